@@ -1,0 +1,104 @@
+"""What can go wrong: every error is a `ValueError` that says where and what to do."""
+
+from __future__ import annotations
+
+__all__ = [
+    "ArgumentError",
+    "FileError",
+    "MissingExtraError",
+    "MissingSignalError",
+    "ModelFileError",
+    "NoModelError",
+    "NotInvertibleError",
+    "OutsideSpanWarning",
+    "RankError",
+    "TrueAngleError",
+]
+
+
+class TrueAngleError(ValueError):
+    """Base of every error that trueangle raises on bad input."""
+
+
+class ArgumentError(TrueAngleError):
+    """An argument is out of range, not finite, of the wrong length or kind."""
+
+
+class RankError(TrueAngleError):
+    """The readings cannot tell the requested unknowns apart.
+
+    Attributes
+    ----------
+    orders : list of (int, int)
+        ``(shaft, order)`` of the harmonics at fault.
+    """
+
+    def __init__(self, message: str, orders: list[tuple[int, int]] | None = None) -> None:
+        super().__init__(message)
+        self.orders = list(orders or ())
+
+
+class NotInvertibleError(TrueAngleError):
+    """The error's slope reaches 1: an indicated angle stands for several true angles.
+
+    Attributes
+    ----------
+    slope : float
+        The greatest ``|d error / d angle|`` the model may reach.
+    """
+
+    def __init__(self, message: str, slope: float = float("nan")) -> None:
+        super().__init__(message)
+        self.slope = slope
+
+
+class NoModelError(TrueAngleError):
+    """No model is supported by the data; the message says why."""
+
+
+class MissingSignalError(TrueAngleError):
+    """The model needs a signal (velocity, temperature, ...) that was not given."""
+
+
+class FileError(TrueAngleError):
+    """A file that cannot be used.
+
+    The message reads ``file, line n, column 'c': what was got; what to do``.
+
+    Attributes
+    ----------
+    path : str
+    line : int or None
+        Counted from 1, the header being line 1.
+    column : str or None
+    """
+
+    def __init__(
+        self,
+        path: object,
+        problem: str,
+        *,
+        line: int | None = None,
+        column: str | None = None,
+    ) -> None:
+        self.path = str(path)
+        self.line = line
+        self.column = column
+        place = [self.path]
+        if line is not None:
+            place.append(f"line {line}")
+        if column is not None:
+            place.append(f"column '{column}'")
+        super().__init__(f"{', '.join(place)}: {problem}")
+
+
+class ModelFileError(FileError):
+    """A model file that is damaged, of a later version, or holds impossible values."""
+
+
+class MissingExtraError(TrueAngleError, ImportError):
+    """An optional dependency is not installed; the message says how to install it."""
+
+
+class OutsideSpanWarning(UserWarning):
+    """Angles outside the span the model was fitted on were corrected."""

@@ -1,0 +1,232 @@
+"""One calibration run: paired readings of a reference and of the joint's own encoder."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from .angles import check_period, circular_mean, wrap
+from .errors import ArgumentError
+
+__all__ = ["CalibrationRun", "as_runs"]
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class CalibrationRun:
+    """Readings of one run, in the order they were taken.
+
+    Parameters
+    ----------
+    reference : array_like, shape (n,)
+        True output angle; may cross 0/period any number of times in either direction.
+    indicated : array_like, shape (n,)
+        The joint's reading reduced to the output, in the same unit, with any zero.
+    period : float
+        One turn in the unit of both: ``2*pi`` (default), 360, 1, or counts per turn.
+    time : array_like, shape (n,), optional
+        Seconds, not decreasing.
+    temperature : array_like or float, optional
+        Degrees Celsius.
+    torque : array_like or float, optional
+        Newton metres at the output.
+    mount : array_like or float, optional
+        How far the reference artefact was turned on its mount, unit of ``reference``.
+    label : str, optional
+    velocity : array_like, optional
+        Output velocity in angle units per second; derived from ``reference`` and
+        ``time`` where absent (`CalibrationRun.speed`).
+    weights : array_like, shape (n,), optional
+        Relative weights of the readings (inverse variances), not negative.
+    columns : mapping of str to array_like, optional
+        Further columns of the file, kept and ignored.
+
+    Raises
+    ------
+    ArgumentError
+        Arrays that differ in length, are empty or not one-dimensional, values that
+        are not finite, or decreasing ``time``.
+
+    Examples
+    --------
+    >>> run = CalibrationRun([0.0, 90.0, 180.0], [359.9, 90.1, 180.0], period=360.0)
+    >>> run.error.round(6)
+    array([-0.1,  0.1,  0. ])
+    """
+
+    reference: Array
+    indicated: Array
+    period: float = 2.0 * math.pi
+    time: Array | None = None
+    temperature: Array | None = None
+    torque: Array | None = None
+    mount: Array | None = None
+    label: str | None = None
+    velocity: Array | None = field(default=None, kw_only=True)
+    weights: Array | None = field(default=None, kw_only=True)
+    columns: Mapping[str, Any] = field(default_factory=dict, kw_only=True)
+
+    def __post_init__(self) -> None:
+        put = object.__setattr__
+        put(self, "period", check_period(self.period))
+        reference = _column("reference", self.reference, None)
+        put(self, "reference", reference)
+        put(self, "indicated", _column("indicated", self.indicated, reference.size))
+        for name in ("time", "temperature", "torque", "mount", "velocity", "weights"):
+            values = getattr(self, name)
+            if values is not None:
+                put(self, name, _column(name, values, reference.size))
+        if self.time is not None:
+            back = np.flatnonzero(np.diff(self.time) < 0.0)
+            if back.size:
+                i = int(back[0]) + 1
+                raise ArgumentError(
+                    f"time must not decrease within a run{self._named()}: "
+                    f"time[{i}] = {self.time[i]:g} after {self.time[i - 1]:g}; "
+                    "sort the rows or split the run there"
+                )
+        if self.weights is not None and (self.weights < 0.0).any():
+            i = int(np.flatnonzero(self.weights < 0.0)[0])
+            raise ArgumentError(f"weights[{i}] must not be negative, got {self.weights[i]:g}")
+        put(self, "columns", MappingProxyType(dict(self.columns)))
+
+    def __len__(self) -> int:
+        return int(self.reference.size)
+
+    def __repr__(self) -> str:
+        return f"CalibrationRun({self.label!r}, {len(self)} readings, period={self.period:g})"
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        names = ("reference", "indicated", "period", "time", "temperature", "torque", "mount")
+        positional = tuple(getattr(self, name) for name in (*names, "label"))
+        return _rebuild, (positional, self.velocity, self.weights, dict(self.columns))
+
+    def _named(self) -> str:
+        return f" ({self.label})" if self.label else ""
+
+    @property
+    def zero(self) -> float:
+        """Circular mean of ``indicated - reference``: the run's zero offset, about."""
+        return circular_mean(self.indicated - self.reference, self.period)
+
+    @property
+    def error(self) -> Array:
+        """``indicated - reference`` wrapped into ``(-period/2, period/2]``."""
+        return wrap(self.indicated - self.reference, self.period)
+
+    @property
+    def centred_error(self) -> Array:
+        """`error` unfolded around `zero`, so that no reading jumps by a turn.
+
+        The run's own zero is still in it; values may lie outside half a turn.
+        """
+        zero = self.zero
+        return zero + wrap(self.indicated - self.reference - zero, self.period)
+
+    @property
+    def unwrapped_reference(self) -> Array:
+        """``reference`` without jumps at 0/period (steps are taken below half a turn)."""
+        return np.unwrap(self.reference, period=self.period)
+
+    @property
+    def speed(self) -> Array | None:
+        """Signed output velocity per reading, or None without ``time`` and ``velocity``.
+
+        ``velocity`` where given, else central differences of the unwrapped reference.
+        """
+        if self.velocity is not None:
+            return self.velocity
+        if self.time is None or len(self) < 2:
+            return None
+        # Equal time stamps: average the angle over them first, then differentiate.
+        time, inverse = np.unique(self.time, return_inverse=True)
+        if time.size < 2:
+            return None
+        count = np.bincount(inverse)
+        angle = np.bincount(inverse, weights=self.unwrapped_reference) / count
+        return np.asarray(np.gradient(angle, time)[inverse])
+
+    @property
+    def direction(self) -> Array:
+        """Direction of travel per reading: -1 or +1, 0 before the first motion.
+
+        The sign of ``velocity`` where given, else of the last step of the reference
+        that was not zero; a reading belongs to the step that led to it, the first
+        reading to the step that leaves it.
+        """
+        if self.velocity is not None:
+            sign = np.sign(self.velocity)
+        elif len(self) < 2:
+            return np.zeros(len(self))
+        else:
+            steps = np.sign(np.diff(self.unwrapped_reference))
+            sign = np.concatenate([steps[:1], steps])
+        moving = np.flatnonzero(sign)
+        if moving.size == 0:
+            return np.zeros(len(self))
+        last = np.maximum.accumulate(np.where(sign != 0.0, np.arange(sign.size), moving[0]))
+        return np.asarray(sign[last])
+
+
+def as_runs(runs: CalibrationRun | Iterable[CalibrationRun]) -> list[CalibrationRun]:
+    """One run or several as a list of runs that share a period.
+
+    Raises
+    ------
+    ArgumentError
+        No run at all, something else than runs, or runs in different units.
+    """
+    found = [runs] if isinstance(runs, CalibrationRun) else list(runs)
+    if not found:
+        raise ArgumentError("runs is empty: at least one CalibrationRun is needed")
+    for i, run in enumerate(found):
+        if not isinstance(run, CalibrationRun):
+            raise ArgumentError(
+                f"runs[{i}] must be a CalibrationRun, got {type(run).__name__}; "
+                "read files with trueangle.read_runs"
+            )
+    periods = sorted({run.period for run in found})
+    if len(periods) > 1:
+        raise ArgumentError(
+            f"the runs are in different units (periods {', '.join(f'{p:g}' for p in periods)}): "
+            "convert them to one"
+        )
+    return found
+
+
+def _column(name: str, values: ArrayLike, size: int | None) -> Array:
+    """``values`` as a read-only one-dimensional float array of ``size`` finite numbers."""
+    try:
+        array = np.array(values, dtype=np.float64)
+    except (TypeError, ValueError) as cause:
+        raise ArgumentError(f"{name} must be numbers: {cause}") from None
+    if size is not None and array.ndim == 0:
+        array = np.full(size, float(array))
+    if array.ndim != 1:
+        raise ArgumentError(f"{name} must be one-dimensional, got shape {array.shape}")
+    if size is None and array.size == 0:
+        raise ArgumentError(f"{name} is empty: a run needs at least one reading")
+    if size is not None and array.size != size:
+        raise ArgumentError(f"{name} has {array.size} readings, reference has {size}")
+    bad = np.flatnonzero(~np.isfinite(array))
+    if bad.size:
+        i = int(bad[0])
+        raise ArgumentError(
+            f"{name}[{i}] is {array[i]}: readings must be finite; drop the row "
+            f"({bad.size} such value{'s' if bad.size > 1 else ''})"
+        )
+    array.flags.writeable = False
+    return array
+
+
+def _rebuild(
+    positional: tuple[Any, ...], velocity: Any, weights: Any, columns: dict[str, Any]
+) -> CalibrationRun:
+    return CalibrationRun(*positional, velocity=velocity, weights=weights, columns=columns)

@@ -1,0 +1,94 @@
+//! What can be wrong with an argument: one variant per broken precondition.
+
+use thiserror::Error;
+
+/// A precondition that did not hold: which argument, what was got, what is wanted.
+#[derive(Clone, Debug, Error, PartialEq)]
+pub enum Error {
+    /// A turn must be a positive finite number.
+    #[error(
+        "period must be a positive finite number (2*pi, 360, 1 or the counts per turn), got {0}"
+    )]
+    Period(f64),
+
+    /// A number that must be finite was not.
+    #[error("{what}[{index}] must be finite, got {got}")]
+    NotFinite {
+        /// The argument's name.
+        what: &'static str,
+        /// Its first offending element.
+        index: usize,
+        /// The offending value.
+        got: f64,
+    },
+
+    /// Two arguments that belong together differ in length.
+    #[error("{what} has {got} elements, {other} has {wanted}: they must be equally long")]
+    Length {
+        /// The argument's name.
+        what: &'static str,
+        /// Its length.
+        got: usize,
+        /// The argument it belongs to.
+        other: &'static str,
+        /// The length wanted.
+        wanted: usize,
+    },
+
+    /// Shaft speeds are positive finite cycles per output turn.
+    #[error("cycles_per_turn of shaft {shaft} must be positive and finite, got {got}")]
+    Cycles {
+        /// Index of the shaft.
+        shaft: usize,
+        /// The offending value.
+        got: f64,
+    },
+
+    /// Orders are whole numbers from 1, strictly increasing within a shaft.
+    #[error(
+        "orders of shaft {shaft} must be whole numbers from 1 in increasing order, got {previous} before {got}"
+    )]
+    Orders {
+        /// Index of the shaft.
+        shaft: usize,
+        /// The order before (0 at the start).
+        previous: u32,
+        /// The offending order.
+        got: u32,
+    },
+
+    /// A weight is negative or not finite.
+    #[error("weights[{index}] must be finite and not negative, got {got}")]
+    Weight {
+        /// Its position.
+        index: usize,
+        /// The offending value.
+        got: f64,
+    },
+
+    /// The readings cannot tell these unknowns apart.
+    #[error("rank {rank} of {unknowns} unknowns: {reason}")]
+    Rank {
+        /// Numerical rank of the design.
+        rank: usize,
+        /// Unknowns asked for.
+        unknowns: usize,
+        /// `(shaft, order)` at fault.
+        orders: Vec<(usize, u32)>,
+        /// Why, and what to do, in a sentence.
+        reason: String,
+    },
+
+    /// `indicated = theta + error(theta)` cannot be inverted.
+    #[error(
+        "the error's slope reaches {slope:.6}: at 1 or more the indicated angle stands for several true angles and cannot be corrected"
+    )]
+    NotInvertible {
+        /// A bound of `|d error / d angle|` that the model may reach.
+        slope: f64,
+    },
+
+    /// Accumulators over different series cannot be merged.
+    #[error("cannot merge moments of different {0}")]
+    Merge(&'static str),
+}

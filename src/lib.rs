@@ -1,0 +1,14 @@
+#![doc = include_str!("../README.md")]
+
+pub mod error;
+
+pub mod angle;
+pub mod series;
+
+pub mod direct;
+
+#[cfg(feature = "python")]
+mod python;
+
+pub use error::Error;
+pub use series::{HarmonicSeries, Shaft};

@@ -1,0 +1,16 @@
+//! Bindings: extract, release the interpreter, call, convert. Nothing is computed here.
+
+mod failure;
+
+use pyo3::prelude::*;
+
+/// The compiled core of trueangle.
+#[pymodule(gil_used = false)]
+mod _core {
+    use super::*;
+
+    #[pymodule_init]
+    fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
+        module.add("__version__", env!("CARGO_PKG_VERSION"))
+    }
+}
