@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from types import MappingProxyType
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -14,9 +14,16 @@ from numpy.typing import ArrayLike, NDArray
 from .angles import check_period, circular_mean, wrap
 from .errors import ArgumentError
 
-__all__ = ["CalibrationRun", "as_runs"]
+__all__ = ["CalibrationRun", "Source", "as_runs"]
 
 Array = NDArray[np.float64]
+
+
+class Source(NamedTuple):
+    """A file that readings came from: its name and the sha256 of its bytes."""
+
+    file: str
+    sha256: str
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,6 +54,8 @@ class CalibrationRun:
         Relative weights of the readings (inverse variances), not negative.
     columns : mapping of str to array_like, optional
         Further columns of the file, kept and ignored.
+    source : Source, optional
+        The file the readings came from, for the provenance of models.
 
     Raises
     ------
@@ -72,6 +81,7 @@ class CalibrationRun:
     velocity: Array | None = field(default=None, kw_only=True)
     weights: Array | None = field(default=None, kw_only=True)
     columns: Mapping[str, Any] = field(default_factory=dict, kw_only=True)
+    source: Source | None = field(default=None, kw_only=True)
 
     def __post_init__(self) -> None:
         put = object.__setattr__
@@ -104,9 +114,8 @@ class CalibrationRun:
         return f"CalibrationRun({self.label!r}, {len(self)} readings, period={self.period:g})"
 
     def __reduce__(self) -> tuple[Any, ...]:
-        names = ("reference", "indicated", "period", "time", "temperature", "torque", "mount")
-        positional = tuple(getattr(self, name) for name in (*names, "label"))
-        return _rebuild, (positional, self.velocity, self.weights, dict(self.columns))
+        values = {entry.name: getattr(self, entry.name) for entry in fields(self)}
+        return _rebuild, (values | {"columns": dict(self.columns)},)
 
     def _named(self) -> str:
         return f" ({self.label})" if self.label else ""
@@ -226,7 +235,5 @@ def _column(name: str, values: ArrayLike, size: int | None) -> Array:
     return array
 
 
-def _rebuild(
-    positional: tuple[Any, ...], velocity: Any, weights: Any, columns: dict[str, Any]
-) -> CalibrationRun:
-    return CalibrationRun(*positional, velocity=velocity, weights=weights, columns=columns)
+def _rebuild(values: dict[str, Any]) -> CalibrationRun:
+    return CalibrationRun(**values)

@@ -35,12 +35,12 @@ def build_parser() -> argparse.ArgumentParser:
     """Parser of the whole command line."""
     parser = argparse.ArgumentParser(
         prog="trueangle",
-        description="Fit, diagnose and correct the angle error of rotary encoders and robot joints.",
+        description="Fit, diagnose and correct the angle error of encoders and robot joints.",
     )
     parser.add_argument("--version", action="version", version=f"trueangle {__version__}")
     subparsers = parser.add_subparsers(dest="command", metavar="COMMAND", required=True)
     for name in COMMANDS:
-        command: Command = importlib.import_module(f".{name}", __name__)  # type: ignore[assignment]
+        command: Command = importlib.import_module(f".{name}", __name__)
         subparser = subparsers.add_parser(
             name,
             help=command.HELP,
