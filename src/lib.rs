@@ -7,6 +7,12 @@ pub mod series;
 
 pub mod direct;
 
+pub mod threads;
+
+pub mod kernel;
+
+pub mod compensator;
+
 #[cfg(feature = "python")]
 mod python;
 

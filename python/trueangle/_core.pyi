@@ -1,1 +1,85 @@
+from collections.abc import Sequence
+from typing import Any, Literal, final, overload
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
 __version__: str
+
+_Path = Literal["table", "exact", "direct", "counts"]
+
+@final
+class Series:
+    """Harmonic series made ready for evaluation, correction and control loops."""
+
+    def __new__(
+        cls,
+        period: float,
+        constant: float,
+        cycles: Sequence[float],
+        orders: Sequence[Sequence[int]],
+        cosine: Sequence[Sequence[float]],
+        sine: Sequence[Sequence[float]],
+        argument: Literal["reference", "indicated"] = "reference",
+    ) -> Series: ...
+    @overload
+    def error(
+        self,
+        theta: float,
+        out: None = None,
+        threads: int | None = None,
+        path: _Path | None = None,
+    ) -> float: ...
+    @overload
+    def error(
+        self,
+        theta: ArrayLike,
+        out: NDArray[np.floating[Any]] | None = None,
+        threads: int | None = None,
+        path: _Path | None = None,
+    ) -> NDArray[np.floating[Any]]: ...
+    @overload
+    def slope(
+        self,
+        theta: float,
+        out: None = None,
+        threads: int | None = None,
+        path: _Path | None = None,
+    ) -> float: ...
+    @overload
+    def slope(
+        self,
+        theta: ArrayLike,
+        out: NDArray[np.floating[Any]] | None = None,
+        threads: int | None = None,
+        path: _Path | None = None,
+    ) -> NDArray[np.floating[Any]]: ...
+    @overload
+    def correct(
+        self,
+        indicated: float,
+        out: None = None,
+        threads: int | None = None,
+        path: _Path | None = None,
+    ) -> float: ...
+    @overload
+    def correct(
+        self,
+        indicated: ArrayLike,
+        out: NDArray[np.floating[Any]] | None = None,
+        threads: int | None = None,
+        path: _Path | None = None,
+    ) -> NDArray[np.floating[Any]]: ...
+    def compensator(self) -> Compensator: ...
+    @property
+    def slope_bound(self) -> float: ...
+    @property
+    def amplitude_sum(self) -> float: ...
+    @property
+    def is_periodic(self) -> bool: ...
+
+@final
+class Compensator:
+    """Correction of one sample at a time."""
+
+    def step(self, indicated: float, /) -> float: ...

@@ -14,11 +14,23 @@ impl From<Error> for PyErr {
     }
 }
 
+/// `ArgumentError(message)`, for what only the bindings can find wrong.
+pub fn argument_error(py: Python<'_>, message: String) -> PyErr {
+    errors(py)
+        .and_then(|module| module.getattr("ArgumentError")?.call1((message,)))
+        .map_or_else(|failure| failure, PyErr::from_value)
+}
+
+fn errors(py: Python<'_>) -> PyResult<&Bound<'_, PyModule>> {
+    ERRORS
+        .get_or_try_init(py, || {
+            PyModule::import(py, "trueangle.errors").map(Bound::unbind)
+        })
+        .map(|module| module.bind(py))
+}
+
 fn raise(py: Python<'_>, error: &Error) -> PyResult<PyErr> {
-    let module = ERRORS.get_or_try_init(py, || {
-        PyModule::import(py, "trueangle.errors").map(Bound::unbind)
-    })?;
-    let module = module.bind(py);
+    let module = errors(py)?;
     let message = error.to_string();
     let instance = match error {
         Error::Rank { orders, .. } => {

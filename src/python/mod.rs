@@ -1,6 +1,9 @@
 //! Bindings: extract, release the interpreter, call, convert. Nothing is computed here.
 
+mod array;
 mod failure;
+mod series;
+mod threads;
 
 use pyo3::prelude::*;
 
@@ -8,6 +11,9 @@ use pyo3::prelude::*;
 #[pymodule(gil_used = false)]
 mod _core {
     use super::*;
+
+    #[pymodule_export]
+    use super::series::{PyCompensator, PySeries};
 
     #[pymodule_init]
     fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {

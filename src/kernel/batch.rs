@@ -1,0 +1,150 @@
+//! Input and output of one batch: two slices of one length, or one slice that is both.
+
+use std::marker::PhantomData;
+
+use crate::error::Error;
+
+/// A number a batch may hold: kernels compute in f64 and convert while loading and storing.
+pub trait Sample: Copy + Send + Sync {
+    /// The exact value, or the nearest double (integers beyond 2^53).
+    fn widen(self) -> f64;
+}
+
+/// A sample that results can be stored in.
+pub trait Real: Sample {
+    /// The value nearest to a double.
+    fn narrow(value: f64) -> Self;
+}
+
+impl Sample for f64 {
+    #[inline(always)]
+    fn widen(self) -> f64 {
+        self
+    }
+}
+
+impl Real for f64 {
+    #[inline(always)]
+    fn narrow(value: f64) -> Self {
+        value
+    }
+}
+
+impl Sample for f32 {
+    #[inline(always)]
+    fn widen(self) -> f64 {
+        f64::from(self)
+    }
+}
+
+impl Real for f32 {
+    #[inline(always)]
+    fn narrow(value: f64) -> Self {
+        value as f32
+    }
+}
+
+/// Samples to read and places to write, element by element.
+pub struct Batch<'a, X, Y> {
+    x: *const X,
+    out: *mut Y,
+    len: usize,
+    life: PhantomData<(&'a [X], &'a mut [Y])>,
+}
+
+// SAFETY: a batch is a shared and an exclusive slice, or one exclusive slice.
+unsafe impl<X: Sync, Y: Send> Send for Batch<'_, X, Y> {}
+
+impl<'a, X: Copy, Y: Copy> Batch<'a, X, Y> {
+    /// Results of `x` go to `out`.
+    pub fn apart(x: &'a [X], out: &'a mut [Y]) -> Result<Self, Error> {
+        if x.len() != out.len() {
+            return Err(Error::Length {
+                what: "out",
+                got: out.len(),
+                other: "the angles",
+                wanted: x.len(),
+            });
+        }
+        // SAFETY: both slices live for 'a and are equally long.
+        Ok(unsafe { Self::from_raw(x.as_ptr(), out.as_mut_ptr(), x.len()) })
+    }
+
+    /// A batch over raw memory.
+    ///
+    /// # Safety
+    /// `x` is readable and `out` writable for `len` aligned elements during `'a`, and
+    /// the two are either the same memory with elements of one size or do not overlap.
+    pub unsafe fn from_raw(x: *const X, out: *mut Y, len: usize) -> Self {
+        Self {
+            x,
+            out,
+            len,
+            life: PhantomData,
+        }
+    }
+
+    /// Number of samples.
+    #[inline(always)]
+    pub fn len(&self) -> usize {
+        self.len
+    }
+
+    /// True when there is nothing to do.
+    #[inline(always)]
+    pub fn is_empty(&self) -> bool {
+        self.len == 0
+    }
+
+    /// Samples `start..start + len` as a batch of their own.
+    ///
+    /// # Safety
+    /// The range lies within this batch, and no other part in use overlaps it.
+    pub unsafe fn part(&self, start: usize, len: usize) -> Batch<'a, X, Y> {
+        debug_assert!(start + len <= self.len);
+        // SAFETY: inside this batch by the caller's promise.
+        unsafe { Batch::from_raw(self.x.add(start), self.out.add(start), len) }
+    }
+
+    /// Where the samples start.
+    #[inline(always)]
+    pub fn input(&self) -> *const X {
+        self.x
+    }
+
+    /// Where the results start.
+    #[inline(always)]
+    pub fn output(&mut self) -> *mut Y {
+        self.out
+    }
+
+    /// Replaces every sample by `f` of it.
+    #[inline(always)]
+    pub fn map(&mut self, mut f: impl FnMut(X) -> Y) {
+        for i in 0..self.len {
+            // SAFETY: i < len; each sample is read before its own place is written.
+            unsafe { self.out.add(i).write(f(self.x.add(i).read())) };
+        }
+    }
+}
+
+impl<'a, X: Copy> Batch<'a, X, X> {
+    /// Results replace their own samples.
+    pub fn in_place(data: &'a mut [X]) -> Self {
+        let start = data.as_mut_ptr();
+        // SAFETY: one exclusive slice, read and written element by element.
+        unsafe { Self::from_raw(start, start, data.len()) }
+    }
+}
+
+macro_rules! counts {
+    ($($int:ty),*) => {$(
+        impl Sample for $int {
+            #[inline(always)]
+            fn widen(self) -> f64 {
+                self as f64
+            }
+        }
+    )*};
+}
+counts!(i8, i16, i32, i64, u8, u16, u32, u64);

@@ -1,0 +1,300 @@
+//! Arguments that are angles: floats, integers, sequences and arrays of every layout.
+//!
+//! An array that is aligned, contiguous and in native byte order is used where it is.
+//! Any other is copied into one that is, and a result that has to go into such an array
+//! is copied there by numpy.
+
+use numpy::npyffi::npy_intp;
+use numpy::{
+    Element, PyArrayDescr, PyArrayDescrMethods, PyArrayDyn, PyArrayMethods, PyUntypedArray,
+    PyUntypedArrayMethods,
+};
+use pyo3::intern;
+use pyo3::prelude::*;
+use pyo3::sync::PyOnceLock;
+use pyo3::types::{IntoPyDict, PyBool};
+
+use super::failure::argument_error;
+
+/// The numpy module, imported once.
+pub fn numpy_module(py: Python<'_>) -> PyResult<&Bound<'_, PyModule>> {
+    static NUMPY: PyOnceLock<Py<PyModule>> = PyOnceLock::new();
+    NUMPY
+        .get_or_try_init(py, || PyModule::import(py, "numpy").map(Bound::unbind))
+        .map(|module| module.bind(py))
+}
+
+/// Element types that kernels read without conversion.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kind {
+    F64,
+    F32,
+    I8,
+    I16,
+    I32,
+    I64,
+    U8,
+    U16,
+    U32,
+    U64,
+}
+
+impl Kind {
+    /// The kind of a dtype, whatever its byte order; `None` for what needs a conversion.
+    fn of(dtype: &Bound<'_, PyArrayDescr>) -> Option<Self> {
+        Some(match (dtype.kind(), dtype.itemsize()) {
+            (b'f', 8) => Self::F64,
+            (b'f', 4) => Self::F32,
+            (b'i', 1) => Self::I8,
+            (b'i', 2) => Self::I16,
+            (b'i', 4) => Self::I32,
+            (b'i', 8) => Self::I64,
+            (b'u', 1) => Self::U8,
+            (b'u', 2) => Self::U16,
+            (b'u', 4) => Self::U32,
+            (b'u', 8) => Self::U64,
+            _ => return None,
+        })
+    }
+
+    /// The kind of the results: float32 for float32, else float64.
+    pub fn of_result(self) -> Self {
+        match self {
+            Self::F32 => Self::F32,
+            _ => Self::F64,
+        }
+    }
+
+    /// numpy's name of the dtype.
+    fn name(self) -> &'static str {
+        match self {
+            Self::F64 => "float64",
+            Self::F32 => "float32",
+            Self::I8 => "int8",
+            Self::I16 => "int16",
+            Self::I32 => "int32",
+            Self::I64 => "int64",
+            Self::U8 => "uint8",
+            Self::U16 => "uint16",
+            Self::U32 => "uint32",
+            Self::U64 => "uint64",
+        }
+    }
+}
+
+/// Angles as an array of a known kind, aligned, in native order, C- or F-contiguous.
+pub struct Angles<'py> {
+    /// The array the caller gave.
+    pub given: Bound<'py, PyUntypedArray>,
+    /// The array to read: the same, or a plain copy.
+    pub plain: Bound<'py, PyUntypedArray>,
+    pub kind: Kind,
+}
+
+/// True when the kernels can use the memory as it is.
+fn is_plain(array: &Bound<'_, PyUntypedArray>) -> bool {
+    array.is_contiguous()
+        && array.is_aligned()
+        && array.dtype().is_native_byteorder().unwrap_or(true)
+}
+
+/// True when elements of both follow one another in the same order of indices.
+fn same_order(a: &Bound<'_, PyUntypedArray>, b: &Bound<'_, PyUntypedArray>) -> bool {
+    (a.is_c_contiguous() && b.is_c_contiguous())
+        || (a.is_fortran_contiguous() && b.is_fortran_contiguous())
+}
+
+/// Where the elements lie.
+pub fn data<T: Element>(array: &Bound<'_, PyUntypedArray>) -> *mut T {
+    // SAFETY: only the address is read; callers match `T` to the array's kind.
+    unsafe { array.cast_unchecked::<PyArrayDyn<T>>() }.data()
+}
+
+impl<'py> Angles<'py> {
+    /// Accepts whatever numpy makes an array of real numbers from.
+    pub fn new(value: &Bound<'py, PyAny>) -> PyResult<Self> {
+        let given = if let Ok(array) = value.cast_exact::<PyUntypedArray>() {
+            array.clone()
+        } else {
+            as_array(value)?
+        };
+        let dtype = given.dtype();
+        let kind = match Kind::of(&dtype) {
+            Some(kind) => kind,
+            None if dtype.kind() == b'f' && dtype.itemsize() < 4 => Kind::F32,
+            None if dtype.kind() == b'f' => Kind::F64,
+            None => {
+                return Err(argument_error(
+                    value.py(),
+                    format!("angles must be real numbers, got an array of dtype {dtype}"),
+                ));
+            }
+        };
+        let plain = if is_plain(&given) && Kind::of(&dtype).is_some() {
+            given.clone()
+        } else {
+            plain_copy(&given, kind)?
+        };
+        Ok(Self { given, plain, kind })
+    }
+
+    /// The array to write results to and, where that is not the caller's own, the
+    /// caller's array to copy it to afterwards.
+    pub fn output(
+        &self,
+        out: Option<&Bound<'py, PyAny>>,
+    ) -> PyResult<(
+        Bound<'py, PyUntypedArray>,
+        Option<Bound<'py, PyUntypedArray>>,
+    )> {
+        let Some(out) = out else {
+            return Ok((self.fresh_output(), None));
+        };
+        let out = self.check_output(out)?;
+        if is_plain(&out) && same_order(&self.plain, &out) {
+            Ok((out, None))
+        } else {
+            Ok((self.fresh_output(), Some(out)))
+        }
+    }
+
+    /// A new array of the result's kind, laid out like the one that is read.
+    fn fresh_output(&self) -> Bound<'py, PyUntypedArray> {
+        let (py, shape) = (self.plain.py(), self.plain.shape());
+        let fortran = !self.plain.is_c_contiguous();
+        // SAFETY: floats may hold any bits; every element is written before it is seen.
+        unsafe {
+            match self.kind.of_result() {
+                Kind::F32 => PyArrayDyn::<f32>::new(py, shape, fortran)
+                    .as_untyped()
+                    .clone(),
+                _ => PyArrayDyn::<f64>::new(py, shape, fortran)
+                    .as_untyped()
+                    .clone(),
+            }
+        }
+    }
+
+    fn check_output(&self, out: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyUntypedArray>> {
+        let py = out.py();
+        let Ok(out) = out.cast::<PyUntypedArray>() else {
+            return Err(argument_error(
+                py,
+                format!("out must be a numpy array, got {}", out.get_type().name()?),
+            ));
+        };
+        let wanted = self.kind.of_result();
+        if Kind::of(&out.dtype()) != Some(wanted) {
+            return Err(argument_error(
+                py,
+                format!(
+                    "out must be of dtype {} for angles of dtype {}, got {}",
+                    wanted.name(),
+                    self.given.dtype(),
+                    out.dtype()
+                ),
+            ));
+        }
+        if out.shape() != self.given.shape() {
+            return Err(argument_error(
+                py,
+                format!(
+                    "out must have the shape of the angles {:?}, got {:?}",
+                    self.given.shape(),
+                    out.shape()
+                ),
+            ));
+        }
+        if !is_writeable(out) {
+            return Err(argument_error(py, "out is read-only".to_owned()));
+        }
+        if overlap(&self.given, out)? {
+            return Err(argument_error(
+                py,
+                "out overlaps the angles in part: give the same array to work in place, \
+                 or memory of its own"
+                    .to_owned(),
+            ));
+        }
+        Ok(out.clone())
+    }
+}
+
+/// `numpy.asarray`, without losing a mask or taking truth values for numbers.
+fn as_array<'py>(value: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyUntypedArray>> {
+    let py = value.py();
+    if value.hasattr(intern!(py, "mask"))? {
+        return Err(argument_error(
+            py,
+            "masked arrays are not supported: fill them with NaN or compress them first".to_owned(),
+        ));
+    }
+    if value.is_instance_of::<PyBool>() {
+        return Err(argument_error(
+            py,
+            format!("angles must be real numbers, got {value}"),
+        ));
+    }
+    numpy_module(py)?
+        .call_method1(intern!(py, "asarray"), (value,))
+        .and_then(|array| Ok(array.cast_into::<PyUntypedArray>()?))
+        .map_err(|cause| argument_error(py, format!("angles must be numbers in an array: {cause}")))
+}
+
+fn plain_copy<'py>(
+    array: &Bound<'py, PyUntypedArray>,
+    kind: Kind,
+) -> PyResult<Bound<'py, PyUntypedArray>> {
+    let py = array.py();
+    let options = [("order", "C")].into_py_dict(py)?;
+    let copy = numpy_module(py)?.call_method(
+        intern!(py, "array"),
+        (array, kind.name()),
+        Some(&options),
+    )?;
+    Ok(copy.cast_into::<PyUntypedArray>()?)
+}
+
+fn is_writeable(array: &Bound<'_, PyUntypedArray>) -> bool {
+    array
+        .getattr(intern!(array.py(), "flags"))
+        .and_then(|flags| flags.getattr(intern!(array.py(), "writeable")))
+        .and_then(|flag| flag.extract())
+        .unwrap_or(false)
+}
+
+/// First byte and the byte after the last.
+fn extent(array: &Bound<'_, PyUntypedArray>) -> (isize, isize) {
+    let start = data::<u8>(array) as isize;
+    if array.is_empty() {
+        return (start, start);
+    }
+    let (mut low, mut high) = (start, start + array.dtype().itemsize() as isize);
+    for (&n, &stride) in array.shape().iter().zip(array.strides()) {
+        let reach = (n as isize - 1) * stride as npy_intp;
+        if reach < 0 {
+            low += reach;
+        } else {
+            high += reach;
+        }
+    }
+    (low, high)
+}
+
+/// True when two arrays share memory without being the same elements in the same places.
+fn overlap(x: &Bound<'_, PyUntypedArray>, out: &Bound<'_, PyUntypedArray>) -> PyResult<bool> {
+    let ((x_low, x_high), (out_low, out_high)) = (extent(x), extent(out));
+    if x_high <= out_low || out_high <= x_low {
+        return Ok(false);
+    }
+    let same = data::<u8>(x) == data::<u8>(out)
+        && x.strides() == out.strides()
+        && x.dtype().itemsize() == out.dtype().itemsize();
+    if same {
+        return Ok(false);
+    }
+    let py = x.py();
+    numpy_module(py)?
+        .call_method1(intern!(py, "shares_memory"), (x, out))?
+        .extract()
+}

@@ -1,0 +1,265 @@
+//! `_core.Series` and `_core.Compensator`.
+
+use std::sync::Arc;
+
+use numpy::{Element, PyUntypedArray, PyUntypedArrayMethods};
+use pyo3::intern;
+use pyo3::prelude::*;
+use pyo3::types::{PyBool, PyFloat, PyInt};
+
+use super::array::{Angles, Kind, data, numpy_module};
+use super::failure::argument_error;
+use super::threads::threads;
+use crate::compensator::Compensator;
+use crate::kernel::{Argument, Batch, Evaluator, Path, Quantity, Real, Sample};
+use crate::series::{HarmonicSeries, Shaft};
+
+/// Samples from which the interpreter is released: below, that costs more than it frees.
+const RELEASED: usize = 1024;
+
+/// How to compute a batch, as the caller wants it.
+struct Wish<'a> {
+    quantity: Quantity,
+    path: Option<&'a str>,
+    threads: Option<i64>,
+}
+
+#[pyclass(name = "Series", module = "trueangle._core", frozen)]
+pub struct PySeries {
+    evaluator: Arc<Evaluator>,
+}
+
+#[pymethods]
+impl PySeries {
+    #[new]
+    #[pyo3(signature = (period, constant, cycles, orders, cosine, sine, argument="reference"))]
+    fn new(
+        py: Python<'_>,
+        period: f64,
+        constant: f64,
+        cycles: Vec<f64>,
+        orders: Vec<Vec<u32>>,
+        cosine: Vec<Vec<f64>>,
+        sine: Vec<Vec<f64>>,
+        argument: &str,
+    ) -> PyResult<Self> {
+        let shafts = cycles.len();
+        for (what, got) in [
+            ("orders", orders.len()),
+            ("cosine", cosine.len()),
+            ("sine", sine.len()),
+        ] {
+            if got != shafts {
+                return Err(argument_error(
+                    py,
+                    format!("{what} has {got} lists, cycles has {shafts}: one list per shaft"),
+                ));
+            }
+        }
+        let argument = match argument {
+            "reference" => Argument::Reference,
+            "indicated" => Argument::Indicated,
+            other => {
+                return Err(argument_error(
+                    py,
+                    format!("argument must be 'reference' or 'indicated', got {other:?}"),
+                ));
+            }
+        };
+        let shafts = cycles
+            .into_iter()
+            .zip(orders)
+            .zip(cosine.into_iter().zip(sine))
+            .map(|((cycles, orders), (cosine, sine))| Shaft {
+                cycles,
+                orders,
+                cosine,
+                sine,
+            })
+            .collect();
+        let series = HarmonicSeries::new(period, constant, shafts)?;
+        Ok(Self {
+            evaluator: Arc::new(Evaluator::new(series, argument)),
+        })
+    }
+
+    #[pyo3(signature = (theta, out=None, threads=None, path=None))]
+    fn error<'py>(
+        &self,
+        theta: &Bound<'py, PyAny>,
+        out: Option<&Bound<'py, PyAny>>,
+        threads: Option<i64>,
+        path: Option<&str>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let quantity = Quantity::Error;
+        self.compute(
+            theta,
+            out,
+            &Wish {
+                quantity,
+                path,
+                threads,
+            },
+        )
+    }
+
+    #[pyo3(signature = (theta, out=None, threads=None, path=None))]
+    fn slope<'py>(
+        &self,
+        theta: &Bound<'py, PyAny>,
+        out: Option<&Bound<'py, PyAny>>,
+        threads: Option<i64>,
+        path: Option<&str>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let quantity = Quantity::Slope;
+        self.compute(
+            theta,
+            out,
+            &Wish {
+                quantity,
+                path,
+                threads,
+            },
+        )
+    }
+
+    #[pyo3(signature = (indicated, out=None, threads=None, path=None))]
+    fn correct<'py>(
+        &self,
+        indicated: &Bound<'py, PyAny>,
+        out: Option<&Bound<'py, PyAny>>,
+        threads: Option<i64>,
+        path: Option<&str>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let quantity = Quantity::Correction;
+        self.compute(
+            indicated,
+            out,
+            &Wish {
+                quantity,
+                path,
+                threads,
+            },
+        )
+    }
+
+    fn compensator(&self) -> PyResult<PyCompensator> {
+        Ok(PyCompensator(Compensator::new(Arc::clone(
+            &self.evaluator,
+        ))?))
+    }
+
+    #[getter]
+    fn slope_bound(&self) -> f64 {
+        self.evaluator.slope_bound()
+    }
+
+    #[getter]
+    fn amplitude_sum(&self) -> f64 {
+        self.evaluator.series().amplitude_sum()
+    }
+
+    #[getter]
+    fn is_periodic(&self) -> bool {
+        self.evaluator.series().is_periodic()
+    }
+}
+
+impl PySeries {
+    fn compute<'py>(
+        &self,
+        x: &Bound<'py, PyAny>,
+        out: Option<&Bound<'py, PyAny>>,
+        wish: &Wish<'_>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let py = x.py();
+        if out.is_none() && is_number(x) {
+            let mut sample = [x.extract::<f64>()?];
+            self.run(py, wish, Batch::in_place(&mut sample))?;
+            return Ok(PyFloat::new(py, sample[0]).into_any());
+        }
+        let angles = Angles::new(x)?;
+        let (target, copy_to) = angles.output(out)?;
+        match angles.kind {
+            Kind::F64 => self.fill::<f64, f64>(wish, &angles.plain, &target),
+            Kind::F32 => self.fill::<f32, f32>(wish, &angles.plain, &target),
+            Kind::I8 => self.fill::<i8, f64>(wish, &angles.plain, &target),
+            Kind::I16 => self.fill::<i16, f64>(wish, &angles.plain, &target),
+            Kind::I32 => self.fill::<i32, f64>(wish, &angles.plain, &target),
+            Kind::I64 => self.fill::<i64, f64>(wish, &angles.plain, &target),
+            Kind::U8 => self.fill::<u8, f64>(wish, &angles.plain, &target),
+            Kind::U16 => self.fill::<u16, f64>(wish, &angles.plain, &target),
+            Kind::U32 => self.fill::<u32, f64>(wish, &angles.plain, &target),
+            Kind::U64 => self.fill::<u64, f64>(wish, &angles.plain, &target),
+        }?;
+        if let Some(destination) = copy_to {
+            numpy_module(py)?.call_method1(intern!(py, "copyto"), (&destination, &target))?;
+            return Ok(destination.into_any());
+        }
+        if out.is_none() && target.ndim() == 0 {
+            // As numpy's own functions: a scalar for an array without dimensions.
+            return target.get_item(());
+        }
+        Ok(target.into_any())
+    }
+
+    /// Results of the plain array `x` to the plain array `out` of the same shape and order.
+    fn fill<X: Sample + Element, Y: Real + Element>(
+        &self,
+        wish: &Wish<'_>,
+        x: &Bound<'_, PyUntypedArray>,
+        out: &Bound<'_, PyUntypedArray>,
+    ) -> PyResult<()> {
+        // SAFETY: both are aligned, contiguous, of these types and equally long, and are
+        // either the same memory or apart (`Angles`). As everywhere in numpy, a caller
+        // who changes an array in another thread meanwhile gets undefined values.
+        let batch = unsafe { Batch::from_raw(data::<X>(x), data::<Y>(out), x.len()) };
+        self.run(x.py(), wish, batch)
+    }
+
+    fn run<X: Sample, Y: Real>(
+        &self,
+        py: Python<'_>,
+        wish: &Wish<'_>,
+        batch: Batch<'_, X, Y>,
+    ) -> PyResult<()> {
+        let path = wish.path.map(|name| parse_path(py, name)).transpose()?;
+        let threads = threads(py, wish.threads, batch.len())?;
+        let evaluator = &self.evaluator;
+        if batch.len() < RELEASED {
+            evaluator.run(wish.quantity, path, threads, batch)?;
+        } else {
+            py.detach(|| evaluator.run(wish.quantity, path, threads, batch))?;
+        }
+        Ok(())
+    }
+}
+
+/// True for Python's own float and int (numpy.float64 is a float).
+fn is_number(x: &Bound<'_, PyAny>) -> bool {
+    x.is_instance_of::<PyFloat>() || (x.is_instance_of::<PyInt>() && !x.is_instance_of::<PyBool>())
+}
+
+fn parse_path(py: Python<'_>, name: &str) -> PyResult<Path> {
+    match name {
+        "table" => Ok(Path::Table),
+        "exact" => Ok(Path::Exact),
+        "direct" => Ok(Path::Direct),
+        "counts" => Ok(Path::Counts),
+        other => Err(argument_error(
+            py,
+            format!("path must be 'table', 'exact', 'direct' or 'counts', got {other:?}"),
+        )),
+    }
+}
+
+#[pyclass(name = "Compensator", module = "trueangle._core", frozen)]
+pub struct PyCompensator(Compensator);
+
+#[pymethods]
+impl PyCompensator {
+    #[pyo3(signature = (indicated, /))]
+    fn step(&self, indicated: f64) -> f64 {
+        self.0.step(indicated)
+    }
+}

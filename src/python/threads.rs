@@ -1,0 +1,36 @@
+//! The `threads=` argument.
+
+use pyo3::intern;
+use pyo3::prelude::*;
+
+use super::failure::argument_error;
+
+/// Threads to use: as asked, or one in a worker process (its siblings have the other
+/// cores), or `None` for as many as the core sees fit.
+pub fn threads(py: Python<'_>, asked: Option<i64>, samples: usize) -> PyResult<Option<usize>> {
+    match asked {
+        Some(n) => match usize::try_from(n) {
+            Ok(n) if n > 0 => Ok(Some(n)),
+            _ => Err(argument_error(
+                py,
+                format!("threads must be 1 or more, or None for all cores, got {n}"),
+            )),
+        },
+        None if samples >= crate::kernel::THREADED && in_worker_process(py)? => Ok(Some(1)),
+        None => Ok(None),
+    }
+}
+
+/// True in a child of `multiprocessing` (and so of joblib, concurrent.futures, dask).
+fn in_worker_process(py: Python<'_>) -> PyResult<bool> {
+    let modules = py
+        .import(intern!(py, "sys"))?
+        .getattr(intern!(py, "modules"))?;
+    let module = modules.call_method1(intern!(py, "get"), ("multiprocessing.process",))?;
+    if module.is_none() {
+        return Ok(false);
+    }
+    Ok(!module
+        .call_method0(intern!(py, "parent_process"))?
+        .is_none())
+}
