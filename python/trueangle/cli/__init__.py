@@ -15,7 +15,7 @@ from ..errors import TrueAngleError
 __all__ = ["COMMANDS", "main"]
 
 #: Modules of this package that each define one command of the same name.
-COMMANDS: tuple[str, ...] = ()
+COMMANDS: tuple[str, ...] = ("plan",)
 
 
 class Command(Protocol):

@@ -1,0 +1,364 @@
+"""What a set of positions can tell apart: distinct positions, folded orders, explanations.
+
+On N equispaced positions the orders m and k are one column of numbers wherever
+``m = k`` or ``m = -k`` modulo N: a tooth mesh 202 times per turn, read every 10
+degrees, is an order 14 that repeats perfectly.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .errors import ArgumentError
+from .runs import CalibrationRun, as_runs
+
+__all__ = [
+    "COMMON_RATIOS",
+    "FIXED_MEMBERS",
+    "POSITION_TOLERANCE",
+    "Explanation",
+    "Positions",
+    "distinct_positions",
+    "energy_near_nyquist",
+    "explain_order",
+    "fold",
+    "gear_orders",
+    "position_coherence",
+]
+
+Array = NDArray[np.float64]
+
+#: Positions closer than this (turns) count as one: 0.01 degree, which turns the phase
+#: of order 202 by 2 degrees, so that no order of interest is told by the difference.
+POSITION_TOLERANCE: Final = 1.0 / 36_000.0
+
+#: Gear ratios of common strain wave gears, tried where none is declared.
+COMMON_RATIOS: Final = (30, 50, 80, 100, 120, 160)
+
+#: The member of the gear that stands still.
+FIXED_MEMBERS: Final = ("circular_spline", "flexspline", "none")
+
+#: Most shifted uniform grids that a union of mounts is searched for.
+_MOST_GRIDS: Final = 24
+
+#: Up to this many positions their spectrum is summed exactly, beyond by a histogram.
+_EXACT_SPECTRUM: Final = 4096
+
+
+@dataclass(frozen=True, eq=False)
+class Positions:
+    """Distinct positions of some readings modulo a turn.
+
+    Attributes
+    ----------
+    turns : ndarray, shape (p,)
+        Distinct positions in turns, ascending in [0, 1).
+    index : ndarray of int, shape (n,)
+        Position of each reading, the runs one after the other.
+    divisions : int or None
+        The greatest N such that the positions are uniform grids of N, each shifted;
+        None when there is no such N (free angles, part of a turn).
+    offsets : tuple of float
+        Shift of each of these grids in turns, in [0, 1/N).
+    """
+
+    turns: Array
+    index: NDArray[np.intp]
+    divisions: int | None
+    offsets: tuple[float, ...]
+
+    def __len__(self) -> int:
+        return int(self.turns.size)
+
+    @property
+    def span(self) -> float:
+        """Part of the turn that is covered, the largest gap left out (1 for a grid)."""
+        gaps = np.diff(self.turns, append=self.turns[0] + 1.0)
+        largest = float(gaps.max())
+        # A full circle has a largest gap like all the others.
+        return 1.0 if largest <= 3.0 * float(np.median(gaps)) else 1.0 - largest
+
+    @property
+    def highest_order(self) -> int:
+        """Highest order below the Nyquist limit of the positions (17 for 36 of them).
+
+        For several shifted grids the limit of one grid: beyond it the mounts together
+        separate only orders that are named.
+        """
+        count = self.divisions if self.divisions is not None else len(self)
+        return max(0, (count - 1) // 2)
+
+    def describe(self) -> str:
+        """The positions in words, as in ``36 positions, 10 deg apart``."""
+        count = f"{len(self)} distinct position{'s' if len(self) != 1 else ''}"
+        if self.divisions is None:
+            part = "" if self.span == 1.0 else f" over {360.0 * self.span:.0f} deg"
+            return count + part
+        pitch = f"{360.0 / self.divisions:g} deg"
+        if len(self.offsets) == 1:
+            return f"{count}, {pitch} apart"
+        shifts = ", ".join(f"{360.0 * (o - self.offsets[0]):.4g}" for o in self.offsets)
+        return f"{count}: {len(self.offsets)} grids of {pitch}, shifted by {shifts} deg"
+
+
+def distinct_positions(
+    runs: CalibrationRun | Iterable[CalibrationRun], tolerance: float | None = None
+) -> Positions:
+    r"""Distinct reference angles of all runs modulo a turn.
+
+    0 and 360 degrees are one position, and so are repeats: they add no rank, only
+    knowledge of the noise and a check of closure.
+
+    Parameters
+    ----------
+    runs : CalibrationRun or iterable of them
+    tolerance : float, optional
+        Angles closer than this count as one, in the unit of the runs; default
+        0.01 degree (`POSITION_TOLERANCE`). A cluster is never wider than it.
+
+    Returns
+    -------
+    Positions
+
+    Examples
+    --------
+    >>> run = CalibrationRun([0.0, 90.0, 180.0, 270.0, 360.0], [0.0] * 5, period=360.0)
+    >>> distinct_positions(run).describe()
+    '4 distinct positions, 90 deg apart'
+    """
+    found = as_runs(runs)
+    period = found[0].period
+    width = POSITION_TOLERANCE if tolerance is None else tolerance / period
+    if not 0.0 < width < 0.5:
+        raise ArgumentError(f"tolerance must lie between 0 and half a turn, got {tolerance!r}")
+    turns = np.concatenate([run.reference for run in found]) / period
+    turns -= np.floor(turns)
+    order = np.argsort(turns, kind="stable")
+    ascending = turns[order]
+    # Begin behind the largest gap: no cluster is then cut at 0 = 1 without need.
+    gaps = np.diff(ascending, append=ascending[0] + 1.0)
+    first = (int(np.argmax(gaps)) + 1) % ascending.size
+    order = np.roll(order, -first)
+    unrolled = np.roll(ascending, -first)
+    unrolled[ascending.size - first :] += 1.0
+    cluster = _clusters(unrolled, width)
+    count = np.bincount(cluster)
+    place = np.bincount(cluster, weights=unrolled) / count
+    place -= np.floor(place)
+    # Means like 1 - 1e-17 belong to 0.
+    place[place > 1.0 - 1e-12] = 0.0
+    rank = np.empty(place.size, dtype=np.intp)
+    ascent = np.argsort(place, kind="stable")
+    rank[ascent] = np.arange(place.size)
+    index = np.empty(turns.size, dtype=np.intp)
+    index[order] = rank[cluster]
+    distinct = place[ascent]
+    divisions, offsets = _grids(distinct, width)
+    return Positions(distinct, index, divisions, offsets)
+
+
+def _clusters(ascending: Array, width: float) -> NDArray[np.intp]:
+    """Number of the cluster of each of the ascending angles; none wider than ``width``."""
+    starts = np.diff(ascending, prepend=-math.inf) > width
+    cluster = np.cumsum(starts) - 1
+    first = ascending[np.flatnonzero(starts)]
+    last = ascending[np.append(np.flatnonzero(starts)[1:] - 1, ascending.size - 1)]
+    if (last - first <= width).all():
+        return np.asarray(cluster, dtype=np.intp)
+    # Dense angles chain together: cut each chain in cells of the width.
+    cell = np.floor((ascending - first[cluster]) / width).astype(np.int64)
+    new = (np.diff(cell, prepend=-1) != 0) | starts
+    return np.asarray(np.cumsum(new) - 1, dtype=np.intp)
+
+
+def _grids(turns: Array, width: float) -> tuple[int | None, tuple[float, ...]]:
+    """Divisions and offsets of the uniform grids that make up the positions."""
+    for grids in range(1, min(_MOST_GRIDS, turns.size // 2) + 1):
+        if turns.size % grids:
+            continue
+        divisions = turns.size // grids
+        step = np.roll(turns, -grids) - turns
+        step -= np.floor(step)
+        # Each end of a step is the mean of a cluster and may be off by its width.
+        if divisions > 2 and np.abs(step - 1.0 / divisions).max() <= 2.0 * width:
+            # A dense log is not a grid: its neighbours are as close as the tolerance.
+            if 1.0 / turns.size <= 2.0 * width:
+                return None, ()
+            pitch = 1.0 / divisions
+            return divisions, tuple(float(o) for o in turns[:grids] % pitch)
+    return None, ()
+
+
+def fold(order: int, divisions: int) -> tuple[int, int]:
+    """Order at which ``order`` appears on ``divisions`` equispaced positions, and sign.
+
+    ``|((m + N/2) mod N) - N/2|``; sign +1 where the phase is kept, -1 where it becomes
+    180 degrees minus the phase.
+
+    Examples
+    --------
+    >>> fold(202, 36), fold(300, 36), fold(1, 36)
+    ((14, -1), (12, 1), (1, 1))
+    """
+    rest = order % divisions
+    return (rest, 1) if 2 * rest <= divisions else (divisions - rest, -1)
+
+
+def position_coherence(
+    positions: Positions, order: float, others: Sequence[float] | Array
+) -> Array:
+    r"""How alike ``order`` and each of ``others`` look at these positions, 0 to 1.
+
+    .. math:: \max_\pm \Big|\frac1P \sum_p e^{2\pi i (m \pm k) t_p}\Big|
+
+    1 means that no reading at these positions tells them apart: they are aliases.
+    """
+    m = np.asarray(others, dtype=np.float64)
+    down = _spectrum(positions.turns, np.abs(m - order))
+    up = _spectrum(positions.turns, m + order)
+    return np.maximum(down, up)
+
+
+def _spectrum(turns: Array, orders: Array) -> Array:
+    """``|mean exp(2 pi i m t)|`` for each m, by a histogram where there are many t."""
+    whole = bool((orders == np.round(orders)).all())
+    if turns.size > _EXACT_SPECTRUM and whole:
+        cells = 1 << 16
+        counts = np.bincount((turns * cells).astype(np.int64) % cells, minlength=cells)
+        full = np.abs(np.fft.rfft(counts)) / turns.size
+        return np.asarray(full[np.minimum(orders.astype(np.int64), cells // 2)])
+    result = np.empty(orders.size)
+    for i, m in enumerate(orders):
+        result[i] = abs(np.exp(2j * math.pi * m * turns).mean())
+    return result
+
+
+def energy_near_nyquist(
+    orders: Sequence[float], amplitudes: Sequence[float], highest: int
+) -> float:
+    """Share of the energy in the upper half of the orders ``1 .. highest``.
+
+    A spectrum that does not fall towards its end is the mark of under-sampling: the
+    paper's joints hold 74 % and 31 % there.
+    """
+    power = np.asarray(amplitudes, dtype=np.float64) ** 2
+    total = float(power.sum())
+    upper = np.asarray(orders, dtype=np.float64) >= 0.5 * (highest + 1)
+    return float(power[upper].sum()) / total if total > 0.0 else 0.0
+
+
+@dataclass(frozen=True)
+class Explanation:
+    """One physical reading of an order: which line of the joint it may be.
+
+    Attributes
+    ----------
+    order : int or float
+        The order per output turn that the line has.
+    name : str
+        The line in a few words.
+    gear_ratio : float or None
+        The ratio for which this holds; None for lines of the output side.
+    assumed : bool
+        True when the ratio was not declared but is one of `COMMON_RATIOS`.
+    """
+
+    order: float
+    name: str
+    gear_ratio: float | None = None
+    assumed: bool = False
+
+    def __str__(self) -> str:
+        ratio = f", if the gear ratio is {self.gear_ratio:g}" if self.assumed else ""
+        return f"{self.order:g} ({self.name}{ratio})"
+
+
+_OUTPUT_SIDE: Final = {
+    1: "eccentricity of the output side, gravity load or the reference's mount",
+    2: "tilt or ellipticity of the output side, or the coupling of the reference",
+}
+
+
+def gear_orders(gear_ratio: float, fixed_member: str = "circular_spline") -> dict[float, str]:
+    """Orders per output turn that a gear of this ratio is known to make, with names.
+
+    ``{i, i+1, 2i, 2i+1, 2i+2, 3i, 4i}`` for i motor turns per output turn with the
+    circular spline fixed; ``i-1, 2i-1, 2i-2`` in place of the sums when the flexspline
+    is fixed; ``{i, 2i, 3i, 4i}`` for any other gear (``"none"``).
+
+    Examples
+    --------
+    >>> list(gear_orders(100))
+    [100, 101, 200, 201, 202, 300, 400]
+    >>> gear_orders(100)[202]
+    'tooth mesh with the circular spline'
+    """
+    if not (math.isfinite(gear_ratio) and gear_ratio > 0.0):
+        raise ArgumentError(
+            f"gear_ratio must be positive (motor turns per output turn), got {gear_ratio!r}"
+        )
+    if fixed_member not in FIXED_MEMBERS:
+        raise ArgumentError(
+            f"fixed_member must be one of {', '.join(FIXED_MEMBERS)}, got {fixed_member!r}"
+        )
+    i = float(gear_ratio)
+    if fixed_member == "none":
+        if i == 1.0:
+            return {}
+        names = ("once", "twice", "three times", "four times")
+        return {_whole((n + 1) * i): f"{name} per motor turn" for n, name in enumerate(names)}
+    # Circular spline fixed: the flexspline goes round with the output, the wave
+    # generator turns i + 1 times against it; flexspline fixed: i - 1 times. One tooth
+    # of difference per lobe makes 2i the teeth of the output member.
+    if fixed_member == "circular_spline":
+        sign, output, fixed = 1.0, "flexspline", "circular spline"
+    else:
+        sign, output, fixed = -1.0, "circular spline", "flexspline"
+    motor = "of the motor's encoder"
+    return {
+        _whole(i): f"once per motor turn: eccentricity or offset {motor}, or wave generator",
+        _whole(i + sign): f"wave generator against the {output}, once per turn",
+        _whole(2 * i): f"twice per motor turn: tilt, gain or quadrature error {motor}, "
+        f"or tooth mesh with the {output}",
+        _whole(2 * i + sign): "side band between the two tooth meshes",
+        _whole(2 * i + 2 * sign): f"tooth mesh with the {fixed}",
+        _whole(3 * i): f"three times per motor turn: waveform {motor}, or wave generator",
+        _whole(4 * i): f"four times per motor turn: interpolation error {motor}, or wave generator",
+    }
+
+
+def explain_order(
+    order: float,
+    aliases: Iterable[float] = (),
+    gear_ratio: float | None = None,
+    fixed_member: str = "circular_spline",
+) -> tuple[Explanation, ...]:
+    """Known lines of the joint that ``order`` or one of its ``aliases`` may be.
+
+    Without ``gear_ratio`` the common ratios are tried and each explanation says for
+    which ratio it holds.
+
+    Examples
+    --------
+    >>> [str(e) for e in explain_order(14, [22, 50, 202], gear_ratio=100)]
+    ['202 (tooth mesh with the circular spline)']
+    """
+    members = {float(order), *(float(m) for m in aliases)}
+    found = [Explanation(m, _OUTPUT_SIDE[m]) for m in sorted(_OUTPUT_SIDE) if m == float(order)]
+    ratios = COMMON_RATIOS if gear_ratio is None else (gear_ratio,)
+    for ratio in ratios:
+        for m, name in gear_orders(ratio, fixed_member).items():
+            if float(m) in members:
+                found.append(Explanation(m, name, float(ratio), gear_ratio is None))
+    return tuple(found)
+
+
+def _whole(order: float) -> float:
+    """An order as an int where it is one."""
+    return round(order) if abs(order - round(order)) < 1e-9 else order

@@ -1,0 +1,134 @@
+"""``trueangle plan``: positions that keep the wanted orders apart."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from ..planning import CalibrationPlan
+
+HELP = "propose calibration positions that keep the wanted orders apart"
+EXAMPLE = "trueangle plan --gear-ratio 100 --positions 36 --mounts 2"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the command's arguments."""
+    add = parser.add_argument
+    add("--gear-ratio", type=float, metavar="R", help="motor turns per output turn")
+    add(
+        "--fixed-member",
+        choices=("circular_spline", "flexspline", "none"),
+        default="circular_spline",
+        help="the member of the gear that stands still (default: %(default)s)",
+    )
+    add("--positions", type=int, metavar="N", help="positions per mount (default: 36)")
+    add("--mounts", type=int, metavar="J", help="mounts of the artefact (default: 2)")
+    add(
+        "--reference",
+        choices=("polygon", "off-null", "encoder"),
+        default="polygon",
+        help="polygon: remount it; off-null: read the autocollimator at tilts instead; "
+        "encoder: a free reference encoder (default: %(default)s)",
+    )
+    add(
+        "--tilt-arcsec",
+        type=float,
+        default=1200.0,
+        metavar="U",
+        help="off-null: largest tilt to both sides (default: %(default)g)",
+    )
+    add("--tilts", type=int, default=2, metavar="T", help="off-null: tilts per facet (default: 2)")
+    add("--orders", metavar="1-17,202", help="orders wanted (default: 1-17 and the gear's own)")
+    add("--noise-arcsec", type=float, metavar="S", help="scatter of one reading")
+    add("--std-arcsec", type=float, metavar="U", help="standard error wanted: gives the readings")
+    add("--json", action="store_true", help="print the plan as JSON")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Print the plan."""
+    from .. import planning
+    from .order_lists import parse_orders
+
+    orders = None if args.orders is None else parse_orders(args.orders)
+    common = {
+        "fixed_member": args.fixed_member,
+        "orders": orders,
+        "noise": args.noise_arcsec,
+        "standard_error": args.std_arcsec,
+    }
+    if args.reference == "encoder":
+        plan = planning.plan_encoder(args.gear_ratio, args.positions, **common)
+    else:
+        positions = 36 if args.positions is None else args.positions
+        if args.reference == "off-null":
+            plan = planning.plan_tilts(
+                args.gear_ratio, positions, args.tilts, tilt_arcsec=args.tilt_arcsec, **common
+            )
+        else:
+            mounts = 2 if args.mounts is None else args.mounts
+            plan = planning.plan_mounts(args.gear_ratio, positions, mounts, **common)
+    print(json.dumps(as_json(plan), indent=2) if args.json else render(plan))
+    return 0
+
+
+def as_json(plan: CalibrationPlan) -> dict[str, object]:
+    """The plan as plain values; an infinite factor becomes null."""
+    return {
+        "kind": plan.kind,
+        "positions": plan.positions,
+        "mount_offsets_deg": list(plan.mount_offsets_deg),
+        "facet_shifts": list(plan.facet_shifts),
+        "facet_noise_factor": _finite(plan.facet_noise_factor),
+        "worst_noise_factor": _finite(plan.worst_noise_factor),
+        "noise_factors": {f"{m:g}": _finite(f) for m, f in plan.noise_factors.items()},
+        "invisible_orders": list(plan.invisible_orders),
+        "tolerance_deg": plan.tolerance_deg,
+        "readings": plan.readings,
+        "notes": list(plan.notes),
+    }
+
+
+def render(plan: CalibrationPlan) -> str:
+    """The plan as text."""
+    offsets = ", ".join(f"{o:.4g}" for o in plan.mount_offsets_deg)
+    if plan.kind == "encoder":
+        lines = [
+            f"{plan.positions} jittered positions of a free reference encoder",
+            f"  clamp it at            {offsets} deg",
+        ]
+    else:
+        what = "mounts" if plan.kind == "mounts" else "tilts"
+        lines = [
+            f"{len(plan.mount_offsets_deg)} {what} of {plan.positions} positions",
+            f"  offsets                {offsets} deg",
+            f"  tolerance              {plan.tolerance_deg:.2g} deg, known to 0.01 deg",
+        ]
+    if plan.kind == "mounts":
+        shifts = ", ".join(str(s) for s in plan.facet_shifts)
+        facet = plan.facet_noise_factor
+        factor = f"{facet:.2f}" if math.isfinite(facet) else "impossible with one mount"
+        lines += [
+            f"  facet shifts           {shifts} facets",
+            f"  artefact fitted too    factor {factor}",
+        ]
+    lines += [
+        f"  worst noise factor     {plan.worst_noise_factor:.2f}",
+        "  noise factor per order",
+        *_table(plan.noise_factors),
+    ]
+    if plan.readings is not None:
+        lines.append(f"  readings needed        {plan.readings}")
+    lines += [f"  note: {note}" for note in plan.notes]
+    return "\n".join(lines)
+
+
+def _table(factors: dict[float, float]) -> list[str]:
+    entries = [f"{m:>5g} {f:5.2f}" for m, f in factors.items()]
+    return ["  " + "  ".join(entries[i : i + 6]) for i in range(0, len(entries), 6)]
+
+
+def _finite(value: float) -> float | None:
+    return value if math.isfinite(value) else None

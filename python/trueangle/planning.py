@@ -1,0 +1,342 @@
+"""Calibration plans: positions that keep the wanted orders apart, and how many readings.
+
+The positions are judged by their noise factors (`trueangle.noisefactors`).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from .aliasing import fold, gear_orders
+from .errors import ArgumentError, NoModelError
+from .mountsearch import offset_tolerance, search_offsets, search_shifts
+from .noisefactors import mount_noise_factors, noise_factors
+
+__all__ = [
+    "HIGHEST_LOW_ORDER",
+    "CalibrationPlan",
+    "plan_encoder",
+    "plan_mounts",
+    "plan_tilts",
+    "readings_needed",
+    "wanted_orders",
+]
+
+#: Low orders wanted by default: what 36 positions can hold beside the constant.
+HIGHEST_LOW_ORDER: Final = 17
+
+
+@dataclass(frozen=True)
+class CalibrationPlan:
+    """Where to read, and how well each order will be known.
+
+    Attributes
+    ----------
+    kind : str
+        ``"mounts"``, ``"encoder"`` or ``"tilts"``.
+    positions : int
+        Positions per mount (or in all, for a free reference encoder).
+    mount_offsets_deg : tuple of float
+        How far the joint stands from the first mount's positions, per mount or tilt.
+    facet_shifts : tuple of int
+        By how many facets to turn the artefact at each mount, so that its own errors
+        separate from the joint's.
+    facet_noise_factor : float
+        Worst factor of an order of the joint when the artefact's errors are fitted too,
+        relative to one mount with a perfect artefact; infinite where they stay mixed.
+    noise_factors : dict of order to float
+        Factor of each wanted order; infinite for an order that no zero-free reading at
+        these positions shows.
+    tolerance_deg : float
+        Every offset may be off by this much with all factors below 2; it must be known
+        to about 0.01 degree (2 degrees of phase at order 202).
+    readings : int or None
+        Readings that reach the wanted standard error, in whole rounds.
+    notes : tuple of str
+    """
+
+    kind: str
+    positions: int
+    mount_offsets_deg: tuple[float, ...]
+    facet_shifts: tuple[int, ...]
+    facet_noise_factor: float
+    noise_factors: dict[float, float]
+    tolerance_deg: float
+    readings: int | None = None
+    notes: tuple[str, ...] = ()
+
+    @property
+    def worst_noise_factor(self) -> float:
+        """The largest factor of the orders that can be seen at all."""
+        return max((f for f in self.noise_factors.values() if math.isfinite(f)), default=math.inf)
+
+    @property
+    def invisible_orders(self) -> tuple[float, ...]:
+        """Wanted orders that fold onto the constant: every zero absorbs them."""
+        return tuple(m for m, f in self.noise_factors.items() if not math.isfinite(f))
+
+
+def wanted_orders(
+    gear_ratio: float | None,
+    fixed_member: str = "circular_spline",
+    highest: int = HIGHEST_LOW_ORDER,
+) -> tuple[float, ...]:
+    """Orders ``1 .. highest`` and the known orders of the gear.
+
+    Examples
+    --------
+    >>> wanted_orders(100)[-8:]
+    (17, 100, 101, 200, 201, 202, 300, 400)
+    """
+    low = [float(k) for k in range(1, highest + 1)]
+    gear = [] if gear_ratio is None else [float(m) for m in gear_orders(gear_ratio, fixed_member)]
+    both = sorted({*low, *gear})
+    return tuple(int(m) if m.is_integer() else m for m in both)
+
+
+def readings_needed(noise: float, standard_error: float, factor: float = 1.0) -> int:
+    r"""Readings that bring an order's standard error down to ``standard_error``.
+
+    .. math:: N = 2\,(f\,\sigma/u)^2
+
+    Examples
+    --------
+    >>> readings_needed(5.0, 0.5, factor=1.02)
+    209
+    """
+    for name, value in (("noise", noise), ("standard_error", standard_error), ("factor", factor)):
+        if not (math.isfinite(value) and value > 0.0):
+            raise ArgumentError(f"{name} must be positive and finite, got {value!r}")
+    return math.ceil(2.0 * (factor * noise / standard_error) ** 2)
+
+
+def plan_mounts(
+    gear_ratio: float | None = 100.0,
+    positions: int = 36,
+    mounts: int = 2,
+    *,
+    fixed_member: str = "circular_spline",
+    orders: Iterable[float] | None = None,
+    noise: float | None = None,
+    standard_error: float | None = None,
+) -> CalibrationPlan:
+    """Mounts of an artefact with ``positions`` facets that keep the wanted orders apart.
+
+    Parameters
+    ----------
+    gear_ratio : float or None
+        Motor turns per output turn.
+    positions, mounts : int
+    fixed_member : {"circular_spline", "flexspline", "none"}
+    orders : iterable of int, optional
+        Orders wanted; default `wanted_orders`, the low ones as far as one mount sees them.
+    noise, standard_error : float, optional
+        Scatter of one reading and the standard error wanted, in one unit: together they
+        give the number of readings.
+
+    Raises
+    ------
+    NoModelError
+        No offsets of so few mounts separate the orders; the message says how many do.
+
+    Notes
+    -----
+    Two mounts are searched exhaustively in steps of a thousandth of the pitch, more from
+    fixed random starts; the result is the same every time. Every mount has its own zero.
+
+    Examples
+    --------
+    >>> plan = plan_mounts(100, positions=36, mounts=2)
+    >>> plan.mount_offsets_deg, round(plan.worst_noise_factor, 2)
+    ((0.0, 2.14), 1.28)
+    """
+    _check_count("positions", positions, 3)
+    _check_count("mounts", mounts, 1)
+    limit = (positions - 1) // 2
+    if orders is None:
+        wanted = wanted_orders(gear_ratio, fixed_member, min(HIGHEST_LOW_ORDER, limit))
+    else:
+        wanted = tuple(sorted({*orders}))
+    if any(m != int(m) for m in wanted):
+        raise ArgumentError(
+            "a gear ratio whose orders are not whole needs several turns of a free reference "
+            "encoder; plan one with --reference encoder"
+        )
+    seen = [m for m in wanted if fold(int(m), positions)[0] != 0]
+    if not seen:
+        raise NoModelError(f"all wanted orders are multiples of {positions}: use other positions")
+    need = _mounts_needed(positions, seen)
+    if mounts < need:
+        crowded = _crowded_class(positions, seen)
+        raise NoModelError(
+            f"{mounts} mount{'s' if mounts > 1 else ''} of {positions} positions cannot separate "
+            f"orders {', '.join(f'{m:g}' for m in crowded)}, which look alike there: "
+            f"use at least {need} mounts, or a free reference encoder"
+        )
+    offsets = search_offsets(positions, mounts, seen)
+    factors = dict(zip(seen, mount_noise_factors(positions, offsets, seen).tolist(), strict=True))
+    shifts, facet = search_shifts(positions, mounts)
+    notes = []
+    hidden = [m for m in wanted if m not in factors]
+    if hidden:
+        notes.append(
+            f"orders {', '.join(f'{m:g}' for m in hidden)} are the same at every position and "
+            "vanish in each mount's zero: only another number of facets shows them"
+        )
+    if mounts == 2:
+        notes.append("with two mounts the artefact's own errors separate badly; three do well")
+    worst = max(factors.values())
+    return CalibrationPlan(
+        kind="mounts",
+        positions=positions,
+        mount_offsets_deg=tuple(offsets),
+        facet_shifts=shifts,
+        facet_noise_factor=facet,
+        noise_factors={m: factors.get(m, math.inf) for m in wanted},
+        tolerance_deg=offset_tolerance(positions, offsets, seen, worst),
+        readings=_rounds(noise, standard_error, worst, positions * mounts),
+        notes=tuple(notes),
+    )
+
+
+def plan_tilts(
+    gear_ratio: float | None = 100.0,
+    positions: int = 36,
+    tilts: int = 2,
+    *,
+    tilt_arcsec: float = 1200.0,
+    fixed_member: str = "circular_spline",
+    orders: Iterable[float] | None = None,
+    noise: float | None = None,
+    standard_error: float | None = None,
+) -> CalibrationPlan:
+    """Off-null readings of an autocollimator at equally spaced tilts, without a remount.
+
+    The joint stands ``-tilt .. +tilt`` away from every facet's null and the autocollimator
+    reads the tilt. Its scale must be calibrated: 0.1 % of 1200 arcsec is 1.2 arcsec.
+
+    Examples
+    --------
+    >>> round(plan_tilts(100, tilt_arcsec=1200.0).worst_noise_factor, 2)
+    1.7
+    """
+    _check_count("positions", positions, 3)
+    _check_count("tilts", tilts, 2)
+    if not (math.isfinite(tilt_arcsec) and tilt_arcsec > 0.0):
+        raise ArgumentError(f"tilt_arcsec must be positive, got {tilt_arcsec!r}")
+    limit = (positions - 1) // 2
+    low = min(HIGHEST_LOW_ORDER, limit)
+    wanted = wanted_orders(gear_ratio, fixed_member, low) if orders is None else tuple(orders)
+    offsets = [float(o) for o in np.linspace(-tilt_arcsec, tilt_arcsec, tilts) / 3600.0]
+    found = mount_noise_factors(positions, offsets, wanted).tolist()
+    factors = dict(zip(wanted, found, strict=True))
+    blind = [m for m in wanted if not math.isfinite(factors[m]) and fold(int(m), positions)[0]]
+    if blind:
+        raise NoModelError(
+            f"{tilts} tilts cannot separate orders {', '.join(f'{m:g}' for m in blind)}: "
+            f"use at least {_mounts_needed(positions, blind)} tilts"
+        )
+    worst = max(f for f in found if math.isfinite(f))
+    seen = [m for m in wanted if math.isfinite(factors[m])]
+    return CalibrationPlan(
+        kind="tilts",
+        positions=positions,
+        mount_offsets_deg=tuple(offsets),
+        facet_shifts=(0,) * tilts,
+        facet_noise_factor=math.inf,
+        noise_factors=factors,
+        tolerance_deg=offset_tolerance(positions, offsets, seen, worst),
+        readings=_rounds(noise, standard_error, worst, positions * tilts),
+        notes=(
+            "fit the autocollimator's scale as one more column: an error of 0.1 % is "
+            f"{0.001 * tilt_arcsec:.2g} arcsec here",
+            "the artefact stays where it is, so its own errors stay in the result",
+        ),
+    )
+
+
+def plan_encoder(
+    gear_ratio: float | None = 100.0,
+    positions: int | None = None,
+    *,
+    fixed_member: str = "circular_spline",
+    orders: Iterable[float] | None = None,
+    noise: float | None = None,
+    standard_error: float | None = None,
+    seed: int = 0,
+) -> CalibrationPlan:
+    """Jittered equispaced positions against a free reference encoder.
+
+    Each position is drawn within its own cell, so no order is an exact alias of another.
+    Without ``positions`` there are ``2 * highest order + 20`` of them (820 for ratio 100).
+
+    Examples
+    --------
+    >>> plan_encoder(100).positions
+    820
+    """
+    wanted = wanted_orders(gear_ratio, fixed_member) if orders is None else tuple(orders)
+    count = 2 * math.ceil(max(wanted)) + 20 if positions is None else positions
+    _check_count("positions", count, 3)
+    jitter = np.random.default_rng(seed).uniform(size=count)
+    found = noise_factors((np.arange(count) + jitter) / count, wanted)
+    if not np.isfinite(found).all():
+        raise NoModelError(
+            f"{count} positions are too few for {len(wanted)} orders: use at least "
+            f"{2 * len(wanted) + 1}, better {2 * math.ceil(max(wanted)) + 20}"
+        )
+    worst = float(found.max())
+    return CalibrationPlan(
+        kind="encoder",
+        positions=count,
+        mount_offsets_deg=(0.0, 130.0, 250.0),
+        facet_shifts=(),
+        facet_noise_factor=math.inf,
+        noise_factors=dict(zip(wanted, found.tolist(), strict=True)),
+        tolerance_deg=180.0 / count,
+        readings=_rounds(noise, standard_error, worst, count),
+        notes=(
+            f"one reading in each of {count} equal cells of the turn, anywhere in the cell",
+            "clamp the reference again at 130 and 250 deg, to separate its own eccentricity "
+            "and coupling from the joint",
+            "move both ways, at two speeds, loads and temperatures, over several turns",
+        ),
+    )
+
+
+def _check_count(name: str, value: int, least: int) -> None:
+    if value != int(value) or value < least:
+        raise ArgumentError(f"{name} must be a whole number of at least {least}, got {value!r}")
+
+
+def _crowded_class(positions: int, orders: Sequence[float]) -> list[float]:
+    """Orders of the fullest fold class (the one at N/2 counts double)."""
+    classes: dict[int, list[float]] = {}
+    for m in orders:
+        classes.setdefault(fold(int(m), positions)[0], []).append(m)
+    return max(classes.items(), key=lambda item: len(item[1]) * _cost(item[0], positions))[1]
+
+
+def _cost(folded: int, positions: int) -> int:
+    return 2 if 2 * folded == positions else 1
+
+
+def _mounts_needed(positions: int, orders: Sequence[float]) -> int:
+    crowded = _crowded_class(positions, orders)
+    return len(crowded) * _cost(fold(int(crowded[0]), positions)[0], positions)
+
+
+def _rounds(
+    noise: float | None, standard_error: float | None, factor: float, per_round: int
+) -> int | None:
+    """Readings for the wanted standard error, in whole rounds of all positions."""
+    if noise is None and standard_error is None:
+        return None
+    if noise is None or standard_error is None:
+        raise ArgumentError("the number of readings needs both noise and standard_error")
+    return math.ceil(readings_needed(noise, standard_error, factor) / per_round) * per_round

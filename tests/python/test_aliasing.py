@@ -1,0 +1,184 @@
+"""Positions, folding and explanations of orders."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+import trueangle as ta
+from trueangle.aliasing import (
+    distinct_positions,
+    energy_near_nyquist,
+    explain_order,
+    fold,
+    gear_orders,
+    position_coherence,
+)
+from trueangle.errors import ArgumentError
+
+
+def run_at(angles, period=360.0):
+    angles = np.asarray(angles, dtype=float)
+    return ta.CalibrationRun(angles, angles, period=period)
+
+
+# Orders behind 36 positions, with the sign of the fold.
+FOLDS = {98: -10, 99: -9, 100: -8, 101: -7, 102: -6, 199: -17, 200: -16, 201: -15, 202: -14}
+FOLDS |= {203: -13, 204: -12, 300: 12, 302: 14, 303: 15, 400: 4, 402: 6, 404: 8, 500: -4, 600: -12}
+
+
+@pytest.mark.parametrize(("order", "folded"), FOLDS.items())
+def test_fold_gives_the_known_orders(order, folded):
+    assert fold(order, 36) == (abs(folded), 1 if folded > 0 else -1)
+
+
+@pytest.mark.parametrize(
+    ("ratio", "member", "folded"),
+    [
+        (30, "circular_spline", [6, 5, 12, 11, 10, 18, 12]),
+        (50, "circular_spline", [14, 15, 8, 7, 6, 6, 16]),
+        (80, "circular_spline", [8, 9, 16, 17, 18, 12, 4]),
+        (100, "circular_spline", [8, 7, 16, 15, 14, 12, 4]),
+        (101, "flexspline", [7, 8, 14, 15, 16, 15, 8]),
+        (120, "circular_spline", [12, 13, 12, 11, 10, 0, 12]),
+        (160, "circular_spline", [16, 17, 4, 3, 2, 12, 8]),
+    ],
+)
+def test_gear_orders_fold_as_tabulated(ratio, member, folded):
+    assert [fold(int(m), 36)[0] for m in gear_orders(ratio, member)] == folded
+
+
+def test_flexspline_fixed_names_orders_below_the_ratio():
+    assert list(gear_orders(101, "flexspline")) == [101, 100, 202, 201, 200, 303, 404]
+    assert "circular spline" in gear_orders(101, "flexspline")[202]
+    assert "flexspline" in gear_orders(101, "flexspline")[200]
+
+
+@given(st.integers(0, 2000), st.integers(3, 400))
+def test_fold_reproduces_the_samples(order, divisions):
+    x = 2.0 * np.pi * np.arange(divisions) / divisions
+    folded, sign = fold(order, divisions)
+    # Rounding of order * x, in radians.
+    rounding = 1e-15 * (order + 1) * 2.0 * np.pi * 4
+    np.testing.assert_allclose(np.cos(order * x), np.cos(folded * x), atol=rounding)
+    np.testing.assert_allclose(np.sin(order * x), sign * np.sin(folded * x), atol=rounding)
+
+
+def test_thirty_seven_readings_are_thirty_six_positions():
+    positions = distinct_positions(run_at(np.arange(37) * 10.0))
+    assert len(positions) == 36
+    assert positions.divisions == 36
+    assert positions.highest_order == 17
+    assert positions.index[0] == positions.index[36]
+    assert positions.describe() == "36 distinct positions, 10 deg apart"
+
+
+@given(
+    st.floats(-1000.0, 1000.0),
+    st.integers(-3, 3),
+    st.sampled_from([360.0, 2 * np.pi, 1.0, 65536.0]),
+    st.randoms(use_true_random=False),
+)
+def test_positions_do_not_depend_on_turns_unit_zero_and_row_order(zero, turn, period, random):
+    angles = [zero / 360.0 + turn * (j % 3) + j / 36.0 for j in range(37)]
+    random.shuffle(angles)
+    positions = distinct_positions(run_at(np.array(angles) * period, period))
+    assert (len(positions), positions.divisions) == (36, 36)
+
+
+def test_jitter_within_the_tolerance_is_one_position():
+    random = np.random.default_rng(1)
+    runs = [
+        run_at(np.arange(36) * 10.0 + random.uniform(-0.004, 0.004, 36) - 20.0) for _ in range(6)
+    ]
+    assert len(distinct_positions(runs)) == 36
+    assert len(distinct_positions(runs, tolerance=1e-7)) == 216
+
+
+def test_mounts_are_a_union_of_grids():
+    positions = distinct_positions([run_at(np.arange(36) * 10.0 + d) for d in (0.0, 2.14)])
+    assert (len(positions), positions.divisions) == (72, 36)
+    assert np.allclose(np.diff(positions.offsets), 2.14 / 360.0)
+    assert "2 grids of 10 deg, shifted by 0, 2.14 deg" in positions.describe()
+
+
+def test_half_way_positions_are_one_finer_grid():
+    positions = distinct_positions([run_at(np.arange(36) * 10.0 + d) for d in (0.0, 5.0)])
+    assert (positions.divisions, len(positions.offsets)) == (72, 1)
+
+
+def test_free_angles_and_part_of_a_turn_are_no_grid():
+    random = np.random.default_rng(2)
+    assert distinct_positions(run_at(random.uniform(0, 360, 500))).divisions is None
+    arc = distinct_positions(run_at(np.arange(0.0, 188.0, 2.0)))
+    assert arc.divisions is None
+    assert arc.span == pytest.approx(186.0 / 360.0)
+
+
+def test_a_dense_log_is_neither_one_position_nor_a_grid():
+    random = np.random.default_rng(3)
+    positions = distinct_positions(run_at(random.uniform(0, 360, 200_000)))
+    assert positions.divisions is None
+    assert 18_000 <= len(positions) <= 73_000
+
+
+def test_coherence_is_one_exactly_for_the_aliases():
+    positions = distinct_positions(run_at(np.arange(36) * 10.0))
+    orders = np.arange(1, 405)
+    coherent = orders[position_coherence(positions, 14, orders) > 1.0 - 1e-9]
+    assert coherent.tolist() == [m for m in orders if fold(int(m), 36)[0] == 14]
+    assert {14, 22, 50, 58, 202} <= set(coherent.tolist())
+
+
+def test_coherence_by_histogram_agrees_with_the_sum():
+    random = np.random.default_rng(4)
+    positions = distinct_positions(run_at(random.uniform(0, 200, 6000)))
+    assert len(positions) > 4096
+    others = np.arange(2, 40)
+    t = positions.turns
+    direct = [max(abs(np.exp(2j * np.pi * (m + s) * t).mean()) for s in (5, -5)) for m in others]
+    # A cell of the histogram is 1/65536 turn wide: phase error below 45 * pi / 65536.
+    np.testing.assert_allclose(position_coherence(positions, 5, others), direct, atol=0.003)
+
+
+def test_explanations_of_the_papers_orders():
+    alias = {m: [n for n in range(1, 405) if fold(n, 36)[0] == m and n != m] for m in range(1, 18)}
+    named = {m: {e.order for e in explain_order(m, alias[m], 100)} for m in alias}
+    assert named[14] == {202}
+    assert named[8] == {100}
+    assert named[16] == {200}
+    assert (named[7], named[15], named[12], named[4]) == ({101}, {201}, {300}, {400})
+    assert str(explain_order(14, alias[14], 100)[0]) == (
+        "202 (tooth mesh with the circular spline)"
+    )
+
+
+def test_without_a_ratio_the_common_ones_are_tried():
+    alias = [n for n in range(1, 700) if fold(n, 36)[0] == 14]
+    texts = [str(e) for e in explain_order(14, alias)]
+    assert any("202 (" in t and "gear ratio is 100" in t for t in texts)
+    assert any("50 (" in t and "gear ratio is 50" in t for t in texts)
+
+
+# Equations 8 and 9 of the paper, arcsec.
+JOINT_A = {1: 14.10, 4: 6.91, 8: 18.05, 12: 6.66, 14: 33.36, 15: 8.94, 16: 19.60}
+JOINT_B = {1: 24.31, 4: 10.18, 7: 4.86, 8: 13.85, 12: 4.68, 14: 17.71, 16: 8.64}
+
+
+@pytest.mark.parametrize(("joint", "share"), [(JOINT_A, 0.74), (JOINT_B, 0.31)])
+def test_energy_near_nyquist_of_the_papers_joints(joint, share):
+    # Tabulated to two digits.
+    assert energy_near_nyquist(list(joint), list(joint.values()), 17) == pytest.approx(
+        share, abs=0.005
+    )
+
+
+@pytest.mark.parametrize("wrong", [{"gear_ratio": -1.0}, {"gear_ratio": float("nan")}])
+def test_bad_ratio_is_named(wrong):
+    with pytest.raises(ArgumentError, match="gear_ratio"):
+        gear_orders(**wrong)
+
+
+def test_bad_member_is_named():
+    with pytest.raises(ArgumentError, match="fixed_member"):
+        gear_orders(100, "housing")
