@@ -57,9 +57,11 @@ pub enum Error {
         got: u32,
     },
 
-    /// A weight is negative or not finite.
-    #[error("weights[{index}] must be finite and not negative, got {got}")]
+    /// A weight or a penalty is negative or not finite.
+    #[error("{what}[{index}] must be finite and not negative, got {got}")]
     Weight {
+        /// The argument's name.
+        what: &'static str,
         /// Its position.
         index: usize,
         /// The offending value.

@@ -13,6 +13,11 @@ pub mod kernel;
 
 pub mod compensator;
 
+pub mod design;
+pub mod fit;
+pub mod lstsq;
+pub mod rank;
+
 #[cfg(feature = "python")]
 mod python;
 

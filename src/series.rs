@@ -194,7 +194,7 @@ fn finite(what: &'static str, values: &[f64]) -> Result<(), Error> {
 
 /// `exp(2 pi i k phase)` for increasing orders `k`, by one complex multiplication per
 /// step; large gaps and every 32nd order start afresh from an exact phase.
-struct Rotation {
+pub(crate) struct Rotation {
     phase: (f64, f64),
     unit: (f64, f64),
     current: (f64, f64),
@@ -206,7 +206,7 @@ impl Rotation {
     /// Orders between fresh starts: rounding grows by about 1e-16 per step.
     const RESEED: u32 = 32;
 
-    fn new(phase: (f64, f64)) -> Self {
+    pub(crate) fn new(phase: (f64, f64)) -> Self {
         let unit = sin_cos_turns(phase);
         Self {
             phase,
@@ -218,7 +218,7 @@ impl Rotation {
     }
 
     /// Sine and cosine of `order` times the phase; `order` must not decrease.
-    fn advance(&mut self, order: u32) -> (f64, f64) {
+    pub(crate) fn advance(&mut self, order: u32) -> (f64, f64) {
         if order - self.seeded >= Self::RESEED {
             self.current = sin_cos_turns(Period::harmonic(self.phase, f64::from(order)));
             self.order = order;

@@ -2,6 +2,7 @@
 
 mod array;
 mod failure;
+mod fit;
 mod series;
 mod threads;
 
@@ -14,6 +15,9 @@ mod _core {
 
     #[pymodule_export]
     use super::series::{PyCompensator, PySeries};
+
+    #[pymodule_export]
+    use super::fit::{Solution, fit};
 
     #[pymodule_init]
     fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {

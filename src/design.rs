@@ -1,0 +1,78 @@
+//! Rows of the design matrix: the harmonics of an angle, without coefficients.
+
+use crate::angle::Period;
+use crate::error::Error;
+use crate::series::{Rotation, check_frequencies};
+
+/// The orders of one shaft.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Frequencies {
+    /// Turns of the shaft per output turn; any positive real.
+    pub cycles: f64,
+    /// Orders from 1, strictly increasing.
+    pub orders: Vec<u32>,
+}
+
+/// The harmonics to fit: columns `cos, sin` of each order of each shaft in turn.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Design {
+    period: Period,
+    shafts: Vec<Frequencies>,
+}
+
+impl Design {
+    /// Checks cycles and orders; a design without orders fits zeros alone.
+    pub fn new(period: f64, shafts: Vec<Frequencies>) -> Result<Self, Error> {
+        let period = Period::new(period)?;
+        for (index, shaft) in shafts.iter().enumerate() {
+            check_frequencies(index, shaft.cycles, &shaft.orders)?;
+        }
+        Ok(Self { period, shafts })
+    }
+
+    /// One turn of the angles.
+    pub fn period(&self) -> Period {
+        self.period
+    }
+
+    /// The shafts in the order given.
+    pub fn shafts(&self) -> &[Frequencies] {
+        &self.shafts
+    }
+
+    /// `2 n`: a cosine and a sine per order.
+    pub fn columns(&self) -> usize {
+        2 * self.shafts.iter().map(|s| s.orders.len()).sum::<usize>()
+    }
+
+    /// `(shaft, order)` of every pair of columns.
+    pub fn harmonics(&self) -> impl Iterator<Item = (usize, u32)> + '_ {
+        let of_shaft = |(index, shaft): (usize, &Frequencies)| {
+            let orders = shaft.orders.clone();
+            orders.into_iter().map(move |order| (index, order))
+        };
+        self.shafts.iter().enumerate().flat_map(of_shaft)
+    }
+
+    /// Cycles per output turn of a harmonic.
+    pub fn frequency(&self, (shaft, order): (usize, u32)) -> f64 {
+        self.shafts[shaft].cycles * f64::from(order)
+    }
+
+    /// True when every harmonic repeats after one turn.
+    pub fn is_periodic(&self) -> bool {
+        self.harmonics()
+            .all(|harmonic| self.frequency(harmonic).fract() == 0.0)
+    }
+
+    /// Appends `scale * cos, scale * sin` of every harmonic at angle `x`.
+    pub fn extend_row(&self, row: &mut Vec<f64>, x: f64, scale: f64) {
+        for shaft in &self.shafts {
+            let mut rotation = Rotation::new(self.period.phase(x, shaft.cycles));
+            for &order in &shaft.orders {
+                let (sine, cosine) = rotation.advance(order);
+                row.extend([scale * cosine, scale * sine]);
+            }
+        }
+    }
+}

@@ -1,0 +1,152 @@
+//! `_core.fit` and `_core.Solution`.
+
+use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, ToPyArray};
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+
+use crate::design::{Design, Frequencies};
+use crate::fit as core;
+use crate::fit::{Argument, Method, Run};
+
+type Readings<'py> = (
+    PyReadonlyArray1<'py, f64>,
+    PyReadonlyArray1<'py, f64>,
+    Option<PyReadonlyArray1<'py, f64>>,
+);
+
+/// What a fit found; see `trueangle.fit`.
+#[pyclass(frozen, module = "trueangle._core")]
+pub struct Solution {
+    inner: core::Solution,
+    /// Orders of each shaft.
+    sizes: Vec<usize>,
+}
+
+#[pymethods]
+impl Solution {
+    #[getter]
+    fn offsets<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        self.inner.offsets.to_pyarray(py)
+    }
+
+    #[getter]
+    fn offset_std<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        self.inner.offset_std.to_pyarray(py)
+    }
+
+    #[getter]
+    fn constant(&self) -> f64 {
+        self.inner.constant
+    }
+
+    #[getter]
+    fn cosine(&self) -> Vec<Vec<f64>> {
+        self.halves(0)
+    }
+
+    #[getter]
+    fn sine(&self) -> Vec<Vec<f64>> {
+        self.halves(1)
+    }
+
+    #[getter]
+    fn covariance<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let size = 1 + self.inner.coefficients.len();
+        self.inner.covariance.to_pyarray(py).reshape([size, size])
+    }
+
+    #[getter]
+    fn residual_variance(&self) -> f64 {
+        self.inner.residual_variance
+    }
+
+    #[getter]
+    fn degrees_of_freedom(&self) -> f64 {
+        self.inner.degrees_of_freedom
+    }
+
+    #[getter]
+    fn rank(&self) -> usize {
+        self.inner.rank
+    }
+
+    #[getter]
+    fn condition_number(&self) -> f64 {
+        self.inner.condition_number
+    }
+
+    #[getter]
+    fn method(&self) -> &'static str {
+        match self.inner.method {
+            Method::Plain => "plain",
+            Method::Moments => "moments",
+            Method::Qr => "qr",
+        }
+    }
+}
+
+impl Solution {
+    /// Every second coefficient, shaft by shaft: cosines from 0, sines from 1.
+    fn halves(&self, first: usize) -> Vec<Vec<f64>> {
+        let mut values = self.inner.coefficients.iter().skip(first).step_by(2);
+        let shaft = |size: &usize| values.by_ref().take(*size).copied().collect();
+        self.sizes.iter().map(shaft).collect()
+    }
+}
+
+/// Least squares of harmonic orders and one zero per run; see `trueangle.fit`.
+#[pyfunction]
+#[pyo3(signature = (runs, period, cycles, orders, argument="reference", method=None, ridge=None, threads=None))]
+#[allow(clippy::too_many_arguments)] // one Python call, its arguments by name
+pub fn fit(
+    py: Python<'_>,
+    runs: Vec<Readings<'_>>,
+    period: f64,
+    cycles: Vec<f64>,
+    orders: Vec<Vec<u32>>,
+    argument: &str,
+    method: Option<&str>,
+    ridge: Option<Vec<f64>>,
+    threads: Option<usize>,
+) -> PyResult<Solution> {
+    let _ = threads;
+    let argument = match argument {
+        "reference" => Argument::Reference,
+        "indicated" => Argument::Indicated,
+        other => return Err(unknown("argument", other, "\"reference\" or \"indicated\"")),
+    };
+    match method {
+        None | Some("plain") => {}
+        Some(other) => return Err(unknown("method", other, "\"plain\" or None")),
+    }
+    if cycles.len() != orders.len() {
+        return Err(PyValueError::new_err(format!(
+            "cycles has {} shafts, orders has {}: they must be equally many",
+            cycles.len(),
+            orders.len()
+        )));
+    }
+    let sizes = orders.iter().map(Vec::len).collect();
+    let shafts = cycles.into_iter().zip(orders);
+    let shafts = shafts.map(|(cycles, orders)| Frequencies { cycles, orders });
+    let design = Design::new(period, shafts.collect())?;
+    let runs = runs.iter().map(slices).collect::<PyResult<Vec<_>>>()?;
+    let inner = py.detach(|| core::fit(&design, &runs, argument, ridge.as_deref()))?;
+    Ok(Solution { inner, sizes })
+}
+
+fn slices<'a>(run: &'a Readings<'_>) -> PyResult<Run<'a>> {
+    let (reference, indicated, weights) = run;
+    Ok(Run {
+        reference: reference.as_slice()?,
+        indicated: indicated.as_slice()?,
+        weights: match weights {
+            Some(weights) => Some(weights.as_slice()?),
+            None => None,
+        },
+    })
+}
+
+fn unknown(what: &str, got: &str, wanted: &str) -> PyErr {
+    PyValueError::new_err(format!("{what} must be {wanted}, got {got:?}"))
+}
