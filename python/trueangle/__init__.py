@@ -8,11 +8,23 @@ from typing import TYPE_CHECKING, Any
 from ._core import __version__
 
 if TYPE_CHECKING:
+    from .fitresult import FitResult as FitResult
+    from .fitting import fit as fit
+    from .model import HarmonicModel as HarmonicModel
+    from .model import Shaft as Shaft
+    from .model import load_model as load_model
+    from .runfiles import read_runs as read_runs
     from .runs import CalibrationRun as CalibrationRun
 
 #: Public names and the modules that define them; a module is imported at first use.
 _PUBLIC = {
     "CalibrationRun": "runs",
+    "FitResult": "fitresult",
+    "HarmonicModel": "model",
+    "Shaft": "model",
+    "fit": "fitting",
+    "load_model": "model",
+    "read_runs": "runfiles",
 }
 
 __all__ = ["__version__", *sorted(_PUBLIC)]

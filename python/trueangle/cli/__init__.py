@@ -15,7 +15,11 @@ from ..errors import TrueAngleError
 __all__ = ["COMMANDS", "main"]
 
 #: Modules of this package that each define one command of the same name.
-COMMANDS: tuple[str, ...] = ("plan",)
+COMMANDS: tuple[str, ...] = (
+    "fit",
+    "correct",
+    "plan",
+)
 
 
 class Command(Protocol):

@@ -1,0 +1,147 @@
+"""``trueangle fit``: calibration runs in, a model file out."""
+
+from __future__ import annotations
+
+import argparse
+import json
+from collections.abc import Mapping
+
+from ..errors import ArgumentError
+
+HELP = "fit a harmonic model to calibration runs and save it"
+EXAMPLE = "trueangle fit joint_a.csv -o joint_a.json --gear-ratio 100"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the command's arguments."""
+    parser.add_argument("runs", nargs="+", metavar="RUNS", help="CSV or Parquet files of readings")
+    parser.add_argument(
+        "-o", "--output", required=True, metavar="MODEL", help="model file to write"
+    )
+    parser.add_argument(
+        "--orders",
+        default="auto",
+        help="auto (default: by evidence), 1-17, 1,4,8, or per shaft: output:1-3;motor:1,2",
+    )
+    add_joint(parser)
+    parser.add_argument(
+        "--argument",
+        choices=("reference", "indicated"),
+        default="reference",
+        help="angle that the error is a function of (default: reference, the true angle)",
+    )
+    parser.add_argument(
+        "--loss",
+        choices=("auto", "linear", "huber", "tukey"),
+        default="auto",
+        help="auto (default): least squares with wild readings set aside and reported",
+    )
+    parser.add_argument(
+        "--run", action="append", metavar="LABEL", help="use this run only (may be repeated)"
+    )
+    parser.add_argument("--json", action="store_true", help="print the result as JSON")
+
+
+def add_joint(parser: argparse.ArgumentParser) -> None:
+    """Options that tell what joint the readings are of; shared by several commands."""
+    from ..shafts import FIXED_MEMBERS
+
+    parser.add_argument("--gear-ratio", type=float, metavar="R", help="motor turns per output turn")
+    parser.add_argument(
+        "--fixed-member",
+        choices=FIXED_MEMBERS,
+        default="circular_spline",
+        help="of the strain wave gear (default: circular_spline)",
+    )
+    parser.add_argument(
+        "--counts-per-turn", type=float, metavar="N", help="of an indicated_count column"
+    )
+
+
+def parse_orders(text: str) -> str | list[int] | Mapping[str, list[int]]:
+    """``auto``, ``1-17``, ``1,4,8`` or ``output:1-3;motor:1,2`` as orders."""
+    if text == "auto":
+        return text
+    if ":" not in text:
+        return _order_list(text)
+    by_shaft: dict[str, list[int]] = {}
+    for part in text.split(";"):
+        shaft, colon, orders = part.partition(":")
+        if not colon or shaft.strip() in by_shaft:
+            raise ArgumentError(f"--orders: each shaft once, as output:1-3;motor:1,2, got {text!r}")
+        by_shaft[shaft.strip()] = _order_list(orders)
+    return by_shaft
+
+
+def _order_list(text: str) -> list[int]:
+    orders: list[int] = []
+    for part in text.split(","):
+        first, dash, last = part.strip().partition("-")
+        if not first.isdigit() or (dash and not last.isdigit()):
+            raise ArgumentError(f"--orders: whole numbers like 1-17 or 1,4,8, got {text!r}")
+        low, high = int(first), int(last or first)
+        if not 1 <= low <= high <= 1_000_000:
+            raise ArgumentError(f"--orders: orders run upwards from 1, got {part.strip()!r}")
+        orders += range(low, high + 1)
+    return orders
+
+
+def run(args: argparse.Namespace) -> int:
+    """Fit, save, print."""
+    from ..fitting import fit
+    from ..runfiles import read_runs
+
+    runs = read_runs(args.runs, counts_per_turn=args.counts_per_turn)
+    if args.run:
+        labels = [str(found.label) for found in runs]
+        missing = [label for label in args.run if label not in labels]
+        if missing:
+            raise ArgumentError(
+                f"--run {missing[0]}: no such run; the runs are {', '.join(labels)}"
+            )
+        runs = [found for found in runs if str(found.label) in args.run]
+    result = fit(
+        runs,
+        orders=parse_orders(args.orders),
+        gear_ratio=args.gear_ratio,
+        fixed_member=args.fixed_member,
+        argument=args.argument,
+        loss=args.loss,
+    )
+    result.model.save(args.output)
+    if args.json:
+        print(json.dumps(_as_json(result, args.output)))
+    else:
+        print(result.summary())
+        print(f"\nsaved {args.output}")
+    return 0
+
+
+def _as_json(result: object, path: str) -> dict[str, object]:
+    from ..angles import arcsec
+    from ..fitresult import FitResult
+
+    assert isinstance(result, FitResult)
+    model = result.model
+    return {
+        "model": path,
+        "readings": sum(len(found) for found in result.runs),
+        "runs": len(result.runs),
+        "residual_arcsec": arcsec(result.residual_std, model.period),
+        "condition_number": result.condition_number,
+        "method": result.method,
+        "ridge": result.ridge,
+        "offset_spread_arcsec": arcsec(result.offset_spread, model.period),
+        "wild": [list(place) for place in result.wild],
+        "orders": [
+            {
+                "shaft": shaft.name,
+                "order": order,
+                "amplitude_arcsec": arcsec(float(shaft.amplitudes[i]), model.period),
+                "phase_deg": float(shaft.phases[i]) * 57.29577951308232 % 360.0,
+            }
+            for shaft in model.shafts
+            for i, order in enumerate(shaft.orders)
+        ],
+        "notes": list(result.notes),
+    }

@@ -1,0 +1,200 @@
+"""The result of a fit: a model, its uncertainties, and what not to trust."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .errors import ArgumentError
+from .model import HarmonicModel
+from .problem import Fitted, Problem
+from .runs import CalibrationRun
+
+if TYPE_CHECKING:
+    from .orders import OrderSelection
+
+__all__ = ["FitResult"]
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class FitResult:
+    """A fitted model and everything needed to judge it.
+
+    All angles, amplitudes and errors are in the unit of the runs (`HarmonicModel.period`).
+
+    Attributes
+    ----------
+    model : HarmonicModel
+    problem : Problem
+        The readings, shafts and orders that were put in.
+    fitted : Fitted
+        The core's solution.
+    weights : tuple of ndarray or None
+        Weights that a robust loss ended with; 0 marks readings set aside as wild.
+    selection : OrderSelection or None
+        The evidence, when the orders were chosen by it.
+    notes : tuple of str
+        What not to trust and why.
+    """
+
+    model: HarmonicModel
+    problem: Problem
+    fitted: Fitted
+    weights: tuple[Array, ...] | None
+    selection: OrderSelection | None
+    notes: tuple[str, ...]
+
+    @property
+    def runs(self) -> tuple[CalibrationRun, ...]:
+        """The runs fitted, as given."""
+        return tuple(self.problem.runs)
+
+    @property
+    def offsets(self) -> Array:
+        """Zero of every run, a nuisance of the fit; the constant is their circular mean."""
+        return self.fitted.offsets
+
+    @property
+    def offset_std(self) -> Array:
+        """Standard errors of `offsets`."""
+        std = np.full(len(self.problem.runs), np.nan)
+        std[np.isfinite(self.offsets)] = self.fitted.solution.offset_std
+        return std
+
+    @property
+    def offset_spread(self) -> float:
+        """Standard deviation of the runs' zeros about their circular mean."""
+        return 0.0 if self.model.fit is None else self.model.fit.offset_spread
+
+    @property
+    def residual_variance(self) -> float:
+        """Weighted sum of squared residuals over `degrees_of_freedom`."""
+        return self.fitted.solution.residual_variance
+
+    @property
+    def residual_std(self) -> float:
+        """Residual standard deviation, degrees of freedom allowed for."""
+        return math.sqrt(self.residual_variance)
+
+    @property
+    def degrees_of_freedom(self) -> float:
+        """Readings less unknowns; effective (not whole) with a ridge."""
+        return self.fitted.solution.degrees_of_freedom
+
+    @property
+    def rank(self) -> int:
+        """Numerical rank of the design."""
+        return self.fitted.solution.rank
+
+    @property
+    def condition_number(self) -> float:
+        """Of the design with its columns scaled to unit length."""
+        return self.fitted.solution.condition_number
+
+    @property
+    def method(self) -> str:
+        """How the normal equations were met: ``"plain"``, ``"moments"`` or ``"qr"``."""
+        return self.fitted.solution.method
+
+    @property
+    def loss(self) -> str:
+        """The loss asked for."""
+        return "linear" if self.model.fit is None else self.model.fit.loss
+
+    @property
+    def ridge(self) -> float:
+        """Tikhonov penalty relative to the sum of weights; 0 on a full turn."""
+        return 0.0 if self.model.fit is None else self.model.fit.ridge
+
+    @property
+    def covariance(self) -> Array:
+        """Of ``[constant, A, B of each order of each shaft in turn]``."""
+        if self.model.covariance is None:
+            raise ArgumentError(
+                "no covariance: as many unknowns as readings leave no residual to take it from"
+            )
+        return self.model.covariance
+
+    @cached_property
+    def residuals(self) -> Array:
+        """Measured less fitted error of every reading, run after run, zeros removed."""
+        return np.concatenate(self.problem.residuals(self.fitted))
+
+    @property
+    def wild(self) -> tuple[tuple[str, int], ...]:
+        """Label and row (from 0) of every reading that was set aside."""
+        if self.weights is None:
+            return ()
+        return tuple(
+            (run.label or str(i), int(row))
+            for i, (run, weights) in enumerate(zip(self.runs, self.weights, strict=True))
+            for row in np.flatnonzero(
+                (weights == 0.0) & (True if run.weights is None else run.weights > 0.0)
+            )
+        )
+
+    @property
+    def orders(self) -> tuple[float, ...]:
+        """Output orders of all harmonics, shaft by shaft."""
+        return self.model.orders
+
+    @property
+    def amplitudes(self) -> Array:
+        """``C_k`` of all harmonics."""
+        return self.model.amplitudes
+
+    @property
+    def phases(self) -> Array:
+        """``phi_k`` in radians of all harmonics."""
+        return self.model.phases
+
+    @cached_property
+    def amplitude_std(self) -> Array:
+        r"""Standard error of every amplitude, to first order from the covariance.
+
+        .. math:: u(C)^2 = (A^2 u_A^2 + B^2 u_B^2 + 2 A B u_{AB}) / C^2
+
+        Where ``C`` is not well above it the amplitude is Rice distributed and this is a
+        lower bound: judge such orders by (A, B) and their covariance (JCGM 102).
+        """
+        return self._polar_std(along=True)
+
+    @cached_property
+    def phase_std(self) -> Array:
+        r"""Standard error of every phase in radians.
+
+        .. math:: u(\varphi)^2 = (B^2 u_A^2 + A^2 u_B^2 - 2 A B u_{AB}) / C^4
+        """
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return self._polar_std(along=False) / self.amplitudes
+
+    def _polar_std(self, along: bool) -> Array:
+        a = np.concatenate([np.zeros(0), *(s.cosine for s in self.model.shafts)])
+        b = np.concatenate([np.zeros(0), *(s.sine for s in self.model.shafts)])
+        index = 1 + 2 * np.arange(a.size)
+        cov = self.covariance
+        aa, bb, ab = cov[index, index], cov[index + 1, index + 1], cov[index, index + 1]
+        with np.errstate(divide="ignore", invalid="ignore"):
+            u, v = (a, b) / np.hypot(a, b) if along else (b, -a) / np.hypot(a, b)
+        # A zero amplitude has no direction: any will do.
+        u, v = np.where(np.isfinite(u), u, 1.0), np.where(np.isfinite(v), v, 0.0)
+        return np.asarray(np.sqrt(np.maximum(u * u * aa + v * v * bb + 2.0 * u * v * ab, 0.0)))
+
+    def summary(self) -> str:
+        """The result as text: coefficients with uncertainties, quality, notes."""
+        from .summaries import fit_summary
+
+        return fit_summary(self)
+
+    def plot(self, ax: Any = None) -> Any:
+        """Measured error of all runs with the model and its band (needs matplotlib)."""
+        from .plots import plot_fit
+
+        return plot_fit(self, ax=ax)

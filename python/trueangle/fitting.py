@@ -1,0 +1,220 @@
+"""Fitting a harmonic model to calibration runs by least squares."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from . import __version__
+from .angles import wrap
+from .errors import ArgumentError, NoModelError
+from .fitresult import FitResult
+from .model import Argument, FitRecord, HarmonicModel, Provenance, Shaft
+from .problem import Fitted, Problem
+from .robust import Loss, Weighted, weigh, without_spikes
+from .runs import CalibrationRun, as_runs
+from .shafts import resolve_orders
+from .travel import Span, choose_ridge, covered_span
+from .units import check_follows
+
+if TYPE_CHECKING:
+    from .orders import OrderSelection
+
+__all__ = ["fit"]
+
+#: Rounding of angles around a whole turn, in parts of a turn: smaller deviations are
+#: never taken for wild readings.
+_ROUNDING = 1e-12
+
+
+def fit(
+    runs: CalibrationRun | Iterable[CalibrationRun],
+    orders: Iterable[int] | Mapping[str, Iterable[int]] | str | None = None,
+    *,
+    gear_ratio: float | None = None,
+    fixed_member: str = "circular_spline",
+    shafts: Mapping[str, float] | None = None,
+    argument: Argument = "reference",
+    loss: Loss = "auto",
+    ridge: float | None = None,
+    method: str | None = None,
+    threads: int | None = None,
+) -> FitResult:
+    r"""Fit a harmonic model to one run or several.
+
+    .. math:: e_{rj} = z_r + \sum_s \sum_k A_{sk} \cos(k f_s x_{rj}) + B_{sk} \sin(k f_s x_{rj})
+
+    with one zero :math:`z_r` per run, by (weighted) linear least squares (paper Eq. 1).
+
+    Parameters
+    ----------
+    runs : CalibrationRun or iterable of them
+        Readings in any unit, at any angles, with any zero and any number of turns.
+    orders : iterable of int, mapping, "auto" or None
+        Orders of the output shaft; or ``{"output": [1, 2], "motor": [1, 2, 4]}``. None and
+        ``"auto"`` select them by evidence (`select_orders`).
+    gear_ratio : float, optional
+        Motor turns per output turn: makes the shafts ``motor`` and ``wave_generator``
+        known, and gear orders candidates of the selection.
+    fixed_member : {"circular_spline", "flexspline", "none"}
+        Of the strain wave gear: decides how fast the wave generator turns against the output.
+    shafts : mapping of str to float, optional
+        Further shafts and their cycles per output turn.
+    argument : {"reference", "indicated"}
+        Which angle the error is a function of. The true angle is right physically.
+    loss : {"auto", "linear", "huber", "tukey"}
+        ``"auto"``: least squares, after readings more than 8 robust standard deviations
+        off are set aside (and reported); ``"linear"``: least squares on all readings.
+    ridge : float, optional
+        Tikhonov penalty relative to the sum of weights. By default 0 on a full turn, and
+        chosen by held-out error on partial travel (`trueangle.travel.choose_ridge`).
+    method : {"plain", "moments", "qr"}, optional
+        Forces a way of solving.
+    threads : int, optional
+
+    Returns
+    -------
+    FitResult
+
+    Raises
+    ------
+    RankError
+        The readings cannot tell the orders apart; names those at fault.
+    NoModelError
+        Orders were to be selected and the data support none; says why.
+    ArgumentError
+        Runs in different units, an indicated angle that does not follow the reference
+        (wrong unit or sign), unknown shafts, and the like.
+    NotInvertibleError
+        The fitted error is too steep to be corrected.
+
+    Notes
+    -----
+    Coefficients agree with `numpy.linalg.lstsq` to 1e-12 relative on well-conditioned
+    data. Cost O(N) for N readings beyond a few thousand, whatever the number of orders.
+
+    Examples
+    --------
+    >>> theta = np.arange(0.0, 360.0, 10.0)
+    >>> run = CalibrationRun(theta, theta + 0.5 * np.sin(np.radians(theta)), period=360.0)
+    >>> result = fit(run, orders=[1, 2], loss="linear")
+    >>> result.model.shafts[0].sine[0].__round__(9)
+    0.5
+    """
+    found = as_runs(runs)
+    for run in found:
+        check_follows(run)
+    selection = None
+    if orders is None or isinstance(orders, str):
+        selection, orders = _selected(found, orders, gear_ratio, fixed_member, loss)
+    problem = Problem(
+        found, resolve_orders(orders, gear_ratio, fixed_member, shafts), argument, method, threads
+    )
+    weighted = weigh(problem, loss, _ROUNDING * problem.period)
+    weights = problem.base if weighted.weights is None else weighted.weights
+    span = covered_span(np.concatenate(problem.angles), problem.period)
+    if ridge is None:
+        ridge = 0.0 if span.full or not problem.unknowns else choose_ridge(problem, weights)
+    fitted = problem.solve(weights, ridge) if ridge > 0.0 else weighted.fitted
+    notes = tuple(_notes(problem, weighted, ridge, span, selection))
+    record = _record(problem, weighted, fitted, loss, ridge, span, notes)
+    model = _model(problem, fitted, record)
+    kept = None if weighted.weights is None else tuple(weighted.weights)
+    return FitResult(model, problem, fitted, kept, selection, notes)
+
+
+def _selected(
+    runs: Sequence[CalibrationRun],
+    orders: str | None,
+    gear_ratio: float | None,
+    fixed_member: str,
+    loss: Loss,
+) -> tuple[OrderSelection, Iterable[int]]:
+    """Orders with evidence, from readings without spikes."""
+    from .orders import select_orders
+
+    if orders not in (None, "auto"):
+        raise ArgumentError(f"orders must be whole numbers, a mapping or 'auto', got {orders!r}")
+    if loss != "linear":
+        runs = [without_spikes(run) for run in runs]
+    selection = select_orders(runs, gear_ratio=gear_ratio, fixed_member=fixed_member)
+    if not selection.orders:
+        raise NoModelError(f"no order is supported by the data: {selection.reason}")
+    return selection, selection.orders
+
+
+def _notes(
+    problem: Problem,
+    weighted: Weighted,
+    ridge: float,
+    span: Span,
+    selection: OrderSelection | None,
+) -> Iterable[str]:
+    """What not to trust and why, one sentence each."""
+    if not span.full:
+        yield (f"Fitted on {span.start:.6g} to {span.stop:.6g} only: outside it is extrapolated.")
+    if ridge > 0.0:
+        yield (
+            f"On this arc the orders nearly cancel: a ridge of {ridge:.1e}, chosen by held-out "
+            "error, keeps the amplitudes small; single coefficients have no meaning of their own."
+        )
+    if weighted.weights is not None and weighted.wild:
+        yield f"{weighted.wild} wild reading{'s' if weighted.wild > 1 else ''} set aside."
+    fractional = [s.name for s in problem.shafts if s.cycles_per_turn % 1.0]
+    if fractional:
+        yield (
+            f"Shaft {', '.join(fractional)} does not turn a whole number of times per output "
+            "turn: the error does not repeat after one turn, angles must be unwrapped."
+        )
+    if selection is not None and selection.note:
+        yield selection.note
+
+
+def _record(
+    problem: Problem,
+    weighted: Weighted,
+    fitted: Fitted,
+    loss: str,
+    ridge: float,
+    span: Span,
+    notes: Sequence[str],
+) -> FitRecord:
+    solution = fitted.solution
+    variance = solution.residual_variance
+    used = fitted.offsets[np.isfinite(fitted.offsets)]
+    around = wrap(used - solution.constant, problem.period)
+    return FitRecord(
+        samples=sum(len(run) for run in problem.runs),
+        runs=len(problem.runs),
+        span=(span.start, span.stop),
+        residual=math.sqrt(variance) if math.isfinite(variance) else None,
+        method=solution.method,
+        loss=loss,
+        wild=weighted.wild,
+        ridge=ridge,
+        offsets=tuple(used.tolist()),
+        offset_spread=float(around.std(ddof=1)) if used.size > 1 else 0.0,
+        note=" ".join(notes),
+    )
+
+
+def _model(problem: Problem, fitted: Fitted, record: FitRecord) -> HarmonicModel:
+    solution = fitted.solution
+    covariance = np.asarray(solution.covariance)
+    sources = dict.fromkeys(run.source for run in problem.runs if run.source is not None)
+    return HarmonicModel(
+        shafts=tuple(
+            Shaft(shaft.name, shaft.cycles_per_turn, shaft.orders, tuple(a), tuple(b))
+            for shaft, a, b in zip(problem.shafts, solution.cosine, solution.sine, strict=True)
+        ),
+        constant=solution.constant,
+        period=problem.period,
+        argument=problem.argument,
+        covariance=covariance if np.isfinite(covariance).all() else None,
+        condition_number=solution.condition_number,
+        fit=record,
+        provenance=Provenance(tuple(sources), f"trueangle {__version__}"),
+    )

@@ -1,0 +1,1 @@
+"""Encoder logs: read, correct and write them in constant memory."""

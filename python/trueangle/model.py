@@ -1,0 +1,441 @@
+"""The harmonic model of an angle error: evaluate it, correct by it, save it."""
+
+from __future__ import annotations
+
+import math
+import warnings
+from collections.abc import Callable
+from dataclasses import dataclass, field, fields, replace
+from functools import cached_property
+from os import PathLike
+from typing import Any, Literal, TypeAlias, overload
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from . import _core
+from .angles import check_period
+from .errors import ArgumentError, NotInvertibleError, OutsideSpanWarning
+from .runs import Source
+
+__all__ = ["Argument", "FitRecord", "HarmonicModel", "Provenance", "Shaft", "load_model"]
+
+Argument: TypeAlias = Literal["reference", "indicated"]
+Array: TypeAlias = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Shaft:
+    """Harmonics of one shaft: order ``k`` is the output order ``k * cycles_per_turn``.
+
+    Parameters
+    ----------
+    name : str
+        ``"output"``, ``"motor"``, ``"wave_generator"`` or a name of your own.
+    cycles_per_turn : float
+        Turns of the shaft per output turn; any positive real.
+    orders : iterable of int
+        Whole numbers from 1, increasing.
+    cosine, sine : iterable of float
+        ``A_k`` and ``B_k``, in the unit of the model's period.
+    """
+
+    name: str
+    cycles_per_turn: float
+    orders: tuple[int, ...]
+    cosine: tuple[float, ...]
+    sine: tuple[float, ...]
+
+    def __post_init__(self) -> None:
+        put = object.__setattr__
+        put(self, "cycles_per_turn", float(self.cycles_per_turn))
+        put(self, "orders", tuple(int(k) for k in self.orders))
+        put(self, "cosine", tuple(float(a) for a in self.cosine))
+        put(self, "sine", tuple(float(b) for b in self.sine))
+
+    @property
+    def amplitudes(self) -> Array:
+        """``C_k = hypot(A_k, B_k)``."""
+        return np.hypot(self.cosine, self.sine)
+
+    @property
+    def phases(self) -> Array:
+        """``phi_k = atan2(A_k, B_k)`` in radians: the term is ``C sin(k x + phi)``."""
+        return np.arctan2(self.cosine, self.sine)
+
+
+@dataclass(frozen=True)
+class FitRecord:
+    """How a model was fitted: what its file says under ``fit``.
+
+    ``span`` is the stretch of angles the fit has seen, ``(0, period)`` for a full turn;
+    ``residual`` is the residual standard deviation (None where no reading is left over to
+    take it from), ``offsets`` the zero of every run and ``offset_spread`` their standard
+    deviation, all in the unit of the model's period. ``positions`` counts the distinct
+    angles within a turn; ``note`` says where the model is verified and where not.
+    """
+
+    samples: int
+    runs: int
+    span: tuple[float, float]
+    residual: float | None
+    method: str = "plain"
+    loss: str = "linear"
+    wild: int = 0
+    ridge: float = 0.0
+    offsets: tuple[float, ...] = ()
+    offset_spread: float = 0.0
+    positions: int | None = None
+    note: str = ""
+
+
+@dataclass(frozen=True)
+class Provenance:
+    """Where a model came from: its input files with their sha256, and the package."""
+
+    inputs: tuple[Source, ...] = ()
+    package: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class HarmonicModel:
+    r"""Angle error as a constant and harmonics of one or more shafts; immutable.
+
+    .. math:: \varepsilon(x) = C_0 + \sum_s \sum_k A_{sk} \cos(k f_s x) + B_{sk} \sin(k f_s x)
+
+    with ``x`` counted in turns of ``2 pi``; error = indicated - reference.
+
+    Parameters
+    ----------
+    shafts : iterable of Shaft
+    constant : float
+        ``C_0``.
+    period : float
+        One turn in the unit of every angle, amplitude and of the constant.
+    argument : {"reference", "indicated"}
+        Which angle ``x`` is: the true one, then correcting solves
+        ``theta + error(theta) = indicated``, or the joint's own reading.
+    covariance : array_like, optional
+        Of ``[C_0, A, B of each order of each shaft in turn]``.
+    condition_number : float, optional
+        Of the design the fit has seen.
+    fit : FitRecord, optional
+    provenance : Provenance, optional
+
+    Raises
+    ------
+    ArgumentError
+        Numbers that are not finite, orders that are not increasing, and the like.
+    NotInvertibleError
+        ``argument="reference"`` and ``|d error / d angle|`` may reach 1.
+
+    Examples
+    --------
+    >>> model = HarmonicModel([Shaft("output", 1, [1], [0.0], [0.5])], period=360.0)
+    >>> model.error(90.0)
+    0.5
+    >>> round(model.correct(90.5), 9)
+    90.0
+    """
+
+    shafts: tuple[Shaft, ...]
+    constant: float = 0.0
+    period: float = 2.0 * math.pi
+    argument: Argument = "reference"
+    covariance: Array | None = field(default=None, repr=False)
+    condition_number: float | None = None
+    fit: FitRecord | None = None
+    provenance: Provenance = Provenance()
+
+    def __post_init__(self) -> None:
+        put = object.__setattr__
+        put(self, "period", check_period(self.period))
+        put(self, "constant", float(self.constant))
+        put(self, "shafts", tuple(self.shafts))
+        if self.argument not in ("reference", "indicated"):
+            raise ArgumentError(
+                f"argument must be 'reference' or 'indicated', got {self.argument!r}"
+            )
+        if self.argument == "reference" and self._series.slope_bound >= 1.0:
+            raise NotInvertibleError(
+                f"|error'| may reach {self._series.slope_bound:.3g}: from 1 on an indicated "
+                "angle stands for several true angles and cannot be corrected; use fewer or "
+                "lower orders, or argument='indicated'",
+                self._series.slope_bound,
+            )
+        if self.covariance is not None:
+            put(self, "covariance", self._checked_covariance(self.covariance))
+
+    @cached_property
+    def _warn(self) -> _SpanGuard:
+        return _SpanGuard(self)
+
+    @cached_property
+    def _series(self) -> _core.Series:
+        names = [shaft.name for shaft in self.shafts]
+        if len(set(names)) != len(names):
+            raise ArgumentError(f"shaft names must differ, got {', '.join(names)}")
+        return _core.Series(
+            self.period,
+            self.constant,
+            [shaft.cycles_per_turn for shaft in self.shafts],
+            [list(shaft.orders) for shaft in self.shafts],
+            [list(shaft.cosine) for shaft in self.shafts],
+            [list(shaft.sine) for shaft in self.shafts],
+            self.argument,
+        )
+
+    def _checked_covariance(self, covariance: ArrayLike) -> Array:
+        matrix = np.array(covariance, dtype=np.float64)
+        size = 1 + 2 * sum(len(shaft.orders) for shaft in self.shafts)
+        if matrix.shape != (size, size) or not np.isfinite(matrix).all():
+            raise ArgumentError(
+                f"covariance must be {size} x {size} finite numbers "
+                f"(constant, then A and B of every order), got shape {matrix.shape}"
+            )
+        matrix.flags.writeable = False
+        return matrix
+
+    # -- evaluation ---------------------------------------------------------------
+
+    @overload
+    def error(
+        self, theta: float, out: None = None, *, threads: int | None = None, path: str | None = None
+    ) -> float: ...
+    @overload
+    def error(
+        self,
+        theta: ArrayLike,
+        out: NDArray[Any] | None = None,
+        *,
+        threads: int | None = None,
+        path: str | None = None,
+    ) -> NDArray[Any]: ...
+    def error(
+        self,
+        theta: ArrayLike,
+        out: NDArray[Any] | None = None,
+        *,
+        threads: int | None = None,
+        path: str | None = None,
+    ) -> float | NDArray[Any]:
+        """Error of the joint at angle ``theta``, in the unit of ``period``.
+
+        Parameters
+        ----------
+        theta : float or array_like
+            The model's `argument`: any shape, any number of turns. float32 gives
+            float32, integers (counts) and everything else float64.
+        out : ndarray, optional
+            Where to put the result, of the result's shape and type; may be ``theta``.
+        threads : int, optional
+            At most so many; by default all allowed to the process for large arrays.
+        path : {"table", "exact", "direct", "counts"}, optional
+            Forces a way of evaluation (`path` names the one taken by default).
+
+        Returns
+        -------
+        float or ndarray
+            A float for a float. NaN and infinite angles give NaN.
+
+        Raises
+        ------
+        ArgumentError
+            ``out`` of the wrong shape or type, or partly overlapping ``theta``.
+
+        Notes
+        -----
+        Within 3e-15 of the sum of amplitudes for angles up to a million radians and
+        orders up to 512; the cost does not depend on the number of orders when every
+        shaft turns a whole number of times per turn.
+        """
+        return self._series.error(theta, out, threads, path)
+
+    @overload
+    def correct(
+        self,
+        indicated: float,
+        out: None = None,
+        *,
+        threads: int | None = None,
+        path: str | None = None,
+    ) -> float: ...
+    @overload
+    def correct(
+        self,
+        indicated: ArrayLike,
+        out: NDArray[Any] | None = None,
+        *,
+        threads: int | None = None,
+        path: str | None = None,
+    ) -> NDArray[Any]: ...
+    def correct(
+        self,
+        indicated: ArrayLike,
+        out: NDArray[Any] | None = None,
+        *,
+        threads: int | None = None,
+        path: str | None = None,
+    ) -> float | NDArray[Any]:
+        """True angle behind an indicated one: ``indicated - error(true angle)``.
+
+        With ``argument="reference"`` this solves ``theta + error(theta) = indicated``
+        to below 1e-12 of a turn; with ``"indicated"`` it is ``indicated -
+        error(indicated)``. Turns are kept: the result is not wrapped.
+
+        Parameters and errors are those of `error`.
+
+        Warns
+        -----
+        OutsideSpanWarning
+            Once per model, when it was fitted on part of a turn only and a corrected
+            angle lies outside that part.
+        """
+        corrected = self._series.correct(indicated, out, threads, path)
+        if self._warn.armed:
+            self._warn(corrected)
+        return corrected
+
+    def compensator(self) -> Callable[[float], float]:
+        """``step(indicated) -> corrected`` for one sample at a time.
+
+        The cheapest call there is: a bound method of the compiled core, no allocation
+        but the result, the same number as `correct`. It does not warn about the span.
+
+        Examples
+        --------
+        >>> model = HarmonicModel([Shaft("output", 1, [1], [0.0], [0.5])], period=360.0)
+        >>> step = model.compensator()
+        >>> round(step(90.5), 9)
+        90.0
+        """
+        return self._series.compensator().step
+
+    # -- description --------------------------------------------------------------
+
+    @property
+    def path(self) -> str:
+        """Way of evaluation taken for batches by default, and the instruction set."""
+        return self._series.path
+
+    @property
+    def orders(self) -> tuple[float, ...]:
+        """Output orders ``k * cycles_per_turn`` of all harmonics, shaft by shaft."""
+        return tuple(k * s.cycles_per_turn for s in self.shafts for k in s.orders)
+
+    @property
+    def amplitudes(self) -> Array:
+        """``C_k`` of all harmonics, shaft by shaft."""
+        return np.concatenate([np.zeros(0), *(shaft.amplitudes for shaft in self.shafts)])
+
+    @property
+    def phases(self) -> Array:
+        """``phi_k`` in radians of all harmonics, shaft by shaft."""
+        return np.concatenate([np.zeros(0), *(shaft.phases for shaft in self.shafts)])
+
+    @property
+    def is_periodic(self) -> bool:
+        """True when the error repeats after one output turn: all cycles are whole."""
+        return self._series.is_periodic
+
+    @property
+    def partial_span(self) -> tuple[float, float] | None:
+        """The stretch the model was fitted on when that was not the whole turn."""
+        if self.fit is None:
+            return None
+        start, stop = self.fit.span
+        return None if stop - start >= self.period or not self.is_periodic else (start, stop)
+
+    def band(self, theta: ArrayLike) -> Array:
+        r"""Standard deviation of the fitted error at ``theta``, from the covariance.
+
+        .. math:: u(\varepsilon(x))^2 = g(x)^T \,\mathrm{cov}\, g(x)
+
+        with ``g`` the row of regressors at ``x``.
+
+        Raises
+        ------
+        ArgumentError
+            The model has no covariance.
+        """
+        from .reference import design_matrix
+
+        if self.covariance is None:
+            raise ArgumentError("the model has no covariance: it was not made by a fit")
+        x = np.asarray(theta, dtype=np.float64)
+        shafts = [(shaft.cycles_per_turn, shaft.orders) for shaft in self.shafts]
+        rows = design_matrix(x.ravel(), shafts, self.period)
+        return np.sqrt(np.einsum("ij,jk,ik->i", rows, self.covariance, rows)).reshape(x.shape)
+
+    def replace(self, **changes: Any) -> HarmonicModel:
+        """A copy with some fields changed, checked anew."""
+        return replace(self, **changes)
+
+    def save(self, path: str | PathLike[str]) -> None:
+        """Write the model file (JSON): complete or not at all.
+
+        Floats are written so that they read back bit for bit.
+        """
+        from .modelfile import save_model
+
+        save_model(self, path)
+
+    # -- identity -----------------------------------------------------------------
+
+    def _values(self) -> tuple[Any, ...]:
+        cov = None if self.covariance is None else self.covariance.tobytes()
+        rest = (entry.name for entry in fields(self) if entry.name != "covariance")
+        return (*(getattr(self, name) for name in rest), cov)
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, HarmonicModel):
+            return NotImplemented
+        return self._values() == other._values()
+
+    def __hash__(self) -> int:
+        return hash(self._values())
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return _rebuild, ({entry.name: getattr(self, entry.name) for entry in fields(self)},)
+
+
+class _SpanGuard:
+    """Warns once when corrected angles leave the stretch a model was fitted on."""
+
+    def __init__(self, model: HarmonicModel) -> None:
+        self.span = model.partial_span
+        self.period = model.period
+        self.armed = self.span is not None
+
+    def __call__(self, corrected: ArrayLike) -> None:
+        if self.span is None:
+            return
+        start, stop = self.span
+        outside = np.mod(np.asarray(corrected) - start, self.period) > stop - start
+        if outside.any():
+            self.armed = False
+            warnings.warn(
+                f"{np.count_nonzero(outside)} of {outside.size} corrected angles lie outside "
+                f"the {start:.6g} to {stop:.6g} the model was fitted on: there it is "
+                "extrapolated and may be far off (said once per model)",
+                OutsideSpanWarning,
+                stacklevel=3,
+            )
+
+
+def load_model(path: str | PathLike[str]) -> HarmonicModel:
+    """Read and check a model file; nothing in it is executed.
+
+    Raises
+    ------
+    ModelFileError
+        Not JSON, truncated, of a later version, unknown or missing keys, numbers that
+        are not finite, a model that cannot be inverted: names the key and what to do.
+    """
+    from .modelfile import load_model as load
+
+    return load(path)
+
+
+def _rebuild(values: dict[str, Any]) -> HarmonicModel:
+    return HarmonicModel(**values)

@@ -1,0 +1,163 @@
+"""A least-squares problem: runs, shafts and orders, solved as often as weights change."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from . import _core
+from .angles import circular_mean, wrap
+from .errors import ArgumentError
+from .model import Argument
+from .runs import CalibrationRun
+from .shafts import ShaftOrders
+
+__all__ = ["Fitted", "Problem"]
+
+Array = NDArray[np.float64]
+
+#: Readings looked at together when residuals are only scanned: stays in cache.
+_BLOCK = 16384
+
+
+class Fitted:
+    """A solution and the series it stands for."""
+
+    def __init__(
+        self,
+        solution: _core.Solution,
+        offsets: Array,
+        shafts: Sequence[ShaftOrders],
+        period: float,
+    ) -> None:
+        self.solution = solution
+        #: Zero of every run; NaN for a run without any weight.
+        self.offsets = offsets
+        self.series = _core.Series(
+            period,
+            solution.constant,
+            [shaft.cycles_per_turn for shaft in shafts],
+            [list(shaft.orders) for shaft in shafts],
+            solution.cosine,
+            solution.sine,
+        )
+
+    @property
+    def amplitude_sum(self) -> float:
+        """Sum of all amplitudes."""
+        return self.series.amplitude_sum
+
+    def predict(self, angles: Array) -> Array:
+        """Error at ``angles``, the runs' mean zero included."""
+        return np.asarray(self.series.error(angles))
+
+
+class Problem:
+    """The readings of several runs and the regressors asked for.
+
+    Parameters
+    ----------
+    runs : sequence of CalibrationRun
+        Of one period.
+    shafts : sequence of ShaftOrders
+    argument : {"reference", "indicated"}
+    method, threads
+        Passed to the core's least squares.
+    """
+
+    def __init__(
+        self,
+        runs: Sequence[CalibrationRun],
+        shafts: Sequence[ShaftOrders],
+        argument: Argument,
+        method: str | None = None,
+        threads: int | None = None,
+    ) -> None:
+        self.runs = runs
+        self.shafts = shafts
+        self.argument = argument
+        self.method = method
+        self.threads = threads
+        self.period = runs[0].period
+        self.base: list[Array | None] = [run.weights for run in runs]
+
+    @property
+    def unknowns(self) -> int:
+        """Two per order; the zeros of the runs are not counted."""
+        return 2 * sum(len(shaft.orders) for shaft in self.shafts)
+
+    @cached_property
+    def angles(self) -> list[Array]:
+        """The argument of every run."""
+        return [getattr(run, self.argument) for run in self.runs]
+
+    @cached_property
+    def errors(self) -> list[Array]:
+        """The measured error of every run, unfolded around its zero."""
+        return [run.centred_error for run in self.runs]
+
+    def solve(self, weights: Sequence[Array | None], penalty: float = 0.0) -> Fitted:
+        """Least squares under ``weights``, with an optional Tikhonov penalty.
+
+        ``penalty`` is relative to the sum of weights, see `trueangle.travel.choose_ridge`.
+        """
+        used = [weight is None or bool(weight.any()) for weight in weights]
+        rows = [
+            (run.reference, run.indicated, weight)
+            for run, weight, taken in zip(self.runs, weights, used, strict=True)
+            if taken
+        ]
+        if not rows:
+            raise ArgumentError("every reading has weight 0: nothing is left to fit")
+        ridge = None
+        if penalty > 0.0:
+            total = sum(x.size if w is None else float(w.sum()) for x, _, w in rows)
+            ridge = np.full(self.unknowns, penalty * total)
+        solution = _core.fit(
+            rows,
+            self.period,
+            [shaft.cycles_per_turn for shaft in self.shafts],
+            [list(shaft.orders) for shaft in self.shafts],
+            self.argument,
+            self.method,
+            ridge,
+            self.threads,
+        )
+        offsets = np.full(len(self.runs), np.nan)
+        offsets[used] = solution.offsets
+        return Fitted(solution, offsets, self.shafts, self.period)
+
+    def residuals(self, fitted: Fitted) -> list[Array]:
+        """Measured less fitted error of every run, each around its own zero."""
+        return [np.concatenate(list(self._blocks(fitted, i))) for i in range(len(self.runs))]
+
+    def scan(self, fitted: Fitted) -> tuple[Array, float]:
+        """A sample of the residuals of weight above 0, and the largest, in constant memory."""
+        stride = max(1, sum(len(run) for run in self.runs) // _BLOCK)
+        sample, largest = [], 0.0
+        for i, weight in enumerate(self.base):
+            for j, block in enumerate(self._blocks(fitted, i)):
+                used = (
+                    block
+                    if weight is None
+                    else block[weight[j * _BLOCK : j * _BLOCK + block.size] > 0.0]
+                )
+                if used.size:
+                    sample.append(used[::stride])
+                    largest = max(largest, float(np.abs(used).max()))
+        return np.concatenate(sample), largest
+
+    def _blocks(self, fitted: Fitted, index: int) -> Iterator[Array]:
+        """Residuals of one run, piece by piece."""
+        run, angles = self.runs[index], self.angles[index]
+        offset, constant = fitted.offsets[index], fitted.solution.constant
+        for i in range(0, len(run), _BLOCK):
+            part = slice(i, i + _BLOCK)
+            shape = fitted.predict(angles[part]) - constant
+            rest = run.indicated[part] - run.reference[part] - shape
+            if np.isnan(offset):
+                offset = circular_mean(rest, self.period)
+            yield wrap(rest - offset, self.period)

@@ -1,0 +1,198 @@
+"""Wild readings: losses of robust fitting, and setting readings aside.
+
+A bit flip or a slipped tooth leaves one reading degrees off, and least squares spreads
+it over every coefficient.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from typing import Literal, NamedTuple, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .errors import ArgumentError
+from .problem import Fitted, Problem
+from .runs import CalibrationRun
+
+__all__ = ["LOSSES", "Loss", "Weighted", "robust_scale", "weigh", "without_spikes"]
+
+Array = NDArray[np.float64]
+Loss: TypeAlias = Literal["auto", "linear", "huber", "tukey"]
+LOSSES: tuple[Loss, ...] = ("auto", "linear", "huber", "tukey")
+
+#: Tuning constants for 95 % efficiency at the normal distribution (Huber 1981, Beaton
+#: and Tukey 1974).
+HUBER = 1.345
+TUKEY = 4.685
+
+#: Median absolute deviation to standard deviation, for the normal distribution.
+MAD_TO_SIGMA = 1.4826
+
+#: Readings further off than this are wild. Of 1e12 normal readings not one is.
+WILD = 8.0
+
+#: With more than this share beyond `WILD` the readings are not wild: the model lacks an
+#: effect, and least squares on all of them is the honest answer.
+WILD_SHARE = 0.2
+
+#: Iterations of re-weighting end when no weight moves by more than this, or after `STEPS`.
+SETTLED = 1e-4
+STEPS = 50
+
+#: Readings whose median a spike is held against.
+_NEIGHBOURS = 7
+
+#: The scale is taken from at most about so many readings.
+SAMPLE = 4096
+
+
+class Weighted(NamedTuple):
+    """A robust fit: its weights (None where all are as given) and what it ended with."""
+
+    fitted: Fitted
+    weights: list[Array] | None
+    wild: int
+
+
+def robust_scale(residuals: Array) -> float:
+    """Standard deviation by the median absolute deviation: half the readings may be wild."""
+    stride = max(1, residuals.size // SAMPLE)
+    sample = residuals[::stride]
+    return MAD_TO_SIGMA * float(np.median(np.abs(sample)))
+
+
+def weigh(problem: Problem, loss: Loss, floor: float) -> Weighted:
+    """Fit under a robust loss.
+
+    ``"linear"`` keeps the weights given. ``"huber"`` and ``"tukey"`` re-weight until the
+    weights settle. ``"auto"`` fits by least squares, and only where a reading lies more
+    than 8 robust standard deviations off sets such readings aside (weight 0), starting
+    from the Huber fit so that they cannot hide each other; the rest is plain least
+    squares, so clean data give the least-squares coefficients exactly.
+
+    Parameters
+    ----------
+    problem : Problem
+    loss : {"auto", "linear", "huber", "tukey"}
+    floor : float
+        Deviations below this are rounding, never wild.
+
+    Returns
+    -------
+    Weighted
+        ``wild`` counts readings of weight 0 that were given more.
+    """
+    if loss not in LOSSES:
+        raise ArgumentError(f"loss must be one of {', '.join(LOSSES)}, got {loss!r}")
+    if loss == "linear":
+        return Weighted(problem.solve(problem.base), None, 0)
+    if loss == "auto":
+        return _set_aside(problem, floor)
+    weights = _iterate(problem, _huber, problem.base, floor)
+    if loss == "tukey":
+        weights = _iterate(problem, _tukey, weights, floor)
+    wild = sum(
+        int(np.count_nonzero((w == 0.0) & (_given(b, w.size) > 0.0)))
+        for w, b in zip(weights, problem.base, strict=True)
+    )
+    return Weighted(problem.solve(weights), weights, wild)
+
+
+def _set_aside(problem: Problem, floor: float) -> Weighted:
+    plain = Weighted(problem.solve(problem.base), None, 0)
+    sample, largest = problem.scan(plain.fitted)
+    if largest <= max(WILD * robust_scale(sample), floor):
+        return plain
+    found = plain
+    wild = _wild(problem, problem.solve(_iterate(problem, _huber, problem.base, floor)), floor)
+    for _ in range(STEPS):
+        share = np.count_nonzero(wild) / wild.size
+        if share == 0.0 or share > WILD_SHARE:
+            return plain
+        edges = np.cumsum([len(run) for run in problem.runs])[:-1]
+        weights = [
+            np.where(far, 0.0, _given(b, far.size))
+            for far, b in zip(np.split(wild, edges), problem.base, strict=True)
+        ]
+        found = Weighted(problem.solve(weights), weights, int(np.count_nonzero(wild)))
+        again = _wild(problem, found.fitted, floor)
+        if (again == wild).all():
+            break
+        wild = again
+    return found
+
+
+def without_spikes(run: CalibrationRun) -> CalibrationRun:
+    """The run with isolated wild readings given weight 0, found without any model.
+
+    A reading is a spike when it lies more than 8 robust standard deviations off the
+    median of its neighbours in angle; an error that changes as much from neighbour to
+    neighbour widens the limit itself. For choosing orders; `weigh` looks again with the
+    model in hand.
+    """
+    if len(run) < 4 * _NEIGHBOURS:
+        return run
+    error = run.centred_error
+    order = np.argsort(np.mod(run.reference, run.period), kind="stable")
+    half = _NEIGHBOURS // 2
+    around = np.concatenate([error[order[-half:]], error[order], error[order[:half]]])
+    windows = np.lib.stride_tricks.sliding_window_view(around, _NEIGHBOURS)
+    deviation = np.empty_like(error)
+    deviation[order] = error[order] - np.median(windows, axis=1)
+    distance = np.abs(deviation)
+    # The mean keeps the limit above 0 where half of the deviations are exactly 0.
+    wild = distance > WILD * max(robust_scale(deviation), float(distance.mean()))
+    if not wild.any() or wild.mean() > WILD_SHARE:
+        return run
+    return replace(run, weights=np.where(wild, 0.0, _given(run.weights, wild.size)))
+
+
+def _wild(problem: Problem, fitted: Fitted, floor: float) -> NDArray[np.bool_]:
+    """Which of all readings, run after run, are wild; those of weight 0 never are."""
+    residuals = problem.residuals(fitted)
+    everything = np.concatenate(residuals)
+    given = [_given(b, r.size) for b, r in zip(problem.base, residuals, strict=True)]
+    used = np.concatenate(given) > 0.0
+    limit = max(WILD * robust_scale(everything[used]), floor)
+    return np.asarray((np.abs(everything) > limit) & used)
+
+
+def _iterate(
+    problem: Problem,
+    weight: Callable[[Array], Array],
+    start: Sequence[Array | None],
+    floor: float,
+) -> list[Array]:
+    """Re-weight from ``start`` until no weight moves."""
+    current: Sequence[Array | None] = start
+    weights: list[Array] = []
+    for _ in range(STEPS):
+        residuals = problem.residuals(problem.solve(current))
+        scale = max(robust_scale(np.concatenate(residuals)), floor)
+        weights = [
+            _given(b, r.size) * weight(np.abs(r) / scale)
+            for b, r in zip(problem.base, residuals, strict=True)
+        ]
+        moved = max(
+            float(np.abs(w - _given(c, w.size)).max())
+            for w, c in zip(weights, current, strict=True)
+        )
+        current = weights
+        if moved <= SETTLED:
+            break
+    return weights
+
+
+def _given(weights: Array | None, size: int) -> Array:
+    return np.ones(size) if weights is None else weights
+
+
+def _huber(distance: Array) -> Array:
+    return HUBER / np.maximum(distance, HUBER)
+
+
+def _tukey(distance: Array) -> Array:
+    return np.square(np.maximum(0.0, 1.0 - np.square(distance / TUKEY)))

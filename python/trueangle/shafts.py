@@ -1,0 +1,92 @@
+"""The shafts of a joint: names, turns per output turn, and orders asked of them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from typing import NamedTuple
+
+from .errors import ArgumentError
+
+__all__ = ["FIXED_MEMBERS", "ShaftOrders", "resolve_orders", "shaft_cycles"]
+
+FIXED_MEMBERS = ("circular_spline", "flexspline", "none")
+
+#: Turns of the wave generator against the output member, less those of the motor.
+_WAVE_GENERATOR = {"circular_spline": 1.0, "flexspline": -1.0, "none": 0.0}
+
+
+class ShaftOrders(NamedTuple):
+    """Orders asked of one shaft."""
+
+    name: str
+    cycles_per_turn: float
+    orders: tuple[int, ...]
+
+
+def shaft_cycles(
+    gear_ratio: float | None, fixed_member: str = "circular_spline"
+) -> dict[str, float]:
+    """Turns per output turn of the shafts that a gear ratio makes known.
+
+    The output turns once, the motor ``gear_ratio`` times, the wave generator against the
+    output member ``gear_ratio + 1`` times when the circular spline is fixed and
+    ``gear_ratio - 1`` times when the flexspline is. ``gear_ratio`` is motor turns per
+    output turn in either case.
+
+    Examples
+    --------
+    >>> shaft_cycles(100.0)
+    {'output': 1.0, 'motor': 100.0, 'wave_generator': 101.0}
+    """
+    if fixed_member not in FIXED_MEMBERS:
+        raise ArgumentError(
+            f"fixed_member must be one of {', '.join(FIXED_MEMBERS)}, got {fixed_member!r}"
+        )
+    cycles = {"output": 1.0}
+    if gear_ratio is not None:
+        if not 0.0 < gear_ratio < float("inf"):
+            raise ArgumentError(
+                f"gear_ratio must be positive motor turns per output turn, got {gear_ratio!r}"
+            )
+        cycles["motor"] = float(gear_ratio)
+        if fixed_member != "none":
+            cycles["wave_generator"] = float(gear_ratio) + _WAVE_GENERATOR[fixed_member]
+    return cycles
+
+
+def resolve_orders(
+    orders: Iterable[int] | Mapping[str, Iterable[int]],
+    gear_ratio: float | None = None,
+    fixed_member: str = "circular_spline",
+    shafts: Mapping[str, float] | None = None,
+) -> list[ShaftOrders]:
+    """Shafts and their sorted orders; plain orders belong to the output.
+
+    Raises
+    ------
+    ArgumentError
+        A shaft of unknown speed, an order that is not a whole number from 1.
+    """
+    cycles = shaft_cycles(gear_ratio, fixed_member) | dict(shafts or {})
+    by_shaft = orders if isinstance(orders, Mapping) else {"output": orders}
+    wanted = []
+    for name, asked in by_shaft.items():
+        if name not in cycles:
+            raise ArgumentError(
+                f"how fast shaft {name!r} turns is not known: give gear_ratio, or "
+                f"shafts={{{name!r}: cycles per output turn}}"
+            )
+        checked = tuple(sorted({_order(order, name) for order in asked}))
+        if checked:
+            wanted.append(ShaftOrders(name, float(cycles[name]), checked))
+    return wanted
+
+
+def _order(order: object, shaft: str) -> int:
+    try:
+        whole = int(order)  # type: ignore[call-overload]
+        if whole == order and 1 <= whole < 2**31:
+            return int(whole)
+    except (TypeError, ValueError, OverflowError):
+        pass
+    raise ArgumentError(f"orders of shaft {shaft!r} must be whole numbers from 1, got {order!r}")
