@@ -1,0 +1,114 @@
+"""Model files: round trip, refusals, nothing half-written."""
+
+import json
+import math
+import os
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+import trueangle as ta
+from trueangle.errors import ModelFileError
+from trueangle.model import FitRecord, Provenance
+from trueangle.runs import Source
+
+numbers = st.floats(-1e-3, 1e-3, allow_nan=False).map(lambda x: x + 0.0)
+
+
+@st.composite
+def models(draw):
+    shafts = []
+    for name, cycles in (("output", 1.0), ("motor", draw(st.floats(0.1, 200.0)))):
+        orders = sorted(draw(st.sets(st.integers(1, 500), max_size=4)))
+        values = st.lists(numbers, min_size=len(orders), max_size=len(orders))
+        shafts.append(ta.Shaft(name, cycles, orders, draw(values), draw(values)))
+    size = 1 + 2 * sum(len(s.orders) for s in shafts)
+    return ta.HarmonicModel(
+        shafts,
+        constant=draw(st.floats(-180, 180)),
+        period=draw(st.sampled_from([360.0, 2 * math.pi, 1.0, 65536.0])),
+        argument="indicated",
+        covariance=draw(st.sampled_from([None, np.eye(size) / 3])),
+        condition_number=draw(st.none() | st.floats(1, 1e9)),
+        fit=FitRecord(37, 2, (0.0, 360.0), 0.1, offsets=(draw(numbers), 1 / 3), note="n"),
+        provenance=Provenance((Source("a.csv", "00ff"),), "trueangle 0"),
+    )
+
+
+@given(model=models())
+def test_save_then_load_is_the_same_model_bit_for_bit(model, tmp_path_factory):
+    path = tmp_path_factory.mktemp("models") / "joint.json"
+    model.save(path)
+    assert ta.load_model(path) == model
+
+
+def written(tmp_path, change=None, text=None):
+    path = tmp_path / "joint.json"
+    model = ta.HarmonicModel([ta.Shaft("output", 1, [1, 2], [0.1, 0], [0.5, 0])], period=360.0)
+    model.save(path)
+    if change is not None:
+        content = json.loads(path.read_text())
+        change(content)
+        path.write_text(json.dumps(content))
+    if text is not None:
+        path.write_text(text(path.read_text()))
+    return path
+
+
+REFUSED = {
+    "truncated": ({"text": lambda s: s[: len(s) // 2]}, "truncated"),
+    "empty": ({"text": lambda s: ""}, "not complete JSON"),
+    "another format": ({"change": lambda c: c.update(format="x")}, "format"),
+    "a later version": ({"change": lambda c: c.update(version=99)}, "later.*upgrade"),
+    "a text as version": ({"change": lambda c: c.update(version="1")}, "version"),
+    "an unknown key": ({"change": lambda c: c.update(colour="red")}, "colour.*unknown"),
+    "a missing key": ({"change": lambda c: c.pop("period")}, "period.*missing"),
+    "an unknown shaft key": ({"change": lambda c: c["shafts"][0].update(x=1)}, r"shafts\[0\]\.x"),
+    "a NaN": ({"text": lambda s: s.replace("0.5", "NaN")}, "NaN"),
+    "an infinity": ({"text": lambda s: s.replace("0.5", "1e999")}, r"sine\[0\].*finite"),
+    "a huge integer": ({"text": lambda s: s.replace("0.5", "9" * 6000)}, "cannot be read"),
+    "a big integer": ({"text": lambda s: s.replace("0.5", "9" * 400)}, r"sine\[0\].*finite"),
+    "a doubled key": ({"text": lambda s: s.replace("{", '{"period": 1,', 1)}, "period.*twice"),
+    "half an order": ({"text": lambda s: s.replace("[1, 2]", "[1, 2.5]")}, "orders"),
+    "falling orders": ({"text": lambda s: s.replace("[1, 2]", "[2, 1]")}, "orders"),
+    "text as number": ({"change": lambda c: c.update(constant="0")}, "constant.*number"),
+    "a steep model": ({"text": lambda s: s.replace("0.5", "90.0")}, "may reach"),
+    "a wrong covariance": ({"change": lambda c: c.update(covariance=[[1.0]])}, "covariance"),
+    "a ragged covariance": ({"change": lambda c: c.update(covariance=[[1], [2, 3]])}, "square"),
+    "terms of the future": ({"change": lambda c: c.update(terms=[{"kind": "x"}])}, "term"),
+    "nested too deep": ({"text": lambda s: "[" * 100_000}, "not"),
+}
+
+
+@pytest.mark.parametrize("case", REFUSED)
+def test_damaged_files_are_refused_with_file_and_key(case, tmp_path):
+    how, message = REFUSED[case]
+    path = written(tmp_path, **how)
+    with pytest.raises(ModelFileError, match=message) as caught:
+        ta.load_model(path)
+    assert str(path) in str(caught.value)
+
+
+def test_a_failed_save_leaves_the_old_file(tmp_path, monkeypatch):
+    path = written(tmp_path)
+    before = path.read_bytes()
+
+    def full_disk(*_):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(os, "fsync", full_disk)
+    with pytest.raises(OSError, match="No space"):
+        ta.load_model(path).save(path)
+    assert path.read_bytes() == before
+    assert os.listdir(tmp_path) == [path.name]
+
+
+def test_the_file_is_readable_by_people_and_states_its_convention(tmp_path):
+    content = json.loads(written(tmp_path).read_text())
+    assert content["format"] == "trueangle-model"
+    assert content["argument"] == "reference"
+    assert content["period"] == 360.0
+    assert content["shafts"][0]["cosine"] == [0.1, 0.0]
+    assert max(len(line) for line in written(tmp_path).read_text().splitlines()) < 100

@@ -1,0 +1,106 @@
+"""Reading runs: units, groups, and errors that name file, line and column."""
+
+import math
+
+import numpy as np
+import pytest
+
+import trueangle as ta
+from trueangle.errors import FileError
+
+GOOD = "run,reference_deg,indicated_deg,time_s,note\na,0,0.5,0,x\na,90,90.5,1,y\nb,0,0.25,0,z\n"
+
+
+def written(tmp_path, text, name="runs.csv"):
+    path = tmp_path / name
+    path.write_bytes(text if isinstance(text, bytes) else text.encode())
+    return path
+
+
+def test_runs_by_label_in_order_with_their_columns(tmp_path):
+    path = written(tmp_path, GOOD.replace("a,", "z,"))
+    first, second = ta.read_runs(path)
+    assert (first.label, second.label) == ("z", "b")
+    assert first.period == 360.0
+    np.testing.assert_array_equal(first.indicated, [0.5, 90.5])
+    np.testing.assert_array_equal(first.time, [0.0, 1.0])
+    assert first.columns["note"].tolist() == ["x", "y"]
+    assert first.source.file == "runs.csv"
+    assert len(first.source.sha256) == 64
+
+
+@pytest.mark.parametrize("delimiter", [",", ";", "\t"])
+@pytest.mark.parametrize("bom", [b"", b"\xef\xbb\xbf"])
+@pytest.mark.parametrize("newline", ["\n", "\r\n"])
+def test_dialects_of_spreadsheets(tmp_path, delimiter, bom, newline):
+    text = GOOD.replace(",", delimiter).replace("\n", newline)
+    assert len(ta.read_runs(written(tmp_path, bom + text.encode()))) == 2
+
+
+@pytest.mark.parametrize(("unit", "turn"), [("deg", 360.0), ("rad", 2 * math.pi), ("turn", 1.0)])
+def test_the_unit_is_in_the_column_name(tmp_path, unit, turn):
+    text = f"reference_{unit},indicated_{unit},mount_deg,velocity_deg_s\n0,0.1,90,180\n"
+    (run,) = ta.read_runs(written(tmp_path, text))
+    assert run.period == turn
+    assert run.label is None
+    assert run.mount[0] == pytest.approx(turn / 4)
+    assert run.velocity[0] == pytest.approx(turn / 2)
+
+
+def test_counts_are_reduced_to_the_unit_of_the_reference(tmp_path):
+    path = written(tmp_path, "reference_deg,indicated_count\n90,1024\n")
+    (run,) = ta.read_runs(path, counts_per_turn=4096)
+    assert run.indicated[0] == 90.0
+    with pytest.raises(FileError, match="--counts-per-turn"):
+        ta.read_runs(path)
+
+
+REFUSED = {
+    "empty": ("", "line 1.*empty"),
+    "header only": ("reference_deg,indicated_deg\n", "no readings"),
+    "one column": ("reference_deg\n1\n", "no column indicated_deg"),
+    "no reference": ("indicated_deg,x\n1,2\n", "no column reference_deg.*indicated_deg, x"),
+    "text": (GOOD.replace("90.5", "abc"), r"line 3, column 'indicated_deg'.*'abc'"),
+    "empty cell": (GOOD.replace("90.5", ""), r"line 3, column 'indicated_deg'.*empty"),
+    "NaN": (GOOD.replace("90.5", "nan"), r"line 3, column 'indicated_deg'.*nan"),
+    "infinity": (GOOD.replace("90.5", "inf"), r"line 3, column 'indicated_deg'.*inf"),
+    "short line": (GOOD.replace(",y", ""), "line 3: 4 values where the header has 5"),
+    "time": (GOOD.replace("90.5,1", "90.5,-1"), r"line 3, column 'time_s'.*backwards"),
+    "two units": ("reference_deg,reference_rad,indicated_deg\n1,1,1\n", "units are mixed"),
+    "mixed units": ("reference_deg,indicated_rad\n1,1\n", "units are mixed.*deg.*rad"),
+    "reference in counts": ("reference_count,indicated_deg\n1,1\n", "reference_count"),
+    "doubled column": ("reference_deg,indicated_deg,indicated_deg\n1,1,1\n", "twice"),
+    "not text": (b"reference_deg,indicated_deg\n1,\xff\xfe\n", "line 2.*UTF-8"),
+    "a stray quote": ('reference_deg,indicated_deg\n1,"2"3\n', "line 2.*CSV"),
+    "not Parquet": (b"PAR1 but no more", "Parquet"),
+}
+
+
+@pytest.mark.parametrize("case", REFUSED)
+def test_bad_files_get_one_error_with_its_place(case, tmp_path):
+    text, message = REFUSED[case]
+    path = written(tmp_path, text)
+    with pytest.raises(FileError, match=message) as caught:
+        ta.read_runs(path)
+    assert str(caught.value).startswith(str(path))
+
+
+def test_files_of_different_units_are_refused(tmp_path):
+    one = written(tmp_path, GOOD)
+    other = written(tmp_path, "reference_rad,indicated_rad\n0,0\n", "other.csv")
+    with pytest.raises(FileError, match=r"other\.csv.*another unit"):
+        ta.read_runs([one, other])
+
+
+def test_parquet_reads_like_csv(tmp_path):
+    pa = pytest.importorskip("pyarrow")
+    import pyarrow.parquet as pq
+
+    path = tmp_path / "runs.parquet"
+    table = {"run": ["a", "a"], "reference_deg": [0.0, 90.0], "indicated_deg": [0.5, 90.5]}
+    pq.write_table(pa.table(table), path)
+    (run,) = ta.read_runs(path)
+    np.testing.assert_array_equal(run.indicated, [0.5, 90.5])
+    pq.write_table(pa.table(table | {"indicated_deg": [0.5, None]}), path)
+    with pytest.raises(FileError, match=r"line 3, column 'indicated_deg'"):
+        ta.read_runs(path)
