@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -192,9 +192,3 @@ class FitResult:
         from .summaries import fit_summary
 
         return fit_summary(self)
-
-    def plot(self, ax: Any = None) -> Any:
-        """Measured error of all runs with the model and its band (needs matplotlib)."""
-        from .plots import plot_fit
-
-        return plot_fit(self, ax=ax)

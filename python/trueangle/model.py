@@ -21,6 +21,7 @@ from .runs import Source
 __all__ = ["Argument", "FitRecord", "HarmonicModel", "Provenance", "Shaft", "load_model"]
 
 Argument: TypeAlias = Literal["reference", "indicated"]
+Path: TypeAlias = Literal["table", "exact", "direct", "counts"]
 Array: TypeAlias = NDArray[np.float64]
 
 
@@ -200,7 +201,12 @@ class HarmonicModel:
 
     @overload
     def error(
-        self, theta: float, out: None = None, *, threads: int | None = None, path: str | None = None
+        self,
+        theta: float,
+        out: None = None,
+        *,
+        threads: int | None = None,
+        path: Path | None = None,
     ) -> float: ...
     @overload
     def error(
@@ -209,7 +215,7 @@ class HarmonicModel:
         out: NDArray[Any] | None = None,
         *,
         threads: int | None = None,
-        path: str | None = None,
+        path: Path | None = None,
     ) -> NDArray[Any]: ...
     def error(
         self,
@@ -217,7 +223,7 @@ class HarmonicModel:
         out: NDArray[Any] | None = None,
         *,
         threads: int | None = None,
-        path: str | None = None,
+        path: Path | None = None,
     ) -> float | NDArray[Any]:
         """Error of the joint at angle ``theta``, in the unit of ``period``.
 
@@ -231,7 +237,7 @@ class HarmonicModel:
         threads : int, optional
             At most so many; by default all allowed to the process for large arrays.
         path : {"table", "exact", "direct", "counts"}, optional
-            Forces a way of evaluation (`path` names the one taken by default).
+            Forces a way of evaluation.
 
         Returns
         -------
@@ -258,7 +264,7 @@ class HarmonicModel:
         out: None = None,
         *,
         threads: int | None = None,
-        path: str | None = None,
+        path: Path | None = None,
     ) -> float: ...
     @overload
     def correct(
@@ -267,7 +273,7 @@ class HarmonicModel:
         out: NDArray[Any] | None = None,
         *,
         threads: int | None = None,
-        path: str | None = None,
+        path: Path | None = None,
     ) -> NDArray[Any]: ...
     def correct(
         self,
@@ -275,7 +281,7 @@ class HarmonicModel:
         out: NDArray[Any] | None = None,
         *,
         threads: int | None = None,
-        path: str | None = None,
+        path: Path | None = None,
     ) -> float | NDArray[Any]:
         """True angle behind an indicated one: ``indicated - error(true angle)``.
 
@@ -312,11 +318,6 @@ class HarmonicModel:
         return self._series.compensator().step
 
     # -- description --------------------------------------------------------------
-
-    @property
-    def path(self) -> str:
-        """Way of evaluation taken for batches by default, and the instruction set."""
-        return self._series.path
 
     @property
     def orders(self) -> tuple[float, ...]:
@@ -365,7 +366,8 @@ class HarmonicModel:
         x = np.asarray(theta, dtype=np.float64)
         shafts = [(shaft.cycles_per_turn, shaft.orders) for shaft in self.shafts]
         rows = design_matrix(x.ravel(), shafts, self.period)
-        return np.sqrt(np.einsum("ij,jk,ik->i", rows, self.covariance, rows)).reshape(x.shape)
+        band: Array = np.sqrt(np.einsum("ij,jk,ik->i", rows, self.covariance, rows))
+        return band.reshape(x.shape)
 
     def replace(self, **changes: Any) -> HarmonicModel:
         """A copy with some fields changed, checked anew."""

@@ -112,10 +112,10 @@ class Problem:
         ]
         if not rows:
             raise ArgumentError("every reading has weight 0: nothing is left to fit")
-        ridge = None
+        ridge: list[float] | None = None
         if penalty > 0.0:
             total = sum(x.size if w is None else float(w.sum()) for x, _, w in rows)
-            ridge = np.full(self.unknowns, penalty * total)
+            ridge = [penalty * total] * self.unknowns
         solution = _core.fit(
             rows,
             self.period,

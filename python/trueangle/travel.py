@@ -78,8 +78,7 @@ def choose_ridge(problem: Problem, weights: Sequence[Array | None]) -> float:
 
     The fit minimises :math:`\sum w (y - \varepsilon)^2 + \lambda \sum w \sum_k (A_k^2 + B_k^2)`.
     Every penalty is scored on readings left out of its fit: whole runs where there are
-    several, else tenths of the arc. Of the penalties within one standard error of the
-    best the largest is taken (Breiman's rule), and it is raised until the amplitudes add
+    several, else tenths of the arc. The best is taken, and raised until the amplitudes add
     up to no more than three times the range of the measured error.
 
     Parameters
@@ -104,14 +103,10 @@ def choose_ridge(problem: Problem, weights: Sequence[Array | None]) -> float:
             for penalty in _PENALTIES
         ]
     )
-    mean = scores.mean(axis=1)
-    best = int(np.argmin(mean))
-    # Paired: how uncertain is the difference from the best, fold by fold?
-    spread = (scores - scores[best]).std(axis=1, ddof=1) / np.sqrt(scores.shape[1])
-    allowed = int(np.flatnonzero(mean <= mean[best] + spread)[-1])
+    best = int(np.argmin(scores.mean(axis=1)))
     everything = np.concatenate([e[w > 0.0] for e, w in zip(problem.errors, base, strict=True)])
     reach = _REACH * float(np.ptp(everything))
-    for penalty in _PENALTIES[allowed:]:
+    for penalty in _PENALTIES[best:]:
         if problem.solve(base, penalty).amplitude_sum <= reach:
             return penalty
     return _PENALTIES[-1]
@@ -133,7 +128,7 @@ def _folds(angles: Sequence[Array], base: Sequence[Array]) -> list[_Fold]:
 
 def _held_out(problem: Problem, fitted: Fitted, held: Sequence[Array]) -> float:
     """Mean squared error of the held-out readings, each whole run around its own zero."""
-    total = weight = 0.0
+    total, weight = 0.0, 0.0
     for w, x, y in zip(held, problem.angles, problem.errors, strict=True):
         rows = w > 0.0
         if not rows.any():
@@ -142,4 +137,4 @@ def _held_out(problem: Problem, fitted: Fitted, held: Sequence[Array]) -> float:
         zero = np.average(residual, weights=w[rows]) if len(held) > 1 else 0.0
         total += float(w[rows] @ (residual - zero) ** 2)
         weight += float(w[rows].sum())
-    return total / weight
+    return float(total / weight)

@@ -143,9 +143,7 @@ def test_correcting_outside_the_fitted_span_warns_once():
     from trueangle.model import FitRecord
 
     record = FitRecord(samples=10, runs=1, span=(350.0, 480.0), residual=0.1)
-    model = ta.HarmonicModel(
-        [ta.Shaft("output", 1, [1], [0.0], [0.5])], period=360.0, fit=record
-    )
+    model = ta.HarmonicModel([ta.Shaft("output", 1, [1], [0.0], [0.5])], period=360.0, fit=record)
     inside = np.array([351.0, 0.0, 100.0, 719.0])
     model.correct(inside)  # no warning: pytest turns warnings into errors
     with pytest.warns(errors.OutsideSpanWarning, match="1 of 2 corrected"):
