@@ -1,0 +1,127 @@
+"""The exam: hidden effects must be named, and nothing that is not there.
+
+The ordinary run asks a few cases with fixed seeds. ``TRUEANGLE_NIGHTLY=1`` asks 20 fresh
+seeds of everything (the first is printed; ``TRUEANGLE_SEED`` repeats a night) and holds the
+answers against the targets. Either way the matrix is written as an artefact, see `exam`.
+"""
+
+from __future__ import annotations
+
+import os
+import secrets
+
+import pytest
+
+import trueangle as ta
+
+from . import blind, exam, pairs
+from .answer import Answer, ask
+from .case import Case
+from .causes import CAUSES
+
+pytestmark = pytest.mark.skipif(not hasattr(ta, "diagnose"), reason="needs trueangle.diagnose")
+
+NIGHTLY = os.environ.get("TRUEANGLE_NIGHTLY") == "1"
+
+#: Seeds of the ordinary run.
+FIXED = 0
+
+#: Share of cases in which a true cause must be named first, by scale.
+NAMED_FIRST = {1.0: 0.99, 0.3: 0.95, 0.1: 0.75}
+
+#: Greatest share of data sets with nothing hidden in which something is named.
+FALSE_ALARMS = 0.02
+
+#: Greatest share of cases with a cause that is not there.
+EXTRA_CAUSES = 0.03
+
+#: Smallest share of pairs of which both are named and nothing else.
+BOTH_NAMED = 0.90
+
+#: Smallest share of blind designs answered by `not_identifiable` and no wrong name.
+HONEST = 0.99
+
+#: Smallest share of shared parameters within three standard errors.
+COVERED = 0.95
+
+
+def share(flags: list[bool]) -> float:
+    return sum(flags) / len(flags)
+
+
+def told(found: list[Answer]) -> str:
+    return "\n" + exam.table(found)
+
+
+@pytest.mark.parametrize("cause", CAUSES)
+def test_a_hidden_cause_is_named(cause: str) -> None:
+    answer = ask(Case((cause,), 1.0, FIXED))
+    assert answer.exact, exam.describe(answer)
+
+
+def test_a_weak_cause_is_named() -> None:
+    found = exam.answers(exam.singles(CAUSES, [0.3], [FIXED]))
+    print(told(found))
+    assert share([a.right_first for a in found]) >= NAMED_FIRST[0.3], told(found)
+
+
+@pytest.mark.parametrize("noise", exam.NOISES)
+def test_noise_alone_has_no_cause(noise: str) -> None:
+    answer = ask(Case((), 1.0, FIXED, "rich", noise))
+    assert answer.found == (), exam.describe(answer)
+
+
+def test_two_causes_are_both_named() -> None:
+    found = exam.answers(pairs.cases(1.0, [FIXED])[::2])
+    assert share([a.exact for a in found]) >= BOTH_NAMED - 1.0 / len(found), told(found)
+
+
+@pytest.mark.parametrize("design", blind.BLIND)
+def test_a_blind_design_is_not_guessed_from(design: str) -> None:
+    answer = ask(Case((blind.BLIND[design][0],), 1.0, FIXED, design))
+    assert answer.honest, exam.describe(answer)
+    assert answer.reasons
+
+
+@pytest.mark.skipif(not NIGHTLY, reason="set TRUEANGLE_NIGHTLY=1: an hour of diagnoses")
+class TestNightly:
+    """20 fresh seeds of everything."""
+
+    @pytest.fixture(scope="class")
+    def seeds(self) -> list[int]:
+        first = int(os.environ.get("TRUEANGLE_SEED") or secrets.randbelow(10**6))
+        print(f"TRUEANGLE_SEED={first}")
+        return list(range(first, first + 20))
+
+    @pytest.fixture(scope="class")
+    def singles(self, seeds: list[int]) -> list[Answer]:
+        jobs = int(os.environ.get("TRUEANGLE_JOBS", "1"))
+        found = exam.answers(exam.singles(CAUSES, NAMED_FIRST, seeds), jobs)
+        print(told(found), exam.save(found, exam.artefacts()))
+        return found
+
+    @pytest.mark.parametrize("scale", NAMED_FIRST)
+    def test_causes_are_named_first(self, singles: list[Answer], scale: float) -> None:
+        group = [a for a in singles if a.case.scale == scale]
+        assert share([a.right_first for a in group]) >= NAMED_FIRST[scale], told(group)
+
+    def test_no_other_causes_are_named(self, singles: list[Answer]) -> None:
+        group = [a for a in singles if a.case.scale == 1.0]
+        assert share([bool(a.extra) for a in group]) < EXTRA_CAUSES, told(group)
+
+    def test_parameters_are_within_their_standard_errors(self, singles: list[Answer]) -> None:
+        scores = [s for a in singles if a.case.scale == 1.0 for s in a.scores.values()]
+        assert share([abs(s) <= 3.0 for s in scores]) >= COVERED
+
+    def test_noise_alone_has_no_cause(self, seeds: list[int]) -> None:
+        found = exam.answers(exam.nothing(seeds))
+        assert share([bool(a.found) for a in found]) <= FALSE_ALARMS, told(found)
+
+    @pytest.mark.parametrize("scale", [1.0, 0.3])
+    def test_two_causes_are_both_named(self, seeds: list[int], scale: float) -> None:
+        found = exam.answers(pairs.cases(scale, seeds[:6]))
+        assert share([a.exact for a in found]) >= BOTH_NAMED, told(found)
+
+    def test_blind_designs_are_not_guessed_from(self, seeds: list[int]) -> None:
+        found = exam.answers(blind.cases(seeds[:6]))
+        assert share([a.honest for a in found]) >= HONEST, told(found)
