@@ -15,6 +15,9 @@ if TYPE_CHECKING:
     from .model import load_model as load_model
     from .runfiles import read_runs as read_runs
     from .runs import CalibrationRun as CalibrationRun
+    from .simulation import Simulation as Simulation
+    from .simulation import load_simulation as load_simulation
+    from .simulation import simulate as simulate
 
 #: Public names and the modules that define them; a module is imported at first use.
 _PUBLIC = {
@@ -25,6 +28,9 @@ _PUBLIC = {
     "fit": "fitting",
     "load_model": "model",
     "read_runs": "runfiles",
+    "Simulation": "simulation",
+    "load_simulation": "simulation",
+    "simulate": "simulation",
 }
 
 __all__ = ["__version__", *sorted(_PUBLIC)]

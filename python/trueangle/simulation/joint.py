@@ -1,0 +1,146 @@
+"""The joint: which shafts turn how often, and which orders they can leave at the output."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from ..errors import ArgumentError
+
+__all__ = ["FIXED_MEMBERS", "Joint"]
+
+FIXED_MEMBERS = ("circular_spline", "flexspline", "none")
+ENCODER_SIDES = ("motor", "output")
+
+
+@dataclass(frozen=True)
+class Joint:
+    """Geometry of one joint.
+
+    Parameters
+    ----------
+    gear_ratio : float
+        Motor turns per output turn; need not be an integer.
+    fixed_member : {"circular_spline", "flexspline", "none"}
+        The member of the strain wave gear held by the housing; "none" is a direct drive.
+    encoder_side : {"motor", "output"}
+        The shaft that carries the joint's own encoder.
+    pole_pairs : int
+        Electrical periods of the encoder in one turn of its shaft.
+
+    Examples
+    --------
+    >>> Joint(100.0).shafts
+    {'output': 1.0, 'motor': 100.0, 'wave_generator': 101.0}
+    """
+
+    gear_ratio: float = 1.0
+    fixed_member: str = "none"
+    encoder_side: str = "output"
+    pole_pairs: int = 1
+
+    def __post_init__(self) -> None:
+        if not 0.0 < self.gear_ratio < float("inf"):
+            raise ArgumentError(f"gear_ratio must be positive and finite, got {self.gear_ratio!r}")
+        if self.fixed_member not in FIXED_MEMBERS:
+            raise ArgumentError(
+                f"fixed_member must be one of {', '.join(FIXED_MEMBERS)}, got {self.fixed_member!r}"
+            )
+        if self.encoder_side not in ENCODER_SIDES:
+            raise ArgumentError(
+                f"encoder_side must be one of {', '.join(ENCODER_SIDES)}, got {self.encoder_side!r}"
+            )
+        if self.pole_pairs < 1:
+            raise ArgumentError(f"pole_pairs must be at least 1, got {self.pole_pairs!r}")
+
+    @property
+    def shafts(self) -> dict[str, float]:
+        """Turns of each shaft in one turn of the output, by name.
+
+        The wave generator is counted against the output member: ``gear_ratio + 1``
+        with the circular spline fixed, ``gear_ratio - 1`` with the flexspline fixed.
+        """
+        shafts = {"output": 1.0}
+        if self.fixed_member != "none" or self.gear_ratio != 1.0:
+            shafts["motor"] = float(self.gear_ratio)
+        if self.fixed_member == "circular_spline":
+            shafts["wave_generator"] = self.gear_ratio + 1.0
+        elif self.fixed_member == "flexspline":
+            shafts["wave_generator"] = self.gear_ratio - 1.0
+        return shafts
+
+    def output_order(self, shaft: str, order: float) -> float:
+        """Cycles per output turn of ``order`` of ``shaft``."""
+        try:
+            return order * self.shafts[shaft]
+        except KeyError:
+            known = ", ".join(self.shafts)
+            raise ArgumentError(f"shaft must be one of {known}, got {shaft!r}") from None
+
+    def gear_orders(self) -> list[tuple[str, int]]:
+        """Orders a gear and its motor-side encoder are known to leave: (shaft, order).
+
+        Motor orders 1 to 4 and those of the encoder's pole pairs, wave generator
+        orders 1, 2 and 4.
+        """
+        found = []
+        if "motor" in self.shafts:
+            poles = {k * self.pole_pairs for k in (1, 2, 3, 4)} if self.pole_pairs <= 8 else set()
+            found += [("motor", k) for k in sorted({1, 2, 3, 4} | poles)]
+        if "wave_generator" in self.shafts:
+            found += [("wave_generator", k) for k in (1, 2, 4)]
+        return found
+
+    def name_order(self, order: float, tolerance: float = 1e-6) -> tuple[str, int] | None:
+        """The shaft that an output order belongs to, the slowest name last: (shaft, order).
+
+        None where ``order`` is no whole multiple of any shaft.
+        """
+        for shaft in ("motor", "wave_generator", "output"):
+            cycles = self.shafts.get(shaft)
+            if cycles is None:
+                continue
+            k = round(order / cycles)
+            low_multiple = shaft == "output" or k <= 8 * self.pole_pairs
+            if k >= 1 and low_multiple and abs(order - k * cycles) <= tolerance * max(order, 1.0):
+                return shaft, k
+        return None
+
+    def explanations(self, order: float, tolerance: float = 1e-6) -> list[str]:
+        """Every physical explanation on record for a line at an output order."""
+        found: list[str] = []
+        near = tolerance * max(order, 1.0)
+        motor = self.shafts.get("motor")
+        generator = self.shafts.get("wave_generator")
+        encoder = motor if (self.encoder_side == "motor" and motor) else 1.0
+        if abs(order - encoder) <= near:
+            found.append("eccentricity of the encoder's magnet or scale")
+        if abs(order - 2.0 * encoder) <= near:
+            found.append("tilt or ellipticity of the encoder's magnet or scale")
+        for k, what in (
+            (1, "offset of the sine and cosine signals"),
+            (2, "gain mismatch or quadrature error of the sine and cosine signals"),
+            (3, "second harmonic in the sine and cosine signals"),
+            (4, "third or fifth harmonic in the sine and cosine signals"),
+        ):
+            if abs(order - k * self.pole_pairs * encoder) <= near:
+                found.append(f"interpolation error: {what}")
+        if generator is not None and motor is not None:
+            if min(abs(order - motor), abs(order - generator)) <= near:
+                found.append("wave generator, once per turn: eccentricity, bearing")
+            if min(abs(order - 2.0 * motor), abs(order - 2.0 * generator)) <= near:
+                found.append("wave generator, twice per turn: meeting the teeth of a spline")
+            if min(abs(order - 4.0 * motor), abs(order - 4.0 * generator)) <= near:
+                found.append("wave generator, four times per turn: its shape")
+        if motor is not None and not found:
+            k = order / motor
+            if k > 0.5 and abs(k - round(k)) * motor <= near:
+                found.append(
+                    f"motor-side error of order {round(k)}, such as the scale's graduation"
+                )
+        if abs(order - 1.0) <= near and encoder != 1.0:
+            found.append("eccentricity at the output: spline, bearing, or the reference's coupling")
+        if abs(order - 2.0) <= near and encoder != 1.0:
+            found.append("misaligned coupling or ellipticity at the output")
+        if not found:
+            found.append("an error of this order with no standard cause for this joint")
+        return found

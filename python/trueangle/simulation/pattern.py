@@ -1,0 +1,142 @@
+"""Periodic part of the error: lines and the pattern they add up to."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import ArgumentError
+from .joint import Joint
+
+__all__ = ["ARCSEC_PER_RAD", "Harmonic", "Pattern"]
+
+Array = NDArray[np.float64]
+
+ARCSEC_PER_RAD = 1_296_000.0 / (2.0 * math.pi)
+
+
+@dataclass(frozen=True)
+class Harmonic:
+    r"""One line: :math:`C \sin(k\,f\,\theta + \varphi)` of a shaft that turns f times.
+
+    Parameters
+    ----------
+    shaft : str
+        "output", "motor" or "wave_generator".
+    order : int or float
+        Cycles per turn of that shaft.
+    amplitude_arcsec : float
+    phase_deg : float
+
+    Examples
+    --------
+    >>> Harmonic("output", 1, 10.0, 90.0).coefficients
+    (10.0, 0.0)
+    """
+
+    shaft: str
+    order: float
+    amplitude_arcsec: float
+    phase_deg: float = 0.0
+
+    def __post_init__(self) -> None:
+        if not self.order > 0:
+            raise ArgumentError(f"order must be positive, got {self.order!r}")
+
+    @property
+    def coefficients(self) -> tuple[float, float]:
+        """``(A, B)`` of ``A cos + B sin``, arcsec, rounded to 1e-12 of the amplitude."""
+        phase = math.radians(self.phase_deg)
+        grain = 12
+        return (
+            self.amplitude_arcsec * round(math.sin(phase), grain),
+            self.amplitude_arcsec * round(math.cos(phase), grain),
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Pattern:
+    r"""Sum of lines as a function of the output angle in radians, arcsec.
+
+    .. math:: p(\theta) = \sum_m A_m \cos m\theta + B_m \sin m\theta
+
+    Parameters
+    ----------
+    orders, cosine, sine : ndarray, shape (k,)
+        Output orders (any positive reals) and coefficients.
+
+    Examples
+    --------
+    >>> lines = Pattern.of([Harmonic("motor", 2, 3.0)], Joint(50.0, "circular_spline", "motor"))
+    >>> lines.orders
+    array([100.])
+    """
+
+    orders: Array
+    cosine: Array
+    sine: Array
+
+    @classmethod
+    def of(cls, harmonics: Iterable[Harmonic], joint: Joint) -> Pattern:
+        """Pattern of ``harmonics``; equal output orders are added up."""
+        total: dict[float, complex] = {}
+        for line in harmonics:
+            a, b = line.coefficients
+            order = joint.output_order(line.shaft, line.order)
+            total[order] = total.get(order, 0j) + complex(a, b)
+        values = list(total.values())
+        return cls(
+            np.array(list(total), dtype=np.float64),
+            np.array([value.real for value in values], dtype=np.float64),
+            np.array([value.imag for value in values], dtype=np.float64),
+        )
+
+    def _sum(self, theta: Array, cosine: Array, sine: Array) -> Array:
+        out = np.zeros_like(theta)
+        for order, a, b in zip(self.orders, cosine, sine, strict=True):
+            x = order * theta
+            out += a * np.cos(x)
+            out += b * np.sin(x)
+        return out
+
+    def value(self, theta: Array) -> Array:
+        """p(theta), arcsec."""
+        return self._sum(theta, self.cosine, self.sine)
+
+    def slope(self, theta: Array) -> Array:
+        """dp/dtheta, arcsec per arcsec (no unit)."""
+        scale = self.orders / ARCSEC_PER_RAD
+        return self._sum(theta, scale * self.sine, -scale * self.cosine)
+
+    def passed(
+        self,
+        theta: Array,
+        turns_per_s: Array,
+        response: Callable[[Array], NDArray[np.complex128]],
+    ) -> Array:
+        """The pattern as seen through a filter while moving.
+
+        ``response(f)`` is the filter's complex gain at the signed frequency f in Hz;
+        a line of order m at v turns per second is at ``m v``.
+        """
+        out = np.zeros_like(theta)
+        for order, a, b in zip(self.orders, self.cosine, self.sine, strict=True):
+            gain = response(order * turns_per_s)
+            # A cos + B sin is the real part of (A - iB) exp(i m theta).
+            out += (complex(a, -b) * gain * np.exp(1j * order * theta)).real
+        return out
+
+    def indicated_value(self, theta: Array, steps: int = 30) -> Array:
+        """e with ``e = p(theta + e)``: the pattern evaluated at the indicated angle."""
+        error = self.value(theta)
+        for _ in range(steps):
+            following = self.value(theta + error / ARCSEC_PER_RAD)
+            done = np.max(np.abs(following - error), initial=0.0) < 1e-9
+            error = following
+            if done:
+                break
+        return error

@@ -1,0 +1,229 @@
+"""What happened at every reading: angle, direction, travel, speed, load, temperature."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..runs import CalibrationRun
+
+__all__ = ["Signals", "join_runs"]
+
+Array = NDArray[np.float64]
+Index = NDArray[np.int64]
+
+#: Share of sign changes between neighbouring steps above which the direction is read
+#: with a dead zone: a reference at rest flickers by a count, a moving one does not.
+FLICKER = 0.05
+
+
+@dataclass(frozen=True, eq=False)
+class Signals:
+    """Readings of several runs, one after the other, as plain arrays.
+
+    Attributes
+    ----------
+    theta : ndarray, shape (n,)
+        True output angle, radians, unwrapped within each run.
+    run, row : ndarray of int, shape (n,)
+        Index of the run and of the row within it.
+    direction : ndarray
+        -1 or +1; 0 where nothing ever moved.
+    travel : ndarray
+        Degrees moved since the last reversal (or since the start of the run).
+    segment : ndarray of int
+        Stretch of one direction that the reading belongs to.
+    segment_direction, segment_length : ndarray, shape (segments,)
+        Direction and whole length (degrees) of every stretch.
+    segment_first : ndarray of bool
+        The stretch opens its run.
+    clock : ndarray
+        Seconds since the start of the run, or the row number without time.
+    velocity, time, temperature, torque, mount : ndarray or None
+        Degrees per second, s, Celsius, Nm, radians; None where no run recorded it.
+    labels : tuple of str
+        Names of the runs.
+    """
+
+    theta: Array
+    run: Index
+    row: Index
+    direction: Array
+    travel: Array
+    segment: Index
+    segment_direction: Array
+    segment_length: Array
+    segment_first: NDArray[np.bool_]
+    clock: Array
+    velocity: Array | None
+    time: Array | None
+    temperature: Array | None
+    torque: Array | None
+    mount: Array | None
+    labels: tuple[str, ...]
+
+    def __len__(self) -> int:
+        return int(self.theta.size)
+
+    @property
+    def runs(self) -> int:
+        """Number of runs."""
+        return len(self.labels)
+
+    @property
+    def degrees(self) -> Array:
+        """True output angle in degrees."""
+        return np.degrees(self.theta)
+
+    @property
+    def turns_per_s(self) -> Array:
+        """Signed output speed in turns per second (zeros where unknown)."""
+        return np.zeros_like(self.theta) if self.velocity is None else self.velocity / 360.0
+
+    def take(self, rows: NDArray[np.bool_] | Index) -> Signals:
+        """The readings ``rows``; runs keep their index and stretches their history."""
+        changes = {
+            name: getattr(self, name)[rows]
+            for name in ("theta", "run", "row", "direction", "travel", "segment", "clock")
+        }
+        for name in ("velocity", "time", "temperature", "torque", "mount"):
+            values = getattr(self, name)
+            changes[name] = None if values is None else values[rows]
+        return replace(self, **changes)
+
+    def run_bounds(self) -> list[tuple[int, int]]:
+        """First and one-past-last reading of every run that has readings, in order."""
+        if not len(self):
+            return []
+        cuts = np.flatnonzero(np.diff(self.run)) + 1
+        edges = [0, *cuts.tolist(), len(self)]
+        return list(zip(edges[:-1], edges[1:], strict=True))
+
+    def presliding(self, length_deg: float) -> Array:
+        r"""State z of a presliding spring of transition length L, in [-1, 1].
+
+        .. math:: z(s) = d - (d - z_0)\,e^{-s/L}
+
+        with travel s since the reversal and state z_0 there; z = 0 at the start of a
+        run, whose history is not known.
+        """
+        decay = np.exp(-self.segment_length / length_deg)
+        start = np.zeros(self.segment_direction.size)
+        state = 0.0
+        for k, (d, keep, first) in enumerate(
+            zip(
+                self.segment_direction.tolist(),
+                decay.tolist(),
+                self.segment_first.tolist(),
+                strict=True,
+            )
+        ):
+            if first:
+                state = 0.0
+            start[k] = state
+            state = d - (d - state) * keep
+        d = self.segment_direction[self.segment]
+        return np.asarray(d - (d - start[self.segment]) * np.exp(-self.travel / length_deg))
+
+
+def join_runs(runs: Sequence[CalibrationRun]) -> Signals:
+    """Signals of ``runs``; a quantity that some run lacks is None for all."""
+    parts = [_travel(run) for run in runs]
+    offset = np.cumsum([0, *(part[3].size for part in parts[:-1])])
+    return Signals(
+        theta=_joined([run.unwrapped_reference * (2.0 * math.pi / run.period) for run in runs]),
+        run=np.repeat(np.arange(len(runs)), [len(run) for run in runs]),
+        row=np.concatenate([np.arange(len(run)) for run in runs]),
+        direction=_joined([part[0] for part in parts]),
+        travel=_joined([part[1] for part in parts]),
+        segment=np.concatenate([part[2] + o for part, o in zip(parts, offset, strict=True)]),
+        segment_direction=_joined([part[3] for part in parts]),
+        segment_length=_joined([part[4] for part in parts]),
+        segment_first=np.concatenate([np.arange(part[3].size) == 0 for part in parts]),
+        clock=_joined([_clock(run) for run in runs]),
+        velocity=_all([_velocity(run) for run in runs]),
+        time=_all([run.time for run in runs]),
+        temperature=_all([run.temperature for run in runs]),
+        torque=_all([run.torque for run in runs]),
+        mount=_all(
+            [
+                None if run.mount is None else run.mount * (2.0 * math.pi / run.period)
+                for run in runs
+            ]
+        ),
+        labels=tuple(run.label or str(j + 1) for j, run in enumerate(runs)),
+    )
+
+
+def _joined(parts: list[Array]) -> Array:
+    return np.concatenate(parts)
+
+
+def _all(parts: Sequence[Array | None]) -> Array | None:
+    present = [part for part in parts if part is not None]
+    return np.concatenate(present) if len(present) == len(parts) else None
+
+
+def _clock(run: CalibrationRun) -> Array:
+    if run.time is None or run.time[-1] == run.time[0]:
+        return np.arange(len(run), dtype=np.float64)
+    return np.asarray(run.time - run.time[0])
+
+
+def _velocity(run: CalibrationRun) -> Array | None:
+    speed = run.speed
+    return None if speed is None else np.asarray(speed * (360.0 / run.period))
+
+
+def _travel(run: CalibrationRun) -> tuple[Array, Array, Index, Array, Array]:
+    """Direction, travel, stretch of every reading; direction and length of every stretch."""
+    angle = run.unwrapped_reference * (360.0 / run.period)
+    direction = run.direction
+    steps = np.diff(angle)
+    if not direction.any() and steps.any():
+        # At rest at every reading: the direction is that of the approach.
+        sign = np.sign(np.concatenate([steps[:1], steps]))
+        last = np.maximum.accumulate(
+            np.where(sign != 0.0, np.arange(sign.size), np.flatnonzero(sign)[0])
+        )
+        direction = sign[last]
+    if np.count_nonzero(np.diff(direction)) > FLICKER * len(run):
+        direction = _dead_zone_direction(angle)
+    cuts = np.flatnonzero(np.diff(direction)) + 1
+    edges = np.concatenate([[0], cuts, [len(run)]])
+    segment = np.repeat(np.arange(edges.size - 1), np.diff(edges))
+    # A stretch starts at the turning point: the last reading of the one before.
+    origin = angle[np.maximum(edges[:-1] - 1, 0)]
+    last_angle = angle[edges[1:] - 1]
+    return (
+        direction,
+        np.abs(angle - origin[segment]),
+        segment,
+        direction[edges[:-1]],
+        np.abs(last_angle - origin),
+    )
+
+
+def _dead_zone_direction(angle: Array) -> Array:
+    """Direction of travel that ignores steps back below three typical steps."""
+    steps = np.abs(np.diff(angle))
+    zone = 3.0 * float(np.median(steps[steps > 0.0])) if steps.any() else 0.0
+    direction = np.zeros(angle.size)
+    extreme, sign, since = angle[0], 0.0, 0
+    for k, x in enumerate(angle.tolist()):
+        if sign == 0.0:
+            if abs(x - extreme) > zone:
+                sign = math.copysign(1.0, x - extreme)
+                direction[: k + 1] = sign
+        elif (x - extreme) * sign >= 0.0:
+            extreme, since = x, k
+        elif abs(x - extreme) > zone:
+            sign = -sign
+            direction[since + 1 :] = sign
+            extreme, since = x, k
+        direction[k] = sign
+    return direction

@@ -1,0 +1,232 @@
+"""The simulation file: TOML read with checks, written back atomically."""
+
+from __future__ import annotations
+
+import math
+import os
+import tomllib
+from collections.abc import Callable, Mapping
+from dataclasses import fields
+from pathlib import Path
+from typing import Any, TypeVar
+
+from ..errors import ArgumentError, FileError
+from .designs import RunDesign
+from .effects import EFFECTS, Effect
+from .joint import Joint
+from .pattern import Harmonic
+from .simulation import Simulation
+
+__all__ = ["load_simulation", "to_table", "write"]
+
+_TABLES = ("joint", "harmonic", "effect", "noise", "run")
+_JOINT_KEYS = ("gear_ratio", "fixed_member", "encoder_side", "pole_pairs")
+
+T = TypeVar("T")
+
+
+def load_simulation(path: str | Path) -> Simulation:
+    """Read a simulation file.
+
+    Parameters
+    ----------
+    path : str or Path
+        TOML with ``[joint]``, ``[[harmonic]]``, ``[[effect]]``, ``[noise]``, ``[[run]]``,
+        each optional; keys are the parameters of `Joint`, `Harmonic`, the effects and
+        `RunDesign`.
+
+    Returns
+    -------
+    Simulation
+
+    Raises
+    ------
+    FileError
+        The file is missing, no TOML, or a key is unknown or out of range: the message
+        names the table and the key.
+
+    Examples
+    --------
+    >>> import tempfile, pathlib
+    >>> path = pathlib.Path(tempfile.mkdtemp()) / "joint.toml"
+    >>> _ = path.write_text("[joint]" + chr(10) + "gear_ratio = 50.0")
+    >>> load_simulation(path).joint.gear_ratio
+    50.0
+    """
+    try:
+        with open(path, "rb") as file:
+            document = tomllib.load(file)
+    except tomllib.TOMLDecodeError as cause:
+        raise FileError(path, f"not a TOML file: {cause}") from None
+    except UnicodeDecodeError as cause:
+        raise FileError(path, f"not a UTF-8 text: {cause}") from None
+    return _simulation(path, document)
+
+
+def _simulation(path: str | Path, document: Mapping[str, Any]) -> Simulation:
+    for name in document:
+        if name not in _TABLES:
+            raise FileError(path, f"unknown table '{name}'; a simulation has {', '.join(_TABLES)}")
+    joint = _build(path, "[joint]", Joint, _table(path, document, "joint"))
+    harmonics = tuple(
+        _build(path, f"[[harmonic]] number {k}", Harmonic, table)
+        for k, table in enumerate(_tables(path, document, "harmonic"), 1)
+    )
+    effects = tuple(
+        _effect(path, f"[[effect]] number {k}", table)
+        for k, table in enumerate(_tables(path, document, "effect"), 1)
+    )
+    designs = tuple(
+        _build(path, f"[[run]] number {k}", RunDesign, table)
+        for k, table in enumerate(_tables(path, document, "run"), 1)
+    )
+    noise = _table(path, document, "noise")
+    for name in noise:
+        if name != "sigma_arcsec":
+            raise FileError(path, f"[noise]: unknown key '{name}'; it has sigma_arcsec")
+    sigma = noise.get("sigma_arcsec", 0.0)
+    if isinstance(sigma, bool) or not isinstance(sigma, int | float):
+        raise FileError(path, f"[noise]: sigma_arcsec must be a number, got {sigma!r}")
+    return _guarded(
+        path,
+        "simulation",
+        lambda: Simulation(joint, harmonics, effects, float(sigma), designs, str(path)),
+    )
+
+
+def _table(path: str | Path, document: Mapping[str, Any], name: str) -> Mapping[str, Any]:
+    table = document.get(name, {})
+    if not isinstance(table, dict):
+        raise FileError(path, f"'{name}' must be one table, [{name}]")
+    return table
+
+
+def _tables(path: str | Path, document: Mapping[str, Any], name: str) -> list[dict[str, Any]]:
+    tables = document.get(name, [])
+    if not isinstance(tables, list) or not all(isinstance(table, dict) for table in tables):
+        raise FileError(path, f"'{name}' must be a list of tables, [[{name}]]")
+    return tables
+
+
+def _build(path: str | Path, where: str, kind: type[T], table: Mapping[str, Any]) -> T:
+    known = {field.name: str(field.type) for field in fields(kind)}  # type: ignore[arg-type]
+    values = {}
+    for name, value in table.items():
+        if name not in known:
+            raise FileError(path, f"{where}: unknown key '{name}'; it has {', '.join(known)}")
+        values[name] = _value(path, where, name, value, known[name])
+    try:
+        return _guarded(path, where, lambda: kind(**values))
+    except TypeError as cause:
+        missing = str(cause).rpartition(": ")[2]
+        raise FileError(path, f"{where}: missing {missing}") from None
+
+
+def _value(path: str | Path, where: str, name: str, value: Any, wanted: str) -> Any:
+    def refuse(what: str) -> FileError:
+        return FileError(path, f"{where}: {name} must be {what}, got {value!r}")
+
+    if wanted.startswith("str"):
+        if not isinstance(value, str):
+            raise refuse("a text")
+        return value
+    if wanted.startswith("tuple"):
+        if not isinstance(value, list) or not all(_is_number(item) for item in value):
+            raise refuse("a list of finite numbers")
+        return tuple(float(item) for item in value)
+    if not _is_number(value):
+        raise refuse("a finite number")
+    if wanted.startswith("int"):
+        if value != int(value):
+            raise refuse("a whole number")
+        return int(value)
+    return float(value)
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
+
+
+def _effect(path: str | Path, where: str, table: dict[str, Any]) -> Effect:
+    parameters = dict(table)
+    kind = parameters.pop("kind", None)
+    if kind not in EFFECTS:
+        raise FileError(path, f"{where}: kind must be one of {', '.join(EFFECTS)}, got {kind!r}")
+    return _guarded(path, where, lambda: EFFECTS[kind].from_table(parameters))
+
+
+def _guarded(path: str | Path, where: str, build: Callable[[], T]) -> T:
+    try:
+        return build()
+    except FileError:
+        raise
+    except ArgumentError as cause:
+        raise FileError(path, f"{where}: {cause}") from None
+
+
+def to_table(sim: Simulation) -> dict[str, Any]:
+    """The tables of a simulation file; keys at their defaults are left out of ``run``."""
+    runs = []
+    for design in sim.runs:
+        values = {field.name: getattr(design, field.name) for field in fields(design)}
+        plain = {field.name: field.default for field in fields(design)}
+        runs.append({k: v for k, v in values.items() if v is not None and v != plain[k]})
+    return {
+        "joint": {name: getattr(sim.joint, name) for name in _JOINT_KEYS},
+        "harmonic": [
+            {field.name: getattr(line, field.name) for field in fields(line)}
+            for line in sim.harmonics
+        ],
+        "effect": [effect.to_table() for effect in sim.effects],
+        "noise": {"sigma_arcsec": sim.sigma_arcsec},
+        "run": runs,
+    }
+
+
+def write(sim: Simulation, path: str | Path) -> None:
+    """Write a simulation file, beside and then renamed; floats round-trip exactly.
+
+    Where the simulation was read from a file, that file's text is kept and only what
+    is new is appended, so comments and layout stay. Otherwise the whole is written.
+    """
+    target = Path(path)
+    beside = target.with_name(f".{target.name}.{os.getpid()}.part")
+    try:
+        beside.write_text(_text(sim), encoding="utf-8")
+        os.replace(beside, target)
+    finally:
+        beside.unlink(missing_ok=True)
+
+
+def _text(sim: Simulation) -> str:
+    whole = to_table(sim)
+    if sim.source is not None and Path(sim.source).is_file():
+        original = load_simulation(sim.source)
+        old = to_table(original)
+        appended = {name: whole[name][len(old[name]) :] for name in ("harmonic", "effect", "run")}
+        kept = {name: [*old[name], *appended[name]] for name in appended}
+        if {**old, **kept} == whole:
+            text = Path(sim.source).read_text(encoding="utf-8").rstrip("\n")
+            return text + "\n" + "".join(_dump(name, appended[name]) for name in appended)
+    return "".join(_dump(name, whole[name]) for name in _TABLES).lstrip("\n")
+
+
+def _dump(name: str, content: Any) -> str:
+    if isinstance(content, list):
+        return "".join(f"\n[[{name}]]\n{_lines(table)}" for table in content)
+    return f"\n[{name}]\n{_lines(content)}"
+
+
+def _lines(table: Mapping[str, Any]) -> str:
+    return "".join(f"{name} = {_literal(value)}\n" for name, value in table.items())
+
+
+def _literal(value: Any) -> str:
+    if isinstance(value, str):
+        escaped = value.replace("\\", "\\\\").replace('"', '\\"')
+        return '"' + "".join(c if c >= " " else f"\\u{ord(c):04x}" for c in escaped) + '"'
+    if isinstance(value, list | tuple):
+        return "[" + ", ".join(_literal(item) for item in value) + "]"
+    if isinstance(value, int):
+        return str(value)
+    return repr(float(value))
