@@ -19,6 +19,7 @@ COMMANDS: tuple[str, ...] = (
     "fit",
     "correct",
     "plan",
+    "simulate",
 )
 
 

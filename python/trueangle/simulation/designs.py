@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from dataclasses import dataclass
 
@@ -76,7 +77,7 @@ class RunDesign:
         if not 0.0 < self.turns < math.inf:
             raise refuse("turns", "positive")
         edges = (0.0, *self.reversals, 1.0)
-        if any(b <= a for a, b in zip(edges[:-1], edges[1:], strict=True)):
+        if any(b <= a for a, b in itertools.pairwise(edges)):
             raise refuse("reversals", "ascending shares of the travel between 0 and 1")
 
     def path(self, rng: np.random.Generator) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -116,5 +117,5 @@ class RunDesign:
             torque=self.torque_Nm + moment,
             mount=np.full(n, self.mount_deg),
             label=self.label or label,
-            velocity=signs * self.speed_deg_s,
+            velocity=np.asarray(signs * self.speed_deg_s, dtype=np.float64),
         )

@@ -132,11 +132,9 @@ class Joint:
             if min(abs(order - 4.0 * motor), abs(order - 4.0 * generator)) <= near:
                 found.append("wave generator, four times per turn: its shape")
         if motor is not None and not found:
-            k = order / motor
-            if k > 0.5 and abs(k - round(k)) * motor <= near:
-                found.append(
-                    f"motor-side error of order {round(k)}, such as the scale's graduation"
-                )
+            multiple = order / motor
+            if multiple > 0.5 and abs(multiple - round(multiple)) * motor <= near:
+                found.append(f"motor-side order {round(multiple)}: graduation of the scale")
         if abs(order - 1.0) <= near and encoder != 1.0:
             found.append("eccentricity at the output: spline, bearing, or the reference's coupling")
         if abs(order - 2.0) <= near and encoder != 1.0:

@@ -131,7 +131,7 @@ class Pattern:
         return out
 
     def indicated_value(self, theta: Array, steps: int = 30) -> Array:
-        """e with ``e = p(theta + e)``: the pattern evaluated at the indicated angle."""
+        """Solution e of ``e = p(theta + e)``: the pattern evaluated at the indicated angle."""
         error = self.value(theta)
         for _ in range(steps):
             following = self.value(theta + error / ARCSEC_PER_RAD)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -19,6 +20,9 @@ Index = NDArray[np.int64]
 #: Share of sign changes between neighbouring steps above which the direction is read
 #: with a dead zone: a reference at rest flickers by a count, a moving one does not.
 FLICKER = 0.05
+
+#: Sign changes that are taken as they are, however short the run.
+REVERSALS_TRUSTED = 10
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,7 +105,7 @@ class Signals:
             return []
         cuts = np.flatnonzero(np.diff(self.run)) + 1
         edges = [0, *cuts.tolist(), len(self)]
-        return list(zip(edges[:-1], edges[1:], strict=True))
+        return list(itertools.pairwise(edges))
 
     def presliding(self, length_deg: float) -> Array:
         r"""State z of a presliding spring of transition length L, in [-1, 1].
@@ -191,7 +195,7 @@ def _travel(run: CalibrationRun) -> tuple[Array, Array, Index, Array, Array]:
             np.where(sign != 0.0, np.arange(sign.size), np.flatnonzero(sign)[0])
         )
         direction = sign[last]
-    if np.count_nonzero(np.diff(direction)) > FLICKER * len(run):
+    if np.count_nonzero(np.diff(direction)) > max(FLICKER * len(run), REVERSALS_TRUSTED):
         direction = _dead_zone_direction(angle)
     cuts = np.flatnonzero(np.diff(direction)) + 1
     edges = np.concatenate([[0], cuts, [len(run)]])

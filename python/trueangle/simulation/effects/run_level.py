@@ -147,4 +147,4 @@ class MissedCounts(Effect):
 
     def signal(self, signals: Signals, around: Surroundings, rng: np.random.Generator) -> Array:
         after = (signals.run == self.run) & (signals.row >= self.row)
-        return self.step_arcsec * after
+        return np.asarray(self.step_arcsec * after)

@@ -1,0 +1,36 @@
+"""``trueangle simulate``: measure a simulated joint."""
+
+from __future__ import annotations
+
+import argparse
+import json
+
+HELP = "measure a simulated joint: calibration runs from a simulation file"
+EXAMPLE = "trueangle simulate joint.toml -o runs.csv --seed 1"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the command's arguments."""
+    add = parser.add_argument
+    add("simulation", metavar="FILE", help="simulation file (TOML) with at least one [[run]]")
+    add("-o", "--output", required=True, metavar="RUNS", help="CSV file to write")
+    add("--seed", type=int, default=0, metavar="N", help="seed of the noise (default: 0)")
+    add("--json", action="store_true", help="print what was written as JSON")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Write the runs."""
+    from ..simulation import load_simulation, simulate
+    from ..simulation.runtable import write_runs
+
+    if args.seed < 0:
+        from ..errors import ArgumentError
+
+        raise ArgumentError(f"--seed must not be negative, got {args.seed}")
+    runs = simulate(load_simulation(args.simulation), seed=args.seed)
+    samples = write_runs(runs, args.output)
+    if args.json:
+        print(json.dumps({"runs": len(runs), "samples": samples, "output": args.output}))
+    else:
+        print(f"{args.output}: {samples} readings in {len(runs)} run{'s'[: len(runs) != 1]}")
+    return 0
