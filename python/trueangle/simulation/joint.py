@@ -29,8 +29,8 @@ class Joint:
 
     Examples
     --------
-    >>> Joint(100.0).shafts
-    {'output': 1.0, 'motor': 100.0, 'wave_generator': 101.0}
+    >>> Joint(100.0, "circular_spline", "motor").shafts["wave_generator"]
+    101.0
     """
 
     gear_ratio: float = 1.0

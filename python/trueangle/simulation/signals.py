@@ -200,15 +200,17 @@ def _travel(run: CalibrationRun) -> tuple[Array, Array, Index, Array, Array]:
     cuts = np.flatnonzero(np.diff(direction)) + 1
     edges = np.concatenate([[0], cuts, [len(run)]])
     segment = np.repeat(np.arange(edges.size - 1), np.diff(edges))
-    # A stretch starts at the turning point: the last reading of the one before.
-    origin = angle[np.maximum(edges[:-1] - 1, 0)]
-    last_angle = angle[edges[1:] - 1]
+    # A stretch starts at the turning point: the farther of the readings on both sides.
+    before, after = angle[np.maximum(edges[:-1] - 1, 0)], angle[edges[:-1]]
+    old = np.concatenate([direction[:1], direction[edges[:-2]]])
+    origin = np.where((after - before) * old > 0.0, after, before)
+    end = np.concatenate([origin[1:], angle[-1:]])
     return (
         direction,
         np.abs(angle - origin[segment]),
         segment,
         direction[edges[:-1]],
-        np.abs(last_angle - origin),
+        np.abs(end - origin),
     )
 
 
