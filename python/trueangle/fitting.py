@@ -105,6 +105,8 @@ def fit(
     0.5
     """
     found = as_runs(runs)
+    if argument not in ("reference", "indicated"):
+        raise ArgumentError(f"argument must be 'reference' or 'indicated', got {argument!r}")
     for run in found:
         check_follows(run)
     selection = None
@@ -134,10 +136,10 @@ def _selected(
     loss: Loss,
 ) -> tuple[OrderSelection, Iterable[int]]:
     """Orders with evidence, from readings without spikes."""
-    from .orders import select_orders
-
     if orders not in (None, "auto"):
         raise ArgumentError(f"orders must be whole numbers, a mapping or 'auto', got {orders!r}")
+    from .orders import select_orders
+
     if loss != "linear":
         runs = [without_spikes(run) for run in runs]
     selection = select_orders(runs, gear_ratio=gear_ratio, fixed_member=fixed_member)

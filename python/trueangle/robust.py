@@ -143,8 +143,8 @@ def without_spikes(run: CalibrationRun) -> CalibrationRun:
     deviation = np.empty_like(error)
     deviation[order] = error[order] - np.median(windows, axis=1)
     distance = np.abs(deviation)
-    # The mean keeps the limit above 0 where half of the deviations are exactly 0.
-    wild = distance > WILD * max(robust_scale(deviation), float(distance.mean()))
+    # Readings in counts: most deviations may be exactly 0, the rest one count.
+    wild = distance > WILD * max(robust_scale(deviation), float(np.quantile(distance, 0.8)))
     if not wild.any() or wild.mean() > WILD_SHARE:
         return run
     return replace(run, weights=np.where(wild, 0.0, _given(run.weights, wild.size)))

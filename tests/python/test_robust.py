@@ -1,0 +1,86 @@
+"""Wild readings: found, reported, harmless; and clean data untouched."""
+
+import numpy as np
+import pytest
+
+import trueangle as ta
+from trueangle.robust import without_spikes
+
+TRUTH = 0.2
+SIGMA = 0.01
+
+
+def contaminated(seed, share, size=10.0, n=400):
+    """Readings of order 3 with normal noise, a share of them moved by Student-t jumps."""
+    rng = np.random.default_rng(seed)
+    theta = rng.uniform(0, 360, n)
+    indicated = theta + TRUTH * np.sin(np.radians(3 * theta)) + SIGMA * rng.normal(size=n)
+    hit = rng.choice(n, int(share * n), replace=False)
+    jumps = size * np.sign(rng.normal(size=hit.size)) * (0.2 + np.abs(rng.standard_t(2, hit.size)))
+    indicated[hit] += jumps
+    return ta.CalibrationRun(theta, indicated, 360.0, label="r"), np.sort(hit)
+
+
+@pytest.mark.parametrize("loss", ["auto", "huber", "tukey"])
+@pytest.mark.parametrize("share", [0.0025, 0.05, 0.15])
+def test_wild_readings_do_not_move_the_amplitude(loss, share):
+    run, _ = contaminated(11, share)
+    result = ta.fit(run, orders=range(1, 6), loss=loss)
+    # 5 standard errors of an amplitude; Huber lets a bounded influence through.
+    allowed = 5 * SIGMA * np.sqrt(2 / 400) + (0.4 * SIGMA if loss == "huber" else 0.0)
+    assert result.amplitudes[2] == pytest.approx(TRUTH, abs=allowed)
+    plain = ta.fit(run, orders=range(1, 6), loss="linear")
+    assert abs(plain.amplitudes[2] - TRUTH) > allowed
+
+
+def test_auto_names_the_rows_it_sets_aside():
+    run, hit = contaminated(12, 0.02)
+    result = ta.fit(run, orders=range(1, 6))
+    assert [row for _, row in result.wild] == hit.tolist()
+    assert {label for label, _ in result.wild} == {"r"}
+    assert "8 wild readings set aside" in result.summary()
+    assert result.model.fit.wild == 8
+
+
+@pytest.mark.parametrize("noise", ["normal", "none", "counts"])
+def test_clean_data_are_plain_least_squares(noise):
+    rng = np.random.default_rng(13)
+    theta = rng.uniform(0, 360, 5000)
+    indicated = theta + TRUTH * np.sin(np.radians(3 * theta))
+    if noise == "normal":
+        indicated = indicated + SIGMA * rng.normal(size=5000)
+    if noise == "counts":
+        indicated = np.round(indicated * 4096 / 360) * 360 / 4096
+    run = ta.CalibrationRun(theta, indicated, 360.0)
+    auto, linear = (ta.fit(run, orders=range(1, 6), loss=loss) for loss in ("auto", "linear"))
+    assert auto.weights is None
+    assert auto.model.shafts == linear.model.shafts
+
+
+def test_an_effect_that_the_model_lacks_is_not_wild():
+    theta = np.linspace(0, 360, 400, endpoint=False)
+    bump = np.where(np.abs(theta - 90) < 45, 3.0, 0.0)  # a quarter of the turn
+    rng = np.random.default_rng(1)
+    run = ta.CalibrationRun(theta, theta + bump + 0.001 * rng.normal(size=400), 360.0)
+    assert ta.fit(run, orders=[1]).weights is None
+
+
+def test_given_weights_stay():
+    run, hit = contaminated(14, 0.05)
+    weights = np.ones(len(run))
+    weights[hit] = 0.0
+    told = ta.CalibrationRun(run.reference, run.indicated, 360.0, weights=weights)
+    result = ta.fit(told, orders=range(1, 6))
+    assert result.weights is None  # nothing wild among the readings that count
+    found = ta.fit(run, orders=range(1, 6))
+    np.testing.assert_allclose(result.amplitudes, found.amplitudes, rtol=1e-12)
+
+
+def test_spikes_are_found_without_a_model():
+    run, hit = contaminated(15, 0.03)
+    cleaned = without_spikes(run)
+    assert set(hit) <= set(np.flatnonzero(cleaned.weights == 0.0)) | set(
+        hit[np.abs(run.centred_error[hit]) < 1.0]
+    )
+    clean, _ = contaminated(16, 0.0)
+    assert without_spikes(clean) is clean
