@@ -54,7 +54,7 @@ def build_parser() -> argparse.ArgumentParser:
             formatter_class=argparse.RawDescriptionHelpFormatter,
         )
         command.add_arguments(subparser)
-        subparser.set_defaults(run=command.run)
+        subparser.set_defaults(handler=command.run)
     return parser
 
 
@@ -69,7 +69,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     args = build_parser().parse_args(argv)
     warnings.showwarning = _print_warning
     try:
-        status: int = args.run(args)
+        status: int = args.handler(args)
     except (TrueAngleError, OSError) as error:
         print(f"trueangle: error: {_one_line(error)}", file=sys.stderr)
         return 1
