@@ -32,7 +32,7 @@ _ROUNDING = 1e-12
 
 def fit(
     runs: CalibrationRun | Iterable[CalibrationRun],
-    orders: Iterable[int] | Mapping[str, Iterable[int]] | str | None = None,
+    orders: Iterable[float] | Mapping[str, Iterable[float]] | str | None = None,
     *,
     gear_ratio: float | None = None,
     fixed_member: str = "circular_spline",
@@ -134,7 +134,7 @@ def _selected(
     gear_ratio: float | None,
     fixed_member: str,
     loss: Loss,
-) -> tuple[OrderSelection, Iterable[int]]:
+) -> tuple[OrderSelection, Iterable[float]]:
     """Orders with evidence, from readings without spikes."""
     if orders not in (None, "auto"):
         raise ArgumentError(f"orders must be whole numbers, a mapping or 'auto', got {orders!r}")

@@ -55,7 +55,7 @@ def shaft_cycles(
 
 
 def resolve_orders(
-    orders: Iterable[int] | Mapping[str, Iterable[int]],
+    orders: Iterable[float] | Mapping[str, Iterable[float]],
     gear_ratio: float | None = None,
     fixed_member: str = "circular_spline",
     shafts: Mapping[str, float] | None = None,

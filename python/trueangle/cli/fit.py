@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import argparse
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 from ..errors import ArgumentError
+from .order_lists import parse_orders
 
 HELP = "fit a harmonic model to calibration runs and save it"
 EXAMPLE = "trueangle fit joint_a.csv -o joint_a.json --gear-ratio 100"
@@ -58,32 +59,19 @@ def add_joint(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def parse_orders(text: str) -> str | list[int] | Mapping[str, list[int]]:
+def orders_by_shaft(text: str) -> str | Sequence[float] | Mapping[str, Sequence[float]]:
     """``auto``, ``1-17``, ``1,4,8`` or ``output:1-3;motor:1,2`` as orders."""
     if text == "auto":
         return text
     if ":" not in text:
-        return _order_list(text)
-    by_shaft: dict[str, list[int]] = {}
+        return parse_orders(text)
+    by_shaft: dict[str, Sequence[float]] = {}
     for part in text.split(";"):
-        shaft, colon, orders = part.partition(":")
-        if not colon or shaft.strip() in by_shaft:
-            raise ArgumentError(f"--orders: each shaft once, as output:1-3;motor:1,2, got {text!r}")
-        by_shaft[shaft.strip()] = _order_list(orders)
+        shaft, _, orders = part.partition(":")
+        if shaft.strip() in by_shaft:
+            raise ArgumentError(f"--orders names shaft {shaft.strip()!r} twice: {text!r}")
+        by_shaft[shaft.strip()] = parse_orders(orders)
     return by_shaft
-
-
-def _order_list(text: str) -> list[int]:
-    orders: list[int] = []
-    for part in text.split(","):
-        first, dash, last = part.strip().partition("-")
-        if not first.isdigit() or (dash and not last.isdigit()):
-            raise ArgumentError(f"--orders: whole numbers like 1-17 or 1,4,8, got {text!r}")
-        low, high = int(first), int(last or first)
-        if not 1 <= low <= high <= 1_000_000:
-            raise ArgumentError(f"--orders: orders run upwards from 1, got {part.strip()!r}")
-        orders += range(low, high + 1)
-    return orders
 
 
 def run(args: argparse.Namespace) -> int:
@@ -102,7 +90,7 @@ def run(args: argparse.Namespace) -> int:
         runs = [found for found in runs if str(found.label) in args.run]
     result = fit(
         runs,
-        orders=parse_orders(args.orders),
+        orders=orders_by_shaft(args.orders),
         gear_ratio=args.gear_ratio,
         fixed_member=args.fixed_member,
         argument=args.argument,

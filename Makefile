@@ -1,0 +1,42 @@
+# One definition of each check, for people and for CI. `make check` runs them all.
+# PYTHON is the interpreter of an environment that has `pip install '.[test,lint]'`.
+PYTHON ?= .venv/bin/python
+
+.PHONY: check format lint types stub rust python docs bench develop
+
+check: lint types stub rust python docs
+
+develop:            ## build the core in place, for work on it
+	$(PYTHON) -m maturin develop --release --extras test,lint,docs
+
+format:             ## rewrite the code in the project's style
+	cargo fmt
+	$(PYTHON) -m ruff check --fix .
+	$(PYTHON) -m ruff format .
+
+lint:               ## style and lints, warnings are errors
+	cargo fmt --check
+	cargo clippy --all-targets --locked -- -D warnings
+	cargo clippy --all-targets --locked --features python -- -D warnings
+	RUSTDOCFLAGS="-D warnings" cargo doc --no-deps --locked
+	$(PYTHON) -m ruff check .
+	$(PYTHON) -m ruff format --check .
+
+types:              ## types of the whole package
+	$(PYTHON) -m mypy
+
+stub:               ## the stub against the built module
+	$(PYTHON) -m mypy.stubtest trueangle._core
+
+rust:               ## tests of the core
+	cargo test --locked
+
+python:             ## tests of the package
+	$(PYTHON) -m pytest
+
+docs:               ## documentation, warnings are errors
+	$(PYTHON) -m sphinx -W --keep-going -q docs docs/_build/html
+
+bench:              ## benchmarks against a reference, in one run
+	cargo bench
+	$(PYTHON) -m trueangle bench
