@@ -22,13 +22,26 @@ SIZE_TOLERANCE = 2e-3
 BURIED = 4.0
 
 
-@pytest.mark.parametrize("cause", [c for c in CAUSES if c != "heteroscedastic_noise"])
+#: Causes whose size is not the rms of a signal.
+OTHERWISE_SIZED = ("heteroscedastic_noise", "stiffening_compliance")
+
+
+@pytest.mark.parametrize("cause", [c for c in CAUSES if c not in OTHERWISE_SIZED])
 @pytest.mark.parametrize("scale", [1.0, 0.1])
 def test_a_signal_has_its_size(cause: str, scale: float) -> None:
     question = pose(Case((cause,), scale, seed=3))
     (source,) = question.sources
     found = spread(source.signals(question.joint, question.scenes))
     assert found == pytest.approx(scale * CAUSES[cause][1], rel=SIZE_TOLERANCE)
+
+
+def test_a_stiffening_spring_is_told_from_a_linear_one_by_what_that_leaves() -> None:
+    question = pose(Case(("stiffening_compliance",), 1.0, seed=3))
+    signal = np.concatenate(question.sources[0].signals(question.joint, question.scenes))
+    torque = np.concatenate([scene.torque for scene in question.scenes])
+    rest = signal - torque * (signal @ torque) / (torque @ torque)
+    assert rest.std() == pytest.approx(0.28 * 1.1, rel=SIZE_TOLERANCE)
+    assert 1.1 < signal.std() < 8.0
 
 
 def test_uneven_noise_changes_by_a_third() -> None:
