@@ -17,7 +17,7 @@ from .problem import Fitted, Problem
 from .robust import Loss, Weighted, weigh, without_spikes
 from .runs import CalibrationRun, as_runs
 from .shafts import resolve_orders
-from .travel import Span, choose_ridge, covered_span
+from .travel import CONDITION, Span, choose_ridge, covered_span
 from .units import check_follows
 
 if TYPE_CHECKING:
@@ -119,7 +119,8 @@ def fit(
     weights = problem.base if weighted.weights is None else weighted.weights
     span = covered_span(np.concatenate(problem.angles), problem.period)
     if ridge is None:
-        ridge = 0.0 if span.full or not problem.unknowns else choose_ridge(problem, weights)
+        tame = span.full or weighted.fitted.solution.condition_number < CONDITION
+        ridge = 0.0 if tame else choose_ridge(problem, weights)
     fitted = problem.solve(weights, ridge) if ridge > 0.0 else weighted.fitted
     notes = tuple(_notes(problem, weighted, ridge, span, selection))
     record = _record(problem, weighted, fitted, loss, ridge, span, notes)
