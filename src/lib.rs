@@ -3,6 +3,7 @@
 pub mod error;
 
 pub mod angle;
+pub mod circle;
 pub mod series;
 
 pub mod direct;

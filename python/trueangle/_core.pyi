@@ -121,3 +121,16 @@ def fit(
     ridge: Sequence[float] | None = None,
     threads: int | None = None,
 ) -> Solution: ...
+def resultant(
+    indicated: NDArray[np.float64], reference: NDArray[np.float64], period: float
+) -> float: ...
+def residuals(
+    indicated: NDArray[np.float64],
+    reference: NDArray[np.float64],
+    offset: float,
+    period: float,
+    fitted: NDArray[np.float64],
+) -> None: ...
+def covered_span(
+    angles: Sequence[NDArray[np.float64]], period: float
+) -> tuple[float, float, bool]: ...

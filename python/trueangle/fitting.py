@@ -117,7 +117,7 @@ def fit(
     )
     weighted = weigh(problem, loss, _ROUNDING * problem.period)
     weights = problem.base if weighted.weights is None else weighted.weights
-    span = covered_span(np.concatenate(problem.angles), problem.period)
+    span = covered_span(problem.angles, problem.period)
     if ridge is None:
         tame = span.full or weighted.fitted.solution.condition_number < CONDITION
         ridge = 0.0 if tame else choose_ridge(problem, weights)

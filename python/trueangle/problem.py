@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import _core
-from .angles import circular_mean, wrap
+from .angles import circular_mean
 from .errors import ArgumentError
 from .model import Argument
 from .runs import CalibrationRun
@@ -153,11 +153,12 @@ class Problem:
     def _blocks(self, fitted: Fitted, index: int) -> Iterator[Array]:
         """Residuals of one run, piece by piece."""
         run, angles = self.runs[index], self.angles[index]
-        offset, constant = fitted.offsets[index], fitted.solution.constant
+        offset = fitted.offsets[index] - fitted.solution.constant
         for i in range(0, len(run), _BLOCK):
             part = slice(i, i + _BLOCK)
-            shape = fitted.predict(angles[part]) - constant
-            rest = run.indicated[part] - run.reference[part] - shape
+            indicated, reference = run.indicated[part], run.reference[part]
+            block = fitted.predict(angles[part])
             if np.isnan(offset):
-                offset = circular_mean(rest, self.period)
-            yield wrap(rest - offset, self.period)
+                offset = circular_mean(indicated - reference - block, self.period)
+            _core.residuals(indicated, reference, offset, self.period, block)
+            yield block

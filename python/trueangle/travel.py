@@ -7,24 +7,18 @@ a hundred degrees that run wild outside the arc.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from . import _core
 from .problem import Fitted, Problem
 
 __all__ = ["Span", "choose_ridge", "covered_span"]
 
 Array = NDArray[np.float64]
-
-#: An arc without readings counts as missing travel when it is wider than this part of a
-#: turn (20 deg) and than chance leaves between n random positions of the same spacing:
-#: the widest of n exponential gaps exceeds (ln n + 4) times their mean in 2 % of cases.
-_MISSING = 20.0 / 360.0
-_CHANCE = 4.0
 
 #: Below this condition number of the design plain least squares is harmless on an arc.
 #: Orders 0..8 reach 31 on 300 deg of travel, 274 on 270 deg.
@@ -49,13 +43,16 @@ class Span(NamedTuple):
     full: bool
 
 
-def covered_span(angles: Array, period: float) -> Span:
+def covered_span(angles: Sequence[Array], period: float) -> Span:
     """The turn without its widest gap, or the whole turn where no gap is missing travel.
+
+    A gap is missing travel when it is wider than 20 deg and than chance leaves between as
+    many random positions (2 %).
 
     Parameters
     ----------
-    angles : ndarray
-        Positions of all runs, any number of turns.
+    angles : sequence of ndarray
+        Positions of every run, any number of turns.
     period : float
 
     Returns
@@ -66,18 +63,10 @@ def covered_span(angles: Array, period: float) -> Span:
 
     Examples
     --------
-    >>> covered_span(np.linspace(-40.0, 150.0, 96), 360.0)
+    >>> covered_span([np.linspace(-40.0, 150.0, 96)], 360.0)
     Span(start=320.0, stop=510.0, full=False)
     """
-    places = np.unique(np.mod(angles, period))
-    gaps = np.diff(places, append=places[0] + period)
-    widest = int(np.argmax(gaps))
-    travelled = float(period - gaps[widest])
-    chance = travelled / max(1, places.size - 1) * (math.log(places.size) + _CHANCE)
-    if gaps[widest] <= max(_MISSING * period, chance):
-        return Span(0.0, period, True)
-    start = float(places[(widest + 1) % places.size])
-    return Span(start, start + travelled, False)
+    return Span(*_core.covered_span(angles, period))
 
 
 def choose_ridge(problem: Problem, weights: Sequence[Array | None]) -> float:

@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
+from . import _core
 from .errors import ArgumentError
 from .runs import CalibrationRun
 
@@ -42,14 +42,15 @@ def check_follows(run: CalibrationRun) -> None:
         Says what the indicated angle looks like instead: another unit, the other sign.
     """
     stride = max(1, len(run) // _SAMPLE)
-    reference, indicated = run.reference[::stride], run.indicated[::stride]
-    if reference.size < 4 or _resultant(indicated - reference, run.period) >= _FOLLOWS:
+    reference = np.ascontiguousarray(run.reference[::stride])
+    indicated = np.ascontiguousarray(run.indicated[::stride])
+    if reference.size < 4 or _core.resultant(indicated, reference, run.period) >= _FOLLOWS:
         return
     remedy = next(
         (
             text
             for text, factor in _REMEDIES.items()
-            if _resultant(factor * indicated - reference, run.period) > _REMEDIED
+            if _core.resultant(factor * indicated, reference, run.period) > _REMEDIED
         ),
         "check units, sign, gear ratio and that the rows belong together",
     )
@@ -58,7 +59,3 @@ def check_follows(run: CalibrationRun) -> None:
         f"the indicated angle{named} does not follow the reference "
         f"(their differences are spread over the whole turn): {remedy}"
     )
-
-
-def _resultant(differences: NDArray[np.float64], period: float) -> float:
-    return float(abs(np.exp(2j * np.pi / period * differences).mean()))

@@ -1,6 +1,7 @@
 //! Bindings: extract, release the interpreter, call, convert. Nothing is computed here.
 
 mod array;
+mod circle;
 mod failure;
 mod fit;
 mod series;
@@ -15,6 +16,9 @@ mod _core {
 
     #[pymodule_export]
     use super::series::{PyCompensator, PySeries};
+
+    #[pymodule_export]
+    use super::circle::{covered_span, residuals, resultant};
 
     #[pymodule_export]
     use super::fit::{Solution, fit};

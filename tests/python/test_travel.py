@@ -20,7 +20,7 @@ from trueangle.travel import covered_span
     ],
 )
 def test_span(angles, expected):
-    assert covered_span(angles, 360.0) == pytest.approx(expected)
+    assert covered_span([angles], 360.0) == pytest.approx(expected)
 
 
 @pytest.mark.parametrize("arc", [90.0, 190.0, 270.0])

@@ -1,0 +1,165 @@
+//! Statistics of angles on the circle: agreement, differences, the stretch travelled.
+
+use std::f64::consts::TAU;
+
+/// Adding and subtracting this rounds a double below 2^51 to a whole number, in two
+/// additions that every processor does for several numbers at once.
+const ROUNDER: f64 = 6_755_399_441_055_744.0;
+
+/// Length (0 to 1) of the mean of unit vectors at `indicated - reference`: 1 where all
+/// differences are one, near 0 where they are spread over the turn.
+pub fn resultant(indicated: &[f64], reference: &[f64], period: f64) -> f64 {
+    let (mut sine, mut cosine) = (0.0, 0.0);
+    for (&x, &y) in indicated.iter().zip(reference) {
+        let (s, c) = (turns(x - y, period) * TAU).sin_cos();
+        sine += s;
+        cosine += c;
+    }
+    sine.hypot(cosine) / indicated.len().max(1) as f64
+}
+
+/// `fitted[i]` becomes `indicated - reference - fitted - offset`, wrapped into half a
+/// turn: the residuals of a fit.
+pub fn residuals(
+    indicated: &[f64],
+    reference: &[f64],
+    offset: f64,
+    period: f64,
+    fitted: &mut [f64],
+) {
+    for (i, value) in fitted.iter_mut().enumerate() {
+        let rest = indicated[i] - reference[i] - *value - offset;
+        *value = rest - period * whole(rest / period);
+    }
+}
+
+/// Stretch of the turn that was travelled.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Span {
+    /// Where it begins, in `[0, period)`.
+    pub start: f64,
+    /// Where it ends; `start + period` at most.
+    pub stop: f64,
+    /// Whether nothing is missing.
+    pub full: bool,
+}
+
+/// Beyond so many angles they are counted into bins instead of sorted.
+const SORTED: usize = 4096;
+
+/// An arc without readings counts as missing travel when it is wider than this part of a
+/// turn (20 deg) ...
+const MISSING: f64 = 20.0 / 360.0;
+
+/// ... and than chance leaves between n random positions: the widest of n exponential
+/// gaps exceeds (ln n + 4) times their mean in 2 % of cases.
+const CHANCE: f64 = 4.0;
+
+/// The turn without its widest gap, or the whole turn where no gap is missing travel.
+///
+/// Exact for up to a few thousand angles, else the ends are those of 4096 bins of a turn.
+pub fn covered_span(angles: &[&[f64]], period: f64) -> Span {
+    let count: usize = angles.iter().map(|a| a.len()).sum();
+    let all = angles.iter().flat_map(|a| a.iter());
+    let fractions = all.map(|&x| {
+        let part = turns(x, period);
+        if part < 0.0 { part + 1.0 } else { part }
+    });
+    let mut places: Vec<f64> = if count <= SORTED {
+        fractions.collect()
+    } else {
+        let mut seen = vec![false; SORTED];
+        for part in fractions {
+            seen[(part * SORTED as f64) as usize % SORTED] = true;
+        }
+        let bins = (0..SORTED).filter(|&i| seen[i]);
+        bins.map(|i| i as f64 / SORTED as f64).collect()
+    };
+    places.sort_unstable_by(f64::total_cmp);
+    places.dedup();
+    let (start, stop, full) =
+        widest_gap(&places).map_or((0.0, 1.0, true), |(start, stop)| (start, stop, false));
+    Span {
+        start: start * period,
+        stop: stop * period,
+        full,
+    }
+}
+
+/// Ends of the stretch outside the widest gap, where that is missing travel.
+fn widest_gap(places: &[f64]) -> Option<(f64, f64)> {
+    let (&first, &last) = (places.first()?, places.last()?);
+    let across = (first + 1.0 - last, first);
+    let (gap, start) = places
+        .windows(2)
+        .map(|pair| (pair[1] - pair[0], pair[1]))
+        .fold(
+            across,
+            |best, next| if next.0 > best.0 { next } else { best },
+        );
+    let travelled = 1.0 - gap;
+    let count = places.len() as f64;
+    let chance = travelled / (count - 1.0).max(1.0) * (count.ln() + CHANCE);
+    (gap > MISSING.max(chance)).then_some((start, start + travelled))
+}
+
+/// The whole number nearest to `x`.
+fn whole(x: f64) -> f64 {
+    (x + ROUNDER) - ROUNDER
+}
+
+/// Part of a turn in `[-1/2, 1/2]`.
+fn turns(angle: f64, period: f64) -> f64 {
+    let part = angle / period;
+    part - whole(part)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn agreement_is_1_for_one_difference_and_0_for_a_full_turn_of_them() {
+        let reference = [10.0, 350.0, 725.0, -80.0];
+        let indicated = reference.map(|x| x + 179.5);
+        assert!((resultant(&indicated, &reference, 360.0) - 1.0).abs() < 1e-12);
+        let spread = [10.0, 440.0, 905.0, 190.0];
+        assert!(resultant(&spread, &reference, 360.0) < 1e-12);
+    }
+
+    #[test]
+    fn residuals_are_wrapped_whatever_the_turns() {
+        let mut fitted = [0.5, -0.25, 0.0];
+        residuals(
+            &[362.0, -719.0, 179.0],
+            &[1.0, 1.0, 0.0],
+            0.5,
+            360.0,
+            &mut fitted,
+        );
+        for (got, wanted) in fitted.iter().zip([0.0, -0.25, 178.5]) {
+            assert!((got - wanted).abs() < 1e-12, "{got} is not {wanted}");
+        }
+    }
+
+    #[test]
+    fn bins_find_the_span_that_sorting_finds() {
+        let few: Vec<f64> = (0..4000)
+            .map(|i| 300.0 + 190.0 * f64::from(i) / 3999.0)
+            .collect();
+        let many: Vec<f64> = (0..40_000)
+            .map(|i| 300.0 + 190.0 * f64::from(i) / 39_999.0)
+            .collect();
+        let (exact, binned) = (covered_span(&[&few], 360.0), covered_span(&[&many], 360.0));
+        assert!(!exact.full && !binned.full);
+        assert!((exact.start - 300.0).abs() < 1e-9 && (exact.stop - 490.0).abs() < 1e-9);
+        let bin = 360.0 / SORTED as f64;
+        assert!((binned.start - 300.0).abs() <= bin && (binned.stop - 490.0).abs() <= bin);
+    }
+
+    #[test]
+    fn one_place_is_no_travel_and_none_is_a_full_turn() {
+        assert_eq!(covered_span(&[&[90.0, 450.0]], 360.0).stop, 90.0);
+        assert!(covered_span(&[], 360.0).full);
+    }
+}
