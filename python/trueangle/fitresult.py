@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +16,8 @@ from .problem import Fitted, Problem
 from .runs import CalibrationRun
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
     from .orders import OrderSelection
 
 __all__ = ["FitResult"]
@@ -186,6 +188,25 @@ class FitResult:
         # A zero amplitude has no direction: any will do.
         u, v = np.where(np.isfinite(u), u, 1.0), np.where(np.isfinite(v), v, 0.0)
         return np.asarray(np.sqrt(np.maximum(u * u * aa + v * v * bb + 2.0 * u * v * ab, 0.0)))
+
+    def plot(self, kind: str = "errors", ax: Axes | None = None, **options: Any) -> Axes:
+        """A picture of the fit (needs ``trueangle[plot]``).
+
+        Parameters
+        ----------
+        kind : {"errors", "spectrum", "phases", "residuals"}
+            Error curves with the model and its band, amplitudes of the orders, phases over
+            the runs, or residuals (``against=`` angle, time, speed, temperature, torque,
+            direction): see `trueangle.plots`.
+        ax : matplotlib Axes, optional
+
+        Returns
+        -------
+        matplotlib Axes
+        """
+        from .plots import fit_plot
+
+        return fit_plot(self, kind, ax, **options)
 
     def summary(self) -> str:
         """The result as text: coefficients with uncertainties, quality, notes."""

@@ -1,0 +1,27 @@
+"""Pictures of runs, fits, order selections, diagnoses and plans.
+
+One file a picture. Every function draws into ``ax`` (a new one when not given) and
+returns it; errors are in arcsec, angles in degrees. Needs ``pip install trueangle[plot]``;
+matplotlib is imported at the first picture.
+"""
+
+from __future__ import annotations
+
+from .amplitudespectrum import amplitude_spectrum
+from .beforeafter import before_after
+from .errorcurves import error_curves
+from .kinds import fit_plot
+from .phasesoverruns import phases_over_runs
+from .planpictures import plan_factors, plan_positions
+from .residualpictures import residuals
+
+__all__ = [
+    "amplitude_spectrum",
+    "before_after",
+    "error_curves",
+    "fit_plot",
+    "phases_over_runs",
+    "plan_factors",
+    "plan_positions",
+    "residuals",
+]

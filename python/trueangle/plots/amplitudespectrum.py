@@ -1,0 +1,167 @@
+"""Amplitude of every order with the threshold it has to pass, retained ones marked."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..angles import ARCSEC_PER_TURN
+from . import palette
+from .canvas import legend, new_axes
+from .curves import CONFIDENCE
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+    from ..fitresult import FitResult
+    from ..orders import OrderSelection
+
+__all__ = ["amplitude_spectrum"]
+
+Array = NDArray[np.float64]
+
+#: Up to so many orders each has a place of its own on the axis.
+_MOST_NAMED = 40
+#: Aliases and explanations written at a bar; the table has them all.
+_MOST_ALIASES = 3
+#: Bars that get their aliases written, the largest first.
+_MOST_ANNOTATED = 12
+
+
+def amplitude_spectrum(result: OrderSelection | FitResult, ax: Axes | None = None) -> Axes:
+    """Amplitude against order: of all candidates of a selection, or of a fit's orders.
+
+    Retained orders are filled, others hollow. The dashed steps are the amplitude that an
+    order needs to be significant; aliases that the positions cannot tell from a retained
+    order stand above its bar. A fit's bars carry 95 % intervals.
+
+    Parameters
+    ----------
+    result : OrderSelection or FitResult
+        A fit that selected its orders shows that selection.
+    ax : matplotlib Axes, optional
+
+    Returns
+    -------
+    matplotlib Axes
+    """
+    selection = getattr(result, "selection", result)
+    return _of_fit(result, ax) if selection is None else _of_selection(selection, ax)
+
+
+def _of_fit(fit: FitResult, ax: Axes | None) -> Axes:
+    ax = new_axes(ax)
+    factor = ARCSEC_PER_TURN / fit.model.period
+    ranks = np.argsort(fit.orders)
+    place = _places(ax, [float(fit.orders[i]) for i in ranks])
+    amplitude = factor * fit.amplitudes[ranks]
+    std = None
+    if fit.model.covariance is not None:
+        std = CONFIDENCE * factor * fit.amplitude_std[ranks]
+    ax.bar(
+        place,
+        amplitude,
+        width=_width(place),
+        color=palette.AFTER,
+        yerr=std,
+        ecolor=palette.MODEL,
+        capsize=2.0,
+        error_kw={"linewidth": 0.8},
+        label="fitted amplitude, 95 % interval",
+    )
+    return _finish(ax)
+
+
+def _of_selection(selection: OrderSelection, ax: Axes | None) -> Axes:
+    ax = new_axes(ax)
+    factor = ARCSEC_PER_TURN / selection.period
+    rows = selection.table
+    place = _places(ax, [float(row.order) for row in rows])
+    width = _width(place)
+    amplitude = np.array([factor * row.amplitude for row in rows])
+    kept = np.array([row.retained for row in rows], dtype=bool)
+    if kept.any():
+        ax.bar(place[kept], amplitude[kept], width, color=palette.AFTER, label="retained")
+    if not kept.all():
+        ax.bar(
+            place[~kept],
+            amplitude[~kept],
+            width,
+            facecolor="none",
+            edgecolor=palette.MUTED,
+            linewidth=0.9,
+            label="not retained",
+        )
+    limit = factor * _thresholds(selection)
+    if np.isfinite(limit).any():
+        ax.hlines(
+            limit,
+            place - 0.5 * width,
+            place + 0.5 * width,
+            color=palette.WARNING,
+            linewidth=1.6,
+            label="needed to be significant",
+        )
+    tall = [i for i in np.argsort(-amplitude) if kept[i] and rows[i].aliases][:_MOST_ANNOTATED]
+    for i in tall:
+        aliases = [f"{m:g}" for m in rows[i].aliases[:_MOST_ALIASES]]
+        more = ", …" if len(rows[i].aliases) > _MOST_ALIASES else ""
+        ax.annotate(
+            f"or {', '.join(aliases)}{more}",
+            (place[i], amplitude[i]),
+            xytext=(0, 3),
+            textcoords="offset points",
+            rotation=90,
+            ha="center",
+            va="bottom",
+            fontsize="x-small",
+            color=palette.WARNING,
+        )
+    if tall:
+        ax.set_ylim(0.0, 1.35 * float(np.nanmax(amplitude)))
+    return _finish(ax)
+
+
+def _thresholds(selection: OrderSelection) -> Array:
+    r"""Amplitude at which each order would just be significant, NaN where none is known.
+
+    The chance of a false alarm in the whole search is ``K P(T)`` with the tail
+    ``P(T) = (1 + T/v)^(-v/2)``; the row gives both ``T`` and that chance, so that ``K``
+    and the T for the largest chance allowed follow, and amplitudes go as ``sqrt(T)``.
+    """
+    from ..orders import FALSE_ALARM
+
+    v = selection.noise.degrees_of_freedom
+    limits = []
+    for row in selection.table:
+        log_tail = -0.5 * v * math.log1p(row.statistic / v) if row.statistic > 0.0 else 0.0
+        log_tests = row.log10_false_alarm * math.log(10.0) - log_tail
+        needed = v * math.expm1(2.0 / v * max(0.0, log_tests - math.log(FALSE_ALARM)))
+        ratio = needed / row.statistic if row.statistic > 0.0 else math.nan
+        limits.append(row.amplitude * math.sqrt(ratio))
+    return np.array(limits)
+
+
+def _places(ax: Axes, orders: list[float]) -> Array:
+    """Where the bars stand: evenly, each with its name, while there are few."""
+    if len(orders) > _MOST_NAMED:
+        return np.asarray(orders, dtype=np.float64)
+    place = np.arange(len(orders), dtype=np.float64)
+    ax.set_xticks(place, [f"{m:g}" for m in orders], rotation=90 if len(orders) > 20 else 0)
+    return place
+
+
+def _width(place: Array) -> float:
+    return 0.75 * float(np.diff(place).min(initial=1.0))
+
+
+def _finish(ax: Axes) -> Axes:
+    ax.set_xlabel("order / cycles per output turn")
+    ax.set_ylabel("amplitude / arcsec")
+    ax.grid(True, axis="y", color="#00000018", linewidth=0.8)
+    ax.set_axisbelow(True)
+    legend(ax)
+    return ax

@@ -1,0 +1,215 @@
+"""What the pictures show, as plain arrays in degrees and arcsec; draws nothing."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Final, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..angles import ARCSEC_PER_TURN, circular_mean, wrap
+from ..errors import ArgumentError, RankError, TrueAngleError
+from ..model import HarmonicModel
+from ..robust import Loss
+from ..runs import CalibrationRun
+
+if TYPE_CHECKING:
+    from ..fitresult import FitResult
+
+__all__ = [
+    "CONFIDENCE",
+    "SIGNALS",
+    "Curve",
+    "Phases",
+    "Points",
+    "error_points",
+    "held_out_points",
+    "model_curve",
+    "residual_points",
+    "run_phases",
+    "seen_span",
+    "thinned",
+]
+
+Array = NDArray[np.float64]
+
+#: Half width of a 95 % band in standard deviations.
+CONFIDENCE: Final = 1.96
+
+#: Points of a curve for each cycle of its highest order, and the least and most of them.
+_PER_CYCLE, _FEWEST, _MOST_SAMPLES = 12, 721, 12001
+
+#: What residuals can be drawn against: axis label by name.
+SIGNALS: Final = {
+    "angle": "reference angle / deg",
+    "time": "time / s",
+    "speed": "output speed / (deg/s)",
+    "temperature": "temperature / °C",
+    "direction": "direction of travel",
+    "torque": "torque / Nm",
+}
+
+
+@dataclass(frozen=True)
+class Points:
+    """Readings of one run: ``x`` (degrees unless it is another signal), ``y`` in arcsec."""
+
+    label: str
+    x: Array
+    y: Array
+
+
+@dataclass(frozen=True)
+class Curve:
+    """A model over the angle in degrees: error and its standard deviation in arcsec."""
+
+    angle: Array
+    error: Array
+    std: Array | None
+
+
+@dataclass(frozen=True)
+class Phases:
+    """One order in every run: amplitude in arcsec, phase in radians."""
+
+    order: float
+    labels: tuple[str, ...]
+    amplitude: Array
+    phase: Array
+
+
+def thinned(points: Points, most: int) -> Points:
+    """At most ``most`` of the points, evenly taken."""
+    stride = -(-points.x.size // most)
+    return points if stride <= 1 else Points(points.label, points.x[::stride], points.y[::stride])
+
+
+def label_of(run: CalibrationRun, number: int) -> str:
+    """The run's label, or its number from 1."""
+    return run.label or str(number + 1)
+
+
+def degrees(run: CalibrationRun, low: float = 0.0) -> Array:
+    """Reference angles in degrees, on the turn that begins at ``low``."""
+    return low + np.mod(run.reference * (360.0 / run.period) - low, 360.0)
+
+
+def error_points(fit: FitResult) -> list[Points]:
+    """Measured error of every run less that run's zero."""
+    factor = ARCSEC_PER_TURN / fit.model.period
+    low, _ = seen_span(fit.model)
+    found = []
+    for number, run in enumerate(fit.runs):
+        zero = fit.offsets[number]
+        zero = run.zero if np.isnan(zero) else zero
+        error = wrap(run.indicated - run.reference - zero, run.period)
+        found.append(Points(label_of(run, number), degrees(run, low), factor * error))
+    return found
+
+
+def model_curve(model: HarmonicModel) -> Curve:
+    """The model without its constant, over the turn or the part of it that was seen."""
+    highest = max(model.orders, default=1.0)
+    low, high = seen_span(model)
+    count = int(np.clip(_PER_CYCLE * highest * (high - low) / 360.0, _FEWEST, _MOST_SAMPLES))
+    angle = np.linspace(low, high, count)
+    theta = angle * (model.period / 360.0)
+    factor = ARCSEC_PER_TURN / model.period
+    error = factor * (np.asarray(model.error(theta)) - model.constant)
+    std = None if model.covariance is None else factor * model.band(theta)
+    return Curve(angle, error, std)
+
+
+def seen_span(model: HarmonicModel) -> tuple[float, float]:
+    """The stretch the model was fitted on, in degrees; a whole turn when it was all."""
+    if model.partial_span is None:
+        return 0.0, 360.0
+    low, high = (360.0 / model.period * x for x in model.partial_span)
+    return low, high
+
+
+def held_out_points(
+    model: HarmonicModel, runs: Sequence[CalibrationRun]
+) -> list[tuple[Points, Points]]:
+    """Error of runs that the model has not seen, before and after correction.
+
+    Each run keeps its own zero: the circular mean of what is left after correction is
+    taken off both.
+    """
+    factor = ARCSEC_PER_TURN / model.period
+    low, _ = seen_span(model)
+    found = []
+    for number, run in enumerate(runs):
+        if run.period != model.period:
+            raise ArgumentError(
+                f"run {label_of(run, number)} has period {run.period:g}, the model "
+                f"{model.period:g}: convert one of them"
+            )
+        after = np.asarray(model.correct(run.indicated)) - run.reference
+        after = wrap(after - circular_mean(after, run.period), run.period)
+        before = wrap(run.indicated - run.reference - run.zero, run.period)
+        x, label = degrees(run, low), label_of(run, number)
+        found.append((Points(label, x, factor * before), Points(label, x, factor * after)))
+    return found
+
+
+def residual_points(fit: FitResult, against: str = "angle") -> list[Points]:
+    """Residuals of every run that has the signal ``against`` (see `SIGNALS`).
+
+    Raises
+    ------
+    ArgumentError
+        An unknown signal, or one that no run has.
+    """
+    if against not in SIGNALS:
+        raise ArgumentError(f"against must be one of {', '.join(SIGNALS)}, got {against!r}")
+    factor = ARCSEC_PER_TURN / fit.model.period
+    low, _ = seen_span(fit.model)
+    parts = np.split(fit.residuals, np.cumsum([len(run) for run in fit.runs])[:-1])
+    found = []
+    for number, (run, rest) in enumerate(zip(fit.runs, parts, strict=True)):
+        x = degrees(run, low) if against == "angle" else getattr(run, against)
+        if x is None:
+            continue
+        scale = 360.0 / run.period if against == "speed" else 1.0
+        found.append(Points(label_of(run, number), scale * np.asarray(x), factor * rest))
+    if not found:
+        raise ArgumentError(f"no run has {against}: it cannot be drawn against the residual")
+    return found
+
+
+def run_phases(fit: FitResult) -> list[Phases]:
+    """Amplitude and phase of the model's orders in every run fitted alone.
+
+    Runs whose readings cannot hold the orders by themselves are left out.
+
+    Raises
+    ------
+    RankError
+        That holds for all of them.
+    """
+    from ..fitting import fit as fit_runs
+
+    orders = {shaft.name: shaft.orders for shaft in fit.model.shafts}
+    shafts = {shaft.name: shaft.cycles_per_turn for shaft in fit.model.shafts}
+    labels, coefficients = [], []
+    for number, run in enumerate(fit.runs):
+        try:
+            alone = fit_runs(
+                run, orders, shafts=shafts, argument=fit.model.argument, loss=cast(Loss, fit.loss)
+            )
+        except TrueAngleError:
+            continue
+        labels.append(label_of(run, number))
+        coefficients.append((alone.amplitudes, alone.phases))
+    if not labels:
+        raise RankError("no run holds these orders by itself: their phases cannot be compared")
+    factor = ARCSEC_PER_TURN / fit.model.period
+    amplitude = factor * np.array([a for a, _ in coefficients])
+    phase = np.array([p for _, p in coefficients])
+    return [
+        Phases(order, tuple(labels), amplitude[:, i], phase[:, i])
+        for i, order in enumerate(fit.orders)
+    ]

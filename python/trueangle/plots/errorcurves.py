@@ -1,0 +1,84 @@
+"""Error curves of all runs with the model and its confidence band."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from . import palette
+from .canvas import legend, new_axes, turn_axis
+from .curves import CONFIDENCE, error_points, model_curve, seen_span, thinned
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+    from ..fitresult import FitResult
+
+__all__ = ["error_curves"]
+
+#: Points drawn per run; a picture is no wider.
+_MOST = 4000
+#: Orders beyond which the model fills the picture.
+_DENSE = 40.0
+
+
+def error_curves(fit: FitResult, ax: Axes | None = None) -> Axes:
+    """Measured error of every run, the fitted model and its 95 % band.
+
+    Every run is shown less its own zero, the model without its constant.
+
+    Parameters
+    ----------
+    fit : FitResult
+    ax : matplotlib Axes, optional
+
+    Returns
+    -------
+    matplotlib Axes
+
+    Raises
+    ------
+    MissingExtraError
+        matplotlib is not installed.
+    """
+    ax = new_axes(ax)
+    for number, points in enumerate(error_points(fit)):
+        part = thinned(points, _MOST)
+        ax.plot(
+            part.x,
+            part.y,
+            linestyle="none",
+            marker=palette.MARKERS[number % len(palette.MARKERS)],
+            markersize=2.0 if part.x.size > 500 else 3.5,
+            alpha=0.35 if part.x.size > 500 else 0.75,
+            markeredgewidth=0.0,
+            color=palette.run_colour(number),
+            label=f"run {part.label}",
+        )
+    curve = model_curve(fit.model)
+    # A gear's orders fill the picture: the readings stay on top of them.
+    dense = max(fit.orders, default=0.0) > _DENSE
+    ax.plot(
+        curve.angle,
+        curve.error,
+        color=palette.MUTED if dense else palette.MODEL,
+        linewidth=0.5 if dense else 1.2,
+        zorder=1.0 if dense else 3.0,
+        label="model",
+    )
+    if curve.std is not None:
+        half = CONFIDENCE * curve.std
+        ax.fill_between(
+            curve.angle,
+            curve.error - half,
+            curve.error + half,
+            color=palette.MODEL,
+            alpha=0.2,
+            linewidth=0.0,
+            zorder=0.5,
+            label="95 % band",
+        )
+    turn_axis(ax, *seen_span(fit.model))
+    ax.set_xlabel("reference angle / deg")
+    ax.set_ylabel("error, zero of the run removed / arcsec")
+    legend(ax)
+    return ax

@@ -1,0 +1,73 @@
+"""Phase of every order over the runs, on polar axes."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from . import palette
+from .canvas import new_axes
+from .curves import run_phases
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+    from ..fitresult import FitResult
+
+__all__ = ["phases_over_runs"]
+
+#: Orders drawn by default, the largest first: beyond that colours repeat too often.
+_MOST_ORDERS = 12
+
+
+def phases_over_runs(fit: FitResult, ax: Axes | None = None, most: int = _MOST_ORDERS) -> Axes:
+    """Phase (angle) and amplitude (radius, arcsec) of every order in every run.
+
+    A point is one run fitted by itself with the fit's orders; points of one order that
+    stay together are a systematic error, points spread around the turn are none.
+
+    Parameters
+    ----------
+    fit : FitResult
+    ax : matplotlib PolarAxes, optional
+    most : int
+        Draw only so many orders, the largest.
+
+    Returns
+    -------
+    matplotlib PolarAxes
+
+    Raises
+    ------
+    RankError
+        No run holds the orders by itself.
+    """
+    found = sorted(run_phases(fit), key=lambda p: -float(p.amplitude.mean()))[:most]
+    polar: Any = new_axes(ax, polar=True)
+    for i, order in enumerate(sorted(found, key=lambda p: p.order)):
+        colour = palette.run_colour(i)
+        marker = palette.MARKERS[(i // len(palette.RUNS) + i) % len(palette.MARKERS)]
+        polar.plot(
+            order.phase,
+            order.amplitude,
+            linestyle="none",
+            marker=marker,
+            markersize=5.0,
+            alpha=0.85,
+            color=colour,
+            label=f"order {order.order:g}",
+        )
+        # From the middle of the cluster to the centre: which phase it stands for.
+        mean = np.mean(order.amplitude * np.exp(1j * order.phase))
+        polar.plot([0.0, np.angle(mean)], [0.0, abs(mean)], color=colour, linewidth=0.8)
+    polar.set_rmin(0.0)
+    top = max((float(p.amplitude.max()) for p in found), default=1.0)
+    polar.set_rmax(1.1 * top)
+    polar.set_rlabel_position(112.5)
+    polar.set_xticks(np.radians(np.arange(0, 360, 45)))
+    polar.set_xlabel("angle: phase / deg; radius: amplitude / arcsec")
+    polar.grid(True, color="#00000020", linewidth=0.8)
+    polar.legend(loc="center left", bbox_to_anchor=(1.08, 0.5), frameon=False, fontsize="small")
+    drawn: Axes = polar
+    return drawn

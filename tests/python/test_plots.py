@@ -1,0 +1,219 @@
+"""Pictures: what they show is what the results say, every axis has a unit."""
+
+from __future__ import annotations
+
+import sys
+
+import numpy as np
+import pytest
+
+import trueangle as ta
+from trueangle import plots
+from trueangle.errors import ArgumentError, MissingExtraError, RankError
+from trueangle.planning import plan_mounts, plan_tilts
+from trueangle.plots import curves, palette
+from trueangle.simulation import Harmonic, Joint, RunDesign, Simulation
+
+matplotlib = pytest.importorskip("matplotlib")
+matplotlib.use("Agg")
+
+#: Labels of axes must end with "/ unit" or name a pure number or category.
+UNITS = ("/ deg", "/ arcsec", "/ s", "/ (deg/s)", "/ °C", "/ Nm", "/ cycles per output turn")
+UNITLESS = ("direction of travel", "noise factor (1 = ideal)")
+
+
+@pytest.fixture(scope="module")
+def runs() -> list[ta.CalibrationRun]:
+    sim = Simulation(
+        Joint(100.0, "circular_spline", "motor"),
+        harmonics=(Harmonic("output", 1, 14.1, 243.75), Harmonic("motor", 1, 18.0, 46.5)),
+        sigma_arcsec=2.0,
+        runs=tuple(RunDesign(label=f"r{i}", direction=(-1) ** i, samples=180) for i in range(4)),
+    )
+    return ta.simulate(sim, seed=3)
+
+
+@pytest.fixture(scope="module")
+def fit(runs: list[ta.CalibrationRun]) -> ta.FitResult:
+    return ta.fit(runs[:3], {"output": [1, 2], "motor": [1]}, gear_ratio=100)
+
+
+@pytest.fixture(autouse=True)
+def _closed():
+    yield
+    from matplotlib import pyplot
+
+    pyplot.close("all")
+
+
+def check_labels(ax) -> None:
+    labels = [ax.get_xlabel(), ax.get_ylabel()]
+    if ax.name == "polar":
+        labels = labels[:1]
+    for label in labels:
+        assert label in UNITLESS or any(unit in label for unit in UNITS), label
+    assert not ax.get_title()
+
+
+def legend_texts(ax) -> list[str]:
+    return [text.get_text() for text in ax.get_legend().get_texts()]
+
+
+def nothing_clipped(ax) -> None:
+    """Every text lies inside the figure."""
+    figure = ax.figure
+    figure.canvas.draw()
+    frame = figure.bbox
+    low, high = sorted(ax.get_ylim())
+    ticks = [t for t in ax.get_yticklabels() if low <= t.get_position()[1] <= high]
+    texts = [ax.xaxis.label, ax.yaxis.label, *ticks]
+    texts += list(ax.texts) + (list(ax.get_legend().get_texts()) if ax.get_legend() else [])
+    for text in texts:
+        if not (text.get_text() and text.get_visible()):
+            continue
+        box = text.get_window_extent()
+        assert frame.x0 - 1 <= box.x0 < box.x1 <= frame.x1 + 1, text.get_text()
+        assert frame.y0 - 1 <= box.y0 < box.y1 <= frame.y1 + 1, text.get_text()
+
+
+def test_error_curves_show_readings_model_and_band(fit: ta.FitResult) -> None:
+    ax = plots.error_curves(fit)
+    check_labels(ax)
+    nothing_clipped(ax)
+    assert legend_texts(ax) == ["run r0", "run r1", "run r2", "model", "95 % band"]
+    model = ax.lines[3]
+    angle, error = model.get_data()
+    expected = 3600.0 * (fit.model.error(angle) - fit.model.constant)
+    np.testing.assert_allclose(error, expected, atol=1e-9)
+    # The readings are the residuals about that model.
+    x, y = ax.lines[0].get_data()
+    left = y - 3600.0 * (fit.model.error(x) - fit.model.constant)
+    np.testing.assert_allclose(left, 3600.0 * fit.residuals[: x.size], atol=1e-6)
+
+
+def test_readings_are_the_same_in_every_unit(runs: list[ta.CalibrationRun]) -> None:
+    shown = []
+    for scale, period in ((1.0, 360.0), (1.0 / 360.0, 1.0)):
+        scaled = [
+            ta.CalibrationRun(r.reference * scale, r.indicated * scale + 0.3 * period, period)
+            for r in runs[:2]
+        ]
+        shown.append(curves.error_points(ta.fit(scaled, [1, 2], loss="linear")))
+    for a, b in zip(*shown, strict=True):
+        np.testing.assert_allclose(a.x, b.x, atol=1e-9)
+        np.testing.assert_allclose(a.y, b.y, atol=1e-6)
+
+
+def test_spectrum_of_a_fit_shows_amplitudes_in_order(fit: ta.FitResult) -> None:
+    ax = plots.amplitude_spectrum(fit)
+    check_labels(ax)
+    nothing_clipped(ax)
+    bars = [patch.get_height() for patch in ax.patches]
+    np.testing.assert_allclose(bars, 3600.0 * fit.amplitudes[np.argsort(fit.orders)])
+    assert [t.get_text() for t in ax.get_xticklabels()] == ["1", "2", "100"]
+
+
+def test_phases_of_systematic_orders_stay_together(fit: ta.FitResult) -> None:
+    ax = plots.phases_over_runs(fit)
+    check_labels(ax)
+    found = {p.order: p for p in curves.run_phases(fit)}
+    # Order 100, 18 arcsec at 46.5 deg; noise 2 arcsec over 180 readings: 0.7 deg per run.
+    np.testing.assert_allclose(np.degrees(found[100.0].phase), 46.5, atol=4.0)
+    np.testing.assert_allclose(found[100.0].amplitude, 18.0, atol=1.0)
+
+
+def test_phases_refuse_runs_that_hold_no_order_alone() -> None:
+    theta = np.linspace(0.0, 350.0, 4)
+    run = ta.CalibrationRun(theta, theta + 0.1, period=360.0)
+    other = ta.CalibrationRun(theta + 40.0, theta + 40.1, period=360.0)
+    result = ta.fit([run, other], [1, 2], loss="linear")
+    with pytest.raises(RankError, match="no run holds"):
+        plots.phases_over_runs(result)
+
+
+def test_before_after_states_rms_and_peak_to_peak(fit: ta.FitResult, runs) -> None:
+    ax = plots.before_after(fit.model, runs[3:])
+    check_labels(ax)
+    nothing_clipped(ax)
+    left = 3600.0 * (fit.model.correct(runs[3].indicated) - runs[3].reference)
+    left -= left.mean()
+    rms, ptp = np.sqrt(np.mean(left**2)), np.ptp(left)
+    assert legend_texts(ax)[1] == f"after: rms {rms:.2f}, peak-to-peak {ptp:.2f} arcsec"
+    assert rms < 2.5
+
+
+def test_before_after_refuses_another_unit(fit: ta.FitResult) -> None:
+    run = ta.CalibrationRun([0.0, 0.5], [0.0, 0.5], period=1.0)
+    with pytest.raises(ArgumentError, match="period 1, the model 360"):
+        plots.before_after(fit.model, run)
+
+
+@pytest.mark.parametrize("against", sorted(curves.SIGNALS))
+def test_residuals_against_every_signal(fit: ta.FitResult, against: str) -> None:
+    ax = plots.residuals(fit, against)
+    check_labels(ax)
+    nothing_clipped(ax)
+    if against != "direction":
+        shown = np.concatenate([line.get_ydata() for line in ax.lines[:3]])
+        np.testing.assert_allclose(shown, 3600.0 * fit.residuals, atol=1e-9)
+
+
+def test_residuals_refuse_unknown_and_missing_signals() -> None:
+    theta = np.arange(0.0, 360.0, 10.0)
+    result = ta.fit(ta.CalibrationRun(theta, theta + 0.1, period=360.0), [1], loss="linear")
+    with pytest.raises(ArgumentError, match="no run has temperature"):
+        plots.residuals(result, "temperature")
+    with pytest.raises(ArgumentError, match="against must be one of"):
+        plots.residuals(result, "colour")
+
+
+def test_many_runs_put_the_legend_beside(runs) -> None:
+    many = [ta.CalibrationRun(r.reference, r.indicated, 360.0) for r in runs for _ in range(3)]
+    ax = plots.error_curves(ta.fit(many, [1], loss="linear"))
+    nothing_clipped(ax)
+    ax.figure.canvas.draw()
+    assert ax.get_legend().get_window_extent().x0 >= ax.get_window_extent().x1
+
+
+def test_partial_travel_is_drawn_where_it_was_seen() -> None:
+    theta = np.mod(np.linspace(-90.0, 90.0, 400), 360.0)
+    run = ta.CalibrationRun(theta, theta + 0.1 * np.sin(np.radians(theta)), period=360.0)
+    ax = plots.error_curves(ta.fit(run, [1], loss="linear"))
+    low, high = ax.get_xlim()
+    assert high - low == pytest.approx(180.0, abs=1.0)
+    x = ax.lines[0].get_xdata()
+    assert x.min() >= low - 1e-6
+    assert x.max() <= high + 1e-6
+
+
+@pytest.mark.parametrize("make", [lambda: plan_mounts(100, 36, 3), lambda: plan_tilts(100)])
+def test_plan_pictures(make) -> None:
+    plan = make()
+    positions, factors = plots.plan_positions(plan), plots.plan_factors(plan)
+    for ax in (positions, factors):
+        check_labels(ax) if ax is factors else None
+        nothing_clipped(ax)
+    heights = [patch.get_height() for patch in factors.patches]
+    np.testing.assert_allclose(heights, [f for f in plan.noise_factors.values() if f < np.inf])
+
+
+def test_given_axes_are_drawn_on_and_returned(fit: ta.FitResult) -> None:
+    from matplotlib import pyplot
+
+    _, ax = pyplot.subplots()
+    assert plots.error_curves(fit, ax=ax) is ax
+    assert fit.plot("residuals", ax=ax, against="time") is ax
+    with pytest.raises(ArgumentError, match="kind must be one of"):
+        fit.plot("pie")
+
+
+def test_colours_are_okabe_ito() -> None:
+    okabe_ito = {"#E69F00", "#56B4E9", "#009E73", "#F0E442", "#0072B2", "#D55E00", "#CC79A7"}
+    assert set(palette.RUNS) <= okabe_ito
+    assert len(set(palette.RUNS)) == len(palette.RUNS)
+
+
+def test_missing_matplotlib_is_named(fit: ta.FitResult, monkeypatch) -> None:
+    monkeypatch.setitem(sys.modules, "matplotlib", None)
+    with pytest.raises(MissingExtraError, match=r"trueangle\[plot\]"):
+        plots.error_curves(fit)
