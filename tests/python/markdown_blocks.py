@@ -1,0 +1,82 @@
+"""Runs the code blocks of a Markdown page: what a page shows is what happens.
+
+``python`` blocks are doctests (or plain code), one session a page; ``console`` blocks hold
+``$ command`` lines and the output that must follow, run in one folder a page.
+"""
+
+from __future__ import annotations
+
+import doctest
+import re
+import subprocess
+import sys
+from pathlib import Path
+from typing import NamedTuple
+
+FENCE = re.compile(r"^```(\w+)[^\n]*\n(.*?)^```$", re.MULTILINE | re.DOTALL)
+FLAGS = doctest.NORMALIZE_WHITESPACE | doctest.ELLIPSIS
+
+
+class Block(NamedTuple):
+    language: str
+    text: str
+    line: int
+
+
+def blocks(page: Path) -> list[Block]:
+    text = page.read_text(encoding="utf-8")
+    return [
+        Block(match[1], match[2], text.count("\n", 0, match.start()) + 1)
+        for match in FENCE.finditer(text)
+    ]
+
+
+def run_page(page: Path, folder: Path, skip: tuple[str, ...] = ()) -> int:
+    """Run every block of ``page`` in ``folder``; the number of blocks run.
+
+    Commands that contain one of ``skip`` are not run (those that CI itself runs).
+    """
+    session: dict[str, object] = {}
+    ran = 0
+    for block in blocks(page):
+        where = f"{page.name}:{block.line}"
+        if block.language == "python":
+            run_python(block, session, where)
+        elif block.language == "console":
+            if any(word in block.text for word in skip):
+                continue
+            run_console(block.text, folder, where)
+        else:
+            continue
+        ran += 1
+    return ran
+
+
+def run_python(block: Block, session: dict[str, object], where: str) -> None:
+    if ">>>" not in block.text:
+        exec(compile(block.text, where, "exec"), session)
+        return
+    test = doctest.DocTestParser().get_doctest(block.text, session, where, where, block.line)
+    report: list[str] = []
+    runner = doctest.DocTestRunner(optionflags=FLAGS)
+    runner.run(test, out=report.append, clear_globs=False)
+    session.update(test.globs)
+    assert runner.failures == 0, "".join(report)
+
+
+def run_console(text: str, folder: Path, where: str) -> None:
+    checker = doctest.OutputChecker()
+    for part in re.split(r"^\$ ", text, flags=re.MULTILINE)[1:]:
+        command, _, expected = part.partition("\n")
+        while command.endswith("\\"):
+            more, _, expected = expected.partition("\n")
+            command = command[:-1] + more.removeprefix("> ").strip()
+        command = re.sub(r"^(\.venv/bin/)?trueangle\b", f"{sys.executable} -m trueangle", command)
+        done = subprocess.run(
+            ["bash", "-c", command], cwd=folder, capture_output=True, text=True, timeout=300
+        )
+        assert done.returncode == 0, f"{where}: $ {command}\n{done.stderr}"
+        if expected.strip():
+            assert checker.check_output(expected, done.stdout, FLAGS), (
+                f"{where}: $ {command}\nexpected:\n{expected}\ngot:\n{done.stdout}"
+            )

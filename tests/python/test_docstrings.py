@@ -1,0 +1,23 @@
+"""Every example in a docstring runs and shows what it says."""
+
+import doctest
+import importlib
+import pkgutil
+
+import numpy as np
+import pytest
+
+import trueangle as ta
+
+MODULES = ["trueangle"] + [
+    module.name
+    for module in pkgutil.walk_packages(ta.__path__, "trueangle.")
+    if not module.name.endswith(("__main__", "._core"))
+]
+
+
+@pytest.mark.parametrize("name", MODULES)
+def test_examples(name):
+    module = importlib.import_module(name)
+    found = doctest.testmod(module, extraglobs={"np": np, "ta": ta}, verbose=False)
+    assert found.failed == 0
