@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 from ._core import __version__
 
 if TYPE_CHECKING:
+    from .angles import wrap as wrap
     from .fitresult import FitResult as FitResult
     from .fitting import fit as fit
     from .model import HarmonicModel as HarmonicModel
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
 
 #: Public names and the modules that define them; a module is imported at first use.
 _PUBLIC = {
+    "wrap": "angles",
     "CalibrationRun": "runs",
     "FitResult": "fitresult",
     "HarmonicModel": "model",

@@ -1,11 +1,13 @@
 """Runs the code blocks of a Markdown page: what a page shows is what happens.
 
 ``python`` blocks are doctests (or plain code), one session a page; ``console`` blocks hold
-``$ command`` lines and the output that must follow, run in one folder a page.
+``$ command`` lines and the output that must follow, run in one folder a page; a block of any
+language marked ``file=NAME`` is written there.
 """
 
 from __future__ import annotations
 
+import contextlib
 import doctest
 import re
 import subprocess
@@ -13,12 +15,13 @@ import sys
 from pathlib import Path
 from typing import NamedTuple
 
-FENCE = re.compile(r"^```(\w+)[^\n]*\n(.*?)^```$", re.MULTILINE | re.DOTALL)
+FENCE = re.compile(r"^```(\w+)([^\n]*)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 FLAGS = doctest.NORMALIZE_WHITESPACE | doctest.ELLIPSIS
 
 
 class Block(NamedTuple):
     language: str
+    file: str | None
     text: str
     line: int
 
@@ -26,9 +29,14 @@ class Block(NamedTuple):
 def blocks(page: Path) -> list[Block]:
     text = page.read_text(encoding="utf-8")
     return [
-        Block(match[1], match[2], text.count("\n", 0, match.start()) + 1)
+        Block(match[1], _file(match[2]), match[3], text.count("\n", 0, match.start()) + 1)
         for match in FENCE.finditer(text)
     ]
+
+
+def _file(info: str) -> str | None:
+    named = re.search(r"file=(\S+)", info)
+    return named[1] if named else None
 
 
 def run_page(page: Path, folder: Path, skip: tuple[str, ...] = ()) -> int:
@@ -40,8 +48,11 @@ def run_page(page: Path, folder: Path, skip: tuple[str, ...] = ()) -> int:
     ran = 0
     for block in blocks(page):
         where = f"{page.name}:{block.line}"
-        if block.language == "python":
-            run_python(block, session, where)
+        if block.file is not None:
+            (folder / block.file).write_text(block.text, encoding="utf-8")
+        elif block.language == "python":
+            with contextlib.chdir(folder):
+                run_python(block, session, where)
         elif block.language == "console":
             if any(word in block.text for word in skip):
                 continue

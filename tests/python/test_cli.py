@@ -42,7 +42,7 @@ def test_fit_then_correct_readings_the_fit_has_not_seen(fitted, tmp_path, capsys
     header, corrected = last_column(tmp_path / "out.csv")
     assert header == "run,reference_deg,indicated_deg,temperature_C,corrected_deg"
     (run,) = ta.read_runs(log)
-    left = ta.angles.wrap(np.array(corrected, dtype=float) - run.reference, 360.0)
+    left = ta.wrap(np.array(corrected, dtype=float) - run.reference, 360.0)
     assert left.std() < 0.006  # the noise is 0.005
     assert "200 readings" in capsys.readouterr().out
 

@@ -161,10 +161,10 @@ def test_every_run_has_its_own_zero_and_the_constant_is_their_circular_mean():
     theta, error = readings(4, noise=0.0)
     runs = [ta.CalibrationRun(theta, theta + error + z, 360.0) for z in (179.0, 181.0, -178.0)]
     result = ta.fit(runs, orders=ORDERS)
-    differences = np.array([ta.angles.wrap(z - result.offsets[0], 360.0) for z in result.offsets])
+    differences = np.array([ta.wrap(z - result.offsets[0], 360.0) for z in result.offsets])
     np.testing.assert_allclose(differences, [0.0, 2.0, 3.0], atol=1e-9)
     assert result.offset_spread == pytest.approx(np.std([0, 2, 3], ddof=1), abs=1e-6)
-    middle = float(ta.angles.wrap(result.model.constant - result.offsets[0], 360.0))
+    middle = float(ta.wrap(result.model.constant - result.offsets[0], 360.0))
     assert middle == pytest.approx(5 / 3, abs=1e-3)  # mean direction, not exactly the mean angle
 
 
