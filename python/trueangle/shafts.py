@@ -69,6 +69,11 @@ def resolve_orders(
     """
     cycles = shaft_cycles(gear_ratio, fixed_member) | dict(shafts or {})
     by_shaft = orders if isinstance(orders, Mapping) else {"output": orders}
+    for name, asked in by_shaft.items():
+        if not isinstance(asked, Iterable):
+            raise ArgumentError(
+                f"orders of shaft {name!r} must be a list such as range(1, 18), got {asked!r}"
+            )
     wanted = []
     for name, asked in by_shaft.items():
         if name not in cycles:

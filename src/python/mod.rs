@@ -1,5 +1,8 @@
 //! Bindings: extract, release the interpreter, call, convert. Nothing is computed here.
 
+// Arguments of a Python function have names: many of them are no confusion.
+#![allow(clippy::too_many_arguments)]
+
 mod array;
 mod circle;
 mod failure;
@@ -25,6 +28,8 @@ mod _core {
 
     #[pymodule_init]
     fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
-        module.add("__version__", env!("CARGO_PKG_VERSION"))
+        module.add("__version__", env!("CARGO_PKG_VERSION"))?;
+        // The stub lists the names; a second list would have to be kept in step with it.
+        module.delattr("__all__")
     }
 }

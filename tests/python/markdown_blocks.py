@@ -1,8 +1,8 @@
 """Runs the code blocks of a Markdown page: what a page shows is what happens.
 
 ``python`` blocks are doctests (or plain code), one session a page; ``console`` blocks hold
-``$ command`` lines and the output that must follow, run in one folder a page; a block of any
-language marked ``file=NAME`` is written there.
+``$ command`` lines and the output that must follow, run in one folder a page; a block
+under ``<!-- file: NAME -->`` is written there.
 """
 
 from __future__ import annotations
@@ -15,7 +15,9 @@ import sys
 from pathlib import Path
 from typing import NamedTuple
 
-FENCE = re.compile(r"^```(\w+)([^\n]*)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
+FENCE = re.compile(
+    r"(?:^<!-- file: (\S+) -->\n)?^```(\w+)[^\n]*\n(.*?)^```$", re.MULTILINE | re.DOTALL
+)
 FLAGS = doctest.NORMALIZE_WHITESPACE | doctest.ELLIPSIS
 
 
@@ -29,14 +31,9 @@ class Block(NamedTuple):
 def blocks(page: Path) -> list[Block]:
     text = page.read_text(encoding="utf-8")
     return [
-        Block(match[1], _file(match[2]), match[3], text.count("\n", 0, match.start()) + 1)
+        Block(match[2], match[1], match[3], text.count("\n", 0, match.start()) + 1)
         for match in FENCE.finditer(text)
     ]
-
-
-def _file(info: str) -> str | None:
-    named = re.search(r"file=(\S+)", info)
-    return named[1] if named else None
 
 
 def run_page(page: Path, folder: Path, skip: tuple[str, ...] = ()) -> int:

@@ -207,6 +207,7 @@ def test_wrong_units_and_signs_are_named(factor, remedy):
     [
         ({"orders": [0]}, "whole numbers from 1"),
         ({"orders": [1.5]}, "whole numbers from 1"),
+        ({"orders": 17}, "a list such as range"),
         ({"orders": {"motor": [1]}}, "gear_ratio"),
         ({"orders": "all"}, "auto"),
         ({"orders": [1], "loss": "cauchy"}, "loss"),
