@@ -42,6 +42,13 @@ impl Period {
         self.low
     }
 
+    /// One turn of a shaft of `cycles` per turn.
+    pub fn divided(self, cycles: f64) -> Self {
+        let high = self.high / cycles;
+        let low = (high.mul_add(-cycles, self.high) + self.low) / cycles;
+        Self { high, low }
+    }
+
     /// Whole turns nearest to `x`, and the rest as an unevaluated sum.
     fn reduce(self, x: f64) -> (f64, f64, f64) {
         let turns = (x / self.high).round_ties_even();

@@ -65,6 +65,33 @@ impl Design {
             .all(|harmonic| self.frequency(harmonic).fract() == 0.0)
     }
 
+    /// The slowest shaft of which every harmonic is a whole order: its cycles per turn,
+    /// and the order of each harmonic in turn. None when the shafts share no such turn.
+    pub fn common_turn(&self) -> Option<(f64, Vec<u32>)> {
+        /// Turns of the first shaft after which the others must be back at their start.
+        const MOST_TURNS: u32 = 1024;
+        let used = || self.shafts.iter().filter(|shaft| !shaft.orders.is_empty());
+        let first = used().next()?.cycles;
+        let turns = if self.is_periodic() {
+            return self.whole_orders(1.0).map(|orders| (1.0, orders));
+        } else {
+            let whole =
+                |turns: &u32| used().all(|s| (s.cycles / first * f64::from(*turns)).fract() == 0.0);
+            (1..=MOST_TURNS).find(whole)?
+        };
+        let base = first / f64::from(turns);
+        self.whole_orders(base).map(|orders| (base, orders))
+    }
+
+    /// Orders in cycles of a shaft that turns `base` times per turn.
+    fn whole_orders(&self, base: f64) -> Option<Vec<u32>> {
+        let order = |harmonic| {
+            let order = self.frequency(harmonic) / base;
+            (order <= f64::from(u32::MAX)).then_some(order.round() as u32)
+        };
+        self.harmonics().map(order).collect()
+    }
+
     /// Appends `scale * cos, scale * sin` of every harmonic at angle `x`.
     pub fn extend_row(&self, row: &mut Vec<f64>, x: f64, scale: f64) {
         for shaft in &self.shafts {

@@ -68,6 +68,14 @@ pub enum Error {
         got: f64,
     },
 
+    /// A method that cannot solve this problem was asked for.
+    #[error(
+        "this problem cannot be solved by moments: it needs orders of shafts that come back \
+         to their start together, and readings that are not too ill-conditioned for the \
+         method; use method \"plain\", or none to have one chosen"
+    )]
+    Method,
+
     /// The readings cannot tell these unknowns apart.
     #[error("rank {rank} of {unknowns} unknowns: {reason}")]
     Rank {

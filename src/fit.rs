@@ -3,37 +3,16 @@
 //! `indicated - reference = zero of the run + sum of A cos + B sin + noise`: the
 //! harmonics are shared by all runs, the zero is each run's own.
 
-use crate::angle::{Period, two_sum};
+mod check;
+mod path;
+mod run;
+
+use crate::angle::Period;
 use crate::design::Design;
 use crate::error::Error;
-use crate::lstsq::{System, Triangle};
-use crate::rank;
+use crate::{rank, threads};
 
-/// Rows reduced at a time: enough to hide the triangle above them, few enough for the cache.
-const BLOCK_ROWS: usize = 256;
-
-/// Readings that a run's circular centre is taken from, at even strides.
-const CENTRE_READINGS: usize = 4096;
-
-/// Readings of one run, in any one unit.
-#[derive(Clone, Copy, Debug)]
-pub struct Run<'a> {
-    /// True output angles.
-    pub reference: &'a [f64],
-    /// What the joint's own encoder says.
-    pub indicated: &'a [f64],
-    /// Reciprocal variances up to a factor; a reading of weight 0 does not count.
-    pub weights: Option<&'a [f64]>,
-}
-
-/// Which angle the harmonics are functions of.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Argument {
-    /// The true angle.
-    Reference,
-    /// The indicated angle.
-    Indicated,
-}
+pub use run::{Argument, Run};
 
 /// How the least-squares problem was solved.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -72,32 +51,45 @@ pub struct Solution {
     pub method: Method,
 }
 
-/// Fits `design` to `runs`; `ridge` penalises the squared coefficients, one penalty each.
-pub fn fit(
-    design: &Design,
-    runs: &[Run],
-    argument: Argument,
-    ridge: Option<&[f64]>,
-) -> Result<Solution, Error> {
-    check(design, runs, ridge)?;
+/// How to fit.
+#[derive(Clone, Copy, Debug)]
+pub struct Options<'a> {
+    /// What the harmonics are functions of.
+    pub argument: Argument,
+    /// The path to take; None for the fastest that keeps the accuracy of QR.
+    pub method: Option<Method>,
+    /// Penalties on the squared coefficients, one each.
+    pub ridge: Option<&'a [f64]>,
+    /// Threads; results do not depend on them.
+    pub threads: usize,
+}
+
+impl Default for Options<'_> {
+    fn default() -> Self {
+        Self {
+            argument: Argument::Reference,
+            method: None,
+            ridge: None,
+            threads: threads::available(),
+        }
+    }
+}
+
+/// Fits `design` to `runs`.
+pub fn fit(design: &Design, runs: &[Run], options: Options) -> Result<Solution, Error> {
+    let Options {
+        argument, ridge, ..
+    } = options;
+    check::check(design, runs, ridge)?;
     let period = design.period();
     let centres: Vec<_> = runs.iter().map(|run| run.centre(period)).collect();
-    let mut system = System {
-        runs: Vec::with_capacity(runs.len()),
-        shared: Triangle::new(design.columns() + 1),
-    };
-    for (run, &centre) in runs.iter().zip(&centres) {
-        let (pivot, rest) = reduce(design, run, argument, centre).eliminate();
-        system.runs.push(pivot);
-        system.shared.merge(&rest);
-    }
-    let readings = runs.iter().map(Run::count).sum::<usize>();
-    let condition_number = system.condition_number();
+    let (system, condition_number, method) = path::reduce(design, runs, &centres, options)?;
     if ridge.is_none() {
         let angles = || runs.iter().flat_map(|run| run.angles(argument));
-        let reach = angles().fold(0.0, |reach: f64, x| reach.max(x.abs()));
-        rank::check(design, &system, condition_number, reach, angles())?;
+        let reach = || angles().fold(0.0, |reach: f64, x| reach.max(x.abs()));
+        rank::check(design, &system, condition_number, reach, angles)?;
     }
+    let readings = runs.iter().map(Run::count).sum::<usize>();
     let estimate = system.solve(ridge).ok_or_else(|| Error::Rank {
         rank: 0,
         unknowns: system.unknowns(),
@@ -134,78 +126,8 @@ pub fn fit(
         degrees_of_freedom,
         rank: system.unknowns(),
         condition_number,
-        method: Method::Plain,
+        method,
     })
-}
-
-impl Run<'_> {
-    fn weight(&self, i: usize) -> f64 {
-        self.weights.map_or(1.0, |weights| weights[i])
-    }
-
-    /// Readings that count.
-    fn count(&self) -> usize {
-        match self.weights {
-            Some(weights) => weights.iter().filter(|w| **w > 0.0).count(),
-            None => self.reference.len(),
-        }
-    }
-
-    /// Regressor angles of the readings that count.
-    fn angles(&self, argument: Argument) -> impl Iterator<Item = f64> {
-        let angles = match argument {
-            Argument::Reference => self.reference,
-            Argument::Indicated => self.indicated,
-        };
-        let counts = |(i, x): (usize, &f64)| (self.weight(i) > 0.0).then_some(*x);
-        angles.iter().enumerate().filter_map(counts)
-    }
-
-    /// `indicated - reference - centre` in `(-period/2, period/2]`.
-    fn error(&self, i: usize, centre: f64, period: Period) -> f64 {
-        // The rounding of the difference matters after many turns: it is carried along.
-        let (difference, carry) = two_sum(self.indicated[i], -self.reference[i]);
-        period.wrap(period.wrap(difference) + carry - centre)
-    }
-
-    /// Circular mean of the errors: no error is cut in two when wrapped around it.
-    fn centre(&self, period: Period) -> f64 {
-        let turn = std::f64::consts::TAU / period.value();
-        let stride = self.reference.len().div_ceil(CENTRE_READINGS).max(1);
-        let (mut sine, mut cosine) = (0.0, 0.0);
-        for i in (0..self.reference.len()).step_by(stride) {
-            let (s, c) = (turn * self.error(i, 0.0, period)).sin_cos();
-            sine += self.weight(i) * s;
-            cosine += self.weight(i) * c;
-        }
-        sine.atan2(cosine) / turn
-    }
-}
-
-/// The triangle of `[1, harmonics | error]` over one run.
-fn reduce(design: &Design, run: &Run, argument: Argument, centre: f64) -> Triangle {
-    let columns = design.columns() + 2;
-    let mut triangle = Triangle::new(columns);
-    let mut rows = Vec::with_capacity(BLOCK_ROWS.min(run.reference.len()) * columns);
-    let angles = match argument {
-        Argument::Reference => run.reference,
-        Argument::Indicated => run.indicated,
-    };
-    for (i, &angle) in angles.iter().enumerate() {
-        let scale = run.weight(i).sqrt();
-        if scale == 0.0 {
-            continue;
-        }
-        rows.push(scale);
-        design.extend_row(&mut rows, angle, scale);
-        rows.push(scale * run.error(i, centre, design.period()));
-        if rows.len() == BLOCK_ROWS * columns {
-            triangle.absorb(&rows);
-            rows.clear();
-        }
-    }
-    triangle.absorb(&rows);
-    triangle
 }
 
 /// Circular mean of the zeros, and its derivative by each of them.
@@ -227,75 +149,4 @@ fn circular_mean(offsets: &[f64], period: Period) -> (f64, Vec<f64>) {
         period.wrap(mean / turn),
         offsets.iter().map(share).collect(),
     )
-}
-
-/// Lengths, finite numbers, weights, and that every run has a reading that counts.
-fn check(design: &Design, runs: &[Run], ridge: Option<&[f64]>) -> Result<(), Error> {
-    if let Some(ridge) = ridge {
-        same_length("ridge", ridge.len(), "coefficients", design.columns())?;
-        not_negative("ridge", ridge)?;
-    }
-    for run in runs {
-        let wanted = run.reference.len();
-        same_length("indicated", run.indicated.len(), "reference", wanted)?;
-        finite("reference", run.reference)?;
-        finite("indicated", run.indicated)?;
-        if let Some(weights) = run.weights {
-            same_length("weights", weights.len(), "reference", wanted)?;
-            not_negative("weights", weights)?;
-        }
-    }
-    let empty = runs.iter().position(|run| run.count() == 0);
-    if runs.is_empty() || empty.is_some() {
-        return Err(Error::Rank {
-            rank: 0,
-            unknowns: runs.len() + design.columns(),
-            orders: design.harmonics().collect(),
-            reason: match empty {
-                Some(run) => format!("run {run} has no reading of positive weight; leave it out"),
-                None => "there are no runs".into(),
-            },
-        });
-    }
-    Ok(())
-}
-
-fn same_length(
-    what: &'static str,
-    got: usize,
-    other: &'static str,
-    wanted: usize,
-) -> Result<(), Error> {
-    if got == wanted {
-        return Ok(());
-    }
-    Err(Error::Length {
-        what,
-        got,
-        other,
-        wanted,
-    })
-}
-
-fn finite(what: &'static str, values: &[f64]) -> Result<(), Error> {
-    match values.iter().position(|v| !v.is_finite()) {
-        Some(index) => Err(Error::NotFinite {
-            what,
-            index,
-            got: values[index],
-        }),
-        None => Ok(()),
-    }
-}
-
-fn not_negative(what: &'static str, values: &[f64]) -> Result<(), Error> {
-    let bad = |v: &f64| !(v.is_finite() && *v >= 0.0);
-    match values.iter().position(bad) {
-        Some(index) => Err(Error::Weight {
-            what,
-            index,
-            got: values[index],
-        }),
-        None => Ok(()),
-    }
 }

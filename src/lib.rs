@@ -17,6 +17,7 @@ pub mod compensator;
 pub mod design;
 pub mod fit;
 pub mod lstsq;
+pub mod moments;
 pub mod rank;
 
 #[cfg(feature = "python")]

@@ -5,14 +5,19 @@
 //! triangle, whatever the number of rows, and triangles merge like the rows they
 //! stand for. The design is never squared. This is the one module that knows nalgebra.
 
+mod blocked;
+
 use nalgebra::{DMatrix, DVector};
+
+use blocked::{cholesky, invert_upper};
 
 /// Above this size the condition number is estimated by power iteration (a few per
 /// cent low at most) instead of all singular values, whose cost grows fastest.
 const SINGULAR_VALUES_UP_TO: usize = 128;
 
-/// Steps of the power iteration.
+/// Most steps of the power iteration, and the change at which it stops.
 const POWER_STEPS: usize = 30;
+const POWER_CHANGE: f64 = 1e-3;
 
 /// The upper triangle `R` of rows; the last column is the right-hand side.
 #[derive(Clone, Debug)]
@@ -34,6 +39,19 @@ impl Triangle {
         self.stack(&DMatrix::from_row_slice(height, columns, rows));
     }
 
+    /// The triangle of some rows, given one after the other.
+    pub fn of_rows(columns: usize, rows: &[f64]) -> Self {
+        let mut triangle = Self::new(columns);
+        triangle.absorb(rows);
+        triangle
+    }
+
+    /// This triangle and another in one.
+    pub fn merged(mut self, after: &Self) -> Self {
+        self.merge(after);
+        self
+    }
+
     /// Adds the rows that another triangle stands for.
     pub fn merge(&mut self, other: &Self) {
         self.stack(&other.factor);
@@ -48,6 +66,27 @@ impl Triangle {
         rows.rows_mut(0, top).copy_from(&self.factor);
         rows.rows_mut(top, below.nrows()).copy_from(below);
         self.factor = rows.qr().unpack_r();
+    }
+
+    /// The triangle of rows whose Gram matrix is given, lower half column by column: the
+    /// squares of the design are all that is left of it, so this is for well-conditioned
+    /// problems. None when the matrix is not positive definite to working precision.
+    pub fn from_gram(columns: usize, gram: Vec<f64>) -> Option<Self> {
+        let mut lower = DMatrix::from_vec(columns, columns, gram);
+        let n = columns - 1;
+        cholesky(lower.view_mut((0, 0), (n, n)))?;
+        let (design, target) = (lower.view((0, 0), (n, n)), lower.view((n, 0), (1, n)));
+        let target = design.solve_lower_triangular(&target.transpose())?;
+        let left_over = lower[(n, n)] - target.norm_squared();
+        let mut factor = DMatrix::zeros(columns, columns);
+        for j in 0..n {
+            for i in 0..=j {
+                factor[(i, j)] = lower[(j, i)];
+            }
+        }
+        factor.view_mut((0, n), (n, 1)).copy_from(&target);
+        factor[(n, n)] = left_over.max(0.0).sqrt();
+        Some(Self { factor })
     }
 
     /// Takes the first column out: the row that holds it, and the rest.
@@ -77,6 +116,31 @@ impl Triangle {
         (0..columns)
             .map(|j| square.column(j).iter().copied().collect())
             .collect()
+    }
+}
+
+/// Triangles of many blocks of rows, merged in pairs like the carries of a binary counter:
+/// rounding grows with the logarithm of the number of blocks.
+#[derive(Clone, Debug, Default)]
+pub struct Reduction {
+    waiting: Vec<(u32, Triangle)>,
+}
+
+impl Reduction {
+    /// Adds the triangle of the next block.
+    pub fn push(&mut self, triangle: Triangle) {
+        let (mut level, mut triangle) = (0, triangle);
+        while let Some((_, before)) = self.waiting.pop_if(|(other, _)| *other == level) {
+            triangle = before.merged(&triangle);
+            level += 1;
+        }
+        self.waiting.push((level, triangle));
+    }
+
+    /// The triangle of all blocks; None without any.
+    pub fn finish(self) -> Option<Triangle> {
+        let triangles = self.waiting.into_iter().rev().map(|(_, triangle)| triangle);
+        triangles.reduce(|after, before| before.merged(&after))
     }
 }
 
@@ -136,9 +200,8 @@ impl System {
         let left_over = square[(n, n)].powi(2);
         let held = ridge.map(|ridge| self.held(ridge).square());
         let factor = held.as_ref().unwrap_or(&square);
-        let inverse = factor
-            .view((0, 0), (n, n))
-            .solve_upper_triangular(&DMatrix::identity(n, n))?;
+        let mut inverse = factor.view((0, 0), (n, n)).into_owned();
+        invert_upper(inverse.view_mut((0, 0), (n, n)));
         let coefficients = &inverse * factor.view((0, n), (n, 1));
         if !coefficients.iter().all(|c| c.is_finite()) {
             return None;
@@ -203,8 +266,8 @@ impl System {
             let values = factor.singular_values();
             return values.max() / values.min();
         }
-        let greatest = power(&factor, |v| factor.tr_mul(&(&factor * v)));
-        let least = power(&factor, |v| {
+        let greatest = power(runs + n, |v| factor.tr_mul(&(&factor * v)));
+        let least = power(runs + n, |v| {
             let up = factor.tr_solve_upper_triangular(&v).unwrap_or(v);
             factor.solve_upper_triangular(&up).unwrap_or(up)
         });
@@ -213,17 +276,20 @@ impl System {
 }
 
 /// Greatest eigenvalue of a symmetric positive operator.
-fn power(factor: &DMatrix<f64>, apply: impl Fn(DVector<f64>) -> DVector<f64>) -> f64 {
-    let size = factor.ncols();
+fn power(size: usize, apply: impl Fn(DVector<f64>) -> DVector<f64>) -> f64 {
     // Any start with a part of every eigenvector will do; this one is reproducible.
     let mut vector = DVector::from_fn(size, |i, _| 1.0 + (i as f64).sin());
     let mut value = 0.0;
     for _ in 0..POWER_STEPS {
         vector.normalize_mut();
         vector = apply(vector);
+        let previous = value;
         value = vector.norm();
         if !value.is_finite() {
             return f64::INFINITY;
+        }
+        if value - previous < POWER_CHANGE * value {
+            break;
         }
     }
     value

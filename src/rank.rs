@@ -33,24 +33,24 @@ struct Dependence {
 /// An error that names the orders at fault, or none when every unknown is determined.
 ///
 /// `reach` is the greatest absolute angle: its rounding bounds how well a column is known.
-pub fn check(
+pub fn check<I: Iterator<Item = f64>>(
     design: &Design,
     system: &System,
     condition: f64,
-    reach: f64,
-    angles: impl Iterator<Item = f64>,
+    reach: impl Fn() -> f64,
+    angles: impl Fn() -> I,
 ) -> Result<(), Error> {
     if condition < SUSPICIOUS_CONDITION {
         return Ok(());
     }
-    let found = dependences(design, system, reach);
+    let found = dependences(design, system, reach());
     let unknowns = system.unknowns();
     let hopeless = condition * f64::EPSILON * unknowns as f64 >= 1.0;
     if found.is_empty() && !hopeless {
         return Ok(());
     }
     let needed = 1 + design.columns();
-    let distinct = distinct_angles(design, angles, needed);
+    let distinct = distinct_angles(design, angles(), needed);
     let lost: Vec<_> = found.iter().map(|d| d.column).collect();
     let (orders, reason) = if distinct < needed {
         let orders = orders_of(design, &lost);

@@ -4,9 +4,10 @@ use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, ToPyArray};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
+use super::threads;
 use crate::design::{Design, Frequencies};
 use crate::fit as core;
-use crate::fit::{Argument, Method, Run};
+use crate::fit::{Argument, Method, Options, Run};
 
 type Readings<'py> = (
     PyReadonlyArray1<'py, f64>,
@@ -107,18 +108,23 @@ pub fn fit(
     argument: &str,
     method: Option<&str>,
     ridge: Option<Vec<f64>>,
-    threads: Option<usize>,
+    threads: Option<i64>,
 ) -> PyResult<Solution> {
-    let _ = threads;
     let argument = match argument {
         "reference" => Argument::Reference,
         "indicated" => Argument::Indicated,
         other => return Err(unknown("argument", other, "\"reference\" or \"indicated\"")),
     };
-    match method {
-        None | Some("plain") => {}
-        Some(other) => return Err(unknown("method", other, "\"plain\" or None")),
-    }
+    let method = match method {
+        None => None,
+        Some("plain") => Some(Method::Plain),
+        Some("moments") => Some(Method::Moments),
+        Some("qr") => Some(Method::Qr),
+        Some(other) => {
+            let wanted = "\"plain\", \"moments\", \"qr\" or None";
+            return Err(unknown("method", other, wanted));
+        }
+    };
     if cycles.len() != orders.len() {
         return Err(PyValueError::new_err(format!(
             "cycles has {} shafts, orders has {}: they must be equally many",
@@ -131,7 +137,15 @@ pub fn fit(
     let shafts = shafts.map(|(cycles, orders)| Frequencies { cycles, orders });
     let design = Design::new(period, shafts.collect())?;
     let runs = runs.iter().map(slices).collect::<PyResult<Vec<_>>>()?;
-    let inner = py.detach(|| core::fit(&design, &runs, argument, ridge.as_deref()))?;
+    let readings = runs.iter().map(|run| run.reference.len()).sum();
+    let threads = threads::threads(py, threads, readings)?;
+    let options = Options {
+        argument,
+        method,
+        ridge: ridge.as_deref(),
+        threads: threads.unwrap_or_else(crate::threads::available),
+    };
+    let inner = py.detach(|| core::fit(&design, &runs, options))?;
     Ok(Solution { inner, sizes })
 }
 

@@ -55,7 +55,7 @@ def make_runs(seed, sizes, period, cycles, orders, zeros, noise=1e-3):
     truth = rng.normal(size=2 * sum(map(len, orders))) * period / 400
     runs = []
     for size, zero in zip(sizes, zeros, strict=True):
-        reference = rng.uniform(0, period, size)
+        reference = rng.uniform(-2 * period, 2 * period, size)
         error = design_matrix(reference, period, cycles, orders) @ truth
         error += noise * period * rng.normal(size=size) + zero
         runs.append((reference, error, rng.uniform(0.5, 2.0, size)))
@@ -66,18 +66,32 @@ CASES = {
     "one shaft": (tau, [1.0], [[1, 2, 3]]),
     "degrees": (360.0, [1.0], [list(range(1, 18))]),
     "two shafts": (360.0, [1.0, 100.0], [[1, 2], [1, 2, 4]]),
+    "rational ratio": (360.0, [1.0, 2.5], [[1, 2], [1, 3]]),
     "real ratio": (1.0, [1.0, 50.37], [[1, 4], [1, 2]]),
     "counts": (65536.0, [1.0], [[1, 2, 400]]),
 }
 
 
-@pytest.mark.parametrize("case", CASES)
+# Shafts of a real ratio never come back to their start together: they have no moments.
+@pytest.mark.parametrize(
+    ("case", "method"),
+    [
+        (case, method)
+        for case in CASES
+        for method in ("plain", "moments", "qr")
+        if case != "real ratio" or method == "plain"
+    ],
+)
 @pytest.mark.parametrize("zeros", [[0.0], [0.01, -0.02, 0.03]])
-def test_agrees_with_numpy(case, zeros):
+def test_agrees_with_numpy(case, zeros, method):
     period, cycles, orders = CASES[case]
     zeros = [zero * period for zero in zeros]
-    _, runs = make_runs(1, [300] * len(zeros), period, cycles, orders, zeros)
-    solution = _core.fit([(r, r + e, w) for r, e, w in runs], period, cycles, orders)
+    size = 300
+    if method == "qr":  # factors want a dozen readings or more in each of 6.5 K segments
+        size = 40_000 if case in ("two shafts", "counts") else 4000
+    _, runs = make_runs(1, [size] * len(zeros), period, cycles, orders, zeros)
+    solution = _core.fit([(r, r + e, w) for r, e, w in runs], period, cycles, orders, method=method)
+    assert solution.method == method
     expected, covariance, variance, condition = numpy_fit(runs, period, cycles, orders)
 
     scale = AGREES * abs(expected).max()
@@ -91,6 +105,39 @@ def test_agrees_with_numpy(case, zeros):
     )
     assert solution.condition_number == pytest.approx(condition, rel=1e-10)
     assert solution.rank == len(expected)
+
+
+@pytest.mark.parametrize(
+    ("travel", "highest", "expected"),
+    [(360, 17, "moments"), (270, 17, "qr"), (180, 8, "qr"), (90, 5, "qr"), (180, 17, "plain")],
+)
+def test_path_follows_the_condition_number_and_is_as_good_as_qr(travel, highest, expected):
+    rng = np.random.default_rng(10)
+    orders = list(range(1, highest + 1))
+    reference = rng.uniform(0, travel, 20_000)
+    truth = rng.normal(size=2 * highest)
+    error = design_matrix(reference, 360.0, [1.0], [orders]) @ truth
+    runs = [(reference, reference + error, None)]
+    solution = _core.fit(runs, 360.0, [1.0], [orders])
+    assert solution.method == expected
+    plain = _core.fit(runs, 360.0, [1.0], [orders], method="plain")
+    # The readings themselves are rounded to 360 * 1.1e-16.
+    worst = max(1e-13, 1e-14 * plain.condition_number)
+    assert coefficients(solution) == pytest.approx(coefficients(plain), abs=worst)
+    assert solution.condition_number == pytest.approx(plain.condition_number, rel=1e-3)
+
+
+@pytest.mark.parametrize("threads", [1, 2, 3])
+@pytest.mark.parametrize("method", ["moments", "qr"])
+def test_threads_do_not_change_a_bit(threads, method):
+    rng = np.random.default_rng(11)
+    reference = rng.uniform(0, 360, 300_000)
+    runs = [(reference, reference + rng.normal(size=reference.size), None)]
+    one, more = (
+        _core.fit(runs, 360.0, [1.0], [[1, 2, 3]], method=method, threads=n) for n in (1, threads)
+    )
+    assert coefficients(one).tolist() == coefficients(more).tolist()
+    assert one.covariance.tolist() == more.covariance.tolist()
 
 
 def test_constant_is_the_circular_mean_and_its_variance_follows():
@@ -274,6 +321,7 @@ def test_bad_arguments():
     for keywords, message in [
         ({"argument": "encoder"}, "argument must be"),
         ({"method": "magic"}, "method must be"),
+        ({"threads": 0}, "threads must be 1 or more"),
         ({"ridge": [1.0]}, "ridge has 1 elements"),
         ({"ridge": [1.0, -1.0]}, r"ridge\[1\]"),
     ]:

@@ -1,0 +1,83 @@
+//! Cholesky factor and triangular inverse by halves: products of matrices do the work.
+
+use nalgebra::{DMatrixView, DMatrixViewMut};
+
+/// Size up to which a factorisation is done column by column; larger ones are halved, so
+/// that nearly all of the work is in matrix products.
+const UNBLOCKED: usize = 48;
+
+/// Lower Cholesky factor in place of the lower half; None when not positive definite.
+pub fn cholesky(mut a: DMatrixViewMut<f64>) -> Option<()> {
+    let n = a.ncols();
+    if n <= UNBLOCKED {
+        for j in 0..n {
+            let before = a.view((j, 0), (1, j)).norm_squared();
+            let rest = a[(j, j)] - before;
+            // What is left of a dependent column is the rounding of its length.
+            if rest.is_nan() || rest <= a[(j, j)] * f64::EPSILON * n as f64 {
+                return None;
+            }
+            let pivot = rest.sqrt();
+            a[(j, j)] = pivot;
+            for i in j + 1..n {
+                let before = a.view((i, 0), (1, j)).dot(&a.view((j, 0), (1, j)));
+                a[(i, j)] = (a[(i, j)] - before) / pivot;
+            }
+        }
+        return Some(());
+    }
+    let half = n / 2;
+    cholesky(a.view_mut((0, 0), (half, half)))?;
+    let upper_left = a.view((0, 0), (half, half)).into_owned();
+    let mut below = a.view((half, 0), (n - half, half)).into_owned();
+    divide_by_transpose(below.as_view_mut(), upper_left.as_view());
+    let mut rest = a.view_mut((half, half), (n - half, n - half));
+    rest.gemm(-1.0, &below, &below.transpose(), 1.0);
+    a.view_mut((half, 0), (n - half, half)).copy_from(&below);
+    cholesky(a.view_mut((half, half), (n - half, n - half)))
+}
+
+/// `B L'^-1` in place of `B`, `L` lower triangular.
+fn divide_by_transpose(mut b: DMatrixViewMut<f64>, l: DMatrixView<f64>) {
+    let n = l.ncols();
+    if n <= UNBLOCKED {
+        for j in 0..n {
+            for k in 0..j {
+                let factor = l[(j, k)];
+                let (before, mut own) = b.columns_range_pair_mut(k, j);
+                own.axpy(-factor, &before, 1.0);
+            }
+            b.column_mut(j).unscale_mut(l[(j, j)]);
+        }
+        return;
+    }
+    let half = n / 2;
+    let (mut left, mut right) = b.columns_range_pair_mut(..half, half..);
+    divide_by_transpose(left.as_view_mut(), l.view((0, 0), (half, half)));
+    let below = l.view((half, 0), (n - half, half));
+    right.gemm(-1.0, &left, &below.transpose(), 1.0);
+    divide_by_transpose(right, l.view((half, half), (n - half, n - half)));
+}
+
+/// Inverse of an upper triangle in its place; infinite where it is singular.
+pub fn invert_upper(mut r: DMatrixViewMut<f64>) {
+    let n = r.ncols();
+    if n <= UNBLOCKED {
+        for j in 0..n {
+            let pivot = 1.0 / r[(j, j)];
+            for i in 0..j {
+                let row = r.view((i, i), (1, j - i));
+                r[(i, j)] = -pivot * row.transpose().dot(&r.view((i, j), (j - i, 1)));
+            }
+            r[(j, j)] = pivot;
+        }
+        return;
+    }
+    let half = n / 2;
+    invert_upper(r.view_mut((0, 0), (half, half)));
+    invert_upper(r.view_mut((half, half), (n - half, n - half)));
+    let product = r.view((0, 0), (half, half)) * r.view((0, half), (half, n - half));
+    let product = product * r.view((half, half), (n - half, n - half));
+    r.view_mut((0, half), (half, n - half))
+        .copy_from(&(-product));
+}

@@ -1,0 +1,215 @@
+//! Moments of one run: constant memory, mergeable, one pass.
+
+use super::kernel::{Around, Frame, Readings, accumulate};
+use super::segment::Segment;
+use crate::angle::{Period, two_sum};
+use crate::threads;
+
+/// Readings per segment summed plainly before they join the compensated total: rounding
+/// stays that of a few hundred additions, whatever the number of readings.
+const BLOCK: usize = 256;
+
+/// Readings below which threads cost more than they save.
+const THREADED: usize = 1 << 17;
+
+/// Bytes that the tables of the parts of one update may take together.
+const PART_BYTES: usize = 8 << 20;
+
+/// Segments per order: half an order turns by `pi / SEGMENTS_PER_ORDER / 2 < 1/4` within a
+/// segment, where a Chebyshev series of 12 terms is exact to 3e-16.
+const SEGMENTS_PER_ORDER: f64 = 6.5;
+
+/// Fewest segments: low orders gain nothing from long ones.
+const FEWEST_SEGMENTS: usize = 32;
+
+/// Moments of one run of readings.
+#[derive(Clone, Debug)]
+pub struct Accumulator {
+    /// Turn of the base shaft.
+    base: Period,
+    /// Turn of the errors.
+    period: Period,
+    centre: f64,
+    /// Sums of the block under way, of all blocks before it, and what rounding took.
+    block: Vec<Segment>,
+    pending: usize,
+    total: Vec<Segment>,
+    carry: Vec<Segment>,
+    squares: (f64, f64),
+    count: usize,
+}
+
+/// Segments of the circle for orders up to `highest`, an even number.
+pub fn segments(highest: u32) -> usize {
+    let needed = (f64::from(highest) * SEGMENTS_PER_ORDER).ceil() as usize;
+    needed.max(FEWEST_SEGMENTS).next_multiple_of(2)
+}
+
+impl Accumulator {
+    /// No readings yet; errors are wrapped around `centre`.
+    pub fn new(period: Period, cycles: f64, highest: u32, centre: f64) -> Self {
+        let empty = vec![Segment::EMPTY; segments(highest)];
+        Self {
+            base: period.divided(cycles),
+            period,
+            centre,
+            block: empty.clone(),
+            pending: 0,
+            total: empty.clone(),
+            carry: empty,
+            squares: (0.0, 0.0),
+            count: 0,
+        }
+    }
+
+    /// The angle that errors are wrapped around and counted from.
+    pub fn centre(&self) -> f64 {
+        self.centre
+    }
+
+    /// Readings of positive weight.
+    pub fn count(&self) -> usize {
+        self.count
+    }
+
+    /// Weighted sum of the squared errors from the centre.
+    pub fn squares(&self) -> f64 {
+        self.squares.0 + self.squares.1
+    }
+
+    /// Adds readings; the result does not depend on `threads`.
+    pub fn update(&mut self, readings: Readings<'_>, threads: usize) {
+        let len = readings.angle.len();
+        self.count += match readings.weights {
+            Some(weights) => weights.iter().filter(|w| **w > 0.0).count(),
+            None => len,
+        };
+        if len < THREADED {
+            return self.add(readings);
+        }
+        let table = size_of::<Segment>() * self.total.len();
+        let parts = (PART_BYTES / table).clamp(4, 16);
+        let bounds: Vec<_> = (0..=parts).map(|i| len * i / parts).collect();
+        let fresh = || {
+            let mut part = self.clone();
+            part.clear();
+            std::sync::Mutex::new(part)
+        };
+        let sums: Vec<_> = (0..parts).map(|_| fresh()).collect();
+        threads::for_each_part(parts, threads, |i| {
+            let mut part = sums[i].lock().unwrap_or_else(|broken| broken.into_inner());
+            part.add(readings.part(bounds[i], bounds[i + 1]));
+        });
+        for part in sums {
+            self.absorb(
+                part.into_inner()
+                    .unwrap_or_else(|broken| broken.into_inner()),
+            );
+        }
+    }
+
+    /// Adds readings block by block.
+    fn add(&mut self, readings: Readings<'_>) {
+        let frame = Frame::new(self.base, self.block.len());
+        let around = Around::new(self.period, self.centre);
+        let full = BLOCK * self.block.len();
+        let mut start = 0;
+        while start < readings.angle.len() {
+            let end = readings.angle.len().min(start + full - self.pending);
+            let squares = accumulate(&frame, &around, readings.part(start, end), &mut self.block);
+            compensate(&mut self.squares.0, &mut self.squares.1, squares);
+            self.pending += end - start;
+            start = end;
+            if self.pending == full {
+                self.flush();
+            }
+        }
+    }
+
+    /// Adds the block under way to the total.
+    fn flush(&mut self) {
+        let mut block = std::mem::take(&mut self.block);
+        self.add_to_total(&block);
+        block.fill(Segment::EMPTY);
+        self.block = block;
+        self.pending = 0;
+    }
+
+    fn add_to_total(&mut self, moments: &[Segment]) {
+        let sums = self.total.iter_mut().zip(&mut self.carry);
+        for ((total, carry), moments) in sums.zip(moments) {
+            let sums = total.values_mut().zip(carry.values_mut());
+            for ((total, carry), value) in sums.zip(moments.values()) {
+                compensate(total, carry, *value);
+            }
+        }
+    }
+
+    /// Forgets all readings.
+    fn clear(&mut self) {
+        for table in [&mut self.block, &mut self.total, &mut self.carry] {
+            table.fill(Segment::EMPTY);
+        }
+        self.pending = 0;
+        self.squares = (0.0, 0.0);
+        self.count = 0;
+    }
+
+    /// Adds the moments of other readings of the same run, taken over the same segments.
+    pub fn merge(&mut self, other: &Self) {
+        let shift = self.period.wrap(other.centre - self.centre);
+        let mut moved = other.clone();
+        moved.flush();
+        if shift != 0.0 {
+            let (weight, error) = moved.sums();
+            let squares = shift * (2.0 * error + shift * weight);
+            compensate(&mut moved.squares.0, &mut moved.squares.1, squares);
+            for table in [&mut moved.total, &mut moved.carry] {
+                table.iter_mut().for_each(|s| *s = s.shifted(shift));
+            }
+        }
+        self.absorb(moved);
+        self.count += other.count;
+    }
+
+    /// Adds another's sums, its centre being the same.
+    fn absorb(&mut self, mut other: Self) {
+        other.flush();
+        self.add_to_total(&other.total);
+        self.add_to_total(&other.carry);
+        compensate(&mut self.squares.0, &mut self.squares.1, other.squares.0);
+        compensate(&mut self.squares.0, &mut self.squares.1, other.squares.1);
+    }
+
+    /// Sums of the weights and of the weighted errors.
+    fn sums(&self) -> (f64, f64) {
+        let moments = self.moments();
+        let weight = moments.iter().map(|s| s.weight[0]).sum();
+        let error = moments.iter().map(|s| s.error[0]).sum();
+        (weight, error)
+    }
+
+    /// The moments of every segment over Chebyshev polynomials.
+    pub fn moments(&self) -> Vec<Segment> {
+        let mut sums = self.clone();
+        sums.flush();
+        let carries = sums.carry.iter();
+        sums.total
+            .iter()
+            .zip(carries)
+            .map(|(total, carry)| {
+                let mut moments = *total;
+                let values = moments.values_mut().zip(carry.values());
+                values.for_each(|(value, carry)| *value += carry);
+                moments.chebyshev()
+            })
+            .collect()
+    }
+}
+
+/// Adds `value` to `sum`; what rounding takes goes to `carry`.
+fn compensate(sum: &mut f64, carry: &mut f64, value: f64) {
+    let (total, lost) = two_sum(*sum, value);
+    *sum = total;
+    *carry += lost;
+}

@@ -1,0 +1,167 @@
+//! Moments against sums term by term, and their algebra.
+
+use std::f64::consts::TAU;
+
+use proptest::prelude::*;
+use trueangle::angle::Period;
+use trueangle::moments::accumulator::Accumulator;
+use trueangle::moments::kernel::Readings;
+use trueangle::moments::spectrum::Spectrum;
+
+/// Of the sum of weights: the series is exact to 3e-16, a block of sums adds some ulp.
+const EXACT: f64 = 2e-15;
+
+fn readings(seed: u64, len: usize, period: f64) -> [Vec<f64>; 3] {
+    let mut state = seed;
+    let mut uniform = || {
+        state = state
+            .wrapping_mul(6364136223846793005)
+            .wrapping_add(1442695040888963407);
+        (state >> 11) as f64 / (1u64 << 53) as f64
+    };
+    let angle = (0..len).map(|_| period * (4.0 * uniform() - 2.0)).collect();
+    let error = (0..len)
+        .map(|_| 0.02 * period * (uniform() - 0.5))
+        .collect();
+    let weights = (0..len).map(|_| 0.5 + uniform()).collect();
+    [angle, error, weights]
+}
+
+fn sums(period: f64, highest: u32, data: &[Vec<f64>; 3], threads: usize) -> Accumulator {
+    let mut sums = Accumulator::new(Period::new(period).unwrap(), 1.0, highest, 0.0);
+    sums.update(
+        Readings {
+            angle: &data[0],
+            error: &data[1],
+            reference: None,
+            weights: Some(&data[2]),
+        },
+        threads,
+    );
+    sums
+}
+
+#[test]
+fn spectrum_is_the_sum_term_by_term() {
+    for (period, highest) in [(TAU, 1), (TAU, 17), (360.0, 40), (1.0, 512), (65536.0, 3)] {
+        let data = readings(1, 3000, period);
+        let spectrum = Spectrum::new(&sums(period, highest, &data, 1), highest);
+        let total: f64 = data[2].iter().sum();
+        let turn = Period::new(period).unwrap();
+        let at = |k: usize, values: &dyn Fn(usize) -> f64| {
+            let (mut real, mut imaginary) = (0.0, 0.0);
+            for (i, &x) in data[0].iter().enumerate() {
+                let phase = Period::harmonic(turn.phase(x, 1.0), k as f64);
+                let (sine, cosine) = trueangle::angle::sin_cos_turns(phase);
+                real += values(i) * cosine;
+                imaginary += values(i) * sine;
+            }
+            (real, imaginary)
+        };
+        for k in 0..=2 * highest as usize {
+            let (real, imaginary) = at(k, &|i| data[2][i]);
+            let found = spectrum.weight[k];
+            assert!(
+                (found.re - real).abs() < EXACT * total,
+                "order {k} of {highest}"
+            );
+            assert!(
+                (found.im - imaginary).abs() < EXACT * total,
+                "order {k} of {highest}"
+            );
+        }
+        for k in 0..=highest as usize {
+            let (real, imaginary) = at(k, &|i| data[2][i] * data[1][i]);
+            let found = spectrum.error[k];
+            let scale = 0.01 * period * total;
+            assert!(
+                (found.re - real).abs() < EXACT * scale,
+                "order {k} of {highest}"
+            );
+            assert!(
+                (found.im - imaginary).abs() < EXACT * scale,
+                "order {k} of {highest}"
+            );
+        }
+        let squares: f64 = data[1].iter().zip(&data[2]).map(|(y, w)| w * y * y).sum();
+        assert!((spectrum.squares / squares - 1.0).abs() < 1e-14);
+        assert_eq!(spectrum.count, 3000);
+    }
+}
+
+#[test]
+fn threads_do_not_change_a_bit() {
+    let data = readings(2, 600_000, 360.0);
+    let one = Spectrum::new(&sums(360.0, 9, &data, 1), 9);
+    for threads in [2, 3, 8] {
+        let more = Spectrum::new(&sums(360.0, 9, &data, threads), 9);
+        assert_eq!(one.weight, more.weight);
+        assert_eq!(one.error, more.error);
+        assert_eq!(one.squares, more.squares);
+    }
+}
+
+#[test]
+fn equal_readings_lose_no_digits() {
+    // Plain summation of two million equal terms would be off by some 1e-11.
+    let len = 2_000_000;
+    let data = [vec![0.3; len], vec![0.1; len], vec![1.1; len]];
+    let spectrum = Spectrum::new(&sums(360.0, 5, &data, 1), 5);
+    let expected = len as f64 * 1.1;
+    assert!((spectrum.weight[0].re / expected - 1.0).abs() < 1e-12);
+    let expected = expected * 0.1;
+    assert!((spectrum.error[0].re / expected - 1.0).abs() < 1e-12);
+}
+
+#[test]
+fn wild_angles_do_no_harm() {
+    let data = [vec![1e300, -1e300, 1e18, 0.0], vec![0.0; 4], vec![1.0; 4]];
+    let spectrum = Spectrum::new(&sums(TAU, 3, &data, 1), 3);
+    assert!((spectrum.weight[0].re - 4.0).abs() < 1e-14);
+}
+
+proptest! {
+    #[test]
+    fn merging_is_adding(
+        seed in any::<u64>(),
+        cut in 0usize..500,
+        centre in -170.0f64..170.0,
+        turned in any::<bool>(),
+    ) {
+        let data = readings(seed, 500, 360.0);
+        let whole = Spectrum::new(&sums(360.0, 6, &data, 1), 6);
+        let parts = [0..cut, cut..500].map(|range| data.each_ref().map(|v| v[range.clone()].to_vec()));
+        // The second part is counted from a centre of its own.
+        let mut second = Accumulator::new(Period::new(360.0).unwrap(), 1.0, 6, centre);
+        second.update(
+            Readings {
+                angle: &parts[1][0],
+                error: &parts[1][1],
+                reference: None,
+                weights: Some(&parts[1][2]),
+            },
+            1,
+        );
+        let mut first = sums(360.0, 6, &parts[0], 1);
+        if turned {
+            // The merge then counts from the other centre: come back for the comparison.
+            let mut zero = Accumulator::new(Period::new(360.0).unwrap(), 1.0, 6, 0.0);
+            second.merge(&first);
+            zero.merge(&second);
+            first = zero;
+        } else {
+            first.merge(&second);
+        }
+        let merged = Spectrum::new(&first, 6);
+        let total = whole.weight[0].re;
+        for (a, b) in whole.weight.iter().zip(&merged.weight) {
+            prop_assert!((a - b).norm() < EXACT * total);
+        }
+        // Errors counted from a centre up to 170 away lose its digits, no more.
+        for (a, b) in whole.error.iter().zip(&merged.error) {
+            prop_assert!((a - b).norm() < EXACT * total * (4.0 + centre.abs()));
+        }
+        prop_assert!((whole.squares - merged.squares).abs() < EXACT * total * 180.0 * 180.0);
+        prop_assert_eq!(whole.count, merged.count);
+    }
+}
