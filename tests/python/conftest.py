@@ -6,6 +6,13 @@ import os
 from pathlib import Path
 
 import pytest
+from hypothesis import HealthCheck, settings
+
+# Machines are shared: time says nothing about correctness.
+settings.register_profile(
+    "trueangle", deadline=None, print_blob=True, suppress_health_check=[HealthCheck.too_slow]
+)
+settings.load_profile("trueangle")
 
 ROOT = Path(__file__).resolve().parents[2]
 

@@ -103,7 +103,7 @@ def test_standard_errors_agree_with_monte_carlo():
     reverse=st.booleans(),
     unit=st.sampled_from([1.0, 2 * math.pi, 65536.0]),
 )
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 def test_zero_turns_wrapping_direction_and_unit_give_one_model(
     seed, zero, turns, fold, reverse, unit
 ):
@@ -125,7 +125,7 @@ def test_zero_turns_wrapping_direction_and_unit_give_one_model(
 
 
 @given(seed=st.integers(0, 2**16))
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 def test_swapping_the_sign_of_all_angles_mirrors_the_model(seed):
     theta, error = readings(seed)
     model = fitted(theta, theta + error).model.shafts[0]
@@ -135,7 +135,7 @@ def test_swapping_the_sign_of_all_angles_mirrors_the_model(seed):
 
 
 @given(seed=st.integers(0, 2**16), shift=st.floats(0, 360))
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 def test_turning_the_zero_of_the_reference_turns_phases_by_order(seed, shift):
     theta, error = readings(seed)
     model = fitted(theta, theta + error).model.shafts[0]
@@ -148,7 +148,7 @@ def test_turning_the_zero_of_the_reference_turns_phases_by_order(seed, shift):
 
 
 @given(seed=st.integers(0, 2**16))
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 def test_the_order_of_rows_does_not_matter(seed):
     theta, error = readings(seed)
     shuffled = np.random.default_rng(seed).permutation(theta.size)
