@@ -9,6 +9,8 @@ from ._core import __version__
 
 if TYPE_CHECKING:
     from .angles import wrap as wrap
+    from .diagnosis import Diagnosis as Diagnosis
+    from .diagnosis import diagnose as diagnose
     from .fitresult import FitResult as FitResult
     from .fitting import fit as fit
     from .model import HarmonicModel as HarmonicModel
@@ -24,6 +26,7 @@ if TYPE_CHECKING:
 _PUBLIC = {
     "wrap": "angles",
     "CalibrationRun": "runs",
+    "Diagnosis": "diagnosis",
     "FitResult": "fitresult",
     "HarmonicModel": "model",
     "Shaft": "model",
@@ -31,6 +34,7 @@ _PUBLIC = {
     "load_model": "model",
     "read_runs": "runfiles",
     "Simulation": "simulation",
+    "diagnose": "diagnosis",
     "load_simulation": "simulation",
     "simulate": "simulation",
 }

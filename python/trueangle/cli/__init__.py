@@ -20,6 +20,7 @@ COMMANDS: tuple[str, ...] = (
     "correct",
     "plan",
     "simulate",
+    "diagnose",
 )
 
 

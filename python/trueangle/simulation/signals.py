@@ -107,15 +107,15 @@ class Signals:
         edges = [0, *cuts.tolist(), len(self)]
         return list(itertools.pairwise(edges))
 
-    def presliding(self, length_deg: float) -> Array:
+    def presliding(self, length_deg: float, start_state: float = 0.0) -> Array:
         r"""State z of a presliding spring of transition length L, in [-1, 1].
 
         .. math:: z(s) = d - (d - z_0)\,e^{-s/L}
 
-        with travel s since the reversal and state z_0 there; z = 0 at the start of a
-        run, whose history is not known.
+        with travel s since the reversal and state z_0 there. A run starts at
+        ``start_state * d``: 0 relaxed, 1 after a run-in in the same direction.
         """
-        decay = np.exp(-self.segment_length / length_deg)
+        decay = np.exp(-np.minimum(self.segment_length / length_deg, 700.0))
         start = np.zeros(self.segment_direction.size)
         state = 0.0
         for k, (d, keep, first) in enumerate(
@@ -127,11 +127,13 @@ class Signals:
             )
         ):
             if first:
-                state = 0.0
+                state = start_state * d
             start[k] = state
             state = d - (d - state) * keep
         d = self.segment_direction[self.segment]
-        return np.asarray(d - (d - start[self.segment]) * np.exp(-self.travel / length_deg))
+        return np.asarray(
+            d - (d - start[self.segment]) * np.exp(-np.minimum(self.travel / length_deg, 700.0))
+        )
 
 
 def join_runs(runs: Sequence[CalibrationRun]) -> Signals:

@@ -65,10 +65,13 @@ class PreslidingHysteresis(Effect):
         h: half of the reversal error far from the reversal.
     length_deg : float
         L: travel in which it builds up.
+    start_state : float
+        Share of the wind-up that is there when a run starts: 0 relaxed, 1 run in.
     """
 
     amplitude_arcsec: float
     length_deg: float
+    start_state: float = 0.0
 
     kind: ClassVar[str] = "presliding_hysteresis"
     sentence: ClassVar[str] = (
@@ -84,4 +87,4 @@ class PreslidingHysteresis(Effect):
     measure: ClassVar[str] = _AFTER_REVERSAL
 
     def signal(self, signals: Signals, around: Surroundings, rng: np.random.Generator) -> Array:
-        return self.amplitude_arcsec * signals.presliding(self.length_deg)
+        return self.amplitude_arcsec * signals.presliding(self.length_deg, self.start_state)

@@ -1,0 +1,102 @@
+"""The diagnosis as readable text."""
+
+from __future__ import annotations
+
+import textwrap
+from typing import Any
+
+from .findings import Diagnosis, Finding
+
+__all__ = ["render"]
+
+WIDTH = 88
+
+
+def render(diagnosis: Diagnosis) -> str:
+    """The account of a diagnosis: what is wrong, why, the evidence, the gain, what is open."""
+    d = diagnosis.discrepancy
+    lines = [
+        f"Measured minus simulated: rms {d.rms:.2f} arcsec, peak-to-peak "
+        f"{d.peak_to_peak:.2f}, max abs {d.max_abs:.2f} ({diagnosis.readings} readings).",
+        f"Noise of one reading: {diagnosis.noise:.2f} arcsec"
+        + (
+            f", correlated by {diagnosis.correlation:.2f} from one to the next."
+            if diagnosis.correlation
+            else "."
+        ),
+    ]
+    if diagnosis.readings_used < diagnosis.readings:
+        lines.append(f"{diagnosis.readings_used} of the readings, spread evenly, were used.")
+    if not diagnosis.findings:
+        lines += ["", "Nothing beyond the simulation is supported by the readings."]
+    for k, finding in enumerate(diagnosis.findings, 1):
+        lines += ["", *_finding(k, finding)]
+    g = diagnosis.gain
+    lines += [
+        "",
+        f"All together: rms {g['rms_before_arcsec']:.2f} -> {g['rms_after_arcsec']:.2f} arcsec, "
+        f"peak-to-peak {g['peak_to_peak_before_arcsec']:.2f} -> "
+        f"{g['peak_to_peak_after_arcsec']:.2f}, max abs {g['max_abs_before_arcsec']:.2f} -> "
+        f"{g['max_abs_after_arcsec']:.2f} (in the readings that were fitted).",
+    ]
+    if diagnosis.not_identifiable:
+        lines += ["", "What these readings cannot tell:"]
+        for spot in sorted(diagnosis.not_identifiable, key=lambda spot: not spot.supported):
+            head = ", ".join(spot.causes)
+            if spot.supported:
+                head += " (one of them is seen)" if len(spot.causes) > 1 else " (something is seen)"
+            lines += _wrapped(f"- {head}: {spot.because}. To tell: {spot.measure}.", 2)
+    return "\n".join(lines)
+
+
+def _finding(number: int, finding: Finding) -> list[str]:
+    lines = [f"{number}. {finding.cause}"]
+    lines += _wrapped(finding.sentence, 3, first=3)
+    for name, entry in finding.parameters.items():
+        lines += _wrapped(f"{name}: {_quantity(entry)}", 7, first=5)
+    text = f"Evidence: BIC better by {finding.evidence['bic_gain']:.1f}"
+    if finding.rivals:
+        text += "; in its place " + ", ".join(
+            f"{cause} would explain {gap:.1f} less" for cause, gap in finding.rivals
+        )
+    lines += _wrapped(text + ".", 5, first=3)
+    gain = finding.gain
+    if gain is not None:
+        text = (
+            f"Gain on held-out data, {gain.holdout}: rms {gain.before[0]:.2f} -> "
+            f"{gain.after[0]:.2f} arcsec, peak-to-peak {gain.before[1]:.2f} -> "
+            f"{gain.after[1]:.2f}, max abs {gain.before[2]:.2f} -> {gain.after[2]:.2f}"
+        )
+        if gain.reducible_share is not None and gain.interval is not None:
+            text += (
+                f"; reducible share {gain.reducible_share:.2f} "
+                f"({gain.interval[0]:.2f} to {gain.interval[1]:.2f})"
+            )
+        if gain.control_share is not None:
+            text += f"; with shuffled labels {gain.control_share:.2f}"
+        if gain.note:
+            text += f"; {gain.note}"
+        lines += _wrapped(text + ".", 5, first=3)
+    return lines
+
+
+def _quantity(entry: dict[str, Any]) -> str:
+    value, std = entry["value"], entry["std"]
+    if isinstance(value, list):
+        shown = ", ".join(_number(item) for item in value[:12])
+        if len(value) > 12:
+            shown += f" and {len(value) - 12} more"
+        if isinstance(std, list):
+            shown += " +- " + ", ".join(_number(item) for item in std[:12])
+        return shown
+    if isinstance(std, float):
+        return f"{_number(value)} +- {_number(std)}"
+    return _number(value)
+
+
+def _number(value: Any) -> str:
+    return f"{value:.4g}" if isinstance(value, float) else str(value)
+
+
+def _wrapped(text: str, indent: int, first: int = 0) -> list[str]:
+    return textwrap.wrap(text, WIDTH, initial_indent=" " * first, subsequent_indent=" " * indent)

@@ -1,0 +1,108 @@
+"""What every candidate cause does: propose an extension, rebuild it, report it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...simulation.effects import EFFECTS, Effect, Surroundings
+from ...simulation.signals import Signals
+from ..space import Proposal, Space
+
+__all__ = ["Array", "Candidate", "Parameters", "golden_maximum", "line_parameters", "quantity"]
+
+Array = NDArray[np.float64]
+
+#: ``{name: {"value": .., "std": ..}}`` of a finding.
+Parameters = dict[str, dict[str, Any]]
+
+_GOLDEN = (5.0**0.5 - 1.0) / 2.0
+
+
+class Candidate:
+    """Base of the candidates, one a cause.
+
+    Class attributes
+    ----------------
+    cause : str
+        Its name in the vocabulary.
+    family : tuple of str
+        Causes that this one contains as a special case: once it is chosen they are not.
+    located : bool
+        It searches a grid; the search is repeated inside the training part of a hold-out.
+    """
+
+    cause: ClassVar[str]
+    family: ClassVar[tuple[str, ...]] = ()
+    located: ClassVar[bool] = False
+
+    @property
+    def effect(self) -> type[Effect]:
+        """The simulation's effect of this cause."""
+        return EFFECTS[self.cause]
+
+    def propose(self, space: Space) -> Proposal | None:
+        """The best extension of this cause in ``space``, or None where it cannot act."""
+        raise NotImplementedError
+
+    def columns(self, signals: Signals, around: Surroundings, shape: dict[str, Any]) -> Array:
+        """Regressors of ``shape`` at other readings, shape (n, p)."""
+        raise NotImplementedError
+
+    def report(
+        self, space: Space, terms: Sequence[tuple[Proposal, Array, Array]]
+    ) -> tuple[Parameters, list[Effect]]:
+        """Parameters of the finding and the effects to extend the simulation with.
+
+        ``terms`` are this cause's terms with their coefficients and covariances.
+        """
+        raise NotImplementedError
+
+
+def quantity(value: Any, std: Any = None) -> dict[str, Any]:
+    """One parameter: numbers as Python floats."""
+
+    def plain(x: Any) -> Any:
+        if isinstance(x, np.ndarray | list | tuple):
+            return [plain(item) for item in x]
+        if isinstance(x, str | int) or x is None:
+            return x
+        return float(x)
+
+    return {"value": plain(value), "std": plain(std)}
+
+
+def line_parameters(coefficients: Array, covariance: Array) -> tuple[float, float, float, float]:
+    """Amplitude, phase (deg) and their standard deviations of ``A cos + B sin``."""
+    a, b = float(coefficients[0]), float(coefficients[1])
+    amplitude = float(np.hypot(a, b))
+    phase = float(np.degrees(np.arctan2(a, b)) % 360.0)
+    if amplitude == 0.0:
+        return 0.0, phase, float(np.sqrt(covariance[0, 0])), 180.0
+    along = np.array([a, b]) / amplitude
+    across = np.array([b, -a]) / amplitude
+    std = float(np.sqrt(along @ covariance @ along))
+    turn = float(np.degrees(np.sqrt(across @ covariance @ across) / amplitude))
+    return amplitude, phase, std, min(turn, 180.0)
+
+
+def golden_maximum(
+    function: Callable[[float], float], low: float, high: float, steps: int = 14
+) -> tuple[float, float]:
+    """Place and value of the maximum of a function with one peak in [low, high]."""
+    a, b = low, high
+    c, d = b - _GOLDEN * (b - a), a + _GOLDEN * (b - a)
+    fc, fd = function(c), function(d)
+    for _ in range(steps):
+        if fc > fd:
+            b, d, fd = d, c, fc
+            c = b - _GOLDEN * (b - a)
+            fc = function(c)
+        else:
+            a, c, fc = c, d, fd
+            d = a + _GOLDEN * (b - a)
+            fd = function(d)
+    return (c, fc) if fc > fd else (d, fd)

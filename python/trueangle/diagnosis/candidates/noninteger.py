@@ -1,0 +1,121 @@
+"""A line of free order with a new phase in every run."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, ClassVar
+
+import numpy as np
+
+from ...simulation.effects import Effect, Surroundings
+from ...simulation.effects.effect import line_columns
+from ...simulation.effects.lines import NonIntegerOrder
+from ...simulation.signals import Signals
+from ..space import Proposal, Space
+from .candidate import Array, Candidate, Parameters, golden_maximum, quantity
+
+__all__ = ["NonIntegerCandidate"]
+
+#: Trial orders per resolution cell (one order over the turns of a run).
+OVERSAMPLING = 3
+
+#: Trial orders at most; beyond, the grid stops at a lower order.
+MOST_TRIALS = 4096
+
+#: Peaks of the quick search that are scored exactly.
+PEAKS = 4
+
+
+class NonIntegerCandidate(Candidate):
+    """Run effect: cosine and sine of an order that is searched.
+
+    The quick search adds up the periodograms of the runs; the best peaks are then
+    scored by the likelihood.
+    """
+
+    cause: ClassVar[str] = "non_integer_order"
+    located: ClassVar[bool] = True
+
+    def propose(self, space: Space) -> Proposal | None:
+        if space.has(self.cause):
+            return None
+        orders, power = self._search(space)
+        if orders.size == 0:
+            return None
+        best: Proposal | None = None
+        # The search counts independent orders, not trials.
+        log_grid = float(np.log(max(orders.size / OVERSAMPLING, 2.0)))
+        step = orders[1] - orders[0]
+        peaks = np.flatnonzero((power[1:-1] >= power[:-2]) & (power[1:-1] >= power[2:])) + 1
+        for k in peaks[np.argsort(power[peaks])[::-1][:PEAKS]]:
+            proposal = self._at(space, float(orders[k]), log_grid)
+            if best is None or proposal.deviance > best.deviance:
+                best = proposal
+        if best is None or best.bic_gain < 0.0:
+            return best
+        middle = best.shape["order"]
+        order, _ = golden_maximum(
+            lambda f: self._at(space, f, log_grid).deviance, middle - step, middle + step, 10
+        )
+        return max(best, self._at(space, order, log_grid), key=lambda p: p.deviance)
+
+    def _at(self, space: Space, order: float, log_grid: float) -> Proposal:
+        return space.propose_run_effect(
+            self.cause, {"order": order}, line_columns(space.signals.theta, order), log_grid
+        )
+
+    @staticmethod
+    def _search(space: Space) -> tuple[Array, Array]:
+        """Trial orders and the deviance of a run effect there, without cross terms."""
+        theta = space.signals.theta
+        starts = np.array([start for start, _ in space.bounds])
+        sizes = np.array([stop - start for start, stop in space.bounds], dtype=np.float64)
+        turns = np.array([np.ptp(theta[a:b]) for a, b in space.bounds]) / (2.0 * np.pi)
+        if sizes.min() < 8 or turns.max() <= 0.0:
+            return np.zeros(0), np.zeros(0)
+        top = float(space.lines.orders.max()) * 0.75
+        # Half the mean rate of readings is as far as a run can tell.
+        step = 1.0 / (OVERSAMPLING * float(np.median(turns)))
+        count = int(min((top - 0.3) / step, MOST_TRIALS))
+        if count < 3:
+            return np.zeros(0), np.zeros(0)
+        orders = 0.3 + step * np.arange(count, dtype=np.float64)
+        e = space.left - space.whiten.run_part(space.left)
+        e = np.where(space.wild, 0.0, e)
+        turn = np.exp(-1j * step * theta).astype(np.complex64)
+        wave = (e * np.exp(-1j * orders[0] * theta)).astype(np.complex64)
+        power = np.empty((count, starts.size))
+        for k in range(count):
+            sums = np.add.reduceat(wave, starts)
+            power[k] = sums.real**2 + sums.imag**2
+            wave *= turn
+        # P: sum of the two squared normalised coefficients per run, 2 on average.
+        p = 2.0 * power / (sizes * space.variance)
+        best = np.zeros(count)
+        for ratio in np.geomspace(1e-3, 1e3, 13):
+            x = ratio * sizes
+            deviance = (p * (x / (2.0 + x))).sum(axis=1) - 2.0 * np.log1p(x / 2.0).sum()
+            best = np.maximum(best, deviance)
+        return orders, best
+
+    def columns(self, signals: Signals, around: Surroundings, shape: dict[str, Any]) -> Array:
+        return np.zeros((len(signals), 0))
+
+    def report(
+        self, space: Space, terms: Sequence[tuple[Proposal, Array, Array]]
+    ) -> tuple[Parameters, list[Effect]]:
+        proposal = terms[0][0]
+        assert proposal.run_effect is not None
+        runs = space.signals.runs
+        # Cosine and sine each of variance s^2: a mean square amplitude of 2 s^2.
+        amplitude = float(np.sqrt(2.0 * proposal.run_effect.ratio * space.variance))
+        noise = float(np.sqrt(2.0 * space.variance / space.n))
+        turns = float(np.median([np.ptp(space.signals.theta[a:b]) for a, b in space.bounds]))
+        order_std = 0.780 * noise / np.sqrt(2.0) / max(amplitude, 1e-12) / (turns / (2.0 * np.pi))
+        parameters = {
+            "order": quantity(proposal.shape["order"], order_std),
+            "amplitude_arcsec": quantity(
+                amplitude, float(np.hypot(noise, amplitude / np.sqrt(4.0 * runs)))
+            ),
+        }
+        return parameters, [NonIntegerOrder(proposal.shape["order"], amplitude)]

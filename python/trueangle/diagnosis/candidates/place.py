@@ -1,0 +1,217 @@
+"""The pattern's argument, local defects and missed counts."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import partial
+from typing import Any, ClassVar
+
+import numpy as np
+
+from ...simulation.effects import Effect, Surroundings
+from ...simulation.effects.place import ArgumentShift, LocalDefect
+from ...simulation.effects.run_level import MissedCounts
+from ...simulation.signals import Signals
+from ..space import Proposal, Space
+from .candidate import Array, Candidate, Parameters, golden_maximum, quantity
+
+__all__ = ["ArgumentCandidate", "DefectCandidate", "MissedCountsCandidate"]
+
+#: Places per turn of a shaft at which a defect is searched, and its widths in degrees.
+PLACES = 1440
+WIDTHS = (0.35, 0.7, 1.4, 2.8, 5.6, 11.0)
+
+#: Peaks of the quick search that are scored exactly.
+PEAKS = 3
+
+#: Readings a step must have on either side of it within its run.
+STEP_MARGIN = 5
+
+
+class ArgumentCandidate(Candidate):
+    """Regressor: the pattern at the indicated angle less that at the true one."""
+
+    cause: ClassVar[str] = "argument_error"
+
+    def propose(self, space: Space) -> Proposal | None:
+        if space.around.pattern.orders.size == 0:
+            return None
+        return space.propose(self.cause, {}, self.columns(space.signals, space.around, {}))
+
+    def columns(self, signals: Signals, around: Surroundings, shape: dict[str, Any]) -> Array:
+        return ArgumentShift.regressors(signals, around)
+
+    def report(
+        self, space: Space, terms: Sequence[tuple[Proposal, Array, Array]]
+    ) -> tuple[Parameters, list[Effect]]:
+        _, (coefficient,), covariance = terms[0]
+        std = float(np.sqrt(covariance[0, 0]))
+        return {"coefficient": quantity(coefficient, std)}, [ArgumentShift(float(coefficient))]
+
+
+class DefectCandidate(Candidate):
+    """Regressor: a bump at a place of a shaft; place, width and shaft are searched.
+
+    The quick search folds the residual on each shaft's turn.
+    """
+
+    cause: ClassVar[str] = "local_defect"
+    located: ClassVar[bool] = True
+
+    def propose(self, space: Space) -> Proposal | None:
+        e = space.target - space.design @ space.coefficients
+        e = e - space.whiten.run_part(e)
+        joint = space.around.joint
+        log_grid = float(np.log(len(joint.shafts) * 360.0))
+        best: Proposal | None = None
+        for shaft, cycles in joint.shafts.items():
+            for place, width in self._search(space, cycles, e):
+                shape = self._refined(space, shaft, place, width)
+                columns = self.columns(space.signals, space.around, shape)
+                proposal = space.propose(self.cause, shape, columns, 3, log_grid)
+                if best is None or proposal.deviance > best.deviance:
+                    best = proposal
+        return best
+
+    @staticmethod
+    def _search(space: Space, cycles: float, e: Array) -> list[tuple[float, float]]:
+        phase = np.mod(space.signals.theta * (cycles / (2.0 * np.pi)), 1.0)
+        bins = np.minimum((phase * PLACES).astype(np.int64), PLACES - 1)
+        count = np.bincount(bins, minlength=PLACES).astype(np.float64)
+        total = np.asarray(np.bincount(bins, weights=e, minlength=PLACES))
+        away = np.arange(PLACES, dtype=np.float64) * (360.0 / PLACES)
+        away = np.minimum(away, 360.0 - away)
+        found = []
+        for width in WIDTHS:
+            window = np.exp(-0.5 * (away / width) ** 2)
+
+            moment = _circular(total, window)
+            power = _circular(count, window**2) - _circular(count, window) ** 2 / space.n
+            seen = power > 4.0
+            score = np.where(seen, moment**2 / np.where(seen, power, 1.0), 0.0)
+            k = int(np.argmax(score))
+            found.append((float(score[k]), (k + 0.5) * 360.0 / PLACES, width))
+        found.sort(reverse=True)
+        return [(place, width) for score, place, width in found[:PEAKS] if score > 0.0]
+
+    def _refined(self, space: Space, shaft: str, place: float, width: float) -> dict[str, Any]:
+        def gain(c: float, w: float) -> float:
+            shape = {"shaft": shaft, "place_deg": c, "width_deg": w}
+            columns = self.columns(space.signals, space.around, shape)
+            return float(space.gains(columns)[0])
+
+        for _ in range(2):
+            gain_at = partial(gain, w=width)
+            place, _ = golden_maximum(gain_at, place - width, place + width, 8)
+            gain_of = partial(gain, place)
+            log_width = float(np.log(width))
+            log_width, _ = golden_maximum(
+                lambda x, f=gain_of: f(float(np.exp(x))),  # type: ignore[misc]
+                log_width - 0.8,
+                log_width + 0.8,
+                8,
+            )
+            width = float(np.exp(log_width))
+        return {"shaft": shaft, "place_deg": float(place % 360.0), "width_deg": width}
+
+    def columns(self, signals: Signals, around: Surroundings, shape: dict[str, Any]) -> Array:
+        cycles = around.joint.output_order(shape["shaft"], 1)
+        phase = signals.theta * cycles
+        return LocalDefect.bump(phase, shape["place_deg"], shape["width_deg"])[:, None]
+
+    def report(
+        self, space: Space, terms: Sequence[tuple[Proposal, Array, Array]]
+    ) -> tuple[Parameters, list[Effect]]:
+        proposal, (height,), _ = terms[0]
+        shape = proposal.shape
+        # Place, width and height together: the derivative of the bump by each.
+        step = 0.05 * shape["width_deg"]
+
+        def bump(**change: float) -> Array:
+            return self.columns(space.signals, space.around, {**shape, **change})[:, 0]
+
+        place, width = shape["place_deg"], shape["width_deg"]
+        columns = np.column_stack(
+            [
+                bump(),
+                height * (bump(place_deg=place + step) - bump(place_deg=place - step)) / (2 * step),
+                height * (bump(width_deg=width + step) - bump(width_deg=width - step)) / (2 * step),
+            ]
+        )
+        others = [term for term in space.terms if term is not proposal]
+        x, _ = space.with_terms(others).projected(columns)
+        std = np.sqrt(space.variance * np.diag(np.linalg.pinv(x.T @ x)))
+        parameters = {
+            "place_deg": quantity(place, std[1]),
+            "width_deg": quantity(width, std[2]),
+            "height_arcsec": quantity(height, std[0]),
+            "shaft": quantity(shape["shaft"]),
+        }
+        return parameters, [LocalDefect(place, width, float(height), shape["shaft"])]
+
+
+def _circular(x: Array, window: Array) -> Array:
+    """Sum of ``x`` under a symmetric window put at every place of the turn."""
+    return np.asarray(np.fft.irfft(np.fft.rfft(x) * np.fft.rfft(window), PLACES))
+
+
+class MissedCountsCandidate(Candidate):
+    """Regressor: one from a row of a run to the run's end; both are searched."""
+
+    cause: ClassVar[str] = "missed_counts"
+    located: ClassVar[bool] = True
+
+    def propose(self, space: Space) -> Proposal | None:
+        e = space.target - space.design @ space.coefficients
+        scores, places = [], []
+        for start, stop in space.bounds:
+            n = stop - start
+            if n < 2 * STEP_MARGIN + 1:
+                continue
+            part = e[start:stop]
+            k = np.arange(1, n)
+            after = part.sum() - np.cumsum(part)[:-1]
+            inside = slice(STEP_MARGIN - 1, n - STEP_MARGIN)
+            own_zero = (after - (n - k) * part.mean()) ** 2 * n / (k * (n - k))
+            common_zero = after**2 / (n - k)
+            for score in (own_zero[inside], common_zero[inside]):
+                best = int(np.argmax(score))
+                scores.append(float(score[best]))
+                places.append((start, start + STEP_MARGIN + best, stop))
+        best_proposal: Proposal | None = None
+        for j in np.argsort(scores)[::-1][:6]:
+            start, at, stop = places[int(j)]
+            for row in {at - 1, at, at + 1}:
+                if not start < row < stop:
+                    continue
+                shape = {
+                    "run": int(space.signals.run[row]),
+                    "row": int(space.signals.row[row]),
+                }
+                columns = self.columns(space.signals, space.around, shape)
+                proposal = space.propose(
+                    self.cause, shape, columns, 2, float(np.log(space.signals.runs))
+                )
+                if best_proposal is None or proposal.deviance > best_proposal.deviance:
+                    best_proposal = proposal
+        return best_proposal
+
+    def columns(self, signals: Signals, around: Surroundings, shape: dict[str, Any]) -> Array:
+        after = (signals.run == shape["run"]) & (signals.row >= shape["row"])
+        return np.asarray(after.astype(np.float64)[:, None])
+
+    def report(
+        self, space: Space, terms: Sequence[tuple[Proposal, Array, Array]]
+    ) -> tuple[Parameters, list[Effect]]:
+        rows = [(float(c[0]), float(np.sqrt(v[0, 0])), t.shape) for t, c, v in terms]
+        labels = space.signals.labels
+
+        def one(values: list[Any]) -> Any:
+            return values[0] if len(values) == 1 else values
+
+        parameters = {
+            "step_arcsec": quantity(one([row[0] for row in rows]), one([row[1] for row in rows])),
+            "run": quantity(one([labels[row[2]["run"]] for row in rows])),
+            "row": quantity(one([row[2]["row"] for row in rows])),
+        }
+        return parameters, [MissedCounts(row[0], row[2]["run"], row[2]["row"]) for row in rows]

@@ -1,0 +1,130 @@
+"""Backlash and presliding hysteresis."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, ClassVar
+
+import numpy as np
+
+from ...simulation.effects import Effect, Surroundings
+from ...simulation.effects.reversal import Backlash, PreslidingHysteresis
+from ...simulation.signals import Signals
+from ..space import Proposal, Space
+from .candidate import Array, Candidate, Parameters, golden_maximum, quantity
+
+__all__ = ["BacklashCandidate", "HysteresisCandidate"]
+
+#: Transition lengths searched, degrees.
+LENGTHS = np.geomspace(0.15, 60.0, 15)
+
+
+class BacklashCandidate(Candidate):
+    """Regressor: the direction of travel."""
+
+    cause: ClassVar[str] = "backlash"
+
+    def propose(self, space: Space) -> Proposal | None:
+        if space.has("presliding_hysteresis"):
+            return None
+        return space.propose(self.cause, {}, space.signals.direction[:, None])
+
+    def columns(self, signals: Signals, around: Surroundings, shape: dict[str, Any]) -> Array:
+        return signals.direction[:, None]
+
+    def report(
+        self, space: Space, terms: Sequence[tuple[Proposal, Array, Array]]
+    ) -> tuple[Parameters, list[Effect]]:
+        _, (width,), covariance = terms[0]
+        std = float(np.sqrt(covariance[0, 0]))
+        return {"half_width_arcsec": quantity(width, std)}, [Backlash(float(width))]
+
+
+class HysteresisCandidate(Candidate):
+    """Regressor: the state of a presliding spring, its length searched.
+
+    A second and third element (Maxwell-slip) may follow, and one of no length.
+    """
+
+    cause: ClassVar[str] = "presliding_hysteresis"
+    family: ClassVar[tuple[str, ...]] = ("backlash",)
+    located: ClassVar[bool] = True
+
+    def propose(self, space: Space) -> Proposal | None:
+        signals = space.signals
+        if np.ptp(signals.direction) == 0.0 and not signals.travel.any():
+            return None
+        best: tuple[float, float, float] | None = None
+        for start in (0.0, 1.0):
+            gains = space.gains(
+                np.column_stack([signals.presliding(length, start) for length in LENGTHS])
+            )
+            k = int(np.argmax(gains))
+            if best is None or gains[k] > best[0] + 1e-9:
+                best = (float(gains[k]), float(LENGTHS[k]), start)
+        assert best is not None
+        gain, length, start = best
+        if gain <= 0.0:
+            return None
+        step = np.log(LENGTHS[1] / LENGTHS[0])
+        log_length, _ = golden_maximum(
+            lambda x: float(space.gains(signals.presliding(np.exp(x), start)[:, None])[0]),
+            np.log(length) - step,
+            np.log(length) + step,
+        )
+        shape = {"length_deg": float(np.exp(log_length)), "start_state": start}
+        columns = self.columns(signals, space.around, shape)
+        proposal = space.propose(self.cause, shape, columns, parameters=2, log_grid=np.log(2.0))
+        if space.has(self.cause):
+            # A further element may have no length: what is left of play.
+            play = space.propose(self.cause, {"length_deg": 0.0}, signals.direction[:, None])
+            return max(play, proposal, key=lambda p: p.bic_gain)
+        return proposal
+
+    def columns(self, signals: Signals, around: Surroundings, shape: dict[str, Any]) -> Array:
+        if shape["length_deg"] == 0.0:
+            return signals.direction[:, None]
+        return signals.presliding(shape["length_deg"], shape["start_state"])[:, None]
+
+    def report(
+        self, space: Space, terms: Sequence[tuple[Proposal, Array, Array]]
+    ) -> tuple[Parameters, list[Effect]]:
+        total = sum(float(c[0]) for _, c, _ in terms)
+        std = float(np.sqrt(sum(v[0, 0] for _, _, v in terms)))
+        weights = np.array([abs(float(c[0])) for _, c, _ in terms])
+        lengths = np.array([t.shape["length_deg"] for t, _, _ in terms])
+        length = float(weights @ lengths / weights.sum())
+        main = terms[int(np.argmax(weights))]
+        effects: list[Effect] = [
+            PreslidingHysteresis(float(c[0]), t.shape["length_deg"], t.shape["start_state"])
+            if t.shape["length_deg"] > 0.0
+            else Backlash(float(c[0]))
+            for t, c, _ in terms
+        ]
+        parameters = {
+            "amplitude_arcsec": quantity(total, std),
+            "length_deg": quantity(length, self._length_std(space, main)),
+        }
+        if len(terms) > 1:
+            parameters["element_lengths_deg"] = quantity(lengths)
+            parameters["element_amplitudes_arcsec"] = quantity([float(c[0]) for _, c, _ in terms])
+        return parameters, effects
+
+    def _length_std(self, space: Space, term: tuple[Proposal, Array, Array]) -> float | None:
+        """From the curvature: the column's derivative by ln L, all else projected out."""
+        proposal, coefficients, _ = term
+        length = proposal.shape["length_deg"]
+        if length == 0.0:
+            return None
+        start, signals, step = proposal.shape["start_state"], space.signals, 0.02
+        derivative = (
+            coefficients[0]
+            * (
+                signals.presliding(length * np.exp(step), start)
+                - signals.presliding(length * np.exp(-step), start)
+            )
+            / (2.0 * step)
+        )
+        x, _ = space.projected(derivative[:, None])
+        information = float(x[:, 0] @ x[:, 0])
+        return length * float(np.sqrt(space.variance / information)) if information > 0 else None

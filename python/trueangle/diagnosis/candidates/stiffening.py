@@ -1,0 +1,109 @@
+"""A spring that stiffens with torque."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, ClassVar
+
+import numpy as np
+
+from ...simulation.effects import Effect, Surroundings
+from ...simulation.effects.effect import line_columns
+from ...simulation.effects.load import StiffeningCompliance
+from ...simulation.signals import Signals
+from ..space import Proposal, Space
+from .candidate import Array, Candidate, Parameters, quantity
+
+__all__ = ["StiffeningCandidate"]
+
+#: Knees searched, in shares of the largest torque.
+KNEES = (0.2, 0.35, 0.5, 0.65, 0.8)
+
+
+class StiffeningCandidate(Candidate):
+    """Torque and its cube, or torque and torque beyond a knee.
+
+    Where the torque column holds the load of an arm and is constant in each run, the
+    moment is load times the sine of the angle from the vertical, which is searched.
+    """
+
+    cause: ClassVar[str] = "stiffening_compliance"
+    family: ClassVar[tuple[str, ...]] = ("torsional_compliance",)
+    located: ClassVar[bool] = True
+
+    def propose(self, space: Space) -> Proposal | None:
+        torque = space.signals.torque
+        if torque is None or not torque.any() or space.has(self.cause):
+            return None
+        shapes: list[dict[str, Any]] = []
+        if np.unique(np.round(torque / np.abs(torque).max(), 3)).size >= 3:
+            shapes += [{"power": 3, "gravity_deg": None}]
+            shapes += [{"knee_share": k, "gravity_deg": None} for k in KNEES]
+        if self._constant_in_runs(space.signals):
+            gravity = self._gravity(space)
+            shapes += [{"power": 3, "gravity_deg": gravity}]
+            shapes += [{"knee_share": k, "gravity_deg": gravity} for k in KNEES]
+        proposals = []
+        for shape in shapes:
+            if "knee_share" in shape:
+                moment = StiffeningCompliance.moment(space.signals, shape["gravity_deg"])
+                shape["knee_Nm"] = float(shape.pop("knee_share") * np.abs(moment).max())
+            columns = self.columns(space.signals, space.around, shape)
+            extra = 0 if shape["gravity_deg"] is None else 1
+            proposals.append(
+                space.propose(
+                    self.cause,
+                    shape,
+                    columns,
+                    parameters=columns.shape[1] + extra,
+                    log_grid=float(np.log(2.0)),
+                )
+            )
+        return max(proposals, key=lambda p: p.bic_gain, default=None)
+
+    @staticmethod
+    def _constant_in_runs(signals: Signals) -> bool:
+        assert signals.torque is not None
+        return all(
+            np.ptp(signals.torque[start:stop]) < 1e-6 * np.abs(signals.torque).max()
+            for start, stop in signals.run_bounds()
+        )
+
+    @staticmethod
+    def _gravity(space: Space) -> float:
+        """Angle of the vertical: where the moment's first order has no phase."""
+        assert space.signals.torque is not None
+        columns = space.signals.torque[:, None] * line_columns(space.signals.theta, 1.0)
+        _, (a, b) = space.gain(columns)
+        return float(-np.degrees(np.arctan2(a, b)))
+
+    def columns(self, signals: Signals, around: Surroundings, shape: dict[str, Any]) -> Array:
+        moment = StiffeningCompliance.moment(signals, shape["gravity_deg"])
+        if "power" in shape:
+            second = moment**3
+        else:
+            second = StiffeningCompliance.beyond(moment, shape["knee_Nm"])
+        return np.column_stack([moment, second])
+
+    def report(
+        self, space: Space, terms: Sequence[tuple[Proposal, Array, Array]]
+    ) -> tuple[Parameters, list[Effect]]:
+        proposal, coefficients, covariance = terms[0]
+        std = np.sqrt(np.diag(covariance))
+        shape = proposal.shape
+        parameters: Parameters = {"arcsec_per_Nm": quantity(coefficients[0], std[0])}
+        gravity = shape["gravity_deg"]
+        if "power" in shape:
+            parameters["arcsec_per_Nm3"] = quantity(coefficients[1], std[1])
+            effect = StiffeningCompliance(
+                float(coefficients[0]), float(coefficients[1]), gravity_deg=gravity
+            )
+        else:
+            parameters["beyond_knee_arcsec_per_Nm"] = quantity(coefficients[1], std[1])
+            parameters["knee_Nm"] = quantity(shape["knee_Nm"])
+            effect = StiffeningCompliance(
+                float(coefficients[0]), 0.0, float(coefficients[1]), shape["knee_Nm"], gravity
+            )
+        if gravity is not None:
+            parameters["gravity_deg"] = quantity(gravity)
+        return parameters, [effect]

@@ -1,0 +1,86 @@
+"""Where measured and simulated errors disagree, first as numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..angles import circular_mean, wrap
+from ..runs import CalibrationRun
+from ..simulation.signals import Signals
+
+__all__ = ["Discrepancy", "compare", "noise_from_repeats", "unfolded_error"]
+
+Array = NDArray[np.float64]
+
+#: Degrees within which two readings count as the same position.
+SAME_PLACE = 1e-3
+
+#: Share of the readings that must be repeats before their scatter is called the noise.
+LEAST_REPEATS = 0.25
+
+
+@dataclass(frozen=True)
+class Discrepancy:
+    """Measured minus simulated, about the common zero, arcsec.
+
+    Attributes
+    ----------
+    rms, peak_to_peak, max_abs : float
+    closure : float or None
+        Mean difference of readings of the same place at the end and the start of a turn.
+    zero_spread : float
+        Standard deviation of the runs' means.
+    """
+
+    rms: float
+    peak_to_peak: float
+    max_abs: float
+    closure: float | None
+    zero_spread: float
+
+
+def unfolded_error(runs: Sequence[CalibrationRun]) -> Array:
+    """Indicated minus reference of all runs in arcsec, without jumps of a turn."""
+    period = runs[0].period
+    difference = np.concatenate([run.indicated - run.reference for run in runs])
+    zero = circular_mean(difference, period)
+    return (zero + wrap(difference - zero, period)) * (1_296_000.0 / period)
+
+
+def compare(signals: Signals, residual: Array) -> Discrepancy:
+    """Numbers of ``residual`` (measured minus simulated, arcsec)."""
+    centred = residual - residual.mean()
+    means = [float(residual[a:b].mean()) for a, b in signals.run_bounds()]
+    gaps = []
+    for start, stop in signals.run_bounds():
+        theta, e = signals.theta[start:stop], residual[start:stop]
+        late = np.flatnonzero(np.abs(np.abs(theta - theta[0]) - 2.0 * np.pi) < 0.05)
+        if late.size:
+            gaps.append(float(e[late].mean() - e[0]))
+    return Discrepancy(
+        float(np.sqrt(np.mean(centred**2))),
+        float(np.ptp(residual)),
+        float(np.abs(centred).max()),
+        float(np.mean(gaps)) if gaps else None,
+        float(np.std(means, ddof=1)) if len(means) > 1 else 0.0,
+    )
+
+
+def noise_from_repeats(signals: Signals, left: Array) -> float | None:
+    """Scatter of what is left at positions read several times in one direction, or None.
+
+    The pure error: it needs no model of the pattern.
+    """
+    place = np.round(np.mod(signals.degrees, 360.0) / SAME_PLACE).astype(np.int64)
+    place %= round(360.0 / SAME_PLACE)
+    key = place * 3 + signals.direction.astype(np.int64) + 1
+    _, group, count = np.unique(key, return_inverse=True, return_counts=True)
+    freedom = int((count - 1).sum())
+    if freedom < LEAST_REPEATS * len(signals):
+        return None
+    mean = np.bincount(group, weights=left) / count
+    return float(np.sqrt(np.sum((left - mean[group]) ** 2) / freedom))

@@ -1,0 +1,214 @@
+"""Scatter: wild readings and noise that depends on angle, speed or load."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import lgamma
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..simulation.effects import Effect
+from ..simulation.effects.dispersion import HeteroscedasticNoise, Outliers
+from .space import Space
+
+__all__ = ["ScatterFinding", "find_outliers", "find_uneven_noise"]
+
+Array = NDArray[np.float64]
+
+#: Squared residuals are taken at most this many variances large.
+SQUARE_CLIP = 9.0
+
+#: Degrees of freedom of heavy-tailed noise, sizes of wild readings to start from.
+TAILS = (2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 12.0, 20.0, 40.0)
+SIZES = (3.0, 10.0, 100.0)
+#: Steps of expectation-maximisation.
+EM_STEPS = 60
+
+SCALES = np.linspace(0.85, 1.1, 11)
+
+#: Evidence by which wild readings must beat mere heavy tails.
+BEYOND_TAILS = 2.0
+
+
+@dataclass(frozen=True)
+class ScatterFinding:
+    """A cause of the scatter with its evidence.
+
+    Attributes
+    ----------
+    cause : str
+    bic_gain : float
+    parameters : dict
+    effects : list of Effect
+    weights : ndarray, shape (n,)
+        Inverse variances, of mean 1 (uneven noise), or 0 for wild readings.
+    """
+
+    cause: str
+    bic_gain: float
+    parameters: dict[str, dict[str, Any]]
+    effects: list[Effect]
+    weights: Array
+
+
+def _standardised(space: Space) -> Array:
+    e = space.whiten(space.residual - space.design @ space.coefficients)
+    spread = 1.4826 * float(np.median(np.abs(e)))
+    return np.asarray(e / max(spread, 1e-300))
+
+
+def find_uneven_noise(space: Space) -> ScatterFinding | None:
+    """Noise whose variance follows angle, speed or load (Koenker's score test, blockwise).
+
+    The clipped squares are regressed on each block; n R^2 is the deviance.
+    """
+    signals, n = space.signals, space.n
+    square = np.minimum(_standardised(space) ** 2, SQUARE_CLIP)
+    blocks: dict[str, Array] = {}
+    for k in (1, 2, 3):
+        x = k * signals.theta
+        blocks[f"order {k}"] = np.column_stack([np.cos(x), np.sin(x)])
+    for name, values in (
+        ("per_deg_s", None if signals.velocity is None else np.abs(signals.velocity)),
+        ("per_Nm", None if signals.torque is None else np.abs(signals.torque)),
+    ):
+        if values is not None and np.ptp(values) > 0.0:
+            blocks[name] = values[:, None]
+    chosen: list[str] = []
+    design = np.ones((n, 1))
+    total = 0.0
+    rest = square - square.mean()
+    while True:
+        power = float(rest @ rest)
+        best = (0.0, "", design)
+        for name, columns in blocks.items():
+            if name in chosen:
+                continue
+            wider = np.hstack([design, columns])
+            q, _ = np.linalg.qr(wider)
+            saved = float(np.sum((q.T @ rest) ** 2))
+            gain = (
+                n * saved / power
+                - columns.shape[1] * space.log_n
+                - 2.0 * float(np.log(len(blocks)))
+            )
+            if gain > best[0]:
+                best = (gain, name, wider)
+        if best[0] <= 0.0:
+            break
+        total += best[0]
+        chosen.append(best[1])
+        design = best[2]
+        rest = square - design @ np.linalg.lstsq(design, square, rcond=None)[0]
+    if not chosen:
+        return None
+    gamma, covariance = _log_variance(design, square)
+    parameters: dict[str, dict[str, Any]] = {}
+    cosine = sine = 0.0
+    order, start = 1.0, 1
+    extra: dict[str, float] = {}
+    effects: list[Effect] = []
+    for name in chosen:
+        std = np.sqrt(np.diag(covariance))
+        if name.startswith("order"):
+            order = float(name.split()[1])
+            cosine, sine = float(gamma[start]), float(gamma[start + 1])
+            suffix = "" if order == 1.0 else f"_{order:.0f}"
+            parameters[f"cosine{suffix}"] = {"value": cosine, "std": float(std[start])}
+            parameters[f"sine{suffix}"] = {"value": sine, "std": float(std[start + 1])}
+            effects.append(HeteroscedasticNoise(cosine, sine, order))
+            start += 2
+        else:
+            parameters[name] = {"value": float(gamma[start]), "std": float(std[start])}
+            extra[name] = float(gamma[start])
+            start += 1
+    if extra:
+        effects.append(HeteroscedasticNoise(**extra))
+    variance = np.exp(design @ gamma)
+    weights = 1.0 / variance
+    return ScatterFinding(
+        "heteroscedastic_noise", total, parameters, effects, weights / weights.mean()
+    )
+
+
+def _log_variance(design: Array, square: Array) -> tuple[Array, Array]:
+    """Coefficients of the log variance by iterated weighted least squares."""
+    gamma = np.zeros(design.shape[1])
+    gamma[0] = np.log(square.mean())
+    inverse = np.linalg.inv(design.T @ design)
+    for _ in range(30):
+        step = inverse @ (design.T @ (square * np.exp(-(design @ gamma)) - 1.0))
+        gamma += step
+        if np.abs(step).max() < 1e-10:
+            break
+    return gamma, 2.0 * inverse
+
+
+def find_outliers(space: Space) -> ScatterFinding | None:
+    """Wild readings: a narrow and a wide normal must beat one normal and heavy tails."""
+    e = _standardised(space)
+    n = space.n
+    normal = max(_normal(e, s) for s in np.append(SCALES, np.linspace(1.15, 3.0, 24)))
+    tails = max(_student(e, nu, s) for nu in TAILS for s in SCALES)
+    value, share, size, scale = max(_two_normals(e, start) for start in SIZES)
+    value -= 0.5 * n * np.log(2.0 * np.pi)
+    gain = 2.0 * (value - normal) - 2.0 * space.log_n
+    beyond = 2.0 * (value - tails) - space.log_n
+    if gain <= 0.0 or beyond <= BEYOND_TAILS:
+        return None
+    x = e / scale
+    wide = share / size * np.exp(-0.5 * (x / size) ** 2)
+    chance = wide / (wide + (1.0 - share) * np.exp(-0.5 * x**2))
+    rows = np.flatnonzero(chance > 0.5)
+    spread = size * scale * np.sqrt(space.variance)
+    std = float(np.sqrt(share * (1.0 - share) / n))
+    parameters: dict[str, dict[str, Any]] = {
+        "fraction": {"value": float(share), "std": max(std, float(share) / 5.0)},
+        "size_arcsec": {"value": float(spread), "std": None},
+        "rows": {
+            "value": [
+                [space.signals.labels[int(space.signals.run[k])], int(space.signals.row[k])]
+                for k in rows
+            ],
+            "std": None,
+        },
+    }
+    weights = np.ones(n)
+    weights[rows] = 1e-6
+    return ScatterFinding(
+        "outliers", gain, parameters, [Outliers(float(share), float(spread))], weights
+    )
+
+
+def _normal(e: Array, scale: float) -> float:
+    n = e.size
+    return -0.5 * float(e @ e) / scale**2 - n * float(np.log(scale) + 0.5 * np.log(2.0 * np.pi))
+
+
+def _student(e: Array, nu: float, scale: float) -> float:
+    constant = lgamma(0.5 * (nu + 1.0)) - lgamma(0.5 * nu) - 0.5 * float(np.log(np.pi * nu))
+    body = -0.5 * (nu + 1.0) * float(np.sum(np.log1p((e / scale) ** 2 / nu)))
+    return body + e.size * (constant - float(np.log(scale)))
+
+
+def _two_normals(e: Array, start: float) -> tuple[float, float, float, float]:
+    """Log-likelihood, share and relative size of the wide part, scale of the narrow one.
+
+    Expectation-maximisation from a share of 1 % and a size of ``start``.
+    """
+    share, size, scale = 0.01, start, 1.0
+    square = e**2
+    for _ in range(EM_STEPS):
+        narrow = (1.0 - share) * np.exp(-0.5 * square / scale**2)
+        wide = share / size * np.exp(-0.5 * square / (scale * size) ** 2)
+        chance = wide / np.maximum(narrow + wide, 1e-300)
+        share = float(np.clip(chance.mean(), 1.0 / e.size, 0.2))
+        kept = 1.0 - chance
+        scale = float(np.sqrt((kept @ square) / kept.sum()))
+        size = max(float(np.sqrt((chance @ square) / max(chance.sum(), 1e-300))) / scale, 2.0)
+    log_narrow = np.log1p(-share) - 0.5 * square / scale**2
+    log_wide = np.log(share / size) - 0.5 * square / (scale * size) ** 2
+    value = float(np.logaddexp(log_narrow, log_wide).sum()) - e.size * float(np.log(scale))
+    return value, share, size, scale

@@ -1,0 +1,126 @@
+"""Findings, and the diagnosis that holds them."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass, field
+from typing import Any
+
+from ..simulation.effects import EFFECTS, Effect
+from ..simulation.simulation import Simulation
+from .discrepancy import Discrepancy
+from .gain import Gain
+from .identifiability import Blindness
+
+__all__ = ["Diagnosis", "Finding"]
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One cause that the readings support.
+
+    Attributes
+    ----------
+    cause : str
+        Of the vocabulary of causes.
+    parameters : dict
+        ``{name: {"value": .., "std": ..}}``.
+    evidence : dict
+        ``bic_gain``, ``deviance`` (2 ln of the likelihood ratio), ``parameters``,
+        ``log_grid``.
+    gain : Gain or None
+        On held-out runs; None for causes of the scatter.
+    rivals : list of (str, float)
+        Other causes and how much less each explains in its place (BIC).
+    effects : list of Effect
+        What extends the simulation.
+    """
+
+    cause: str
+    parameters: dict[str, dict[str, Any]]
+    evidence: dict[str, float]
+    gain: Gain | None
+    rivals: list[tuple[str, float]]
+    effects: list[Effect] = field(repr=False, default_factory=list)
+
+    @property
+    def sentence(self) -> str:
+        """The physics in one sentence."""
+        return EFFECTS[self.cause].sentence
+
+    def to_json(self) -> dict[str, Any]:
+        """The entry of ``findings``."""
+        return {
+            "cause": self.cause,
+            "parameters": self.parameters,
+            "evidence": self.evidence,
+            "gain": None if self.gain is None else self.gain.to_json(),
+            "rivals": [{"cause": cause, "bic_gap": gap} for cause, gap in self.rivals],
+            "physics": self.sentence,
+            "correctable": EFFECTS[self.cause].correctable,
+        }
+
+
+@dataclass(frozen=True)
+class Diagnosis:
+    """What `trueangle.diagnose` found.
+
+    Attributes
+    ----------
+    discrepancy : Discrepancy
+        Measured minus simulated before anything is added.
+    noise : float
+        Scatter of one reading, arcsec: from repeats where there are any, else what the
+        findings leave.
+    findings : list of Finding
+        In the order found; empty where the simulation is enough.
+    not_identifiable : list of Blindness
+        What this data cannot tell, and the measurement that would.
+    extended : Simulation
+        The simulation with every finding.
+    gain : dict
+        rms, peak-to-peak and max abs in arcsec, before and after all findings.
+    readings, readings_used : int
+    correlation : float
+        Of the noise of neighbouring readings.
+    """
+
+    discrepancy: Discrepancy
+    noise: float
+    findings: list[Finding]
+    not_identifiable: list[Blindness]
+    extended: Simulation
+    gain: dict[str, float]
+    readings: int
+    readings_used: int
+    correlation: float
+
+    def to_dict(self, extended_simulation: str | None = None) -> dict[str, Any]:
+        """The object that ``trueangle diagnose --json`` prints."""
+        return {
+            "simulation": {
+                "rms_arcsec": self.discrepancy.rms,
+                "peak_to_peak_arcsec": self.discrepancy.peak_to_peak,
+                "max_abs_arcsec": self.discrepancy.max_abs,
+                "closure_arcsec": self.discrepancy.closure,
+                "zero_spread_arcsec": self.discrepancy.zero_spread,
+            },
+            "noise_arcsec": self.noise,
+            "noise_correlation": self.correlation,
+            "readings": self.readings,
+            "readings_used": self.readings_used,
+            "findings": [finding.to_json() for finding in self.findings],
+            "gain": self.gain,
+            "not_identifiable": [spot.to_json() for spot in self.not_identifiable],
+            "extended_simulation": extended_simulation,
+        }
+
+    def to_json(self, extended_simulation: str | None = None) -> str:
+        """`to_dict` as JSON text."""
+        return json.dumps(self.to_dict(extended_simulation), indent=2, allow_nan=False)
+
+    def summary(self) -> str:
+        """A readable account (`trueangle.diagnosis.account.render`)."""
+        from .account import render
+
+        return render(self)

@@ -1,0 +1,62 @@
+"""Uniform grids of positions and the orders that look alike on them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["UniformGrid", "uniform_grid"]
+
+#: Departure from the grid, in shares of its step, up to which readings lie on it.
+ON_GRID = 0.02
+
+#: Positions beyond which a grid is not looked for.
+MOST_POSITIONS = 10_000
+
+
+@dataclass(frozen=True)
+class UniformGrid:
+    """Equal steps of one turn.
+
+    Attributes
+    ----------
+    positions : int
+    """
+
+    positions: int
+
+    def folded(self, order: float) -> float:
+        """The lowest order with the same values at the positions.
+
+        Examples
+        --------
+        >>> UniformGrid(36).folded(202)
+        14
+        """
+        n = self.positions
+        rest = order % n
+        return min(rest, n - rest)
+
+    def aliases(self, order: float, count: int) -> list[float]:
+        """Further orders with the same values, ascending."""
+        n = self.positions
+        low = self.folded(order)
+        found = sorted({abs(s * low + k * n) for k in range(count + 2) for s in (1, -1)})
+        return [m for m in found if m != order][:count]
+
+
+def uniform_grid(theta: NDArray[np.float64]) -> UniformGrid | None:
+    """The uniform grid that all angles (radians) lie on, or None."""
+    turns = np.sort(np.mod(theta / (2.0 * np.pi), 1.0))
+    # Positions are groups of angles closer than the finest grid looked for.
+    gaps = np.diff(np.append(turns, turns[0] + 1.0))
+    near = 0.2 / MOST_POSITIONS
+    positions = int(np.count_nonzero(gaps > near))
+    if not 3 <= positions <= MOST_POSITIONS:
+        return None
+    shift = np.angle(np.mean(np.exp(2j * np.pi * positions * turns))) / (2.0 * np.pi)
+    away = turns * positions - shift
+    away -= np.round(away)
+    return UniformGrid(positions) if float(np.abs(away).max()) < ON_GRID else None

@@ -1,0 +1,83 @@
+"""Cosines and sines of every order that is searched for, once for all scores."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..simulation.joint import Joint
+
+__all__ = ["LineBasis", "plausible_orders"]
+
+#: Orders searched at least, and at most: bounds memory and the price of the search.
+LEAST_ORDERS, MOST_ORDERS = 128, 1024
+
+#: Output orders up to this one are expected of any rotary part.
+LOW_ORDERS = 24
+
+
+class LineBasis:
+    """``exp(i m theta)`` for every order m searched, in single precision.
+
+    Whole output orders up to four turns of the fastest shaft and a bit, and the
+    multiples of shafts that turn a fractional number of times.
+
+    Attributes
+    ----------
+    orders : ndarray, shape (k,)
+    plausible : ndarray of bool, shape (k,)
+        Orders that physics expects; they pay a lower price for the search.
+    """
+
+    def __init__(
+        self, theta: NDArray[np.float64], joint: Joint, values: NDArray[np.complex64] | None = None
+    ) -> None:
+        self.theta = theta
+        self.joint = joint
+        top = math.ceil(4.0 * max(joint.shafts.values())) + 8
+        top = min(max(top, LEAST_ORDERS), MOST_ORDERS)
+        fractional = {
+            k * cycles
+            for cycles in joint.shafts.values()
+            if cycles != round(cycles)
+            for k in range(1, 9)
+        }
+        self.orders = np.array([*range(1, top + 1), *sorted(fractional)], dtype=np.float64)
+        self._whole = top
+        expected = plausible_orders(joint)
+        self.plausible = np.array([any(abs(m - p) < 1e-9 for p in expected) for m in self.orders])
+        self._values = values
+
+    @property
+    def values(self) -> NDArray[np.complex64]:
+        """The basis, shape (n, k); computed at first use by repeated rotation."""
+        if self._values is None:
+            step = np.exp(1j * self.theta)
+            out = np.empty((self.theta.size, self.orders.size), dtype=np.complex64)
+            turn = np.ones_like(step)
+            for k in range(self._whole):
+                turn *= step
+                out[:, k] = turn
+            for k in range(self._whole, self.orders.size):
+                out[:, k] = np.exp(1j * self.orders[k] * self.theta)
+            self._values = out
+        return self._values
+
+    def take(self, rows: NDArray[np.bool_]) -> LineBasis:
+        """The basis of some of the readings."""
+        part = object.__new__(LineBasis)
+        part.__dict__.update(self.__dict__)
+        part.theta = self.theta[rows]
+        part._values = None if self._values is None else self._values[rows]
+        return part
+
+
+def plausible_orders(joint: Joint) -> list[float]:
+    """Output orders with a standard physical cause, and the neighbours of gear orders."""
+    found = {float(m) for m in range(1, LOW_ORDERS + 1)}
+    found |= {joint.output_order(shaft, k) for shaft, k in joint.gear_orders()}
+    if "wave_generator" in joint.shafts:
+        found.add(joint.shafts["motor"] + joint.shafts["wave_generator"])
+    return sorted(found)

@@ -1,0 +1,125 @@
+"""Choose the causes: forward by evidence, flexible ones last, then backward."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from .candidates import CANDIDATES, FLEXIBLE, SEPARATE
+from .space import Proposal, Space
+
+__all__ = ["NEW_CAUSE", "cause_terms", "finding_groups", "proposals", "select"]
+
+#: Evidence (in units of BIC) that a new cause must bring beyond its price: 6 is what
+#: Kass and Raftery call strong, odds of 20 to 1.
+NEW_CAUSE = 6.0
+
+#: Specific causes that act on whole runs: direction, speed, load, temperature, mount.
+RUN_FACTORS = (
+    "backlash",
+    "latency",
+    "torsional_compliance",
+    "scale_error",
+    "thermal_drift",
+    "stiffening_compliance",
+    "presliding_hysteresis",
+    "reference_error",
+)
+
+#: Terms at most.
+MOST_TERMS = 14
+
+
+def select(space: Space) -> Space:
+    """The space with the causes that its readings support.
+
+    Forward selection with every candidate; where that takes a flexible cause (which can
+    imitate any effect of a run), a second path takes flexible ones only after every
+    specific one had its say. Both are pruned backward; the better by BIC is kept.
+    """
+    direct = _pruned(_forward(space, list(CANDIDATES)))
+    if not any(term.cause in FLEXIBLE for term in direct.terms):
+        return direct
+    patient = _pruned(_forward(_forward(space, RUN_FACTORS), list(CANDIDATES)))
+    return min(direct, patient, key=total_price)
+
+
+def total_price(space: Space) -> float:
+    """BIC with the price of every cause: lower is better."""
+    return space.bic + NEW_CAUSE * len(finding_groups(space.terms))
+
+
+def finding_groups(terms: Sequence[Proposal]) -> list[list[int]]:
+    """Indices of the terms that make one finding together, in the order found."""
+    groups: list[list[int]] = []
+    place: dict[str, int] = {}
+    for k, term in enumerate(terms):
+        if term.cause in SEPARATE or term.cause not in place:
+            place[term.cause] = len(groups)
+            groups.append([k])
+        else:
+            groups[place[term.cause]].append(k)
+    return groups
+
+
+def cause_terms(space: Space, group: Sequence[int]) -> Space:
+    """The space without the terms ``group``."""
+    return space.with_terms(t for k, t in enumerate(space.terms) if k not in group)
+
+
+def proposals(space: Space, causes: Sequence[str]) -> list[tuple[Proposal, Space, float]]:
+    """What every cause proposes: the extension, the space it extends, its net BIC gain.
+
+    A cause that contains chosen ones as special cases takes their place.
+    """
+    found = []
+    for cause in causes:
+        candidate = CANDIDATES[cause]
+        if any(space.has(contained) for contained in candidate.family):
+            start = space.with_terms(t for t in space.terms if t.cause not in candidate.family)
+            price = total_price(start) - total_price(space)
+        else:
+            start, price = space, 0.0
+        proposal = candidate.propose(start)
+        if proposal is not None:
+            found.append((proposal, start, proposal.bic_gain - price))
+    return found
+
+
+def _forward(space: Space, causes: Sequence[str]) -> Space:
+    while len(space.terms) < MOST_TERMS:
+        best: tuple[float, Space, Proposal] | None = None
+        for proposal, start, gain in proposals(space, causes):
+            new = proposal.cause in SEPARATE or not start.has(proposal.cause)
+            score = gain - (NEW_CAUSE if new else 0.0)
+            if score > 0.0 and (best is None or score > best[0] + 1e-6):
+                best = (score, start, proposal)
+        if best is None:
+            return space
+        _, start, proposal = best
+        space = start.with_terms([*start.terms, proposal])
+    return space
+
+
+def _pruned(space: Space) -> Space:
+    """Without the terms that the others have made superfluous."""
+    while space.terms:
+        full = total_price(space)
+        without = [
+            space.with_terms(t for k, t in enumerate(space.terms) if k != drop)
+            for drop in range(len(space.terms))
+        ]
+        best = min(without, key=total_price)
+        if total_price(best) > full:
+            break
+        space = best
+    return space.with_terms(_rescored(space))
+
+
+def _rescored(space: Space) -> list[Proposal]:
+    """The terms with the deviance each saves beside all the others."""
+    terms = []
+    for k, term in enumerate(space.terms):
+        rest = cause_terms(space, [k])
+        terms.append(replace(term, deviance=rest.deviance - space.deviance))
+    return terms

@@ -1,0 +1,370 @@
+"""The readings with what is already known projected out: candidates are scored in it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..simulation.effects import Surroundings
+from ..simulation.effects.effect import line_columns
+from ..simulation.pattern import Pattern
+from ..simulation.signals import Signals
+from .linebasis import LineBasis
+from .whitening import RunEffect, Whitener, lag_correlation
+
+__all__ = ["Proposal", "Space"]
+
+Array = NDArray[np.float64]
+
+#: Residuals are taken at most this many robust standard deviations large: wild readings
+#: must not make causes, and normal ones are not touched.
+CLIP = 4.0
+
+#: Share of a column's power that must be left after projection for it to count at all.
+EXCITED = 1e-4
+
+#: Ratios of variance (run effect to one reading) that are tried.
+RATIOS = np.geomspace(1e-5, 1e8, 53)
+
+
+@dataclass(frozen=True, eq=False)
+class Proposal:
+    r"""A candidate extension with its evidence.
+
+    .. math:: \text{bic gain} = 2\Delta\ln L - k \ln n - 2 \ln(\text{grid})
+
+    Attributes
+    ----------
+    cause : str
+    shape : dict
+        What was searched for: order, length, place ... enough to rebuild the columns.
+    columns : ndarray, shape (n, p)
+        Regressors; none for a run effect.
+    run_effect : RunEffect or None
+    parameters : int
+        k.
+    log_grid : float
+        ln of the number of alternatives that were searched.
+    deviance : float
+        2 ln of the likelihood ratio.
+    """
+
+    cause: str
+    shape: dict[str, Any]
+    columns: Array
+    parameters: int
+    log_grid: float = 0.0
+    deviance: float = 0.0
+    log_n: float = 0.0
+    run_effect: RunEffect | None = None
+    coefficients: Array = field(default_factory=lambda: np.zeros(0))
+
+    @property
+    def bic_gain(self) -> float:
+        """Evidence: the deviance less the price of its parameters and of the search."""
+        return self.deviance - self.parameters * self.log_n - 2.0 * self.log_grid
+
+
+class Space:
+    """Readings, what the simulation expects of them, and the terms chosen so far.
+
+    Parameters
+    ----------
+    signals : Signals
+    residual : ndarray
+        Measured minus simulated error, arcsec, unfolded.
+    around : Surroundings
+        The joint and the pattern that the simulation believes.
+    weights : ndarray, optional
+    lines : LineBasis, optional
+        Shared between spaces of the same readings.
+    """
+
+    def __init__(
+        self,
+        signals: Signals,
+        residual: Array,
+        around: Surroundings,
+        weights: Array | None = None,
+        lines: LineBasis | None = None,
+        rho: float | None = None,
+    ) -> None:
+        self.signals = signals
+        self.residual = residual
+        self.belief = around
+        self.around = around
+        self.weights = weights
+        self.fixed_rho = rho
+        self.bounds = signals.run_bounds()
+        self.n = len(signals)
+        self.log_n = float(np.log(max(self.n, 2)))
+        self.lines = lines if lines is not None else LineBasis(signals.theta, around.joint)
+        self.base = np.column_stack(
+            [np.ones(self.n), *(line_columns(signals.theta, m) for m in around.pattern.orders)]
+        )
+        self.terms: list[Proposal] = []
+        self._wlines: NDArray[np.complex64] | None = None
+        self.update()
+
+    # -- model -------------------------------------------------------------------
+
+    def with_terms(self, terms: Iterable[Proposal]) -> Space:
+        """A space of the same readings with other terms."""
+        other = object.__new__(Space)
+        other.__dict__.update(self.__dict__)
+        other.terms = list(terms)
+        other.update()
+        return other
+
+    def update(self) -> None:
+        """Fit the terms: run effects, correlation, clipping, projection."""
+        design = np.hstack([self.base, *(term.columns for term in self.terms)])
+        effects = [term.run_effect for term in self.terms if term.run_effect is not None]
+        target, rho = self.residual, 0.0
+        for _ in range(2):
+            self._project(design, target, Whitener(self.bounds, rho, effects, self.weights))
+            for k in range(len(effects) if len(effects) > 1 else 0):
+                effects[k] = self._refit_ratio(design, target, rho, effects, k)
+            left = self.residual - design @ self.coefficients
+            left -= self.whiten.run_part(left)
+            scale = self.root_weights * left
+            spread = 1.4826 * float(np.median(np.abs(scale - np.median(scale))))
+            limit = CLIP * max(spread, 1e-12) / self.root_weights
+            wild = np.abs(left) > limit
+            if self.fixed_rho is None:
+                kept = np.clip(left, -limit, limit) * self.root_weights
+                rho = lag_correlation(kept, self.signals.clock, self.bounds)
+            else:
+                rho = self.fixed_rho
+            if not wild.any() and rho == self.whiten.rho:
+                break
+            target = np.where(
+                wild, self.residual - left + np.clip(left, -limit, limit), self.residual
+            )
+        else:
+            self._project(design, target, Whitener(self.bounds, rho, effects, self.weights))
+        self.target, self.design, self.wild = target, design, wild
+        kept_effects = iter(effects)
+        self.terms = [
+            replace(term, run_effect=next(kept_effects)) if term.run_effect is not None else term
+            for term in self.terms
+        ]
+        self.left = self.residual - design @ self.coefficients
+        self.around = Surroundings(self.belief.joint, self._pattern())
+        self._wlines = None
+
+    @property
+    def root_weights(self) -> Array:
+        """Square roots of the weights."""
+        return np.ones(self.n) if self.weights is None else np.sqrt(self.weights)
+
+    def _project(self, design: Array, target: Array, whiten: Whitener) -> None:
+        self.whiten = whiten
+        columns = whiten(design)
+        scale = np.sqrt(np.einsum("ij,ij->j", columns, columns))
+        scale[scale == 0.0] = 1.0
+        u, s, vt = np.linalg.svd(columns / scale, full_matrices=False)
+        kept = s > 1e-7 * s[0]
+        self.q = u[:, kept]
+        y = whiten(target)
+        inner = self.q.T @ y
+        self.r = y - self.q @ inner
+        self.rss = max(float(self.r @ self.r), 1e-300)
+        back = vt[kept].T / s[kept] / scale[:, None]
+        self.coefficients = back @ inner
+        self.unscaled_covariance = back @ back.T
+
+    def _refit_ratio(
+        self, design: Array, target: Array, rho: float, effects: list[RunEffect], k: int
+    ) -> RunEffect:
+        others = [effect for j, effect in enumerate(effects) if j != k]
+        self._project(design, target, Whitener(self.bounds, rho, others, self.weights))
+        ratio, _ = self.run_effect_gain(effects[k].columns)
+        effects[k] = RunEffect(effects[k].columns, max(ratio, 1e-9))
+        self._project(design, target, Whitener(self.bounds, rho, effects, self.weights))
+        return effects[k]
+
+    def _pattern(self) -> Pattern:
+        """The believed pattern with the fitted corrections and missing orders."""
+        belief = self.belief.pattern
+        k = belief.orders.size
+        change = self.coefficients[1 : 1 + 2 * k].reshape(k, 2)
+        orders = [*belief.orders]
+        pairs = [
+            (a + da, b + db)
+            for a, b, (da, db) in zip(belief.cosine, belief.sine, change, strict=True)
+        ]
+        for term, coefficients in self.fitted():
+            if term.cause == "missing_order":
+                orders.append(term.shape["output_order"])
+                pairs.append((coefficients[0], coefficients[1]))
+        array = np.array(pairs, dtype=np.float64).reshape(-1, 2)
+        return Pattern(np.array(orders, dtype=np.float64), array[:, 0], array[:, 1])
+
+    def fitted(self) -> list[tuple[Proposal, Array]]:
+        """Every term with its coefficients."""
+        found = []
+        start = self.base.shape[1]
+        for term in self.terms:
+            stop = start + term.columns.shape[1]
+            found.append((term, self.coefficients[start:stop]))
+            start = stop
+        return found
+
+    def covariance(self, k: int) -> Array:
+        """Covariance of the coefficients of term ``k``."""
+        start = self.base.shape[1] + sum(t.columns.shape[1] for t in self.terms[:k])
+        stop = start + self.terms[k].columns.shape[1]
+        return np.asarray(self.unscaled_covariance[start:stop, start:stop] * self.variance)
+
+    @property
+    def variance(self) -> float:
+        """Variance of one reading's noise, arcsec squared."""
+        return self.rss / max(self.n - self.q.shape[1], 1)
+
+    @property
+    def deviance(self) -> float:
+        """-2 ln of the likelihood, up to a constant of the readings."""
+        return self.n * float(np.log(self.rss / self.n)) + self.whiten.log_determinant
+
+    @property
+    def bic(self) -> float:
+        """Deviance plus the price of the terms' parameters and searches."""
+        price = sum(t.parameters * self.log_n + 2.0 * t.log_grid for t in self.terms)
+        return self.deviance + price
+
+    # -- scores ------------------------------------------------------------------
+
+    def projected(self, columns: Array) -> tuple[Array, NDArray[np.bool_]]:
+        """Whitened columns with what is known taken out, and which are excited."""
+        x = self.whiten(columns)
+        before = np.einsum("ij,ij->j", x, x)
+        x = x - self.q @ (self.q.T @ x)
+        after = np.einsum("ij,ij->j", x, x)
+        return x, after > EXCITED * np.maximum(before, 1e-300)
+
+    def gain(self, columns: Array) -> tuple[float, Array]:
+        """Deviance that ``columns`` save together, and their coefficients."""
+        x, excited = self.projected(columns)
+        coefficients = np.zeros(columns.shape[1])
+        if not excited.all():
+            return 0.0, coefficients
+        gram = x.T @ x
+        scale = np.sqrt(np.diag(gram))
+        values, vectors = np.linalg.eigh(gram / np.outer(scale, scale))
+        if values[0] < EXCITED * values[-1]:
+            return 0.0, coefficients
+        moment = vectors.T @ (x.T @ self.r / scale)
+        saved = float(np.sum(moment**2 / values))
+        coefficients = (vectors @ (moment / values)) / scale
+        return self.as_deviance(saved), coefficients
+
+    def gains(self, columns: Array) -> Array:
+        """Deviance that each column saves alone."""
+        x, excited = self.projected(columns)
+        power = np.einsum("ij,ij->j", x, x)
+        saved = (x.T @ self.r) ** 2 / np.maximum(power, 1e-300)
+        return np.where(excited, self.as_deviances(saved), 0.0)
+
+    def fixed_gains(self, columns: Array) -> Array:
+        """Deviance that each column saves with the coefficient 1."""
+        x, excited = self.projected(columns)
+        saved = 2.0 * (x.T @ self.r) - np.einsum("ij,ij->j", x, x)
+        return np.where(excited, self.as_deviances(saved), 0.0)
+
+    def as_deviance(self, saved: float) -> float:
+        """``n ln(RSS/(RSS - saved))``."""
+        return float(self.as_deviances(np.array([saved]))[0])
+
+    def as_deviances(self, saved: Array) -> Array:
+        """`as_deviance` of each."""
+        share = np.minimum(saved / self.rss, 1.0 - 1e-15)
+        return np.asarray(-self.n * np.log1p(-share))
+
+    def line_gains(self) -> Array:
+        """Deviance that a line of each order of `lines` saves (two coefficients)."""
+        if self._wlines is None:
+            basis = self.lines.values
+            self._wlines = basis if self.whiten.is_identity else self.whiten(basis)
+        e = self._wlines
+        known = self.q.astype(np.float32).T @ e
+        moment = self.r.astype(np.float32) @ e
+        square = np.einsum("ij,ij->j", e, e)  # sum of e^2: cos^2 - sin^2 and 2 cos sin
+        power = np.einsum("ij,ij->j", e, e.conj()).real
+        aa = 0.5 * (power + square.real) - (known.real**2).sum(axis=0)
+        bb = 0.5 * (power - square.real) - (known.imag**2).sum(axis=0)
+        ab = 0.5 * square.imag - (known.real * known.imag).sum(axis=0)
+        determinant = aa.astype(np.float64) * bb - ab.astype(np.float64) ** 2
+        c, s = moment.real.astype(np.float64), moment.imag.astype(np.float64)
+        excited = determinant > 1e-3 * (0.5 * power.astype(np.float64)) ** 2
+        saved = (bb * c * c - 2.0 * ab * c * s + aa * s * s) / np.where(excited, determinant, 1.0)
+        return np.where(excited, self.as_deviances(np.maximum(saved, 0.0)), 0.0)
+
+    def run_effect_gain(self, columns: Array) -> tuple[float, float]:
+        """Best ratio of variances of a run effect and the deviance it saves."""
+        z = self.whiten(columns)
+        pieces, sizes = [], []
+        stacked = np.column_stack([self.q, self.r])
+        for start, stop in self.bounds:
+            u, s, _ = np.linalg.svd(z[start:stop], full_matrices=False)
+            pieces.append(u.T @ stacked[start:stop])
+            sizes.append(s**2)
+        b, power = np.vstack(pieces), np.concatenate(sizes)
+        bq, br = b[:, :-1], b[:, -1]
+        best, ratio = 0.0, 0.0
+        for trial in RATIOS / max(float(power.max(initial=0.0)), 1e-300):
+            shrink = trial * power / (1.0 + trial * power)
+            saved = float(br @ (shrink * br))
+            cross = bq.T @ (shrink * br)
+            inner = np.eye(bq.shape[1]) - bq.T @ (shrink[:, None] * bq)
+            saved += float(cross @ np.linalg.solve(inner + 1e-12 * np.eye(len(inner)), cross))
+            deviance = self.as_deviance(saved) - float(np.log1p(trial * power).sum())
+            if deviance > best:
+                best, ratio = deviance, float(trial)
+        return ratio, best
+
+    def propose(
+        self,
+        cause: str,
+        shape: dict[str, Any],
+        columns: Array,
+        parameters: int | None = None,
+        log_grid: float = 0.0,
+        deviance: float | None = None,
+    ) -> Proposal:
+        """Proposal of regressors with their evidence in this space."""
+        saved, coefficients = self.gain(columns)
+        return Proposal(
+            cause,
+            shape,
+            columns,
+            columns.shape[1] if parameters is None else parameters,
+            log_grid,
+            saved if deviance is None else deviance,
+            self.log_n,
+            coefficients=coefficients,
+        )
+
+    def propose_run_effect(
+        self, cause: str, shape: dict[str, Any], columns: Array, log_grid: float = 0.0
+    ) -> Proposal:
+        """Proposal of a run effect with its evidence in this space."""
+        ratio, deviance = self.run_effect_gain(columns)
+        return Proposal(
+            cause,
+            shape,
+            np.zeros((self.n, 0)),
+            1,
+            log_grid,
+            deviance,
+            self.log_n,
+            RunEffect(columns, ratio),
+        )
+
+    def has(self, cause: str) -> bool:
+        """A term of this cause is among the terms."""
+        return any(term.cause == cause for term in self.terms)
