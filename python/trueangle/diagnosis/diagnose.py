@@ -160,13 +160,13 @@ def _findings(
         terms = [(*fitted[k], space.covariance(k)) for k in group]
         cause = terms[0][0].cause
         parameters, effects = CANDIDATES[cause].report(space, terms)
-        evidence = {
+        weight = {
             "bic_gain": float(sum(t.bic_gain for t, _, _ in terms)),
             "deviance": float(sum(t.deviance for t, _, _ in terms)),
             "parameters": float(sum(t.parameters for t, _, _ in terms)),
             "log_grid": float(sum(t.log_grid for t, _, _ in terms)),
         }
-        findings.append(Finding(cause, parameters, evidence, gain, _rivals(space, group), effects))
+        findings.append(Finding(cause, parameters, weight, gain, _rivals(space, group), effects))
     return findings + _corrected_lines(space, spots), spots
 
 

@@ -143,7 +143,7 @@ def _log_variance(design: Array, square: Array) -> tuple[Array, Array]:
         gamma += step
         if np.abs(step).max() < 1e-10:
             break
-    return gamma, 2.0 * inverse
+    return gamma, np.asarray(2.0 * inverse, dtype=np.float64)
 
 
 def find_outliers(space: Space) -> ScatterFinding | None:

@@ -229,7 +229,7 @@ class Space:
     @property
     def deviance(self) -> float:
         """-2 ln of the likelihood, up to a constant of the readings."""
-        return self.n * float(np.log(self.rss / self.n)) + self.whiten.log_determinant
+        return float(self.n * np.log(self.rss / self.n)) + float(self.whiten.log_determinant)
 
     @property
     def bic(self) -> float:

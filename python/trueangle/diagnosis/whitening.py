@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -91,7 +92,7 @@ class Whitener:
         self.effects = list(effects or ())
         self.root_weights = None if weights is None else np.sqrt(weights)
         self._rotations: list[tuple[Array, Array]] = []
-        self.log_determinant = -len(bounds) * float(np.log1p(-(rho**2)))
+        self.log_determinant: float = -len(bounds) * float(np.log1p(-(rho**2)))
         if weights is not None:
             self.log_determinant -= float(np.log(weights).sum())
         if self.effects:
@@ -108,7 +109,7 @@ class Whitener:
         """Nothing to do: white noise, no run effects."""
         return self.rho == 0.0 and not self.effects and self.root_weights is None
 
-    def _filtered(self, x: NDArray) -> NDArray:
+    def _filtered(self, x: NDArray[Any]) -> NDArray[Any]:
         if self.root_weights is not None:
             scale = self.root_weights.astype(x.real.dtype)
             x = x * (scale if x.ndim == 1 else scale[:, None])
@@ -120,7 +121,7 @@ class Whitener:
         out[first] = x[first] * x.dtype.type(np.sqrt(1.0 - self.rho**2))
         return out
 
-    def __call__(self, x: NDArray) -> NDArray:
+    def __call__(self, x: NDArray[Any]) -> NDArray[Any]:
         """The map applied to a column or to columns, shape (n,) or (n, k)."""
         out = self._filtered(x)
         if not self.effects:

@@ -7,6 +7,7 @@ from functools import partial
 from typing import Any, ClassVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...simulation.effects import Effect, Surroundings
 from ...simulation.effects.place import ArgumentShift, LocalDefect
@@ -150,7 +151,7 @@ class DefectCandidate(Candidate):
         return parameters, [LocalDefect(place, width, float(height), shape["shaft"])]
 
 
-def _circular(x: Array, window: Array) -> Array:
+def _circular(x: NDArray[Any], window: Array) -> Array:
     """Sum of ``x`` under a symmetric window put at every place of the turn."""
     return np.asarray(np.fft.irfft(np.fft.rfft(x) * np.fft.rfft(window), PLACES))
 
