@@ -13,6 +13,8 @@ if TYPE_CHECKING:
     from .diagnosis import diagnose as diagnose
     from .fitresult import FitResult as FitResult
     from .fitting import fit as fit
+    from .logs.batch import correct_logs as correct_logs
+    from .logs.frames import correct as correct
     from .model import HarmonicModel as HarmonicModel
     from .model import Shaft as Shaft
     from .model import load_model as load_model
@@ -30,6 +32,8 @@ _PUBLIC = {
     "FitResult": "fitresult",
     "HarmonicModel": "model",
     "Shaft": "model",
+    "correct": "logs.frames",
+    "correct_logs": "logs.batch",
     "fit": "fitting",
     "load_model": "model",
     "read_runs": "runfiles",

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 __all__ = [
     "ArgumentError",
     "FileError",
@@ -90,6 +92,16 @@ class FileError(TrueAngleError):
         if column is not None:
             place.append(f"column '{column}'")
         super().__init__(f"{', '.join(place)}: {problem}")
+        self._problem = problem
+
+    def __reduce__(self) -> tuple[Any, ...]:  # workers of a cluster send errors home
+        return _file_error, (type(self), self.path, self._problem, self.line, self.column)
+
+
+def _file_error(
+    kind: type[FileError], path: str, problem: str, line: int | None, column: str | None
+) -> FileError:
+    return kind(path, problem, line=line, column=column)
 
 
 class ModelFileError(FileError):

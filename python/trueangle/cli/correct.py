@@ -4,75 +4,192 @@ from __future__ import annotations
 
 import argparse
 import json
-from functools import partial
-from pathlib import Path
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
 
-from ..errors import ArgumentError
+from ..errors import ArgumentError, TrueAngleError
+
+if TYPE_CHECKING:
+    from ..logs.batch import BatchReport, LogReport
 
 HELP = "correct the indicated angles of logs with a saved model"
-EXAMPLE = "trueangle correct log.csv -m joint_a.json -o corrected.csv"
+EXAMPLE = "trueangle correct logs/*.parquet -m joint_a.json -o corrected/"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command's arguments."""
-    parser.add_argument("logs", nargs="+", metavar="LOG", help="CSV files of readings")
-    parser.add_argument("-m", "--model", required=True, help="model file written by trueangle fit")
-    parser.add_argument(
-        "-o", "--output", required=True, metavar="OUT", help="file to write; a folder for several"
+    add = parser.add_argument
+    add(
+        "logs",
+        nargs="+",
+        metavar="LOG",
+        help="logs or folders of them: Parquet, Arrow, CSV, HDF5, MATLAB v7.3, ROS bags, "
+        "MCAP, MDF4",
     )
-    parser.add_argument("--column", metavar="NAME", help="of the angle (default: indicated_*)")
-    parser.add_argument(
+    add(
+        "-m",
+        "--model",
+        action="append",
+        required=True,
+        metavar="[JOINT=]FILE",
+        help="model file written by trueangle fit; with several joints one of each",
+    )
+    add("-o", "--output", metavar="OUT", help="file to write; a folder for several")
+    add(
+        "--in-place",
+        action="store_true",
+        help="replace every log by its corrected copy once that is verified",
+    )
+    add(
+        "--column",
+        action="append",
+        metavar="[JOINT=]NAME",
+        help="of the angle (default: indicated_*, of a joint JOINT_indicated_* or the like)",
+    )
+    add(
+        "--signal",
+        action="append",
+        metavar="[JOINT.]SIGNAL=NAME",
+        help="column of a signal that the model needs: velocity, temperature, torque, time "
+        "(default: velocity_deg_s, temperature_C, torque_Nm, time_s)",
+    )
+    add(
         "--unit",
         choices=("deg", "rad", "turn", "count"),
-        help="of that column (default: the ending of its name, else the model's)",
+        help="of the angle (default: the ending of its name, else the model's)",
     )
-    parser.add_argument("--counts-per-turn", type=float, metavar="N", help="of an angle in counts")
-    parser.add_argument("--json", action="store_true", help="print the result as JSON")
+    add("--counts-per-turn", type=float, metavar="N", help="of an angle in counts")
+    add("--topic", metavar="NAME", help="JointState topic of a ROS bag (default: the only one)")
+    add(
+        "--output-topic",
+        metavar="NAME",
+        help="topic that takes the corrected positions (default: TOPIC_corrected; the topic "
+        "itself replaces them)",
+    )
+    add(
+        "--scheduler",
+        metavar="tcp://HOST:PORT",
+        help="Dask scheduler whose workers share the files: every log on one of them",
+    )
+    add(
+        "--progress",
+        choices=("auto", "text", "json", "none"),
+        default="auto",
+        help="on stderr (default: text on a terminal; one JSON object a line with --json)",
+    )
+    add("--json", action="store_true", help="print the result as JSON")
 
 
 def run(args: argparse.Namespace) -> int:
     """Correct every log."""
-    from ..logs.columns import find_angle_column
-    from ..logs.csvlog import correct_csv
-    from ..model import load_model
+    import sys
 
-    model = load_model(args.model)
-    done = []
-    for source, target in _targets([Path(log) for log in args.logs], Path(args.output)):
-        lines = correct_csv(
-            source,
-            target,
-            model,
-            partial(
-                find_angle_column,
-                source,
-                model.period,
-                column=args.column,
-                unit=args.unit,
-                counts_per_turn=args.counts_per_turn,
-            ),
-        )
-        done.append({"log": str(source), "output": str(target), "rows": lines})
-        if not args.json:
-            print(f"{source}: {lines} readings corrected -> {target}")
+    from ..logs.batch import correct_logs
+
+    progress = args.progress
+    if progress == "auto" and args.json and sys.stderr.isatty():
+        progress = "json"
+    models: dict[Any, Any] = by_joint(args.model, "--model")
+    result = correct_logs(
+        args.logs,
+        models.get(None, models),
+        args.output,
+        in_place=args.in_place,
+        column=_columns(args.column, None in models),
+        signals=_signals(args.signal, None in models),
+        unit=args.unit,
+        counts_per_turn=args.counts_per_turn,
+        topic=args.topic,
+        output_topic=args.output_topic,
+        scheduler=args.scheduler,
+        progress=progress,
+        report=(lambda log: None) if args.json else _print,
+    )
     if args.json:
-        print(json.dumps({"files": done}))
-    return 0
+        print(json.dumps(result.as_json()))
+    return _status(result)
 
 
-def _targets(sources: list[Path], output: Path) -> list[tuple[Path, Path]]:
-    """Where every log goes; never onto a log itself."""
-    into_folder = len(sources) > 1 or output.is_dir()
-    if into_folder:
-        output.mkdir(parents=True, exist_ok=True)
-    pairs = [(source, output / source.name if into_folder else output) for source in sources]
-    for source, target in pairs:
-        if not source.is_file():
-            raise ArgumentError(f"{source}: no such file")
-        if target.exists() and target.samefile(source):
-            raise ArgumentError(f"{source}: the output would overwrite it; name another with -o")
-    names = [target for _, target in pairs]
-    doubled = next((name for name in names if names.count(name) > 1), None)
-    if doubled is not None:
-        raise ArgumentError(f"{doubled}: two logs of this name; correct them into other folders")
-    return pairs
+def by_joint(entries: Sequence[str], option: str) -> dict[str | None, str]:
+    """``FILE`` or several ``JOINT=FILE`` as a mapping."""
+    found: dict[str | None, str] = {}
+    for entry in entries:
+        joint, equals, value = entry.partition("=")
+        key = joint if equals else None
+        if not equals:
+            value = entry
+        if key in found or not value or key == "":
+            raise ArgumentError(f"{option}: every joint once, as joint3=NAME, got {entry!r}")
+        found[key] = value
+    if None in found and len(found) > 1:
+        raise ArgumentError(f"{option}: with several joints name them all, as joint3={found[None]}")
+    return found
+
+
+def _columns(entries: Sequence[str] | None, single: bool) -> Any:
+    if not entries:
+        return None
+    if single:
+        if len(entries) > 1:
+            raise ArgumentError("--column: one model corrects one column")
+        return entries[0]
+    return by_joint(entries, "--column")
+
+
+def _signals(entries: Sequence[str] | None, single: bool) -> Any:
+    signals: dict[str, Any] = {}
+    for entry in entries or ():
+        signal, equals, column = entry.partition("=")
+        joint, dot, name = signal.rpartition(".")
+        if not equals or not column or bool(dot) == single:
+            wanted = "SIGNAL=NAME" if single else "JOINT.SIGNAL=NAME"
+            raise ArgumentError(f"--signal: {wanted} is needed, got {entry!r}")
+        (signals if single else signals.setdefault(joint, {}))[name] = column
+    return signals or None
+
+
+def _print(log: LogReport) -> None:
+    if not log.is_done:
+        return  # told at the end, on stderr
+    result = log.result
+    if log.status == "done before":
+        print(f"{log.log}: done before -> {log.output}")
+        return
+    print(
+        f"{log.log}: {result['rows']} readings corrected at "
+        f"{result['rows_per_second']:.3g} rows/s -> {log.output}"
+    )
+    for joint in result["joints"]:
+        text = (
+            f"  {joint['corrected']}: correction {joint['rms_correction_arcsec']:.2f} arcsec rms, "
+            f"{joint['max_abs_correction_arcsec']:.2f} max abs"
+        )
+        if joint["missing"]:
+            text += f", {joint['missing']} missing kept"
+        if joint["outside_span"]:
+            text += f", {joint['outside_span']} outside the calibrated span"
+        print(text, flush=True)
+
+
+def _status(result: BatchReport) -> int:
+    """0, or an error that lists what is not done."""
+    if result.is_done and not result.interrupted:
+        return 0
+    failed = [log for log in result.logs if log.error is not None]
+    if len(result.logs) == 1 and failed and failed[0].error is not None:
+        raise failed[0].error
+    done = sum(log.is_done for log in result.logs)
+    waiting = [str(log.log) for log in result.logs if log.status == "not started"]
+    parts = [f"{done} of {len(result.logs)} logs are corrected and complete"]
+    parts += [f"failed: {_told(log)}" for log in failed]
+    if waiting:
+        parts.append(f"not started: {', '.join(waiting)}")
+    parts.append("run the same command again to go on")
+    if result.interrupted:
+        parts.insert(0, "interrupted")
+    raise TrueAngleError("; ".join(parts))
+
+
+def _told(log: LogReport) -> str:
+    text = str(log.error)
+    return text if str(log.log) in text else f"{log.log}: {text}"

@@ -1,16 +1,24 @@
-"""Which column of a log holds the indicated angle, and in what unit."""
+"""Which column of a log holds the indicated angle of a joint, and in what unit."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 from ..angles import UNIT_PERIODS, unit_name
 from ..errors import FileError
 
-__all__ = ["UNITS", "AngleColumn", "find_angle_column"]
+__all__ = ["UNITS", "AngleColumn", "find_angle_column", "find_signal_column"]
 
 UNITS = (*UNIT_PERIODS, "count")
+
+#: Column endings of the signals that terms of a model may need.
+_SIGNALS = {
+    "time": ("time_s",),
+    "temperature": ("temperature_C",),
+    "torque": ("torque_Nm",),
+    "velocity": tuple(f"velocity_{unit}_s" for unit in UNITS),
+}
 
 
 class AngleColumn(NamedTuple):
@@ -27,14 +35,18 @@ def find_angle_column(
     model_period: float,
     header: Sequence[str],
     *,
+    joint: str | None = None,
     column: str | None = None,
     unit: str | None = None,
     counts_per_turn: float | None = None,
 ) -> AngleColumn:
-    """The indicated angle among the columns of ``path``.
+    """The indicated angle of ``joint`` among the columns of ``path``.
 
-    Without ``column`` the one column ``indicated_deg``, ``_rad``, ``_turn`` or ``_count``;
-    its unit is ``unit``, else the ending of its name, else that of the model.
+    Without ``column`` it is the one column ``indicated_deg``, ``_rad``, ``_turn`` or
+    ``_count``; for a named joint ``JOINT_indicated_deg``, ``indicated_deg_JOINT``,
+    ``JOINT_deg`` or ``JOINT``. Groups of a file are part of the name, with a slash:
+    ``JOINT/indicated_deg``. The unit is ``unit``, else the ending of the name, else that of
+    the model.
 
     Raises
     ------
@@ -43,25 +55,10 @@ def find_angle_column(
         result's name is there already.
     """
     if column is None:
-        found = [name for name in header if name in {f"indicated_{unit}" for unit in UNITS}]
-        if len(found) != 1:
-            problem = (
-                "no indicated_deg (_rad, _turn, _count) column"
-                if not found
-                else (f"several indicated columns ({', '.join(found)})")
-            )
-            raise FileError(
-                path,
-                f"{problem}: name the angle with --column; its columns are {', '.join(header)}",
-                line=1,
-            )
-        column = found[0]
+        column = _search(path, header, joint)
     elif column not in header:
-        raise FileError(
-            path, f"no such column; its columns are {', '.join(header)}", line=1, column=column
-        )
-    ending = column.rpartition("_")[2]
-    unit = unit or (ending if ending in UNITS else unit_name(model_period))
+        raise FileError(path, f"no such column; {_listed(header)}", line=1, column=column)
+    unit = unit or _unit_of(column, joint) or unit_name(model_period)
     period = UNIT_PERIODS.get(unit) or counts_per_turn
     if period is None and unit_name(model_period) == "count":
         period = model_period
@@ -72,9 +69,98 @@ def find_angle_column(
             line=1,
             column=column,
         )
-    corrected = f"corrected_{unit}"
+    corrected = _corrected_name(column, unit, joint)
     if corrected in header:
         raise FileError(
             path, "is there already: this log was corrected before", line=1, column=corrected
         )
     return AngleColumn(column, unit, float(period), corrected)
+
+
+def find_signal_column(
+    path: object, header: Sequence[str], signal: str, joint: str | None, column: str | None
+) -> str | None:
+    """The column of ``signal`` (velocity, temperature, ...) of ``joint``, or None.
+
+    Without ``column`` it is ``JOINT_velocity_deg_s``, ``velocity_deg_s_JOINT`` or
+    ``velocity_deg_s`` and so on, those of the joint first.
+    """
+    if column is not None:
+        if column not in header:
+            raise FileError(path, f"no such column; {_listed(header)}", line=1, column=column)
+        return column
+    patterns = (
+        ["{}"] if joint is None else [f"{joint}_{{}}", f"{{}}_{joint}", f"{joint}/{{}}", "{}"]
+    )
+    for pattern in patterns:
+        for ending in _SIGNALS.get(signal, (signal,)):
+            if pattern.format(ending) in header:
+                return pattern.format(ending)
+    return None
+
+
+def _search(path: object, header: Sequence[str], joint: str | None) -> str:
+    if joint is None:
+        wanted = {f"indicated_{unit}" for unit in UNITS}
+        found = [name for name in header if name.rpartition("/")[2] in wanted]
+        if len(found) == 1:
+            return found[0]
+        problem = (
+            f"several indicated columns ({', '.join(found)})"
+            if found
+            else "no indicated_deg (_rad, _turn, _count) column"
+        )
+        raise FileError(path, f"{problem}: name the angle with --column; {_listed(header)}", line=1)
+    for candidates in _joint_names(joint):
+        found = [name for name in candidates if name in header]
+        if len(found) == 1:
+            return found[0]
+        if found:
+            raise FileError(
+                path,
+                f"several columns of joint {joint} ({', '.join(found)}): name one with "
+                f"--column {joint}=NAME",
+                line=1,
+            )
+    raise FileError(
+        path,
+        f"no column of joint {joint}, such as {joint}_indicated_deg: name it with "
+        f"--column {joint}=NAME; {_listed(header)}",
+        line=1,
+    )
+
+
+def _joint_names(joint: str) -> Iterator[list[str]]:
+    """Names that the angle of a joint may have, the most telling first."""
+    indicated = [f"indicated_{unit}" for unit in UNITS]
+    yield [
+        name
+        for ending in indicated
+        for name in (f"{joint}_{ending}", f"{ending}_{joint}", f"{joint}/{ending}")
+    ]
+    yield [f"{joint}_{unit}" for unit in UNITS]
+    yield [joint]
+
+
+def _unit_of(column: str, joint: str | None) -> str | None:
+    name = column.rpartition("/")[2]
+    ending = name.rpartition("_")[2]
+    if ending not in UNITS and joint is not None:
+        ending = name.removesuffix(f"_{joint}").rpartition("_")[2]
+    return ending if ending in UNITS else None
+
+
+def _corrected_name(column: str, unit: str, joint: str | None) -> str:
+    group, slash, name = column.rpartition("/")
+    if "indicated" in name:
+        corrected = name.replace("indicated", "corrected", 1)
+    elif joint is not None:
+        corrected = f"{joint}_corrected_{unit}"
+    else:
+        corrected = f"corrected_{unit}"
+    return group + slash + corrected
+
+
+def _listed(header: Sequence[str]) -> str:
+    shown = ", ".join(header[:20])
+    return f"its columns are {shown}" + (f" and {len(header) - 20} more" if header[20:] else "")

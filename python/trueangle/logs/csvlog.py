@@ -1,123 +1,113 @@
-"""Correcting a CSV log line by line in blocks: every other column stays as it is."""
+"""CSV logs: the corrected angle is added to every line, whose own text stays as it is.
+
+Blocks of lines without quotes go through pyarrow where it is installed; quoted cells, and
+everything without pyarrow, through the standard library.
+"""
 
 from __future__ import annotations
 
-import csv
-from collections.abc import Callable, Iterator, Sequence
-from os import PathLike
+import importlib.util
+import zlib
+from collections.abc import Iterator, Sequence
 from pathlib import Path
+from typing import IO, Any, TypeAlias
 
-import numpy as np
+from numpy.typing import NDArray
 
-from ..errors import FileError
-from ..files import written_atomically
-from ..model import HarmonicModel
-from .columns import AngleColumn
+from .csvrows import BLOCK, Header, QuotedBlock, quoted_blocks
+from .formats import Choose, Contents, Watch
+from .joints import Channel
 
-__all__ = ["correct_csv"]
+if importlib.util.find_spec("pyarrow") is not None:
+    from .csvblocks import PlainBlock, plain_block
+else:
+    plain_block = None  # type: ignore[assignment]
 
-#: Lines corrected together: small enough for the cache, large enough for the core.
-_BLOCK = 16384
+__all__ = ["columns", "contents", "copy", "read"]
 
-
-def correct_csv(
-    source: str | PathLike[str],
-    target: str | PathLike[str],
-    model: HarmonicModel,
-    choose: Callable[[Sequence[str]], AngleColumn],
-) -> int:
-    """Copy a CSV log and add the corrected angle as its last column.
-
-    Parameters
-    ----------
-    source, target : path
-    model : HarmonicModel
-    choose : callable
-        Finds the angle among the names of the header (`find_angle_column`).
-
-    Returns
-    -------
-    int
-        Lines corrected. Empty cells stay empty, NaN stays NaN.
-
-    Raises
-    ------
-    FileError
-        Names the line and column of a cell that is no number, or a line of another
-        length than the header. The target is then not written at all.
-    """
-    path = Path(source)
-    with path.open(encoding="utf-8-sig", newline="") as file:
-        try:
-            first = file.readline()
-            if not first.strip():
-                raise FileError(path, "is empty; a header line is needed", line=1)
-            delimiter = max(",;\t", key=first.count)
-            header = next(csv.reader([first], delimiter=delimiter))
-            angle = choose([name.strip() for name in header])
-            reader = csv.reader(file, delimiter=delimiter, strict=True)
-            with written_atomically(target) as output:
-                writer = csv.writer(output, delimiter=delimiter, lineterminator="\n")
-                writer.writerow([*header, angle.corrected])
-                lines = 0
-                for block, line in _blocks(reader, len(header), path):
-                    texts = _corrected(block, line, header, angle, model, path)
-                    writer.writerows([*row, text] for row, text in zip(block, texts, strict=True))
-                    lines += len(block)
-        except UnicodeDecodeError:
-            raise FileError(path, "is not UTF-8 text") from None
-        except csv.Error as cause:
-            raise FileError(path, f"is not readable as CSV: {cause}") from None
-    return lines
+_Block: TypeAlias = "QuotedBlock | PlainBlock"
 
 
-def _blocks(
-    reader: Iterator[list[str]], width: int, path: Path
-) -> Iterator[tuple[list[list[str]], int]]:
-    """Rows in blocks, each with the line number of its first row (the header is line 1)."""
-    block: list[list[str]] = []
-    first = 2
-    for line, row in enumerate(reader, 2):
-        if not row:
-            continue
-        if len(row) != width:
-            raise FileError(
-                path, f"{len(row)} values where the header has {width} columns", line=line
-            )
-        block.append(row)
-        if len(block) == _BLOCK:
-            yield block, first
-            block, first = [], line + 1
-    if block:
-        yield block, first
+def columns(path: Path, topic: str | None = None) -> list[str]:
+    """Names in the header line."""
+    with path.open("rb") as file:
+        return Header(path, file.readline()).names
 
 
-def _corrected(
-    block: Sequence[Sequence[str]],
-    line: int,
-    header: Sequence[str],
-    angle: AngleColumn,
-    model: HarmonicModel,
-    path: Path,
-) -> list[str]:
-    index = [name.strip() for name in header].index(angle.name)
-    cells = [row[index].strip() for row in block]
-    try:
-        values = np.array([float(cell) if cell else np.nan for cell in cells])
-    except ValueError:
-        for offset, cell in enumerate(cells):
-            try:
-                float(cell or "nan")
-            except ValueError:
-                raise FileError(
-                    path,
-                    f"a number is needed, got {cell!r}",
-                    line=line + offset,
-                    column=angle.name,
-                ) from None
-        raise
-    scale = model.period / angle.period
-    corrected = model.correct(values * scale) / scale
-    return [
-        repr(value) if cell else "" for value, cell in zip(corrected.tolist(), cells, strict=True)
-    ]
+def read(
+    path: Path, names: Sequence[str], topic: str | None = None
+) -> Iterator[dict[str, NDArray[Any]]]:
+    """Columns ``names`` in batches, empty cells as NaN; see `formats.FormatModule`."""
+    with path.open("rb") as file:
+        header = Header(path, file.readline())
+        for block in _blocks(file, header):
+            yield block.numbers(names)
+
+
+def copy(
+    source: Path,
+    target: Path,
+    choose: Choose,
+    watch: Watch,
+    topic: str | None = None,
+    output_topic: str | None = None,
+) -> Contents:
+    """Write ``target`` with the corrected columns last; see `formats.FormatModule`."""
+    size = max(source.stat().st_size, 1)
+    rows, check = 0, 0
+    with source.open("rb") as file, target.open("wb") as output:
+        header = Header(source, file.readline())
+        channels = choose(header.names)
+        used = _used(channels)
+        added = [channel.angle.corrected for channel in channels]
+        line = header.delimiter.join([header.text, *added]) + header.ending
+        head = header.mark + line.encode()
+        output.write(head)
+        check = zlib.crc32(head, check)
+        for block in _blocks(file, header):
+            values = block.numbers(used)
+            corrected = []
+            for channel in channels:
+                signals = {name: values[column] for name, column in channel.signals.items()}
+                indicated = values[channel.angle.name]
+                corrected.append((channel.angle.name, channel.correct(indicated, signals)))
+            data = block.with_columns(corrected)
+            output.write(data)
+            check = zlib.crc32(data, check)
+            rows += block.rows
+            watch(block.rows, file.tell() / size)
+    return Contents(rows, {"bytes": f"{check:08x}"})
+
+
+def contents(path: Path, topic: str | None = None) -> Contents:
+    """Rows and checksum of the bytes as they read back."""
+    rows, check = 0, 0
+    with path.open("rb") as file:
+        line = file.readline()
+        check = zlib.crc32(line, check)
+        for block in _blocks(file, Header(path, line)):
+            rows += block.rows
+            check = zlib.crc32(block.data, check)
+    return Contents(rows, {"bytes": f"{check:08x}"})
+
+
+def _used(channels: Sequence[Channel]) -> list[str]:
+    names = [c.angle.name for c in channels] + [n for c in channels for n in c.signals.values()]
+    return list(dict.fromkeys(names))
+
+
+def _blocks(file: IO[bytes], header: Header) -> Iterator[_Block]:
+    """The rest of the file in blocks of whole rows."""
+    line, held = 2, b""
+    while data := held + file.read(BLOCK):
+        if plain_block is None or b'"' in data:
+            # A quoted cell may hold line breaks: from here on rows are cut by csv.
+            yield from quoted_blocks(data, file, header, line)
+            return
+        cut = data.rfind(b"\n") + 1
+        if len(data) == len(held):  # the end of the file, its last line without an end
+            cut = len(data)
+        data, held = data[:cut], data[cut:]
+        if data:
+            yield plain_block(data, header, line) or QuotedBlock.whole(data, header, line)
+            line += data.count(b"\n")

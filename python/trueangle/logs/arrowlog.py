@@ -1,0 +1,143 @@
+"""Arrow and Feather logs: record batch by record batch from mapped memory."""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import pyarrow as pa
+from numpy.typing import NDArray
+
+from ..errors import FileError
+from .ahead import ahead
+from .arrowtables import ArrowDigest, add_corrected, column_batches, corrected_schema
+from .formats import Choose, Contents, Watch
+
+__all__ = ["columns", "contents", "copy", "read"]
+
+_FILE_MAGIC = b"ARROW1"
+#: Codecs by their number in the format's BodyCompression.
+_CODECS = {0: "lz4", 1: "zstd"}
+_RECORD_BATCH = 3
+
+
+def columns(path: Path, topic: str | None = None) -> list[str]:
+    """Names of the top columns."""
+    with _opened(path) as (schema, _batches, _options):
+        return list(schema.names)
+
+
+def read(
+    path: Path, names: Sequence[str], topic: str | None = None
+) -> Iterator[dict[str, NDArray[Any]]]:
+    """Columns ``names`` in batches; see `formats.FormatModule`."""
+    with _opened(path) as (_schema, batches, _options):
+        yield from ahead(column_batches(path, names, batches))
+
+
+def copy(
+    source: Path,
+    target: Path,
+    choose: Choose,
+    watch: Watch,
+    topic: str | None = None,
+    output_topic: str | None = None,
+) -> Contents:
+    """Write ``target`` with the corrected columns; see `formats.FormatModule`."""
+    digest = ArrowDigest()
+    with _opened(source) as (schema, batches, options):
+        channels = choose(schema.names)
+        enlarged = corrected_schema(schema, channels, source)
+        new = pa.ipc.new_file if _is_file(source) else pa.ipc.new_stream
+        size = max(source.stat().st_size, 1)
+        done = 0
+
+        def corrected() -> Iterator[pa.RecordBatch]:
+            for batch in batches:
+                made = add_corrected(source, batch, channels, enlarged)
+                digest.update(made)
+                yield made
+
+        with pa.OSFile(str(target), "wb") as file, new(file, enlarged, options=options) as writer:
+            for batch in ahead(corrected()):
+                writer.write_batch(batch)
+                done += batch.nbytes
+                watch(batch.num_rows, min(1.0, done / size))
+    return digest.contents()
+
+
+def contents(path: Path, topic: str | None = None) -> Contents:
+    """Rows and checksums of all columns as they read back."""
+    digest = ArrowDigest()
+    with _opened(path) as (_schema, batches, _options):
+        for batch in batches:
+            digest.update(batch)
+    return digest.contents()
+
+
+def _is_file(path: Path) -> bool:
+    with path.open("rb") as file:
+        return file.read(len(_FILE_MAGIC)) == _FILE_MAGIC
+
+
+@contextmanager
+def _opened(
+    path: Path,
+) -> Iterator[tuple[pa.Schema, Iterator[pa.RecordBatch], pa.ipc.IpcWriteOptions]]:
+    """Schema, batches and how they are compressed, of the file or of the stream format."""
+    try:
+        is_file = _is_file(path)
+        with pa.memory_map(str(path), "r") as source:
+            options = pa.ipc.IpcWriteOptions(compression=_compression(path, is_file))
+            if is_file:
+                file = pa.ipc.open_file(source)
+                batches = (file.get_batch(i) for i in range(file.num_record_batches))
+                yield file.schema, batches, options
+            else:
+                stream = pa.ipc.open_stream(source)
+                yield stream.schema, iter(stream), options
+    except pa.ArrowException as cause:
+        raise FileError(path, f"is damaged or not Arrow: {cause}") from None
+    except OSError as cause:
+        if cause.errno is not None:
+            raise
+        raise FileError(path, f"is damaged: {cause}") from None
+
+
+def _compression(path: Path, is_file: bool) -> str | None:
+    """Codec of the first record batch, which only the message's own header tells."""
+    with pa.memory_map(str(path), "r") as source:
+        if is_file:
+            source.seek(8)  # the magic and its padding; a stream follows
+        reader = pa.ipc.MessageReader.open_stream(source)
+        for message in reader:
+            if message.type == "record batch":
+                return _codec(message.metadata.to_pybytes())
+    return None
+
+
+def _codec(header: bytes) -> str | None:
+    """The compression field of a record batch's flatbuffer (Message.fbs of Arrow)."""
+
+    def field(table: int, number: int) -> int | None:
+        vtable = table - struct.unpack_from("<i", header, table)[0]
+        if 4 + 2 * number >= struct.unpack_from("<H", header, vtable)[0]:
+            return None
+        offset = struct.unpack_from("<H", header, vtable + 4 + 2 * number)[0]
+        return table + offset if offset else None
+
+    def follow(place: int) -> int:
+        return int(place + struct.unpack_from("<I", header, place)[0])
+
+    message = follow(0)
+    kind, body = field(message, 1), field(message, 2)
+    if kind is None or body is None or header[kind] != _RECORD_BATCH:
+        return None
+    compression = field(follow(body), 3)
+    if compression is None:
+        return None
+    codec = field(follow(compression), 0)
+    return _CODECS[0 if codec is None else header[codec]]

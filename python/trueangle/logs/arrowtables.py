@@ -1,0 +1,195 @@
+"""Arrow data: columns as numpy arrays, corrected columns added, checksums of any type."""
+
+from __future__ import annotations
+
+import zlib
+from collections.abc import Iterable, Iterator, Sequence
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.compute as pc
+from numpy.typing import NDArray
+
+from ..errors import FileError
+from .checksum import Checksum
+from .formats import Contents
+from .joints import Channel, provenance
+
+__all__ = [
+    "METADATA_KEY",
+    "ArrowDigest",
+    "add_corrected",
+    "column_batches",
+    "corrected_schema",
+    "numbers",
+]
+
+#: Key of the schema's metadata under which the provenance is kept.
+METADATA_KEY = b"trueangle"
+
+
+def numbers(path: object, name: str, column: pa.Array | pa.ChunkedArray) -> NDArray[Any]:
+    """A column as an array without a copy where it has no nulls; nulls become NaN.
+
+    Raises
+    ------
+    FileError
+        The column holds no numbers.
+    """
+    if isinstance(column, pa.ChunkedArray):
+        column = column.chunk(0) if column.num_chunks == 1 else column.combine_chunks()
+    if isinstance(column, pa.ChunkedArray):  # an empty one stays chunked in some versions
+        column = pa.array([], column.type)
+    kind = column.type
+    if pa.types.is_dictionary(kind):
+        column = column.dictionary_decode()
+        kind = column.type
+    if pa.types.is_float16(kind):
+        column = column.cast(pa.float32())
+    elif pa.types.is_decimal(kind):
+        column = column.cast(pa.float64())
+    elif not (pa.types.is_integer(kind) or pa.types.is_floating(kind)):
+        raise FileError(path, f"numbers are needed, the column holds {kind}", column=name)
+    values: NDArray[Any] = column.to_numpy(zero_copy_only=False)
+    return values
+
+
+def corrected_schema(schema: pa.Schema, channels: Sequence[Channel], path: object) -> pa.Schema:
+    """``schema`` with the corrected columns and the provenance added."""
+    for channel in channels:
+        kind = schema.field(channel.angle.name).type
+        if pa.types.is_dictionary(kind):
+            kind = kind.value_type
+        single = pa.types.is_float16(kind) or pa.types.is_float32(kind)
+        schema = schema.append(
+            pa.field(channel.angle.corrected, pa.float32() if single else pa.float64())
+        )
+    return schema.with_metadata(
+        {**(schema.metadata or {}), METADATA_KEY: provenance(channels).encode()}
+    )
+
+
+def add_corrected(path: object, table: Any, channels: Sequence[Channel], schema: pa.Schema) -> Any:
+    """A table or record batch with the corrected column of every channel.
+
+    Nulls stay null, NaN stays NaN; the other columns are not touched.
+    """
+    columns = list(table.columns)
+    for channel in channels:
+        column = table[channel.angle.name]
+        signals = {
+            signal: numbers(path, name, table[name]) for signal, name in channel.signals.items()
+        }
+        corrected = channel.correct(numbers(path, channel.angle.name, column), signals)
+        missing = None
+        if column.null_count:
+            missing = np.asarray(column.is_null().to_numpy(zero_copy_only=False))
+        columns.append(pa.array(corrected, mask=missing))
+    return type(table).from_arrays(columns, schema=schema)
+
+
+class ArrowDigest:
+    """Checksums of every column of tables or batches, however they were cut."""
+
+    def __init__(self) -> None:
+        self.rows = 0
+        self._sums: dict[str, Checksum | int] = {}
+
+    def update(self, table: Any) -> None:
+        """Take in the next rows."""
+        self.rows += table.num_rows
+        for name, column in zip(table.schema.names, table.columns, strict=True):
+            chunks = column.chunks if isinstance(column, pa.ChunkedArray) else [column]
+            for chunk in chunks:
+                self._column(name, chunk)
+
+    def contents(self) -> Contents:
+        """Rows and checksums so far."""
+        return Contents(
+            self.rows,
+            {
+                name: f"{found:08x}" if isinstance(found, int) else found.text()
+                for name, found in self._sums.items()
+            },
+        )
+
+    def _column(self, name: str, column: pa.Array) -> None:
+        nulls = self._sums.setdefault(f"{name}:null", Checksum())
+        assert isinstance(nulls, Checksum)
+        if column.null_count:
+            nulls.update(column.is_null().cast(pa.uint8()).to_numpy())
+            column = column.drop_null()  # what lies under a null means nothing
+        else:
+            nulls.count += len(column)  # zeros
+        kind = column.type
+        if isinstance(column, pa.ExtensionArray):
+            self._column(name, column.storage)
+        elif pa.types.is_dictionary(kind):
+            self._column(name, column.dictionary_decode())
+        elif pa.types.is_run_end_encoded(kind):
+            self._column(name, pc.run_end_decode(column))
+        elif pa.types.is_struct(kind):
+            for i, child in enumerate(column.flatten()):
+                self._column(f"{name}.{kind.field(i).name}", child)
+        elif _is_list(kind):
+            lengths = pc.list_value_length(column)
+            self._words(f"{name}:length", lengths.cast(pa.int64()).to_numpy())
+            self._column(f"{name}[]", column.flatten())
+        elif _is_text(kind):
+            self._text(name, column)
+        elif pa.types.is_boolean(kind):
+            self._words(name, column.cast(pa.uint8()).to_numpy())
+        elif not pa.types.is_null(kind):
+            width = kind.bit_width // 8
+            data = np.frombuffer(column.buffers()[1] or b"", dtype=np.uint8)
+            data = data[column.offset * width : (column.offset + len(column)) * width]
+            word = 8 if width % 8 == 0 else width if width in (2, 4) else 1
+            self._words(name, data.view(f"u{word}"))
+
+    def _text(self, name: str, column: pa.Array) -> None:
+        large = pa.large_binary()
+        if _is_string(column.type):
+            column = column.cast(pa.large_string())
+        column = column.cast(large)
+        self._words(f"{name}:length", pc.binary_length(column).to_numpy())
+        if len(column):
+            offsets = np.frombuffer(column.buffers()[1], dtype=np.int64)[column.offset :]
+            data = memoryview(column.buffers()[2] or b"")[offsets[0] : offsets[len(column)]]
+            before = self._sums.get(name, 0)
+            assert isinstance(before, int)
+            self._sums[name] = zlib.crc32(data, before)
+
+    def _words(self, name: str, values: NDArray[Any]) -> None:
+        found = self._sums.setdefault(name, Checksum())
+        assert isinstance(found, Checksum)
+        found.update(values)
+
+
+def _is_string(kind: pa.DataType) -> bool:
+    return bool(
+        pa.types.is_string(kind) or pa.types.is_large_string(kind) or pa.types.is_string_view(kind)
+    )
+
+
+def _is_text(kind: pa.DataType) -> bool:
+    return _is_string(kind) or bool(
+        pa.types.is_binary(kind) or pa.types.is_large_binary(kind) or pa.types.is_binary_view(kind)
+    )
+
+
+def _is_list(kind: pa.DataType) -> bool:
+    return bool(
+        pa.types.is_list(kind)
+        or pa.types.is_large_list(kind)
+        or pa.types.is_fixed_size_list(kind)
+        or pa.types.is_map(kind)
+    )
+
+
+def column_batches(
+    path: object, names: Sequence[str], batches: Iterable[Any]
+) -> Iterator[dict[str, NDArray[Any]]]:
+    """Some columns of record batches as arrays."""
+    for batch in batches:
+        yield {name: numbers(path, name, batch[name]) for name in names}

@@ -1,0 +1,231 @@
+"""Correcting many logs: one after the other or on a cluster, resumed where it stopped."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass, field
+from os import PathLike
+from pathlib import Path
+from typing import Any
+
+from ..errors import TrueAngleError
+from ..model import HarmonicModel
+from .correction import Task, correct_log, is_disk_full
+from .joints import LogSettings, joints_of
+from .manifest import Manifest
+from .progress import Progress
+from .safety import remove_leftovers, stamp
+from .sources import Place, places
+from .turns import TurnState
+
+__all__ = ["BatchReport", "LogReport", "correct_logs"]
+
+
+@dataclass
+class LogReport:
+    """What became of one log.
+
+    Attributes
+    ----------
+    log, output : Path
+    size : int
+        Bytes of the log.
+    status : {"done", "done before", "failed", "not started"}
+    result : dict
+        Rows, rate and the joints' summaries, see `correction.correct_log`.
+    error : Exception or None
+    """
+
+    log: Path
+    output: Path
+    size: int = 0
+    status: str = "not started"
+    result: Mapping[str, Any] = field(default_factory=dict)
+    error: Exception | None = None
+
+    @property
+    def is_done(self) -> bool:
+        """True when the output is complete and verified."""
+        return self.status.startswith("done")
+
+    def as_json(self) -> dict[str, Any]:
+        """Plain values."""
+        known = {key: value for key, value in self.result.items() if key != "turns"}
+        error = {} if self.error is None else {"error": str(self.error)}
+        return {
+            "log": str(self.log),
+            "output": str(self.output),
+            "status": self.status,
+            **known,
+            **error,
+        }
+
+
+@dataclass
+class BatchReport:
+    """What became of all logs, in the order they were given."""
+
+    logs: list[LogReport]
+    seconds: float = 0.0
+    interrupted: bool = False
+
+    @property
+    def is_done(self) -> bool:
+        """True when every log is."""
+        return all(log.is_done for log in self.logs)
+
+    def as_json(self) -> dict[str, Any]:
+        """Plain values."""
+        done = [log for log in self.logs if log.status == "done"]
+        return {
+            "files": [log.as_json() for log in self.logs],
+            "rows": sum(log.result["rows"] for log in done),
+            "seconds": self.seconds,
+            "complete": self.is_done,
+        }
+
+
+def correct_logs(
+    logs: str | PathLike[str] | Iterable[str | PathLike[str]],
+    model: HarmonicModel | str | PathLike[str] | Mapping[str, Any],
+    output: str | PathLike[str] | None = None,
+    *,
+    in_place: bool = False,
+    column: str | Mapping[str, str] | None = None,
+    signals: Mapping[str, Any] | None = None,
+    unit: str | None = None,
+    counts_per_turn: float | None = None,
+    topic: str | None = None,
+    output_topic: str | None = None,
+    scheduler: str | None = None,
+    threads: int | None = None,
+    progress: str = "none",
+    report: Callable[[LogReport], None] = lambda log: None,
+) -> BatchReport:
+    r"""Correct log files, in constant memory and without ever losing a row.
+
+    Every output is written aside, read back and compared, synced, and only then named.
+    A log that fails does not stop the others (a full disk does). Running again skips what
+    is done: the output folder's manifest knows.
+
+    Parameters
+    ----------
+    logs : path or iterable of paths
+        Files or folders of Parquet, Arrow, CSV, HDF5, MATLAB v7.3, ROS bags, MCAP, MDF4.
+    model : HarmonicModel, path, or mapping of joint names to them
+    output : path, optional
+        A file for one log, a folder for several.
+    in_place : bool
+        Replace every log by its corrected copy once that is verified.
+    column : str or mapping of joint names to str, optional
+        The indicated angle; by default the column named so.
+    signals : mapping, optional
+        Columns of signals that terms of the model need: ``{"temperature": "T_motor"}``, or
+        such a mapping by joint name.
+    unit : {"deg", "rad", "turn", "count"}, optional
+    counts_per_turn : float, optional
+    topic, output_topic : str, optional
+        Of ROS bags: the JointState topic, and the one that takes the corrected positions.
+    scheduler : str, optional
+        Address of a Dask scheduler whose workers share the file system.
+    threads : int, optional
+        At most so many for the correction itself.
+    progress : {"auto", "text", "json", "none"}
+        On stderr; see `Progress`.
+    report : callable
+        Is given the `LogReport` of every log as it is finished.
+
+    Returns
+    -------
+    BatchReport
+        What is done and what is not, in the order of the logs.
+
+    Raises
+    ------
+    ArgumentError
+        Nothing has been done yet: no such log, an output that is an input.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> from trueangle import HarmonicModel, Shaft
+    >>> model = HarmonicModel([Shaft("output", 1, [1], [0.0], [0.5])], period=360.0)
+    >>> folder = Path(tempfile.mkdtemp())
+    >>> _ = (folder / "a.csv").write_text("indicated_deg\n90.5\n")
+    >>> done = correct_logs(folder / "a.csv", model, folder / "b.csv")
+    >>> (folder / "b.csv").read_text().split()
+    ['indicated_deg,corrected_deg', '90.5,90']
+    """
+    start = time.monotonic()
+    settings = LogSettings(
+        joints_of(model, column, signals), unit, counts_per_turn, topic, output_topic, threads
+    )
+    paths = [logs] if isinstance(logs, (str, PathLike)) else list(logs)
+    found = places(paths, output, in_place)
+    result = BatchReport(
+        [LogReport(place.source, place.target, stamp(place.source)[0]) for place in found]
+    )
+    shown = Progress(len(found), sum(log.size for log in result.logs), progress)
+
+    def finished(log: LogReport) -> None:
+        shown.clear()
+        shown.finish_file(log.size, skipped=log.status == "done before")
+        report(log)
+
+    with ExitStack() as stack:
+        folders = dict.fromkeys(place.manifest for place in found if place.manifest is not None)
+        manifests = {f: stack.enter_context(Manifest(f).opened()) for f in folders}
+        for place in found:
+            remove_leftovers(place.target)
+        try:
+            if scheduler is None:
+                _one_by_one(found, result.logs, settings, manifests, shown, finished)
+            else:
+                from .cluster import on_cluster
+
+                on_cluster(scheduler, found, result.logs, settings, manifests, shown, finished)
+        except KeyboardInterrupt:
+            result.interrupted = True
+        finally:
+            shown.clear()
+    result.seconds = time.monotonic() - start
+    return result
+
+
+def done_before(
+    place: Place, log: LogReport, settings: LogSettings, manifests: Mapping[Path, Manifest]
+) -> bool:
+    """Whether the manifest knows the output; the report is then filled from it."""
+    if place.manifest is None:
+        return False
+    known = manifests[place.manifest].done(place.source, place.target, settings.digest)
+    if known is not None:
+        log.status, log.result = "done before", known
+    return known is not None
+
+
+def _one_by_one(
+    found: Sequence[Place],
+    logs: Sequence[LogReport],
+    settings: LogSettings,
+    manifests: Mapping[Path, Manifest],
+    shown: Progress,
+    finished: Callable[[LogReport], None],
+) -> None:
+    turns: Mapping[str, TurnState] = {}
+    for place, log in zip(found, logs, strict=True):
+        if not done_before(place, log, settings, manifests):
+            shown.start_file(log.size)
+            task = Task(place.source, place.target, settings, turns, place.manifest)
+            try:
+                log.result = correct_log(task, shown.advance)
+                log.status = "done"
+            except (TrueAngleError, OSError) as error:
+                log.status, log.error = "failed", error
+        finished(log)
+        # Without the turns of this log, those of the logs after it cannot be told.
+        if log.error is not None and (is_disk_full(log.error) or settings.counts_turns):
+            return
+        turns = {name: TurnState(*state) for name, state in log.result.get("turns", {}).items()}

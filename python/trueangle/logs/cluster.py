@@ -1,0 +1,154 @@
+"""Logs corrected side by side by the workers of a Dask cluster, a log on each."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from ..errors import ArgumentError, FileError, MissingExtraError, TrueAngleError
+from .batch import LogReport, done_before
+from .correction import Task, correct_log, count_turns, is_disk_full
+from .joints import LogSettings
+from .manifest import Manifest
+from .progress import Progress
+from .sources import Place
+from .turns import TurnSpan, TurnState
+
+__all__ = ["connected", "on_cluster"]
+
+#: Seconds to wait for the scheduler.
+_TIMEOUT = 20
+
+
+@contextmanager
+def connected(scheduler: str) -> Iterator[Any]:
+    """A client of the Dask scheduler at this address.
+
+    Raises
+    ------
+    MissingExtraError
+        Dask is not installed.
+    ArgumentError
+        Nobody answers there.
+    """
+    distributed: Any = _distributed()
+    try:
+        client = distributed.Client(scheduler, timeout=_TIMEOUT, set_as_default=False)
+    except (OSError, TimeoutError, ValueError) as cause:
+        raise ArgumentError(f"--scheduler {scheduler}: no Dask scheduler answers ({cause})") from (
+            None
+        )
+    with client:
+        yield client
+
+
+def _distributed() -> Any:
+    try:
+        import distributed
+    except ImportError:
+        raise MissingExtraError(
+            "a cluster needs distributed: pip install 'trueangle[dask]'"
+        ) from None
+    return distributed
+
+
+def on_cluster(
+    scheduler: str,
+    found: Sequence[Place],
+    logs: Sequence[LogReport],
+    settings: LogSettings,
+    manifests: Mapping[Path, Manifest],
+    shown: Progress,
+    finished: Callable[[LogReport], None],
+) -> None:
+    """Fill the reports of all logs; Dask does a lost worker's log again on another.
+
+    Every worker corrects with one thread, so that the numbers of workers and of their
+    threads decide how much runs at once. Paths are made absolute: all machines must see
+    the files under the same names.
+    """
+    distributed: Any = _distributed()
+    settings = replace(settings, threads=settings.threads or 1)
+    waiting = []
+    for place, log in zip(found, logs, strict=True):
+        if done_before(place, log, settings, manifests):
+            finished(log)
+        else:
+            waiting.append((place, log))
+    with connected(scheduler) as client:
+        begins = _turns(client, found, logs, settings)
+        futures = {
+            client.submit(_correct, _task(place, settings, begins.get(place.source)), pure=False): (
+                log
+            )
+            for place, log in waiting
+        }
+        try:
+            for future in distributed.as_completed(futures):
+                log = futures[future]
+                if future.status == "cancelled":
+                    continue
+                log.status, log.result, log.error = _outcome(future, log)
+                shown.advance(log.result.get("rows", 0), 1.0)
+                finished(log)
+                if log.error is not None and is_disk_full(log.error):
+                    client.cancel(list(futures))
+        except KeyboardInterrupt:
+            client.cancel(list(futures))
+            raise
+
+
+def _task(place: Place, settings: LogSettings, turns: Mapping[str, TurnState] | None) -> Task:
+    manifest = None if place.manifest is None else place.manifest.resolve()
+    return Task(place.source.resolve(), place.target.resolve(), settings, turns, manifest)
+
+
+def _correct(task: Task) -> dict[str, Any]:
+    """On a worker. A log that a lost worker had finished is not done twice."""
+    try:
+        return _known(task) or correct_log(task)
+    except (TrueAngleError, OSError):
+        # A worker thought lost may have finished it in the meantime.
+        known = _known(task)
+        if known is None:
+            raise
+        return known
+
+
+def _known(task: Task) -> dict[str, Any] | None:
+    if task.manifest is None:
+        return None
+    manifest = Manifest(task.manifest)
+    manifest.read()
+    known = manifest.done(task.source, task.target, task.settings.digest)
+    return None if known is None else dict(known)
+
+
+def _outcome(future: Any, log: LogReport) -> tuple[str, Mapping[str, Any], Exception | None]:
+    distributed: Any = _distributed()
+    try:
+        return "done", future.result(), None
+    except (TrueAngleError, OSError) as error:
+        return "failed", {}, error
+    except distributed.scheduler.KilledWorker as error:
+        return "failed", {}, FileError(log.log, f"every worker that took it died: {error}")
+
+
+def _turns(
+    client: Any, found: Sequence[Place], logs: Sequence[LogReport], settings: LogSettings
+) -> dict[Path, dict[str, TurnState]]:
+    """Where every log begins, for models that count turns: one more pass, side by side."""
+    if not settings.counts_turns:
+        return {}
+    spans: list[dict[str, TurnSpan]] = client.gather(
+        [client.submit(count_turns, place.source.resolve(), settings) for place in found]
+    )
+    begins: dict[Path, dict[str, TurnState]] = {}
+    state: dict[str, TurnState] = {}
+    for place, span in zip(found, spans, strict=True):
+        begins[place.source] = state
+        state = {joint: one.after(state.get(joint, TurnState())) for joint, one in span.items()}
+    return begins

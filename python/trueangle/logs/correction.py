@@ -1,0 +1,126 @@
+"""Correcting one log: copied aside with the corrected columns, verified, published."""
+
+from __future__ import annotations
+
+import errno
+import shutil
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..errors import FileError
+from .formats import Watch, find_format
+from .joints import Channel, LogSettings
+from .manifest import Manifest
+from .safety import publish, stamp, workplace
+from .turns import TurnCounter, TurnSpan, TurnState
+
+__all__ = ["Task", "correct_log", "count_turns", "is_disk_full"]
+
+
+@dataclass(frozen=True)
+class Task:
+    """One log to correct: can be sent to another process.
+
+    ``turns`` tells, by joint, where the log before stopped; ``manifest`` is the folder
+    whose manifest notes the output.
+    """
+
+    source: Path
+    target: Path
+    settings: LogSettings
+    turns: Mapping[str, TurnState] | None = None
+    manifest: Path | None = None
+
+
+def correct_log(task: Task, watch: Watch = lambda rows, part: None) -> dict[str, Any]:
+    """Correct one log; its output is complete and verified, or not there.
+
+    Returns
+    -------
+    dict
+        ``rows``, ``seconds``, ``rows_per_second``, ``joints`` (see `Channel.summary`) and,
+        for models that count turns, ``turns`` to pass on to the log that follows.
+
+    Raises
+    ------
+    FileError
+        A log that is damaged or has not the columns needed.
+    OSError
+        No space, no permission.
+    """
+    start = time.perf_counter()
+    source, target, settings = task.source, task.target, task.settings
+    module = find_format(source).module
+    before = stamp(source)
+    channels: list[Channel] = []
+
+    def choose(header: Any) -> list[Channel]:
+        channels.extend(settings.channels(source, header, task.turns))
+        return channels
+
+    with workplace(target) as aside:
+        written = module.copy(source, aside, choose, watch, settings.topic, settings.output_topic)
+        read_back = module.contents(aside, settings.topic)
+        if written != read_back:
+            changed = [
+                name
+                for name in written.checksums.keys() | read_back.checksums.keys()
+                if written.checksums.get(name) != read_back.checksums.get(name)
+            ]
+            raise FileError(
+                target,
+                f"did not read back as written ({read_back.rows} of {written.rows} rows; "
+                f"differing: {', '.join(sorted(changed)[:5]) or 'rows'}): not kept; "
+                "check the disk",
+            )
+        if stamp(source) != before:
+            raise FileError(source, "changed while it was read: it is still being written; wait")
+        seconds = time.perf_counter() - start
+        result = {
+            "rows": written.rows,
+            "seconds": seconds,
+            "rows_per_second": written.rows / seconds,
+            "joints": [channel.summary() for channel in channels],
+            "turns": {c.name: list(c.turns) for c in channels if c.turns is not None},
+        }
+        if target.is_file() and aside.is_file():
+            shutil.copymode(target, aside)
+        if task.manifest is not None:
+            Manifest(task.manifest).record(
+                source, target, settings.digest, before, stamp(aside), result
+            )
+        publish(aside, target)
+    return result
+
+
+def count_turns(source: Path, settings: LogSettings) -> dict[str, TurnSpan]:
+    """What logs corrected side by side must know of each other, by joint that needs it.
+
+    One pass over the angle columns.
+    """
+    module = find_format(source).module
+    header = module.columns(source, settings.topic)
+    channels = [c for c in settings.channels(source, header) if c.turns is not None]
+    counters = {c.name: TurnCounter(c.angle.period) for c in channels}
+    first: dict[str, float | None] = {c.name: None for c in channels}
+    for batch in module.read(source, [c.angle.name for c in channels], settings.topic):
+        for channel in channels:
+            angle = batch[channel.angle.name]
+            known = angle[np.isfinite(angle)]
+            if first[channel.name] is None and known.size:
+                first[channel.name] = float(known[0])
+            counters[channel.name].count(angle)
+    return {
+        name: TurnSpan(counter.period, first[name], *counter.state)
+        for name, counter in counters.items()
+    }
+
+
+def is_disk_full(error: BaseException) -> bool:
+    """True when no further output can be written either."""
+    return isinstance(error, OSError) and error.errno in (errno.ENOSPC, errno.EDQUOT, errno.EROFS)

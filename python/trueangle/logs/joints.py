@@ -1,0 +1,284 @@
+"""Joints of a log: their models, the columns they are read from, and their correction."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import tempfile
+import warnings
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from os import PathLike
+from pathlib import Path
+from typing import Any, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .. import __version__
+from ..errors import ArgumentError, OutsideSpanWarning
+from ..model import HarmonicModel, load_model
+from .columns import AngleColumn, find_angle_column, find_signal_column
+from .statistics import CorrectionStatistics
+from .turns import TurnCounter, TurnState
+
+__all__ = ["Channel", "Joint", "LogSettings", "joints_of", "provenance"]
+
+Array: TypeAlias = NDArray[np.floating[Any]]
+
+
+@dataclass(frozen=True)
+class Joint:
+    """A joint and how to find it in a log.
+
+    Parameters
+    ----------
+    model : HarmonicModel
+    name : str, optional
+        Needed where a log holds several joints.
+    column : str, optional
+        Of the indicated angle; searched by name where None.
+    signals : mapping of str to str
+        Columns of the signals that terms of the model need, where their names do not say.
+    file, sha256 : str
+        Of the model file, for the provenance of the output.
+    """
+
+    model: HarmonicModel
+    name: str | None = None
+    column: str | None = None
+    signals: Mapping[str, str] = field(default_factory=dict)
+    file: str = ""
+    sha256: str = ""
+
+    @classmethod
+    def load(
+        cls,
+        path: str | PathLike[str],
+        name: str | None = None,
+        column: str | None = None,
+        signals: Mapping[str, str] | None = None,
+    ) -> Joint:
+        """Joint of the model file ``path``."""
+        digest = hashlib.sha256(Path(path).read_bytes()).hexdigest()
+        return cls(load_model(path), name, column, signals or {}, Path(path).name, digest)
+
+    @cached_property
+    def digest(self) -> str:
+        """sha256 of the model file: of the one it would be saved as, where it has none."""
+        if self.sha256:
+            return self.sha256
+        with tempfile.TemporaryDirectory() as folder:
+            file = Path(folder, "model.json")
+            self.model.save(file)
+            return hashlib.sha256(file.read_bytes()).hexdigest()
+
+
+@dataclass(frozen=True)
+class LogSettings:
+    """What `trueangle correct` was asked to do to every log.
+
+    ``topic`` and ``output_topic`` belong to ROS bags; ``threads`` bounds the threads of
+    the correction.
+    """
+
+    joints: tuple[Joint, ...]
+    unit: str | None = None
+    counts_per_turn: float | None = None
+    topic: str | None = None
+    output_topic: str | None = None
+    threads: int | None = None
+
+    def channels(
+        self,
+        path: object,
+        header: Sequence[str],
+        turns: Mapping[str, TurnState] | None = None,
+    ) -> list[Channel]:
+        """One channel per joint for a log with the columns ``header``.
+
+        Raises
+        ------
+        FileError
+            A joint has no angle among the columns, or two have the same.
+        """
+        found: list[Channel] = []
+        taken = list(header)
+        for joint in self.joints:
+            angle = find_angle_column(
+                path,
+                joint.model.period,
+                taken,
+                joint=joint.name,
+                column=joint.column,
+                unit=self.unit,
+                counts_per_turn=self.counts_per_turn,
+            )
+            taken.append(angle.corrected)
+            state = (turns or {}).get(joint.name or "", TurnState())
+            found.append(Channel(joint, angle, signal_columns(path, header, joint), state, self))
+        return found
+
+    @property
+    def digest(self) -> str:
+        """Changes with everything that changes the output."""
+        content = [
+            [[j.name, j.column, sorted(j.signals.items()), j.digest] for j in self.joints],
+            [self.unit, self.counts_per_turn, self.topic, self.output_topic],
+        ]
+        return hashlib.sha256(json.dumps(content).encode()).hexdigest()
+
+    @property
+    def counts_turns(self) -> bool:
+        """True when a model's error does not repeat after one turn."""
+        return not all(joint.model.is_periodic for joint in self.joints)
+
+
+def signal_columns(path: object, header: Sequence[str], joint: Joint) -> dict[str, str]:
+    """Columns of the signals that the joint's model needs."""
+    found = {}
+    for signal in getattr(joint.model, "signals", ()):
+        column = find_signal_column(path, header, signal, joint.name, joint.signals.get(signal))
+        if column is not None:
+            found[signal] = column
+    return found
+
+
+class Channel:
+    """The indicated angle of one joint in one log, corrected batch after batch.
+
+    Batches must come in the order of the rows: turns are counted over their borders where
+    the model needs them (a model whose error repeats after one turn does not, and does not
+    pay for it).
+    """
+
+    def __init__(
+        self,
+        joint: Joint,
+        angle: AngleColumn,
+        signals: Mapping[str, str],
+        turns: TurnState,
+        settings: LogSettings,
+    ) -> None:
+        self.joint = joint
+        self.angle = angle
+        self.signals = dict(signals)
+        self.statistics = CorrectionStatistics()
+        self._threads = settings.threads
+        model = joint.model
+        self._scale = model.period / angle.period
+        self._counter = None if model.is_periodic else TurnCounter(angle.period, turns)
+        span = model.partial_span
+        self._span = None if span is None else (span[0] / self._scale, span[1] / self._scale)
+
+    @property
+    def name(self) -> str:
+        """Name of the joint; empty where a log has one only."""
+        return self.joint.name or ""
+
+    @property
+    def turns(self) -> TurnState | None:
+        """Where the count of turns stands; None for a model that needs none."""
+        return None if self._counter is None else self._counter.state
+
+    def correct(
+        self, indicated: NDArray[Any], signals: Mapping[str, NDArray[Any]] | None = None
+    ) -> Array:
+        """Corrected angles of the next batch, in the unit of the column.
+
+        float32 gives float32, integers and float64 give float64; NaN stays NaN; the turn of
+        a reading is kept.
+        """
+        kept = indicated.dtype if indicated.dtype == np.float32 else np.dtype(np.float64)
+        if self._counter is None:
+            corrected = self._apply(indicated, signals)
+        else:
+            offset = self._counter.count(indicated) * self.angle.period
+            corrected = (self._apply(indicated + offset, signals) - offset).astype(kept)
+        self.statistics.update(indicated, corrected, self.angle.period, self._span)
+        return corrected
+
+    def _apply(self, angle: NDArray[Any], signals: Mapping[str, NDArray[Any]] | None) -> Array:
+        model, scale = self.joint.model, self._scale
+        values = angle if scale == 1.0 else angle * scale
+        with warnings.catch_warnings():
+            # Rows outside the span are counted in the summary instead.
+            if self._span is not None:
+                warnings.simplefilter("ignore", OutsideSpanWarning)
+            given: Any = signals or {}
+            corrected: Array = model.correct(values, threads=self._threads, **given)
+        return corrected if scale == 1.0 else corrected / scale
+
+    def summary(self) -> dict[str, Any]:
+        """Counts and sizes for people and for ``--json``."""
+        numbers = self.statistics
+        return {
+            "joint": self.joint.name,
+            "column": self.angle.name,
+            "corrected": self.angle.corrected,
+            "rms_correction_arcsec": numbers.rms_arcsec,
+            "max_abs_correction_arcsec": numbers.max_abs_arcsec,
+            "missing": numbers.missing,
+            "outside_span": numbers.outside if self._span is not None else None,
+        }
+
+
+def joints_of(
+    model: HarmonicModel | str | PathLike[str] | Mapping[str, Any],
+    column: str | Mapping[str, str] | None = None,
+    signals: Mapping[str, Any] | None = None,
+) -> tuple[Joint, ...]:
+    """Joints from one model (or its file) or a mapping of joint names to models.
+
+    ``column`` and ``signals`` are those of the joint, or mappings by joint name.
+    """
+    by_name: Mapping[Any, Any] = model if isinstance(model, Mapping) else {None: model}
+    if not by_name:
+        raise ArgumentError("model is empty: at least one joint is needed")
+    columns: Mapping[Any, str | None] = (
+        column if isinstance(column, Mapping) else dict.fromkeys(by_name, column)
+    )
+    _check_known(columns, by_name, "column")
+    by_joint: Mapping[Any, Any] = signals or {}
+    if signals and not isinstance(model, Mapping):
+        by_joint = {None: signals}
+    _check_known(by_joint, by_name, "signals")
+    return tuple(
+        _joint(entry, name, columns.get(name), by_joint.get(name))
+        for name, entry in by_name.items()
+    )
+
+
+def _check_known(names: Iterable[Any], known: Mapping[Any, Any], argument: str) -> None:
+    for name in names:
+        if name not in known:
+            listed = ", ".join(str(k) for k in known if k is not None)
+            hint = f"the joints are {listed}" if listed else "name the joint's model too"
+            raise ArgumentError(f"{argument}: no joint {name!r} has a model; {hint}")
+
+
+def _joint(entry: Any, name: str | None, column: str | None, signals: Any) -> Joint:
+    if isinstance(entry, HarmonicModel):
+        return Joint(entry, name, column, signals or {})
+    if isinstance(entry, (str, PathLike)):
+        return Joint.load(entry, name, column, signals)
+    raise ArgumentError(f"model must be a HarmonicModel or its file, got {type(entry).__name__}")
+
+
+def provenance(channels: Sequence[Channel]) -> str:
+    """How the corrected columns were made, as the JSON text that outputs carry."""
+    return json.dumps(
+        {
+            "package": f"trueangle {__version__}",
+            "corrected": [
+                {
+                    "column": channel.angle.corrected,
+                    "from": channel.angle.name,
+                    "model": channel.joint.file,
+                    "model_sha256": channel.joint.digest,
+                }
+                for channel in channels
+            ],
+        }
+    )

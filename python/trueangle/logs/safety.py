@@ -1,0 +1,110 @@
+"""Outputs that are complete or not there: written aside, synced, verified, renamed."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+try:
+    import fcntl
+except ImportError:  # pragma: no cover - Windows has no flock
+    fcntl = None  # type: ignore[assignment]
+
+__all__ = ["Stamp", "locked", "publish", "remove_leftovers", "stamp", "workplace"]
+
+_ENDING = ".trueangle-partial"
+#: Of a name that its hidden folder repeats: names may have 255 bytes in all.
+_LONGEST = 50
+
+Stamp = tuple[int, int]
+
+
+def stamp(path: Path) -> Stamp:
+    """Size in bytes and time of the last change (ns) of a file, or of all in a folder."""
+    files = [path] if path.is_file() else [p for p in path.rglob("*") if p.is_file()]
+    stats = [file.stat() for file in files]
+    return sum(s.st_size for s in stats), max((s.st_mtime_ns for s in stats), default=0)
+
+
+@contextmanager
+def workplace(target: Path) -> Iterator[Path]:
+    """Path of the same name in a new hidden folder beside ``target``, removed at the end.
+
+    The folder is locked as long as its process lives: `remove_leftovers` spares it.
+    """
+    folder = Path(
+        tempfile.mkdtemp(dir=target.parent, prefix=f".{target.name[:_LONGEST]}.", suffix=_ENDING)
+    )
+    try:
+        with locked(folder):
+            yield folder / target.name
+    finally:
+        shutil.rmtree(folder, ignore_errors=True)
+
+
+@contextmanager
+def locked(path: Path) -> Iterator[bool]:
+    """Hold a lock on a file or folder until the end; False when another process has it.
+
+    The system takes the lock from a process that dies.
+    """
+    if fcntl is None:  # pragma: no cover - Windows
+        yield True
+        return
+    handle = os.open(path, os.O_RDONLY)
+    try:
+        try:
+            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            yield False
+        else:
+            yield True
+    finally:
+        os.close(handle)
+
+
+def publish(aside: Path, target: Path) -> None:
+    """Sync ``aside`` to the disk and give it the name ``target``, replacing what is there."""
+    for file in [aside] if aside.is_file() else list(aside.rglob("*")):
+        _sync(file)
+    _sync(aside)
+    if target.is_dir() and aside.is_dir():
+        # A folder cannot be replaced in one step: `remove_leftovers` undoes a half.
+        os.replace(target, _replaced(aside))
+    os.replace(aside, target)
+    _sync(target.parent)
+
+
+def remove_leftovers(target: Path) -> None:
+    """Remove what killed processes left of ``target``; put a replaced folder back."""
+    for folder in target.parent.glob(f".{glob_escape(target.name[:_LONGEST])}.*{_ENDING}"):
+        with locked(folder) as free:
+            if not free:
+                continue
+            replaced = _replaced(folder / target.name)
+            if replaced.exists() and not target.exists():
+                os.replace(replaced, target)
+            shutil.rmtree(folder, ignore_errors=True)
+
+
+def glob_escape(name: str) -> str:
+    """``name`` without meaning to glob."""
+    return "".join(f"[{c}]" if c in "*?[" else c for c in name)
+
+
+def _replaced(aside: Path) -> Path:
+    return aside.with_name(aside.name + ".replaced")
+
+
+def _sync(path: Path) -> None:
+    if os.name == "nt" and path.is_dir():  # pragma: no cover - folders have no handle there
+        return
+    handle = os.open(path, os.O_RDONLY)
+    try:
+        os.fsync(handle)
+    finally:
+        os.close(handle)

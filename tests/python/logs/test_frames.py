@@ -1,0 +1,151 @@
+"""ta.correct: every kind of data gives its own kind back, with the model's own numbers."""
+
+import numpy as np
+import pytest
+
+import trueangle as ta
+from trueangle.errors import ArgumentError, FileError
+
+from .conftest import made_angles, made_model, unwrapped_truth
+
+ANGLES = made_angles(1000)
+
+
+def columns():
+    return {"t": np.arange(1000), "indicated_deg": ANGLES, "text": [str(i) for i in range(1000)]}
+
+
+def test_arrays(model):
+    np.testing.assert_array_equal(ta.correct(ANGLES, model), model.correct(ANGLES))
+    single = ANGLES.astype(np.float32)
+    assert ta.correct(single, model).dtype == np.float32
+
+
+def test_arrays_of_a_model_that_counts_turns():
+    model = made_model(ratio=50.5)
+    np.testing.assert_allclose(
+        ta.correct(ANGLES, model), unwrapped_truth(model, ANGLES), rtol=0, atol=1e-10
+    )
+
+
+def test_pyarrow(model):
+    pa = pytest.importorskip("pyarrow")
+    table = pa.table(columns())
+    for data in (
+        table,
+        table.to_batches()[0],
+        pa.RecordBatchReader.from_batches(table.schema, table.to_batches(max_chunksize=77)),
+    ):
+        out = ta.correct(data, model)
+        assert type(out) is type(data)
+        out = out.read_all() if isinstance(out, pa.RecordBatchReader) else out
+        np.testing.assert_array_equal(out["corrected_deg"], model.correct(ANGLES))
+        assert out["text"].to_pylist() == columns()["text"]
+
+
+def test_streams_are_lazy(model):
+    pa = pytest.importorskip("pyarrow")
+    taken = []
+
+    def batches():
+        for i in range(3):
+            taken.append(i)
+            yield pa.record_batch({"indicated_deg": ANGLES})
+
+    schema = pa.schema([("indicated_deg", pa.float64())])
+    out = ta.correct(pa.RecordBatchReader.from_batches(schema, batches()), model)
+    assert taken == []
+    out.read_next_batch()
+    assert taken == [0]
+
+
+def test_polars(model):
+    pl = pytest.importorskip("polars")
+    frame = pl.DataFrame(columns())
+    np.testing.assert_array_equal(
+        ta.correct(frame, model)["corrected_deg"].to_numpy(), model.correct(ANGLES)
+    )
+    lazy = ta.correct(frame.lazy(), model)
+    assert isinstance(lazy, pl.LazyFrame)
+    assert lazy.collect().equals(ta.correct(frame, model))
+    missing = pl.DataFrame({"indicated_deg": [90.0, None, float("nan")]})
+    out = ta.correct(missing, model)["corrected_deg"].to_list()
+    assert out[:2] == [model.correct(90.0), None]
+    assert np.isnan(out[2])
+
+
+@pytest.mark.parametrize("kind", ["float64", "float32", "Float64", "Int64", "double[pyarrow]"])
+def test_pandas(kind, model):
+    pd = pytest.importorskip("pandas")
+    if "pyarrow" in kind:
+        pytest.importorskip("pyarrow")
+    frame = pd.DataFrame(columns(), index=np.arange(1000) * 2)
+    frame["indicated_deg"] = np.round(frame["indicated_deg"]).astype(kind)
+    if kind[0] != "f":
+        frame.loc[4, "indicated_deg"] = pd.NA
+    out = ta.correct(frame, model)
+    assert list(out.columns) == [*frame.columns, "corrected_deg"]
+    pd.testing.assert_frame_equal(out[list(frame.columns)], frame)
+    expected = model.correct(np.round(ANGLES).astype("float32" if kind == "float32" else float))
+    known = out["corrected_deg"].notna().to_numpy()
+    assert known.sum() == (1000 if kind[0] == "f" else 999)
+    found = out["corrected_deg"].to_numpy(dtype=expected.dtype, na_value=np.nan)
+    np.testing.assert_array_equal(found[known], expected[known])
+    assert "corrected_deg" not in frame
+
+
+def test_duckdb_streams_through_the_arrow_capsule(model):
+    duckdb = pytest.importorskip("duckdb")
+    pytest.importorskip("pyarrow")
+    relation = duckdb.sql("select 90.5::double as indicated_deg, 7 as n")
+    out = ta.correct(relation, model).read_all()
+    assert out["corrected_deg"][0].as_py() == model.correct(90.5)
+    assert out["n"][0].as_py() == 7
+
+
+def test_several_joints_and_named_columns(model):
+    pa = pytest.importorskip("pyarrow")
+    table = pa.table({"a": ANGLES, "b": ANGLES[::-1]})
+    other = made_model(argument="indicated")
+    out = ta.correct(table, {"j1": model, "j2": other}, column={"j1": "a", "j2": "b"})
+    np.testing.assert_array_equal(out["j1_corrected_deg"], model.correct(ANGLES))
+    np.testing.assert_array_equal(out["j2_corrected_deg"], other.correct(ANGLES[::-1]))
+
+
+def test_dask_arrays_stay_lazy_and_give_the_same_numbers(model):
+    da = pytest.importorskip("dask.array")
+    lazy = ta.correct(da.from_array(ANGLES, chunks=130), model)
+    assert isinstance(lazy, da.Array)
+    np.testing.assert_array_equal(lazy.compute(scheduler="threads"), model.correct(ANGLES))
+
+
+def test_dask_arrays_count_turns_over_blocks():
+    da = pytest.importorskip("dask.array")
+    model = made_model(ratio=50.5)
+    wraps = np.flatnonzero(np.abs(np.diff(ANGLES)) > 180.0) + 1
+    chunks = tuple(np.diff([0, *wraps.tolist(), 1000]).tolist())  # borders right at the wrap
+    out = ta.correct(da.from_array(ANGLES, chunks=(chunks,)), model).compute(scheduler="threads")
+    np.testing.assert_allclose(out, unwrapped_truth(model, ANGLES), rtol=0, atol=1e-10)
+
+
+def test_dask_frames_stay_lazy_and_give_the_same_numbers(model):
+    dd = pytest.importorskip("dask.dataframe")
+    pd = pytest.importorskip("pandas")
+    frame = dd.from_pandas(pd.DataFrame(columns()), npartitions=4)
+    lazy = ta.correct(frame, model)
+    assert isinstance(lazy, dd.DataFrame)
+    assert lazy["corrected_deg"].dtype == np.float64
+    found = lazy.compute(scheduler="threads")["corrected_deg"]
+    np.testing.assert_array_equal(found, model.correct(ANGLES))
+    with pytest.raises(ArgumentError, match="row after row"):
+        ta.correct(frame, made_model(ratio=50.5))
+
+
+def test_what_cannot_be_corrected_is_refused(model):
+    with pytest.raises(ArgumentError, match="got list"):
+        ta.correct([1.0], model)
+    with pytest.raises(ArgumentError, match="HarmonicModel or its file, got int"):
+        ta.correct(ANGLES, 3)
+    pa = pytest.importorskip("pyarrow")
+    with pytest.raises(FileError, match="data, line 1: no indicated_deg"):
+        ta.correct(pa.table({"x": ANGLES}), model)

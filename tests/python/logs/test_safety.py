@@ -1,0 +1,299 @@
+"""Nothing half-written passes for complete: kills, full disks, damaged logs, resuming."""
+
+import json
+import os
+import random
+import resource
+import shutil
+import signal
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pytest
+
+import trueangle as ta
+from trueangle.cli import main
+from trueangle.logs import safety
+from trueangle.logs.manifest import MANIFEST
+
+from .conftest import made_angles
+
+pa = pytest.importorskip("pyarrow")
+pq = pytest.importorskip("pyarrow.parquet")
+
+FILES = 6
+ROWS = 60_000
+KILLS = 8
+
+
+@pytest.fixture
+def logs(tmp_path):
+    folder = tmp_path / "logs"
+    (folder / "cell1").mkdir(parents=True)
+    for i in range(FILES):
+        angles = made_angles(ROWS, seed=i)
+        table = pa.table({"time_s": np.arange(ROWS) / 1e3, "indicated_deg": angles})
+        path = folder / ("cell1" if i % 2 else "") / f"log{i}.parquet"
+        pq.write_table(table, path, row_group_size=10_000)
+    return folder
+
+
+def tree(folder):
+    """Every file but the manifest, hidden ones too, with its bytes."""
+    files = (path for path in folder.rglob("*") if path.is_file())
+    return {str(p.relative_to(folder)): p.read_bytes() for p in files if p.name != MANIFEST}
+
+
+def command(logs, model_file, *more):
+    return ["correct", str(logs), "-m", str(model_file), *map(str, more)]
+
+
+def run_and_kill(arguments, seconds):
+    """Run the command in a process of its own and kill it; True when it was still running."""
+    process = subprocess.Popen(
+        [sys.executable, "-m", "trueangle", *arguments],
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+    )
+    try:
+        process.wait(timeout=seconds)
+    except subprocess.TimeoutExpired:
+        process.send_signal(signal.SIGKILL)
+        process.wait()
+        return True
+    return False
+
+
+def test_killed_at_random_moments_then_resumed_equals_unbroken(logs, model_file, tmp_path):
+    whole = tmp_path / "whole"
+    start = time.monotonic()
+    assert not run_and_kill(command(logs, model_file, "-o", whole), 60)
+    seconds = time.monotonic() - start
+    expected = tree(whole)
+    assert len(expected) == FILES
+    seed = random.randrange(2**32)
+    print("seed", seed)
+    rng = random.Random(seed)
+    broken = tmp_path / "broken"
+    killed = 0
+    for _ in range(KILLS):
+        killed += run_and_kill(
+            command(logs, model_file, "-o", broken), rng.uniform(0.3, 1.0) * seconds
+        )
+        if broken.is_dir():
+            for path in broken.rglob("[!.]*.parquet"):
+                if safety._ENDING not in str(path.parent):
+                    # What has its final name is complete.
+                    assert path.read_bytes() == expected[str(path.relative_to(broken))]
+    assert killed
+    assert main(command(logs, model_file, "-o", broken)) == 0
+    assert tree(broken) == expected  # byte for byte, and no leftovers
+
+
+def test_killed_in_place_never_loses_an_original(logs, model_file, model, tmp_path):
+    originals = tree(logs)
+    seed = random.randrange(2**32)
+    print("seed", seed)
+    rng = random.Random(seed)
+    for _ in range(KILLS):
+        run_and_kill(command(logs, model_file, "--in-place"), rng.uniform(0.3, 1.5))
+        for name, before in originals.items():
+            now = (logs / name).read_bytes()
+            if now != before:
+                check_corrected(pq.read_table(logs / name), pq.read_table(pa.BufferReader(before)))
+    assert main(command(logs, model_file, "--in-place")) == 0
+    for name, before in originals.items():
+        found, source = pq.read_table(logs / name), pq.read_table(pa.BufferReader(before))
+        check_corrected(found, source)
+        np.testing.assert_array_equal(
+            found["corrected_deg"], model.correct(source["indicated_deg"].to_numpy())
+        )
+    assert tree(logs).keys() == originals.keys()
+
+
+def check_corrected(found, source):
+    assert found.drop_columns(["corrected_deg"]).equals(source)
+    assert found["corrected_deg"].null_count == 0
+
+
+def test_running_again_does_nothing_twice(logs, model_file, tmp_path, capsys):
+    out = tmp_path / "out"
+    assert main(command(logs, model_file, "-o", out, "--json")) == 0
+    times = {path: path.stat().st_mtime_ns for path in out.rglob("*.parquet")}
+    capsys.readouterr()
+    assert main(command(logs, model_file, "-o", out, "--json")) == 0
+    again = json.loads(capsys.readouterr().out)
+    assert {log["status"] for log in again["files"]} == {"done before"}
+    assert {path: path.stat().st_mtime_ns for path in out.rglob("*.parquet")} == times
+    # A changed log, a lost output and another model are done anew.
+    source = logs / "log0.parquet"
+    pq.write_table(pq.read_table(source).slice(10), source)
+    (out / "log2.parquet").unlink()
+    capsys.readouterr()
+    assert main(command(logs, model_file, "-o", out, "--json")) == 0
+    statuses = {f["log"]: f["status"] for f in json.loads(capsys.readouterr().out)["files"]}
+    anew = {name for name, status in statuses.items() if status == "done"}
+    assert anew == {str(source), str(logs / "log2.parquet")}
+
+
+def test_half_a_line_of_the_manifest_is_skipped(logs, model_file, tmp_path, capsys):
+    out = tmp_path / "out"
+    main(command(logs, model_file, "-o", out))
+    manifest = out / MANIFEST
+    manifest.write_bytes(manifest.read_bytes()[:-40])
+    capsys.readouterr()
+    for expected in (1, 0):
+        main(command(logs, model_file, "-o", out, "--json"))
+        files = json.loads(capsys.readouterr().out)["files"]
+        assert sum(f["status"] == "done" for f in files) == expected
+
+
+def test_damaged_logs_are_listed_and_the_others_done(logs, model_file, tmp_path, capsys):
+    group, short = logs / "log0.parquet", logs / "log2.parquet"
+    data = bytearray(group.read_bytes())
+    middle = pq.ParquetFile(group).metadata.row_group(3).column(1).data_page_offset
+    data[middle : middle + 2000] = bytes(2000)
+    group.write_bytes(data)
+    short.write_bytes(short.read_bytes()[:-500])
+    out = tmp_path / "out"
+    assert main(command(logs, model_file, "-o", out)) == 1
+    told = capsys.readouterr().err
+    assert told.count("\n") == 1
+    assert f"{FILES - 2} of {FILES} logs are corrected" in told
+    assert "log0.parquet" in told
+    assert "log2.parquet" in told
+    assert "run the same command again" in told
+    assert len(tree(out)) == FILES - 2
+
+
+def test_a_full_disk_ends_the_run_and_it_resumes(logs, model_file, tmp_path, capsys):
+    """On a small tmpfs; `test_a_file_size_limit...` needs no mount."""
+    disk = tmp_path / "disk"
+    disk.mkdir()
+    mounted = shutil.which("mount") and subprocess.run(
+        ["mount", "-t", "tmpfs", "-o", "size=2600k", "tmpfs", str(disk)], capture_output=True
+    )
+    if not mounted or mounted.returncode:
+        pytest.skip("mounting a tmpfs is not permitted here")
+    try:
+        assert main(command(logs, model_file, "-o", disk, "--json")) == 1
+        captured = capsys.readouterr()
+        statuses = [f["status"] for f in json.loads(captured.out)["files"]]
+        assert statuses[0] == "done"
+        assert statuses.count("failed") == 1
+        assert statuses[-1] == "not started"
+        assert "No space left" in captured.err
+        assert "not started" in captured.err
+        assert len(tree(disk)) == statuses.count("done")
+        subprocess.run(["mount", "-o", "remount,size=64m", str(disk)], check=True)
+        assert main(command(logs, model_file, "-o", disk)) == 0
+        assert main(command(logs, model_file, "-o", tmp_path / "whole")) == 0
+        assert tree(disk) == tree(tmp_path / "whole")
+    finally:
+        subprocess.run(["umount", str(disk)], check=True)
+
+
+def test_a_file_size_limit_leaves_nothing(logs, model_file, tmp_path):
+    out = tmp_path / "out"
+
+    def limit():
+        signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+        resource.setrlimit(resource.RLIMIT_FSIZE, (300_000, 300_000))
+
+    done = subprocess.run(
+        [sys.executable, "-m", "trueangle", *command(logs, model_file, "-o", out)],
+        capture_output=True,
+        text=True,
+        preexec_fn=limit,
+    )
+    assert done.returncode == 1
+    assert done.stderr.count("\n") == 1, done.stderr
+    assert "0 of 6" in done.stderr
+    assert tree(out) == {}
+
+
+def test_an_output_that_reads_back_differently_is_not_kept(logs, model, tmp_path, monkeypatch):
+    from trueangle.logs import parquetlog
+
+    real = parquetlog.contents
+
+    def flipped(path, topic=None):
+        table = pq.read_table(path)
+        values = table["corrected_deg"].to_numpy().copy()
+        values[1234] = np.nextafter(values[1234], 0)
+        pq.write_table(table.set_column(2, table.schema.field(2), pa.array(values)), path)
+        return real(path)
+
+    monkeypatch.setattr(parquetlog, "contents", flipped)
+    report = ta.correct_logs(logs / "log0.parquet", model, tmp_path / "b.parquet")
+    assert "corrected_deg" in str(report.logs[0].error)
+    assert "did not read back" in str(report.logs[0].error)
+    assert not (tmp_path / "b.parquet").exists()
+
+
+def test_two_runs_into_one_folder_do_not_mix(logs, model, tmp_path):
+    out = tmp_path / "out"
+    out.mkdir()
+    (out / MANIFEST).touch()
+    with safety.locked(out / MANIFEST), pytest.raises(ta.errors.ArgumentError, match="another run"):
+        ta.correct_logs(logs, model, out)
+
+
+def test_leftovers_of_the_living_are_spared(tmp_path):
+    target = tmp_path / "a.csv"
+    with safety.workplace(target) as aside:
+        aside.write_text("x")
+        safety.remove_leftovers(target)
+        assert aside.exists()
+        dead = tmp_path / (aside.parent.name.replace(".a.csv.", ".a.csv.dead"))
+        dead.mkdir()
+        safety.remove_leftovers(target)
+        assert not dead.exists()
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_folder_is_replaced_whole_and_put_back_when_killed_between(tmp_path):
+    target = tmp_path / "bag"
+    target.mkdir()
+    (target / "x").write_text("old")
+    with safety.workplace(target) as aside:
+        aside.mkdir()
+        (aside / "x").write_text("new")
+        safety.publish(aside, target)
+    assert (target / "x").read_text() == "new"
+    # Killed after the old folder was moved aside, before the new one had its name.
+    dead = tmp_path / f".bag.dead{safety._ENDING}"
+    dead.mkdir()
+    os.replace(target, dead / "bag.replaced")
+    safety.remove_leftovers(target)
+    assert (target / "x").read_text() == "new"
+    assert not dead.exists()
+
+
+def test_permissions_are_kept_in_place(logs, model):
+    path = logs / "log0.parquet"
+    path.chmod(0o640)
+    assert ta.correct_logs(path, model, in_place=True).is_done
+    assert path.stat().st_mode & 0o777 == 0o640
+
+
+@pytest.mark.parametrize(
+    ("more", "message"),
+    [
+        (["-o", "OUT", "--in-place"], "either an output"),
+        ([], "either an output"),
+        (["-o", "LOGS"], "overwrite"),
+        (["-o", "OUT", "--column", "j1=x"], "j1"),
+        (["-o", "OUT", "--signal", "x"], "SIGNAL=NAME"),
+    ],
+)
+def test_impossible_requests_are_refused_before_anything_is_done(
+    more, message, logs, model_file, tmp_path, capsys
+):
+    before = tree(tmp_path)
+    named = {"OUT": tmp_path / "out", "LOGS": logs}
+    assert main(command(logs, model_file, *(named.get(a, a) for a in more))) == 1
+    assert message in capsys.readouterr().err
+    assert tree(tmp_path) == before
