@@ -98,6 +98,15 @@ pub enum Error {
         slope: f64,
     },
 
+    /// A path of evaluation that is not there.
+    #[error("path {path:?} cannot be taken: {reason}")]
+    Path {
+        /// As asked for.
+        path: String,
+        /// Why not.
+        reason: &'static str,
+    },
+
     /// Accumulators over different series cannot be merged.
     #[error("cannot merge moments of different {0}")]
     Merge(&'static str),

@@ -18,6 +18,24 @@ pub struct Shaft {
     pub sine: Vec<f64>,
 }
 
+/// One harmonic: `A cos(k x) + B sin(k x)`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Line {
+    /// Cycles per output turn.
+    pub order: f64,
+    /// `A`.
+    pub cosine: f64,
+    /// `B`.
+    pub sine: f64,
+}
+
+impl Line {
+    /// `hypot(A, B)`.
+    pub fn amplitude(self) -> f64 {
+        self.cosine.hypot(self.sine)
+    }
+}
+
 /// `error(x) = C0 + sum over shafts and orders of A cos(k f x) + B sin(k f x)`.
 ///
 /// `x`, `C0`, `A` and `B` are in one unit, whose turn is `period`; the argument of
@@ -65,6 +83,14 @@ impl HarmonicSeries {
         self.constant
     }
 
+    /// The same series with `C0 = 0`.
+    pub fn without_constant(&self) -> Self {
+        Self {
+            constant: 0.0,
+            ..self.clone()
+        }
+    }
+
     /// The shafts, in the order given.
     pub fn shafts(&self) -> &[Shaft] {
         &self.shafts
@@ -99,16 +125,22 @@ impl HarmonicSeries {
 
     /// `sum of C_k`: what stated accuracies are relative to.
     pub fn amplitude_sum(&self) -> f64 {
-        self.amplitudes().map(|(_, _, c)| c).sum()
+        self.lines().map(|line| line.amplitude()).sum()
     }
 
-    /// `(cycles, order, C_k)` of every harmonic.
-    fn amplitudes(&self) -> impl Iterator<Item = (f64, u32, f64)> + '_ {
-        self.shafts.iter().flat_map(|s| {
-            s.orders
+    /// Every harmonic by its order of the output, shaft after shaft.
+    pub fn lines(&self) -> impl Iterator<Item = Line> + '_ {
+        self.shafts.iter().flat_map(|shaft| {
+            let coefficients = shaft.cosine.iter().zip(&shaft.sine);
+            shaft
+                .orders
                 .iter()
-                .zip(s.cosine.iter().zip(&s.sine))
-                .map(|(&k, (a, b))| (s.cycles, k, a.hypot(*b)))
+                .zip(coefficients)
+                .map(|(&order, (&cosine, &sine))| Line {
+                    order: f64::from(order) * shaft.cycles,
+                    cosine,
+                    sine,
+                })
         })
     }
 
@@ -121,8 +153,8 @@ impl HarmonicSeries {
     pub fn slope_bound(&self) -> f64 {
         let rate = TAU / self.period.value();
         let sum: f64 = self
-            .amplitudes()
-            .map(|(f, k, c)| rate * f * f64::from(k) * c)
+            .lines()
+            .map(|line| rate * line.order * line.amplitude())
             .sum();
         if sum < 1.0 {
             return sum;
@@ -150,8 +182,8 @@ impl HarmonicSeries {
         /// Samples per period of the highest order; the bound is 1/cos(pi/32) = 1.005 wide.
         const SAMPLES_PER_PERIOD: f64 = 32.0;
         let degree = self
-            .amplitudes()
-            .map(|(f, k, _)| f * turns * f64::from(k))
+            .lines()
+            .map(|line| turns * line.order)
             .fold(1.0, f64::max);
         let samples = (SAMPLES_PER_PERIOD * degree).ceil();
         let step = turns * self.period.value() / samples;

@@ -6,7 +6,7 @@ from numpy.typing import ArrayLike, NDArray
 
 __version__: str
 
-_Path = Literal["table", "exact", "direct", "counts"]
+_Path = str  # "table", "exact", "direct", "counts"; "-avx2" and the like force a processor
 
 @final
 class Series:
@@ -71,6 +71,8 @@ class Series:
         path: _Path | None = None,
     ) -> NDArray[np.floating[Any]]: ...
     def compensator(self) -> Compensator: ...
+    @property
+    def path(self) -> str: ...
     @property
     def slope_bound(self) -> float: ...
     @property

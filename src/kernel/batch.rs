@@ -128,6 +128,28 @@ impl<'a, X: Copy, Y: Copy> Batch<'a, X, Y> {
     }
 }
 
+/// Samples of one block: what is computed of it stays in the first-level cache.
+const BLOCK: usize = 256;
+
+impl<X: Sample, Y: Real> Batch<'_, X, Y> {
+    /// Blocks as doubles through `f(samples, results)`.
+    pub fn map_blocks(&mut self, mut f: impl FnMut(&[f64], &mut [f64])) {
+        let (mut x, mut out) = ([0.0; BLOCK], [0.0; BLOCK]);
+        for start in (0..self.len).step_by(BLOCK) {
+            let len = BLOCK.min(self.len - start);
+            for (i, x) in x[..len].iter_mut().enumerate() {
+                // SAFETY: start + i < len.
+                *x = unsafe { self.x.add(start + i).read() }.widen();
+            }
+            f(&x[..len], &mut out[..len]);
+            for (i, &value) in out[..len].iter().enumerate() {
+                // SAFETY: start + i < len.
+                unsafe { self.out.add(start + i).write(Y::narrow(value)) };
+            }
+        }
+    }
+}
+
 impl<'a, X: Copy> Batch<'a, X, X> {
     /// Results replace their own samples.
     pub fn in_place(data: &'a mut [X]) -> Self {

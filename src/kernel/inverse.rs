@@ -1,39 +1,197 @@
-//! `theta` from `theta + error(theta) = indicated`, one sample at a time.
+//! `g` from `g = error(y - g)`: what to subtract from an indicated angle `y`.
 
+use std::f64::consts::{PI, TAU};
+
+use super::Batch;
+use super::exact::Exact;
+use super::expansion;
+use super::lanes::InstructionSet;
+use super::table::{DEGREE, MOST_SEGMENTS, OVERSHOOT, Table};
 use crate::series::HarmonicSeries;
 
-/// Newton steps before giving up on another ulp: bisection alone needs about 60.
+/// Steps before giving up on another ulp: bisection alone needs about 60.
 const MOST_STEPS: usize = 100;
 
-/// Newton's method inside a bracket that shrinks, so it converges wherever
-/// `|error'| < 1` (the root is within the sum of amplitudes around `indicated - C0`).
+/// What the forward table may add while the inverse is built, of the sum of amplitudes.
+const FORWARD_TOLERANCE: f64 = 1e-16;
+
+/// Root of `g - error(y - g)` in `[low, high]`, where `error` gives value and slope at
+/// `y - g`. Newton's method in a shrinking bracket: it converges wherever `|error'| < 1`.
+fn root(error: impl Fn(f64) -> (f64, f64), mut low: f64, mut high: f64, start: f64) -> f64 {
+    let resolution = 0.5 * f64::EPSILON * (high - low);
+    let mut g = start;
+    for _ in 0..MOST_STEPS {
+        let (value, slope) = error(g);
+        let excess = g - value;
+        if excess < 0.0 {
+            low = low.max(g);
+        } else {
+            high = high.min(g);
+        }
+        let mut next = g - excess / (1.0 + slope);
+        if !(low <= next && next <= high) {
+            next = 0.5 * (low + high);
+        }
+        if (next - g).abs() <= resolution {
+            return next;
+        }
+        g = next;
+    }
+    g
+}
+
+/// The true angle of an indicated one; `reach` is the sum of amplitudes.
 pub fn solve(series: &HarmonicSeries, reach: f64, indicated: f64) -> f64 {
     if !indicated.is_finite() {
         return f64::NAN;
     }
-    let centre = indicated - series.constant();
-    let (mut low, mut high) = (centre - reach, centre + reach);
-    let mut theta = centre;
-    for _ in 0..MOST_STEPS {
-        let (error, slope) = series.evaluate(theta);
-        let excess = (theta - indicated) + error;
-        if excess == 0.0 {
-            return theta;
+    let centre = series.constant();
+    let g = root(
+        |g| series.evaluate(indicated - g),
+        centre - reach,
+        centre + reach,
+        centre,
+    );
+    indicated - g
+}
+
+/// Newton's method on vectors: most samples converge in two or three steps, and those
+/// that do not go to a solver that cannot fail.
+pub struct Newton<'e> {
+    /// `error`.
+    pub error: &'e Exact,
+    /// Its slope, or `None` where `error` takes the indicated angle and one step is exact.
+    pub slope: Option<&'e Exact>,
+    /// The sum of amplitudes.
+    pub reach: f64,
+    /// What to compute on.
+    pub set: InstructionSet,
+}
+
+impl Newton<'_> {
+    /// True angles `theta` of indicated ones; `safe` solves for a single one.
+    pub fn solve(&self, indicated: &[f64], theta: &mut [f64], safe: impl Fn(f64) -> f64) {
+        /// Steps after which a sample is hopeless.
+        const STEPS: usize = 8;
+        let mut error = vec![0.0; theta.len()];
+        let Some(slope) = self.slope else {
+            self.fill(self.error, indicated, &mut error);
+            for ((theta, x), error) in theta.iter_mut().zip(indicated).zip(&error) {
+                *theta = x - error;
+            }
+            return;
+        };
+        let mut steepness = vec![0.0; theta.len()];
+        let mut last_step = vec![f64::INFINITY; theta.len()];
+        theta.copy_from_slice(indicated);
+        for _ in 0..STEPS {
+            self.fill(self.error, theta, &mut error);
+            self.fill(slope, theta, &mut steepness);
+            for i in 0..theta.len() {
+                let step = ((theta[i] - indicated[i]) + error[i]) / (1.0 + steepness[i]);
+                theta[i] -= step;
+                last_step[i] = step.abs();
+            }
+            if (0..theta.len()).all(|i| self.is_done(theta[i], last_step[i])) {
+                break;
+            }
         }
-        if excess < 0.0 {
-            low = low.max(theta);
-        } else {
-            high = high.min(theta);
+        for i in 0..theta.len() {
+            if !self.is_done(theta[i], last_step[i]) {
+                theta[i] = safe(indicated[i]);
+            }
         }
-        let mut next = theta - excess / (1.0 + slope);
-        if !(low <= next && next <= high) {
-            next = 0.5 * (low + high);
-        }
-        // A step below half an ulp cannot improve the result.
-        if next == theta || (next - theta).abs() <= 0.5 * f64::EPSILON * theta.abs() {
-            return next;
-        }
-        theta = next;
     }
-    theta
+
+    /// True when the angle cannot be told from the solution, or there is none.
+    fn is_done(&self, theta: f64, last_step: f64) -> bool {
+        last_step.is_nan() || last_step <= f64::EPSILON * (theta.abs() + self.reach)
+    }
+
+    fn fill(&self, function: &Exact, x: &[f64], out: &mut [f64]) {
+        let batch = Batch::apart(x, out).expect("blocks are equally long");
+        function.run(self.set, batch);
+    }
+}
+
+/// Greatest difference between the inverse and its polynomials over `segments`.
+///
+/// In the strip `|Im theta| <= s` the slope is at most
+/// `l(s) = slope + sum k C_k sinh(k s)`. While `l(s) < 1`, `g -> error(y - g)` contracts
+/// there for every y with `|Im y| <= s (1 - l(s))`: g is analytic in that strip and at
+/// most `sum C_k cosh(k s)` from C0. An ellipse of Bernstein around a segment that fits
+/// into it bounds the interpolation error by `4 B rho^-n / (rho - 1)` (Trefethen,
+/// Approximation Theory and Approximation Practice, theorem 8.2).
+pub fn bound(series: &HarmonicSeries, slope: f64, segments: usize) -> f64 {
+    /// Strips tried, each 1.2 times as wide as the one before.
+    const STRIPS: i32 = 60;
+    let radians = TAU / series.period().value();
+    let highest = series.lines().map(|line| line.order).fold(1.0, f64::max);
+    let mut best = f64::INFINITY;
+    for i in 0..STRIPS {
+        let strip = 20.0 / highest / 1.2f64.powi(i);
+        let (mut steepness, mut size) = (slope, 0.0);
+        for line in series.lines() {
+            let (k, c) = (line.order, line.amplitude());
+            steepness += radians * k * c * (k * strip).sinh();
+            size += c * (k * strip).cosh();
+        }
+        if steepness >= 1.0 {
+            continue;
+        }
+        let semi_axis = strip * (1.0 - steepness) * segments as f64 / PI;
+        let rho = semi_axis + semi_axis.hypot(1.0);
+        best = best.min(4.0 * size * rho.powi(-(DEGREE as i32)) / (rho - 1.0));
+    }
+    OVERSHOOT * best
+}
+
+/// The table of `g` for a periodic series whose slope is at most `slope < 1`, within
+/// `tolerance`; `None` where that would take too many segments.
+pub fn table(series: &HarmonicSeries, slope: f64, tolerance: f64) -> Option<Table> {
+    let mut segments = 8;
+    while bound(series, slope, segments) > tolerance {
+        segments *= 2;
+        if segments > MOST_SEGMENTS {
+            return None;
+        }
+    }
+    // The constant is left out until the end, so that a large one costs no digits.
+    let reach = series.amplitude_sum();
+    let varying = series.without_constant();
+    let forward = expansion::table(&varying, FORWARD_TOLERANCE * reach, segments)?;
+    let per_segment = forward.segments() / segments;
+    let half = 0.5 * series.period().value() / segments as f64;
+    let nodes: [f64; DEGREE + 1] = std::array::from_fn(|i| node(2 * i + 1));
+    let transform = chebyshev_transform();
+    let mut g = 0.0;
+    let expansions = (0..segments).map(|n| {
+        let values = nodes.map(|u| {
+            let offset = u * half - series.constant();
+            let error = |g: f64| forward.at(n * per_segment, offset - g);
+            g = root(error, -reach, reach, g);
+            g
+        });
+        transform.map(|row| row.iter().zip(&values).map(|(t, v)| t * v).sum())
+    });
+    Some(Table::new(
+        expansions,
+        series.constant(),
+        series.period(),
+        bound(series, slope, segments),
+    ))
+}
+
+/// `cos(m pi / 16)`: the zeros of T_8 for odd m, and the values of T_j there.
+fn node(m: usize) -> f64 {
+    (PI * m as f64 / (2 * DEGREE + 2) as f64).cos()
+}
+
+/// From values at the zeros of T_8 to Chebyshev coefficients of their polynomial.
+fn chebyshev_transform() -> [[f64; DEGREE + 1]; DEGREE + 1] {
+    let n = (DEGREE + 1) as f64;
+    std::array::from_fn(|j| {
+        let scale = if j == 0 { 1.0 / n } else { 2.0 / n };
+        std::array::from_fn(|i| scale * node(j * (2 * i + 1)))
+    })
 }

@@ -11,7 +11,7 @@ use super::array::{Angles, Kind, data, numpy_module};
 use super::failure::argument_error;
 use super::threads::threads;
 use crate::compensator::Compensator;
-use crate::kernel::{Argument, Batch, Evaluator, Path, Quantity, Real, Sample};
+use crate::kernel::{Argument, Batch, Evaluator, Quantity, Real, Route, Sample, TOLERANCE};
 use crate::series::{HarmonicSeries, Shaft};
 
 /// Samples from which the interpreter is released: below, that costs more than it frees.
@@ -32,6 +32,7 @@ pub struct PySeries {
 #[pymethods]
 impl PySeries {
     #[new]
+    #[allow(clippy::too_many_arguments)] // the keywords of the Python constructor
     #[pyo3(signature = (period, constant, cycles, orders, cosine, sine, argument="reference"))]
     fn new(
         py: Python<'_>,
@@ -79,7 +80,7 @@ impl PySeries {
             .collect();
         let series = HarmonicSeries::new(period, constant, shafts)?;
         Ok(Self {
-            evaluator: Arc::new(Evaluator::new(series, argument)),
+            evaluator: Arc::new(Evaluator::new(series, argument, TOLERANCE)),
         })
     }
 
@@ -147,6 +148,11 @@ impl PySeries {
         Ok(PyCompensator(Compensator::new(Arc::clone(
             &self.evaluator,
         ))?))
+    }
+
+    #[getter]
+    fn path(&self) -> String {
+        self.evaluator.route(Quantity::Error).to_string()
     }
 
     #[getter]
@@ -223,13 +229,13 @@ impl PySeries {
         wish: &Wish<'_>,
         batch: Batch<'_, X, Y>,
     ) -> PyResult<()> {
-        let path = wish.path.map(|name| parse_path(py, name)).transpose()?;
+        let route = wish.path.map(|name| parse_route(py, name)).transpose()?;
         let threads = threads(py, wish.threads, batch.len())?;
         let evaluator = &self.evaluator;
         if batch.len() < RELEASED {
-            evaluator.run(wish.quantity, path, threads, batch)?;
+            evaluator.run(wish.quantity, route, threads, batch)?;
         } else {
-            py.detach(|| evaluator.run(wish.quantity, path, threads, batch))?;
+            py.detach(|| evaluator.run(wish.quantity, route, threads, batch))?;
         }
         Ok(())
     }
@@ -240,17 +246,16 @@ fn is_number(x: &Bound<'_, PyAny>) -> bool {
     x.is_instance_of::<PyFloat>() || (x.is_instance_of::<PyInt>() && !x.is_instance_of::<PyBool>())
 }
 
-fn parse_path(py: Python<'_>, name: &str) -> PyResult<Path> {
-    match name {
-        "table" => Ok(Path::Table),
-        "exact" => Ok(Path::Exact),
-        "direct" => Ok(Path::Direct),
-        "counts" => Ok(Path::Counts),
-        other => Err(argument_error(
+fn parse_route(py: Python<'_>, name: &str) -> PyResult<Route> {
+    name.parse().map_err(|()| {
+        argument_error(
             py,
-            format!("path must be 'table', 'exact', 'direct' or 'counts', got {other:?}"),
-        )),
-    }
+            format!(
+                "path must be 'table', 'exact', 'direct' or 'counts', with '-portable', \
+                 '-avx2' or '-avx512' to force an instruction set, got {name:?}"
+            ),
+        )
+    })
 }
 
 #[pyclass(name = "Compensator", module = "trueangle._core", frozen)]

@@ -253,7 +253,7 @@ def test_slope_is_the_derivative(series):
 
 def test_what_cannot_be_inverted():
     steep = Series(2 * math.pi, 0.0, [1.0], [[1]], [[0.0]], [[1.5]])
-    assert steep.error(0.5) == pytest.approx(1.5 * math.sin(0.5), abs=1e-15)
+    assert steep.error(0.5) == pytest.approx(1.5 * math.sin(0.5), abs=1.5 * ACCURACY)
     for correct in (lambda: steep.correct(0.5), lambda: steep.correct(np.zeros(3))):
         with pytest.raises(NotInvertibleError) as caught:
             correct()
@@ -288,9 +288,39 @@ def test_threads_must_be_positive(series):
             series.error(np.zeros(3), threads=threads)
 
 
-def test_unknown_path(series):
-    with pytest.raises(ArgumentError, match="'table', 'exact', 'direct' or 'counts'"):
-        series.error(np.zeros(3), path="fast")
+def test_paths(series):
+    theta = np.linspace(-720.0, 720.0, 1001)
+    direct = series.error(theta, path="direct")
+    assert series.path.startswith("table-")
+    for path in ("table", "exact", "table-portable", "exact-portable", series.path):
+        error = abs(series.error(theta, path=path) - direct).max()
+        assert error <= ACCURACY * series.amplitude_sum + np.spacing(CONSTANT)
+    for path in ("fast", "table-mmx", "table-", ""):
+        with pytest.raises(ArgumentError, match="'table', 'exact', 'direct' or 'counts'"):
+            series.error(np.zeros(3), path=path)
+    with pytest.raises(ArgumentError, match="slopes are not tabulated"):
+        series.slope(theta, path="table")
+
+
+def test_without_a_period_in_common():
+    series = Series(
+        PERIOD,
+        CONSTANT,
+        [1.0, 100.5],
+        [ORDERS, [1, 2]],
+        [COSINE, [1e-4, 2e-4]],
+        [SINE, [0.0, -1e-4]],
+    )
+    assert series.path.startswith("exact-")
+    theta = np.linspace(-7200.0, 7200.0, 10_001)
+    tolerance = ACCURACY * series.amplitude_sum + np.spacing(CONSTANT)
+    direct = series.error(theta, path="direct")
+    np.testing.assert_allclose(series.error(theta), direct, rtol=0, atol=tolerance)
+    np.testing.assert_allclose(
+        series.correct(theta + direct), theta, rtol=0, atol=4 * np.spacing(7200.0)
+    )
+    with pytest.raises(ArgumentError, match="does not repeat after one turn"):
+        series.error(theta, path="table")
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,236 @@
+//! Lanes of AVX2 with FMA, and of AVX-512.
+
+use std::arch::x86_64::*;
+use std::ops::{Add, Mul, Sub};
+
+use super::lanes::{Lanes, MOST_LANES, Row};
+
+/// Four doubles.
+#[derive(Clone, Copy)]
+pub struct F64x4(__m256d);
+
+/// Eight doubles.
+#[derive(Clone, Copy)]
+pub struct F64x8(__m512d);
+
+// SAFETY of every intrinsic below: `dispatch` runs kernels over these types only on
+// processors that have the instruction set.
+macro_rules! operators {
+    ($lanes:ident, $add:ident, $sub:ident, $mul:ident) => {
+        impl Add for $lanes {
+            type Output = Self;
+            #[inline(always)]
+            fn add(self, other: Self) -> Self {
+                unsafe { Self($add(self.0, other.0)) }
+            }
+        }
+        impl Sub for $lanes {
+            type Output = Self;
+            #[inline(always)]
+            fn sub(self, other: Self) -> Self {
+                unsafe { Self($sub(self.0, other.0)) }
+            }
+        }
+        impl Mul for $lanes {
+            type Output = Self;
+            #[inline(always)]
+            fn mul(self, other: Self) -> Self {
+                unsafe { Self($mul(self.0, other.0)) }
+            }
+        }
+    };
+}
+operators!(F64x4, _mm256_add_pd, _mm256_sub_pd, _mm256_mul_pd);
+operators!(F64x8, _mm512_add_pd, _mm512_sub_pd, _mm512_mul_pd);
+
+impl Lanes for F64x4 {
+    const N: usize = 4;
+    const FUSED: bool = true;
+
+    #[inline(always)]
+    fn splat(value: f64) -> Self {
+        unsafe { Self(_mm256_set1_pd(value)) }
+    }
+
+    #[inline(always)]
+    fn from_array(values: &[f64; MOST_LANES]) -> Self {
+        unsafe { Self(_mm256_loadu_pd(values.as_ptr())) }
+    }
+
+    #[inline(always)]
+    fn to_array(self, values: &mut [f64; MOST_LANES]) {
+        unsafe { _mm256_storeu_pd(values.as_mut_ptr(), self.0) }
+    }
+
+    #[inline(always)]
+    fn mul_add(self, b: Self, c: Self) -> Self {
+        unsafe { Self(_mm256_fmadd_pd(self.0, b.0, c.0)) }
+    }
+
+    #[inline(always)]
+    fn neg_mul_add(self, b: Self, c: Self) -> Self {
+        unsafe { Self(_mm256_fnmadd_pd(self.0, b.0, c.0)) }
+    }
+
+    #[inline(always)]
+    fn product_rest(self, b: Self, product: Self) -> Self {
+        unsafe { Self(_mm256_fmsub_pd(self.0, b.0, product.0)) }
+    }
+
+    #[inline(always)]
+    fn any_beyond(self, limit: f64) -> bool {
+        unsafe {
+            let magnitude = _mm256_andnot_pd(_mm256_set1_pd(-0.0), self.0);
+            let beyond = _mm256_cmp_pd::<_CMP_GT_OQ>(magnitude, _mm256_set1_pd(limit));
+            _mm256_movemask_pd(beyond) != 0
+        }
+    }
+
+    /// Each row is loaded as two halves, the upper one folded onto the lower while still
+    /// a row, and only four columns are transposed: half the shuffles.
+    #[inline(always)]
+    unsafe fn fold_rows(whole: Self, mask: u64, rows: *const Row, high: Self) -> [Self; 4] {
+        unsafe {
+            let index = _mm256_and_si256(
+                _mm256_castpd_si256(whole.0),
+                _mm256_set1_epi64x(mask as i64),
+            );
+            let mut place = [0u64; 4];
+            _mm256_storeu_si256(place.as_mut_ptr().cast(), index);
+            let r0 = fold_row(
+                rows,
+                place[0],
+                _mm256_permute4x64_pd::<0b00_00_00_00>(high.0),
+            );
+            let r1 = fold_row(
+                rows,
+                place[1],
+                _mm256_permute4x64_pd::<0b01_01_01_01>(high.0),
+            );
+            let r2 = fold_row(
+                rows,
+                place[2],
+                _mm256_permute4x64_pd::<0b10_10_10_10>(high.0),
+            );
+            let r3 = fold_row(
+                rows,
+                place[3],
+                _mm256_permute4x64_pd::<0b11_11_11_11>(high.0),
+            );
+            let (even_01, odd_01) = (_mm256_unpacklo_pd(r0, r1), _mm256_unpackhi_pd(r0, r1));
+            let (even_23, odd_23) = (_mm256_unpacklo_pd(r2, r3), _mm256_unpackhi_pd(r2, r3));
+            [
+                Self(_mm256_permute2f128_pd::<0x20>(even_01, even_23)),
+                Self(_mm256_permute2f128_pd::<0x20>(odd_01, odd_23)),
+                Self(_mm256_permute2f128_pd::<0x31>(even_01, even_23)),
+                Self(_mm256_permute2f128_pd::<0x31>(odd_01, odd_23)),
+            ]
+        }
+    }
+}
+
+impl Lanes for F64x8 {
+    const N: usize = 8;
+    const FUSED: bool = true;
+
+    #[inline(always)]
+    fn splat(value: f64) -> Self {
+        unsafe { Self(_mm512_set1_pd(value)) }
+    }
+
+    #[inline(always)]
+    fn from_array(values: &[f64; MOST_LANES]) -> Self {
+        unsafe { Self(_mm512_loadu_pd(values.as_ptr())) }
+    }
+
+    #[inline(always)]
+    fn to_array(self, values: &mut [f64; MOST_LANES]) {
+        unsafe { _mm512_storeu_pd(values.as_mut_ptr(), self.0) }
+    }
+
+    #[inline(always)]
+    fn mul_add(self, b: Self, c: Self) -> Self {
+        unsafe { Self(_mm512_fmadd_pd(self.0, b.0, c.0)) }
+    }
+
+    #[inline(always)]
+    fn neg_mul_add(self, b: Self, c: Self) -> Self {
+        unsafe { Self(_mm512_fnmadd_pd(self.0, b.0, c.0)) }
+    }
+
+    #[inline(always)]
+    fn product_rest(self, b: Self, product: Self) -> Self {
+        unsafe { Self(_mm512_fmsub_pd(self.0, b.0, product.0)) }
+    }
+
+    #[inline(always)]
+    fn any_beyond(self, limit: f64) -> bool {
+        unsafe {
+            let magnitude = _mm512_abs_pd(self.0);
+            _mm512_cmp_pd_mask::<_CMP_GT_OQ>(magnitude, _mm512_set1_pd(limit)) != 0
+        }
+    }
+
+    /// As for four lanes, with rows `i` and `i + 4` side by side in one register.
+    #[inline(always)]
+    unsafe fn fold_rows(whole: Self, mask: u64, rows: *const Row, high: Self) -> [Self; 4] {
+        unsafe {
+            let index =
+                _mm512_and_si512(_mm512_castpd_si512(whole.0), _mm512_set1_epi64(mask as i64));
+            let mut place = [0u64; 8];
+            _mm512_storeu_si512(place.as_mut_ptr().cast(), index);
+            let r0 = fold_pair(rows, place[0], place[4], 0, high.0);
+            let r1 = fold_pair(rows, place[1], place[5], 1, high.0);
+            let r2 = fold_pair(rows, place[2], place[6], 2, high.0);
+            let r3 = fold_pair(rows, place[3], place[7], 3, high.0);
+            let (even_01, odd_01) = (_mm512_unpacklo_pd(r0, r1), _mm512_unpackhi_pd(r0, r1));
+            let (even_23, odd_23) = (_mm512_unpacklo_pd(r2, r3), _mm512_unpackhi_pd(r2, r3));
+            let lower = _mm512_setr_epi64(0, 1, 8, 9, 4, 5, 12, 13);
+            let upper = _mm512_setr_epi64(2, 3, 10, 11, 6, 7, 14, 15);
+            [
+                Self(_mm512_permutex2var_pd(even_01, lower, even_23)),
+                Self(_mm512_permutex2var_pd(odd_01, lower, odd_23)),
+                Self(_mm512_permutex2var_pd(even_01, upper, even_23)),
+                Self(_mm512_permutex2var_pd(odd_01, upper, odd_23)),
+            ]
+        }
+    }
+}
+
+/// The upper half of a row times `high`, on top of its lower half.
+#[inline(always)]
+unsafe fn fold_row(rows: *const Row, place: u64, high: __m256d) -> __m256d {
+    unsafe {
+        let row: *const f64 = rows.add(place as usize).cast();
+        _mm256_fmadd_pd(high, _mm256_load_pd(row.add(4)), _mm256_load_pd(row))
+    }
+}
+
+/// The same of two rows side by side, by lanes `lane` and `lane + 4` of `high`.
+#[inline(always)]
+unsafe fn fold_pair(
+    rows: *const Row,
+    first: u64,
+    second: u64,
+    lane: i64,
+    high: __m512d,
+) -> __m512d {
+    unsafe {
+        let first: *const f64 = rows.add(first as usize).cast();
+        let second: *const f64 = rows.add(second as usize).cast();
+        let (a, b) = (lane, lane + 4);
+        _mm512_fmadd_pd(
+            _mm512_permutexvar_pd(_mm512_setr_epi64(a, a, a, a, b, b, b, b), high),
+            side_by_side(first.add(4), second.add(4)),
+            side_by_side(first, second),
+        )
+    }
+}
+
+#[inline(always)]
+unsafe fn side_by_side(first: *const f64, second: *const f64) -> __m512d {
+    unsafe {
+        let first = _mm512_castpd256_pd512(_mm256_load_pd(first));
+        _mm512_insertf64x4::<1>(first, _mm256_load_pd(second))
+    }
+}
