@@ -83,11 +83,13 @@ impl Design {
         self.whole_orders(base).map(|orders| (base, orders))
     }
 
-    /// Orders in cycles of a shaft that turns `base` times per turn.
-    fn whole_orders(&self, base: f64) -> Option<Vec<u32>> {
+    /// The harmonics as orders of a shaft of `base` cycles; None when they are not whole.
+    pub fn whole_orders(&self, base: f64) -> Option<Vec<u32>> {
         let order = |harmonic| {
             let order = self.frequency(harmonic) / base;
-            (order <= f64::from(u32::MAX)).then_some(order.round() as u32)
+            let whole = order.round();
+            let close = (order - whole).abs() <= 4.0 * f64::EPSILON * order;
+            (close && whole <= f64::from(u32::MAX)).then_some(whole as u32)
         };
         self.harmonics().map(order).collect()
     }

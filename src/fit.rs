@@ -3,15 +3,20 @@
 //! `indicated - reference = zero of the run + sum of A cos + B sin + noise`: the
 //! harmonics are shared by all runs, the zero is each run's own.
 
-mod check;
+pub(crate) mod check;
 mod path;
 mod run;
+
+use std::f64::consts::TAU;
 
 use crate::angle::Period;
 use crate::design::Design;
 use crate::error::Error;
+use crate::moments::accumulator::Accumulator;
+use crate::moments::readings::Readings;
 use crate::{rank, threads};
 
+use path::Reduced;
 pub use run::{Argument, Run};
 
 /// How the least-squares problem was solved.
@@ -80,16 +85,57 @@ pub fn fit(design: &Design, runs: &[Run], options: Options) -> Result<Solution, 
     let Options {
         argument, ridge, ..
     } = options;
-    check::check(design, runs, ridge)?;
+    check::shapes(design, runs, ridge)?;
     let period = design.period();
-    let centres: Vec<_> = runs.iter().map(|run| run.centre(period)).collect();
-    let (system, condition_number, method) = path::reduce(design, runs, &centres, options)?;
+    let readings: Vec<_> = runs.iter().map(|run| run.readings(argument)).collect();
+    let centres: Vec<_> = readings.iter().map(|run| run.centre(period)).collect();
+    // A number that is not finite spoils every sum it enters: it is looked for when one has.
+    let reduced = path::reduce(design, &readings, &centres, options, || check::angles(runs))?;
     if ridge.is_none() {
-        let angles = || runs.iter().flat_map(|run| run.angles(argument));
-        let reach = || angles().fold(0.0, |reach: f64, x| reach.max(x.abs()));
-        rank::check(design, &system, condition_number, reach, angles)?;
+        let angles = || readings.iter().flat_map(Readings::angles);
+        let rounding = || {
+            let reach = angles().fold(period.value(), |reach, x| reach.max(x.abs()));
+            TAU * f64::EPSILON * reach / period.value()
+        };
+        let (system, condition) = (&reduced.system, reduced.condition_number);
+        rank::check(design, system, condition, rounding, angles)?;
     }
-    let readings = runs.iter().map(Run::count).sum::<usize>();
+    let count = readings.iter().map(Readings::count).sum();
+    conclude(design, reduced, &centres, count, ridge)
+}
+
+/// Fits `design` to runs of which the moments are left; its orders must be whole orders,
+/// and not too high ones, of the moments' base shaft.
+pub fn fit_moments(design: &Design, runs: &[&Accumulator]) -> Result<Solution, Error> {
+    check::have_readings(design, runs.iter().map(|run| run.count()))?;
+    let reduced = path::reduce_moments(design, runs)?;
+    let (system, condition) = (&reduced.system, reduced.condition_number);
+    rank::check(
+        design,
+        system,
+        condition,
+        || path::FACTOR_ROUNDING,
+        std::iter::empty,
+    )?;
+    let centres: Vec<_> = runs.iter().map(|run| run.centre()).collect();
+    let count = runs.iter().map(|run| run.count()).sum();
+    conclude(design, reduced, &centres, count, None)
+}
+
+/// Solves the reduced system and puts centres and variances back.
+fn conclude(
+    design: &Design,
+    reduced: Reduced,
+    centres: &[f64],
+    count: usize,
+    ridge: Option<&[f64]>,
+) -> Result<Solution, Error> {
+    let Reduced {
+        system,
+        condition_number,
+        method,
+    } = reduced;
+    let period = design.period();
     let estimate = system.solve(ridge).ok_or_else(|| Error::Rank {
         rank: 0,
         unknowns: system.unknowns(),
@@ -97,7 +143,7 @@ pub fn fit(design: &Design, runs: &[Run], options: Options) -> Result<Solution, 
         reason: "the penalised problem is singular; give every order a positive ridge".into(),
     })?;
 
-    let degrees_of_freedom = (readings as f64 - estimate.unknowns).max(0.0);
+    let degrees_of_freedom = (count as f64 - estimate.unknowns).max(0.0);
     let residual_variance = if degrees_of_freedom > 0.0 {
         estimate.squares / degrees_of_freedom
     } else {
@@ -106,7 +152,7 @@ pub fn fit(design: &Design, runs: &[Run], options: Options) -> Result<Solution, 
     let offsets: Vec<_> = estimate
         .offsets
         .iter()
-        .zip(&centres)
+        .zip(centres)
         .map(|(offset, centre)| period.wrap(offset + centre))
         .collect();
     let (constant, shares) = circular_mean(&offsets, period);
@@ -134,7 +180,7 @@ pub fn fit(design: &Design, runs: &[Run], options: Options) -> Result<Solution, 
 fn circular_mean(offsets: &[f64], period: Period) -> (f64, Vec<f64>) {
     /// Mean resultant length below which the direction is rounding.
     const NO_DIRECTION: f64 = 1e-9;
-    let turn = std::f64::consts::TAU / period.value();
+    let turn = TAU / period.value();
     let sine: f64 = offsets.iter().map(|o| (turn * o).sin()).sum();
     let cosine: f64 = offsets.iter().map(|o| (turn * o).cos()).sum();
     let length = sine.hypot(cosine);

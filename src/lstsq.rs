@@ -200,6 +200,10 @@ impl System {
         let left_over = square[(n, n)].powi(2);
         let held = ridge.map(|ridge| self.held(ridge).square());
         let factor = held.as_ref().unwrap_or(&square);
+        let pivots = factor.view((0, 0), (n, n)).diagonal().abs();
+        if n > 0 && pivots.min() <= pivots.max() * f64::EPSILON * n as f64 {
+            return None;
+        }
         let mut inverse = factor.view((0, 0), (n, n)).into_owned();
         invert_upper(inverse.view_mut((0, 0), (n, n)));
         let coefficients = &inverse * factor.view((0, n), (n, 1));

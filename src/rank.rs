@@ -32,18 +32,19 @@ struct Dependence {
 
 /// An error that names the orders at fault, or none when every unknown is determined.
 ///
-/// `reach` is the greatest absolute angle: its rounding bounds how well a column is known.
+/// `rounding` is what the angles are known to, in radians: it bounds how well a column is
+/// known. `angles` are those read, or none where only their sums are left.
 pub fn check<I: Iterator<Item = f64>>(
     design: &Design,
     system: &System,
     condition: f64,
-    reach: impl Fn() -> f64,
+    rounding: impl Fn() -> f64,
     angles: impl Fn() -> I,
 ) -> Result<(), Error> {
     if condition < SUSPICIOUS_CONDITION {
         return Ok(());
     }
-    let found = dependences(design, system, reach());
+    let found = dependences(design, system, rounding());
     let unknowns = system.unknowns();
     let hopeless = condition * f64::EPSILON * unknowns as f64 >= 1.0;
     if found.is_empty() && !hopeless {
@@ -52,7 +53,7 @@ pub fn check<I: Iterator<Item = f64>>(
     let needed = 1 + design.columns();
     let distinct = distinct_angles(design, angles(), needed);
     let lost: Vec<_> = found.iter().map(|d| d.column).collect();
-    let (orders, reason) = if distinct < needed {
+    let (orders, reason) = if (1..needed).contains(&distinct) {
         let orders = orders_of(design, &lost);
         let reason = format!(
             "readings at {distinct} distinct angles cannot determine {}; \
@@ -124,11 +125,9 @@ fn orders_of(design: &Design, columns: &[usize]) -> Vec<(usize, u32)> {
 
 /// Columns of the shared triangle that the ones before them make to within the
 /// rounding of the angles.
-fn dependences(design: &Design, system: &System, reach: f64) -> Vec<Dependence> {
+fn dependences(design: &Design, system: &System, step: f64) -> Vec<Dependence> {
     let weight: f64 = system.runs.iter().map(|run| run.norm * run.norm).sum();
     let scale = weight.sqrt();
-    let step = std::f64::consts::TAU * reach.max(design.period().value()) * f64::EPSILON
-        / design.period().value();
     let harmonics: Vec<_> = design.harmonics().collect();
     let mut basis: Vec<Vec<f64>> = Vec::new();
     let mut made: Vec<Vec<f64>> = Vec::new();

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from .model import HarmonicModel as HarmonicModel
     from .model import Shaft as Shaft
     from .model import load_model as load_model
+    from .moments import Moments as Moments
     from .runfiles import read_runs as read_runs
     from .runs import CalibrationRun as CalibrationRun
     from .simulation import Simulation as Simulation
@@ -36,6 +37,7 @@ _PUBLIC = {
     "correct_logs": "logs.batch",
     "fit": "fitting",
     "load_model": "model",
+    "Moments": "moments",
     "read_runs": "runfiles",
     "Simulation": "simulation",
     "diagnose": "diagnosis",

@@ -136,3 +136,33 @@ def residuals(
 def covered_span(
     angles: Sequence[NDArray[np.float64]], period: float
 ) -> tuple[float, float, bool]: ...
+
+@final
+class Moments:
+    def __new__(
+        cls, period: float, cycles: Sequence[float], orders: Sequence[Sequence[int]]
+    ) -> Moments: ...
+    @property
+    def cycles(self) -> float: ...
+    @property
+    def count(self) -> int: ...
+    def update(
+        self,
+        theta: _Array,
+        error: _Array,
+        weights: _Array | None = None,
+        threads: int | None = None,
+    ) -> None: ...
+    def merge(self, other: Moments) -> None: ...
+    def spectrum(
+        self,
+    ) -> tuple[NDArray[np.complex128], NDArray[np.complex128], float, int, float]: ...
+    def store(self) -> _Array | None: ...
+    def restore(self, numbers: _Array) -> None: ...
+
+def fit_moments(
+    runs: Sequence[Moments],
+    period: float,
+    cycles: Sequence[float],
+    orders: Sequence[Sequence[int]],
+) -> Solution: ...

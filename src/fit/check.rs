@@ -1,11 +1,11 @@
 //! What must hold of readings before they are fitted.
 
-use super::Run;
+use super::{Argument, Run};
 use crate::design::Design;
 use crate::error::Error;
 
-/// Lengths, finite numbers, weights, and that every run has a reading that counts.
-pub fn check(design: &Design, runs: &[Run], ridge: Option<&[f64]>) -> Result<(), Error> {
+/// Lengths, weights, and that every run has a reading that counts.
+pub fn shapes(design: &Design, runs: &[Run], ridge: Option<&[f64]>) -> Result<(), Error> {
     if let Some(ridge) = ridge {
         same_length("ridge", ridge.len(), "coefficients", design.columns())?;
         not_negative("ridge", ridge)?;
@@ -13,29 +13,45 @@ pub fn check(design: &Design, runs: &[Run], ridge: Option<&[f64]>) -> Result<(),
     for run in runs {
         let wanted = run.reference.len();
         same_length("indicated", run.indicated.len(), "reference", wanted)?;
-        finite("reference", run.reference)?;
-        finite("indicated", run.indicated)?;
         if let Some(weights) = run.weights {
             same_length("weights", weights.len(), "reference", wanted)?;
             not_negative("weights", weights)?;
         }
     }
-    let empty = runs.iter().position(|run| run.count() == 0);
-    if runs.is_empty() || empty.is_some() {
-        return Err(Error::Rank {
-            rank: 0,
-            unknowns: runs.len() + design.columns(),
-            orders: design.harmonics().collect(),
-            reason: match empty {
-                Some(run) => format!("run {run} has no reading of positive weight; leave it out"),
-                None => "there are no runs".into(),
-            },
-        });
+    let counts = |run: &Run| run.readings(Argument::Reference).count();
+    have_readings(design, runs.iter().map(counts))
+}
+
+/// That there are runs, and none without a reading that counts.
+pub fn have_readings(
+    design: &Design,
+    mut counts: impl ExactSizeIterator<Item = usize>,
+) -> Result<(), Error> {
+    let runs = counts.len();
+    let reason = match counts.position(|count| count == 0) {
+        Some(run) => format!("run {run} has no reading of positive weight; leave it out"),
+        None if runs == 0 => "there are no runs".into(),
+        None => return Ok(()),
+    };
+    Err(Error::Rank {
+        rank: 0,
+        unknowns: runs + design.columns(),
+        orders: design.harmonics().collect(),
+        reason,
+    })
+}
+
+/// That every angle is a finite number.
+pub fn angles(runs: &[Run]) -> Result<(), Error> {
+    for run in runs {
+        finite("reference", run.reference)?;
+        finite("indicated", run.indicated)?;
     }
     Ok(())
 }
 
-fn same_length(
+/// That two arguments are equally long.
+pub fn same_length(
     what: &'static str,
     got: usize,
     other: &'static str,
@@ -52,7 +68,8 @@ fn same_length(
     })
 }
 
-fn finite(what: &'static str, values: &[f64]) -> Result<(), Error> {
+/// That every element is a finite number.
+pub fn finite(what: &'static str, values: &[f64]) -> Result<(), Error> {
     match values.iter().position(|v| !v.is_finite()) {
         Some(index) => Err(Error::NotFinite {
             what,
@@ -63,7 +80,8 @@ fn finite(what: &'static str, values: &[f64]) -> Result<(), Error> {
     }
 }
 
-fn not_negative(what: &'static str, values: &[f64]) -> Result<(), Error> {
+/// That every element is finite and not negative.
+pub fn not_negative(what: &'static str, values: &[f64]) -> Result<(), Error> {
     let bad = |v: &f64| !(v.is_finite() && *v >= 0.0);
     match values.iter().position(bad) {
         Some(index) => Err(Error::Weight {

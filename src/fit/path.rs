@@ -1,10 +1,11 @@
 //! The ways from readings to a system of equations.
 
-use super::{Argument, Method, Options, Run};
+use super::{Method, Options};
 use crate::design::Design;
 use crate::error::Error;
 use crate::lstsq::{Reduction, System, Triangle};
 use crate::moments::accumulator::{Accumulator, segments};
+use crate::moments::readings::Readings;
 use crate::moments::spectrum::Spectrum;
 use crate::moments::{factor, normal};
 
@@ -27,68 +28,106 @@ const NORMAL_UP_TO: f64 = 30.0;
 /// as good as QR of all rows, which takes over beyond.
 const FACTORS_UP_TO: f64 = 1e7;
 
-/// The readings reduced to a system, its condition number and the path taken: the
-/// fastest that keeps the accuracy of QR unless one is asked for.
-pub fn reduce(
-    design: &Design,
-    runs: &[Run],
-    centres: &[f64],
-    options: Options,
-) -> Result<(System, f64, Method), Error> {
-    let readings: usize = runs.iter().map(|run| run.reference.len()).sum();
-    let asked = options.method;
-    let common = match asked {
-        Some(Method::Plain) => None,
-        _ => design.common_turn(),
-    };
-    if let Some((cycles, orders)) = common {
-        let highest = orders.iter().copied().max().unwrap_or(0);
-        let segments = segments(highest);
-        let many = readings >= READINGS_PER_SEGMENT * segments * runs.len();
-        if segments <= MOST_SEGMENTS && (many || asked.is_some()) {
-            let sums = |(run, &centre): (&Run, &f64)| {
-                let mut sums = Accumulator::new(design.period(), cycles, highest, centre);
-                sums.update(run.readings(options.argument), options.threads);
-                sums
-            };
-            let sums: Vec<_> = runs.iter().zip(centres).map(sums).collect();
-            if asked != Some(Method::Qr) {
-                let spectra: Vec<_> = sums.iter().map(|s| Spectrum::new(s, highest)).collect();
-                if let Some(system) = normal::system(&spectra, &orders) {
-                    let condition = system.condition_number();
-                    if condition < NORMAL_UP_TO || asked.is_some() {
-                        return Ok((system, condition, Method::Moments));
-                    }
-                }
-            }
-            let enough = readings >= READINGS_PER_FACTOR * segments * runs.len();
-            if asked == Some(Method::Qr) || asked.is_none() && enough {
-                let system = factor::system(&sums, &orders);
-                let condition = system.condition_number();
-                if condition < FACTORS_UP_TO || asked.is_some() {
-                    return Ok((system, condition, Method::Qr));
-                }
-            }
-        }
-    }
-    match asked {
-        Some(Method::Moments | Method::Qr) => Err(Error::Method),
-        _ => {
-            let system = rows(design, runs, centres, options.argument);
-            let condition = system.condition_number();
-            Ok((system, condition, Method::Plain))
+/// What relations between orders are known to from factors of segments, in radians.
+pub const FACTOR_ROUNDING: f64 = 1e-8;
+
+/// A system, its condition number and the path that led to it.
+pub struct Reduced {
+    pub system: System,
+    pub condition_number: f64,
+    pub method: Method,
+}
+
+impl Reduced {
+    fn new(system: System, method: Method) -> Self {
+        Self {
+            condition_number: system.condition_number(),
+            system,
+            method,
         }
     }
 }
 
+/// The readings reduced by the fastest path that keeps the accuracy of QR, unless one is
+/// asked for. `inspect` names the reading that is not finite once a sum is not.
+pub fn reduce(
+    design: &Design,
+    runs: &[Readings],
+    centres: &[f64],
+    options: Options,
+    inspect: impl Fn() -> Result<(), Error>,
+) -> Result<Reduced, Error> {
+    let asked = options.method;
+    if asked != Some(Method::Plain)
+        && let Some((cycles, orders)) = design.common_turn()
+    {
+        let highest = orders.iter().copied().max().unwrap_or(0);
+        let segments = segments(highest);
+        let readings: usize = runs.iter().map(|run| run.angle.len()).sum();
+        let per_segment = readings / (segments * runs.len());
+        let pays = per_segment >= READINGS_PER_SEGMENT && segments <= MOST_SEGMENTS;
+        if pays || asked.is_some() {
+            let sum = |(run, &centre): (&Readings, &f64)| {
+                let mut sums = Accumulator::new(design.period(), cycles, highest, centre);
+                sums.update(*run, options.threads);
+                sums
+            };
+            let sums: Vec<_> = runs.iter().zip(centres).map(sum).collect();
+            if !sums.iter().all(|sums| sums.squares().is_finite()) {
+                inspect()?;
+            }
+            let sums: Vec<_> = sums.iter().collect();
+            if asked != Some(Method::Qr)
+                && let Some(reduced) = by_moments(&sums, &orders, highest)
+                && (reduced.condition_number < NORMAL_UP_TO || asked.is_some())
+            {
+                return Ok(reduced);
+            }
+            if asked == Some(Method::Qr) || per_segment >= READINGS_PER_FACTOR {
+                let reduced = Reduced::new(factor::system(&sums, &orders), Method::Qr);
+                if reduced.condition_number < FACTORS_UP_TO || asked.is_some() {
+                    return Ok(reduced);
+                }
+            }
+        }
+    }
+    if matches!(asked, Some(Method::Moments | Method::Qr)) {
+        return Err(Error::Method);
+    }
+    inspect()?;
+    let system = rows(design, runs, centres);
+    Ok(Reduced::new(system, Method::Plain))
+}
+
+/// The system of moments, by the way that fits its condition number.
+pub fn reduce_moments(design: &Design, runs: &[&Accumulator]) -> Result<Reduced, Error> {
+    let base = runs[0];
+    let orders = design.whole_orders(base.cycles()).ok_or(Error::Method)?;
+    let highest = orders.iter().copied().max().unwrap_or(0);
+    if highest > base.highest() {
+        return Err(Error::Method);
+    }
+    match by_moments(runs, &orders, highest) {
+        Some(reduced) if reduced.condition_number < NORMAL_UP_TO => Ok(reduced),
+        _ => Ok(Reduced::new(factor::system(runs, &orders), Method::Qr)),
+    }
+}
+
+/// By normal equations; None where they are singular to working precision.
+fn by_moments(runs: &[&Accumulator], orders: &[u32], highest: u32) -> Option<Reduced> {
+    let spectra: Vec<_> = runs.iter().map(|run| Spectrum::new(run, highest)).collect();
+    let system = normal::system(&spectra, orders)?;
+    Some(Reduced::new(system, Method::Moments))
+}
+
 /// The system by QR of all rows.
-fn rows(design: &Design, runs: &[Run], centres: &[f64], argument: Argument) -> System {
+fn rows(design: &Design, runs: &[Readings], centres: &[f64]) -> System {
     let mut system = System {
         runs: Vec::with_capacity(runs.len()),
         shared: Triangle::new(design.columns() + 1),
     };
     for (run, &centre) in runs.iter().zip(centres) {
-        let (pivot, rest) = run_rows(design, run, argument, centre).eliminate();
+        let (pivot, rest) = run_rows(design, run, centre).eliminate();
         system.runs.push(pivot);
         system.shared.merge(&rest);
     }
@@ -96,12 +135,11 @@ fn rows(design: &Design, runs: &[Run], centres: &[f64], argument: Argument) -> S
 }
 
 /// The triangle of `[1, harmonics | error]` over one run.
-fn run_rows(design: &Design, run: &Run, argument: Argument, centre: f64) -> Triangle {
+fn run_rows(design: &Design, run: &Readings, centre: f64) -> Triangle {
     let columns = design.columns() + 2;
-    let angles = run.readings(argument).angle;
-    let mut rows = Vec::with_capacity(BLOCK_ROWS.min(angles.len()) * columns);
+    let mut rows = Vec::with_capacity(BLOCK_ROWS.min(run.angle.len()) * columns);
     let mut reduction = Reduction::default();
-    for (block, angles) in angles.chunks(BLOCK_ROWS).enumerate() {
+    for (block, angles) in run.angle.chunks(BLOCK_ROWS).enumerate() {
         rows.clear();
         for (i, &angle) in angles.iter().enumerate() {
             let i = BLOCK_ROWS * block + i;

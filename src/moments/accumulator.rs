@@ -1,6 +1,7 @@
 //! Moments of one run: constant memory, mergeable, one pass.
 
-use super::kernel::{Around, Frame, Readings, accumulate};
+use super::kernel::{Around, Frame, accumulate};
+use super::readings::Readings;
 use super::segment::Segment;
 use crate::angle::{Period, two_sum};
 use crate::threads;
@@ -25,6 +26,8 @@ const FEWEST_SEGMENTS: usize = 32;
 /// Moments of one run of readings.
 #[derive(Clone, Debug)]
 pub struct Accumulator {
+    cycles: f64,
+    highest: u32,
     /// Turn of the base shaft.
     base: Period,
     /// Turn of the errors.
@@ -50,6 +53,8 @@ impl Accumulator {
     pub fn new(period: Period, cycles: f64, highest: u32, centre: f64) -> Self {
         let empty = vec![Segment::EMPTY; segments(highest)];
         Self {
+            cycles,
+            highest,
             base: period.divided(cycles),
             period,
             centre,
@@ -60,6 +65,16 @@ impl Accumulator {
             squares: (0.0, 0.0),
             count: 0,
         }
+    }
+
+    /// Turns of the base shaft per turn.
+    pub fn cycles(&self) -> f64 {
+        self.cycles
+    }
+
+    /// Highest order of the base shaft.
+    pub fn highest(&self) -> u32 {
+        self.highest
     }
 
     /// The angle that errors are wrapped around and counted from.
@@ -80,10 +95,7 @@ impl Accumulator {
     /// Adds readings; the result does not depend on `threads`.
     pub fn update(&mut self, readings: Readings<'_>, threads: usize) {
         let len = readings.angle.len();
-        self.count += match readings.weights {
-            Some(weights) => weights.iter().filter(|w| **w > 0.0).count(),
-            None => len,
-        };
+        self.count += readings.count();
         if len < THREADED {
             return self.add(readings);
         }
@@ -187,6 +199,42 @@ impl Accumulator {
         let weight = moments.iter().map(|s| s.weight[0]).sum();
         let error = moments.iter().map(|s| s.error[0]).sum();
         (weight, error)
+    }
+
+    /// All sums as plain numbers, for storage; `restore` takes them back.
+    pub fn store(&self) -> Vec<f64> {
+        let mut sums = self.clone();
+        sums.flush();
+        let mut numbers = vec![
+            self.centre,
+            self.count as f64,
+            self.squares.0,
+            self.squares.1,
+        ];
+        for table in [&sums.total, &sums.carry] {
+            numbers.extend(table.iter().flat_map(Segment::values));
+        }
+        numbers
+    }
+
+    /// An accumulator over the same orders with the sums of another; None when the
+    /// numbers are not its own.
+    pub fn restore(&self, numbers: &[f64]) -> Option<Self> {
+        let (head, values) = numbers.split_first_chunk::<4>()?;
+        let mut sums = self.clone();
+        sums.clear();
+        sums.centre = head[0];
+        sums.count = head[1] as usize;
+        sums.squares = (head[2], head[3]);
+        let places = sums.total.iter_mut().chain(&mut sums.carry);
+        let mut places: Vec<_> = places.flat_map(Segment::values_mut).collect();
+        if places.len() != values.len() {
+            return None;
+        }
+        for (place, value) in places.iter_mut().zip(values) {
+            **place = *value;
+        }
+        Some(sums)
     }
 
     /// The moments of every segment over Chebyshev polynomials.

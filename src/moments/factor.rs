@@ -22,7 +22,7 @@ const BATCH: usize = 24;
 type Square = [[f64; ERROR_TERMS]; ERROR_TERMS];
 
 /// The system of some orders, one accumulator per run.
-pub fn system(runs: &[Accumulator], orders: &[u32]) -> System {
+pub fn system(runs: &[&Accumulator], orders: &[u32]) -> System {
     let mut system = System {
         runs: Vec::with_capacity(runs.len()),
         shared: Triangle::new(2 * orders.len() + 1),

@@ -5,6 +5,7 @@
 //! that the binary digits of `j` name. The products span the same polynomials as
 //! `T_0, T_1, ...`, never exceed 1, and eight of them cost two vector multiplications.
 
+use super::readings::Readings;
 use super::segment::{LANES, Segment};
 use crate::angle::Period;
 
@@ -13,31 +14,6 @@ const CHUNK: usize = 64;
 
 /// Adding it to a whole number below 2^52 leaves that number in the low bits.
 const WHOLE: f64 = (1u64 << 52) as f64;
-
-/// Readings as they come: an angle, an error or the two angles it is the difference of.
-#[derive(Clone, Copy, Debug)]
-pub struct Readings<'a> {
-    /// What the harmonics are functions of.
-    pub angle: &'a [f64],
-    /// The error, or the indicated angle.
-    pub error: &'a [f64],
-    /// The reference angle to be subtracted from the indicated one.
-    pub reference: Option<&'a [f64]>,
-    /// Weights; all 1 when absent.
-    pub weights: Option<&'a [f64]>,
-}
-
-impl Readings<'_> {
-    /// Some of the readings.
-    pub fn part(&self, start: usize, end: usize) -> Readings<'_> {
-        Readings {
-            angle: &self.angle[start..end],
-            error: &self.error[start..end],
-            reference: self.reference.map(|values| &values[start..end]),
-            weights: self.weights.map(|values| &values[start..end]),
-        }
-    }
-}
 
 /// Division of a turn into `2 half` equal segments.
 #[derive(Clone, Copy, Debug)]

@@ -10,5 +10,6 @@ mod bessel;
 pub mod factor;
 pub mod kernel;
 pub mod normal;
+pub mod readings;
 pub mod segment;
 pub mod spectrum;

@@ -18,9 +18,9 @@ type Readings<'py> = (
 /// What a fit found; see `trueangle.fit`.
 #[pyclass(frozen, module = "trueangle._core")]
 pub struct Solution {
-    inner: core::Solution,
-    /// Orders of each shaft.
-    sizes: Vec<usize>,
+    pub inner: core::Solution,
+    /// Number of orders of each shaft.
+    pub sizes: Vec<usize>,
 }
 
 #[pymethods]
@@ -125,17 +125,8 @@ pub fn fit(
             return Err(unknown("method", other, wanted));
         }
     };
-    if cycles.len() != orders.len() {
-        return Err(PyValueError::new_err(format!(
-            "cycles has {} shafts, orders has {}: they must be equally many",
-            cycles.len(),
-            orders.len()
-        )));
-    }
     let sizes = orders.iter().map(Vec::len).collect();
-    let shafts = cycles.into_iter().zip(orders);
-    let shafts = shafts.map(|(cycles, orders)| Frequencies { cycles, orders });
-    let design = Design::new(period, shafts.collect())?;
+    let design = design(period, cycles, orders)?;
     let runs = runs.iter().map(slices).collect::<PyResult<Vec<_>>>()?;
     let readings = runs.iter().map(|run| run.reference.len()).sum();
     let threads = threads::threads(py, threads, readings)?;
@@ -147,6 +138,20 @@ pub fn fit(
     };
     let inner = py.detach(|| core::fit(&design, &runs, options))?;
     Ok(Solution { inner, sizes })
+}
+
+/// The harmonics of several shafts.
+pub fn design(period: f64, cycles: Vec<f64>, orders: Vec<Vec<u32>>) -> PyResult<Design> {
+    if cycles.len() != orders.len() {
+        return Err(PyValueError::new_err(format!(
+            "cycles has {} shafts, orders has {}: they must be equally many",
+            cycles.len(),
+            orders.len()
+        )));
+    }
+    let shafts = cycles.into_iter().zip(orders);
+    let shafts = shafts.map(|(cycles, orders)| Frequencies { cycles, orders });
+    Ok(Design::new(period, shafts.collect())?)
 }
 
 fn slices<'a>(run: &'a Readings<'_>) -> PyResult<Run<'a>> {

@@ -7,6 +7,7 @@ mod array;
 mod circle;
 mod failure;
 mod fit;
+mod moments;
 mod series;
 mod threads;
 
@@ -25,6 +26,9 @@ mod _core {
 
     #[pymodule_export]
     use super::fit::{Solution, fit};
+
+    #[pymodule_export]
+    use super::moments::{PyMoments, fit_moments};
 
     #[pymodule_init]
     fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {

@@ -1,0 +1,318 @@
+"""Fitting in one pass and constant memory: sums that merge."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Hashable, Iterable, Mapping
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from . import _core
+from .errors import ArgumentError
+from .model import Argument, HarmonicModel, Shaft
+from .shafts import ShaftOrders, resolve_orders
+
+__all__ = ["Moments", "MomentsFit", "Spectrum"]
+
+_Orders = Iterable[float] | Mapping[str, Iterable[float]]
+
+
+class Spectrum(NamedTuple):
+    r"""Sums over the readings of one run from which any orders can be fitted.
+
+    Order ``k`` counts cycles of the base shaft, ``cycles`` per output turn; ``y`` is the
+    error counted from ``centre``.
+    """
+
+    weight: NDArray[np.complex128]
+    r""":math:`\sum w e^{ikx}` for ``k`` from 0 to twice the highest order."""
+    error: NDArray[np.complex128]
+    r""":math:`\sum w y e^{ikx}` for ``k`` from 0 to the highest order."""
+    squares: float
+    r""":math:`\sum w y^2`."""
+    samples: int
+    """Readings of positive weight."""
+    centre: float
+    """The angle that ``y`` is counted from."""
+    cycles: float
+    """Turns of the base shaft per output turn."""
+
+
+@dataclass(frozen=True)
+class MomentsFit:
+    """What `Moments.solve` found; angles in the unit of the moments' period."""
+
+    shafts: tuple[Shaft, ...]
+    constant: float
+    """Circular mean of the zeros of the runs."""
+    offsets: dict[Hashable, float]
+    """Zero of each run."""
+    offset_std: dict[Hashable, float]
+    covariance: NDArray[np.float64]
+    """Of ``[constant, A, B of each order of each shaft in turn]``."""
+    residual_variance: float
+    degrees_of_freedom: float
+    condition_number: float
+    period: float
+    method: str
+    """``"moments"`` (normal equations) or ``"qr"`` (factors of segments)."""
+
+    @property
+    def orders(self) -> tuple[int, ...]:
+        """Orders of each shaft in turn."""
+        return tuple(k for shaft in self.shafts for k in shaft.orders)
+
+    @property
+    def cosine(self) -> NDArray[np.float64]:
+        """``A`` of each order."""
+        return np.array([a for shaft in self.shafts for a in shaft.cosine])
+
+    @property
+    def sine(self) -> NDArray[np.float64]:
+        """``B`` of each order."""
+        return np.array([b for shaft in self.shafts for b in shaft.sine])
+
+    @property
+    def amplitudes(self) -> NDArray[np.float64]:
+        """``C = hypot(A, B)`` of each order."""
+        return np.hypot(self.cosine, self.sine)
+
+    @property
+    def phases(self) -> NDArray[np.float64]:
+        """``phi = atan2(A, B)`` of each order, in radians."""
+        return np.arctan2(self.cosine, self.sine)
+
+    @property
+    def std(self) -> NDArray[np.float64]:
+        """Standard errors of ``[constant, A, B ...]``."""
+        return np.sqrt(np.diag(self.covariance))
+
+    def model(self, argument: Argument = "reference") -> HarmonicModel:
+        """The fitted series as a model that corrects."""
+        return HarmonicModel(
+            self.shafts,
+            self.constant,
+            self.period,
+            argument,
+            covariance=self.covariance,
+            condition_number=self.condition_number,
+        )
+
+
+class Moments:
+    r"""Sums over readings, taken in one pass, from which any of the orders can be fitted.
+
+    The normal equations of
+
+    .. math:: e_{rj} = z_r + \sum_k A_k \cos k x_{rj} + B_k \sin k x_{rj}
+
+    need only :math:`\sum w e^{ikx}` and :math:`\sum w e\, e^{ikx}`. They are assembled from
+    Chebyshev moments of some 6.5 segments of the circle per order, which also hold what
+    ill-conditioned problems need to be solved without squaring their condition number.
+
+    Parameters
+    ----------
+    orders : iterable of int, or mapping of shaft name to such
+        All orders that may ever be asked for.
+    period : float
+        One turn of ``theta`` and ``error``.
+    gear_ratio, fixed_member, shafts
+        As in `fit`. Shafts that never come back to their start together have no moments.
+
+    Notes
+    -----
+    About 4 ns per reading and core, whatever the number of orders; 900 bytes per segment
+    and run, whatever the number of readings. Sums are compensated: a billion readings lose
+    no digits. Results do not depend on ``threads``. An accumulator belongs to one thread
+    at a time: give each its own and merge them.
+
+    Examples
+    --------
+    >>> theta = np.linspace(0.0, 360.0, 1000, endpoint=False)
+    >>> day, night = Moments([1, 2, 3], period=360.0), Moments([1, 2, 3], period=360.0)
+    >>> _ = day.update(theta, 0.5 + 0.1 * np.cos(np.radians(theta)))
+    >>> _ = night.update(theta, 0.5 + 0.3 * np.cos(np.radians(theta)))
+    >>> (day + night).solve(orders=[1]).cosine.round(9)
+    array([0.2])
+    """
+
+    def __init__(
+        self,
+        orders: _Orders,
+        *,
+        period: float = 2.0 * math.pi,
+        gear_ratio: float | None = None,
+        fixed_member: str = "circular_spline",
+        shafts: Mapping[str, float] | None = None,
+    ) -> None:
+        self._shafts = resolve_orders(orders, gear_ratio, fixed_member, shafts)
+        self._period = float(period)
+        self._runs: dict[Hashable, _core.Moments] = {}
+        self._new()  # a wrong period or shaft is named here, not at the first update
+
+    def _new(self) -> _core.Moments:
+        cycles, orders = _lists(self._shafts)
+        return _core.Moments(self._period, cycles, orders)
+
+    @property
+    def period(self) -> float:
+        """One turn of angles and errors."""
+        return self._period
+
+    @property
+    def runs(self) -> tuple[Hashable, ...]:
+        """Labels of the runs, in the order of their first update."""
+        return tuple(self._runs)
+
+    @property
+    def count(self) -> int:
+        """Readings of positive weight."""
+        return sum(run.count for run in self._runs.values())
+
+    def update(
+        self,
+        theta: ArrayLike,
+        error: ArrayLike,
+        weights: ArrayLike | None = None,
+        *,
+        run: Hashable = None,
+        threads: int | None = None,
+    ) -> Moments:
+        """Add readings: angles and errors (indicated - reference), of any shape.
+
+        Parameters
+        ----------
+        theta : array_like
+            Angles that the error is a function of, any number of turns.
+        error : array_like
+            Of the same shape. Errors are taken modulo a turn around the circular mean of
+            the first readings of their run, so any zero will do.
+        weights : array_like, optional
+            Reciprocal variances up to a factor; 0 for readings that do not count.
+        run : hashable, optional
+            Label of the run; each run has its own zero.
+        threads : int, optional
+
+        Returns
+        -------
+        Moments
+            Itself.
+
+        Raises
+        ------
+        ArgumentError
+            Different lengths, numbers that are not finite, negative weights.
+        """
+        shape = np.shape(theta)
+        for what, values in (("error", error), ("weights", weights)):
+            if values is not None and np.shape(values) != shape:
+                raise ArgumentError(
+                    f"{what} has shape {np.shape(values)}, theta has {shape}: they must agree"
+                )
+        sums = self._runs.get(run)
+        if sums is None:
+            sums = self._new()
+        sums.update(
+            _flat(theta), _flat(error), None if weights is None else _flat(weights), threads
+        )
+        if sums.count:
+            self._runs[run] = sums
+        return self
+
+    def merge(self, other: Moments) -> Moments:
+        """Add the readings of another accumulator over the same orders; runs go by label."""
+        if not isinstance(other, Moments):
+            raise ArgumentError(f"moments merge with moments, got {type(other).__name__}")
+        if (self._shafts, self._period) != (other._shafts, other._period):
+            raise ArgumentError("moments merge when their orders, shafts and period agree")
+        for label, sums in other._runs.items():
+            mine = self._runs.setdefault(label, self._new())
+            mine.merge(sums)
+        return self
+
+    def __add__(self, other: Moments) -> Moments:
+        if not isinstance(other, Moments):
+            return NotImplemented
+        return self.copy().merge(other)
+
+    def __iadd__(self, other: Moments) -> Moments:
+        return self.merge(other)
+
+    def copy(self) -> Moments:
+        """An accumulator of its own with the same readings."""
+        fresh = Moments.__new__(Moments)
+        fresh._shafts, fresh._period, fresh._runs = self._shafts, self._period, {}
+        return fresh.merge(self)
+
+    def spectrum(self, run: Hashable = None) -> Spectrum:
+        """All sums of one run: the input of order selection and of transforms."""
+        if run not in self._runs:
+            raise ArgumentError(f"there is no run {run!r}; the runs are {list(self._runs)!r}")
+        sums = self._runs[run]
+        return Spectrum(*sums.spectrum(), cycles=sums.cycles)
+
+    def solve(self, orders: _Orders | None = None) -> MomentsFit:
+        """Least-squares fit of some of the orders, or of all.
+
+        Raises
+        ------
+        RankError
+            The readings cannot tell the orders apart.
+        ArgumentError
+            Orders that were not accumulated.
+        """
+        wanted = self._shafts if orders is None else self._subset(orders)
+        cycles, lists = _lists(wanted)
+        found = _core.fit_moments(list(self._runs.values()), self._period, cycles, lists)
+        pairs = zip(wanted, found.cosine, found.sine, strict=True)
+        return MomentsFit(
+            shafts=tuple(
+                Shaft(s.name, s.cycles_per_turn, s.orders, tuple(a), tuple(b)) for s, a, b in pairs
+            ),
+            constant=found.constant,
+            offsets=dict(zip(self._runs, found.offsets.tolist(), strict=True)),
+            offset_std=dict(zip(self._runs, found.offset_std.tolist(), strict=True)),
+            covariance=found.covariance,
+            residual_variance=found.residual_variance,
+            degrees_of_freedom=found.degrees_of_freedom,
+            condition_number=found.condition_number,
+            period=self._period,
+            method=found.method,
+        )
+
+    def _subset(self, orders: _Orders) -> list[ShaftOrders]:
+        known = {shaft.name: shaft.cycles_per_turn for shaft in self._shafts}
+        wanted = resolve_orders(orders, shafts=known)
+        have = {(s.name, s.cycles_per_turn, k) for s in self._shafts for k in s.orders}
+        for shaft in wanted:
+            missing = [k for k in shaft.orders if (*shaft[:2], k) not in have]
+            if missing:
+                raise ArgumentError(
+                    f"orders {missing} of shaft {shaft.name!r} were not accumulated"
+                )
+        return wanted
+
+    def __getstate__(self) -> dict[str, Any]:
+        runs = {label: sums.store() for label, sums in self._runs.items()}
+        return {"shafts": self._shafts, "period": self._period, "runs": runs}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self._shafts, self._period, self._runs = state["shafts"], state["period"], {}
+        for label, numbers in state["runs"].items():
+            self._runs[label] = self._new()
+            self._runs[label].restore(numbers)
+
+    def __repr__(self) -> str:
+        orders = sum(len(shaft.orders) for shaft in self._shafts)
+        return f"<Moments of {orders} orders, {len(self._runs)} runs, {self.count} readings>"
+
+
+def _lists(shafts: list[ShaftOrders]) -> tuple[list[float], list[list[int]]]:
+    return [s.cycles_per_turn for s in shafts], [list(s.orders) for s in shafts]
+
+
+def _flat(values: ArrayLike) -> NDArray[np.float64]:
+    return np.ascontiguousarray(values, dtype=np.float64).reshape(-1)

@@ -1,0 +1,73 @@
+//! Readings as the sums take them.
+
+use std::f64::consts::TAU;
+
+use crate::angle::{Period, two_sum};
+
+/// Readings that a circular centre is taken from, at even strides.
+const CENTRE_READINGS: usize = 4096;
+
+/// An angle and an error each, or the two angles that the error is the difference of.
+#[derive(Clone, Copy, Debug)]
+pub struct Readings<'a> {
+    /// What the harmonics are functions of.
+    pub angle: &'a [f64],
+    /// The error, or the indicated angle.
+    pub error: &'a [f64],
+    /// The reference angle to be subtracted from the indicated one.
+    pub reference: Option<&'a [f64]>,
+    /// Weights; all 1 when absent.
+    pub weights: Option<&'a [f64]>,
+}
+
+impl Readings<'_> {
+    /// Readings `start..end`.
+    pub fn part(&self, start: usize, end: usize) -> Readings<'_> {
+        Readings {
+            angle: &self.angle[start..end],
+            error: &self.error[start..end],
+            reference: self.reference.map(|values| &values[start..end]),
+            weights: self.weights.map(|values| &values[start..end]),
+        }
+    }
+
+    /// Weight of reading `i`.
+    pub fn weight(&self, i: usize) -> f64 {
+        self.weights.map_or(1.0, |weights| weights[i])
+    }
+
+    /// Readings that count.
+    pub fn count(&self) -> usize {
+        match self.weights {
+            Some(weights) => weights.iter().filter(|w| **w > 0.0).count(),
+            None => self.angle.len(),
+        }
+    }
+
+    /// Angles of the readings that count.
+    pub fn angles(&self) -> impl Iterator<Item = f64> {
+        let counts = |(i, x): (usize, &f64)| (self.weight(i) > 0.0).then_some(*x);
+        self.angle.iter().enumerate().filter_map(counts)
+    }
+
+    /// `error - centre` of reading `i` in `(-period/2, period/2]`.
+    pub fn error(&self, i: usize, centre: f64, period: Period) -> f64 {
+        // The rounding of the difference matters after many turns: it is carried along.
+        let reference = self.reference.map_or(0.0, |values| values[i]);
+        let (difference, carry) = two_sum(self.error[i], -reference);
+        period.wrap(period.wrap(difference) + carry - centre)
+    }
+
+    /// Circular mean of the errors: no error is cut in two when wrapped around it.
+    pub fn centre(&self, period: Period) -> f64 {
+        let turn = TAU / period.value();
+        let stride = self.angle.len().div_ceil(CENTRE_READINGS).max(1);
+        let (mut sine, mut cosine) = (0.0, 0.0);
+        for i in (0..self.angle.len()).step_by(stride) {
+            let (s, c) = (turn * self.error(i, 0.0, period)).sin_cos();
+            sine += self.weight(i) * s;
+            cosine += self.weight(i) * c;
+        }
+        sine.atan2(cosine) / turn
+    }
+}

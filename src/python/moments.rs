@@ -1,0 +1,157 @@
+//! `_core.Moments`: the sums of one run, and `_core.fit_moments`.
+
+use numpy::{Complex64, PyArray1, PyReadonlyArray1, ToPyArray};
+use pyo3::prelude::*;
+
+use super::failure::argument_error;
+use super::fit::{Solution, design};
+use super::threads;
+use crate::angle::Period;
+use crate::error::Error;
+use crate::fit::{check, fit_moments as core_fit};
+use crate::moments::accumulator::Accumulator;
+use crate::moments::readings::Readings;
+use crate::moments::spectrum::Spectrum;
+
+type Array<'py> = Bound<'py, PyArray1<f64>>;
+type Complexes<'py> = Bound<'py, PyArray1<Complex64>>;
+
+/// One-pass sums of one run; see `trueangle.Moments`.
+#[pyclass(module = "trueangle._core", name = "Moments")]
+pub struct PyMoments {
+    period: f64,
+    cycles: f64,
+    highest: u32,
+    sums: Option<Accumulator>,
+}
+
+impl PyMoments {
+    fn fresh(&self, centre: f64) -> Result<Accumulator, Error> {
+        let period = Period::new(self.period)?;
+        Ok(Accumulator::new(period, self.cycles, self.highest, centre))
+    }
+}
+
+#[pymethods]
+impl PyMoments {
+    #[new]
+    fn new(period: f64, cycles: Vec<f64>, orders: Vec<Vec<u32>>) -> PyResult<Self> {
+        let design = design(period, cycles, orders)?;
+        let (cycles, orders) = design.common_turn().ok_or(Error::Method)?;
+        Ok(Self {
+            period,
+            cycles,
+            highest: orders.into_iter().max().unwrap_or(0),
+            sums: None,
+        })
+    }
+
+    /// Cycles per turn of the shaft that the orders of the spectrum belong to.
+    #[getter]
+    fn cycles(&self) -> f64 {
+        self.cycles
+    }
+
+    #[getter]
+    fn count(&self) -> usize {
+        self.sums.as_ref().map_or(0, Accumulator::count)
+    }
+
+    #[pyo3(signature = (theta, error, weights=None, threads=None))]
+    fn update(
+        &mut self,
+        py: Python<'_>,
+        theta: PyReadonlyArray1<'_, f64>,
+        error: PyReadonlyArray1<'_, f64>,
+        weights: Option<PyReadonlyArray1<'_, f64>>,
+        threads: Option<i64>,
+    ) -> PyResult<()> {
+        let readings = Readings {
+            angle: theta.as_slice()?,
+            error: error.as_slice()?,
+            reference: None,
+            weights: match &weights {
+                Some(weights) => Some(weights.as_slice()?),
+                None => None,
+            },
+        };
+        let len = readings.angle.len();
+        check::same_length("error", readings.error.len(), "theta", len)?;
+        check::finite("theta", readings.angle)?;
+        check::finite("error", readings.error)?;
+        if let Some(weights) = readings.weights {
+            check::same_length("weights", weights.len(), "theta", len)?;
+            check::not_negative("weights", weights)?;
+        }
+        if readings.count() == 0 {
+            return Ok(());
+        }
+        let threads = threads::threads(py, threads, len)?;
+        let threads = threads.unwrap_or_else(crate::threads::available);
+        let mut sums = match self.sums.take() {
+            Some(sums) => sums,
+            None => self.fresh(readings.centre(Period::new(self.period)?))?,
+        };
+        py.detach(|| sums.update(readings, threads));
+        self.sums = Some(sums);
+        Ok(())
+    }
+
+    fn merge(&mut self, other: &Self) -> PyResult<()> {
+        if (self.period, self.cycles, self.highest) != (other.period, other.cycles, other.highest) {
+            return Err(Error::Merge("period or orders").into());
+        }
+        match (&mut self.sums, &other.sums) {
+            (Some(sums), Some(other)) => sums.merge(other),
+            (sums @ None, Some(other)) => *sums = Some(other.clone()),
+            _ => {}
+        }
+        Ok(())
+    }
+
+    /// `sum w e^(ikx)`, `sum w y e^(ikx)`, `sum w y^2`, readings, and what `y` is counted from.
+    fn spectrum<'py>(
+        &self,
+        py: Python<'py>,
+    ) -> PyResult<(Complexes<'py>, Complexes<'py>, f64, usize, f64)> {
+        let spectrum = match &self.sums {
+            Some(sums) => Spectrum::new(sums, self.highest),
+            None => Spectrum::new(&self.fresh(0.0)?, self.highest),
+        };
+        Ok((
+            spectrum.weight.to_pyarray(py),
+            spectrum.error.to_pyarray(py),
+            spectrum.squares,
+            spectrum.count,
+            spectrum.centre,
+        ))
+    }
+
+    /// All sums as numbers, for pickling.
+    fn store<'py>(&self, py: Python<'py>) -> Option<Array<'py>> {
+        Some(self.sums.as_ref()?.store().to_pyarray(py))
+    }
+
+    fn restore(&mut self, py: Python<'_>, numbers: PyReadonlyArray1<'_, f64>) -> PyResult<()> {
+        let sums = self.fresh(0.0)?.restore(numbers.as_slice()?);
+        let failure = || argument_error(py, "these are not the sums of such moments".to_owned());
+        self.sums = Some(sums.ok_or_else(failure)?);
+        Ok(())
+    }
+}
+
+/// Least squares from the moments of several runs.
+#[pyfunction]
+pub fn fit_moments(
+    py: Python<'_>,
+    runs: Vec<PyRef<'_, PyMoments>>,
+    period: f64,
+    cycles: Vec<f64>,
+    orders: Vec<Vec<u32>>,
+) -> PyResult<Solution> {
+    let sizes = orders.iter().map(Vec::len).collect();
+    let design = design(period, cycles, orders)?;
+    let sums: Vec<_> = runs.iter().filter_map(|run| run.sums.as_ref()).collect();
+    let inner = py.detach(|| core_fit(&design, &sums))?;
+    Ok(Solution { inner, sizes })
+}
