@@ -13,6 +13,7 @@ from .motion import Motion, strokes
 Array = NDArray[np.float64]
 
 #: Degrees moved before the first reading, so that backlash and wind-up are in a known state.
+#: Fast strokes need up to 12 of them to gain speed.
 RUN_IN = 30.0
 
 #: Share of the span of temperatures by which a run warms up while it is measured.
@@ -94,12 +95,14 @@ class Design:
         # A run-in in the direction of the first stroke, joined without a stop.
         lengths[0] += np.sign(lengths[0]) * RUN_IN
         start -= np.sign(lengths[0]) * RUN_IN
+        path = float(np.abs(lengths).sum()) - RUN_IN
+        if self.travel != "reversing":
+            lengths[-1] += np.sign(lengths[-1]) * RUN_IN  # measured at constant speed only
         motion = strokes(start, list(lengths), speed, acceleration, float(rng.uniform(0.0, 0.3)))
         begin = float(motion.times_at_travel(np.array([RUN_IN]), 0.0)[0])
         # The controller also logs where a stroke ends, so that direction is never in doubt.
-        ends = motion.stops
+        ends = motion.stops if self.travel == "reversing" else np.empty(0)
         count = self.readings - ends.size
-        path = float(np.abs(lengths).sum()) - RUN_IN
         travel = (np.arange(count) + rng.uniform(0.02, 0.98, count)) * path / count
         time = np.concatenate([motion.times_at_travel(travel, begin), ends])
         return motion, np.sort(time)

@@ -14,8 +14,10 @@ from __future__ import annotations
 import argparse
 import csv
 import json
+import math
 import os
 import sys
+import traceback
 from collections import Counter, defaultdict
 from collections.abc import Iterable, Iterator
 from concurrent.futures import ProcessPoolExecutor
@@ -45,8 +47,18 @@ def answers(cases: list[Case], jobs: int = 1, show: bool = False) -> list[Answer
     """Ask every case, in as many processes as allowed."""
     if jobs > 1:
         with ProcessPoolExecutor(jobs) as pool:
-            return list(_told(pool.map(ask, cases), show))
-    return list(_told(map(ask, cases), show))
+            return list(_told(pool.map(attempt, cases), show))
+    return list(_told(map(attempt, cases), show))
+
+
+def attempt(case: Case) -> Answer:
+    """The answer to a case; an exception is a wrong answer and no reason to stop the exam."""
+    try:
+        return ask(case)
+    except Exception as failure:
+        where = traceback.extract_tb(failure.__traceback__)[-1]
+        name = f"{type(failure).__name__} in {Path(where.filename).name}:{where.lineno}"
+        return Answer(case, (name,), (), {}, {}, str(failure), math.nan, math.nan)
 
 
 def _told(found: Iterable[Answer], show: bool) -> Iterator[Answer]:
@@ -129,11 +141,12 @@ def _percent(flags: Iterable[bool]) -> str:
 def save(found: list[Answer], folder: Path) -> Path:
     """Write ``confusion.csv`` (truth by first name) and ``answers.json``; return the folder."""
     folder.mkdir(parents=True, exist_ok=True)
-    names = [*CAUSES, "none"]
+    names = [*CAUSES, "none", "crash"]
     rows: dict[tuple[str, float], Counter[str]] = defaultdict(Counter)
     for a in found:
         if a.case.design == "rich" and len(a.case.causes) < 2:
-            rows["".join(a.case.causes) or "none", a.case.scale][a.first] += 1
+            first = a.first if a.first in names else "crash"
+            rows["".join(a.case.causes) or "none", a.case.scale][first] += 1
     with (folder / "confusion.csv").open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)
         writer.writerow(["hidden", "scale", *names])

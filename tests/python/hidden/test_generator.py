@@ -135,6 +135,8 @@ TRACELESS = [
     ("paper", "latency"),
     ("paper", "filter_lag"),
     ("paper", "torsional_compliance"),
+    ("one_of_everything", "latency"),
+    ("one_of_everything", "backlash"),
     ("static_dense", "latency"),
     ("static_dense", "backlash"),
 ]
