@@ -110,4 +110,16 @@ pub enum Error {
     /// Accumulators over different series cannot be merged.
     #[error("cannot merge moments of different {0}")]
     Merge(&'static str),
+
+    /// A term of the correction lacks a signal.
+    #[error(
+        "the model's term '{term}' needs {signal}, which was not given: pass {signal}=, in a log the column {}",
+        crate::terms::Signal::column(signal)
+    )]
+    MissingSignal {
+        /// The keyword of the signal.
+        signal: &'static str,
+        /// The kind of the term.
+        term: &'static str,
+    },
 }

@@ -13,6 +13,7 @@ pub mod threads;
 pub mod kernel;
 
 pub mod compensator;
+pub mod terms;
 
 pub mod design;
 pub mod fit;

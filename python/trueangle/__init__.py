@@ -24,6 +24,14 @@ if TYPE_CHECKING:
     from .simulation import Simulation as Simulation
     from .simulation import load_simulation as load_simulation
     from .simulation import simulate as simulate
+    from .terms import Backlash as Backlash
+    from .terms import FilterLag as FilterLag
+    from .terms import Latency as Latency
+    from .terms import LoadDependentGearError as LoadDependentGearError
+    from .terms import PreslidingHysteresis as PreslidingHysteresis
+    from .terms import StiffeningCompliance as StiffeningCompliance
+    from .terms import ThermalDrift as ThermalDrift
+    from .terms import TorsionalCompliance as TorsionalCompliance
 
 #: Public names and the modules that define them; a module is imported at first use.
 _PUBLIC = {
@@ -43,6 +51,19 @@ _PUBLIC = {
     "diagnose": "diagnosis",
     "load_simulation": "simulation",
     "simulate": "simulation",
+    **dict.fromkeys(
+        (
+            "Backlash",
+            "FilterLag",
+            "Latency",
+            "LoadDependentGearError",
+            "PreslidingHysteresis",
+            "StiffeningCompliance",
+            "ThermalDrift",
+            "TorsionalCompliance",
+        ),
+        "terms",
+    ),
 }
 
 __all__ = ["__version__", *sorted(_PUBLIC)]

@@ -89,6 +89,39 @@ class Compensator:
 _Array = NDArray[np.float64]
 
 @final
+class Corrector:
+    """Correction by a series and its terms, in the order the samples were taken."""
+
+    def __new__(cls, series: Series, terms: Sequence[Any]) -> Corrector: ...
+    def step(
+        self,
+        indicated: float,
+        /,
+        velocity: float | None = None,
+        temperature: float | None = None,
+        torque: float | None = None,
+        direction: float | None = None,
+    ) -> float: ...
+    def reset(self) -> None: ...
+    def correct(
+        self,
+        indicated: _Array,
+        velocity: _Array | None,
+        temperature: _Array | None,
+        torque: _Array | None,
+        direction: _Array | None,
+        threads: int | None,
+    ) -> _Array: ...
+    def error(
+        self,
+        theta: _Array,
+        velocity: _Array | None,
+        temperature: _Array | None,
+        torque: _Array | None,
+        direction: _Array | None,
+    ) -> _Array: ...
+
+@final
 class Solution:
     @property
     def offsets(self) -> _Array: ...

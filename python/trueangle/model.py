@@ -8,7 +8,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from os import PathLike
-from typing import Any, Literal, TypeAlias, overload
+from typing import TYPE_CHECKING, Any, Literal, TypeAlias, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -17,6 +17,10 @@ from . import _core
 from .angles import check_period
 from .errors import ArgumentError, NotInvertibleError, OutsideSpanWarning
 from .runs import Source
+from .terms.term import Term
+
+if TYPE_CHECKING:
+    from .terms.corrector import Corrector
 
 __all__ = ["Argument", "FitRecord", "HarmonicModel", "Provenance", "Shaft", "load_model"]
 
@@ -100,11 +104,12 @@ class Provenance:
 
 @dataclass(frozen=True, eq=False)
 class HarmonicModel:
-    r"""Angle error as a constant and harmonics of one or more shafts; immutable.
+    r"""Angle error as a constant, harmonics of one or more shafts and terms; immutable.
 
     .. math:: \varepsilon(x) = C_0 + \sum_s \sum_k A_{sk} \cos(k f_s x) + B_{sk} \sin(k f_s x)
 
-    with ``x`` counted in turns of ``2 pi``; error = indicated - reference.
+    with ``x`` counted in turns of ``2 pi``; error = indicated - reference. ``terms`` add
+    what follows travel, velocity, temperature and torque (`trueangle.terms`).
 
     Parameters
     ----------
@@ -122,6 +127,7 @@ class HarmonicModel:
         Of the design the fit has seen.
     fit : FitRecord, optional
     provenance : Provenance, optional
+    terms : iterable of Term, optional
 
     Raises
     ------
@@ -147,12 +153,14 @@ class HarmonicModel:
     condition_number: float | None = None
     fit: FitRecord | None = None
     provenance: Provenance = Provenance()
+    terms: tuple[Term, ...] = ()
 
     def __post_init__(self) -> None:
         put = object.__setattr__
         put(self, "period", check_period(self.period))
         put(self, "constant", float(self.constant))
         put(self, "shafts", tuple(self.shafts))
+        put(self, "terms", tuple(self.terms))
         if self.argument not in ("reference", "indicated"):
             raise ArgumentError(
                 f"argument must be 'reference' or 'indicated', got {self.argument!r}"
@@ -166,6 +174,19 @@ class HarmonicModel:
             )
         if self.covariance is not None:
             put(self, "covariance", self._checked_covariance(self.covariance))
+        if self.terms:
+            self._check_terms()
+
+    def _check_terms(self) -> None:
+        for i, term in enumerate(self.terms):
+            if not isinstance(term, Term):
+                raise ArgumentError(
+                    f"terms[{i}] must be a term of trueangle.terms, got {type(term).__name__}"
+                )
+        self._core_corrector()  # refuses terms that leave no unique correction
+
+    def _core_corrector(self) -> _core.Corrector:
+        return _core.Corrector(self._series, list(self.terms))
 
     @cached_property
     def _warn(self) -> _SpanGuard:
@@ -205,6 +226,10 @@ class HarmonicModel:
         theta: float,
         out: None = None,
         *,
+        direction: float | None = None,
+        velocity: float | None = None,
+        temperature: float | None = None,
+        torque: float | None = None,
         threads: int | None = None,
         path: Path | None = None,
     ) -> float: ...
@@ -214,6 +239,10 @@ class HarmonicModel:
         theta: ArrayLike,
         out: NDArray[Any] | None = None,
         *,
+        direction: ArrayLike | None = None,
+        velocity: ArrayLike | None = None,
+        temperature: ArrayLike | None = None,
+        torque: ArrayLike | None = None,
         threads: int | None = None,
         path: Path | None = None,
     ) -> NDArray[Any]: ...
@@ -222,6 +251,10 @@ class HarmonicModel:
         theta: ArrayLike,
         out: NDArray[Any] | None = None,
         *,
+        direction: ArrayLike | None = None,
+        velocity: ArrayLike | None = None,
+        temperature: ArrayLike | None = None,
+        torque: ArrayLike | None = None,
         threads: int | None = None,
         path: Path | None = None,
     ) -> float | NDArray[Any]:
@@ -234,10 +267,14 @@ class HarmonicModel:
             float32, integers (counts) and everything else float64.
         out : ndarray, optional
             Where to put the result, of the result's shape and type; may be ``theta``.
+        direction, velocity, temperature, torque : float or array_like, optional
+            Signals at the samples, broadcast: sign of travel (0 keeps the last one),
+            angle units per second, degrees Celsius, newton metres. `signals` names those
+            the model needs; others are ignored.
         threads : int, optional
             At most so many; by default all allowed to the process for large arrays.
         path : {"table", "exact", "direct", "counts"}, optional
-            Forces a way of evaluation.
+            Forces a way of evaluation, of a model without terms.
 
         Returns
         -------
@@ -248,13 +285,22 @@ class HarmonicModel:
         ------
         ArgumentError
             ``out`` of the wrong shape or type, or partly overlapping ``theta``.
+        MissingSignalError
+            Names a signal that was not given and the term that needs it.
 
         Notes
         -----
+        Backlash and hysteresis take the samples in the order given (C order), the first
+        one before any motion; without ``direction`` and ``velocity`` they follow the
+        angle itself. `corrector` carries that state over batches.
+
         Within 3e-15 of the sum of amplitudes for angles up to a million radians and
         orders up to 512; the cost does not depend on the number of orders when every
         shaft turns a whole number of times per turn.
         """
+        if self.terms:
+            given = _given(direction, velocity, temperature, torque)
+            return self._with_terms("error", theta, out, given)
         return self._series.error(theta, out, threads, path)
 
     @overload
@@ -263,6 +309,10 @@ class HarmonicModel:
         indicated: float,
         out: None = None,
         *,
+        direction: float | None = None,
+        velocity: float | None = None,
+        temperature: float | None = None,
+        torque: float | None = None,
         threads: int | None = None,
         path: Path | None = None,
     ) -> float: ...
@@ -272,6 +322,10 @@ class HarmonicModel:
         indicated: ArrayLike,
         out: NDArray[Any] | None = None,
         *,
+        direction: ArrayLike | None = None,
+        velocity: ArrayLike | None = None,
+        temperature: ArrayLike | None = None,
+        torque: ArrayLike | None = None,
         threads: int | None = None,
         path: Path | None = None,
     ) -> NDArray[Any]: ...
@@ -280,6 +334,10 @@ class HarmonicModel:
         indicated: ArrayLike,
         out: NDArray[Any] | None = None,
         *,
+        direction: ArrayLike | None = None,
+        velocity: ArrayLike | None = None,
+        temperature: ArrayLike | None = None,
+        torque: ArrayLike | None = None,
         threads: int | None = None,
         path: Path | None = None,
     ) -> float | NDArray[Any]:
@@ -297,16 +355,38 @@ class HarmonicModel:
             Once per model, when it was fitted on part of a turn only and a corrected
             angle lies outside that part.
         """
-        corrected = self._series.correct(indicated, out, threads, path)
+        if self.terms:
+            given = _given(direction, velocity, temperature, torque)
+            corrected = self._with_terms("correct", indicated, out, given, threads)
+        else:
+            corrected = self._series.correct(indicated, out, threads, path)
         if self._warn.armed:
             self._warn(corrected)
         return corrected
 
-    def compensator(self) -> Callable[[float], float]:
+    def _with_terms(self, *arguments: Any) -> float | NDArray[Any]:
+        from .terms.corrector import evaluate
+
+        return evaluate(self, self._core_corrector(), *arguments)
+
+    def corrector(self) -> Corrector:
+        """`correct` that carries its state from batch to batch and step to step.
+
+        For the batches of a long log, and for joints whose reversal error depends on
+        travel before; see `trueangle.terms.corrector.Corrector`.
+        """
+        from .terms.corrector import Corrector
+
+        return Corrector(self)
+
+    def compensator(self) -> Callable[..., float]:
         """``step(indicated) -> corrected`` for one sample at a time.
 
         The cheapest call there is: a bound method of the compiled core, no allocation
         but the result, the same number as `correct`. It does not warn about the span.
+
+        With terms it is ``step(indicated, velocity=, temperature=, torque=, direction=)``
+        and keeps the state of travel; `corrector` gives the same step and a ``reset``.
 
         Examples
         --------
@@ -315,6 +395,8 @@ class HarmonicModel:
         >>> round(step(90.5), 9)
         90.0
         """
+        if self.terms:
+            return self._core_corrector().step
         return self._series.compensator().step
 
     # -- description --------------------------------------------------------------
@@ -337,7 +419,24 @@ class HarmonicModel:
     @property
     def is_periodic(self) -> bool:
         """True when the error repeats after one output turn: all cycles are whole."""
-        return self._series.is_periodic
+        return self._series.is_periodic and all(term.is_periodic for term in self.terms)
+
+    @property
+    def signals(self) -> tuple[str, ...]:
+        """Signals without which the model cannot correct: "velocity", "temperature" ...
+
+        Where "direction" is among them, a velocity will do as well.
+        """
+        needed = {name for term in self.terms for name in term.needs}
+        return tuple(name for name in _SIGNALS if name in needed)
+
+    @property
+    def uses_signals(self) -> tuple[str, ...]:
+        """`signals` and those it takes where given: direction and velocity for travel."""
+        used = set(self.signals)
+        if any(term.follows_travel for term in self.terms):
+            used |= {"direction", "velocity"}
+        return tuple(name for name in _SIGNALS if name in used)
 
     @property
     def partial_span(self) -> tuple[float, float] | None:
@@ -399,6 +498,13 @@ class HarmonicModel:
 
     def __reduce__(self) -> tuple[Any, ...]:
         return _rebuild, ({entry.name: getattr(self, entry.name) for entry in fields(self)},)
+
+
+_SIGNALS = ("direction", "velocity", "temperature", "torque")
+
+
+def _given(*signals: ArrayLike | None) -> dict[str, ArrayLike | None]:
+    return dict(zip(_SIGNALS, signals, strict=True))
 
 
 class _SpanGuard:

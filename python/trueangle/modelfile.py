@@ -12,10 +12,11 @@ from typing import Any
 
 import numpy as np
 
-from .errors import ModelFileError, TrueAngleError
+from .errors import ArgumentError, ModelFileError, TrueAngleError
 from .files import written_atomically
 from .model import FitRecord, HarmonicModel, Provenance, Shaft
 from .runs import Source
+from .terms import TERMS, Term
 
 __all__ = ["FORMAT", "VERSION", "load_model", "save_model"]
 
@@ -48,7 +49,7 @@ def save_model(model: HarmonicModel, path: str | PathLike[str]) -> None:
         "argument": model.argument,
         "shafts": [asdict(shaft) for shaft in model.shafts],
         "constant": model.constant,
-        "terms": [],
+        "terms": [term.to_table() for term in model.terms],
         "covariance": None if model.covariance is None else model.covariance.tolist(),
         "condition_number": model.condition_number,
         "fit": None if model.fit is None else asdict(model.fit),
@@ -130,8 +131,6 @@ class _Reader:
                 "version",
             )
         self.keys(content, _KEYS)
-        if content.get("terms"):
-            raise self.error("unknown terms; upgrade trueangle", "terms")
         if content["argument"] not in ("reference", "indicated"):
             raise self.error(
                 f"must be 'reference' or 'indicated', got {content['argument']!r}", "argument"
@@ -157,6 +156,7 @@ class _Reader:
                 else self.number(condition, "condition_number"),
                 fit=self.fit(content.get("fit")),
                 provenance=self.provenance(content.get("provenance")),
+                terms=self.terms(content.get("terms")),
             )
         except ModelFileError:
             raise
@@ -211,6 +211,30 @@ class _Reader:
                 )
             )
         return tuple(shafts)
+
+    def terms(self, values: Any) -> tuple[Term, ...]:
+        if values is None:
+            return ()
+        if not isinstance(values, list):
+            raise self.error("a list of terms is needed", "terms")
+        terms = []
+        for i, value in enumerate(values):
+            where = f"terms[{i}]"
+            if not isinstance(value, dict):
+                raise self.error("an object is needed", where)
+            kind = value.get("kind")
+            if kind not in TERMS:
+                raise self.error(
+                    f"{kind!r} is unknown; the kinds are {', '.join(TERMS)}; "
+                    "a later trueangle may know it",
+                    f"{where}.kind",
+                )
+            table = {key: entry for key, entry in value.items() if key != "kind"}
+            try:
+                terms.append(TERMS[kind].from_table(table))
+            except ArgumentError as cause:
+                raise self.error(str(cause), where) from None
+        return tuple(terms)
 
     def fit(self, value: Any) -> FitRecord | None:
         if value is None:

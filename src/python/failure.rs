@@ -40,6 +40,7 @@ fn raise(py: Python<'_>, error: &Error) -> PyResult<PyErr> {
         Error::NotInvertible { slope } => module
             .getattr("NotInvertibleError")?
             .call1((message, *slope))?,
+        Error::MissingSignal { .. } => module.getattr("MissingSignalError")?.call1((message,))?,
         _ => module.getattr("ArgumentError")?.call1((message,))?,
     };
     Ok(PyErr::from_value(instance))

@@ -9,6 +9,7 @@ mod failure;
 mod fit;
 mod moments;
 mod series;
+mod terms;
 mod threads;
 
 use pyo3::prelude::*;
@@ -23,6 +24,9 @@ mod _core {
 
     #[pymodule_export]
     use super::circle::{covered_span, residuals, resultant};
+
+    #[pymodule_export]
+    use super::terms::PyCorrector;
 
     #[pymodule_export]
     use super::fit::{Solution, fit};

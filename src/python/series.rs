@@ -26,7 +26,7 @@ struct Wish<'a> {
 
 #[pyclass(name = "Series", module = "trueangle._core", frozen)]
 pub struct PySeries {
-    evaluator: Arc<Evaluator>,
+    pub(super) evaluator: Arc<Evaluator>,
 }
 
 #[pymethods]

@@ -1,0 +1,342 @@
+//! Correction by a series and its terms, sample by sample, with the state it needs.
+
+use std::sync::Arc;
+
+use super::signals::{Columns, Signal, Signals};
+use super::term::{Smooth, Term};
+use super::travel::{Element, Heading, Travel};
+use crate::compensator::Compensator;
+use crate::error::Error;
+use crate::kernel::{Argument, Batch, Evaluator, Quantity};
+
+/// Steps before the signals are taken to leave no unique angle. Each step gains at least
+/// a factor of the terms' slope times the series' slope, as a rule three digits.
+const MOST_STEPS: usize = 60;
+
+/// Part of a period at which the solution is good: the next step would be smaller still.
+const SOLVED: f64 = 1e-14;
+
+/// A series and its terms: immutable, shared by its correctors.
+#[derive(Debug)]
+pub struct Terms {
+    evaluator: Arc<Evaluator>,
+    plain: Compensator,
+    smooth: Vec<Smooth>,
+    is_shaped: bool,
+    backlash: f64,
+    elements: Vec<Element>,
+    has_travel: bool,
+    delay: f64,
+    /// Signals needed, each with the first term that needs it.
+    needs: Vec<(Signal, &'static str)>,
+}
+
+impl Terms {
+    /// Refuses numbers that are not finite, and terms that leave no unique correction.
+    pub fn new(evaluator: Arc<Evaluator>, terms: &[Term]) -> Result<Self, Error> {
+        let period = evaluator.series().period().value();
+        let mut ready = Self {
+            plain: Compensator::new(Arc::clone(&evaluator))?,
+            evaluator,
+            smooth: Vec::new(),
+            is_shaped: false,
+            backlash: 0.0,
+            elements: Vec::new(),
+            has_travel: false,
+            delay: 0.0,
+            needs: Vec::new(),
+        };
+        for term in terms {
+            match *term {
+                Term::Backlash { half_width } => {
+                    ready.backlash += half_width;
+                    ready.has_travel = true;
+                }
+                Term::PreslidingHysteresis { amplitude, length } => {
+                    ready.elements.push(Element { amplitude, length });
+                    ready.has_travel = true;
+                }
+                Term::Latency { delay } => ready.delay += delay,
+                _ => {}
+            }
+            ready.smooth.extend(Smooth::new(term, period)?);
+            if let Some(signal) = term.needs()
+                && ready.needs.iter().all(|(known, _)| *known != signal)
+            {
+                ready.needs.push((signal, term.kind()));
+            }
+        }
+        ready.is_shaped = ready.smooth.iter().any(Smooth::is_shaped);
+        // |dz/ds| reaches 2/length, just after a reversal.
+        let steepest: f64 = ready
+            .elements
+            .iter()
+            .map(|element| 2.0 * element.amplitude.abs() / element.length)
+            .sum();
+        let slope = steepest + ready.evaluator.slope_bound();
+        if ready.evaluator.argument() == Argument::Reference && slope >= 1.0 {
+            return Err(Error::NotInvertible { slope });
+        }
+        Ok(ready)
+    }
+
+    /// True when corrections depend on samples before.
+    pub fn has_state(&self) -> bool {
+        self.has_travel
+    }
+
+    /// Signals that must be given, each with a term that needs it.
+    pub fn needs(&self) -> &[(Signal, &'static str)] {
+        &self.needs
+    }
+
+    fn level(&self, signals: &Signals) -> f64 {
+        self.smooth.iter().map(|term| term.level(signals)).sum()
+    }
+
+    fn delayed(&self, signals: &Signals) -> f64 {
+        match signals.velocity {
+            Some(velocity) if self.delay != 0.0 => velocity * self.delay,
+            _ => 0.0,
+        }
+    }
+
+    fn check(&self, given: impl Fn(Signal) -> bool) -> Result<(), Error> {
+        for &(signal, term) in &self.needs {
+            let implied = signal == Signal::Direction && given(Signal::Velocity);
+            if !implied && !given(signal) {
+                return Err(Error::MissingSignal {
+                    signal: signal.name(),
+                    term,
+                });
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Corrects samples in the order they were taken.
+#[derive(Clone, Debug)]
+pub struct Corrector {
+    terms: Arc<Terms>,
+    travel: Travel,
+}
+
+impl Corrector {
+    /// A corrector that knows nothing of the past.
+    pub fn new(terms: Arc<Terms>) -> Self {
+        let travel = Travel::new(terms.elements.len());
+        Self { terms, travel }
+    }
+
+    /// Forgets the past.
+    pub fn reset(&mut self) {
+        self.travel = Travel::new(self.terms.elements.len());
+    }
+
+    /// The true angle behind an indicated one; NaN for what is not finite, which leaves
+    /// the state alone.
+    pub fn correct(&mut self, indicated: f64, signals: &Signals) -> Result<f64, Error> {
+        self.terms.check(|signal| signals.get(signal).is_some())?;
+        Ok(self.solve(indicated, signals))
+    }
+
+    /// Error at the true angle `theta` (at the indicated one where that is the argument).
+    pub fn error(&mut self, theta: f64, signals: &Signals) -> Result<f64, Error> {
+        self.terms.check(|signal| signals.get(signal).is_some())?;
+        Ok(self.indicate(theta, signals))
+    }
+
+    /// `correct` of many samples, or `error` of them.
+    pub fn run(
+        &mut self,
+        quantity: Quantity,
+        angles: &[f64],
+        columns: &Columns<'_>,
+        threads: Option<usize>,
+        out: &mut [f64],
+    ) -> Result<(), Error> {
+        if out.len() != angles.len() {
+            return Err(Error::Length {
+                what: "out",
+                got: out.len(),
+                other: "angle",
+                wanted: angles.len(),
+            });
+        }
+        columns.check(angles.len())?;
+        self.terms.check(|signal| match signal {
+            Signal::Direction => columns.direction.is_some(),
+            Signal::Velocity => columns.velocity.is_some(),
+            Signal::Temperature => columns.temperature.is_some(),
+            Signal::Torque => columns.torque.is_some(),
+        })?;
+        let terms = Arc::clone(&self.terms);
+        if quantity != Quantity::Correction {
+            for (i, (&x, y)) in angles.iter().zip(out).enumerate() {
+                *y = self.indicate(x, &columns.at(i));
+            }
+        } else if terms.has_travel || terms.is_shaped || terms.is_indicated() {
+            for (i, (&x, y)) in angles.iter().zip(out).enumerate() {
+                *y = self.solve(x, &columns.at(i));
+            }
+        } else {
+            // The terms do not depend on the angle: all samples at once.
+            for (i, (&x, y)) in angles.iter().zip(out.iter_mut()).enumerate() {
+                *y = x - terms.level(&columns.at(i));
+            }
+            let batch = Batch::in_place(&mut *out);
+            terms
+                .evaluator
+                .run(Quantity::Correction, None, threads, batch)?;
+            if terms.delay != 0.0 {
+                for (i, y) in out.iter_mut().enumerate() {
+                    *y += terms.delayed(&columns.at(i));
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn solve(&mut self, indicated: f64, signals: &Signals) -> f64 {
+        let terms = Arc::clone(&self.terms);
+        let (level, delayed) = (terms.level(signals), terms.delayed(signals));
+        // The series is undone first where its argument is the indicated angle.
+        let (goal, invert) = if terms.is_indicated() {
+            (terms.plain.step(indicated) - level, false)
+        } else {
+            (indicated - level, true)
+        };
+        if !(goal + delayed).is_finite() {
+            return f64::NAN;
+        }
+        if !terms.has_travel && !terms.is_shaped {
+            return delayed + if invert { terms.plain.step(goal) } else { goal };
+        }
+        let find =
+            |travel: &Travel, heading: Heading| terms.find(travel, heading, goal, invert, signals);
+        if !terms.has_travel {
+            return delayed + find(&self.travel, NOWHERE);
+        }
+        let travel = &mut self.travel;
+        let constant = terms.evaluator.series().constant();
+        travel.align(indicated - constant, terms.period());
+        if let Some(signal) = signals.direction.or(signals.velocity) {
+            let heading = travel.heading(signal);
+            let x = find(travel, heading);
+            if x.is_nan() || signal.is_nan() {
+                return f64::NAN;
+            }
+            travel.advance(&terms.elements, heading, x);
+            return x + delayed;
+        }
+        if !travel.is_known() {
+            let x = find(travel, NOWHERE);
+            if !x.is_nan() {
+                travel.advance(&terms.elements, NOWHERE, x);
+            }
+            return x + delayed;
+        }
+        // Play: the joint has moved where the angle leaves the band of the play.
+        let first = if travel.direction < 0.0 { -1.0 } else { 1.0 };
+        for direction in [first, -first] {
+            let heading = travel.heading(direction);
+            let x = find(travel, heading);
+            if x.is_nan() {
+                return x;
+            }
+            if (x - travel.farthest) * direction >= 0.0 {
+                travel.advance(&terms.elements, heading, x);
+                return x + delayed;
+            }
+        }
+        travel.farthest + delayed
+    }
+
+    fn indicate(&mut self, theta: f64, signals: &Signals) -> f64 {
+        let terms = Arc::clone(&self.terms);
+        if terms.is_indicated() {
+            return theta - self.solve(theta, signals);
+        }
+        let delayed = terms.delayed(signals);
+        let x = theta - delayed;
+        let mut value = [x];
+        let done = terms
+            .evaluator
+            .run(Quantity::Error, None, Some(1), Batch::in_place(&mut value));
+        debug_assert!(done.is_ok(), "an error can always be evaluated");
+        let mut error = value[0] + terms.level(signals) + terms.shape(signals, x).0;
+        if terms.has_travel && error.is_finite() {
+            let travel = &mut self.travel;
+            travel.align(x, terms.period());
+            let way = x - travel.farthest;
+            let moved = if way.is_nan() { 0.0 } else { way };
+            let signal = signals.direction.or(signals.velocity).unwrap_or(moved);
+            if signal.is_nan() {
+                return f64::NAN;
+            }
+            let heading = travel.heading(signal);
+            error +=
+                terms.backlash * heading.direction + travel.friction(&terms.elements, heading, x).0;
+            travel.advance(&terms.elements, heading, x);
+        }
+        error - delayed
+    }
+}
+
+/// Before the first motion.
+const NOWHERE: Heading = Heading {
+    direction: 0.0,
+    turned: false,
+};
+
+impl Terms {
+    fn is_indicated(&self) -> bool {
+        self.evaluator.argument() == Argument::Indicated
+    }
+
+    fn period(&self) -> f64 {
+        self.evaluator.series().period().value()
+    }
+
+    fn shape(&self, signals: &Signals, x: f64) -> (f64, f64) {
+        let series = self.evaluator.series();
+        self.smooth
+            .iter()
+            .map(|term| term.shape(signals, series, x))
+            .fold((0.0, 0.0), |(e, de), (f, df)| (e + f, de + df))
+    }
+
+    /// `x` with `x + series(x) + terms(x) = goal`, by Newton steps on the terms around
+    /// the inverse of the series; NaN where the signals leave no unique angle.
+    fn find(
+        &self,
+        travel: &Travel,
+        heading: Heading,
+        goal: f64,
+        invert: bool,
+        signals: &Signals,
+    ) -> f64 {
+        let goal = goal - self.backlash * heading.direction;
+        let inverse = |goal: f64| if invert { self.plain.step(goal) } else { goal };
+        let tolerance = SOLVED * self.period() + 2.0 * f64::EPSILON * goal.abs();
+        let mut x = inverse(goal);
+        if !self.is_shaped && self.elements.is_empty() {
+            return x;
+        }
+        for _ in 0..MOST_STEPS {
+            let (mut error, mut slope) = self.shape(signals, x);
+            if !self.elements.is_empty() {
+                let (friction, rise) = travel.friction(&self.elements, heading, x);
+                error += friction;
+                slope += rise;
+            }
+            let step = (inverse(goal - error) - x) / (1.0 + slope);
+            x += step;
+            if step.abs() <= tolerance {
+                return if slope.abs() < 1.0 { x } else { f64::NAN };
+            }
+        }
+        f64::NAN
+    }
+}

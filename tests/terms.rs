@@ -1,0 +1,204 @@
+//! Terms of the correction, in pure Rust: inversion, state, signals.
+
+use std::sync::Arc;
+
+use proptest::prelude::*;
+use trueangle::kernel::{Argument, Evaluator, Quantity};
+use trueangle::terms::{Columns, Corrector, Line, Signals, Term, Terms};
+use trueangle::{Error, HarmonicSeries, Shaft};
+
+const PERIOD: f64 = 360.0;
+
+/// The contract: corrections to below 1e-12 of a turn.
+const SOLVED: f64 = 1e-12 * PERIOD;
+
+fn corrector(terms: &[Term]) -> Corrector {
+    let shafts = vec![
+        Shaft {
+            cycles: 1.0,
+            orders: vec![1, 3],
+            cosine: vec![0.3, 0.0],
+            sine: vec![0.1, 0.05],
+        },
+        Shaft {
+            cycles: 50.0,
+            orders: vec![2],
+            cosine: vec![0.003],
+            sine: vec![0.002],
+        },
+    ];
+    let series = HarmonicSeries::new(PERIOD, 30.0, shafts).unwrap();
+    let evaluator = Arc::new(Evaluator::new(series, Argument::Reference));
+    Corrector::new(Arc::new(Terms::new(evaluator, terms).unwrap()))
+}
+
+fn every_term() -> Vec<Term> {
+    let line = |order, cosine, sine| Line {
+        order,
+        cosine,
+        sine,
+    };
+    vec![
+        Term::Backlash { half_width: 0.02 },
+        Term::PreslidingHysteresis {
+            amplitude: 0.01,
+            length: 2.0,
+        },
+        Term::Latency { delay: 1e-3 },
+        Term::FilterLag { cutoff: 50.0 },
+        Term::ThermalDrift {
+            zero: 1e-3,
+            pattern: 1e-3,
+            lines: vec![line(1.0, 1e-3, 0.0), line(50.5, 0.0, 2e-5)],
+            reference: 20.0,
+        },
+        Term::TorsionalCompliance {
+            linear: 3e-3,
+            lines: vec![],
+        },
+        Term::StiffeningCompliance {
+            linear: 1e-3,
+            cubic: 2e-6,
+            beyond: -2e-4,
+            knee: 3.0,
+            gravity: Some(30.0),
+        },
+        Term::LoadDependentGearError {
+            lines: vec![line(100.0, 1e-5, 1e-5)],
+            absolute: true,
+        },
+    ]
+}
+
+proptest! {
+    /// Defining identity, over random walks and random signals.
+    #[test]
+    fn correct_is_the_inverse_of_error(
+        steps in prop::collection::vec((-5.0..5.0f64, -300.0..300.0f64, -20.0..60.0f64, -9.0..9.0f64), 1..200),
+        directed in any::<bool>(),
+        start in -1e4..1e4f64,
+    ) {
+        let mut terms = every_term();
+        if !directed {
+            terms.retain(|term| !matches!(term, Term::Latency { .. } | Term::FilterLag { .. }));
+        }
+        let (mut forward, mut back) = (corrector(&terms), corrector(&terms));
+        let mut theta = start;
+        for (step, velocity, temperature, torque) in steps {
+            theta += step;
+            let signals = Signals {
+                velocity: directed.then_some(velocity),
+                temperature: Some(temperature),
+                torque: Some(torque),
+                direction: directed.then_some(step),
+            };
+            let error = forward.error(theta, &signals).unwrap();
+            let found = back.correct(theta + error, &signals).unwrap();
+            prop_assert!((found - theta).abs() <= SOLVED, "{found} {theta}");
+        }
+    }
+
+    /// Batches of any size give what steps give, bit for bit.
+    #[test]
+    fn a_batch_is_its_steps(angles in prop::collection::vec(-400.0..400.0f64, 0..300)) {
+        for terms in [
+            every_term(),
+            vec![Term::Latency { delay: 1e-3 }, Term::TorsionalCompliance { linear: 1e-3, lines: vec![] }],
+        ] {
+            let velocity: Vec<f64> = angles.iter().map(|x| 3.0 * x).collect();
+            let columns = Columns {
+                velocity: Some(&velocity),
+                temperature: Some(&[35.0]),
+                torque: Some(&[-4.0]),
+                direction: None,
+            };
+            let mut batch = vec![0.0; angles.len()];
+            corrector(&terms).run(Quantity::Correction, &angles, &columns, None, &mut batch).unwrap();
+            let mut steps = corrector(&terms);
+            for (i, &x) in angles.iter().enumerate() {
+                prop_assert_eq!(steps.correct(x, &columns.at(i)).unwrap(), batch[i]);
+            }
+        }
+    }
+}
+
+#[test]
+fn a_missing_signal_is_named() {
+    let mut corrector = corrector(&every_term());
+    let signals = Signals {
+        temperature: Some(20.0),
+        velocity: Some(1.0),
+        ..Signals::default()
+    };
+    assert_eq!(
+        corrector.correct(1.0, &signals),
+        Err(Error::MissingSignal {
+            signal: "torque",
+            term: "torsional_compliance"
+        })
+    );
+    let mut out = [0.0];
+    let columns = Columns {
+        velocity: Some(&[1.0]),
+        ..Columns::default()
+    };
+    let failure = corrector.run(Quantity::Correction, &[1.0], &columns, None, &mut out);
+    assert!(
+        failure
+            .unwrap_err()
+            .to_string()
+            .contains("needs temperature")
+    );
+}
+
+#[test]
+fn columns_of_another_length_are_refused() {
+    let mut out = [0.0; 3];
+    let columns = Columns {
+        torque: Some(&[1.0, 2.0]),
+        velocity: Some(&[1.0]),
+        temperature: Some(&[1.0]),
+        ..Columns::default()
+    };
+    let failure = corrector(&every_term())
+        .run(Quantity::Correction, &[1.0; 3], &columns, None, &mut out)
+        .unwrap_err();
+    assert_eq!(
+        failure,
+        Error::Length {
+            what: "torque",
+            got: 2,
+            other: "angle",
+            wanted: 3
+        }
+    );
+}
+
+#[test]
+fn resetting_forgets_the_past() {
+    let mut corrector = corrector(&[Term::Backlash { half_width: 1.0 }]);
+    let forward = Signals {
+        direction: Some(1.0),
+        ..Signals::default()
+    };
+    let unknown = Signals::default();
+    let first = corrector.correct(10.0, &unknown).unwrap();
+    let moving = corrector.correct(10.0, &forward).unwrap();
+    assert!((first - moving - 1.0).abs() < 0.01);
+    corrector.reset();
+    assert_eq!(corrector.correct(10.0, &unknown).unwrap(), first);
+}
+
+#[test]
+fn friction_steeper_than_the_angle_is_refused() {
+    let steep = Term::PreslidingHysteresis {
+        amplitude: 1.0,
+        length: 1.0,
+    };
+    let series = HarmonicSeries::new(PERIOD, 0.0, vec![]).unwrap();
+    let evaluator = Arc::new(Evaluator::new(series, Argument::Reference));
+    assert!(matches!(
+        Terms::new(evaluator, &[steep]),
+        Err(Error::NotInvertible { slope }) if slope == 2.0
+    ));
+}
