@@ -19,6 +19,8 @@ if TYPE_CHECKING:
     from .model import Shaft as Shaft
     from .model import load_model as load_model
     from .moments import Moments as Moments
+    from .orders import OrderSelection as OrderSelection
+    from .orders import select_orders as select_orders
     from .runfiles import read_runs as read_runs
     from .runs import CalibrationRun as CalibrationRun
     from .simulation import Simulation as Simulation
@@ -38,6 +40,8 @@ _PUBLIC = {
     "wrap": "angles",
     "CalibrationRun": "runs",
     "Diagnosis": "diagnosis",
+    "OrderSelection": "orders",
+    "select_orders": "orders",
     "FitResult": "fitresult",
     "HarmonicModel": "model",
     "Shaft": "model",

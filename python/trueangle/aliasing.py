@@ -17,10 +17,10 @@ from numpy.typing import NDArray
 
 from .errors import ArgumentError
 from .runs import CalibrationRun, as_runs
+from .shafts import FIXED_MEMBERS
 
 __all__ = [
     "COMMON_RATIOS",
-    "FIXED_MEMBERS",
     "POSITION_TOLERANCE",
     "Explanation",
     "Positions",
@@ -41,8 +41,10 @@ POSITION_TOLERANCE: Final = 1.0 / 36_000.0
 #: Gear ratios of common strain wave gears, tried where none is declared.
 COMMON_RATIOS: Final = (30, 50, 80, 100, 120, 160)
 
-#: The member of the gear that stands still.
-FIXED_MEMBERS: Final = ("circular_spline", "flexspline", "none")
+
+#: A gap counts as missing travel when wider than this part of a turn (20 deg) and than
+#: three usual ones.
+_MISSING: Final = 20.0 / 360.0
 
 #: Most shifted uniform grids that a union of mounts is searched for.
 _MOST_GRIDS: Final = 24
@@ -78,11 +80,10 @@ class Positions:
 
     @property
     def span(self) -> float:
-        """Part of the turn that is covered, the largest gap left out (1 for a grid)."""
+        """Part of the turn that is covered: 1, or less where an arc was not travelled."""
         gaps = np.diff(self.turns, append=self.turns[0] + 1.0)
         largest = float(gaps.max())
-        # A full circle has a largest gap like all the others.
-        return 1.0 if largest <= 3.0 * float(np.median(gaps)) else 1.0 - largest
+        return 1.0 if largest <= max(_MISSING, 3.0 * float(np.median(gaps))) else 1.0 - largest
 
     @property
     def highest_order(self) -> int:

@@ -1,0 +1,177 @@
+"""Candidate orders of a selection, and how much false alarm each may use up."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .aliasing import (
+    COMMON_RATIOS,
+    POSITION_TOLERANCE,
+    Positions,
+    distinct_positions,
+    gear_orders,
+    position_coherence,
+)
+from .errors import ArgumentError
+from .planning import HIGHEST_LOW_ORDER
+from .runs import CalibrationRun
+
+__all__ = ["Candidates", "choose_candidates", "effective_positions"]
+
+#: Low orders looked at when no gear is declared and the angles are free.
+HIGHEST_FREE_ORDER: Final = 100
+
+#: Orders scanned beyond the low ones where the angles are free.
+HIGHEST_SCANNED: Final = 450
+
+#: Part of the allowed false alarm that the scan may use up.
+_SCAN_SHARE: Final = 0.2
+
+#: Coherence from which two orders are one at the positions, whatever the noise.
+_SAME: Final = 1.0 - 1e-9
+
+#: Aliases are listed at least up to this order.
+_LEAST_ALIAS: Final = 404
+
+#: Side bands of a reference order: modulation by its eccentricity and tilt.
+_SIDE_BANDS: Final = (-2, -1, 1, 2)
+
+
+@dataclass(frozen=True)
+class Candidates:
+    """Orders to look at.
+
+    Attributes
+    ----------
+    orders : tuple of float
+        All of them, ascending.
+    main : frozenset of float
+        Those looked at closely; the others are scanned.
+    reference : tuple of float
+        Orders of the reference itself, side bands included.
+    carriers : tuple of float
+        The reference orders as they were declared.
+    gear_ratio : float or None
+    fixed_member : str
+    highest : int
+        Nyquist limit of the positions for orders that are not named.
+    """
+
+    orders: tuple[float, ...]
+    main: frozenset[float]
+    reference: tuple[float, ...]
+    carriers: tuple[float, ...]
+    gear_ratio: float | None
+    fixed_member: str
+    highest: int
+
+    @property
+    def highest_alias(self) -> int:
+        """Highest order listed as an alias: 4 motor turns' worth, at least 400."""
+        ratio = max(COMMON_RATIOS) if self.gear_ratio is None else self.gear_ratio
+        return max(_LEAST_ALIAS, math.ceil(4.0 * ratio) + 4)
+
+    @property
+    def whole(self) -> bool:
+        """Whether all orders are whole."""
+        return all(float(k).is_integer() for k in self.orders)
+
+    @property
+    def main_indices(self) -> list[int]:
+        """Indices of the orders looked at closely."""
+        return [i for i, k in enumerate(self.orders) if k in self.main]
+
+    def log_limits(self, false_alarm: float) -> NDArray[np.float64]:
+        """Log of the false-alarm chance of each order, ``false_alarm`` in all."""
+        main = np.array([k in self.main for k in self.orders], dtype=bool)
+        scanned = int((~main).sum())
+        share = 1.0 - _SCAN_SHARE if scanned else 1.0
+        limits = np.empty(main.size)
+        limits[main] = math.log(share * false_alarm / max(1, int(main.sum())))
+        limits[~main] = math.log(_SCAN_SHARE * false_alarm / max(1, scanned))
+        return limits
+
+
+def effective_positions(runs: Sequence[CalibrationRun], positions: Positions) -> Positions:
+    """Positions as a grid even where small shifts of the zero blur it.
+
+    Unnamed orders are looked for only below the Nyquist limit of that grid.
+    """
+    if positions.divisions is not None:
+        return positions
+    for widening in (10.0, 100.0):
+        blurred = distinct_positions(runs, widening * POSITION_TOLERANCE * runs[0].period)
+        if blurred.divisions is not None and len(blurred) < len(positions):
+            return blurred
+    return positions
+
+
+def choose_candidates(
+    runs: Sequence[CalibrationRun],
+    positions: Positions,
+    candidates: Iterable[float] | None,
+    gear_ratio: float | None,
+    fixed_member: str,
+    reference_orders: Sequence[float],
+) -> Candidates:
+    """Candidates as asked for, or low orders, the gear's own and a scan.
+
+    Raises
+    ------
+    ArgumentError
+        Orders that are not positive and finite.
+    """
+    gear = [] if gear_ratio is None else [float(m) for m in gear_orders(gear_ratio, fixed_member)]
+    effective = effective_positions(runs, positions)
+    highest = effective.highest_order
+    if effective.divisions is None:
+        highest = min(highest, math.floor((len(positions) - 1) / (2.0 * positions.span)))
+    carriers = tuple(_checked(reference_orders, "reference_orders"))
+    reference = sorted(
+        {k + s for k in carriers for s in (0, *_SIDE_BANDS) if k + s > max(_SIDE_BANDS)}
+        | set(carriers)
+    )
+    scanned: list[float] = []
+    if candidates is not None:
+        main = _checked(candidates, "candidates")
+    else:
+        limit = HIGHEST_FREE_ORDER if gear_ratio is None else HIGHEST_LOW_ORDER
+        main = [float(k) for k in range(1, min(limit, highest) + 1)]
+        for m in gear:
+            if m not in main and _apart(positions, m, main):
+                main.append(m)
+        if positions.span == 1.0:
+            top = min(HIGHEST_SCANNED, highest)
+            scanned = [float(k) for k in range(1, top + 1) if float(k) not in main]
+    orders = sorted({*main, *scanned, *reference})
+    tidy = tuple(int(k) if k.is_integer() else k for k in orders)
+    return Candidates(
+        orders=tidy,
+        main=frozenset({*main, *reference}),
+        reference=tuple(reference),
+        carriers=carriers,
+        gear_ratio=gear_ratio,
+        fixed_member=fixed_member,
+        highest=highest,
+    )
+
+
+def _apart(positions: Positions, order: float, others: Sequence[float]) -> bool:
+    """Whether the positions tell ``order`` from the constant and from all of ``others``."""
+    return bool(position_coherence(positions, order, [0.0, *others]).max() < _SAME)
+
+
+def _checked(orders: Iterable[float], name: str) -> list[float]:
+    found = []
+    for k in orders:
+        value = float(k)
+        if not (math.isfinite(value) and value > 0.0):
+            raise ArgumentError(f"{name} must be positive orders, got {k!r}")
+        found.append(value)
+    return sorted(set(found))

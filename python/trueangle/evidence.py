@@ -1,0 +1,358 @@
+"""Evidence for orders: significance with a bound for the search, and held-out gain.
+
+All of it works on the normal equations of `HarmonicSums`; the readings are not touched
+again. An order has two coefficients, so that with noise variance s^2 known from v
+degrees of freedom the statistic ``T = gain / s^2`` of a line that is not there follows
+``2 F(2, v)``, whose tail is ``(1 + T / v)^(-v / 2)``.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .harmonicsums import HarmonicSums
+
+__all__ = [
+    "OrderTest",
+    "choose_forward",
+    "examine_orders",
+    "fit_subset",
+    "held_out_error",
+    "held_out_gains",
+    "log_tail",
+    "pooled_scatter",
+    "run_scatter",
+]
+
+Array = NDArray[np.float64]
+Index = NDArray[np.intp]
+
+#: A candidate whose columns keep less than this of their energy beside those already
+#: chosen is an alias of them.
+_COLLINEAR: Final = 1e-8
+
+#: Least degrees of freedom that a residual must keep.
+_LEAST_DOF: Final = 3
+
+#: Scatter between runs counts as an order's own where chance makes it rarer than this.
+_OVERDISPERSED: Final = 1e-3
+
+
+def log_tail(statistic: Array | float, dof: float) -> Array:
+    """Logarithm of the probability that noise alone reaches ``statistic``."""
+    t = np.maximum(np.asarray(statistic, dtype=np.float64), 0.0)
+    return np.asarray(-0.5 * t if math.isinf(dof) else -0.5 * dof * np.log1p(t / dof))
+
+
+def _pairs(matrix: Array, n: int) -> tuple[Array, Array, Array]:
+    """Entries aa, ab, bb of the 2x2 diagonal blocks of orders."""
+    i = np.arange(n)
+    return matrix[i, i], matrix[i, i + n], matrix[i + n, i + n]
+
+
+def choose_forward(
+    sums: HarmonicSums,
+    log_limits: Array,
+    readings: int,
+    noise: tuple[float, float] | None,
+    forced: Sequence[int] = (),
+) -> list[int]:
+    """Indices of orders, taken one by one while the best of the rest is significant.
+
+    Parameters
+    ----------
+    sums : HarmonicSums
+    log_limits : ndarray, shape (orders,)
+        Log of the false-alarm probability that each order may use up.
+    readings : int
+        Degrees of freedom before any order: readings less zeros.
+    noise : (variance, degrees of freedom) or None
+        None takes the residual of the orders chosen so far, the one on trial included.
+    forced : sequence of int
+        Taken first, whatever they bring.
+
+    Returns
+    -------
+    list of int
+        In the order of their choice; among aliases the lowest order.
+    """
+    gram, rhs, rest = sums.total()
+    gram, rhs = gram.copy(), rhs.copy()
+    n = sums.orders.size
+    aa, ab, bb = _pairs(gram, n)
+    # Scale free: energy of both columns, the smaller direction counts.
+    energy = 0.5 * (aa + bb)
+    alive = energy > 0.0
+    chosen: list[int] = []
+    queue = list(forced)
+    while alive.any():
+        dof = readings - 2 * len(chosen) - 2
+        if dof < _LEAST_DOF:
+            break
+        aa, ab, bb = _pairs(gram, n)
+        det = aa * bb - ab * ab
+        alive &= det > (_COLLINEAR * energy) ** 2
+        alive &= np.minimum(aa, bb) > _COLLINEAR * energy
+        safe = np.where(alive, det, 1.0)
+        a, b = rhs[:n], rhs[n:]
+        gain = np.where(alive, (bb * a * a - 2.0 * ab * a * b + aa * b * b) / safe, 0.0)
+        if queue:
+            best = queue.pop(0)
+            if not alive[best]:
+                continue
+        else:
+            if noise is None:
+                left = np.maximum(rest - gain, 1e-300)
+                score = log_tail(gain * dof / left, dof) - log_limits
+            else:
+                score = log_tail(gain / noise[0], noise[1]) - log_limits
+            score = np.where(alive, score, math.inf)
+            top = int(np.argmin(score))
+            if not score[top] <= 0.0:
+                break
+            # Aliases explain equally much: keep the lowest order, the first one.
+            same = alive & (gain >= gain[top] * (1.0 - 1e-9))
+            best = int(np.flatnonzero(same)[np.argmin(sums.orders[same])])
+        chosen.append(best)
+        pivot = sums.columns([best])
+        factor = np.linalg.solve(gram[np.ix_(pivot, pivot)], gram[pivot])
+        rest -= float(gain[best])
+        rhs -= factor.T @ rhs[pivot]
+        gram -= gram[:, pivot] @ factor
+        alive[best] = False
+    return chosen
+
+
+def fit_subset(sums: HarmonicSums, chosen: Sequence[int]) -> tuple[Array, Array, float]:
+    """Coefficients of the chosen orders, inverse normal matrix, residual sum of squares."""
+    gram, rhs, squares = sums.total()
+    columns = sums.columns(chosen)
+    if columns.size == 0:
+        return np.zeros(0), np.zeros((0, 0)), squares
+    inverse = _inverse(gram[np.ix_(columns, columns)])
+    coefficients = inverse @ rhs[columns]
+    return coefficients, inverse, max(0.0, squares - float(rhs[columns] @ coefficients))
+
+
+def _inverse(gram: Array) -> Array:
+    """Inverse of a normal matrix; directions that the readings do not see get zero."""
+    scale = np.sqrt(np.maximum(np.diag(gram), 1e-300))
+    values, vectors = np.linalg.eigh(gram / np.outer(scale, scale))
+    keep = values > 1e-12 * values[-1]
+    inverse = (vectors[:, keep] / values[keep]) @ vectors[:, keep].T
+    return np.asarray(inverse / np.outer(scale, scale))
+
+
+def run_scatter(sums: HarmonicSums, chosen: Sequence[int], orders: Sequence[int]) -> Array:
+    r"""Variance of one reading as each order's coefficients vary between the units.
+
+    .. math:: s_k^2 = \frac{1}{2(R-1)} \sum_r h_{rk}^T H_{rk}^{-1} h_{rk}
+
+    with the scores ``h = X' W (y - model)`` of each unit about their common fit: the
+    noise at that order, whatever its colour, including what really changes from run to
+    run. Infinite with one unit.
+    """
+    index = np.asarray(orders, dtype=np.intp)
+    if sums.units < 2 or index.size == 0:
+        return np.full(index.size, math.inf)
+    coefficients, _, _ = fit_subset(sums, chosen)
+    n = index.size
+    both = np.concatenate([index, np.asarray(chosen, dtype=np.intp)])
+    parts = []
+    for unit in range(sums.units):
+        gram = sums.gram(unit, both)
+        mine = np.concatenate([np.arange(n), np.arange(n) + both.size])
+        theirs = np.concatenate([np.arange(n, both.size), np.arange(n, both.size) + both.size])
+        score = sums.rhs(unit, index) - gram[np.ix_(mine, theirs)] @ coefficients
+        i = np.arange(n)
+        blocks = np.empty((n, 2, 2))
+        blocks[:, 0, 0] = gram[i, i]
+        blocks[:, 1, 1] = gram[i + both.size, i + both.size]
+        blocks[:, 0, 1] = blocks[:, 1, 0] = gram[i, i + both.size]
+        blocks += 1e-9 * np.trace(blocks, axis1=1, axis2=2)[:, None, None] * np.eye(2)
+        parts.append((blocks, np.stack([score[:n], score[n:]], axis=1)))
+    together = np.sum([blocks for blocks, _ in parts], axis=0)
+    common = np.linalg.solve(together, np.sum([s for _, s in parts], axis=0)[..., None])
+    quadratic = np.zeros(n)
+    for blocks, score in parts:
+        own = score - (blocks @ common)[..., 0]
+        quadratic += np.einsum("ki,ki->k", own, np.linalg.solve(blocks, own[..., None])[..., 0])
+    return np.asarray(quadratic / (2.0 * (sums.units - 1)))
+
+
+@dataclass(frozen=True, eq=False)
+class OrderTest:
+    """Statistics of orders beside the chosen ones (or among them).
+
+    Arrays have one entry per order asked for; ``cosine``/``sine`` are the coefficients
+    with all chosen orders in the model.
+    """
+
+    cosine: Array
+    sine: Array
+    variance: Array
+    statistic: Array
+    log_p: Array
+
+
+def pooled_scatter(scatter: Array, units: int) -> tuple[float, float] | None:
+    """Noise common to most orders: mean of their scatter, the overdispersed left out."""
+    finite = scatter[np.isfinite(scatter)]
+    each = 2 * (units - 1)
+    if finite.size * each < 20:
+        return None
+    # Median of chi-square over its mean (Wilson and Hilferty).
+    middle = float(np.median(finite)) / (1.0 - 2.0 / (9.0 * each)) ** 3
+    usual = finite[_log_chi2_tail(finite / middle * each, each) > math.log(_OVERDISPERSED)]
+    if usual.size * each < 20:
+        return None
+    return float(usual.mean()), float(usual.size * each)
+
+
+def _log_chi2_tail(x: Array, dof: int) -> Array:
+    """Log of the upper tail of chi-square with an even number of degrees of freedom."""
+    half = 0.5 * np.asarray(x, dtype=np.float64)[..., None]
+    i = np.arange(dof // 2)
+    terms = i * np.log(np.maximum(half, 1e-300)) - np.array([math.lgamma(j + 1.0) for j in i])
+    top = terms.max(axis=-1, keepdims=True)
+    return np.asarray(-half[..., 0] + top[..., 0] + np.log(np.exp(terms - top).sum(axis=-1)))
+
+
+def examine_orders(
+    sums: HarmonicSums,
+    chosen: Sequence[int],
+    orders: Sequence[int],
+    noise: tuple[float, float],
+    scatter: Array | None,
+) -> OrderTest:
+    """Significance of ``orders``, each beside the other chosen ones.
+
+    ``scatter`` (from `run_scatter`) replaces the noise for an order that varies between
+    the units by more than the noise.
+    """
+    total, rhs, _ = sums.total()
+    n = len(orders)
+    cosine, sine, variance, statistic = np.empty((4, n))
+    level = np.full(n, noise[0])
+    dof = np.full(n, noise[1])
+    if scatter is not None and sums.units > 1:
+        each = 2 * (sums.units - 1)
+        ratio = np.maximum(scatter, 0.0) / noise[0] * each
+        own = np.isfinite(scatter) & (_log_chi2_tail(ratio, each) < math.log(_OVERDISPERSED))
+        np.copyto(level, scatter, where=own)
+        dof[own] = each
+    position = {k: i for i, k in enumerate(chosen)}
+    coefficients, inverse, _ = fit_subset(sums, chosen)
+    base = sums.columns(chosen)
+    size = len(chosen)
+    outside = [k for k in orders if k not in position]
+    if outside:
+        other = sums.columns(outside)
+        cross = total[np.ix_(base, other)]
+        slope = inverse @ cross
+        blocks = total[np.ix_(other, other)] - cross.T @ slope
+        scores = rhs[other] - cross.T @ coefficients
+    log_p = np.empty(n)
+    for i, k in enumerate(orders):
+        if k in position:
+            j = position[k]
+            pair = [j, j + size]
+            pair_inverse = inverse[np.ix_(pair, pair)]
+            value = coefficients[pair]
+            gain = float(value @ np.linalg.pinv(pair_inverse) @ value)
+        else:
+            j = outside.index(k)
+            pair = [j, j + len(outside)]
+            block = blocks[np.ix_(pair, pair)]
+            scale = float(np.trace(total[np.ix_(other[pair], other[pair])]))
+            if np.linalg.eigvalsh(block)[0] <= _COLLINEAR * scale:
+                cosine[i] = sine[i] = variance[i] = math.nan
+                statistic[i], log_p[i] = 0.0, 0.0
+                continue
+            pair_inverse = np.asarray(np.linalg.inv(block))
+            value = pair_inverse @ scores[pair]
+            gain = float(value @ scores[pair])
+        cosine[i], sine[i] = value
+        variance[i] = level[i] * 0.5 * float(np.trace(pair_inverse))
+        statistic[i] = gain / level[i] if level[i] > 0.0 else math.inf
+        log_p[i] = float(log_tail(statistic[i], dof[i]))
+    return OrderTest(cosine, sine, variance, statistic, log_p)
+
+
+def held_out_gains(
+    sums: HarmonicSums, chosen: Sequence[int], orders: Sequence[int]
+) -> tuple[Array, Array, float]:
+    """Held-out sum of squares with and without each order, one unit left out at a time.
+
+    The left-out unit keeps its own zero, the chosen orders come from the other units.
+
+    Returns
+    -------
+    without, with_ : ndarray, shape (len(orders),)
+        For an order among the chosen ones ``with_`` is the model itself; for another one
+        ``without`` is. Entry by entry their difference is the gain of that order.
+    model : float
+        Held-out sum of squares of the chosen orders.
+    """
+    position = {k: i for i, k in enumerate(chosen)}
+    outside = [k for k in orders if k not in position]
+    both = np.asarray([*chosen, *outside], dtype=np.intp)
+    size, every = len(chosen), both.size
+    base = np.concatenate([np.arange(size), np.arange(size) + every])
+    other = np.stack([np.arange(size, every), np.arange(size, every) + every], axis=1)
+    grams = [sums.gram(u, both) for u in range(sums.units)]
+    rhs = [sums.rhs(u, both) for u in range(sums.units)]
+    total, whole = np.sum(grams, axis=0), np.sum(rhs, axis=0)
+    model = 0.0
+    dropped, added = np.zeros(size), np.zeros(len(outside))
+    for gram, mine, squares in zip(grams, rhs, sums.squares, strict=True):
+        train, score = total - gram, whole - mine
+        inverse = _inverse(train[np.ix_(base, base)]) if size else np.zeros((0, 0))
+        fitted = inverse @ score[base]
+        here = gram[np.ix_(base, base)]
+        left = mine - gram[:, base] @ fitted
+        error = float(squares - fitted @ (mine[base] + left[base]))
+        model += error
+        # Dropping order j moves all coefficients by -inverse_j inverse_jj^-1 fitted_j.
+        pairs = np.stack([np.arange(size), np.arange(size) + size], axis=1)
+        own = np.linalg.pinv(inverse[pairs[:, :, None], pairs[:, None, :]], hermitian=True)
+        back = np.einsum("bki,kij,kj->bk", inverse[:, pairs], own, fitted[pairs])
+        dropped += error + 2.0 * left[base] @ back + np.einsum("bk,bk->k", back, here @ back)
+        # Adding an order moves the others by -slope times its own coefficients.
+        slope = (inverse @ train[np.ix_(base, other.ravel())]).reshape(2 * size, len(outside), 2)
+        flat = train[np.ix_(base, other.ravel())].reshape(2 * size, len(outside), 2)
+        blocks = train[other[:, :, None], other[:, None, :]] - np.einsum(
+            "bki,bkj->kij", flat, slope
+        )
+        step = np.einsum(
+            "kij,kj->ki",
+            np.linalg.pinv(blocks, rcond=_COLLINEAR, hermitian=True),
+            score[other] - np.einsum("bki,b->ki", flat, fitted),
+        )
+        move = np.einsum("bki,ki->bk", slope, step)
+        linear = np.einsum("ki,ki->k", step, left[other]) - left[base] @ move
+        mixed = gram[np.ix_(base, other.ravel())].reshape(2 * size, len(outside), 2)
+        square = (
+            np.einsum("ki,kij,kj->k", step, gram[other[:, :, None], other[:, None, :]], step)
+            - 2.0 * np.einsum("bk,bki,ki->k", move, mixed, step)
+            + np.einsum("bk,bk->k", move, here @ move)
+        )
+        added += square - 2.0 * linear
+    without, with_ = np.full(len(orders), model), np.full(len(orders), model)
+    for i, k in enumerate(orders):
+        if k in position:
+            without[i] = dropped[position[k]]
+        else:
+            with_[i] += added[outside.index(k)]
+    return without, with_, model
+
+
+def held_out_error(sums: HarmonicSums, chosen: Sequence[int]) -> float:
+    """Held-out sum of squares of the chosen orders, one unit left out at a time."""
+    return float(held_out_gains(sums, chosen, [])[2])

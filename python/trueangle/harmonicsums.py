@@ -1,0 +1,216 @@
+"""Sums that every fit of some orders needs, taken in one pass over the readings.
+
+For integer orders these are the spectra ``sum w e^{imx}`` and ``sum w y e^{imx}`` of
+each unit of readings: the normal equations of any set of orders follow from them, so
+that 450 orders cost one pass and not 450 fits.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["HarmonicSums", "Readings", "harmonic_sums"]
+
+Array = NDArray[np.float64]
+
+#: Powers of e^{ix} between two fresh evaluations: keeps rounding near 1e-15 * 64.
+_RESEED: Final = 64
+
+#: Readings handled at once: the working set stays in the cache.
+_CHUNK: Final = 1 << 15
+
+
+@dataclass(frozen=True, eq=False)
+class Readings:
+    """Readings of one unit: a run, or a run on one mount, that has its own zero.
+
+    Attributes
+    ----------
+    turns : ndarray, shape (n,)
+        Reference angle in turns; unwrapped where the orders are not whole.
+    error : ndarray, shape (n,)
+        Error around its zero, in any unit.
+    weights : ndarray, shape (n,)
+        Positive.
+    label : str
+    """
+
+    turns: Array
+    error: Array
+    weights: Array
+    label: str
+
+    def part(self, mask: NDArray[np.bool_], label: str) -> Readings:
+        """The readings where ``mask`` is true."""
+        return Readings(self.turns[mask], self.error[mask], self.weights[mask], label)
+
+
+class HarmonicSums:
+    """Normal equations of orders, unit by unit, each unit's own zero taken out.
+
+    Columns are ``cos`` of all orders, then ``sin`` of all orders.
+    """
+
+    def __init__(
+        self,
+        orders: Sequence[float],
+        weight: Array,
+        count: NDArray[np.int64],
+        squares: Array,
+        moments: Array,
+        grams: list[Array] | None,
+        spectra: NDArray[np.complex128] | None,
+        means: Array,
+    ) -> None:
+        self.orders = np.asarray(orders, dtype=np.float64)
+        #: Readings and their total weight, per unit.
+        self.count, self.weight = count, weight
+        #: Weighted sum of squares about the unit's mean, per unit.
+        self.squares = squares
+        self._rhs = moments
+        self._grams = grams
+        self._spectra = spectra
+        self._means = means
+        self._total: Array | None = None
+
+    @property
+    def units(self) -> int:
+        """Number of units."""
+        return int(self.count.size)
+
+    def columns(self, index: Sequence[int] | NDArray[np.intp]) -> NDArray[np.intp]:
+        """Columns of the orders at ``index``: their cosines, then their sines."""
+        i = np.asarray(index, dtype=np.intp)
+        return np.concatenate([i, i + self.orders.size])
+
+    def rhs(self, unit: int, index: Sequence[int] | NDArray[np.intp]) -> Array:
+        """``X' W y`` of a unit about its means, for the orders at ``index``."""
+        return np.asarray(self._rhs[unit, self.columns(index)])
+
+    def gram(self, unit: int, index: Sequence[int] | NDArray[np.intp]) -> Array:
+        """``X' W X`` of a unit about its means, for the orders at ``index``."""
+        columns = self.columns(index)
+        if self._grams is not None:
+            return np.asarray(self._grams[unit][np.ix_(columns, columns)])
+        assert self._spectra is not None
+        whole = self.orders[np.asarray(index, dtype=np.intp)].astype(np.int64)
+        spectrum = self._spectra[unit]
+        down, up = whole[:, None] - whole[None, :], whole[:, None] + whole[None, :]
+        minus, plus = spectrum[np.abs(down)], spectrum[up]
+        sine = np.sign(down) * minus.imag
+        gram = 0.5 * np.block(
+            [
+                [plus.real + minus.real, plus.imag - sine],
+                [plus.imag + sine, minus.real - plus.real],
+            ]
+        )
+        mean = self._means[unit, columns]
+        return np.asarray(gram - self.weight[unit] * np.outer(mean, mean))
+
+    def total(self) -> tuple[Array, Array, float]:
+        """Sums of all units: ``X' W X``, ``X' W y`` and the sum of squares."""
+        if self._total is None:
+            everything = np.arange(self.orders.size)
+            total = self.gram(0, everything)
+            for unit in range(1, self.units):
+                total = total + self.gram(unit, everything)
+            self._total = total
+        return self._total, self._rhs.sum(axis=0), float(self.squares.sum())
+
+
+def harmonic_sums(units: Sequence[Readings], orders: Sequence[float]) -> HarmonicSums:
+    """One pass over the readings of every unit.
+
+    Memory per unit is three numbers per order where all orders are whole, else a square
+    matrix of twice the number of orders; the readings are never expanded to a matrix.
+    """
+    whole = all(float(k).is_integer() for k in orders)
+    count = np.array([u.turns.size for u in units], dtype=np.int64)
+    weight = np.array([u.weights.sum() for u in units])
+    centre = [float(np.dot(u.weights, u.error)) / w for u, w in zip(units, weight, strict=True)]
+    squares = np.array(
+        [float(np.dot(u.weights, (u.error - c) ** 2)) for u, c in zip(units, centre, strict=True)]
+    )
+    if whole:
+        return _from_spectra(units, orders, weight, count, squares, centre)
+    return _from_columns(units, orders, weight, count, squares, centre)
+
+
+def _from_spectra(
+    units: Sequence[Readings],
+    orders: Sequence[float],
+    weight: Array,
+    count: NDArray[np.int64],
+    squares: Array,
+    centre: list[float],
+) -> HarmonicSums:
+    index = np.asarray(orders, dtype=np.int64)
+    highest = int(index.max(initial=0))
+    spectra = np.empty((len(units), 2 * highest + 1), dtype=np.complex128)
+    moments = np.empty((len(units), 2 * index.size))
+    for i, unit in enumerate(units):
+        spectra[i], values = _spectra(unit, centre[i], highest)
+        moments[i] = np.concatenate([values[index].real, values[index].imag])
+    picked = spectra[:, index] / weight[:, None]
+    means = np.concatenate([picked.real, picked.imag], axis=1)
+    return HarmonicSums(orders, weight, count, squares, moments, None, spectra, means)
+
+
+def _spectra(
+    unit: Readings, centre: float, highest: int
+) -> tuple[NDArray[np.complex128], NDArray[np.complex128]]:
+    """``sum w e^{imx}`` for m to twice the highest order, ``sum w (y - c) e^{imx}`` to it."""
+    weights = np.zeros(2 * highest + 1, dtype=np.complex128)
+    values = np.zeros(highest + 1, dtype=np.complex128)
+    for start in range(0, unit.turns.size, _CHUNK):
+        part = slice(start, start + _CHUNK)
+        turns = unit.turns[part] - np.floor(unit.turns[part])
+        step = np.exp(2j * math.pi * turns)
+        w = unit.weights[part]
+        wy = w * (unit.error[part] - centre)
+        for m in range(2 * highest + 1):
+            if m % _RESEED == 0:
+                # The product m * t loses what lies before the point: take it off first.
+                phase = m * turns
+                power = np.exp(2j * math.pi * (phase - np.round(phase)))
+            else:
+                power *= step
+            weights[m] += w @ power
+            if m <= highest:
+                values[m] += wy @ power
+    return weights, values
+
+
+def _from_columns(
+    units: Sequence[Readings],
+    orders: Sequence[float],
+    weight: Array,
+    count: NDArray[np.int64],
+    squares: Array,
+    centre: list[float],
+) -> HarmonicSums:
+    angular = 2.0 * math.pi * np.asarray(orders, dtype=np.float64)
+    grams, means = [], np.empty((len(units), 2 * angular.size))
+    moments = np.empty((len(units), 2 * angular.size))
+    for i, unit in enumerate(units):
+        gram = np.zeros((2 * angular.size, 2 * angular.size))
+        first = np.zeros(2 * angular.size)
+        moment = np.zeros(2 * angular.size)
+        for start in range(0, unit.turns.size, _CHUNK):
+            part = slice(start, start + _CHUNK)
+            x = unit.turns[part, None] * angular
+            design = np.concatenate([np.cos(x), np.sin(x)], axis=1)
+            weighted = design * unit.weights[part, None]
+            gram += weighted.T @ design
+            first += weighted.sum(axis=0)
+            moment += weighted.T @ (unit.error[part] - centre[i])
+        means[i] = first / weight[i]
+        grams.append(gram - weight[i] * np.outer(means[i], means[i]))
+        moments[i] = moment
+    return HarmonicSums(orders, weight, count, squares, moments, grams, None, means)

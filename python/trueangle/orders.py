@@ -1,0 +1,107 @@
+"""Which orders are real: selection with evidence, and a refusal where there is none."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from .aliasing import distinct_positions
+from .candidates import choose_candidates
+from .errors import ArgumentError
+from .ordertable import OrderRow, OrderSelection
+from .runs import CalibrationRun, as_runs
+from .selection import EvidenceSelection
+
+__all__ = ["OrderRow", "OrderSelection", "select_orders"]
+
+
+def select_orders(
+    runs: CalibrationRun | Iterable[CalibrationRun],
+    candidates: Iterable[float] | None = None,
+    gear_ratio: float | None = None,
+    fixed_member: str = "circular_spline",
+    *,
+    reference_orders: Iterable[float] = (),
+    tolerance: float | None = None,
+) -> OrderSelection:
+    r"""Orders of the angle error that the readings support.
+
+    An order is retained when it is significant,
+
+    .. math:: P\{2 F(2, \nu) > T_k\} \le \alpha_k / K_k, \qquad
+              T_k = \frac{\text{reduction of the sum of squares}}{\sigma^2},
+
+    with a bound for all the orders searched (0.5 % chance of any false order), **and**
+    when it lowers the error of readings that took no part in the fit. Held out are whole
+    runs, with several mounts whole parts of them; with a single run whole blocks of
+    neighbouring positions. Rows of the same positions are never split at random: a wrong
+    order that repeats at all of them would pass.
+
+    Parameters
+    ----------
+    runs : CalibrationRun or iterable of them
+        Each with its own zero. Readings of weight 0 take no part.
+    candidates : iterable of float, optional
+        Orders to look at. By default 1 .. 17 and the gear's own orders when
+        ``gear_ratio`` is given, else 1 .. 100, as far as the positions can tell them; and
+        a scan up to order 450 where the angles are free.
+    gear_ratio : float, optional
+        Motor turns per output turn.
+    fixed_member : {"circular_spline", "flexspline", "none"}
+    reference_orders : iterable of float, optional
+        Orders that the reference itself is known to make (50 and 100 for a stepper motor
+        of 200 steps). They and their side bands are fitted, named and not retained.
+    tolerance : float, optional
+        Positions closer than this are one, default 0.01 degree; unit of the runs.
+
+    Returns
+    -------
+    OrderSelection
+        With no orders and a reason when the data support none.
+
+    Raises
+    ------
+    ArgumentError
+        Runs in different units, candidates that are not positive.
+
+    Notes
+    -----
+    The noise comes from repeats of the same position where there are enough (pure error,
+    no model enters), else from the residual. An order that varies from run to run by more
+    than that is judged by its own scatter between the runs. One pass over the readings,
+    whatever the number of candidates.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> theta = np.tile(np.arange(0.0, 360.0, 10.0), 6)
+    >>> noise = np.random.default_rng(1).normal(0.0, 0.001, theta.size)
+    >>> run = CalibrationRun(theta, theta + 0.02 * np.sin(np.radians(3 * theta)) + noise, 360.0)
+    >>> select_orders(run).orders
+    (3,)
+    """
+    found = as_runs(runs)
+    kept = [run for run in map(_without_zero_weights, found) if run is not None]
+    if not kept:
+        raise ArgumentError("all readings have weight 0: nothing is left to select orders from")
+    positions = distinct_positions(kept, tolerance)
+    chosen = choose_candidates(
+        kept, positions, candidates, gear_ratio, fixed_member, tuple(reference_orders)
+    )
+    return EvidenceSelection(kept, positions, chosen).result()
+
+
+def _without_zero_weights(run: CalibrationRun) -> CalibrationRun | None:
+    if run.weights is None or (run.weights > 0.0).all():
+        return run
+    keep = run.weights > 0.0
+    if not keep.any():
+        return None
+    mount = None if run.mount is None else run.mount[keep]
+    return CalibrationRun(
+        run.reference[keep],
+        run.indicated[keep],
+        period=run.period,
+        mount=mount,
+        label=run.label,
+        weights=run.weights[keep],
+    )

@@ -1,0 +1,78 @@
+"""Rendering of a selection of orders as text."""
+
+from __future__ import annotations
+
+import math
+import textwrap
+
+from .angles import arcsec
+from .ordertable import OrderRow, OrderSelection
+
+__all__ = ["summarise"]
+
+#: Rejected orders listed beside the retained ones, the strongest first.
+_REJECTED = 8
+_WIDTH = 96
+
+
+def summarise(selection: OrderSelection) -> str:
+    """Table of the orders, the reasons and the notes; amplitudes in arcsec."""
+    period = selection.period
+    noise = arcsec(selection.noise.standard_deviation, period)
+    before, after = (arcsec(v, period) for v in selection.holdout_rms)
+    runs = f"{selection.runs} run{'s' if selection.runs != 1 else ''}"
+    lines = [
+        f"Orders of the angle error ({selection.method})",
+        f"  {selection.samples} readings in {runs}, {selection.positions.describe()}",
+        f"  noise of one reading  {noise:.4g} arcsec, from {_source(selection)}",
+        f"  held-out rms          {before:.4g} -> {after:.4g} arcsec ({selection.holdout})",
+    ]
+    retained = [row for row in selection.table if row.retained]
+    others = [row for row in selection.table if not row.retained and row.verdict != "alias"]
+    others.sort(key=lambda row: row.log10_false_alarm)
+    shown = sorted([*retained, *others[:_REJECTED]], key=lambda row: row.order)
+    if shown:
+        lines += ["", _HEADER, *(_line(row, period) for row in shown)]
+    hidden = len(selection.table) - len(shown)
+    if hidden:
+        lines.append(f"  ... and {hidden} weaker orders, not retained")
+    lines.append("")
+    if not retained:
+        lines.append(f"NO ORDER RETAINED: {selection.reason}")
+    for row in selection.table:
+        if row.doubtful or row.verdict == "reference":
+            text = row.reason if row.doubtful else f"{row.order:g}: {row.reason}"
+            lines += textwrap.wrap(f"! {text}", _WIDTH, subsequent_indent="  ")
+    for note in selection.notes:
+        lines += textwrap.wrap(f"note: {note}", _WIDTH, subsequent_indent="  ")
+    return "\n".join(lines).rstrip()
+
+
+_HEADER = (
+    "  order   amplitude        +-   phase     +-  spread  false alarm  held-out gain  verdict"
+)
+
+
+def _line(row: OrderRow, period: float) -> str:
+    chance = (
+        f"1e{math.floor(row.log10_false_alarm):d}"
+        if row.log10_false_alarm < -3
+        else (f"{10.0**row.log10_false_alarm:.3g}")
+    )
+    spread = f"{row.phase_spread_deg:6.0f}" if math.isfinite(row.phase_spread_deg) else "     -"
+    return (
+        f"  {row.order:>5g} {arcsec(row.amplitude, period):11.4g} "
+        f"{arcsec(row.standard_error, period):9.3g} {row.phase_deg % 360.0:7.1f} "
+        f"{row.phase_error_deg:6.1f}  {spread} {chance:>12} {100.0 * row.holdout_gain:12.3g} %"
+        f"  {row.verdict}"
+    )
+
+
+def _source(selection: OrderSelection) -> str:
+    noise = selection.noise
+    what = {
+        "repeats": "repeats at the same positions",
+        "residual": "the residual of all candidates",
+        "model": "the residual of the retained orders",
+    }[noise.source]
+    return f"{what} ({noise.degrees_of_freedom} degrees of freedom)"

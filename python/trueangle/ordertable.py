@@ -1,0 +1,176 @@
+"""The result of a selection of orders: one row of evidence per order."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from .aliasing import Explanation, Positions
+from .repeats import Noise
+
+__all__ = ["OrderRow", "OrderSelection"]
+
+
+@dataclass(frozen=True)
+class OrderRow:
+    """What the data say about one order.
+
+    Angles are in the unit of the runs unless the name says otherwise.
+
+    Attributes
+    ----------
+    order : int or float
+        Cycles per output turn.
+    retained : bool
+    verdict : str
+        ``"retained"``, ``"noise"``, ``"no held-out gain"``, ``"negligible"``,
+        ``"alias"``, ``"reference"`` or ``"weak"``.
+    cosine, sine : float
+        Coefficients A and B beside all retained orders.
+    standard_error : float
+        Of each of A and B, and of the amplitude where it is well above zero.
+    statistic : float
+        Reduction of the sum of squares over the noise variance; about 2 for noise.
+    log10_false_alarm : float
+        Logarithm of the chance that noise alone does as well in the whole search.
+    holdout_gain : float
+        Part by which the held-out mean square falls when this order joins the other
+        retained ones (negative: it makes new data worse).
+    phase_spread_deg : float
+        Circular range of the phase over the runs, NaN with a single run.
+    aliases : tuple of int
+        Orders that these readings cannot tell from this one.
+    explanations : tuple of Explanation
+        Known lines of the joint that the order or an alias of it may be.
+    reason : str
+    """
+
+    order: float
+    retained: bool
+    verdict: str
+    cosine: float
+    sine: float
+    standard_error: float
+    statistic: float
+    log10_false_alarm: float
+    holdout_gain: float
+    phase_spread_deg: float
+    aliases: tuple[float, ...] = ()
+    explanations: tuple[Explanation, ...] = ()
+    reason: str = ""
+
+    @property
+    def amplitude(self) -> float:
+        """``hypot(A, B)``."""
+        return math.hypot(self.cosine, self.sine)
+
+    @property
+    def phase_deg(self) -> float:
+        """``atan2(A, B)`` in degrees, in (-180, 180]."""
+        return math.degrees(math.atan2(self.cosine, self.sine))
+
+    @property
+    def doubtful(self) -> bool:
+        """Whether an alias of the order is a known line of the joint."""
+        return any(e.order != self.order for e in self.explanations)
+
+    @property
+    def phase_error_deg(self) -> float:
+        """Standard error of the phase; 180 at most."""
+        ratio = self.standard_error / self.amplitude if self.amplitude > 0.0 else math.inf
+        return min(180.0, math.degrees(ratio))
+
+
+@dataclass(frozen=True, eq=False)
+class OrderSelection:
+    """Orders that the data support, and the evidence for and against each candidate.
+
+    Attributes
+    ----------
+    orders : tuple of int (or float for a gear whose ratio is not whole)
+        Retained orders of the output turn, ascending; may be empty.
+    table : tuple of OrderRow
+        One row per candidate that was looked at closely, ascending.
+    reason : str
+        Why nothing was retained; empty otherwise.
+    method : str
+    period : float
+        Unit of the amplitudes.
+    positions : Positions
+        Distinct positions of the readings.
+    samples, runs : int
+    noise : Noise
+        Variance of a reading of weight 1 and where it comes from.
+    holdout : str
+        What was held out.
+    holdout_rms : (float, float)
+        Held-out rms without any order and with the retained ones.
+    gear_ratio : float or None
+    notes : tuple of str
+        What a user must know before trusting the orders.
+    """
+
+    orders: tuple[float, ...]
+    table: tuple[OrderRow, ...]
+    reason: str
+    method: str
+    period: float
+    positions: Positions
+    samples: int
+    runs: int
+    noise: Noise
+    holdout: str
+    holdout_rms: tuple[float, float]
+    gear_ratio: float | None = None
+    notes: tuple[str, ...] = ()
+
+    @property
+    def by_shaft(self) -> Mapping[str, tuple[int, ...]]:
+        """Retained orders as `trueangle.fit` takes them: whole ones belong to the output.
+
+        Orders that are not whole are those of a gear whose ratio is not; they belong to
+        the motor, or to the wave generator one turn apart from it.
+        """
+        found: dict[str, list[int]] = {}
+        for order in self.orders:
+            if float(order).is_integer():
+                found.setdefault("output", []).append(int(order))
+                continue
+            ratio = float(self.gear_ratio or math.nan)
+            for shaft, cycles in (
+                ("motor", ratio),
+                ("wave_generator", ratio + 1.0),
+                ("wave_generator", ratio - 1.0),
+            ):
+                if abs(order / cycles - round(order / cycles)) < 1e-9:
+                    found.setdefault(shaft, []).append(round(order / cycles))
+                    break
+        return {shaft: tuple(orders) for shaft, orders in found.items()}
+
+    def row(self, order: float) -> OrderRow:
+        """The row of one order.
+
+        Raises
+        ------
+        KeyError
+            The order was not among the candidates.
+        """
+        for row in self.table:
+            if row.order == order:
+                return row
+        raise KeyError(order)
+
+    @property
+    def note(self) -> str:
+        """The notes in one line, for a model's record."""
+        return ". ".join(note[:1].upper() + note[1:] for note in self.notes)
+
+    def summary(self) -> str:
+        """The table and its notes as text, amplitudes in arcsec."""
+        from .ordersummary import summarise
+
+        return summarise(self)
+
+    def __str__(self) -> str:
+        return self.summary()

@@ -1,0 +1,85 @@
+"""Noise from repeats: what readings at the same position disagree by."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .aliasing import Positions
+from .harmonicsums import Readings
+
+__all__ = ["Noise", "pure_error"]
+
+#: Sweeps of alternating means (positions, zeros); whole grids need one.
+_SWEEPS: Final = 20
+
+
+@dataclass(frozen=True)
+class Noise:
+    """Variance of one reading of weight 1.
+
+    Attributes
+    ----------
+    variance : float
+        Square of the unit of the error.
+    degrees_of_freedom : int
+    source : str
+        ``"repeats"`` (readings at the same position), ``"residual"`` (of the model with
+        all candidates) or ``"model"`` (residual of the orders kept so far).
+    """
+
+    variance: float
+    degrees_of_freedom: int
+    source: str
+
+    @property
+    def standard_deviation(self) -> float:
+        """Scatter of one reading."""
+        return math.sqrt(self.variance)
+
+
+def pure_error(units: Sequence[Readings], positions: Positions) -> Noise | None:
+    r"""Scatter of the readings about the means of their positions and units.
+
+    .. math:: y_{up} = m_p + z_u + e
+
+    with a mean ``m`` for each position and a zero ``z`` for each unit: no model of the
+    error enters. None where no position was read twice.
+    """
+    y = np.concatenate([u.error for u in units])
+    w = np.concatenate([u.weights for u in units])
+    unit = np.repeat(np.arange(len(units)), [u.turns.size for u in units])
+    place = positions.index
+    pairs = np.unique(unit * len(positions) + place)
+    dof = y.size - len(positions) - len(units) + _components(pairs, len(units), len(positions))
+    if dof < 1:
+        return None
+    place_weight = np.bincount(place, weights=w)
+    unit_weight = np.bincount(unit, weights=w)
+    e = y.copy()
+    for _ in range(_SWEEPS):
+        e -= (np.bincount(unit, weights=w * e) / unit_weight)[unit]
+        mean = np.bincount(place, weights=w * e) / place_weight
+        e -= mean[place]
+        if float(np.abs(mean).max()) <= 1e-9 * (float(np.abs(y).max()) or 1.0):
+            break
+    return Noise(float(np.dot(w, e * e)) / dof, int(dof), "repeats")
+
+
+def _components(pairs: NDArray[np.int64], units: int, positions: int) -> int:
+    """Groups of units that no shared position connects."""
+    unit, place = pairs // positions, pairs % positions
+    label = np.arange(units)
+    while True:
+        lowest = np.full(positions, units)
+        np.minimum.at(lowest, place, label[unit])
+        new = label.copy()
+        np.minimum.at(new, unit, lowest[place])
+        if (new == label).all():
+            return int(np.unique(label).size)
+        label = new

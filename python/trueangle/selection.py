@@ -1,0 +1,290 @@
+"""Selection of orders by evidence, step by step."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .aliasing import Positions
+from .candidates import Candidates
+from .evidence import (
+    choose_forward,
+    examine_orders,
+    fit_subset,
+    held_out_error,
+    held_out_gains,
+    pooled_scatter,
+    run_scatter,
+)
+from .harmonicsums import HarmonicSums, Readings, harmonic_sums
+from .lookalikes import find_lookalikes
+from .ordertable import OrderRow, OrderSelection
+from .phases import circular_range_deg, unit_phases
+from .repeats import Noise, pure_error
+from .runs import CalibrationRun
+from .verdicts import explained, selection_notes
+
+__all__ = ["EvidenceSelection", "angle_blocks", "units_of"]
+
+Array = NDArray[np.float64]
+
+#: Chance, over the whole search, that noise alone makes any order significant. Half of
+#: the 1 % promised: the rest covers what the noise estimate itself does not know.
+FALSE_ALARM: Final = 0.005
+
+#: Least degrees of freedom for which a noise estimate is used on its own.
+_ENOUGH_DOF: Final = 20
+
+#: An order is left out as negligible when its amplitude is below this share of the whole
+#: error (root sum of squares of the amplitudes) ...
+NEGLIGIBLE_SHARE: Final = 0.01
+#: ... and at the same time below this share of one reading's scatter: correcting it would
+#: change the error of no reading by anything to speak of.
+NEGLIGIBLE_NOISE: Final = 0.1
+
+#: Folds of a single run: whole blocks of neighbouring positions, dealt in turn.
+_FOLDS: Final = 6
+_BLOCKS: Final = 24
+
+
+def units_of(runs: Sequence[CalibrationRun], whole: bool) -> tuple[list[Readings], Array]:
+    """Units with a zero of their own: runs, split where the mount changes within one.
+
+    Returns the units and the place of each of their readings among all readings of the
+    runs. Angles are unwrapped unless ``whole`` (all orders are whole).
+    """
+    units, places, start = [], [], 0
+    for number, run in enumerate(runs):
+        label = run.label or str(number + 1)
+        angle = run.reference if whole else run.unwrapped_reference
+        weights = np.ones(len(run)) if run.weights is None else run.weights
+        everything = Readings(angle / run.period, run.centred_error, weights, label)
+        place = np.arange(start, start + len(run))
+        if run.mount is not None and np.unique(run.mount).size > 1:
+            for mount in np.unique(run.mount):
+                mask = run.mount == mount
+                units.append(everything.part(mask, f"{label}, mount {mount:g}"))
+                places.append(place[mask])
+        else:
+            units.append(everything)
+            places.append(place)
+        start += len(run)
+    return units, np.concatenate(places)
+
+
+def angle_blocks(unit: Readings, positions: Positions) -> list[Readings]:
+    """Folds of a single run: blocks of neighbouring positions, dealt in turn."""
+    blocks = min(_BLOCKS, len(positions) // 2)
+    folds = min(_FOLDS, blocks)
+    if folds < 2:
+        return []
+    fold = (positions.index * blocks // len(positions)) % folds
+    return [unit.part(fold == f, f"block {f + 1}") for f in range(folds)]
+
+
+class EvidenceSelection:
+    """One selection by evidence, step by step."""
+
+    def __init__(
+        self, runs: Sequence[CalibrationRun], positions: Positions, candidates: Candidates
+    ) -> None:
+        self.runs = runs
+        self.candidates = candidates
+        self.orders = candidates.orders
+        self.units, places = units_of(runs, candidates.whole)
+        self.positions = Positions(
+            positions.turns, positions.index[places], positions.divisions, positions.offsets
+        )
+        self.sums = harmonic_sums(self.units, self.orders)
+        self.samples = int(self.sums.count.sum())
+        self.free = self.samples - len(self.units)
+        self.repeats = pure_error(self.units, self.positions)
+        self.limits = candidates.log_limits(FALSE_ALARM)
+        reference = set(candidates.reference)
+        self.forced = [i for i, k in enumerate(self.orders) if k in reference]
+        if len(self.units) > 1:
+            self.holdout = "one run at a time"
+            if len(self.units) > len(runs):
+                self.holdout = "one mount at a time"
+            self.folds: HarmonicSums | None = self.sums
+        else:
+            parts = angle_blocks(self.units[0], self.positions)
+            self.holdout = "whole blocks of neighbouring positions (single run)"
+            self.folds = harmonic_sums(parts, self.orders) if parts else None
+
+    def result(self) -> OrderSelection:
+        """The selection with its table."""
+        chosen = self._forward()
+        chosen, dropped = self._backward(chosen)
+        return self._report(self._lowest(chosen), dropped)
+
+    def _noise(self, chosen: Sequence[int]) -> Noise:
+        """Repeats, or the residual of all candidates, or of the chosen orders."""
+        if self.repeats is not None and self.repeats.degrees_of_freedom >= _ENOUGH_DOF:
+            return self.repeats
+        everything = len(self.orders)
+        if self.free - 2 * everything >= max(_ENOUGH_DOF, 2 * everything):
+            _, _, squares = fit_subset(self.sums, range(everything))
+            dof = self.free - 2 * everything
+            return Noise(squares / dof, dof, "residual")
+        dof = max(1, self.free - 2 * len(chosen))
+        return Noise(fit_subset(self.sums, chosen)[2] / dof, dof, "model")
+
+    def _level(self, chosen: Sequence[int]) -> tuple[tuple[float, float], Array | None]:
+        """Noise of the coefficients: common to all orders, and each order's own."""
+        noise = self._noise(chosen)
+        level = (noise.variance, float(noise.degrees_of_freedom))
+        if len(self.units) < 2:
+            return level, None
+        scatter = run_scatter(self.sums, chosen, range(len(self.orders)))
+        return pooled_scatter(scatter, len(self.units)) or level, scatter
+
+    def _forward(self) -> list[int]:
+        noise = self._noise(())
+        known = None
+        if noise.source != "model":
+            known = (noise.variance, float(noise.degrees_of_freedom))
+        return choose_forward(self.sums, self.limits, self.free, known, self.forced)
+
+    def _backward(self, chosen: list[int]) -> tuple[list[int], dict[int, str]]:
+        """Drop, worst first, what does not stand beside the others."""
+        dropped: dict[int, str] = {}
+        while True:
+            mine = [i for i in chosen if i not in self.forced]
+            if not mine:
+                return chosen, dropped
+            level, scatter = self._level(chosen)
+            own = None if scatter is None else scatter[mine]
+            test = examine_orders(self.sums, chosen, mine, level, own)
+            verdict, failing = "noise", test.log_p - self.limits[mine]
+            if not (failing > 0.0).any():
+                verdict, failing = "no held-out gain", -self._gains(chosen, mine)
+            if not (failing >= 0.0).any():
+                amplitude = np.hypot(test.cosine, test.sine)
+                share = amplitude / math.sqrt(float((amplitude**2).sum()))
+                scatter_of_one = self._noise(chosen).standard_deviation
+                small = (share < NEGLIGIBLE_SHARE) & (amplitude < NEGLIGIBLE_NOISE * scatter_of_one)
+                verdict, failing = "negligible", np.where(small, -amplitude, -math.inf)
+                if not small.any():
+                    return chosen, dropped
+                failing += amplitude[small].max()
+            # The worst half at once: the others may recover once these are gone.
+            worst = np.argsort(-failing, kind="stable")[: (int((failing >= 0.0).sum()) + 1) // 2]
+            dropped |= {mine[w]: verdict for w in worst}
+            gone = {mine[w] for w in worst}
+            chosen = [i for i in chosen if i not in gone]
+
+    def _gains(self, chosen: Sequence[int], orders: Sequence[int]) -> Array:
+        """Part by which each order lowers the held-out mean square."""
+        if self.folds is None:
+            return np.full(len(orders), math.nan)
+        without, with_, _ = held_out_gains(self.folds, chosen, orders)
+        return np.asarray((without - with_) / np.maximum(np.abs(without), 1e-300))
+
+    def _lookalikes(self, chosen: Sequence[int]) -> dict[int, tuple[float, ...]]:
+        """Aliases of every chosen order that these readings cannot exclude."""
+        found = find_lookalikes(
+            self.units,
+            self.positions,
+            [self.orders[i] for i in chosen],
+            self._noise(chosen).variance,
+            self.candidates.highest_alias,
+        )
+        return dict(zip(chosen, found, strict=True))
+
+    def _lowest(self, chosen: list[int]) -> list[int]:
+        """Where the readings decide nothing, a class stands by its lowest candidate."""
+        result = list(chosen)
+        for i, aliases in self._lookalikes(chosen).items():
+            lower = [m for m in aliases if m < self.orders[i]]
+            known = [j for j, k in enumerate(self.orders) if k in lower]
+            free = [j for j in known if j not in result]
+            if free and i not in self.forced:
+                result[result.index(i)] = free[0]
+        return result
+
+    def _report(self, chosen: list[int], dropped: Mapping[int, str]) -> OrderSelection:
+        shown = sorted({*chosen, *dropped, *self.candidates.main_indices})
+        level, scatter = self._level(chosen)
+        own = None if scatter is None else scatter[shown]
+        test = examine_orders(self.sums, chosen, shown, level, own)
+        gains = self._gains(chosen, shown)
+        phases = unit_phases(self.sums, chosen, shown)
+        lookalikes = self._lookalikes(chosen)
+        verdicts = {**dict.fromkeys(chosen, "retained"), **dict.fromkeys(self.forced, "reference")}
+        rows = []
+        for n, i in enumerate(shown):
+            usable = math.isfinite(test.cosine[n])
+            verdict = verdicts.get(i) or dropped.get(i) or ("noise" if usable else "alias")
+            if verdict == "noise" and test.log_p[n] <= self.limits[i]:
+                verdict = "no held-out gain" if not gains[n] > 0.0 else "weak"
+            rows.append(
+                OrderRow(
+                    order=self.orders[i],
+                    retained=verdict == "retained",
+                    verdict=verdict,
+                    cosine=float(test.cosine[n]) if usable else 0.0,
+                    sine=float(test.sine[n]) if usable else 0.0,
+                    standard_error=math.sqrt(test.variance[n]) if usable else math.inf,
+                    statistic=float(test.statistic[n]),
+                    log10_false_alarm=self._false_alarm(float(test.log_p[n]), i),
+                    holdout_gain=float(gains[n]),
+                    phase_spread_deg=circular_range_deg(phases[:, n]),
+                    aliases=lookalikes.get(i, ()),
+                )
+            )
+        rows = [explained(row, self.candidates, self.positions) for row in rows]
+        orders = tuple(row.order for row in rows if row.retained)
+        without, with_ = self._held_out_rms(chosen)
+        selection = OrderSelection(
+            orders=orders,
+            table=tuple(rows),
+            reason="" if orders else self._refusal(rows),
+            method="evidence",
+            period=self.runs[0].period,
+            positions=self.positions,
+            samples=self.samples,
+            runs=len(self.runs),
+            noise=self._noise(chosen),
+            holdout=self.holdout,
+            holdout_rms=(without, with_),
+            gear_ratio=self.candidates.gear_ratio,
+        )
+        return replace(selection, notes=selection_notes(selection, self.candidates))
+
+    def _refusal(self, rows: Sequence[OrderRow]) -> str:
+        """Why nothing was retained."""
+        if not rows:
+            return (
+                f"{len(self.positions)} distinct positions can tell no order from the zero: "
+                "read at three positions or more"
+            )
+        best = min(rows, key=lambda row: row.log10_false_alarm)
+        beside = f"the strongest of {len(self.orders)} orders searched, {best.order:g},"
+        if best.verdict == "reference":
+            return "the only orders that stand out are the reference's own"
+        if best.verdict == "no held-out gain":
+            return f"{beside} does not lower the error of readings held out of the fit"
+        chance = 100.0 * 10.0**best.log10_false_alarm
+        return (
+            f"{beside} does not stand out of the noise "
+            f"(noise alone does as well in {chance:.2g} % of such searches)"
+        )
+
+    def _held_out_rms(self, chosen: Sequence[int]) -> tuple[float, float]:
+        """Held-out rms with no order at all and with the chosen ones."""
+        if self.folds is None:
+            return math.nan, math.nan
+        weight = float(self.folds.weight.sum())
+        none = float(self.folds.squares.sum())
+        model = held_out_error(self.folds, chosen) if chosen else none
+        return math.sqrt(none / weight), math.sqrt(max(0.0, model) / weight)
+
+    def _false_alarm(self, log_p: float, i: int) -> float:
+        """Log10 of the chance in the whole search: the limit stands for `FALSE_ALARM`."""
+        return min(0.0, (log_p - float(self.limits[i]) + math.log(FALSE_ALARM)) / math.log(10.0))

@@ -1,0 +1,190 @@
+"""What a selection means, in words: reasons per order, notes, verified positions."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from typing import Final
+
+import numpy as np
+
+from .aliasing import Positions, distinct_positions, energy_near_nyquist, explain_order
+from .candidates import Candidates, choose_candidates
+from .errors import NoModelError
+from .ordertable import OrderRow, OrderSelection
+from .planning import plan_mounts
+from .runs import CalibrationRun, as_runs
+
+__all__ = ["VerifiedPositions", "explained", "selection_notes", "verified_positions"]
+
+#: Share of the energy in the upper half of the orders from which under-sampling is said.
+_UNDER_SAMPLED: Final = 0.25
+
+_VERDICTS: Final = {
+    "noise": "does not stand out of the noise",
+    "weak": "significant by itself, but taken up by the retained orders",
+    "no held-out gain": "does not lower the error of readings held out of the fit",
+    "negligible": "significant, but too small to change any reading",
+    "alias": "cannot be told from retained orders at these positions",
+}
+
+
+def explained(row: OrderRow, candidates: Candidates, positions: Positions) -> OrderRow:
+    """The row with its explanations and the reason of its verdict."""
+    ratio, member = candidates.gear_ratio, candidates.fixed_member
+    if row.verdict == "reference":
+        return replace(row, reason=_reference_reason(row.order, candidates.carriers))
+    if not row.retained:
+        return replace(row, reason=_VERDICTS[row.verdict])
+    explanations = explain_order(row.order, row.aliases, ratio, member)
+    reason = "significant, and lowers the error of readings held out of the fit"
+    gear = [str(e) for e in explanations if e.order != row.order]
+    if gear:
+        reason = (
+            f"{row.order:g} may be {' or '.join(gear)}; these positions cannot tell. "
+            f"Measure {_measure(positions, ratio, member)}"
+        )
+    return replace(row, explanations=explanations, reason=reason)
+
+
+def _reference_reason(order: float, carriers: Sequence[float]) -> str:
+    if order in carriers:
+        return "the reference's own, as declared"
+    carrier = min(carriers, key=lambda c: abs(order - c))
+    return f"the reference's own: side band {order - carrier:+g} of its order {carrier:g}"
+
+
+def _measure(positions: Positions, ratio: float | None, member: str) -> str:
+    """What to measure to tell aliases apart."""
+    if positions.divisions is None:
+        return "over more of the turn, or at more positions"
+    offset = _separating_offset(positions.divisions, ratio, member)
+    where = (
+        f"again with the reference turned by {offset:.4g} deg on its mount"
+        if offset
+        else ("at free angles between these positions")
+    )
+    return f"{where} (trueangle plan)"
+
+
+@lru_cache(maxsize=32)
+def _separating_offset(divisions: int, ratio: float | None, member: str) -> float | None:
+    """Offset of a second mount that serves the declared gear, or ratio 100."""
+    try:
+        plan = plan_mounts(ratio or 100.0, divisions, 2, fixed_member=member)
+    except ValueError:
+        return None
+    return plan.mount_offsets_deg[1]
+
+
+def selection_notes(selection: OrderSelection, candidates: Candidates) -> tuple[str, ...]:
+    """What a user must know before trusting the orders."""
+    positions = selection.positions
+    notes = []
+    retained = [row for row in selection.table if row.retained]
+    aliased = [row for row in retained if row.aliases]
+    grid = positions.divisions is not None and len(positions.offsets) == 1
+    if grid and retained:
+        share = energy_near_nyquist(
+            [row.order for row in retained],
+            [row.amplitude for row in retained],
+            positions.highest_order,
+        )
+        if share > _UNDER_SAMPLED:
+            notes.append(
+                f"{100.0 * share:.0f} % of the energy lies in the upper half of the orders that "
+                "these positions hold: the mark of orders beyond them"
+            )
+    if aliased:
+        notes.append(_sentence(positions, candidates))
+    if candidates.gear_ratio is not None and not candidates.whole:
+        notes.append(
+            f"gear ratio {candidates.gear_ratio:g} is not whole: the error is not periodic in "
+            "one output turn"
+        )
+    return tuple(notes)
+
+
+@dataclass(frozen=True)
+class VerifiedPositions:
+    """Where a model fitted to some readings is verified.
+
+    Attributes
+    ----------
+    count : int
+        Distinct positions modulo a turn.
+    between : bool
+        Whether the readings also speak for the angles in between.
+    sentence : str
+    """
+
+    count: int
+    between: bool
+    sentence: str
+
+
+def verified_positions(
+    runs: CalibrationRun | Iterable[CalibrationRun],
+    gear_ratio: float | None = None,
+    fixed_member: str = "circular_spline",
+) -> VerifiedPositions:
+    """At which positions the readings can verify a model, and whether also in between.
+
+    In between is verified where the positions are no grid, or a grid (or union of grids)
+    that tells the low orders and all orders of the gear from each other; without a
+    declared gear the orders of the common ratios are taken.
+
+    Examples
+    --------
+    >>> run = CalibrationRun(np.arange(36) * 10.0, np.arange(36) * 10.0, period=360.0)
+    >>> verified_positions(run, gear_ratio=100).between
+    False
+    """
+    found = as_runs(runs)
+    positions = distinct_positions(found)
+    candidates = choose_candidates(found, positions, None, gear_ratio, fixed_member, ())
+    return VerifiedPositions(
+        len(positions), _between(positions, candidates), _sentence(positions, candidates)
+    )
+
+
+def _between(positions: Positions, candidates: Candidates) -> bool:
+    divisions = positions.divisions
+    if divisions is None:
+        return len(positions) > 2 * candidates.highest and candidates.highest > 0
+    if divisions > 2 * candidates.highest_alias:
+        return True
+    if candidates.gear_ratio is None:
+        return False
+    try:
+        plan_mounts(
+            candidates.gear_ratio,
+            divisions,
+            len(positions.offsets),
+            fixed_member=candidates.fixed_member,
+        )
+    except (NoModelError, ValueError):
+        return False
+    return math.isfinite(_worst_factor(positions, candidates))
+
+
+def _worst_factor(positions: Positions, candidates: Candidates) -> float:
+    from .noisefactors import mount_noise_factors
+    from .planning import wanted_orders
+
+    assert positions.divisions is not None
+    assert candidates.gear_ratio is not None
+    orders = wanted_orders(
+        candidates.gear_ratio, candidates.fixed_member, min(17, positions.highest_order)
+    )
+    offsets = 360.0 * np.asarray(positions.offsets)
+    return float(mount_noise_factors(positions.divisions, offsets, orders).max())
+
+
+def _sentence(positions: Positions, candidates: Candidates) -> str:
+    where = f"verified at {positions.describe()}"
+    if _between(positions, candidates):
+        return f"{where}, and in between for the orders these tell apart"
+    return f"{where}; in between it is not: higher orders look like those retained"
