@@ -51,6 +51,7 @@ _MOST_GRIDS: Final = 24
 
 #: Up to this many positions their spectrum is summed exactly, beyond by a histogram.
 _EXACT_SPECTRUM: Final = 4096
+_BLOCK: Final = 1 << 18
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,6 +85,18 @@ class Positions:
         gaps = np.diff(self.turns, append=self.turns[0] + 1.0)
         largest = float(gaps.max())
         return 1.0 if largest <= max(_MISSING, 3.0 * float(np.median(gaps))) else 1.0 - largest
+
+    def spectrum(self, highest: int) -> Array:
+        """``|mean exp(2 pi i m t)|`` for m = 0 .. highest, by a histogram for many t."""
+        if len(self) > _EXACT_SPECTRUM:
+            cells = 1 << 16
+            counts = np.bincount((self.turns * cells).astype(np.int64) % cells, minlength=cells)
+            return np.asarray(np.abs(np.fft.rfft(counts))[: highest + 1] / len(self))
+        orders = np.arange(highest + 1)
+        # One block of orders after the other keeps the matrix small.
+        blocks = np.array_split(orders, 1 + orders.size * len(self) // _BLOCK)
+        means = [np.exp(2j * math.pi * np.outer(m, self.turns)).mean(axis=1) for m in blocks]
+        return np.asarray(np.abs(np.concatenate(means)))
 
     @property
     def highest_order(self) -> int:
@@ -221,23 +234,16 @@ def position_coherence(
     1 means that no reading at these positions tells them apart: they are aliases.
     """
     m = np.asarray(others, dtype=np.float64)
-    down = _spectrum(positions.turns, np.abs(m - order))
-    up = _spectrum(positions.turns, m + order)
-    return np.maximum(down, up)
+    down, up = np.abs(m - order), m + order
+    if not (float(order).is_integer() and (m == np.round(m)).all()):
+        return np.maximum(_spectrum(positions.turns, down), _spectrum(positions.turns, up))
+    spectrum = positions.spectrum(int(up.max(initial=0.0)))
+    return np.maximum(spectrum[down.astype(np.int64)], spectrum[up.astype(np.int64)])
 
 
 def _spectrum(turns: Array, orders: Array) -> Array:
-    """``|mean exp(2 pi i m t)|`` for each m, by a histogram where there are many t."""
-    whole = bool((orders == np.round(orders)).all())
-    if turns.size > _EXACT_SPECTRUM and whole:
-        cells = 1 << 16
-        counts = np.bincount((turns * cells).astype(np.int64) % cells, minlength=cells)
-        full = np.abs(np.fft.rfft(counts)) / turns.size
-        return np.asarray(full[np.minimum(orders.astype(np.int64), cells // 2)])
-    result = np.empty(orders.size)
-    for i, m in enumerate(orders):
-        result[i] = abs(np.exp(2j * math.pi * m * turns).mean())
-    return result
+    """``|mean exp(2 pi i m t)|`` for each m."""
+    return np.array([abs(np.exp(2j * math.pi * m * turns).mean()) for m in orders])
 
 
 def energy_near_nyquist(

@@ -61,6 +61,8 @@ class Candidates:
     fixed_member : str
     highest : int
         Nyquist limit of the positions for orders that are not named.
+    effective : Positions
+        The positions as a grid even where small shifts of the zero blur it.
     """
 
     orders: tuple[float, ...]
@@ -70,6 +72,7 @@ class Candidates:
     gear_ratio: float | None
     fixed_member: str
     highest: int
+    effective: Positions
 
     @property
     def highest_alias(self) -> int:
@@ -159,6 +162,7 @@ def choose_candidates(
         gear_ratio=gear_ratio,
         fixed_member=fixed_member,
         highest=highest,
+        effective=effective,
     )
 
 

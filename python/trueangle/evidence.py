@@ -80,7 +80,7 @@ def choose_forward(
     Returns
     -------
     list of int
-        In the order of their choice; among aliases the lowest order.
+        In the order of their choice; among aliases the lowest of the likeliest.
     """
     gram, rhs, rest = sums.total()
     gram, rhs = gram.copy(), rhs.copy()
@@ -116,9 +116,9 @@ def choose_forward(
             top = int(np.argmin(score))
             if not score[top] <= 0.0:
                 break
-            # Aliases explain equally much: keep the lowest order, the first one.
-            same = alive & (gain >= gain[top] * (1.0 - 1e-9))
-            best = int(np.flatnonzero(same)[np.argmin(sums.orders[same])])
+            # Aliases explain equally much: keep one that was asked for, and the lowest.
+            same = np.flatnonzero(alive & (gain >= gain[top] * (1.0 - 1e-9)))
+            best = int(same[np.lexsort((sums.orders[same], -log_limits[same]))[0]])
         chosen.append(best)
         pivot = sums.columns([best])
         factor = np.linalg.solve(gram[np.ix_(pivot, pivot)], gram[pivot])

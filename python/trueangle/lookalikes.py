@@ -22,6 +22,9 @@ __all__ = ["DECISIVE", "find_lookalikes", "substitution_losses"]
 #: likelihood ratio of e^5, about 150 to 1.
 DECISIVE: Final = 10.0
 
+#: From here on two orders are one at the positions, whatever the noise.
+_SAME: Final = 1.0 - 1e-9
+
 #: Only orders this alike at the positions are tried: one below explains at most
 #: ``coherence^2`` of the other's energy and fails by itself.
 _ALIKE: Final = 0.9
@@ -33,26 +36,25 @@ def find_lookalikes(
     orders: Sequence[float],
     variance: float,
     highest: int,
-) -> list[tuple[float, ...]]:
+) -> list[dict[int, float]]:
     """For each of ``orders``, those up to ``highest`` that could take its place.
 
     Returns
     -------
-    list of tuple of int
-        Ascending; empty where the readings decide.
+    list of dict of int to float
+        Ascending, with the increase of the sum of squares that each would cost; empty
+        where the readings decide.
     """
     every = np.arange(1, highest + 1)
-    found: list[tuple[float, ...]] = []
+    found: list[dict[int, float]] = []
     for order in orders:
         coherence = position_coherence(positions, order, every.astype(np.float64))
-        alike = [int(m) for m in every[coherence > _ALIKE] if m != order and m not in orders]
-        if not alike:
-            found.append(())
-            continue
-        losses = substitution_losses(units, orders, order, alike)
-        found.append(
-            tuple(m for m, loss in zip(alike, losses, strict=True) if loss < DECISIVE * variance)
-        )
+        coherence[[int(k) - 1 for k in orders if k <= highest and k == int(k)]] = 0.0
+        same = {int(m): 0.0 for m in every[coherence > _SAME]}
+        alike = [int(m) for m in every[coherence > _ALIKE] if m not in same]
+        losses = substitution_losses(units, orders, order, alike) if alike else []
+        tried = same | dict(zip(alike, losses, strict=True))
+        found.append({m: tried[m] for m in sorted(tried) if tried[m] < DECISIVE * variance})
     return found
 
 

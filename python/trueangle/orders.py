@@ -9,9 +9,9 @@ from .candidates import choose_candidates
 from .errors import ArgumentError
 from .ordertable import OrderRow, OrderSelection
 from .runs import CalibrationRun, as_runs
-from .selection import EvidenceSelection
+from .selection import FALSE_ALARM, EvidenceSelection
 
-__all__ = ["OrderRow", "OrderSelection", "select_orders"]
+__all__ = ["FALSE_ALARM", "OrderRow", "OrderSelection", "select_orders"]
 
 
 def select_orders(

@@ -25,7 +25,7 @@ class OrderRow:
     retained : bool
     verdict : str
         ``"retained"``, ``"noise"``, ``"no held-out gain"``, ``"negligible"``,
-        ``"alias"``, ``"reference"`` or ``"weak"``.
+        ``"too steep"``, ``"alias"``, ``"reference"`` or ``"weak"``.
     cosine, sine : float
         Coefficients A and B beside all retained orders.
     standard_error : float
@@ -44,6 +44,9 @@ class OrderRow:
     explanations : tuple of Explanation
         Known lines of the joint that the order or an alias of it may be.
     reason : str
+    doubtful : bool
+        True when an alias of a retained order is a known line of the joint or was a
+        candidate too.
     """
 
     order: float
@@ -59,6 +62,7 @@ class OrderRow:
     aliases: tuple[float, ...] = ()
     explanations: tuple[Explanation, ...] = ()
     reason: str = ""
+    doubtful: bool = False
 
     @property
     def amplitude(self) -> float:
@@ -69,11 +73,6 @@ class OrderRow:
     def phase_deg(self) -> float:
         """``atan2(A, B)`` in degrees, in (-180, 180]."""
         return math.degrees(math.atan2(self.cosine, self.sine))
-
-    @property
-    def doubtful(self) -> bool:
-        """Whether an alias of the order is a known line of the joint."""
-        return any(e.order != self.order for e in self.explanations)
 
     @property
     def phase_error_deg(self) -> float:

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from .aliasing import Positions
 from .candidates import Candidates
 from .evidence import (
+    OrderTest,
     choose_forward,
     examine_orders,
     fit_subset,
@@ -46,6 +47,10 @@ NEGLIGIBLE_SHARE: Final = 0.01
 #: ... and at the same time below this share of one reading's scatter: correcting it would
 #: change the error of no reading by anything to speak of.
 NEGLIGIBLE_NOISE: Final = 0.1
+
+#: Bound of the error's slope that the retained orders must keep: from 1 on an indicated
+#: angle stands for several true ones, as ill-determined orders on a short arc make it.
+STEEPEST: Final = 0.95
 
 #: Folds of a single run: whole blocks of neighbouring positions, dealt in turn.
 _FOLDS: Final = 6
@@ -169,15 +174,26 @@ class EvidenceSelection:
                 share = amplitude / math.sqrt(float((amplitude**2).sum()))
                 scatter_of_one = self._noise(chosen).standard_deviation
                 small = (share < NEGLIGIBLE_SHARE) & (amplitude < NEGLIGIBLE_NOISE * scatter_of_one)
-                verdict, failing = "negligible", np.where(small, -amplitude, -math.inf)
+                verdict, failing = "negligible", np.where(small, 1.0, -1.0)
                 if not small.any():
+                    verdict, failing = "too steep", self._too_steep(chosen, mine, test)
+                if not (failing >= 0.0).any():
                     return chosen, dropped
-                failing += amplitude[small].max()
             # The worst half at once: the others may recover once these are gone.
             worst = np.argsort(-failing, kind="stable")[: (int((failing >= 0.0).sum()) + 1) // 2]
             dropped |= {mine[w]: verdict for w in worst}
             gone = {mine[w] for w in worst}
             chosen = [i for i in chosen if i not in gone]
+
+    def _too_steep(self, chosen: Sequence[int], orders: Sequence[int], test: OrderTest) -> Array:
+        """0 at the weakest order while the error may be too steep to be corrected, else -1."""
+        coefficients = fit_subset(self.sums, chosen)[0].reshape(2, -1)
+        speed = np.array([self.orders[i] for i in chosen])
+        slope = float(speed @ np.hypot(*coefficients)) * 2.0 * math.pi / self.runs[0].period
+        failing = np.full(len(orders), -1.0)
+        if slope >= STEEPEST:
+            failing[int(np.argmin(test.statistic))] = 0.0
+        return failing
 
     def _gains(self, chosen: Sequence[int], orders: Sequence[int]) -> Array:
         """Part by which each order lowers the held-out mean square."""
@@ -186,7 +202,7 @@ class EvidenceSelection:
         without, with_, _ = held_out_gains(self.folds, chosen, orders)
         return np.asarray((without - with_) / np.maximum(np.abs(without), 1e-300))
 
-    def _lookalikes(self, chosen: Sequence[int]) -> dict[int, tuple[float, ...]]:
+    def _lookalikes(self, chosen: Sequence[int]) -> dict[int, dict[int, float]]:
         """Aliases of every chosen order that these readings cannot exclude."""
         found = find_lookalikes(
             self.units,
@@ -198,11 +214,12 @@ class EvidenceSelection:
         return dict(zip(chosen, found, strict=True))
 
     def _lowest(self, chosen: list[int]) -> list[int]:
-        """Where the readings decide nothing, a class stands by its lowest candidate."""
+        """Where the readings say nothing, the lowest candidate stands for its aliases."""
         result = list(chosen)
-        for i, aliases in self._lookalikes(chosen).items():
-            lower = [m for m in aliases if m < self.orders[i]]
-            known = [j for j, k in enumerate(self.orders) if k in lower]
+        enough = self._noise(chosen).variance
+        for i, losses in self._lookalikes(chosen).items():
+            lower = [m for m, loss in losses.items() if m < self.orders[i] and loss < enough]
+            known = [j for j in self.candidates.main_indices if self.orders[j] in lower]
             free = [j for j in known if j not in result]
             if free and i not in self.forced:
                 result[result.index(i)] = free[0]
@@ -235,7 +252,7 @@ class EvidenceSelection:
                     log10_false_alarm=self._false_alarm(float(test.log_p[n]), i),
                     holdout_gain=float(gains[n]),
                     phase_spread_deg=circular_range_deg(phases[:, n]),
-                    aliases=lookalikes.get(i, ()),
+                    aliases=tuple(lookalikes.get(i, ())),
                 )
             )
         rows = [explained(row, self.candidates, self.positions) for row in rows]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
@@ -12,9 +11,9 @@ import numpy as np
 
 from .aliasing import Positions, distinct_positions, energy_near_nyquist, explain_order
 from .candidates import Candidates, choose_candidates
-from .errors import NoModelError
+from .noisefactors import mount_noise_factors
 from .ordertable import OrderRow, OrderSelection
-from .planning import plan_mounts
+from .planning import HIGHEST_LOW_ORDER, plan_mounts, wanted_orders
 from .runs import CalibrationRun, as_runs
 
 __all__ = ["VerifiedPositions", "explained", "selection_notes", "verified_positions"]
@@ -22,11 +21,15 @@ __all__ = ["VerifiedPositions", "explained", "selection_notes", "verified_positi
 #: Share of the energy in the upper half of the orders from which under-sampling is said.
 _UNDER_SAMPLED: Final = 0.25
 
+#: Largest noise factor with which mounts count as telling orders apart.
+_TELLING_FACTOR: Final = 5.0
+
 _VERDICTS: Final = {
     "noise": "does not stand out of the noise",
     "weak": "significant by itself, but taken up by the retained orders",
     "no held-out gain": "does not lower the error of readings held out of the fit",
     "negligible": "significant, but too small to change any reading",
+    "too steep": "with it an indicated angle would stand for several true ones",
     "alias": "cannot be told from retained orders at these positions",
 }
 
@@ -40,13 +43,16 @@ def explained(row: OrderRow, candidates: Candidates, positions: Positions) -> Or
         return replace(row, reason=_VERDICTS[row.verdict])
     explanations = explain_order(row.order, row.aliases, ratio, member)
     reason = "significant, and lowers the error of readings held out of the fit"
-    gear = [str(e) for e in explanations if e.order != row.order]
-    if gear:
+    rivals = [str(e) for e in explanations if e.order != row.order]
+    named = {e.order for e in explanations}
+    # Where the readings only hint at a high order, the low one is a rival too.
+    rivals += [f"{m:g}" for m in row.aliases if m in candidates.main and m not in named]
+    if rivals:
         reason = (
-            f"{row.order:g} may be {' or '.join(gear)}; these positions cannot tell. "
+            f"{row.order:g} may be {' or '.join(rivals)}; these positions cannot tell. "
             f"Measure {_measure(positions, ratio, member)}"
         )
-    return replace(row, explanations=explanations, reason=reason)
+    return replace(row, explanations=explanations, reason=reason, doubtful=bool(rivals))
 
 
 def _reference_reason(order: float, carriers: Sequence[float]) -> str:
@@ -151,36 +157,19 @@ def verified_positions(
 
 
 def _between(positions: Positions, candidates: Candidates) -> bool:
-    divisions = positions.divisions
-    if divisions is None:
-        return len(positions) > 2 * candidates.highest and candidates.highest > 0
-    if divisions > 2 * candidates.highest_alias:
+    """Whether the readings tell the low orders from those of the gear."""
+    grid = candidates.effective
+    if grid.divisions is None:
+        return len(positions) > 2 * candidates.highest > 0
+    if grid.divisions > 2 * candidates.highest_alias:
         return True
-    if candidates.gear_ratio is None:
+    if candidates.gear_ratio is None or not candidates.whole:
         return False
-    try:
-        plan_mounts(
-            candidates.gear_ratio,
-            divisions,
-            len(positions.offsets),
-            fixed_member=candidates.fixed_member,
-        )
-    except (NoModelError, ValueError):
-        return False
-    return math.isfinite(_worst_factor(positions, candidates))
-
-
-def _worst_factor(positions: Positions, candidates: Candidates) -> float:
-    from .noisefactors import mount_noise_factors
-    from .planning import wanted_orders
-
-    assert positions.divisions is not None
-    assert candidates.gear_ratio is not None
-    orders = wanted_orders(
-        candidates.gear_ratio, candidates.fixed_member, min(17, positions.highest_order)
-    )
-    offsets = 360.0 * np.asarray(positions.offsets)
-    return float(mount_noise_factors(positions.divisions, offsets, orders).max())
+    low = min(HIGHEST_LOW_ORDER, grid.highest_order)
+    orders = wanted_orders(candidates.gear_ratio, candidates.fixed_member, low)
+    offsets = 360.0 * np.asarray(grid.offsets)
+    worst = float(mount_noise_factors(grid.divisions, offsets, orders).max())
+    return worst <= _TELLING_FACTOR
 
 
 def _sentence(positions: Positions, candidates: Candidates) -> str:

@@ -35,6 +35,8 @@ def test_rm44_held_out_runs_are_as_good_as_with_24_orders_by_numpy(data_dir):
     assert result.model.constant == pytest.approx(-109.4, abs=1.0)
 
 
+# One held-out reading lies a little outside the arc of the run that was fitted.
+@pytest.mark.filterwarnings("ignore::trueangle.errors.OutsideSpanWarning")
 def test_arm_joint_on_188_degrees_with_a_wild_reading(data_dir):
     runs = {r.label: r for r in ta.read_runs(data_dir / "arm_joint_protractor.csv")}
     held = runs["joint2_2021-05-28"]

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..angles import ARCSEC_PER_TURN
+from ..ordertable import OrderSelection
 from . import palette
 from .canvas import legend, new_axes
 from .curves import CONFIDENCE
@@ -17,7 +18,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
     from ..fitresult import FitResult
-    from ..orders import OrderSelection
+
 
 __all__ = ["amplitude_spectrum"]
 
@@ -48,7 +49,9 @@ def amplitude_spectrum(result: OrderSelection | FitResult, ax: Axes | None = Non
     -------
     matplotlib Axes
     """
-    selection = getattr(result, "selection", result)
+    if isinstance(result, OrderSelection):
+        return _of_selection(result, ax)
+    selection = result.selection
     return _of_fit(result, ax) if selection is None else _of_selection(selection, ax)
 
 
