@@ -95,8 +95,11 @@ class LogSettings:
         path: object,
         header: Sequence[str],
         turns: Mapping[str, TurnState] | None = None,
+        unit: str | None = None,
     ) -> list[Channel]:
         """One channel per joint for a log with the columns ``header``.
+
+        ``unit`` is that of the log's format where it defines one.
 
         Raises
         ------
@@ -112,7 +115,7 @@ class LogSettings:
                 taken,
                 joint=joint.name,
                 column=joint.column,
-                unit=self.unit,
+                unit=self.unit or unit,
                 counts_per_turn=self.counts_per_turn,
             )
             taken.append(angle.corrected)
