@@ -80,7 +80,10 @@ def proposals(space: Space, causes: Sequence[str]) -> list[tuple[Proposal, Space
             price = total_price(start) - total_price(space)
         else:
             start, price = space, 0.0
-        proposal = candidate.propose(start)
+        key = (cause, *((t.cause, repr(t.shape)) for t in start.terms))
+        if key not in space.memory:
+            space.memory[key] = candidate.propose(start)
+        proposal = space.memory[key]
         if proposal is not None:
             found.append((proposal, start, proposal.bic_gain - price))
     return found

@@ -107,6 +107,8 @@ class Space:
             [np.ones(self.n), *(line_columns(signals.theta, m) for m in around.pattern.orders)]
         )
         self.terms: list[Proposal] = []
+        #: What causes proposed beside given terms; shared by spaces of the same readings.
+        self.memory: dict[Any, Any] = {}
         self._wlines: NDArray[np.complex64] | None = None
         self.update()
 
@@ -224,7 +226,7 @@ class Space:
     @property
     def variance(self) -> float:
         """Variance of one reading's noise, arcsec squared."""
-        return self.rss / max(self.n - self.q.shape[1], 1)
+        return float(self.rss / max(self.n - self.q.shape[1], 1))
 
     @property
     def deviance(self) -> float:
@@ -307,13 +309,15 @@ class Space:
     def run_effect_gain(self, columns: Array) -> tuple[float, float]:
         """Best ratio of variances of a run effect and the deviance it saves."""
         z = self.whiten(columns)
-        pieces, sizes = [], []
         stacked = np.column_stack([self.q, self.r])
-        for start, stop in self.bounds:
-            u, s, _ = np.linalg.svd(z[start:stop], full_matrices=False)
-            pieces.append(u.T @ stacked[start:stop])
-            sizes.append(s**2)
-        b, power = np.vstack(pieces), np.concatenate(sizes)
+        gram = np.array([z[a:b].T @ z[a:b] for a, b in self.bounds])
+        moment = np.array([z[a:b].T @ stacked[a:b] for a, b in self.bounds])
+        values, vectors = np.linalg.eigh(gram)
+        values = np.maximum(values, 0.0)
+        kept = values > 1e-12 * values.max(initial=1e-300)
+        turned = np.einsum("jki,jkl->jil", vectors, moment)
+        b = (turned / np.sqrt(np.where(kept, values, 1.0))[:, :, None])[kept]
+        power = values[kept]
         bq, br = b[:, :-1], b[:, -1]
         best, ratio = 0.0, 0.0
         for trial in RATIOS / max(float(power.max(initial=0.0)), 1e-300):
@@ -364,6 +368,10 @@ class Space:
             self.log_n,
             RunEffect(columns, ratio),
         )
+
+    def hopeless(self, deviance: float, parameters: int, log_grid: float = 0.0) -> bool:
+        """A coarse search this far below its price gains nothing by refining."""
+        return 1.5 * deviance + 10.0 < parameters * self.log_n + 2.0 * log_grid
 
     def has(self, cause: str) -> bool:
         """A term of this cause is among the terms."""

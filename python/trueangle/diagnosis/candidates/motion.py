@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 from typing import Any, ClassVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...simulation.effects import Effect, Surroundings
 from ...simulation.effects.motion import FilterLag, Latency
+from ...simulation.pattern import Pattern
 from ...simulation.signals import Signals
 from ..space import Proposal, Space
 from .candidate import Array, Candidate, Parameters, golden_maximum, quantity
@@ -16,10 +19,10 @@ from .candidate import Array, Candidate, Parameters, golden_maximum, quantity
 __all__ = ["FilterLagCandidate", "LatencyCandidate"]
 
 #: Cutoffs searched, in multiples of the highest frequency at which a line passes.
-CUTOFFS = np.geomspace(0.2, 3000.0, 18)
+CUTOFFS = np.geomspace(0.2, 3000.0, 12)
 
-#: Damping ratios of a second-order loop; None is the first-order filter.
-DAMPING = (None, 0.7)
+#: Damping ratios of a second-order loop.
+DAMPING = (0.4, 0.7, 1.1)
 
 
 class LatencyCandidate(Candidate):
@@ -44,7 +47,10 @@ class LatencyCandidate(Candidate):
 
 
 class FilterLagCandidate(Candidate):
-    """The pattern through a low-pass, less the pattern; its cutoff is searched."""
+    """The pattern through a low-pass, less the pattern; its cutoff is searched.
+
+    First order, or a loop of second order whose damping is searched as well.
+    """
 
     cause: ClassVar[str] = "filter_lag"
     located: ClassVar[bool] = True
@@ -56,59 +62,113 @@ class FilterLagCandidate(Candidate):
         top = float(pattern.orders.max() * np.abs(signals.turns_per_s).max())
         if top == 0.0:
             return None
-        best: tuple[float, float, float | None] = (0.0, 0.0, None)
-        for damping in DAMPING:
-            shapes = [{"cutoff_hz": top * c, "damping": damping} for c in CUTOFFS]
-            gains = space.fixed_gains(
-                np.hstack([self.columns(signals, space.around, shape) for shape in shapes])
+        waves = _waves(pattern, signals.theta)
+        frequency = pattern.orders * signals.turns_per_s[:, None]
+
+        def gain(cutoff: float, damping: float | None) -> float:
+            column = _lagged(waves, frequency, cutoff, damping)
+            return float(space.fixed_gains(column[:, None])[0])
+
+        cutoffs = top * CUTOFFS
+
+        def grid(damping: float | None) -> Array:
+            columns = [_lagged(waves, frequency, float(c), damping) for c in cutoffs]
+            return space.fixed_gains(np.column_stack(columns))
+
+        grids: dict[float | None, Array] = {None: grid(None)}
+        if not space.hopeless(float(grids[None].max()), 1):
+            grids |= {damping: grid(damping) for damping in DAMPING}
+        step = float(np.log(CUTOFFS[1] / CUTOFFS[0]))
+        best: Proposal | None = None
+        for order in (1, 2):
+            if order == 2 and len(grids) == 1:
+                break
+            damping = None if order == 1 else max(DAMPING, key=lambda d: float(grids[d].max()))
+            cutoff = float(cutoffs[int(np.argmax(grids[damping]))])
+            deviance = float(grids[damping].max())
+            if deviance <= 0.0:
+                continue
+            for width in (step, 0.3 * step) if len(grids) > 1 else ():
+                f = partial(gain, damping=damping)
+                x, deviance = golden_maximum(
+                    lambda x, f=f: f(float(np.exp(x))),  # type: ignore[misc]
+                    np.log(cutoff) - width,
+                    np.log(cutoff) + width,
+                    10,
+                )
+                cutoff = float(np.exp(x))
+                if damping is None:
+                    break
+                damping, deviance = golden_maximum(
+                    partial(gain, cutoff), 0.7 * damping, 1.4 * damping, 8
+                )
+            shape = {"cutoff_hz": cutoff, "damping": damping}
+            proposal = space.propose(
+                self.cause,
+                shape,
+                _lagged(waves, frequency, cutoff, damping)[:, None],
+                parameters=order,
+                deviance=deviance,
             )
-            k = int(np.argmax(gains))
-            if gains[k] > best[0] + 1e-9:
-                best = (float(gains[k]), float(top * CUTOFFS[k]), damping)
-        if best[0] <= 0.0:
-            return None
-        _, cutoff, damping = best
-
-        def gain(log_cutoff: float) -> float:
-            shape = {"cutoff_hz": float(np.exp(log_cutoff)), "damping": damping}
-            return float(space.fixed_gains(self.columns(signals, space.around, shape))[0])
-
-        step = np.log(CUTOFFS[1] / CUTOFFS[0])
-        log_cutoff, deviance = golden_maximum(gain, np.log(cutoff) - step, np.log(cutoff) + step)
-        shape = {"cutoff_hz": float(np.exp(log_cutoff)), "damping": damping}
-        return space.propose(
-            self.cause,
-            shape,
-            self.columns(signals, space.around, shape),
-            parameters=1,
-            log_grid=float(np.log(len(DAMPING))),
-            deviance=deviance,
-        )
+            if best is None or proposal.bic_gain > best.bic_gain:
+                best = proposal
+        return best
 
     def columns(self, signals: Signals, around: Surroundings, shape: dict[str, Any]) -> Array:
-        cutoff, damping = shape["cutoff_hz"], shape["damping"]
-
-        def response(frequency: Array) -> Any:
-            w = frequency / cutoff
-            if damping is None:
-                return 1.0 / (1.0 + 1j * w)
-            return 1.0 / (1.0 - w**2 + 2j * damping * w)
-
-        pattern = around.pattern
-        seen = pattern.passed(signals.theta, signals.turns_per_s, response)
-        return np.asarray((seen - pattern.value(signals.theta))[:, None])
+        waves = _waves(around.pattern, signals.theta)
+        frequency = around.pattern.orders * signals.turns_per_s[:, None]
+        return _lagged(waves, frequency, shape["cutoff_hz"], shape["damping"])[:, None]
 
     def report(
         self, space: Space, terms: Sequence[tuple[Proposal, Array, Array]]
     ) -> tuple[Parameters, list[Effect]]:
-        proposal, (scale,), covariance = terms[0]
-        cutoff = proposal.shape["cutoff_hz"]
-        relative = float(np.sqrt(covariance[0, 0])) / max(abs(float(scale)), 1e-12)
-        damping = proposal.shape["damping"]
+        proposal = terms[0][0]
+        cutoff, damping = proposal.shape["cutoff_hz"], proposal.shape["damping"]
+        waves = _waves(space.around.pattern, space.signals.theta)
+        frequency = space.around.pattern.orders * space.signals.turns_per_s[:, None]
+        step = 0.01
+
+        def slope(cutoff_step: float, damping_step: float) -> Array:
+            up, down = (
+                _lagged(
+                    waves,
+                    frequency,
+                    cutoff * float(np.exp(sign * cutoff_step)),
+                    None if damping is None else damping * float(np.exp(sign * damping_step)),
+                )
+                for sign in (1.0, -1.0)
+            )
+            return np.asarray((up - down) / (2.0 * step))
+
+        slopes = [slope(step, 0.0)] if damping is None else [slope(step, 0.0), slope(0.0, step)]
+        others = space.with_terms(term for term in space.terms if term is not proposal)
+        x, _ = others.projected(np.column_stack(slopes))
+        covariance = space.variance * np.linalg.pinv(x.T @ x)
         # Far below the cutoff both delay by 1/(2 pi f_c) and 2 zeta/(2 pi f_n).
+        delay = np.array([1.0] if damping is None else [1.0, -1.0])
         equivalent = cutoff if damping is None else cutoff / (2.0 * damping)
+        relative = float(np.sqrt(delay @ covariance @ delay))
         parameters = {"cutoff_hz": quantity(equivalent, equivalent * relative)}
         if damping is not None:
-            parameters["natural_frequency_hz"] = quantity(cutoff, cutoff * relative)
-            parameters["damping"] = quantity(damping)
+            std = np.sqrt(np.diag(covariance))
+            parameters["natural_frequency_hz"] = quantity(cutoff, cutoff * std[0])
+            parameters["damping"] = quantity(damping, damping * std[1])
         return parameters, [FilterLag(equivalent)]
+
+
+def _waves(pattern: Pattern, theta: Array) -> NDArray[np.complex128]:
+    """Complex lines of a pattern, shape (n, k): their real parts add up to it."""
+    amplitudes = pattern.cosine - 1j * pattern.sine
+    return np.asarray(amplitudes * np.exp(1j * theta[:, None] * pattern.orders))
+
+
+def _lagged(
+    waves: NDArray[np.complex128], frequency: Array, cutoff: float, damping: float | None
+) -> Array:
+    """Change of the pattern by a low-pass of first or second order."""
+    w = frequency / cutoff
+    if damping is None:
+        change = -1j * w / (1.0 + 1j * w)
+    else:
+        change = (w**2 - 2j * damping * w) / (1.0 - w**2 + 2j * damping * w)
+    return np.asarray((waves * change).real.sum(axis=1))

@@ -22,6 +22,9 @@ OVERSAMPLING = 3
 #: Trial orders at most; beyond, the grid stops at a lower order.
 MOST_TRIALS = 4096
 
+#: Orders nearer than this to a known line belong to that line: it changes from run to run.
+OWN_LINE = 0.1
+
 #: Peaks of the quick search that are scored exactly.
 PEAKS = 4
 
@@ -57,7 +60,9 @@ class NonIntegerCandidate(Candidate):
         order, _ = golden_maximum(
             lambda f: self._at(space, f, log_grid).deviance, middle - step, middle + step, 10
         )
-        return max(best, self._at(space, order, log_grid), key=lambda p: p.deviance)
+        best = max(best, self._at(space, float(order), log_grid), key=lambda p: p.deviance)
+        near = np.abs(space.around.pattern.orders - best.shape["order"])
+        return None if near.min(initial=1.0) < OWN_LINE else best
 
     def _at(self, space: Space, order: float, log_grid: float) -> Proposal:
         return space.propose_run_effect(

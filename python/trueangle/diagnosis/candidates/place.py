@@ -23,7 +23,7 @@ PLACES = 1440
 WIDTHS = (0.35, 0.7, 1.4, 2.8, 5.6, 11.0)
 
 #: Peaks of the quick search that are scored exactly.
-PEAKS = 3
+PEAKS = 2
 
 #: Readings a step must have on either side of it within its run.
 STEP_MARGIN = 5
@@ -66,8 +66,10 @@ class DefectCandidate(Candidate):
         log_grid = float(np.log(len(joint.shafts) * 360.0))
         best: Proposal | None = None
         for shaft, cycles in joint.shafts.items():
-            for place, width in self._search(space, cycles, e):
-                shape = self._refined(space, shaft, place, width)
+            for score, place, width in self._search(space, cycles, e):
+                shape = {"shaft": shaft, "place_deg": place, "width_deg": width}
+                if not space.hopeless(score / space.variance, 3, log_grid):
+                    shape = self._refined(space, shaft, place, width)
                 columns = self.columns(space.signals, space.around, shape)
                 proposal = space.propose(self.cause, shape, columns, 3, log_grid)
                 if best is None or proposal.deviance > best.deviance:
@@ -75,7 +77,7 @@ class DefectCandidate(Candidate):
         return best
 
     @staticmethod
-    def _search(space: Space, cycles: float, e: Array) -> list[tuple[float, float]]:
+    def _search(space: Space, cycles: float, e: Array) -> list[tuple[float, float, float]]:
         phase = np.mod(space.signals.theta * (cycles / (2.0 * np.pi)), 1.0)
         bins = np.minimum((phase * PLACES).astype(np.int64), PLACES - 1)
         count = np.bincount(bins, minlength=PLACES).astype(np.float64)
@@ -86,14 +88,14 @@ class DefectCandidate(Candidate):
         for width in WIDTHS:
             window = np.exp(-0.5 * (away / width) ** 2)
 
-            moment = _circular(total, window)
+            moment = _circular(total - count * (total.sum() / space.n), window)
             power = _circular(count, window**2) - _circular(count, window) ** 2 / space.n
             seen = power > 4.0
             score = np.where(seen, moment**2 / np.where(seen, power, 1.0), 0.0)
             k = int(np.argmax(score))
             found.append((float(score[k]), (k + 0.5) * 360.0 / PLACES, width))
         found.sort(reverse=True)
-        return [(place, width) for score, place, width in found[:PEAKS] if score > 0.0]
+        return [peak for peak in found[:PEAKS] if peak[0] > 0.0]
 
     def _refined(self, space: Space, shaft: str, place: float, width: float) -> dict[str, Any]:
         def gain(c: float, w: float) -> float:

@@ -16,8 +16,22 @@ from .candidate import Array, Candidate, Parameters, quantity
 
 __all__ = ["DriftCandidate", "ScaleCandidate", "ZeroSlipCandidate"]
 
-#: Terms of a random walk's expansion over one run.
-WALK_TERMS = 8
+#: Half periods over one run that make up a wander.
+WANDER_TERMS = 24
+
+#: Time constant of settling, in shares of the run.
+SETTLING = 0.4
+
+#: Forms of a drift: from the start of the run, or about its mean.
+FORMS = (
+    "ramp",
+    "settling",
+    "walk",
+    "flicker",
+    "centred ramp",
+    "centred walk",
+    "centred flicker",
+)
 
 
 class ZeroSlipCandidate(Candidate):
@@ -44,41 +58,47 @@ class ZeroSlipCandidate(Candidate):
 
 
 class DriftCandidate(Candidate):
-    """Run effect: a ramp or a random walk in time, from the start or about the mean."""
+    """Run effect: a ramp, settling, a random walk or 1/f wander in time."""
 
     cause: ClassVar[str] = "drift_within_run"
 
     def propose(self, space: Space) -> Proposal | None:
         if space.has(self.cause):
             return None
-        kinds = ("ramp", "walk", "centred ramp", "centred walk")
         proposals = [
             space.propose_run_effect(
                 self.cause,
-                {"form": kind},
-                self._shapes(space, kind),
-                log_grid=float(np.log(len(kinds))),
+                {"form": form},
+                self._shapes(space, form),
+                log_grid=float(np.log(len(FORMS))),
             )
-            for kind in kinds
+            for form in FORMS
         ]
         return max(proposals, key=lambda p: p.bic_gain)
 
     @staticmethod
-    def _shapes(space: Space, kind: str) -> Array:
-        """Ramp from 0 to 1, or the terms of a random walk that ends at variance 1."""
+    def _shapes(space: Space, form: str) -> Array:
+        """Columns of a drift, scaled so that it ends at variance 1 or about that."""
         u = np.zeros(space.n)
         for start, stop in space.bounds:
             clock = space.signals.clock[start:stop]
             u[start:stop] = (clock - clock[0]) / max(float(clock[-1] - clock[0]), 1e-300)
-        k = np.arange(1, WALK_TERMS + 1)
-        if kind == "ramp":
+        k = np.arange(1, WANDER_TERMS + 1)
+        if form == "ramp":
             return u[:, None]
-        if kind == "centred ramp":
+        if form == "centred ramp":
             return u[:, None] - 0.5
-        if kind == "walk":
+        if form == "settling":
+            return (1.0 - np.exp(-u / SETTLING))[:, None]
+        if form == "walk":
             sines = np.sin(np.pi * np.outer(u, k - 0.5))
             return np.asarray(np.sqrt(2.0) * sines / (np.pi * (k - 0.5)))
-        return np.asarray(np.sqrt(2.0) * np.cos(np.pi * np.outer(u, k)) / (np.pi * k))
+        cosines = np.cos(np.pi * np.outer(u, k))
+        if form == "centred walk":
+            return np.asarray(np.sqrt(2.0) * cosines / (np.pi * k))
+        if form == "flicker":
+            cosines = cosines - 1.0
+        return np.asarray(cosines / np.sqrt(k * np.log(WANDER_TERMS)))
 
     def columns(self, signals: Signals, around: Surroundings, shape: dict[str, Any]) -> Array:
         return np.zeros((len(signals), 0))
@@ -100,8 +120,8 @@ class DriftCandidate(Candidate):
         }
         if space.signals.time is None:
             parameters["arcsec_per_s"] = quantity(None)
-        walk = "walk" in proposal.shape["form"]
-        effect = DriftWithinRun(0.0, size) if walk else DriftWithinRun(rate, 0.0)
+        ramp = "ramp" in proposal.shape["form"]
+        effect = DriftWithinRun(rate, 0.0) if ramp else DriftWithinRun(0.0, size)
         return parameters, [effect]
 
 
