@@ -22,7 +22,7 @@ from .findings import Diagnosis, Finding
 from .gain import Gain, measure_gain
 from .identifiability import Blindness, blind_spots, doubts_about
 from .selection import NEW_CAUSE, cause_terms, finding_groups, proposals, select
-from .space import Space
+from .space import Proposal, Space
 
 __all__ = ["MOST_READINGS", "diagnose"]
 
@@ -199,7 +199,7 @@ def _corrected_lines(space: Space, spots: list[Blindness]) -> list[Finding]:
         if bic_gain <= NEW_CAUSE:
             continue
         shape = {"output_order": float(order)}
-        proposal = space.propose("missing_order", shape, np.zeros((space.n, 0)), 2, log_grid, 0.0)
+        proposal = Proposal("missing_order", shape, np.zeros((space.n, 0)), 2, log_grid)
         doubt = doubts_about(proposal, space, spots)
         if doubt is not None:
             spots[:] = [spot for spot in spots if spot != doubt]
