@@ -9,7 +9,7 @@ mod blocked;
 
 use nalgebra::{DMatrix, DVector};
 
-use blocked::{cholesky, invert_upper};
+use blocked::{cholesky, invert_upper, times_transpose};
 
 /// Above this size the condition number is estimated by power iteration (a few per
 /// cent low at most) instead of all singular values, whose cost grows fastest.
@@ -215,7 +215,9 @@ impl System {
             let spread = &share * inverse.transpose();
             (spread.tr_mul(&spread), share.norm_squared())
         } else {
-            (&inverse * inverse.transpose(), n as f64)
+            let mut covariance = DMatrix::zeros(n, n);
+            times_transpose(inverse.as_view(), covariance.as_view_mut());
+            (covariance, n as f64)
         };
         let misfit = (plain * &coefficients - target).norm_squared();
         let mut estimate = Estimate {

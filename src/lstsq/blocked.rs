@@ -81,3 +81,74 @@ pub fn invert_upper(mut r: DMatrixViewMut<f64>) {
     r.view_mut((0, half), (half, n - half))
         .copy_from(&(-product));
 }
+
+/// `U U'` of an upper triangle.
+pub fn times_transpose(u: DMatrixView<f64>, mut out: DMatrixViewMut<f64>) {
+    let n = u.ncols();
+    if n <= UNBLOCKED {
+        out.gemm(1.0, &u, &u.transpose(), 0.0);
+        return;
+    }
+    let half = n / 2;
+    let rest = n - half;
+    let corner = u.view((0, half), (half, rest));
+    let last = u.view((half, half), (rest, rest));
+    times_transpose(
+        u.view((0, 0), (half, half)),
+        out.view_mut((0, 0), (half, half)),
+    );
+    let mut first = out.view_mut((0, 0), (half, half));
+    first.gemm(1.0, &corner, &corner.transpose(), 1.0);
+    let aside = corner * last.transpose();
+    out.view_mut((0, half), (half, rest)).copy_from(&aside);
+    out.view_mut((half, 0), (rest, half))
+        .copy_from(&aside.transpose());
+    times_transpose(last, out.view_mut((half, half), (rest, rest)));
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::DMatrix;
+
+    use super::*;
+
+    /// Of elements of order 1 in sums of 200.
+    const ROUNDING: f64 = 1e-12;
+
+    /// Upper triangle with a heavy diagonal, larger than one block.
+    fn upper() -> DMatrix<f64> {
+        let n = 4 * UNBLOCKED + 7;
+        DMatrix::from_fn(n, n, |i, j| match i.cmp(&j) {
+            std::cmp::Ordering::Less => ((3 * i + 7 * j) as f64).sin() / n as f64,
+            std::cmp::Ordering::Equal => 1.0 + (i as f64).cos().powi(2),
+            std::cmp::Ordering::Greater => 0.0,
+        })
+    }
+
+    #[test]
+    fn factor_inverse_and_product_meet_their_definitions() {
+        let u = upper();
+        let n = u.ncols();
+        let mut gram = u.tr_mul(&u);
+        cholesky(gram.as_view_mut()).unwrap();
+        let found = gram.lower_triangle().transpose();
+        assert!((&found - &u).amax() < ROUNDING);
+
+        let mut inverse = u.clone();
+        invert_upper(inverse.as_view_mut());
+        assert!((&inverse * &u - DMatrix::identity(n, n)).amax() < ROUNDING);
+
+        let mut square = DMatrix::zeros(n, n);
+        times_transpose(u.as_view(), square.as_view_mut());
+        assert!((square - &u * u.transpose()).amax() < ROUNDING);
+    }
+
+    #[test]
+    fn indefinite_matrices_have_no_factor() {
+        let u = upper();
+        let mut gram = u.tr_mul(&u);
+        let last = gram.ncols() - 1;
+        gram[(last, last)] -= u[(last, last)].powi(2);
+        assert!(cholesky(gram.as_view_mut()).is_none());
+    }
+}

@@ -14,7 +14,7 @@ const BLOCK: usize = 256;
 const THREADED: usize = 1 << 17;
 
 /// Bytes that the tables of the parts of one update may take together.
-const PART_BYTES: usize = 8 << 20;
+const PART_BYTES: usize = 4 << 20;
 
 /// Segments per order: half an order turns by `pi / SEGMENTS_PER_ORDER / 2 < 1/4` within a
 /// segment, where a Chebyshev series of 12 terms is exact to 3e-16.
