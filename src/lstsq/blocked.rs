@@ -6,15 +6,22 @@ use nalgebra::{DMatrixView, DMatrixViewMut};
 /// that nearly all of the work is in matrix products.
 const UNBLOCKED: usize = 48;
 
-/// Lower Cholesky factor in place of the lower half; None when not positive definite.
-pub fn cholesky(mut a: DMatrixViewMut<f64>) -> Option<()> {
+/// Lower Cholesky factor in place of the lower half; None when not positive definite to
+/// working precision.
+pub fn cholesky(a: DMatrixViewMut<f64>) -> Option<()> {
+    let greatest = a.diagonal().iter().fold(0.0, |m: f64, d| m.max(*d));
+    // What is left of a dependent column is the rounding of its length.
+    let least = greatest * f64::EPSILON * a.ncols() as f64;
+    factor(a, least)
+}
+
+fn factor(mut a: DMatrixViewMut<f64>, least: f64) -> Option<()> {
     let n = a.ncols();
     if n <= UNBLOCKED {
         for j in 0..n {
             let before = a.view((j, 0), (1, j)).norm_squared();
             let rest = a[(j, j)] - before;
-            // What is left of a dependent column is the rounding of its length.
-            if rest.is_nan() || rest <= a[(j, j)] * f64::EPSILON * n as f64 {
+            if rest.is_nan() || rest <= least {
                 return None;
             }
             let pivot = rest.sqrt();
@@ -27,14 +34,14 @@ pub fn cholesky(mut a: DMatrixViewMut<f64>) -> Option<()> {
         return Some(());
     }
     let half = n / 2;
-    cholesky(a.view_mut((0, 0), (half, half)))?;
+    factor(a.view_mut((0, 0), (half, half)), least)?;
     let upper_left = a.view((0, 0), (half, half)).into_owned();
     let mut below = a.view((half, 0), (n - half, half)).into_owned();
     divide_by_transpose(below.as_view_mut(), upper_left.as_view());
     let mut rest = a.view_mut((half, half), (n - half, n - half));
     rest.gemm(-1.0, &below, &below.transpose(), 1.0);
     a.view_mut((half, 0), (n - half, half)).copy_from(&below);
-    cholesky(a.view_mut((half, half), (n - half, n - half)))
+    factor(a.view_mut((half, half), (n - half, n - half)), least)
 }
 
 /// `B L'^-1` in place of `B`, `L` lower triangular.

@@ -1,0 +1,198 @@
+//! The fit as a whole: what must not change it, and the paths against each other.
+
+use proptest::prelude::*;
+use trueangle::Error;
+use trueangle::design::{Design, Frequencies};
+use trueangle::fit::{Argument, Method, Options, Run, Solution, fit};
+
+/// Of errors of a few degrees: rounding of angles of a turn or two, and of either path.
+const SAME: f64 = 1e-12;
+
+fn design(period: f64, orders: &[u32]) -> Design {
+    let orders = orders.to_vec();
+    Design::new(
+        period,
+        vec![Frequencies {
+            cycles: 1.0,
+            orders,
+        }],
+    )
+    .unwrap()
+}
+
+/// Readings over one turn of 360, with harmonics 1 and 3, a zero and noise.
+fn readings(seed: u64, len: usize) -> (Vec<f64>, Vec<f64>) {
+    let mut state = seed | 1;
+    let mut uniform = || {
+        state = state
+            .wrapping_mul(6364136223846793005)
+            .wrapping_add(1442695040888963407);
+        (state >> 11) as f64 / (1u64 << 53) as f64
+    };
+    let reference: Vec<f64> = (0..len).map(|_| 360.0 * uniform()).collect();
+    let error = |x: &f64| {
+        let radians = x.to_radians();
+        2.0 + radians.cos() - 0.5 * (3.0 * radians).sin()
+    };
+    let indicated = reference
+        .iter()
+        .map(|x| x + error(x) + 0.1 * uniform())
+        .collect();
+    (reference, indicated)
+}
+
+fn solve(
+    design: &Design,
+    reference: &[f64],
+    indicated: &[f64],
+    method: Option<Method>,
+) -> Solution {
+    let run = Run {
+        reference,
+        indicated,
+        weights: None,
+    };
+    fit(
+        design,
+        &[run],
+        Options {
+            method,
+            ..Options::default()
+        },
+    )
+    .unwrap()
+}
+
+fn close(a: &[f64], b: &[f64], tolerance: f64) -> bool {
+    a.iter().zip(b).all(|(a, b)| (a - b).abs() <= tolerance)
+}
+
+#[test]
+fn residuals_are_orthogonal_to_every_harmonic() {
+    let design = design(360.0, &[1, 2, 3]);
+    for len in [40, 5000] {
+        let (reference, indicated) = readings(1, len);
+        let found = solve(&design, &reference, &indicated, None);
+        let mut products = vec![0.0; 7];
+        for (x, y) in reference.iter().zip(&indicated) {
+            let mut row = vec![1.0];
+            design.extend_row(&mut row, *x, 1.0);
+            let fitted: f64 = row[1..]
+                .iter()
+                .zip(&found.coefficients)
+                .map(|(r, c)| r * c)
+                .sum();
+            let residual = y - x - found.constant - fitted;
+            for (product, value) in products.iter_mut().zip(&row) {
+                *product += residual * value;
+            }
+        }
+        assert!(
+            close(&products, &[0.0; 7], 1e-13 * len as f64),
+            "{products:?}"
+        );
+        assert_eq!(
+            found.method,
+            if len < 1000 {
+                Method::Plain
+            } else {
+                Method::Moments
+            }
+        );
+    }
+}
+
+#[test]
+fn ridge_that_leaves_an_order_undetermined_is_refused() {
+    let reference: Vec<f64> = (0..72).map(|i| 10.0 * f64::from(i)).collect();
+    let design = design(360.0, &[1, 18]);
+    let run = Run {
+        reference: &reference,
+        indicated: &reference,
+        weights: None,
+    };
+    let options = Options {
+        ridge: Some(&[1.0, 1.0, 0.0, 0.0]),
+        ..Options::default()
+    };
+    assert!(matches!(
+        fit(&design, &[run], options),
+        Err(Error::Rank { .. })
+    ));
+}
+
+#[test]
+fn numbers_that_are_not_finite_are_named_on_every_path() {
+    for len in [30, 5000] {
+        let (reference, mut indicated) = readings(2, len);
+        indicated[17] = f64::NAN;
+        let run = Run {
+            reference: &reference,
+            indicated: &indicated,
+            weights: None,
+        };
+        for method in [
+            None,
+            Some(Method::Plain),
+            Some(Method::Moments),
+            Some(Method::Qr),
+        ] {
+            let options = Options {
+                method,
+                ..Options::default()
+            };
+            let Err(Error::NotFinite { what, index, .. }) =
+                fit(&design(360.0, &[1]), &[run], options)
+            else {
+                panic!("{method:?} took a NaN");
+            };
+            assert_eq!((what, index), ("indicated", 17));
+        }
+    }
+}
+
+proptest! {
+    #[test]
+    fn zero_turns_order_and_sign_do_not_matter(
+        seed in any::<u64>(),
+        len in prop::sample::select(vec![60usize, 900]),
+        zero in -180.0f64..180.0,
+        turns in -5i32..5,
+        indicated_argument in any::<bool>(),
+    ) {
+        let design = design(360.0, &[1, 3]);
+        let (reference, indicated) = readings(seed, len);
+        let base = solve(&design, &reference, &indicated, None);
+
+        let moved: Vec<f64> = indicated.iter().rev()
+            .map(|y| (y + zero + 360.0 * f64::from(turns)).rem_euclid(360.0)).collect();
+        let reversed: Vec<f64> = reference.iter().rev().copied().collect();
+        let other = solve(&design, &reversed, &moved, None);
+        prop_assert!(close(&base.coefficients, &other.coefficients, SAME));
+
+        // Reference and indicated angles change places: the error changes its sign.
+        let argument = if indicated_argument { Argument::Indicated } else { Argument::Reference };
+        let twin = if indicated_argument { Argument::Reference } else { Argument::Indicated };
+        let run = Run { reference: &reference, indicated: &indicated, weights: None };
+        let swapped = Run { reference: &indicated, indicated: &reference, weights: None };
+        let one = fit(&design, &[run], Options { argument, ..Options::default() }).unwrap();
+        let two = fit(&design, &[swapped], Options { argument: twin, ..Options::default() }).unwrap();
+        let negated: Vec<f64> = two.coefficients.iter().map(|c| -c).collect();
+        prop_assert!(close(&one.coefficients, &negated, SAME));
+    }
+
+    #[test]
+    fn paths_agree(seed in any::<u64>(), unit in prop::sample::select(vec![1.0, 360.0, 65536.0])) {
+        let (reference, indicated) = readings(seed, 3000);
+        let scaled = |v: &[f64]| v.iter().map(|x| x * (unit / 360.0)).collect::<Vec<_>>();
+        let (x, y) = (scaled(&reference), scaled(&indicated));
+        let design = design(unit, &[1, 2, 3, 5]);
+        let plain = solve(&design, &x, &y, Some(Method::Plain));
+        for method in [Method::Moments, Method::Qr] {
+            let found = solve(&design, &x, &y, Some(method));
+            prop_assert!(close(&plain.coefficients, &found.coefficients, SAME * unit / 360.0));
+            prop_assert!((plain.residual_variance / found.residual_variance - 1.0).abs() < 1e-10);
+            prop_assert!((plain.constant - found.constant).abs() < SAME * unit / 360.0);
+        }
+    }
+}
