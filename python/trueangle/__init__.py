@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from .moments import Moments as Moments
     from .orders import OrderSelection as OrderSelection
     from .orders import select_orders as select_orders
+    from .reports import report as report
     from .runfiles import read_runs as read_runs
     from .runs import CalibrationRun as CalibrationRun
     from .simulation import Simulation as Simulation
@@ -51,6 +52,7 @@ _PUBLIC = {
     "load_model": "model",
     "Moments": "moments",
     "read_runs": "runfiles",
+    "report": "reports",
     "Simulation": "simulation",
     "diagnose": "diagnosis",
     "load_simulation": "simulation",

@@ -21,6 +21,7 @@ COMMANDS: tuple[str, ...] = (
     "plan",
     "simulate",
     "diagnose",
+    "report",
 )
 
 

@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import json
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from ..simulation.effects import EFFECTS, Effect
 from ..simulation.simulation import Simulation
 from .discrepancy import Discrepancy
 from .gain import Gain
 from .identifiability import Blindness
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 __all__ = ["Diagnosis", "Finding"]
 
@@ -118,6 +121,16 @@ class Diagnosis:
     def to_json(self, extended_simulation: str | None = None) -> str:
         """`to_dict` as JSON text."""
         return json.dumps(self.to_dict(extended_simulation), indent=2, allow_nan=False)
+
+    def plot(self, ax: Axes | None = None) -> Axes:
+        """Gain of every finding with its interval (needs ``trueangle[plot]``).
+
+        `trueangle.plots.measured_and_simulated` and `trueangle.plots.error_left` show the
+        readings themselves.
+        """
+        from ..plots import gains
+
+        return gains(self, ax)
 
     def summary(self) -> str:
         """A readable account (`trueangle.diagnosis.account.render`)."""

@@ -8,16 +8,15 @@ from typing import NamedTuple
 from ..angles import UNIT_PERIODS, unit_name
 from ..errors import FileError
 
-__all__ = ["SIGNAL_COLUMNS", "UNITS", "AngleColumn", "find_angle_column", "find_signal_column"]
+__all__ = ["UNITS", "AngleColumn", "find_angle_column", "find_signal_column"]
 
 UNITS = (*UNIT_PERIODS, "count")
 
 #: Column endings of the signals that terms of a model may need.
-SIGNAL_COLUMNS = {
+_SIGNALS = {
     "time": ("time_s",),
     "temperature": ("temperature_C",),
     "torque": ("torque_Nm",),
-    "direction": ("direction",),
     "velocity": tuple(f"velocity_{unit}_s" for unit in UNITS),
 }
 
@@ -94,7 +93,7 @@ def find_signal_column(
         ["{}"] if joint is None else [f"{joint}_{{}}", f"{{}}_{joint}", f"{joint}/{{}}", "{}"]
     )
     for pattern in patterns:
-        for ending in SIGNAL_COLUMNS.get(signal, (signal,)):
+        for ending in _SIGNALS.get(signal, (signal,)):
             if pattern.format(ending) in header:
                 return pattern.format(ending)
     return None

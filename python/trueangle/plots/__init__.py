@@ -10,7 +10,10 @@ from __future__ import annotations
 from .amplitudespectrum import amplitude_spectrum
 from .beforeafter import before_after
 from .errorcurves import error_curves
+from .errorleft import error_left
+from .gains import gains
 from .kinds import fit_plot
+from .measuredsimulated import measured_and_simulated
 from .phasesoverruns import phases_over_runs
 from .planpictures import plan_factors, plan_positions
 from .residualpictures import residuals
@@ -19,7 +22,10 @@ __all__ = [
     "amplitude_spectrum",
     "before_after",
     "error_curves",
+    "error_left",
     "fit_plot",
+    "gains",
+    "measured_and_simulated",
     "phases_over_runs",
     "plan_factors",
     "plan_positions",

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from ..fitresult import FitResult
 
 
-__all__ = ["amplitude_spectrum"]
+__all__ = ["amplitude_spectrum", "thresholds"]
 
 Array = NDArray[np.float64]
 
@@ -98,7 +98,7 @@ def _of_selection(selection: OrderSelection, ax: Axes | None) -> Axes:
             linewidth=0.9,
             label="not retained",
         )
-    limit = factor * _thresholds(selection)
+    limit = factor * thresholds(selection)
     if np.isfinite(limit).any():
         ax.hlines(
             limit,
@@ -128,7 +128,7 @@ def _of_selection(selection: OrderSelection, ax: Axes | None) -> Axes:
     return _finish(ax)
 
 
-def _thresholds(selection: OrderSelection) -> Array:
+def thresholds(selection: OrderSelection) -> Array:
     r"""Amplitude at which each order would just be significant, NaN where none is known.
 
     The chance of a false alarm in the whole search is ``K P(T)`` with the tail

@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Final, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from ..angles import ARCSEC_PER_TURN, circular_mean, wrap
+from ..angles import ARCSEC_PER_TURN, wrap
 from ..errors import ArgumentError, RankError, TrueAngleError
+from ..heldout import correct_held_out
 from ..model import HarmonicModel
 from ..robust import Loss
 from ..runs import CalibrationRun
@@ -135,23 +136,15 @@ def held_out_points(
 ) -> list[tuple[Points, Points]]:
     """Error of runs that the model has not seen, before and after correction.
 
-    Each run keeps its own zero: the circular mean of what is left after correction is
-    taken off both.
+    Each run keeps its own zero (`trueangle.heldout.correct_held_out`).
     """
-    factor = ARCSEC_PER_TURN / model.period
     low, _ = seen_span(model)
     found = []
     for number, run in enumerate(runs):
-        if run.period != model.period:
-            raise ArgumentError(
-                f"run {label_of(run, number)} has period {run.period:g}, the model "
-                f"{model.period:g}: convert one of them"
-            )
-        after = np.asarray(model.correct(run.indicated)) - run.reference
-        after = wrap(after - circular_mean(after, run.period), run.period)
-        before = wrap(run.indicated - run.reference - run.zero, run.period)
-        x, label = degrees(run, low), label_of(run, number)
-        found.append((Points(label, x, factor * before), Points(label, x, factor * after)))
+        label = label_of(run, number)
+        held = correct_held_out(model, run, label)
+        x = degrees(run, low)
+        found.append((Points(label, x, held.before), Points(label, x, held.after)))
     return found
 
 

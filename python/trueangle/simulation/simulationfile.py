@@ -17,7 +17,7 @@ from .joint import Joint
 from .pattern import Harmonic
 from .simulation import Simulation
 
-__all__ = ["load_simulation", "to_table", "write"]
+__all__ = ["dumps", "load_simulation", "to_table", "write"]
 
 _TABLES = ("joint", "harmonic", "effect", "noise", "run")
 _JOINT_KEYS = ("gear_ratio", "fixed_member", "encoder_side", "pole_pairs")
@@ -192,13 +192,14 @@ def write(sim: Simulation, path: str | Path) -> None:
     target = Path(path)
     beside = target.with_name(f".{target.name}.{os.getpid()}.part")
     try:
-        beside.write_text(_text(sim), encoding="utf-8")
+        beside.write_text(dumps(sim), encoding="utf-8")
         os.replace(beside, target)
     finally:
         beside.unlink(missing_ok=True)
 
 
-def _text(sim: Simulation) -> str:
+def dumps(sim: Simulation) -> str:
+    """The text of a simulation file, as `write` writes it."""
     whole = to_table(sim)
     if sim.source is not None and Path(sim.source).is_file():
         original = load_simulation(sim.source)

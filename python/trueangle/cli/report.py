@@ -1,0 +1,53 @@
+"""``trueangle report``: one self-contained page from calibration runs."""
+
+from __future__ import annotations
+
+import argparse
+import json
+
+from .fit import add_joint, orders_by_shaft
+
+HELP = "write a report on calibration runs: one HTML page, or a PDF"
+EXAMPLE = "trueangle report joint_a.csv --simulation joint.toml -o report.html"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the command's arguments."""
+    add = parser.add_argument
+    add("runs", nargs="+", metavar="RUNS", help="calibration runs, CSV or Parquet")
+    add("-o", "--output", required=True, metavar="FILE", help="the page to write (HTML)")
+    add("--simulation", metavar="FILE", help="say what this simulation gets wrong, and why")
+    add("--orders", default="auto", help="auto (default: by evidence), 1-17, output:1-3;motor:1,2")
+    add_joint(parser)
+    add("--title", help="heading of the report")
+    add("--pdf", metavar="FILE", help="print it to a PDF too, by an installed browser")
+    add("--json", action="store_true", help="print the report's numbers as JSON")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Write the report."""
+    from ..reports import report
+    from ..runfiles import read_runs
+
+    runs = read_runs(args.runs, counts_per_turn=args.counts_per_turn)
+    simulation = None
+    if args.simulation is not None:
+        from ..simulation import load_simulation
+
+        simulation = load_simulation(args.simulation)
+    made = report(
+        runs,
+        args.output,
+        simulation=simulation,
+        orders=orders_by_shaft(args.orders),
+        gear_ratio=args.gear_ratio,
+        fixed_member=args.fixed_member,
+        title=args.title,
+    )
+    if args.pdf is not None:
+        made.save_pdf(args.pdf)
+    if args.json:
+        print(json.dumps(made.content, indent=2, allow_nan=False))
+    else:
+        print(args.output)
+    return 0

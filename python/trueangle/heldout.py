@@ -1,0 +1,193 @@
+"""What a fit gains on readings that took no part in it: one run left out at a time."""
+
+from __future__ import annotations
+
+import math
+import warnings
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Final, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .angles import ARCSEC_PER_TURN, circular_mean, wrap
+from .errors import ArgumentError, NoModelError, OutsideSpanWarning, TrueAngleError
+from .model import HarmonicModel
+from .robust import Loss
+from .runs import CalibrationRun
+
+if TYPE_CHECKING:
+    from .fitresult import FitResult
+
+__all__ = ["HeldOut", "HeldOutRun", "correct_held_out", "hold_out"]
+
+Array = NDArray[np.float64]
+
+#: Most refits: with more runs several are left out together.
+_MOST_FOLDS: Final = 12
+#: Resamples of the runs for the interval of the reduction, and the fewest runs for one.
+_RESAMPLES, _FEWEST_RUNS = 2000, 3
+
+
+@dataclass(frozen=True, eq=False)
+class HeldOutRun:
+    """Error of one run before and after correction by a model of the other runs.
+
+    Attributes
+    ----------
+    label : str
+    model : HarmonicModel or None
+        None where the other runs supported no order: nothing is corrected.
+    before, after : ndarray
+        Arcsec per reading, each less its own circular mean: every run has its own zero.
+    """
+
+    label: str
+    run: CalibrationRun
+    model: HarmonicModel | None
+    before: Array
+    after: Array
+
+
+@dataclass(frozen=True, eq=False)
+class HeldOut:
+    """Gain on held-out runs.
+
+    Attributes
+    ----------
+    runs : tuple of HeldOutRun
+    left_in : tuple of (str, str)
+        Runs that could not be left out, and why: without them the orders are not
+        separable, for example.
+    """
+
+    runs: tuple[HeldOutRun, ...]
+    left_in: tuple[tuple[str, str], ...]
+
+    @property
+    def rms_before(self) -> float:
+        """Root mean square over all held-out readings before correction, arcsec."""
+        return _rms([run.before for run in self.runs])
+
+    @property
+    def rms_after(self) -> float:
+        """The same after correction."""
+        return _rms([run.after for run in self.runs])
+
+    @property
+    def reduction(self) -> float:
+        """``1 - rms_after / rms_before``; negative when correction makes new runs worse."""
+        return 1.0 - self.rms_after / self.rms_before if self.rms_before > 0.0 else 0.0
+
+    @property
+    def reduction_interval(self) -> tuple[float, float] | None:
+        """95 % interval of `reduction` by resampling whole runs; None below three runs."""
+        if len(self.runs) < _FEWEST_RUNS:
+            return None
+        squares = np.array([[r.before @ r.before, r.after @ r.after] for r in self.runs])
+        pick = np.random.default_rng(0).integers(len(squares), size=(_RESAMPLES, len(squares)))
+        before, after = squares[pick].sum(axis=1).T
+        ratio = np.sqrt(after / np.where(before > 0.0, before, np.inf))
+        low, high = np.quantile(1.0 - ratio, [0.025, 0.975])
+        return float(low), float(high)
+
+
+def hold_out(fit: FitResult) -> HeldOut:
+    """Leave out each run of a fit, fit the others the same way, correct the one left out.
+
+    Where the orders were selected by evidence they are selected anew without the run, so
+    that nothing of it enters the model that corrects it.
+
+    Raises
+    ------
+    ArgumentError
+        One run only, or none that can be left out.
+
+    Examples
+    --------
+    >>> import trueangle as ta
+    >>> theta = np.arange(0.0, 360.0, 5.0)
+    >>> noise = np.random.default_rng(0).normal(0.0, 1e-3, (3, theta.size))
+    >>> error = 0.1 * np.sin(np.radians(theta))
+    >>> runs = [ta.CalibrationRun(theta, theta + error + n, period=360.0) for n in noise]
+    >>> gain = hold_out(ta.fit(runs, orders=[1]))
+    >>> 0.98 < gain.reduction < 0.99
+    True
+    """
+    runs = fit.runs
+    if len(runs) < 2:
+        raise ArgumentError("one run only: nothing can be held out; measure another run")
+    found, left_in = [], []
+    for fold in _folds(len(runs)):
+        train = [run for i, run in enumerate(runs) if i not in fold]
+        labels = [runs[i].label or str(i + 1) for i in fold]
+        try:
+            model: HarmonicModel | None = _refit(fit, train)
+        except NoModelError:
+            model = None
+        except TrueAngleError as reason:
+            left_in += [(label, str(reason)) for label in labels]
+            continue
+        found += [
+            correct_held_out(model, runs[i], label) for i, label in zip(fold, labels, strict=True)
+        ]
+    if not found:
+        raise ArgumentError(f"no run can be left out: {left_in[0][1]}")
+    return HeldOut(tuple(found), tuple(left_in))
+
+
+def _folds(count: int) -> list[list[int]]:
+    folds = min(count, _MOST_FOLDS)
+    return [list(range(start, count, folds)) for start in range(folds)]
+
+
+def _refit(fit: FitResult, train: Sequence[CalibrationRun]) -> HarmonicModel:
+    from .fitting import fit as fit_runs
+
+    loss = cast(Loss, fit.loss)
+    argument = fit.model.argument
+    shafts = {shaft.name: shaft.cycles_per_turn for shaft in fit.problem.shafts}
+    if fit.selection is None:
+        orders = {shaft.name: shaft.orders for shaft in fit.problem.shafts}
+        return fit_runs(train, orders, shafts=shafts, argument=argument, loss=loss).model
+    ratio = fit.selection.gear_ratio
+    member = _fixed_member(ratio, shafts)
+    return fit_runs(
+        train, gear_ratio=ratio, fixed_member=member, argument=argument, loss=loss
+    ).model
+
+
+def _fixed_member(ratio: float | None, shafts: dict[str, float]) -> str:
+    """The member that the shafts of a fit were resolved with."""
+    generator = shafts.get("wave_generator")
+    return "flexspline" if ratio and generator and generator < ratio else "circular_spline"
+
+
+def correct_held_out(model: HarmonicModel | None, run: CalibrationRun, label: str) -> HeldOutRun:
+    """Error of a run before and after correction, each less its own circular mean.
+
+    Raises
+    ------
+    ArgumentError
+        The run is in another unit than the model.
+    """
+    if model is not None and run.period != model.period:
+        raise ArgumentError(
+            f"run {label} has period {run.period:g}, the model {model.period:g}: "
+            "convert one of them"
+        )
+    factor = ARCSEC_PER_TURN / run.period
+    with warnings.catch_warnings():
+        # Readings outside the model's span are part of the verdict, not news.
+        warnings.simplefilter("ignore", OutsideSpanWarning)
+        corrected = run.indicated if model is None else np.asarray(model.correct(run.indicated))
+    before, after = (
+        factor * wrap(error - circular_mean(error, run.period), run.period)
+        for error in (run.indicated - run.reference, corrected - run.reference)
+    )
+    return HeldOutRun(label, run, model, before, after)
+
+
+def _rms(parts: Sequence[Array]) -> float:
+    return math.sqrt(sum(float(p @ p) for p in parts) / sum(p.size for p in parts))

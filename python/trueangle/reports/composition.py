@@ -1,0 +1,219 @@
+"""A report: its content, figures and page, written as HTML or PDF."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from os import PathLike
+from typing import TYPE_CHECKING, Any
+
+from ..angles import ARCSEC_PER_TURN, wrap
+from ..diagnosis import diagnose
+from ..errors import ArgumentError, NoModelError, TrueAngleError
+from ..files import written_atomically
+from ..heldout import HeldOut, hold_out
+from ..plots.curves import Points, degrees, error_points, label_of
+from ..plots.simulatedcurves import left_after_causes
+from ..runs import CalibrationRun, as_runs
+from . import diagnosisfigures, figures
+from .diagnosed import diagnosed
+from .gained import gained
+from .measured import measured
+from .modelled import modelled, selected
+from .provenance import provenance
+from .unknowns import unknowns
+
+if TYPE_CHECKING:
+    from ..fitresult import FitResult
+    from ..orders import OrderSelection
+    from ..simulation import Simulation
+
+__all__ = ["Report", "report"]
+
+FORMAT, VERSION = "trueangle-report", 1
+
+
+@dataclass(frozen=True, eq=False)
+class Report:
+    """A report on calibration runs.
+
+    Attributes
+    ----------
+    title : str
+    content : dict
+        Every number of the page, plain values: what the page carries as JSON.
+    figures : dict of str to dict
+        Interactive figures by name, plotly specifications with an ``alt`` text.
+    """
+
+    title: str
+    content: dict[str, Any]
+    figures: dict[str, dict[str, Any]]
+
+    @cached_property
+    def html(self) -> str:
+        """The page: one file that needs no network.
+
+        Raises
+        ------
+        MissingExtraError
+            jinja2 or plotly is not installed.
+        """
+        from .page import render
+
+        return render(self)
+
+    def save(self, path: str | PathLike[str]) -> None:
+        """Write the page, complete or not at all."""
+        html = self.html
+        with written_atomically(path) as file:
+            file.write(html)
+
+    def save_pdf(self, path: str | PathLike[str], browser: str | None = None) -> None:
+        """Print the page to a PDF by an installed browser (Chromium, Chrome, Edge).
+
+        Raises
+        ------
+        ArgumentError
+            No such browser is installed, or it failed.
+        """
+        from .pdf import print_pdf
+
+        print_pdf(self.html, path, browser)
+
+
+def report(
+    runs: CalibrationRun | Iterable[CalibrationRun],
+    path: str | PathLike[str] | None = None,
+    *,
+    simulation: Simulation | None = None,
+    orders: Iterable[float] | Mapping[str, Iterable[float]] | str | None = None,
+    gear_ratio: float | None = None,
+    fixed_member: str = "circular_spline",
+    title: str | None = None,
+) -> Report:
+    """Fit, select orders, hold out, diagnose and put it all on one page.
+
+    Parameters
+    ----------
+    runs : CalibrationRun or iterable of them
+    path : path, optional
+        Where to write the page (HTML).
+    simulation : Simulation, optional
+        What is believed of the joint: the report then says what it gets wrong and why.
+        Gives the gear ratio too.
+    orders : optional
+        As for `trueangle.fit`; by default selected by evidence.
+    gear_ratio, fixed_member
+        As for `trueangle.fit`.
+    title : str, optional
+
+    Returns
+    -------
+    Report
+
+    Raises
+    ------
+    MissingExtraError
+        jinja2 or plotly is not installed (``pip install trueangle[report]``).
+
+    Examples
+    --------
+    >>> theta = np.arange(0.0, 360.0, 5.0)
+    >>> error = 0.1 * np.sin(np.radians(theta))
+    >>> made = report(CalibrationRun(theta, theta + error, period=360.0), orders=[1])
+    >>> round(made.content["model"]["coefficients"][0]["amplitude_arcsec"], 6)
+    360.0
+    """
+    found = as_runs(runs)
+    if simulation is not None:
+        if gear_ratio is not None:
+            raise ArgumentError("give gear_ratio or a simulation (which states it), not both")
+        if "motor" in simulation.joint.shafts:
+            gear_ratio = simulation.joint.gear_ratio
+            fixed_member = simulation.joint.fixed_member
+    fit, selection, why_not = _fitted(found, orders, gear_ratio, fixed_member)
+    held, why_no_gain = _held_out(fit)
+    diagnosis = None if simulation is None else diagnose(found, simulation)
+    heading = title or _title(found)
+    content: dict[str, Any] = {
+        "format": FORMAT,
+        "version": VERSION,
+        "title": heading,
+        "measured": measured(found),
+        "selection": None if selection is None else selected(selection),
+        "model": None if fit is None else modelled(fit),
+        "why_no_model": why_not,
+        "gain": None if held is None else gained(held),
+        "why_no_gain": why_no_gain,
+        "diagnosis": None,
+        "provenance": provenance(found, None if simulation is None else simulation.source),
+    }
+    drawn = _figures(found, fit, selection, held)
+    if simulation is not None and diagnosis is not None:
+        left = left_after_causes(diagnosis, found, simulation)
+        content["diagnosis"] = diagnosed(diagnosis, left)
+        drawn |= diagnosisfigures.figures_of(diagnosis, found, simulation, left)
+    content["unknowns"] = unknowns(found, selection, content["diagnosis"])
+    made = Report(heading, content, drawn)
+    if path is not None:
+        made.save(path)
+    return made
+
+
+def _title(runs: list[CalibrationRun]) -> str:
+    files = sorted({run.source.file for run in runs if run.source is not None})
+    return f"Angle error of {', '.join(files)}" if files else "Angle error of a joint"
+
+
+def _fitted(
+    runs: list[CalibrationRun], orders: Any, gear_ratio: float | None, fixed_member: str
+) -> tuple[FitResult | None, OrderSelection | None, str]:
+    """The fit; or the selection and the reason why there is none."""
+    from ..fitting import fit as fit_runs
+
+    try:
+        fit = fit_runs(runs, orders, gear_ratio=gear_ratio, fixed_member=fixed_member)
+    except NoModelError as reason:
+        from ..orders import select_orders
+
+        selection = select_orders(runs, gear_ratio=gear_ratio, fixed_member=fixed_member)
+        return None, selection, str(reason)
+    return fit, fit.selection, ""
+
+
+def _held_out(fit: FitResult | None) -> tuple[HeldOut | None, str]:
+    if fit is None:
+        return None, "There is no model to hold against other runs."
+    try:
+        return hold_out(fit), ""
+    except TrueAngleError as reason:
+        return None, f"{str(reason)[0].upper()}{str(reason)[1:]}."
+
+
+def _figures(
+    runs: list[CalibrationRun],
+    fit: FitResult | None,
+    selection: OrderSelection | None,
+    held: HeldOut | None,
+) -> dict[str, dict[str, Any]]:
+    """Every figure that this report has."""
+    points = error_points(fit) if fit is not None else [_plain(r, i) for i, r in enumerate(runs)]
+    made = {"errors": figures.errors_of_runs(fit, runs, points)}
+    if fit is not None or selection is not None:
+        made["spectrum"] = figures.spectrum(fit, selection)
+    if held is not None:
+        made["before-after"] = figures.before_after(held)
+    if fit is not None:
+        polar = figures.phases(fit)
+        if polar is not None:
+            made["phases"] = polar
+        for signal in figures.signals_present(fit):
+            made[f"residual-{signal}"] = figures.residuals(fit, signal)
+    return made
+
+
+def _plain(run: CalibrationRun, number: int) -> Points:
+    error = wrap(run.indicated - run.reference - run.zero, run.period)
+    return Points(label_of(run, number), degrees(run), (ARCSEC_PER_TURN / run.period) * error)

@@ -1,0 +1,73 @@
+"""The diagnosis as plain values."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, Final
+
+if TYPE_CHECKING:
+    from ..diagnosis import Diagnosis
+
+__all__ = ["diagnosed"]
+
+#: Units by the end of a parameter's name, the longer ones first.
+_UNITS: Final = {
+    "arcsec_per_Nm3": "arcsec/Nm³",
+    "arcsec_per_Nm": "arcsec/Nm",
+    "arcsec_per_K": "arcsec/K",
+    "arcsec_per_s": "arcsec/s",
+    "per_Nm": "1/Nm",
+    "per_kelvin": "1/K",
+    "arcsec": "arcsec",
+    "deg": "deg",
+    "hz": "Hz",
+    "s": "s",
+}
+
+
+def diagnosed(diagnosis: Diagnosis, left: list[tuple[str, float]]) -> dict[str, Any]:
+    """`Diagnosis.to_dict` with the sentences of its findings and what each of them leaves.
+
+    Parameters are listed; a value that is no single number is given as ``text``.
+    """
+    content = diagnosis.to_dict()
+    content["findings_count"] = len(content["findings"])
+    for finding, (_, rms) in zip(content["findings"], left[1:], strict=True):
+        finding["sentence"] = finding.pop("physics")
+        finding["rms_left_arcsec"] = rms
+        finding["parameters"] = [
+            _parameter(i, *entry) for i, entry in enumerate(finding["parameters"].items())
+        ]
+        gain = finding["gain"]
+        if gain is not None:
+            share, interval = gain["reducible_share"], gain["reducible_share_interval"]
+            gain["reducible_percent"] = None if share is None else 100.0 * share
+            low, high = (None, None) if interval is None else (100.0 * x for x in interval)
+            gain["reducible_low_percent"], gain["reducible_high_percent"] = low, high
+    content["extended"] = _toml(diagnosis)
+    return content
+
+
+def _parameter(index: int, name: str, entry: dict[str, Any]) -> dict[str, Any]:
+    value, std = entry["value"], entry["std"]
+    number = isinstance(value, int | float) and not isinstance(value, bool)
+    unit = next((u for u in _UNITS if name.endswith(f"_{u}")), "")
+    return {
+        "index": index,
+        "name": name.removesuffix(f"_{unit}").replace("_", " "),
+        "unit": _UNITS.get(unit, ""),
+        "value": value if number else None,
+        "std": std if number and isinstance(std, int | float) else None,
+        "text": "" if number else _text(value),
+    }
+
+
+def _text(value: Any) -> str:
+    if isinstance(value, list):
+        return "; ".join(_text(item) for item in value)
+    return f"{value:.4g}" if isinstance(value, float) else str(value)
+
+
+def _toml(diagnosis: Diagnosis) -> str:
+    from ..simulation.simulationfile import dumps
+
+    return dumps(diagnosis.extended)

@@ -1,0 +1,32 @@
+"""The gain on held-out runs as plain values."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from ..heldout import HeldOut
+from .measured import error_size
+
+__all__ = ["gained"]
+
+
+def gained(held: HeldOut) -> dict[str, Any]:
+    """Error of held-out runs before and after correction, in all and run by run."""
+    interval = held.reduction_interval
+    return {
+        "before": error_size([run.before for run in held.runs]),
+        "after": error_size([run.after for run in held.runs]),
+        "reduction_percent": 100.0 * held.reduction,
+        "reduction_low_percent": None if interval is None else 100.0 * interval[0],
+        "reduction_high_percent": None if interval is None else 100.0 * interval[1],
+        "runs": [
+            {
+                "label": run.label,
+                "corrected": run.model is not None,
+                "before": error_size([run.before]),
+                "after": error_size([run.after]),
+            }
+            for run in held.runs
+        ],
+        "left_in": [{"label": label, "because": why} for label, why in held.left_in],
+    }

@@ -1,0 +1,121 @@
+"""The correction model as plain values: coefficients, uncertainties, what hangs together."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from ..angles import ARCSEC_PER_TURN
+
+if TYPE_CHECKING:
+    from ..fitresult import FitResult
+    from ..orders import OrderSelection
+
+__all__ = ["modelled", "selected"]
+
+#: Correlations of coefficients below this are not worth a note.
+_NOTABLE: Final = 0.3
+_MOST_CORRELATIONS: Final = 5
+
+
+def modelled(fit: FitResult) -> dict[str, Any]:
+    """Coefficients with standard errors, and the quality of the fit, in arcsec and deg."""
+    model = fit.model
+    factor = ARCSEC_PER_TURN / model.period
+    coefficients = []
+    known = model.covariance is not None
+    sigma = np.sqrt(np.diag(fit.covariance)) * factor if known else None
+    rows = [(s, i) for s in model.shafts for i in range(len(s.orders))]
+    for n, (shaft, i) in enumerate(rows):
+        coefficients.append(
+            {
+                "shaft": shaft.name,
+                "order": shaft.orders[i],
+                "output_order": shaft.orders[i] * shaft.cycles_per_turn,
+                "cosine_arcsec": factor * shaft.cosine[i],
+                "cosine_std_arcsec": None if sigma is None else float(sigma[1 + 2 * n]),
+                "sine_arcsec": factor * shaft.sine[i],
+                "sine_std_arcsec": None if sigma is None else float(sigma[2 + 2 * n]),
+                "amplitude_arcsec": factor * float(fit.amplitudes[n]),
+                "amplitude_std_arcsec": factor * float(fit.amplitude_std[n]) if known else None,
+                "phase_deg": math.degrees(fit.phases[n]) % 360.0,
+                "phase_std_deg": _degrees(fit.phase_std[n]) if known else None,
+            }
+        )
+    return {
+        "argument": model.argument,
+        "constant_deg": model.constant * 360.0 / model.period,
+        "coefficients": coefficients,
+        "residual_std_arcsec": _finite(factor * fit.residual_std),
+        "degrees_of_freedom": float(fit.degrees_of_freedom),
+        "condition_number": _finite(fit.condition_number),
+        "offset_spread_arcsec": factor * fit.offset_spread,
+        "wild_readings": len(fit.wild),
+        "ridge": fit.ridge,
+        "correlations": _correlations(fit) if known else [],
+        "notes": list(fit.notes),
+    }
+
+
+def _correlations(fit: FitResult) -> list[dict[str, Any]]:
+    """The strongest correlations between two coefficients."""
+    names = [
+        f"{part} of {shaft.name} order {order}"
+        for shaft in fit.model.shafts
+        for order in shaft.orders
+        for part in ("A", "B")
+    ]
+    std = np.sqrt(np.diag(fit.covariance))[1:]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        matrix = fit.covariance[1:, 1:] / np.outer(std, std)
+    upper = np.triu(np.nan_to_num(np.abs(matrix)), k=1)
+    strongest = np.argsort(upper, axis=None)[::-1][:_MOST_CORRELATIONS]
+    pairs = zip(*np.unravel_index(strongest, upper.shape), strict=True)
+    return [
+        {"first": names[i], "second": names[j], "correlation": float(matrix[i, j])}
+        for i, j in pairs
+        if upper[i, j] >= _NOTABLE
+    ]
+
+
+def selected(selection: OrderSelection) -> dict[str, Any]:
+    """Every candidate order and the evidence for or against it."""
+    factor = ARCSEC_PER_TURN / selection.period
+    before, after = selection.holdout_rms
+    return {
+        "orders": [float(m) for m in selection.orders],
+        "reason": selection.reason,
+        "holdout": selection.holdout,
+        "holdout_rms_before_arcsec": _finite(factor * before),
+        "holdout_rms_after_arcsec": _finite(factor * after),
+        "noise_arcsec": _finite(factor * selection.noise.standard_deviation),
+        "noise_source": selection.noise.source,
+        "gear_ratio": selection.gear_ratio,
+        "notes": list(selection.notes),
+        "table": [
+            {
+                "order": float(row.order),
+                "retained": row.retained,
+                "verdict": row.verdict,
+                "amplitude_arcsec": _finite(factor * row.amplitude),
+                "std_arcsec": _finite(factor * row.standard_error),
+                "phase_deg": _finite(row.phase_deg % 360.0),
+                "phase_spread_deg": _finite(row.phase_spread_deg),
+                "holdout_gain_percent": _finite(100.0 * row.holdout_gain),
+                "aliases": [float(m) for m in row.aliases],
+                "explanations": [str(e) for e in row.explanations],
+                "reason": row.reason,
+            }
+            for row in selection.table
+        ],
+    }
+
+
+def _degrees(radians: float) -> float:
+    return min(math.degrees(radians), 180.0) if math.isfinite(radians) else 180.0
+
+
+def _finite(value: float) -> float | None:
+    return float(value) if math.isfinite(value) else None

@@ -1,0 +1,118 @@
+"""What these runs cannot tell, and which measurement would."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from ..runs import CalibrationRun
+
+if TYPE_CHECKING:
+    from ..orders import OrderSelection
+
+__all__ = ["unknowns"]
+
+#: Speeds (relative), temperatures (K) and torques (Nm) that differ by less are one.
+_SPEED, _TEMPERATURE, _TORQUE = 0.05, 1.0, 0.1
+
+
+def unknowns(
+    runs: Sequence[CalibrationRun],
+    selection: OrderSelection | None,
+    diagnosis: dict[str, Any] | None,
+) -> list[dict[str, str]]:
+    """``{what, because, measure}``: from the diagnosis where there is one.
+
+    A diagnosis works out itself what the conditions of the runs leave open; without one
+    the usual conditions are gone through.
+    """
+    if diagnosis is None:
+        return _folded(selection) + _conditions(runs) + _held(runs)
+    found = [
+        _entry(
+            " or ".join(cause.replace("_", " ") for cause in entry["causes"])
+            + (" (something is seen)" if entry["supported"] else ""),
+            entry["because"],
+            entry["measure"],
+        )
+        for entry in sorted(diagnosis["not_identifiable"], key=lambda e: not e["supported"])
+    ]
+    return found + _folded(selection) + _held(runs)
+
+
+def _held(runs: Sequence[CalibrationRun]) -> list[dict[str, str]]:
+    if len(runs) > 1:
+        return []
+    return [
+        _entry(
+            "repeatability, and the gain on new data",
+            "there is one run only",
+            "repeat the run, on another day if possible",
+        )
+    ]
+
+
+def _conditions(runs: Sequence[CalibrationRun]) -> list[dict[str, str]]:
+    entries = []
+    ways = {float(d) for run in runs for d in np.unique(run.direction) if d}
+    if len(ways) < 2:
+        entries.append(
+            _entry(
+                "reversal error: backlash, hysteresis",
+                "all readings were approached from one direction",
+                "repeat the runs backwards",
+            )
+        )
+    speeds = [np.median(np.abs(run.speed)) for run in runs if run.speed is not None]
+    if not speeds or np.ptp(speeds) <= _SPEED * max(speeds):
+        entries.append(
+            _entry(
+                "latency and filters",
+                "there is one speed only" if speeds else "no time was recorded",
+                "measure at a second speed at least three times as high, in both directions",
+            )
+        )
+    for name, unit, least, what, measure in (
+        ("temperature", "temperature", _TEMPERATURE, "thermal drift", "warm by 10 K or more"),
+        ("torque", "load", _TORQUE, "compliance and load-dependent gear error", "under two loads"),
+    ):
+        values = [getattr(r, name) for r in runs if getattr(r, name) is not None]
+        if not values or np.ptp(np.concatenate(values)) < least:
+            because = f"there is one {unit} only" if values else f"no {unit} was recorded"
+            verb = "repeat a run" if name == "temperature" else "repeat a run in both directions"
+            entries.append(_entry(what, because, f"{verb} {measure}"))
+    mounts = [run.mount for run in runs if run.mount is not None]
+    if not mounts or float(np.ptp(np.concatenate(mounts))) == 0.0:
+        entries.append(
+            _entry(
+                "the reference's own errors, which look like the joint's",
+                "the reference was never turned on its mount",
+                "remount it as the command trueangle plan proposes (three mounts do well)",
+            )
+        )
+    return entries
+
+
+def _folded(selection: OrderSelection | None) -> list[dict[str, str]]:
+    """Retained orders that these positions cannot tell from others."""
+    if selection is None:
+        return []
+    return [
+        _entry(
+            f"whether order {row.order:g} is really order "
+            + ", ".join(f"{m:g}" for m in row.aliases[:_MOST_ALIASES]),
+            "at these positions they are one and the same column of numbers",
+            "repeat a run with the positions shifted as the command trueangle plan proposes",
+        )
+        for row in selection.table
+        if row.retained and row.aliases
+    ]
+
+
+_MOST_ALIASES: Final = 3
+
+
+def _entry(what: str, because: str, measure: str) -> dict[str, str]:
+    return {"what": what, "because": because, "measure": measure}

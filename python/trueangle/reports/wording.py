@@ -1,0 +1,60 @@
+"""Words of the page that depend on the content; numbers are set in by the template."""
+
+from __future__ import annotations
+
+from typing import Any, Final
+
+__all__ = ["FIGURE_TITLES", "cause_name", "joined", "residual_signals", "verdict"]
+
+FIGURE_TITLES: Final = {
+    "errors": "Measured error of every run, and the model",
+    "measured-simulated": "Measured error and what the simulation expects",
+    "error-left": "Error left after each cause is added",
+    "gains": "Gain of each cause on held-out runs",
+    "spectrum": "Size of every order",
+    "phases": "Phase and size of every order, run by run",
+    "before-after": "Held-out runs before and after correction",
+}
+
+#: Reduction, in percent, from which a correction is worth having.
+_WORTH: Final = 1.0
+
+
+def verdict(content: dict[str, Any]) -> str:
+    """``"gain"``, ``"no-gain"``, ``"unchecked"`` or ``"no-model"``."""
+    if content["model"] is None:
+        return "no-model"
+    gain = content["gain"]
+    if gain is None:
+        return "unchecked"
+    low = gain["reduction_low_percent"]
+    low = gain["reduction_percent"] if low is None else low
+    return "gain" if low >= _WORTH else "no-gain"
+
+
+def cause_name(cause: str) -> str:
+    """A cause of the fixed vocabulary as words.
+
+    Examples
+    --------
+    >>> cause_name("zero_slip")
+    'zero slip'
+    """
+    return cause.replace("_", " ")
+
+
+def joined(items: list[Any]) -> str:
+    """Items as a list in a sentence.
+
+    Examples
+    --------
+    >>> joined([1, 2, 3])
+    '1, 2 and 3'
+    """
+    texts = [f"{item:g}" if isinstance(item, float) else str(item) for item in items]
+    return texts[0] if len(texts) == 1 else f"{', '.join(texts[:-1])} and {texts[-1]}"
+
+
+def residual_signals(figures: dict[str, Any]) -> list[str]:
+    """Signals that the residual is drawn against."""
+    return [name.removeprefix("residual-") for name in figures if name.startswith("residual-")]

@@ -1,0 +1,171 @@
+"""Content of the report against the results it comes from, and the page against the content."""
+
+from __future__ import annotations
+
+import html
+import json
+import re
+import sys
+
+import numpy as np
+import pytest
+
+import trueangle as ta
+from trueangle.cli import main
+from trueangle.errors import ArgumentError, MissingExtraError
+from trueangle.heldout import hold_out
+from trueangle.reports.page import formatted, lookup
+from trueangle.reports.pdf import find_browser, print_pdf
+
+from .conftest import ORDERS
+
+#: Numbers that reached the content by another route than the page's may differ by rounding.
+TINY = 1e-9
+
+
+@pytest.fixture(scope="module")
+def fit(runs) -> ta.FitResult:
+    return ta.fit(runs, ORDERS, gear_ratio=100.0)
+
+
+def test_coefficients_are_those_of_the_fit(made, fit: ta.FitResult) -> None:
+    rows = made.content["model"]["coefficients"]
+    assert [row["output_order"] for row in rows] == list(fit.orders)
+    for key, values in (
+        ("amplitude_arcsec", 3600.0 * fit.amplitudes),
+        ("amplitude_std_arcsec", 3600.0 * fit.amplitude_std),
+        ("phase_deg", np.degrees(fit.phases) % 360.0),
+        ("phase_std_deg", np.degrees(fit.phase_std)),
+    ):
+        np.testing.assert_allclose([row[key] for row in rows], values, rtol=TINY)
+    cov = np.diag(fit.covariance)[1:]
+    stds = [row[k] for row in rows for k in ("cosine_std_arcsec", "sine_std_arcsec")]
+    np.testing.assert_allclose(stds, 3600.0 * np.sqrt(cov), rtol=TINY)
+
+
+def test_gain_is_the_held_out_gain(made, fit: ta.FitResult) -> None:
+    held, gain = hold_out(fit), made.content["gain"]
+    assert gain["before"]["rms_arcsec"] == pytest.approx(held.rms_before, rel=TINY)
+    assert gain["after"]["rms_arcsec"] == pytest.approx(held.rms_after, rel=TINY)
+    # Backlash of 8 and noise of 3 arcsec stay: sqrt(8^2 + 3^2) = 8.5.
+    assert gain["after"]["rms_arcsec"] == pytest.approx(8.54, abs=0.2)
+
+
+def test_held_out_run_does_not_enter_its_own_model(runs) -> None:
+    held = hold_out(ta.fit(runs[:3], [1]))
+    for i, run in enumerate(held.runs):
+        others = [r for j, r in enumerate(runs[:3]) if j != i]
+        assert run.model.amplitudes == pytest.approx(ta.fit(others, [1]).amplitudes, rel=TINY)
+
+
+def test_one_run_has_no_gain_and_says_so(runs) -> None:
+    made = ta.report(runs[:1], orders=[1])
+    assert made.content["gain"] is None
+    assert "One run only" in made.content["why_no_gain"]
+    assert "Not verified" in made.html
+    assert any("repeatability" in e["what"] for e in made.content["unknowns"])
+
+
+def test_unknowns_follow_from_the_conditions(runs) -> None:
+    whats = [e["what"] for e in ta.report(runs, orders=[1]).content["unknowns"]]
+    assert not any("latency" in w or "reversal" in w for w in whats)
+    assert any("thermal" in w for w in whats)
+    theta = np.arange(0.0, 360.0, 10.0)
+    static = ta.CalibrationRun(theta, theta + 0.01 * np.sin(np.radians(theta)), period=360.0)
+    whats = [e["what"] for e in ta.report(static, orders=[1]).content["unknowns"]]
+    assert any("latency" in w for w in whats)
+    assert any("reversal" in w for w in whats)
+
+
+def page_numbers(page: str) -> list[tuple[str, int, str]]:
+    found = re.findall(r'<span class="n" data-path="([^"]+)" data-digits="(\d+)">([^<]*)<', page)
+    return [(path, int(digits), html.unescape(text)) for path, digits, text in found]
+
+
+def test_every_number_of_the_page_is_the_content(made) -> None:
+    numbers = page_numbers(made.html)
+    assert len(numbers) > 150
+    for path, digits, text in numbers:
+        assert text == formatted(lookup(made.content, path), digits), path
+
+
+def test_no_number_stands_on_the_page_without_its_path(made) -> None:
+    """Table cells that are numbers come from the content by path."""
+    body = made.html.split("<main", 1)[1].split("</main>", 1)[0]
+    bare = re.findall(r'<td class="r"[^>]*>([^<]+)</td>', body)
+    assert not [cell for cell in bare if re.search(r"\d", cell)]
+
+
+def test_page_carries_the_content_as_json(made) -> None:
+    text = re.search(r'id="result">(.*?)</script>', made.html, re.S)
+    assert json.loads(text[1]) == made.content
+
+
+def test_text_is_escaped_and_nothing_is_fetched(made) -> None:
+    assert "A &lt;joint&gt; &amp; its error" in made.html
+    assert "<joint>" not in made.html
+    outside = re.sub(
+        r'<script type="application/octet-stream".*?</script>', "", made.html, flags=re.S
+    )
+    assert not re.search(r'(src|href)="(?!#|data:,)', outside)
+    assert "http" not in re.sub(r"http-equiv", "", outside)
+
+
+def test_every_figure_has_an_alternative_text_and_data(made) -> None:
+    assert {"errors", "spectrum", "before-after", "phases"} <= set(made.figures)
+    assert {"residual-angle", "residual-direction", "residual-speed"} <= set(made.figures)
+    for name, figure in made.figures.items():
+        assert len(figure["alt"]) > 30, name
+        assert figure["data"], name
+
+
+def test_signal_that_does_not_vary_has_no_figure(made) -> None:
+    assert "residual-temperature" not in made.figures
+
+
+def test_command_writes_the_page(runs, tmp_path, capsys) -> None:
+    rows = ["run,reference_deg,indicated_deg"]
+    for run in runs[:2]:
+        pairs = zip(run.reference.tolist(), run.indicated.tolist(), strict=True)
+        rows += [f"{run.label},{r!r},{i!r}" for r, i in pairs]
+    file = tmp_path / "joint.csv"
+    file.write_text("\n".join(rows) + "\n")
+    page = tmp_path / "report.html"
+    assert main(["report", str(file), "-o", str(page), "--orders", "1", "--json"]) == 0
+    content = json.loads(capsys.readouterr().out)
+    assert content["provenance"]["inputs"][0]["file"].endswith("joint.csv")
+    assert len(content["provenance"]["inputs"][0]["sha256"]) == 64
+    assert content["provenance"]["inputs"][0]["sha256"] in page.read_text()
+
+
+def test_bad_file_leaves_no_page(tmp_path, capsys) -> None:
+    bad = tmp_path / "bad.csv"
+    bad.write_text("reference_deg\n1\n")
+    page = tmp_path / "report.html"
+    assert main(["report", str(bad), "-o", str(page)]) == 1
+    assert "bad.csv" in capsys.readouterr().err
+    assert list(tmp_path.iterdir()) == [bad]
+
+
+def test_missing_extras_are_named(made, monkeypatch) -> None:
+    from trueangle.reports import page
+
+    monkeypatch.setitem(sys.modules, "jinja2", None)
+    with pytest.raises(MissingExtraError, match=r"trueangle\[report\]"):
+        page.render(made)
+
+
+def test_pdf_without_a_browser_says_what_to_do(made, tmp_path) -> None:
+    with pytest.raises(ArgumentError, match="needs an installed browser"):
+        made.save_pdf(tmp_path / "report.pdf", browser="no-such-browser")
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.skipif(find_browser() is None, reason="no browser installed")
+def test_pdf_is_printed(made, tmp_path) -> None:
+    print_pdf(made.html, tmp_path / "report.pdf")
+    data = (tmp_path / "report.pdf").read_bytes()
+    assert data.startswith(b"%PDF")
+    # Vector figures make the file: a page whose figures failed is below 200 kB.
+    assert len(data) > 500_000
+    assert [p.name for p in tmp_path.iterdir()] == ["report.pdf"]
