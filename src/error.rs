@@ -98,6 +98,10 @@ pub enum Error {
         slope: f64,
     },
 
+    /// A tolerance beyond what doubles, or anybody, can use.
+    #[error("tolerance must be from 2e-15 to 1e-2 of the sum of amplitudes, got {0}")]
+    Tolerance(f64),
+
     /// A path of evaluation that is not there.
     #[error("path {path:?} cannot be taken: {reason}")]
     Path {

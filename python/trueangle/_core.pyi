@@ -1,4 +1,4 @@
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any, Literal, final, overload
 
 import numpy as np
@@ -21,6 +21,7 @@ class Series:
         cosine: Sequence[Sequence[float]],
         sine: Sequence[Sequence[float]],
         argument: Literal["reference", "indicated"] = "reference",
+        tolerance: float = 3e-15,
     ) -> Series: ...
     @overload
     def error(
@@ -74,6 +75,12 @@ class Series:
     @property
     def path(self) -> str: ...
     @property
+    def counts_path(self) -> str: ...
+    @property
+    def segments(self) -> int: ...
+    @property
+    def error_bound(self) -> float: ...
+    @property
     def slope_bound(self) -> float: ...
     @property
     def amplitude_sum(self) -> float: ...
@@ -84,7 +91,9 @@ class Series:
 class Compensator:
     """Correction of one sample at a time."""
 
-    def step(self, indicated: float, /) -> float: ...
+    @property
+    def step(self) -> Callable[[float], float]: ...
+    def _empty_step(self, indicated: float, /) -> float: ...
 
 _Array = NDArray[np.float64]
 

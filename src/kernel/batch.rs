@@ -6,8 +6,14 @@ use crate::error::Error;
 
 /// A number a batch may hold: kernels compute in f64 and convert while loading and storing.
 pub trait Sample: Copy + Send + Sync {
+    /// True for integers, which may be looked up by their place within a turn.
+    const IS_COUNT: bool;
+
     /// The exact value, or the nearest double (integers beyond 2^53).
     fn widen(self) -> f64;
+
+    /// Place of an integer within a turn of so many counts; 0 for other numbers.
+    fn place(self, counts_per_turn: usize) -> usize;
 }
 
 /// A sample that results can be stored in.
@@ -17,9 +23,16 @@ pub trait Real: Sample {
 }
 
 impl Sample for f64 {
+    const IS_COUNT: bool = false;
+
     #[inline(always)]
     fn widen(self) -> f64 {
         self
+    }
+
+    #[inline(always)]
+    fn place(self, _: usize) -> usize {
+        0
     }
 }
 
@@ -31,9 +44,16 @@ impl Real for f64 {
 }
 
 impl Sample for f32 {
+    const IS_COUNT: bool = false;
+
     #[inline(always)]
     fn widen(self) -> f64 {
         f64::from(self)
+    }
+
+    #[inline(always)]
+    fn place(self, _: usize) -> usize {
+        0
     }
 }
 
@@ -162,9 +182,22 @@ impl<'a, X: Copy> Batch<'a, X, X> {
 macro_rules! counts {
     ($($int:ty),*) => {$(
         impl Sample for $int {
+            const IS_COUNT: bool = true;
+
             #[inline(always)]
             fn widen(self) -> f64 {
                 self as f64
+            }
+
+            #[inline(always)]
+            fn place(self, counts_per_turn: usize) -> usize {
+                // Negative counts become huge: one comparison finds them and the high.
+                let place = self as i64 as u64;
+                if place < counts_per_turn as u64 {
+                    place as usize
+                } else {
+                    (i128::from(self)).rem_euclid(counts_per_turn as i128) as usize
+                }
             }
         }
     )*};

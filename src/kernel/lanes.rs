@@ -6,6 +6,7 @@
 
 use std::ops::{Add, Mul, Sub};
 
+use super::portable::{Portable, TARGET_FUSES};
 use crate::angle::Period;
 
 /// Adding this to a double below 2^51 rounds it to an integer, held in the low bits.
@@ -132,6 +133,11 @@ impl InstructionSet {
         }
     }
 
+    /// True when it rounds a product and sum once.
+    pub fn fuses(self) -> bool {
+        self != Self::Portable || TARGET_FUSES
+    }
+
     /// The fastest that this processor has.
     pub fn best() -> Self {
         [Self::Avx512, Self::Avx2]
@@ -172,5 +178,5 @@ pub fn dispatch<K: Kernel>(set: InstructionSet, kernel: K) {
         }
     }
     let _ = set;
-    kernel.run::<super::portable::Portable>();
+    kernel.run::<Portable<4, TARGET_FUSES>>();
 }

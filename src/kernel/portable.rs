@@ -7,14 +7,14 @@ use std::ops::{Add, Mul, Sub};
 
 use super::lanes::{Lanes, MOST_LANES, Row};
 
-const N: usize = 4;
-const FUSED: bool = cfg!(any(target_arch = "aarch64", target_feature = "fma"));
+/// True where the target always has fused multiply-add.
+pub const TARGET_FUSES: bool = cfg!(any(target_arch = "aarch64", target_feature = "fma"));
 
-/// Four doubles.
+/// `N` doubles, of a processor with or without fused multiply-add.
 #[derive(Clone, Copy)]
-pub struct Portable([f64; N]);
+pub struct Portable<const N: usize, const FUSED: bool>([f64; N]);
 
-impl Portable {
+impl<const N: usize, const FUSED: bool> Portable<N, FUSED> {
     #[inline(always)]
     fn zip(self, other: Self, f: impl Fn(f64, f64) -> f64) -> Self {
         let mut result = self.0;
@@ -25,7 +25,7 @@ impl Portable {
     }
 }
 
-impl Add for Portable {
+impl<const N: usize, const FUSED: bool> Add for Portable<N, FUSED> {
     type Output = Self;
     #[inline(always)]
     fn add(self, other: Self) -> Self {
@@ -33,7 +33,7 @@ impl Add for Portable {
     }
 }
 
-impl Sub for Portable {
+impl<const N: usize, const FUSED: bool> Sub for Portable<N, FUSED> {
     type Output = Self;
     #[inline(always)]
     fn sub(self, other: Self) -> Self {
@@ -41,7 +41,7 @@ impl Sub for Portable {
     }
 }
 
-impl Mul for Portable {
+impl<const N: usize, const FUSED: bool> Mul for Portable<N, FUSED> {
     type Output = Self;
     #[inline(always)]
     fn mul(self, other: Self) -> Self {
@@ -49,7 +49,7 @@ impl Mul for Portable {
     }
 }
 
-impl Lanes for Portable {
+impl<const N: usize, const FUSED: bool> Lanes for Portable<N, FUSED> {
     const N: usize = N;
     const FUSED: bool = FUSED;
 
@@ -60,7 +60,9 @@ impl Lanes for Portable {
 
     #[inline(always)]
     fn from_array(values: &[f64; MOST_LANES]) -> Self {
-        Self(std::array::from_fn(|i| values[i]))
+        let mut lanes = [0.0; N];
+        lanes.copy_from_slice(&values[..N]);
+        Self(lanes)
     }
 
     #[inline(always)]
@@ -70,30 +72,26 @@ impl Lanes for Portable {
 
     #[inline(always)]
     fn mul_add(self, b: Self, c: Self) -> Self {
-        if FUSED {
-            Self(std::array::from_fn(|i| self.0[i].mul_add(b.0[i], c.0[i])))
-        } else {
-            self * b + c
+        let mut result = c;
+        for i in 0..N {
+            result.0[i] = mul_add::<FUSED>(self.0[i], b.0[i], c.0[i]);
         }
+        result
     }
 
     #[inline(always)]
     fn neg_mul_add(self, b: Self, c: Self) -> Self {
-        if FUSED {
-            Self(std::array::from_fn(|i| {
-                (-self.0[i]).mul_add(b.0[i], c.0[i])
-            }))
-        } else {
-            c - self * b
+        let mut result = c;
+        for i in 0..N {
+            result.0[i] = mul_add::<FUSED>(-self.0[i], b.0[i], c.0[i]);
         }
+        result
     }
 
     #[inline(always)]
     fn product_rest(self, b: Self, product: Self) -> Self {
         if FUSED {
-            return Self(std::array::from_fn(|i| {
-                self.0[i].mul_add(b.0[i], -product.0[i])
-            }));
+            return self.mul_add(b, Self::splat(0.0) - product);
         }
         let (a_high, a_low) = split(self);
         let (b_high, b_low) = split(b);
@@ -102,7 +100,11 @@ impl Lanes for Portable {
 
     #[inline(always)]
     fn any_beyond(self, limit: f64) -> bool {
-        self.0.iter().any(|v| v.abs() > limit)
+        let mut any = false;
+        for value in self.0 {
+            any |= value.abs() > limit;
+        }
+        any
     }
 
     #[inline(always)]
@@ -111,19 +113,23 @@ impl Lanes for Portable {
         for lane in 0..N {
             // SAFETY: the index is at most `mask`.
             let row = unsafe { &(*rows.add((whole.0[lane].to_bits() & mask) as usize)).0 };
-            for (j, column) in columns.iter_mut().enumerate() {
-                let (low, high) = (row[j], high.0[lane] * row[j + 4]);
-                column.0[lane] = low + high;
+            for j in 0..4 {
+                columns[j].0[lane] = mul_add::<FUSED>(high.0[lane], row[j + 4], row[j]);
             }
         }
         columns
     }
 }
 
+#[inline(always)]
+fn mul_add<const FUSED: bool>(a: f64, b: f64, c: f64) -> f64 {
+    if FUSED { a.mul_add(b, c) } else { a * b + c }
+}
+
 /// Halves of 26 bits whose products are exact (Veltkamp).
 #[inline(always)]
-fn split(a: Portable) -> (Portable, Portable) {
-    let scaled = a * Portable::splat(134_217_729.0);
+fn split<L: Lanes>(a: L) -> (L, L) {
+    let scaled = a * L::splat(134_217_729.0);
     let high = scaled - (scaled - a);
     (high, a - high)
 }

@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use numpy::{Element, PyUntypedArray, PyUntypedArrayMethods};
+use pyo3::ffi;
 use pyo3::intern;
 use pyo3::prelude::*;
 use pyo3::types::{PyBool, PyFloat, PyInt};
@@ -33,7 +34,7 @@ pub struct PySeries {
 impl PySeries {
     #[new]
     #[allow(clippy::too_many_arguments)] // the keywords of the Python constructor
-    #[pyo3(signature = (period, constant, cycles, orders, cosine, sine, argument="reference"))]
+    #[pyo3(signature = (period, constant, cycles, orders, cosine, sine, argument="reference", tolerance=TOLERANCE))]
     fn new(
         py: Python<'_>,
         period: f64,
@@ -43,6 +44,7 @@ impl PySeries {
         cosine: Vec<Vec<f64>>,
         sine: Vec<Vec<f64>>,
         argument: &str,
+        tolerance: f64,
     ) -> PyResult<Self> {
         let shafts = cycles.len();
         for (what, got) in [
@@ -80,7 +82,7 @@ impl PySeries {
             .collect();
         let series = HarmonicSeries::new(period, constant, shafts)?;
         Ok(Self {
-            evaluator: Arc::new(Evaluator::new(series, argument, TOLERANCE)),
+            evaluator: Arc::new(Evaluator::new(series, argument).with_tolerance(tolerance)?),
         })
     }
 
@@ -152,7 +154,25 @@ impl PySeries {
 
     #[getter]
     fn path(&self) -> String {
-        self.evaluator.route(Quantity::Error).to_string()
+        let route = self.evaluator.route::<f64>(Quantity::Error, 1);
+        route.to_string()
+    }
+
+    #[getter]
+    fn counts_path(&self) -> String {
+        let route = self.evaluator.route::<u32>(Quantity::Error, usize::MAX);
+        route.to_string()
+    }
+
+    #[getter]
+    fn segments(&self) -> usize {
+        let table = self.evaluator.table(Quantity::Error);
+        table.map_or(0, |table| table.segments())
+    }
+
+    #[getter]
+    fn error_bound(&self) -> f64 {
+        self.evaluator.error_bound()
     }
 
     #[getter]
@@ -263,8 +283,58 @@ pub struct PyCompensator(Compensator);
 
 #[pymethods]
 impl PyCompensator {
+    /// A bound function of one float, cheaper to call than a method that PyO3 wraps.
+    #[getter]
+    fn step<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
+        let definition = &raw const STEP.0;
+        // SAFETY: the definition is static, and the function holds a reference to `slf`.
+        unsafe {
+            let function =
+                ffi::PyCFunction_NewEx(definition.cast_mut(), slf.as_ptr(), std::ptr::null_mut());
+            Bound::from_owned_ptr_or_err(slf.py(), function)
+        }
+    }
+
+    /// What a call costs that does nothing: the limit that benchmarks compare `step` with.
     #[pyo3(signature = (indicated, /))]
-    fn step(&self, indicated: f64) -> f64 {
-        self.0.step(indicated)
+    fn _empty_step(&self, indicated: f64) -> f64 {
+        indicated
+    }
+}
+
+/// Definitions hold pointers, but nobody writes to this one.
+struct Definition(ffi::PyMethodDef);
+
+// SAFETY: read-only.
+unsafe impl Sync for Definition {}
+
+static STEP: Definition = Definition(ffi::PyMethodDef {
+    ml_name: c"step".as_ptr(),
+    ml_meth: ffi::PyMethodDefPointer { PyCFunction: step },
+    ml_flags: ffi::METH_O,
+    ml_doc: c"step(indicated, /)\n--\n\nThe true angle of an indicated one.".as_ptr(),
+});
+
+/// `Compensator.step`: nothing in it can panic.
+///
+/// # Safety
+/// Called by the interpreter, attached, with the compensator the function is bound to.
+unsafe extern "C" fn step(
+    compensator: *mut ffi::PyObject,
+    indicated: *mut ffi::PyObject,
+) -> *mut ffi::PyObject {
+    unsafe {
+        let angle = ffi::PyFloat_AsDouble(indicated);
+        if angle == -1.0 && !ffi::PyErr_Occurred().is_null() {
+            return std::ptr::null_mut();
+        }
+        let py = Python::assume_attached();
+        let compensator = Bound::from_borrowed_ptr(py, compensator);
+        let corrected = compensator
+            .cast_unchecked::<PyCompensator>()
+            .get()
+            .0
+            .step(angle);
+        ffi::PyFloat_FromDouble(corrected)
     }
 }

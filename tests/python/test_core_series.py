@@ -302,6 +302,42 @@ def test_paths(series):
         series.slope(theta, path="table")
 
 
+@pytest.mark.parametrize("dtype", ["i2", "u2", "i4", "i8", "u8"])
+@pytest.mark.parametrize("method", ["error", "correct"])
+def test_counts(dtype, method):
+    series = make(period=4096.0)
+    assert series.counts_path == "counts"
+    limits = np.iinfo(dtype)
+    theta = np.random.default_rng(7).integers(
+        max(limits.min, -(10**6)), min(limits.max, 10**6), 20_000, dtype=dtype
+    )
+    compute = getattr(series, method)
+    np.testing.assert_array_equal(compute(theta), compute(theta.astype(float)))
+    np.testing.assert_array_equal(compute(theta, path="counts"), compute(theta, path="table"))
+    for period in (4096.5, 2.0**21):
+        with pytest.raises(ArgumentError, match="whole number of counts"):
+            make(period=period).error(theta, path="counts")
+    with pytest.raises(ArgumentError, match="must be integers"):
+        series.error(theta.astype(float), path="counts")
+
+
+def test_tolerance_is_selectable_and_stated():
+    arguments = (PERIOD, 0.0, [1.0], [ORDERS], [COSINE], [SINE], "indicated")
+    theta = np.linspace(-720.0, 720.0, 100_001)
+    segments = []
+    for tolerance in (2e-15, 3e-15, 1e-12, 1e-6):
+        series = Series(*arguments, tolerance)
+        assert series.error_bound <= tolerance * series.amplitude_sum
+        error = abs(series.error(theta) - series.error(theta, path="direct")).max()
+        assert error <= series.error_bound
+        segments.append(series.segments)
+    assert segments == sorted(segments, reverse=True)
+    assert segments[-1] < segments[0]
+    for tolerance in (0.0, 1e-15, 0.1, math.nan):
+        with pytest.raises(ArgumentError, match="tolerance must be"):
+            Series(*arguments, tolerance)
+
+
 def test_without_a_period_in_common():
     series = Series(
         PERIOD,

@@ -1,0 +1,330 @@
+//! A series made ready for batches: chooses how to compute and spreads it over threads.
+
+use std::sync::{Arc, OnceLock};
+
+use super::batch::{Batch, Real, Sample};
+use super::counts::{Counts, MOST_COUNTS};
+use super::exact::Exact;
+use super::lanes::InstructionSet;
+use super::route::{Path, Route};
+use super::table::{Scalar, Table};
+use super::{Argument, Quantity, expansion, inverse};
+use crate::direct;
+use crate::error::Error;
+use crate::series::HarmonicSeries;
+use crate::threads;
+
+/// Samples below which threads cost more than they save.
+pub const THREADED: usize = 100_000;
+
+/// Samples of one piece of work for a thread.
+const PART: usize = 1 << 15;
+
+/// Integers per entry from which it pays to compute an entry for every count.
+const PAYING_SHARE: f64 = 0.25;
+
+/// Greatest error of the default path, of the sum of amplitudes.
+pub const TOLERANCE: f64 = 3e-15;
+
+/// Tolerances that can be asked for.
+const TOLERANCES: (f64, f64) = (2e-15, 1e-2);
+
+/// The part of it that rounding may take: the transform that builds a table (4e-16 at
+/// most in tests up to order 512), its rows, and three roundings of the result.
+const ROUNDING: f64 = 1e-15;
+
+/// What is looked up for one quantity, built at the first use.
+#[derive(Debug, Default)]
+struct Tables {
+    polynomials: OnceLock<Option<Arc<Table>>>,
+    counts: OnceLock<Counts>,
+}
+
+/// What a route computes with.
+#[derive(Clone, Copy)]
+enum Method<'e> {
+    Table(&'e Table),
+    Counts(&'e Counts),
+    Exact,
+    Direct,
+}
+
+/// A series made ready for batches: immutable, shared between threads.
+#[derive(Debug)]
+pub struct Evaluator {
+    series: HarmonicSeries,
+    argument: Argument,
+    tolerance: f64,
+    reach: f64,
+    slope_bound: f64,
+    best: InstructionSet,
+    exact_error: Exact,
+    exact_slope: Exact,
+    errors: Tables,
+    corrections: Tables,
+}
+
+impl Evaluator {
+    /// Takes the series over; tables are built when first needed.
+    pub fn new(series: HarmonicSeries, argument: Argument) -> Self {
+        Self {
+            reach: series.amplitude_sum(),
+            slope_bound: series.slope_bound(),
+            exact_error: Exact::error(&series),
+            exact_slope: Exact::slope(&series),
+            series,
+            argument,
+            tolerance: TOLERANCE,
+            best: InstructionSet::best(),
+            errors: Tables::default(),
+            corrections: Tables::default(),
+        }
+    }
+
+    /// With another greatest error of the table path, of the sum of amplitudes.
+    pub fn with_tolerance(self, tolerance: f64) -> Result<Self, Error> {
+        if !(TOLERANCES.0..=TOLERANCES.1).contains(&tolerance) {
+            return Err(Error::Tolerance(tolerance));
+        }
+        Ok(Self {
+            tolerance,
+            errors: Tables::default(),
+            corrections: Tables::default(),
+            ..self
+        })
+    }
+
+    /// The series evaluated.
+    pub fn series(&self) -> &HarmonicSeries {
+        &self.series
+    }
+
+    /// Which angle the series takes.
+    pub fn argument(&self) -> Argument {
+        self.argument
+    }
+
+    /// Upper bound of `|d error / dx|`.
+    pub fn slope_bound(&self) -> f64 {
+        self.slope_bound
+    }
+
+    /// An error where the indicated angle does not determine the true one.
+    pub fn check_invertible(&self) -> Result<(), Error> {
+        if self.argument == Argument::Reference && self.slope_bound >= 1.0 {
+            return Err(Error::NotInvertible {
+                slope: self.slope_bound,
+            });
+        }
+        Ok(())
+    }
+
+    /// Where a quantity is looked up: the correction of a series of the indicated angle
+    /// subtracts the error itself.
+    fn tables(&self, quantity: Quantity) -> &Tables {
+        match (quantity, self.argument) {
+            (Quantity::Correction, Argument::Reference) => &self.corrections,
+            _ => &self.errors,
+        }
+    }
+
+    /// The table a quantity is looked up in, built at the first call; `None` where the
+    /// series is not periodic or too rough for one.
+    pub fn table(&self, quantity: Quantity) -> Option<&Arc<Table>> {
+        if !self.series.is_periodic() || quantity == Quantity::Slope {
+            return None;
+        }
+        let tables = self.tables(quantity);
+        let tolerance = (self.tolerance - ROUNDING) * self.reach;
+        let build = || {
+            if std::ptr::eq(tables, &self.errors) {
+                expansion::table(&self.series, tolerance, 8)
+            } else {
+                inverse::table(&self.series, self.slope_bound, tolerance)
+            }
+        };
+        tables
+            .polynomials
+            .get_or_init(|| build().map(Arc::new))
+            .as_ref()
+    }
+
+    /// Entries per count; `None` where the turn is not a whole number of them.
+    fn counts(&self, quantity: Quantity) -> Option<&Counts> {
+        let per_turn = self.series.period().value();
+        if per_turn.fract() != 0.0 || per_turn > MOST_COUNTS {
+            return None;
+        }
+        let table = self.table(quantity)?;
+        let counts = &self.tables(quantity).counts;
+        Some(counts.get_or_init(|| Counts::new(table, self.best)))
+    }
+
+    /// The path and instruction set that batches of so many samples take.
+    ///
+    /// Integers are looked up once there are enough of them to pay for the entries; the
+    /// results are the same to the last bit.
+    pub fn route<X: Sample>(&self, quantity: Quantity, samples: usize) -> Route {
+        let per_turn = self.series.period().value();
+        let path = if X::IS_COUNT
+            && samples as f64 >= PAYING_SHARE * per_turn
+            && self.counts(quantity).is_some()
+        {
+            Path::Counts
+        } else if self.table(quantity).is_some() {
+            Path::Table
+        } else {
+            Path::Exact
+        };
+        Route {
+            path,
+            set: self.best,
+        }
+    }
+
+    /// What a route needs, or why it cannot be taken.
+    fn method<X: Sample>(
+        &self,
+        quantity: Quantity,
+        route: Route,
+    ) -> Result<Method<'_>, &'static str> {
+        if !route.set.is_available() {
+            return Err("this processor does not have the instruction set");
+        }
+        match route.path {
+            Path::Direct => return Ok(Method::Direct),
+            Path::Exact => return Ok(Method::Exact),
+            Path::Counts if !X::IS_COUNT => return Err("the angles must be integers"),
+            Path::Table | Path::Counts => {}
+        }
+        let table = match self.table(quantity) {
+            Some(table) => table,
+            None if quantity == Quantity::Slope => return Err("slopes are not tabulated"),
+            None if !self.series.is_periodic() => {
+                return Err("the error does not repeat after one turn");
+            }
+            None => return Err("the table would need too many segments"),
+        };
+        if route.path == Path::Table {
+            return Ok(Method::Table(table));
+        }
+        self.counts(quantity)
+            .map(Method::Counts)
+            .ok_or("the turn must be a whole number of counts, at most 2^20")
+    }
+
+    /// `quantity` of every sample of a batch, by the default route or the one given.
+    ///
+    /// The results do not depend on `threads` (`None`: all cores, for large batches).
+    pub fn run<X: Sample, Y: Real>(
+        &self,
+        quantity: Quantity,
+        route: Option<Route>,
+        threads: Option<usize>,
+        batch: Batch<'_, X, Y>,
+    ) -> Result<(), Error> {
+        if quantity == Quantity::Correction {
+            self.check_invertible()?;
+        }
+        let len = batch.len();
+        let route = route.unwrap_or_else(|| self.route::<X>(quantity, len));
+        let method = self
+            .method::<X>(quantity, route)
+            .map_err(|reason| Error::Path {
+                path: route.to_string(),
+                reason,
+            })?;
+        if len < THREADED {
+            self.run_part(quantity, method, route.set, batch);
+            return Ok(());
+        }
+        let threads = threads.unwrap_or_else(threads::available);
+        let batch = Shared(batch);
+        threads::for_each_part(len.div_ceil(PART), threads, |i| {
+            let start = i * PART;
+            // SAFETY: parts lie within the batch, and each is handed out once.
+            let part = unsafe { batch.get().part(start, PART.min(len - start)) };
+            self.run_part(quantity, method, route.set, part);
+        });
+        Ok(())
+    }
+
+    fn run_part<X: Sample, Y: Real>(
+        &self,
+        quantity: Quantity,
+        method: Method<'_>,
+        set: InstructionSet,
+        mut batch: Batch<'_, X, Y>,
+    ) {
+        match (method, quantity) {
+            (Method::Table(table), Quantity::Correction) => table.subtract(set, batch),
+            (Method::Table(table), _) => table.values(set, batch),
+            (Method::Counts(counts), Quantity::Correction) => counts.subtract(batch),
+            (Method::Counts(counts), _) => counts.values(batch),
+            (Method::Exact, Quantity::Error) => self.exact_error.run(set, batch),
+            (Method::Exact, Quantity::Slope) => self.exact_slope.run(set, batch),
+            (Method::Exact, Quantity::Correction) => self.correct_exactly(set, batch),
+            (Method::Direct, _) => batch.map(|x| Y::narrow(self.direct(quantity, x.widen()))),
+        }
+    }
+
+    /// The correction of single samples by its table: for a compensator.
+    pub fn scalar(&self) -> Option<(Arc<Table>, Scalar)> {
+        let table = self.table(Quantity::Correction)?;
+        Some((Arc::clone(table), Table::scalar_subtract(self.best)))
+    }
+
+    /// The correction of one sample without a table.
+    pub fn correct_one(&self, indicated: f64) -> f64 {
+        match self.argument {
+            Argument::Reference => inverse::solve(&self.series, self.reach, indicated),
+            Argument::Indicated => indicated - self.series.evaluate(indicated).0,
+        }
+    }
+
+    /// What the error of the default route is at most, in the unit of the angles.
+    pub fn error_bound(&self) -> f64 {
+        // Four roundings of half an ulp of a sum that holds the constant.
+        2.0 * f64::EPSILON * self.series.constant().abs()
+            + match self.table(Quantity::Error) {
+                Some(table) => table.bound() + ROUNDING * self.reach,
+                None => TOLERANCE * self.reach,
+            }
+    }
+
+    /// The slow truth.
+    fn direct(&self, quantity: Quantity, x: f64) -> f64 {
+        match (quantity, self.argument) {
+            (Quantity::Error, _) => direct::error(&self.series, x),
+            (Quantity::Slope, _) => direct::slope(&self.series, x),
+            (_, Argument::Indicated) => x - direct::error(&self.series, x),
+            (_, Argument::Reference) if x.is_finite() => direct::correct(&self.series, x),
+            (_, Argument::Reference) => f64::NAN,
+        }
+    }
+
+    /// Corrections without a table, block by block.
+    fn correct_exactly<X: Sample, Y: Real>(&self, set: InstructionSet, mut batch: Batch<'_, X, Y>) {
+        let newton = inverse::Newton {
+            error: &self.exact_error,
+            slope: (self.argument == Argument::Reference).then_some(&self.exact_slope),
+            reach: self.reach,
+            set,
+        };
+        batch.map_blocks(|x, out| {
+            newton.solve(x, out, |x| self.correct_one(x));
+        });
+    }
+}
+
+/// A batch that threads take disjoint parts of.
+struct Shared<'a, X, Y>(Batch<'a, X, Y>);
+
+// SAFETY: only `part` is called through the shared reference, on disjoint ranges.
+unsafe impl<X: Sync, Y: Send> Sync for Shared<'_, X, Y> {}
+
+impl<'a, X, Y> Shared<'a, X, Y> {
+    fn get(&self) -> &Batch<'a, X, Y> {
+        &self.0
+    }
+}
