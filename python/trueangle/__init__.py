@@ -10,7 +10,7 @@ from ._core import __version__
 if TYPE_CHECKING:
     from .angles import wrap as wrap
     from .diagnosis import Diagnosis as Diagnosis
-    from .diagnosis import diagnose as diagnose
+    from .diagnosis.diagnose import diagnose as diagnose
     from .fitresult import FitResult as FitResult
     from .fitting import fit as fit
     from .logs.batch import correct_logs as correct_logs

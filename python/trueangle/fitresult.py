@@ -11,9 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .errors import ArgumentError
+from .fittedmodel import build_model, fit_notes
 from .model import HarmonicModel
 from .problem import Fitted, Problem
+from .robust import Weighted
 from .runs import CalibrationRun
+from .travel import Span
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -33,25 +36,47 @@ class FitResult:
 
     Attributes
     ----------
-    model : HarmonicModel
     problem : Problem
         The readings, shafts and orders that were put in.
     fitted : Fitted
         The core's solution.
-    weights : tuple of ndarray or None
-        Weights that a robust loss ended with; 0 marks readings set aside as wild.
+    weighted : Weighted
+        What the loss did to the weights.
+    loss : str
+        The loss asked for.
+    ridge : float
+        Tikhonov penalty relative to the sum of weights; 0 on a full turn.
+    span : Span
+        Stretch of the turn that was travelled.
     selection : OrderSelection or None
         The evidence, when the orders were chosen by it.
-    notes : tuple of str
-        What not to trust and why.
+    joint : tuple
+        Gear ratio (or None) and fixed member, as told.
     """
 
-    model: HarmonicModel
     problem: Problem
     fitted: Fitted
-    weights: tuple[Array, ...] | None
+    weighted: Weighted
+    loss: str
+    ridge: float
+    span: Span
     selection: OrderSelection | None
-    notes: tuple[str, ...]
+    joint: tuple[float | None, str]
+
+    @cached_property
+    def model(self) -> HarmonicModel:
+        """The fitted model, with its covariance and the record of this fit."""
+        return build_model(self)
+
+    @cached_property
+    def notes(self) -> tuple[str, ...]:
+        """What not to trust and why."""
+        return tuple(fit_notes(self))
+
+    @property
+    def weights(self) -> list[Array] | None:
+        """Weights that a robust loss ended with; 0 marks readings set aside as wild."""
+        return self.weighted.weights
 
     @property
     def runs(self) -> tuple[CalibrationRun, ...]:
@@ -104,16 +129,6 @@ class FitResult:
     def method(self) -> str:
         """How the normal equations were met: ``"plain"``, ``"moments"`` or ``"qr"``."""
         return self.fitted.solution.method
-
-    @property
-    def loss(self) -> str:
-        """The loss asked for."""
-        return "linear" if self.model.fit is None else self.model.fit.loss
-
-    @property
-    def ridge(self) -> float:
-        """Tikhonov penalty relative to the sum of weights; 0 on a full turn."""
-        return 0.0 if self.model.fit is None else self.model.fit.ridge
 
     @property
     def covariance(self) -> Array:

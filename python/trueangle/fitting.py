@@ -2,22 +2,17 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING
 
-import numpy as np
-
-from . import __version__
-from .angles import wrap
 from .errors import ArgumentError, NoModelError
 from .fitresult import FitResult
-from .model import Argument, FitRecord, HarmonicModel, Provenance, Shaft
-from .problem import Fitted, Problem
-from .robust import Loss, Weighted, weigh, without_spikes
+from .model import Argument, check_invertible
+from .problem import Problem
+from .robust import Loss, weigh, without_spikes
 from .runs import CalibrationRun, as_runs
 from .shafts import resolve_orders
-from .travel import CONDITION, Span, choose_ridge, covered_span
+from .travel import CONDITION, choose_ridge, covered_span
 from .units import check_follows
 
 if TYPE_CHECKING:
@@ -116,17 +111,17 @@ def fit(
         found, resolve_orders(orders, gear_ratio, fixed_member, shafts), argument, method, threads
     )
     weighted = weigh(problem, loss, _ROUNDING * problem.period)
-    weights = problem.base if weighted.weights is None else weighted.weights
     span = covered_span(problem.angles, problem.period)
     if ridge is None:
         tame = span.full or weighted.fitted.solution.condition_number < CONDITION
-        ridge = 0.0 if tame else choose_ridge(problem, weights)
-    fitted = problem.solve(weights, ridge) if ridge > 0.0 else weighted.fitted
-    notes = tuple(_notes(problem, weighted, ridge, span, selection))
-    record = _record(problem, weighted, fitted, loss, ridge, span, notes)
-    model = _model(problem, fitted, record)
-    kept = None if weighted.weights is None else tuple(weighted.weights)
-    return FitResult(model, problem, fitted, kept, selection, notes)
+        ridge = 0.0 if tame else choose_ridge(problem, weighted.weights or problem.base)
+    fitted = weighted.fitted
+    if ridge > 0.0:
+        fitted = problem.solve(weighted.weights or problem.base, ridge)
+    if argument == "reference":
+        check_invertible(fitted.series.slope_bound)
+    joint = (gear_ratio, fixed_member)
+    return FitResult(problem, fitted, weighted, loss, ridge, span, selection, joint)
 
 
 def _selected(
@@ -135,7 +130,7 @@ def _selected(
     gear_ratio: float | None,
     fixed_member: str,
     loss: Loss,
-) -> tuple[OrderSelection, Iterable[float]]:
+) -> tuple[OrderSelection, Mapping[str, Iterable[float]]]:
     """Orders with evidence, from readings without spikes."""
     if orders not in (None, "auto"):
         raise ArgumentError(f"orders must be whole numbers, a mapping or 'auto', got {orders!r}")
@@ -146,78 +141,4 @@ def _selected(
     selection = select_orders(runs, gear_ratio=gear_ratio, fixed_member=fixed_member)
     if not selection.orders:
         raise NoModelError(f"no order is supported by the data: {selection.reason}")
-    return selection, selection.orders
-
-
-def _notes(
-    problem: Problem,
-    weighted: Weighted,
-    ridge: float,
-    span: Span,
-    selection: OrderSelection | None,
-) -> Iterable[str]:
-    """What not to trust and why, one sentence each."""
-    if not span.full:
-        yield (f"Fitted on {span.start:.6g} to {span.stop:.6g} only: outside it is extrapolated.")
-    if ridge > 0.0:
-        yield (
-            f"On this arc the orders nearly cancel: a ridge of {ridge:.1e}, chosen by held-out "
-            "error, keeps the amplitudes small; single coefficients have no meaning of their own."
-        )
-    if weighted.weights is not None and weighted.wild:
-        yield f"{weighted.wild} wild reading{'s' if weighted.wild > 1 else ''} set aside."
-    fractional = [s.name for s in problem.shafts if s.cycles_per_turn % 1.0]
-    if fractional:
-        yield (
-            f"Shaft {', '.join(fractional)} does not turn a whole number of times per output "
-            "turn: the error does not repeat after one turn, angles must be unwrapped."
-        )
-    if selection is not None and selection.note:
-        yield selection.note
-
-
-def _record(
-    problem: Problem,
-    weighted: Weighted,
-    fitted: Fitted,
-    loss: str,
-    ridge: float,
-    span: Span,
-    notes: Sequence[str],
-) -> FitRecord:
-    solution = fitted.solution
-    variance = solution.residual_variance
-    used = fitted.offsets[np.isfinite(fitted.offsets)]
-    around = wrap(used - solution.constant, problem.period)
-    return FitRecord(
-        samples=sum(len(run) for run in problem.runs),
-        runs=len(problem.runs),
-        span=(span.start, span.stop),
-        residual=math.sqrt(variance) if math.isfinite(variance) else None,
-        method=solution.method,
-        loss=loss,
-        wild=weighted.wild,
-        ridge=ridge,
-        offsets=tuple(used.tolist()),
-        offset_spread=float(around.std(ddof=1)) if used.size > 1 else 0.0,
-        note=" ".join(notes),
-    )
-
-
-def _model(problem: Problem, fitted: Fitted, record: FitRecord) -> HarmonicModel:
-    solution = fitted.solution
-    covariance = np.asarray(solution.covariance)
-    sources = dict.fromkeys(run.source for run in problem.runs if run.source is not None)
-    return HarmonicModel(
-        shafts=tuple(
-            Shaft(shaft.name, shaft.cycles_per_turn, shaft.orders, tuple(a), tuple(b))
-            for shaft, a, b in zip(problem.shafts, solution.cosine, solution.sine, strict=True)
-        ),
-        constant=solution.constant,
-        period=problem.period,
-        argument=problem.argument,
-        covariance=covariance if np.isfinite(covariance).all() else None,
-        condition_number=solution.condition_number,
-        fit=record,
-        provenance=Provenance(tuple(sources), f"trueangle {__version__}"),
-    )
+    return selection, selection.by_shaft

@@ -165,13 +165,8 @@ class HarmonicModel:
             raise ArgumentError(
                 f"argument must be 'reference' or 'indicated', got {self.argument!r}"
             )
-        if self.argument == "reference" and self._series.slope_bound >= 1.0:
-            raise NotInvertibleError(
-                f"|error'| may reach {self._series.slope_bound:.3g}: from 1 on an indicated "
-                "angle stands for several true angles and cannot be corrected; use fewer or "
-                "lower orders, or argument='indicated'",
-                self._series.slope_bound,
-            )
+        if self.argument == "reference":
+            check_invertible(self._series.slope_bound)
         if self.covariance is not None:
             put(self, "covariance", self._checked_covariance(self.covariance))
         if self.terms:
@@ -529,6 +524,17 @@ class _SpanGuard:
                 OutsideSpanWarning,
                 stacklevel=3,
             )
+
+
+def check_invertible(slope: float) -> None:
+    """Raise `NotInvertibleError` when ``|d error / d angle|`` may reach 1."""
+    if slope >= 1.0:
+        raise NotInvertibleError(
+            f"|error'| may reach {slope:.3g}: from 1 on an indicated angle stands for several "
+            "true angles and cannot be corrected; use fewer or lower orders, or "
+            "argument='indicated'",
+            slope,
+        )
 
 
 def load_model(path: str | PathLike[str]) -> HarmonicModel:

@@ -104,8 +104,8 @@ def choose_ridge(problem: Problem, weights: Sequence[Array | None]) -> float:
     reach = _REACH * float(np.ptp(everything))
     for penalty in _PENALTIES[best:]:
         if problem.solve(base, penalty).amplitude_sum <= reach:
-            return penalty
-    return _PENALTIES[-1]
+            break
+    return float(penalty)
 
 
 _Fold = tuple[list[Array], list[Array]]

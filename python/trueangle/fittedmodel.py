@@ -1,0 +1,98 @@
+"""The model that a fit makes: its coefficients, its record, and what not to trust."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from . import __version__
+from .angles import wrap
+from .model import FitRecord, HarmonicModel, Provenance, Shaft
+
+if TYPE_CHECKING:
+    from .fitresult import FitResult
+
+__all__ = ["build_model", "fit_notes"]
+
+#: Positions are told apart by sorting: of more readings than this they are not counted.
+_COUNTED = 20_000
+
+
+def build_model(fit: FitResult) -> HarmonicModel:
+    """The fitted series with its covariance, record and provenance."""
+    problem, solution = fit.problem, fit.fitted.solution
+    covariance = np.asarray(solution.covariance)
+    sources = dict.fromkeys(run.source for run in problem.runs if run.source is not None)
+    return HarmonicModel(
+        shafts=tuple(
+            Shaft(shaft.name, shaft.cycles_per_turn, shaft.orders, tuple(a), tuple(b))
+            for shaft, a, b in zip(problem.shafts, solution.cosine, solution.sine, strict=True)
+        ),
+        constant=solution.constant,
+        period=problem.period,
+        argument=problem.argument,
+        covariance=covariance if np.isfinite(covariance).all() else None,
+        condition_number=solution.condition_number,
+        fit=_record(fit),
+        provenance=Provenance(tuple(sources), f"trueangle {__version__}"),
+    )
+
+
+def fit_notes(fit: FitResult) -> Iterable[str]:
+    """What not to trust and why, one sentence each."""
+    span, weighted = fit.span, fit.weighted
+    if not span.full:
+        yield f"Fitted on {span.start:.6g} to {span.stop:.6g} only: outside it is extrapolated."
+    if fit.ridge > 0.0:
+        yield (
+            f"On this arc the orders nearly cancel: a ridge of {fit.ridge:.1e} keeps the "
+            "amplitudes small; single coefficients have no meaning of their own."
+        )
+    if weighted.weights is not None and weighted.wild:
+        yield f"{weighted.wild} wild reading{'s' if weighted.wild > 1 else ''} set aside."
+    fractional = [s.name for s in fit.problem.shafts if s.cycles_per_turn % 1.0]
+    if fractional:
+        yield (
+            f"Shaft {', '.join(fractional)} does not turn a whole number of times per output "
+            "turn: the error does not repeat after one turn, angles must be unwrapped."
+        )
+    if fit.selection is not None and fit.selection.notes:
+        yield from (f"{note[:1].upper()}{note[1:]}." for note in fit.selection.notes)
+    elif (verified := _verified(fit)) is not None:
+        yield f"{verified[1][:1].upper()}{verified[1][1:]}."
+
+
+def _record(fit: FitResult) -> FitRecord:
+    problem, solution = fit.problem, fit.fitted.solution
+    variance = solution.residual_variance
+    used = fit.offsets[np.isfinite(fit.offsets)]
+    around = wrap(used - solution.constant, problem.period)
+    verified = _verified(fit)
+    return FitRecord(
+        samples=sum(len(run) for run in problem.runs),
+        runs=len(problem.runs),
+        span=(fit.span.start, fit.span.stop),
+        residual=math.sqrt(variance) if math.isfinite(variance) else None,
+        method=solution.method,
+        loss=fit.loss,
+        wild=fit.weighted.wild,
+        ridge=fit.ridge,
+        offsets=tuple(used.tolist()),
+        offset_spread=float(around.std(ddof=1)) if used.size > 1 else 0.0,
+        positions=None if verified is None else verified[0],
+        note=" ".join(fit.notes),
+    )
+
+
+def _verified(fit: FitResult) -> tuple[int, str] | None:
+    """Distinct positions and where the model is verified; None for free or many angles."""
+    from .verdicts import verified_positions
+
+    runs = fit.problem.runs
+    if sum(len(run) for run in runs) > _COUNTED:
+        return None
+    verified = verified_positions(runs, *fit.joint)
+    return None if verified.between else (verified.count, verified.sentence)
