@@ -6,6 +6,7 @@ import textwrap
 from typing import Any
 
 from .findings import Diagnosis, Finding
+from .quantity import Quantity
 
 __all__ = ["render"]
 
@@ -80,8 +81,8 @@ def _finding(number: int, finding: Finding) -> list[str]:
     return lines
 
 
-def _quantity(entry: dict[str, Any]) -> str:
-    value, std = entry["value"], entry["std"]
+def _quantity(entry: Quantity) -> str:
+    value, std = entry.value, entry.std
     if isinstance(value, list):
         shown = ", ".join(_number(item) for item in value[:12])
         if len(value) > 12:

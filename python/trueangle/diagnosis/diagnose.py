@@ -15,12 +15,13 @@ from ..simulation.effects.lines import MissingOrder
 from ..simulation.signals import join_runs
 from ..simulation.simulation import Simulation
 from .candidates import CANDIDATES
-from .candidates.candidate import line_parameters, quantity
+from .candidates.candidate import line_parameters
 from .discrepancy import compare, noise_from_repeats, unfolded_error
 from .dispersion import ScatterFinding, find_outliers, find_uneven_noise
 from .findings import Diagnosis, Finding
 from .gain import Gain, measure_gain
 from .identifiability import Blindness, blind_spots, doubts_about
+from .quantity import quantity
 from .selection import NEW_CAUSE, cause_terms, finding_groups, proposals, select
 from .space import Proposal, Space
 
@@ -33,6 +34,9 @@ MOST_READINGS = 40_000
 
 #: Fewest readings that can support a cause.
 LEAST_READINGS = 20
+
+#: Standard deviations beyond which readings are wild whatever the mean.
+WILD_ANYWAY = 12.0
 
 #: Rivals reported for each finding.
 RIVALS = 3
@@ -110,7 +114,12 @@ def diagnose(
     if wild is not None and wild.bic_gain > NEW_CAUSE:
         scatter.append(wild)
     findings, spots = _findings(chosen, spots, gain)
-    findings += [_scatter_finding(item) for item in scatter]
+    in_doubt = any(spot.supported for spot in spots)
+    for item in scatter:
+        if in_doubt and item.size < WILD_ANYWAY:
+            spots.append(_scatter_doubt(item))
+        else:
+            findings.append(_scatter_finding(item))
     findings.sort(key=lambda finding: -finding.evidence["bic_gain"])
     extended = sim.with_effects(effect for finding in findings for effect in finding.effects)
     noise = noise_from_repeats(signals, chosen.left - chosen.whiten.run_part(chosen.left))
@@ -230,6 +239,18 @@ def _corrected_lines(space: Space, spots: list[Blindness]) -> list[Finding]:
 def _scatter_finding(item: ScatterFinding) -> Finding:
     evidence = {"bic_gain": item.bic_gain}
     return Finding(item.cause, item.parameters, evidence, None, [], item.effects)
+
+
+def _scatter_doubt(item: ScatterFinding) -> Blindness:
+    """Scatter about a mean that is itself in doubt."""
+    return Blindness(
+        (item.cause,),
+        "the error that the readings show has no certain cause yet, so what scatters about it "
+        "has none either",
+        "the measurements named above, then diagnose again",
+        True,
+        item.bic_gain,
+    )
 
 
 def _overall(before: Space, after: Space) -> dict[str, float]:

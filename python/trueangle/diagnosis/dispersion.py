@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from math import lgamma
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..simulation.effects import Effect
 from ..simulation.effects.dispersion import HeteroscedasticNoise, Outliers
+from .quantity import Parameters, quantity
 from .space import Space
 
 __all__ = ["ScatterFinding", "find_outliers", "find_uneven_noise"]
@@ -44,13 +44,16 @@ class ScatterFinding:
     effects : list of Effect
     weights : ndarray, shape (n,)
         Inverse variances, of mean 1 (uneven noise), or 0 for wild readings.
+    size : float
+        Of the scatter, in standard deviations of one reading.
     """
 
     cause: str
     bic_gain: float
-    parameters: dict[str, dict[str, Any]]
+    parameters: Parameters
     effects: list[Effect]
     weights: Array
+    size: float = 1.0
 
 
 def _standardised(space: Space) -> Array:
@@ -105,7 +108,7 @@ def find_uneven_noise(space: Space) -> ScatterFinding | None:
     if not chosen:
         return None
     gamma, covariance = _log_variance(design, square)
-    parameters: dict[str, dict[str, Any]] = {}
+    parameters: Parameters = {}
     cosine = sine = 0.0
     order, start = 1.0, 1
     extra: dict[str, float] = {}
@@ -116,12 +119,12 @@ def find_uneven_noise(space: Space) -> ScatterFinding | None:
             order = float(name.split()[1])
             cosine, sine = float(gamma[start]), float(gamma[start + 1])
             suffix = "" if order == 1.0 else f"_{order:.0f}"
-            parameters[f"cosine{suffix}"] = {"value": cosine, "std": float(std[start])}
-            parameters[f"sine{suffix}"] = {"value": sine, "std": float(std[start + 1])}
+            parameters[f"cosine{suffix}"] = quantity(cosine, float(std[start]))
+            parameters[f"sine{suffix}"] = quantity(sine, float(std[start + 1]))
             effects.append(HeteroscedasticNoise(cosine, sine, order))
             start += 2
         else:
-            parameters[name] = {"value": float(gamma[start]), "std": float(std[start])}
+            parameters[name] = quantity(float(gamma[start]), float(std[start]))
             extra[name] = float(gamma[start])
             start += 1
     if extra:
@@ -164,21 +167,20 @@ def find_outliers(space: Space) -> ScatterFinding | None:
     rows = np.flatnonzero(chance > 0.5)
     spread = size * scale * np.sqrt(space.variance)
     std = float(np.sqrt(share * (1.0 - share) / n))
-    parameters: dict[str, dict[str, Any]] = {
-        "fraction": {"value": float(share), "std": max(std, float(share) / 5.0)},
-        "size_arcsec": {"value": float(spread), "std": None},
-        "rows": {
-            "value": [
+    parameters: Parameters = {
+        "fraction": quantity(float(share), max(std, float(share) / 5.0)),
+        "size_arcsec": quantity(float(spread), None),
+        "rows": quantity(
+            [
                 [space.signals.labels[int(space.signals.run[k])], int(space.signals.row[k])]
                 for k in rows
-            ],
-            "std": None,
-        },
+            ]
+        ),
     }
     weights = np.ones(n)
     weights[rows] = 1e-6
     return ScatterFinding(
-        "outliers", gain, parameters, [Outliers(float(share), float(spread))], weights
+        "outliers", gain, parameters, [Outliers(float(share), float(spread))], weights, size
     )
 
 

@@ -11,6 +11,7 @@ from ..simulation.simulation import Simulation
 from .discrepancy import Discrepancy
 from .gain import Gain
 from .identifiability import Blindness
+from .quantity import Parameters
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -26,8 +27,8 @@ class Finding:
     ----------
     cause : str
         Of the vocabulary of causes.
-    parameters : dict
-        ``{name: {"value": .., "std": ..}}``.
+    parameters : dict of str to Quantity
+        ``.value`` and ``.std`` by the names of the contract.
     evidence : dict
         ``bic_gain``, ``deviance`` (2 ln of the likelihood ratio), ``parameters``,
         ``log_grid``.
@@ -40,7 +41,7 @@ class Finding:
     """
 
     cause: str
-    parameters: dict[str, dict[str, Any]]
+    parameters: Parameters
     evidence: dict[str, float]
     gain: Gain | None
     rivals: list[tuple[str, float]]
@@ -55,7 +56,7 @@ class Finding:
         """The entry of ``findings``."""
         return {
             "cause": self.cause,
-            "parameters": self.parameters,
+            "parameters": {name: q.to_json() for name, q in self.parameters.items()},
             "evidence": self.evidence,
             "gain": None if self.gain is None else self.gain.to_json(),
             "rivals": [{"cause": cause, "bic_gap": gap} for cause, gap in self.rivals],

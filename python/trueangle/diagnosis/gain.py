@@ -44,7 +44,8 @@ class Gain:
     interval : (float, float) or None
         95 % of its bootstrap over runs.
     control_share : float or None
-        The same share with the factor's labels shuffled over runs: should be at most 0.
+        The same share with the factor's labels shuffled over runs: should be at most 0
+        (given as -1 where it is below).
     note : str
     """
 
@@ -237,18 +238,21 @@ def _control(
     test = unit % 2 == 0
     shares = []
     for _ in range(SHUFFLES):
-        signals = _shuffled(space.signals, EFFECTS[cause].factor, rng)
+        signals = _shuffled(space.signals, EFFECTS[cause].factor, unit, rng)
         columns = np.hstack(
             [CANDIDATES[cause].columns(signals, space.around, space.terms[k].shape) for k in group]
         )
         coefficients = np.linalg.lstsq(columns[~test], y[~test], rcond=None)[0]
         after = y[test] - columns[test] @ coefficients
         p0, p1 = float(np.mean(y[test] ** 2)), float(np.mean(after**2))
-        shares.append((p0 - p1) / max(p0 - space.variance, 1e-3 * space.variance))
+        share = (p0 - p1) / max(p0 - space.variance, 1e-3 * space.variance)
+        shares.append(max(share, -1.0))
     return float(np.mean(shares))
 
 
-def _shuffled(signals: Signals, factor: str, rng: np.random.Generator) -> Signals:
+def _shuffled(
+    signals: Signals, factor: str, unit: NDArray[np.int64], rng: np.random.Generator
+) -> Signals:
     """The labels of ``factor`` given to other runs (or turned round at random)."""
     runs = signals.runs
     run = signals.run
@@ -275,7 +279,8 @@ def _shuffled(signals: Signals, factor: str, rng: np.random.Generator) -> Signal
         return replace(signals, torque=shape * scale[other][run])
     if factor == "mount" and signals.mount is not None:
         return replace(signals, mount=_level(signals.mount, run)[other][run])
-    return replace(signals, theta=signals.theta + rng.uniform(0.0, 2.0 * np.pi, runs)[run])
+    turned = rng.uniform(0.0, 2.0 * np.pi, int(unit.max()) + 1)[unit]
+    return replace(signals, theta=signals.theta + turned)
 
 
 def _level(values: Array, run: NDArray[np.int64]) -> Array:

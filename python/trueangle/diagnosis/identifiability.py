@@ -17,17 +17,14 @@ __all__ = ["Blindness", "blind_spots", "doubts_about"]
 
 Array = NDArray[np.float64]
 
-#: Share of a regressor's power that must be its own for an effect to show at all.
-VISIBLE = 1e-3
-
 #: Share of velocity that direction must leave for latency and backlash to be told apart.
 OWN_OF_VELOCITY = 0.10
 
 #: The same for a presliding transition against plain backlash: it is short by nature.
 OWN_OF_TRANSITION = 1e-3
 
-#: The same for torque against order 1, and its cube against the torque.
-OWN_OF_TORQUE = 0.02
+#: The same for velocity against the zero, torque against order 1, its cube against it.
+OWN_POWER = 0.02
 
 #: Kelvin of change below which temperature counts as constant.
 LEAST_KELVIN = 2.0
@@ -153,14 +150,15 @@ def _velocity(space: Space) -> list[Blindness]:
         if both:
             spots.append(
                 _spot(
-                    ("backlash", "latency"),
-                    "velocity is unknown: a delay at one speed looks like a reversal error",
+                    ("backlash", "latency", "presliding_hysteresis"),
+                    "velocity is unknown: a delay looks like a reversal error, and one that "
+                    "builds up where the joint gathers speed",
                 )
             )
         return spots
     spots = []
     velocity = signals.velocity[:, None]
-    if share_left(space, velocity) < VISIBLE:
+    if share_left(space, velocity) < OWN_POWER:
         spots.append(
             _spot(
                 ("latency",),
@@ -232,7 +230,7 @@ def _torque(space: Space) -> list[Blindness]:
     torque = signals.torque[:, None]
     low = np.hstack([line_columns(signals.theta, k) for k in (1, 2, 3)])
     spots = []
-    if share_left(space, torque, low[:, :2]) < OWN_OF_TORQUE:
+    if share_left(space, torque, low[:, :2]) < OWN_POWER:
         spots.append(
             _spot(
                 ("torsional_compliance",),
@@ -241,9 +239,9 @@ def _torque(space: Space) -> list[Blindness]:
         )
     moments = torque * line_columns(signals.theta, 1)
     if (
-        share_left(space, torque**3, low, torque) < OWN_OF_TORQUE
+        share_left(space, torque**3, low, torque) < OWN_POWER
         and share_left(space, moments * line_columns(signals.theta, 2), low, torque, moments)
-        < OWN_OF_TORQUE
+        < OWN_POWER
     ):
         spots.append(
             _spot(
@@ -256,7 +254,7 @@ def _torque(space: Space) -> list[Blindness]:
     if gear:
         m = float(gear[-1])
         beside = np.hstack([line_columns(signals.theta, m + k) for k in (-1, 0, 1)])
-        if share_left(space, torque * line_columns(signals.theta, m), beside) < OWN_OF_TORQUE:
+        if share_left(space, torque * line_columns(signals.theta, m), beside) < OWN_POWER:
             spots.append(
                 _spot(
                     ("load_dependent_gear_error",),
@@ -285,9 +283,8 @@ def _mount(space: Space) -> list[Blindness]:
 def _runs(space: Space) -> list[Blindness]:
     signals = space.signals
     spots = []
-    if signals.runs < RUNS_PER_LEVEL:
-        spots.append(_spot(("zero_slip",), f"only {signals.runs} run(s): a zero has no spread"))
     if signals.runs < 2:
+        spots.append(_spot(("zero_slip",), "one run: a zero has no spread"))
         spots.append(
             _spot(("non_integer_order", "missing_order"), "one run: a phase cannot change")
         )

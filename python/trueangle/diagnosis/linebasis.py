@@ -14,6 +14,9 @@ __all__ = ["LineBasis", "plausible_orders"]
 #: Orders searched at least, and at most: bounds memory and the price of the search.
 LEAST_ORDERS, MOST_ORDERS = 128, 1024
 
+#: Orders of each shaft (per pole pair of the encoder) searched beyond the whole ones.
+SHAFT_ORDERS = 12
+
 #: Output orders up to this one are expected of any rotary part.
 LOW_ORDERS = 24
 
@@ -21,8 +24,8 @@ LOW_ORDERS = 24
 class LineBasis:
     """``exp(i m theta)`` for every order m searched, in single precision.
 
-    Whole output orders up to four turns of the fastest shaft and a bit, and the
-    multiples of shafts that turn a fractional number of times.
+    Whole output orders up to four turns of the fastest shaft and a bit, and the lowest
+    multiples of every shaft.
 
     Attributes
     ----------
@@ -38,13 +41,14 @@ class LineBasis:
         self.joint = joint
         top = math.ceil(4.0 * max(joint.shafts.values())) + 8
         top = min(max(top, LEAST_ORDERS), MOST_ORDERS)
-        fractional = {
+        whole = {float(m) for m in range(1, top + 1)}
+        multiples = {
             k * cycles
             for cycles in joint.shafts.values()
-            if cycles != round(cycles)
-            for k in range(1, 9)
+            for k in range(1, SHAFT_ORDERS * min(joint.pole_pairs, 4) + 1)
         }
-        self.orders = np.array([*range(1, top + 1), *sorted(fractional)], dtype=np.float64)
+        further = sorted(multiples - whole)
+        self.orders = np.array([*sorted(whole), *further], dtype=np.float64)
         self._whole = top
         expected = plausible_orders(joint)
         self.plausible = np.array([any(abs(m - p) < 1e-9 for p in expected) for m in self.orders])

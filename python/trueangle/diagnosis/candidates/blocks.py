@@ -42,7 +42,7 @@ class FactorCandidate(Candidate):
                 self.cause,
                 shape,
                 self.columns(space.signals, space.around, shape),
-                log_grid=float(np.log(len(shapes))),
+                log_grid=float(np.log(2.0 if shape["what"] == "zero" else 2.0 * len(shapes))),
             )
             for shape in shapes
         ]

@@ -10,14 +10,12 @@ from numpy.typing import NDArray
 
 from ...simulation.effects import EFFECTS, Effect, Surroundings
 from ...simulation.signals import Signals
+from ..quantity import Parameters, quantity
 from ..space import Proposal, Space
 
 __all__ = ["Array", "Candidate", "Parameters", "golden_maximum", "line_parameters", "quantity"]
 
 Array = NDArray[np.float64]
-
-#: ``{name: {"value": .., "std": ..}}`` of a finding.
-Parameters = dict[str, dict[str, Any]]
 
 _GOLDEN = (5.0**0.5 - 1.0) / 2.0
 
@@ -60,19 +58,6 @@ class Candidate:
         ``terms`` are this cause's terms with their coefficients and covariances.
         """
         raise NotImplementedError
-
-
-def quantity(value: Any, std: Any = None) -> dict[str, Any]:
-    """One parameter: numbers as Python floats."""
-
-    def plain(x: Any) -> Any:
-        if isinstance(x, np.ndarray | list | tuple):
-            return [plain(item) for item in x]
-        if isinstance(x, str | int) or x is None:
-            return x
-        return float(x)
-
-    return {"value": plain(value), "std": plain(std)}
 
 
 def line_parameters(coefficients: Array, covariance: Array) -> tuple[float, float, float, float]:

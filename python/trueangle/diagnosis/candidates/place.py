@@ -25,6 +25,9 @@ WIDTHS = (0.35, 0.7, 1.4, 2.8, 5.6, 11.0)
 #: Peaks of the quick search that are scored exactly.
 PEAKS = 2
 
+#: Readings' worth of power that a bump must rest on.
+LEAST_READINGS = 4.0
+
 #: Readings a step must have on either side of it within its run.
 STEP_MARGIN = 5
 
@@ -71,6 +74,10 @@ class DefectCandidate(Candidate):
                 if not space.hopeless(score / space.variance, 3, log_grid):
                     shape = self._refined(space, shaft, place, width)
                 columns = self.columns(space.signals, space.around, shape)
+                power = columns[:, 0] ** 2
+                # One or two readings are wild readings, not a place of the joint.
+                if power.sum() < LEAST_READINGS * power.max(initial=0.0):
+                    continue
                 proposal = space.propose(self.cause, shape, columns, 3, log_grid)
                 if best is None or proposal.deviance > best.deviance:
                     best = proposal
