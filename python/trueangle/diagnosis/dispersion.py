@@ -180,7 +180,7 @@ def find_outliers(space: Space) -> ScatterFinding | None:
     weights = np.ones(n)
     weights[rows] = 1e-6
     return ScatterFinding(
-        "outliers", gain, parameters, [Outliers(float(share), float(spread))], weights, size
+        "outliers", float(gain), parameters, [Outliers(float(share), float(spread))], weights, size
     )
 
 

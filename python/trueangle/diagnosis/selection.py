@@ -34,14 +34,21 @@ def select(space: Space) -> Space:
     """The space with the causes that its readings support.
 
     Forward selection with every candidate; where that takes a flexible cause (which can
-    imitate any effect of a run), a second path takes flexible ones only after every
-    specific one had its say. Both are pruned backward; the better by BIC is kept.
+    imitate any effect of a run), further paths take flexible ones only after the
+    specific ones had their say, without and with a zero of each run's own. All are
+    pruned backward; the best by BIC is kept.
     """
     direct = _pruned(_forward(space, list(CANDIDATES)))
     if not any(term.cause in FLEXIBLE for term in direct.terms):
         return direct
     patient = _pruned(_forward(_forward(space, RUN_FACTORS), list(CANDIDATES)))
-    return min(direct, patient, key=total_price)
+    paths = [direct, patient]
+    slip = CANDIDATES["zero_slip"].propose(space)
+    if slip is not None and slip.bic_gain > NEW_CAUSE:
+        specific = [cause for cause in CANDIDATES if cause not in FLEXIBLE]
+        settled = _forward(space.with_terms([slip]), specific)
+        paths.append(_pruned(_forward(settled, list(CANDIDATES))))
+    return min(paths, key=total_price)
 
 
 def total_price(space: Space) -> float:

@@ -8,36 +8,74 @@ from typing import Any, ClassVar
 import numpy as np
 
 from ...simulation.effects import Effect, Surroundings
+from ...simulation.effects.effect import line_columns
 from ...simulation.effects.reversal import Backlash, PreslidingHysteresis
 from ...simulation.signals import Signals
 from ..space import Proposal, Space
-from .candidate import Array, Candidate, Parameters, golden_maximum, quantity
+from .candidate import (
+    Array,
+    Candidate,
+    Parameters,
+    golden_maximum,
+    line_parameters,
+    quantity,
+)
 
 __all__ = ["BacklashCandidate", "HysteresisCandidate"]
+
+#: Orders of the angle with which play may vary from place to place.
+PLACE_ORDERS = (1, 2, 3)
 
 #: Transition lengths searched, degrees.
 LENGTHS = np.geomspace(0.15, 60.0, 15)
 
 
 class BacklashCandidate(Candidate):
-    """Regressor: the direction of travel."""
+    """Regressor: the direction of travel; then its product with low orders of the angle."""
 
     cause: ClassVar[str] = "backlash"
 
     def propose(self, space: Space) -> Proposal | None:
         if space.has("presliding_hysteresis"):
             return None
-        return space.propose(self.cause, {}, space.signals.direction[:, None])
+        shapes: list[dict[str, Any]] = [{"order": 0}]
+        if space.has(self.cause):
+            shapes = [{"order": k} for k in PLACE_ORDERS]
+        log_grid = float(np.log(len(shapes)))
+        proposals = [
+            space.propose(
+                self.cause,
+                shape,
+                self.columns(space.signals, space.around, shape),
+                log_grid=log_grid,
+            )
+            for shape in shapes
+        ]
+        return max(proposals, key=lambda p: p.bic_gain)
 
     def columns(self, signals: Signals, around: Surroundings, shape: dict[str, Any]) -> Array:
-        return signals.direction[:, None]
+        if shape["order"] == 0:
+            return signals.direction[:, None]
+        return signals.direction[:, None] * line_columns(signals.theta, shape["order"])
 
     def report(
         self, space: Space, terms: Sequence[tuple[Proposal, Array, Array]]
     ) -> tuple[Parameters, list[Effect]]:
-        _, (width,), covariance = terms[0]
-        std = float(np.sqrt(covariance[0, 0]))
-        return {"half_width_arcsec": quantity(width, std)}, [Backlash(float(width))]
+        width, std = 0.0, 0.0
+        lines = []
+        for proposal, coefficients, covariance in terms:
+            order = float(proposal.shape["order"])
+            if order == 0.0:
+                width, std = float(coefficients[0]), float(np.sqrt(covariance[0, 0]))
+            else:
+                lines.append((order, *line_parameters(coefficients, covariance)))
+        parameters = {"half_width_arcsec": quantity(width, std)}
+        if lines:
+            parameters["place_orders"] = quantity([line[0] for line in lines])
+            parameters["place_amplitudes_arcsec"] = quantity(
+                [line[1] for line in lines], [line[3] for line in lines]
+            )
+        return parameters, [Backlash(width, tuple((m, a, p) for m, a, p, _, _ in lines))]
 
 
 class HysteresisCandidate(Candidate):

@@ -8,7 +8,7 @@ from typing import ClassVar
 import numpy as np
 
 from ..signals import Signals
-from .effect import Array, Effect, Surroundings
+from .effect import Array, Effect, Surroundings, line_sum
 
 __all__ = ["Backlash", "PreslidingHysteresis"]
 
@@ -29,10 +29,13 @@ class Backlash(Effect):
     Parameters
     ----------
     half_width_arcsec : float
-        b: half of forward minus reverse.
+        b: half of forward minus reverse, on average over a turn.
+    lines : list of [output order, arcsec, phase_deg]
+        How b varies with the place.
     """
 
     half_width_arcsec: float
+    lines: tuple[tuple[float, float, float], ...] = ()
 
     kind: ClassVar[str] = "backlash"
     sentence: ClassVar[str] = (
@@ -48,7 +51,8 @@ class Backlash(Effect):
     measure: ClassVar[str] = "approach every position from both directions, within each run"
 
     def signal(self, signals: Signals, around: Surroundings, rng: np.random.Generator) -> Array:
-        return self.half_width_arcsec * signals.direction
+        width = self.half_width_arcsec + line_sum(signals.theta, self.lines)
+        return np.asarray(width * signals.direction)
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,145 @@
+"""Numerics of the diagnosis against slow references: dense covariances and least squares."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from trueangle.diagnosis.discrepancy import noise_from_repeats
+from trueangle.diagnosis.grid import UniformGrid, uniform_grid
+from trueangle.diagnosis.space import Space
+from trueangle.diagnosis.whitening import RunEffect, Whitener, lag_correlation
+from trueangle.simulation import Harmonic, Joint, RunDesign, Simulation, join_runs, simulate
+
+#: Relative rounding of double precision sums over a few hundred readings.
+ROUNDING = 1e-9
+
+#: Relative rounding of single precision sums over a few hundred readings.
+SINGLE = 1e-3
+
+JOINT = Joint(20.0, "circular_spline", "motor")
+LINES = (Harmonic("output", 1, 10.0, 30.0), Harmonic("motor", 1, 5.0, 80.0))
+RUNS = tuple(
+    RunDesign(samples=n, reversals=(0.6,), speed_deg_s=v, start_deg=7.0 * n)
+    for n, v in ((61, 5.0), (80, 30.0), (47, 5.0))
+)
+
+
+@pytest.fixture
+def space():
+    sim = Simulation(JOINT, LINES, sigma_arcsec=1.0, runs=RUNS)
+    runs = simulate(sim, 11)
+    residual = np.concatenate([run.error for run in runs]) * 3600.0
+    signals = join_runs(runs)
+    return Space(signals, residual - sim.predict(signals), sim.surroundings)
+
+
+def dense_covariance(space, rho, effects, weights):
+    """Covariance of the readings' noise, block by run, from its definition."""
+    v = np.zeros((space.n, space.n))
+    for start, stop in space.bounds:
+        n = stop - start
+        lag = np.abs(np.subtract.outer(np.arange(n), np.arange(n)))
+        block = rho**lag / (1.0 - rho**2)
+        for effect in effects:
+            z = effect.columns[start:stop]
+            block = block + effect.ratio * z @ z.T
+        scale = 1.0 / np.sqrt(weights[start:stop])
+        v[start:stop, start:stop] = block * np.outer(scale, scale)
+    return v
+
+
+def test_whitening_inverts_the_covariance(space):
+    rng = np.random.default_rng(1)
+    weights = rng.uniform(0.5, 2.0, space.n)
+    scale = np.sqrt(weights)[:, None]
+    # Run effects are those of the weighted readings, so scale them for the definition.
+    columns = rng.standard_normal((space.n, 3))
+    effects = [RunEffect(columns, 0.7), RunEffect(np.ones((space.n, 1)), 2.0)]
+    whiten = Whitener(space.bounds, 0.4, effects, weights)
+    scaled = [RunEffect(scale * effect.columns, effect.ratio) for effect in effects]
+    v = dense_covariance(space, 0.4, scaled, weights)
+    w = whiten(np.eye(space.n))
+    # The map's own run effects are in filtered units: identity of quadratic forms.
+    x = rng.standard_normal(space.n)
+    assert np.sum(whiten(x) ** 2) == pytest.approx(float(x @ np.linalg.solve(v, x)), rel=ROUNDING)
+    assert whiten.log_determinant == pytest.approx(np.linalg.slogdet(v)[1], rel=ROUNDING)
+    assert np.abs(w @ x - whiten(x)).max() < ROUNDING
+
+
+def test_gains_are_those_of_least_squares(space):
+    rng = np.random.default_rng(2)
+    columns = rng.standard_normal((space.n, 4))
+    target = space.target
+    before = np.sum((target - space.base @ np.linalg.lstsq(space.base, target)[0]) ** 2)
+
+    def after(extra):
+        design = np.hstack([space.base, extra])
+        return np.sum((target - design @ np.linalg.lstsq(design, target)[0]) ** 2)
+
+    gain, coefficients = space.gain(columns)
+    assert gain == pytest.approx(space.n * np.log(before / after(columns)), rel=ROUNDING)
+    whole = np.linalg.lstsq(np.hstack([space.base, columns]), target)[0]
+    assert coefficients == pytest.approx(whole[-4:], rel=1e-7)
+    singles = [space.n * np.log(before / after(columns[:, [k]])) for k in range(4)]
+    assert space.gains(columns) == pytest.approx(singles, rel=1e-7)
+    lines = space.line_gains()
+    for order in (2, 7, 33):
+        x = order * space.signals.theta
+        pair = np.column_stack([np.cos(x), np.sin(x)])
+        slow = space.n * np.log(before / after(pair))
+        assert lines[order - 1] == pytest.approx(slow, rel=SINGLE, abs=SINGLE)
+    # Known lines cannot gain: they are free already.
+    assert lines[0] == lines[19] == 0.0
+
+
+def test_run_effects_have_the_likelihood_of_the_dense_covariance(space):
+    z = np.column_stack([np.ones(space.n), space.signals.clock / 10.0])
+    ratio, deviance = space.run_effect_gain(z)
+
+    def minus_two_log_likelihood(ratio):
+        v = dense_covariance(space, 0.0, [RunEffect(z, ratio)], np.ones(space.n))
+        inverse = np.linalg.inv(v)
+        x, y = space.base, space.target
+        beta = np.linalg.solve(x.T @ inverse @ x, x.T @ inverse @ y)
+        e = y - x @ beta
+        return space.n * np.log(e @ inverse @ e / space.n) + np.linalg.slogdet(v)[1]
+
+    none = minus_two_log_likelihood(0.0)
+    assert deviance == pytest.approx(none - minus_two_log_likelihood(ratio), abs=1e-6)
+    trials = ratio * np.geomspace(0.1, 10.0, 9)
+    # The grid of ratios is a factor of 1.8 wide: the maximum is flat.
+    assert deviance > max(none - minus_two_log_likelihood(t) for t in trials) - 0.05
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_correlation_is_estimated_and_white_noise_is_white(seed):
+    rng = np.random.default_rng(seed)
+    bounds = [(400 * k, 400 * k + 400) for k in range(20)]
+    clock = np.tile(np.arange(400.0), 20)
+    white = rng.standard_normal(8000)
+    assert lag_correlation(white, clock, bounds) == 0.0
+    noise = np.zeros(8000)
+    for k in range(1, 8000):
+        noise[k] = 0.5 * noise[k - 1] + white[k]
+    # Standard error sqrt((1 - rho^2)/n) = 0.01, and the bias of the wander's removal.
+    assert lag_correlation(noise, clock, bounds) == pytest.approx(0.5, abs=0.06)
+
+
+def test_grids_are_seen_and_orders_fold_as_the_paper_counts():
+    theta = np.radians(np.tile(np.arange(0.0, 361.0, 10.0), 3) + 2.5)
+    grid = uniform_grid(theta)
+    assert grid == UniformGrid(36)
+    folds = {100: 8, 101: 7, 200: 16, 201: 15, 202: 14, 300: 12, 400: 4}
+    assert {m: grid.folded(m) for m in folds} == folds
+    assert grid.aliases(14, 3) == [22, 50, 58]
+    assert uniform_grid(theta + np.radians(np.random.default_rng(0).random(theta.size))) is None
+
+
+def test_repeats_give_the_noise_without_a_model():
+    design = RunDesign(samples=36, spacing="uniform")
+    sim = Simulation(JOINT, LINES, sigma_arcsec=2.0, runs=(design,) * 20)
+    runs = simulate(sim, 3)
+    error = np.concatenate([run.error for run in runs]) * 3600.0
+    # 19 * 36 degrees of freedom: 2.7 % standard error.
+    assert noise_from_repeats(join_runs(runs), error) == pytest.approx(2.0, rel=0.11)
