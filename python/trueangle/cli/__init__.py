@@ -18,6 +18,7 @@ __all__ = ["COMMANDS", "main"]
 COMMANDS: tuple[str, ...] = (
     "fit",
     "correct",
+    "demo",
     "plan",
     "simulate",
     "diagnose",
