@@ -16,14 +16,14 @@ if TYPE_CHECKING:
     from .logs.batch import correct_logs as correct_logs
     from .logs.frames import correct as correct
     from .model import HarmonicModel as HarmonicModel
-    from .model import Shaft as Shaft
-    from .model import load_model as load_model
+    from .modelfile import load_model as load_model
     from .moments import Moments as Moments
     from .orders import OrderSelection as OrderSelection
     from .orders import select_orders as select_orders
     from .reports import report as report
     from .runfiles import read_runs as read_runs
     from .runs import CalibrationRun as CalibrationRun
+    from .shafts import Shaft as Shaft
     from .simulation import Simulation as Simulation
     from .simulation import load_simulation as load_simulation
     from .simulation import simulate as simulate
@@ -45,11 +45,11 @@ _PUBLIC = {
     "select_orders": "orders",
     "FitResult": "fitresult",
     "HarmonicModel": "model",
-    "Shaft": "model",
+    "Shaft": "shafts",
     "correct": "logs.frames",
     "correct_logs": "logs.batch",
     "fit": "fitting",
-    "load_model": "model",
+    "load_model": "modelfile",
     "Moments": "moments",
     "read_runs": "runfiles",
     "report": "reports",

@@ -10,7 +10,9 @@ import numpy as np
 
 from . import __version__
 from .angles import wrap
-from .model import FitRecord, HarmonicModel, Provenance, Shaft
+from .model import HarmonicModel
+from .records import FitRecord, Provenance
+from .shafts import Shaft
 
 if TYPE_CHECKING:
     from .fitresult import FitResult

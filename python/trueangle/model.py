@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import warnings
 from collections.abc import Callable
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
@@ -15,91 +14,20 @@ from numpy.typing import ArrayLike, NDArray
 
 from . import _core
 from .angles import check_period
-from .errors import ArgumentError, NotInvertibleError, OutsideSpanWarning
-from .runs import Source
+from .errors import ArgumentError, NotInvertibleError
+from .records import FitRecord, Provenance
+from .shafts import Shaft
+from .spanguard import SpanGuard
 from .terms.term import Term
 
 if TYPE_CHECKING:
     from .terms.corrector import Corrector
 
-__all__ = ["Argument", "FitRecord", "HarmonicModel", "Provenance", "Shaft", "load_model"]
+__all__ = ["Argument", "HarmonicModel", "check_invertible"]
 
 Argument: TypeAlias = Literal["reference", "indicated"]
 Path: TypeAlias = Literal["table", "exact", "direct", "counts"]
 Array: TypeAlias = NDArray[np.float64]
-
-
-@dataclass(frozen=True)
-class Shaft:
-    """Harmonics of one shaft: order ``k`` is the output order ``k * cycles_per_turn``.
-
-    Parameters
-    ----------
-    name : str
-        ``"output"``, ``"motor"``, ``"wave_generator"`` or a name of your own.
-    cycles_per_turn : float
-        Turns of the shaft per output turn; any positive real.
-    orders : iterable of int
-        Whole numbers from 1, increasing.
-    cosine, sine : iterable of float
-        ``A_k`` and ``B_k``, in the unit of the model's period.
-    """
-
-    name: str
-    cycles_per_turn: float
-    orders: tuple[int, ...]
-    cosine: tuple[float, ...]
-    sine: tuple[float, ...]
-
-    def __post_init__(self) -> None:
-        put = object.__setattr__
-        put(self, "cycles_per_turn", float(self.cycles_per_turn))
-        put(self, "orders", tuple(int(k) for k in self.orders))
-        put(self, "cosine", tuple(float(a) for a in self.cosine))
-        put(self, "sine", tuple(float(b) for b in self.sine))
-
-    @property
-    def amplitudes(self) -> Array:
-        """``C_k = hypot(A_k, B_k)``."""
-        return np.hypot(self.cosine, self.sine)
-
-    @property
-    def phases(self) -> Array:
-        """``phi_k = atan2(A_k, B_k)`` in radians: the term is ``C sin(k x + phi)``."""
-        return np.arctan2(self.cosine, self.sine)
-
-
-@dataclass(frozen=True)
-class FitRecord:
-    """How a model was fitted: what its file says under ``fit``.
-
-    ``span`` is the stretch of angles the fit has seen, ``(0, period)`` for a full turn;
-    ``residual`` is the residual standard deviation (None where no reading is left over to
-    take it from), ``offsets`` the zero of every run and ``offset_spread`` their standard
-    deviation, all in the unit of the model's period. ``positions`` counts the distinct
-    angles within a turn; ``note`` says where the model is verified and where not.
-    """
-
-    samples: int
-    runs: int
-    span: tuple[float, float]
-    residual: float | None
-    method: str = "plain"
-    loss: str = "linear"
-    wild: int = 0
-    ridge: float = 0.0
-    offsets: tuple[float, ...] = ()
-    offset_spread: float = 0.0
-    positions: int | None = None
-    note: str = ""
-
-
-@dataclass(frozen=True)
-class Provenance:
-    """Where a model came from: its input files with their sha256, and the package."""
-
-    inputs: tuple[Source, ...] = ()
-    package: str = ""
 
 
 @dataclass(frozen=True, eq=False)
@@ -152,7 +80,7 @@ class HarmonicModel:
     covariance: Array | None = field(default=None, repr=False)
     condition_number: float | None = None
     fit: FitRecord | None = None
-    provenance: Provenance = Provenance()
+    provenance: Provenance = field(default_factory=Provenance)
     terms: tuple[Term, ...] = ()
 
     def __post_init__(self) -> None:
@@ -184,8 +112,8 @@ class HarmonicModel:
         return _core.Corrector(self._series, list(self.terms))
 
     @cached_property
-    def _warn(self) -> _SpanGuard:
-        return _SpanGuard(self)
+    def _warn(self) -> SpanGuard:
+        return SpanGuard(self.partial_span, self.period)
 
     @cached_property
     def _series(self) -> _core.Series:
@@ -502,30 +430,6 @@ def _given(*signals: ArrayLike | None) -> dict[str, ArrayLike | None]:
     return dict(zip(_SIGNALS, signals, strict=True))
 
 
-class _SpanGuard:
-    """Warns once when corrected angles leave the stretch a model was fitted on."""
-
-    def __init__(self, model: HarmonicModel) -> None:
-        self.span = model.partial_span
-        self.period = model.period
-        self.armed = self.span is not None
-
-    def __call__(self, corrected: ArrayLike) -> None:
-        if self.span is None:
-            return
-        start, stop = self.span
-        outside = np.mod(np.asarray(corrected) - start, self.period) > stop - start
-        if outside.any():
-            self.armed = False
-            warnings.warn(
-                f"{np.count_nonzero(outside)} of {outside.size} corrected angles lie outside "
-                f"the {start:.6g} to {stop:.6g} the model was fitted on: there it is "
-                "extrapolated and may be far off (said once per model)",
-                OutsideSpanWarning,
-                stacklevel=3,
-            )
-
-
 def check_invertible(slope: float) -> None:
     """Raise `NotInvertibleError` when ``|d error / d angle|`` may reach 1."""
     if slope >= 1.0:
@@ -535,20 +439,6 @@ def check_invertible(slope: float) -> None:
             "argument='indicated'",
             slope,
         )
-
-
-def load_model(path: str | PathLike[str]) -> HarmonicModel:
-    """Read and check a model file; nothing in it is executed.
-
-    Raises
-    ------
-    ModelFileError
-        Not JSON, truncated, of a later version, unknown or missing keys, numbers that
-        are not finite, a model that cannot be inverted: names the key and what to do.
-    """
-    from .modelfile import load_model as load
-
-    return load(path)
 
 
 def _rebuild(values: dict[str, Any]) -> HarmonicModel:

@@ -14,8 +14,10 @@ import numpy as np
 
 from .errors import ArgumentError, ModelFileError, TrueAngleError
 from .files import written_atomically
-from .model import FitRecord, HarmonicModel, Provenance, Shaft
+from .model import HarmonicModel
+from .records import FitRecord, Provenance
 from .runs import Source
+from .shafts import Shaft
 from .terms import TERMS, Term
 
 __all__ = ["FORMAT", "VERSION", "load_model", "save_model"]
@@ -63,7 +65,14 @@ def save_model(model: HarmonicModel, path: str | PathLike[str]) -> None:
 
 
 def load_model(path: str | PathLike[str]) -> HarmonicModel:
-    """Read a model; see `trueangle.load_model`."""
+    """Read and check a model file; nothing in it is executed.
+
+    Raises
+    ------
+    ModelFileError
+        Not JSON, truncated, of a later version, unknown or missing keys, numbers that
+        are not finite, a model that cannot be inverted: names the key and what to do.
+    """
     return _Reader(Path(path)).model()
 
 

@@ -12,8 +12,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from . import _core
 from .errors import ArgumentError
-from .model import Argument, HarmonicModel, Shaft
-from .shafts import ShaftOrders, resolve_orders
+from .model import Argument, HarmonicModel
+from .shafts import Shaft, ShaftOrders, resolve_orders
 
 __all__ = ["Moments", "MomentsFit", "Spectrum"]
 

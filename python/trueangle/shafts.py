@@ -1,18 +1,64 @@
-"""The shafts of a joint: names, turns per output turn, and orders asked of them."""
+"""The shafts of a joint: turns per output turn, their harmonics, orders asked of them."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from typing import NamedTuple
+from dataclasses import dataclass
+from typing import NamedTuple, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
 
 from .errors import ArgumentError
 
-__all__ = ["FIXED_MEMBERS", "ShaftOrders", "resolve_orders", "shaft_cycles"]
+__all__ = ["FIXED_MEMBERS", "Shaft", "ShaftOrders", "resolve_orders", "shaft_cycles"]
+
+Array: TypeAlias = NDArray[np.float64]
 
 FIXED_MEMBERS = ("circular_spline", "flexspline", "none")
 
 #: Turns of the wave generator against the output member, less those of the motor.
 _WAVE_GENERATOR = {"circular_spline": 1.0, "flexspline": -1.0, "none": 0.0}
+
+
+@dataclass(frozen=True)
+class Shaft:
+    """Harmonics of one shaft: order ``k`` is the output order ``k * cycles_per_turn``.
+
+    Parameters
+    ----------
+    name : str
+        ``"output"``, ``"motor"``, ``"wave_generator"`` or a name of your own.
+    cycles_per_turn : float
+        Turns of the shaft per output turn; any positive real.
+    orders : iterable of int
+        Whole numbers from 1, increasing.
+    cosine, sine : iterable of float
+        ``A_k`` and ``B_k``, in the unit of the model's period.
+    """
+
+    name: str
+    cycles_per_turn: float
+    orders: tuple[int, ...]
+    cosine: tuple[float, ...]
+    sine: tuple[float, ...]
+
+    def __post_init__(self) -> None:
+        put = object.__setattr__
+        put(self, "cycles_per_turn", float(self.cycles_per_turn))
+        put(self, "orders", tuple(int(k) for k in self.orders))
+        put(self, "cosine", tuple(float(a) for a in self.cosine))
+        put(self, "sine", tuple(float(b) for b in self.sine))
+
+    @property
+    def amplitudes(self) -> Array:
+        """``C_k = hypot(A_k, B_k)``."""
+        return np.hypot(self.cosine, self.sine)
+
+    @property
+    def phases(self) -> Array:
+        """``phi_k = atan2(A_k, B_k)`` in radians: the term is ``C sin(k x + phi)``."""
+        return np.arctan2(self.cosine, self.sine)
 
 
 class ShaftOrders(NamedTuple):

@@ -140,7 +140,7 @@ def test_impossible_models_are_refused_by_name(change, message):
 
 
 def test_correcting_outside_the_fitted_span_warns_once():
-    from trueangle.model import FitRecord
+    from trueangle.records import FitRecord
 
     record = FitRecord(samples=10, runs=1, span=(350.0, 480.0), residual=0.1)
     model = ta.HarmonicModel([ta.Shaft("output", 1, [1], [0.0], [0.5])], period=360.0, fit=record)

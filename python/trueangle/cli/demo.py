@@ -22,7 +22,7 @@ def run(args: argparse.Namespace) -> int:
     print()
     print(_diagnosed(args.seed))
     if args.report:
-        from ..reports import demo_report
+        from ..reports.demo import demo_report
 
         demo_report(args.report, seed=args.seed)
         print(f"\nreport written to {args.report}")
@@ -67,7 +67,7 @@ def _diagnosed(seed: int) -> str:
     from dataclasses import replace
 
     from ..diagnosis import diagnose
-    from ..reports import demo_simulation
+    from ..reports.demo import demo_simulation
     from ..simulation import simulate
     from ..simulation.effects.reversal import Backlash
 

@@ -18,7 +18,8 @@ from numpy.typing import NDArray
 
 from .. import __version__
 from ..errors import ArgumentError, OutsideSpanWarning
-from ..model import HarmonicModel, load_model
+from ..model import HarmonicModel
+from ..modelfile import load_model
 from .columns import AngleColumn, find_angle_column, find_signal_column
 from .statistics import CorrectionStatistics
 from .turns import TurnCounter, TurnState

@@ -1,0 +1,42 @@
+"""What a model file says of its making: the fit, and where its readings came from."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from .runs import Source
+
+__all__ = ["FitRecord", "Provenance"]
+
+
+@dataclass(frozen=True)
+class FitRecord:
+    """How a model was fitted: what its file says under ``fit``.
+
+    ``span`` is the stretch of angles the fit has seen, ``(0, period)`` for a full turn;
+    ``residual`` is the residual standard deviation (None where no reading is left over to
+    take it from), ``offsets`` the zero of every run and ``offset_spread`` their standard
+    deviation, all in the unit of the model's period. ``positions`` counts the distinct
+    angles within a turn; ``note`` says where the model is verified and where not.
+    """
+
+    samples: int
+    runs: int
+    span: tuple[float, float]
+    residual: float | None
+    method: str = "plain"
+    loss: str = "linear"
+    wild: int = 0
+    ridge: float = 0.0
+    offsets: tuple[float, ...] = ()
+    offset_spread: float = 0.0
+    positions: int | None = None
+    note: str = ""
+
+
+@dataclass(frozen=True)
+class Provenance:
+    """Where a model came from: its input files with their sha256, and the package."""
+
+    inputs: tuple[Source, ...] = ()
+    package: str = ""
