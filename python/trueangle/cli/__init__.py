@@ -23,6 +23,7 @@ COMMANDS: tuple[str, ...] = (
     "simulate",
     "diagnose",
     "report",
+    "bench",
 )
 
 

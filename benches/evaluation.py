@@ -1,0 +1,74 @@
+"""Evaluation targets: batches, small calls, single samples, latency, peers.
+
+    python benches/evaluation.py [--samples 10000000] [--rounds 7] [--latency SECONDS]
+                                 [--save FILE.npz]
+
+Ways are interleaved within one run; ratios of medians are what counts. ``--latency``
+paces a loop for so many seconds at 1 and at 10 kHz and ``--save`` keeps every latency.
+"""
+
+from __future__ import annotations
+
+import argparse
+import platform
+
+import numpy as np
+
+from trueangle.bench import evaluation
+from trueangle.bench.evaluation import Row
+from trueangle.bench.latency import histogram, paced
+
+
+def show(title: str, rows: list[Row], base: str, ratio: str) -> None:
+    print(f"\n{title}")
+    unit = next(row for row in rows if row.name == base).timing
+    for row in rows:
+        t = row.timing
+        scale = 1e9 / row.samples
+        print(
+            f"  {row.name:38s} {t.median * scale:10.2f} ns"
+            f" ({t.least * scale:.2f} .. {t.most * scale:.2f})"
+            f"   {ratio} {t.median / unit.median:8.2f}, of minima {t.least / unit.least:8.2f}"
+        )
+
+
+def latency(seconds: float, save: str | None) -> None:
+    step = evaluation.harmonics(evaluation.ORDERS["17 orders"]).compensator()
+    kept = {}
+    for rate in (1e3, 1e4):
+        for name, function in (("empty", float), ("step", step)):
+            found = paced(name, function, rate, int(seconds * rate))
+            kept[f"{name}_{rate:.0f}Hz"] = found.nanoseconds
+            quantiles = ", ".join(f"{q} {v:.0f} ns" for q, v in found.quantiles().items())
+            print(f"\n{name} at {rate:.0f} Hz, {found.nanoseconds.size} calls: {quantiles}")
+            print(histogram(found))
+    if save is not None:
+        np.savez_compressed(save, **kept)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--samples", type=int, default=10_000_000)
+    parser.add_argument("--rounds", type=int, default=7)
+    parser.add_argument("--peer-rounds", type=int, default=3)
+    parser.add_argument("--latency", type=float, default=0.0, metavar="SECONDS")
+    parser.add_argument("--save", metavar="FILE.npz")
+    args = parser.parse_args()
+    print(f"python {platform.python_version()}, numpy {np.__version__}, {platform.machine()}")
+    path = evaluation.harmonics([1])._series.path
+    print(f"default path {path}, {args.samples} samples")
+
+    batches = evaluation.batches(args.samples, args.rounds)
+    show("Batches, ns per sample", batches, "copy float64", "x copy of float64")
+    peers, missing = evaluation.peer_batches(args.samples, args.peer_rounds)
+    show("Peers, 17 orders, ns per sample", peers, "trueangle", "x trueangle")
+    for name in missing:
+        print(f"  {name:38s} not installed")
+    show("37 samples, ns per call", evaluation.small(), "error", "x error")
+    show("One sample, ns per call with its loop", evaluation.single(), "step", "x step")
+    if args.latency > 0.0:
+        latency(args.latency, args.save)
+
+
+if __name__ == "__main__":
+    main()
