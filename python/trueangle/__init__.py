@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from .moments import Moments as Moments
     from .orders import OrderSelection as OrderSelection
     from .orders import select_orders as select_orders
+    from .planning import plan_mounts as plan_mounts
     from .reports import report as report
     from .runfiles import read_runs as read_runs
     from .runs import CalibrationRun as CalibrationRun
@@ -42,6 +43,7 @@ _PUBLIC = {
     "CalibrationRun": "runs",
     "Diagnosis": "diagnosis",
     "OrderSelection": "orders",
+    "plan_mounts": "planning",
     "select_orders": "orders",
     "FitResult": "fitresult",
     "HarmonicModel": "model",

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -85,6 +85,10 @@ class Positions:
         gaps = np.diff(self.turns, append=self.turns[0] + 1.0)
         largest = float(gaps.max())
         return 1.0 if largest <= max(_MISSING, 3.0 * float(np.median(gaps))) else 1.0 - largest
+
+    def of_rows(self, rows: NDArray[np.intp]) -> Positions:
+        """The same positions for the readings in another order, or for some of them."""
+        return replace(self, index=self.index[rows])
 
     def spectrum(self, highest: int) -> Array:
         """``|mean exp(2 pi i m t)|`` for m = 0 .. highest, by a histogram for many t."""

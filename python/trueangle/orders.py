@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from typing import Literal
 
 from .aliasing import distinct_positions
 from .candidates import choose_candidates
 from .errors import ArgumentError
 from .ordertable import OrderRow, OrderSelection
+from .paper import select_by_paper
 from .runs import CalibrationRun, as_runs
 from .selection import FALSE_ALARM, EvidenceSelection
 
 __all__ = ["FALSE_ALARM", "OrderRow", "OrderSelection", "select_orders"]
+
+Method = Literal["evidence", "paper"]
 
 
 def select_orders(
@@ -19,6 +23,7 @@ def select_orders(
     candidates: Iterable[float] | None = None,
     gear_ratio: float | None = None,
     fixed_member: str = "circular_spline",
+    method: Method = "evidence",
     *,
     reference_orders: Iterable[float] = (),
     tolerance: float | None = None,
@@ -47,6 +52,8 @@ def select_orders(
     gear_ratio : float, optional
         Motor turns per output turn.
     fixed_member : {"circular_spline", "flexspline", "none"}
+    method : {"evidence", "paper"}
+        ``"paper"``: amplitude and phase range over the runs, `trueangle.paper.select_by_paper`.
     reference_orders : iterable of float, optional
         Orders that the reference itself is known to make (50 and 100 for a stepper motor
         of 200 steps). They and their side bands are fitted, named and not retained.
@@ -79,6 +86,8 @@ def select_orders(
     >>> select_orders(run).orders
     (3,)
     """
+    if method not in ("evidence", "paper"):
+        raise ArgumentError(f"method must be 'evidence' or 'paper', got {method!r}")
     found = as_runs(runs)
     kept = [run for run in map(_without_zero_weights, found) if run is not None]
     if not kept:
@@ -87,6 +96,8 @@ def select_orders(
     chosen = choose_candidates(
         kept, positions, candidates, gear_ratio, fixed_member, tuple(reference_orders)
     )
+    if method == "paper":
+        return select_by_paper(kept, positions, chosen)
     return EvidenceSelection(kept, positions, chosen).result()
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from .aliasing import Explanation, Positions
 from .repeats import Noise
@@ -25,7 +25,8 @@ class OrderRow:
     retained : bool
     verdict : str
         ``"retained"``, ``"noise"``, ``"no held-out gain"``, ``"negligible"``,
-        ``"too steep"``, ``"alias"``, ``"reference"`` or ``"weak"``.
+        ``"too steep"``, ``"alias"``, ``"reference"``, ``"weak"``; with method ``"paper"``
+        also ``"small"`` and ``"phase varies"``.
     cosine, sine : float
         Coefficients A and B beside all retained orders.
     standard_error : float
@@ -146,6 +147,10 @@ class OrderSelection:
                     found.setdefault(shaft, []).append(round(order / cycles))
                     break
         return {shaft: tuple(orders) for shaft, orders in found.items()}
+
+    def with_notes(self, notes: tuple[str, ...]) -> OrderSelection:
+        """The same selection with these notes."""
+        return replace(self, notes=notes)
 
     def row(self, order: float) -> OrderRow:
         """The row of one order.

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
+from . import _core
 from .aliasing import Positions
 from .candidates import Candidates
 from .evidence import (
@@ -22,15 +22,16 @@ from .evidence import (
     pooled_scatter,
     run_scatter,
 )
-from .harmonicsums import HarmonicSums, Readings, harmonic_sums
+from .harmonicsums import HarmonicSums, harmonic_sums
 from .lookalikes import find_lookalikes
 from .ordertable import OrderRow, OrderSelection
 from .phases import circular_range_deg, unit_phases
 from .repeats import Noise, pure_error
 from .runs import CalibrationRun
 from .verdicts import explained, selection_notes
+from .zerogroups import angle_blocks, units_of
 
-__all__ = ["EvidenceSelection", "angle_blocks", "units_of"]
+__all__ = ["FALSE_ALARM", "EvidenceSelection"]
 
 Array = NDArray[np.float64]
 
@@ -52,45 +53,6 @@ NEGLIGIBLE_NOISE: Final = 0.1
 #: angle stands for several true ones, as ill-determined orders on a short arc make it.
 STEEPEST: Final = 0.95
 
-#: Folds of a single run: whole blocks of neighbouring positions, dealt in turn.
-_FOLDS: Final = 6
-_BLOCKS: Final = 24
-
-
-def units_of(runs: Sequence[CalibrationRun], whole: bool) -> tuple[list[Readings], Array]:
-    """Units with a zero of their own: runs, split where the mount changes within one.
-
-    Returns the units and the place of each of their readings among all readings of the
-    runs. Angles are unwrapped unless ``whole`` (all orders are whole).
-    """
-    units, places, start = [], [], 0
-    for number, run in enumerate(runs):
-        label = run.label or str(number + 1)
-        angle = run.reference if whole else run.unwrapped_reference
-        weights = np.ones(len(run)) if run.weights is None else run.weights
-        everything = Readings(angle / run.period, run.centred_error, weights, label)
-        place = np.arange(start, start + len(run))
-        if run.mount is not None and np.unique(run.mount).size > 1:
-            for mount in np.unique(run.mount):
-                mask = run.mount == mount
-                units.append(everything.part(mask, f"{label}, mount {mount:g}"))
-                places.append(place[mask])
-        else:
-            units.append(everything)
-            places.append(place)
-        start += len(run)
-    return units, np.concatenate(places)
-
-
-def angle_blocks(unit: Readings, positions: Positions) -> list[Readings]:
-    """Folds of a single run: blocks of neighbouring positions, dealt in turn."""
-    blocks = min(_BLOCKS, len(positions) // 2)
-    folds = min(_FOLDS, blocks)
-    if folds < 2:
-        return []
-    fold = (positions.index * blocks // len(positions)) % folds
-    return [unit.part(fold == f, f"block {f + 1}") for f in range(folds)]
-
 
 class EvidenceSelection:
     """One selection by evidence, step by step."""
@@ -102,9 +64,7 @@ class EvidenceSelection:
         self.candidates = candidates
         self.orders = candidates.orders
         self.units, places = units_of(runs, candidates.whole)
-        self.positions = Positions(
-            positions.turns, positions.index[places], positions.divisions, positions.offsets
-        )
+        self.positions = positions.of_rows(places)
         self.sums = harmonic_sums(self.units, self.orders)
         self.samples = int(self.sums.count.sum())
         self.free = self.samples - len(self.units)
@@ -179,19 +139,27 @@ class EvidenceSelection:
                     verdict, failing = "too steep", self._too_steep(chosen, mine, test)
                 if not (failing >= 0.0).any():
                     return chosen, dropped
-            # The worst half at once: the others may recover once these are gone.
-            worst = np.argsort(-failing, kind="stable")[: (int((failing >= 0.0).sum()) + 1) // 2]
+            # The weaker half at once: the stronger may recover once these are gone.
+            weakest = np.argsort(test.statistic, kind="stable")
+            weakest = weakest[failing[weakest] >= 0.0]
+            worst = weakest[: (weakest.size + 1) // 2]
             dropped |= {mine[w]: verdict for w in worst}
             gone = {mine[w] for w in worst}
             chosen = [i for i in chosen if i not in gone]
 
     def _too_steep(self, chosen: Sequence[int], orders: Sequence[int], test: OrderTest) -> Array:
         """0 at the weakest order while the error may be too steep to be corrected, else -1."""
-        coefficients = fit_subset(self.sums, chosen)[0].reshape(2, -1)
-        speed = np.array([self.orders[i] for i in chosen])
-        slope = float(speed @ np.hypot(*coefficients)) * 2.0 * math.pi / self.runs[0].period
+        ranks = sorted(chosen)
+        cosine, sine = fit_subset(self.sums, ranks)[0].reshape(2, -1).tolist()
+        orders_of = [self.orders[i] for i in ranks]
+        if self.candidates.whole:
+            cycles, lines, a, b = [1.0], [[int(k) for k in orders_of]], [cosine], [sine]
+        else:
+            cycles, lines = [float(k) for k in orders_of], [[1]] * len(ranks)
+            a, b = [[v] for v in cosine], [[v] for v in sine]
+        error = _core.Series(self.runs[0].period, 0.0, cycles, lines, a, b)
         failing = np.full(len(orders), -1.0)
-        if slope >= STEEPEST:
+        if error.slope_bound >= STEEPEST:
             failing[int(np.argmin(test.statistic))] = 0.0
         return failing
 
@@ -272,7 +240,7 @@ class EvidenceSelection:
             holdout_rms=(without, with_),
             gear_ratio=self.candidates.gear_ratio,
         )
-        return replace(selection, notes=selection_notes(selection, self.candidates))
+        return selection.with_notes(selection_notes(selection, self.candidates))
 
     def _refusal(self, rows: Sequence[OrderRow]) -> str:
         """Why nothing was retained."""

@@ -30,6 +30,8 @@ _VERDICTS: Final = {
     "no held-out gain": "does not lower the error of readings held out of the fit",
     "negligible": "significant, but too small to change any reading",
     "too steep": "with it an indicated angle would stand for several true ones",
+    "small": "has no prominent amplitude",
+    "phase varies": "its phase varies from run to run",
     "alias": "cannot be told from retained orders at these positions",
 }
 

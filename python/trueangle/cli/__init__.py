@@ -19,6 +19,7 @@ COMMANDS: tuple[str, ...] = (
     "fit",
     "correct",
     "demo",
+    "orders",
     "plan",
     "simulate",
     "diagnose",

@@ -77,19 +77,10 @@ def orders_by_shaft(text: str) -> str | Sequence[float] | Mapping[str, Sequence[
 def run(args: argparse.Namespace) -> int:
     """Fit, save, print."""
     from ..fitting import fit
-    from ..runfiles import read_runs
+    from .run_lists import read_selected
 
-    runs = read_runs(args.runs, counts_per_turn=args.counts_per_turn)
-    if args.run:
-        labels = [str(found.label) for found in runs]
-        missing = [label for label in args.run if label not in labels]
-        if missing:
-            raise ArgumentError(
-                f"--run {missing[0]}: no such run; the runs are {', '.join(labels)}"
-            )
-        runs = [found for found in runs if str(found.label) in args.run]
     result = fit(
-        runs,
+        read_selected(args.runs, args.counts_per_turn, args.run),
         orders=orders_by_shaft(args.orders),
         gear_ratio=args.gear_ratio,
         fixed_member=args.fixed_member,

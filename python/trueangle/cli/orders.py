@@ -1,0 +1,102 @@
+"""``trueangle orders``: which orders of the error are real."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+from typing import TYPE_CHECKING
+
+from .fit import add_joint
+from .order_lists import parse_orders
+
+if TYPE_CHECKING:
+    from ..ordertable import OrderRow, OrderSelection
+
+HELP = "say which orders of the angle error are real, and what they may be"
+EXAMPLE = "trueangle orders joint_a.csv --gear-ratio 100"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the command's arguments."""
+    add = parser.add_argument
+    add("runs", nargs="+", metavar="RUNS", help="CSV or Parquet files of readings")
+    add("--orders", metavar="1-17,202", help="candidates (default: low orders and the gear's own)")
+    add_joint(parser)
+    add(
+        "--method",
+        choices=("evidence", "paper"),
+        default="evidence",
+        help="evidence (default): significance and held-out error; paper: amplitude and phase "
+        "range over the runs",
+    )
+    add(
+        "--reference-orders",
+        metavar="50,100",
+        help="orders that the reference itself makes: named, with their side bands, not retained",
+    )
+    add("--run", action="append", metavar="LABEL", help="use this run only (may be repeated)")
+    add("--json", action="store_true", help="print the table as JSON")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Print the table of orders."""
+    from ..orders import select_orders
+    from ..robust import without_spikes
+    from .run_lists import read_selected
+
+    runs = read_selected(args.runs, args.counts_per_turn, args.run)
+    reference = () if args.reference_orders is None else parse_orders(args.reference_orders)
+    selection = select_orders(
+        [without_spikes(run) for run in runs],
+        None if args.orders is None else parse_orders(args.orders),
+        args.gear_ratio,
+        args.fixed_member,
+        args.method,
+        reference_orders=reference,
+    )
+    print(json.dumps(as_json(selection), indent=2) if args.json else selection.summary())
+    return 0
+
+
+def as_json(selection: OrderSelection) -> dict[str, object]:
+    """The selection as plain values, angles in arcsec; what is not a number becomes null."""
+    scale = 1_296_000.0 / selection.period
+    before, after = selection.holdout_rms
+    return {
+        "distinct_positions": len(selection.positions),
+        "positions": selection.positions.describe(),
+        "samples": selection.samples,
+        "runs": selection.runs,
+        "method": selection.method,
+        "noise_arcsec": _finite(scale * selection.noise.standard_deviation),
+        "noise_source": selection.noise.source,
+        "holdout": selection.holdout,
+        "holdout_rms_before_arcsec": _finite(scale * before),
+        "holdout_rms_after_arcsec": _finite(scale * after),
+        "reason": selection.reason,
+        "notes": list(selection.notes),
+        "orders": [_row(row, scale) for row in selection.table],
+    }
+
+
+def _row(row: OrderRow, scale: float) -> dict[str, object]:
+    return {
+        "order": row.order,
+        "retained": row.retained,
+        "verdict": row.verdict,
+        "amplitude_arcsec": _finite(scale * row.amplitude),
+        "phase_deg": _finite(row.phase_deg % 360.0),
+        "std_arcsec": _finite(scale * row.standard_error),
+        "phase_std_deg": _finite(row.phase_error_deg),
+        "phase_spread_deg": _finite(row.phase_spread_deg),
+        "log10_false_alarm": _finite(row.log10_false_alarm),
+        "holdout_gain": _finite(row.holdout_gain),
+        "aliases": list(row.aliases),
+        "explanations": [str(e) for e in row.explanations],
+        "reason": row.reason,
+    }
+
+
+def _finite(value: float) -> float | None:
+    return value if math.isfinite(value) else None
