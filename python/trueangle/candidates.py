@@ -101,22 +101,22 @@ class Candidates:
         return limits
 
 
-def effective_positions(runs: Sequence[CalibrationRun], positions: Positions) -> Positions:
+def effective_positions(positions: Positions) -> Positions:
     """Positions as a grid even where small shifts of the zero blur it.
 
     Unnamed orders are looked for only below the Nyquist limit of that grid.
     """
     if positions.divisions is not None:
         return positions
+    once = CalibrationRun(positions.turns, positions.turns, period=1.0)
     for widening in (10.0, 100.0):
-        blurred = distinct_positions(runs, widening * POSITION_TOLERANCE * runs[0].period)
+        blurred = distinct_positions(once, widening * POSITION_TOLERANCE)
         if blurred.divisions is not None and len(blurred) < len(positions):
             return blurred
     return positions
 
 
 def choose_candidates(
-    runs: Sequence[CalibrationRun],
     positions: Positions,
     candidates: Iterable[float] | None,
     gear_ratio: float | None,
@@ -131,7 +131,7 @@ def choose_candidates(
         Orders that are not positive and finite.
     """
     gear = [] if gear_ratio is None else [float(m) for m in gear_orders(gear_ratio, fixed_member)]
-    effective = effective_positions(runs, positions)
+    effective = effective_positions(positions)
     highest = effective.highest_order
     if effective.divisions is None:
         highest = min(highest, math.floor((len(positions) - 1) / (2.0 * positions.span)))

@@ -23,7 +23,6 @@ __all__ = [
     "choose_forward",
     "examine_orders",
     "fit_subset",
-    "held_out_error",
     "held_out_gains",
     "log_tail",
     "pooled_scatter",
@@ -351,8 +350,3 @@ def held_out_gains(
         else:
             with_[i] += added[outside.index(k)]
     return without, with_, model
-
-
-def held_out_error(sums: HarmonicSums, chosen: Sequence[int]) -> float:
-    """Held-out sum of squares of the chosen orders, one unit left out at a time."""
-    return float(held_out_gains(sums, chosen, [])[2])

@@ -94,7 +94,7 @@ def select_orders(
         raise ArgumentError("all readings have weight 0: nothing is left to select orders from")
     positions = distinct_positions(kept, tolerance)
     chosen = choose_candidates(
-        kept, positions, candidates, gear_ratio, fixed_member, tuple(reference_orders)
+        positions, candidates, gear_ratio, fixed_member, tuple(reference_orders)
     )
     if method == "paper":
         return select_by_paper(kept, positions, chosen)

@@ -17,7 +17,6 @@ from .evidence import (
     choose_forward,
     examine_orders,
     fit_subset,
-    held_out_error,
     held_out_gains,
     pooled_scatter,
     run_scatter,
@@ -165,10 +164,14 @@ class EvidenceSelection:
 
     def _gains(self, chosen: Sequence[int], orders: Sequence[int]) -> Array:
         """Part by which each order lowers the held-out mean square."""
+        return self._gains_and_model(chosen, orders)[0]
+
+    def _gains_and_model(self, chosen: Sequence[int], orders: Sequence[int]) -> tuple[Array, float]:
+        """The gains, and the held-out sum of squares of the chosen orders."""
         if self.folds is None:
-            return np.full(len(orders), math.nan)
-        without, with_, _ = held_out_gains(self.folds, chosen, orders)
-        return np.asarray((without - with_) / np.maximum(np.abs(without), 1e-300))
+            return np.full(len(orders), math.nan), math.nan
+        without, with_, model = held_out_gains(self.folds, chosen, orders)
+        return np.asarray((without - with_) / np.maximum(np.abs(without), 1e-300)), model
 
     def _lookalikes(self, chosen: Sequence[int]) -> dict[int, dict[int, float]]:
         """Aliases of every chosen order that these readings cannot exclude."""
@@ -198,7 +201,7 @@ class EvidenceSelection:
         level, scatter = self._level(chosen)
         own = None if scatter is None else scatter[shown]
         test = examine_orders(self.sums, chosen, shown, level, own)
-        gains = self._gains(chosen, shown)
+        gains, model = self._gains_and_model(chosen, shown)
         phases = unit_phases(self.sums, chosen, shown)
         lookalikes = self._lookalikes(chosen)
         verdicts = {**dict.fromkeys(chosen, "retained"), **dict.fromkeys(self.forced, "reference")}
@@ -225,7 +228,7 @@ class EvidenceSelection:
             )
         rows = [explained(row, self.candidates, self.positions) for row in rows]
         orders = tuple(row.order for row in rows if row.retained)
-        without, with_ = self._held_out_rms(chosen)
+        without, with_ = self._held_out_rms(model)
         selection = OrderSelection(
             orders=orders,
             table=tuple(rows),
@@ -261,13 +264,12 @@ class EvidenceSelection:
             f"(noise alone does as well in {chance:.2g} % of such searches)"
         )
 
-    def _held_out_rms(self, chosen: Sequence[int]) -> tuple[float, float]:
+    def _held_out_rms(self, model: float) -> tuple[float, float]:
         """Held-out rms with no order at all and with the chosen ones."""
         if self.folds is None:
             return math.nan, math.nan
         weight = float(self.folds.weight.sum())
         none = float(self.folds.squares.sum())
-        model = held_out_error(self.folds, chosen) if chosen else none
         return math.sqrt(none / weight), math.sqrt(max(0.0, model) / weight)
 
     def _false_alarm(self, log_p: float, i: int) -> float:

@@ -152,7 +152,7 @@ def verified_positions(
     """
     found = as_runs(runs)
     positions = distinct_positions(found)
-    candidates = choose_candidates(found, positions, None, gear_ratio, fixed_member, ())
+    candidates = choose_candidates(positions, None, gear_ratio, fixed_member, ())
     return VerifiedPositions(
         len(positions), _between(positions, candidates), _sentence(positions, candidates)
     )

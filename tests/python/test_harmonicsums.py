@@ -1,0 +1,142 @@
+"""Sums of a selection against the plain design matrix, and the core's one pass."""
+
+import numpy as np
+import pytest
+
+import trueangle as ta
+from trueangle import harmonicsums
+from trueangle.evidence import (
+    choose_forward,
+    examine_orders,
+    fit_subset,
+    held_out_gains,
+    log_tail,
+)
+from trueangle.harmonicsums import Readings, harmonic_sums
+
+# Normal equations of a few hundred readings, relative to their size.
+ROUNDING = 1e-10
+
+
+def some_units(seed=0, count=3):
+    random = np.random.default_rng(seed)
+    units = []
+    for number in range(count):
+        size = 80 + 10 * number
+        turns = random.uniform(-2.0, 3.0, size)
+        error = 7.0 + number + 0.3 * np.sin(2 * np.pi * 3 * turns) + random.normal(0, 0.1, size)
+        units.append(Readings(turns, error, random.uniform(0.5, 2.0, size), str(number)))
+    return units
+
+
+def design(unit, orders):
+    x = 2 * np.pi * unit.turns[:, None] * np.asarray(orders, dtype=float)
+    columns = np.concatenate([np.cos(x), np.sin(x)], axis=1)
+    return columns - np.average(columns, axis=0, weights=unit.weights)
+
+
+@pytest.mark.parametrize("orders", [(1, 2, 3, 200), (1, 2.5, 3, 7.3)])
+def test_normal_equations_are_those_of_the_design_matrix(orders):
+    units = some_units()
+    sums = harmonic_sums(units, orders)
+    index = [2, 0, 3]
+    for number, unit in enumerate(units):
+        columns = design(unit, [orders[i] for i in index])
+        centred = unit.error - np.average(unit.error, weights=unit.weights)
+        np.testing.assert_allclose(
+            sums.gram(number, index), (columns.T * unit.weights) @ columns, atol=ROUNDING * 100
+        )
+        np.testing.assert_allclose(
+            sums.rhs(number, index), columns.T @ (unit.weights * centred), atol=ROUNDING * 100
+        )
+        assert sums.squares[number] == pytest.approx(np.dot(unit.weights, centred**2))
+
+
+def test_the_cores_sums_are_the_same(monkeypatch):
+    random = np.random.default_rng(1)
+    turns = random.uniform(-3.0, 5.0, 20_000)
+    unit = Readings(turns, random.normal(300.0, 40.0, turns.size), np.ones(turns.size), "")
+    large = harmonic_sums([unit], range(1, 451))
+    monkeypatch.setattr(harmonicsums, "_LARGE", 10**9)
+    small = harmonic_sums([unit], range(1, 451))
+    for mine, other in zip(large.total(), small.total(), strict=True):
+        scale = np.abs(other).max()
+        np.testing.assert_allclose(mine, other, atol=ROUNDING * scale)
+
+
+def test_450_orders_take_one_pass(monkeypatch):
+    passes = []
+    inner = harmonicsums._spectra
+    monkeypatch.setattr(
+        harmonicsums, "_spectra", lambda *a: passes.append(a[0].turns.size) or inner(*a)
+    )
+    random = np.random.default_rng(2)
+    runs = []
+    for _ in range(3):
+        angles = random.uniform(0.0, 360.0, 60_000)
+        error = 0.02 * np.cos(np.radians(3 * angles)) + 0.005 * np.sin(np.radians(402 * angles))
+        noisy = angles + error + random.normal(0.0, 0.05, angles.size)
+        runs.append(ta.CalibrationRun(angles, noisy, period=360.0))
+    chosen = ta.select_orders(runs, candidates=range(1, 451))
+    assert chosen.orders == (3, 402)
+    assert passes == [60_000] * 3
+
+
+def test_statistics_are_those_of_least_squares():
+    units = some_units(3)
+    orders = (1, 2, 3, 4, 5)
+    sums = harmonic_sums(units, orders)
+    root = np.concatenate([np.sqrt(u.weights) for u in units])
+    zero = np.repeat(np.eye(3), [u.turns.size for u in units], axis=0)
+    turns = np.concatenate([u.turns for u in units])
+    error = np.concatenate([u.error for u in units])
+
+    def residual(used):
+        x = 2 * np.pi * turns[:, None] * np.asarray(used, dtype=float)
+        full = np.concatenate([np.cos(x), np.sin(x), zero], axis=1) * root[:, None]
+        solution = np.linalg.lstsq(full, error * root, rcond=None)[0]
+        return solution, float(((error * root - full @ solution) ** 2).sum())
+
+    solution, left = residual((3, 1))
+    coefficients, _, squares = fit_subset(sums, [2, 0])
+    np.testing.assert_allclose(coefficients, solution[:4], rtol=1e-8)
+    assert squares == pytest.approx(left)
+    test = examine_orders(sums, [2, 0], [0, 4], (0.01, 50.0), None)
+    assert test.statistic[0] == pytest.approx((residual((3,))[1] - left) / 0.01)
+    assert test.statistic[1] == pytest.approx((left - residual((3, 1, 5))[1]) / 0.01)
+
+
+def test_held_out_errors_are_those_of_leaving_units_out():
+    units = some_units(4)
+    orders = (1, 2, 3, 4)
+    sums = harmonic_sums(units, orders)
+
+    def left_out(used):
+        total = 0.0
+        for out, unit in enumerate(units):
+            gram = sum(sums.gram(u, used) for u in range(3) if u != out)
+            rhs = sum(sums.rhs(u, used) for u in range(3) if u != out)
+            columns = design(unit, [orders[i] for i in used])
+            centred = unit.error - np.average(unit.error, weights=unit.weights)
+            wrong = centred - columns @ np.linalg.solve(gram, rhs)
+            total += float(np.dot(unit.weights, wrong**2))
+        return total
+
+    without, with_, model = held_out_gains(sums, [2, 1], [1, 2, 3])
+    assert model == pytest.approx(left_out([2, 1]))
+    assert without == pytest.approx([left_out([2]), left_out([1]), left_out([2, 1])])
+    assert with_ == pytest.approx([left_out([2, 1]), left_out([2, 1]), left_out([2, 1, 3])])
+
+
+def test_forward_choice_takes_the_lowest_of_aliases():
+    turns = np.arange(36) / 36.0
+    unit = Readings(turns, np.sin(2 * np.pi * 202 * turns), np.ones(36), "")
+    sums = harmonic_sums([unit], (14, 202, 22))
+    assert choose_forward(sums, np.full(3, -3.0), 35, (0.01, 100.0)) == [0]
+
+
+def test_tail_of_the_f_distribution():
+    stats = pytest.importorskip("scipy.stats")
+    for t, dof in ((3.0, 5.0), (15.0, 140.0), (40.0, 1000.0)):
+        assert log_tail(t, dof) == pytest.approx(stats.f.logsf(t / 2, 2, dof))
+    assert log_tail(15.0, np.inf) == pytest.approx(stats.chi2.logsf(15.0, 2))
