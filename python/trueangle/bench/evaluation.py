@@ -9,7 +9,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..model import HarmonicModel, Shaft
+from ..model import HarmonicModel
+from ..shafts import Shaft
 from .evaluationpeers import peers
 from .interleaved import Timing, interleave
 
