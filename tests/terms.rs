@@ -43,6 +43,13 @@ fn every_term() -> Vec<Term> {
         Term::PreslidingHysteresis {
             amplitude: 0.01,
             length: 2.0,
+            start: 0.5,
+        },
+        Term::LocalDefect {
+            place: 100.0,
+            width: 5.0,
+            height: 0.01,
+            cycles: 2.0,
         },
         Term::Latency { delay: 1e-3 },
         Term::FilterLag { cutoff: 50.0 },
@@ -194,6 +201,7 @@ fn friction_steeper_than_the_angle_is_refused() {
     let steep = Term::PreslidingHysteresis {
         amplitude: 1.0,
         length: 1.0,
+        start: 0.0,
     };
     let series = HarmonicSeries::new(PERIOD, 0.0, vec![]).unwrap();
     let evaluator = Arc::new(Evaluator::new(series, Argument::Reference));

@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from .terms import FilterLag as FilterLag
     from .terms import Latency as Latency
     from .terms import LoadDependentGearError as LoadDependentGearError
+    from .terms import LocalDefect as LocalDefect
     from .terms import PreslidingHysteresis as PreslidingHysteresis
     from .terms import StiffeningCompliance as StiffeningCompliance
     from .terms import ThermalDrift as ThermalDrift
@@ -65,6 +66,7 @@ _PUBLIC = {
             "FilterLag",
             "Latency",
             "LoadDependentGearError",
+            "LocalDefect",
             "PreslidingHysteresis",
             "StiffeningCompliance",
             "ThermalDrift",

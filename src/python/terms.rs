@@ -120,6 +120,7 @@ fn term(object: &Bound<'_, PyAny>) -> PyResult<Term> {
         "presliding_hysteresis" => Term::PreslidingHysteresis {
             amplitude: number("amplitude")?,
             length: number("length")?,
+            start: number("start")?,
         },
         "latency" => Term::Latency {
             delay: number("delay_s")?,
@@ -147,6 +148,12 @@ fn term(object: &Bound<'_, PyAny>) -> PyResult<Term> {
         "load_dependent_gear_error" => Term::LoadDependentGearError {
             lines: lines(object)?,
             absolute: object.getattr("torque")?.extract::<String>()? == "absolute",
+        },
+        "local_defect" => Term::LocalDefect {
+            place: number("place")?,
+            width: number("width")?,
+            height: number("height")?,
+            cycles: number("cycles_per_turn")?,
         },
         other => {
             return Err(argument_error(

@@ -9,12 +9,11 @@ use crate::compensator::Compensator;
 use crate::error::Error;
 use crate::kernel::{Argument, Batch, Evaluator, Quantity};
 
-/// Steps before the signals are taken to leave no unique angle. Each step gains at least
-/// a factor of the terms' slope times the series' slope, as a rule three digits.
+/// Steps before the signals are taken to leave no unique angle; as a rule two or three do.
 const MOST_STEPS: usize = 60;
 
-/// Part of a period at which the solution is good: the next step would be smaller still.
-const SOLVED: f64 = 1e-14;
+/// Part of a period that steps yet to come may add up to; corrections promise 1e-12.
+const SOLVED: f64 = 3e-13;
 
 /// A series and its terms: immutable, shared by its correctors.
 #[derive(Debug)]
@@ -27,6 +26,8 @@ pub struct Terms {
     elements: Vec<Element>,
     has_travel: bool,
     delay: f64,
+    /// Bound of the slope of the inverted series less 1.
+    steepness: f64,
     /// Signals needed, each with the first term that needs it.
     needs: Vec<(Signal, &'static str)>,
 }
@@ -44,6 +45,7 @@ impl Terms {
             elements: Vec::new(),
             has_travel: false,
             delay: 0.0,
+            steepness: 0.0,
             needs: Vec::new(),
         };
         for term in terms {
@@ -52,8 +54,16 @@ impl Terms {
                     ready.backlash += half_width;
                     ready.has_travel = true;
                 }
-                Term::PreslidingHysteresis { amplitude, length } => {
-                    ready.elements.push(Element { amplitude, length });
+                Term::PreslidingHysteresis {
+                    amplitude,
+                    length,
+                    start,
+                } => {
+                    ready.elements.push(Element {
+                        amplitude,
+                        length,
+                        start,
+                    });
                     ready.has_travel = true;
                 }
                 Term::Latency { delay } => ready.delay += delay,
@@ -73,7 +83,9 @@ impl Terms {
             .iter()
             .map(|element| 2.0 * element.amplitude.abs() / element.length)
             .sum();
-        let slope = steepest + ready.evaluator.slope_bound();
+        let bound = ready.evaluator.slope_bound();
+        ready.steepness = bound / (1.0 - bound).max(f64::MIN_POSITIVE);
+        let slope = steepest + bound;
         if ready.evaluator.argument() == Argument::Reference && slope >= 1.0 {
             return Err(Error::NotInvertible { slope });
         }
@@ -199,7 +211,7 @@ impl Corrector {
     }
 
     fn solve(&mut self, indicated: f64, signals: &Signals) -> f64 {
-        let terms = Arc::clone(&self.terms);
+        let Self { terms, travel } = self;
         let (level, delayed) = (terms.level(signals), terms.delayed(signals));
         // The series is undone first where its argument is the indicated angle.
         let (goal, invert) = if terms.is_indicated() {
@@ -216,9 +228,8 @@ impl Corrector {
         let find =
             |travel: &Travel, heading: Heading| terms.find(travel, heading, goal, invert, signals);
         if !terms.has_travel {
-            return delayed + find(&self.travel, NOWHERE);
+            return delayed + find(travel, NOWHERE);
         }
-        let travel = &mut self.travel;
         let constant = terms.evaluator.series().constant();
         travel.align(indicated - constant, terms.period());
         if let Some(signal) = signals.direction.or(signals.velocity) {
@@ -254,10 +265,10 @@ impl Corrector {
     }
 
     fn indicate(&mut self, theta: f64, signals: &Signals) -> f64 {
-        let terms = Arc::clone(&self.terms);
-        if terms.is_indicated() {
+        if self.terms.is_indicated() {
             return theta - self.solve(theta, signals);
         }
+        let Self { terms, travel } = self;
         let delayed = terms.delayed(signals);
         let x = theta - delayed;
         let mut value = [x];
@@ -267,7 +278,6 @@ impl Corrector {
         debug_assert!(done.is_ok(), "an error can always be evaluated");
         let mut error = value[0] + terms.level(signals) + terms.shape(signals, x).0;
         if terms.has_travel && error.is_finite() {
-            let travel = &mut self.travel;
             travel.align(x, terms.period());
             let way = x - travel.farthest;
             let moved = if way.is_nan() { 0.0 } else { way };
@@ -307,8 +317,11 @@ impl Terms {
             .fold((0.0, 0.0), |(e, de), (f, df)| (e + f, de + df))
     }
 
-    /// `x` with `x + series(x) + terms(x) = goal`, by Newton steps on the terms around
-    /// the inverse of the series; NaN where the signals leave no unique angle.
+    /// `x` with `x + series(x) + terms(x) = goal`, NaN where the signals leave no unique
+    /// angle.
+    ///
+    /// Newton steps on the terms around the inverse of the series shrink by the product of
+    /// both slopes; the shrinking seen is carried on to its limit (Aitken).
     fn find(
         &self,
         travel: &Travel,
@@ -319,23 +332,40 @@ impl Terms {
     ) -> f64 {
         let goal = goal - self.backlash * heading.direction;
         let inverse = |goal: f64| if invert { self.plain.step(goal) } else { goal };
-        let tolerance = SOLVED * self.period() + 2.0 * f64::EPSILON * goal.abs();
-        let mut x = inverse(goal);
         if !self.is_shaped && self.elements.is_empty() {
-            return x;
+            return inverse(goal);
         }
-        for _ in 0..MOST_STEPS {
+        let at = |x: f64| {
             let (mut error, mut slope) = self.shape(signals, x);
             if !self.elements.is_empty() {
                 let (friction, rise) = travel.friction(&self.elements, heading, x);
                 error += friction;
                 slope += rise;
             }
+            (error, slope)
+        };
+        let tolerance = SOLVED * self.period() + 4.0 * f64::EPSILON * goal.abs();
+        let mut x = goal;
+        if invert {
+            // The series is small beside the lengths on which terms change: a good start.
+            x = inverse(goal - at(goal - self.evaluator.series().constant()).0);
+        }
+        let mut last = f64::NAN;
+        for _ in 0..MOST_STEPS {
+            let (error, slope) = at(x);
             let step = (inverse(goal - error) - x) / (1.0 + slope);
+            let ratio = step / last;
             x += step;
-            if step.abs() <= tolerance {
+            if ratio.abs() < 0.5 {
+                x += step * ratio / (1.0 - ratio);
+            }
+            // What is left is smaller by both slopes, and as much as was seen (NaN at first).
+            let shrink = (slope * self.steepness).abs().max(ratio.abs());
+            let seen = !ratio.is_nan();
+            if step.abs() <= tolerance || (seen && step.abs() * shrink <= tolerance) {
                 return if slope.abs() < 1.0 { x } else { f64::NAN };
             }
+            last = step;
         }
         f64::NAN
     }

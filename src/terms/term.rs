@@ -32,6 +32,8 @@ pub enum Term {
         amplitude: f64,
         /// Travel in which it builds up.
         length: f64,
+        /// Share of the wind-up that is there at the first motion, 0 to 1.
+        start: f64,
     },
     /// The indicated angle is that of `delay` seconds ago.
     Latency {
@@ -82,6 +84,17 @@ pub enum Term {
         /// The absolute torque counts.
         absolute: bool,
     },
+    /// `height exp(-(a - place)^2 / (2 width^2))` at the angle `a = cycles x` of a shaft.
+    LocalDefect {
+        /// In units of the period, a turn of the shaft.
+        place: f64,
+        /// One standard deviation, likewise.
+        width: f64,
+        /// Error at the place.
+        height: f64,
+        /// Turns of the shaft per output turn.
+        cycles: f64,
+    },
 }
 
 impl Term {
@@ -96,6 +109,7 @@ impl Term {
             Self::TorsionalCompliance { .. } => "torsional_compliance",
             Self::StiffeningCompliance { .. } => "stiffening_compliance",
             Self::LoadDependentGearError { .. } => "load_dependent_gear_error",
+            Self::LocalDefect { .. } => "local_defect",
         }
     }
 
@@ -106,7 +120,7 @@ impl Term {
     pub fn needs(&self) -> Option<Signal> {
         match self {
             Self::Backlash { half_width } => (*half_width < 0.0).then_some(Signal::Direction),
-            Self::PreslidingHysteresis { .. } => None,
+            Self::PreslidingHysteresis { .. } | Self::LocalDefect { .. } => None,
             Self::Latency { .. } | Self::FilterLag { .. } => Some(Signal::Velocity),
             Self::ThermalDrift { .. } => Some(Signal::Temperature),
             Self::TorsionalCompliance { .. }
@@ -137,6 +151,12 @@ pub(super) enum Smooth {
     },
     Filter {
         cutoff: f64,
+    },
+    Bump {
+        place: f64,
+        width: f64,
+        height: f64,
+        cycles: f64,
     },
 }
 
@@ -190,6 +210,17 @@ impl Smooth {
                 knee: *knee,
                 gravity: *gravity,
             })),
+            Term::LocalDefect {
+                place,
+                width,
+                height,
+                cycles,
+            } => Ok(Some(Self::Bump {
+                place: *place,
+                width: *width,
+                height: *height,
+                cycles: *cycles,
+            })),
         }
     }
 
@@ -200,7 +231,7 @@ impl Smooth {
                 relative, lines, ..
             } => *relative != 0.0 || lines.is_some(),
             Self::Spring { gravity, .. } => gravity.is_some(),
-            Self::Filter { .. } => true,
+            Self::Filter { .. } | Self::Bump { .. } => true,
         }
     }
 
@@ -260,6 +291,18 @@ impl Smooth {
             Self::Filter { cutoff } => {
                 let turns_per_second = value(signals, Signal::Velocity) / series.period().value();
                 filtered(series, turns_per_second / cutoff, x)
+            }
+            Self::Bump {
+                place,
+                width,
+                height,
+                cycles,
+            } => {
+                let period = series.period();
+                let (turn, low) = period.phase(x, *cycles);
+                let away = period.wrap((turn + low) * period.value() - place) / width;
+                let sum = height * (-0.5 * away * away).exp();
+                (sum, -sum * away * cycles / width)
             }
         }
     }

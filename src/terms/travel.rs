@@ -5,6 +5,8 @@
 pub(super) struct Element {
     pub amplitude: f64,
     pub length: f64,
+    /// Share of the wind-up that is there at the first motion.
+    pub start: f64,
 }
 
 /// A direction of travel, and whether the joint has just turned into it.
@@ -64,7 +66,7 @@ impl Travel {
         let (mut sum, mut slope) = (0.0, 0.0);
         let (way, towards) = self.way(heading, x);
         for (element, &state) in elements.iter().zip(&self.state) {
-            let left = (towards - state) * (-way / element.length).exp();
+            let left = (towards - self.begun(element, state, heading)) * decay(way, element);
             sum += element.amplitude * (towards - left);
             slope += element.amplitude * left / element.length;
         }
@@ -74,15 +76,23 @@ impl Travel {
     /// Moves on to angle `x`.
     pub fn advance(&mut self, elements: &[Element], heading: Heading, x: f64) {
         let (way, towards) = self.way(heading, x);
-        if way > 0.0 {
-            for (element, state) in elements.iter().zip(&mut self.state) {
-                *state = towards - (towards - *state) * (-way / element.length).exp();
-            }
+        for (i, element) in elements.iter().enumerate() {
+            let state = self.begun(element, self.state[i], heading);
+            self.state[i] = towards - (towards - state) * decay(way, element);
         }
         if way > 0.0 || !self.is_known() {
             self.farthest = x;
         }
         self.direction = heading.direction;
+    }
+
+    /// The state before this way: the first motion finds some wind-up in its direction.
+    fn begun(&self, element: &Element, state: f64, heading: Heading) -> f64 {
+        if self.direction == 0.0 {
+            element.start * heading.direction
+        } else {
+            state
+        }
     }
 
     /// Way from the farthest point to `x`, and the direction it pulls the elements to.
@@ -98,5 +108,13 @@ impl Travel {
         } else {
             (0.0, heading.direction)
         }
+    }
+}
+
+fn decay(way: f64, element: &Element) -> f64 {
+    if way > 0.0 {
+        (-way / element.length).exp()
+    } else {
+        1.0
     }
 }

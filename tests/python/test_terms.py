@@ -24,7 +24,9 @@ lines = st.lists(st.tuples(st.floats(0.5, 500.0), numbers, numbers), max_size=3)
 def any_terms(draw):
     return (
         ta.Backlash(draw(numbers)),
-        ta.PreslidingHysteresis(draw(numbers), draw(st.floats(0.1, 100.0))),
+        ta.PreslidingHysteresis(
+            draw(numbers), draw(st.floats(0.1, 100.0)), draw(st.floats(0.0, 1.0))
+        ),
         ta.Latency(draw(numbers)),
         ta.FilterLag(draw(st.floats(0.1, 1e4))),
         ta.ThermalDrift(draw(numbers), draw(numbers), **draw(lines), reference_C=draw(numbers)),
@@ -34,6 +36,9 @@ def any_terms(draw):
         ),
         ta.LoadDependentGearError(
             **draw(lines), torque=draw(st.sampled_from(["signed", "absolute"]))
+        ),
+        ta.LocalDefect(
+            draw(numbers), draw(st.floats(1.0, 9.0)), draw(numbers), draw(st.floats(0.1, 200.0))
         ),
     )
 
@@ -98,6 +103,9 @@ def test_files_with_impossible_terms_are_refused(tmp_path, term, said):
     [
         (lambda: ta.Backlash(math.nan), "half_width must be a finite number"),
         (lambda: ta.PreslidingHysteresis(1.0, 0.0), "length must be positive"),
+        (lambda: ta.PreslidingHysteresis(1.0, 1.0, 1.5), "start must be from 0 to 1"),
+        (lambda: ta.LocalDefect(0.0, 0.0, 1.0), "width must be positive"),
+        (lambda: ta.LocalDefect(0.0, 1.0, 1.0, -1.0), "cycles_per_turn must be positive"),
         (lambda: ta.StiffeningCompliance(knee_Nm=-1.0), "knee_Nm must be 0 or more"),
         (lambda: ta.LoadDependentGearError([0.0], [1.0], [1.0]), "orders must be positive"),
         (lambda: ta.LoadDependentGearError([1], [1], [1], "both"), "torque must be 'signed'"),

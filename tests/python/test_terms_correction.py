@@ -37,13 +37,14 @@ def every_term(period=360.0):
     return (
         ta.Backlash(0.02 * unit),
         ta.PreslidingHysteresis(0.01 * unit, 3.0 * unit),
-        ta.PreslidingHysteresis(0.004 * unit, 0.3 * unit),
+        ta.PreslidingHysteresis(0.004 * unit, 0.3 * unit, 1.0),
         ta.Latency(1.5e-3),
         ta.FilterLag(40.0),
         ta.ThermalDrift(2e-3 * unit, 1e-3, [1, 51], [1e-3 * unit, 0], [0, 2e-5 * unit], 20.0),
         ta.TorsionalCompliance(3e-3 * unit, [1], [1e-3 * unit], [0]),
         ta.StiffeningCompliance(1e-3 * unit, 2e-6 * unit, -2e-4 * unit, 3.0, 30.0 * unit),
         ta.LoadDependentGearError([100.5], [1e-5 * unit], [2e-5 * unit], "absolute"),
+        ta.LocalDefect(100.0 * unit, 8.0 * unit, 0.01 * unit, 3.0),
     )
 
 
@@ -76,7 +77,7 @@ def test_correct_is_the_inverse_of_error(period, directed):
     np.testing.assert_allclose(corrected, theta, rtol=0, atol=SOLVED * period)
 
 
-@given(seed=st.integers(0, 2**32 - 1), which=st.sets(st.integers(0, 8), min_size=1))
+@given(seed=st.integers(0, 2**32 - 1), which=st.sets(st.integers(0, 9), min_size=1))
 def test_any_choice_of_terms_is_inverted(seed, which):
     theta, signals = motion(np.random.default_rng(seed), n=300)
     model = joint(terms=[every_term()[i] for i in sorted(which)])
@@ -249,6 +250,8 @@ def test_thermal_and_load_terms_against_their_formulas():
         ta.LoadDependentGearError([100], [1e-4], [0], "absolute"): np.abs(load)
         * 1e-4
         * np.cos(100 * x),
+        ta.LocalDefect(100.0, 8.0, 0.01, 3.0): 0.01
+        * np.exp(-0.5 * ((np.mod(3.0 * theta - 100.0 + 180.0, 360.0) - 180.0) / 8.0) ** 2),
     }
     for term, expected in cases.items():
         model = plain.replace(terms=[term])

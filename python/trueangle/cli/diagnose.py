@@ -3,6 +3,13 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+from ..errors import ArgumentError
+
+if TYPE_CHECKING:
+    from ..diagnosis import Diagnosis
 
 HELP = "name the physical causes that a simulation of the joint lacks"
 EXAMPLE = "trueangle diagnose runs.csv --simulation joint.toml --extend better.toml"
@@ -14,6 +21,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("runs", nargs="+", metavar="RUNS", help="calibration runs (CSV or Parquet)")
     add("--simulation", required=True, metavar="FILE", help="simulation file (TOML)")
     add("--extend", metavar="FILE", help="write the simulation extended by the findings")
+    add("--model", metavar="FILE", help="correction model, to extend by the findings")
+    add("--corrected-model", metavar="FILE", help="write that extended correction model")
     add("--counts-per-turn", type=float, metavar="N", help="unit of indicated_count")
     add("--json", action="store_true", help="print the diagnosis as JSON")
 
@@ -21,18 +30,38 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Print the diagnosis."""
     from ..diagnosis import diagnose
+    from ..modelfile import load_model
     from ..runfiles import read_runs
     from ..simulation import load_simulation
 
+    if (args.model is None) != (args.corrected_model is None):
+        raise ArgumentError(
+            "--model FILE (the model to extend) and --corrected-model FILE (the one to write) "
+            "belong together"
+        )
     simulation = load_simulation(args.simulation)
     runs = read_runs(args.runs, counts_per_turn=args.counts_per_turn)
     result = diagnose(runs, simulation)
     if args.extend:
         result.extended.save(args.extend)
+    if args.corrected_model:
+        result.correction(load_model(args.model), runs).save(args.corrected_model)
     if args.json:
         print(result.to_json(args.extend))
     else:
         print(result.summary())
         if args.extend:
             print(f"\nExtended simulation: {args.extend}")
+        if args.corrected_model:
+            print("\n".join(_corrected(result, args.corrected_model)))
     return 0
+
+
+def _corrected(result: Diagnosis, path: str) -> Iterator[str]:
+    """What the extended correction model takes off, and what it cannot."""
+    from ..terms.extension import NOT_AT_RUN_TIME
+
+    yield f"\nExtended correction model: {path}"
+    for finding in result.findings:
+        if finding.cause in NOT_AT_RUN_TIME:
+            yield f"  not corrected: {finding.cause} ({NOT_AT_RUN_TIME[finding.cause]})"

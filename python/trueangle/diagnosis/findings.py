@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
@@ -15,6 +16,9 @@ from .quantity import Parameters
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+
+    from ..model import HarmonicModel
+    from ..runs import CalibrationRun
 
 __all__ = ["Diagnosis", "Finding"]
 
@@ -98,6 +102,17 @@ class Diagnosis:
     readings: int
     readings_used: int
     correlation: float
+
+    def correction(
+        self, model: HarmonicModel, runs: CalibrationRun | Iterable[CalibrationRun]
+    ) -> HarmonicModel:
+        """The correction model extended by the findings and fitted anew to the runs.
+
+        See `trueangle.terms.extension.extend_model`.
+        """
+        from ..terms.extension import extend_model
+
+        return extend_model(model, runs, self.extended)
 
     def to_dict(self, extended_simulation: str | None = None) -> dict[str, Any]:
         """The object that ``trueangle diagnose --json`` prints."""

@@ -18,6 +18,7 @@ thermal_drift             zero, pattern, lines per kelvin  temperature
 torsional_compliance      torque times compliance          torque
 stiffening_compliance     its cube, torque beyond a knee   torque
 load_dependent_gear_error gear lines times torque          torque
+local_defect              a bump at one place of a shaft   none
 ========================= ================================ =========================
 
 What cannot be corrected while the joint runs, and why:
@@ -42,6 +43,7 @@ from __future__ import annotations
 
 from .load import LoadDependentGearError, StiffeningCompliance, TorsionalCompliance
 from .motion import FilterLag, Latency
+from .place import LocalDefect
 from .reversal import Backlash, PreslidingHysteresis
 from .term import Term
 from .thermal import ThermalDrift
@@ -52,6 +54,7 @@ __all__ = [
     "FilterLag",
     "Latency",
     "LoadDependentGearError",
+    "LocalDefect",
     "PreslidingHysteresis",
     "StiffeningCompliance",
     "Term",
@@ -71,5 +74,6 @@ TERMS: dict[str, type[Term]] = {
         TorsionalCompliance,
         StiffeningCompliance,
         LoadDependentGearError,
+        LocalDefect,
     )
 }

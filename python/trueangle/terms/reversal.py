@@ -49,7 +49,7 @@ class PreslidingHysteresis(Term):
 
     for travel s since the last reversal, where the state was :math:`z_0` (Dahl); after a
     long stretch :math:`z_0 = -d` and :math:`z = d\,(1 - 2e^{-s/L})`. Several elements of
-    different lengths add up to a Maxwell-slip model. ``z = 0`` before the first motion.
+    different lengths add up to a Maxwell-slip model.
 
     Parameters
     ----------
@@ -57,6 +57,9 @@ class PreslidingHysteresis(Term):
         h: half of the reversal error far from the reversal.
     length : float
         L > 0: travel in which it builds up.
+    start : float
+        Share of the wind-up that is there at the first motion, in its direction: 0 for a
+        relaxed joint, 1 for one that has been run in.
 
     Notes
     -----
@@ -66,6 +69,7 @@ class PreslidingHysteresis(Term):
 
     amplitude: float
     length: float
+    start: float = 0.0
 
     kind: ClassVar[str] = "presliding_hysteresis"
     follows_travel: ClassVar[bool] = True
@@ -73,10 +77,13 @@ class PreslidingHysteresis(Term):
     def check(self) -> None:
         if self.length <= 0.0:
             raise self._out_of_range("length", "positive")
+        if not 0.0 <= self.start <= 1.0:
+            raise self._out_of_range("start", "from 0 to 1")
 
     @classmethod
     def from_effect(cls, table: Mapping[str, Any], period: float) -> Self:
         return cls(
             from_arcsec(table["amplitude_arcsec"], period),
             table["length_deg"] * (period / 360.0),
+            table.get("start_state", 0.0),
         )
