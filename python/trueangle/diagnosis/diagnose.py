@@ -41,6 +41,9 @@ WILD_ANYWAY = 12.0
 #: Rivals reported for each finding.
 RIVALS = 3
 
+#: Findings, in the order found, for which rivals are tried.
+RIVALLED = 4
+
 
 def diagnose(
     runs: CalibrationRun | Iterable[CalibrationRun], sim: Simulation, *, gain: bool = True
@@ -164,18 +167,19 @@ def _findings(
     if with_gain and named:
         gains = measure_gain(space, named)
     fitted = space.fitted()
-    findings = []
+    findings: list[Finding] = []
     for group, gain in zip(named, gains, strict=True):
         terms = [(*fitted[k], space.covariance(k)) for k in group]
         cause = terms[0][0].cause
         parameters, effects = CANDIDATES[cause].report(space, terms)
+        rivals = _rivals(space, group) if len(findings) < RIVALLED else []
         weight = {
             "bic_gain": float(sum(t.bic_gain for t, _, _ in terms)),
             "deviance": float(sum(t.deviance for t, _, _ in terms)),
             "parameters": float(sum(t.parameters for t, _, _ in terms)),
             "log_grid": float(sum(t.log_grid for t, _, _ in terms)),
         }
-        findings.append(Finding(cause, parameters, weight, gain, _rivals(space, group), effects))
+        findings.append(Finding(cause, parameters, weight, gain, rivals, effects))
     return findings + _corrected_lines(space, spots), spots
 
 
@@ -197,8 +201,11 @@ def _corrected_lines(space: Space, spots: list[Blindness]) -> list[Finding]:
     interacting = {"thermal_drift", "load_dependent_gear_error", "filter_lag"}
     if belief.orders.size == 0 or interacting & {term.cause for term in space.terms}:
         return []
+    modulated = {term.shape["carrier"] for term in space.terms if term.cause == "sidebands"}
     found = []
     for k, order in enumerate(belief.orders):
+        if order in modulated:
+            continue  # modulation takes from its carrier what it gives to the sidebands
         where = slice(1 + 2 * k, 3 + 2 * k)
         change = space.coefficients[where]
         spread = space.unscaled_covariance[where, where] * space.variance

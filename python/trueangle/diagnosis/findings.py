@@ -39,7 +39,8 @@ class Finding:
     gain : Gain or None
         On held-out runs; None for causes of the scatter.
     rivals : list of (str, float)
-        Other causes and how much less each explains in its place (BIC).
+        Other causes and how much less each explains in its place (BIC); tried for the
+        first four findings.
     effects : list of Effect
         What extends the simulation.
     """

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
+import numpy as np
+
 from .candidates import CANDIDATES, FLEXIBLE, SEPARATE
 from .space import Proposal, Space
 
@@ -114,22 +116,30 @@ def _forward(space: Space, causes: Sequence[str]) -> Space:
 def _pruned(space: Space) -> Space:
     """Without the terms that the others have made superfluous."""
     while space.terms:
-        full = total_price(space)
-        without = [
-            space.with_terms(t for k, t in enumerate(space.terms) if k != drop)
-            for drop in range(len(space.terms))
-        ]
-        best = min(without, key=total_price)
-        if total_price(best) > full:
+        least = min(range(len(space.terms)), key=lambda k: _worth(space, k))
+        without = cause_terms(space, [least])
+        if total_price(without) > total_price(space):
             break
-        space = best
-    return space.with_terms(_rescored(space))
+        space = without
+    terms = [replace(term, deviance=_lost(space, k)) for k, term in enumerate(space.terms)]
+    return space.with_terms(terms)
 
 
-def _rescored(space: Space) -> list[Proposal]:
-    """The terms with the deviance each saves beside all the others."""
-    terms = []
-    for k, term in enumerate(space.terms):
-        rest = cause_terms(space, [k])
-        terms.append(replace(term, deviance=rest.deviance - space.deviance))
-    return terms
+def _worth(space: Space, k: int) -> float:
+    """Deviance that dropping term ``k`` would cost, less the price it would save."""
+    term = space.terms[k]
+    alone = any(group == [k] for group in finding_groups(space.terms))
+    price = term.parameters * term.log_n + 2.0 * term.log_grid
+    return _lost(space, k) - price - (NEW_CAUSE if alone else 0.0)
+
+
+def _lost(space: Space, k: int) -> float:
+    """Deviance that term ``k`` saves beside all the others (Wald, or by fitting without)."""
+    term = space.terms[k]
+    if term.run_effect is not None:
+        return cause_terms(space, [k]).deviance - space.deviance
+    _, coefficients = space.fitted()[k]
+    spread = space.covariance(k) / space.variance
+    return space.n * float(
+        np.log1p(coefficients @ np.linalg.pinv(spread) @ coefficients / space.rss)
+    )

@@ -23,6 +23,10 @@ from .candidate import (
 
 __all__ = ["BacklashCandidate", "HysteresisCandidate"]
 
+#: Elements of a Maxwell-slip model at most, and the ratio of lengths that keeps them apart.
+MOST_ELEMENTS = 3
+APART = 2.5
+
 #: Orders of the angle with which play may vary from place to place.
 PLACE_ORDERS = (1, 2, 3)
 
@@ -102,7 +106,8 @@ class HysteresisCandidate(Candidate):
                 best = (float(gains[k]), float(LENGTHS[k]), start)
         assert best is not None
         gain, length, start = best
-        if gain <= 0.0:
+        present = [term.shape["length_deg"] for term in space.terms if term.cause == self.cause]
+        if gain <= 0.0 or len(present) >= MOST_ELEMENTS:
             return None
         step = np.log(LENGTHS[1] / LENGTHS[0])
         log_length, _ = golden_maximum(
@@ -116,7 +121,11 @@ class HysteresisCandidate(Candidate):
         if space.has(self.cause):
             # A further element may have no length: what is left of play.
             play = space.propose(self.cause, {"length_deg": 0.0}, signals.direction[:, None])
-            return max(play, proposal, key=lambda p: p.bic_gain)
+            apart = all(
+                other > 0.0 and abs(np.log(shape["length_deg"] / other)) > np.log(APART)
+                for other in present
+            )
+            return max(play, proposal, key=lambda p: p.bic_gain) if apart else play
         return proposal
 
     def columns(self, signals: Signals, around: Surroundings, shape: dict[str, Any]) -> Array:
