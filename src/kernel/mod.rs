@@ -10,7 +10,7 @@ mod evaluator;
 mod exact;
 mod expansion;
 mod inverse;
-mod lanes;
+pub(crate) mod lanes;
 mod portable;
 mod route;
 mod sincos;

@@ -100,7 +100,9 @@ impl Accumulator {
             return self.add(readings);
         }
         let table = size_of::<Segment>() * self.total.len();
-        let parts = (PART_BYTES / table).clamp(4, 16);
+        let parts = (PART_BYTES / table)
+            .clamp(4, 16)
+            .min(len.div_ceil(THREADED));
         let bounds: Vec<_> = (0..=parts).map(|i| len * i / parts).collect();
         let fresh = || {
             let mut part = self.clone();
@@ -150,10 +152,8 @@ impl Accumulator {
     fn add_to_total(&mut self, moments: &[Segment]) {
         let sums = self.total.iter_mut().zip(&mut self.carry);
         for ((total, carry), moments) in sums.zip(moments) {
-            let sums = total.values_mut().zip(carry.values_mut());
-            for ((total, carry), value) in sums.zip(moments.values()) {
-                compensate(total, carry, *value);
-            }
+            add_all(&mut total.weight, &mut carry.weight, &moments.weight);
+            add_all(&mut total.error, &mut carry.error, &moments.error);
         }
     }
 
@@ -260,4 +260,14 @@ fn compensate(sum: &mut f64, carry: &mut f64, value: f64) {
     let (total, lost) = two_sum(*sum, value);
     *sum = total;
     *carry += lost;
+}
+
+fn add_all<const TERMS: usize>(
+    sums: &mut [f64; TERMS],
+    carries: &mut [f64; TERMS],
+    values: &[f64; TERMS],
+) {
+    for i in 0..TERMS {
+        compensate(&mut sums[i], &mut carries[i], values[i]);
+    }
 }

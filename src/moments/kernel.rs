@@ -8,6 +8,7 @@
 use super::readings::Readings;
 use super::segment::{LANES, Segment};
 use crate::angle::Period;
+use crate::kernel::lanes::{InstructionSet, Kernel, Lanes, dispatch};
 
 /// Readings prepared at a time; their places and polynomials stay in the first cache.
 const CHUNK: usize = 64;
@@ -112,6 +113,7 @@ struct Call<'a, 'b> {
     around: &'a Around,
     readings: Readings<'a>,
     table: &'b mut [Segment],
+    squares: &'b mut f64,
 }
 
 /// Adds readings to their segments; returns the weighted sum of squared errors.
@@ -121,59 +123,39 @@ pub fn accumulate(
     readings: Readings<'_>,
     table: &mut [Segment],
 ) -> f64 {
+    let mut squares = 0.0;
     let call = Call {
         frame,
         around,
         readings,
         table,
+        squares: &mut squares,
     };
-    #[cfg(target_arch = "x86_64")]
-    {
-        if is_x86_feature_detected!("avx512f")
-            && is_x86_feature_detected!("avx512dq")
-            && is_x86_feature_detected!("avx512vl")
-        {
-            // SAFETY: the processor has what the function was compiled for.
-            return unsafe { avx512(call) };
+    dispatch(InstructionSet::best(), call);
+    squares
+}
+
+impl Kernel for Call<'_, '_> {
+    /// The shapes of readings, each compiled on its own.
+    #[inline(always)]
+    fn run<L: Lanes>(self) {
+        match (self.readings.reference, self.readings.weights) {
+            (None, None) => run::<L, false, false>(self),
+            (None, Some(_)) => run::<L, false, true>(self),
+            (Some(_), None) => run::<L, true, false>(self),
+            (Some(_), Some(_)) => run::<L, true, true>(self),
         }
-        if is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma") {
-            // SAFETY: as above.
-            return unsafe { avx2(call) };
-        }
-    }
-    specialise::<{ cfg!(target_feature = "fma") || cfg!(target_arch = "aarch64") }>(call)
-}
-
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx512f,avx512dq,avx512vl,fma")]
-fn avx512(call: Call<'_, '_>) -> f64 {
-    specialise::<true>(call)
-}
-
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx2,fma")]
-fn avx2(call: Call<'_, '_>) -> f64 {
-    specialise::<true>(call)
-}
-
-/// The shapes of readings, each compiled on its own.
-#[inline(always)]
-fn specialise<const FUSED: bool>(call: Call<'_, '_>) -> f64 {
-    match (call.readings.reference, call.readings.weights) {
-        (None, None) => run::<FUSED, false, false>(call),
-        (None, Some(_)) => run::<FUSED, false, true>(call),
-        (Some(_), None) => run::<FUSED, true, false>(call),
-        (Some(_), Some(_)) => run::<FUSED, true, true>(call),
     }
 }
 
 #[inline(always)]
-fn run<const FUSED: bool, const DIFFERENCE: bool, const WEIGHTED: bool>(call: Call<'_, '_>) -> f64 {
+fn run<L: Lanes, const DIFFERENCE: bool, const WEIGHTED: bool>(call: Call<'_, '_>) {
     let Call {
         frame,
         around,
         readings,
         table,
+        squares: sum,
     } = call;
     let mut chunk = Chunk::new();
     let mut squares = [0.0; LANES];
@@ -194,10 +176,10 @@ fn run<const FUSED: bool, const DIFFERENCE: bool, const WEIGHTED: bool>(call: Ca
         chunk.prepare(frame, around, &angle, &error, &reference);
         chunk.square(&mut squares);
         for i in 0..CHUNK {
-            chunk.add::<FUSED>(i, &mut table[chunk.segment[i] as usize]);
+            chunk.add::<L>(i, &mut table[chunk.segment[i] as usize]);
         }
     }
-    squares.iter().sum()
+    *sum = squares.iter().sum();
 }
 
 /// `CHUNK` values from `start`, the last repeated where there are only `len`.
@@ -268,7 +250,7 @@ impl Chunk {
 
     /// Adds reading `i` to its segment.
     #[inline(always)]
-    fn add<const FUSED: bool>(&self, i: usize, segment: &mut Segment) {
+    fn add<L: Lanes>(&self, i: usize, segment: &mut Segment) {
         let pairs = [self.pairs[0][i], self.pairs[1][i], self.pairs[2][i]];
         let (t8, t16) = (self.high[0][i], self.high[1][i]);
         let (weight, error) = (self.weight[i], self.error[i]);
@@ -279,18 +261,88 @@ impl Chunk {
         for (j, &low) in low.iter().enumerate() {
             let [first, second, third] = [j, LANES + j, 2 * LANES + j];
             segment.weight[first] += low;
-            segment.weight[second] = fused::<FUSED>(low, t8, segment.weight[second]);
-            segment.weight[third] = fused::<FUSED>(low, t16, segment.weight[third]);
-            segment.error[first] = fused::<FUSED>(low, error, segment.error[first]);
+            segment.weight[second] = fused::<L>(low, t8, segment.weight[second]);
+            segment.weight[third] = fused::<L>(low, t16, segment.weight[third]);
+            segment.error[first] = fused::<L>(low, error, segment.error[first]);
         }
         for (value, &low) in segment.error[LANES..].iter_mut().zip(&low) {
-            *value = fused::<FUSED>(low, t8 * error, *value);
+            *value = fused::<L>(low, t8 * error, *value);
         }
     }
 }
 
 /// `a * b + c`, in one instruction where the processor has it (a slow call elsewhere).
 #[inline(always)]
-fn fused<const FUSED: bool>(a: f64, b: f64, c: f64) -> f64 {
-    if FUSED { a.mul_add(b, c) } else { a * b + c }
+fn fused<L: Lanes>(a: f64, b: f64, c: f64) -> f64 {
+    if L::FUSED { a.mul_add(b, c) } else { a * b + c }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Of sums of 1000 terms up to 1.
+    const ROUNDING: f64 = 1e-12;
+
+    /// Every set of instructions and every shape of readings gives the same sums.
+    #[test]
+    fn instruction_sets_agree() {
+        let sets = [
+            InstructionSet::Avx512,
+            InstructionSet::Avx2,
+            InstructionSet::Portable,
+        ];
+        let sets: Vec<_> = sets.into_iter().filter(|set| set.is_available()).collect();
+        let period = Period::new(360.0).unwrap();
+        let frame = Frame::new(period, 34);
+        let around = Around::new(period, 2.0);
+        let angle: Vec<f64> = (0..1003)
+            .map(|i| 700.0 * (f64::from(i) * 0.618).sin())
+            .collect();
+        let error: Vec<f64> = angle.iter().map(|x| 1.5 + (0.1 * x).sin()).collect();
+        let indicated: Vec<f64> = angle
+            .iter()
+            .zip(&error)
+            .map(|(x, e)| x + e - 720.0)
+            .collect();
+        let ones = vec![1.0; angle.len()];
+        let sums = |set, readings| {
+            let (mut squares, mut table) = (0.0, vec![Segment::EMPTY; 34]);
+            let call = Call {
+                frame: &frame,
+                around: &around,
+                readings,
+                table: &mut table,
+                squares: &mut squares,
+            };
+            dispatch(set, call);
+            (squares, table)
+        };
+        let plain = Readings {
+            angle: &angle,
+            error: &error,
+            reference: None,
+            weights: None,
+        };
+        let (squares, table) = sums(sets[0], plain);
+        for set in sets {
+            for (error, reference) in [(&error, None), (&indicated, Some(&angle[..]))] {
+                for weights in [None, Some(&ones[..])] {
+                    let readings = Readings {
+                        angle: &angle,
+                        error,
+                        reference,
+                        weights,
+                    };
+                    let found = sums(set, readings);
+                    assert!((found.0 - squares).abs() < ROUNDING, "{set:?}");
+                    for (a, b) in found.1.iter().zip(&table) {
+                        for (a, b) in a.values().zip(b.values()) {
+                            assert!((a - b).abs() < ROUNDING, "{set:?}: {a} {b}");
+                        }
+                    }
+                }
+            }
+        }
+    }
 }

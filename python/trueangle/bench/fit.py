@@ -1,0 +1,93 @@
+"""Least-squares fits: ours against `trueangle.bench.fitpeers`."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from functools import partial
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .. import _core
+from .fitpeers import peers
+from .interleaved import Timing, interleave
+
+__all__ = ["Case", "Row", "measure", "quick", "readings"]
+
+
+class Case(NamedTuple):
+    """One problem: readings over an arc of the circle, orders 1 to the highest."""
+
+    samples: int
+    highest: int
+    arc_deg: float = 360.0
+
+
+class Row(NamedTuple):
+    """What one way of fitting took."""
+
+    case: Case
+    name: str
+    timing: Timing
+    deviation: float
+    """Largest difference of a coefficient from ours, relative to the largest."""
+
+
+def readings(case: Case) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Angles in radians at random over the arc, and errors with noise; seed 0."""
+    rng = np.random.default_rng(0)
+    theta = rng.uniform(0.0, np.radians(case.arc_deg), case.samples)
+    error = 1e-3 * np.cos(theta) + 1e-4 * np.sin(3 * theta) + 1e-5 * rng.normal(size=theta.size)
+    return theta, error
+
+
+def _ours(
+    theta: NDArray[np.float64],
+    indicated: NDArray[np.float64],
+    highest: int,
+    threads: int | None = None,
+    method: str | None = None,
+) -> NDArray[np.float64]:
+    orders = list(range(1, highest + 1))
+    found = _core.fit(
+        [(theta, indicated, None)], 2 * np.pi, [1.0], [orders], method=method, threads=threads
+    )
+    pairs = np.column_stack([found.cosine[0], found.sine[0]]).ravel()
+    return np.concatenate([[found.constant], pairs])
+
+
+def measure(
+    case: Case,
+    rounds: int = 5,
+    only: Iterable[str] | None = None,
+    threads: Iterable[int] = (1, 2),
+    methods: Iterable[str] = (),
+) -> list[Row]:
+    """Time our fit, by numbers of threads and forced methods, and those of the peers."""
+    theta, error = readings(case)
+    indicated = theta + error
+    ways = {
+        f"trueangle, {n} thread{'s' * (n > 1)}": partial(
+            _ours, theta, indicated, case.highest, threads=n
+        )
+        for n in threads
+    }
+    for method in methods:
+        name = f"trueangle, 1 thread, {method}"
+        ways[name] = partial(_ours, theta, indicated, case.highest, threads=1, method=method)
+    for name, fit in peers()[0].items():
+        if only is None or name in only:
+            ways[name] = partial(fit, theta, error, case.highest)
+    timings = interleave(ways, rounds)
+    ours = next(iter(ways.values()))()
+    scale = np.abs(ours).max()
+    return [
+        Row(case, name, timing, float(np.abs(ways[name]() - ours).max() / scale))
+        for name, timing in timings.items()
+    ]
+
+
+def quick() -> list[Row]:
+    """Seconds, not minutes: a small problem and one of 100 000 readings."""
+    return measure(Case(37, 5), 200, threads=(1,)) + measure(Case(100_000, 17), 3)

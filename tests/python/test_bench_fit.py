@@ -1,0 +1,19 @@
+"""The fit benchmark compares like with like: all ways give the same coefficients."""
+
+from __future__ import annotations
+
+from trueangle.bench.fit import Case, measure
+from trueangle.bench.fitpeers import peers
+
+# Ours relative to the largest coefficient; the error is a difference of angles of a turn.
+AGREES = 1e-11
+
+
+def test_every_way_solves_the_same_problem():
+    rows = measure(Case(500, 3), rounds=1, methods=("plain", "moments", "qr"))
+    names = {row.name for row in rows}
+    assert names >= {"trueangle, 1 thread", "trueangle, 2 threads", "numpy.linalg.lstsq"}
+    assert names >= set(peers()[0])
+    for row in rows:
+        assert row.deviation < AGREES, row
+        assert row.timing.least <= row.timing.median <= row.timing.most
