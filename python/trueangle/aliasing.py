@@ -24,6 +24,7 @@ __all__ = [
     "POSITION_TOLERANCE",
     "Explanation",
     "Positions",
+    "closure_errors",
     "distinct_positions",
     "energy_near_nyquist",
     "explain_order",
@@ -179,6 +180,35 @@ def distinct_positions(
     distinct = place[ascent]
     divisions, offsets = _grids(distinct, width)
     return Positions(distinct, index, divisions, offsets)
+
+
+def closure_errors(
+    runs: CalibrationRun | Iterable[CalibrationRun], tolerance: float | None = None
+) -> Array:
+    """What the last reading of each run differs by that closes a turn at its first position.
+
+    Drift, slip or a lost count within a run show here; a turn that closes is no proof
+    against them at other places. Runs that do not end where they began have no entry.
+
+    Returns
+    -------
+    ndarray
+        Error of the last reading less that of the first, unit of the runs.
+
+    Examples
+    --------
+    >>> run = CalibrationRun([0.0, 120.0, 240.0, 360.0], [0.0, 120.0, 240.0, 360.1], 360.0)
+    >>> closure_errors(run).round(9)
+    array([0.1])
+    """
+    found = []
+    for run in as_runs(runs):
+        width = run.period * POSITION_TOLERANCE if tolerance is None else tolerance
+        travel = run.unwrapped_reference[-1] - run.unwrapped_reference[0]
+        turns = round(float(travel / run.period))
+        if turns and abs(travel - turns * run.period) <= width:
+            found.append(float(run.centred_error[-1] - run.centred_error[0]))
+    return np.array(found, dtype=np.float64)
 
 
 def _clusters(ascending: Array, width: float) -> NDArray[np.intp]:

@@ -157,7 +157,10 @@ def select_by_paper(
         holdout_rms=(float(np.sqrt(np.mean(before**2))), float(np.sqrt(np.mean(after**2)))),
         gear_ratio=candidates.gear_ratio,
     )
-    notes = (*_verification(before, after, runs[0].period), *selection_notes(selection, candidates))
+    notes = (
+        *_verification(before, after, runs[0].period),
+        *selection_notes(selection, candidates, runs),
+    )
     return selection.with_notes(notes)
 
 

@@ -243,7 +243,7 @@ class EvidenceSelection:
             holdout_rms=(without, with_),
             gear_ratio=self.candidates.gear_ratio,
         )
-        return selection.with_notes(selection_notes(selection, self.candidates))
+        return selection.with_notes(selection_notes(selection, self.candidates, self.runs))
 
     def _refusal(self, rows: Sequence[OrderRow]) -> str:
         """Why nothing was retained."""

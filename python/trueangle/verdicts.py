@@ -9,7 +9,15 @@ from typing import Final
 
 import numpy as np
 
-from .aliasing import Positions, distinct_positions, energy_near_nyquist, explain_order
+from .aliasing import (
+    Positions,
+    closure_errors,
+    distinct_positions,
+    energy_near_nyquist,
+    explain_order,
+    fold,
+)
+from .angles import arcsec
 from .candidates import Candidates, choose_candidates
 from .noisefactors import mount_noise_factors
 from .ordertable import OrderRow, OrderSelection
@@ -47,6 +55,9 @@ def explained(row: OrderRow, candidates: Candidates, positions: Positions) -> Or
     reason = "significant, and lowers the error of readings held out of the fit"
     rivals = [str(e) for e in explanations if e.order != row.order]
     named = {e.order for e in explanations}
+    low = _seen_at(row.order, candidates)
+    if low is not None and not rivals:
+        reason += f", and these positions tell it from {low}"
     # Where the readings only hint at a high order, the low one is a rival too.
     rivals += [f"{m:g}" for m in row.aliases if m in candidates.main and m not in named]
     if rivals:
@@ -55,6 +66,15 @@ def explained(row: OrderRow, candidates: Candidates, positions: Positions) -> Or
             f"Measure {_measure(positions, ratio, member)}"
         )
     return replace(row, explanations=explanations, reason=reason, doubtful=bool(rivals))
+
+
+def _seen_at(order: float, candidates: Candidates) -> int | None:
+    """The low order that one grid of the positions would show instead, if any."""
+    divisions = candidates.effective.divisions
+    if divisions is None or not float(order).is_integer():
+        return None
+    low = fold(int(order), divisions)[0]
+    return low if low != order else None
 
 
 def _reference_reason(order: float, carriers: Sequence[float]) -> str:
@@ -87,10 +107,20 @@ def _separating_offset(divisions: int, ratio: float | None, member: str) -> floa
     return plan.mount_offsets_deg[1]
 
 
-def selection_notes(selection: OrderSelection, candidates: Candidates) -> tuple[str, ...]:
+def selection_notes(
+    selection: OrderSelection, candidates: Candidates, runs: Sequence[CalibrationRun]
+) -> tuple[str, ...]:
     """What a user must know before trusting the orders."""
     positions = selection.positions
     notes = []
+    closure = closure_errors(runs)
+    if closure.size:
+        worst = arcsec(float(np.abs(closure).max()), selection.period)
+        count = f"{closure.size} run{'s' if closure.size > 1 else ''}"
+        notes.append(
+            f"closure: the last reading repeats the first position in {count}, and differs by "
+            f"{worst:.3g} arcsec at most"
+        )
     retained = [row for row in selection.table if row.retained]
     aliased = [row for row in retained if row.aliases]
     grid = positions.divisions is not None and len(positions.offsets) == 1

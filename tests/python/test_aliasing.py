@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 
 import trueangle as ta
 from trueangle.aliasing import (
+    closure_errors,
     distinct_positions,
     energy_near_nyquist,
     explain_order,
@@ -93,6 +94,17 @@ def test_jitter_within_the_tolerance_is_one_position():
     ]
     assert len(distinct_positions(runs)) == 36
     assert len(distinct_positions(runs, tolerance=1e-7)) == 216
+
+
+def test_closure_is_the_difference_at_the_repeated_position():
+    angles = np.arange(37) * 10.0 - 50.0
+    drift = np.linspace(0.0, 0.01, 37)
+    run = ta.CalibrationRun(np.mod(angles, 360.0), angles + drift + 77.0, period=360.0)
+    back = ta.CalibrationRun(angles[::-1], (angles + drift)[::-1], period=360.0)
+    np.testing.assert_allclose(closure_errors([run, back]), [0.01, -0.01], atol=1e-9)
+    assert closure_errors(run_at(np.arange(36) * 10.0)).size == 0
+    # There and back ends where it began, but closes no turn.
+    assert closure_errors(run_at([0.0, 10.0, 20.0, 10.0, 0.0])).size == 0
 
 
 def test_mounts_are_a_union_of_grids():

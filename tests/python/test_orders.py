@@ -63,6 +63,7 @@ def test_two_mounts_tell_low_orders_from_gear_orders(seed, offsets):
     chosen = ta.select_orders(six_groups(seed, offsets), gear_ratio=100)
     assert chosen.orders == (1, 100, 200, 202)
     assert not any(chosen.row(k).retained for k in (8, 14, 16))
+    assert chosen.row(202).reason.endswith("and these positions tell it from 14")
     assert not any(row.doubtful for row in chosen.table)
     # Six groups know an amplitude to 5 sqrt(2/216) = 0.48 arcsec, two to 0.83.
     for order, (amplitude, phase) in GEAR.items():
@@ -211,6 +212,7 @@ def test_the_closing_reading_is_no_new_position():
     runs = [group(random, np.append(GRID, 360.0), GEAR) for _ in range(6)]
     chosen = ta.select_orders(runs, gear_ratio=100)
     assert (len(chosen.positions), chosen.samples) == (36, 222)
+    assert "closure: the last reading repeats the first position in 6 runs" in chosen.summary()
     assert chosen.orders == (1, 8, 14, 16)
 
 
