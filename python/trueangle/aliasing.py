@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import Final
 
 import numpy as np
@@ -53,6 +54,7 @@ _MOST_GRIDS: Final = 24
 #: Up to this many positions their spectrum is summed exactly, beyond by a histogram.
 _EXACT_SPECTRUM: Final = 4096
 _BLOCK: Final = 1 << 18
+_CELLS: Final = 1 << 16
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,8 +96,8 @@ class Positions:
     def spectrum(self, highest: int) -> Array:
         """``|mean exp(2 pi i m t)|`` for m = 0 .. highest, by a histogram for many t."""
         if len(self) > _EXACT_SPECTRUM:
-            cells = 1 << 16
-            counts = np.bincount((self.turns * cells).astype(np.int64) % cells, minlength=cells)
+            cells = (self.turns * _CELLS).astype(np.int64) % _CELLS
+            counts = np.bincount(cells, minlength=_CELLS)
             return np.asarray(np.abs(np.fft.rfft(counts))[: highest + 1] / len(self))
         orders = np.arange(highest + 1)
         # One block of orders after the other keeps the matrix small.
@@ -269,10 +271,17 @@ def position_coherence(
     """
     m = np.asarray(others, dtype=np.float64)
     down, up = np.abs(m - order), m + order
-    if not (float(order).is_integer() and (m == np.round(m)).all()):
+    whole = float(order).is_integer() and (m == np.round(m)).all()
+    if not whole or up.max(initial=0.0) >= _CELLS // 4:
         return np.maximum(_spectrum(positions.turns, down), _spectrum(positions.turns, up))
-    spectrum = positions.spectrum(int(up.max(initial=0.0)))
+    # Rounded up, so that the orders of one selection share one spectrum.
+    spectrum = _cached_spectrum(positions, 1 << int(up.max(initial=0.0)).bit_length())
     return np.maximum(spectrum[down.astype(np.int64)], spectrum[up.astype(np.int64)])
+
+
+@lru_cache(maxsize=8)
+def _cached_spectrum(positions: Positions, highest: int) -> Array:
+    return positions.spectrum(highest)
 
 
 def _spectrum(turns: Array, orders: Array) -> Array:

@@ -36,6 +36,9 @@ Index = NDArray[np.intp]
 #: chosen is an alias of them.
 _COLLINEAR: Final = 1e-8
 
+#: Columns that keep this part of their length beside all others are inverted directly.
+_REGULAR: Final = 1e-4
+
 #: Least degrees of freedom that a residual must keep.
 _LEAST_DOF: Final = 3
 
@@ -142,7 +145,13 @@ def fit_subset(sums: HarmonicSums, chosen: Sequence[int]) -> tuple[Array, Array,
 def _inverse(gram: Array) -> Array:
     """Inverse of a normal matrix; directions that the readings do not see get zero."""
     scale = np.sqrt(np.maximum(np.diag(gram), 1e-300))
-    values, vectors = np.linalg.eigh(gram / np.outer(scale, scale))
+    unit = gram / np.outer(scale, scale)
+    try:
+        if float(np.diag(np.linalg.cholesky(unit)).min(initial=1.0)) > _REGULAR:
+            return np.asarray(np.linalg.inv(unit) / np.outer(scale, scale))
+    except np.linalg.LinAlgError:
+        pass
+    values, vectors = np.linalg.eigh(unit)
     keep = values > 1e-12 * values[-1]
     inverse = (vectors[:, keep] / values[keep]) @ vectors[:, keep].T
     return np.asarray(inverse / np.outer(scale, scale))
