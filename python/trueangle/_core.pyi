@@ -21,7 +21,7 @@ class Series:
         cosine: Sequence[Sequence[float]],
         sine: Sequence[Sequence[float]],
         argument: Literal["reference", "indicated"] = "reference",
-        tolerance: float = 3e-15,
+        tolerance: float = ...,
     ) -> Series: ...
     @overload
     def error(
