@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from .fitresult import FitResult as FitResult
     from .fitting import fit as fit
     from .logs.batch import correct_logs as correct_logs
+    from .logs.fitting import fit_logs as fit_logs
     from .logs.frames import correct as correct
     from .model import HarmonicModel as HarmonicModel
     from .modelfile import load_model as load_model
@@ -52,6 +53,7 @@ _PUBLIC = {
     "correct": "logs.frames",
     "correct_logs": "logs.batch",
     "fit": "fitting",
+    "fit_logs": "logs.fitting",
     "load_model": "modelfile",
     "Moments": "moments",
     "read_runs": "runfiles",

@@ -357,9 +357,14 @@ class HarmonicModel:
     def uses_signals(self) -> tuple[str, ...]:
         """`signals` and those it takes where given: direction and velocity for travel."""
         used = set(self.signals)
-        if any(term.follows_travel for term in self.terms):
+        if self.follows_travel:
             used |= {"direction", "velocity"}
         return tuple(name for name in _SIGNALS if name in used)
+
+    @property
+    def follows_travel(self) -> bool:
+        """True when a correction depends on the travel before it: backlash, hysteresis."""
+        return any(term.follows_travel for term in self.terms)
 
     @property
     def partial_span(self) -> tuple[float, float] | None:

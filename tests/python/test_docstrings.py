@@ -18,6 +18,11 @@ MODULES = ["trueangle"] + [
 
 @pytest.mark.parametrize("name", MODULES)
 def test_examples(name):
-    module = importlib.import_module(name)
+    try:
+        module = importlib.import_module(name)
+    except ModuleNotFoundError as cause:
+        if (cause.name or "").startswith("trueangle"):
+            raise
+        pytest.skip(f"the extra with {cause.name} is not installed")
     found = doctest.testmod(module, extraglobs={"np": np, "ta": ta}, verbose=False)
     assert found.failed == 0

@@ -7,6 +7,7 @@ import json
 from collections.abc import Mapping, Sequence
 
 from ..errors import ArgumentError
+from .onepass import add_one_pass, saved, wants_one_pass
 from .order_lists import parse_orders
 
 HELP = "fit a harmonic model to calibration runs and save it"
@@ -40,6 +41,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--run", action="append", metavar="LABEL", help="use this run only (may be repeated)"
     )
+    add_one_pass(parser)
     parser.add_argument("--json", action="store_true", help="print the result as JSON")
 
 
@@ -79,6 +81,8 @@ def run(args: argparse.Namespace) -> int:
     from ..fitting import fit
     from .run_lists import read_selected
 
+    if wants_one_pass(args):
+        return saved(args, orders_by_shaft(args.orders))
     result = fit(
         read_selected(args.runs, args.counts_per_turn, args.run),
         orders=orders_by_shaft(args.orders),

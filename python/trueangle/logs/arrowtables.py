@@ -190,6 +190,30 @@ def _is_list(kind: pa.DataType) -> bool:
 def column_batches(
     path: object, names: Sequence[str], batches: Iterable[Any]
 ) -> Iterator[dict[str, NDArray[Any]]]:
-    """Some columns of record batches as arrays."""
+    """Some columns of record batches as arrays; texts (labels) as numbers from 0."""
+    labels: dict[Any, int] = {}
     for batch in batches:
-        yield {name: numbers(path, name, batch[name]) for name in names}
+        yield {
+            name: _codes(batch[name], labels)
+            if _is_label(batch[name].type)
+            else numbers(path, name, batch[name])
+            for name in names
+        }
+
+
+def _codes(column: pa.Array | pa.ChunkedArray, labels: dict[Any, int]) -> NDArray[np.float64]:
+    """Every text's number, in the order of their first appearance in the log."""
+    if isinstance(column, pa.ChunkedArray):
+        column = column.combine_chunks()
+    if not pa.types.is_dictionary(column.type):
+        column = column.dictionary_encode()
+    numbered = [labels.setdefault(text, len(labels)) for text in column.dictionary.to_pylist()]
+    codes = column.indices.to_numpy(zero_copy_only=False)
+    if column.null_count:
+        numbered.append(labels.setdefault(None, len(labels)))
+        codes = np.where(np.isnan(codes), len(numbered) - 1, codes)
+    return np.asarray(np.array(numbered, dtype=np.float64)[codes.astype(np.intp)])
+
+
+def _is_label(kind: pa.DataType) -> bool:
+    return _is_string(kind.value_type if pa.types.is_dictionary(kind) else kind)

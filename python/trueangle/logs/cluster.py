@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import ArgumentError, FileError, MissingExtraError, TrueAngleError
+from .accumulation import Accumulated, LogFitSettings, accumulate, merged
 from .batch import LogReport, done_before
 from .correction import Task, correct_log, count_turns, is_disk_full
 from .joints import LogSettings
@@ -17,7 +18,7 @@ from .progress import Progress
 from .sources import Place
 from .turns import TurnSpan, TurnState
 
-__all__ = ["connected", "on_cluster"]
+__all__ = ["accumulated_on_cluster", "connected", "on_cluster"]
 
 #: Seconds to wait for the scheduler.
 _TIMEOUT = 20
@@ -87,7 +88,7 @@ def on_cluster(
             for place, log in waiting
         }
         try:
-            for future in distributed.as_completed(futures):
+            for future in distributed.as_completed(futures, loop=client.loop):
                 log = futures[future]
                 if future.status == "cancelled":
                     continue
@@ -99,6 +100,19 @@ def on_cluster(
         except KeyboardInterrupt:
             client.cancel(list(futures))
             raise
+
+
+def accumulated_on_cluster(
+    scheduler: str, paths: Sequence[Path], settings: LogFitSettings
+) -> Accumulated:
+    """Moments of all logs: a log on each worker, merged there in a tree."""
+    settings = replace(settings, threads=settings.threads or 1)
+    with connected(scheduler) as client:
+        parts = [client.submit(accumulate, path.resolve(), settings) for path in paths]
+        while len(parts) > 1:
+            parts = [client.submit(merged, parts[i : i + 2]) for i in range(0, len(parts), 2)]
+        found: Accumulated = parts[0].result()
+    return found
 
 
 def _task(place: Place, settings: LogSettings, turns: Mapping[str, TurnState] | None) -> Task:

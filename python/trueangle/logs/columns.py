@@ -8,15 +8,23 @@ from typing import NamedTuple
 from ..angles import UNIT_PERIODS, unit_name
 from ..errors import FileError
 
-__all__ = ["UNITS", "AngleColumn", "find_angle_column", "find_signal_column"]
+__all__ = [
+    "SIGNAL_COLUMNS",
+    "UNITS",
+    "AngleColumn",
+    "find_angle_column",
+    "find_reference_column",
+    "find_signal_column",
+]
 
 UNITS = (*UNIT_PERIODS, "count")
 
 #: Column endings of the signals that terms of a model may need.
-_SIGNALS = {
+SIGNAL_COLUMNS = {
     "time": ("time_s",),
     "temperature": ("temperature_C",),
     "torque": ("torque_Nm",),
+    "direction": ("direction",),
     "velocity": tuple(f"velocity_{unit}_s" for unit in UNITS),
 }
 
@@ -39,6 +47,7 @@ def find_angle_column(
     column: str | None = None,
     unit: str | None = None,
     counts_per_turn: float | None = None,
+    fresh: bool = True,
 ) -> AngleColumn:
     """The indicated angle of ``joint`` among the columns of ``path``.
 
@@ -46,7 +55,7 @@ def find_angle_column(
     ``_count``; for a named joint ``JOINT_indicated_deg``, ``indicated_deg_JOINT``,
     ``JOINT_deg`` or ``JOINT``. Groups of a file are part of the name, with a slash:
     ``JOINT/indicated_deg``. The unit is ``unit``, else the ending of the name, else that of
-    the model.
+    the model. With ``fresh`` the log must not hold the corrected column yet.
 
     Raises
     ------
@@ -70,11 +79,30 @@ def find_angle_column(
             column=column,
         )
     corrected = _corrected_name(column, unit, joint)
-    if corrected in header:
+    if fresh and corrected in header:
         raise FileError(
             path, "is there already: this log was corrected before", line=1, column=corrected
         )
     return AngleColumn(column, unit, float(period), corrected)
+
+
+def find_reference_column(path: object, header: Sequence[str]) -> str:
+    """The true angle of a calibration log: ``reference_deg``, ``_rad`` or ``_turn``.
+
+    Raises
+    ------
+    FileError
+        None of them, or several.
+    """
+    found = [name for name in (f"reference_{unit}" for unit in UNIT_PERIODS) if name in header]
+    if len(found) != 1:
+        problem = f"several of them ({', '.join(found)})" if found else "there is none"
+        raise FileError(
+            path,
+            f"one column reference_deg, _rad or _turn is needed and {problem}; {_listed(header)}",
+            line=1,
+        )
+    return found[0]
 
 
 def find_signal_column(
@@ -93,7 +121,7 @@ def find_signal_column(
         ["{}"] if joint is None else [f"{joint}_{{}}", f"{{}}_{joint}", f"{joint}/{{}}", "{}"]
     )
     for pattern in patterns:
-        for ending in _SIGNALS.get(signal, (signal,)):
+        for ending in SIGNAL_COLUMNS.get(signal, (signal,)):
             if pattern.format(ending) in header:
                 return pattern.format(ending)
     return None

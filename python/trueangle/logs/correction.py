@@ -43,8 +43,9 @@ def correct_log(task: Task, watch: Watch = lambda rows, part: None) -> dict[str,
     Returns
     -------
     dict
-        ``rows``, ``seconds``, ``rows_per_second``, ``joints`` (see `Channel.summary`) and,
-        for models that count turns, ``turns`` to pass on to the log that follows.
+        ``rows`` (readings of a joint), ``seconds``, ``rows_per_second``, ``joints`` (see
+        `Channel.summary`) and, for models that count turns, ``turns`` to pass on to the log
+        that follows.
 
     Raises
     ------
@@ -55,12 +56,13 @@ def correct_log(task: Task, watch: Watch = lambda rows, part: None) -> dict[str,
     """
     start = time.perf_counter()
     source, target, settings = task.source, task.target, task.settings
-    module = find_format(source).module
+    kind = find_format(source)
+    module = kind.module
     before = stamp(source)
     channels: list[Channel] = []
 
     def choose(header: Any) -> list[Channel]:
-        channels.extend(settings.channels(source, header, task.turns))
+        channels.extend(settings.channels(source, header, task.turns, kind.unit))
         return channels
 
     with workplace(target) as aside:
@@ -81,10 +83,11 @@ def correct_log(task: Task, watch: Watch = lambda rows, part: None) -> dict[str,
         if stamp(source) != before:
             raise FileError(source, "changed while it was read: it is still being written; wait")
         seconds = time.perf_counter() - start
+        rows = max(channel.statistics.rows for channel in channels)
         result = {
-            "rows": written.rows,
+            "rows": rows,
             "seconds": seconds,
-            "rows_per_second": written.rows / seconds,
+            "rows_per_second": rows / seconds,
             "joints": [channel.summary() for channel in channels],
             "turns": {c.name: list(c.turns) for c in channels if c.turns is not None},
         }
@@ -103,9 +106,10 @@ def count_turns(source: Path, settings: LogSettings) -> dict[str, TurnSpan]:
 
     One pass over the angle columns.
     """
-    module = find_format(source).module
+    kind = find_format(source)
+    module = kind.module
     header = module.columns(source, settings.topic)
-    channels = [c for c in settings.channels(source, header) if c.turns is not None]
+    channels = [c for c in settings.channels(source, header, unit=kind.unit) if c.turns is not None]
     counters = {c.name: TurnCounter(c.angle.period) for c in channels}
     first: dict[str, float | None] = {c.name: None for c in channels}
     for batch in module.read(source, [c.angle.name for c in channels], settings.topic):

@@ -32,7 +32,7 @@ Choose: TypeAlias = Callable[[Sequence[str]], list[Channel]]
 
 
 class Contents(NamedTuple):
-    """What a log holds: its rows and a checksum by column, topic or the like."""
+    """What a log holds: its rows (or messages) and a checksum by column, topic or the like."""
 
     rows: int
     checksums: Mapping[str, str]
@@ -69,12 +69,16 @@ class FormatModule(Protocol):
 
 @dataclass(frozen=True)
 class LogFormat:
-    """A format: the endings of its files, its module and the extra that it needs."""
+    """A format: the endings of its files, its module and the extra that it needs.
+
+    ``unit`` is that of all angles of formats that define it.
+    """
 
     name: str
     endings: tuple[str, ...]
     module_name: str
     extra: str | None
+    unit: str | None = None
 
     @cached_property
     def module(self) -> FormatModule:
@@ -100,6 +104,9 @@ class LogFormat:
 FORMATS = (
     LogFormat("Parquet", (".parquet", ".pq"), "parquetlog", "arrow"),
     LogFormat("Arrow", (".arrow", ".arrows", ".feather", ".ipc"), "arrowlog", "arrow"),
+    LogFormat("HDF5", (".h5", ".hdf5", ".hdf", ".he5", ".mat", ".nc"), "hdf5log", "hdf5"),
+    LogFormat("ROS bag", (".bag", ".db3", ".mcap"), "rosbaglog", "ros", unit="rad"),
+    LogFormat("MDF4", (".mf4", ".mdf"), "mdflog", "mdf"),
     LogFormat("CSV", (".csv", ".tsv", ".txt"), "csvlog", None),
 )
 

@@ -74,10 +74,8 @@ def correct(
     --------
     >>> from trueangle import Shaft
     >>> model = HarmonicModel([Shaft("output", 1, [1], [0.0], [0.5])], period=360.0)
-    >>> import pyarrow as pa
-    >>> table = pa.table({"t": [0, 1], "indicated_deg": [90.5, None]})
-    >>> correct(table, model)["corrected_deg"].to_pylist()
-    [90.0, None]
+    >>> correct(np.array([90.5, np.nan]), model).round(9)
+    array([90., nan])
     """
     settings = LogSettings(
         joints_of(model, column, signals), unit, counts_per_turn, threads=threads
@@ -136,7 +134,7 @@ def _stream(pa: Any, reader: Any, settings: LogSettings) -> Any:
 
 def _from_polars(pl: Any, data: Any, settings: LogSettings) -> Any:
     if isinstance(data, pl.LazyFrame):
-        if settings.counts_turns:
+        if settings.needs_order:
             raise ArgumentError(_OUT_OF_ORDER.format("a LazyFrame", "collect it first"))
         schema = data.collect_schema()
         channels = settings.channels(_DATA, schema.names())
@@ -189,7 +187,7 @@ def _numpy(series: Any) -> Any:
 def _from_dask_frame(dd: Any, data: Any, settings: LogSettings) -> Any:
     if not isinstance(data, dd.DataFrame):
         return NotImplemented
-    if settings.counts_turns:
+    if settings.needs_order:
         raise ArgumentError(_OUT_OF_ORDER.format("a Dask DataFrame", "correct its files instead"))
     import pandas as pd
 
@@ -207,8 +205,10 @@ def _from_dask_array(da: Any, data: Any, settings: LogSettings) -> Any:
     if not isinstance(data, da.Array):
         return NotImplemented
     kind = np.float32 if data.dtype == np.float32 else np.float64
-    if not settings.counts_turns:
+    if not settings.needs_order:
         return data.map_blocks(_block, settings, dtype=kind)
+    if not settings.counts_turns:
+        raise ArgumentError(_OUT_OF_ORDER.format("a Dask array", "compute it first"))
     if data.ndim != 1:
         raise ArgumentError(
             "the model's error does not repeat after one turn: turns are counted along arrays "
@@ -263,8 +263,8 @@ def _array_channel(settings: LogSettings, state: Any = None) -> Channel:
 
 
 _OUT_OF_ORDER = (
-    "the model's error does not repeat after one turn, so that turns must be counted row "
-    "after row, which {} does not do: {}"
+    "the model needs the rows in their order (to count turns, since its error does not repeat "
+    "after one turn, or to follow the direction of travel), which {} does not keep: {}"
 )
 
 #: Library -> what corrects its data, or says NotImplemented to that of others.

@@ -17,10 +17,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .. import __version__
-from ..errors import ArgumentError, OutsideSpanWarning
+from ..angles import UNIT_PERIODS
+from ..errors import ArgumentError, FileError, OutsideSpanWarning
 from ..model import HarmonicModel
 from ..modelfile import load_model
-from .columns import AngleColumn, find_angle_column, find_signal_column
+from .columns import SIGNAL_COLUMNS, AngleColumn, find_angle_column, find_signal_column
 from .statistics import CorrectionStatistics
 from .turns import TurnCounter, TurnState
 
@@ -96,8 +97,11 @@ class LogSettings:
         path: object,
         header: Sequence[str],
         turns: Mapping[str, TurnState] | None = None,
+        unit: str | None = None,
     ) -> list[Channel]:
         """One channel per joint for a log with the columns ``header``.
+
+        ``unit`` is that of the log's format where it defines one.
 
         Raises
         ------
@@ -113,7 +117,7 @@ class LogSettings:
                 taken,
                 joint=joint.name,
                 column=joint.column,
-                unit=self.unit,
+                unit=self.unit or unit,
                 counts_per_turn=self.counts_per_turn,
             )
             taken.append(angle.corrected)
@@ -135,14 +139,41 @@ class LogSettings:
         """True when a model's error does not repeat after one turn."""
         return not all(joint.model.is_periodic for joint in self.joints)
 
+    @property
+    def needs_order(self) -> bool:
+        """True when a row depends on rows before: its turn, or its direction of travel."""
+        return self.counts_turns or any(joint.model.follows_travel for joint in self.joints)
+
 
 def signal_columns(path: object, header: Sequence[str], joint: Joint) -> dict[str, str]:
-    """Columns of the signals that the joint's model needs."""
-    found = {}
-    for signal in getattr(joint.model, "signals", ()):
+    """Columns of the signals that the joint's model uses; time stands in for velocity.
+
+    Raises
+    ------
+    FileError
+        Names the column of a signal that the model cannot do without.
+    """
+    model = joint.model
+    found: dict[str, str] = {}
+    for signal in (*model.uses_signals, *(["time"] if "velocity" in model.uses_signals else [])):
+        if signal == "time" and "velocity" in found:
+            continue
         column = find_signal_column(path, header, signal, joint.name, joint.signals.get(signal))
         if column is not None:
             found[signal] = column
+    for term in model.terms:
+        for signal in term.needs:
+            stand_in = {"velocity": {"time"}, "direction": {"velocity", "time"}}.get(signal, set())
+            if signal not in found and not stand_in & found.keys():
+                columns = " or ".join(
+                    SIGNAL_COLUMNS[name][0] for name in (signal, *sorted(stand_in))
+                )
+                raise FileError(
+                    path,
+                    f"no column {columns}: the model's term '{term.kind}' needs {signal}; "
+                    f"name its column with --signal {signal}=NAME",
+                    line=1,
+                )
     return found
 
 
@@ -169,6 +200,8 @@ class Channel:
         self._threads = settings.threads
         model = joint.model
         self._scale = model.period / angle.period
+        self._corrector = model.corrector() if model.terms else None
+        self._velocity_scale = _velocity_scale(self.signals.get("velocity"), model, self._scale)
         self._counter = None if model.is_periodic else TurnCounter(angle.period, turns)
         span = model.partial_span
         self._span = None if span is None else (span[0] / self._scale, span[1] / self._scale)
@@ -207,8 +240,11 @@ class Channel:
             # Rows outside the span are counted in the summary instead.
             if self._span is not None:
                 warnings.simplefilter("ignore", OutsideSpanWarning)
-            given: Any = signals or {}
-            corrected: Array = model.correct(values, threads=self._threads, **given)
+            given: Any = dict(signals or {})
+            if "velocity" in given:
+                given["velocity"] = given["velocity"] * self._velocity_scale
+            apply: Any = model.correct if self._corrector is None else self._corrector
+            corrected: Array = apply(values, threads=self._threads, **given)
         return corrected if scale == 1.0 else corrected / scale
 
     def summary(self) -> dict[str, Any]:
@@ -223,6 +259,13 @@ class Channel:
             "missing": numbers.missing,
             "outside_span": numbers.outside if self._span is not None else None,
         }
+
+
+def _velocity_scale(column: str | None, model: HarmonicModel, angle_scale: float) -> float:
+    """From the unit that the column's name states, else that of the angle, to the model's."""
+    unit = (column or "").removesuffix("_s").rpartition("_")[2]
+    period = UNIT_PERIODS.get(unit)
+    return angle_scale if period is None else model.period / period
 
 
 def joints_of(

@@ -1,0 +1,136 @@
+"""Fits of logs too large for memory: options and output of the one-pass way."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from ..errors import ArgumentError
+
+if TYPE_CHECKING:
+    from ..logs.fitting import LogFit
+
+__all__ = ["add_one_pass", "as_json", "fit_in_one_pass", "saved", "wants_one_pass"]
+
+#: Bytes of files from which on they are not read whole.
+_LARGE = 256 << 20
+
+
+def add_one_pass(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments of fits in one pass."""
+    add = parser.add_argument
+    add(
+        "--one-pass",
+        action="store_true",
+        help="constant memory, one pass, without setting wild readings aside: so for folders, "
+        "log formats other than CSV and Parquet, a --scheduler, and more than 256 MiB",
+    )
+    add(
+        "--scheduler",
+        metavar="tcp://HOST:PORT",
+        help="Dask scheduler whose workers share the files: a log on each, in one pass",
+    )
+    add(
+        "--progress",
+        choices=("auto", "text", "json", "none"),
+        default="auto",
+        help="of a fit in one pass, on stderr (default: text on a terminal)",
+    )
+
+
+def wants_one_pass(args: argparse.Namespace) -> bool:
+    """Whether the files must or should not be read whole.
+
+    Raises
+    ------
+    ArgumentError
+        An option that needs the readings twice.
+    """
+    paths = [Path(path) for path in args.runs]
+    asked = bool(args.one_pass or args.scheduler)
+    asked = asked or any(
+        path.is_dir() or path.suffix.lower() not in (".csv", ".parquet", ".pq", "")
+        for path in paths
+    )
+    if not asked:
+        existing = [path for path in paths if path.is_file()]
+        asked = sum(path.stat().st_size for path in existing) > _LARGE
+    if asked and (getattr(args, "run", None) or getattr(args, "loss", "auto") not in _LINEAR):
+        raise ArgumentError(
+            "--run and the losses huber and tukey need the readings more than once: they do "
+            "not go with logs in one pass"
+        )
+    return asked
+
+
+_LINEAR = ("auto", "linear")
+
+
+def fit_in_one_pass(args: argparse.Namespace, orders: Any) -> LogFit:
+    """Fit by the arguments of a command."""
+    from ..logs.fitting import fit_logs
+
+    return fit_logs(
+        args.runs,
+        orders,
+        gear_ratio=args.gear_ratio,
+        fixed_member=args.fixed_member,
+        argument=getattr(args, "argument", "reference"),
+        counts_per_turn=args.counts_per_turn,
+        scheduler=args.scheduler,
+        progress=args.progress,
+    )
+
+
+def as_json(found: LogFit) -> dict[str, object]:
+    """The fit as plain values, named as those of a fit of runs."""
+    from ..angles import arcsec
+
+    model = found.model
+    return {
+        "readings": found.rows,
+        "missing": found.missing,
+        "runs": len(found.moments.runs),
+        "residual_arcsec": arcsec(math.sqrt(found.fit.residual_variance), model.period),
+        "condition_number": found.fit.condition_number,
+        "method": found.fit.method,
+        "orders": [
+            {
+                "shaft": shaft.name,
+                "order": order,
+                "amplitude_arcsec": arcsec(float(shaft.amplitudes[i]), model.period),
+                "phase_deg": math.degrees(float(shaft.phases[i])) % 360.0,
+            }
+            for shaft in model.shafts
+            for i, order in enumerate(shaft.orders)
+        ],
+        "evidence": [
+            {
+                "shaft": row.shaft,
+                "order": row.order,
+                "retained": row.retained,
+                "amplitude_arcsec": arcsec(row.amplitude, model.period),
+                "std_arcsec": arcsec(row.std, model.period),
+                "phase_deg": row.phase_deg,
+                "holdout_gain": None if math.isnan(row.held_out_gain) else row.held_out_gain,
+                "reason": row.reason,
+            }
+            for row in found.table
+        ],
+        "notes": list(found.notes),
+    }
+
+
+def saved(args: argparse.Namespace, orders: Any) -> int:
+    """Fit, save, print."""
+    found = fit_in_one_pass(args, orders)
+    found.model.save(args.output)
+    if args.json:
+        print(json.dumps({"model": args.output, **as_json(found)}))
+    else:
+        print(found.summary())
+        print(f"\nsaved {args.output}")
+    return 0

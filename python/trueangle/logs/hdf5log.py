@@ -1,0 +1,211 @@
+"""HDF5 and MATLAB v7.3 logs: the file is copied whole and corrected data sets are added."""
+
+from __future__ import annotations
+
+import errno
+import json
+import os
+import shutil
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import FileError
+from .checksum import Checksum
+from .formats import Choose, Contents, Watch
+from .joints import Channel, provenance
+
+__all__ = ["columns", "contents", "copy", "read"]
+
+#: Readings taken together.
+_BLOCK = 1 << 20
+#: Attribute of a corrected data set that says how it was made.
+_ATTRIBUTE = "trueangle"
+
+
+def columns(path: Path, topic: str | None = None) -> list[str]:
+    """Paths of all data sets of numbers, without the leading slash."""
+    with _opened(path) as file:
+        return _names(file)
+
+
+def read(
+    path: Path, names: Sequence[str], topic: str | None = None
+) -> Iterator[dict[str, NDArray[Any]]]:
+    """Data sets ``names`` in batches; see `formats.FormatModule`."""
+    with _opened(path) as file:
+        sets = {name: _data_set(path, file, name) for name in names}
+        _check_lengths(path, sets)
+        size = next(iter(sets.values())).size if sets else 0
+        for start in range(0, size, _BLOCK):
+            stop = min(start + _BLOCK, size)
+            yield {name: _part(data, start, stop) for name, data in sets.items()}
+
+
+def copy(
+    source: Path,
+    target: Path,
+    choose: Choose,
+    watch: Watch,
+    topic: str | None = None,
+    output_topic: str | None = None,
+) -> Contents:
+    """Write ``target`` with the corrected data sets; see `formats.FormatModule`."""
+    with _opened(source) as file:  # refuse what cannot be corrected before it is copied
+        channels = choose(_names(file))
+        for channel in channels:
+            names = [channel.angle.name, *channel.signals.values()]
+            _check_lengths(source, {name: _data_set(source, file, name) for name in names})
+        total = max(sum(file[channel.angle.name].size for channel in channels), 1)
+    shutil.copyfile(source, target)
+    before = contents(source)  # an earlier correction, of another joint
+    rows, done = before.rows, 0
+    sums: dict[str, Checksum] = {}
+    with _opened(target, "r+") as file:
+        for channel in channels:
+            indicated = file[channel.angle.name]
+            corrected = _like(file, indicated, channel)
+            checks = [
+                sums.setdefault(name, Checksum())
+                for name in (channel.angle.name, channel.angle.corrected)
+            ]
+            for start in range(0, indicated.size, _BLOCK):
+                stop = min(start + _BLOCK, indicated.size)
+                given = _part(indicated, start, stop)
+                signals = {s: _part(file[n], start, stop) for s, n in channel.signals.items()}
+                after = channel.correct(given, signals)
+                _put(corrected, start, stop, after)
+                for check, values in zip(checks, (given, after), strict=True):
+                    check.update(values)
+                done += stop - start
+                watch(stop - start, done / total)
+            rows = max(rows, indicated.size)
+    texts = {name: found.text() for name, found in sums.items()}
+    return Contents(rows, {**before.checksums, **texts})
+
+
+def contents(path: Path, topic: str | None = None) -> Contents:
+    """Rows and checksums of the corrected data sets and their sources as they read back."""
+    rows = 0
+    sums: dict[str, Checksum] = {}
+    with _opened(path) as file:
+        corrected = [name for name in _names(file) if _ATTRIBUTE in file[name].attrs]
+        sources = [_source_of(file[name]) for name in corrected]
+        for name in dict.fromkeys([*sources, *corrected]):
+            data = file[name]
+            found = sums[name] = Checksum()
+            for start in range(0, data.size, _BLOCK):
+                found.update(_part(data, start, min(start + _BLOCK, data.size)))
+            rows = max(rows, data.size)
+    return Contents(rows, {name: found.text() for name, found in sums.items()})
+
+
+@contextmanager
+def _opened(path: Path, mode: str = "r") -> Iterator[h5py.File]:
+    """The file, its errors told with its name."""
+    try:
+        with h5py.File(path, mode) as file:
+            yield file
+    except OSError as cause:
+        if cause.errno is not None and not path.is_file():
+            raise
+        if "errno = 28" in str(cause) or cause.errno == errno.ENOSPC:
+            raise _disk_full(path) from None
+        hint = "; MATLAB saves HDF5 with -v7.3 only" if path.suffix == ".mat" else ""
+        raise FileError(path, f"is damaged or not HDF5: {_first_line(cause)}{hint}") from None
+    except RuntimeError as cause:  # how the library tells of damage within
+        if "errno = 28" in str(cause):
+            raise _disk_full(path) from None
+        raise FileError(path, f"is damaged: {_first_line(cause)}") from None
+
+
+def _disk_full(path: Path) -> OSError:
+    return OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(path))
+
+
+def _first_line(error: Exception) -> str:
+    return str(error).partition("\n")[0]
+
+
+def _names(file: h5py.File) -> list[str]:
+    found: list[str] = []
+
+    def visit(name: str, item: Any) -> None:
+        if isinstance(item, h5py.Dataset) and item.dtype.kind in "fiu" and item.ndim:
+            found.append(name)
+
+    file.visititems(visit)
+    return found
+
+
+def _data_set(path: Path, file: h5py.File, name: str) -> h5py.Dataset:
+    data = file[name]
+    if max(data.shape, default=0) != data.size:
+        raise FileError(
+            path, f"one angle after the other is needed, its shape is {data.shape}", column=name
+        )
+    return data
+
+
+def _check_lengths(path: Path, sets: dict[str, h5py.Dataset]) -> None:
+    sizes = {name: data.size for name, data in sets.items()}
+    if len(set(sizes.values())) > 1:
+        listed = ", ".join(f"{name} {size}" for name, size in sizes.items())
+        raise FileError(path, f"data sets that belong together differ in length: {listed}")
+
+
+def _place(data: h5py.Dataset, start: int, stop: int) -> tuple[slice, ...]:
+    """Selection of a stretch of a vector, also of one stored as 1 x n or n x 1 (MATLAB)."""
+    along = int(np.argmax(data.shape))
+    return tuple(slice(start, stop) if i == along else slice(None) for i in range(data.ndim))
+
+
+def _part(data: h5py.Dataset, start: int, stop: int) -> NDArray[Any]:
+    values: NDArray[Any] = data[_place(data, start, stop)].reshape(-1)
+    return values.astype(values.dtype.newbyteorder("="), copy=False)
+
+
+def _put(data: h5py.Dataset, start: int, stop: int, values: NDArray[Any]) -> None:
+    place = _place(data, start, stop)
+    shape = tuple(
+        stop - start if s.start is not None else n for s, n in zip(place, data.shape, strict=True)
+    )
+    data[place] = values.reshape(shape)
+
+
+def _like(file: h5py.File, indicated: h5py.Dataset, channel: Channel) -> h5py.Dataset:
+    """An empty data set beside ``indicated``, laid out and compressed like it."""
+    kind = (
+        np.float32
+        if indicated.dtype.kind == "f" and indicated.dtype.itemsize == 4
+        else (np.float64)
+    )
+    made = file.create_dataset(
+        channel.angle.corrected,
+        indicated.shape,
+        kind,
+        maxshape=indicated.maxshape if indicated.chunks else None,
+        chunks=indicated.chunks,
+        compression=indicated.compression,
+        compression_opts=indicated.compression_opts,
+        shuffle=indicated.shuffle or None,
+        fletcher32=indicated.fletcher32 or None,
+    )
+    if "MATLAB_class" in indicated.attrs:
+        made.attrs["MATLAB_class"] = np.bytes_("single" if kind is np.float32 else "double")
+    for name in ("units", "DIMENSION_LABELS"):
+        if name in indicated.attrs:
+            made.attrs[name] = indicated.attrs[name]
+    made.attrs[_ATTRIBUTE] = provenance([channel])
+    return made
+
+
+def _source_of(corrected: h5py.Dataset) -> str:
+    (entry,) = json.loads(corrected.attrs[_ATTRIBUTE])["corrected"]
+    name: str = entry["from"]
+    return name

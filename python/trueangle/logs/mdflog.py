@@ -1,0 +1,227 @@
+"""MDF4 logs: channels read in parts, corrected ones added in a channel group of their own."""
+
+from __future__ import annotations
+
+import struct
+import zlib
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from asammdf import MDF, Signal
+from asammdf.blocks.mdf_v4 import MDF4
+from asammdf.blocks.utils import MdfException
+from numpy.typing import NDArray
+
+from ..errors import FileError
+from .checksum import Checksum
+from .formats import Choose, Contents, Watch
+from .joints import Channel, provenance
+
+__all__ = ["columns", "contents", "copy", "read"]
+
+#: Readings taken together.
+_BLOCK = 1 << 19
+#: Acquisition name of the groups of corrected channels.
+_GROUP = "trueangle"
+#: First bytes of a file, also of one that was not finished.
+_MAGIC = (b"MDF     ", b"UnFinMF ")
+#: Compression argument of asammdf by the type of data block found.
+_COMPRESSIONS = {0: 0, 1: 1, 2: 2, 3: 5, 4: 6, 5: 3, 6: 4}
+
+
+def columns(path: Path, topic: str | None = None) -> list[str]:
+    """Names of the channels that occur once; time channels left out."""
+    with _opened(path) as mdf:
+        return _names(mdf)
+
+
+def read(
+    path: Path, names: Sequence[str], topic: str | None = None
+) -> Iterator[dict[str, NDArray[Any]]]:
+    """Channels ``names`` in batches; see `formats.FormatModule`."""
+    with _opened(path) as mdf:
+        group = _common_group(path, mdf, names)
+        for start in range(0, _cycles(mdf, group), _BLOCK):
+            yield {name: _part(path, mdf, _place(mdf, name), start).samples for name in names}
+
+
+def copy(
+    source: Path,
+    target: Path,
+    choose: Choose,
+    watch: Watch,
+    topic: str | None = None,
+    output_topic: str | None = None,
+) -> Contents:
+    """Write ``target`` with the corrected channels; see `formats.FormatModule`.
+
+    Each goes into a new channel group with the times of its source; a reading marked
+    invalid stays marked.
+    """
+    with _opened(source) as mdf:
+        channels = choose(_names(mdf))
+        groups = [
+            _common_group(source, mdf, [channel.angle.name, *channel.signals.values()])
+            for channel in channels
+        ]
+        rows = [_cycles(mdf, group) for group in groups]
+    # What is added is kept beside the output until it is saved.
+    with _opened(source, temporary_folder=str(target.parent)) as mdf:
+        sums = _kept(source, mdf)
+        compression = _compression(mdf)
+        done, total = 0, max(sum(rows), 1)
+        for channel, count in zip(channels, rows, strict=True):
+            check = Checksum()
+            place = _place(mdf, channel.angle.name)
+            made: int | None = None
+            for start in range(0, max(count, 1), _BLOCK):
+                part = _part(source, mdf, place, start)
+                signals = {
+                    signal: _part(source, mdf, _place(mdf, name), start).samples
+                    for signal, name in channel.signals.items()
+                }
+                corrected = channel.correct(part.samples, signals)
+                check.update(corrected)
+                made = _put(mdf, made, part, corrected, channel)
+                done += corrected.size
+                watch(corrected.size, done / total)
+            sums[channel.angle.corrected] = check.text()
+        mdf.save(target, overwrite=True, compression=compression)
+    return Contents(max(rows), sums)
+
+
+def contents(path: Path, topic: str | None = None) -> Contents:
+    """Checksums of the corrected channels and the rows of every other group."""
+    with _opened(path) as mdf:
+        rows = [_cycles(mdf, i) for i in range(len(mdf.groups)) if _is_ours(mdf, i)]
+        return Contents(max(rows, default=0), _kept(path, mdf))
+
+
+@contextmanager
+def _opened(path: Path, **options: Any) -> Iterator[MDF]:
+    """The file, its errors told with its name."""
+    with path.open("rb") as file:
+        if file.read(8) not in _MAGIC:
+            raise FileError(path, "is not MDF4")
+    try:
+        with MDF(path, **options) as mdf:
+            if mdf.version < "4":
+                raise FileError(path, f"is MDF {mdf.version}; convert it to MDF 4")
+            yield mdf
+    except FileError:
+        raise
+    except OSError:
+        raise
+    except (MdfException, ValueError, KeyError, IndexError, struct.error, zlib.error) as cause:
+        _close_half_built(cause)
+        raise FileError(path, f"is damaged or not MDF4: {cause or type(cause).__name__}") from None
+
+
+def _close_half_built(error: Exception) -> None:
+    """A constructor of asammdf that fails leaves an object that cannot be closed."""
+    place = error.__traceback__
+    while place is not None:
+        half_built = place.tb_frame.f_locals.get("self")
+        if isinstance(half_built, MDF4) and not hasattr(half_built, "_file"):
+            half_built._tempfile.close()
+            half_built._closed = True
+        place = place.tb_next
+
+
+def _master(mdf: MDF, group: int) -> int | None:
+    """Index of the time channel of a group."""
+    index: int | None = mdf.masters_db.get(group)
+    return index
+
+
+def _names(mdf: MDF) -> list[str]:
+    return [
+        name
+        for name, places in mdf.channels_db.items()
+        if len(places) == 1 and _master(mdf, places[0][0]) != places[0][1]
+    ]
+
+
+def _place(mdf: MDF, name: str) -> tuple[int, int]:
+    (place,) = mdf.channels_db[name]
+    return int(place[0]), int(place[1])
+
+
+def _common_group(path: Path, mdf: MDF, names: Sequence[str]) -> int:
+    groups = {name: _place(mdf, name)[0] for name in names}
+    if len(set(groups.values())) > 1:
+        listed = ", ".join(f"{name} in {group}" for name, group in groups.items())
+        raise FileError(path, f"channels that belong together are in several groups: {listed}")
+    return groups[names[0]]
+
+
+def _cycles(mdf: MDF, group: int) -> int:
+    return int(mdf.groups[group].channel_group.cycles_nr)
+
+
+def _part(path: Path, mdf: MDF, place: tuple[int, int], start: int) -> Signal:
+    """Readings from row ``start``; those marked invalid become NaN and stay marked."""
+    group, index = place
+    part = mdf.get(
+        group=group,
+        index=index,
+        record_offset=start,
+        record_count=_BLOCK,
+        ignore_invalidation_bits=True,
+    )
+    if part.samples.dtype.kind not in "fiu":
+        raise FileError(
+            path, f"numbers are needed, the channel holds {part.samples.dtype}", column=part.name
+        )
+    if part.invalidation_bits is not None and part.invalidation_bits.any():
+        kind = np.float32 if part.samples.dtype == np.float32 else np.float64
+        part.samples = np.where(part.invalidation_bits, np.nan, part.samples).astype(kind)
+    return part
+
+
+def _put(
+    mdf: MDF, group: int | None, part: Signal, corrected: NDArray[Any], channel: Channel
+) -> int:
+    """Append a batch of corrected readings to their group, which the first batch makes."""
+    invalid = part.invalidation_bits
+    if group is not None:
+        mdf.extend(group, [(part.timestamps, None), (corrected, invalid)])
+        return group
+    signal = Signal(
+        corrected,
+        part.timestamps,
+        unit=part.unit,
+        name=channel.angle.corrected,
+        invalidation_bits=invalid,
+    )
+    return int(mdf.append([signal], acq_name=_GROUP, comment=provenance([channel])))
+
+
+def _is_ours(mdf: MDF, group: int) -> bool:
+    return bool(mdf.groups[group].channel_group.acq_name == _GROUP)
+
+
+def _kept(path: Path, mdf: MDF) -> dict[str, str]:
+    """Checksums of corrected channels, rows and channels of every other group."""
+    found: dict[str, str] = {}
+    for index, group in enumerate(mdf.groups):
+        if not _is_ours(mdf, index):
+            found[f"group {index}"] = f"{_cycles(mdf, index)}:{len(group.channels)}"
+            continue
+        for i, channel in enumerate(group.channels):
+            if i == _master(mdf, index):
+                continue
+            check = Checksum()
+            for start in range(0, _cycles(mdf, index), _BLOCK):
+                check.update(_part(path, mdf, (index, i), start).samples)
+            found[channel.name] = check.text()
+    return found
+
+
+def _compression(mdf: MDF) -> int:
+    """How the data blocks of a file are compressed."""
+    kinds = (int(block.block_type) for group in mdf.groups for block in group.get_data_blocks())
+    return _COMPRESSIONS.get(max(kinds, default=0), 0)

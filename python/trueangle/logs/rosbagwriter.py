@@ -1,0 +1,111 @@
+"""Writing bags of the kind that was read: version, storage, compression, connections."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from rosbags.interfaces import MessageDefinitionFormat
+from rosbags.rosbag1 import Writer as Writer1
+from rosbags.rosbag1.reader import decompressors
+from rosbags.rosbag2 import StoragePlugin, Writer
+from rosbags.rosbag2.enums import CompressionFormat, CompressionMode
+
+from ..errors import FileError
+
+if TYPE_CHECKING:
+    from .rosbaglog import Bag
+
+__all__ = ["BagWriter", "opened_writer"]
+
+_KEY = "trueangle"
+
+
+class BagWriter:
+    """A bag being written beside the one read."""
+
+    def __init__(self, bag: Bag, writer: Any, note: str) -> None:
+        self._bag = bag
+        self._writer = writer
+        self._note = note
+        self.write = writer.write
+
+    def add(self, connection: Any, topic: str) -> Any:
+        """A connection like one that was read, perhaps of another topic.
+
+        Raises
+        ------
+        FileError
+            An old bag holds no definition of a type of its own.
+        """
+        if self._bag.is_ros1:
+            caller = connection.ext.callerid if topic == connection.topic else self._note
+            return self._writer.add_connection(
+                topic,
+                connection.msgtype,
+                msgdef=connection.msgdef.data,
+                md5sum=connection.digest,
+                callerid=caller,
+                latching=connection.ext.latching,
+            )
+        known = connection.msgdef.format != MessageDefinitionFormat.NONE and connection.digest
+        if not known and connection.msgtype not in self._bag.types.fielddefs:
+            raise FileError(
+                self._bag.path,
+                f"topic {connection.topic} is of type {connection.msgtype}, whose definition this "
+                "old bag does not hold; convert it with ros2 bag convert first",
+            )
+        definition: dict[str, Any] = (
+            {"msgdef": connection.msgdef.data, "rihs01": connection.digest}
+            if known
+            else {"typestore": self._bag.types}
+        )
+        return self._writer.add_connection(
+            topic,
+            connection.msgtype,
+            serialization_format=connection.ext.serialization_format,
+            offered_qos_profiles=connection.ext.offered_qos_profiles,
+            **definition,
+        )
+
+
+@contextmanager
+def opened_writer(bag: Bag, target: Path, note: str) -> Iterator[BagWriter]:
+    """A writer of the kind of ``bag``; ``note`` says where the corrected topic is from."""
+    if bag.is_ros1:
+        with _ros1(bag, target) as writer:
+            yield BagWriter(bag, writer, note)
+        return
+    single = not bag.path.is_dir()
+    folder = target.with_name(f"{target.name}.bag") if single else target
+    storage = bag.reader.storage
+    parts = [storage] if single else storage.storages
+    mcap = type(parts[0]).__name__ == "McapReader" if parts else False
+    writer = Writer(
+        folder, version=9, storage_plugin=StoragePlugin.MCAP if mcap else StoragePlugin.SQLITE3
+    )
+    mode = bag.reader.compression_mode
+    if mcap and any(chunk.compression for part in parts for chunk in part.chunks):
+        writer.set_compression(CompressionMode.STORAGE, CompressionFormat.ZSTD)
+    elif mode:
+        writer.set_compression(CompressionMode[mode.upper()], CompressionFormat.ZSTD)
+    for key, value in (storage.metadata.custom or {}).items():
+        writer.set_custom_data(key, value)
+    writer.set_custom_data(_KEY, note)
+    with writer:
+        yield BagWriter(bag, writer, note)
+    if single:
+        (made,) = (path for path in folder.iterdir() if path.name != "metadata.yaml")
+        os.replace(made, target)
+
+
+def _ros1(bag: Bag, target: Path) -> Any:
+    writer = Writer1(target)
+    used = {chunk.decompressor for chunk in bag.reader.chunks.values()}
+    for compression in Writer1.CompressionFormat:
+        if decompressors[compression.name.lower()] in used:
+            writer.set_compression(compression)
+    return writer

@@ -1,0 +1,126 @@
+"""HDF5 and MATLAB v7.3 logs: corrected data sets beside their sources, all else untouched."""
+
+import numpy as np
+import pytest
+
+import trueangle as ta
+
+from .conftest import made_angles, made_model, unwrapped_truth
+
+h5py = pytest.importorskip("h5py")
+
+ROWS = 10_000
+
+
+@pytest.fixture(autouse=True)
+def small_blocks(monkeypatch):
+    monkeypatch.setattr("trueangle.logs.hdf5log._BLOCK", 999)
+
+
+def made_file(path, angles, **options):
+    with h5py.File(path, "w", userblock_size=512) as file:
+        file.attrs["robot"] = "r7"
+        group = file.create_group("joint3")
+        group.create_dataset("indicated_deg", data=angles, **options)
+        group["indicated_deg"].attrs["units"] = "deg"
+        group["time_s"] = np.arange(angles.size) / 1e3
+        file["note"] = "kept"
+        file["table"] = np.array([(1, b"a")], dtype=[("x", "i4"), ("name", "S3")])
+        file["link"] = h5py.SoftLink("/joint3/time_s")
+    return path
+
+
+def test_data_sets_are_added_and_all_else_is_kept(tmp_path, model):
+    angles = made_angles(ROWS)
+    angles[[5, 2000]] = np.nan
+    options = {"chunks": (700,), "compression": "gzip", "compression_opts": 3, "shuffle": True}
+    source = made_file(tmp_path / "a.h5", angles, fletcher32=True, **options)
+    before = source.read_bytes()
+    report = ta.correct_logs(source, model, tmp_path / "b.h5")
+    assert source.read_bytes() == before
+    assert report.logs[0].result["rows"] == ROWS
+    assert report.logs[0].result["joints"][0]["missing"] == 2
+    with h5py.File(tmp_path / "b.h5") as out, h5py.File(source) as given:
+        made = out["joint3/corrected_deg"]
+        np.testing.assert_array_equal(made[()], model.correct(angles))
+        assert {name: getattr(made, name) for name in options} == options
+        assert made.fletcher32
+        assert made.attrs["units"] == "deg"
+        assert "model_sha256" in made.attrs["trueangle"]
+        assert out.attrs["robot"] == "r7"
+        assert out["note"][()] == b"kept"
+        assert out["table"][0].item() == given["table"][0].item()
+        np.testing.assert_array_equal(out["link"][()], given["joint3/time_s"][()])
+        np.testing.assert_array_equal(out["joint3/indicated_deg"][()], angles)
+        assert out.userblock_size == 512
+
+
+@pytest.mark.parametrize("shape", [(1, ROWS), (ROWS, 1)])
+def test_matlab_files_store_vectors_as_matrices(shape, tmp_path, model):
+    angles = made_angles(ROWS).astype(np.float32)
+    with h5py.File(tmp_path / "a.mat", "w", userblock_size=512) as file:
+        file["indicated_deg"] = angles.reshape(shape)
+        file["indicated_deg"].attrs["MATLAB_class"] = np.bytes_("single")
+    ta.correct_logs(tmp_path / "a.mat", model, tmp_path / "b.mat")
+    with h5py.File(tmp_path / "b.mat") as out:
+        made = out["corrected_deg"]
+        assert (made.shape, made.dtype) == (shape, np.float32)
+        assert made.attrs["MATLAB_class"] == b"single"
+        np.testing.assert_array_equal(made[()].ravel(), model.correct(angles))
+
+
+def test_several_joints_one_after_the_other_or_together(tmp_path):
+    first, second = made_model(), made_model(argument="indicated")
+    a, b = made_angles(ROWS, seed=1), made_angles(300, seed=2)
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        file["j1/indicated_deg"] = a
+        file["j2/indicated_deg"] = b
+    ta.correct_logs(tmp_path / "a.h5", {"j1": first, "j2": second}, tmp_path / "both.h5")
+    ta.correct_logs(tmp_path / "a.h5", {"j1": first}, tmp_path / "one.h5")
+    ta.correct_logs(tmp_path / "one.h5", {"j2": second}, tmp_path / "two.h5")
+    for name in ("both.h5", "two.h5"):
+        with h5py.File(tmp_path / name) as out:
+            np.testing.assert_array_equal(out["j1/corrected_deg"][()], first.correct(a))
+            np.testing.assert_array_equal(out["j2/corrected_deg"][()], second.correct(b))
+
+
+def test_turns_are_counted_over_blocks(tmp_path):
+    model = made_model(ratio=50.5)
+    angles = made_angles(ROWS, turns=5.5)
+    ta.correct_logs(made_file(tmp_path / "a.h5", angles), model, tmp_path / "b.h5")
+    with h5py.File(tmp_path / "b.h5") as out:
+        np.testing.assert_allclose(
+            out["joint3/corrected_deg"][()], unwrapped_truth(model, angles), rtol=0, atol=1e-10
+        )
+
+
+def test_bad_files_are_refused_with_their_name(tmp_path, model):
+    (tmp_path / "text.h5").write_text("no HDF5")
+    (tmp_path / "old.mat").write_bytes(b"MATLAB 5.0 MAT-file" + bytes(500))
+    source = made_file(tmp_path / "short.h5", made_angles(ROWS))
+    source.write_bytes(source.read_bytes()[:-3000])
+    with h5py.File(tmp_path / "grid.h5", "w") as file:
+        file["indicated_deg"] = np.zeros((3, 4))
+    messages = {
+        "text.h5": "not HDF5",
+        "old.mat": "-v7.3",
+        "short.h5": "damaged",
+        "grid.h5": r"shape is \(3, 4\)",
+    }
+    for name, message in messages.items():
+        report = ta.correct_logs(tmp_path / name, model, tmp_path / "out.h5")
+        with pytest.raises(ta.errors.FileError, match=rf"{name}.*{message}"):
+            raise report.logs[0].error
+        assert not (tmp_path / "out.h5").exists()
+
+
+def test_damage_within_is_found(tmp_path, model):
+    options = {"chunks": (700,), "compression": "gzip"}
+    source = made_file(tmp_path / "a.h5", made_angles(ROWS), **options)
+    with h5py.File(source) as file:
+        place = file["joint3/indicated_deg"].id.get_chunk_info(7).byte_offset + 512
+    data = bytearray(source.read_bytes())
+    data[place + 20 : place + 600] = bytes(580)
+    source.write_bytes(data)
+    report = ta.correct_logs(source, model, tmp_path / "b.h5")
+    assert "damaged" in str(report.logs[0].error)

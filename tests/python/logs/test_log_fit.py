@@ -1,0 +1,164 @@
+"""Fits of logs in one pass: the fit of all readings in memory is the oracle."""
+
+import json
+
+import numpy as np
+import pytest
+
+import trueangle as ta
+from trueangle.cli import main
+from trueangle.errors import FileError, NoModelError
+
+from .conftest import made_model
+
+pa = pytest.importorskip("pyarrow")
+pq = pytest.importorskip("pyarrow.parquet")
+
+NOISE = 0.01
+
+
+def readings(rows, seed, zero, model=None):
+    """Degrees of a joint whose error is that of `made_model`, with its own zero."""
+    rng = np.random.default_rng(seed)
+    reference = np.mod(np.cumsum(rng.uniform(0.0, 0.3, rows)), 360.0)
+    error = (model or made_model(ratio=50.0)).error(reference)
+    indicated = np.mod(reference + error + zero + rng.normal(0.0, NOISE, rows), 360.0)
+    return reference, indicated
+
+
+@pytest.fixture
+def folder(tmp_path):
+    """Three logs; the second holds two runs by name, the third two missing readings."""
+    logs = tmp_path / "logs"
+    logs.mkdir()
+    for i in range(3):
+        reference, indicated = readings(20_000, i, 100.0 * i)
+        table = {"reference_deg": reference, "indicated_deg": indicated}
+        if i == 1:
+            indicated[8000:] = np.mod(indicated[8000:] + 7.0, 360.0)
+            table["run"] = ["warm"] * 8000 + ["cold"] * 12_000
+        if i == 2:
+            indicated[5], reference[700] = np.nan, np.nan
+        pq.write_table(pa.table(table), logs / f"{i}.parquet", row_group_size=3000)
+    return logs
+
+
+def in_memory(folder):
+    runs = []
+    for i in range(3):
+        table = pq.read_table(folder / f"{i}.parquet")
+        reference = table["reference_deg"].to_numpy()
+        indicated = table["indicated_deg"].to_numpy()
+        known = np.isfinite(reference) & np.isfinite(indicated)
+        parts = [known]
+        if i == 1:
+            parts = [known & (np.arange(20_000) < 8000), known & (np.arange(20_000) >= 8000)]
+        runs += [ta.CalibrationRun(reference[p], indicated[p], 360.0) for p in parts]
+    return runs
+
+
+ORDERS = {"output": [1, 2, 3], "motor": [1]}
+
+
+def test_one_pass_equals_the_fit_in_memory(folder):
+    found = ta.fit_logs(folder, ORDERS, gear_ratio=50.0)
+    expected = ta.fit(in_memory(folder), ORDERS, gear_ratio=50.0, loss="linear")
+    assert (found.rows, found.missing, len(found.moments.runs)) == (60_000, 2, 4)
+    for mine, theirs in zip(found.model.shafts, expected.model.shafts, strict=True):
+        assert (mine.name, mine.orders) == (theirs.name, theirs.orders)
+        np.testing.assert_allclose(mine.cosine, theirs.cosine, rtol=0, atol=1e-13)
+        np.testing.assert_allclose(mine.sine, theirs.sine, rtol=0, atol=1e-13)
+    np.testing.assert_allclose(found.fit.covariance, expected.covariance, rtol=1e-6, atol=1e-14)
+    assert found.fit.residual_variance == pytest.approx(expected.residual_variance, rel=1e-9)
+    assert found.model.partial_span is None
+
+
+def test_one_pass_gives_any_other_orders(folder):
+    found = ta.fit_logs(folder, ORDERS, gear_ratio=50.0)
+    less = found.moments.solve([1, 3])
+    expected = ta.fit(in_memory(folder), [1, 3], loss="linear")
+    np.testing.assert_allclose(less.amplitudes, expected.amplitudes, rtol=0, atol=1e-13)
+
+
+def test_orders_are_selected_by_evidence(folder):
+    found = ta.fit_logs(folder, gear_ratio=50.0)
+    assert {shaft.name: shaft.orders for shaft in found.model.shafts} == {
+        "output": (1, 3),
+        "motor": (1,),
+    }
+    rows = {(row.shaft, row.order): row for row in found.table}
+    assert rows["output", 1].held_out_gain > 0.5
+    assert rows["output", 2].reason == "not significant"
+    assert found.notes == ("2 readings without a reference or indicated angle left out.",)
+
+
+def test_no_order_is_selected_from_noise(tmp_path):
+    flat = ta.HarmonicModel([], period=360.0)
+    for i in range(4):
+        reference, indicated = readings(5000, i, 3.0, flat)
+        table = pa.table({"reference_deg": reference, "indicated_deg": indicated})
+        pq.write_table(table, tmp_path / f"{i}.parquet")
+    with pytest.raises(NoModelError, match="no order is supported"):
+        ta.fit_logs(tmp_path)
+
+
+def test_partial_travel_is_noted_and_kept_in_the_model(tmp_path):
+    reference = np.linspace(30.0, 240.0, 50_000)
+    indicated = reference + 0.3 * np.sin(np.radians(reference))
+    table = pa.table({"reference_deg": reference, "indicated_deg": indicated})
+    pq.write_table(table, tmp_path / "a.parquet")
+    found = ta.fit_logs(tmp_path, [1])
+    start, stop = found.model.partial_span
+    assert (start, stop) == (pytest.approx(30.0, abs=1.0), pytest.approx(240.0, abs=1.0))
+    assert "outside it is extrapolated" in found.summary()
+
+
+def test_units_counts_and_csv(tmp_path):
+    reference, indicated = readings(3000, 1, 0.0)
+    counts = indicated * 65536 / 360
+    rows = [f"{np.radians(x)!r},{c!r}" for x, c in zip(reference.tolist(), counts, strict=True)]
+    rows = [row.replace("np.float64(", "").replace(")", "") for row in rows]
+    (tmp_path / "a.csv").write_text("\n".join(["reference_rad,indicated_count", *rows]))
+    found = ta.fit_logs(tmp_path / "a.csv", ORDERS, gear_ratio=50.0, counts_per_turn=65536)
+    run = ta.CalibrationRun(np.radians(reference), np.radians(indicated))
+    expected = ta.fit(run, ORDERS, gear_ratio=50.0, loss="linear")
+    np.testing.assert_allclose(found.model.amplitudes, expected.amplitudes, rtol=0, atol=1e-12)
+
+
+def test_wrong_signs_and_missing_columns_are_refused(tmp_path):
+    reference, indicated = readings(3000, 1, 0.0)
+    pq.write_table(
+        pa.table({"reference_deg": reference, "indicated_deg": -indicated}), tmp_path / "a.parquet"
+    )
+    with pytest.raises(FileError, match=r"a.parquet.*runs backwards"):
+        ta.fit_logs(tmp_path, [1])
+    pq.write_table(pa.table({"indicated_deg": indicated}), tmp_path / "a.parquet")
+    with pytest.raises(FileError, match=r"reference_deg.*there is none"):
+        ta.fit_logs(tmp_path, [1])
+
+
+def test_the_command_fits_folders_in_one_pass(folder, tmp_path, capsys):
+    model = tmp_path / "m.json"
+    assert main(["fit", str(folder), "-o", str(model), "--gear-ratio", "50", "--json"]) == 0
+    printed = json.loads(capsys.readouterr().out)
+    assert (printed["readings"], printed["runs"], printed["missing"]) == (60_000, 4, 2)
+    assert [(o["shaft"], o["order"]) for o in printed["orders"]] == [
+        ("output", 1),
+        ("output", 3),
+        ("motor", 1),
+    ]
+    assert any(not row["retained"] for row in printed["evidence"])
+    assert main(["fit", str(folder), "-o", str(model), "--loss", "huber"]) == 1
+    assert "in one pass" in capsys.readouterr().err
+
+
+def test_a_fit_of_logs_corrects_logs(tmp_path):
+    for i in range(2):  # of one zero: a model has one
+        reference, indicated = readings(20_000, i, 5.0)
+        table = pa.table({"reference_deg": reference, "indicated_deg": indicated})
+        pq.write_table(table, tmp_path / f"{i}.parquet")
+    model = ta.fit_logs(tmp_path / "0.parquet", ORDERS, gear_ratio=50.0).model
+    ta.correct_logs(tmp_path / "1.parquet", model, tmp_path / "out.parquet")
+    out = pq.read_table(tmp_path / "out.parquet")
+    left = ta.angles.wrap(out["corrected_deg"].to_numpy() - out["reference_deg"].to_numpy(), 360.0)
+    assert left.std() < 1.02 * NOISE

@@ -1,0 +1,104 @@
+"""MDF4 logs: corrected channels in groups of their own, all else kept."""
+
+import numpy as np
+import pytest
+
+import trueangle as ta
+
+from .conftest import made_angles, made_model, unwrapped_truth
+
+asammdf = pytest.importorskip("asammdf")
+
+ROWS = 5000
+
+
+@pytest.fixture(autouse=True)
+def small_blocks(monkeypatch):
+    monkeypatch.setattr("trueangle.logs.mdflog._BLOCK", 777)
+
+
+def made_file(path, angles, compression=0, invalid=()):
+    times = np.arange(angles.size) / 1e3
+    bits = np.zeros(angles.size, dtype=bool)
+    bits[list(invalid)] = True
+    with asammdf.MDF(version="4.11") as mdf:
+        signal = asammdf.Signal
+        mdf.append(
+            [
+                signal(angles, times, unit="deg", name="indicated_deg", invalidation_bits=bits),
+                signal(np.arange(angles.size, dtype=np.uint16), times, name="counter"),
+            ],
+            comment="joint",
+        )
+        mdf.append(
+            [
+                signal(
+                    np.array([b"on", b"off"]), np.array([0.0, 1.0]), name="state", encoding="utf-8"
+                )
+            ]
+        )
+        mdf.save(path, overwrite=True, compression=compression)
+    return path
+
+
+def read(path, name):
+    with asammdf.MDF(path) as mdf:
+        found = mdf.get(name, ignore_invalidation_bits=True)
+        return found.samples, found.timestamps, found.invalidation_bits, found.unit
+
+
+@pytest.mark.parametrize("compression", [0, 1, 2])
+def test_channels_are_added_and_all_else_is_kept(compression, tmp_path, model):
+    angles = made_angles(ROWS)
+    angles[9] = np.nan
+    source = made_file(tmp_path / "a.mf4", angles, compression, invalid=[0, 2000, 2001])
+    report = ta.correct_logs(source, model, tmp_path / "b.mf4")
+    assert report.logs[0].error is None
+    assert report.logs[0].result["rows"] == ROWS
+    assert report.logs[0].result["joints"][0]["missing"] == 4
+    for name in ("indicated_deg", "counter", "state"):
+        for before, after in zip(read(source, name), read(tmp_path / "b.mf4", name), strict=True):
+            np.testing.assert_array_equal(before, after)
+    _, times, invalid, _ = read(source, "indicated_deg")
+    found, found_times, found_invalid, unit = read(tmp_path / "b.mf4", "corrected_deg")
+    assert unit == "deg"
+    np.testing.assert_array_equal(found_times, times)
+    np.testing.assert_array_equal(found_invalid, invalid)
+    valid = ~invalid
+    np.testing.assert_array_equal(found[valid], model.correct(angles)[valid])
+    with asammdf.MDF(tmp_path / "b.mf4") as mdf:
+        kinds = {b.block_type for g in mdf.groups for b in g.get_data_blocks()}
+        assert "model_sha256" in mdf.groups[2].channel_group.comment
+        assert mdf.groups[0].channel_group.comment == "joint"
+    assert max(kinds) == compression
+
+
+def test_single_precision_and_turns(tmp_path):
+    model = made_model(ratio=50.5)
+    angles = made_angles(ROWS, turns=5.5)
+    made_file(tmp_path / "a.mf4", angles)
+    ta.correct_logs(tmp_path / "a.mf4", model, tmp_path / "b.mf4")
+    found, *_ = read(tmp_path / "b.mf4", "corrected_deg")
+    np.testing.assert_allclose(found, unwrapped_truth(model, angles), rtol=0, atol=1e-10)
+    single = angles.astype(np.float32)
+    ta.correct_logs(made_file(tmp_path / "c.mf4", single), made_model(), tmp_path / "d.mf4")
+    found, *_ = read(tmp_path / "d.mf4", "corrected_deg")
+    assert found.dtype == np.float32
+    np.testing.assert_array_equal(found, made_model().correct(single))
+
+
+def test_bad_files_are_refused_with_their_name(tmp_path, model):
+    (tmp_path / "text.mf4").write_text("no MDF at all, but long enough " * 10)
+    source = made_file(tmp_path / "short.mf4", made_angles(ROWS))
+    source.write_bytes(source.read_bytes()[:30_000])
+    made_file(tmp_path / "named.mf4", made_angles(10))
+    for name, column, message in (
+        ("text.mf4", None, "not MDF4"),
+        ("short.mf4", None, "damaged"),
+        ("named.mf4", "state", "numbers are needed"),
+        ("named.mf4", "speed", "no such column"),
+    ):
+        report = ta.correct_logs(tmp_path / name, model, tmp_path / "out.mf4", column=column)
+        with pytest.raises(ta.errors.FileError, match=message):
+            raise report.logs[0].error
+        assert not (tmp_path / "out.mf4").exists()

@@ -1,0 +1,110 @@
+"""`trueangle correct` with models that need signals: columns, units, state over batches."""
+
+import csv
+import math
+
+import numpy as np
+import pytest
+
+import trueangle as ta
+from trueangle.cli import main
+
+
+@pytest.fixture
+def joint():
+    """A model in radians with every kind of signal."""
+    shaft = ta.Shaft("output", 1.0, (1,), (0.003,), (0.002,))
+    terms = [
+        ta.Backlash(2e-4),
+        ta.Latency(2e-3),
+        ta.ThermalDrift(1e-5),
+        ta.TorsionalCompliance(3e-5),
+    ]
+    return ta.HarmonicModel([shaft], period=2.0 * math.pi, terms=terms)
+
+
+def written_log(path, joint, rows=40_000, columns=("velocity_deg_s", "temperature_C", "torque_Nm")):
+    """A log of many blocks that ends in another direction than it begins, in degrees."""
+    t = np.arange(rows) * 1e-3
+    theta = 200.0 * np.sin(0.4 * t)
+    speed = 80.0 * np.cos(0.4 * t)
+    warm, load = 20.0 + 0.3 * t, 5.0 * np.sin(t)
+    error = joint.error(
+        np.radians(theta), velocity=np.radians(speed), temperature=warm, torque=load
+    )
+    every = {
+        "time_s": t,
+        "velocity_deg_s": speed,
+        "temperature_C": warm,
+        "torque_Nm": load,
+        "indicated_deg": theta + np.degrees(error),
+    }
+    names = [name for name in every if name in ("indicated_deg", *columns)]
+    with path.open("w", newline="") as file:
+        writer = csv.writer(file)
+        writer.writerow(names)
+        writer.writerows(zip(*(every[name].tolist() for name in names), strict=True))
+    return theta
+
+
+def run(joint, folder, *options):
+    joint.save(folder / "joint.json")
+    log, out = folder / "log.csv", folder / "out.csv"
+    status = main(["correct", str(log), "-m", str(folder / "joint.json"), "-o", str(out), *options])
+    return status, out
+
+
+def corrected(out):
+    with out.open(newline="") as file:
+        return np.array([float(row["corrected_deg"]) for row in csv.DictReader(file)])
+
+
+def test_signals_come_from_their_columns_and_travel_crosses_blocks(tmp_path, joint):
+    theta = written_log(tmp_path / "log.csv", joint)
+    status, out = run(joint, tmp_path)
+    assert status == 0
+    # 1e-12 of a turn.
+    np.testing.assert_allclose(corrected(out), theta, rtol=0, atol=3.6e-10)
+
+
+def test_time_stamps_stand_in_for_the_velocity(tmp_path, joint):
+    columns = ("time_s", "temperature_C", "torque_Nm")
+    theta = written_log(tmp_path / "log.csv", joint, columns=columns)
+    status, out = run(joint, tmp_path)
+    assert status == 0
+    left = corrected(out)[1:] - theta[1:]
+    # The velocity of the indicated angle, half a sample late: |error'| and acceleration
+    # times the delay: 80 deg/s, slope 0.0036, 2 ms; 32 deg/s^2, 0.5 ms, 2 ms.
+    bound = 80.0 * 0.0036 * 2e-3 + 32.0 * 0.5e-3 * 2e-3
+    assert np.sort(np.abs(left))[-40] < 1.1 * bound
+    # At a reversal the log jumps by the whole play within one step of 1 ms.
+    jump = 2.0 * np.degrees(2e-4) * (2e-3 / 1e-3)
+    assert np.abs(left).max() < 1.1 * (bound + jump)
+
+
+@pytest.mark.parametrize(
+    ("missing", "said"),
+    [
+        ("velocity_deg_s", "velocity_deg_s or time_s: the model's term 'latency'"),
+        ("temperature_C", "temperature_C: the model's term 'thermal_drift'"),
+        ("torque_Nm", "torque_Nm: the model's term 'torsional_compliance'"),
+    ],
+)
+def test_a_missing_column_is_named(tmp_path, joint, capsys, missing, said):
+    columns = {"velocity_deg_s", "temperature_C", "torque_Nm"} - {missing}
+    written_log(tmp_path / "log.csv", joint, rows=5, columns=columns)
+    status, out = run(joint, tmp_path)
+    assert status == 1
+    error = capsys.readouterr().err
+    assert said in error
+    assert "log.csv" in error
+    assert not out.exists()
+
+
+def test_a_column_of_another_name(tmp_path, joint):
+    theta = written_log(tmp_path / "log.csv", joint, rows=100)
+    log = tmp_path / "log.csv"
+    log.write_text(log.read_text().replace("temperature_C", "T_motor"))
+    status, out = run(joint, tmp_path, "--signal", "temperature=T_motor")
+    assert status == 0
+    np.testing.assert_allclose(corrected(out), theta, rtol=0, atol=3.6e-10)
