@@ -10,15 +10,9 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from .aliasing import (
-    COMMON_RATIOS,
-    POSITION_TOLERANCE,
-    Positions,
-    distinct_positions,
-    gear_orders,
-    position_coherence,
-)
+from .aliasing import POSITION_TOLERANCE, Positions, distinct_positions, position_coherence
 from .errors import ArgumentError
+from .explanations import COMMON_RATIOS, gear_orders
 from .planning import HIGHEST_LOW_ORDER
 from .runs import CalibrationRun
 

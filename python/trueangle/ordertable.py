@@ -6,7 +6,8 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
-from .aliasing import Explanation, Positions
+from .aliasing import Positions
+from .explanations import Explanation
 from .repeats import Noise
 
 __all__ = ["OrderRow", "OrderSelection"]

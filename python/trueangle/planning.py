@@ -12,8 +12,9 @@ from typing import Final
 
 import numpy as np
 
-from .aliasing import fold, gear_orders
+from .aliasing import fold
 from .errors import ArgumentError, NoModelError
+from .explanations import gear_orders
 from .mountsearch import offset_tolerance, search_offsets, search_shifts
 from .noisefactors import mount_noise_factors, noise_factors
 

@@ -9,16 +9,10 @@ from typing import Final
 
 import numpy as np
 
-from .aliasing import (
-    Positions,
-    closure_errors,
-    distinct_positions,
-    energy_near_nyquist,
-    explain_order,
-    fold,
-)
+from .aliasing import Positions, closure_errors, distinct_positions, energy_near_nyquist, fold
 from .angles import arcsec
 from .candidates import Candidates, choose_candidates
+from .explanations import explain_order
 from .noisefactors import mount_noise_factors
 from .ordertable import OrderRow, OrderSelection
 from .planning import HIGHEST_LOW_ORDER, plan_mounts, wanted_orders

@@ -10,12 +10,11 @@ from trueangle.aliasing import (
     closure_errors,
     distinct_positions,
     energy_near_nyquist,
-    explain_order,
     fold,
-    gear_orders,
     position_coherence,
 )
 from trueangle.errors import ArgumentError
+from trueangle.explanations import explain_order, gear_orders
 
 
 def run_at(angles, period=360.0):
