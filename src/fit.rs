@@ -140,7 +140,7 @@ fn conclude(
         rank: 0,
         unknowns: system.unknowns(),
         orders: design.harmonics().collect(),
-        reason: "the penalised problem is singular; give every order a positive ridge".into(),
+        reason: "singular to working precision; fit fewer orders, or give each a ridge".into(),
     })?;
 
     let degrees_of_freedom = (count as f64 - estimate.unknowns).max(0.0);
