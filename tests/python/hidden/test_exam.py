@@ -12,14 +12,10 @@ import secrets
 
 import pytest
 
-import trueangle as ta
-
 from . import blind, exam, pairs
 from .answer import Answer, ask
 from .case import Case
 from .causes import CAUSES
-
-pytestmark = pytest.mark.skipif(not hasattr(ta, "diagnose"), reason="needs trueangle.diagnose")
 
 NIGHTLY = os.environ.get("TRUEANGLE_NIGHTLY") == "1"
 

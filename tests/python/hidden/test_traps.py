@@ -14,8 +14,6 @@ from .answer import diagnose
 from .case import Case, Question, pose
 from .joint import Joint, Line
 
-pytestmark = pytest.mark.skipif(not hasattr(ta, "diagnose"), reason="needs trueangle.diagnose")
-
 #: Positions of the paper's design.
 POSITIONS = 36
 
