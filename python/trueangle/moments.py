@@ -303,7 +303,8 @@ class Moments:
         self._shafts, self._period, self._runs = state["shafts"], state["period"], {}
         for label, numbers in state["runs"].items():
             self._runs[label] = self._new()
-            self._runs[label].restore(numbers)
+            # Buffers that come over a network need not be aligned.
+            self._runs[label].restore(np.require(numbers, requirements=["C", "A"]))
 
     def __repr__(self) -> str:
         orders = sum(len(shaft.orders) for shaft in self._shafts)
