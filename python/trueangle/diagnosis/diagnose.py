@@ -198,7 +198,8 @@ def _corrected_lines(space: Space, spots: list[Blindness]) -> list[Finding]:
     """Lines that the simulation has, with another amplitude or phase."""
     belief = space.belief.pattern
     joint = space.belief.joint
-    interacting = {"thermal_drift", "load_dependent_gear_error", "filter_lag"}
+    # Causes that act on the lines themselves take or give a part of them on average.
+    interacting = {"thermal_drift", "load_dependent_gear_error", "filter_lag", "argument_error"}
     if belief.orders.size == 0 or interacting & {term.cause for term in space.terms}:
         return []
     modulated = {term.shape["carrier"] for term in space.terms if term.cause == "sidebands"}

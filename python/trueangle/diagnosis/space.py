@@ -191,15 +191,14 @@ class Space:
         return effects[k]
 
     def _pattern(self) -> Pattern:
-        """The believed pattern with the fitted corrections and missing orders."""
+        """The believed pattern with the missing orders found so far.
+
+        Not with the fitted corrections: an effect on the pattern (a filter) would be
+        taken for one in part, and then act on a pattern that it has already changed.
+        """
         belief = self.belief.pattern
-        k = belief.orders.size
-        change = self.coefficients[1 : 1 + 2 * k].reshape(k, 2)
         orders = [*belief.orders]
-        pairs = [
-            (a + da, b + db)
-            for a, b, (da, db) in zip(belief.cosine, belief.sine, change, strict=True)
-        ]
+        pairs = [*zip(belief.cosine, belief.sine, strict=True)]
         for term, coefficients in self.fitted():
             if term.cause == "missing_order":
                 orders.append(term.shape["output_order"])
