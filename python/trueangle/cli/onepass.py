@@ -13,7 +13,14 @@ from ..errors import ArgumentError
 if TYPE_CHECKING:
     from ..logs.fitting import LogFit
 
-__all__ = ["add_one_pass", "as_json", "fit_in_one_pass", "saved", "wants_one_pass"]
+__all__ = [
+    "add_one_pass",
+    "as_json",
+    "fit_in_one_pass",
+    "printed_orders",
+    "saved",
+    "wants_one_pass",
+]
 
 #: Bytes of files from which on they are not read whole.
 _LARGE = 256 << 20
@@ -133,4 +140,27 @@ def saved(args: argparse.Namespace, orders: Any) -> int:
     else:
         print(found.summary())
         print(f"\nsaved {args.output}")
+    return 0
+
+
+def printed_orders(args: argparse.Namespace) -> int:
+    """Print the evidence for every order of logs in one pass."""
+    if args.orders is not None or args.method != "evidence" or args.reference_orders is not None:
+        raise ArgumentError(
+            "--orders, --method and --reference-orders do not go with logs in one pass"
+        )
+    found = fit_in_one_pass(args, None)
+    result = as_json(found)
+    if args.json:
+        renamed = {"samples": result["readings"], "noise_arcsec": result["residual_arcsec"]}
+        print(json.dumps(renamed | {"runs": result["runs"], "orders": result["evidence"]}))
+        return 0
+    print(f"{found.rows} readings, residual {result['residual_arcsec']:.2f} arcsec")
+    for row in found.table:
+        arcsec = 1_296_000.0 / found.model.period
+        print(
+            f"  {row.shaft:<15} {row.order:5d}  {arcsec * row.amplitude:10.3f} +- "
+            f"{arcsec * row.std:.3f} arcsec, {row.phase_deg:6.2f} deg  "
+            + ("retained" if row.retained else row.reason)
+        )
     return 0

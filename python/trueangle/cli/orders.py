@@ -8,6 +8,7 @@ import math
 from typing import TYPE_CHECKING
 
 from .fit import add_joint
+from .onepass import add_one_pass, printed_orders, wants_one_pass
 from .order_lists import parse_orders
 
 if TYPE_CHECKING:
@@ -36,6 +37,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="orders that the reference itself makes: named, with their side bands, not retained",
     )
     add("--run", action="append", metavar="LABEL", help="use this run only (may be repeated)")
+    add_one_pass(parser)
     add("--json", action="store_true", help="print the table as JSON")
 
 
@@ -45,6 +47,8 @@ def run(args: argparse.Namespace) -> int:
     from ..robust import without_spikes
     from .run_lists import read_selected
 
+    if wants_one_pass(args):
+        return printed_orders(args)
     runs = read_selected(args.runs, args.counts_per_turn, args.run)
     reference = () if args.reference_orders is None else parse_orders(args.reference_orders)
     selection = select_orders(

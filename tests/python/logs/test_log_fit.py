@@ -162,3 +162,14 @@ def test_a_fit_of_logs_corrects_logs(tmp_path):
     out = pq.read_table(tmp_path / "out.parquet")
     left = ta.angles.wrap(out["corrected_deg"].to_numpy() - out["reference_deg"].to_numpy(), 360.0)
     assert left.std() < 1.02 * NOISE
+
+
+def test_the_orders_command_prints_the_evidence_of_logs(folder, capsys):
+    assert main(["orders", str(folder), "--gear-ratio", "50", "--json"]) == 0
+    printed = json.loads(capsys.readouterr().out)
+    retained = [(o["shaft"], o["order"]) for o in printed["orders"] if o["retained"]]
+    assert retained == [("output", 1), ("output", 3), ("motor", 1)]
+    assert printed["noise_arcsec"] == pytest.approx(NOISE * 3600, rel=0.05)
+    assert main(["orders", str(folder), "--gear-ratio", "50"]) == 0
+    assert "not significant" in capsys.readouterr().out
+    assert main(["orders", str(folder), "--method", "paper"]) == 1
