@@ -6,7 +6,7 @@ import math
 import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final, cast
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,8 +24,9 @@ __all__ = ["HeldOut", "HeldOutRun", "correct_held_out", "hold_out"]
 
 Array = NDArray[np.float64]
 
-#: Most refits: with more runs several are left out together.
-_MOST_FOLDS: Final = 12
+#: Most refits, and most of them with a selection of orders, which costs more: with more
+#: runs several are left out together.
+_MOST_FOLDS, _MOST_SELECTIONS = 12, 5
 #: Resamples of the runs for the interval of the reduction, and the fewest runs for one.
 _RESAMPLES, _FEWEST_RUNS = 2000, 3
 
@@ -96,6 +97,9 @@ class HeldOut:
 def hold_out(fit: FitResult) -> HeldOut:
     """Leave out each run of a fit, fit the others the same way, correct the one left out.
 
+    With many runs several are left out together (five or twelve parts, with and without
+    a selection of orders).
+
     Where the orders were selected by evidence they are selected anew without the run, so
     that nothing of it enters the model that corrects it.
 
@@ -119,7 +123,8 @@ def hold_out(fit: FitResult) -> HeldOut:
     if len(runs) < 2:
         raise ArgumentError("one run only: nothing can be held out; measure another run")
     found, left_in = [], []
-    for fold in _folds(len(runs)):
+    most = _MOST_FOLDS if fit.selection is None else _MOST_SELECTIONS
+    for fold in _folds(len(runs), most):
         train = [run for i, run in enumerate(runs) if i not in fold]
         labels = [runs[i].label or str(i + 1) for i in fold]
         try:
@@ -137,8 +142,8 @@ def hold_out(fit: FitResult) -> HeldOut:
     return HeldOut(tuple(found), tuple(left_in))
 
 
-def _folds(count: int) -> list[list[int]]:
-    folds = min(count, _MOST_FOLDS)
+def _folds(count: int, most: int) -> list[list[int]]:
+    folds = min(count, most)
     return [list(range(start, count, folds)) for start in range(folds)]
 
 

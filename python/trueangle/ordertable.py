@@ -5,10 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 from .aliasing import Positions
 from .explanations import Explanation
 from .repeats import Noise
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 __all__ = ["OrderRow", "OrderSelection"]
 
@@ -170,6 +174,12 @@ class OrderSelection:
     def note(self) -> str:
         """The notes in one line, for a model's record."""
         return ". ".join(note[:1].upper() + note[1:] for note in self.notes)
+
+    def plot(self, ax: Axes | None = None) -> Axes:
+        """Amplitude of every candidate with its threshold (needs ``trueangle[plot]``)."""
+        from .plots import amplitude_spectrum
+
+        return amplitude_spectrum(self, ax)
 
     def summary(self) -> str:
         """The table and its notes as text, amplitudes in arcsec."""

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import trueangle as ta
-from trueangle import plots
+from trueangle import plots, simulation
 from trueangle.errors import ArgumentError, MissingExtraError, RankError
 from trueangle.planning import plan_mounts, plan_tilts
 from trueangle.plots import curves, palette
@@ -217,3 +217,86 @@ def test_missing_matplotlib_is_named(fit: ta.FitResult, monkeypatch) -> None:
     monkeypatch.setitem(sys.modules, "matplotlib", None)
     with pytest.raises(MissingExtraError, match=r"trueangle\[plot\]"):
         plots.error_curves(fit)
+
+
+@pytest.fixture(scope="module")
+def selection(runs: list[ta.CalibrationRun]) -> ta.OrderSelection:
+    return ta.select_orders(runs, gear_ratio=100)
+
+
+def test_threshold_parts_significant_orders_from_the_others(selection) -> None:
+    from trueangle.orders import FALSE_ALARM
+    from trueangle.plots.amplitudespectrum import thresholds
+
+    limit = thresholds(selection)
+    assert np.isfinite(limit).all()
+    for row, needed in zip(selection.table, limit, strict=True):
+        significant = row.log10_false_alarm <= np.log10(FALSE_ALARM)
+        assert (row.amplitude >= needed) == significant, row.order
+    # Some 20 orders at 0.5 %: T = 2 ln(20 / 0.005) = 16.6, amplitude sqrt(16.6) standard errors.
+    errors = np.array([row.standard_error for row in selection.table])
+    np.testing.assert_allclose(limit / errors, np.sqrt(16.6), rtol=0.15)
+
+
+def test_spectrum_of_a_selection_marks_the_retained(selection) -> None:
+    ax = selection.plot()
+    check_labels(ax)
+    nothing_clipped(ax)
+    kept = [row for row in selection.table if row.retained]
+    heights = [patch.get_height() for patch in ax.patches[: len(kept)]]
+    np.testing.assert_allclose(heights, [3600.0 * row.amplitude for row in kept])
+    assert "retained" in legend_texts(ax)
+    assert "needed to be significant" in legend_texts(ax)
+
+
+def test_spectrum_names_the_aliases_of_folded_orders() -> None:
+    theta = np.arange(0.0, 360.0, 10.0)
+    rng = np.random.default_rng(0)
+    runs = [
+        ta.CalibrationRun(
+            theta, theta + 0.01 * np.sin(np.radians(14 * theta)) + rng.normal(0, 1e-4, 36), 360.0
+        )
+        for _ in range(3)
+    ]
+    ax = ta.select_orders(runs, gear_ratio=100).plot()
+    nothing_clipped(ax)
+    assert any("202" in text.get_text() for text in ax.texts)
+
+
+@pytest.fixture(scope="module")
+def diagnosed():
+    sim = Simulation(
+        harmonics=(Harmonic("output", 1, 20.0, 30.0),),
+        sigma_arcsec=2.0,
+        runs=tuple(
+            RunDesign(samples=120, turns=2.0, reversals=(0.5,), speed_deg_s=speed)
+            for speed in (5.0, 30.0, 5.0, 30.0)
+        ),
+    )
+    runs = ta.simulate(sim.with_effects([simulation.Backlash(6.0)]), seed=2)
+    return ta.diagnose(runs, sim), runs, sim
+
+
+def test_diagnosis_pictures(diagnosed) -> None:
+    diagnosis, runs, sim = diagnosed
+    gains = diagnosis.plot()
+    left = plots.error_left(diagnosis, runs, sim)
+    compared = plots.measured_and_simulated(runs, sim)
+    for ax in (gains, left, compared):
+        nothing_clipped(ax)
+    gain = diagnosis.findings[0].gain
+    assert gains.patches[0].get_width() == pytest.approx(100.0 * gain.reducible_share)
+    before, after = (patch.get_width() for patch in left.patches)
+    assert before == pytest.approx(diagnosis.discrepancy.rms, rel=1e-9)
+    # Backlash of 6 and noise of 2 arcsec before, the noise after.
+    assert before == pytest.approx(np.hypot(6.0, 2.0), rel=0.1)
+    assert after == pytest.approx(2.0, rel=0.1)
+    assert legend_texts(compared) == ["measured", "simulated", "difference"]
+
+
+def test_diagnosis_without_findings_has_no_gain_to_draw(diagnosed) -> None:
+    _, _, sim = diagnosed
+    nothing = ta.diagnose(ta.simulate(sim, seed=1), sim)
+    assert nothing.findings == []
+    with pytest.raises(ArgumentError, match="no finding"):
+        nothing.plot()

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..angles import ARCSEC_PER_TURN
-from ..ordertable import OrderSelection
+from ..ordertable import OrderRow, OrderSelection
 from . import palette
 from .canvas import legend, new_axes
 from .curves import CONFIDENCE
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from ..fitresult import FitResult
 
 
-__all__ = ["amplitude_spectrum", "thresholds"]
+__all__ = ["amplitude_spectrum", "likely_aliases", "thresholds"]
 
 Array = NDArray[np.float64]
 
@@ -110,8 +110,9 @@ def _of_selection(selection: OrderSelection, ax: Axes | None) -> Axes:
         )
     tall = [i for i in np.argsort(-amplitude) if kept[i] and rows[i].aliases][:_MOST_ANNOTATED]
     for i in tall:
-        aliases = [f"{m:g}" for m in rows[i].aliases[:_MOST_ALIASES]]
-        more = ", …" if len(rows[i].aliases) > _MOST_ALIASES else ""
+        likely = likely_aliases(rows[i])
+        aliases = [f"{m:g}" for m in likely[:_MOST_ALIASES]]
+        more = ", …" if len(likely) > _MOST_ALIASES else ""
         ax.annotate(
             f"or {', '.join(aliases)}{more}",
             (place[i], amplitude[i]),
@@ -129,23 +130,26 @@ def _of_selection(selection: OrderSelection, ax: Axes | None) -> Axes:
 
 
 def thresholds(selection: OrderSelection) -> Array:
-    r"""Amplitude at which each order would just be significant, NaN where none is known.
+    r"""Amplitude at which each order of the table would just be significant.
 
-    The chance of a false alarm in the whole search is ``K P(T)`` with the tail
-    ``P(T) = (1 + T/v)^(-v/2)``; the row gives both ``T`` and that chance, so that ``K``
-    and the T for the largest chance allowed follow, and amplitudes go as ``sqrt(T)``.
+    .. math:: C = u \sqrt{T}, \qquad (1 + T/v)^{-v/2} = \alpha / K
+
+    with the order's standard error u, v degrees of freedom of the noise and the chance
+    alpha of a false alarm shared by the K orders of the table. Orders found by a wider scan
+    had to pass more.
     """
     from ..orders import FALSE_ALARM
 
-    v = selection.noise.degrees_of_freedom
-    limits = []
-    for row in selection.table:
-        log_tail = -0.5 * v * math.log1p(row.statistic / v) if row.statistic > 0.0 else 0.0
-        log_tests = row.log10_false_alarm * math.log(10.0) - log_tail
-        needed = v * math.expm1(2.0 / v * max(0.0, log_tests - math.log(FALSE_ALARM)))
-        ratio = needed / row.statistic if row.statistic > 0.0 else math.nan
-        limits.append(row.amplitude * math.sqrt(ratio))
-    return np.array(limits)
+    v = float(selection.noise.degrees_of_freedom)
+    log_share = math.log(max(1, len(selection.table)) / FALSE_ALARM)
+    needed = v * math.expm1(2.0 / v * log_share) if v > 0.0 else math.nan
+    return np.array([row.standard_error * math.sqrt(needed) for row in selection.table])
+
+
+def likely_aliases(row: OrderRow) -> tuple[float, ...]:
+    """Aliases of an order, those that are known lines of the joint alone where there are any."""
+    known = tuple(e.order for e in row.explanations if e.order != row.order)
+    return known or row.aliases
 
 
 def _places(ax: Axes, orders: list[float]) -> Array:

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from ..angles import ARCSEC_PER_TURN
 from ..errors import RankError
 from ..plots import curves, palette
-from ..plots.amplitudespectrum import thresholds
+from ..plots.amplitudespectrum import likely_aliases, thresholds
 from ..plots.curves import CONFIDENCE, Points
 
 if TYPE_CHECKING:
@@ -201,7 +201,7 @@ def spectrum(fit: FitResult | None, selection: OrderSelection | None) -> Figure:
 def _hover(row: Any) -> str:
     lines = [row.verdict]
     if row.aliases:
-        lines.append("looks like order " + ", ".join(f"{m:g}" for m in row.aliases[:4]))
+        lines.append("looks like order " + ", ".join(f"{m:g}" for m in likely_aliases(row)[:4]))
     lines += [str(e) for e in row.explanations[:3]]
     return "<br>".join(lines)
 

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
+from ..plots.amplitudespectrum import likely_aliases
 from ..runs import CalibrationRun
 
 if TYPE_CHECKING:
@@ -75,7 +76,7 @@ def _conditions(runs: Sequence[CalibrationRun]) -> list[dict[str, str]]:
             )
         )
     for name, unit, least, what, measure in (
-        ("temperature", "temperature", _TEMPERATURE, "thermal drift", "warm by 10 K or more"),
+        ("temperature", "temperature", _TEMPERATURE, "thermal drift", "10 K warmer or colder"),
         ("torque", "load", _TORQUE, "compliance and load-dependent gear error", "under two loads"),
     ):
         values = [getattr(r, name) for r in runs if getattr(r, name) is not None]
@@ -102,7 +103,7 @@ def _folded(selection: OrderSelection | None) -> list[dict[str, str]]:
     return [
         _entry(
             f"whether order {row.order:g} is really order "
-            + ", ".join(f"{m:g}" for m in row.aliases[:_MOST_ALIASES]),
+            + ", ".join(f"{m:g}" for m in likely_aliases(row)[:_MOST_ALIASES]),
             "at these positions they are one and the same column of numbers",
             "repeat a run with the positions shifted as the command trueangle plan proposes",
         )

@@ -169,3 +169,72 @@ def test_pdf_is_printed(made, tmp_path) -> None:
     # Vector figures make the file: a page whose figures failed is below 200 kB.
     assert len(data) > 500_000
     assert [p.name for p in tmp_path.iterdir()] == ["report.pdf"]
+
+
+@pytest.fixture(scope="module")
+def demo(runs):
+    from trueangle.reports.demo import demo_simulation
+
+    pytest.importorskip("jinja2")
+    pytest.importorskip("plotly")
+    return ta.report(runs, orders=ORDERS, simulation=demo_simulation())
+
+
+def test_diagnosis_is_on_the_page(demo, runs) -> None:
+    from trueangle.reports.demo import demo_simulation
+
+    result = ta.diagnose(runs, demo_simulation())
+    content = demo.content["diagnosis"]
+    assert content["simulation"]["rms_arcsec"] == pytest.approx(result.discrepancy.rms, rel=TINY)
+    finding = content["findings"][0]
+    assert finding["cause"] == "backlash"
+    quantity = finding["parameters"][0]
+    assert (quantity["name"], quantity["unit"]) == ("half width", "arcsec")
+    value = result.findings[0].parameters["half_width_arcsec"].value
+    assert quantity["value"] == pytest.approx(value, rel=TINY)
+    assert finding["sentence"] in html.unescape(demo.html)
+    assert {"measured-simulated", "error-left", "gains"} <= set(demo.figures)
+
+
+def test_numbers_of_the_diagnosis_are_the_content(demo) -> None:
+    numbers = page_numbers(demo.html)
+    assert any(path.startswith("diagnosis.findings.0.gain") for path, _, _ in numbers)
+    for path, digits, text in numbers:
+        assert text == formatted(lookup(demo.content, path), digits), path
+
+
+def test_extended_simulation_can_be_read_back(demo, tmp_path) -> None:
+    file = tmp_path / "extended.toml"
+    file.write_text(demo.content["diagnosis"]["extended"])
+    extended = ta.load_simulation(file)
+    assert [effect.kind for effect in extended.effects] == ["backlash"]
+
+
+def test_not_identifiable_causes_are_unknowns(demo) -> None:
+    entries = {e["what"]: e for e in demo.content["unknowns"]}
+    spots = demo.content["diagnosis"]["not_identifiable"]
+    assert len(spots) > 0
+    for spot in spots:
+        what = " or ".join(cause.replace("_", " ") for cause in spot["causes"])
+        assert any(key.startswith(what) for key in entries)
+
+
+def test_runs_that_support_no_order_get_a_report_that_says_so() -> None:
+    rng = np.random.default_rng(5)
+    theta = np.arange(0.0, 360.0, 5.0)
+    runs = [ta.CalibrationRun(theta, theta + rng.normal(0, 0.01, 72), 360.0) for _ in range(3)]
+    made = ta.report(runs)
+    assert made.content["model"] is None
+    assert made.content["why_no_model"]
+    assert "No correction." in made.html
+    assert "spectrum" in made.figures
+
+
+def test_demo_report_is_written(tmp_path) -> None:
+    from trueangle.reports import demo_report
+    from trueangle.simulation import Latency
+
+    pytest.importorskip("jinja2")
+    made = demo_report(tmp_path / "demo.html", hidden=Latency(1e-4), seed=1)
+    assert made.content["diagnosis"]["findings"][0]["cause"] == "latency"
+    assert (tmp_path / "demo.html").stat().st_size > 1e6
