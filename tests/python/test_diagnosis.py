@@ -142,6 +142,8 @@ def test_an_effect_is_named_and_its_parameters_come_back(cause):
             limit = STANDARD_ERRORS * found.std if found.std else 1e-6
             assert abs(found.value - value) <= limit, (name, found)
     assert finding.sentence
+    if cause not in ("outliers", "heteroscedastic_noise"):
+        assert 0.0 < result.structure[cause] <= 1.0
     if finding.gain is not None and finding.gain.reducible_share is not None:
         assert finding.gain.reducible_share > 0.85
         assert finding.gain.control_share < 0.3

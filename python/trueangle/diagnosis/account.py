@@ -26,6 +26,9 @@ def render(diagnosis: Diagnosis) -> str:
             else "."
         ),
     ]
+    if diagnosis.structure:
+        shares = [f"{cause} {100.0 * s:.0f} %" for cause, s in diagnosis.structure.items()]
+        lines += _wrapped(f"Each alone would explain: {', '.join(shares[:6])}.", 0)
     if diagnosis.readings_used < diagnosis.readings:
         lines.append(f"{diagnosis.readings_used} of the readings, spread evenly, were used.")
     if not diagnosis.findings:

@@ -128,6 +128,7 @@ def diagnose(
     noise = noise_from_repeats(signals, chosen.left - chosen.whiten.run_part(chosen.left))
     return Diagnosis(
         compare(every, residual_all),
+        _structure(start),
         noise if noise is not None else float(np.sqrt(chosen.variance)),
         findings,
         spots,
@@ -137,6 +138,16 @@ def diagnose(
         len(signals),
         chosen.whiten.rho,
     )
+
+
+def _structure(start: Space) -> dict[str, float]:
+    """Share of the variance that each cause would explain alone, largest first."""
+    alone = {
+        cause: 1.0 - float(np.exp(-max(proposal.deviance, 0.0) / start.n))
+        for cause in CANDIDATES
+        if (proposal := start.memory.get((cause,))) is not None and proposal.bic_gain > 0.0
+    }
+    return dict(sorted(alone.items(), key=lambda item: -item[1]))
 
 
 def _subsample(n: int) -> NDArray[np.int64] | None:

@@ -78,6 +78,9 @@ class Diagnosis:
     ----------
     discrepancy : Discrepancy
         Measured minus simulated before anything is added.
+    structure : dict of str to float
+        Share of its variance that each cause would explain alone, largest first; shares
+        overlap, and a flexible cause explains much that is not its own.
     noise : float
         Scatter of one reading, arcsec: from repeats where there are any, else what the
         findings leave.
@@ -95,6 +98,7 @@ class Diagnosis:
     """
 
     discrepancy: Discrepancy
+    structure: dict[str, float]
     noise: float
     findings: list[Finding]
     not_identifiable: list[Blindness]
@@ -125,6 +129,7 @@ class Diagnosis:
                 "closure_arcsec": self.discrepancy.closure,
                 "zero_spread_arcsec": self.discrepancy.zero_spread,
             },
+            "structure": self.structure,
             "noise_arcsec": self.noise,
             "noise_correlation": self.correlation,
             "readings": self.readings,

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -103,12 +102,6 @@ class Simulation:
         from .simulationfile import write
 
         write(self, path)
-
-    def to_table(self) -> dict[str, Any]:
-        """The simulation as the tables of its file."""
-        from .simulationfile import to_table
-
-        return to_table(self)
 
 
 def simulate(

@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from ...simulation.effects import EFFECTS, Effect, Surroundings
+from ...simulation.effects import Effect, Surroundings
 from ...simulation.signals import Signals
 from ..quantity import Parameters, quantity
 from ..space import Proposal, Space
@@ -36,11 +36,6 @@ class Candidate:
     cause: ClassVar[str]
     family: ClassVar[tuple[str, ...]] = ()
     located: ClassVar[bool] = False
-
-    @property
-    def effect(self) -> type[Effect]:
-        """The simulation's effect of this cause."""
-        return EFFECTS[self.cause]
 
     def propose(self, space: Space) -> Proposal | None:
         """The best extension of this cause in ``space``, or None where it cannot act."""

@@ -60,8 +60,6 @@ class Effect:
     measure: ClassVar[str] = ""
     transfers: ClassVar[bool] = True
     correctable: ClassVar[bool] = True
-    #: Applied after every other effect, to the indicated angle as it is written down.
-    last: ClassVar[bool] = False
 
     def signal(self, signals: Signals, around: Surroundings, rng: np.random.Generator) -> Array:
         """The effect's error at every reading, arcsec; random where its nature is random."""

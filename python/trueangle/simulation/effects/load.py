@@ -116,7 +116,7 @@ class StiffeningCompliance(Effect):
 
 @dataclass(frozen=True)
 class LoadDependentGearError(Effect):
-    r"""Gear lines that grow with torque: :math:`\varepsilon = |\tau|^{q}\ldots` of a line.
+    r"""Gear lines that grow with torque l (signed or absolute).
 
     .. math:: \varepsilon = \ell\,\sum_m C_m \sin(m\theta + \varphi_m)
 
@@ -124,7 +124,7 @@ class LoadDependentGearError(Effect):
     ----------
     lines_per_Nm : list of [output order, arcsec per Nm, phase_deg]
     torque : {"signed", "absolute"}
-        l is the torque or its absolute value.
+        Whether l is the torque or its absolute value.
     """
 
     lines_per_Nm: tuple[tuple[float, float, float], ...]
