@@ -23,6 +23,8 @@ __all__ = ["Accumulated", "LogFitSettings", "accumulate", "merged"]
 #: Every so many readings one is looked at for the travel covered, in bins of a degree.
 _STRIDE = 16
 _BINS = 360
+#: Readings taken together: what is computed of them stays in the cache.
+_BLOCK = 1 << 16
 #: Readings, at most, of the first batch that are checked for wrong units and signs.
 _LOOKED_AT = 4096
 
@@ -95,7 +97,11 @@ def accumulate(
             said = said * scale
         if found.rows == 0:
             _check_follows(path, true, said, period)
-        _take(found, true, said, batch.get("run"), period, settings)
+        runs = batch.get("run")
+        for start in range(0, true.size, _BLOCK):
+            part = slice(start, start + _BLOCK)
+            labels = None if runs is None else runs[part]
+            _take(found, true[part], said[part], labels, period, settings)
         watch(true.size, min(1.0, found.rows * 16 / size))
     if not found.moments.count:
         raise FileError(path, "has no readings")
@@ -137,7 +143,7 @@ def _take(
     """Add one batch."""
     found.rows += true.size
     error = np.subtract(said, true, dtype=np.float64)
-    if not np.isfinite(np.dot(error, error)):  # some are missing: look closer
+    if not np.isfinite(error.sum()):  # some are missing: look closer
         known = np.isfinite(error)
         found.missing += known.size - int(np.count_nonzero(known))
         true, said, error = true[known], said[known], error[known]

@@ -120,7 +120,6 @@ def _options(file: pq.ParquetFile, channels: Sequence[Channel]) -> dict[str, Any
     added = [channel.angle.corrected for channel in channels]
     options: dict[str, Any] = {
         "version": meta.format_version if meta.format_version in ("1.0", "2.4", "2.6") else "2.6",
-        "write_page_checksum": True,
         "compression": "snappy",
         "use_dictionary": False,
     }
