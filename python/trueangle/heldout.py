@@ -19,14 +19,15 @@ from .runs import CalibrationRun
 
 if TYPE_CHECKING:
     from .fitresult import FitResult
+    from .simulation import Simulation
 
-__all__ = ["HeldOut", "HeldOutRun", "correct_held_out", "hold_out"]
+__all__ = ["HeldOut", "HeldOutRun", "correct_held_out", "hold_out", "hold_out_extended"]
 
 Array = NDArray[np.float64]
 
 #: Most refits, and most of them with a selection of orders, which costs more: with more
 #: runs several are left out together.
-_MOST_FOLDS, _MOST_SELECTIONS = 12, 5
+_MOST_FOLDS, _MOST_SELECTIONS, _MOST_DIAGNOSES = 12, 5, 3
 #: Resamples of the runs for the interval of the reduction, and the fewest runs for one.
 _RESAMPLES, _FEWEST_RUNS = 2000, 3
 
@@ -139,7 +140,51 @@ def hold_out(fit: FitResult) -> HeldOut:
         ]
     if not found:
         raise ArgumentError(f"no run can be left out: {left_in[0][1]}")
-    return HeldOut(tuple(found), tuple(left_in))
+    return HeldOut(_in_order(found, runs), tuple(left_in))
+
+
+def hold_out_extended(fit: FitResult, sim: Simulation) -> HeldOut:
+    """As `hold_out`, with what a diagnosis of the other runs finds as terms of the correction.
+
+    Causes, their parameters and the harmonics come from the other runs alone (three parts).
+
+    Raises
+    ------
+    ArgumentError
+        One run only, or none that can be left out.
+    """
+    from .diagnosis import diagnose
+    from .terms.extension import without_terms
+
+    runs = fit.runs
+    if len(runs) < 2:
+        raise ArgumentError("one run only: nothing can be held out; measure another run")
+    found, left_in = [], []
+    for fold in _folds(len(runs), _MOST_DIAGNOSES):
+        train = [run for i, run in enumerate(runs) if i not in fold]
+        labels = [runs[i].label or str(i + 1) for i in fold]
+        try:
+            result = diagnose(train, sim, gain=False)
+            model = result.correction(fit.model, train)
+            cleaned = without_terms([runs[i] for i in fold], model)
+        except TrueAngleError as reason:
+            left_in += [(label, str(reason)) for label in labels]
+            continue
+        for i, label, run in zip(fold, labels, cleaned, strict=True):
+            after = correct_held_out(model.replace(terms=()), run, label).after
+            before = correct_held_out(None, runs[i], label).before
+            found.append(HeldOutRun(label, runs[i], model, before, after))
+    if not found:
+        raise ArgumentError(f"no run can be left out: {left_in[0][1]}")
+    return HeldOut(_in_order(found, runs), tuple(left_in))
+
+
+def _in_order(
+    found: Sequence[HeldOutRun], runs: Sequence[CalibrationRun]
+) -> tuple[HeldOutRun, ...]:
+    """Held-out runs in the order of the fit."""
+    place = {id(run): i for i, run in enumerate(runs)}
+    return tuple(sorted(found, key=lambda held: place[id(held.run)]))
 
 
 def _folds(count: int, most: int) -> list[list[int]]:

@@ -12,19 +12,20 @@ from ..angles import ARCSEC_PER_TURN, wrap
 from ..diagnosis import diagnose
 from ..errors import ArgumentError, NoModelError, TrueAngleError
 from ..files import written_atomically
-from ..heldout import HeldOut, hold_out
+from ..heldout import HeldOut, hold_out, hold_out_extended
 from ..plots.curves import Points, degrees, error_points, label_of
 from ..plots.simulatedcurves import left_after_causes
 from ..runs import CalibrationRun, as_runs
 from . import diagnosisfigures, figures
 from .diagnosed import diagnosed
-from .gained import gained
+from .gained import extended_model, gained
 from .measured import measured
 from .modelled import modelled, selected
 from .provenance import provenance
 from .unknowns import unknowns
 
 if TYPE_CHECKING:
+    from ..diagnosis import Diagnosis
     from ..fitresult import FitResult
     from ..orders import OrderSelection
     from ..simulation import Simulation
@@ -148,12 +149,14 @@ def report(
         "gain": None if held is None else gained(held),
         "why_no_gain": why_no_gain,
         "diagnosis": None,
+        "extended": None,
         "provenance": provenance(found, None if simulation is None else simulation.source),
     }
     drawn = _figures(found, fit, selection, held)
     if simulation is not None and diagnosis is not None:
         left = left_after_causes(diagnosis, found, simulation)
         content["diagnosis"] = diagnosed(diagnosis, left)
+        content["extended"] = _extended(fit, diagnosis, found, simulation)
         drawn |= diagnosisfigures.figures_of(diagnosis, found, simulation, left)
     content["unknowns"] = unknowns(found, selection, content["diagnosis"])
     made = Report(heading, content, drawn)
@@ -192,6 +195,22 @@ def _held_out(fit: FitResult | None) -> tuple[HeldOut | None, str]:
         return None, f"{str(reason)[0].upper()}{str(reason)[1:]}."
 
 
+def _extended(
+    fit: FitResult | None,
+    diagnosis: Diagnosis,
+    runs: list[CalibrationRun],
+    sim: Simulation,
+) -> dict[str, Any] | None:
+    """The correction with the causes found as its terms; None where there are none."""
+    if fit is None or not diagnosis.findings:
+        return None
+    try:
+        model = diagnosis.correction(fit.model, runs)
+        return extended_model(model, hold_out_extended(fit, sim)) if model.terms else None
+    except TrueAngleError:
+        return None
+
+
 def _figures(
     runs: list[CalibrationRun],
     fit: FitResult | None,
@@ -204,7 +223,7 @@ def _figures(
     if fit is not None or selection is not None:
         made["spectrum"] = figures.spectrum(fit, selection)
     if held is not None:
-        made["before-after"] = figures.before_after(held)
+        made["before-after"] = figures.before_after(held, runs)
     if fit is not None:
         polar = figures.phases(fit)
         if polar is not None:

@@ -242,7 +242,7 @@ def phases(fit: FitResult) -> Figure | None:
     return {"alt": alt, "data": traces, "layout": {"polar": polar}}
 
 
-def before_after(held: HeldOut) -> Figure:
+def before_after(held: HeldOut, runs: Sequence[CalibrationRun]) -> Figure:
     """Error of every held-out run before and after correction."""
     traces = []
     for name, colour, symbol in (
@@ -252,7 +252,8 @@ def before_after(held: HeldOut) -> Figure:
         for number, run in enumerate(held.runs):
             low = 0.0 if run.model is None else curves.seen_span(run.model)[0]
             points = Points(run.label, curves.degrees(run.run, low), getattr(run, name))
-            trace = run_trace(number, points, 2 * len(held.runs))
+            index = next(i for i, known in enumerate(runs) if known is run.run)
+            trace = run_trace(index, points, 2 * len(held.runs))
             trace |= {"name": name, "legendgroup": name, "showlegend": number == 0}
             trace["marker"] = {"size": 4, "color": colour, "symbol": symbol, "opacity": 0.75}
             trace["hovertemplate"] = f"run {run.label}, {name}: %{{y:.2f}} arcsec at %{{x:.2f}}°"

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import fields
 from typing import Any
 
 from ..heldout import HeldOut
+from ..model import HarmonicModel
 from .measured import error_size
 
-__all__ = ["gained"]
+__all__ = ["extended_model", "gained"]
 
 
 def gained(held: HeldOut) -> dict[str, Any]:
@@ -30,3 +32,18 @@ def gained(held: HeldOut) -> dict[str, Any]:
         ],
         "left_in": [{"label": label, "because": why} for label, why in held.left_in],
     }
+
+
+def extended_model(model: HarmonicModel, held: HeldOut) -> dict[str, Any]:
+    """Terms of the extended correction, and what they gain on held-out runs."""
+    terms = []
+    for term in model.terms:
+        values = {f.name: getattr(term, f.name) for f in fields(term)}
+        numbers = {name: v for name, v in values.items() if isinstance(v, int | float)}
+        terms.append(
+            {
+                "kind": term.kind,
+                "parameters": [{"name": k, "value": float(v)} for k, v in numbers.items()],
+            }
+        )
+    return {"terms": terms, "orders": [float(m) for m in model.orders], "gain": gained(held)}

@@ -238,3 +238,23 @@ def test_demo_report_is_written(tmp_path) -> None:
     made = demo_report(tmp_path / "demo.html", hidden=Latency(1e-4), seed=1)
     assert made.content["diagnosis"]["findings"][0]["cause"] == "latency"
     assert (tmp_path / "demo.html").stat().st_size > 1e6
+
+
+def test_extended_model_takes_off_what_the_harmonics_cannot(demo) -> None:
+    extended = demo.content["extended"]
+    assert [term["kind"] for term in extended["terms"]] == ["backlash"]
+    value = extended["terms"][0]["parameters"][0]["value"]
+    assert value * 3600.0 == pytest.approx(8.0, abs=0.3)
+    # The noise of 3 arcsec is all that is left.
+    assert extended["gain"]["after"]["rms_arcsec"] == pytest.approx(3.0, abs=0.2)
+    assert demo.content["gain"]["after"]["rms_arcsec"] > 8.0
+
+
+def test_boxes_of_runs_mean_the_same_run_in_every_figure(made, runs) -> None:
+    labels = [run.label for run in runs]
+    for figure in made.figures.values():
+        for trace in figure["data"]:
+            number = trace.get("meta", {}).get("run")
+            if number is not None:
+                shown = trace["name"] + trace.get("hovertemplate", "")
+                assert f"run {labels[number]}" in shown
