@@ -67,7 +67,7 @@ class HarmonicModel:
     Examples
     --------
     >>> model = HarmonicModel([Shaft("output", 1, [1], [0.0], [0.5])], period=360.0)
-    >>> model.error(90.0)
+    >>> round(model.error(90.0), 12)
     0.5
     >>> round(model.correct(90.5), 9)
     90.0
