@@ -88,6 +88,7 @@ def measure(
     ]
 
 
-def quick() -> list[Row]:
-    """Seconds, not minutes: a small problem and one of 100 000 readings."""
-    return measure(Case(37, 5), 200, threads=(1,)) + measure(Case(100_000, 17), 3)
+def quick(samples: int, rounds: int) -> list[Row]:
+    """A polygon's problem and one of ``samples`` readings."""
+    small = measure(Case(37, 5), 20 * rounds, threads=(1,))
+    return small + measure(Case(samples, 17), rounds)
