@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import platform
-import timeit
+import subprocess
+import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -21,8 +22,8 @@ from trueangle.simulation.effects.reversal import Backlash
 
 __all__ = ["everything"]
 
-#: Samples of the evaluations that are timed, and repeats whose median counts.
-SAMPLES, REPEATS = 1_000_000, 7
+#: Size of the batches that are timed.
+SAMPLES = 200_000
 
 
 def everything(folder: Path) -> None:
@@ -74,39 +75,10 @@ def folded() -> mpl.axes.Axes:
 
 
 def performance() -> str:
-    """Timings of this machine, medians, as a Markdown table."""
-    rng = np.random.default_rng(0)
-    theta = rng.uniform(0.0, 2.0 * np.pi, SAMPLES)
-    orders = tuple(range(1, 18))
-    amplitudes = rng.normal(0.0, 1e-5, (2, len(orders)))
-    model = ta.HarmonicModel([ta.Shaft("output", 1.0, orders, *amplitudes.tolist())])
-    indicated = theta + np.asarray(model.error(theta))
-    step = model.compensator()
-    run = ta.CalibrationRun(theta, indicated)
-    few = theta[: SAMPLES // 10]
-
-    def by_numpy() -> None:
-        k = np.outer(few, orders)
-        np.cos(k) @ amplitudes[0] + np.sin(k) @ amplitudes[1]
-
-    rows = [
-        ("`model.error`, 17 orders", _ns(lambda: model.error(theta), SAMPLES)),
-        ("the same sum by numpy", _ns(by_numpy, few.size)),
-        ("`model.correct`", _ns(lambda: model.correct(indicated), SAMPLES)),
-        ("`step`, one sample a call", _ns(lambda: [step(1.0) for _ in range(10_000)], 10_000)),
-        ("`ta.fit`, 17 orders", _ns(lambda: ta.fit(run, orders, loss="linear"), SAMPLES)),
-    ]
-    lines = [
-        f"Measured by this build on {platform.machine()} with numpy {np.__version__}, median of "
-        f"{REPEATS} repeats, all threads allowed:",
-        "",
-        "| what | nanoseconds per sample |",
-        "| --- | ---: |",
-        *(f"| {name} | {ns:,.1f} |" for name, ns in rows),
-    ]
-    return "\n".join(lines) + "\n"
-
-
-def _ns(work: object, samples: int) -> float:
-    times = timeit.repeat(work, number=1, repeat=REPEATS)  # type: ignore[arg-type]
-    return float(np.median(times)) / samples * 1e9
+    """The text that ``trueangle bench`` prints on the machine of this build."""
+    command = [sys.executable, "-m", "trueangle", "bench", "--samples", str(SAMPLES)]
+    done = subprocess.run(command, capture_output=True, text=True, check=True)
+    where = f"{platform.machine()}, numpy {np.__version__}"
+    return (
+        f"Nanoseconds per sample, measured by this build ({where}):\n\n```text\n{done.stdout}```\n"
+    )
