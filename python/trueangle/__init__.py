@@ -11,17 +11,17 @@ if TYPE_CHECKING:
     from .angles import wrap as wrap
     from .diagnosis import Diagnosis as Diagnosis
     from .diagnosis.diagnose import diagnose as diagnose
-    from .fitresult import FitResult as FitResult
-    from .fitting import fit as fit
+    from .fitting.fit import fit as fit
+    from .fitting.result import FitResult as FitResult
     from .logs.batch import correct_logs as correct_logs
     from .logs.fitting import fit_logs as fit_logs
     from .logs.frames import correct as correct
     from .model import HarmonicModel as HarmonicModel
     from .modelfile import load_model as load_model
     from .moments import Moments as Moments
-    from .orders import OrderSelection as OrderSelection
-    from .orders import select_orders as select_orders
-    from .planning import plan_mounts as plan_mounts
+    from .orders.select import OrderSelection as OrderSelection
+    from .orders.select import select_orders as select_orders
+    from .planning.plan import plan_mounts as plan_mounts
     from .reports import report as report
     from .runfiles import read_runs as read_runs
     from .runs import CalibrationRun as CalibrationRun
@@ -47,12 +47,12 @@ _PUBLIC = {
     "OrderSelection": "orders",
     "plan_mounts": "planning",
     "select_orders": "orders",
-    "FitResult": "fitresult",
+    "FitResult": "fitting.result",
     "HarmonicModel": "model",
     "Shaft": "shafts",
     "correct": "logs.frames",
     "correct_logs": "logs.batch",
-    "fit": "fitting",
+    "fit": "fitting.fit",
     "fit_logs": "logs.fitting",
     "load_model": "modelfile",
     "Moments": "moments",

@@ -4,15 +4,15 @@ import numpy as np
 import pytest
 
 import trueangle as ta
-from trueangle import harmonicsums
-from trueangle.evidence import (
+from trueangle.orders import harmonicsums
+from trueangle.orders.evidence import (
     choose_forward,
     examine_orders,
     fit_subset,
     held_out_gains,
     log_tail,
 )
-from trueangle.harmonicsums import Readings, harmonic_sums
+from trueangle.orders.harmonicsums import Readings, harmonic_sums
 
 # Normal equations of a few hundred readings, relative to their size.
 ROUNDING = 1e-10

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 import trueangle as ta
 from trueangle.errors import ArgumentError
-from trueangle.verdicts import verified_positions
+from trueangle.orders.verdicts import verified_positions
 
 GRID = np.arange(36) * 10.0
 NOISE = 5.0  # arcsec

@@ -10,9 +10,9 @@ import pytest
 import trueangle as ta
 from conftest import ROOT
 from trueangle.errors import ArgumentError
-from trueangle.paper import select_by_paper
-from trueangle.paperreport import short_report, study_table
-from trueangle.paperstudy import (
+from trueangle.orders.paper import select_by_paper
+from trueangle.paperstudy.report import short_report, study_table
+from trueangle.paperstudy.study import (
     GEAR_ORDERS,
     JOINT_A,
     JOINT_B,

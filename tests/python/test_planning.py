@@ -8,7 +8,6 @@ import pytest
 
 from trueangle.cli import main
 from trueangle.errors import ArgumentError, NoModelError
-from trueangle.noisefactors import facet_noise_factor, mount_noise_factors, noise_factors
 from trueangle.planning import (
     plan_encoder,
     plan_mounts,
@@ -16,6 +15,7 @@ from trueangle.planning import (
     readings_needed,
     wanted_orders,
 )
+from trueangle.planning.noisefactors import facet_noise_factor, mount_noise_factors, noise_factors
 
 # The tables give factors with two or three digits.
 TABLE = 0.006

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import trueangle as ta
-from trueangle.robust import without_spikes
+from trueangle.fitting.robust import without_spikes
 
 TRUTH = 0.2
 SIGMA = 0.01

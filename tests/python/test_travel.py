@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import trueangle as ta
-from trueangle.travel import covered_span
+from trueangle.fitting.travel import covered_span
 
 
 @pytest.mark.parametrize(

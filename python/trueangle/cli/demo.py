@@ -33,8 +33,8 @@ def _corrected(seed: int) -> str:
     """The paper's joint a: fitted on five groups, the sixth corrected."""
     import numpy as np
 
-    from ..fitting import fit
-    from ..paperstudy import JOINT_A, PUBLISHED, simulated_groups
+    from ..fitting.fit import fit
+    from ..paperstudy.study import JOINT_A, PUBLISHED, simulated_groups
 
     *groups, unseen = simulated_groups(JOINT_A, seed=seed)
     model = fit(groups).model
@@ -56,8 +56,8 @@ def _corrected(seed: int) -> str:
 
 def _between(seed: int) -> str:
     """What the 36 positions cannot tell."""
-    from ..paperreport import short_report
-    from ..paperstudy import paper_study
+    from ..paperstudy.report import short_report
+    from ..paperstudy.study import paper_study
 
     return short_report(paper_study(seed))
 

@@ -78,7 +78,7 @@ def orders_by_shaft(text: str) -> str | Sequence[float] | Mapping[str, Sequence[
 
 def run(args: argparse.Namespace) -> int:
     """Fit, save, print."""
-    from ..fitting import fit
+    from ..fitting.fit import fit
     from .run_lists import read_selected
 
     if wants_one_pass(args):
@@ -102,7 +102,7 @@ def run(args: argparse.Namespace) -> int:
 
 def _as_json(result: object, path: str) -> dict[str, object]:
     from ..angles import arcsec
-    from ..fitresult import FitResult
+    from ..fitting.result import FitResult
 
     assert isinstance(result, FitResult)
     model = result.model

@@ -12,7 +12,7 @@ from .onepass import add_one_pass, printed_orders, wants_one_pass
 from .order_lists import parse_orders
 
 if TYPE_CHECKING:
-    from ..ordertable import OrderRow, OrderSelection
+    from ..orders.table import OrderRow, OrderSelection
 
 HELP = "say which orders of the angle error are real, and what they may be"
 EXAMPLE = "trueangle orders joint_a.csv --gear-ratio 100"
@@ -43,8 +43,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Print the table of orders."""
-    from ..orders import select_orders
-    from ..robust import without_spikes
+    from ..fitting.robust import without_spikes
+    from ..orders.select import select_orders
     from .run_lists import read_selected
 
     if wants_one_pass(args):

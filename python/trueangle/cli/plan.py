@@ -8,7 +8,7 @@ import math
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from ..planning import CalibrationPlan
+    from ..planning.plan import CalibrationPlan
 
 HELP = "propose calibration positions that keep the wanted orders apart"
 EXAMPLE = "trueangle plan --gear-ratio 100 --positions 36 --mounts 2"
@@ -49,7 +49,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Print the plan."""
-    from .. import planning
+    from ..planning import plan as planning
     from .order_lists import parse_orders
 
     orders = None if args.orders is None else parse_orders(args.orders)

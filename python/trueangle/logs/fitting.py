@@ -13,14 +13,14 @@ import numpy as np
 from .. import __version__
 from ..angles import arcsec, wrap
 from ..errors import ArgumentError, NoModelError
-from ..evidence import choose_forward, examine_orders, fit_subset, held_out_gains
+from ..fitting.travel import Span, covered_span
 from ..model import Argument, HarmonicModel
 from ..moments import Moments, MomentsFit
+from ..orders.evidence import choose_forward, examine_orders, fit_subset, held_out_gains
+from ..orders.selection import FALSE_ALARM, NEGLIGIBLE_NOISE, NEGLIGIBLE_SHARE
 from ..records import FitRecord, Provenance
 from ..runs import Source
-from ..selection import FALSE_ALARM, NEGLIGIBLE_NOISE, NEGLIGIBLE_SHARE
 from ..shafts import resolve_orders, shaft_cycles
-from ..travel import Span, covered_span
 from .accumulation import Accumulated, LogFitSettings, accumulate, merged
 from .momentsums import sums_of
 from .progress import Progress

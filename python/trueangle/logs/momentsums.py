@@ -7,8 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..errors import ArgumentError
-from ..harmonicsums import HarmonicSums
 from ..moments import Moments
+from ..orders.harmonicsums import HarmonicSums
 
 __all__ = ["sums_of"]
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..angles import ARCSEC_PER_TURN
-from ..ordertable import OrderRow, OrderSelection
+from ..orders.table import OrderRow, OrderSelection
 from . import palette
 from .canvas import legend, new_axes
 from .curves import CONFIDENCE
@@ -17,7 +17,7 @@ from .curves import CONFIDENCE
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from ..fitresult import FitResult
+    from ..fitting.result import FitResult
 
 
 __all__ = ["amplitude_spectrum", "likely_aliases", "thresholds"]
@@ -138,7 +138,7 @@ def thresholds(selection: OrderSelection) -> Array:
     alpha of a false alarm shared by the K orders of the table. Orders found by a wider scan
     had to pass more.
     """
-    from ..orders import FALSE_ALARM
+    from ..orders.select import FALSE_ALARM
 
     v = float(selection.noise.degrees_of_freedom)
     log_share = math.log(max(1, len(selection.table)) / FALSE_ALARM)

@@ -11,13 +11,13 @@ from numpy.typing import NDArray
 
 from ..angles import ARCSEC_PER_TURN, wrap
 from ..errors import ArgumentError, RankError, TrueAngleError
-from ..heldout import correct_held_out
+from ..fitting.heldout import correct_held_out
+from ..fitting.robust import Loss
 from ..model import HarmonicModel
-from ..robust import Loss
 from ..runs import CalibrationRun
 
 if TYPE_CHECKING:
-    from ..fitresult import FitResult
+    from ..fitting.result import FitResult
 
 __all__ = [
     "CONFIDENCE",
@@ -138,7 +138,7 @@ def held_out_points(
 ) -> list[tuple[Points, Points]]:
     """Error of runs that the model has not seen, before and after correction.
 
-    Each run keeps its own zero (`trueangle.heldout.correct_held_out`).
+    Each run keeps its own zero (`trueangle.fitting.heldout.correct_held_out`).
     """
     low, _ = seen_span(model)
     found = []
@@ -185,7 +185,7 @@ def run_phases(fit: FitResult) -> list[Phases]:
     RankError
         That holds for all of them.
     """
-    from ..fitting import fit as fit_runs
+    from ..fitting.fit import fit as fit_runs
 
     orders = {shaft.name: shaft.orders for shaft in fit.model.shafts}
     shafts = {shaft.name: shaft.cycles_per_turn for shaft in fit.model.shafts}

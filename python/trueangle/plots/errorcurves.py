@@ -11,7 +11,7 @@ from .curves import CONFIDENCE, error_points, model_curve, seen_span, thinned
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from ..fitresult import FitResult
+    from ..fitting.result import FitResult
 
 __all__ = ["error_curves"]
 

@@ -13,7 +13,7 @@ from .residualpictures import residuals
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from ..fitresult import FitResult
+    from ..fitting.result import FitResult
 
 __all__ = ["fit_plot"]
 

@@ -13,7 +13,7 @@ from .curves import run_phases
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from ..fitresult import FitResult
+    from ..fitting.result import FitResult
 
 __all__ = ["phases_over_runs"]
 

@@ -13,7 +13,7 @@ from .canvas import new_axes
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from ..planning import CalibrationPlan
+    from ..planning.plan import CalibrationPlan
 
 __all__ = ["plan_factors", "plan_positions"]
 

@@ -13,7 +13,7 @@ from .curves import SIGNALS, Points, residual_points, seen_span, thinned
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from ..fitresult import FitResult
+    from ..fitting.result import FitResult
 
 __all__ = ["residuals"]
 

@@ -12,7 +12,7 @@ from ..angles import ARCSEC_PER_TURN, wrap
 from ..diagnosis import diagnose
 from ..errors import ArgumentError, NoModelError, TrueAngleError
 from ..files import written_atomically
-from ..heldout import HeldOut, hold_out, hold_out_extended
+from ..fitting.heldout import HeldOut, hold_out, hold_out_extended
 from ..plots.curves import Points, degrees, error_points, label_of
 from ..plots.simulatedcurves import left_after_causes
 from ..runs import CalibrationRun, as_runs
@@ -26,8 +26,8 @@ from .unknowns import unknowns
 
 if TYPE_CHECKING:
     from ..diagnosis import Diagnosis
-    from ..fitresult import FitResult
-    from ..orders import OrderSelection
+    from ..fitting.result import FitResult
+    from ..orders.select import OrderSelection
     from ..simulation import Simulation
 
 __all__ = ["Report", "report"]
@@ -174,12 +174,12 @@ def _fitted(
     runs: list[CalibrationRun], orders: Any, gear_ratio: float | None, fixed_member: str
 ) -> tuple[FitResult | None, OrderSelection | None, str]:
     """The fit; or the selection and the reason why there is none."""
-    from ..fitting import fit as fit_runs
+    from ..fitting.fit import fit as fit_runs
 
     try:
         fit = fit_runs(runs, orders, gear_ratio=gear_ratio, fixed_member=fixed_member)
     except NoModelError as reason:
-        from ..orders import select_orders
+        from ..orders.select import select_orders
 
         selection = select_orders(runs, gear_ratio=gear_ratio, fixed_member=fixed_member)
         return None, selection, str(reason)

@@ -19,10 +19,10 @@ from ..plots.amplitudespectrum import likely_aliases, thresholds
 from ..plots.curves import CONFIDENCE, Points
 
 if TYPE_CHECKING:
-    from ..fitresult import FitResult
-    from ..heldout import HeldOut
+    from ..fitting.heldout import HeldOut
+    from ..fitting.result import FitResult
     from ..model import HarmonicModel
-    from ..orders import OrderSelection
+    from ..orders.select import OrderSelection
     from ..runs import CalibrationRun
 
 __all__ = [

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import fields
 from typing import Any
 
-from ..heldout import HeldOut
+from ..fitting.heldout import HeldOut
 from ..model import HarmonicModel
 from .measured import error_size
 

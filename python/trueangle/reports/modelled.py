@@ -10,8 +10,8 @@ import numpy as np
 from ..angles import ARCSEC_PER_TURN
 
 if TYPE_CHECKING:
-    from ..fitresult import FitResult
-    from ..orders import OrderSelection
+    from ..fitting.result import FitResult
+    from ..orders.select import OrderSelection
 
 __all__ = ["modelled", "selected"]
 

@@ -11,7 +11,7 @@ from ..plots.amplitudespectrum import likely_aliases
 from ..runs import CalibrationRun
 
 if TYPE_CHECKING:
-    from ..orders import OrderSelection
+    from ..orders.select import OrderSelection
 
 __all__ = ["unknowns"]
 

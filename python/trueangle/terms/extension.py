@@ -139,7 +139,7 @@ def extend_model(
     MissingSignalError
         A run lacks a signal that a term needs.
     """
-    from ..fitting import fit
+    from ..fitting.fit import fit
 
     found = as_runs(runs)
     cycles, orders = _shafts(model, simulation)

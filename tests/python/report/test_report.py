@@ -13,7 +13,7 @@ import pytest
 import trueangle as ta
 from trueangle.cli import main
 from trueangle.errors import ArgumentError, MissingExtraError
-from trueangle.heldout import hold_out
+from trueangle.fitting.heldout import hold_out
 from trueangle.reports.page import formatted, lookup
 from trueangle.reports.pdf import find_browser, print_pdf
 

@@ -9,14 +9,14 @@ from typing import Final
 
 import numpy as np
 
-from .aliasing import Positions, closure_errors, distinct_positions, energy_near_nyquist, fold
-from .angles import arcsec
+from ..aliasing import Positions, closure_errors, distinct_positions, energy_near_nyquist, fold
+from ..angles import arcsec
+from ..explanations import explain_order
+from ..planning.noisefactors import mount_noise_factors
+from ..planning.plan import HIGHEST_LOW_ORDER, plan_mounts, wanted_orders
+from ..runs import CalibrationRun, as_runs
 from .candidates import Candidates, choose_candidates
-from .explanations import explain_order
-from .noisefactors import mount_noise_factors
-from .ordertable import OrderRow, OrderSelection
-from .planning import HIGHEST_LOW_ORDER, plan_mounts, wanted_orders
-from .runs import CalibrationRun, as_runs
+from .table import OrderRow, OrderSelection
 
 __all__ = ["VerifiedPositions", "explained", "selection_notes", "verified_positions"]
 

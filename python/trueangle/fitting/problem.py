@@ -8,12 +8,12 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from . import _core
-from .angles import circular_mean
-from .errors import ArgumentError
-from .model import Argument
-from .runs import CalibrationRun
-from .shafts import ShaftOrders
+from .. import _core
+from ..angles import circular_mean
+from ..errors import ArgumentError
+from ..model import Argument
+from ..runs import CalibrationRun
+from ..shafts import ShaftOrders
 
 __all__ = ["Fitted", "Problem"]
 
@@ -102,7 +102,7 @@ class Problem:
     def solve(self, weights: Sequence[Array | None], penalty: float = 0.0) -> Fitted:
         """Least squares under ``weights``, with an optional Tikhonov penalty.
 
-        ``penalty`` is relative to the sum of weights, see `trueangle.travel.choose_ridge`.
+        ``penalty`` is relative to the sum of weights, see `trueangle.fitting.travel.choose_ridge`.
         """
         used = [weight is None or bool(weight.any()) for weight in weights]
         rows = [

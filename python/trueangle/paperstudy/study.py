@@ -14,11 +14,11 @@ from typing import Final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .aliasing import fold
-from .orders import select_orders
-from .ordertable import OrderSelection
-from .planning import CalibrationPlan, plan_mounts, wanted_orders
-from .runs import CalibrationRun
+from ..aliasing import fold
+from ..orders.select import select_orders
+from ..orders.table import OrderSelection
+from ..planning.plan import CalibrationPlan, plan_mounts, wanted_orders
+from ..runs import CalibrationRun
 
 __all__ = [
     "GEAR_ORDERS",

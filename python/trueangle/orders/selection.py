@@ -9,8 +9,9 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from . import _core
-from .aliasing import Positions
+from .. import _core
+from ..aliasing import Positions
+from ..runs import CalibrationRun
 from .candidates import Candidates
 from .evidence import (
     OrderTest,
@@ -23,10 +24,9 @@ from .evidence import (
 )
 from .harmonicsums import HarmonicSums, harmonic_sums
 from .lookalikes import find_lookalikes
-from .ordertable import OrderRow, OrderSelection
 from .phases import circular_range_deg, unit_phases
 from .repeats import Noise, pure_error
-from .runs import CalibrationRun
+from .table import OrderRow, OrderSelection
 from .verdicts import explained, selection_notes
 from .zerogroups import angle_blocks, units_of
 

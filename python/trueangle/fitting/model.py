@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from . import __version__
-from .angles import wrap
-from .model import HarmonicModel
-from .records import FitRecord, Provenance
-from .shafts import Shaft
+from .. import __version__
+from ..angles import wrap
+from ..model import HarmonicModel
+from ..records import FitRecord, Provenance
+from ..shafts import Shaft
 
 if TYPE_CHECKING:
-    from .fitresult import FitResult
+    from .result import FitResult
 
 __all__ = ["build_model", "fit_notes"]
 
@@ -91,7 +91,7 @@ def _record(fit: FitResult) -> FitRecord:
 
 def _verified(fit: FitResult) -> tuple[int, str] | None:
     """Distinct positions and where the model is verified; None for free or many angles."""
-    from .verdicts import verified_positions
+    from ..orders.verdicts import verified_positions
 
     runs = fit.problem.runs
     if sum(len(run) for run in runs) > _COUNTED:

@@ -12,7 +12,7 @@ from typing import Final
 
 import numpy as np
 
-from .aliasing import Positions, position_coherence
+from ..aliasing import Positions, position_coherence
 from .evidence import fit_subset
 from .harmonicsums import Readings, harmonic_sums
 

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from . import _core
+from .. import _core
 from .problem import Fitted, Problem
 
 __all__ = ["Span", "choose_ridge", "covered_span"]

@@ -15,7 +15,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from . import _core
+from .. import _core
 
 __all__ = ["HarmonicSums", "Readings", "harmonic_sums"]
 

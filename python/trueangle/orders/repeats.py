@@ -10,7 +10,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from .aliasing import Positions
+from ..aliasing import Positions
 from .harmonicsums import Readings
 
 __all__ = ["Noise", "pure_error"]

@@ -10,11 +10,11 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from .aliasing import POSITION_TOLERANCE, Positions, distinct_positions, position_coherence
-from .errors import ArgumentError
-from .explanations import COMMON_RATIOS, gear_orders
-from .planning import HIGHEST_LOW_ORDER
-from .runs import CalibrationRun
+from ..aliasing import POSITION_TOLERANCE, Positions, distinct_positions, position_coherence
+from ..errors import ArgumentError
+from ..explanations import COMMON_RATIOS, gear_orders
+from ..planning.plan import HIGHEST_LOW_ORDER
+from ..runs import CalibrationRun
 
 __all__ = ["Candidates", "choose_candidates", "effective_positions"]
 

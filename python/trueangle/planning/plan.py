@@ -1,6 +1,6 @@
 """Calibration plans: positions that keep the wanted orders apart, and how many readings.
 
-The positions are judged by their noise factors (`trueangle.noisefactors`).
+The positions are judged by their noise factors (`trueangle.planning.noisefactors`).
 """
 
 from __future__ import annotations
@@ -12,9 +12,9 @@ from typing import Final
 
 import numpy as np
 
-from .aliasing import fold
-from .errors import ArgumentError, NoModelError
-from .explanations import gear_orders
+from ..aliasing import fold
+from ..errors import ArgumentError, NoModelError
+from ..explanations import gear_orders
 from .mountsearch import offset_tolerance, search_offsets, search_shifts
 from .noisefactors import mount_noise_factors, noise_factors
 

@@ -5,18 +5,18 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING
 
-from .errors import ArgumentError, NoModelError
-from .fitresult import FitResult
-from .model import Argument, check_invertible
+from ..errors import ArgumentError, NoModelError
+from ..model import Argument, check_invertible
+from ..runs import CalibrationRun, as_runs
+from ..shafts import resolve_orders
+from ..units import check_follows
 from .problem import Problem
+from .result import FitResult
 from .robust import Loss, weigh, without_spikes
-from .runs import CalibrationRun, as_runs
-from .shafts import resolve_orders
 from .travel import CONDITION, choose_ridge, covered_span
-from .units import check_follows
 
 if TYPE_CHECKING:
-    from .orders import OrderSelection
+    from ..orders.select import OrderSelection
 
 __all__ = ["fit"]
 
@@ -65,7 +65,7 @@ def fit(
         off are set aside (and reported); ``"linear"``: least squares on all readings.
     ridge : float, optional
         Tikhonov penalty relative to the sum of weights. By default 0 on a full turn, and
-        chosen by held-out error on partial travel (`trueangle.travel.choose_ridge`).
+        chosen by held-out error on partial travel (`trueangle.fitting.travel.choose_ridge`).
     method : {"plain", "moments", "qr"}, optional
         Forces a way of solving.
     threads : int, optional
@@ -134,7 +134,7 @@ def _selected(
     """Orders with evidence, from readings without spikes."""
     if orders not in (None, "auto"):
         raise ArgumentError(f"orders must be whole numbers, a mapping or 'auto', got {orders!r}")
-    from .orders import select_orders
+    from ..orders.select import select_orders
 
     if loss != "linear":
         runs = [without_spikes(run) for run in runs]

@@ -14,16 +14,16 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from .aliasing import Positions
+from ..aliasing import Positions
+from ..errors import ArgumentError
+from ..runs import CalibrationRun
 from .candidates import Candidates
-from .errors import ArgumentError
 from .evidence import log_tail
 from .harmonicsums import Readings
 from .lookalikes import find_lookalikes
-from .ordertable import OrderRow, OrderSelection
 from .phases import circular_range_deg
 from .repeats import Noise
-from .runs import CalibrationRun
+from .table import OrderRow, OrderSelection
 from .verdicts import explained, selection_notes
 from .zerogroups import units_of
 

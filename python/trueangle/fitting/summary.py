@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .angles import arcsec, unit_name
+from ..angles import arcsec, unit_name
 
 if TYPE_CHECKING:
-    from .fitresult import FitResult
+    from .result import FitResult
 
 __all__ = ["fit_summary"]
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 import textwrap
 
-from .angles import arcsec
-from .ordertable import OrderRow, OrderSelection
+from ..angles import arcsec
+from .table import OrderRow, OrderSelection
 
 __all__ = ["summarise"]
 

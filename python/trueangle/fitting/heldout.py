@@ -11,15 +11,15 @@ from typing import TYPE_CHECKING, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from .angles import ARCSEC_PER_TURN, circular_mean, wrap
-from .errors import ArgumentError, NoModelError, OutsideSpanWarning, TrueAngleError
-from .model import HarmonicModel
+from ..angles import ARCSEC_PER_TURN, circular_mean, wrap
+from ..errors import ArgumentError, NoModelError, OutsideSpanWarning, TrueAngleError
+from ..model import HarmonicModel
+from ..runs import CalibrationRun
 from .robust import Loss
-from .runs import CalibrationRun
 
 if TYPE_CHECKING:
-    from .fitresult import FitResult
-    from .simulation import Simulation
+    from ..simulation import Simulation
+    from .result import FitResult
 
 __all__ = ["HeldOut", "HeldOutRun", "correct_held_out", "hold_out", "hold_out_extended"]
 
@@ -153,8 +153,8 @@ def hold_out_extended(fit: FitResult, sim: Simulation) -> HeldOut:
     ArgumentError
         One run only, or none that can be left out.
     """
-    from .diagnosis import diagnose
-    from .terms.extension import without_terms
+    from ..diagnosis import diagnose
+    from ..terms.extension import without_terms
 
     runs = fit.runs
     if len(runs) < 2:
@@ -193,7 +193,7 @@ def _folds(count: int, most: int) -> list[list[int]]:
 
 
 def _refit(fit: FitResult, train: Sequence[CalibrationRun]) -> HarmonicModel:
-    from .fitting import fit as fit_runs
+    from .fit import fit as fit_runs
 
     loss = cast(Loss, fit.loss)
     argument = fit.model.argument

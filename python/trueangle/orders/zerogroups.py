@@ -8,9 +8,9 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from .aliasing import Positions
+from ..aliasing import Positions
+from ..runs import CalibrationRun
 from .harmonicsums import Readings
-from .runs import CalibrationRun
 
 __all__ = ["angle_blocks", "units_of"]
 

@@ -13,9 +13,9 @@ from typing import Literal, NamedTuple, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from .errors import ArgumentError
+from ..errors import ArgumentError
+from ..runs import CalibrationRun
 from .problem import Fitted, Problem
-from .runs import CalibrationRun
 
 __all__ = ["LOSSES", "Loss", "Weighted", "robust_scale", "weigh", "without_spikes"]
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from .paperstudy import PUBLISHED, PUBLISHED_MEAN, Reduction, Study
+from .study import PUBLISHED, PUBLISHED_MEAN, Reduction, Study
 
 __all__ = ["short_report", "study_table"]
 

@@ -10,18 +10,18 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .errors import ArgumentError
-from .fittedmodel import build_model, fit_notes
-from .model import HarmonicModel
+from ..errors import ArgumentError
+from ..model import HarmonicModel
+from ..runs import CalibrationRun
+from .model import build_model, fit_notes
 from .problem import Fitted, Problem
 from .robust import Weighted
-from .runs import CalibrationRun
 from .travel import Span
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from .orders import OrderSelection
+    from ..orders.select import OrderSelection
 
 __all__ = ["FitResult"]
 
@@ -219,12 +219,12 @@ class FitResult:
         -------
         matplotlib Axes
         """
-        from .plots import fit_plot
+        from ..plots import fit_plot
 
         return fit_plot(self, kind, ax, **options)
 
     def summary(self) -> str:
         """The result as text: coefficients with uncertainties, quality, notes."""
-        from .summaries import fit_summary
+        from .summary import fit_summary
 
         return fit_summary(self)

@@ -7,8 +7,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
-from .aliasing import Positions
-from .explanations import Explanation
+from ..aliasing import Positions
+from ..explanations import Explanation
 from .repeats import Noise
 
 if TYPE_CHECKING:
@@ -177,13 +177,13 @@ class OrderSelection:
 
     def plot(self, ax: Axes | None = None) -> Axes:
         """Amplitude of every candidate with its threshold (needs ``trueangle[plot]``)."""
-        from .plots import amplitude_spectrum
+        from ..plots import amplitude_spectrum
 
         return amplitude_spectrum(self, ax)
 
     def summary(self) -> str:
         """The table and its notes as text, amplitudes in arcsec."""
-        from .ordersummary import summarise
+        from .summary import summarise
 
         return summarise(self)
 

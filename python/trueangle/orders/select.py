@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Literal
 
-from .aliasing import distinct_positions
+from ..aliasing import distinct_positions
+from ..errors import ArgumentError
+from ..runs import CalibrationRun, as_runs
 from .candidates import choose_candidates
-from .errors import ArgumentError
-from .ordertable import OrderRow, OrderSelection
 from .paper import select_by_paper
-from .runs import CalibrationRun, as_runs
 from .selection import FALSE_ALARM, EvidenceSelection
+from .table import OrderRow, OrderSelection
 
 __all__ = ["FALSE_ALARM", "OrderRow", "OrderSelection", "select_orders"]
 
@@ -53,7 +53,8 @@ def select_orders(
         Motor turns per output turn.
     fixed_member : {"circular_spline", "flexspline", "none"}
     method : {"evidence", "paper"}
-        ``"paper"``: amplitude and phase range over the runs, `trueangle.paper.select_by_paper`.
+        ``"paper"``: amplitude and phase range over the runs
+        (`trueangle.orders.paper.select_by_paper`).
     reference_orders : iterable of float, optional
         Orders that the reference itself is known to make (50 and 100 for a stepper motor
         of 200 steps). They and their side bands are fitted, named and not retained.

@@ -1,0 +1,6 @@
+"""Which orders of the angle error are real: selection with evidence, aliases, the paper."""
+
+from .select import FALSE_ALARM, select_orders
+from .table import OrderRow, OrderSelection
+
+__all__ = ["FALSE_ALARM", "OrderRow", "OrderSelection", "select_orders"]

@@ -1,0 +1,21 @@
+"""Where to measure so that the wanted orders can be told apart."""
+
+from .plan import (
+    HIGHEST_LOW_ORDER,
+    CalibrationPlan,
+    plan_encoder,
+    plan_mounts,
+    plan_tilts,
+    readings_needed,
+    wanted_orders,
+)
+
+__all__ = [
+    "HIGHEST_LOW_ORDER",
+    "CalibrationPlan",
+    "plan_encoder",
+    "plan_mounts",
+    "plan_tilts",
+    "readings_needed",
+    "wanted_orders",
+]
