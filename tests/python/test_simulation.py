@@ -248,3 +248,13 @@ def test_the_command_writes_runs_that_read_back_exactly(tmp_path, capsys):
         assert (read.velocity == made.velocity).all()
     assert main(["simulate", str(tmp_path / "none.toml"), "-o", str(out)]) == 1
     assert "none.toml" in capsys.readouterr().err
+
+
+def test_a_gear_is_a_strain_wave_gear_unless_said_otherwise(tmp_path):
+    path = tmp_path / "joint.toml"
+    path.write_text("[joint]\ngear_ratio = 50\n")
+    assert ta.load_simulation(path).joint == Joint(50, "circular_spline", "motor")
+    path.write_text('[joint]\ngear_ratio = 50\nfixed_member = "none"\n')
+    assert ta.load_simulation(path).joint == Joint(50, "none", "motor")
+    path.write_text("[joint]\npole_pairs = 4\n")
+    assert ta.load_simulation(path).joint.shafts == {"output": 1.0}

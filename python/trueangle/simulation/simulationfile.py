@@ -33,7 +33,8 @@ def load_simulation(path: str | Path) -> Simulation:
     path : str or Path
         TOML with ``[joint]``, ``[[harmonic]]``, ``[[effect]]``, ``[noise]``, ``[[run]]``,
         each optional; keys are the parameters of `Joint`, `Harmonic`, the effects and
-        `RunDesign`.
+        `RunDesign`. With a ``gear_ratio`` the ``fixed_member`` is the circular spline and
+        the encoder on the motor where the file does not say.
 
     Returns
     -------
@@ -67,7 +68,7 @@ def _simulation(path: str | Path, document: Mapping[str, Any]) -> Simulation:
     for name in document:
         if name not in _TABLES:
             raise FileError(path, f"unknown table '{name}'; a simulation has {', '.join(_TABLES)}")
-    joint = _build(path, "[joint]", Joint, _table(path, document, "joint"))
+    joint = _build(path, "[joint]", Joint, _geared(_table(path, document, "joint")))
     harmonics = tuple(
         _build(path, f"[[harmonic]] number {k}", Harmonic, table)
         for k, table in enumerate(_tables(path, document, "harmonic"), 1)
@@ -92,6 +93,13 @@ def _simulation(path: str | Path, document: Mapping[str, Any]) -> Simulation:
         "simulation",
         lambda: Simulation(joint, harmonics, effects, float(sigma), designs, str(path)),
     )
+
+
+def _geared(joint: Mapping[str, Any]) -> Mapping[str, Any]:
+    """A gear is a strain wave gear behind a motor encoder unless the file says otherwise."""
+    if joint.get("gear_ratio", 1.0) == 1.0:
+        return joint
+    return {"fixed_member": "circular_spline", "encoder_side": "motor"} | dict(joint)
 
 
 def _table(path: str | Path, document: Mapping[str, Any], name: str) -> Mapping[str, Any]:
