@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import csv
-import os
 from collections.abc import Iterable
 from pathlib import Path
 
+from ..files import written_atomically
 from ..runs import CalibrationRun, as_runs
 
 __all__ = ["write_runs"]
@@ -37,20 +37,12 @@ def write_runs(runs: CalibrationRun | Iterable[CalibrationRun], path: str | Path
     kept = [
         source for source in sources if all(getattr(run, source[1]) is not None for run in found)
     ]
-    target = Path(path)
-    beside = target.with_name(f".{target.name}.{os.getpid()}.part")
-    rows = 0
-    try:
-        with open(beside, "w", encoding="utf-8", newline="") as file:
-            writer = csv.writer(file, lineterminator="\n")
-            writer.writerow(["run", *(name for name, _, _ in kept)])
-            for j, run in enumerate(found):
-                label = run.label or str(j + 1)
-                columns = [(getattr(run, name) * factor).tolist() for _, name, factor in kept]
-                for values in zip(*columns, strict=True):
-                    writer.writerow([label, *map(repr, values)])
-                rows += len(run)
-        os.replace(beside, target)
-    finally:
-        beside.unlink(missing_ok=True)
-    return rows
+    with written_atomically(path) as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(["run", *(name for name, _, _ in kept)])
+        for j, run in enumerate(found):
+            label = run.label or str(j + 1)
+            columns = [(getattr(run, name) * factor).tolist() for _, name, factor in kept]
+            for values in zip(*columns, strict=True):
+                writer.writerow([label, *map(repr, values)])
+    return sum(len(run) for run in found)

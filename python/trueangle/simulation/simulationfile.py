@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import os
 import tomllib
 from collections.abc import Callable, Mapping
 from dataclasses import fields
@@ -11,6 +10,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from ..errors import ArgumentError, FileError
+from ..files import written_atomically
 from .designs import RunDesign
 from .effects import EFFECTS, Effect
 from .joint import Joint
@@ -197,13 +197,9 @@ def write(sim: Simulation, path: str | Path) -> None:
     Where the simulation was read from a file, that file's text is kept and only what
     is new is appended, so comments and layout stay. Otherwise the whole is written.
     """
-    target = Path(path)
-    beside = target.with_name(f".{target.name}.{os.getpid()}.part")
-    try:
-        beside.write_text(dumps(sim), encoding="utf-8")
-        os.replace(beside, target)
-    finally:
-        beside.unlink(missing_ok=True)
+    text = dumps(sim)
+    with written_atomically(path) as file:
+        file.write(text)
 
 
 def dumps(sim: Simulation) -> str:
