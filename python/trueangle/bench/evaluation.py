@@ -14,7 +14,7 @@ from ..shafts import Shaft
 from .evaluationpeers import peers
 from .interleaved import Timing, interleave
 
-__all__ = ["ORDERS", "Row", "batches", "harmonics", "peer_batches", "quick", "single", "small"]
+__all__ = ["ORDERS", "Row", "batches", "harmonics", "peer_batches", "single", "small"]
 
 #: Orders of the models timed, by name.
 ORDERS: dict[str, Sequence[int]] = {
@@ -141,10 +141,3 @@ def single(rounds: int = 200) -> list[Row]:
         return loop
 
     return _rows({name: repeat(function) for name, function in functions.items()}, _CALLS, rounds)
-
-
-def quick() -> list[Row]:
-    """Seconds, not minutes."""
-    few = batches(1_000_000, 5)
-    others, _ = peer_batches(100_000, 3)
-    return [*few, *others, *small(rounds=20), *single(rounds=20)]

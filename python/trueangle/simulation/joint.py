@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from ..errors import ArgumentError
+from ..shafts import FIXED_MEMBERS, shaft_cycles
 
-__all__ = ["FIXED_MEMBERS", "Joint"]
+__all__ = ["Joint"]
 
-FIXED_MEMBERS = ("circular_spline", "flexspline", "none")
 ENCODER_SIDES = ("motor", "output")
 
 
@@ -59,14 +59,9 @@ class Joint:
         The wave generator is counted against the output member: ``gear_ratio + 1``
         with the circular spline fixed, ``gear_ratio - 1`` with the flexspline fixed.
         """
-        shafts = {"output": 1.0}
-        if self.fixed_member != "none" or self.gear_ratio != 1.0:
-            shafts["motor"] = float(self.gear_ratio)
-        if self.fixed_member == "circular_spline":
-            shafts["wave_generator"] = self.gear_ratio + 1.0
-        elif self.fixed_member == "flexspline":
-            shafts["wave_generator"] = self.gear_ratio - 1.0
-        return shafts
+        if self.fixed_member == "none" and self.gear_ratio == 1.0:
+            return {"output": 1.0}
+        return shaft_cycles(self.gear_ratio, self.fixed_member)
 
     def output_order(self, shaft: str, order: float) -> float:
         """Cycles per output turn of ``order`` of ``shaft``."""
