@@ -101,7 +101,6 @@ def test_numpy_haptic_joint(haptic) -> None:
     assert amplitudes == pytest.approx([0.036, 0.043, 0.024], abs=0.003)
 
 
-@pytest.mark.xfail(strict=True, reason="motor orders 1 and 4 are taken for a bump and side bands")
 def test_haptic_joint_has_a_reversal_error_a_delay_and_motor_lines(haptic, tmp_path) -> None:
     time, indicated, output, speed, ratio = (
         column[::EVERY] if isinstance(column, np.ndarray) else column for column in haptic

@@ -23,6 +23,12 @@ SQUARE_CLIP = 9.0
 #: Degrees of freedom of heavy-tailed noise, sizes of wild readings to start from.
 TAILS = (2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 12.0, 20.0, 40.0)
 SIZES = (3.0, 10.0, 100.0)
+
+#: A wild reading's neighbours are smaller by this factor; of the stretches of wild
+#: readings at least this share must be such single ones.
+BESIDE = 0.5
+ISOLATED = 0.5
+
 #: Steps of expectation-maximisation.
 EM_STEPS = 60
 
@@ -165,6 +171,11 @@ def find_outliers(space: Space) -> ScatterFinding | None:
     wide = share / size * np.exp(-0.5 * (x / size) ** 2)
     chance = wide / (wide + (1.0 - share) * np.exp(-0.5 * x**2))
     rows = np.flatnonzero(chance > 0.5)
+    alone = rows[_isolated(space, rows)]
+    stretches = 1 + np.count_nonzero(np.diff(rows) > 1)
+    if alone.size < ISOLATED * stretches:
+        return None
+    rows = alone
     spread = size * scale * np.sqrt(space.variance)
     std = float(np.sqrt(share * (1.0 - share) / n))
     parameters: Parameters = {
@@ -182,6 +193,20 @@ def find_outliers(space: Space) -> ScatterFinding | None:
     return ScatterFinding(
         "outliers", float(gain), parameters, [Outliers(float(share), float(spread))], weights, size
     )
+
+
+def _isolated(space: Space, rows: NDArray[np.int64]) -> NDArray[np.bool_]:
+    """Which of ``rows`` are far larger than the readings next to them in their run.
+
+    A glitch is over with the next reading; what lasts (a transition at a reversal, a
+    manoeuvre) is an error of the mean.
+    """
+    size = np.abs(space.left - space.whiten.run_part(space.left))
+    padded = np.concatenate([[0.0], size, [0.0]])
+    first = np.array([start for start, _ in space.bounds])
+    before, after = padded[:-2].copy(), padded[2:].copy()
+    before[first] = after[first[1:] - 1] = 0.0
+    return np.asarray(np.maximum(before, after)[rows] < BESIDE * size[rows])
 
 
 def _normal(e: Array, scale: float) -> float:

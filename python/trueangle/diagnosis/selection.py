@@ -36,21 +36,23 @@ def select(space: Space) -> Space:
     """The space with the causes that its readings support.
 
     Forward selection with every candidate; where that takes a flexible cause (which can
-    imitate any effect of a run), further paths take flexible ones only after the
+    imitate any effect of a run) or a bump, further paths take those only after the
     specific ones had their say, without and with a zero of each run's own. All are
     pruned backward; the best by BIC is kept.
     """
     direct = _pruned(_forward(space, list(CANDIDATES)))
-    if not any(term.cause in FLEXIBLE for term in direct.terms):
+    found = {term.cause for term in direct.terms}
+    if not found & {*FLEXIBLE, "local_defect"}:
         return direct
-    patient = _pruned(_forward(_forward(space, RUN_FACTORS), list(CANDIDATES)))
-    paths = [direct, patient]
-    slip = CANDIDATES["zero_slip"].propose(space)
-    if slip is not None and slip.bic_gain > NEW_CAUSE:
-        specific = [cause for cause in CANDIDATES if cause not in FLEXIBLE]
-        settled = _forward(space.with_terms([slip]), specific)
-        paths.append(_pruned(_forward(settled, list(CANDIDATES))))
-    return min(paths, key=total_price)
+    # A bump, too, can stand for several lines at once: lines first.
+    specific = [cause for cause in CANDIDATES if cause not in (*FLEXIBLE, "local_defect")]
+    starts = [_forward(space, RUN_FACTORS)]
+    if found & {*FLEXIBLE}:
+        slip = CANDIDATES["zero_slip"].propose(space)
+        if slip is not None and slip.bic_gain > NEW_CAUSE:
+            starts.append(space.with_terms([slip]))
+    paths = [_pruned(_forward(_forward(s, specific), list(CANDIDATES))) for s in starts]
+    return min([direct, *paths], key=total_price)
 
 
 def total_price(space: Space) -> float:

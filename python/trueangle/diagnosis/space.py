@@ -126,11 +126,9 @@ class Space:
         """Fit the terms: run effects, correlation, clipping, projection."""
         design = np.hstack([self.base, *(term.columns for term in self.terms)])
         effects = [term.run_effect for term in self.terms if term.run_effect is not None]
-        target, rho = self.residual, 0.0
+        target, rho = self.residual, self.fixed_rho or 0.0
         for _ in range(2):
             self._project(design, target, Whitener(self.bounds, rho, effects, self.weights))
-            for k in range(len(effects) if len(effects) > 1 else 0):
-                effects[k] = self._refit_ratio(design, target, rho, effects, k)
             left = self.residual - design @ self.coefficients
             left -= self.whiten.run_part(left)
             scale = self.root_weights * left
@@ -140,14 +138,16 @@ class Space:
             if self.fixed_rho is None:
                 kept = np.clip(left, -limit, limit) * self.root_weights
                 rho = lag_correlation(kept, self.signals.clock, self.bounds)
-            else:
-                rho = self.fixed_rho
-            if not wild.any() and rho == self.whiten.rho:
+            settled = not wild.any() and rho == self.whiten.rho
+            if settled:
                 break
             target = np.where(
                 wild, self.residual - left + np.clip(left, -limit, limit), self.residual
             )
-        else:
+        if len(effects) > 1:
+            for k in range(len(effects)):
+                effects[k] = self._refit_ratio(design, target, rho, effects, k)
+        if len(effects) > 1 or not settled:
             self._project(design, target, Whitener(self.bounds, rho, effects, self.weights))
         self.target, self.design, self.wild = target, design, wild
         kept_effects = iter(effects)
@@ -186,9 +186,7 @@ class Space:
         others = [effect for j, effect in enumerate(effects) if j != k]
         self._project(design, target, Whitener(self.bounds, rho, others, self.weights))
         ratio, _ = self.run_effect_gain(effects[k].columns)
-        effects[k] = RunEffect(effects[k].columns, max(ratio, 1e-9))
-        self._project(design, target, Whitener(self.bounds, rho, effects, self.weights))
-        return effects[k]
+        return RunEffect(effects[k].columns, max(ratio, 1e-9))
 
     def _pattern(self) -> Pattern:
         """The believed pattern with the missing orders found so far.
@@ -318,16 +316,24 @@ class Space:
         b = (turned / np.sqrt(np.where(kept, values, 1.0))[:, :, None])[kept]
         power = values[kept]
         bq, br = b[:, :-1], b[:, -1]
-        best, ratio = 0.0, 0.0
-        for trial in RATIOS / max(float(power.max(initial=0.0)), 1e-300):
+        scale = max(float(power.max(initial=0.0)), 1e-300)
+
+        def saved(trial: float) -> float:
             shrink = trial * power / (1.0 + trial * power)
-            saved = float(br @ (shrink * br))
             cross = bq.T @ (shrink * br)
             inner = np.eye(bq.shape[1]) - bq.T @ (shrink[:, None] * bq)
-            saved += float(cross @ np.linalg.solve(inner + 1e-12 * np.eye(len(inner)), cross))
-            deviance = self.as_deviance(saved) - float(np.log1p(trial * power).sum())
-            if deviance > best:
-                best, ratio = deviance, float(trial)
+            inner[np.diag_indices_from(inner)] += 1e-12
+            total = float(br @ (shrink * br)) + float(cross @ np.linalg.solve(inner, cross))
+            return self.as_deviance(total) - float(np.log1p(trial * power).sum())
+
+        # Every fourth ratio first: the maximum is broad.
+        trials = RATIOS / scale
+        coarse = range(0, trials.size, 4)
+        middle = max(coarse, key=lambda k: saved(float(trials[k])))
+        near = range(max(middle - 3, 0), min(middle + 4, trials.size))
+        deviance = {k: saved(float(trials[k])) for k in near}
+        k = max(near, key=lambda k: deviance[k])
+        ratio, best = (float(trials[k]), deviance[k]) if deviance[k] > 0.0 else (0.0, 0.0)
         return ratio, best
 
     def propose(

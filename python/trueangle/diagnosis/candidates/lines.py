@@ -20,6 +20,14 @@ __all__ = ["MissingOrderCandidate", "ReferenceCandidate", "SidebandsCandidate"]
 #: Orders of the reference that are searched.
 REFERENCE_ORDERS = range(1, 37)
 
+#: Periods of the modulation that a run must cover for sidebands to be looked for.
+RESOLVED = 0.75
+
+
+#: Orders closer than this share of one over the turns covered, that explain at least this
+#: much of what the best one does, are hardly told apart.
+UNRESOLVED, ALIKE = 0.5, 0.9
+
 
 class MissingOrderCandidate(Candidate):
     """Two regressors: the line of one order, every order searched."""
@@ -35,10 +43,21 @@ class MissingOrderCandidate(Candidate):
         best = int(np.argmax(gains - prices))
         if gains[best] <= 0.0:
             return None
+        # Over a part of a turn neighbouring orders are hardly told apart: a fast shaft's
+        # own order is then the likelier one.
+        away = np.abs(lines.orders - lines.orders[best]) * _longest_travel(space)
+        alike = np.flatnonzero((away < UNRESOLVED) & (gains > ALIKE * gains[best]))
+        named = [space.around.joint.name_order(float(lines.orders[k])) for k in alike]
+        own = [k for k, name in zip(alike, named, strict=True) if name and name[0] != "output"]
+        if best not in own and own:
+            best = int(max(own, key=lambda k: gains[k] - prices[k]))
         order = float(lines.orders[best])
         return space.propose(
             self.cause,
-            {"output_order": order},
+            {
+                "output_order": order,
+                "alike": [float(lines.orders[k]) for k in alike if k != best],
+            },
             line_columns(space.signals.theta, order),
             log_grid=float(prices[best] / 2.0),
         )
@@ -62,6 +81,8 @@ class MissingOrderCandidate(Candidate):
             "phase_deg": quantity(phase, phase_std),
             "explanations": quantity(joint.explanations(output_order)),
         }
+        if proposal.shape["alike"]:
+            parameters["hardly_told_from_output_orders"] = quantity(proposal.shape["alike"])
         return parameters, [MissingOrder(shaft, order, amplitude, phase)]
 
 
@@ -79,9 +100,12 @@ class SidebandsCandidate(Candidate):
             if named is not None and named[0] != "output":
                 carriers.append(m)
         present = {float(m) for m in space.around.pattern.orders}
+        travel = _longest_travel(space)
         shapes: list[dict[str, Any]] = []
+        # Over less than that the pair and the line between them are hardly told apart.
+        offsets = [k for k in (1, 2) if k * travel > RESOLVED]
         for m in carriers:
-            for k in (1, 2):
+            for k in offsets:
                 if m in present:
                     shapes += [{"carrier": m, "offset": k, "form": f} for f in ("AM", "PM")]
                 shapes.append({"carrier": m, "offset": k, "form": "free"})
@@ -199,3 +223,8 @@ class ReferenceCandidate(Candidate):
             ReferenceLines((row[0],), (row[1],), (row[2],), row[5]) for row in rows
         ]
         return parameters, effects
+
+
+def _longest_travel(space: Space) -> float:
+    """Turns that the longest run covers."""
+    return max(float(np.ptp(space.signals.theta[a:b])) for a, b in space.bounds) / (2.0 * np.pi)

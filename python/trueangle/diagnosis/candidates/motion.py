@@ -31,7 +31,7 @@ class LatencyCandidate(Candidate):
     cause: ClassVar[str] = "latency"
 
     def propose(self, space: Space) -> Proposal | None:
-        if space.signals.velocity is None:
+        if space.signals.velocity is None or space.has(self.cause):
             return None
         return space.propose(self.cause, {}, self.columns(space.signals, space.around, {}))
 

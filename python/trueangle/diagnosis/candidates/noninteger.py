@@ -25,6 +25,10 @@ MOST_TRIALS = 4096
 #: Orders nearer than this to a known line belong to that line: it changes from run to run.
 OWN_LINE = 0.1
 
+#: Share of a resolution cell (one order over the turns of a run) within which orders are
+#: hardly told apart.
+UNRESOLVED = 0.5
+
 #: Peaks of the quick search that are scored exactly.
 PEAKS = 4
 
@@ -62,7 +66,25 @@ class NonIntegerCandidate(Candidate):
         )
         best = max(best, self._at(space, float(order), log_grid), key=lambda p: p.deviance)
         near = np.abs(space.around.pattern.orders - best.shape["order"])
-        return None if near.min(initial=1.0) < OWN_LINE else best
+        if near.min(initial=1.0) < OWN_LINE or self._keeps_phase(space, best):
+            return None
+        return best
+
+    @staticmethod
+    def _keeps_phase(space: Space, found: Proposal) -> bool:
+        """A searched order that the travel does not resolve from it explains as much.
+
+        Phases that are new in each of R runs leave a share of 1/R to one phase for all.
+        """
+        orders = space.lines.orders
+        away = np.abs(orders - found.shape["order"])
+        turns = max(float(np.ptp(space.signals.theta[a:b])) for a, b in space.bounds)
+        alike = orders[away < UNRESOLVED * 2.0 * np.pi / turns]
+        share = 0.5 + 1.0 / space.signals.runs
+        return any(
+            space.gain(line_columns(space.signals.theta, float(m)))[0] > share * found.deviance
+            for m in alike
+        )
 
     def _at(self, space: Space, order: float, log_grid: float) -> Proposal:
         return space.propose_run_effect(

@@ -22,6 +22,10 @@ __all__ = ["ArgumentCandidate", "DefectCandidate", "MissedCountsCandidate"]
 PLACES = 1440
 WIDTHS = (0.35, 0.7, 1.4, 2.8, 5.6, 11.0)
 
+#: Degrees of its shaft beyond which a bump is not local: its Fourier series is then a few
+#: low orders, which have causes of their own (order 7 falls to 1/e^2 at 16 deg).
+WIDEST = 16.0
+
 #: Peaks of the quick search that are scored exactly.
 PEAKS = 2
 
@@ -118,7 +122,7 @@ class DefectCandidate(Candidate):
             log_width, _ = golden_maximum(
                 lambda x, f=gain_of: f(float(np.exp(x))),  # type: ignore[misc]
                 log_width - 0.8,
-                log_width + 0.8,
+                min(log_width + 0.8, float(np.log(WIDEST))),
                 8,
             )
             width = float(np.exp(log_width))
