@@ -195,6 +195,13 @@ class Moments:
         weights: _Array | None = None,
         threads: int | None = None,
     ) -> None: ...
+    def update_known(
+        self,
+        reference: _Array,
+        indicated: _Array,
+        of_indicated: bool,
+        travel: NDArray[np.int64],
+    ) -> int: ...
     def merge(self, other: Moments) -> None: ...
     def spectrum(
         self,
@@ -208,3 +215,4 @@ def fit_moments(
     cycles: Sequence[float],
     orders: Sequence[Sequence[int]],
 ) -> Solution: ...
+def thread_count(threads: int | None = None) -> int: ...

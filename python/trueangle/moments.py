@@ -222,6 +222,41 @@ class Moments:
             self._runs[run] = sums
         return self
 
+    def update_known(
+        self,
+        reference: NDArray[np.float64],
+        indicated: NDArray[np.float64],
+        *,
+        travel: NDArray[np.int64],
+        argument: Argument = "reference",
+        run: Hashable = None,
+    ) -> int:
+        """Add readings given by both angles, in one pass that leaves missing ones out.
+
+        Parameters
+        ----------
+        reference, indicated : ndarray
+            Contiguous vectors of one length; a reading is missing where either is not finite.
+        travel : ndarray of int
+            One of 16 readings is counted in it, by place in the turn.
+        argument : {"reference", "indicated"}
+            The angle that the error is a function of.
+        run : hashable, optional
+            Label of the run.
+
+        Returns
+        -------
+        int
+            Readings that are known.
+        """
+        sums = self._runs.get(run)
+        if sums is None:
+            sums = self._new()
+        known = sums.update_known(reference, indicated, argument == "indicated", travel)
+        if known:
+            self._runs[run] = sums
+        return known
+
     def merge(self, other: Moments) -> Moments:
         """Add the readings of another accumulator over the same orders; runs go by label."""
         if not isinstance(other, Moments):
@@ -229,7 +264,9 @@ class Moments:
         if (self._shafts, self._period) != (other._shafts, other._period):
             raise ArgumentError("moments merge when their orders, shafts and period agree")
         for label, sums in other._runs.items():
-            mine = self._runs.setdefault(label, self._new())
+            mine = self._runs.get(label)
+            if mine is None:
+                mine = self._runs[label] = self._new()
             mine.merge(sums)
         return self
 

@@ -9,6 +9,7 @@ pub mod accumulator;
 mod bessel;
 pub mod factor;
 pub mod kernel;
+pub mod known;
 pub mod normal;
 pub mod readings;
 pub mod segment;

@@ -34,6 +34,9 @@ mod _core {
     #[pymodule_export]
     use super::moments::{PyMoments, fit_moments};
 
+    #[pymodule_export]
+    use super::threads::thread_count;
+
     #[pymodule_init]
     fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
         module.add("__version__", env!("CARGO_PKG_VERSION"))?;

@@ -1,6 +1,6 @@
 //! `_core.Moments`: the sums of one run, and `_core.fit_moments`.
 
-use numpy::{Complex64, PyArray1, PyReadonlyArray1, ToPyArray};
+use numpy::{Complex64, PyArray1, PyReadonlyArray1, PyReadwriteArray1, ToPyArray};
 use pyo3::prelude::*;
 
 use super::failure::argument_error;
@@ -10,6 +10,7 @@ use crate::angle::Period;
 use crate::error::Error;
 use crate::fit::{check, fit_moments as core_fit};
 use crate::moments::accumulator::Accumulator;
+use crate::moments::known::{Angles, add_known};
 use crate::moments::readings::Readings;
 use crate::moments::spectrum::Spectrum;
 
@@ -95,6 +96,30 @@ impl PyMoments {
         py.detach(|| sums.update(readings, threads));
         self.sums = Some(sums);
         Ok(())
+    }
+
+    /// Adds the readings of which both angles are known; returns how many those are.
+    fn update_known(
+        &mut self,
+        py: Python<'_>,
+        reference: PyReadonlyArray1<'_, f64>,
+        indicated: PyReadonlyArray1<'_, f64>,
+        of_indicated: bool,
+        mut travel: PyReadwriteArray1<'_, i64>,
+    ) -> PyResult<usize> {
+        let angles = Angles {
+            reference: reference.as_slice()?,
+            indicated: indicated.as_slice()?,
+            of_indicated,
+        };
+        let wanted = angles.reference.len();
+        check::same_length("indicated", angles.indicated.len(), "reference", wanted)?;
+        let travel = travel.as_slice_mut()?;
+        let period = Period::new(self.period)?;
+        let (cycles, highest) = (self.cycles, self.highest);
+        let fresh = |centre| Accumulator::new(period, cycles, highest, centre);
+        let sums = &mut self.sums;
+        Ok(py.detach(|| add_known(sums, fresh, period, angles, travel)))
     }
 
     fn merge(&mut self, other: &Self) -> PyResult<()> {

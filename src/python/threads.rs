@@ -21,6 +21,14 @@ pub fn threads(py: Python<'_>, asked: Option<i64>, samples: usize) -> PyResult<O
     }
 }
 
+/// How many threads work that is worth splitting may use.
+#[pyfunction]
+#[pyo3(signature = (threads=None))]
+pub fn thread_count(py: Python<'_>, threads: Option<i64>) -> PyResult<usize> {
+    let asked = self::threads(py, threads, usize::MAX)?;
+    Ok(asked.unwrap_or_else(crate::threads::available))
+}
+
 /// True in a child of `multiprocessing` (and so of joblib, concurrent.futures, dask).
 fn in_worker_process(py: Python<'_>) -> PyResult<bool> {
     let modules = py

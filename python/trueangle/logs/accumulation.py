@@ -2,31 +2,41 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import reduce
+from itertools import groupby
+from operator import itemgetter
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
+from .. import _core
 from ..angles import UNIT_PERIODS
 from ..errors import FileError
+from ..model import Argument
 from ..moments import Moments
 from ..runs import CalibrationRun
 from ..units import check_follows
-from .columns import find_angle_column, find_reference_column
-from .formats import Watch, find_format
+from .ahead import side_by_side
+from .columns import RUN_COLUMN, find_angle_column, find_reference_column
+from .formats import Labels, LogFormat, find_format
 
-__all__ = ["Accumulated", "LogFitSettings", "accumulate", "merged"]
+__all__ = ["Accumulated", "LogFitSettings", "accumulate", "accumulate_each", "merged"]
 
-#: Every so many readings one is looked at for the travel covered, in bins of a degree.
-_STRIDE = 16
+#: Places in the turn, a degree each, where readings are looked for.
 _BINS = 360
 #: Readings taken together: what is computed of them stays in the cache.
 _BLOCK = 1 << 16
 #: Readings, at most, of the first batch that are checked for wrong units and signs.
 _LOOKED_AT = 4096
+#: Bytes that a reading takes, to tell how much of a log is done.
+_BYTES = 16
+
+#: Called after every batch with its rows and the bytes that those took.
+Advance: TypeAlias = Callable[[int, float], None]
 
 
 @dataclass(frozen=True)
@@ -39,7 +49,7 @@ class LogFitSettings:
 
     orders: Mapping[str, tuple[int, ...]]
     shafts: Mapping[str, float]
-    argument: str = "reference"
+    argument: Argument = "reference"
     counts_per_turn: float | None = None
     topic: str | None = None
     threads: int | None = None
@@ -57,7 +67,7 @@ class Accumulated:
     rows, missing : int
         Readings, and those without a reference or indicated angle.
     travel : ndarray
-        Readings seen in each degree of the turn, one of 16 counted.
+        Readings seen in each degree of the turn, one of 16 looked at.
     """
 
     moments: Moments
@@ -66,10 +76,29 @@ class Accumulated:
     missing: int = 0
     travel: NDArray[np.int64] = field(default_factory=lambda: np.zeros(_BINS, dtype=np.int64))
 
+    def add(self, other: Accumulated) -> Accumulated:
+        """Itself with the next stretch of the same log taken in."""
+        self.moments.merge(other.moments)
+        self.rows += other.rows
+        self.missing += other.missing
+        self.travel += other.travel
+        return self
 
-def accumulate(
-    path: Path, settings: LogFitSettings, watch: Watch = lambda rows, part: None
-) -> Accumulated:
+
+class _Stretch(NamedTuple):
+    """A part of a log and how to read it."""
+
+    path: Path
+    kind: LogFormat
+    part: Any
+    is_first: bool
+    size: float
+    names: Sequence[str]
+    period: float
+    scale: float
+
+
+def accumulate(path: Path, settings: LogFitSettings) -> Accumulated:
     """Moments of one log with the columns ``reference_*``, ``indicated_*`` and maybe ``run``.
 
     Raises
@@ -78,6 +107,33 @@ def accumulate(
         A column is missing or holds no numbers, the indicated angle does not follow the
         reference, the file is damaged.
     """
+    (found,) = accumulate_each([path], settings)
+    return found
+
+
+def accumulate_each(
+    paths: Iterable[Path], settings: LogFitSettings, advance: Advance = lambda rows, size: None
+) -> Iterator[Accumulated]:
+    """Moments of every log in turn, stretches of logs read side by side.
+
+    A log is always cut in the same stretches, merged in their order: the sums are the same,
+    bit for bit, whatever the number of threads.
+    """
+    workers = _core.thread_count(settings.threads)
+    stretches = (stretch for path in paths for stretch in _stretches(path, settings))
+
+    def work(stretch: _Stretch) -> tuple[Path, Accumulated]:
+        return stretch.path, _accumulate(stretch, settings, advance)
+
+    done = side_by_side(work, stretches, workers)
+    for path, parts in groupby(done, key=itemgetter(0)):
+        found = reduce(Accumulated.add, (part for _, part in parts))
+        if not found.moments.count:
+            raise FileError(path, "has no readings")
+        yield found
+
+
+def _stretches(path: Path, settings: LogFitSettings) -> Iterator[_Stretch]:
     kind = find_format(path)
     header = kind.module.columns(path, settings.topic)
     reference = find_reference_column(path, header)
@@ -85,27 +141,66 @@ def accumulate(
     indicated = find_angle_column(
         path, period, header, counts_per_turn=settings.counts_per_turn, fresh=False
     )
-    names = [reference, indicated.name, *(["run"] if "run" in header else [])]
-    scale = period / indicated.period
+    names = [reference, indicated.name, *([RUN_COLUMN] if RUN_COLUMN in header else [])]
+    parts = kind.stretches(path)
+    size = path.stat().st_size / len(parts)
+    for i, part in enumerate(parts):
+        scale = period / indicated.period
+        yield _Stretch(path, kind, part, i == 0, size, names, period, scale)
+
+
+def _accumulate(stretch: _Stretch, settings: LogFitSettings, advance: Advance) -> Accumulated:
+    """Moments of one stretch of a log."""
+    path, period = stretch.path, stretch.period
     found = Accumulated(
         Moments(settings.orders, period=period, shafts=settings.shafts), (str(path),)
     )
-    size = max(path.stat().st_size, 1)
-    for batch in kind.module.read(path, names, settings.topic):
-        true, said = batch[reference], batch[indicated.name]
-        if scale != 1.0:
-            said = said * scale
-        if found.rows == 0:
-            _check_follows(path, true, said, period)
-        runs = batch.get("run")
+    reference, indicated, *run = stretch.names
+    left = stretch.size
+    for batch in stretch.kind.read(path, stretch.names, settings.topic, stretch.part):
+        true, said = batch[reference], batch[indicated]
+        if stretch.is_first and found.rows == 0:
+            _check_follows(path, true, said * stretch.scale, period)
+        runs = batch[run[0]] if run else None
         for start in range(0, true.size, _BLOCK):
-            part = slice(start, start + _BLOCK)
-            labels = None if runs is None else runs[part]
-            _take(found, true[part], said[part], labels, period, settings)
-        watch(true.size, min(1.0, found.rows * 16 / size))
-    if not found.moments.count:
-        raise FileError(path, "has no readings")
+            block = slice(start, start + _BLOCK)
+            for label, rows in _runs(runs, block):
+                x = np.ascontiguousarray(true[block][rows], dtype=np.float64)
+                y = np.ascontiguousarray(said[block][rows], dtype=np.float64)
+                known = found.moments.update_known(
+                    x,
+                    y if stretch.scale == 1.0 else y * stretch.scale,
+                    travel=found.travel,
+                    argument=settings.argument,
+                    run=(found.files[0], label),
+                )
+                found.rows += x.size
+                found.missing += x.size - known
+        taken = min(float(true.size * _BYTES), left)
+        left -= taken
+        advance(true.size, taken)
+    advance(0, left)
     return found
+
+
+def _runs(
+    runs: NDArray[Any] | Labels | None, block: slice
+) -> Iterator[tuple[str | float | None, Any]]:
+    """Every label in a block of readings, None where there is none, and its readings."""
+    if runs is None:
+        yield None, slice(None)
+        return
+    codes = (runs.codes if isinstance(runs, Labels) else runs)[block]
+    if codes.size and (codes == codes[0]).all():
+        found, each = codes[:1], [slice(None)]
+    else:
+        found, place = np.unique(codes, return_inverse=True)
+        each = [place == i for i in range(found.size)]
+    for code, rows in zip(found.tolist(), each, strict=True):
+        if isinstance(runs, Labels):
+            yield runs.names[code], rows
+        else:
+            yield (code if code == code else None), rows  # NaN
 
 
 def merged(parts: Sequence[Accumulated]) -> Accumulated:
@@ -130,39 +225,6 @@ def _merged_pair(first: Accumulated, second: Accumulated | None = None) -> Accum
         first.missing + second.missing,
         first.travel + second.travel,
     )
-
-
-def _take(
-    found: Accumulated,
-    true: NDArray[Any],
-    said: NDArray[Any],
-    runs: NDArray[Any] | None,
-    period: float,
-    settings: LogFitSettings,
-) -> None:
-    """Add one batch."""
-    found.rows += true.size
-    error = np.subtract(said, true, dtype=np.float64)
-    if not np.isfinite(error.sum()):  # some are missing: look closer
-        known = np.isfinite(error)
-        found.missing += known.size - int(np.count_nonzero(known))
-        true, said, error = true[known], said[known], error[known]
-        runs = None if runs is None else runs[known]
-    theta = true if settings.argument == "reference" else said
-    file = found.files[0]
-    labels = [None] if runs is None else np.unique(runs)
-    for label in labels:
-        if runs is None or len(labels) == 1:
-            x, y = theta, error
-        else:
-            rows = runs == label
-            x, y = theta[rows], error[rows]
-        if x.size:
-            found.moments.update(
-                x, y, run=(file, None if label is None else float(label)), threads=settings.threads
-            )
-    places = np.floor(np.mod(theta[::_STRIDE], period) * (_BINS / period)).astype(np.intp)
-    found.travel += np.bincount(np.minimum(places, _BINS - 1), minlength=_BINS)
 
 
 def _check_follows(path: Path, true: NDArray[Any], said: NDArray[Any], period: float) -> None:

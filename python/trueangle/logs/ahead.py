@@ -1,15 +1,21 @@
-"""Work done ahead in a second thread, so that reading and writing overlap."""
+"""Work done by further threads: ahead of its use, or side by side."""
 
 from __future__ import annotations
 
 import queue
 import threading
-from collections.abc import Iterable, Iterator
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import Future, ThreadPoolExecutor
 from typing import Any, TypeVar
 
-__all__ = ["ahead"]
+__all__ = ["ahead", "side_by_side"]
 
 T = TypeVar("T")
+R = TypeVar("R")
+
+#: Items in hand or waiting for each worker.
+_WAITING = 2
 
 
 def ahead(items: Iterable[T], depth: int = 1) -> Iterator[T]:
@@ -59,3 +65,31 @@ def ahead(items: Iterable[T], depth: int = 1) -> Iterator[T]:
     finally:
         stopped.set()
         thread.join()
+
+
+def side_by_side(work: Callable[[T], R], items: Iterable[T], workers: int) -> Iterator[R]:
+    """``work(item)`` of every item in their order, up to ``workers`` at a time.
+
+    Items are taken only a few ahead. The first exception reaches the user of the results,
+    and nothing more is begun.
+
+    Examples
+    --------
+    >>> list(side_by_side(abs, [-1, 2, -3], workers=2))
+    [1, 2, 3]
+    """
+    if workers == 1:
+        yield from map(work, items)
+        return
+    waiting: deque[Future[R]] = deque()
+    with ThreadPoolExecutor(workers, "trueangle-work") as pool:
+        try:
+            for item in items:
+                waiting.append(pool.submit(work, item))
+                if len(waiting) >= _WAITING * workers:
+                    yield waiting.popleft().result()
+            while waiting:
+                yield waiting.popleft().result()
+        finally:
+            for future in waiting:
+                future.cancel()

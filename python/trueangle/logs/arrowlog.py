@@ -6,22 +6,27 @@ import struct
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
 
 import pyarrow as pa
-from numpy.typing import NDArray
 
-from ..errors import FileError
 from .ahead import ahead
-from .arrowtables import ArrowDigest, add_corrected, column_batches, corrected_schema
-from .formats import Choose, Contents, Watch
+from .arrowtables import (
+    ArrowDigest,
+    add_corrected,
+    column_batches,
+    corrected_schema,
+    damage_told,
+)
+from .formats import Batch, Choose, Contents, Watch
 
-__all__ = ["columns", "contents", "copy", "read"]
+__all__ = ["columns", "contents", "copy", "read", "stretches"]
 
 _FILE_MAGIC = b"ARROW1"
 #: Codecs by their number in the format's BodyCompression.
 _CODECS = {0: "lz4", 1: "zstd"}
 _RECORD_BATCH = 3
+#: Bytes of a stretch that is read on its own.
+_STRETCH = 1 << 24
 
 
 def columns(path: Path, topic: str | None = None) -> list[str]:
@@ -30,12 +35,32 @@ def columns(path: Path, topic: str | None = None) -> list[str]:
         return list(schema.names)
 
 
+def stretches(path: Path) -> list[range | None]:
+    """Record batches that are read together; None for the stream format, which has no index."""
+    with damage_told(path, "Arrow"):
+        if not _is_file(path):
+            return [None]
+        with pa.memory_map(str(path), "r") as source:
+            batches = pa.ipc.open_file(source).num_record_batches
+    each = max(1, batches * _STRETCH // max(path.stat().st_size, 1))
+    return [range(i, min(i + each, batches)) for i in range(0, batches, each)] or [None]
+
+
 def read(
-    path: Path, names: Sequence[str], topic: str | None = None
-) -> Iterator[dict[str, NDArray[Any]]]:
+    path: Path, names: Sequence[str], topic: str | None = None, stretch: range | None = None
+) -> Iterator[Batch]:
     """Columns ``names`` in batches; see `formats.FormatModule`."""
-    with _opened(path) as (_schema, batches, _options):
-        yield from ahead(column_batches(path, names, batches))
+    if stretch is None:
+        with _opened(path) as (_schema, batches, _options):
+            yield from ahead(column_batches(path, names, batches))
+        return
+    with damage_told(path, "Arrow"), pa.memory_map(str(path), "r") as source:
+        schema = pa.ipc.open_file(source).schema
+        only = pa.ipc.IpcReadOptions(
+            included_fields=[schema.get_field_index(name) for name in names], use_threads=False
+        )
+        file = pa.ipc.open_file(source, options=only)
+        yield from column_batches(path, names, (file.get_batch(i) for i in stretch))
 
 
 def copy(
@@ -88,23 +113,16 @@ def _opened(
     path: Path,
 ) -> Iterator[tuple[pa.Schema, Iterator[pa.RecordBatch], pa.ipc.IpcWriteOptions]]:
     """Schema, batches and how they are compressed, of the file or of the stream format."""
-    try:
+    with damage_told(path, "Arrow"), pa.memory_map(str(path), "r") as source:
         is_file = _is_file(path)
-        with pa.memory_map(str(path), "r") as source:
-            options = pa.ipc.IpcWriteOptions(compression=_compression(path, is_file))
-            if is_file:
-                file = pa.ipc.open_file(source)
-                batches = (file.get_batch(i) for i in range(file.num_record_batches))
-                yield file.schema, batches, options
-            else:
-                stream = pa.ipc.open_stream(source)
-                yield stream.schema, iter(stream), options
-    except pa.ArrowException as cause:
-        raise FileError(path, f"is damaged or not Arrow: {cause}") from None
-    except OSError as cause:
-        if cause.errno is not None:
-            raise
-        raise FileError(path, f"is damaged: {cause}") from None
+        options = pa.ipc.IpcWriteOptions(compression=_compression(path, is_file))
+        if is_file:
+            file = pa.ipc.open_file(source)
+            batches = (file.get_batch(i) for i in range(file.num_record_batches))
+            yield file.schema, batches, options
+        else:
+            stream = pa.ipc.open_stream(source)
+            yield stream.schema, iter(stream), options
 
 
 def _compression(path: Path, is_file: bool) -> str | None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import zlib
 from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
@@ -13,7 +14,7 @@ from numpy.typing import NDArray
 
 from ..errors import FileError
 from .checksum import Checksum
-from .formats import Contents
+from .formats import Batch, Contents, Labels
 from .joints import Channel, provenance
 
 __all__ = [
@@ -22,6 +23,7 @@ __all__ = [
     "add_corrected",
     "column_batches",
     "corrected_schema",
+    "damage_told",
     "numbers",
 ]
 
@@ -187,33 +189,39 @@ def _is_list(kind: pa.DataType) -> bool:
     )
 
 
-def column_batches(
-    path: object, names: Sequence[str], batches: Iterable[Any]
-) -> Iterator[dict[str, NDArray[Any]]]:
-    """Some columns of record batches as arrays; texts (labels) as numbers from 0."""
-    labels: dict[Any, int] = {}
+def column_batches(path: object, names: Sequence[str], batches: Iterable[Any]) -> Iterator[Batch]:
+    """Some columns of record batches: numbers as arrays, texts as labels."""
     for batch in batches:
         yield {
-            name: _codes(batch[name], labels)
+            name: _labels(batch[name])
             if _is_label(batch[name].type)
             else numbers(path, name, batch[name])
             for name in names
         }
 
 
-def _codes(column: pa.Array | pa.ChunkedArray, labels: dict[Any, int]) -> NDArray[np.float64]:
-    """Every text's number, in the order of their first appearance in the log."""
+def _labels(column: pa.Array | pa.ChunkedArray) -> Labels:
     if isinstance(column, pa.ChunkedArray):
         column = column.combine_chunks()
     if not pa.types.is_dictionary(column.type):
         column = column.dictionary_encode()
-    numbered = [labels.setdefault(text, len(labels)) for text in column.dictionary.to_pylist()]
-    codes = column.indices.to_numpy(zero_copy_only=False)
-    if column.null_count:
-        numbered.append(labels.setdefault(None, len(labels)))
-        codes = np.where(np.isnan(codes), len(numbered) - 1, codes)
-    return np.asarray(np.array(numbered, dtype=np.float64)[codes.astype(np.intp)])
+    names = column.dictionary.to_pylist()
+    codes = column.indices.fill_null(len(names))
+    return Labels(codes.to_numpy(zero_copy_only=False).astype(np.intp), [*names, None])
 
 
 def _is_label(kind: pa.DataType) -> bool:
     return _is_string(kind.value_type if pa.types.is_dictionary(kind) else kind)
+
+
+@contextmanager
+def damage_told(path: object, name: str) -> Iterator[None]:
+    """Errors of pyarrow told with the file they are of, which should be of format ``name``."""
+    try:
+        yield
+    except pa.ArrowException as cause:
+        raise FileError(path, f"is damaged or not {name}: {cause}") from None
+    except OSError as cause:
+        if cause.errno is not None:
+            raise
+        raise FileError(path, f"is damaged: {cause}") from None

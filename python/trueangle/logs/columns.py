@@ -9,6 +9,7 @@ from ..angles import UNIT_PERIODS, unit_name
 from ..errors import FileError
 
 __all__ = [
+    "RUN_COLUMN",
     "SIGNAL_COLUMNS",
     "UNITS",
     "AngleColumn",
@@ -18,6 +19,9 @@ __all__ = [
 ]
 
 UNITS = (*UNIT_PERIODS, "count")
+
+#: Labels of the runs of a calibration log.
+RUN_COLUMN = "run"
 
 #: Column endings of the signals that terms of a model may need.
 SIGNAL_COLUMNS = {

@@ -21,7 +21,7 @@ from ..orders.selection import FALSE_ALARM, NEGLIGIBLE_NOISE, NEGLIGIBLE_SHARE
 from ..records import FitRecord, Provenance
 from ..runs import Source
 from ..shafts import resolve_orders, shaft_cycles
-from .accumulation import Accumulated, LogFitSettings, accumulate, merged
+from .accumulation import Accumulated, LogFitSettings, accumulate_each, merged
 from .momentsums import sums_of
 from .progress import Progress
 from .sources import find_logs
@@ -220,10 +220,9 @@ def _accumulated(
     shown = Progress(len(paths), sum(path.stat().st_size for path in paths), progress)
     parts = []
     try:
-        for path in paths:
-            shown.start_file(path.stat().st_size)
-            parts.append(accumulate(path, settings, shown.advance))
-            shown.finish_file(path.stat().st_size)
+        for part in accumulate_each(paths, settings, shown.add):
+            parts.append(part)
+            shown.files += 1
     finally:
         shown.clear()
     return merged(parts)

@@ -17,8 +17,10 @@ from .joints import Channel
 
 __all__ = [
     "FORMATS",
+    "Batch",
     "Choose",
     "Contents",
+    "Labels",
     "LogFormat",
     "Watch",
     "find_format",
@@ -29,6 +31,17 @@ __all__ = [
 Watch: TypeAlias = Callable[[int, float], None]
 #: Finds the channels among the columns of a log.
 Choose: TypeAlias = Callable[[Sequence[str]], list[Channel]]
+
+
+class Labels(NamedTuple):
+    """A column of texts: the place of each one's text in ``names``."""
+
+    codes: NDArray[np.intp]
+    names: Sequence[str | None]
+
+
+#: Columns by name: numbers, or labels where the column holds text.
+Batch: TypeAlias = dict[str, Any]
 
 
 class Contents(NamedTuple):
@@ -44,10 +57,12 @@ class FormatModule(Protocol):
     def columns(self, path: Path, topic: str | None) -> list[str]:
         """Names of the columns that could be angles or signals."""
 
-    def read(
-        self, path: Path, names: Sequence[str], topic: str | None
-    ) -> Iterator[dict[str, NDArray[np.floating[Any]]]]:
-        """Some columns in batches of bounded size, NaN where a value is missing."""
+    def read(self, path: Path, names: Sequence[str], topic: str | None) -> Iterator[Batch]:
+        """Some columns in batches of bounded size, NaN where a value is missing.
+
+        Modules that define ``stretches(path)`` take one of them as a fourth argument: then
+        the batches of that stretch only. Stretches of a log may be read side by side.
+        """
 
     def copy(
         self,
@@ -99,6 +114,18 @@ class LogFormat:
             ) from None
         found: FormatModule = module
         return found
+
+    def stretches(self, path: Path) -> list[Any]:
+        """Parts of a log, in their order, that `read` takes on their own."""
+        cut = getattr(self.module, "stretches", None)
+        return [None] if cut is None else list(cut(path))
+
+    def read(
+        self, path: Path, names: Sequence[str], topic: str | None, stretch: Any
+    ) -> Iterator[Batch]:
+        """Batches of one of the `stretches`."""
+        more = () if stretch is None else (stretch,)
+        return self.module.read(path, names, topic, *more)
 
 
 FORMATS = (

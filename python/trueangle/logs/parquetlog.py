@@ -5,22 +5,38 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import pyarrow as pa
 import pyarrow.parquet as pq
-from numpy.typing import NDArray
 
 from ..errors import FileError
 from .ahead import ahead
-from .arrowtables import ArrowDigest, add_corrected, column_batches, corrected_schema
-from .formats import Choose, Contents, Watch
+from .arrowtables import (
+    ArrowDigest,
+    add_corrected,
+    column_batches,
+    corrected_schema,
+    damage_told,
+)
+from .formats import Batch, Choose, Contents, Watch
 from .joints import Channel
 
-__all__ = ["columns", "contents", "copy", "read"]
+__all__ = ["columns", "contents", "copy", "read", "stretches"]
 
 #: Bytes of decoded columns in hand at once; larger row groups are cut.
 _BYTES = 1 << 25
+#: Rows, at least, of a stretch that is read on its own, and of the batches it is read in:
+#: these stay in the cache until they are used.
+_STRETCH = 1 << 20
+_BATCH = 1 << 15
+
+
+class Stretch(NamedTuple):
+    """Neighbouring row groups, and the footer that tells where they are."""
+
+    groups: list[int]
+    footer: pq.FileMetaData
 
 
 def columns(path: Path, topic: str | None = None) -> list[str]:
@@ -29,12 +45,43 @@ def columns(path: Path, topic: str | None = None) -> list[str]:
         return list(file.schema_arrow.names)
 
 
-def read(
-    path: Path, names: Sequence[str], topic: str | None = None
-) -> Iterator[dict[str, NDArray[Any]]]:
-    """Columns ``names`` in batches; see `formats.FormatModule`."""
+def stretches(path: Path) -> list[Stretch | None]:
+    """Row groups that are read together; None where that is the whole file."""
     with _opened(path) as file:
-        yield from ahead(column_batches(path, names, _tables(file, list(names))))
+        footer = file.metadata
+    found: list[list[int]] = []
+    rows = _STRETCH
+    for group in range(footer.num_row_groups):
+        if rows >= _STRETCH:
+            found.append([])
+            rows = 0
+        found[-1].append(group)
+        rows += footer.row_group(group).num_rows
+    return [Stretch(groups, footer) for groups in found] if len(found) > 1 else [None]
+
+
+def read(
+    path: Path, names: Sequence[str], topic: str | None = None, stretch: Stretch | None = None
+) -> Iterator[Batch]:
+    """Columns ``names`` in batches; see `formats.FormatModule`.
+
+    A stretch is read from mapped memory, by the calling thread alone.
+    """
+    if stretch is None:
+        with _opened(path) as file:
+            yield from ahead(column_batches(path, names, _batches(file, names)))
+        return
+    with _opened(path, metadata=stretch.footer, memory_map=True) as file:
+        yield from column_batches(path, names, _batches(file, names, stretch.groups))
+
+
+def _batches(
+    file: pq.ParquetFile, names: Sequence[str], groups: list[int] | None = None
+) -> Iterator[pa.RecordBatch]:
+    found: Iterator[pa.RecordBatch] = file.iter_batches(
+        _BATCH, row_groups=groups, columns=list(names), use_threads=False
+    )
+    return found
 
 
 def copy(
@@ -79,29 +126,25 @@ def contents(path: Path, topic: str | None = None) -> Contents:
 
 
 @contextmanager
-def _opened(path: Path) -> Iterator[pq.ParquetFile]:
+def _opened(path: Path, **options: Any) -> Iterator[pq.ParquetFile]:
     """The file, its errors told with its name."""
-    try:
-        with pq.ParquetFile(path, page_checksum_verification=True) as file:
-            yield file
-    except pa.ArrowException as cause:
-        raise FileError(path, f"is damaged or not Parquet: {cause}") from None
-    except OSError as cause:
-        if cause.errno is not None:
-            raise
-        raise FileError(path, f"is damaged: {cause}") from None
+    with (
+        damage_told(path, "Parquet"),
+        pq.ParquetFile(path, page_checksum_verification=True, **options) as file,
+    ):
+        yield file
 
 
-def _tables(file: pq.ParquetFile, names: list[str] | None = None) -> Iterator[pa.Table]:
+def _tables(file: pq.ParquetFile) -> Iterator[pa.Table]:
     """One table per row group, or several where it is large; empty row groups left out."""
     for group in range(file.metadata.num_row_groups):
         rows = file.metadata.row_group(group).num_rows
         most = _rows_at_once(file, group)
         if rows <= most:
             if rows:
-                yield file.read_row_group(group, columns=names)
+                yield file.read_row_group(group)
             continue
-        for batch in file.iter_batches(batch_size=most, row_groups=[group], columns=names):
+        for batch in file.iter_batches(batch_size=most, row_groups=[group]):
             yield pa.Table.from_batches([batch])
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import sys
+import threading
 import time
 from collections.abc import Callable
 from typing import TextIO
@@ -43,7 +44,8 @@ class Progress:
         self._files = files
         self._total = max(total, 1)
         self._start = self._shown = clock()
-        self._before = 0
+        self._before = 0.0
+        self._lock = threading.Lock()
         self._skipped = 0
         self._width = 0
         self._size = 0
@@ -61,6 +63,12 @@ class Progress:
         if self._style != "none" and now - self._shown >= _INTERVAL:
             self._shown = now
             self._show(now, self._before + part * self._size)
+
+    def add(self, rows: int, size: float) -> None:
+        """``rows`` more are done, of files side by side, and ``size`` bytes more."""
+        with self._lock:
+            self._before += size
+            self.advance(rows, 0.0)
 
     def finish_file(self, size: int, skipped: bool = False) -> None:
         """A file is done, or was done before (``skipped``), or failed."""

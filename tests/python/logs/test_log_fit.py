@@ -8,6 +8,7 @@ import pytest
 import trueangle as ta
 from trueangle.cli import main
 from trueangle.errors import FileError, NoModelError
+from trueangle.logs.formats import find_format
 
 from .conftest import made_model
 
@@ -78,6 +79,58 @@ def test_one_pass_gives_any_other_orders(folder):
     less = found.moments.solve([1, 3])
     expected = ta.fit(in_memory(folder), [1, 3], loss="linear")
     np.testing.assert_allclose(less.amplitudes, expected.amplitudes, rtol=0, atol=1e-13)
+
+
+@pytest.mark.parametrize("kind", ["parquet", "arrow"])
+def test_threads_change_no_bit(tmp_path, monkeypatch, kind):
+    monkeypatch.setattr("trueangle.logs.parquetlog._STRETCH", 4000)
+    monkeypatch.setattr("trueangle.logs.arrowlog._STRETCH", 1 << 16)
+    for i in range(3):
+        reference, indicated = readings(20_000, i, 100.0 * i)
+        indicated[100 * i] = np.nan
+        table = pa.table(
+            {
+                "other": np.arange(20_000),
+                "reference_deg": reference,
+                "run": np.where(np.arange(20_000) // 100 % 3 == 1, "warm", "cold"),
+                "indicated_deg": indicated,
+            }
+        )
+        if kind == "parquet":
+            pq.write_table(table, tmp_path / f"{i}.parquet", row_group_size=1500)
+        else:
+            with pa.ipc.new_file(tmp_path / f"{i}.arrow", table.schema) as writer:
+                writer.write_table(table, max_chunksize=1500)
+    one, two, four = (ta.fit_logs(tmp_path, [1, 2, 3], threads=n) for n in (1, 2, 4))
+    assert (one.rows, one.missing) == (60_000, 3)
+    assert sorted(label for _file, label in one.moments.runs) == ["cold"] * 3 + ["warm"] * 3
+    for other in (two, four):
+        assert other.model == one.model
+        assert other.moments.runs == one.moments.runs
+        np.testing.assert_array_equal(other.fit.covariance, one.fit.covariance)
+    log = tmp_path / f"0.{kind}"
+    assert len(find_format(log).stretches(log)) > 3
+
+
+@pytest.mark.parametrize("threads", [1, 2])
+def test_a_damaged_log_ends_the_fit(folder, monkeypatch, threads):
+    monkeypatch.setattr("trueangle.logs.parquetlog._STRETCH", 4000)
+    path = folder / "2.parquet"
+    data = bytearray(path.read_bytes())
+    data[len(data) // 2 : len(data) // 2 + 20_000] = bytes(20_000)
+    path.write_bytes(data)
+    with pytest.raises(FileError, match=r"2.parquet.*damaged"):
+        ta.fit_logs(folder, [1], threads=threads)
+
+
+def test_runs_without_a_label_are_one_run(tmp_path):
+    reference, indicated = readings(3000, 1, 0.0)
+    labels = np.repeat([1.0, np.nan, 2.0], 1000)
+    table = {"reference_deg": reference, "indicated_deg": indicated, "run": labels}
+    pq.write_table(pa.table(table), tmp_path / "a.parquet")
+    found = ta.fit_logs(tmp_path / "a.parquet", [1])
+    assert [label for _file, label in found.moments.runs] == [1.0, 2.0, None]
+    assert found.rows == found.moments.count == 3000
 
 
 def test_orders_are_selected_by_evidence(folder):
