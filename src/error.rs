@@ -70,9 +70,11 @@ pub enum Error {
 
     /// A method that cannot solve this problem was asked for.
     #[error(
-        "this problem cannot be solved by moments: it needs orders of shafts that come back \
-         to their start together, and readings that are not too ill-conditioned for the \
-         method; use method \"plain\", or none to have one chosen"
+        "this problem cannot be solved by the method asked for: \"moments\" and \"qr\" need \
+         orders of shafts that come back to their start together, and readings that are not \
+         too ill-conditioned for the method; \"counts\" needs an argument of whole numbers, at \
+         most 131072 to a turn and eight readings to each; use method \"plain\", or none to \
+         have one chosen"
     )]
     Method,
 

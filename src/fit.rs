@@ -4,20 +4,25 @@
 //! harmonics are shared by all runs, the zero is each run's own.
 
 pub(crate) mod check;
+mod counts;
 mod path;
 mod run;
+mod scan;
 
 use std::f64::consts::TAU;
 
 use crate::angle::Period;
 use crate::design::Design;
 use crate::error::Error;
+use crate::lstsq::{Estimate, System};
 use crate::moments::accumulator::Accumulator;
 use crate::moments::readings::Readings;
 use crate::{rank, threads};
 
+use counts::Counts;
 use path::Reduced;
 pub use run::{Argument, Run};
+pub use scan::{Scan, scan};
 
 /// How the least-squares problem was solved.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -29,6 +34,9 @@ pub enum Method {
     Moments,
     /// One pass of piecewise moments, one small QR of their factors: the design is not squared.
     Qr,
+    /// One mean per count of an encoder that counts, then one of the others: for an
+    /// argument of whole numbers, up to 2^17 to a turn.
+    Counts,
 }
 
 /// A fitted series, with what is known of its uncertainty.
@@ -40,20 +48,43 @@ pub struct Solution {
     pub offset_std: Vec<f64>,
     /// Circular mean of the zeros; where they cancel on the circle, the first.
     pub constant: f64,
-    /// `A, B` of each order of each shaft in turn.
-    pub coefficients: Vec<f64>,
-    /// Covariance of `[constant, A, B, ...]`, row by row; NaN without degrees of freedom.
-    pub covariance: Vec<f64>,
     /// Weighted sum of squared residuals per degree of freedom; NaN without any.
     pub residual_variance: f64,
     /// Readings that count minus unknowns; with a ridge, the effective unknowns.
     pub degrees_of_freedom: f64,
     /// Unknowns determined: all of them, or there is an error instead.
     pub rank: usize,
-    /// Of the weighted design matrix with one constant column per run, 2-norm.
-    pub condition_number: f64,
     /// The path taken.
     pub method: Method,
+    system: System,
+    condition_number: Option<f64>,
+    estimate: Estimate,
+    /// Derivative of the constant by every zero.
+    shares: Vec<f64>,
+}
+
+impl Solution {
+    /// `A, B` of each order of each shaft in turn.
+    pub fn coefficients(&self) -> &[f64] {
+        &self.estimate.coefficients
+    }
+
+    /// Of the weighted design matrix with one constant column per run, 2-norm; made anew
+    /// by every call where the choice of the path did not need it.
+    pub fn condition_number(&self) -> f64 {
+        let made = || self.system.condition_number();
+        self.condition_number.unwrap_or_else(made)
+    }
+
+    /// Covariance of `[constant, A, B, ...]`, row by row; NaN without degrees of freedom.
+    ///
+    /// Made anew by every call, at the price of a solution or more: O(n^3).
+    pub fn covariance(&self) -> Vec<f64> {
+        let mut covariance = self.estimate.covariance(&self.shares);
+        let scale = |value: &mut f64| *value *= self.residual_variance;
+        covariance.iter_mut().for_each(scale);
+        covariance
+    }
 }
 
 /// How to fit.
@@ -89,16 +120,39 @@ pub fn fit(design: &Design, runs: &[Run], options: Options) -> Result<Solution, 
     let period = design.period();
     let readings: Vec<_> = runs.iter().map(|run| run.readings(argument)).collect();
     let centres: Vec<_> = readings.iter().map(|run| run.centre(period)).collect();
+    let counts = match options.method {
+        None | Some(Method::Counts) if design.is_periodic() => {
+            Counts::of_runs(&readings, &centres, period, options.threads)
+        }
+        _ => None,
+    };
     // A number that is not finite spoils every sum it enters: it is looked for when one has.
-    let reduced = path::reduce(design, &readings, &centres, options, || check::angles(runs))?;
+    let inspect = || check::angles(runs);
+    let reduced = match &counts {
+        Some(counts) => {
+            let means: Vec<_> = counts.iter().map(Counts::readings).collect();
+            let centres = vec![0.0; runs.len()];
+            let options = Options {
+                method: None,
+                ..options
+            };
+            let scatter: f64 = counts.iter().map(|run| run.scatter).sum();
+            if !scatter.is_finite() {
+                inspect()?;
+            }
+            let reduced = path::reduce(design, &means, &centres, options, inspect)?;
+            reduced.from_counts(scatter)
+        }
+        None => path::reduce(design, &readings, &centres, options, inspect)?,
+    };
     if ridge.is_none() {
         let angles = || readings.iter().flat_map(Readings::angles);
         let rounding = || {
             let reach = angles().fold(period.value(), |reach, x| reach.max(x.abs()));
             TAU * f64::EPSILON * reach / period.value()
         };
-        let (system, condition) = (&reduced.system, reduced.condition_number);
-        rank::check(design, system, condition, rounding, angles)?;
+        let known = reduced.condition_number;
+        rank::check(design, &reduced.system, known, rounding, angles)?;
     }
     let count = readings.iter().map(Readings::count).sum();
     conclude(design, reduced, &centres, count, ridge)
@@ -109,14 +163,9 @@ pub fn fit(design: &Design, runs: &[Run], options: Options) -> Result<Solution, 
 pub fn fit_moments(design: &Design, runs: &[&Accumulator]) -> Result<Solution, Error> {
     check::have_readings(design, runs.iter().map(|run| run.count()))?;
     let reduced = path::reduce_moments(design, runs)?;
-    let (system, condition) = (&reduced.system, reduced.condition_number);
-    rank::check(
-        design,
-        system,
-        condition,
-        || path::FACTOR_ROUNDING,
-        std::iter::empty,
-    )?;
+    let rounding = || path::FACTOR_ROUNDING;
+    let known = reduced.condition_number;
+    rank::check(design, &reduced.system, known, rounding, std::iter::empty)?;
     let centres: Vec<_> = runs.iter().map(|run| run.centre()).collect();
     let count = runs.iter().map(|run| run.count()).sum();
     conclude(design, reduced, &centres, count, None)
@@ -134,6 +183,7 @@ fn conclude(
         system,
         condition_number,
         method,
+        scatter,
     } = reduced;
     let period = design.period();
     let estimate = system.solve(ridge).ok_or_else(|| Error::Rank {
@@ -145,7 +195,7 @@ fn conclude(
 
     let degrees_of_freedom = (count as f64 - estimate.unknowns).max(0.0);
     let residual_variance = if degrees_of_freedom > 0.0 {
-        estimate.squares / degrees_of_freedom
+        (estimate.squares + scatter) / degrees_of_freedom
     } else {
         f64::NAN
     };
@@ -156,8 +206,6 @@ fn conclude(
         .map(|(offset, centre)| period.wrap(offset + centre))
         .collect();
     let (constant, shares) = circular_mean(&offsets, period);
-    let mut covariance = estimate.covariance(&shares);
-    covariance.iter_mut().for_each(|c| *c *= residual_variance);
     Ok(Solution {
         offset_std: estimate
             .offset_variances
@@ -166,13 +214,14 @@ fn conclude(
             .collect(),
         offsets,
         constant,
-        coefficients: estimate.coefficients,
-        covariance,
         residual_variance,
         degrees_of_freedom,
         rank: system.unknowns(),
-        condition_number,
         method,
+        system,
+        condition_number,
+        estimate,
+        shares,
     })
 }
 

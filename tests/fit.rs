@@ -3,7 +3,9 @@
 use proptest::prelude::*;
 use trueangle::Error;
 use trueangle::design::{Design, Frequencies};
-use trueangle::fit::{Argument, Method, Options, Run, Solution, fit};
+use trueangle::fit::{Argument, Method, Options, Run, Solution, fit, scan};
+use trueangle::kernel;
+use trueangle::series::{HarmonicSeries, Shaft};
 
 /// Of errors of a few degrees: rounding of angles of a turn or two, and of either path.
 const SAME: f64 = 1e-12;
@@ -79,7 +81,7 @@ fn residuals_are_orthogonal_to_every_harmonic() {
             design.extend_row(&mut row, *x, 1.0);
             let fitted: f64 = row[1..]
                 .iter()
-                .zip(&found.coefficients)
+                .zip(found.coefficients())
                 .map(|(r, c)| r * c)
                 .sum();
             let residual = y - x - found.constant - fitted;
@@ -151,7 +153,118 @@ fn numbers_that_are_not_finite_are_named_on_every_path() {
     }
 }
 
+#[test]
+fn counts_are_told_from_other_numbers() {
+    let (reference, indicated) = readings(3, 4000);
+    let counts: Vec<f64> = reference.iter().map(|x| x.round()).collect();
+    let by_counts = solve(&design(360.0, &[1]), &counts, &indicated, None);
+    assert_eq!(by_counts.method, Method::Counts);
+    // One angle between two counts, and one too far to be told from its neighbours.
+    for odd in [counts[9] + 0.5, 360.0 * 2f64.powi(52)] {
+        let mut other = counts.clone();
+        other[9] = odd;
+        let found = solve(&design(360.0, &[1]), &other, &indicated, None);
+        assert_eq!(found.method, Method::Moments, "{odd}");
+    }
+    let run = Run {
+        reference: &reference,
+        indicated: &indicated,
+        weights: None,
+    };
+    let options = Options {
+        method: Some(Method::Counts),
+        ..Options::default()
+    };
+    let refused = fit(&design(360.0, &[1]), &[run], options);
+    assert!(matches!(refused, Err(Error::Method)));
+}
+
+#[test]
+fn a_scan_sees_the_residuals_that_count() {
+    let (reference, mut indicated) = readings(5, 150_000);
+    // Two readings stand out; the greater has weight 0.
+    indicated[70_000] += 40.0;
+    indicated[140_001] -= 50.0;
+    let weights: Vec<f64> = (0..reference.len())
+        .map(|i| (i % 3) as f64 * if i == 140_001 { 0.0 } else { 1.0 })
+        .collect();
+    let shaft = Shaft {
+        cycles: 1.0,
+        orders: vec![1],
+        cosine: vec![1.0],
+        sine: vec![0.0],
+    };
+    let series = HarmonicSeries::new(360.0, 2.0, vec![shaft]).unwrap();
+    let fitted = kernel::Evaluator::new(series.clone(), kernel::Argument::Reference);
+    let residual = |i: usize| {
+        let rest = indicated[i] - reference[i] - series.evaluate(reference[i]).0 - 0.25;
+        (rest + 180.0).rem_euclid(360.0) - 180.0
+    };
+    for weights in [None, Some(&weights[..])] {
+        let run = Run {
+            reference: &reference,
+            indicated: &indicated,
+            weights,
+        };
+        let counts = |i: &usize| weights.is_none_or(|w| w[*i] > 0.0);
+        let look = |stride, threads| {
+            scan(&fitted, &run, Argument::Reference, 0.25, stride, threads).unwrap()
+        };
+        let all = look(1, 2);
+        let slow: Vec<f64> = (0..reference.len()).filter(counts).map(residual).collect();
+        assert!(close(&all.sample, &slow, SAME) && all.sample.len() == slow.len());
+        let most = slow
+            .iter()
+            .fold(0.0f64, |most, value| most.max(value.abs()));
+        assert!((all.largest - most).abs() < SAME);
+        let few = look(37, 1);
+        assert_eq!(few, look(37, 2));
+        assert_eq!(few.largest, all.largest);
+        assert!((few.sample.len() as f64 / (slow.len() as f64 / 37.0) - 1.0).abs() < 0.01);
+    }
+}
+
 proptest! {
+    /// Means of counts are sufficient: the same answer as from every reading by itself, on
+    /// a full turn and on an arc, over many turns, with weights.
+    #[test]
+    fn counts_agree_with_their_readings(
+        seed in any::<u64>(),
+        arc in prop::sample::select(vec![1.0, 0.4]),
+        weighted in any::<bool>(),
+        swap in any::<bool>(),
+    ) {
+        const UNIT: f64 = 1000.0;
+        let (reference, indicated) = readings(seed, 20_000);
+        let turns = |i: usize| UNIT * (i % 7) as f64 - 3.0 * UNIT;
+        let x: Vec<f64> = reference.iter().enumerate()
+            .map(|(i, x)| (x / 360.0 * UNIT * arc).round() + turns(i)).collect();
+        let y: Vec<f64> = indicated.iter().zip(&reference).zip(&x)
+            .map(|((y, r), x)| x + (y - r) / 360.0 * UNIT).collect();
+        let weights: Vec<f64> = (0..x.len()).map(|i| (i % 4) as f64).collect();
+        let weights = weighted.then_some(&weights[..]);
+        let (argument, run) = if swap {
+            (Argument::Indicated, Run { reference: &y, indicated: &x, weights })
+        } else {
+            (Argument::Reference, Run { reference: &x, indicated: &y, weights })
+        };
+        let design = design(UNIT, &[1, 2, 3]);
+        let by = |method, threads| {
+            let options = Options { argument, method, threads, ..Options::default() };
+            fit(&design, &[run], options).unwrap()
+        };
+        let counts = by(None, 2);
+        prop_assert_eq!(counts.method, Method::Counts);
+        let plain = by(Some(Method::Plain), 1);
+        let tolerance = SAME * plain.condition_number() * UNIT / 360.0;
+        prop_assert!(close(plain.coefficients(), counts.coefficients(), tolerance));
+        prop_assert!((plain.constant - counts.constant).abs() < tolerance);
+        prop_assert!((plain.residual_variance / counts.residual_variance - 1.0).abs() < 1e-10);
+        prop_assert_eq!(plain.degrees_of_freedom, counts.degrees_of_freedom);
+        let one = by(None, 1);
+        prop_assert_eq!(one.coefficients(), counts.coefficients());
+    }
+
     #[test]
     fn zero_turns_order_and_sign_do_not_matter(
         seed in any::<u64>(),
@@ -168,7 +281,7 @@ proptest! {
             .map(|y| (y + zero + 360.0 * f64::from(turns)).rem_euclid(360.0)).collect();
         let reversed: Vec<f64> = reference.iter().rev().copied().collect();
         let other = solve(&design, &reversed, &moved, None);
-        prop_assert!(close(&base.coefficients, &other.coefficients, SAME));
+        prop_assert!(close(base.coefficients(), other.coefficients(), SAME));
 
         // Reference and indicated angles change places: the error changes its sign.
         let argument = if indicated_argument { Argument::Indicated } else { Argument::Reference };
@@ -177,8 +290,8 @@ proptest! {
         let swapped = Run { reference: &indicated, indicated: &reference, weights: None };
         let one = fit(&design, &[run], Options { argument, ..Options::default() }).unwrap();
         let two = fit(&design, &[swapped], Options { argument: twin, ..Options::default() }).unwrap();
-        let negated: Vec<f64> = two.coefficients.iter().map(|c| -c).collect();
-        prop_assert!(close(&one.coefficients, &negated, SAME));
+        let negated: Vec<f64> = two.coefficients().iter().map(|c| -c).collect();
+        prop_assert!(close(one.coefficients(), &negated, SAME));
     }
 
     #[test]
@@ -190,7 +303,7 @@ proptest! {
         let plain = solve(&design, &x, &y, Some(Method::Plain));
         for method in [Method::Moments, Method::Qr] {
             let found = solve(&design, &x, &y, Some(method));
-            prop_assert!(close(&plain.coefficients, &found.coefficients, SAME * unit / 360.0));
+            prop_assert!(close(plain.coefficients(), found.coefficients(), SAME * unit / 360.0));
             prop_assert!((plain.residual_variance / found.residual_variance - 1.0).abs() < 1e-10);
             prop_assert!((plain.constant - found.constant).abs() < SAME * unit / 360.0);
         }

@@ -102,6 +102,7 @@ proptest! {
         }
         let (pivot, shared) = reduction.finish().unwrap().eliminate();
         let blocks = System { runs: vec![pivot], shared };
+        prop_assert!(blocks.condition_number() <= blocks.condition_bound() * (1.0 + ORTHOGONAL));
         prop_assume!(blocks.condition_number() < 100.0);
         let estimate = blocks.solve(None).unwrap();
         let unknowns: Vec<f64> = [&estimate.offsets[..], &estimate.coefficients].concat();

@@ -168,6 +168,14 @@ def fit(
 def resultant(
     indicated: NDArray[np.float64], reference: NDArray[np.float64], period: float
 ) -> float: ...
+def scan_residuals(
+    series: Series,
+    run: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64] | None],
+    argument: str,
+    offset: float,
+    stride: int,
+    threads: int | None = None,
+) -> tuple[NDArray[np.float64], float]: ...
 def residuals(
     indicated: NDArray[np.float64],
     reference: NDArray[np.float64],

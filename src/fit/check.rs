@@ -11,16 +11,20 @@ pub fn shapes(design: &Design, runs: &[Run], ridge: Option<&[f64]>) -> Result<()
         same_length("ridge", ridge.len(), "coefficients", design.columns())?;
         not_negative("ridge", ridge)?;
     }
-    for run in runs {
-        let wanted = run.reference.len();
-        same_length("indicated", run.indicated.len(), "reference", wanted)?;
-        if let Some(weights) = run.weights {
-            same_length("weights", weights.len(), "reference", wanted)?;
-            not_negative("weights", weights)?;
-        }
-    }
+    runs.iter().try_for_each(lengths)?;
+    let weights = |run: &Run| run.weights.map_or(Ok(()), |w| not_negative("weights", w));
+    runs.iter().try_for_each(weights)?;
     let counts = |run: &Run| run.readings(Argument::Reference).count();
     have_readings(design, runs.iter().map(counts))
+}
+
+/// That the columns of a run are equally long.
+pub fn lengths(run: &Run) -> Result<(), Error> {
+    let wanted = run.reference.len();
+    same_length("indicated", run.indicated.len(), "reference", wanted)?;
+    run.weights.map_or(Ok(()), |weights| {
+        same_length("weights", weights.len(), "reference", wanted)
+    })
 }
 
 /// That there are runs, and none without a reading that counts.

@@ -34,16 +34,38 @@ pub const FACTOR_ROUNDING: f64 = 1e-8;
 /// A system, its condition number and the path that led to it.
 pub struct Reduced {
     pub system: System,
-    pub condition_number: f64,
+    /// Where the choice of the path needed it.
+    pub condition_number: Option<f64>,
     pub method: Method,
+    /// Weighted sum of squares that no harmonic can explain, beside what is left over in
+    /// the system: that of readings at one count about their mean.
+    pub scatter: f64,
 }
 
 impl Reduced {
     fn new(system: System, method: Method) -> Self {
         Self {
-            condition_number: system.condition_number(),
             system,
+            condition_number: None,
             method,
+            scatter: 0.0,
+        }
+    }
+
+    /// True where the condition number, which is then known, is below `limit`.
+    fn is_within(&mut self, limit: f64) -> bool {
+        *self
+            .condition_number
+            .get_or_insert_with(|| self.system.condition_number())
+            < limit
+    }
+
+    /// The same from mean errors of counts, about which the readings scatter.
+    pub fn from_counts(self, scatter: f64) -> Self {
+        Self {
+            method: Method::Counts,
+            scatter,
+            ..self
         }
     }
 }
@@ -58,7 +80,7 @@ pub fn reduce(
     inspect: impl Fn() -> Result<(), Error>,
 ) -> Result<Reduced, Error> {
     let asked = options.method;
-    if asked != Some(Method::Plain)
+    if !matches!(asked, Some(Method::Plain | Method::Counts))
         && let Some((cycles, orders)) = design.common_turn()
     {
         let highest = orders.iter().copied().max().unwrap_or(0);
@@ -78,20 +100,20 @@ pub fn reduce(
             }
             let sums: Vec<_> = sums.iter().collect();
             if asked != Some(Method::Qr)
-                && let Some(reduced) = by_moments(&sums, &orders, highest)
-                && (reduced.condition_number < NORMAL_UP_TO || asked.is_some())
+                && let Some(mut reduced) = by_moments(&sums, &orders, highest)
+                && (reduced.is_within(NORMAL_UP_TO) || asked.is_some())
             {
                 return Ok(reduced);
             }
             if asked == Some(Method::Qr) || per_segment >= READINGS_PER_FACTOR {
-                let reduced = Reduced::new(factor::system(&sums, &orders), Method::Qr);
-                if reduced.condition_number < FACTORS_UP_TO || asked.is_some() {
+                let mut reduced = Reduced::new(factor::system(&sums, &orders), Method::Qr);
+                if reduced.is_within(FACTORS_UP_TO) || asked.is_some() {
                     return Ok(reduced);
                 }
             }
         }
     }
-    if matches!(asked, Some(Method::Moments | Method::Qr)) {
+    if matches!(asked, Some(Method::Moments | Method::Qr | Method::Counts)) {
         return Err(Error::Method);
     }
     inspect()?;
@@ -107,10 +129,12 @@ pub fn reduce_moments(design: &Design, runs: &[&Accumulator]) -> Result<Reduced,
     if highest > base.highest() {
         return Err(Error::Method);
     }
-    match by_moments(runs, &orders, highest) {
-        Some(reduced) if reduced.condition_number < NORMAL_UP_TO => Ok(reduced),
-        _ => Ok(Reduced::new(factor::system(runs, &orders), Method::Qr)),
+    if let Some(mut reduced) = by_moments(runs, &orders, highest)
+        && reduced.is_within(NORMAL_UP_TO)
+    {
+        return Ok(reduced);
     }
+    Ok(Reduced::new(factor::system(runs, &orders), Method::Qr))
 }
 
 /// By normal equations; None where they are singular to working precision.

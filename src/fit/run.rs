@@ -23,6 +23,15 @@ pub enum Argument {
 }
 
 impl<'a> Run<'a> {
+    /// Readings `start..end`.
+    pub fn part(&self, start: usize, end: usize) -> Self {
+        Self {
+            reference: &self.reference[start..end],
+            indicated: &self.indicated[start..end],
+            weights: self.weights.map(|weights| &weights[start..end]),
+        }
+    }
+
     /// The run as harmonics of its argument.
     pub fn readings(&self, argument: Argument) -> Readings<'a> {
         Readings {

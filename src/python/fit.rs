@@ -4,6 +4,7 @@ use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, ToPyArray};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
+use super::series::PySeries;
 use super::threads;
 use crate::design::{Design, Frequencies};
 use crate::fit as core;
@@ -52,8 +53,8 @@ impl Solution {
 
     #[getter]
     fn covariance<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        let size = 1 + self.inner.coefficients.len();
-        self.inner.covariance.to_pyarray(py).reshape([size, size])
+        let size = 1 + self.inner.coefficients().len();
+        self.inner.covariance().to_pyarray(py).reshape([size, size])
     }
 
     #[getter]
@@ -73,7 +74,7 @@ impl Solution {
 
     #[getter]
     fn condition_number(&self) -> f64 {
-        self.inner.condition_number
+        self.inner.condition_number()
     }
 
     #[getter]
@@ -82,6 +83,7 @@ impl Solution {
             Method::Plain => "plain",
             Method::Moments => "moments",
             Method::Qr => "qr",
+            Method::Counts => "counts",
         }
     }
 }
@@ -89,7 +91,7 @@ impl Solution {
 impl Solution {
     /// Every second coefficient, shaft by shaft: cosines from 0, sines from 1.
     fn halves(&self, first: usize) -> Vec<Vec<f64>> {
-        let mut values = self.inner.coefficients.iter().skip(first).step_by(2);
+        let mut values = self.inner.coefficients().iter().skip(first).step_by(2);
         let shaft = |size: &usize| values.by_ref().take(*size).copied().collect();
         self.sizes.iter().map(shaft).collect()
     }
@@ -110,18 +112,15 @@ pub fn fit(
     ridge: Option<Vec<f64>>,
     threads: Option<i64>,
 ) -> PyResult<Solution> {
-    let argument = match argument {
-        "reference" => Argument::Reference,
-        "indicated" => Argument::Indicated,
-        other => return Err(unknown("argument", other, "\"reference\" or \"indicated\"")),
-    };
+    let argument = argument_named(argument)?;
     let method = match method {
         None => None,
         Some("plain") => Some(Method::Plain),
         Some("moments") => Some(Method::Moments),
         Some("qr") => Some(Method::Qr),
+        Some("counts") => Some(Method::Counts),
         Some(other) => {
-            let wanted = "\"plain\", \"moments\", \"qr\" or None";
+            let wanted = "\"plain\", \"moments\", \"qr\", \"counts\" or None";
             return Err(unknown("method", other, wanted));
         }
     };
@@ -129,15 +128,44 @@ pub fn fit(
     let design = design(period, cycles, orders)?;
     let runs = runs.iter().map(slices).collect::<PyResult<Vec<_>>>()?;
     let readings = runs.iter().map(|run| run.reference.len()).sum();
-    let threads = threads::threads(py, threads, readings)?;
+    let threads = threads::count(py, threads, readings)?;
     let options = Options {
         argument,
         method,
         ridge: ridge.as_deref(),
-        threads: threads.unwrap_or_else(crate::threads::available),
+        threads,
     };
     let inner = py.detach(|| core::fit(&design, &runs, options))?;
     Ok(Solution { inner, sizes })
+}
+
+/// A sample of the residuals of one run, and the largest.
+#[pyfunction]
+#[pyo3(signature = (series, run, argument, offset, stride, threads=None))]
+pub fn scan_residuals<'py>(
+    py: Python<'py>,
+    series: &PySeries,
+    run: Readings<'py>,
+    argument: &str,
+    offset: f64,
+    stride: usize,
+    threads: Option<i64>,
+) -> PyResult<(Bound<'py, PyArray1<f64>>, f64)> {
+    let argument = argument_named(argument)?;
+    let run = slices(&run)?;
+    let threads = threads::count(py, threads, run.reference.len())?;
+    let evaluator = &series.evaluator;
+    let found =
+        py.detach(|| core::scan(evaluator, &run, argument, offset, stride.max(1), threads))?;
+    Ok((found.sample.to_pyarray(py), found.largest))
+}
+
+fn argument_named(name: &str) -> PyResult<Argument> {
+    match name {
+        "reference" => Ok(Argument::Reference),
+        "indicated" => Ok(Argument::Indicated),
+        other => Err(unknown("argument", other, "\"reference\" or \"indicated\"")),
+    }
 }
 
 /// The harmonics of several shafts.

@@ -87,8 +87,7 @@ impl PyMoments {
         if readings.count() == 0 {
             return Ok(());
         }
-        let threads = threads::threads(py, threads, len)?;
-        let threads = threads.unwrap_or_else(crate::threads::available);
+        let threads = threads::count(py, threads, len)?;
         let mut sums = match self.sums.take() {
             Some(sums) => sums,
             None => self.fresh(readings.centre(Period::new(self.period)?))?,

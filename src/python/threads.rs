@@ -25,8 +25,15 @@ pub fn threads(py: Python<'_>, asked: Option<i64>, samples: usize) -> PyResult<O
 #[pyfunction]
 #[pyo3(signature = (threads=None))]
 pub fn thread_count(py: Python<'_>, threads: Option<i64>) -> PyResult<usize> {
-    let asked = self::threads(py, threads, usize::MAX)?;
-    Ok(asked.unwrap_or_else(crate::threads::available))
+    count(py, threads, usize::MAX)
+}
+
+/// As [`threads`], for work that takes a number of threads. Few samples get one without
+/// a look at the cores, which takes longer than they do.
+pub fn count(py: Python<'_>, asked: Option<i64>, samples: usize) -> PyResult<usize> {
+    let few = samples < crate::kernel::THREADED;
+    let own = || if few { 1 } else { crate::threads::available() };
+    Ok(threads(py, asked, samples)?.unwrap_or_else(own))
 }
 
 /// True in a child of `multiprocessing` (and so of joblib, concurrent.futures, dask).

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from functools import cached_property
 
@@ -137,18 +138,22 @@ class Problem:
     def scan(self, fitted: Fitted) -> tuple[Array, float]:
         """A sample of the residuals of weight above 0, and the largest, in constant memory."""
         stride = max(1, sum(len(run) for run in self.runs) // _BLOCK)
-        sample, largest = [], 0.0
-        for i, weight in enumerate(self.base):
-            for j, block in enumerate(self._blocks(fitted, i)):
-                used = (
-                    block
-                    if weight is None
-                    else block[weight[j * _BLOCK : j * _BLOCK + block.size] > 0.0]
-                )
-                if used.size:
-                    sample.append(used[::stride])
-                    largest = max(largest, float(np.abs(used).max()))
-        return np.concatenate(sample), largest
+        offsets = (fitted.offsets - fitted.solution.constant).tolist()
+        found = [
+            _core.scan_residuals(
+                fitted.series,
+                (run.reference, run.indicated, weight),
+                self.argument,
+                offset,
+                stride,
+                self.threads,
+            )
+            for run, weight, offset in zip(self.runs, self.base, offsets, strict=True)
+            if not math.isnan(offset)
+        ]
+        if len(found) == 1:
+            return found[0]
+        return np.concatenate([part for part, _ in found]), max(most for _, most in found)
 
     def _blocks(self, fitted: Fitted, index: int) -> Iterator[Array]:
         """Residuals of one run, piece by piece."""

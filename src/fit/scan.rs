@@ -1,0 +1,109 @@
+//! Residuals looked at, not kept.
+
+use super::{Argument, Run, check};
+use crate::circle::residuals;
+use crate::error::Error;
+use crate::kernel::{Batch, Evaluator, Quantity};
+use crate::threads;
+
+/// Readings worked on at a time: residuals stay in the fastest cache.
+const BLOCK: usize = 2048;
+
+/// Blocks handed to a thread at a time.
+const BLOCKS_PER_PART: usize = 32;
+
+/// What a look at the residuals of a run shows.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Scan {
+    /// The residual of every so many readings that count.
+    pub sample: Vec<f64>,
+    /// The greatest of all that count, signs left away.
+    pub largest: f64,
+}
+
+/// The residuals of a run around a fitted series (of the true angle, its constant left in)
+/// and a zero of `offset`; one of every `stride` that count is kept. Results do not depend on `threads`.
+pub fn scan(
+    fitted: &Evaluator,
+    run: &Run,
+    argument: Argument,
+    offset: f64,
+    stride: usize,
+    threads: usize,
+) -> Result<Scan, Error> {
+    check::lengths(run)?;
+    let len = run.reference.len();
+    let part = BLOCK * BLOCKS_PER_PART;
+    let parts: Vec<_> = (0..len.div_ceil(part))
+        .map(|_| std::sync::Mutex::new(Ok(Scan::default())))
+        .collect();
+    threads::for_each_part(parts.len(), threads, |i| {
+        let found = scan_part(
+            fitted,
+            &run.part(i * part, len.min((i + 1) * part)),
+            argument,
+            offset,
+            stride,
+        );
+        *parts[i].lock().unwrap_or_else(|broken| broken.into_inner()) = found;
+    });
+    let mut whole = Scan::default();
+    for found in parts {
+        let found = found
+            .into_inner()
+            .unwrap_or_else(|broken| broken.into_inner())?;
+        whole.sample.extend(found.sample);
+        whole.largest = whole.largest.max(found.largest);
+    }
+    Ok(whole)
+}
+
+fn scan_part(
+    fitted: &Evaluator,
+    run: &Run,
+    argument: Argument,
+    offset: f64,
+    stride: usize,
+) -> Result<Scan, Error> {
+    let len = run.reference.len();
+    let period = fitted.series().period().value();
+    let mut scan = Scan::default();
+    let mut used = 0usize;
+    let mut block = vec![0.0; BLOCK.min(len)];
+    for start in (0..len).step_by(BLOCK) {
+        let run = run.part(start, len.min(start + BLOCK));
+        let readings = run.readings(argument);
+        let rest = &mut block[..run.reference.len()];
+        let batch = Batch::apart(readings.angle, rest)?;
+        fitted.run(Quantity::Error, None, Some(1), batch)?;
+        residuals(run.indicated, run.reference, offset, period, rest);
+        match run.weights {
+            None => {
+                let first = start.next_multiple_of(stride) - start;
+                scan.sample.extend(rest.iter().skip(first).step_by(stride));
+            }
+            Some(weights) => {
+                for (value, &weight) in rest.iter_mut().zip(weights) {
+                    if weight == 0.0 {
+                        *value = f64::NAN;
+                        continue;
+                    }
+                    if used.is_multiple_of(stride) {
+                        scan.sample.push(*value);
+                    }
+                    used += 1;
+                }
+            }
+        }
+        // A comparison with NaN is false: readings that do not count change nothing.
+        let greater = |most: f64, value: &f64| {
+            if value.abs() > most {
+                value.abs()
+            } else {
+                most
+            }
+        };
+        scan.largest = rest.iter().fold(scan.largest, greater);
+    }
+    Ok(scan)
+}
