@@ -3,7 +3,8 @@
 use super::{Argument, Run, check};
 use crate::circle::residuals;
 use crate::error::Error;
-use crate::kernel::{Batch, Evaluator, Quantity};
+use crate::kernel::lanes::InstructionSet;
+use crate::kernel::{Batch, Evaluator, Path, Quantity, Route};
 use crate::threads;
 
 /// Readings worked on at a time: residuals stay in the fastest cache.
@@ -11,6 +12,9 @@ const BLOCK: usize = 2048;
 
 /// Blocks handed to a thread at a time.
 const BLOCKS_PER_PART: usize = 32;
+
+/// Readings below which a series is evaluated as it is: its table costs more to build.
+const WITHOUT_TABLE: usize = 4096;
 
 /// What a look at the residuals of a run shows.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -67,6 +71,10 @@ fn scan_part(
 ) -> Result<Scan, Error> {
     let len = run.reference.len();
     let period = fitted.series().period().value();
+    let route = (len < WITHOUT_TABLE).then(|| Route {
+        path: Path::Exact,
+        set: InstructionSet::best(),
+    });
     let mut scan = Scan::default();
     let mut used = 0usize;
     let mut block = vec![0.0; BLOCK.min(len)];
@@ -75,7 +83,7 @@ fn scan_part(
         let readings = run.readings(argument);
         let rest = &mut block[..run.reference.len()];
         let batch = Batch::apart(readings.angle, rest)?;
-        fitted.run(Quantity::Error, None, Some(1), batch)?;
+        fitted.run(Quantity::Error, route, Some(1), batch)?;
         residuals(run.indicated, run.reference, offset, period, rest);
         match run.weights {
             None => {

@@ -107,6 +107,31 @@ def test_agrees_with_numpy(case, zeros, method):
     assert solution.rank == len(expected)
 
 
+@pytest.mark.parametrize("travel", [1.0, 0.5])
+def test_counts_agree_with_numpy(travel):
+    period, orders = 4096.0, [[1, 2, 5]]
+    zeros = [30.0, -2000.0]
+    _, runs = make_runs(3, [50_000, 40_000], period, [1.0], orders, zeros)
+    runs = [
+        (np.rint(travel * (r % period)) + 3 * period, np.rint(e).astype(float), w)
+        for r, e, w in runs
+    ]
+    rows = [(r, r + e, w) for r, e, w in runs]
+    solution = _core.fit(rows, period, [1.0], orders)
+    assert solution.method == "counts"
+    expected, covariance, variance, condition = numpy_fit(runs, period, [1.0], orders)
+    scale = AGREES * condition * abs(expected).max()
+    assert coefficients(solution) == pytest.approx(expected[2:], rel=0, abs=scale)
+    assert solution.offsets == pytest.approx(expected[:2], rel=0, abs=scale)
+    assert solution.residual_variance == pytest.approx(variance, rel=1e-10)
+    assert solution.condition_number == pytest.approx(condition, rel=1e-6)
+    np.testing.assert_allclose(
+        solution.covariance[1:, 1:], covariance[2:, 2:], rtol=0, atol=1e-8 * covariance.max()
+    )
+    with pytest.raises(ValueError, match="whole numbers"):
+        _core.fit([(r + 0.5, r, None) for r, _, _ in rows], period, [1.0], orders, method="counts")
+
+
 @pytest.mark.parametrize(
     ("travel", "highest", "expected"),
     [(360, 17, "moments"), (270, 17, "qr"), (180, 8, "qr"), (90, 5, "qr"), (180, 17, "plain")],

@@ -66,8 +66,10 @@ def fit(
     ridge : float, optional
         Tikhonov penalty relative to the sum of weights. By default 0 on a full turn, and
         chosen by held-out error on partial travel (`trueangle.fitting.travel.choose_ridge`).
-    method : {"plain", "moments", "qr"}, optional
-        Forces a way of solving.
+    method : {"plain", "moments", "qr", "counts"}, optional
+        Forces a way of solving: QR of all rows, one pass of piecewise moments with normal
+        equations or with QR, or one mean error per count of an encoder that counts (whole
+        numbers, at most 2^17 to a turn). By default the fastest that keeps QR's accuracy.
     threads : int, optional
 
     Returns

@@ -127,7 +127,7 @@ class FitResult:
 
     @property
     def method(self) -> str:
-        """How the normal equations were met: ``"plain"``, ``"moments"`` or ``"qr"``."""
+        """The way taken: ``"plain"``, ``"moments"``, ``"qr"`` or ``"counts"``, see `fit`."""
         return self.fitted.solution.method
 
     @property
