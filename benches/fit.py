@@ -99,6 +99,7 @@ def main() -> None:
     show(measure(Case(1_000_000, 17), 5, only=fast, methods=("qr",)))
     if large:
         show(measure(Case(10_000_000, 17), 5, only=fast[1:]))
+        show(measure(Case(10_000_000, 17, counts=1 << 16), 5, only=[], methods=("moments",)))
         show(measure(Case(10_000_000, 512), 5, only=fast[1:]))
         show(measure(Case(10_000_000, 8, 180.0), 5, only=[], methods=("moments", "qr")))
 

@@ -141,7 +141,7 @@ pub fn fit(design: &Design, runs: &[Run], options: Options) -> Result<Solution, 
                 inspect()?;
             }
             let reduced = path::reduce(design, &means, &centres, options, inspect)?;
-            reduced.from_counts(scatter)
+            reduced.counted(scatter)
         }
         None => path::reduce(design, &readings, &centres, options, inspect)?,
     };

@@ -61,7 +61,7 @@ impl Reduced {
     }
 
     /// The same from mean errors of counts, about which the readings scatter.
-    pub fn from_counts(self, scatter: f64) -> Self {
+    pub fn counted(self, scatter: f64) -> Self {
         Self {
             method: Method::Counts,
             scatter,

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import pytest
+
 from trueangle.bench.fit import Case, measure
 from trueangle.bench.fitpeers import peers
 
@@ -9,8 +11,15 @@ from trueangle.bench.fitpeers import peers
 AGREES = 1e-11
 
 
-def test_every_way_solves_the_same_problem():
-    rows = measure(Case(500, 3), rounds=1, methods=("plain", "moments", "qr"))
+@pytest.mark.parametrize(
+    ("case", "methods"),
+    [
+        (Case(500, 3), ("plain", "moments", "qr")),
+        (Case(2000, 3, counts=200), ("plain", "moments", "counts")),
+    ],
+)
+def test_every_way_solves_the_same_problem(case, methods):
+    rows = measure(case, rounds=1, methods=methods)
     names = {row.name for row in rows}
     assert names >= {"trueangle, 1 thread", "trueangle, 2 threads", "numpy.linalg.lstsq"}
     assert names >= set(peers()[0])

@@ -60,7 +60,7 @@ def batches(samples: int, rounds: int) -> list[Row]:
     rng = np.random.default_rng(0)
     theta = rng.uniform(0.0, 2.0 * math.pi, samples)
     out = np.empty_like(theta)
-    theta32, out32 = theta.astype(np.float32), out.astype(np.float32)
+    theta32, out32 = theta.astype(np.float32), np.empty(samples, np.float32)
     counts = rng.integers(0, 65536, samples, dtype=np.uint16)
     models = {name: harmonics(orders) for name, orders in ORDERS.items()}
     dense = models["17 orders"]

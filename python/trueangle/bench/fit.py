@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from functools import partial
 from typing import NamedTuple
 
@@ -10,6 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .. import _core
+from ..fitting.fit import fit
+from ..runs import CalibrationRun
 from .fitpeers import peers
 from .interleaved import Timing, interleave
 
@@ -17,11 +19,20 @@ __all__ = ["Case", "Row", "measure", "quick", "readings"]
 
 
 class Case(NamedTuple):
-    """One problem: readings over an arc of the circle, orders 1 to the highest."""
+    """One problem: readings over an arc of the circle, orders 1 to the highest.
+
+    With ``counts`` the angles are whole numbers of them to a turn.
+    """
 
     samples: int
     highest: int
     arc_deg: float = 360.0
+    counts: int | None = None
+
+    @property
+    def period(self) -> float:
+        """One turn in the unit in which our fit gets the angles."""
+        return 2.0 * np.pi if self.counts is None else float(self.counts)
 
 
 class Row(NamedTuple):
@@ -38,23 +49,35 @@ def readings(case: Case) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Angles in radians at random over the arc, and errors with noise; seed 0."""
     rng = np.random.default_rng(0)
     theta = rng.uniform(0.0, np.radians(case.arc_deg), case.samples)
+    if case.counts is not None:
+        theta = np.rint(theta * (case.counts / (2.0 * np.pi))) * (2.0 * np.pi / case.counts)
     error = 1e-3 * np.cos(theta) + 1e-4 * np.sin(3 * theta) + 1e-5 * rng.normal(size=theta.size)
     return theta, error
 
 
 def _ours(
-    theta: NDArray[np.float64],
-    indicated: NDArray[np.float64],
-    highest: int,
-    threads: int | None = None,
-    method: str | None = None,
+    run: CalibrationRun, highest: int, threads: int | None = None, method: str | None = None
 ) -> NDArray[np.float64]:
+    """The core alone: coefficients in radians."""
     orders = list(range(1, highest + 1))
     found = _core.fit(
-        [(theta, indicated, None)], 2 * np.pi, [1.0], [orders], method=method, threads=threads
+        [(run.reference, run.indicated, None)],
+        run.period,
+        [1.0],
+        [orders],
+        method=method,
+        threads=threads,
     )
     pairs = np.column_stack([found.cosine[0], found.sine[0]]).ravel()
-    return np.concatenate([[found.constant], pairs])
+    return np.concatenate([[found.constant], pairs]) * (2.0 * np.pi / run.period)
+
+
+def _whole(run: CalibrationRun, highest: int) -> NDArray[np.float64]:
+    """All that `trueangle.fit` does by default: checks, wild readings, travel."""
+    found = fit(run, orders=range(1, highest + 1))
+    solution = found.fitted.solution
+    pairs = np.column_stack([solution.cosine[0], solution.sine[0]]).ravel()
+    return np.concatenate([[solution.constant], pairs]) * (2.0 * np.pi / run.period)
 
 
 def measure(
@@ -66,19 +89,20 @@ def measure(
 ) -> list[Row]:
     """Time our fit, by numbers of threads and forced methods, and those of the peers."""
     theta, error = readings(case)
-    indicated = theta + error
-    ways = {
-        f"trueangle, {n} thread{'s' * (n > 1)}": partial(
-            _ours, theta, indicated, case.highest, threads=n
-        )
+    unit = case.period / (2.0 * np.pi)
+    place = theta * unit if case.counts is None else np.rint(theta * unit)
+    run = CalibrationRun(place, place + error * unit, period=case.period)
+    ways: dict[str, Callable[[], NDArray[np.float64]]] = {
+        f"trueangle, {n} thread{'s' * (n > 1)}": partial(_ours, run, case.highest, threads=n)
         for n in threads
     }
     for method in methods:
         name = f"trueangle, 1 thread, {method}"
-        ways[name] = partial(_ours, theta, indicated, case.highest, threads=1, method=method)
-    for name, fit in peers()[0].items():
+        ways[name] = partial(_ours, run, case.highest, threads=1, method=method)
+    ways["trueangle.fit, all it does"] = partial(_whole, run, case.highest)
+    for name, peer in peers()[0].items():
         if only is None or name in only:
-            ways[name] = partial(fit, theta, error, case.highest)
+            ways[name] = partial(peer, theta, error, case.highest)
     timings = interleave(ways, rounds)
     ours = next(iter(ways.values()))()
     scale = np.abs(ours).max()
