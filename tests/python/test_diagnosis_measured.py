@@ -155,11 +155,23 @@ def test_arm_joint_has_a_new_zero(data_dir, tmp_path, joint) -> None:
     assert "zero_slip" in named(findings(runs, simulation(tmp_path)))
 
 
-@pytest.mark.xfail(strict=True, reason="wander takes the reversal error; velocity is unknown")
-def test_arm_joint_has_a_reversal_error(data_dir, tmp_path) -> None:
+def test_arm_joint_has_a_reversal_error_that_is_not_named_but_estimated(data_dir, tmp_path) -> None:
+    # No time and no velocity, one reversal in each of two runs: play, winding up, a delay
+    # and a wander in time give these readings alike, so none may be named. What a
+    # calibration needs, the size of the reversal error, is there all the same.
     runs = [r for r in ta.read_runs(data_dir / "arm_joint_protractor.csv") if "joint1" in r.label]
-    found = named(findings(runs, simulation(tmp_path)))
-    assert {"backlash", "presliding_hysteresis"} & found
+    result = ta.diagnose(runs, simulation(tmp_path)).to_dict()
+    unsure = {"backlash", "presliding_hysteresis", "latency", "drift_within_run"}
+    assert not unsure & named(result["findings"])
+    (seen,) = [
+        spot
+        for spot in result["not_identifiable"]
+        if spot["supported"] and "backlash" in spot["causes"]
+    ]
+    assert unsure == set(seen["causes"])
+    half = seen["estimates"]["backlash"]["half_width_arcsec"]
+    assert half["value"] / 3600.0 == pytest.approx(0.16, abs=0.02)
+    assert 0.0 < half["std"] / 3600.0 < 0.03
 
 
 def test_arm_joint_has_one_wild_reading(data_dir, tmp_path) -> None:
@@ -236,6 +248,13 @@ def test_servo_has_a_reversal_error_and_an_offset_under_load(servo, tmp_path) ->
                     label=f"from {start:.0f} s",
                 )
             )
-    found = named(findings(runs, simulation(tmp_path)))
-    assert {"backlash", "presliding_hysteresis"} & found
-    assert {"torsional_compliance", "stiffening_compliance"} & found
+    result = ta.diagnose(runs, simulation(tmp_path))
+    found = {f.cause: f.parameters for f in result.findings}
+    assert {"torsional_compliance", "stiffening_compliance"} & set(found)
+    (reversal,) = {"backlash", "presliding_hysteresis"} & set(found)
+    # It depends on the place, about as much as it is large: nothing in the middle.
+    half = next(iter(found[reversal].values())).value
+    place = found[reversal]["place_amplitudes_arcsec"].value
+    assert half < 0.0
+    assert 0.5 < max(place) / -half < 2.0
+    assert "place_amplitudes_arcsec" in result.summary()

@@ -50,6 +50,9 @@ def render(diagnosis: Diagnosis) -> str:
             if spot.supported:
                 head += " (one of them is seen)" if len(spot.causes) > 1 else " (something is seen)"
             lines += _wrapped(f"- {head}: {spot.because}. To tell: {spot.measure}.", 2)
+            for cause, parameters in spot.estimates.items():
+                shown = ", ".join(f"{name} {_quantity(q)}" for name, q in parameters.items())
+                lines += _wrapped(f"If {cause}: {shown}.", 6, first=4)
     return "\n".join(lines)
 
 

@@ -21,7 +21,7 @@ from .dispersion import ScatterFinding, find_outliers, find_uneven_noise
 from .findings import Diagnosis, Finding
 from .gain import Gain, measure_gain
 from .identifiability import Blindness, blind_spots, doubts_about
-from .quantity import quantity
+from .quantity import Parameters, quantity
 from .selection import NEW_CAUSE, cause_terms, finding_groups, proposals, select
 from .space import Proposal, Space
 
@@ -173,7 +173,8 @@ def _findings(
             continue
         evidence = sum(space.terms[k].bic_gain for k in group)
         spots = [spot for spot in spots if spot != doubt]
-        spots.append(replace(doubt, supported=True, evidence=evidence))
+        estimates = _estimates(space, group, doubt.causes)
+        spots.append(replace(doubt, supported=True, evidence=evidence, estimates=estimates))
     gains: Sequence[Gain | None] = [None] * len(named)
     if with_gain and named:
         gains = measure_gain(space, named)
@@ -192,6 +193,22 @@ def _findings(
         }
         findings.append(Finding(cause, parameters, weight, gain, rivals, effects))
     return findings + _corrected_lines(space, spots), spots
+
+
+def _estimates(space: Space, group: Sequence[int], causes: Sequence[str]) -> dict[str, Parameters]:
+    """Parameters of every cause that may be the one, each alone in place of a finding."""
+    rest = cause_terms(space, group, settled=True)
+    found = {}
+    for cause in causes:
+        candidate = CANDIDATES[cause]
+        proposal = candidate.propose(rest)
+        if proposal is None or proposal.cause != cause or proposal.deviance <= 0.0:
+            continue
+        fitted = rest.with_terms([*rest.terms, proposal])
+        k = len(fitted.terms) - 1
+        parameters, _ = candidate.report(fitted, [(*fitted.fitted()[k], fitted.covariance(k))])
+        found[cause] = parameters
+    return found
 
 
 def _rivals(space: Space, group: Sequence[int]) -> list[tuple[str, float]]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -11,7 +11,9 @@ from numpy.typing import NDArray
 from ..simulation.effects import EFFECTS
 from ..simulation.effects.effect import line_columns
 from .grid import UniformGrid, uniform_grid
+from .quantity import Parameters
 from .space import Proposal, Space
+from .whitening import wander_basis
 
 __all__ = ["Blindness", "blind_spots", "doubts_about"]
 
@@ -47,6 +49,10 @@ class Blindness:
         Why, and the measurement to add.
     supported : bool
         The readings do show something that one of these causes explains.
+    evidence : float or None
+        By how much BIC is better with it.
+    estimates : dict of str to Parameters
+        What each of the causes would be if it alone were the one; where something is seen.
     """
 
     causes: tuple[str, ...]
@@ -54,6 +60,7 @@ class Blindness:
     measure: str
     supported: bool = False
     evidence: float | None = None
+    estimates: dict[str, Parameters] = field(default_factory=dict)
 
     def to_json(self) -> dict[str, Any]:
         """The entry of ``not_identifiable``."""
@@ -63,6 +70,10 @@ class Blindness:
             "measure": self.measure,
             "supported": self.supported,
             "bic_gain": self.evidence,
+            "estimates": {
+                cause: {name: q.to_json() for name, q in parameters.items()}
+                for cause, parameters in self.estimates.items()
+            },
         }
 
 
@@ -85,6 +96,8 @@ def doubts_about(proposal: Proposal, space: Space, spots: list[Blindness]) -> Bl
     for spot in spots:
         if cause in spot.causes and cause != "missing_order":
             return spot
+    if cause == "drift_within_run":
+        return _doubt_about_wander(space)
     if cause == "missing_order":
         return _doubt_about_line(float(proposal.shape["output_order"]), space, spots)
     return None
@@ -332,6 +345,34 @@ def _gear_lines(space: Space) -> list[float]:
     if "wave_generator" in joint.shafts:
         lines.add(joint.shafts["motor"] + joint.shafts["wave_generator"])
     return sorted(lines)
+
+
+def _doubt_about_wander(space: Space) -> Blindness | None:
+    """Why a wander in time may be an error of reversal: few runs that reverse once."""
+    signals = space.signals
+    if signals.runs >= RUNS_PER_LEVEL or np.ptp(signals.direction) == 0.0:
+        return None
+    left = power = 0.0
+    for start, stop in space.bounds:
+        wander = wander_basis(signals.clock[start:stop])
+        q, _ = np.linalg.qr(np.column_stack([np.ones(stop - start), wander]))
+        direction = signals.direction[start:stop]
+        power += float(np.sum((direction - direction.mean()) ** 2))
+        left += float(np.sum((direction - q @ (q.T @ direction)) ** 2))
+    if left > OWN_OF_VELOCITY * power:
+        return None
+    rest = space.with_terms(t for t in space.terms if t.cause != "drift_within_run")
+    reversal = rest.propose("backlash", {}, signals.direction[:, None])
+    if reversal.bic_gain <= 0.0:
+        return None
+    causes = ("drift_within_run", "backlash", "presliding_hysteresis")
+    return Blindness(
+        causes if signals.velocity is not None else (*causes, "latency"),
+        f"{signals.runs} run(s) that reverse about once: an error that changes with the "
+        "direction of travel and one that changes with time look alike",
+        "reverse several times within each run, at places that differ from run to run, or "
+        "repeat the runs",
+    )
 
 
 def _doubt_about_line(order: float, space: Space, spots: list[Blindness]) -> Blindness | None:

@@ -37,8 +37,9 @@ def select(space: Space) -> Space:
 
     Forward selection with every candidate; where that takes a flexible cause (which can
     imitate any effect of a run) or a bump, further paths take those only after the
-    specific ones had their say, without and with a zero of each run's own. All are
-    pruned backward; the best by BIC is kept.
+    specific ones had their say, without and with a zero of each run's own (or with what
+    acts on whole runs beside an error that repeats at the same angle). All are pruned
+    backward; the best by BIC is kept.
     """
     direct = _pruned(_forward(space, list(CANDIDATES)))
     found = {term.cause for term in direct.terms}
@@ -47,12 +48,32 @@ def select(space: Space) -> Space:
     # A bump, too, can stand for several lines at once: lines first.
     specific = [cause for cause in CANDIDATES if cause not in (*FLEXIBLE, "local_defect")]
     starts = [_forward(space, RUN_FACTORS)]
-    if found & {*FLEXIBLE}:
+    beyond = space.without_repeats()
+    if beyond is not space:
+        # What acts on whole runs shows best beside an unknown pattern that repeats.
+        settled = _forward(_forward(beyond, RUN_FACTORS), ("zero_slip",))
+        starts.append(space.with_terms(settled.terms))
+    elif found & {*FLEXIBLE}:
         slip = CANDIDATES["zero_slip"].propose(space)
         if slip is not None and slip.bic_gain > NEW_CAUSE:
             starts.append(space.with_terms([slip]))
     paths = [_pruned(_forward(_forward(s, specific), list(CANDIDATES))) for s in starts]
-    return min([direct, *paths], key=total_price)
+    return _made_specific(min([direct, *paths], key=total_price))
+
+
+def _made_specific(space: Space) -> Space:
+    """With a specific cause in place of a flexible one where that explains more."""
+    for term in [term for term in space.terms if term.cause in FLEXIBLE]:
+        rest = space.with_terms(t for t in space.terms if t.cause != term.cause)
+        tried = [
+            start.with_terms([*start.terms, proposal])
+            for proposal, start, gain in proposals(rest, RUN_FACTORS)
+            if total_price(rest) - gain < total_price(space)
+        ]
+        best = min(tried, key=total_price, default=space)
+        if total_price(best) < total_price(space):
+            space = _pruned(_forward(best, list(CANDIDATES)))
+    return space
 
 
 def total_price(space: Space) -> float:
@@ -73,9 +94,10 @@ def finding_groups(terms: Sequence[Proposal]) -> list[list[int]]:
     return groups
 
 
-def cause_terms(space: Space, group: Sequence[int]) -> Space:
-    """The space without the terms ``group``."""
-    return space.with_terms(t for k, t in enumerate(space.terms) if k not in group)
+def cause_terms(space: Space, group: Sequence[int], settled: bool = False) -> Space:
+    """The space without the terms ``group``; ``settled`` keeps its correlation of the noise."""
+    terms = [t for k, t in enumerate(space.terms) if k not in group]
+    return space.with_terms(terms, space.whiten.rho if settled else None)
 
 
 def proposals(space: Space, causes: Sequence[str]) -> list[tuple[Proposal, Space, float]]:

@@ -14,6 +14,7 @@ from ..simulation.effects.effect import line_columns
 from ..simulation.pattern import Pattern
 from ..simulation.signals import Signals
 from .linebasis import LineBasis
+from .repeatability import repeated_part
 from .whitening import RunEffect, Whitener, lag_correlation
 
 __all__ = ["Proposal", "Space"]
@@ -114,11 +115,26 @@ class Space:
 
     # -- model -------------------------------------------------------------------
 
-    def with_terms(self, terms: Iterable[Proposal]) -> Space:
-        """A space of the same readings with other terms."""
+    def with_terms(self, terms: Iterable[Proposal], rho: float | None = None) -> Space:
+        """A space of the same readings with other terms (and this correlation of the noise)."""
         other = object.__new__(Space)
         other.__dict__.update(self.__dict__)
         other.terms = list(terms)
+        if rho is not None:
+            other.fixed_rho = rho
+        other.update()
+        return other
+
+    def without_repeats(self, by_direction: bool = False) -> Space:
+        """The space without what repeats at the same place; itself where nothing does."""
+        left = np.where(self.wild, 0.0, self.left)
+        repeated = repeated_part(left, self.signals, by_direction)
+        if not repeated.any():
+            return self
+        other = object.__new__(Space)
+        other.__dict__.update(self.__dict__)
+        other.residual = self.residual - repeated
+        other.memory = {}
         other.update()
         return other
 

@@ -19,6 +19,9 @@ __all__ = ["NonIntegerCandidate"]
 #: Trial orders per resolution cell (one order over the turns of a run).
 OVERSAMPLING = 3
 
+#: Lowest order searched, and cycles that a run must show: fewer are a bend, not a line.
+LOWEST, LEAST_CYCLES = 0.3, 2.0
+
 #: Trial orders at most; beyond, the grid stops at a lower order.
 MOST_TRIALS = 4096
 
@@ -101,12 +104,13 @@ class NonIntegerCandidate(Candidate):
         if sizes.min() < 8 or turns.max() <= 0.0:
             return np.zeros(0), np.zeros(0)
         top = float(space.lines.orders.max()) * 0.75
+        low = max(LOWEST, LEAST_CYCLES / float(np.median(turns)))
         # Half the mean rate of readings is as far as a run can tell.
         step = 1.0 / (OVERSAMPLING * float(np.median(turns)))
-        count = int(min((top - 0.3) / step, MOST_TRIALS))
+        count = int(min((top - low) / step, MOST_TRIALS))
         if count < 3:
             return np.zeros(0), np.zeros(0)
-        orders = 0.3 + step * np.arange(count, dtype=np.float64)
+        orders = low + step * np.arange(count, dtype=np.float64)
         e = space.left - space.whiten.run_part(space.left)
         e = np.where(space.wild, 0.0, e)
         turn = np.exp(-1j * step * theta).astype(np.complex64)

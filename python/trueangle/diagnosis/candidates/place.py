@@ -42,7 +42,7 @@ class ArgumentCandidate(Candidate):
     cause: ClassVar[str] = "argument_error"
 
     def propose(self, space: Space) -> Proposal | None:
-        if space.around.pattern.orders.size == 0:
+        if space.around.pattern.orders.size == 0 or space.has(self.cause):
             return None
         return space.propose(self.cause, {}, self.columns(space.signals, space.around, {}))
 

@@ -58,34 +58,25 @@ class BacklashCandidate(Candidate):
         return max(proposals, key=lambda p: p.bic_gain)
 
     def columns(self, signals: Signals, around: Surroundings, shape: dict[str, Any]) -> Array:
-        if shape["order"] == 0:
-            return signals.direction[:, None]
-        return signals.direction[:, None] * line_columns(signals.theta, shape["order"])
+        return _play_columns(signals, shape["order"])
 
     def report(
         self, space: Space, terms: Sequence[tuple[Proposal, Array, Array]]
     ) -> tuple[Parameters, list[Effect]]:
         width, std = 0.0, 0.0
-        lines = []
         for proposal, coefficients, covariance in terms:
-            order = float(proposal.shape["order"])
-            if order == 0.0:
+            if _everywhere(proposal):
                 width, std = float(coefficients[0]), float(np.sqrt(covariance[0, 0]))
-            else:
-                lines.append((order, *line_parameters(coefficients, covariance)))
-        parameters = {"half_width_arcsec": quantity(width, std)}
-        if lines:
-            parameters["place_orders"] = quantity([line[0] for line in lines])
-            parameters["place_amplitudes_arcsec"] = quantity(
-                [line[1] for line in lines], [line[3] for line in lines]
-            )
+        lines = _place_lines(terms)
+        parameters = {"half_width_arcsec": quantity(width, std)} | _place_parameters(lines)
         return parameters, [Backlash(width, tuple((m, a, p) for m, a, p, _, _ in lines))]
 
 
 class HysteresisCandidate(Candidate):
     """Regressor: the state of a presliding spring, its length searched.
 
-    A second and third element (Maxwell-slip) may follow, and one of no length.
+    A second and third element (Maxwell-slip) may follow, one of no length (play), and play
+    that varies with the place.
     """
 
     cause: ClassVar[str] = "presliding_hysteresis"
@@ -106,7 +97,11 @@ class HysteresisCandidate(Candidate):
                 best = (float(gains[k]), float(LENGTHS[k]), start)
         assert best is not None
         gain, length, start = best
-        present = [term.shape["length_deg"] for term in space.terms if term.cause == self.cause]
+        present = [
+            term.shape["length_deg"]
+            for term in space.terms
+            if term.cause == self.cause and _everywhere(term)
+        ]
         if gain <= 0.0 or len(present) >= MOST_ELEMENTS:
             return None
         step = np.log(LENGTHS[1] / LENGTHS[0])
@@ -118,44 +113,70 @@ class HysteresisCandidate(Candidate):
         shape = {"length_deg": float(np.exp(log_length)), "start_state": start}
         columns = self.columns(signals, space.around, shape)
         proposal = space.propose(self.cause, shape, columns, parameters=2, log_grid=np.log(2.0))
-        if space.has(self.cause):
-            # A further element may have no length: what is left of play.
-            play = space.propose(self.cause, {"length_deg": 0.0}, signals.direction[:, None])
-            apart = all(
-                other > 0.0 and abs(np.log(shape["length_deg"] / other)) > np.log(APART)
-                for other in present
-            )
-            return max(play, proposal, key=lambda p: p.bic_gain) if apart else play
-        return proposal
+        if not space.has(self.cause):
+            return proposal
+        # What may follow: play, play that varies with the place, another element.
+        further = [self._play(space, order) for order in (0, *PLACE_ORDERS)]
+        apart = all(
+            other == 0.0 or abs(np.log(shape["length_deg"] / other)) > np.log(APART)
+            for other in present
+        )
+        if apart:
+            further.append(proposal)
+        further.sort(key=lambda p: -p.bic_gain)
+        return next((p for p in further if p.bic_gain > 0.0 and self._pulls_back(space, p)), None)
+
+    def _pulls_back(self, space: Space, proposal: Proposal) -> bool:
+        """With this term all elements have one sign, as springs have.
+
+        Elements of unlike signs would only be a difference of two that are alike.
+        """
+        trial = space.with_terms([*space.terms, proposal])
+        elements = [
+            float(c[0]) for t, c in trial.fitted() if t.cause == self.cause and _everywhere(t)
+        ]
+        return min(elements) * max(elements) > 0.0
+
+    def _play(self, space: Space, order: int) -> Proposal:
+        shape = {"length_deg": 0.0, "order": order}
+        columns = self.columns(space.signals, space.around, shape)
+        log_grid = float(np.log(len(PLACE_ORDERS))) if order else 0.0
+        return space.propose(self.cause, shape, columns, log_grid=log_grid)
 
     def columns(self, signals: Signals, around: Surroundings, shape: dict[str, Any]) -> Array:
         if shape["length_deg"] == 0.0:
-            return signals.direction[:, None]
+            return _play_columns(signals, shape["order"])
         return signals.presliding(shape["length_deg"], shape["start_state"])[:, None]
 
     def report(
         self, space: Space, terms: Sequence[tuple[Proposal, Array, Array]]
     ) -> tuple[Parameters, list[Effect]]:
+        lines = _place_lines(terms)
+        terms = [term for term in terms if _everywhere(term[0])]
         total = sum(float(c[0]) for _, c, _ in terms)
         std = float(np.sqrt(sum(v[0, 0] for _, _, v in terms)))
         weights = np.array([abs(float(c[0])) for _, c, _ in terms])
         lengths = np.array([t.shape["length_deg"] for t, _, _ in terms])
-        length = float(weights @ lengths / weights.sum())
-        main = terms[int(np.argmax(weights))]
+        length = float(weights @ lengths / weights.sum()) if terms else 0.0
         effects: list[Effect] = [
             PreslidingHysteresis(float(c[0]), t.shape["length_deg"], t.shape["start_state"])
             if t.shape["length_deg"] > 0.0
             else Backlash(float(c[0]))
             for t, c, _ in terms
         ]
+        if lines:
+            effects.append(Backlash(0.0, tuple((m, a, p) for m, a, p, _, _ in lines)))
         parameters = {
             "amplitude_arcsec": quantity(total, std),
-            "length_deg": quantity(length, self._length_std(space, main)),
+            "length_deg": quantity(
+                length,
+                self._length_std(space, terms[int(np.argmax(weights))]) if terms else None,
+            ),
         }
         if len(terms) > 1:
             parameters["element_lengths_deg"] = quantity(lengths)
             parameters["element_amplitudes_arcsec"] = quantity([float(c[0]) for _, c, _ in terms])
-        return parameters, effects
+        return parameters | _place_parameters(lines), effects
 
     def _length_std(self, space: Space, term: tuple[Proposal, Array, Array]) -> float | None:
         """From the curvature: the column's derivative by ln L, all else projected out."""
@@ -175,3 +196,33 @@ class HysteresisCandidate(Candidate):
         x, _ = space.projected(derivative[:, None])
         information = float(x[:, 0] @ x[:, 0])
         return length * float(np.sqrt(space.variance / information)) if information > 0 else None
+
+
+def _everywhere(term: Proposal) -> bool:
+    """The term is the same at every place."""
+    return not term.shape.get("order")
+
+
+def _play_columns(signals: Signals, order: int) -> Array:
+    if order == 0:
+        return signals.direction[:, None]
+    return signals.direction[:, None] * line_columns(signals.theta, order)
+
+
+def _place_lines(
+    terms: Sequence[tuple[Proposal, Array, Array]],
+) -> list[tuple[float, float, float, float, float]]:
+    """(order, amplitude, phase, their standard deviations) of play that varies with place."""
+    return [
+        (float(t.shape["order"]), *line_parameters(c, v)) for t, c, v in terms if not _everywhere(t)
+    ]
+
+
+def _place_parameters(lines: list[tuple[float, float, float, float, float]]) -> Parameters:
+    if not lines:
+        return {}
+    return {
+        "place_orders": quantity([line[0] for line in lines]),
+        "place_amplitudes_arcsec": quantity([line[1] for line in lines], [x[3] for x in lines]),
+        "place_phases_deg": quantity([line[2] for line in lines], [x[4] for x in lines]),
+    }

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any, ClassVar
 
 import numpy as np
@@ -65,16 +66,25 @@ class DriftCandidate(Candidate):
     def propose(self, space: Space) -> Proposal | None:
         if space.has(self.cause):
             return None
-        proposals = [
-            space.propose_run_effect(
-                self.cause,
-                {"form": form},
-                self._shapes(space, form),
-                log_grid=float(np.log(len(FORMS))),
-            )
-            for form in FORMS
-        ]
-        return max(proposals, key=lambda p: p.bic_gain)
+        proposals = [self._proposal(space, form) for form in FORMS]
+        best = max(proposals, key=lambda p: p.bic_gain)
+        if best.bic_gain <= 0.0:
+            return best
+        # An error that comes back at the same place on the next pass in that direction is
+        # no wander in time, nor is a new zero.
+        beyond = space.without_repeats(by_direction=True)
+        if beyond is space:
+            return best
+        if space.signals.runs > 1 and not space.has("zero_slip"):
+            zero = beyond.propose_run_effect("zero_slip", {}, np.ones((space.n, 1)))
+            beyond = beyond.with_terms([*beyond.terms, zero])
+        deviance = self._proposal(beyond, best.shape["form"]).deviance
+        return replace(best, deviance=min(best.deviance, deviance))
+
+    def _proposal(self, space: Space, form: str) -> Proposal:
+        columns = self._shapes(space, form)
+        log_grid = float(np.log(len(FORMS)))
+        return space.propose_run_effect(self.cause, {"form": form}, columns, log_grid)
 
     @staticmethod
     def _shapes(space: Space, form: str) -> Array:

@@ -1,0 +1,130 @@
+"""Diagnosis over a part of a turn, with few passes: what may and may not be told apart."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import trueangle as ta
+from trueangle.diagnosis.dispersion import find_outliers
+from trueangle.diagnosis.repeatability import repeated_part
+from trueangle.diagnosis.space import Space
+from trueangle.simulation import Joint, Simulation, join_runs
+
+JOINT = Joint(7.3, "none", "motor")
+
+
+def sweeps(rng, runs=4, span=130.0, n=600, error=lambda theta, time, direction: 0.0, sigma=2.0):
+    """Runs to and fro over ``span`` degrees, errors in arcsec."""
+    made = []
+    for j in range(runs):
+        up = np.sort(rng.uniform(20.0, 20.0 + span, n // 2))
+        theta = np.concatenate([up, np.sort(rng.uniform(20.0, 20.0 + span, n // 2))[::-1]])
+        time = np.arange(n) * 0.02
+        direction = np.repeat([1.0, -1.0], n // 2)
+        e = error(theta, time, direction) + sigma * rng.standard_normal(n)
+        made.append(ta.CalibrationRun(theta, theta + e / 3600.0, 360.0, time=time, label=str(j)))
+    return made
+
+
+def space_of(runs):
+    signals = join_runs(runs)
+    residual = np.concatenate([(run.indicated - run.reference) * 3600.0 for run in runs])
+    return Space(signals, residual, Simulation(JOINT, sigma_arcsec=1.0).surroundings)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_a_motor_line_is_named_where_the_travel_does_not_resolve_its_neighbours(seed):
+    rng = np.random.default_rng(seed)
+
+    def line(theta, *_):
+        return 40.0 * np.sin(np.radians(2 * JOINT.gear_ratio * theta + 50.0))
+
+    runs = sweeps(rng, error=line, sigma=40.0)
+    (found,) = ta.diagnose(runs, Simulation(JOINT, sigma_arcsec=1.0), gain=False).findings
+    assert found.cause == "missing_order"
+    assert (found.parameters["shaft"].value, found.parameters["order"].value) == ("motor", 2)
+    # Over 0.36 of a turn orders half an order apart explain nearly as much, as is said.
+    assert {14.0, 15.0} & set(found.parameters["hardly_told_from_output_orders"].value)
+
+
+def test_a_wide_bump_on_a_shaft_is_low_orders_and_a_narrow_one_is_a_defect():
+    rng = np.random.default_rng(8)
+
+    def bump(width):
+        def error(theta, *_):
+            away = (JOINT.gear_ratio * theta - 100.0 + 180.0) % 360.0 - 180.0
+            return 60.0 * np.exp(-0.5 * (away / width) ** 2)
+
+        return error
+
+    for width, local in ((40.0, False), (6.0, True)):
+        runs = sweeps(rng, error=bump(width))
+        found = ta.diagnose(runs, Simulation(JOINT, sigma_arcsec=1.0), gain=False).findings
+        widths = [f.parameters["width_deg"].value for f in found if f.cause == "local_defect"]
+        assert all(w <= 16.0 for w in widths)
+        assert (found[0].cause == "local_defect") is local
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_what_repeats_at_an_angle_is_told_from_what_wanders_in_time(seed):
+    rng = np.random.default_rng(seed)
+    pattern = space_of(sweeps(rng, error=lambda theta, *_: 30.0 * np.sin(np.radians(5 * theta))))
+    repeated = repeated_part(pattern.left, pattern.signals)
+    assert np.std(pattern.left - repeated) < 0.25 * np.std(pattern.left)
+    assert pattern.without_repeats().variance < 0.1 * np.var(pattern.left)
+
+    def walk(theta, time, direction):
+        return np.cumsum(rng.standard_normal(time.size))
+
+    wander = space_of(sweeps(rng, runs=8, error=walk))
+    assert not repeated_part(wander.left, wander.signals).any()
+    assert wander.without_repeats() is wander
+
+
+def test_wild_readings_stand_alone_and_transitions_do_not():
+    rng = np.random.default_rng(3)
+    single, pairs = (space_of(sweeps(rng)) for _ in range(2))
+    rows = np.arange(20, 2400, 100)
+    single.residual = single.residual.copy()
+    single.residual[rows] += 80.0
+    single.update()
+    found = find_outliers(single)
+    assert found is not None
+    assert len(found.parameters["rows"].value) == rows.size
+    pairs.residual = pairs.residual.copy()
+    for shift in (0, 1, 2):
+        pairs.residual[rows + shift] += 80.0
+    pairs.update()
+    assert find_outliers(pairs) is None
+
+
+def test_elements_of_a_spring_have_one_sign_and_play_may_depend_on_the_place():
+    rng = np.random.default_rng(5)
+
+    def error(theta, time, direction):
+        return direction * (60.0 + 50.0 * np.sin(np.radians(theta - 40.0)))
+
+    made = []
+    for j, speed in enumerate((5.0, 5.0, 40.0, 40.0)):
+        theta = np.concatenate([np.linspace(0, 300, 500), np.linspace(300, 0, 500)[1:]])
+        theta = theta + 0.1 * rng.standard_normal(theta.size)
+        direction = np.repeat([1.0, -1.0], [500, 499])
+        time = np.arange(theta.size) * (0.6 / speed)
+        e = error(theta, time, direction) + 2.0 * rng.standard_normal(theta.size)
+        made.append(
+            ta.CalibrationRun(
+                theta,
+                theta + e / 3600.0,
+                360.0,
+                time=time,
+                velocity=speed * direction,
+                label=str(j),
+            )
+        )
+    found = ta.diagnose(made, Simulation(JOINT, sigma_arcsec=1.0), gain=False).findings
+    (play,) = [f for f in found if f.cause in ("backlash", "presliding_hysteresis")]
+    assert next(iter(play.parameters.values())).value == pytest.approx(60.0, abs=1.0)
+    assert play.parameters["place_orders"].value == [1.0]
+    assert play.parameters["place_amplitudes_arcsec"].value[0] == pytest.approx(50.0, abs=1.5)
+    assert play.parameters["place_phases_deg"].value[0] == pytest.approx(320.0, abs=2.0)
