@@ -6,6 +6,7 @@ import textwrap
 from typing import Any
 
 from .findings import Diagnosis, Finding
+from .levels import LevelGain
 from .quantity import Quantity
 
 __all__ = ["render"]
@@ -84,7 +85,21 @@ def _finding(number: int, finding: Finding) -> list[str]:
         if gain.note:
             text += f"; {gain.note}"
         lines += _wrapped(text + ".", 5, first=3)
+        if gain.by_level is not None:
+            lines += _wrapped(_by_level(gain.by_level), 5, first=3)
     return lines
+
+
+def _by_level(gain: LevelGain) -> str:
+    levels = ", ".join(f"{value:.4g}" for value in gain.held_out or gain.levels)
+    if gain.reducible_share is None or gain.interval is None:
+        return f"Gain by {gain.factor} ({levels} {gain.unit}): {gain.note}."
+    return (
+        f"Gain with each {gain.factor} left out in turn ({levels} {gain.unit}): rms "
+        f"{gain.rms_before:.2f} -> {gain.rms_after:.2f} arcsec; reducible share "
+        f"{gain.reducible_share:.2f} ({gain.interval[0]:.2f} to {gain.interval[1]:.2f}); "
+        f"{gain.note}."
+    )
 
 
 def _quantity(entry: Quantity) -> str:

@@ -14,7 +14,7 @@ from ..simulation.effects import Effect
 from ..simulation.effects.lines import MissingOrder
 from ..simulation.signals import join_runs
 from ..simulation.simulation import Simulation
-from .candidates import CANDIDATES
+from .candidates import CANDIDATES, FLEXIBLE
 from .candidates.candidate import line_parameters
 from .discrepancy import compare, noise_from_repeats, unfolded_error
 from .dispersion import ScatterFinding, find_outliers, find_uneven_noise
@@ -22,7 +22,7 @@ from .findings import Diagnosis, Finding
 from .gain import Gain, measure_gain
 from .identifiability import Blindness, blind_spots, doubts_about
 from .quantity import Parameters, quantity
-from .selection import NEW_CAUSE, cause_terms, finding_groups, proposals, select
+from .selection import NEW_CAUSE, RUN_FACTORS, cause_terms, finding_groups, proposals, select
 from .space import Proposal, Space
 
 __all__ = ["MOST_READINGS", "diagnose"]
@@ -199,10 +199,11 @@ def _estimates(space: Space, group: Sequence[int], causes: Sequence[str]) -> dic
     """Parameters of every cause that may be the one, each alone in place of a finding."""
     rest = cause_terms(space, group, settled=True)
     found = {}
+    # Not lines: one that another hides behind is no property of the joint.
     for cause in causes:
         candidate = CANDIDATES[cause]
-        proposal = candidate.propose(rest)
-        if proposal is None or proposal.cause != cause or proposal.deviance <= 0.0:
+        proposal = candidate.propose(rest) if cause in (*RUN_FACTORS, *FLEXIBLE) else None
+        if proposal is None or proposal.bic_gain <= 0.0:
             continue
         fitted = rest.with_terms([*rest.terms, proposal])
         k = len(fitted.terms) - 1

@@ -1,4 +1,4 @@
-"""Gain of a finding on runs that took no part in choosing it."""
+"""Gain of a finding on runs, and on levels of its factor, that took no part in choosing it."""
 
 from __future__ import annotations
 
@@ -12,21 +12,18 @@ from numpy.typing import NDArray
 from ..simulation.effects import EFFECTS
 from ..simulation.signals import Signals
 from .candidates import CANDIDATES
-from .space import Proposal, Space
-from .whitening import RunEffect
+from .holdout import held_out, numbers, reducible_share
+from .levels import LevelGain, gains_by_level
+from .space import Space
 
 __all__ = ["Gain", "measure_gain"]
 
 Array = NDArray[np.float64]
 Rows = NDArray[np.bool_]
 
-#: Parts of the runs held out in turn; resamples of runs for the interval; shuffles.
+#: Parts of the runs held out in turn; shuffles.
 FOLDS = 5
-RESAMPLES = 1000
 SHUFFLES = 3
-
-#: Findings, in the order found, for which every fold searches again.
-SEARCHED = 4
 
 #: Causes that leave each run with a zero of its own, which held-out runs then get too.
 OWN_ZERO = ("zero_slip", "drift_within_run", "missed_counts")
@@ -50,6 +47,10 @@ class Gain:
         The same share with the factor's labels shuffled over runs: should be at most 0
         (given as -1 where it is below).
     note : str
+    by_level : LevelGain or None
+        The same with whole levels of the cause's factor left out (all runs at one speed,
+        temperature, load or mount); None where the cause has no such factor or it did
+        not change from run to run.
     """
 
     holdout: str
@@ -59,6 +60,7 @@ class Gain:
     interval: tuple[float, float] | None
     control_share: float | None
     note: str
+    by_level: LevelGain | None = None
 
     def to_json(self) -> dict[str, Any]:
         """The ``gain`` object of a finding."""
@@ -70,6 +72,7 @@ class Gain:
         found["reducible_share_interval"] = None if self.interval is None else [*self.interval]
         found["control_share"] = self.control_share
         found["note"] = self.note
+        found["by_level"] = None if self.by_level is None else self.by_level.to_json()
         return found
 
 
@@ -78,7 +81,8 @@ def measure_gain(space: Space, groups: Sequence[Sequence[int]], seed: int = 0) -
 
     In every fold the model is fitted to the other runs alone, and what was searched for
     (orders, lengths, places) is searched there again, for the first `SEARCHED` findings.
-    A single run is left out in stretches of its record.
+    A single run is left out in stretches of its record. Causes of a factor with levels
+    are measured on left out levels as well.
     """
     rng = np.random.default_rng(seed)
     unit, what = _units(space)
@@ -88,9 +92,10 @@ def measure_gain(space: Space, groups: Sequence[Sequence[int]], seed: int = 0) -
     left = np.zeros((len(groups) + 1, space.n))
     for fold in range(int(folds.max()) + 1):
         test = folds[unit] == fold
-        for k, values in enumerate(_held_out(space, groups, test, own_zero)):
+        for k, values in enumerate(held_out(space, groups, test, own_zero)):
             left[k, test] = values
     clean = ~space.wild
+    by_level = gains_by_level(space, groups, own_zero, unit, rng)
     found = []
     for k, group in enumerate(groups):
         cause = space.terms[group[0]].cause
@@ -98,14 +103,14 @@ def measure_gain(space: Space, groups: Sequence[Sequence[int]], seed: int = 0) -
         transfers = EFFECTS[cause].transfers
         share = interval = control = None
         if transfers:
-            share, interval = _share(before, after, unit[clean], space.variance, rng)
+            share, interval = reducible_share(before, after, unit[clean], space.variance, rng)
             control = _control(space, group, unit, rng)
         found.append(
             Gain(
                 f"{what} ({int(folds.max()) + 1} parts)"
                 + (", zero of each held-out run taken from itself" if own_zero else ""),
-                _numbers(before),
-                _numbers(after),
+                numbers(before),
+                numbers(after),
                 share,
                 interval,
                 control,
@@ -113,6 +118,7 @@ def measure_gain(space: Space, groups: Sequence[Sequence[int]], seed: int = 0) -
                 if transfers
                 else "no transferable gain: a new run draws it anew; what is gained is an "
                 "honest uncertainty",
+                by_level.get(k),
             )
         )
     return found
@@ -124,110 +130,6 @@ def _units(space: Space) -> tuple[NDArray[np.int64], str]:
     if present.size > 1:
         return np.searchsorted(present, space.signals.run), "whole runs"
     return (np.arange(space.n) * 2 * FOLDS) // space.n, "stretches of the one run"
-
-
-def _numbers(e: Array) -> tuple[float, float, float]:
-    return (
-        float(np.sqrt(np.mean(e**2))),
-        float(np.ptp(e)),
-        float(np.abs(e).max()),
-    )
-
-
-def _held_out(
-    space: Space, groups: Sequence[Sequence[int]], test: Rows, own_zero: bool
-) -> list[Array]:
-    """Residuals of the held-out readings with every finding, then without each."""
-    train = _part(space, ~test)
-    terms = [_rebuilt(term, train, space, ~test) for term in space.terms]
-    full = train.with_terms(terms)
-    for group in groups[:SEARCHED]:
-        cause = space.terms[group[0]].cause
-        if CANDIDATES[cause].located and EFFECTS[cause].transfers:
-            full = _searched_again(full, group)
-    signals = space.signals.take(test)
-    results = [_residual(full, signals, space.residual[test], own_zero)]
-    for group in groups:
-        rest = full.with_terms(t for k, t in enumerate(full.terms) if k not in group)
-        results.append(_residual(rest, signals, space.residual[test], own_zero))
-    return results
-
-
-def _part(space: Space, rows: Rows) -> Space:
-    return Space(
-        space.signals.take(rows),
-        space.residual[rows],
-        space.belief,
-        None if space.weights is None else space.weights[rows],
-        space.lines.take(rows),
-        rho=space.whiten.rho,
-    )
-
-
-def _rebuilt(term: Proposal, train: Space, space: Space, rows: Rows) -> Proposal:
-    effect = term.run_effect
-    if effect is not None:
-        effect = RunEffect(effect.columns[rows], effect.ratio)
-    return replace(term, columns=term.columns[rows], run_effect=effect)
-
-
-def _searched_again(full: Space, group: Sequence[int]) -> Space:
-    """The finding's searched terms chosen anew in this part of the runs."""
-    terms = list(full.terms)
-    kept = [term for k, term in enumerate(terms) if k not in group]
-    current = full.with_terms(kept)
-    found: list[Proposal] = []
-    for k in group:
-        proposal = CANDIDATES[terms[k].cause].propose(current)
-        if proposal is None or proposal.cause != terms[k].cause:
-            break
-        found.append(proposal)
-        current = full.with_terms([*kept, *found])
-    if len(found) < len(group):
-        return full
-    for k, proposal in zip(group, found, strict=True):
-        terms[k] = proposal
-    return full.with_terms(terms)
-
-
-def _residual(fitted: Space, signals: Signals, residual: Array, own_zero: bool) -> Array:
-    """Residual at other readings: lines and every regressor that can be rebuilt there."""
-    from ..simulation.effects.effect import line_columns
-
-    base = np.column_stack(
-        [
-            np.ones(len(signals)),
-            *(line_columns(signals.theta, m) for m in fitted.belief.pattern.orders),
-        ]
-    )
-    left = residual - base @ fitted.coefficients[: base.shape[1]]
-    for term, coefficients in fitted.fitted():
-        if coefficients.size and EFFECTS[term.cause].transfers:
-            columns = CANDIDATES[term.cause].columns(signals, fitted.around, term.shape)
-            left = left - columns @ coefficients
-    if own_zero:
-        for start, stop in signals.run_bounds():
-            left[start:stop] -= np.median(left[start:stop])
-    return np.asarray(left)
-
-
-def _share(
-    before: Array, after: Array, unit: NDArray[np.int64], variance: float, rng: np.random.Generator
-) -> tuple[float, tuple[float, float]]:
-    """Reducible share and its bootstrap interval over the units held out."""
-    count = np.bincount(unit).astype(np.float64)
-    power0 = np.bincount(unit, weights=before**2)
-    power1 = np.bincount(unit, weights=after**2)
-
-    def share(weights: Array) -> Array:
-        n = weights @ count
-        p0, p1 = weights @ power0 / n, weights @ power1 / n
-        reducible = np.maximum(p0 - variance, 1e-3 * variance)
-        return np.asarray((p0 - p1) / reducible)
-
-    draws = rng.multinomial(count.size, np.full(count.size, 1.0 / count.size), RESAMPLES)
-    low, high = np.quantile(share(draws.astype(np.float64)), [0.025, 0.975])
-    return float(share(np.ones((1, count.size)))[0]), (float(low), float(high))
 
 
 def _control(

@@ -10,7 +10,7 @@ import numpy as np
 from .candidates import CANDIDATES, FLEXIBLE, SEPARATE
 from .space import Proposal, Space
 
-__all__ = ["NEW_CAUSE", "cause_terms", "finding_groups", "proposals", "select"]
+__all__ = ["NEW_CAUSE", "RUN_FACTORS", "cause_terms", "finding_groups", "proposals", "select"]
 
 #: Evidence (in units of BIC) that a new cause must bring beyond its price: 6 is what
 #: Kass and Raftery call strong, odds of 20 to 1.

@@ -1,0 +1,139 @@
+"""Readings held out: what a model fitted to the others leaves of them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..simulation.effects import EFFECTS
+from ..simulation.effects.effect import line_columns
+from ..simulation.signals import Signals
+from .candidates import CANDIDATES
+from .space import Proposal, Space
+from .whitening import RunEffect
+
+__all__ = ["held_out", "numbers", "part", "rebuilt", "reducible_share"]
+
+Array = NDArray[np.float64]
+Rows = NDArray[np.bool_]
+
+#: Resamples of runs for the interval.
+RESAMPLES = 1000
+
+#: Findings, in the order found, for which every fold searches again.
+SEARCHED = 4
+
+
+def held_out(
+    space: Space,
+    groups: Sequence[Sequence[int]],
+    test: Rows,
+    own_zero: bool,
+    search: bool = True,
+) -> list[Array]:
+    """Residuals of the held-out readings with every finding, then without each.
+
+    ``search`` repeats the searches (orders, lengths, places) without those readings.
+    """
+    train = part(space, ~test)
+    terms = [rebuilt(term, ~test) for term in space.terms]
+    full = train.with_terms(terms)
+    for group in groups[: SEARCHED if search else 0]:
+        cause = space.terms[group[0]].cause
+        if CANDIDATES[cause].located and EFFECTS[cause].transfers:
+            full = _searched_again(full, group)
+    signals = space.signals.take(test)
+    results = [_residual(full, signals, space.residual[test], own_zero)]
+    for group in groups:
+        rest = full.with_terms(t for k, t in enumerate(full.terms) if k not in group)
+        results.append(_residual(rest, signals, space.residual[test], own_zero))
+    return results
+
+
+def part(space: Space, rows: Rows) -> Space:
+    """The space of some of the readings, without terms."""
+    return Space(
+        space.signals.take(rows),
+        space.residual[rows],
+        space.belief,
+        None if space.weights is None else space.weights[rows],
+        space.lines.take(rows),
+        rho=space.whiten.rho,
+    )
+
+
+def rebuilt(term: Proposal, rows: Rows) -> Proposal:
+    """A term at some of the readings."""
+    effect = term.run_effect
+    if effect is not None:
+        effect = RunEffect(effect.columns[rows], effect.ratio)
+    return replace(term, columns=term.columns[rows], run_effect=effect)
+
+
+def _searched_again(full: Space, group: Sequence[int]) -> Space:
+    """The finding's searched terms chosen anew in this part of the runs."""
+    terms = list(full.terms)
+    kept = [term for k, term in enumerate(terms) if k not in group]
+    current = full.with_terms(kept)
+    found: list[Proposal] = []
+    for k in group:
+        proposal = CANDIDATES[terms[k].cause].propose(current)
+        if proposal is None or proposal.cause != terms[k].cause:
+            break
+        found.append(proposal)
+        current = full.with_terms([*kept, *found])
+    if len(found) < len(group):
+        return full
+    for k, proposal in zip(group, found, strict=True):
+        terms[k] = proposal
+    return full.with_terms(terms)
+
+
+def _residual(fitted: Space, signals: Signals, residual: Array, own_zero: bool) -> Array:
+    """Residual at other readings: lines and every regressor that can be rebuilt there."""
+    base = np.column_stack(
+        [
+            np.ones(len(signals)),
+            *(line_columns(signals.theta, m) for m in fitted.belief.pattern.orders),
+        ]
+    )
+    left = residual - base @ fitted.coefficients[: base.shape[1]]
+    for term, coefficients in fitted.fitted():
+        if coefficients.size and EFFECTS[term.cause].transfers:
+            columns = CANDIDATES[term.cause].columns(signals, fitted.around, term.shape)
+            left = left - columns @ coefficients
+    if own_zero:
+        for start, stop in signals.run_bounds():
+            left[start:stop] -= np.median(left[start:stop])
+    return np.asarray(left)
+
+
+def reducible_share(
+    before: Array, after: Array, unit: NDArray[np.int64], variance: float, rng: np.random.Generator
+) -> tuple[float, tuple[float, float]]:
+    """Reducible share and its bootstrap interval over the units held out."""
+    count = np.bincount(unit).astype(np.float64)
+    power0 = np.bincount(unit, weights=before**2)
+    power1 = np.bincount(unit, weights=after**2)
+
+    def of(weights: Array) -> Array:
+        n = weights @ count
+        p0, p1 = weights @ power0 / n, weights @ power1 / n
+        reducible = np.maximum(p0 - variance, 1e-3 * variance)
+        return np.asarray((p0 - p1) / reducible)
+
+    draws = rng.multinomial(count.size, np.full(count.size, 1.0 / count.size), RESAMPLES)
+    low, high = np.quantile(of(draws.astype(np.float64)), [0.025, 0.975])
+    return float(of(np.ones((1, count.size)))[0]), (float(low), float(high))
+
+
+def numbers(e: Array) -> tuple[float, float, float]:
+    """rms, peak-to-peak and max abs."""
+    return (
+        float(np.sqrt(np.mean(e**2))),
+        float(np.ptp(e)),
+        float(np.abs(e).max()),
+    )

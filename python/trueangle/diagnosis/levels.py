@@ -1,0 +1,218 @@
+"""Gain of findings at levels of their factor that were left out as a whole.
+
+The speeds, temperatures, loads and mounts at which runs were made.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..simulation.effects import EFFECTS
+from ..simulation.signals import Signals
+from .holdout import held_out, numbers, part, rebuilt, reducible_share
+from .space import Space
+
+__all__ = ["UNITS", "LevelGain", "gains_by_level", "run_levels"]
+
+Array = NDArray[np.float64]
+Rows = NDArray[np.bool_]
+
+#: Factors that have levels, and the unit of each.
+UNITS = {"velocity": "deg/s", "temperature": "C", "torque": "Nm", "mount": "deg"}
+
+#: Share of the whole range that parts one level from the next, and the least range that
+#: makes levels: of the largest value, or absolute (kelvin, degrees of the mount).
+GAP = 0.1
+LEAST_SHARE = 0.2
+LEAST_RANGE = {"temperature": 2.0, "mount": 0.5}
+
+#: Share of a run's torque that must have one sign for its level to have that sign.
+ONE_SIGN = 0.9
+
+#: Levels at most; of more, neighbours are put together.
+MOST_LEVELS = 5
+
+NONE_TO_SPARE = "no level can be left out: the others alone do not tell this cause from all else"
+
+#: Share of its regressors' power by which a cause must differ from all else at the levels
+#: that are left, to be fitted there at all.
+LEAST_OWN = 0.05
+
+
+@dataclass(frozen=True)
+class LevelGain:
+    """What a finding is worth at a level of its factor that was left out as a whole.
+
+    Attributes
+    ----------
+    factor, unit : str
+    levels : list of float
+        Every level of the factor in the data.
+    held_out : list of float
+        Those that were left out in turn; none where the rest never shows the cause alone.
+    rms_before, rms_after : float or None
+        Arcsec at the levels left out, together.
+    reducible_share : float or None
+    interval : (float, float) or None
+        95 % of its bootstrap over runs.
+    note : str
+        How far the cause's law was carried.
+    """
+
+    factor: str
+    unit: str
+    levels: list[float]
+    held_out: list[float] = field(default_factory=list)
+    rms_before: float | None = None
+    rms_after: float | None = None
+    reducible_share: float | None = None
+    interval: tuple[float, float] | None = None
+    note: str = ""
+
+    def to_json(self) -> dict[str, Any]:
+        """The ``by_level`` object of a gain."""
+        return {
+            "factor": self.factor,
+            "unit": self.unit,
+            "levels": self.levels,
+            "held_out": self.held_out,
+            "rms_before_arcsec": self.rms_before,
+            "rms_after_arcsec": self.rms_after,
+            "reducible_share": self.reducible_share,
+            "reducible_share_interval": None if self.interval is None else [*self.interval],
+            "note": self.note,
+        }
+
+
+def run_levels(signals: Signals, factor: str) -> tuple[NDArray[np.int64], list[float]] | None:
+    """Level of every reading (that of its run) and the mean value of every level, ascending.
+
+    None where the factor has no levels, was not recorded or did not change from run to run.
+
+    Examples
+    --------
+    >>> from trueangle.simulation import RunDesign, Simulation, join_runs, simulate
+    >>> runs = tuple(RunDesign(samples=50, speed_deg_s=v) for v in (5.0, 30.0, 5.0))
+    >>> level, values = run_levels(join_runs(simulate(Simulation(runs=runs))), "velocity")
+    >>> level[::50].tolist(), [round(v) for v in values]
+    ([0, 1, 0], [5, 30])
+    """
+    column = getattr(signals, factor) if factor in UNITS else None
+    if column is None:
+        return None
+    bounds = signals.run_bounds()
+    of_run = np.array([_value(factor, column[start:stop]) for start, stop in bounds])
+    span = float(np.ptp(of_run))
+    if span <= LEAST_RANGE.get(factor, LEAST_SHARE * float(np.abs(of_run).max())):
+        return None
+    order = np.argsort(of_run, kind="stable")
+    group = np.zeros(of_run.size, dtype=np.int64)
+    group[order[1:]] = np.cumsum(np.diff(of_run[order]) > GAP * span)
+    count = int(group.max()) + 1
+    if count > MOST_LEVELS:
+        group = group * MOST_LEVELS // count
+    values = np.bincount(group, of_run) / np.bincount(group)
+    sizes = [stop - start for start, stop in bounds]
+    return np.repeat(group, sizes), [float(value) for value in values]
+
+
+def _value(factor: str, column: Array) -> float:
+    """What one run counts as."""
+    if factor == "velocity":
+        moving = np.abs(column[column != 0.0])
+        return float(np.median(moving)) if moving.size else 0.0
+    mean = float(np.mean(column))
+    if factor == "mount":
+        return float(np.degrees(mean))
+    if factor == "torque":
+        size = float(np.mean(np.abs(column)))
+        return mean if abs(mean) > ONE_SIGN * size else size
+    return mean
+
+
+def gains_by_level(
+    space: Space,
+    groups: Sequence[Sequence[int]],
+    own_zero: bool,
+    unit: NDArray[np.int64],
+    rng: np.random.Generator,
+) -> dict[int, LevelGain]:
+    """Gain of the findings (by their place) at levels of their factor that were left out."""
+    found: dict[int, LevelGain] = {}
+    for factor in UNITS:
+        causes = [space.terms[group[0]].cause for group in groups]
+        concerned = [
+            k
+            for k, cause in enumerate(causes)
+            if EFFECTS[cause].factor == factor and EFFECTS[cause].transfers
+        ]
+        split = run_levels(space.signals, factor) if concerned else None
+        if split is None:
+            continue
+        level, values = split
+        # With the finding and without it at every level left out; NaN where it cannot be.
+        left = np.full((len(concerned), 2, space.n), np.nan)
+        for j in range(len(values)):
+            test = level == j
+            able = [k for k in concerned if _can_do_without(space, groups[k], test)]
+            if not able:
+                continue
+            # Two mounts do not tell which way a mount counts: what all tell is kept.
+            after, *before = held_out(
+                space, [groups[k] for k in able], test, own_zero, search=factor != "mount"
+            )
+            for k, values_before in zip(able, before, strict=True):
+                left[concerned.index(k)][:, test] = values_before, after
+        for k, (before_k, after_k) in zip(concerned, left, strict=True):
+            used = ~space.wild & ~np.isnan(before_k)
+            held = [values[j] for j in np.unique(level[used])]
+            if not held:
+                found[k] = LevelGain(factor, UNITS[factor], values, note=NONE_TO_SPARE)
+                continue
+            _, of_unit = np.unique(unit[used], return_inverse=True)
+            share, interval = reducible_share(
+                before_k[used], after_k[used], of_unit, space.variance, rng
+            )
+            found[k] = LevelGain(
+                factor,
+                UNITS[factor],
+                values,
+                held,
+                numbers(before_k[used])[0],
+                numbers(after_k[used])[0],
+                share,
+                interval,
+                _reach(values, held),
+            )
+    return found
+
+
+def _reach(levels: list[float], held_out: list[float]) -> str:
+    """How far the law of a cause was carried."""
+    if len(levels) == 2:
+        reach = "the law fitted at one level was carried to the other"
+    elif {levels[0], levels[-1]} & {*held_out}:
+        reach = "the law was carried to levels between and beyond those it was fitted at"
+    else:
+        reach = "the law was carried to levels between those it was fitted at"
+    if len(held_out) < len(levels):
+        reach += "; without the levels not left out it cannot be fitted"
+    return reach
+
+
+def _can_do_without(space: Space, group: Sequence[int], test: Rows) -> bool:
+    """The other readings still tell the finding from all else."""
+    train = part(space, ~test)
+    terms = [rebuilt(term, ~test) for term in space.terms]
+    rest = train.with_terms(t for k, t in enumerate(terms) if k not in group)
+    columns = np.hstack([terms[k].columns for k in group])
+    own = rest.whiten(columns)
+    power = np.einsum("ij,ij->j", own, own)
+    own = own - rest.q @ (rest.q.T @ own)
+    left = np.einsum("ij,ij->j", own, own)
+    return bool((left > LEAST_OWN * np.maximum(power, 1e-300)).all())
