@@ -6,13 +6,15 @@ use std::f64::consts::TAU;
 use std::sync::Arc;
 
 use trueangle::compensator::Compensator;
-use trueangle::kernel::{Argument, Batch, Evaluator, Quantity};
+use trueangle::kernel::{Argument, Batch, Evaluator, Quantity, Real, Sample};
 use trueangle::{HarmonicSeries, Shaft};
 
 /// Instruction sets that callgrind can emulate.
-const CASES: [&str; 6] = [
+const CASES: [&str; 8] = [
     "table-avx2",
     "table-portable",
+    "cubics-avx2",
+    "cubics-portable",
     "exact-avx2",
     "exact-portable",
     "counts",
@@ -29,6 +31,7 @@ fn main() {
     let samples: u32 = samples.expect("usage: kernels CASE SAMPLES");
     let evaluator = Arc::new(evaluator(if case == "counts" { 4096.0 } else { TAU }));
     let mut out = vec![0.0; samples as usize];
+    let mut singles = vec![0.0f32; samples as usize];
     match case.as_str() {
         "step" => {
             let compensator = Compensator::new(evaluator).expect("not steep");
@@ -44,6 +47,12 @@ fn main() {
                 Batch::apart(&x, &mut out).expect("equally long"),
             );
         }
+        "cubics-avx2" | "cubics-portable" => {
+            for (i, out) in (0..).zip(&mut singles) {
+                *out = i as f32 * 0.01;
+            }
+            run(&evaluator, &case, Batch::in_place(&mut singles));
+        }
         _ => {
             for (i, out) in (0..).zip(&mut out) {
                 *out = f64::from(i) * 0.01;
@@ -51,10 +60,10 @@ fn main() {
             run(&evaluator, &case, Batch::in_place(&mut out));
         }
     }
-    assert!(out.iter().all(|v| v.is_finite()));
+    assert!(out.iter().all(|v| v.is_finite()) && singles.iter().all(|v| v.is_finite()));
 }
 
-fn run<X: trueangle::kernel::Sample>(evaluator: &Evaluator, case: &str, batch: Batch<'_, X, f64>) {
+fn run<X: Sample, Y: Real>(evaluator: &Evaluator, case: &str, batch: Batch<'_, X, Y>) {
     let route = case.parse().expect("one of the cases");
     evaluator
         .run(Quantity::Error, Some(route), Some(1), batch)

@@ -253,10 +253,10 @@ fn counts_are_looked_up_and_agree_with_the_table() {
             }
             assert_eq!(values[0], values[1]);
         }
-        let route = evaluator.route::<i32>(Quantity::Error, x.len());
+        let route = evaluator.route::<i32, f64>(Quantity::Error, x.len());
         assert_eq!(route.to_string(), "counts");
         assert_eq!(
-            evaluator.route::<i32>(Quantity::Error, 10).path,
+            evaluator.route::<i32, f64>(Quantity::Error, 10).path,
             Path::Table
         );
         let extremes = [i64::MIN, i64::MAX, -1, 0];

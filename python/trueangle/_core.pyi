@@ -6,7 +6,7 @@ from numpy.typing import ArrayLike, NDArray
 
 __version__: str
 
-_Path = str  # "table", "exact", "direct", "counts"; "-avx2" and the like force a processor
+_Path = str  # "table", "cubics", "exact", "direct", "counts"; "-avx2" and the like force a set
 
 @final
 class Series:
@@ -76,6 +76,10 @@ class Series:
     def path(self) -> str: ...
     @property
     def counts_path(self) -> str: ...
+    @property
+    def float32_path(self) -> str: ...
+    @property
+    def float32_bound(self) -> float: ...
     @property
     def segments(self) -> int: ...
     @property

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 __all__ = ["Argument", "HarmonicModel", "check_invertible"]
 
 Argument: TypeAlias = Literal["reference", "indicated"]
-Path: TypeAlias = Literal["table", "exact", "direct", "counts"]
+Path: TypeAlias = Literal["table", "cubics", "exact", "direct", "counts"]
 Array: TypeAlias = NDArray[np.float64]
 
 
@@ -196,8 +196,8 @@ class HarmonicModel:
             the model needs; others are ignored.
         threads : int, optional
             At most so many; by default all allowed to the process for large arrays.
-        path : {"table", "exact", "direct", "counts"}, optional
-            Forces a way of evaluation, of a model without terms.
+        path : {"table", "cubics", "exact", "direct", "counts"}, optional
+            Forces a way of evaluation, of a model without terms ("cubics": float32 only).
 
         Returns
         -------
@@ -219,7 +219,9 @@ class HarmonicModel:
 
         Within 3e-15 of the sum of amplitudes for angles up to a million radians and
         orders up to 512; the cost does not depend on the number of orders when every
-        shaft turns a whole number of times per turn.
+        shaft turns a whole number of times per turn. float32 takes cubics in single
+        precision, within 2.4e-7 of the sum of amplitudes and the constant at any angle;
+        ``path="table"`` computes it in double precision and rounds once.
         """
         if self.terms:
             given = _given(direction, velocity, temperature, torque)

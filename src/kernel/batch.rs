@@ -1,11 +1,12 @@
 //! Input and output of one batch: two slices of one length, or one slice that is both.
 
+use std::any::TypeId;
 use std::marker::PhantomData;
 
 use crate::error::Error;
 
 /// A number a batch may hold: kernels compute in f64 and convert while loading and storing.
-pub trait Sample: Copy + Send + Sync {
+pub trait Sample: Copy + Send + Sync + 'static {
     /// True for integers, which may be looked up by their place within a turn.
     const IS_COUNT: bool;
 
@@ -62,6 +63,11 @@ impl Real for f32 {
     fn narrow(value: f64) -> Self {
         value as f32
     }
+}
+
+/// True for f32 to f32: kernels may then compute in single precision.
+pub fn is_single<X: Sample, Y: Real>() -> bool {
+    [TypeId::of::<X>(), TypeId::of::<Y>()] == [TypeId::of::<f32>(); 2]
 }
 
 /// Samples to read and places to write, element by element.
@@ -151,7 +157,14 @@ impl<'a, X: Copy, Y: Copy> Batch<'a, X, Y> {
 /// Samples of one block: what is computed of it stays in the first-level cache.
 const BLOCK: usize = 256;
 
-impl<X: Sample, Y: Real> Batch<'_, X, Y> {
+impl<'a, X: Sample, Y: Real> Batch<'a, X, Y> {
+    /// The same, where both types are f32.
+    pub fn into_single(self) -> Option<Batch<'a, f32, f32>> {
+        // SAFETY: the types are the same.
+        is_single::<X, Y>()
+            .then(|| unsafe { Batch::from_raw(self.x.cast(), self.out.cast(), self.len) })
+    }
+
     /// Blocks as doubles through `f(samples, results)`.
     pub fn map_blocks(&mut self, mut f: impl FnMut(&[f64], &mut [f64])) {
         let (mut x, mut out) = ([0.0; BLOCK], [0.0; BLOCK]);

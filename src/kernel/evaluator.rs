@@ -2,8 +2,9 @@
 
 use std::sync::{Arc, OnceLock};
 
-use super::batch::{Batch, Real, Sample};
+use super::batch::{Batch, Real, Sample, is_single};
 use super::counts::{Counts, MOST_COUNTS};
+use super::cubics::{self, Cubics};
 use super::exact::Exact;
 use super::lanes::InstructionSet;
 use super::route::{Path, Route};
@@ -38,6 +39,7 @@ const ROUNDING: f64 = 1e-15;
 struct Tables {
     polynomials: OnceLock<Option<Arc<Table>>>,
     counts: OnceLock<Counts>,
+    cubics: OnceLock<Option<Cubics>>,
 }
 
 /// What a route computes with.
@@ -45,6 +47,7 @@ struct Tables {
 enum Method<'e> {
     Table(&'e Table),
     Counts(&'e Counts),
+    Cubics(&'e Cubics),
     Exact,
     Direct,
 }
@@ -149,6 +152,25 @@ impl Evaluator {
             .as_ref()
     }
 
+    /// The cubics that f32 is looked up in; `None` where there is no table, or they would
+    /// be too many.
+    pub fn cubics(&self, quantity: Quantity) -> Option<&Cubics> {
+        let table = self.table(quantity)?;
+        let tables = self.tables(quantity);
+        let tolerance = self.tolerance.max(cubics::ROUNDING) * self.reach;
+        let interpolation = |segments| {
+            if std::ptr::eq(tables, &self.errors) {
+                expansion::cubic_bound(&self.series, segments)
+            } else {
+                inverse::bound(&self.series, self.slope_bound, segments, cubics::DEGREE)
+            }
+        };
+        tables
+            .cubics
+            .get_or_init(|| Cubics::new(table, tolerance, interpolation))
+            .as_ref()
+    }
+
     /// Entries per count; `None` where the turn is not a whole number of them.
     fn counts(&self, quantity: Quantity) -> Option<&Counts> {
         let per_turn = self.series.period().value();
@@ -164,13 +186,15 @@ impl Evaluator {
     ///
     /// Integers are looked up once there are enough of them to pay for the entries; the
     /// results are the same to the last bit.
-    pub fn route<X: Sample>(&self, quantity: Quantity, samples: usize) -> Route {
+    pub fn route<X: Sample, Y: Real>(&self, quantity: Quantity, samples: usize) -> Route {
         let per_turn = self.series.period().value();
         let path = if X::IS_COUNT
             && samples as f64 >= PAYING_SHARE * per_turn
             && self.counts(quantity).is_some()
         {
             Path::Counts
+        } else if is_single::<X, Y>() && self.cubics(quantity).is_some() {
+            Path::Cubics
         } else if self.table(quantity).is_some() {
             Path::Table
         } else {
@@ -183,7 +207,7 @@ impl Evaluator {
     }
 
     /// What a route needs, or why it cannot be taken.
-    fn method<X: Sample>(
+    fn method<X: Sample, Y: Real>(
         &self,
         quantity: Quantity,
         route: Route,
@@ -195,7 +219,8 @@ impl Evaluator {
             Path::Direct => return Ok(Method::Direct),
             Path::Exact => return Ok(Method::Exact),
             Path::Counts if !X::IS_COUNT => return Err("the angles must be integers"),
-            Path::Table | Path::Counts => {}
+            Path::Cubics if !is_single::<X, Y>() => return Err("the angles must be float32"),
+            Path::Table | Path::Cubics | Path::Counts => {}
         }
         let table = match self.table(quantity) {
             Some(table) => table,
@@ -205,12 +230,17 @@ impl Evaluator {
             }
             None => return Err("the table would need too many segments"),
         };
-        if route.path == Path::Table {
-            return Ok(Method::Table(table));
+        match route.path {
+            Path::Cubics => self
+                .cubics(quantity)
+                .map(Method::Cubics)
+                .ok_or("the cubics would need too many segments, or values beyond float32"),
+            Path::Counts => self
+                .counts(quantity)
+                .map(Method::Counts)
+                .ok_or("the turn must be a whole number of counts, at most 2^20"),
+            _ => Ok(Method::Table(table)),
         }
-        self.counts(quantity)
-            .map(Method::Counts)
-            .ok_or("the turn must be a whole number of counts, at most 2^20")
     }
 
     /// `quantity` of every sample of a batch, by the default route or the one given.
@@ -227,9 +257,9 @@ impl Evaluator {
             self.check_invertible()?;
         }
         let len = batch.len();
-        let route = route.unwrap_or_else(|| self.route::<X>(quantity, len));
+        let route = route.unwrap_or_else(|| self.route::<X, Y>(quantity, len));
         let method = self
-            .method::<X>(quantity, route)
+            .method::<X, Y>(quantity, route)
             .map_err(|reason| Error::Path {
                 path: route.to_string(),
                 reason,
@@ -261,6 +291,13 @@ impl Evaluator {
             (Method::Table(table), _) => table.values(set, batch),
             (Method::Counts(counts), Quantity::Correction) => counts.subtract(batch),
             (Method::Counts(counts), _) => counts.values(batch),
+            (Method::Cubics(cubics), _) => {
+                let batch = batch.into_single().expect("`method` looked at the types");
+                match quantity {
+                    Quantity::Correction => cubics.subtract(set, batch),
+                    _ => cubics.values(set, batch),
+                }
+            }
             (Method::Exact, Quantity::Error) => self.exact_error.run(set, batch),
             (Method::Exact, Quantity::Slope) => self.exact_slope.run(set, batch),
             (Method::Exact, Quantity::Correction) => self.correct_exactly(set, batch),
@@ -290,6 +327,17 @@ impl Evaluator {
                 Some(table) => table.bound() + ROUNDING * self.reach,
                 None => TOLERANCE * self.reach,
             }
+    }
+
+    /// The same for f32.
+    pub fn single_bound(&self) -> f64 {
+        match self.cubics(Quantity::Error) {
+            Some(cubics) => cubics.bound(),
+            None => {
+                let greatest = self.reach + self.series.constant().abs();
+                self.error_bound() + cubics::ROUNDING * greatest
+            }
+        }
     }
 
     /// The slow truth.

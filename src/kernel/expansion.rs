@@ -10,7 +10,8 @@ use std::f64::consts::PI;
 use rustfft::FftPlanner;
 use rustfft::num_complex::Complex;
 
-use super::table::{DEGREE, MOST_SEGMENTS, OVERSHOOT, Table};
+use super::segments::OVERSHOOT;
+use super::table::{DEGREE, MOST_SEGMENTS, Table};
 use crate::series::HarmonicSeries;
 
 /// Greatest difference between a periodic series and its table of `segments`.
@@ -25,6 +26,17 @@ pub fn bound(series: &HarmonicSeries, segments: usize) -> f64 {
         .lines()
         .map(|line| line.amplitude() * tail(line.order))
         .sum()
+}
+
+/// Greatest difference between a periodic series and its interpolation by cubics in
+/// Chebyshev's points: the fourth derivative over `4! 2^3` (DLMF 3.3.17).
+pub fn cubic_bound(series: &HarmonicSeries, segments: usize) -> f64 {
+    let step = PI / segments as f64;
+    let lines = series.lines();
+    OVERSHOOT / 192.0
+        * lines
+            .map(|line| line.amplitude() * (step * line.order).powi(4))
+            .sum::<f64>()
 }
 
 /// The table of a periodic series with the fewest segments, from `least` (a power of two),

@@ -3,10 +3,12 @@
 use std::f64::consts::{PI, TAU};
 
 use super::Batch;
+use super::chebyshev;
 use super::exact::Exact;
 use super::expansion;
 use super::lanes::InstructionSet;
-use super::table::{DEGREE, MOST_SEGMENTS, OVERSHOOT, Table};
+use super::segments::OVERSHOOT;
+use super::table::{DEGREE, MOST_SEGMENTS, Table};
 use crate::series::HarmonicSeries;
 
 /// Steps before giving up on another ulp: bisection alone needs about 60.
@@ -114,7 +116,8 @@ impl Newton<'_> {
     }
 }
 
-/// Greatest difference between the inverse and its polynomials over `segments`.
+/// Greatest difference between the inverse and its interpolation by polynomials of so
+/// high a degree over `segments`, in Chebyshev's points.
 ///
 /// In the strip `|Im theta| <= s` the slope is at most
 /// `l(s) = slope + sum k C_k sinh(k s)`. While `l(s) < 1`, `g -> error(y - g)` contracts
@@ -122,7 +125,7 @@ impl Newton<'_> {
 /// most `sum C_k cosh(k s)` from C0. An ellipse of Bernstein around a segment that fits
 /// into it bounds the interpolation error by `4 B rho^-n / (rho - 1)` (Trefethen,
 /// Approximation Theory and Approximation Practice, theorem 8.2).
-pub fn bound(series: &HarmonicSeries, slope: f64, segments: usize) -> f64 {
+pub fn bound(series: &HarmonicSeries, slope: f64, segments: usize, degree: usize) -> f64 {
     /// Strips tried, each 1.2 times as wide as the one before.
     const STRIPS: i32 = 60;
     let radians = TAU / series.period().value();
@@ -141,7 +144,7 @@ pub fn bound(series: &HarmonicSeries, slope: f64, segments: usize) -> f64 {
         }
         let semi_axis = strip * (1.0 - steepness) * segments as f64 / PI;
         let rho = semi_axis + semi_axis.hypot(1.0);
-        best = best.min(4.0 * size * rho.powi(-(DEGREE as i32)) / (rho - 1.0));
+        best = best.min(4.0 * size * rho.powi(-(degree as i32)) / (rho - 1.0));
     }
     OVERSHOOT * best
 }
@@ -150,7 +153,7 @@ pub fn bound(series: &HarmonicSeries, slope: f64, segments: usize) -> f64 {
 /// `tolerance`; `None` where that would take too many segments.
 pub fn table(series: &HarmonicSeries, slope: f64, tolerance: f64) -> Option<Table> {
     let mut segments = 8;
-    while bound(series, slope, segments) > tolerance {
+    while bound(series, slope, segments, DEGREE) > tolerance {
         segments *= 2;
         if segments > MOST_SEGMENTS {
             return None;
@@ -162,36 +165,22 @@ pub fn table(series: &HarmonicSeries, slope: f64, tolerance: f64) -> Option<Tabl
     let forward = expansion::table(&varying, FORWARD_TOLERANCE * reach, segments)?;
     let per_segment = forward.segments() / segments;
     let half = 0.5 * series.period().value() / segments as f64;
-    let nodes: [f64; DEGREE + 1] = std::array::from_fn(|i| node(2 * i + 1));
-    let transform = chebyshev_transform();
+    let points: [f64; DEGREE + 1] = chebyshev::points();
+    let transform = chebyshev::transform();
     let mut g = 0.0;
     let expansions = (0..segments).map(|n| {
-        let values = nodes.map(|u| {
+        let values = points.map(|u| {
             let offset = u * half - series.constant();
             let error = |g: f64| forward.at(n * per_segment, offset - g);
             g = root(error, -reach, reach, g);
             g
         });
-        transform.map(|row| row.iter().zip(&values).map(|(t, v)| t * v).sum())
+        chebyshev::apply(&transform, &values)
     });
     Some(Table::new(
         expansions,
         series.constant(),
         series.period(),
-        bound(series, slope, segments),
+        bound(series, slope, segments, DEGREE),
     ))
-}
-
-/// `cos(m pi / 16)`: the zeros of T_8 for odd m, and the values of T_j there.
-fn node(m: usize) -> f64 {
-    (PI * m as f64 / (2 * DEGREE + 2) as f64).cos()
-}
-
-/// From values at the zeros of T_8 to Chebyshev coefficients of their polynomial.
-fn chebyshev_transform() -> [[f64; DEGREE + 1]; DEGREE + 1] {
-    let n = (DEGREE + 1) as f64;
-    std::array::from_fn(|j| {
-        let scale = if j == 0 { 1.0 / n } else { 2.0 / n };
-        std::array::from_fn(|i| scale * node(j * (2 * i + 1)))
-    })
 }

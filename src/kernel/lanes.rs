@@ -20,6 +20,11 @@ pub const MOST_LANES: usize = 8;
 #[repr(C, align(64))]
 pub struct Row(pub [f64; 8]);
 
+/// Coefficients of a cubic in single precision.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[repr(C, align(16))]
+pub struct Quad(pub [f32; 4]);
+
 /// A vector of doubles. Methods are safe in a function compiled for the instruction set,
 /// which [`dispatch`] makes sure of.
 pub trait Lanes: Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> {
@@ -56,6 +61,18 @@ pub trait Lanes: Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = S
     /// # Safety
     /// `rows` points to `mask + 1` rows.
     unsafe fn fold_rows(whole: Self, mask: u64, rows: *const Row, high: Self) -> [Self; 4];
+
+    /// Cubics at `u` of each lane of two vectors, in single precision: row `whole & mask`,
+    /// as in [`Lanes::fold_rows`]. The first `2 N` of the array are set.
+    ///
+    /// # Safety
+    /// `rows` points to `mask + 1` rows.
+    unsafe fn cubics(
+        whole: [Self; 2],
+        u: [Self; 2],
+        mask: u64,
+        rows: *const Quad,
+    ) -> [f32; 2 * MOST_LANES];
 
     /// Lanes beyond `limit` moved into one turn.
     #[cold]

@@ -5,7 +5,9 @@
 #![allow(clippy::needless_range_loop)]
 
 mod batch;
+mod chebyshev;
 mod counts;
+mod cubics;
 mod evaluator;
 mod exact;
 mod expansion;
@@ -13,6 +15,7 @@ mod inverse;
 pub(crate) mod lanes;
 mod portable;
 mod route;
+mod segments;
 mod sincos;
 mod sweep;
 mod table;
@@ -20,6 +23,7 @@ mod table;
 mod x86;
 
 pub use batch::{Batch, Real, Sample};
+pub use cubics::Cubics;
 pub use evaluator::{Evaluator, THREADED, TOLERANCE};
 pub use lanes::InstructionSet;
 pub use route::{Path, Route};

@@ -5,7 +5,7 @@
 
 use std::ops::{Add, Mul, Sub};
 
-use super::lanes::{Lanes, MOST_LANES, Row};
+use super::lanes::{Lanes, MOST_LANES, Quad, Row};
 
 /// True where the target always has fused multiply-add.
 pub const TARGET_FUSES: bool = cfg!(any(target_arch = "aarch64", target_feature = "fma"));
@@ -118,6 +118,33 @@ impl<const N: usize, const FUSED: bool> Lanes for Portable<N, FUSED> {
             }
         }
         columns
+    }
+
+    #[inline(always)]
+    unsafe fn cubics(
+        whole: [Self; 2],
+        u: [Self; 2],
+        mask: u64,
+        rows: *const Quad,
+    ) -> [f32; 2 * MOST_LANES] {
+        let mut values = [0.0; 2 * MOST_LANES];
+        for i in 0..2 {
+            for lane in 0..N {
+                let u = u[i].0[lane] as f32;
+                // SAFETY: the index is at most `mask`.
+                let row = unsafe { &(*rows.add((whole[i].0[lane].to_bits() & mask) as usize)).0 };
+                let mut value = row[3];
+                for j in [2, 1, 0] {
+                    value = if FUSED {
+                        value.mul_add(u, row[j])
+                    } else {
+                        value * u + row[j]
+                    };
+                }
+                values[i * N + lane] = value;
+            }
+        }
+        values
     }
 }
 

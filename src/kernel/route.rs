@@ -10,6 +10,8 @@ use super::lanes::InstructionSet;
 pub enum Path {
     /// Piecewise polynomials over one turn.
     Table,
+    /// The same in cubics of single precision, for f32.
+    Cubics,
     /// One sine and cosine per group of orders and sample, then Horner's rule.
     Exact,
     /// One sine and cosine per sample and order, by the platform's libm: the reference.
@@ -20,8 +22,9 @@ pub enum Path {
 
 impl Path {
     /// Every path, by its name.
-    const NAMES: [(&str, Self); 4] = [
+    const NAMES: [(&str, Self); 5] = [
         ("table", Self::Table),
+        ("cubics", Self::Cubics),
         ("exact", Self::Exact),
         ("direct", Self::Direct),
         ("counts", Self::Counts),
@@ -46,7 +49,7 @@ impl fmt::Display for Route {
         match self.path {
             // Neither has vectors.
             Path::Direct | Path::Counts => Ok(()),
-            Path::Table | Path::Exact => write!(f, "-{}", self.set.name()),
+            Path::Table | Path::Cubics | Path::Exact => write!(f, "-{}", self.set.name()),
         }
     }
 }

@@ -1,7 +1,8 @@
 //! Piecewise polynomials over one turn: the cost of a sample does not depend on the series.
 
-use super::lanes::{InstructionSet, Lanes, MOST_LANES, ROUNDER, Row, dispatch};
+use super::lanes::{InstructionSet, Lanes, MOST_LANES, Row, dispatch};
 use super::portable::{Portable, TARGET_FUSES};
+use super::segments::Segments;
 use super::sweep::{Map, Sweep};
 use super::{Batch, Real, Sample};
 use crate::angle::Period;
@@ -12,28 +13,12 @@ pub const DEGREE: usize = 7;
 /// Most segments: 8 MiB of rows, beyond which memory would be slower than the exact path.
 pub const MOST_SEGMENTS: usize = 1 << 17;
 
-/// Segments an angle may be away from zero: its place within a segment is exact, and `u`
-/// exceeds 1 by at most `FAR_SEGMENTS * 2^-52`, which `OVERSHOOT` allows for.
-const FAR_SEGMENTS: f64 = (1u64 << 40) as f64;
-
-/// Growth of `T_8(u)` from `|u| = 1` to `1 + 2^-12`: `cosh(8 acosh(1 + 2^-12)) < 1.016`.
-pub const OVERSHOOT: f64 = 1.016;
-
 /// A periodic function, as polynomials in `u`, which runs from -1 to 1 over a segment.
-/// Segment `n` is centred on `n * period / segments`.
 #[derive(Clone, Debug)]
 pub struct Table {
     rows: Vec<Row>,
-    period: Period,
+    segments: Segments,
     bound: f64,
-    /// Width of a segment, and what the double misses of it.
-    step: f64,
-    step_low: f64,
-    /// Segments per unit of the angle, and half segments.
-    per_unit: f64,
-    per_half: f64,
-    /// Angles beyond this are moved into one turn first.
-    far: f64,
 }
 
 /// One sample at a time, on the processor that [`Table::scalar_subtract`] found.
@@ -49,18 +34,10 @@ impl Table {
         bound: f64,
     ) -> Self {
         let rows: Vec<Row> = expansions.map(|a| by_powers(a, constant)).collect();
-        assert!(rows.len().is_power_of_two());
-        let segments = rows.len() as f64;
-        let step = period.value() / segments;
         Self {
+            segments: Segments::new(rows.len(), period),
             rows,
-            period,
             bound,
-            step,
-            step_low: period.low() / segments,
-            per_unit: segments / period.value(),
-            per_half: 2.0 / step,
-            far: FAR_SEGMENTS * step,
         }
     }
 
@@ -76,7 +53,7 @@ impl Table {
 
     /// One turn in the unit of the angles.
     pub fn period(&self) -> Period {
-        self.period
+        self.segments.period()
     }
 
     /// Values of the function.
@@ -119,16 +96,14 @@ impl Table {
     /// Value and derivative at `offset` from the centre of `segment`: for building the
     /// inverse, whose angles must be known better than a double around `period` is.
     pub fn at(&self, segment: usize, offset: f64) -> (f64, f64) {
-        let away = (offset * self.per_unit).round_ties_even();
-        let place = (segment as i64 + away as i64).rem_euclid(self.rows.len() as i64);
-        let u = away.mul_add(-self.step, offset) * self.per_half;
-        let row = &self.rows[place as usize].0;
+        let (place, u) = self.segments.at(segment, offset);
+        let row = &self.rows[place].0;
         let (mut value, mut slope) = (row[DEGREE], 0.0);
         for &c in row[..DEGREE].iter().rev() {
             slope = u * slope + value;
             value = u * value + c;
         }
-        (value, slope * self.per_half)
+        (value, slope * self.segments.per_half())
     }
 }
 
@@ -157,12 +132,7 @@ impl<const SUBTRACT: bool> Map for Lookup<'_, SUBTRACT> {
         let mut results = x;
         for result in &mut results {
             let x = *result;
-            let near = if x.any_beyond(self.0.far) {
-                x.wrap_beyond(self.0.far, self.0.period)
-            } else {
-                x
-            };
-            let value = self.0.value(near);
+            let value = self.0.value(x);
             *result = if SUBTRACT { x - value } else { value };
         }
         results
@@ -172,16 +142,11 @@ impl<const SUBTRACT: bool> Map for Lookup<'_, SUBTRACT> {
 impl Table {
     #[inline(always)]
     fn value<L: Lanes>(&self, x: L) -> L {
-        let whole = x.mul_add(L::splat(self.per_unit), L::splat(ROUNDER));
-        let n = whole - L::splat(ROUNDER);
-        let rest = x.remainder(n, L::splat(self.step));
-        let rest = n.neg_mul_add(L::splat(self.step_low), rest);
-        let u = rest * L::splat(self.per_half);
-        let square = u * u;
-        let mask = self.rows.len() as u64 - 1;
+        let (place, u) = self.segments.locate(x);
+        let (square, mask) = (u * u, self.segments.mask());
         // SAFETY: the mask is the number of rows less one.
         let [c0, c1, c2, c3] =
-            unsafe { L::fold_rows(whole, mask, self.rows.as_ptr(), square * square) };
+            unsafe { L::fold_rows(place, mask, self.rows.as_ptr(), square * square) };
         c3.mul_add(u, c2).mul_add(square, c1.mul_add(u, c0))
     }
 }

@@ -3,7 +3,7 @@
 use std::arch::x86_64::*;
 use std::ops::{Add, Mul, Sub};
 
-use super::lanes::{Lanes, MOST_LANES, Row};
+use super::lanes::{Lanes, MOST_LANES, Quad, Row};
 
 /// Four doubles.
 #[derive(Clone, Copy)]
@@ -127,6 +127,42 @@ impl Lanes for F64x4 {
             ]
         }
     }
+
+    /// Rows `i` and `i + 4` side by side; blocks of four are transposed.
+    #[inline(always)]
+    unsafe fn cubics(
+        whole: [Self; 2],
+        u: [Self; 2],
+        mask: u64,
+        rows: *const Quad,
+    ) -> [f32; 2 * MOST_LANES] {
+        unsafe {
+            let mask = _mm256_set1_epi64x(mask as i64);
+            let mut place = [0u64; 8];
+            for i in 0..2 {
+                let index = _mm256_and_si256(_mm256_castpd_si256(whole[i].0), mask);
+                _mm256_storeu_si256(place.as_mut_ptr().add(4 * i).cast(), index);
+            }
+            let r0 = two_quads(rows, place[0], place[4]);
+            let r1 = two_quads(rows, place[1], place[5]);
+            let r2 = two_quads(rows, place[2], place[6]);
+            let r3 = two_quads(rows, place[3], place[7]);
+            let low_01 = _mm256_castps_pd(_mm256_unpacklo_ps(r0, r1));
+            let high_01 = _mm256_castps_pd(_mm256_unpackhi_ps(r0, r1));
+            let low_23 = _mm256_castps_pd(_mm256_unpacklo_ps(r2, r3));
+            let high_23 = _mm256_castps_pd(_mm256_unpackhi_ps(r2, r3));
+            let c0 = _mm256_castpd_ps(_mm256_unpacklo_pd(low_01, low_23));
+            let c1 = _mm256_castpd_ps(_mm256_unpackhi_pd(low_01, low_23));
+            let c2 = _mm256_castpd_ps(_mm256_unpacklo_pd(high_01, high_23));
+            let c3 = _mm256_castpd_ps(_mm256_unpackhi_pd(high_01, high_23));
+            let u = _mm256_set_m128(_mm256_cvtpd_ps(u[1].0), _mm256_cvtpd_ps(u[0].0));
+            let value = _mm256_fmadd_ps(_mm256_fmadd_ps(c3, u, c2), u, c1);
+            let value = _mm256_fmadd_ps(value, u, c0);
+            let mut values = [0.0; 2 * MOST_LANES];
+            _mm256_storeu_ps(values.as_mut_ptr(), value);
+            values
+        }
+    }
 }
 
 impl Lanes for F64x8 {
@@ -195,6 +231,43 @@ impl Lanes for F64x8 {
             ]
         }
     }
+
+    /// As for four lanes, with four rows side by side.
+    #[inline(always)]
+    unsafe fn cubics(
+        whole: [Self; 2],
+        u: [Self; 2],
+        mask: u64,
+        rows: *const Quad,
+    ) -> [f32; 2 * MOST_LANES] {
+        unsafe {
+            let mask = _mm512_set1_epi64(mask as i64);
+            let mut place = [0u64; 16];
+            for i in 0..2 {
+                let index = _mm512_and_si512(_mm512_castpd_si512(whole[i].0), mask);
+                _mm512_storeu_si512(place.as_mut_ptr().add(8 * i).cast(), index);
+            }
+            let r0 = four_quads(rows, [place[0], place[4], place[8], place[12]]);
+            let r1 = four_quads(rows, [place[1], place[5], place[9], place[13]]);
+            let r2 = four_quads(rows, [place[2], place[6], place[10], place[14]]);
+            let r3 = four_quads(rows, [place[3], place[7], place[11], place[15]]);
+            let low_01 = _mm512_castps_pd(_mm512_unpacklo_ps(r0, r1));
+            let high_01 = _mm512_castps_pd(_mm512_unpackhi_ps(r0, r1));
+            let low_23 = _mm512_castps_pd(_mm512_unpacklo_ps(r2, r3));
+            let high_23 = _mm512_castps_pd(_mm512_unpackhi_ps(r2, r3));
+            let c0 = _mm512_castpd_ps(_mm512_unpacklo_pd(low_01, low_23));
+            let c1 = _mm512_castpd_ps(_mm512_unpackhi_pd(low_01, low_23));
+            let c2 = _mm512_castpd_ps(_mm512_unpacklo_pd(high_01, high_23));
+            let c3 = _mm512_castpd_ps(_mm512_unpackhi_pd(high_01, high_23));
+            let low_u = _mm512_castps256_ps512(_mm512_cvtpd_ps(u[0].0));
+            let u = _mm512_insertf32x8::<1>(low_u, _mm512_cvtpd_ps(u[1].0));
+            let value = _mm512_fmadd_ps(_mm512_fmadd_ps(c3, u, c2), u, c1);
+            let value = _mm512_fmadd_ps(value, u, c0);
+            let mut values = [0.0; 2 * MOST_LANES];
+            _mm512_storeu_ps(values.as_mut_ptr(), value);
+            values
+        }
+    }
 }
 
 /// The upper half of a row times `high`, on top of its lower half.
@@ -232,5 +305,28 @@ unsafe fn side_by_side(first: *const f64, second: *const f64) -> __m512d {
     unsafe {
         let first = _mm512_castpd256_pd512(_mm256_load_pd(first));
         _mm512_insertf64x4::<1>(first, _mm256_load_pd(second))
+    }
+}
+
+#[inline(always)]
+unsafe fn quad(rows: *const Quad, place: u64) -> __m128 {
+    unsafe { _mm_load_ps(rows.add(place as usize).cast()) }
+}
+
+#[inline(always)]
+unsafe fn two_quads(rows: *const Quad, first: u64, second: u64) -> __m256 {
+    unsafe {
+        let first = _mm256_castps128_ps256(quad(rows, first));
+        _mm256_insertf128_ps::<1>(first, quad(rows, second))
+    }
+}
+
+#[inline(always)]
+unsafe fn four_quads(rows: *const Quad, places: [u64; 4]) -> __m512 {
+    unsafe {
+        let all = _mm512_castps128_ps512(quad(rows, places[0]));
+        let all = _mm512_insertf32x4::<1>(all, quad(rows, places[1]));
+        let all = _mm512_insertf32x4::<2>(all, quad(rows, places[2]));
+        _mm512_insertf32x4::<3>(all, quad(rows, places[3]))
     }
 }

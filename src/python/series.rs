@@ -19,9 +19,9 @@ use crate::series::{HarmonicSeries, Shaft};
 const RELEASED: usize = 1024;
 
 /// How to compute a batch, as the caller wants it.
-struct Wish<'a> {
+struct Wish {
     quantity: Quantity,
-    path: Option<&'a str>,
+    route: Option<Route>,
     threads: Option<i64>,
 }
 
@@ -94,16 +94,7 @@ impl PySeries {
         threads: Option<i64>,
         path: Option<&str>,
     ) -> PyResult<Bound<'py, PyAny>> {
-        let quantity = Quantity::Error;
-        self.compute(
-            theta,
-            out,
-            &Wish {
-                quantity,
-                path,
-                threads,
-            },
-        )
+        self.compute(Quantity::Error, theta, out, threads, path)
     }
 
     #[pyo3(signature = (theta, out=None, threads=None, path=None))]
@@ -114,16 +105,7 @@ impl PySeries {
         threads: Option<i64>,
         path: Option<&str>,
     ) -> PyResult<Bound<'py, PyAny>> {
-        let quantity = Quantity::Slope;
-        self.compute(
-            theta,
-            out,
-            &Wish {
-                quantity,
-                path,
-                threads,
-            },
-        )
+        self.compute(Quantity::Slope, theta, out, threads, path)
     }
 
     #[pyo3(signature = (indicated, out=None, threads=None, path=None))]
@@ -134,16 +116,7 @@ impl PySeries {
         threads: Option<i64>,
         path: Option<&str>,
     ) -> PyResult<Bound<'py, PyAny>> {
-        let quantity = Quantity::Correction;
-        self.compute(
-            indicated,
-            out,
-            &Wish {
-                quantity,
-                path,
-                threads,
-            },
-        )
+        self.compute(Quantity::Correction, indicated, out, threads, path)
     }
 
     fn compensator(&self) -> PyResult<PyCompensator> {
@@ -154,14 +127,27 @@ impl PySeries {
 
     #[getter]
     fn path(&self) -> String {
-        let route = self.evaluator.route::<f64>(Quantity::Error, 1);
+        let route = self.evaluator.route::<f64, f64>(Quantity::Error, 1);
         route.to_string()
     }
 
     #[getter]
     fn counts_path(&self) -> String {
-        let route = self.evaluator.route::<u32>(Quantity::Error, usize::MAX);
+        let route = self
+            .evaluator
+            .route::<u32, f64>(Quantity::Error, usize::MAX);
         route.to_string()
+    }
+
+    #[getter]
+    fn float32_path(&self) -> String {
+        let route = self.evaluator.route::<f32, f32>(Quantity::Error, 1);
+        route.to_string()
+    }
+
+    #[getter]
+    fn float32_bound(&self) -> f64 {
+        self.evaluator.single_bound()
     }
 
     #[getter]
@@ -194,11 +180,18 @@ impl PySeries {
 impl PySeries {
     fn compute<'py>(
         &self,
+        quantity: Quantity,
         x: &Bound<'py, PyAny>,
         out: Option<&Bound<'py, PyAny>>,
-        wish: &Wish<'_>,
+        threads: Option<i64>,
+        path: Option<&str>,
     ) -> PyResult<Bound<'py, PyAny>> {
         let py = x.py();
+        let wish = &Wish {
+            quantity,
+            route: path.map(|name| parse_route(py, name)).transpose()?,
+            threads,
+        };
         if out.is_none() && is_number(x) {
             let mut sample = [x.extract::<f64>()?];
             self.run(py, wish, Batch::in_place(&mut sample))?;
@@ -232,7 +225,7 @@ impl PySeries {
     /// Results of the plain array `x` to the plain array `out` of the same shape and order.
     fn fill<X: Sample + Element, Y: Real + Element>(
         &self,
-        wish: &Wish<'_>,
+        wish: &Wish,
         x: &Bound<'_, PyUntypedArray>,
         out: &Bound<'_, PyUntypedArray>,
     ) -> PyResult<()> {
@@ -246,16 +239,15 @@ impl PySeries {
     fn run<X: Sample, Y: Real>(
         &self,
         py: Python<'_>,
-        wish: &Wish<'_>,
+        wish: &Wish,
         batch: Batch<'_, X, Y>,
     ) -> PyResult<()> {
-        let route = wish.path.map(|name| parse_route(py, name)).transpose()?;
         let threads = threads(py, wish.threads, batch.len())?;
         let evaluator = &self.evaluator;
         if batch.len() < RELEASED {
-            evaluator.run(wish.quantity, route, threads, batch)?;
+            evaluator.run(wish.quantity, wish.route, threads, batch)?;
         } else {
-            py.detach(|| evaluator.run(wish.quantity, route, threads, batch))?;
+            py.detach(|| evaluator.run(wish.quantity, wish.route, threads, batch))?;
         }
         Ok(())
     }
@@ -271,7 +263,7 @@ fn parse_route(py: Python<'_>, name: &str) -> PyResult<Route> {
         argument_error(
             py,
             format!(
-                "path must be 'table', 'exact', 'direct' or 'counts', with '-portable', \
+                "path must be 'table', 'cubics', 'exact', 'direct' or 'counts', with '-portable', \
                  '-avx2' or '-avx512' to force an instruction set, got {name:?}"
             ),
         )

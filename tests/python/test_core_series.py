@@ -124,14 +124,42 @@ def test_no_samples(series, shape):
     assert series.error(np.empty(shape), out=np.empty(shape)).shape == shape
 
 
-def test_float32_stays_float32(series):
+def test_float32_stays_float32_within_its_bound(series):
     theta = np.linspace(-400.0, 800.0, 1001, dtype=np.float32)
     result = series.error(theta)
     assert result.dtype == np.float32
-    np.testing.assert_array_equal(result, series.error(theta.astype(float)).astype(np.float32))
+    exact = series.error(theta.astype(float))
+    np.testing.assert_allclose(result, exact, rtol=0, atol=series.float32_bound)
+    # A unit in the last place of the greatest value, and little more.
+    assert series.float32_bound <= 2.5 * np.finfo(np.float32).eps * (
+        series.amplitude_sum + abs(CONSTANT)
+    )
     in_place = theta.copy()
     assert series.correct(in_place, out=in_place) is in_place
-    np.testing.assert_array_equal(in_place, series.correct(theta.astype(float)).astype(np.float32))
+    # The inverse is as accurate as the series here, and the difference is rounded once.
+    atol = 2 * series.float32_bound + 0.5 * np.spacing(np.float32(800.0))
+    np.testing.assert_allclose(in_place, series.correct(theta.astype(float)), rtol=0, atol=atol)
+
+
+def test_float32_by_the_table_of_doubles_is_rounded_once(series):
+    theta = np.linspace(-400.0, 800.0, 1001, dtype=np.float32)
+    for method in (series.error, series.correct):
+        expected = method(theta.astype(float)).astype(np.float32)
+        np.testing.assert_array_equal(method(theta, path="table"), expected)
+
+
+def test_float32_path_is_told_and_forced(series):
+    assert series.float32_path.startswith("cubics-")
+    theta = np.linspace(0.0, 360.0, 101, dtype=np.float32)
+    forced = series.error(theta, path=series.float32_path)
+    np.testing.assert_array_equal(forced, series.error(theta))
+    with pytest.raises(ArgumentError, match="float32"):
+        series.error(theta.astype(float), path="cubics")
+    # Shafts without a common turn have no table.
+    free = Series(PERIOD, 0.0, [1.5], [[1]], [[1.0]], [[0.0]])
+    assert free.float32_path.startswith("exact-")
+    exact = free.error(theta.astype(float))
+    np.testing.assert_allclose(free.error(theta), exact, rtol=0, atol=free.float32_bound)
 
 
 @pytest.mark.parametrize("dtype", ["i1", "i2", "i4", "i8", "u1", "u2", "u4", "u8", ">i2", "f2"])
@@ -296,7 +324,7 @@ def test_paths(series):
         error = abs(series.error(theta, path=path) - direct).max()
         assert error <= ACCURACY * series.amplitude_sum + np.spacing(CONSTANT)
     for path in ("fast", "table-mmx", "table-", ""):
-        with pytest.raises(ArgumentError, match="'table', 'exact', 'direct' or 'counts'"):
+        with pytest.raises(ArgumentError, match="'table', 'cubics', 'exact', 'direct' or"):
             series.error(np.zeros(3), path=path)
     with pytest.raises(ArgumentError, match="slopes are not tabulated"):
         series.slope(theta, path="table")
