@@ -1,6 +1,7 @@
 //! Moments of one run: constant memory, mergeable, one pass.
 
-use super::kernel::{Around, Frame, accumulate};
+use super::frame::{Around, Frame};
+use super::kernel::accumulate;
 use super::readings::Readings;
 use super::segment::Segment;
 use crate::angle::{Period, two_sum};

@@ -4,108 +4,20 @@
 //! where `phi_j` is the product of the Chebyshev polynomials `T_1, T_2, T_4, T_8, T_16`
 //! that the binary digits of `j` name. The products span the same polynomials as
 //! `T_0, T_1, ...`, never exceed 1, and eight of them cost two vector multiplications.
+//!
+//! Readings that follow each other in one segment, as those of a joint that moves slowly,
+//! are taken side by side in the lanes of vectors; others one by one.
 
+use super::frame::{Around, Frame};
 use super::readings::Readings;
 use super::segment::{LANES, Segment};
-use crate::angle::Period;
 use crate::kernel::lanes::{InstructionSet, Kernel, Lanes, dispatch};
 
 /// Readings prepared at a time; their places and polynomials stay in the first cache.
-const CHUNK: usize = 64;
+const CHUNK: usize = 128;
 
-/// Adding it to a whole number below 2^52 leaves that number in the low bits.
-const WHOLE: f64 = (1u64 << 52) as f64;
-
-/// Division of a turn into `2 half` equal segments.
-#[derive(Clone, Copy, Debug)]
-pub struct Frame {
-    turn: Wrap,
-    half: f64,
-    scale: f64,
-    scale_low: f64,
-}
-
-/// Reduction by whole turns; the products are exact thanks to fused multiply-adds.
-#[derive(Clone, Copy, Debug)]
-struct Wrap {
-    inverse: f64,
-    high: f64,
-    low: f64,
-}
-
-impl Wrap {
-    fn new(period: Period) -> Self {
-        Self {
-            inverse: 1.0 / period.value(),
-            high: period.value(),
-            low: period.low(),
-        }
-    }
-
-    /// `x` minus the whole turns nearest to `near`.
-    #[inline(always)]
-    fn reduce(&self, x: f64, near: f64) -> f64 {
-        let turns = (near * self.inverse).round_ties_even();
-        (-turns).mul_add(self.low, (-turns).mul_add(self.high, x))
-    }
-}
-
-impl Frame {
-    /// `segments` (an even number) over one turn of `period`.
-    pub fn new(period: Period, segments: usize) -> Self {
-        let count = segments as f64;
-        let scale = count / period.value();
-        let rest = (-scale).mul_add(period.value(), count) - scale * period.low();
-        Self {
-            turn: Wrap::new(period),
-            half: 0.5 * count,
-            scale,
-            scale_low: rest / period.value(),
-        }
-    }
-
-    /// Segment of `x` and the place in it, from -1 to 1.
-    #[inline(always)]
-    fn place(&self, x: f64) -> (u32, f64) {
-        let rest = self.turn.reduce(x, x);
-        let floor = clamp((rest * self.scale).floor(), -self.half, self.half - 1.0);
-        let part = rest.mul_add(self.scale, -floor) + rest * self.scale_low;
-        let segment = (floor + self.half + WHOLE).to_bits() as u32;
-        (segment, clamp(part.mul_add(2.0, -1.0), -1.0, 1.0))
-    }
-}
-
-/// `x` between two bounds, the lower one for NaN: no angle can leave the table.
-#[inline(always)]
-fn clamp(x: f64, low: f64, high: f64) -> f64 {
-    let x = if x >= low { x } else { low };
-    if x <= high { x } else { high }
-}
-
-/// Errors are taken around a centre, modulo their own turn.
-#[derive(Clone, Copy, Debug)]
-pub struct Around {
-    turn: Wrap,
-    centre: f64,
-}
-
-impl Around {
-    /// Errors in `(-period/2, period/2]` around `centre`.
-    pub fn new(period: Period, centre: f64) -> Self {
-        Self {
-            turn: Wrap::new(period),
-            centre,
-        }
-    }
-
-    /// `indicated - reference - centre` without whole turns.
-    #[inline(always)]
-    fn difference(&self, indicated: f64, reference: f64) -> f64 {
-        let (difference, carry) = crate::angle::two_sum(indicated, -reference);
-        let rest = self.turn.reduce(difference, difference - self.centre);
-        (rest - self.centre) + carry
-    }
-}
+/// Readings in one segment from which lanes save more than their sums cost at the end.
+const RUN: usize = 24;
 
 /// One call of the inner loop.
 struct Call<'a, 'b> {
@@ -175,9 +87,7 @@ fn run<L: Lanes, const DIFFERENCE: bool, const WEIGHTED: bool>(call: Call<'_, '_
         chunk.weight[len..].fill(0.0);
         chunk.prepare(frame, around, &angle, &error, &reference);
         chunk.square(&mut squares);
-        for i in 0..CHUNK {
-            chunk.add::<L>(i, &mut table[chunk.segment[i] as usize]);
-        }
+        chunk.add_all::<L>(table);
     }
     *sum = squares.iter().sum();
 }
@@ -194,10 +104,8 @@ fn load(values: &[f64], start: usize, len: usize) -> [f64; CHUNK] {
 /// Readings made ready for their segments.
 struct Chunk {
     segment: [u32; CHUNK],
-    /// `1` and `T` for `T_1, T_2, T_4`: eight products of them are two multiplications.
-    pairs: [[[f64; 2]; CHUNK]; 3],
-    /// `T_8` and `T_16`.
-    high: [[f64; CHUNK]; 2],
+    /// `T_1, T_2, T_4, T_8, T_16`.
+    polynomials: [[f64; CHUNK]; 5],
     weight: [f64; CHUNK],
     error: [f64; CHUNK],
 }
@@ -206,8 +114,7 @@ impl Chunk {
     fn new() -> Self {
         Self {
             segment: [0; CHUNK],
-            pairs: [[[1.0; 2]; CHUNK]; 3],
-            high: [[0.0; CHUNK]; 2],
+            polynomials: [[0.0; CHUNK]; 5],
             weight: [0.0; CHUNK],
             error: [0.0; CHUNK],
         }
@@ -227,11 +134,11 @@ impl Chunk {
             let double = |t: f64| (t + t).mul_add(t, -1.0);
             let (t2, t4) = (double(u), double(double(u)));
             self.segment[i] = segment;
-            self.pairs[0][i] = [1.0, u];
-            self.pairs[1][i] = [1.0, t2];
-            self.pairs[2][i] = [1.0, t4];
-            self.high[0][i] = double(t4);
-            self.high[1][i] = double(double(t4));
+            self.polynomials[0][i] = u;
+            self.polynomials[1][i] = t2;
+            self.polynomials[2][i] = t4;
+            self.polynomials[3][i] = double(t4);
+            self.polynomials[4][i] = double(double(t4));
             self.error[i] = around.difference(error[i], reference[i]);
         }
     }
@@ -248,15 +155,100 @@ impl Chunk {
         }
     }
 
+    /// Adds all readings to their segments.
+    #[inline(always)]
+    fn add_all<L: Lanes>(&self, table: &mut [Segment]) {
+        let mut start = 0;
+        while start < CHUNK {
+            let segment = self.segment[start];
+            let mut end = start;
+            while end < CHUNK && self.is_within::<L>(end, segment) {
+                end += L::N;
+            }
+            let moments = &mut table[segment as usize];
+            if end - start >= RUN {
+                self.add_run::<L, 0>(start, end, moments);
+                self.add_run::<L, 1>(start, end, moments);
+                self.add_run::<L, 2>(start, end, moments);
+                self.add_run::<L, 3>(start, end, moments);
+            } else {
+                end = end.max(start + L::N);
+                for i in start..end {
+                    self.add::<L>(i, &mut table[self.segment[i] as usize]);
+                }
+            }
+            start = end;
+        }
+    }
+
+    /// Whether as many readings from `i` as there are lanes are in the segment.
+    #[inline(always)]
+    fn is_within<L: Lanes>(&self, i: usize, segment: u32) -> bool {
+        let mut other = 0;
+        for found in &self.segment[i..i + L::N] {
+            other |= found ^ segment;
+        }
+        other == 0
+    }
+
+    /// Adds readings `start..end`, all of one segment, to its moments `2 PASS` and `2 PASS + 1`
+    /// and those above by 8 and 16: as many as there are registers for.
+    #[inline(always)]
+    fn add_run<L: Lanes, const PASS: usize>(
+        &self,
+        start: usize,
+        end: usize,
+        segment: &mut Segment,
+    ) {
+        let [t1, t2, t4, t8, t16] = &self.polynomials;
+        let mut sums = [[L::splat(0.0); 5]; 2];
+        for i in (start..end).step_by(L::N) {
+            let (weight, error) = (lanes::<L>(&self.weight, i), lanes::<L>(&self.error, i));
+            let (t8, t16) = (lanes::<L>(t8, i), lanes::<L>(t16, i));
+            let even = match PASS {
+                0 => weight,
+                1 => weight * lanes::<L>(t2, i),
+                2 => weight * lanes::<L>(t4, i),
+                _ => weight * (lanes::<L>(t2, i) * lanes::<L>(t4, i)),
+            };
+            let low = [even, even * lanes::<L>(t1, i)];
+            for k in 0..2 {
+                sums[k][0] = sums[k][0] + low[k];
+                sums[k][1] = low[k].mul_add(t8, sums[k][1]);
+                sums[k][2] = low[k].mul_add(t16, sums[k][2]);
+                sums[k][3] = low[k].mul_add(error, sums[k][3]);
+                if PASS < 2 {
+                    sums[k][4] = low[k].mul_add(t8 * error, sums[k][4]);
+                }
+            }
+        }
+        for k in 0..2 {
+            let j = 2 * PASS + k;
+            segment.weight[j] += total(sums[k][0]);
+            segment.weight[LANES + j] += total(sums[k][1]);
+            segment.weight[2 * LANES + j] += total(sums[k][2]);
+            segment.error[j] += total(sums[k][3]);
+            if PASS < 2 {
+                segment.error[LANES + j] += total(sums[k][4]);
+            }
+        }
+    }
+
     /// Adds reading `i` to its segment.
     #[inline(always)]
     fn add<L: Lanes>(&self, i: usize, segment: &mut Segment) {
-        let pairs = [self.pairs[0][i], self.pairs[1][i], self.pairs[2][i]];
-        let (t8, t16) = (self.high[0][i], self.high[1][i]);
+        let [t1, t2, t4, t8, t16] = &self.polynomials;
+        let (t8, t16) = (t8[i], t16[i]);
         let (weight, error) = (self.weight[i], self.error[i]);
         let mut low = [0.0; LANES];
-        for (j, value) in low.iter_mut().enumerate() {
-            *value = weight * (pairs[0][j & 1] * pairs[1][j >> 1 & 1] * pairs[2][j >> 2]);
+        for first in (0..LANES).step_by(L::N) {
+            let product = factor::<L>(first, 0, t1[i]) * factor::<L>(first, 1, t2[i]);
+            let product = L::splat(weight) * (product * factor::<L>(first, 2, t4[i]));
+            let mut values = [0.0; LANES];
+            product.to_array(&mut values);
+            for lane in 0..L::N {
+                low[first + lane] = values[lane];
+            }
         }
         for (j, &low) in low.iter().enumerate() {
             let [first, second, third] = [j, LANES + j, 2 * LANES + j];
@@ -271,6 +263,46 @@ impl Chunk {
     }
 }
 
+/// Values from the `i`-th, one to a lane.
+#[inline(always)]
+fn lanes<L: Lanes>(values: &[f64; CHUNK], i: usize) -> L {
+    let mut array = [0.0; LANES];
+    array[..L::N].copy_from_slice(&values[i..i + L::N]);
+    L::from_array(&array)
+}
+
+/// 1 at the numbers that have the bit, by bit; the second half repeats the first.
+const HAS_BIT: [[f64; 2 * LANES]; 3] = {
+    let mut table = [[0.0; 2 * LANES]; 3];
+    let mut place = 0;
+    while place < 6 * LANES {
+        let (bit, number) = (place / (2 * LANES), place % (2 * LANES));
+        table[bit][number] = (number >> bit & 1) as f64;
+        place += 1;
+    }
+    table
+};
+
+/// In the lanes `first, first + 1, ...` the polynomial `t` where the lane's number has the
+/// bit, else 1.
+#[inline(always)]
+fn factor<L: Lanes>(first: usize, bit: usize, t: f64) -> L {
+    let (mut with, mut without) = ([0.0; LANES], [0.0; LANES]);
+    for lane in 0..LANES {
+        with[lane] = HAS_BIT[bit][first + lane];
+        without[lane] = 1.0 - with[lane];
+    }
+    L::splat(t).mul_add(L::from_array(&with), L::from_array(&without))
+}
+
+/// Sum of all lanes.
+#[inline(always)]
+fn total<L: Lanes>(lanes: L) -> f64 {
+    let mut v = [0.0; LANES];
+    lanes.to_array(&mut v);
+    ((v[0] + v[4]) + (v[2] + v[6])) + ((v[1] + v[5]) + (v[3] + v[7]))
+}
+
 /// `a * b + c`, in one instruction where the processor has it (a slow call elsewhere).
 #[inline(always)]
 fn fused<L: Lanes>(a: f64, b: f64, c: f64) -> f64 {
@@ -280,19 +312,60 @@ fn fused<L: Lanes>(a: f64, b: f64, c: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::angle::Period;
 
     /// Of sums of 1000 terms up to 1.
     const ROUNDING: f64 = 1e-12;
 
+    fn sets() -> impl Iterator<Item = InstructionSet> {
+        use InstructionSet::{Avx2, Avx512, Portable};
+        [Avx512, Avx2, Portable]
+            .into_iter()
+            .filter(|set| set.is_available())
+    }
+
+    /// Readings in order of angle, of which many follow each other in a segment, give the
+    /// sums of the same readings in disorder, with every set of instructions.
+    #[test]
+    fn readings_side_by_side_give_the_sums_of_single_ones() {
+        let period = Period::new(360.0).unwrap();
+        let (frame, around) = (Frame::new(period, 34), Around::new(period, 0.0));
+        let of = |order: &dyn Fn(usize) -> usize, set| {
+            let angle: Vec<f64> = (0..1009).map(|i| 0.1 * order(i) as f64 - 50.0).collect();
+            let error: Vec<f64> = angle.iter().map(|x| (0.1 * x).sin()).collect();
+            let weights: Vec<f64> = angle.iter().map(|x| 2.0 + (3.0 * x).cos()).collect();
+            let (mut squares, mut table) = (0.0, vec![Segment::EMPTY; 34]);
+            let readings = Readings {
+                angle: &angle,
+                error: &error,
+                reference: None,
+                weights: Some(&weights),
+            };
+            let call = Call {
+                frame: &frame,
+                around: &around,
+                readings,
+                table: &mut table,
+                squares: &mut squares,
+            };
+            dispatch(set, call);
+            table
+        };
+        for set in sets() {
+            // 397 and the prime 1009: neighbours are far apart.
+            let (sweep, disorder) = (of(&|i| i, set), of(&|i| i * 397 % 1009, set));
+            for (a, b) in sweep.iter().zip(&disorder) {
+                for (a, b) in a.values().zip(b.values()) {
+                    assert!((a - b).abs() < ROUNDING, "{set:?}: {a} {b}");
+                }
+            }
+        }
+    }
+
     /// Every set of instructions and every shape of readings gives the same sums.
     #[test]
     fn instruction_sets_agree() {
-        let sets = [
-            InstructionSet::Avx512,
-            InstructionSet::Avx2,
-            InstructionSet::Portable,
-        ];
-        let sets: Vec<_> = sets.into_iter().filter(|set| set.is_available()).collect();
+        let sets: Vec<_> = sets().collect();
         let period = Period::new(360.0).unwrap();
         let frame = Frame::new(period, 34);
         let around = Around::new(period, 2.0);

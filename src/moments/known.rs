@@ -32,16 +32,16 @@ pub fn add_known(
     angles: Angles<'_>,
     travel: &mut [i64],
 ) -> usize {
-    let (mut reference, mut indicated) = (Vec::new(), Vec::new());
     let mut known = 0;
     let blocks = angles.reference.chunks(BLOCK);
     for (mut all, mut said) in blocks.zip(angles.indicated.chunks(BLOCK)) {
+        let kept: (Vec<f64>, Vec<f64>);
         if !(all_finite(all) && all_finite(said)) {
             let pairs = all.iter().zip(said);
-            (reference, indicated) = pairs
+            kept = pairs
                 .filter(|(a, b)| a.is_finite() && b.is_finite())
                 .unzip();
-            (all, said) = (&reference, &indicated);
+            (all, said) = (&kept.0, &kept.1);
         }
         if all.is_empty() {
             continue;

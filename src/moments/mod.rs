@@ -8,6 +8,7 @@
 pub mod accumulator;
 mod bessel;
 pub mod factor;
+pub mod frame;
 pub mod kernel;
 pub mod known;
 pub mod normal;

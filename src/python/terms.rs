@@ -48,6 +48,18 @@ impl PyCorrector {
         self.0.reset();
     }
 
+    fn store(&self) -> Vec<f64> {
+        self.0.store()
+    }
+
+    fn restore(&mut self, py: Python<'_>, numbers: Vec<f64>) -> PyResult<()> {
+        if self.0.restore(&numbers) {
+            return Ok(());
+        }
+        let problem = "this is not the state of a corrector with such terms";
+        Err(argument_error(py, problem.to_owned()))
+    }
+
     #[pyo3(signature = (indicated, velocity, temperature, torque, direction, threads))]
     fn correct<'py>(
         &mut self,

@@ -146,6 +146,19 @@ impl Corrector {
         self.travel = Travel::new(self.terms.elements.len());
     }
 
+    /// The past as plain numbers.
+    pub fn store(&self) -> Vec<f64> {
+        self.travel.store()
+    }
+
+    /// Takes over the past of a corrector of the same terms; false when it is not one.
+    pub fn restore(&mut self, numbers: &[f64]) -> bool {
+        let found = self.travel.restored(numbers);
+        let is_one = found.is_some();
+        self.travel = found.unwrap_or_else(|| self.travel.clone());
+        is_one
+    }
+
     /// The true angle behind an indicated one; NaN for what is not finite, which leaves
     /// the state alone.
     pub fn correct(&mut self, indicated: f64, signals: &Signals) -> Result<f64, Error> {

@@ -36,6 +36,23 @@ impl Travel {
         }
     }
 
+    /// Everything as plain numbers; `restored` takes them back.
+    pub fn store(&self) -> Vec<f64> {
+        let mut numbers = vec![self.farthest, self.direction];
+        numbers.extend(&self.state);
+        numbers
+    }
+
+    /// Travel with the numbers of another over as many elements; None when they are not.
+    pub fn restored(&self, numbers: &[f64]) -> Option<Self> {
+        let (&[farthest, direction], state) = numbers.split_first_chunk()?;
+        (state.len() == self.state.len()).then(|| Self {
+            farthest,
+            direction,
+            state: state.to_vec(),
+        })
+    }
+
     pub fn is_known(&self) -> bool {
         !self.farthest.is_nan()
     }

@@ -425,3 +425,13 @@ def test_signals_that_leave_no_unique_angle_give_nan():
     result = model.correct([10.0] * 4, temperature=[25.0, 220.0, 1e4, 1e6])
     assert np.isfinite(result[0])
     assert np.isnan(result[1:]).all()
+
+
+def test_a_state_is_that_of_a_corrector_with_such_terms():
+    model = ta.HarmonicModel([], period=360.0, terms=[ta.Backlash(0.5)])
+    first, second = model.corrector(), model.corrector()
+    first([10.0, 20.0], time=[0.0, 1.0])
+    second.state = first.state
+    assert second([19.8]) == first([19.8]) == 19.5
+    with pytest.raises(ta.errors.ArgumentError, match="not the state"):
+        second.state = (*first.state, 0.0)

@@ -108,3 +108,56 @@ def test_a_column_of_another_name(tmp_path, joint):
     status, out = run(joint, tmp_path, "--signal", "temperature=T_motor")
     assert status == 0
     np.testing.assert_allclose(corrected(out), theta, rtol=0, atol=3.6e-10)
+
+
+@pytest.fixture
+def recording(tmp_path):
+    """One recording cut in three logs, right after a reversal and while a spring winds up."""
+    pytest.importorskip("pyarrow.parquet")
+    theta = np.concatenate([np.linspace(0.0, 300.0, 900), np.linspace(300.0, 100.0, 1100)])
+    terms = [ta.Backlash(0.3), ta.PreslidingHysteresis(0.2, 40.0)]
+    model = ta.HarmonicModel([ta.Shaft("output", 1, [1], [0.1], [0.2])], period=360.0, terms=terms)
+    said = np.mod(theta + model.error(theta) + 1e-3, 360.0)
+    folder = tmp_path / "logs"
+    folder.mkdir()
+    for name, part in (("1", slice(0, 905)), ("2", slice(905, 930)), ("10", slice(930, 2000))):
+        rows = "\n".join(repr(x) for x in said[part].tolist())
+        (folder / f"{name}.csv").write_text(f"indicated_deg\n{rows}\n")
+    return model, folder, model.correct(said)
+
+
+def parts(out):
+    return np.concatenate([corrected(out / f"{name}.csv") for name in ("1", "2", "10")])
+
+
+def test_travel_crosses_the_borders_of_files(recording, tmp_path):
+    model, folder, whole = recording
+    assert ta.correct_logs(folder, model, tmp_path / "out").is_done
+    np.testing.assert_array_equal(parts(tmp_path / "out"), whole)
+    alone = ta.correct_logs(folder / "2.csv", model, tmp_path / "2.csv")
+    assert alone.is_done
+    # Without the log before, neither the direction nor the spring is known: the border counts.
+    assert abs(corrected(tmp_path / "2.csv")[0] - whole[905]) > 0.1
+
+
+def test_travel_is_taken_up_again_by_the_run_that_resumes(recording, tmp_path):
+    model, folder, whole = recording
+    out = tmp_path / "out"
+    assert ta.correct_logs(folder, model, out).is_done
+    (out / "2.csv").unlink()
+    (out / "10.csv").unlink()
+    report = ta.correct_logs(folder, model, out)
+    assert [log.status for log in report.logs] == ["done before", "done", "done"]
+    np.testing.assert_array_equal(parts(out), whole)
+
+
+@pytest.mark.filterwarnings("default")  # the cluster's own warnings are not ours
+def test_travel_crosses_files_on_a_cluster(recording, tmp_path):
+    distributed = pytest.importorskip("distributed")
+    model, folder, whole = recording
+    with distributed.LocalCluster(
+        n_workers=2, threads_per_worker=1, dashboard_address=None, silence_logs=50
+    ) as found:
+        report = ta.correct_logs(folder, model, tmp_path / "out", scheduler=found.scheduler_address)
+    assert report.is_done
+    np.testing.assert_array_equal(parts(tmp_path / "out"), whole)

@@ -42,6 +42,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--run", action="append", metavar="LABEL", help="use this run only (may be repeated)"
     )
     add_one_pass(parser)
+    parser.add_argument(
+        "--checksums",
+        action="store_true",
+        help="keep the sha256 of the files in the model, also of a fit in one pass",
+    )
     parser.add_argument("--json", action="store_true", help="print the result as JSON")
 
 

@@ -88,6 +88,7 @@ def fit_in_one_pass(args: argparse.Namespace, orders: Any) -> LogFit:
         argument=getattr(args, "argument", "reference"),
         counts_per_turn=args.counts_per_turn,
         scheduler=args.scheduler,
+        checksums=getattr(args, "checksums", False),
         progress=args.progress,
     )
 

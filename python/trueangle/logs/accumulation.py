@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import reduce
@@ -53,6 +54,7 @@ class LogFitSettings:
     counts_per_turn: float | None = None
     topic: str | None = None
     threads: int | None = None
+    checksums: bool = False
 
 
 @dataclass
@@ -63,7 +65,8 @@ class Accumulated:
     ----------
     moments : Moments
         Runs are labelled ``(file, run)``.
-    files : tuple of str
+    files, sha256 : tuple of str
+        Checksums are empty where they were not asked for, and of folders.
     rows, missing : int
         Readings, and those without a reference or indicated angle.
     travel : ndarray
@@ -72,6 +75,7 @@ class Accumulated:
 
     moments: Moments
     files: tuple[str, ...] = ()
+    sha256: tuple[str, ...] = ()
     rows: int = 0
     missing: int = 0
     travel: NDArray[np.int64] = field(default_factory=lambda: np.zeros(_BINS, dtype=np.int64))
@@ -153,7 +157,9 @@ def _accumulate(stretch: _Stretch, settings: LogFitSettings, advance: Advance) -
     """Moments of one stretch of a log."""
     path, period = stretch.path, stretch.period
     found = Accumulated(
-        Moments(settings.orders, period=period, shafts=settings.shafts), (str(path),)
+        Moments(settings.orders, period=period, shafts=settings.shafts),
+        (str(path),),
+        (_sha256(path) if settings.checksums and stretch.is_first else "",),
     )
     reference, indicated, *run = stretch.names
     left = stretch.size
@@ -221,10 +227,18 @@ def _merged_pair(first: Accumulated, second: Accumulated | None = None) -> Accum
     return Accumulated(
         first.moments + second.moments,
         first.files + second.files,
+        first.sha256 + second.sha256,
         first.rows + second.rows,
         first.missing + second.missing,
         first.travel + second.travel,
     )
+
+
+def _sha256(path: Path) -> str:
+    if not path.is_file():
+        return ""
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
 
 
 def _check_follows(path: Path, true: NDArray[Any], said: NDArray[Any], period: float) -> None:

@@ -24,6 +24,7 @@ __all__ = [
     "column_batches",
     "corrected_schema",
     "damage_told",
+    "labels",
     "numbers",
 ]
 
@@ -193,14 +194,15 @@ def column_batches(path: object, names: Sequence[str], batches: Iterable[Any]) -
     """Some columns of record batches: numbers as arrays, texts as labels."""
     for batch in batches:
         yield {
-            name: _labels(batch[name])
+            name: labels(batch[name])
             if _is_label(batch[name].type)
             else numbers(path, name, batch[name])
             for name in names
         }
 
 
-def _labels(column: pa.Array | pa.ChunkedArray) -> Labels:
+def labels(column: pa.Array | pa.ChunkedArray) -> Labels:
+    """A column of texts by their place among the different ones; nulls are the last."""
     if isinstance(column, pa.ChunkedArray):
         column = column.combine_chunks()
     if not pa.types.is_dictionary(column.type):

@@ -12,13 +12,12 @@ from typing import Any
 
 from ..errors import TrueAngleError
 from ..model import HarmonicModel
-from .correction import Task, correct_log, is_disk_full
-from .joints import LogSettings, joints_of
+from .correction import Task, correct_log, is_disk_full, states_after
+from .joints import JointState, LogSettings, joints_of
 from .manifest import Manifest
 from .progress import Progress
 from .safety import remove_leftovers, stamp
 from .sources import Place, places
-from .turns import TurnState
 
 __all__ = ["BatchReport", "LogReport", "correct_logs"]
 
@@ -52,7 +51,7 @@ class LogReport:
 
     def as_json(self) -> dict[str, Any]:
         """Plain values."""
-        known = {key: value for key, value in self.result.items() if key != "turns"}
+        known = {key: value for key, value in self.result.items() if key != "after"}
         error = {} if self.error is None else {"error": str(self.error)}
         return {
             "log": str(self.log),
@@ -214,11 +213,11 @@ def _one_by_one(
     shown: Progress,
     finished: Callable[[LogReport], None],
 ) -> None:
-    turns: Mapping[str, TurnState] = {}
+    before: Mapping[str, JointState] = {}
     for place, log in zip(found, logs, strict=True):
         if not done_before(place, log, settings, manifests):
             shown.start_file(log.size)
-            task = Task(place.source, place.target, settings, turns, place.manifest)
+            task = Task(place.source, place.target, settings, before, place.manifest)
             try:
                 log.result = correct_log(task, shown.advance)
                 log.status = "done"
@@ -228,4 +227,4 @@ def _one_by_one(
         # Without the turns of this log, those of the logs after it cannot be told.
         if log.error is not None and (is_disk_full(log.error) or settings.counts_turns):
             return
-        turns = {name: TurnState(*state) for name, state in log.result.get("turns", {}).items()}
+        before = states_after(log.result)

@@ -6,13 +6,13 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from ..errors import ArgumentError, FileError, MissingExtraError, TrueAngleError
 from .accumulation import Accumulated, LogFitSettings, accumulate, merged
 from .batch import LogReport, done_before
-from .correction import Task, correct_log, count_turns, is_disk_full
-from .joints import LogSettings
+from .correction import Task, correct_log, count_turns, is_disk_full, states_after
+from .joints import JointState, LogSettings
 from .manifest import Manifest
 from .progress import Progress
 from .sources import Place
@@ -73,20 +73,11 @@ def on_cluster(
     """
     distributed: Any = _distributed()
     settings = replace(settings, threads=settings.threads or 1)
-    waiting = []
     for place, log in zip(found, logs, strict=True):
         if done_before(place, log, settings, manifests):
             finished(log)
-        else:
-            waiting.append((place, log))
     with connected(scheduler) as client:
-        begins = _turns(client, found, logs, settings)
-        futures = {
-            client.submit(_correct, _task(place, settings, begins.get(place.source)), pure=False): (
-                log
-            )
-            for place, log in waiting
-        }
+        futures = _submitted(client, found, logs, settings)
         try:
             for future in distributed.as_completed(futures, loop=client.loop):
                 log = futures[future]
@@ -115,21 +106,47 @@ def accumulated_on_cluster(
     return found
 
 
-def _task(place: Place, settings: LogSettings, turns: Mapping[str, TurnState] | None) -> Task:
-    manifest = None if place.manifest is None else place.manifest.resolve()
-    return Task(place.source.resolve(), place.target.resolve(), settings, turns, manifest)
+def _submitted(
+    client: Any, found: Sequence[Place], logs: Sequence[LogReport], settings: LogSettings
+) -> dict[Any, LogReport]:
+    """The report to fill by the future of every log that is not done.
+
+    Logs of a model whose terms follow the travel wait for the log before.
+    """
+    begins = {} if settings.follows_travel else _turns(client, found, settings)
+    futures: dict[Any, LogReport] = {}
+    before: Any = None
+    for place, log in zip(found, logs, strict=True):
+        if log.is_done:
+            before = _Outcome(log.result)
+            continue
+        manifest = None if place.manifest is None else place.manifest.resolve()
+        begin = begins.get(place.source)
+        task = Task(place.source.resolve(), place.target.resolve(), settings, begin, manifest)
+        before = client.submit(
+            _correct, task, before if settings.follows_travel else None, pure=False
+        )
+        futures[before] = log
+    return futures
 
 
-def _correct(task: Task) -> dict[str, Any]:
+class _Outcome(NamedTuple):
+    """What became of a log: an error does not keep the log after it from being corrected."""
+
+    result: Mapping[str, Any]
+    error: Exception | None = None
+
+
+def _correct(task: Task, before: _Outcome | None) -> _Outcome:
     """On a worker. A log that a lost worker had finished is not done twice."""
+    if before is not None:
+        task = replace(task, before=states_after(before.result))
     try:
-        return _known(task) or correct_log(task)
-    except (TrueAngleError, OSError):
+        return _Outcome(_known(task) or correct_log(task))
+    except (TrueAngleError, OSError) as error:
         # A worker thought lost may have finished it in the meantime.
         known = _known(task)
-        if known is None:
-            raise
-        return known
+        return _Outcome({}, error) if known is None else _Outcome(known)
 
 
 def _known(task: Task) -> dict[str, Any] | None:
@@ -144,25 +161,24 @@ def _known(task: Task) -> dict[str, Any] | None:
 def _outcome(future: Any, log: LogReport) -> tuple[str, Mapping[str, Any], Exception | None]:
     distributed: Any = _distributed()
     try:
-        return "done", future.result(), None
-    except (TrueAngleError, OSError) as error:
-        return "failed", {}, error
-    except distributed.scheduler.KilledWorker as error:
-        return "failed", {}, FileError(log.log, f"every worker that took it died: {error}")
+        result, error = future.result()
+    except distributed.scheduler.KilledWorker as cause:
+        return "failed", {}, FileError(log.log, f"every worker that took it died: {cause}")
+    return "done" if error is None else "failed", result, error
 
 
 def _turns(
-    client: Any, found: Sequence[Place], logs: Sequence[LogReport], settings: LogSettings
-) -> dict[Path, dict[str, TurnState]]:
+    client: Any, found: Sequence[Place], settings: LogSettings
+) -> dict[Path, dict[str, JointState]]:
     """Where every log begins, for models that count turns: one more pass, side by side."""
     if not settings.counts_turns:
         return {}
     spans: list[dict[str, TurnSpan]] = client.gather(
         [client.submit(count_turns, place.source.resolve(), settings) for place in found]
     )
-    begins: dict[Path, dict[str, TurnState]] = {}
+    begins: dict[Path, dict[str, JointState]] = {}
     state: dict[str, TurnState] = {}
     for place, span in zip(found, spans, strict=True):
-        begins[place.source] = state
+        begins[place.source] = {joint: JointState(one) for joint, one in state.items()}
         state = {joint: one.after(state.get(joint, TurnState())) for joint, one in span.items()}
     return begins

@@ -14,26 +14,26 @@ import numpy as np
 
 from ..errors import FileError
 from .formats import Watch, find_format
-from .joints import Channel, LogSettings
+from .joints import Channel, JointState, LogSettings
 from .manifest import Manifest
 from .safety import publish, stamp, workplace
-from .turns import TurnCounter, TurnSpan, TurnState
+from .turns import TurnCounter, TurnSpan
 
-__all__ = ["Task", "correct_log", "count_turns", "is_disk_full"]
+__all__ = ["Task", "correct_log", "count_turns", "is_disk_full", "states_after"]
 
 
 @dataclass(frozen=True)
 class Task:
     """One log to correct: can be sent to another process.
 
-    ``turns`` tells, by joint, where the log before stopped; ``manifest`` is the folder
+    ``before`` tells, by joint, where the log before stopped; ``manifest`` is the folder
     whose manifest notes the output.
     """
 
     source: Path
     target: Path
     settings: LogSettings
-    turns: Mapping[str, TurnState] | None = None
+    before: Mapping[str, JointState] | None = None
     manifest: Path | None = None
 
 
@@ -44,8 +44,8 @@ def correct_log(task: Task, watch: Watch = lambda rows, part: None) -> dict[str,
     -------
     dict
         ``rows`` (readings of a joint), ``seconds``, ``rows_per_second``, ``joints`` (see
-        `Channel.summary`) and, for models that count turns, ``turns`` to pass on to the log
-        that follows.
+        `Channel.summary`) and ``after``, the joints' states to pass on to the log that
+        follows.
 
     Raises
     ------
@@ -62,7 +62,7 @@ def correct_log(task: Task, watch: Watch = lambda rows, part: None) -> dict[str,
     channels: list[Channel] = []
 
     def choose(header: Any) -> list[Channel]:
-        channels.extend(settings.channels(source, header, task.turns, kind.unit))
+        channels.extend(settings.channels(source, header, task.before, kind.unit))
         return channels
 
     with workplace(target) as aside:
@@ -89,7 +89,7 @@ def correct_log(task: Task, watch: Watch = lambda rows, part: None) -> dict[str,
             "seconds": seconds,
             "rows_per_second": rows / seconds,
             "joints": [channel.summary() for channel in channels],
-            "turns": {c.name: list(c.turns) for c in channels if c.turns is not None},
+            "after": {c.name: c.state for c in channels},
         }
         if target.is_file() and aside.is_file():
             shutil.copymode(target, aside)
@@ -101,6 +101,11 @@ def correct_log(task: Task, watch: Watch = lambda rows, part: None) -> dict[str,
     return result
 
 
+def states_after(result: Mapping[str, Any]) -> dict[str, JointState]:
+    """The joints' states in what `correct_log` returned or a manifest kept of it."""
+    return {name: JointState.of(state) for name, state in result.get("after", {}).items()}
+
+
 def count_turns(source: Path, settings: LogSettings) -> dict[str, TurnSpan]:
     """What logs corrected side by side must know of each other, by joint that needs it.
 
@@ -109,7 +114,7 @@ def count_turns(source: Path, settings: LogSettings) -> dict[str, TurnSpan]:
     kind = find_format(source)
     module = kind.module
     header = module.columns(source, settings.topic)
-    channels = [c for c in settings.channels(source, header, unit=kind.unit) if c.turns is not None]
+    channels = [c for c in settings.channels(source, header, unit=kind.unit) if c.counts_turns]
     counters = {c.name: TurnCounter(c.angle.period) for c in channels}
     first: dict[str, float | None] = {c.name: None for c in channels}
     for batch in module.read(source, [c.angle.name for c in channels], settings.topic):

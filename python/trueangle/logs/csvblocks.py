@@ -11,7 +11,9 @@ import pyarrow.compute as pc
 import pyarrow.csv
 from numpy.typing import NDArray
 
+from .arrowtables import labels
 from .csvrows import Header, QuotedBlock
+from .formats import Labels
 
 __all__ = ["PlainBlock", "plain_block"]
 
@@ -50,16 +52,22 @@ class PlainBlock:
         """Number of lines."""
         return int(self._starts.size)
 
-    def numbers(self, names: Sequence[str]) -> dict[str, NDArray[np.float64]]:
-        """Columns as numbers, empty cells as NaN; see `QuotedBlock.numbers`."""
+    def numbers(
+        self, names: Sequence[str], texts: Sequence[str] = ()
+    ) -> dict[str, NDArray[np.float64]]:
+        """Columns as numbers, empty cells as NaN; see `QuotedBlock.numbers`.
+
+        Columns ``texts`` are cut out on the way, for `labels`.
+        """
         try:
             self._table = pa.csv.read_csv(
                 pa.BufferReader(self.data),
                 pa.csv.ReadOptions(column_names=self.header.names),
                 pa.csv.ParseOptions(delimiter=self.header.delimiter, quote_char=False),
                 pa.csv.ConvertOptions(
-                    include_columns=list(names),
-                    column_types=dict.fromkeys(names, pa.float64()),
+                    include_columns=[*names, *texts],
+                    column_types=dict.fromkeys(names, pa.float64())
+                    | dict.fromkeys(texts, pa.dictionary(pa.int32(), pa.string())),
                     null_values=[""],
                 ),
             )
@@ -70,6 +78,13 @@ class PlainBlock:
             self._quoted = QuotedBlock.whole(self.data, self.header, self.line)
             return self._quoted.numbers(names)
         return {name: self._table[name].to_numpy() for name in names}
+
+    def labels(self, name: str) -> Labels:
+        """A column of texts after `numbers`; see `QuotedBlock.labels`."""
+        if self._quoted is not None:
+            return self._quoted.labels(name)
+        codes, names = labels(self._table[name])
+        return Labels(codes, [(text or "").strip() or None for text in names])
 
     def with_columns(self, columns: Sequence[tuple[str, NDArray[Any]]]) -> bytes:
         """The text with a value added to every line; see `QuotedBlock.with_columns`."""

@@ -10,12 +10,11 @@ import importlib.util
 import zlib
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import IO, Any, TypeAlias
+from typing import IO, TypeAlias
 
-from numpy.typing import NDArray
-
+from .columns import RUN_COLUMN
 from .csvrows import BLOCK, Header, QuotedBlock, quoted_blocks
-from .formats import Choose, Contents, Watch
+from .formats import Batch, Choose, Contents, Watch
 from .joints import Channel
 
 if importlib.util.find_spec("pyarrow") is not None:
@@ -34,14 +33,17 @@ def columns(path: Path, topic: str | None = None) -> list[str]:
         return Header(path, file.readline()).names
 
 
-def read(
-    path: Path, names: Sequence[str], topic: str | None = None
-) -> Iterator[dict[str, NDArray[Any]]]:
-    """Columns ``names`` in batches, empty cells as NaN; see `formats.FormatModule`."""
+def read(path: Path, names: Sequence[str], topic: str | None = None) -> Iterator[Batch]:
+    """Columns ``names`` in batches, empty cells as NaN; see `formats.FormatModule`.
+
+    Labels of runs are text, whatever they look like.
+    """
+    angles = [name for name in names if name != RUN_COLUMN]
+    texts = [name for name in names if name == RUN_COLUMN]
     with path.open("rb") as file:
         header = Header(path, file.readline())
         for block in _blocks(file, header):
-            yield block.numbers(names)
+            yield {**block.numbers(angles, texts), **{name: block.labels(name) for name in texts}}
 
 
 def copy(

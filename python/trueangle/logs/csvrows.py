@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import FileError
+from .formats import Labels
 
 __all__ = ["BLOCK", "Header", "QuotedBlock", "quoted_blocks"]
 
@@ -68,8 +69,10 @@ class QuotedBlock:
         """The text of the block."""
         return "".join(self.texts).encode(errors="surrogateescape")
 
-    def numbers(self, names: Sequence[str]) -> dict[str, NDArray[np.float64]]:
-        """Columns as numbers, empty cells as NaN."""
+    def numbers(
+        self, names: Sequence[str], texts: Sequence[str] = ()
+    ) -> dict[str, NDArray[np.float64]]:
+        """Columns as numbers, empty cells as NaN; ``texts`` are at hand anyway."""
         return {name: self._numbers(name) for name in names}
 
     def _numbers(self, name: str) -> NDArray[np.float64]:
@@ -89,6 +92,14 @@ class QuotedBlock:
                         column=name,
                     ) from None
             raise
+
+    def labels(self, name: str) -> Labels:
+        """A column of texts, empty ones as None."""
+        place = self.header.names.index(name)
+        codes: dict[str | None, int] = {}
+        cells = [row[place].strip() or None for row in self.cells if row]
+        found = [codes.setdefault(cell, len(codes)) for cell in cells]
+        return Labels(np.array(found, dtype=np.intp), list(codes))
 
     def with_columns(self, columns: Sequence[tuple[str, NDArray[Any]]]) -> bytes:
         """The text with a value added to every row; empty where the angle's cell is."""

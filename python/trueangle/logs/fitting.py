@@ -125,6 +125,7 @@ def fit_logs(
     counts_per_turn: float | None = None,
     scheduler: str | None = None,
     threads: int | None = None,
+    checksums: bool = False,
     progress: str = "none",
 ) -> LogFit:
     r"""Fit a model to logs of any size: one pass, constant memory, any set of orders.
@@ -151,6 +152,8 @@ def fit_logs(
         Address of a Dask scheduler whose workers share the file system: a log on each, the
         moments merged in a tree; the numbers are the same, bit for bit.
     threads : int, optional
+    checksums : bool
+        Keep the sha256 of every log in the model's provenance: some 0.5 ns a byte more.
     progress : {"auto", "text", "json", "none"}
 
     Returns
@@ -169,7 +172,8 @@ def fit_logs(
     Notes
     -----
     Wild readings are not set aside: that needs the readings twice. About 5 ns a reading
-    beyond reading the file; some 100 kB per run for 17 orders.
+    beyond reading the file, stretches of Parquet and Arrow files side by side; some 100 kB
+    per run for 17 orders. The numbers do not depend on ``threads``.
 
     Examples
     --------
@@ -193,7 +197,12 @@ def fit_logs(
         wanted = resolve_orders(orders or (), gear_ratio, fixed_member, shafts)
         asked = {shaft.name: shaft.orders for shaft in wanted}
     settings = LogFitSettings(
-        asked, {name: cycles[name] for name in asked}, argument, counts_per_turn, threads=threads
+        asked,
+        {name: cycles[name] for name in asked},
+        argument,
+        counts_per_turn,
+        threads=threads,
+        checksums=checksums,
     )
     found = _accumulated(paths, settings, scheduler, progress)
     table = _judged(found.moments, asked, cycles) if automatic else ()
@@ -292,8 +301,8 @@ def _result(
         offset_spread=float(around.std(ddof=1)) if offsets.size > 1 else 0.0,
         note=" ".join(notes),
     )
-    # The logs are not read a second time only to take their sha256.
-    sources = tuple(Source(Path(file).name, "") for file in found.files)
+    files = zip(found.files, found.sha256, strict=True)
+    sources = tuple(Source(Path(file).name, sha256) for file, sha256 in files)
     model = fit.model(argument).replace(
         fit=record, provenance=Provenance(sources, f"trueangle {__version__}")
     )

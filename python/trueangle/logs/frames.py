@@ -11,7 +11,7 @@ import numpy as np
 
 from ..errors import ArgumentError, MissingExtraError
 from ..model import HarmonicModel
-from .joints import Channel, LogSettings, joints_of
+from .joints import Channel, JointState, LogSettings, joints_of
 
 __all__ = ["correct"]
 
@@ -253,13 +253,12 @@ def _array_channel(settings: LogSettings, state: Any = None) -> Channel:
     """Bare angles are those of the one joint, in the model's unit."""
     from ..angles import unit_name
     from .columns import AngleColumn
-    from .turns import TurnState
 
     if len(settings.joints) > 1:
         raise ArgumentError("an array holds one joint: give one model")
     (joint,) = settings.joints
     angle = AngleColumn("", unit_name(joint.model.period), joint.model.period, "")
-    return Channel(joint, angle, {}, state or TurnState(), settings)
+    return Channel(joint, angle, {}, JointState(state) if state else JointState(), settings)
 
 
 _OUT_OF_ORDER = (

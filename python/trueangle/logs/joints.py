@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from os import PathLike
 from pathlib import Path
-from typing import Any, TypeAlias
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,7 +25,7 @@ from .columns import SIGNAL_COLUMNS, AngleColumn, find_angle_column, find_signal
 from .statistics import CorrectionStatistics
 from .turns import TurnCounter, TurnState
 
-__all__ = ["Channel", "Joint", "LogSettings", "joints_of", "provenance"]
+__all__ = ["Channel", "Joint", "JointState", "LogSettings", "joints_of", "provenance"]
 
 Array: TypeAlias = NDArray[np.floating[Any]]
 
@@ -96,12 +96,13 @@ class LogSettings:
         self,
         path: object,
         header: Sequence[str],
-        turns: Mapping[str, TurnState] | None = None,
+        before: Mapping[str, JointState] | None = None,
         unit: str | None = None,
     ) -> list[Channel]:
         """One channel per joint for a log with the columns ``header``.
 
-        ``unit`` is that of the log's format where it defines one.
+        ``before`` tells by joint how the log before ended; ``unit`` is that of the log's
+        format where it defines one.
 
         Raises
         ------
@@ -121,7 +122,7 @@ class LogSettings:
                 counts_per_turn=self.counts_per_turn,
             )
             taken.append(angle.corrected)
-            state = (turns or {}).get(joint.name or "", TurnState())
+            state = (before or {}).get(joint.name or "", JointState())
             found.append(Channel(joint, angle, signal_columns(path, header, joint), state, self))
         return found
 
@@ -140,9 +141,14 @@ class LogSettings:
         return not all(joint.model.is_periodic for joint in self.joints)
 
     @property
+    def follows_travel(self) -> bool:
+        """True when a term of a model depends on the way to the reading."""
+        return any(joint.model.follows_travel for joint in self.joints)
+
+    @property
     def needs_order(self) -> bool:
         """True when a row depends on rows before: its turn, or its direction of travel."""
-        return self.counts_turns or any(joint.model.follows_travel for joint in self.joints)
+        return self.counts_turns or self.follows_travel
 
 
 def signal_columns(path: object, header: Sequence[str], joint: Joint) -> dict[str, str]:
@@ -177,6 +183,22 @@ def signal_columns(path: object, header: Sequence[str], joint: Joint) -> dict[st
     return found
 
 
+class JointState(NamedTuple):
+    """Where a joint stopped, for the log that goes on from there.
+
+    ``travel`` is the state of the corrector of a model with terms.
+    """
+
+    turns: TurnState = TurnState()
+    travel: Sequence[float] = ()
+
+    @classmethod
+    def of(cls, plain: Sequence[Any]) -> JointState:
+        """From the lists that JSON makes of it."""
+        turns, travel = plain
+        return cls(TurnState(*turns), tuple(travel))
+
+
 class Channel:
     """The indicated angle of one joint in one log, corrected batch after batch.
 
@@ -190,7 +212,7 @@ class Channel:
         joint: Joint,
         angle: AngleColumn,
         signals: Mapping[str, str],
-        turns: TurnState,
+        before: JointState,
         settings: LogSettings,
     ) -> None:
         self.joint = joint
@@ -202,7 +224,9 @@ class Channel:
         self._scale = model.period / angle.period
         self._corrector = model.corrector() if model.terms else None
         self._velocity_scale = _velocity_scale(self.signals.get("velocity"), model, self._scale)
-        self._counter = None if model.is_periodic else TurnCounter(angle.period, turns)
+        if self._corrector is not None and before.travel:
+            self._corrector.state = before.travel
+        self._counter = None if model.is_periodic else TurnCounter(angle.period, before.turns)
         span = model.partial_span
         self._span = None if span is None else (span[0] / self._scale, span[1] / self._scale)
 
@@ -212,9 +236,15 @@ class Channel:
         return self.joint.name or ""
 
     @property
-    def turns(self) -> TurnState | None:
-        """Where the count of turns stands; None for a model that needs none."""
-        return None if self._counter is None else self._counter.state
+    def counts_turns(self) -> bool:
+        """True where the model's error does not repeat after one turn."""
+        return self._counter is not None
+
+    @property
+    def state(self) -> JointState:
+        """Where the readings so far leave the joint."""
+        turns = TurnState() if self._counter is None else self._counter.state
+        return JointState(turns, () if self._corrector is None else self._corrector.state)
 
     def correct(
         self, indicated: NDArray[Any], signals: Mapping[str, NDArray[Any]] | None = None

@@ -69,6 +69,23 @@ class Corrector:
         self._core.reset()
         self._velocity.reset()
 
+    @property
+    def state(self) -> tuple[float, ...]:
+        """All that later samples need to know of the past, as numbers to keep and to set.
+
+        Raises
+        ------
+        ArgumentError
+            When set: not the state of a corrector of this model.
+        """
+        return (*self._velocity.state, *self._core.store())
+
+    @state.setter
+    def state(self, numbers: Iterable[float]) -> None:
+        angle, time, last, *travel = (*numbers,)
+        self._core.restore(travel)
+        self._velocity.state = angle, time, last
+
     def __call__(
         self,
         indicated: ArrayLike,

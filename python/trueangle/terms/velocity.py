@@ -34,6 +34,15 @@ class Velocity:
         self._angle = self._time = np.nan
         self._last = np.nan
 
+    @property
+    def state(self) -> tuple[float, float, float]:
+        """The last angle, time and velocity; NaN where there is none yet."""
+        return self._angle, self._time, self._last
+
+    @state.setter
+    def state(self, numbers: tuple[float, float, float]) -> None:
+        self._angle, self._time, self._last = numbers
+
     def __call__(self, angle: ArrayLike, time: ArrayLike) -> Array:
         """Velocity at every sample; samples that are not finite leave no trace."""
         x = np.asarray(angle, dtype=np.float64)

@@ -1,5 +1,6 @@
 """Fits of logs in one pass: the fit of all readings in memory is the oracle."""
 
+import hashlib
 import json
 
 import numpy as np
@@ -123,6 +124,36 @@ def test_a_damaged_log_ends_the_fit(folder, monkeypatch, threads):
         ta.fit_logs(folder, [1], threads=threads)
 
 
+@pytest.mark.parametrize("arrow", [True, False])
+def test_csv_with_runs_equals_parquet(tmp_path, monkeypatch, arrow):
+    if not arrow:
+        monkeypatch.setattr("trueangle.logs.csvlog.plain_block", None)
+    monkeypatch.setattr("trueangle.logs.csvrows.BLOCK", 1 << 16)
+    monkeypatch.setattr("trueangle.logs.csvlog.BLOCK", 1 << 16)
+    reference, indicated = readings(9000, 1, 0.0)
+    indicated[4000:] += 3.0
+    labels = np.repeat(["01", "1", "slow, warm"], [4000, 3000, 2000]).tolist()
+    table = {"run": labels, "reference_deg": reference, "indicated_deg": indicated}
+    pq.write_table(pa.table(table), tmp_path / "a.parquet")
+    for path, last in (("plain.csv", "slow warm"), ("quoted.csv", '"slow, warm"')):
+        rows = [
+            f"{last if label.startswith('s') else label + ' '},{x!r},{y!r}"
+            for label, x, y in zip(labels, reference.tolist(), indicated.tolist(), strict=True)
+        ]
+        (tmp_path / path).write_text("\n".join(["run,reference_deg,indicated_deg", *rows]))
+    expected = ta.fit_logs(tmp_path / "a.parquet", [1, 2, 3])
+    for path in ("plain.csv", "quoted.csv"):
+        found = ta.fit_logs(tmp_path / path, [1, 2, 3])
+        names = [label.replace(",", "") for _file, label in found.moments.runs]
+        assert names == ["01", "1", "slow warm"]
+        assert (found.rows, found.missing) == (9000, 0)
+        np.testing.assert_allclose(
+            found.model.amplitudes, expected.model.amplitudes, rtol=0, atol=1e-13
+        )
+        zeros = [fit.fit.offsets.values() for fit in (found, expected)]
+        np.testing.assert_allclose(*map(list, zeros), rtol=0, atol=1e-12)
+
+
 def test_runs_without_a_label_are_one_run(tmp_path):
     reference, indicated = readings(3000, 1, 0.0)
     labels = np.repeat([1.0, np.nan, 2.0], 1000)
@@ -203,6 +234,18 @@ def test_the_command_fits_folders_in_one_pass(folder, tmp_path, capsys):
     assert any(not row["retained"] for row in printed["evidence"])
     assert main(["fit", str(folder), "-o", str(model), "--loss", "huber"]) == 1
     assert "in one pass" in capsys.readouterr().err
+
+
+def test_checksums_are_kept_where_asked_for(folder, tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr("trueangle.logs.parquetlog._STRETCH", 4000)
+    wanted = [hashlib.sha256((folder / f"{i}.parquet").read_bytes()).hexdigest() for i in range(3)]
+    path = tmp_path / "m.json"
+    assert main(["fit", str(folder), "-o", str(path), "--orders", "1", "--checksums"]) == 0
+    sources = ta.load_model(path).provenance.inputs
+    assert [source.sha256 for source in sources] == wanted
+    assert [source.file for source in sources] == ["0.parquet", "1.parquet", "2.parquet"]
+    without = ta.fit_logs(folder, [1]).model.provenance.inputs
+    assert [source.sha256 for source in without] == ["", "", ""]
 
 
 def test_a_fit_of_logs_corrects_logs(tmp_path):
