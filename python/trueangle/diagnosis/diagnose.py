@@ -112,7 +112,7 @@ def diagnose(
     if uneven is not None and uneven.bic_gain > NEW_CAUSE:
         scatter.append(uneven)
         start = Space(signals, residual, sim.surroundings, uneven.weights, start.lines)
-        chosen = select(start)
+        chosen = select(start, chosen.terms)
     wild = find_outliers(chosen)
     if wild is not None and wild.bic_gain > NEW_CAUSE:
         scatter.append(wild)

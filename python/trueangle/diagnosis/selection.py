@@ -32,15 +32,18 @@ RUN_FACTORS = (
 MOST_TERMS = 14
 
 
-def select(space: Space) -> Space:
+def select(space: Space, known: Sequence[Proposal] = ()) -> Space:
     """The space with the causes that its readings support.
 
     Forward selection with every candidate; where that takes a flexible cause (which can
     imitate any effect of a run) or a bump, further paths take those only after the
     specific ones had their say, without and with a zero of each run's own (or with what
     acts on whole runs beside an error that repeats at the same angle). All are pruned
-    backward; the best by BIC is kept.
+    backward; the best by BIC is kept. Terms ``known`` from the same readings with other
+    weights are a start that needs no further path.
     """
+    if known:
+        return _made_specific(_pruned(_forward(space.with_terms(known), list(CANDIDATES))))
     direct = _pruned(_forward(space, list(CANDIDATES)))
     found = {term.cause for term in direct.terms}
     if not found & {*FLEXIBLE, "local_defect"}:

@@ -192,9 +192,9 @@ class Space:
         inner = self.q.T @ y
         self.r = y - self.q @ inner
         self.rss = max(float(self.r @ self.r), 1e-300)
-        back = vt[kept].T / s[kept] / scale[:, None]
-        self.coefficients = back @ inner
-        self.unscaled_covariance = back @ back.T
+        self.back = vt[kept].T / s[kept] / scale[:, None]
+        self.coefficients = self.back @ inner
+        self.unscaled_covariance = self.back @ self.back.T
 
     def _refit_ratio(
         self, design: Array, target: Array, rho: float, effects: list[RunEffect], k: int
@@ -277,6 +277,11 @@ class Space:
         saved = float(np.sum(moment**2 / values))
         coefficients = (vectors @ (moment / values)) / scale
         return self.as_deviance(saved), coefficients
+
+    def coefficients_with(self, proposal: Proposal) -> Array:
+        """Coefficients of all terms so far if a proposal joined them."""
+        moved = self.back @ (self.q.T @ self.whiten(proposal.columns))
+        return np.asarray(self.coefficients - moved @ proposal.coefficients)
 
     def gains(self, columns: Array) -> Array:
         """Deviance that each column saves alone."""

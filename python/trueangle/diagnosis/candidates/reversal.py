@@ -131,11 +131,14 @@ class HysteresisCandidate(Candidate):
 
         Elements of unlike signs would only be a difference of two that are alike.
         """
-        trial = space.with_terms([*space.terms, proposal])
-        elements = [
-            float(c[0]) for t, c in trial.fitted() if t.cause == self.cause and _everywhere(t)
-        ]
-        return min(elements) * max(elements) > 0.0
+        after = space.coefficients_with(proposal)
+        elements = [float(proposal.coefficients[0])] if _everywhere(proposal) else []
+        at = space.base.shape[1]
+        for term in space.terms:
+            if term.cause == self.cause and _everywhere(term):
+                elements.append(float(after[at]))
+            at += term.columns.shape[1]
+        return not elements or min(elements) * max(elements) > 0.0
 
     def _play(self, space: Space, order: int) -> Proposal:
         shape = {"length_deg": 0.0, "order": order}
