@@ -190,3 +190,12 @@ def test_a_law_that_does_not_reach_another_level_gains_nothing_there():
     gain = found["latency"]
     assert gain.reducible_share > 0.9
     assert gain.by_level.reducible_share < gain.reducible_share - 0.3
+
+
+def test_rounding_of_runs_without_noise_has_no_cause():
+    design = tuple(RunDesign(samples=200, speed_deg_s=v, reversals=(0.5,)) for v in (5.0, 30.0) * 3)
+    sim = Simulation(runs=design)
+    runs = simulate(sim.with_effects([Latency(1e-4)]), 1)
+    (found,) = ta.diagnose(runs, sim, gain=False).findings
+    assert found.cause == "latency"
+    assert found.parameters["delay_s"].value == pytest.approx(1e-4, rel=1e-9)

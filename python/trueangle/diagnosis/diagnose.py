@@ -23,7 +23,7 @@ from .gain import Gain, measure_gain
 from .identifiability import Blindness, blind_spots, doubts_about
 from .quantity import Parameters, quantity
 from .selection import NEW_CAUSE, RUN_FACTORS, cause_terms, finding_groups, proposals, select
-from .space import Proposal, Space
+from .space import ROUNDING, Proposal, Space
 
 __all__ = ["MOST_READINGS", "diagnose"]
 
@@ -242,7 +242,7 @@ def _corrected_lines(space: Space, spots: list[Blindness]) -> list[Finding]:
         deviance = float(change @ np.linalg.pinv(spread) @ change)
         log_grid = float(np.log(belief.orders.size))
         bic_gain = deviance - 2.0 * space.log_n - 2.0 * log_grid
-        if bic_gain <= NEW_CAUSE:
+        if bic_gain <= NEW_CAUSE or float(np.abs(change).max()) < ROUNDING:
             continue
         shape = {"output_order": float(order)}
         proposal = Proposal("missing_order", shape, np.zeros((space.n, 0)), 2, log_grid)

@@ -73,6 +73,8 @@ def find_uneven_noise(space: Space) -> ScatterFinding | None:
 
     The clipped squares are regressed on each block; n R^2 is the deviance.
     """
+    if space.is_explained:
+        return None
     signals, n = space.signals, space.n
     square = np.minimum(_standardised(space) ** 2, SQUARE_CLIP)
     blocks: dict[str, Array] = {}
@@ -157,6 +159,8 @@ def _log_variance(design: Array, square: Array) -> tuple[Array, Array]:
 
 def find_outliers(space: Space) -> ScatterFinding | None:
     """Wild readings: a narrow and a wide normal must beat one normal and heavy tails."""
+    if space.is_explained:
+        return None
     e = _standardised(space)
     n = space.n
     normal = max(_normal(e, s) for s in np.append(SCALES, np.linspace(1.15, 3.0, 24)))

@@ -126,7 +126,7 @@ def proposals(space: Space, causes: Sequence[str]) -> list[tuple[Proposal, Space
 
 
 def _forward(space: Space, causes: Sequence[str]) -> Space:
-    while len(space.terms) < MOST_TERMS:
+    while len(space.terms) < MOST_TERMS and not space.is_explained:
         best: tuple[float, Space, Proposal] | None = None
         for proposal, start, gain in proposals(space, causes):
             new = proposal.cause in SEPARATE or not start.has(proposal.cause)

@@ -17,13 +17,16 @@ from .linebasis import LineBasis
 from .repeatability import repeated_part
 from .whitening import RunEffect, Whitener, lag_correlation
 
-__all__ = ["Proposal", "Space"]
+__all__ = ["ROUNDING", "Proposal", "Space"]
 
 Array = NDArray[np.float64]
 
 #: Residuals are taken at most this many robust standard deviations large: wild readings
 #: must not make causes, and normal ones are not touched.
 CLIP = 4.0
+
+#: Arcsec below which what is left is the rounding of angles (1e-12 of a turn).
+ROUNDING = 1e-6
 
 #: Share of a column's power that must be left after projection for it to count at all.
 EXCITED = 1e-4
@@ -240,6 +243,11 @@ class Space:
     def variance(self) -> float:
         """Variance of one reading's noise, arcsec squared."""
         return float(self.rss / max(self.n - self.q.shape[1], 1))
+
+    @property
+    def is_explained(self) -> bool:
+        """Nothing but rounding is left (of simulated runs without noise)."""
+        return self.variance < ROUNDING**2
 
     @property
     def deviance(self) -> float:
