@@ -2,8 +2,9 @@
 
     python benches/logs.py [--rows 20000000] [--files 4] [--folder DIR]
 
-Prints rows per second and peak memory (of the process, interpreter included). Files are
-made in DIR (default: a temporary folder) and removed. Slow ways get fewer rows.
+Prints median and least seconds, median seconds of all cores, rows per second and peak memory
+(of the process, interpreter included). Files are made in DIR (default: a temporary folder) and
+removed. Slow ways get fewer rows.
 """
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ from __future__ import annotations
 import argparse
 import json
 import os
+import resource
 import shutil
 import subprocess
 import sys
@@ -23,6 +25,7 @@ import numpy as np
 ORDERS = range(1, 18)
 #: Rows of ways that take too long, or too much memory, for all of them.
 FEWER = {"pandas loop": 100_000, "numpy": 5_000_000, "polars": 5_000_000, "duckdb": 2_000_000}
+_MEDIANS = ("seconds", "cores")
 
 
 def made_model():
@@ -201,14 +204,19 @@ def main() -> None:
         start = time.perf_counter()
         WAYS[args.way](args.folder, args.out)
         seconds = time.perf_counter() - start
+        used = (resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN))
+        cores = sum(one.ru_utime + one.ru_stime for one in used)
         # Not ru_maxrss: that of the process which started this one counts in it.
         status = Path("/proc/self/status").read_text()
         peak = int(status.partition("VmHWM:")[2].split()[0]) / 1024.0
-        print(json.dumps({"seconds": seconds, "megabytes": peak}))
+        print(json.dumps({"seconds": seconds, "cores": cores, "megabytes": peak}))
         return
     with tempfile.TemporaryDirectory(dir=args.folder) as made:
         folders: dict[int, Path] = {}
-        print(f"{'way':<24}{'rows':>12}{'s':>9}{'rows/s':>11}{'ns/row':>9}{'peak MB':>9}")
+        print(
+            f"{'way':<24}{'rows':>12}{'s':>9}{'least':>9}{'core s':>9}{'rows/s':>11}{'ns/row':>9}"
+            f"{'peak MB':>9}"
+        )
         ways = args.only or list(WAYS)
         runs: dict[str, list[dict[str, float]]] = {way: [] for way in ways}
         for _ in range(args.repeat):  # interleaved: all ways see the same noise
@@ -221,11 +229,12 @@ def main() -> None:
                 runs[way].append(measured(way, folders[rows]))
         for way, found in runs.items():
             rows = min(args.rows, FEWER.get(way, args.rows)) // args.files * args.files
-            seconds = float(np.median([one["seconds"] for one in found]))
+            seconds, cores = (float(np.median([one[k] for one in found])) for k in _MEDIANS)
+            least = min(one["seconds"] for one in found)
             peak = max(one["megabytes"] for one in found)
             print(
-                f"{way:<24}{rows:>12}{seconds:>9.2f}{rows / seconds:>11.3g}"
-                f"{seconds / rows * 1e9:>9.1f}{peak:>9.0f}"
+                f"{way:<24}{rows:>12}{seconds:>9.2f}{least:>9.2f}{cores:>9.2f}"
+                f"{rows / seconds:>11.3g}{seconds / rows * 1e9:>9.1f}{peak:>9.0f}"
             )
 
 
