@@ -29,7 +29,11 @@ class Corrector:
 
     Made by `HarmonicModel.corrector`. Backlash and hysteresis depend on travel before:
     the state is carried from call to call, so that batches of a log give bit for bit what
-    the whole log gives at once, and single steps the same. Not to be shared by threads.
+    the whole log gives at once, and single steps the same.
+
+    A corrector belongs to one thread: called by two at once it raises `RuntimeError` or
+    takes the samples in an order that nobody chose. Models, and `step` of a model without
+    terms, hold no state and may be shared by any number of threads.
 
     Parameters
     ----------
