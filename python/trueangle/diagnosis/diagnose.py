@@ -17,7 +17,7 @@ from ..simulation.simulation import Simulation
 from .candidates import CANDIDATES, FLEXIBLE
 from .candidates.candidate import line_parameters
 from .discrepancy import compare, noise_from_repeats, unfolded_error
-from .dispersion import ScatterFinding, find_outliers, find_uneven_noise
+from .dispersion import NEW_SCATTER, ScatterFinding, find_outliers, find_uneven_noise
 from .findings import Diagnosis, Finding
 from .gain import Gain, measure_gain
 from .identifiability import Blindness, blind_spots, doubts_about
@@ -109,7 +109,7 @@ def diagnose(
     chosen = select(start)
     scatter: list[ScatterFinding] = []
     uneven = find_uneven_noise(chosen)
-    if uneven is not None and uneven.bic_gain > NEW_CAUSE:
+    if uneven is not None and uneven.bic_gain > NEW_SCATTER:
         scatter.append(uneven)
         start = Space(signals, residual, sim.surroundings, uneven.weights, start.lines)
         chosen = select(start, chosen.terms)

@@ -13,9 +13,13 @@ from ..simulation.effects.dispersion import HeteroscedasticNoise, Outliers
 from .quantity import Parameters, quantity
 from .space import Space
 
-__all__ = ["ScatterFinding", "find_outliers", "find_uneven_noise"]
+__all__ = ["NEW_SCATTER", "ScatterFinding", "find_outliers", "find_uneven_noise"]
 
 Array = NDArray[np.float64]
+
+#: Evidence that uneven noise must bring beyond its price. Half of what other causes must:
+#: nothing in the mean of the readings imitates it.
+NEW_SCATTER = 3.0
 
 #: Squared residuals are taken at most this many variances large.
 SQUARE_CLIP = 9.0
@@ -77,16 +81,21 @@ def find_uneven_noise(space: Space) -> ScatterFinding | None:
         return None
     signals, n = space.signals, space.n
     square = np.minimum(_standardised(space) ** 2, SQUARE_CLIP)
+    # A reading tells half as much of the logarithm of a variance as of a mean.
+    log_n = space.log_n - float(np.log(2.0))
     blocks: dict[str, Array] = {}
+    prices: dict[str, float] = {}
     for k in (1, 2, 3):
         x = k * signals.theta
         blocks[f"order {k}"] = np.column_stack([np.cos(x), np.sin(x)])
+        prices[f"order {k}"] = 2.0 * log_n + 2.0 * float(np.log(2.0 * k))
     for name, values in (
         ("per_deg_s", None if signals.velocity is None else np.abs(signals.velocity)),
         ("per_Nm", None if signals.torque is None else np.abs(signals.torque)),
     ):
         if values is not None and np.ptp(values) > 0.0:
             blocks[name] = values[:, None]
+            prices[name] = log_n + 2.0 * float(np.log(4.0))
     chosen: list[str] = []
     design = np.ones((n, 1))
     total = 0.0
@@ -100,11 +109,7 @@ def find_uneven_noise(space: Space) -> ScatterFinding | None:
             wider = np.hstack([design, columns])
             q, _ = np.linalg.qr(wider)
             saved = float(np.sum((q.T @ rest) ** 2))
-            gain = (
-                n * saved / power
-                - columns.shape[1] * space.log_n
-                - 2.0 * float(np.log(len(blocks)))
-            )
+            gain = n * saved / power - prices[name]
             if gain > best[0]:
                 best = (gain, name, wider)
         if best[0] <= 0.0:

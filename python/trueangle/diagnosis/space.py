@@ -31,6 +31,13 @@ ROUNDING = 1e-6
 #: Share of a column's power that must be left after projection for it to count at all.
 EXCITED = 1e-4
 
+#: Size at which an effect is expected, in standard deviations of one reading. A coefficient
+#: costs ln(size^2 n) (Kass and Wasserman 1995; size 1 is Schwarz's price). Up to
+#: `FEW_READINGS` effects must be as large as the noise to matter; of many more are taken
+#: because effects are smaller.
+EXPECTED_SIZE = 0.3
+FEW_READINGS = 900
+
 #: Ratios of variance (run effect to one reading) that are tried.
 RATIOS = np.geomspace(1e-5, 1e8, 53)
 
@@ -39,7 +46,10 @@ RATIOS = np.geomspace(1e-5, 1e8, 53)
 class Proposal:
     r"""A candidate extension with its evidence.
 
-    .. math:: \text{bic gain} = 2\Delta\ln L - k \ln n - 2 \ln(\text{grid})
+    .. math:: \text{bic gain} = 2\Delta\ln L - k \ln n_e - 2 \ln(\text{grid})
+
+    with :math:`n_e` the readings, or the runs for the variance of a run effect, that
+    inform on a parameter.
 
     Attributes
     ----------
@@ -105,7 +115,7 @@ class Space:
         self.fixed_rho = rho
         self.bounds = signals.run_bounds()
         self.n = len(signals)
-        self.log_n = float(np.log(max(self.n, 2)))
+        self.log_n = price_of_parameter(self.n)
         self.lines = lines if lines is not None else LineBasis(signals.theta, around.joint)
         self.base = np.column_stack(
             [np.ones(self.n), *(line_columns(signals.theta, m) for m in around.pattern.orders)]
@@ -257,7 +267,7 @@ class Space:
     @property
     def bic(self) -> float:
         """Deviance plus the price of the terms' parameters and searches."""
-        price = sum(t.parameters * self.log_n + 2.0 * t.log_grid for t in self.terms)
+        price = sum(t.parameters * t.log_n + 2.0 * t.log_grid for t in self.terms)
         return self.deviance + price
 
     # -- scores ------------------------------------------------------------------
@@ -399,7 +409,7 @@ class Space:
             1,
             log_grid,
             deviance,
-            self.log_n,
+            float(np.log(max(len(self.bounds), 2))),
             RunEffect(columns, ratio),
         )
 
@@ -410,3 +420,9 @@ class Space:
     def has(self, cause: str) -> bool:
         """A term of this cause is among the terms."""
         return any(term.cause == cause for term in self.terms)
+
+
+def price_of_parameter(readings: int) -> float:
+    """Units of BIC that a coefficient costs."""
+    informing = max(min(readings, FEW_READINGS), EXPECTED_SIZE**2 * readings)
+    return float(np.log(max(informing, 2.0)))

@@ -33,6 +33,12 @@ class FactorCandidate(Candidate):
     def shapes(self, space: Space) -> list[dict[str, Any]]:
         raise NotImplementedError
 
+    def alternatives(
+        self, space: Space, shape: dict[str, Any], shapes: list[dict[str, Any]]
+    ) -> int:
+        """Shapes as likely as this one; half of the belief goes to the likeliest."""
+        return 1 if shape["what"] == "zero" else len(shapes)
+
     def propose(self, space: Space) -> Proposal | None:
         shapes = self.shapes(space)
         if not shapes:
@@ -42,7 +48,7 @@ class FactorCandidate(Candidate):
                 self.cause,
                 shape,
                 self.columns(space.signals, space.around, shape),
-                log_grid=float(np.log(2.0 if shape["what"] == "zero" else 2.0 * len(shapes))),
+                log_grid=float(np.log(2.0 * self.alternatives(space, shape, shapes))),
             )
             for shape in shapes
         ]
@@ -173,6 +179,15 @@ class LoadDependentGearCandidate(FactorCandidate):
             if _is_gear_order(space, m)
             for kind in (("signed", "absolute") if both_signs else ("signed",))
         ]
+
+    def alternatives(
+        self, space: Space, shape: dict[str, Any], shapes: list[dict[str, Any]]
+    ) -> int:
+        """The lobes pass the teeth twice a turn: these two lines grow with load first."""
+        joint = space.around.joint
+        mesh = [joint.output_order(shaft, 2) for shaft in joint.shafts if shaft != "output"]
+        likely = sum(other["order"] in mesh for other in shapes)
+        return likely if shape["order"] in mesh else len(shapes)
 
     def report(
         self, space: Space, terms: Sequence[tuple[Proposal, Array, Array]]

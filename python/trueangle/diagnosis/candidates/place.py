@@ -37,14 +37,20 @@ STEP_MARGIN = 5
 
 
 class ArgumentCandidate(Candidate):
-    """Regressor: the pattern at the indicated angle less that at the true one."""
+    """The pattern at the indicated angle less that at the true one: c is -1 or 0.
+
+    Nothing is free in it, so the evidence is that of c = -1 itself and no parameter is
+    paid for; c is fitted for the report only.
+    """
 
     cause: ClassVar[str] = "argument_error"
 
     def propose(self, space: Space) -> Proposal | None:
         if space.around.pattern.orders.size == 0 or space.has(self.cause):
             return None
-        return space.propose(self.cause, {}, self.columns(space.signals, space.around, {}))
+        columns = self.columns(space.signals, space.around, {})
+        deviance = float(space.fixed_gains(-columns)[0])
+        return space.propose(self.cause, {}, columns, parameters=0, deviance=deviance)
 
     def columns(self, signals: Signals, around: Surroundings, shape: dict[str, Any]) -> Array:
         return ArgumentShift.regressors(signals, around)

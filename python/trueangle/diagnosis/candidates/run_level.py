@@ -34,6 +34,9 @@ FORMS = (
     "centred flicker",
 )
 
+#: Of these as many are unlike each other: a slope, a bend, a finer wander.
+UNLIKE_FORMS = 3.0
+
 
 class ZeroSlipCandidate(Candidate):
     """Run effect: a constant."""
@@ -83,7 +86,7 @@ class DriftCandidate(Candidate):
 
     def _proposal(self, space: Space, form: str) -> Proposal:
         columns = self._shapes(space, form)
-        log_grid = float(np.log(len(FORMS)))
+        log_grid = float(np.log(UNLIKE_FORMS))
         return space.propose_run_effect(self.cause, {"form": form}, columns, log_grid)
 
     @staticmethod
