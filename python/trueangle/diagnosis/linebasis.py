@@ -11,6 +11,8 @@ from ..simulation.joint import Joint
 
 __all__ = ["LineBasis", "plausible_orders"]
 
+Array = NDArray[np.float64]
+
 #: Orders searched at least, and at most: bounds memory and the price of the search.
 LEAST_ORDERS, MOST_ORDERS = 128, 1024
 
@@ -53,6 +55,7 @@ class LineBasis:
         expected = plausible_orders(joint)
         self.plausible = np.array([any(abs(m - p) < 1e-9 for p in expected) for m in self.orders])
         self._values = values
+        self._products: tuple[Array, Array, Array] | None = None
 
     @property
     def values(self) -> NDArray[np.complex64]:
@@ -69,11 +72,25 @@ class LineBasis:
             self._values = out
         return self._values
 
+    def products(self, whitened: NDArray[np.complex64] | None = None) -> tuple[Array, Array, Array]:
+        """Sums of cos^2, sin^2 and cos sin of every order, of the basis or of it whitened."""
+        if whitened is None and self._products is not None:
+            return self._products
+        e = self.values if whitened is None else whitened
+        parts = e.view(np.float32)
+        squares = np.einsum("ij,ij->j", parts, parts).astype(np.float64)
+        mixed = np.einsum("ij,ij->j", e.real, e.imag).astype(np.float64)
+        found = squares[0::2], squares[1::2], mixed
+        if whitened is None:
+            self._products = found
+        return found
+
     def take(self, rows: NDArray[np.bool_]) -> LineBasis:
         """The basis of some of the readings."""
         part = object.__new__(LineBasis)
         part.__dict__.update(self.__dict__)
         part.theta = self.theta[rows]
+        part._products = None
         part._values = None if self._values is None else self._values[rows]
         return part
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -13,6 +13,7 @@ from ..simulation.effects import Surroundings
 from ..simulation.effects.effect import line_columns
 from ..simulation.pattern import Pattern
 from ..simulation.signals import Signals
+from .blocks import Blocks, block_gram
 from .linebasis import LineBasis
 from .repeatability import repeated_part
 from .whitening import RunEffect, Whitener, lag_correlation
@@ -123,7 +124,6 @@ class Space:
         self.terms: list[Proposal] = []
         #: What causes proposed beside given terms; shared by spaces of the same readings.
         self.memory: dict[Any, Any] = {}
-        self._wlines: NDArray[np.complex64] | None = None
         self.update()
 
     # -- model -------------------------------------------------------------------
@@ -154,10 +154,12 @@ class Space:
     def update(self) -> None:
         """Fit the terms: run effects, correlation, clipping, projection."""
         design = np.hstack([self.base, *(term.columns for term in self.terms)])
+        self.design = design
         effects = [term.run_effect for term in self.terms if term.run_effect is not None]
         target, rho = self.residual, self.fixed_rho or 0.0
+        self._noise: Whitener | None = None  # under which the design is projected
         for _ in range(2):
-            self._project(design, target, Whitener(self.bounds, rho, effects, self.weights))
+            self._project(target, rho, effects)
             left = self.residual - design @ self.coefficients
             left -= self.whiten.run_part(left)
             scale = self.root_weights * left
@@ -175,10 +177,10 @@ class Space:
             )
         if len(effects) > 1:
             for k in range(len(effects)):
-                effects[k] = self._refit_ratio(design, target, rho, effects, k)
+                effects[k] = self._refit_ratio(target, rho, effects, k)
         if len(effects) > 1 or not settled:
-            self._project(design, target, Whitener(self.bounds, rho, effects, self.weights))
-        self.target, self.design, self.wild = target, design, wild
+            self._project(target, rho, effects)
+        self.target, self.wild = target, wild
         kept_effects = iter(effects)
         self.terms = [
             replace(term, run_effect=next(kept_effects)) if term.run_effect is not None else term
@@ -186,34 +188,35 @@ class Space:
         ]
         self.left = self.residual - design @ self.coefficients
         self.around = Surroundings(self.belief.joint, self._pattern())
-        self._wlines = None
 
     @property
     def root_weights(self) -> Array:
         """Square roots of the weights."""
         return np.ones(self.n) if self.weights is None else np.sqrt(self.weights)
 
-    def _project(self, design: Array, target: Array, whiten: Whitener) -> None:
-        self.whiten = whiten
-        columns = whiten(design)
-        scale = np.sqrt(np.einsum("ij,ij->j", columns, columns))
-        scale[scale == 0.0] = 1.0
-        u, s, vt = np.linalg.svd(columns / scale, full_matrices=False)
-        kept = s > 1e-7 * s[0]
-        self.q = u[:, kept]
-        y = whiten(target)
+    def _project(self, target: Array, rho: float, effects: list[RunEffect]) -> None:
+        """Fit the design to ``target`` under this noise."""
+        if self._noise is None or self._noise.rho != rho or self._noise.effects != effects:
+            self._noise = self.whiten = Whitener(self.bounds, rho, effects, self.weights)
+            columns = self.whiten(self.design)
+            scale = np.sqrt(np.einsum("ij,ij->j", columns, columns))
+            scale[scale == 0.0] = 1.0
+            u, s, vt = np.linalg.svd(columns / scale, full_matrices=False)
+            kept = s > 1e-7 * s[0]
+            self.q = u[:, kept]
+            self.back = vt[kept].T / s[kept] / scale[:, None]
+            self.unscaled_covariance = self.back @ self.back.T
+        y = self.whiten(target)
         inner = self.q.T @ y
         self.r = y - self.q @ inner
         self.rss = max(float(self.r @ self.r), 1e-300)
-        self.back = vt[kept].T / s[kept] / scale[:, None]
         self.coefficients = self.back @ inner
-        self.unscaled_covariance = self.back @ self.back.T
 
     def _refit_ratio(
-        self, design: Array, target: Array, rho: float, effects: list[RunEffect], k: int
+        self, target: Array, rho: float, effects: list[RunEffect], k: int
     ) -> RunEffect:
         others = [effect for j, effect in enumerate(effects) if j != k]
-        self._project(design, target, Whitener(self.bounds, rho, others, self.weights))
+        self._project(target, rho, others)
         ratio, _ = self.run_effect_gain(effects[k].columns)
         return RunEffect(effects[k].columns, max(ratio, 1e-9))
 
@@ -308,6 +311,38 @@ class Space:
         saved = (x.T @ self.r) ** 2 / np.maximum(power, 1e-300)
         return np.where(excited, self.as_deviances(saved), 0.0)
 
+    def block_gains(self, blocks: Blocks) -> Array:
+        """Deviance that each block of columns saves alone, as `gain` of each."""
+        found = np.zeros(blocks.count)
+        for where, width, columns, gram in blocks.groups:
+            x = self.whiten(columns)
+            before = gram if x is columns else block_gram(x, width)
+            known = (self.q.T @ x).reshape(self.q.shape[1], -1, width)
+            moment = (self.r @ x).reshape(-1, width)
+            after = before - np.einsum("kbi,kbj->bij", known, known)
+            power = np.einsum("bii->bi", after)
+            limit = EXCITED * np.maximum(np.einsum("bii->bi", before), 1e-300)
+            excited = (power > limit).all(axis=1)
+            scale = np.sqrt(np.where(excited[:, None], power, 1.0))
+            values, vectors = np.linalg.eigh(after / (scale[:, :, None] * scale[:, None, :]))
+            excited &= values[:, 0] > EXCITED * values[:, -1]
+            turned = np.einsum("bij,bi->bj", vectors, moment / scale)
+            saved = np.sum(turned**2 / np.where(excited[:, None], values, 1.0), axis=1)
+            found[where] = self.as_deviances(np.where(excited, saved, 0.0))
+        return found
+
+    def remembered(self, name: str, key: object, build: Callable[[], Any]) -> Any:
+        """What ``build`` makes for ``key``; of every name the last one is kept.
+
+        The pattern is part of the key.
+        """
+        pattern = self.around.pattern
+        key = (key, *(a.tobytes() for a in (pattern.orders, pattern.cosine, pattern.sine)))
+        kept = self.memory.get(("kept", name))
+        if kept is None or kept[0] != key:
+            kept = self.memory["kept", name] = (key, build())
+        return kept[1]
+
     def fixed_gains(self, columns: Array) -> Array:
         """Deviance that each column saves with the coefficient 1."""
         x, excited = self.projected(columns)
@@ -325,20 +360,18 @@ class Space:
 
     def line_gains(self) -> Array:
         """Deviance that a line of each order of `lines` saves (two coefficients)."""
-        if self._wlines is None:
-            basis = self.lines.values
-            self._wlines = basis if self.whiten.is_identity else self.whiten(basis)
-        e = self._wlines
-        known = self.q.astype(np.float32).T @ e
-        moment = self.r.astype(np.float32) @ e
-        square = np.einsum("ij,ij->j", e, e)  # sum of e^2: cos^2 - sin^2 and 2 cos sin
-        power = np.einsum("ij,ij->j", e, e.conj()).real
-        aa = 0.5 * (power + square.real) - (known.real**2).sum(axis=0)
-        bb = 0.5 * (power - square.real) - (known.imag**2).sum(axis=0)
-        ab = 0.5 * square.imag - (known.real * known.imag).sum(axis=0)
-        determinant = aa.astype(np.float64) * bb - ab.astype(np.float64) ** 2
-        c, s = moment.real.astype(np.float64), moment.imag.astype(np.float64)
-        excited = determinant > 1e-3 * (0.5 * power.astype(np.float64)) ** 2
+        whitened = None if self.whiten.is_identity else self.whiten(self.lines.values)
+        cosines, sines, mixed = self.lines.products(whitened)
+        # Cosines and sines side by side, real.
+        e = (self.lines.values if whitened is None else whitened).view(np.float32)
+        known = (self.q.astype(np.float32).T @ e).astype(np.float64)
+        moment = (self.r.astype(np.float32) @ e).astype(np.float64)
+        aa = cosines - (known[:, 0::2] ** 2).sum(axis=0)
+        bb = sines - (known[:, 1::2] ** 2).sum(axis=0)
+        ab = mixed - (known[:, 0::2] * known[:, 1::2]).sum(axis=0)
+        determinant = aa * bb - ab**2
+        c, s = moment[0::2], moment[1::2]
+        excited = determinant > 1e-3 * (0.5 * (cosines + sines)) ** 2
         saved = (bb * c * c - 2.0 * ab * c * s + aa * s * s) / np.where(excited, determinant, 1.0)
         return np.where(excited, self.as_deviances(np.maximum(saved, 0.0)), 0.0)
 

@@ -123,6 +123,11 @@ class Whitener:
 
     def __call__(self, x: NDArray[Any]) -> NDArray[Any]:
         """The map applied to a column or to columns, shape (n,) or (n, k)."""
+        if np.iscomplexobj(x):
+            # Real and imaginary parts side by side: the map is real.
+            parts = np.ascontiguousarray(x).view(x.real.dtype)
+            mapped = self(parts)
+            return x if mapped is parts else mapped.view(x.dtype)
         out = self._filtered(x)
         if not self.effects:
             return out

@@ -41,18 +41,8 @@ class FactorCandidate(Candidate):
 
     def propose(self, space: Space) -> Proposal | None:
         shapes = self.shapes(space)
-        if not shapes:
-            return None
-        proposals = [
-            space.propose(
-                self.cause,
-                shape,
-                self.columns(space.signals, space.around, shape),
-                log_grid=float(np.log(2.0 * self.alternatives(space, shape, shapes))),
-            )
-            for shape in shapes
-        ]
-        return max(proposals, key=lambda proposal: proposal.bic_gain)
+        log_grids = [np.log(2.0 * self.alternatives(space, shape, shapes)) for shape in shapes]
+        return self.best(space, shapes, log_grids)
 
     def columns(self, signals: Signals, around: Surroundings, shape: dict[str, Any]) -> Array:
         factor = self.factor(signals, shape.get("kind", "signed"))

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from ...simulation.effects import Effect, Surroundings
 from ...simulation.signals import Signals
+from ..blocks import Blocks
 from ..quantity import Parameters, quantity
 from ..space import Proposal, Space
 
@@ -40,6 +41,33 @@ class Candidate:
     def propose(self, space: Space) -> Proposal | None:
         """The best extension of this cause in ``space``, or None where it cannot act."""
         raise NotImplementedError
+
+    def best(
+        self,
+        space: Space,
+        shapes: Sequence[dict[str, Any]],
+        log_grids: Sequence[float],
+        extra: Sequence[int] | None = None,
+    ) -> Proposal | None:
+        """The proposal of the shape with the most evidence; all are scored at once.
+
+        ``extra`` counts the parameters of a shape that are no coefficients.
+        """
+        if not shapes:
+            return None
+        blocks: Blocks = space.remembered(
+            self.cause,
+            repr(shapes),
+            lambda: Blocks([self.columns(space.signals, space.around, s) for s in shapes]),
+        )
+        more = np.zeros(len(shapes)) if extra is None else np.asarray(extra)
+        price = more * space.log_n + 2.0 * np.asarray(log_grids)
+        for where, width, _, _ in blocks.groups:
+            price[where] += width * space.log_n
+        k = int(np.argmax(space.block_gains(blocks) - price))
+        columns = self.columns(space.signals, space.around, shapes[k])
+        parameters = columns.shape[1] + int(more[k])
+        return space.propose(self.cause, shapes[k], columns, parameters, float(log_grids[k]))
 
     def columns(self, signals: Signals, around: Surroundings, shape: dict[str, Any]) -> Array:
         """Regressors of ``shape`` at other readings, shape (n, p)."""

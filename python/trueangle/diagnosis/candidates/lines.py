@@ -109,18 +109,7 @@ class SidebandsCandidate(Candidate):
                 if m in present:
                     shapes += [{"carrier": m, "offset": k, "form": f} for f in ("AM", "PM")]
                 shapes.append({"carrier": m, "offset": k, "form": "free"})
-        if not shapes:
-            return None
-        proposals = [
-            space.propose(
-                self.cause,
-                shape,
-                self.columns(space.signals, space.around, shape),
-                log_grid=float(np.log(len(shapes))),
-            )
-            for shape in shapes
-        ]
-        return max(proposals, key=lambda p: p.bic_gain)
+        return self.best(space, shapes, [float(np.log(len(shapes)))] * len(shapes))
 
     def columns(self, signals: Signals, around: Surroundings, shape: dict[str, Any]) -> Array:
         theta, carrier, k = signals.theta, shape["carrier"], shape["offset"]
@@ -192,17 +181,8 @@ class ReferenceCandidate(Candidate):
             for h in REFERENCE_ORDERS
             for sign in (1.0, -1.0)
         ]
-        proposals = [
-            space.propose(
-                self.cause,
-                shape,
-                self.columns(space.signals, space.around, shape),
-                # Low orders are likelier by far, as of any rotary part.
-                log_grid=float(np.log(4.0 * shape["order"])),
-            )
-            for shape in shapes
-        ]
-        return max(proposals, key=lambda p: p.bic_gain)
+        # Low orders are likelier by far, as of any rotary part.
+        return self.best(space, shapes, [float(np.log(4.0 * s["order"])) for s in shapes])
 
     def columns(self, signals: Signals, around: Surroundings, shape: dict[str, Any]) -> Array:
         return line_columns(ReferenceLines.angle(signals, shape["mount_sign"]), shape["order"])

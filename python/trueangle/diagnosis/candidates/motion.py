@@ -21,6 +21,9 @@ __all__ = ["FilterLagCandidate", "LatencyCandidate"]
 #: Cutoffs searched, in multiples of the highest frequency at which a line passes.
 CUTOFFS = np.geomspace(0.2, 3000.0, 12)
 
+#: The coarse search must promise some of what a new cause needs to be worth refining.
+REFINED_FROM = 3.0
+
 #: Damping ratios of a second-order loop.
 DAMPING = (0.4, 0.7, 1.1)
 
@@ -33,7 +36,10 @@ class LatencyCandidate(Candidate):
     def propose(self, space: Space) -> Proposal | None:
         if space.signals.velocity is None or space.has(self.cause):
             return None
-        return space.propose(self.cause, {}, self.columns(space.signals, space.around, {}))
+        columns = space.remembered(
+            self.cause, None, lambda: self.columns(space.signals, space.around, {})
+        )
+        return space.propose(self.cause, {}, columns)
 
     def columns(self, signals: Signals, around: Surroundings, shape: dict[str, Any]) -> Array:
         return Latency.regressors(signals, around)
@@ -62,8 +68,14 @@ class FilterLagCandidate(Candidate):
         top = float(pattern.orders.max() * np.abs(signals.turns_per_s).max())
         if top == 0.0:
             return None
-        waves = _waves(pattern, signals.theta)
-        frequency = pattern.orders * signals.turns_per_s[:, None]
+        waves, frequency = space.remembered(
+            "waves",
+            None,
+            lambda: (
+                _waves(pattern, signals.theta),
+                pattern.orders * signals.turns_per_s[:, None],
+            ),
+        )
 
         def gain(cutoff: float, damping: float | None) -> float:
             column = _lagged(waves, frequency, cutoff, damping)
@@ -72,11 +84,17 @@ class FilterLagCandidate(Candidate):
         cutoffs = top * CUTOFFS
 
         def grid(damping: float | None) -> Array:
-            columns = [_lagged(waves, frequency, float(c), damping) for c in cutoffs]
-            return space.fixed_gains(np.column_stack(columns))
+            columns = space.remembered(
+                f"lagged {damping}",
+                None,
+                lambda: np.column_stack(
+                    [_lagged(waves, frequency, float(c), damping) for c in cutoffs]
+                ),
+            )
+            return space.fixed_gains(columns)
 
         grids: dict[float | None, Array] = {None: grid(None)}
-        if not space.hopeless(float(grids[None].max()), 1):
+        if not space.hopeless(float(grids[None].max()), 1, REFINED_FROM):
             grids |= {damping: grid(damping) for damping in DAMPING}
         step = float(np.log(CUTOFFS[1] / CUTOFFS[0]))
         best: Proposal | None = None

@@ -95,7 +95,7 @@ class NonIntegerCandidate(Candidate):
 
     @staticmethod
     def _log_grid(space: Space, orders: Array) -> Array:
-        """ln of the independent orders searched: of those of cages, or of all."""
+        """Logarithm of the independent orders searched: those of cages, or of all."""
         cages = np.zeros(orders.size, dtype=bool)
         for cycles in space.around.joint.shafts.values():
             cages |= (orders > CAGE[0] * cycles) & (orders < CAGE[1] * cycles)

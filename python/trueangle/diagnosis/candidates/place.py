@@ -48,7 +48,9 @@ class ArgumentCandidate(Candidate):
     def propose(self, space: Space) -> Proposal | None:
         if space.around.pattern.orders.size == 0 or space.has(self.cause):
             return None
-        columns = self.columns(space.signals, space.around, {})
+        columns = space.remembered(
+            self.cause, None, lambda: self.columns(space.signals, space.around, {})
+        )
         deviance = float(space.fixed_gains(-columns)[0])
         return space.propose(self.cause, {}, columns, parameters=0, deviance=deviance)
 

@@ -89,9 +89,14 @@ class HysteresisCandidate(Candidate):
             return None
         best: tuple[float, float, float] | None = None
         for start in (0.0, 1.0):
-            gains = space.gains(
-                np.column_stack([signals.presliding(length, start) for length in LENGTHS])
+            columns = space.remembered(
+                f"presliding {start}",
+                None,
+                lambda start=start: np.column_stack(  # type: ignore[misc]
+                    [signals.presliding(length, start) for length in LENGTHS]
+                ),
             )
+            gains = space.gains(columns)
             k = int(np.argmax(gains))
             if best is None or gains[k] > best[0] + 1e-9:
                 best = (float(gains[k]), float(LENGTHS[k]), start)

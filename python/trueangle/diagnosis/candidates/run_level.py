@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 from typing import Any, ClassVar
 
 import numpy as np
@@ -85,7 +86,7 @@ class DriftCandidate(Candidate):
         return replace(best, deviance=min(best.deviance, deviance))
 
     def _proposal(self, space: Space, form: str) -> Proposal:
-        columns = self._shapes(space, form)
+        columns = space.remembered(form, None, partial(self._shapes, space, form))
         log_grid = float(np.log(UNLIKE_FORMS))
         return space.propose_run_effect(self.cause, {"form": form}, columns, log_grid)
 

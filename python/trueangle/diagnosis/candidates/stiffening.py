@@ -43,23 +43,12 @@ class StiffeningCandidate(Candidate):
             gravity = self._gravity(space)
             shapes += [{"power": 3, "gravity_deg": gravity}]
             shapes += [{"knee_share": k, "gravity_deg": gravity} for k in KNEES]
-        proposals = []
         for shape in shapes:
             if "knee_share" in shape:
                 moment = StiffeningCompliance.moment(space.signals, shape["gravity_deg"])
                 shape["knee_Nm"] = float(shape.pop("knee_share") * np.abs(moment).max())
-            columns = self.columns(space.signals, space.around, shape)
-            extra = 0 if shape["gravity_deg"] is None else 1
-            proposals.append(
-                space.propose(
-                    self.cause,
-                    shape,
-                    columns,
-                    parameters=columns.shape[1] + extra,
-                    log_grid=float(np.log(2.0)),
-                )
-            )
-        return max(proposals, key=lambda p: p.bic_gain, default=None)
+        extra = [0 if shape["gravity_deg"] is None else 1 for shape in shapes]
+        return self.best(space, shapes, [float(np.log(2.0))] * len(shapes), extra)
 
     @staticmethod
     def _constant_in_runs(signals: Signals) -> bool:
