@@ -109,7 +109,8 @@ class SidebandsCandidate(Candidate):
                 if m in present:
                     shapes += [{"carrier": m, "offset": k, "form": f} for f in ("AM", "PM")]
                 shapes.append({"carrier": m, "offset": k, "form": "free"})
-        return self.best(space, shapes, [float(np.log(len(shapes)))] * len(shapes))
+        log_grid = float(np.log(max(len(shapes), 1)))
+        return self.best(space, shapes, [log_grid] * len(shapes))
 
     def columns(self, signals: Signals, around: Surroundings, shape: dict[str, Any]) -> Array:
         theta, carrier, k = signals.theta, shape["carrier"], shape["offset"]

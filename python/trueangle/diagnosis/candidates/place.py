@@ -29,6 +29,9 @@ WIDEST = 16.0
 #: Peaks of the quick search that are scored exactly.
 PEAKS = 2
 
+#: Steps by which place and width are made exact.
+NEWTON_STEPS = 4
+
 #: Readings' worth of power that a bump must rest on.
 LEAST_READINGS = 4.0
 
@@ -134,7 +137,36 @@ class DefectCandidate(Candidate):
                 8,
             )
             width = float(np.exp(log_width))
-        return {"shaft": shaft, "place_deg": float(place % 360.0), "width_deg": width}
+        # The searches stop at some 4 % of the width, a strong bump's place is known better.
+        value = gain(place, width)
+        for _ in range(NEWTON_STEPS):
+            shape = {"shaft": shaft, "place_deg": place, "width_deg": width}
+            x, excited = space.projected(self._tangents(space, shape, 1.0))
+            if not excited.all():
+                break
+            height, *moves = np.linalg.lstsq(x, space.r, rcond=1e-10)[0]
+            step = np.clip(np.array(moves) / height, -0.3 * width, 0.3 * width)
+            following = gain(place + step[0], min(width + step[1], WIDEST))
+            if not following > value:
+                break
+            place, width, value = place + step[0], min(width + step[1], WIDEST), following
+        return {"shaft": shaft, "place_deg": float(place % 360.0), "width_deg": float(width)}
+
+    def _tangents(self, space: Space, shape: dict[str, Any], height: float) -> Array:
+        """The bump and, for its ``height``, its derivatives by place and width."""
+        step = 0.05 * shape["width_deg"]
+
+        def bump(**change: float) -> Array:
+            return self.columns(space.signals, space.around, {**shape, **change})[:, 0]
+
+        place, width = shape["place_deg"], shape["width_deg"]
+        return np.column_stack(
+            [
+                bump(),
+                height * (bump(place_deg=place + step) - bump(place_deg=place - step)) / (2 * step),
+                height * (bump(width_deg=width + step) - bump(width_deg=width - step)) / (2 * step),
+            ]
+        )
 
     def columns(self, signals: Signals, around: Surroundings, shape: dict[str, Any]) -> Array:
         cycles = around.joint.output_order(shape["shaft"], 1)
@@ -146,23 +178,12 @@ class DefectCandidate(Candidate):
     ) -> tuple[Parameters, list[Effect]]:
         proposal, (height,), _ = terms[0]
         shape = proposal.shape
-        # Place, width and height together: the derivative of the bump by each.
-        step = 0.05 * shape["width_deg"]
-
-        def bump(**change: float) -> Array:
-            return self.columns(space.signals, space.around, {**shape, **change})[:, 0]
-
-        place, width = shape["place_deg"], shape["width_deg"]
-        columns = np.column_stack(
-            [
-                bump(),
-                height * (bump(place_deg=place + step) - bump(place_deg=place - step)) / (2 * step),
-                height * (bump(width_deg=width + step) - bump(width_deg=width - step)) / (2 * step),
-            ]
-        )
+        # Place, width and height together.
+        columns = self._tangents(space, shape, float(height))
         others = [term for term in space.terms if term is not proposal]
         x, _ = space.with_terms(others).projected(columns)
         std = np.sqrt(space.variance * np.diag(np.linalg.pinv(x.T @ x)))
+        place, width = shape["place_deg"], shape["width_deg"]
         parameters = {
             "place_deg": quantity(place, std[1]),
             "width_deg": quantity(width, std[2]),
