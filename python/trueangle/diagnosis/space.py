@@ -39,6 +39,9 @@ EXCITED = 1e-4
 EXPECTED_SIZE = 0.3
 FEW_READINGS = 900
 
+#: Runs from which they, and not the readings, are what informs on a variance between runs.
+ENOUGH_RUNS = 8
+
 #: Ratios of variance (run effect to one reading) that are tried.
 RATIOS = np.geomspace(1e-5, 1e8, 53)
 
@@ -117,6 +120,9 @@ class Space:
         self.bounds = signals.run_bounds()
         self.n = len(signals)
         self.log_n = price_of_parameter(self.n)
+        runs = len(self.bounds)
+        #: What a variance between runs costs.
+        self.log_runs = float(np.log(runs)) if runs >= ENOUGH_RUNS else self.log_n
         self.lines = lines if lines is not None else LineBasis(signals.theta, around.joint)
         self.base = np.column_stack(
             [np.ones(self.n), *(line_columns(signals.theta, m) for m in around.pattern.orders)]
@@ -125,6 +131,8 @@ class Space:
         #: What causes proposed beside given terms; shared by spaces of the same readings.
         self.memory: dict[Any, Any] = {}
         self.update()
+        #: `deviance` without any term.
+        self.start = self.deviance
 
     # -- model -------------------------------------------------------------------
 
@@ -149,6 +157,7 @@ class Space:
         other.residual = self.residual - repeated
         other.memory = {}
         other.update()
+        other.start = self.start + other.deviance - self.deviance
         return other
 
     def update(self) -> None:
@@ -442,7 +451,7 @@ class Space:
             1,
             log_grid,
             deviance,
-            float(np.log(max(len(self.bounds), 2))),
+            self.log_runs,
             RunEffect(columns, ratio),
         )
 

@@ -99,8 +99,9 @@ class NonIntegerCandidate(Candidate):
         cages = np.zeros(orders.size, dtype=bool)
         for cycles in space.around.joint.shafts.values():
             cages |= (orders > CAGE[0] * cycles) & (orders < CAGE[1] * cycles)
-        # Half of the belief goes to either; neighbouring trials are not independent.
-        counts = 2.0 * np.where(cages, cages.sum(), orders.size) / OVERSAMPLING
+        # Half of the belief goes to either; the maximum over an order is like that of two
+        # independent ones.
+        counts = 4.0 * np.where(cages, cages.sum(), orders.size) / OVERSAMPLING
         return np.asarray(np.log(np.maximum(counts, 2.0)))
 
     def _at(self, space: Space, order: float, log_grid: float) -> Proposal:
