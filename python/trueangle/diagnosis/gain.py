@@ -147,6 +147,9 @@ def _control(
         columns = np.hstack(
             [CANDIDATES[cause].columns(signals, space.around, space.terms[k].shape) for k in group]
         )
+        # What the training half does not show (a bump that it never passes) has no size.
+        seen = np.linalg.norm(columns[~test], axis=0) > 1e-6 * np.linalg.norm(columns, axis=0)
+        columns = columns[:, seen]
         coefficients = np.linalg.lstsq(columns[~test], y[~test], rcond=None)[0]
         after = y[test] - columns[test] @ coefficients
         p0, p1 = float(np.mean(y[test] ** 2)), float(np.mean(after**2))

@@ -35,7 +35,8 @@ NEWTON_STEPS = 4
 #: Readings' worth of power that a bump must rest on.
 LEAST_READINGS = 4.0
 
-#: Readings a step must have on either side of it within its run.
+#: Readings a step must have on either side of it within its run, up to the next step: a
+#: few readings that are off and come back are wild, no lost counts.
 STEP_MARGIN = 5
 
 
@@ -207,6 +208,11 @@ class MissedCountsCandidate(Candidate):
     def propose(self, space: Space) -> Proposal | None:
         e = space.target - space.design @ space.coefficients
         scores, places = [], []
+        near = np.zeros(space.n, dtype=bool)
+        for term in space.terms:
+            if term.cause == self.cause:
+                away = np.abs(space.signals.row - term.shape["row"])
+                near |= (space.signals.run == term.shape["run"]) & (away < STEP_MARGIN)
         for start, stop in space.bounds:
             n = stop - start
             if n < 2 * STEP_MARGIN + 1:
@@ -218,14 +224,14 @@ class MissedCountsCandidate(Candidate):
             own_zero = (after - (n - k) * part.mean()) ** 2 * n / (k * (n - k))
             common_zero = after**2 / (n - k)
             for score in (own_zero[inside], common_zero[inside]):
-                best = int(np.argmax(score))
+                best = int(np.argmax(score * ~near[start + 1 : stop][inside]))
                 scores.append(float(score[best]))
                 places.append((start, start + STEP_MARGIN + best, stop))
         best_proposal: Proposal | None = None
         for j in np.argsort(scores)[::-1][:6]:
             start, at, stop = places[int(j)]
             for row in {at - 1, at, at + 1}:
-                if not start < row < stop:
+                if not start < row < stop or near[row]:
                     continue
                 shape = {
                     "run": int(space.signals.run[row]),
