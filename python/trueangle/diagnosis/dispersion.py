@@ -33,6 +33,11 @@ SIZES = (3.0, 10.0, 100.0)
 BESIDE = 0.5
 ISOLATED = 0.5
 
+#: Wild readings smaller than this many standard deviations hide in the noise: of sizes
+#: spread evenly up to ``size`` that is a share of ``HIDDEN / size``, which the form of the
+#: wide normal supplies and no reading shows. It counts as the fraction's uncertainty.
+HIDDEN = 3.0
+
 #: Steps of expectation-maximisation.
 EM_STEPS = 60
 
@@ -188,7 +193,9 @@ def find_outliers(space: Space) -> ScatterFinding | None:
     spread = size * scale * np.sqrt(space.variance)
     std = float(np.sqrt(share * (1.0 - share) / n))
     parameters: Parameters = {
-        "fraction": quantity(float(share), max(std, float(share) / 5.0)),
+        "fraction": quantity(
+            float(share), max(std, float(share) * float(np.clip(HIDDEN / size, 0.2, 1.0)))
+        ),
         "size_arcsec": quantity(float(spread), None),
         "rows": quantity(
             [
