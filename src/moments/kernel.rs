@@ -222,14 +222,13 @@ impl Chunk {
                 }
             }
         }
-        for k in 0..2 {
-            let j = 2 * PASS + k;
-            segment.weight[j] += total(sums[k][0]);
-            segment.weight[LANES + j] += total(sums[k][1]);
-            segment.weight[2 * LANES + j] += total(sums[k][2]);
-            segment.error[j] += total(sums[k][3]);
+        for (j, sums) in (2 * PASS..).zip(sums) {
+            segment.weight[j] += total(sums[0]);
+            segment.weight[LANES + j] += total(sums[1]);
+            segment.weight[2 * LANES + j] += total(sums[2]);
+            segment.error[j] += total(sums[3]);
             if PASS < 2 {
-                segment.error[LANES + j] += total(sums[k][4]);
+                segment.error[LANES + j] += total(sums[4]);
             }
         }
     }
@@ -246,9 +245,7 @@ impl Chunk {
             let product = L::splat(weight) * (product * factor::<L>(first, 2, t4[i]));
             let mut values = [0.0; LANES];
             product.to_array(&mut values);
-            for lane in 0..L::N {
-                low[first + lane] = values[lane];
-            }
+            low[first..first + L::N].copy_from_slice(&values[..L::N]);
         }
         for (j, &low) in low.iter().enumerate() {
             let [first, second, third] = [j, LANES + j, 2 * LANES + j];

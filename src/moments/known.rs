@@ -76,7 +76,7 @@ fn note(travel: &mut [i64], angles: &[f64], period: Period) {
 /// Whether every value is finite; told without a branch for each.
 pub fn all_finite(values: &[f64]) -> bool {
     let finite = |part: &[f64]| {
-        let bad = part.iter().map(|v| i64::from(!(v.abs() <= f64::MAX)));
+        let bad = part.iter().map(|v| i64::from(!v.is_finite()));
         bad.fold(0, |any, one| any | one) == 0
     };
     values.chunks(BLOCK).all(finite)
