@@ -40,6 +40,9 @@ RUN_FACTORS = (
     "reference_error",
 )
 
+#: Travel (radians) from which on lines and bumps differ for certain.
+WHOLE_TURN = 0.9 * 2.0 * np.pi
+
 #: Terms at most.
 MOST_TERMS = 14
 
@@ -48,19 +51,20 @@ def select(space: Space, known: Sequence[Proposal] = ()) -> Space:
     """The space with the causes that its readings support.
 
     Forward selection with every candidate; where that takes a flexible cause (which can
-    imitate any effect of a run) or a bump, further paths take those only after the
-    specific ones had their say, without and with a zero of each run's own (or with what
-    acts on whole runs beside an error that repeats at the same angle). All are pruned
-    backward; the best by BIC is kept. Terms ``known`` from the same readings with other
-    weights are a start that needs no further path.
+    imitate any effect of a run) or, over a part of a turn, a bump, further paths take
+    those only after the specific ones had their say, without and with a zero of each
+    run's own (or with what acts on whole runs beside an error that repeats at the same
+    angle). All are pruned backward; the best by BIC is kept. Terms ``known`` from the
+    same readings with other weights are a start that needs no further path.
     """
     if known:
         return _made_specific(_pruned(_forward(space.with_terms(known), list(CANDIDATES))))
     direct = _pruned(_forward(space, list(CANDIDATES)))
     found = {term.cause for term in direct.terms}
-    if not found & {*FLEXIBLE, "local_defect"}:
+    # Over a part of a turn a bump, too, can stand for several lines at once: lines first.
+    travel = max(float(np.ptp(space.signals.theta[a:b])) for a, b in space.bounds)
+    if not found & {*FLEXIBLE, *(["local_defect"] if travel < WHOLE_TURN else [])}:
         return direct
-    # A bump, too, can stand for several lines at once: lines first.
     specific = [cause for cause in CANDIDATES if cause not in (*FLEXIBLE, "local_defect")]
     starts = [_forward(space, RUN_FACTORS)]
     beyond = space.without_repeats()
