@@ -6,7 +6,9 @@
 
 use std::ops::{Add, Mul, Sub};
 
-use super::portable::{Portable, TARGET_FUSES};
+#[cfg(not(target_arch = "aarch64"))]
+use super::portable::Portable;
+use super::portable::TARGET_FUSES;
 use crate::angle::Period;
 
 /// Adding this to a double below 2^51 rounds it to an integer, held in the low bits.
@@ -195,5 +197,9 @@ pub fn dispatch<K: Kernel>(set: InstructionSet, kernel: K) {
         }
     }
     let _ = set;
+    // aarch64 always has NEON: there it is the portable set.
+    #[cfg(target_arch = "aarch64")]
+    kernel.run::<super::neon::F64x4>();
+    #[cfg(not(target_arch = "aarch64"))]
     kernel.run::<Portable<4, TARGET_FUSES>>();
 }

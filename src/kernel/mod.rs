@@ -13,6 +13,8 @@ mod exact;
 mod expansion;
 mod inverse;
 pub(crate) mod lanes;
+#[cfg(target_arch = "aarch64")]
+mod neon;
 mod portable;
 mod route;
 mod segments;
