@@ -171,6 +171,21 @@ pub fn fit_moments(design: &Design, runs: &[&Accumulator]) -> Result<Solution, E
     conclude(design, reduced, &centres, count, None)
 }
 
+/// The triangle `R` of the weighted rows `[1, harmonics | error - zero]` of a run, row by
+/// row: all that the readings say, for whoever solves them in several ways.
+pub fn triangle(
+    design: &Design,
+    run: &Run,
+    argument: Argument,
+    zero: f64,
+    threads: usize,
+) -> Result<Vec<f64>, Error> {
+    check::lengths(run)?;
+    check::angles(std::slice::from_ref(run))?;
+    let found = path::triangle(design, &run.readings(argument), zero, threads);
+    Ok(found.to_rows())
+}
+
 /// Solves the reduced system and puts centres and variances back.
 fn conclude(
     design: &Design,

@@ -108,6 +108,11 @@ impl Triangle {
         Cow::Owned(self.factor.clone().resize(columns, columns, 0.0))
     }
 
+    /// All of it, one row after the other.
+    pub fn to_rows(&self) -> Vec<f64> {
+        self.square().transpose().as_slice().to_vec()
+    }
+
     /// The columns of the design part.
     pub fn design_columns(&self) -> Vec<Vec<f64>> {
         let square = self.square();

@@ -174,6 +174,15 @@ def fit(
 def resultant(
     indicated: NDArray[np.float64], reference: NDArray[np.float64], period: float
 ) -> float: ...
+def triangle(
+    run: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64] | None],
+    period: float,
+    cycles: Sequence[float],
+    orders: Sequence[Sequence[int]],
+    argument: str,
+    zero: float,
+    threads: int | None = None,
+) -> NDArray[np.float64]: ...
 def scan_residuals(
     series: Series,
     run: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64] | None],

@@ -121,6 +121,22 @@ pub fn reduce(
     Ok(Reduced::new(system, Method::Plain))
 }
 
+/// The triangle of `[1, harmonics | error]` over one run, whose errors are counted from
+/// `centre`: by one pass where the readings are many.
+pub fn triangle(design: &Design, run: &Readings, centre: f64, threads: usize) -> Triangle {
+    if let Some((cycles, orders)) = design.common_turn() {
+        let highest = orders.iter().copied().max().unwrap_or(0);
+        let segments = segments(highest);
+        let per_segment = run.angle.len() / segments;
+        if per_segment >= READINGS_PER_FACTOR && segments <= MOST_SEGMENTS {
+            let mut sums = Accumulator::new(design.period(), cycles, highest, centre);
+            sums.update(*run, threads);
+            return factor::reduce(&sums, &orders);
+        }
+    }
+    run_rows(design, run, centre)
+}
+
 /// The system of moments, by the way that fits its condition number.
 pub fn reduce_moments(design: &Design, runs: &[&Accumulator]) -> Result<Reduced, Error> {
     let base = runs[0];

@@ -36,7 +36,7 @@ pub fn system(runs: &[&Accumulator], orders: &[u32]) -> System {
 }
 
 /// The triangle of `[1, harmonics | error]` over one run.
-fn reduce(run: &Accumulator, orders: &[u32]) -> Triangle {
+pub fn reduce(run: &Accumulator, orders: &[u32]) -> Triangle {
     let columns = 2 * orders.len() + 2;
     let moments = run.moments();
     let half_width = PI / moments.len() as f64;

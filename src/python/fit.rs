@@ -139,6 +139,28 @@ pub fn fit(
     Ok(Solution { inner, sizes })
 }
 
+/// The triangle of the weighted rows [1, harmonics | error - zero] of one run.
+#[pyfunction]
+#[pyo3(signature = (run, period, cycles, orders, argument, zero, threads=None))]
+pub fn triangle<'py>(
+    py: Python<'py>,
+    run: Readings<'py>,
+    period: f64,
+    cycles: Vec<f64>,
+    orders: Vec<Vec<u32>>,
+    argument: &str,
+    zero: f64,
+    threads: Option<i64>,
+) -> PyResult<Bound<'py, PyArray2<f64>>> {
+    let argument = argument_named(argument)?;
+    let design = design(period, cycles, orders)?;
+    let size = design.columns() + 2;
+    let run = slices(&run)?;
+    let threads = threads::count(py, threads, run.reference.len())?;
+    let rows = py.detach(|| core::triangle(&design, &run, argument, zero, threads))?;
+    rows.to_pyarray(py).reshape([size, size])
+}
+
 /// A sample of the residuals of one run, and the largest.
 #[pyfunction]
 #[pyo3(signature = (series, run, argument, offset, stride, threads=None))]

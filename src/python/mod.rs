@@ -29,7 +29,7 @@ mod _core {
     use super::terms::PyCorrector;
 
     #[pymodule_export]
-    use super::fit::{Solution, fit, scan_residuals};
+    use super::fit::{Solution, fit, scan_residuals, triangle};
 
     #[pymodule_export]
     use super::moments::{PyMoments, fit_moments};

@@ -4,7 +4,10 @@ import numpy as np
 import pytest
 
 import trueangle as ta
+from trueangle.fitting import ridge
+from trueangle.fitting.problem import Problem
 from trueangle.fitting.travel import covered_span
+from trueangle.shafts import resolve_orders
 
 
 @pytest.mark.parametrize(
@@ -44,6 +47,67 @@ def test_an_arc_gives_a_usable_model_with_small_amplitudes(arc, runs):
     assert result.model.amplitudes.sum() < 5.0
     assert result.model.partial_span == pytest.approx((0.0, arc), abs=5.0)
     assert any("extrapolated" in note for note in result.notes)
+
+
+@pytest.mark.parametrize("runs", [1, 3])
+@pytest.mark.parametrize("count", [300, 6000])  # by rows, and by one pass of moments
+@pytest.mark.parametrize("weighted", [False, True])
+def test_penalties_are_scored_as_by_a_fit_each(runs, count, weighted):
+    """Against one least-squares fit, by numpy, of every fold under every penalty."""
+    rng = np.random.default_rng(5)
+    data, orders = [], range(1, 6)
+    for _ in range(runs):
+        x = rng.uniform(-60.0, 120.0, count)
+        e = 0.5 * np.tanh(3 * np.sin(np.radians(x))) + 0.1 * rng.normal(size=count)
+        w = rng.integers(0, 3, count).astype(float) if weighted else None
+        data.append(ta.CalibrationRun(x, x + e + rng.uniform(-9, 9), 360.0, weights=w))
+    problem = Problem(data, resolve_orders(orders), "reference")
+    found = ridge._folds(problem, problem.base)
+    if runs > 1:
+        parts = [(run.reference, run.indicated, run.weights) for run in data]
+    else:
+        (run,) = data
+        cuts = np.digitize(run.reference, np.quantile(run.reference, np.arange(1, 10) / 10), True)
+        cut = lambda v, j: None if v is None else v[cuts == j]  # noqa: E731
+        columns = run.reference, run.indicated, run.weights
+        parts = [tuple(cut(column, j) for column in columns) for j in range(10)]
+
+    def rows(part):
+        x, y, w = part
+        design = np.column_stack([f(k * np.radians(x)) for k in orders for f in (np.cos, np.sin)])
+        return design, y - x, np.ones(x.size) if w is None else w
+
+    def centred(design, error, w):
+        mean = lambda v: np.average(v, axis=0, weights=w)  # noqa: E731
+        return (design - mean(design)) * np.sqrt(w)[:, None], (error - mean(error)) * np.sqrt(w)
+
+    slow = np.zeros(ridge._PENALTIES.size)
+    for j, part in enumerate(parts):
+        others = [rows(p) for i, p in enumerate(parts) if i != j]
+        if runs > 1:
+            pieces = [centred(*other) for other in others]
+            kept, target = np.vstack([a for a, _ in pieces]), np.concatenate([b for _, b in pieces])
+        else:
+            design, error, w = (np.concatenate(column) for column in zip(*others, strict=True))
+            kept, target = centred(design, error, w)
+        total = sum(w.sum() for _, _, w in others)
+        held, aim, weight = rows(part)
+        for i, penalty in enumerate(ridge._PENALTIES):
+            below = np.sqrt(penalty * total) * np.eye(kept.shape[1])
+            stacked = np.vstack([kept, below]), np.concatenate([target, np.zeros(len(below))])
+            solution = np.linalg.lstsq(*stacked)[0]
+            left = aim - held @ solution
+            if runs > 1:
+                zero = np.average(left, weights=weight)
+            else:
+                zero = np.average(error - design @ solution, weights=w)
+            slow[i] += np.average((left - zero) ** 2, weights=weight)
+    fast = np.zeros_like(slow)
+    for j, held in enumerate(found):
+        others = [fold for i, fold in enumerate(found) if i != j]
+        fast += ridge._held_out(ridge._solutions(others, runs > 1), held, runs > 1)
+    # Plain least squares on an arc: condition 1e4, so 1e-12 of what the fit loses.
+    assert fast == pytest.approx(slow, rel=1e-6)
 
 
 def test_a_full_turn_is_never_penalised():

@@ -12,8 +12,9 @@ from ..shafts import resolve_orders
 from ..units import check_follows
 from .problem import Problem
 from .result import FitResult
+from .ridge import choose_ridge
 from .robust import Loss, weigh, without_spikes
-from .travel import CONDITION, choose_ridge, covered_span
+from .travel import CONDITION, covered_span
 
 if TYPE_CHECKING:
     from ..orders.select import OrderSelection
@@ -65,7 +66,7 @@ def fit(
         off are set aside (and reported); ``"linear"``: least squares on all readings.
     ridge : float, optional
         Tikhonov penalty relative to the sum of weights. By default 0 on a full turn, and
-        chosen by held-out error on partial travel (`trueangle.fitting.travel.choose_ridge`).
+        chosen by held-out error on partial travel (`trueangle.fitting.ridge.choose_ridge`).
     method : {"plain", "moments", "qr", "counts"}, optional
         Forces a way of solving: QR of all rows, one pass of piecewise moments with normal
         equations or with QR, or one mean error per count of an encoder that counts (whole

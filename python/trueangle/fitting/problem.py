@@ -95,15 +95,10 @@ class Problem:
         """The argument of every run."""
         return [getattr(run, self.argument) for run in self.runs]
 
-    @cached_property
-    def errors(self) -> list[Array]:
-        """The measured error of every run, unfolded around its zero."""
-        return [run.centred_error for run in self.runs]
-
     def solve(self, weights: Sequence[Array | None], penalty: float = 0.0) -> Fitted:
         """Least squares under ``weights``, with an optional Tikhonov penalty.
 
-        ``penalty`` is relative to the sum of weights, see `trueangle.fitting.travel.choose_ridge`.
+        ``penalty`` is relative to the sum of weights, see `trueangle.fitting.ridge.choose_ridge`.
         """
         used = [weight is None or bool(weight.any()) for weight in weights]
         rows = [

@@ -1,0 +1,176 @@
+"""The Tikhonov penalty for partial travel, chosen by held-out error."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .. import _core
+from ..angles import circular_mean
+from ..runs import CalibrationRun
+from .problem import Problem
+
+__all__ = ["choose_ridge"]
+
+Array = NDArray[np.float64]
+
+#: Penalties tried, relative to the sum of weights: from "none" to "hardly any harmonics".
+_PENALTIES = np.array([0.0, *np.logspace(-9.0, 0.0, 19).tolist()])
+
+#: Parts of the arc left out in turn when there is one run only.
+_BLOCKS = 10
+
+#: The amplitudes may add up to so many times the range of the measured error. On a full
+#: turn the sum of amplitudes of a smooth error is about half its range.
+_REACH = 3.0
+
+#: Readings whose angles and errors are looked at for the ends of blocks and the range.
+_LOOKED_AT = 65_536
+
+#: Singular values below this part of the greatest carry nothing but rounding.
+_NOTHING = 1e-14
+
+
+class _Fold(NamedTuple):
+    """Readings left out together: the triangle of ``[1, harmonics | error]`` over them."""
+
+    triangle: Array
+    weight: float
+
+
+def choose_ridge(problem: Problem, weights: Sequence[Array | None]) -> float:
+    r"""Tikhonov penalty for partial travel, chosen by held-out error.
+
+    The fit minimises :math:`\sum w (y - \varepsilon)^2 + \lambda \sum w \sum_k (A_k^2 + B_k^2)`.
+    Every penalty is scored on readings left out of its fit: whole runs where there are
+    several, else tenths of the arc. The best is taken, and raised until the amplitudes add
+    up to no more than three times the range of the measured error.
+
+    Parameters
+    ----------
+    problem : Problem
+    weights : sequence of (ndarray or None)
+        Of every run; readings of weight 0 take no part.
+
+    Returns
+    -------
+    float
+        The penalty relative to the sum of weights; 0 for plain least squares.
+
+    Notes
+    -----
+    Every reading is reduced once, to the triangle of its fold, which is all that the
+    many fits and scores need: O(N) for N readings, whatever the number of penalties.
+    """
+    folds = _folds(problem, weights)
+    own_zeros = len(problem.runs) > 1
+    scores = np.zeros(_PENALTIES.size)
+    for j, held in enumerate(folds):
+        kept = [fold for i, fold in enumerate(folds) if i != j]
+        if held.weight > 0.0 and any(fold.weight > 0.0 for fold in kept):
+            scores += _held_out(_solutions(kept, own_zeros), held, own_zeros)
+    best = int(np.argmin(scores))
+    amplitudes = _solutions(folds, own_zeros)[1:]
+    sums = np.hypot(amplitudes[::2], amplitudes[1::2]).sum(axis=0)
+    reach = _REACH * _error_range(problem, weights)
+    tame = np.flatnonzero(sums[best:] <= reach)
+    return float(_PENALTIES[best + tame[0]] if tame.size else _PENALTIES[-1])
+
+
+def _folds(problem: Problem, weights: Sequence[Array | None]) -> list[_Fold]:
+    if len(problem.runs) > 1:
+        parts = [
+            (run.reference, run.indicated, weight, _zero(run))
+            for run, weight in zip(problem.runs, weights, strict=True)
+        ]
+    else:
+        (run,), (weight,) = problem.runs, weights
+        zero = _zero(run)
+        block = _blocks(problem.angles[0])
+        order = np.argsort(block, kind="stable")
+        pieces = np.split(order, np.cumsum(np.bincount(block, minlength=_BLOCKS))[:-1])
+        parts = [
+            (run.reference[i], run.indicated[i], None if weight is None else weight[i], zero)
+            for i in pieces
+            if i.size
+        ]
+    cycles = [shaft.cycles_per_turn for shaft in problem.shafts]
+    orders = [list(shaft.orders) for shaft in problem.shafts]
+    return [
+        _Fold(
+            _core.triangle(
+                (reference, indicated, weight),
+                problem.period,
+                cycles,
+                orders,
+                problem.argument,
+                zero,
+                problem.threads,
+            ),
+            float(reference.size if weight is None else weight.sum()),
+        )
+        for reference, indicated, weight, zero in parts
+    ]
+
+
+def _zero(run: CalibrationRun) -> float:
+    """About the zero of a run: errors are unfolded around it."""
+    stride = max(1, len(run) // _LOOKED_AT)
+    return circular_mean(run.indicated[::stride] - run.reference[::stride], run.period)
+
+
+def _blocks(angles: Array) -> NDArray[np.uint8]:
+    """Which tenth of the readings, in the order of their angles, each belongs to."""
+    looked_at = angles[:: max(1, angles.size // _LOOKED_AT)]
+    ends = np.quantile(looked_at, np.arange(1, _BLOCKS) / _BLOCKS)
+    block = np.zeros(angles.size, dtype=np.uint8)
+    for end in ends:
+        block += angles > end
+    return block
+
+
+def _without_zero(triangle: Array) -> Array:
+    """Rows of ``[harmonics | error]`` with the zero fitted; the first row fixes the zero."""
+    return np.asarray(np.linalg.qr(triangle, mode="r"))
+
+
+def _solutions(folds: Sequence[_Fold], own_zeros: bool) -> Array:
+    """``[zero, A, B, ...]``, a column per penalty; the zero is 0 where runs have their own."""
+    if own_zeros:
+        first = None
+        rows = np.vstack([fold.triangle[1:, 1:] for fold in folds])
+    else:
+        triangle = _without_zero(np.vstack([fold.triangle for fold in folds]))
+        first, rows = triangle[0], triangle[1:, 1:]
+    u, s, vt = np.linalg.svd(rows[:, :-1], full_matrices=False)
+    moment = u.T @ rows[:, -1]
+    weight = sum(fold.weight for fold in folds)
+    s = np.where(s > _NOTHING * s.max(initial=0.0), s, 0.0)[:, None]
+    square = s**2 + weight * _PENALTIES
+    gain = np.divide(s, square, out=np.zeros_like(square), where=square > 0.0)
+    harmonics = vt.T @ (gain * moment[:, None])
+    zero = np.zeros((1, _PENALTIES.size))
+    if first is not None and first[0] != 0.0:
+        zero = ((first[-1] - first[1:-1] @ harmonics) / first[0])[None, :]
+    return np.vstack([zero, harmonics])
+
+
+def _held_out(solutions: Array, held: _Fold, own_zeros: bool) -> Array:
+    """Mean squared error of the held-out readings, a whole run around its own zero."""
+    triangle = held.triangle[1:] if own_zeros else held.triangle
+    unexplained = triangle[:, :-1] @ solutions - triangle[:, -1:]
+    return np.asarray(np.einsum("ij,ij->j", unexplained, unexplained) / held.weight)
+
+
+def _error_range(problem: Problem, weights: Sequence[Array | None]) -> float:
+    """Peak-to-peak of the measured errors that count, each run around its own zero."""
+    stride = max(1, sum(len(run) for run in problem.runs) // _LOOKED_AT)
+    parts = []
+    for run, weight in zip(problem.runs, weights, strict=True):
+        error = run.indicated[::stride] - run.reference[::stride] - _zero(run)
+        error -= problem.period * np.round(error / problem.period)
+        parts.append(error if weight is None else error[weight[::stride] > 0.0])
+    return float(np.ptp(np.concatenate(parts)))
