@@ -1,10 +1,11 @@
 """Evaluation targets: batches, small calls, single samples, latency, peers.
 
     python benches/evaluation.py [--samples 10000000] [--rounds 7] [--latency SECONDS]
-                                 [--save FILE.npz]
+                                 [--save FILE.npz] [--plot FILE]
 
 Ways are interleaved within one run; ratios of medians are what counts. ``--latency``
 paces a loop for so many seconds at 1 and at 10 kHz and ``--save`` keeps every latency.
+``--plot`` draws all ways over the array (SVG, PNG, PDF; needs ``trueangle[plot]``).
 """
 
 from __future__ import annotations
@@ -46,6 +47,35 @@ def latency(seconds: float, save: str | None) -> None:
         np.savez_compressed(save, **kept)
 
 
+def plot(rows: list[Row], file: str) -> None:
+    """Medians with their spread, fastest first, against a copy of the array."""
+    from matplotlib.figure import Figure
+
+    rows = sorted(rows, key=lambda row: -row.timing.median / row.samples)
+    figure = Figure(figsize=(8.0, 0.8 + 0.24 * len(rows)), layout="constrained")
+    ax = figure.subplots()
+    scale = [1e9 / row.samples for row in rows]
+    median = np.array([s * row.timing.median for s, row in zip(scale, rows, strict=True)])
+    least = np.array([s * row.timing.least for s, row in zip(scale, rows, strict=True)])
+    most = np.array([s * row.timing.most for s, row in zip(scale, rows, strict=True)])
+    known = ("trueangle", "error", "correct", "exact", "float32", "16-bit")
+    ours = [row.name.startswith(known) for row in rows]
+    ax.barh(
+        [row.name for row in rows],
+        median,
+        xerr=[median - least, most - median],
+        color=["tab:blue" if own else "tab:gray" for own in ours],
+        error_kw={"elinewidth": 1.0, "capsize": 2.0},
+    )
+    copy = next(m for m, row in zip(median, rows, strict=True) if row.name == "copy float64")
+    ax.axvline(copy, color="black", linewidth=0.8, linestyle=":")
+    ax.set_xscale("log")
+    ax.set_xlabel("ns per sample: median, least and most; dotted: a copy of the array")
+    ax.margins(y=0.01)
+    ax.grid(axis="x", alpha=0.3)
+    figure.savefig(file)
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--samples", type=int, default=10_000_000)
@@ -53,6 +83,7 @@ def main() -> None:
     parser.add_argument("--peer-rounds", type=int, default=3)
     parser.add_argument("--latency", type=float, default=0.0, metavar="SECONDS")
     parser.add_argument("--save", metavar="FILE.npz")
+    parser.add_argument("--plot", metavar="FILE")
     args = parser.parse_args()
     print(f"python {platform.python_version()}, numpy {np.__version__}, {platform.machine()}")
     path = evaluation.harmonics([1])._series.path
@@ -66,6 +97,8 @@ def main() -> None:
         print(f"  {name:38s} not installed")
     show("37 samples, ns per call", evaluation.small(), "error", "x error")
     show("One sample, ns per call with its loop", evaluation.single(), "step", "x step")
+    if args.plot is not None:
+        plot([*batches, *peers], args.plot)
     if args.latency > 0.0:
         latency(args.latency, args.save)
 
