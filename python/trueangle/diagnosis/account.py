@@ -52,7 +52,8 @@ def render(diagnosis: Diagnosis) -> str:
                 head += " (one of them is seen)" if len(spot.causes) > 1 else " (something is seen)"
             lines += _wrapped(f"- {head}: {spot.because}. To tell: {spot.measure}.", 2)
             for cause, parameters in spot.estimates.items():
-                shown = ", ".join(f"{name} {_quantity(q)}" for name, q in parameters.items())
+                known = {name: q for name, q in parameters.items() if q.value is not None}
+                shown = ", ".join(f"{name} {_quantity(q)}" for name, q in known.items())
                 lines += _wrapped(f"If {cause}: {shown}.", 6, first=4)
     return "\n".join(lines)
 

@@ -114,14 +114,25 @@ def measure_gain(space: Space, groups: Sequence[Sequence[int]], seed: int = 0) -
                 share,
                 interval,
                 control,
-                ""
-                if transfers
-                else "no transferable gain: a new run draws it anew; what is gained is an "
-                "honest uncertainty",
+                _note(share),
                 by_level.get(k),
             )
         )
     return found
+
+
+def _note(share: float | None) -> str:
+    """What is to be thought of a share on held-out readings."""
+    if share is None:
+        return (
+            "no transferable gain: a new run draws it anew; what is gained is an honest uncertainty"
+        )
+    if share <= 0.0:
+        return (
+            "the readings held out are no better with it: it describes these runs, and a "
+            "correction should not contain it before more runs confirm it"
+        )
+    return ""
 
 
 def _units(space: Space) -> tuple[NDArray[np.int64], str]:
