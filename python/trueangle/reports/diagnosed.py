@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING, Any, Final
 
 if TYPE_CHECKING:
@@ -51,14 +52,23 @@ def _parameter(index: int, name: str, entry: dict[str, Any]) -> dict[str, Any]:
     value, std = entry["value"], entry["std"]
     number = isinstance(value, int | float) and not isinstance(value, bool)
     unit = next((u for u in _UNITS if name.endswith(f"_{u}")), "")
+    known = number and isinstance(std, int | float)
     return {
         "index": index,
         "name": name.removesuffix(f"_{unit}").replace("_", " "),
         "unit": _UNITS.get(unit, ""),
         "value": value if number else None,
-        "std": std if number and isinstance(std, int | float) else None,
+        "std": std if known else None,
+        "digits": _digits(std, 2) if known else _digits(value, 4) if number else 0,
         "text": "" if number else _text(value),
     }
+
+
+def _digits(value: float, significant: int) -> int:
+    """Digits after the point that show so many significant ones of ``value``."""
+    if value == 0.0 or not math.isfinite(value):
+        return significant
+    return min(max(significant - 1 - math.floor(math.log10(abs(value))), 0), 12)
 
 
 def _text(value: Any) -> str:

@@ -35,12 +35,25 @@ def unknowns(
         _entry(
             " or ".join(cause.replace("_", " ") for cause in entry["causes"])
             + (" (something is seen)" if entry["supported"] else ""),
-            entry["because"],
+            "; ".join([entry["because"], *_estimates(entry)]),
             entry["measure"],
         )
         for entry in sorted(diagnosis["not_identifiable"], key=lambda e: not e["supported"])
     ]
     return found + _folded(selection) + _held(runs)
+
+
+def _estimates(entry: dict[str, Any]) -> list[str]:
+    """What each cause in doubt would amount to, where something is seen."""
+    return [
+        f"if {cause.replace('_', ' ')}: "
+        + ", ".join(
+            f"{name.replace('_', ' ')} {q['value']:.4g} +- {q['std']:.3g}"
+            for name, q in parameters.items()
+            if isinstance(q["value"], float) and isinstance(q["std"], float)
+        )
+        for cause, parameters in entry.get("estimates", {}).items()
+    ]
 
 
 def _held(runs: Sequence[CalibrationRun]) -> list[dict[str, str]]:
