@@ -27,9 +27,10 @@ pub fn residuals(
     period: f64,
     fitted: &mut [f64],
 ) {
-    for (i, value) in fitted.iter_mut().enumerate() {
-        let rest = indicated[i] - reference[i] - *value - offset;
-        *value = rest - period * whole(rest / period);
+    let per_turn = 1.0 / period;
+    for ((value, &x), &y) in fitted.iter_mut().zip(indicated).zip(reference) {
+        let rest = x - y - *value - offset;
+        *value = rest - period * whole(rest * per_turn);
     }
 }
 
