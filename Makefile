@@ -31,10 +31,10 @@ stub:               ## the stub against the built module
 rust:               ## tests of the core
 	cargo test --locked
 
-aarch64:            ## tests of the kernels on an emulated aarch64; apart from `check`, for it takes minutes
+aarch64:            ## tests of the core on an emulated aarch64; apart from `check`, for it takes minutes
 	CARGO_TARGET_AARCH64_UNKNOWN_LINUX_GNU_LINKER=aarch64-linux-gnu-gcc \
 	CARGO_TARGET_AARCH64_UNKNOWN_LINUX_GNU_RUNNER="qemu-aarch64 -L /usr/aarch64-linux-gnu" \
-	cargo test --locked --target aarch64-unknown-linux-gnu --test kernel --test singles --test compensator
+	cargo test --locked --target aarch64-unknown-linux-gnu --tests
 
 python:             ## tests of the package
 	$(PYTHON) -m pytest
