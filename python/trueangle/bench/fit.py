@@ -68,16 +68,19 @@ def _ours(
         method=method,
         threads=threads,
     )
-    pairs = np.column_stack([found.cosine[0], found.sine[0]]).ravel()
-    return np.concatenate([[found.constant], pairs]) * (2.0 * np.pi / run.period)
+    return _coefficients(found, run.period)
 
 
 def _whole(run: CalibrationRun, highest: int) -> NDArray[np.float64]:
     """All that `trueangle.fit` does by default: checks, wild readings, travel."""
     found = fit(run, orders=range(1, highest + 1))
-    solution = found.fitted.solution
+    return _coefficients(found.fitted.solution, run.period)
+
+
+def _coefficients(solution: _core.Solution, period: float) -> NDArray[np.float64]:
+    """``[constant, A, B, ...]`` in radians."""
     pairs = np.column_stack([solution.cosine[0], solution.sine[0]]).ravel()
-    return np.concatenate([[solution.constant], pairs]) * (2.0 * np.pi / run.period)
+    return np.concatenate([[solution.constant], pairs]) * (2.0 * np.pi / period)
 
 
 def measure(

@@ -40,8 +40,8 @@ RUN_FACTORS = (
     "reference_error",
 )
 
-#: Travel (radians) from which on lines and bumps differ for certain.
-WHOLE_TURN = 0.9 * 2.0 * np.pi
+#: Travel (turns) from which on lines and bumps differ for certain.
+WHOLE_TURN = 0.9
 
 #: Terms at most.
 MOST_TERMS = 14
@@ -62,7 +62,7 @@ def select(space: Space, known: Sequence[Proposal] = ()) -> Space:
     direct = _pruned(_forward(space, list(CANDIDATES)))
     found = {term.cause for term in direct.terms}
     # Over a part of a turn a bump, too, can stand for several lines at once: lines first.
-    travel = max(float(np.ptp(space.signals.theta[a:b])) for a, b in space.bounds)
+    travel = space.signals.run_turns().max()
     if not found & {*FLEXIBLE, *(["local_defect"] if travel < WHOLE_TURN else [])}:
         return direct
     specific = [cause for cause in CANDIDATES if cause not in (*FLEXIBLE, "local_defect")]

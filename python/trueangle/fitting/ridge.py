@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .. import _core
-from ..angles import circular_mean
+from ..angles import circular_mean, wrap
 from ..runs import CalibrationRun
 from .problem import Problem
 
@@ -132,18 +132,16 @@ def _blocks(angles: Array) -> NDArray[np.uint8]:
     return block
 
 
-def _without_zero(triangle: Array) -> Array:
-    """Rows of ``[harmonics | error]`` with the zero fitted; the first row fixes the zero."""
-    return np.asarray(np.linalg.qr(triangle, mode="r"))
-
-
 def _solutions(folds: Sequence[_Fold], own_zeros: bool) -> Array:
     """``[zero, A, B, ...]``, a column per penalty; the zero is 0 where runs have their own."""
     if own_zeros:
         first = None
         rows = np.vstack([fold.triangle[1:, 1:] for fold in folds])
     else:
-        triangle = _without_zero(np.vstack([fold.triangle for fold in folds]))
+        # The first row fixes the zero; the others are free of it.
+        triangle: Array = np.asarray(
+            np.linalg.qr(np.vstack([fold.triangle for fold in folds]), mode="r")
+        )
         first, rows = triangle[0], triangle[1:, 1:]
     u, s, vt = np.linalg.svd(rows[:, :-1], full_matrices=False)
     moment = u.T @ rows[:, -1]
@@ -171,6 +169,6 @@ def _error_range(problem: Problem, weights: Sequence[Array | None]) -> float:
     parts = []
     for run, weight in zip(problem.runs, weights, strict=True):
         error = run.indicated[::stride] - run.reference[::stride] - _zero(run)
-        error -= problem.period * np.round(error / problem.period)
+        error = wrap(error, problem.period)
         parts.append(error if weight is None else error[weight[::stride] > 0.0])
     return float(np.ptp(np.concatenate(parts)))

@@ -107,6 +107,11 @@ class Signals:
         edges = [0, *cuts.tolist(), len(self)]
         return list(itertools.pairwise(edges))
 
+    def run_turns(self) -> Array:
+        """Output turns between the ends of every run's travel, in order."""
+        covered = [np.ptp(self.theta[start:stop]) for start, stop in self.run_bounds()]
+        return np.array(covered) / (2.0 * np.pi)
+
     def presliding(self, length_deg: float, start_state: float = 0.0) -> Array:
         r"""State z of a presliding spring of transition length L, in [-1, 1].
 

@@ -23,7 +23,6 @@ REFERENCE_ORDERS = range(1, 37)
 #: Periods of the modulation that a run must cover for sidebands to be looked for.
 RESOLVED = 0.75
 
-
 #: Orders closer than this share of one over the turns covered, that explain at least this
 #: much of what the best one does, are hardly told apart.
 UNRESOLVED, ALIKE = 0.5, 0.9
@@ -45,7 +44,7 @@ class MissingOrderCandidate(Candidate):
             return None
         # Over a part of a turn neighbouring orders are hardly told apart: a fast shaft's
         # own order is then the likelier one.
-        away = np.abs(lines.orders - lines.orders[best]) * _longest_travel(space)
+        away = np.abs(lines.orders - lines.orders[best]) * space.signals.run_turns().max()
         alike = np.flatnonzero((away < UNRESOLVED) & (gains > ALIKE * gains[best]))
         named = [space.around.joint.name_order(float(lines.orders[k])) for k in alike]
         own = [k for k, name in zip(alike, named, strict=True) if name and name[0] != "output"]
@@ -100,7 +99,7 @@ class SidebandsCandidate(Candidate):
             if named is not None and named[0] != "output":
                 carriers.append(m)
         present = {float(m) for m in space.around.pattern.orders}
-        travel = _longest_travel(space)
+        travel = space.signals.run_turns().max()
         shapes: list[dict[str, Any]] = []
         # Over less than that the pair and the line between them are hardly told apart.
         offsets = [k for k in (1, 2) if k * travel > RESOLVED]
@@ -204,8 +203,3 @@ class ReferenceCandidate(Candidate):
             ReferenceLines((row[0],), (row[1],), (row[2],), row[5]) for row in rows
         ]
         return parameters, effects
-
-
-def _longest_travel(space: Space) -> float:
-    """Turns that the longest run covers."""
-    return max(float(np.ptp(space.signals.theta[a:b])) for a, b in space.bounds) / (2.0 * np.pi)

@@ -85,8 +85,7 @@ class NonIntegerCandidate(Candidate):
         """
         orders = space.lines.orders
         away = np.abs(orders - found.shape["order"])
-        turns = max(float(np.ptp(space.signals.theta[a:b])) for a, b in space.bounds)
-        alike = orders[away < UNRESOLVED * 2.0 * np.pi / turns]
+        alike = orders[away * space.signals.run_turns().max() < UNRESOLVED]
         share = 0.5 + 1.0 / space.signals.runs
         return any(
             space.gain(line_columns(space.signals.theta, float(m)))[0] > share * found.deviance
@@ -115,7 +114,7 @@ class NonIntegerCandidate(Candidate):
         theta = space.signals.theta
         starts = np.array([start for start, _ in space.bounds])
         sizes = np.array([stop - start for start, stop in space.bounds], dtype=np.float64)
-        turns = np.array([np.ptp(theta[a:b]) for a, b in space.bounds]) / (2.0 * np.pi)
+        turns = space.signals.run_turns()
         if sizes.min() < 8 or turns.max() <= 0.0:
             return np.zeros(0), np.zeros(0)
         top = float(space.lines.orders.max()) * 0.75
@@ -156,8 +155,8 @@ class NonIntegerCandidate(Candidate):
         # Cosine and sine each of variance s^2: a mean square amplitude of 2 s^2.
         amplitude = float(np.sqrt(2.0 * proposal.run_effect.ratio * space.variance))
         noise = float(np.sqrt(2.0 * space.variance / space.n))
-        turns = float(np.median([np.ptp(space.signals.theta[a:b]) for a, b in space.bounds]))
-        order_std = 0.780 * noise / np.sqrt(2.0) / max(amplitude, 1e-12) / (turns / (2.0 * np.pi))
+        turns = float(np.median(space.signals.run_turns()))
+        order_std = 0.780 * noise / np.sqrt(2.0) / max(amplitude, 1e-12) / turns
         parameters = {
             "order": quantity(proposal.shape["order"], order_std),
             "amplitude_arcsec": quantity(
