@@ -2,9 +2,7 @@
 
 use std::f64::consts::TAU;
 
-/// Adding and subtracting this rounds a double below 2^51 to a whole number, in two
-/// additions that every processor does for several numbers at once.
-const ROUNDER: f64 = 6_755_399_441_055_744.0;
+use crate::kernel::lanes::ROUNDER;
 
 /// Length (0 to 1) of the mean of unit vectors at `indicated - reference`: 1 where all
 /// differences are one, near 0 where they are spread over the turn.
@@ -30,7 +28,7 @@ pub fn residuals(
     let per_turn = 1.0 / period;
     for ((value, &x), &y) in fitted.iter_mut().zip(indicated).zip(reference) {
         let rest = x - y - *value - offset;
-        *value = rest - period * whole(rest * per_turn);
+        *value = rest - period * whole_number(rest * per_turn);
     }
 }
 
@@ -104,15 +102,17 @@ fn widest_gap(places: &[f64]) -> Option<(f64, f64)> {
     (gap > MISSING.max(chance)).then_some((start, start + travelled))
 }
 
-/// The whole number nearest to `x`.
-fn whole(x: f64) -> f64 {
+/// The whole number nearest to `x`, in two additions that every processor does for several
+/// numbers at once; `x` is below 2^51.
+#[inline(always)]
+pub fn whole_number(x: f64) -> f64 {
     (x + ROUNDER) - ROUNDER
 }
 
 /// Part of a turn in `[-1/2, 1/2]`.
 fn turns(angle: f64, period: f64) -> f64 {
     let part = angle / period;
-    part - whole(part)
+    part - whole_number(part)
 }
 
 #[cfg(test)]

@@ -5,6 +5,7 @@
 //! belongs to one process id and a child that needs threads starts its own.
 
 use std::sync::atomic::{AtomicPtr, AtomicUsize, Ordering};
+use std::sync::{Mutex, PoisonError};
 use std::thread::available_parallelism;
 
 use rayon::{ThreadPool, ThreadPoolBuilder};
@@ -48,6 +49,24 @@ pub fn pool(threads: usize) -> Option<&'static ThreadPool> {
     // Two callers may race here: the later pool stays, the earlier works for its caller.
     STANDING.store(fresh, Ordering::Release);
     Some(&fresh.pool)
+}
+
+/// Results of `work(0..parts)` in the order of the parts, from up to `threads` threads:
+/// what is made of them does not depend on `threads`.
+pub fn map_parts<T: Send>(
+    parts: usize,
+    threads: usize,
+    work: impl Fn(usize) -> T + Sync,
+) -> impl Iterator<Item = T> {
+    let found: Vec<_> = (0..parts).map(|_| Mutex::new(None)).collect();
+    for_each_part(parts, threads, |i| {
+        let part = work(i);
+        *found[i].lock().unwrap_or_else(PoisonError::into_inner) = Some(part);
+    });
+    // Every part has run: there is a result in each place.
+    found
+        .into_iter()
+        .filter_map(|part| part.into_inner().unwrap_or_else(PoisonError::into_inner))
 }
 
 /// Runs `work(0..parts)` on up to `threads` threads, in any order, each part once.

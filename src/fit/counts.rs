@@ -5,6 +5,7 @@
 //! sufficient: the fit that follows sees as many rows as there are counts, exactly.
 
 use crate::angle::Period;
+use crate::circle::whole_number;
 use crate::kernel::lanes::{InstructionSet, Kernel, Lanes, ROUNDER, dispatch};
 use crate::moments::readings::Readings;
 use crate::threads;
@@ -61,20 +62,12 @@ impl Counts {
     fn of_run(run: &Readings, centre: f64, turn: f64, threads: usize) -> Option<Self> {
         let (len, counts) = (run.angle.len(), turn as usize);
         let parts = (len / (READINGS_PER_COUNT * counts)).clamp(1, MOST_PARTS);
-        let tables: Vec<_> = (0..parts).map(|_| std::sync::Mutex::new(None)).collect();
-        threads::for_each_part(parts, threads, |i| {
+        let tables = threads::map_parts(parts, threads, |i| {
             let part = run.part(len * i / parts, len * (i + 1) / parts);
-            let table = Table::of_readings(part, centre, turn);
-            *tables[i]
-                .lock()
-                .unwrap_or_else(|broken| broken.into_inner()) = table;
+            Table::of_readings(part, centre, turn)
         });
         let mut whole = Table::new(counts);
         for table in tables {
-            // In the order of the readings: results do not depend on threads.
-            let table = table
-                .into_inner()
-                .unwrap_or_else(|broken| broken.into_inner());
             whole.merge(&table?);
         }
         Some(whole.means())
@@ -185,13 +178,12 @@ impl Kernel for Call<'_, '_> {
         } = self;
         let len = readings.angle.len();
         let per_count = 1.0 / turn;
-        let nearest = |x: f64| (x + ROUNDER) - ROUNDER;
         let mut all = true;
         let mut counts = [0u32; CHUNK];
         for (count, &x) in counts.iter_mut().zip(readings.angle) {
-            all &= (nearest(x) == x) & (x.abs() < FARTHEST);
+            all &= (whole_number(x) == x) & (x.abs() < FARTHEST);
             // Products of turns and counts are whole numbers, so they are exact.
-            let rest = x - turn * nearest(x * per_count);
+            let rest = x - turn * whole_number(x * per_count);
             let place = if rest < 0.0 { rest + turn } else { rest };
             // The low bits of a rounded double are the whole number itself.
             *count = (place + ROUNDER).to_bits() as u32;
@@ -206,7 +198,7 @@ impl Kernel for Call<'_, '_> {
         let (mut error, mut squares) = ([0.0; CHUNK], [0.0; CHUNK]);
         for i in 0..len {
             let (difference, carry) = crate::angle::two_sum(indicated[i], -reference[i]);
-            let turns = nearest((difference - centre) * per_count);
+            let turns = whole_number((difference - centre) * per_count);
             let rest = (difference - turn * turns) - centre + carry;
             error[i] = weight[i] * rest;
             squares[i] = error[i] * rest;

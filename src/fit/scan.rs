@@ -38,24 +38,13 @@ pub fn scan(
     check::lengths(run)?;
     let len = run.reference.len();
     let part = BLOCK * BLOCKS_PER_PART;
-    let parts: Vec<_> = (0..len.div_ceil(part))
-        .map(|_| std::sync::Mutex::new(Ok(Scan::default())))
-        .collect();
-    threads::for_each_part(parts.len(), threads, |i| {
-        let found = scan_part(
-            fitted,
-            &run.part(i * part, len.min((i + 1) * part)),
-            argument,
-            offset,
-            stride,
-        );
-        *parts[i].lock().unwrap_or_else(|broken| broken.into_inner()) = found;
+    let parts = threads::map_parts(len.div_ceil(part), threads, |i| {
+        let run = run.part(i * part, len.min((i + 1) * part));
+        scan_part(fitted, &run, argument, offset, stride)
     });
     let mut whole = Scan::default();
     for found in parts {
-        let found = found
-            .into_inner()
-            .unwrap_or_else(|broken| broken.into_inner())?;
+        let found = found?;
         whole.sample.extend(found.sample);
         whole.largest = whole.largest.max(found.largest);
     }

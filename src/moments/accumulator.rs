@@ -105,21 +105,18 @@ impl Accumulator {
             .clamp(4, 16)
             .min(len.div_ceil(THREADED));
         let bounds: Vec<_> = (0..=parts).map(|i| len * i / parts).collect();
-        let fresh = || {
+        let empty = {
             let mut part = self.clone();
             part.clear();
-            std::sync::Mutex::new(part)
+            part
         };
-        let sums: Vec<_> = (0..parts).map(|_| fresh()).collect();
-        threads::for_each_part(parts, threads, |i| {
-            let mut part = sums[i].lock().unwrap_or_else(|broken| broken.into_inner());
+        let sums = threads::map_parts(parts, threads, |i| {
+            let mut part = empty.clone();
             part.add(readings.part(bounds[i], bounds[i + 1]));
+            part
         });
         for part in sums {
-            self.absorb(
-                part.into_inner()
-                    .unwrap_or_else(|broken| broken.into_inner()),
-            );
+            self.absorb(part);
         }
     }
 
