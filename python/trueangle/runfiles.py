@@ -6,7 +6,7 @@ import csv
 import hashlib
 import io
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -17,11 +17,10 @@ from numpy.typing import NDArray
 from .angles import UNIT_PERIODS
 from .errors import ArgumentError, FileError, MissingExtraError
 from .runs import CalibrationRun, Source
+from .signals import FIELDS, SIGNALS, Signal, find_signal
 
 __all__ = ["read_runs"]
 
-#: Columns that are passed on as they are, by the argument of `CalibrationRun`.
-_PLAIN = {"time": "time_s", "temperature": "temperature_C", "torque": "torque_Nm"}
 _UNITS = (*UNIT_PERIODS, "count")
 
 
@@ -112,25 +111,26 @@ def _read_file(path: Path, counts_per_turn: float | None) -> list[CalibrationRun
     parquet = data[:4] == b"PAR1" or path.suffix in (".parquet", ".pq")
     table = _parquet(path, data) if parquet else _csv(path, data)
     period, angles = _angles(table, counts_per_turn)
-    scalars = {
-        argument: table.numbers(column)
-        for argument, column in _PLAIN.items()
-        if column in table.columns
-    }
-    for argument, pattern in (("mount", "mount_{}"), ("velocity", "velocity_{}_s")):
-        for unit, turn in UNIT_PERIODS.items():
-            if (column := pattern.format(unit)) in table.columns:
-                scalars[argument] = table.numbers(column) * (period / turn)
-    known = {"run", *_PLAIN.values()}
-    others = {k: np.asarray(v) for k, v in table.columns.items() if k not in known}
+    scalars = {}
+    for signal in _signals_of(table.columns):
+        for column, factor in _places(signal, period):
+            if column in table.columns:
+                scalars[signal.name] = table.numbers(column) * factor
+    known = {"run", "unit", *(SIGNALS[name].column for name in ("time", "temperature", "torque"))}
+    others = {k: _kept(v) for k, v in table.columns.items() if k not in known}
     runs = []
-    for label, rows in _groups(table):
+    for unit, label, rows in _groups(table):
         _check_time(table, scalars.get("time"), rows)
+        fields: dict[str, Any] = {k: v[rows] for k, v in scalars.items() if k in FIELDS}
         runs.append(
             CalibrationRun(
-                **{name: values[rows] for name, values in (angles | scalars).items()},
+                angles["reference"][rows],
+                angles["indicated"][rows],
+                **fields,
                 period=period,
                 label=label,
+                unit=unit,
+                signals={k: v[rows] for k, v in scalars.items() if k not in FIELDS},
                 columns={name: values[rows] for name, values in others.items()},
                 source=source,
             )
@@ -256,14 +256,47 @@ def _unit(table: _Table, what: str) -> str:
     )
 
 
-def _groups(table: _Table) -> list[tuple[str | None, NDArray[np.intp]]]:
-    """Rows of every run label, labels in the order of their first row."""
-    if "run" not in table.columns:
-        return [(None, np.arange(table.lines.size))]
-    labels = np.asarray(table.columns["run"]).astype(str)
-    unique, first, inverse = np.unique(labels, return_index=True, return_inverse=True)
-    order: Sequence[int] = np.argsort(first).tolist()
-    return [(str(unique[i]), np.flatnonzero(inverse == i)) for i in order]
+def _signals_of(columns: Iterable[str]) -> Iterator[Signal]:
+    """Signals that may be among the columns: those of the list, and the heads by number."""
+    yield from SIGNALS.values()
+    heads = {name.partition("_")[0] for name in columns if name.startswith("head")}
+    for name in sorted(heads):
+        try:
+            yield find_signal(name)
+        except ArgumentError:
+            continue
+
+
+def _places(signal: Signal, period: float) -> Iterator[tuple[str, float]]:
+    """Columns that may hold a signal, each with the factor to the unit of the run."""
+    if signal.kind in ("angle", "velocity"):
+        for unit, turn in UNIT_PERIODS.items():
+            yield signal.column.format(unit), period / turn
+    else:
+        yield signal.column, 1.0
+
+
+def _kept(values: Any) -> NDArray[Any]:
+    """A column as it is; texts as objects, since an array of texts is as wide as the longest."""
+    if isinstance(values, np.ndarray):
+        return values
+    return np.fromiter(values, dtype=object, count=len(values))
+
+
+def _groups(table: _Table) -> list[tuple[str | None, str | None, NDArray[np.intp]]]:
+    """Unit, label and rows of every run, in the order of their first row."""
+    names = [name for name in ("unit", "run") if name in table.columns]
+    rows: dict[tuple[str, ...], list[int]] = {}
+    keys = zip(*(map(str, table.columns[name]) for name in names), strict=True)
+    for i, key in enumerate(keys):
+        rows.setdefault(key, []).append(i)
+    if not names:
+        return [(None, None, np.arange(table.lines.size))]
+    found = []
+    for key, places in rows.items():
+        labels = dict(zip(names, key, strict=True))
+        found.append((labels.get("unit"), labels.get("run"), np.array(places, dtype=np.intp)))
+    return found
 
 
 def _check_time(table: _Table, time: NDArray[np.float64] | None, rows: NDArray[np.intp]) -> None:

@@ -9,10 +9,11 @@ from types import MappingProxyType
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from .angles import check_period, circular_mean, wrap
 from .errors import ArgumentError
+from .signals import FIELDS, column, find_signal, signal_columns
 
 __all__ = ["CalibrationRun", "Source", "as_runs"]
 
@@ -52,6 +53,13 @@ class CalibrationRun:
         ``time`` where absent (`CalibrationRun.speed`).
     weights : array_like, shape (n,), optional
         Relative weights of the readings (inverse variances), not negative.
+    signals : mapping of str to array_like or float, optional
+        Further signals of `trueangle.signals.SIGNALS` by name: ``current`` (A), ``shift``
+        and the angles ``motor``, ``head1``, ``head2`` ... in the unit of ``reference``.
+    unit : str, optional
+        Label of the joint that the run is of, where runs of several are read together.
+    left_out : int
+        Rows of the file that an empty cell kept out of the run.
     columns : mapping of str to array_like, optional
         Further columns of the file, kept and ignored.
     source : Source, optional
@@ -80,19 +88,23 @@ class CalibrationRun:
     label: str | None = None
     velocity: Array | None = field(default=None, kw_only=True)
     weights: Array | None = field(default=None, kw_only=True)
+    signals: Mapping[str, Any] = field(default_factory=dict, kw_only=True)
+    unit: str | None = field(default=None, kw_only=True)
+    left_out: int = field(default=0, kw_only=True)
     columns: Mapping[str, Any] = field(default_factory=dict, kw_only=True)
     source: Source | None = field(default=None, kw_only=True)
 
     def __post_init__(self) -> None:
         put = object.__setattr__
         put(self, "period", check_period(self.period))
-        reference = _column("reference", self.reference, None)
+        reference = column("reference", self.reference, None)
         put(self, "reference", reference)
-        put(self, "indicated", _column("indicated", self.indicated, reference.size))
-        for name in ("time", "temperature", "torque", "mount", "velocity", "weights"):
+        put(self, "indicated", column("indicated", self.indicated, reference.size))
+        for name in (*FIELDS, "weights"):
             values = getattr(self, name)
             if values is not None:
-                put(self, name, _column(name, values, reference.size))
+                put(self, name, column(name, values, reference.size))
+        put(self, "signals", MappingProxyType(signal_columns(self.signals, reference.size)))
         if self.time is not None:
             back = np.flatnonzero(np.diff(self.time) < 0.0)
             if back.size:
@@ -115,10 +127,31 @@ class CalibrationRun:
 
     def __reduce__(self) -> tuple[Any, ...]:
         values = {entry.name: getattr(self, entry.name) for entry in fields(self)}
-        return _rebuild, (values | {"columns": dict(self.columns)},)
+        plain = {"columns": dict(self.columns), "signals": dict(self.signals)}
+        return _rebuild, (values | plain,)
 
     def _named(self) -> str:
         return f" ({self.label})" if self.label else ""
+
+    def signal(self, name: str) -> Array | None:
+        """Values of the signal ``name``, whether a field of its own or not; None without.
+
+        Examples
+        --------
+        >>> run = CalibrationRun([0.0, 1.0], [0.0, 1.0], torque=2.0, signals={"current": 0.5})
+        >>> run.signal("torque"), run.signal("current"), run.signal("shift")
+        (array([2., 2.]), array([0.5, 0.5]), None)
+        """
+        if name in FIELDS:
+            values: Array | None = getattr(self, name)
+            return values
+        return self.signals.get(find_signal(name).name)
+
+    @property
+    def heads(self) -> dict[str, Array]:
+        """The signals ``head1``, ``head2`` ... in the order of their numbers."""
+        names = [name for name in self.signals if name.startswith("head")]
+        return {name: self.signals[name] for name in sorted(names, key=lambda n: int(n[4:]))}
 
     @property
     def zero(self) -> float:
@@ -166,12 +199,13 @@ class CalibrationRun:
     def direction(self) -> Array:
         """Direction of travel per reading: -1 or +1, 0 before the first motion.
 
-        The sign of ``velocity`` where given, else of the last step of the reference
-        that was not zero; a reading belongs to the step that led to it, the first
-        reading to the step that leaves it.
+        The signal ``direction`` where given, else the sign of ``velocity``, else of the
+        last step of the reference that was not zero; a reading belongs to the step that
+        led to it, the first reading to the step that leaves it.
         """
-        if self.velocity is not None:
-            sign = np.sign(self.velocity)
+        given = self.signals.get("direction", self.velocity)
+        if given is not None:
+            sign = np.sign(given)
         elif len(self) < 2:
             return np.zeros(len(self))
         else:
@@ -208,31 +242,6 @@ def as_runs(runs: CalibrationRun | Iterable[CalibrationRun]) -> list[Calibration
             "convert them to one"
         )
     return found
-
-
-def _column(name: str, values: ArrayLike, size: int | None) -> Array:
-    """``values`` as a read-only one-dimensional float array of ``size`` finite numbers."""
-    try:
-        array = np.array(values, dtype=np.float64)
-    except (TypeError, ValueError) as cause:
-        raise ArgumentError(f"{name} must be numbers: {cause}") from None
-    if size is not None and array.ndim == 0:
-        array = np.full(size, float(array))
-    if array.ndim != 1:
-        raise ArgumentError(f"{name} must be one-dimensional, got shape {array.shape}")
-    if size is None and array.size == 0:
-        raise ArgumentError(f"{name} is empty: a run needs at least one reading")
-    if size is not None and array.size != size:
-        raise ArgumentError(f"{name} has {array.size} readings, reference has {size}")
-    bad = np.flatnonzero(~np.isfinite(array))
-    if bad.size:
-        i = int(bad[0])
-        raise ArgumentError(
-            f"{name}[{i}] is {array[i]}: readings must be finite; drop the row "
-            f"({bad.size} such value{'s' if bad.size > 1 else ''})"
-        )
-    array.flags.writeable = False
-    return array
 
 
 def _rebuild(values: dict[str, Any]) -> CalibrationRun:

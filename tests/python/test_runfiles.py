@@ -104,3 +104,24 @@ def test_parquet_reads_like_csv(tmp_path):
     pq.write_table(pa.table(table | {"indicated_deg": [0.5, None]}), path)
     with pytest.raises(FileError, match=r"line 3, column 'indicated_deg'"):
         ta.read_runs(path)
+
+
+def test_signals_go_there_and_back(tmp_path):
+    from trueangle.simulation.runtable import write_runs
+
+    text = (
+        "unit,run,reference_turn,indicated_turn,current_A,shift_deg,motor_rad,head1_turn\n"
+        "left,1,0,0,1.5,90,6.25,0.5\nright,1,0.5,0.5,2.5,180,12.5,0.25\n"
+    )
+    runs = ta.read_runs(written(tmp_path, text))
+    assert [(run.unit, run.label) for run in runs] == [("left", "1"), ("right", "1")]
+    assert runs[1].signal("current")[0] == 2.5
+    assert runs[1].signal("shift")[0] == pytest.approx(0.5)
+    assert runs[1].signal("motor")[0] == pytest.approx(12.5 / (2.0 * math.pi))
+    assert write_runs(runs, tmp_path / "again.csv") == 2
+    again = ta.read_runs(tmp_path / "again.csv")
+    assert [(run.unit, run.label) for run in again] == [("left", "1"), ("right", "1")]
+    for before, after in zip(runs, again, strict=True):
+        for name in ("current", "shift", "motor", "head1"):
+            scale = 1.0 if name == "current" else 360.0
+            assert after.signal(name)[0] == pytest.approx(scale * before.signal(name)[0])

@@ -97,3 +97,38 @@ def test_runs_of_two_units_are_refused():
         as_runs([])
     with pytest.raises(ArgumentError, match=r"runs\[0\].*str"):
         as_runs("joint.csv")
+
+
+def test_further_signals_are_of_one_container():
+    run = ta.CalibrationRun(
+        THETA,
+        THETA,
+        period=360.0,
+        torque=1.5,
+        signals={"current": -0.5, "head2": THETA + 1.0, "head1": THETA, "direction": -1.0},
+        unit="arm 3",
+    )
+    np.testing.assert_array_equal(run.signal("current"), np.full(len(run), -0.5))
+    np.testing.assert_array_equal(run.signal("torque"), run.torque)
+    assert list(run.heads) == ["head1", "head2"]
+    assert run.signal("shift") is None
+    assert (run.direction == -1.0).all()
+    again = pickle.loads(pickle.dumps(run))
+    np.testing.assert_array_equal(again.signal("head2"), THETA + 1.0)
+    assert again.unit == "arm 3"
+
+
+@pytest.mark.parametrize(
+    ("signals", "message"),
+    [
+        ({"curent": 1.0}, "did you mean current"),
+        ({"torque": 1.0}, "argument of its own"),
+        ({"head0": 1.0}, "no signal"),
+        ({"current": [1.0, 2.0]}, r"signals\['current'\] has 2"),
+        ({"current": np.nan}, "must be finite"),
+        ([1.0], "must be a mapping"),
+    ],
+)
+def test_signals_that_are_none(signals, message):
+    with pytest.raises(ArgumentError, match=message):
+        ta.CalibrationRun(THETA, THETA, period=360.0, signals=signals)

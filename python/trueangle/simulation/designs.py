@@ -45,6 +45,10 @@ class RunDesign:
         Where given, the temperature runs linearly there.
     mount_deg : float
         How far the reference artefact was turned on its mount.
+    current_A : float, optional
+        Constant current of the motor; no column where not given.
+    shift_deg : float, optional
+        How far one of two encoders was turned for this run; no column where not given.
     """
 
     label: str | None = None
@@ -61,6 +65,8 @@ class RunDesign:
     temperature_C: float = 20.0
     temperature_end_C: float | None = None
     mount_deg: float = 0.0
+    current_A: float | None = None
+    shift_deg: float | None = None
 
     def __post_init__(self) -> None:
         def refuse(name: str, wanted: str) -> ArgumentError:
@@ -107,6 +113,7 @@ class RunDesign:
         if self.temperature_end_C is not None:
             share = travel / (360.0 * self.turns)
             temperature += (self.temperature_end_C - self.temperature_C) * share
+        constant = {"current": self.current_A, "shift": self.shift_deg}
         moment = self.gravity_Nm * np.sin(np.radians(angle - self.gravity_deg))
         return CalibrationRun(
             angle,
@@ -118,4 +125,5 @@ class RunDesign:
             mount=np.full(n, self.mount_deg),
             label=self.label or label,
             velocity=np.asarray(signs * self.speed_deg_s, dtype=np.float64),
+            signals={name: value for name, value in constant.items() if value is not None},
         )

@@ -6,17 +6,25 @@ import csv
 from collections.abc import Iterable
 from pathlib import Path
 
+import numpy as np
+from numpy.typing import NDArray
+
 from ..files import written_atomically
 from ..runs import CalibrationRun, as_runs
+from ..signals import find_signal
 
 __all__ = ["write_runs"]
+
+#: Signals that stand first, in the order that these files have always had.
+_ORDER = ("time", "velocity", "torque", "temperature", "mount")
 
 
 def write_runs(runs: CalibrationRun | Iterable[CalibrationRun], path: str | Path) -> int:
     """Write ``runs`` in degrees, beside and then renamed; floats round-trip exactly.
 
-    Columns: run, reference_deg, indicated_deg and, where every run has them, time_s,
-    velocity_deg_s, torque_Nm, temperature_C, mount_deg.
+    Columns: run, reference_deg, indicated_deg and those of the signals of
+    `trueangle.signals.SIGNALS` that every run has, such as time_s and current_A; ``unit``
+    where a run has one.
 
     Returns
     -------
@@ -25,24 +33,26 @@ def write_runs(runs: CalibrationRun | Iterable[CalibrationRun], path: str | Path
     """
     found = as_runs(runs)
     scale = 360.0 / found[0].period
-    sources = (
-        ("reference_deg", "reference", scale),
-        ("indicated_deg", "indicated", scale),
-        ("time_s", "time", 1.0),
-        ("velocity_deg_s", "velocity", scale),
-        ("torque_Nm", "torque", 1.0),
-        ("temperature_C", "temperature", 1.0),
-        ("mount_deg", "mount", scale),
-    )
-    kept = [
-        source for source in sources if all(getattr(run, source[1]) is not None for run in found)
-    ]
+    kept = [("reference_deg", "reference", scale), ("indicated_deg", "indicated", scale)]
+    for name in (*_ORDER, *found[0].signals):
+        if all(run.signal(name) is not None for run in found):
+            signal = find_signal(name)
+            is_angle = signal.kind in ("angle", "velocity")
+            kept.append((signal.column.format("deg"), name, scale if is_angle else 1.0))
+    has_units = any(run.unit is not None for run in found)
     with written_atomically(path) as file:
         writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(["run", *(name for name, _, _ in kept)])
+        writer.writerow([*(["unit"] if has_units else []), "run", *(name for name, _, _ in kept)])
         for j, run in enumerate(found):
             label = run.label or str(j + 1)
-            columns = [(getattr(run, name) * factor).tolist() for _, name, factor in kept]
+            texts = [run.unit or "", label] if has_units else [label]
+            columns = [(_values(run, name) * factor).tolist() for _, name, factor in kept]
             for values in zip(*columns, strict=True):
-                writer.writerow([label, *map(repr, values)])
+                writer.writerow([*texts, *map(repr, values)])
     return sum(len(run) for run in found)
+
+
+def _values(run: CalibrationRun, name: str) -> NDArray[np.float64]:
+    found = getattr(run, name) if name in ("reference", "indicated") else run.signal(name)
+    assert found is not None
+    return found
