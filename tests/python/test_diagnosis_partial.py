@@ -7,8 +7,8 @@ import pytest
 
 import trueangle as ta
 from trueangle.diagnosis.dispersion import find_outliers
-from trueangle.diagnosis.repeatability import repeated_part
-from trueangle.diagnosis.space import Space
+from trueangle.regression.regression import Regression
+from trueangle.regression.repeats import repeated_part
 from trueangle.simulation import Joint, RunDesign, Simulation, join_runs, simulate
 from trueangle.simulation.effects.motion import Latency
 from trueangle.simulation.effects.temperature import ThermalDrift
@@ -32,7 +32,7 @@ def sweeps(rng, runs=4, span=130.0, n=600, error=lambda theta, time, direction: 
 def space_of(runs):
     signals = join_runs(runs)
     residual = np.concatenate([(run.indicated - run.reference) * 3600.0 for run in runs])
-    return Space(signals, residual, Simulation(JOINT, sigma_arcsec=1.0).surroundings)
+    return Regression(signals, residual, Simulation(JOINT, sigma_arcsec=1.0).surroundings)
 
 
 def test_a_motor_line_is_named_where_the_travel_does_not_resolve_its_neighbours():

@@ -7,8 +7,9 @@ import pytest
 
 from trueangle.diagnosis.discrepancy import noise_from_repeats
 from trueangle.diagnosis.grid import UniformGrid, uniform_grid
-from trueangle.diagnosis.space import Space
-from trueangle.diagnosis.whitening import RunEffect, Whitener, lag_correlation
+from trueangle.regression.leastsquares import best_ratio
+from trueangle.regression.regression import Regression
+from trueangle.regression.whitening import RunEffect, Whitener, lag_correlation
 from trueangle.simulation import Harmonic, Joint, RunDesign, Simulation, join_runs, simulate
 
 #: Relative rounding of double precision sums over a few hundred readings.
@@ -31,7 +32,7 @@ def space():
     runs = simulate(sim, 11)
     residual = np.concatenate([run.error for run in runs]) * 3600.0
     signals = join_runs(runs)
-    return Space(signals, residual - sim.predict(signals), sim.surroundings)
+    return Regression(signals, residual - sim.predict(signals), sim.surroundings)
 
 
 def dense_covariance(space, rho, effects, weights):
@@ -95,7 +96,7 @@ def test_gains_are_those_of_least_squares(space):
 
 def test_run_effects_have_the_likelihood_of_the_dense_covariance(space):
     z = np.column_stack([np.ones(space.n), space.signals.clock / 10.0])
-    ratio, deviance = space.run_effect_gain(z)
+    ratio, deviance = best_ratio(space, z)
 
     def minus_two_log_likelihood(ratio):
         v = dense_covariance(space, 0.0, [RunEffect(z, ratio)], np.ones(space.n))

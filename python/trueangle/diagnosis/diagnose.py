@@ -9,10 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import ArgumentError
+from ..joint.signals import join_runs
+from ..regression.estimate import Parameters, quantity
+from ..regression.regression import ROUNDING, Extension, Regression
 from ..runs import CalibrationRun, as_runs
 from ..simulation.effects import Effect
 from ..simulation.effects.lines import MissingOrder
-from ..simulation.signals import join_runs
 from ..simulation.simulation import Simulation
 from .candidates import CANDIDATES, FLEXIBLE
 from .candidates.candidate import line_parameters
@@ -21,17 +23,15 @@ from .dispersion import NEW_SCATTER, ScatterFinding, find_outliers, find_uneven_
 from .findings import Diagnosis, Finding
 from .gain import Gain, measure_gain
 from .identifiability import Blindness, blind_spots, doubts_about
-from .quantity import Parameters, quantity
 from .selection import (
     NEW_CAUSE,
     RUN_FACTORS,
     cause_terms,
+    extensions,
     finding_groups,
     misfit,
-    proposals,
     select,
 )
-from .space import ROUNDING, Proposal, Space
 
 __all__ = ["MOST_READINGS", "diagnose"]
 
@@ -115,14 +115,14 @@ def diagnose(
     rows = _subsample(len(every))
     signals = every if rows is None else every.take(rows)
     residual = residual_all if rows is None else residual_all[rows]
-    start = Space(signals, residual, sim.surroundings)
+    start = Regression(signals, residual, sim.surroundings)
     spots = blind_spots(start)
     chosen = select(start)
     scatter: list[ScatterFinding] = []
     uneven = find_uneven_noise(chosen)
     if uneven is not None and uneven.bic_gain > NEW_SCATTER + misfit(chosen):
         scatter.append(uneven)
-        start = Space(signals, residual, sim.surroundings, uneven.weights, start.lines)
+        start = Regression(signals, residual, sim.surroundings, uneven.weights, start.lines)
         chosen = select(start, chosen.terms)
     wild = find_outliers(chosen)
     if wild is not None and wild.bic_gain > NEW_CAUSE:
@@ -151,12 +151,12 @@ def diagnose(
     )
 
 
-def _structure(start: Space) -> dict[str, float]:
+def _structure(start: Regression) -> dict[str, float]:
     """Share of the variance that each cause would explain alone, largest first."""
     alone = {
-        cause: 1.0 - float(np.exp(-max(proposal.deviance, 0.0) / start.n))
+        cause: 1.0 - float(np.exp(-max(extension.deviance, 0.0) / start.n))
         for cause in CANDIDATES
-        if (proposal := start.memory.get((cause,))) is not None and proposal.bic_gain > 0.0
+        if (extension := start.memory.get((cause,))) is not None and extension.bic_gain > 0.0
     }
     return dict(sorted(alone.items(), key=lambda item: -item[1]))
 
@@ -171,31 +171,31 @@ def _subsample(n: int) -> NDArray[np.int64] | None:
 
 
 def _findings(
-    space: Space, spots: list[Blindness], with_gain: bool
+    regression: Regression, spots: list[Blindness], with_gain: bool
 ) -> tuple[list[Finding], list[Blindness]]:
     """Findings of the chosen terms; those in doubt become entries of what is not told."""
     spots = list(spots)
-    groups = finding_groups(space.terms)
+    groups = finding_groups(regression.terms)
     named = []
     for group in groups:
-        doubt = doubts_about(space.terms[group[0]], space, spots)
+        doubt = doubts_about(regression.terms[group[0]], regression, spots)
         if doubt is None:
             named.append(group)
             continue
-        evidence = sum(space.terms[k].bic_gain for k in group)
+        evidence = sum(regression.terms[k].bic_gain for k in group)
         spots = [spot for spot in spots if spot != doubt]
-        estimates = _estimates(space, group, doubt.causes)
+        estimates = _estimates(regression, group, doubt.causes)
         spots.append(replace(doubt, supported=True, evidence=evidence, estimates=estimates))
     gains: Sequence[Gain | None] = [None] * len(named)
     if with_gain and named:
-        gains = measure_gain(space, named)
-    fitted = space.fitted()
+        gains = measure_gain(regression, named)
+    fitted = regression.fitted()
     findings: list[Finding] = []
     for group, gain in zip(named, gains, strict=True):
-        terms = [(*fitted[k], space.covariance(k)) for k in group]
+        terms = [(*fitted[k], regression.covariance(k)) for k in group]
         cause = terms[0][0].cause
-        parameters, effects = CANDIDATES[cause].report(space, terms)
-        rivals = _rivals(space, group) if len(findings) < RIVALLED else []
+        parameters, effects = CANDIDATES[cause].report(regression, terms)
+        rivals = _rivals(regression, group) if len(findings) < RIVALLED else []
         weight = {
             "bic_gain": float(sum(t.bic_gain for t, _, _ in terms)),
             "deviance": float(sum(t.deviance for t, _, _ in terms)),
@@ -203,61 +203,63 @@ def _findings(
             "log_grid": float(sum(t.log_grid for t, _, _ in terms)),
         }
         findings.append(Finding(cause, parameters, weight, gain, rivals, effects))
-    return findings + _corrected_lines(space, spots), spots
+    return findings + _corrected_lines(regression, spots), spots
 
 
-def _estimates(space: Space, group: Sequence[int], causes: Sequence[str]) -> dict[str, Parameters]:
+def _estimates(
+    regression: Regression, group: Sequence[int], causes: Sequence[str]
+) -> dict[str, Parameters]:
     """Parameters of every cause that may be the one, each alone in place of a finding."""
-    rest = cause_terms(space, group, settled=True)
+    rest = cause_terms(regression, group, settled=True)
     found = {}
     # Not lines: one that another hides behind is no property of the joint.
     for cause in causes:
         candidate = CANDIDATES[cause]
-        proposal = candidate.propose(rest) if cause in (*RUN_FACTORS, *FLEXIBLE) else None
-        if proposal is None or proposal.bic_gain <= 0.0:
+        extension = candidate.propose(rest) if cause in (*RUN_FACTORS, *FLEXIBLE) else None
+        if extension is None or extension.bic_gain <= 0.0:
             continue
-        fitted = rest.with_terms([*rest.terms, proposal])
+        fitted = rest.with_terms([*rest.terms, extension])
         k = len(fitted.terms) - 1
         parameters, _ = candidate.report(fitted, [(*fitted.fitted()[k], fitted.covariance(k))])
         found[cause] = parameters
     return found
 
 
-def _rivals(space: Space, group: Sequence[int]) -> list[tuple[str, float]]:
+def _rivals(regression: Regression, group: Sequence[int]) -> list[tuple[str, float]]:
     """The best other causes in place of a finding, and how much less they explain."""
-    cause = space.terms[group[0]].cause
-    rest = cause_terms(space, group)
-    own = rest.bic - space.bic
+    cause = regression.terms[group[0]].cause
+    rest = cause_terms(regression, group)
+    own = rest.bic - regression.bic
     others = [name for name in CANDIDATES if name != cause]
-    gaps = [(p.cause, own - gain) for p, _, gain in proposals(rest, others) if p.deviance > 0.0]
+    gaps = [(p.cause, own - gain) for p, _, gain in extensions(rest, others) if p.deviance > 0.0]
     gaps.sort(key=lambda item: item[1])
     return [(name, float(gap)) for name, gap in gaps[:RIVALS]]
 
 
-def _corrected_lines(space: Space, spots: list[Blindness]) -> list[Finding]:
+def _corrected_lines(regression: Regression, spots: list[Blindness]) -> list[Finding]:
     """Lines that the simulation has, with another amplitude or phase."""
-    belief = space.belief.pattern
-    joint = space.belief.joint
+    belief = regression.belief.pattern
+    joint = regression.belief.joint
     # Causes that act on the lines themselves take or give a part of them on average.
     interacting = {"thermal_drift", "load_dependent_gear_error", "filter_lag", "argument_error"}
-    if belief.orders.size == 0 or interacting & {term.cause for term in space.terms}:
+    if belief.orders.size == 0 or interacting & {term.cause for term in regression.terms}:
         return []
-    modulated = {term.shape["carrier"] for term in space.terms if term.cause == "sidebands"}
+    modulated = {term.shape["carrier"] for term in regression.terms if term.cause == "sidebands"}
     found = []
     for k, order in enumerate(belief.orders):
         if order in modulated:
             continue  # modulation takes from its carrier what it gives to the sidebands
         where = slice(1 + 2 * k, 3 + 2 * k)
-        change = space.coefficients[where]
-        spread = space.unscaled_covariance[where, where] * space.variance
+        change = regression.coefficients[where]
+        spread = regression.unscaled_covariance[where, where] * regression.variance
         deviance = float(change @ np.linalg.pinv(spread) @ change)
         log_grid = float(np.log(belief.orders.size))
-        bic_gain = deviance - 2.0 * space.log_n - 2.0 * log_grid
+        bic_gain = deviance - 2.0 * regression.log_n - 2.0 * log_grid
         if bic_gain <= NEW_CAUSE or float(np.abs(change).max()) < ROUNDING:
             continue
         shape = {"output_order": float(order)}
-        proposal = Proposal("missing_order", shape, np.zeros((space.n, 0)), 2, log_grid)
-        doubt = doubts_about(proposal, space, spots)
+        extension = Extension("missing_order", shape, np.zeros((regression.n, 0)), 2, log_grid)
+        doubt = doubts_about(extension, regression, spots)
         if doubt is not None:
             spots[:] = [spot for spot in spots if spot != doubt]
             spots.append(replace(doubt, supported=True, evidence=bic_gain))
@@ -301,11 +303,11 @@ def _scatter_doubt(item: ScatterFinding) -> Blindness:
     )
 
 
-def _overall(before: Space, after: Space) -> dict[str, float]:
+def _overall(before: Regression, after: Regression) -> dict[str, float]:
     """rms, peak-to-peak and max abs without and with all findings, fitted alike."""
     numbers = {}
-    for name, space in (("before", before), ("after", after)):
-        left = space.left - space.whiten.run_part(space.left)
+    for name, regression in (("before", before), ("after", after)):
+        left = regression.left - regression.whiten.run_part(regression.left)
         numbers[f"rms_{name}_arcsec"] = float(np.sqrt(np.mean(left**2)))
         numbers[f"peak_to_peak_{name}_arcsec"] = float(np.ptp(left))
         numbers[f"max_abs_{name}_arcsec"] = float(np.abs(left).max())

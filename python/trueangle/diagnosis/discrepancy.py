@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..angles import circular_mean, wrap
+from ..joint.signals import Signals
 from ..runs import CalibrationRun
-from ..simulation.signals import Signals
 
 __all__ = ["Discrepancy", "compare", "noise_from_repeats", "unfolded_error"]
 

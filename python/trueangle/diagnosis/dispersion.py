@@ -8,10 +8,10 @@ from math import lgamma
 import numpy as np
 from numpy.typing import NDArray
 
+from ..regression.estimate import Parameters, quantity
+from ..regression.regression import Regression
 from ..simulation.effects import Effect
 from ..simulation.effects.dispersion import HeteroscedasticNoise, Outliers
-from .quantity import Parameters, quantity
-from .space import Space
 
 __all__ = ["NEW_SCATTER", "ScatterFinding", "find_outliers", "find_uneven_noise"]
 
@@ -71,23 +71,23 @@ class ScatterFinding:
     size: float = 1.0
 
 
-def _standardised(space: Space) -> Array:
-    e = space.whiten(space.residual - space.design @ space.coefficients)
+def _standardised(regression: Regression) -> Array:
+    e = regression.whiten(regression.residual - regression.design @ regression.coefficients)
     spread = 1.4826 * float(np.median(np.abs(e)))
     return np.asarray(e / max(spread, 1e-300))
 
 
-def find_uneven_noise(space: Space) -> ScatterFinding | None:
+def find_uneven_noise(regression: Regression) -> ScatterFinding | None:
     """Noise whose variance follows angle, speed or load (Koenker's score test, blockwise).
 
     The clipped squares are regressed on each block; n R^2 is the deviance.
     """
-    if space.is_explained:
+    if regression.is_explained:
         return None
-    signals, n = space.signals, space.n
-    square = np.minimum(_standardised(space) ** 2, SQUARE_CLIP)
+    signals, n = regression.signals, regression.n
+    square = np.minimum(_standardised(regression) ** 2, SQUARE_CLIP)
     # A reading tells half as much of the logarithm of a variance as of a mean.
-    log_n = space.log_n - float(np.log(2.0))
+    log_n = regression.log_n - float(np.log(2.0))
     blocks: dict[str, Array] = {}
     prices: dict[str, float] = {}
     for k in (1, 2, 3):
@@ -167,30 +167,30 @@ def _log_variance(design: Array, square: Array) -> tuple[Array, Array]:
     return gamma, np.asarray(2.0 * inverse, dtype=np.float64)
 
 
-def find_outliers(space: Space) -> ScatterFinding | None:
+def find_outliers(regression: Regression) -> ScatterFinding | None:
     """Wild readings: a narrow and a wide normal must beat one normal and heavy tails."""
-    if space.is_explained:
+    if regression.is_explained:
         return None
-    e = _standardised(space)
-    n = space.n
+    e = _standardised(regression)
+    n = regression.n
     normal = max(_normal(e, s) for s in np.append(SCALES, np.linspace(1.15, 3.0, 24)))
     tails = max(_student(e, nu, s) for nu in TAILS for s in SCALES)
     value, share, size, scale = max(_two_normals(e, start) for start in SIZES)
     value -= 0.5 * n * np.log(2.0 * np.pi)
-    gain = 2.0 * (value - normal) - 2.0 * space.log_n
-    beyond = 2.0 * (value - tails) - space.log_n
+    gain = 2.0 * (value - normal) - 2.0 * regression.log_n
+    beyond = 2.0 * (value - tails) - regression.log_n
     if gain <= 0.0 or beyond <= BEYOND_TAILS:
         return None
     x = e / scale
     wide = share / size * np.exp(-0.5 * (x / size) ** 2)
     chance = wide / (wide + (1.0 - share) * np.exp(-0.5 * x**2))
     rows = np.flatnonzero(chance > 0.5)
-    alone = rows[_isolated(space, rows)]
+    alone = rows[_isolated(regression, rows)]
     stretches = 1 + np.count_nonzero(np.diff(rows) > 1)
     if alone.size < ISOLATED * stretches:
         return None
     rows = alone
-    spread = size * scale * np.sqrt(space.variance)
+    spread = size * scale * np.sqrt(regression.variance)
     std = float(np.sqrt(share * (1.0 - share) / n))
     parameters: Parameters = {
         "fraction": quantity(
@@ -199,7 +199,10 @@ def find_outliers(space: Space) -> ScatterFinding | None:
         "size_arcsec": quantity(float(spread), None),
         "rows": quantity(
             [
-                [space.signals.labels[int(space.signals.run[k])], int(space.signals.row[k])]
+                [
+                    regression.signals.labels[int(regression.signals.run[k])],
+                    int(regression.signals.row[k]),
+                ]
                 for k in rows
             ]
         ),
@@ -211,15 +214,15 @@ def find_outliers(space: Space) -> ScatterFinding | None:
     )
 
 
-def _isolated(space: Space, rows: NDArray[np.int64]) -> NDArray[np.bool_]:
+def _isolated(regression: Regression, rows: NDArray[np.int64]) -> NDArray[np.bool_]:
     """Which of ``rows`` are far larger than the readings next to them in their run.
 
     A glitch is over with the next reading; what lasts (a transition at a reversal, a
     manoeuvre) is an error of the mean.
     """
-    size = np.abs(space.left - space.whiten.run_part(space.left))
+    size = np.abs(regression.left - regression.whiten.run_part(regression.left))
     padded = np.concatenate([[0.0], size, [0.0]])
-    first = np.array([start for start, _ in space.bounds])
+    first = np.array([start for start, _ in regression.bounds])
     before, after = padded[:-2].copy(), padded[2:].copy()
     before[first] = after[first[1:] - 1] = 0.0
     return np.asarray(np.maximum(before, after)[rows] < BESIDE * size[rows])

@@ -7,12 +7,12 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
+from ..regression.estimate import Parameters
 from ..simulation.effects import EFFECTS, Effect
 from ..simulation.simulation import Simulation
 from .discrepancy import Discrepancy
 from .gain import Gain
 from .identifiability import Blindness
-from .quantity import Parameters
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -155,7 +155,7 @@ class Diagnosis:
         return gains(self, ax)
 
     def summary(self) -> str:
-        """A readable account (`trueangle.diagnosis.account.render`)."""
-        from .account import render
+        """A readable account (`trueangle.diagnosis.summary.render`)."""
+        from .summary import render
 
         return render(self)

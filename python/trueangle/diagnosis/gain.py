@@ -9,12 +9,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..joint.signals import Signals
+from ..regression.regression import Regression
 from ..simulation.effects import EFFECTS
-from ..simulation.signals import Signals
 from .candidates import CANDIDATES
 from .holdout import held_out, numbers, reducible_share
 from .levels import LevelGain, gains_by_level
-from .space import Space
 
 __all__ = ["Gain", "measure_gain"]
 
@@ -76,7 +76,9 @@ class Gain:
         return found
 
 
-def measure_gain(space: Space, groups: Sequence[Sequence[int]], seed: int = 0) -> list[Gain]:
+def measure_gain(
+    regression: Regression, groups: Sequence[Sequence[int]], seed: int = 0
+) -> list[Gain]:
     """Gain of every finding (its terms' indices) beside the others, by leaving out runs.
 
     In every fold the model is fitted to the other runs alone, and what was searched for
@@ -85,26 +87,26 @@ def measure_gain(space: Space, groups: Sequence[Sequence[int]], seed: int = 0) -
     are measured on left out levels as well.
     """
     rng = np.random.default_rng(seed)
-    unit, what = _units(space)
+    unit, what = _units(regression)
     count = int(unit.max()) + 1
     folds = rng.permutation(count) % min(FOLDS, count)
-    own_zero = any(term.cause in OWN_ZERO for term in space.terms)
-    left = np.zeros((len(groups) + 1, space.n))
+    own_zero = any(term.cause in OWN_ZERO for term in regression.terms)
+    left = np.zeros((len(groups) + 1, regression.n))
     for fold in range(int(folds.max()) + 1):
         test = folds[unit] == fold
-        for k, values in enumerate(held_out(space, groups, test, own_zero)):
+        for k, values in enumerate(held_out(regression, groups, test, own_zero)):
             left[k, test] = values
-    clean = ~space.wild
-    by_level = gains_by_level(space, groups, own_zero, unit, rng)
+    clean = ~regression.wild
+    by_level = gains_by_level(regression, groups, own_zero, unit, rng)
     found = []
     for k, group in enumerate(groups):
-        cause = space.terms[group[0]].cause
+        cause = regression.terms[group[0]].cause
         before, after = left[k + 1][clean], left[0][clean]
         transfers = EFFECTS[cause].transfers
         share = interval = control = None
         if transfers:
-            share, interval = reducible_share(before, after, unit[clean], space.variance, rng)
-            control = _control(space, group, unit, rng)
+            share, interval = reducible_share(before, after, unit[clean], regression.variance, rng)
+            control = _control(regression, group, unit, rng)
         found.append(
             Gain(
                 f"{what} ({int(folds.max()) + 1} parts)"
@@ -135,28 +137,31 @@ def _note(share: float | None) -> str:
     return ""
 
 
-def _units(space: Space) -> tuple[NDArray[np.int64], str]:
+def _units(regression: Regression) -> tuple[NDArray[np.int64], str]:
     """What is held out as a whole: the runs, or stretches of the one run there is."""
-    present = np.unique(space.signals.run)
+    present = np.unique(regression.signals.run)
     if present.size > 1:
-        return np.searchsorted(present, space.signals.run), "whole runs"
-    return (np.arange(space.n) * 2 * FOLDS) // space.n, "stretches of the one run"
+        return np.searchsorted(present, regression.signals.run), "whole runs"
+    return (np.arange(regression.n) * 2 * FOLDS) // regression.n, "stretches of the one run"
 
 
 def _control(
-    space: Space, group: Sequence[int], unit: NDArray[np.int64], rng: np.random.Generator
+    regression: Regression, group: Sequence[int], unit: NDArray[np.int64], rng: np.random.Generator
 ) -> float:
     """Share that the finding reaches with its factor's labels shuffled over runs."""
-    cause = space.terms[group[0]].cause
-    rest = space.with_terms(t for k, t in enumerate(space.terms) if k not in group)
+    cause = regression.terms[group[0]].cause
+    rest = regression.with_terms(t for k, t in enumerate(regression.terms) if k not in group)
     y = rest.left - rest.whiten.run_part(rest.left)
-    y = np.where(space.wild, 0.0, y)
+    y = np.where(regression.wild, 0.0, y)
     test = unit % 2 == 0
     shares = []
     for _ in range(SHUFFLES):
-        signals = _shuffled(space.signals, EFFECTS[cause].factor, unit, rng)
+        signals = _shuffled(regression.signals, EFFECTS[cause].factor, unit, rng)
         columns = np.hstack(
-            [CANDIDATES[cause].columns(signals, space.around, space.terms[k].shape) for k in group]
+            [
+                CANDIDATES[cause].columns(signals, regression.around, regression.terms[k].shape)
+                for k in group
+            ]
         )
         # What the training half does not show (a bump that it never passes) has no size.
         seen = np.linalg.norm(columns[~test], axis=0) > 1e-6 * np.linalg.norm(columns, axis=0)
@@ -164,7 +169,7 @@ def _control(
         coefficients = np.linalg.lstsq(columns[~test], y[~test], rcond=None)[0]
         after = y[test] - columns[test] @ coefficients
         p0, p1 = float(np.mean(y[test] ** 2)), float(np.mean(after**2))
-        share = (p0 - p1) / max(p0 - space.variance, 1e-3 * space.variance)
+        share = (p0 - p1) / max(p0 - regression.variance, 1e-3 * regression.variance)
         shares.append(max(share, -1.0))
     return float(np.mean(shares))
 

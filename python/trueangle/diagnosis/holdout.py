@@ -8,12 +8,12 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ..joint.pattern import line_columns
+from ..joint.signals import Signals
+from ..regression.regression import Extension, Regression
+from ..regression.whitening import RunEffect
 from ..simulation.effects import EFFECTS
-from ..simulation.effects.effect import line_columns
-from ..simulation.signals import Signals
 from .candidates import CANDIDATES
-from .space import Proposal, Space
-from .whitening import RunEffect
 
 __all__ = ["held_out", "numbers", "part", "rebuilt", "reducible_share"]
 
@@ -28,7 +28,7 @@ SEARCHED = 4
 
 
 def held_out(
-    space: Space,
+    regression: Regression,
     groups: Sequence[Sequence[int]],
     test: Rows,
     own_zero: bool,
@@ -38,34 +38,34 @@ def held_out(
 
     ``search`` repeats the searches (orders, lengths, places) without those readings.
     """
-    train = part(space, ~test)
-    terms = [rebuilt(term, ~test) for term in space.terms]
+    train = part(regression, ~test)
+    terms = [rebuilt(term, ~test) for term in regression.terms]
     full = train.with_terms(terms)
     for group in groups[: SEARCHED if search else 0]:
-        cause = space.terms[group[0]].cause
+        cause = regression.terms[group[0]].cause
         if CANDIDATES[cause].located and EFFECTS[cause].transfers:
             full = _searched_again(full, group)
-    signals = space.signals.take(test)
-    results = [_residual(full, signals, space.residual[test], own_zero)]
+    signals = regression.signals.take(test)
+    results = [_residual(full, signals, regression.residual[test], own_zero)]
     for group in groups:
         rest = full.with_terms(t for k, t in enumerate(full.terms) if k not in group)
-        results.append(_residual(rest, signals, space.residual[test], own_zero))
+        results.append(_residual(rest, signals, regression.residual[test], own_zero))
     return results
 
 
-def part(space: Space, rows: Rows) -> Space:
-    """The space of some of the readings, without terms."""
-    return Space(
-        space.signals.take(rows),
-        space.residual[rows],
-        space.belief,
-        None if space.weights is None else space.weights[rows],
-        space.lines.take(rows),
-        rho=space.whiten.rho,
+def part(regression: Regression, rows: Rows) -> Regression:
+    """The regression of some of the readings, without terms."""
+    return Regression(
+        regression.signals.take(rows),
+        regression.residual[rows],
+        regression.belief,
+        None if regression.weights is None else regression.weights[rows],
+        regression.lines.take(rows),
+        rho=regression.whiten.rho,
     )
 
 
-def rebuilt(term: Proposal, rows: Rows) -> Proposal:
+def rebuilt(term: Extension, rows: Rows) -> Extension:
     """A term at some of the readings."""
     effect = term.run_effect
     if effect is not None:
@@ -73,26 +73,26 @@ def rebuilt(term: Proposal, rows: Rows) -> Proposal:
     return replace(term, columns=term.columns[rows], run_effect=effect)
 
 
-def _searched_again(full: Space, group: Sequence[int]) -> Space:
+def _searched_again(full: Regression, group: Sequence[int]) -> Regression:
     """The finding's searched terms chosen anew in this part of the runs."""
     terms = list(full.terms)
     kept = [term for k, term in enumerate(terms) if k not in group]
     current = full.with_terms(kept)
-    found: list[Proposal] = []
+    found: list[Extension] = []
     for k in group:
-        proposal = CANDIDATES[terms[k].cause].propose(current)
-        if proposal is None or proposal.cause != terms[k].cause:
+        extension = CANDIDATES[terms[k].cause].propose(current)
+        if extension is None or extension.cause != terms[k].cause:
             break
-        found.append(proposal)
+        found.append(extension)
         current = full.with_terms([*kept, *found])
     if len(found) < len(group):
         return full
-    for k, proposal in zip(group, found, strict=True):
-        terms[k] = proposal
+    for k, extension in zip(group, found, strict=True):
+        terms[k] = extension
     return full.with_terms(terms)
 
 
-def _residual(fitted: Space, signals: Signals, residual: Array, own_zero: bool) -> Array:
+def _residual(fitted: Regression, signals: Signals, residual: Array, own_zero: bool) -> Array:
     """Residual at other readings: lines and every regressor that can be rebuilt there."""
     base = np.column_stack(
         [

@@ -8,12 +8,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..joint.pattern import line_columns
+from ..regression.estimate import Parameters
+from ..regression.regression import Extension, Regression
+from ..regression.whitening import wander_basis
 from ..simulation.effects import EFFECTS
-from ..simulation.effects.effect import line_columns
 from .grid import UniformGrid, uniform_grid
-from .quantity import Parameters
-from .space import Proposal, Space
-from .whitening import wander_basis
 
 __all__ = ["Blindness", "blind_spots", "doubts_about"]
 
@@ -77,35 +77,37 @@ class Blindness:
         }
 
 
-def blind_spots(space: Space) -> list[Blindness]:
-    """What the design of the runs in ``space`` cannot tell; the readings are not looked at."""
+def blind_spots(regression: Regression) -> list[Blindness]:
+    """What the design of the runs in ``regression`` cannot tell; the readings are not looked at."""
     return [
-        *_direction(space),
-        *_velocity(space),
-        *_temperature(space),
-        *_torque(space),
-        *_mount(space),
-        *_runs(space),
-        *_grid(space),
+        *_direction(regression),
+        *_velocity(regression),
+        *_temperature(regression),
+        *_torque(regression),
+        *_mount(regression),
+        *_runs(regression),
+        *_grid(regression),
     ]
 
 
-def doubts_about(proposal: Proposal, space: Space, spots: list[Blindness]) -> Blindness | None:
+def doubts_about(
+    extension: Extension, regression: Regression, spots: list[Blindness]
+) -> Blindness | None:
     """The reason not to name a supported cause, or None."""
-    cause = proposal.cause
+    cause = extension.cause
     for spot in spots:
         if cause in spot.causes and cause != "missing_order":
             return spot
     if cause == "drift_within_run":
-        return _doubt_about_wander(space)
+        return _doubt_about_wander(regression)
     if cause == "missing_order":
-        return _doubt_about_line(float(proposal.shape["output_order"]), space, spots)
+        return _doubt_about_line(float(extension.shape["output_order"]), regression, spots)
     return None
 
 
-def share_left(space: Space, columns: Array, *others: Array) -> float:
+def share_left(regression: Regression, columns: Array, *others: Array) -> float:
     """Largest share of power that columns keep beside the simulation's lines and others."""
-    known = np.hstack([space.base, *others])
+    known = np.hstack([regression.base, *others])
     u, s, _ = np.linalg.svd(known / np.linalg.norm(known, axis=0).clip(1e-300), False)
     q = u[:, s > 1e-7 * s[0]]
     rest = columns - q @ (q.T @ columns)
@@ -123,8 +125,8 @@ def _spot(causes: tuple[str, ...], because: str, measure: str | None = None) -> 
     return Blindness(causes, because, measure)
 
 
-def _direction(space: Space) -> list[Blindness]:
-    signals = space.signals
+def _direction(regression: Regression) -> list[Blindness]:
+    signals = regression.signals
     moving = signals.direction[signals.direction != 0.0]
     if moving.size == 0 or np.ptp(moving) == 0.0:
         because = "all runs go in one direction: a constant reversal error is part of the zero"
@@ -132,7 +134,7 @@ def _direction(space: Space) -> list[Blindness]:
     spots = []
     direction = signals.direction[:, None]
     transitions = np.column_stack([signals.presliding(length, 1.0) for length in (1.0, 3.0, 10.0)])
-    if share_left(space, transitions, direction) < OWN_OF_TRANSITION:
+    if share_left(regression, transitions, direction) < OWN_OF_TRANSITION:
         spots.append(
             _spot(
                 ("presliding_hysteresis", "backlash"),
@@ -140,7 +142,7 @@ def _direction(space: Space) -> list[Blindness]:
                 "the same two branches",
             )
         )
-    of_run = [float(np.mean(signals.direction[a:b])) for a, b in space.bounds]
+    of_run = [float(np.mean(signals.direction[a:b])) for a, b in regression.bounds]
     if all(abs(d) == 1.0 for d in of_run):
         fewest = min(sum(d > 0 for d in of_run), sum(d < 0 for d in of_run))
         if fewest < RUNS_PER_LEVEL:
@@ -154,8 +156,8 @@ def _direction(space: Space) -> list[Blindness]:
     return spots
 
 
-def _velocity(space: Space) -> list[Blindness]:
-    signals = space.signals
+def _velocity(regression: Regression) -> list[Blindness]:
+    signals = regression.signals
     both = bool(np.ptp(signals.direction) > 0.0)
     if signals.velocity is None:
         because = "no time stamps and no velocity were recorded"
@@ -171,14 +173,14 @@ def _velocity(space: Space) -> list[Blindness]:
         return spots
     spots = []
     velocity = signals.velocity[:, None]
-    if share_left(space, velocity) < OWN_POWER:
+    if share_left(regression, velocity) < OWN_POWER:
         spots.append(
             _spot(
                 ("latency",),
                 "one speed in one direction (or at rest): a delay is part of the zero",
             )
         )
-    elif both and share_left(space, velocity, signals.direction[:, None]) < OWN_OF_VELOCITY:
+    elif both and share_left(regression, velocity, signals.direction[:, None]) < OWN_OF_VELOCITY:
         spots.append(
             _spot(
                 ("backlash", "latency"),
@@ -196,17 +198,17 @@ def _velocity(space: Space) -> list[Blindness]:
                     "another pattern",
                 )
             )
-    elif not signals.velocity.any() or not _lines_pass(space):
+    elif not signals.velocity.any() or not _lines_pass(regression):
         spots.append(_spot(("filter_lag",), "nothing moved, or no line is known to filter"))
     return spots
 
 
-def _lines_pass(space: Space) -> bool:
-    return bool(space.belief.pattern.orders.size)
+def _lines_pass(regression: Regression) -> bool:
+    return bool(regression.belief.pattern.orders.size)
 
 
-def _temperature(space: Space) -> list[Blindness]:
-    signals = space.signals
+def _temperature(regression: Regression) -> list[Blindness]:
+    signals = regression.signals
     if signals.temperature is None:
         return [_spot(("thermal_drift",), "no temperature was recorded")]
     if np.ptp(signals.temperature) < LEAST_KELVIN:
@@ -216,14 +218,14 @@ def _temperature(space: Space) -> list[Blindness]:
     temperature = (signals.temperature - signals.temperature.mean())[:, None]
     if signals.torque is not None:
         level = np.abs(signals.torque)[:, None]
-        if share_left(space, temperature, level) < OWN_OF_VELOCITY:
+        if share_left(regression, temperature, level) < OWN_OF_VELOCITY:
             return [
                 _spot(
                     ("thermal_drift", "torsional_compliance", "load_dependent_gear_error"),
                     "temperature and load change together",
                 )
             ]
-    levels = {round(float(signals.temperature[a:b].mean())) for a, b in space.bounds}
+    levels = {round(float(signals.temperature[a:b].mean())) for a, b in regression.bounds}
     if signals.runs < len(levels) + RUNS_PER_LEVEL - 1:
         return [
             _spot(
@@ -234,8 +236,8 @@ def _temperature(space: Space) -> list[Blindness]:
     return []
 
 
-def _torque(space: Space) -> list[Blindness]:
-    signals = space.signals
+def _torque(regression: Regression) -> list[Blindness]:
+    signals = regression.signals
     causes = ("torsional_compliance", "stiffening_compliance", "load_dependent_gear_error")
     if signals.torque is None or not signals.torque.any():
         because = "no torque was recorded" if signals.torque is None else "all runs are unloaded"
@@ -243,7 +245,7 @@ def _torque(space: Space) -> list[Blindness]:
     torque = signals.torque[:, None]
     low = np.hstack([line_columns(signals.theta, k) for k in (1, 2, 3)])
     spots = []
-    if share_left(space, torque, low[:, :2]) < OWN_POWER:
+    if share_left(regression, torque, low[:, :2]) < OWN_POWER:
         spots.append(
             _spot(
                 ("torsional_compliance",),
@@ -252,8 +254,8 @@ def _torque(space: Space) -> list[Blindness]:
         )
     moments = torque * line_columns(signals.theta, 1)
     if (
-        share_left(space, torque**3, low, torque) < OWN_POWER
-        and share_left(space, moments * line_columns(signals.theta, 2), low, torque, moments)
+        share_left(regression, torque**3, low, torque) < OWN_POWER
+        and share_left(regression, moments * line_columns(signals.theta, 2), low, torque, moments)
         < OWN_POWER
     ):
         spots.append(
@@ -263,11 +265,11 @@ def _torque(space: Space) -> list[Blindness]:
                 "the low orders",
             )
         )
-    gear = [m for m in space.lines.orders[space.lines.plausible] if m > 40.0][:2]
+    gear = [m for m in regression.lines.orders[regression.lines.plausible] if m > 40.0][:2]
     if gear:
         m = float(gear[-1])
         beside = np.hstack([line_columns(signals.theta, m + k) for k in (-1, 0, 1)])
-        if share_left(space, torque * line_columns(signals.theta, m), beside) < OWN_POWER:
+        if share_left(regression, torque * line_columns(signals.theta, m), beside) < OWN_POWER:
             spots.append(
                 _spot(
                     ("load_dependent_gear_error",),
@@ -277,8 +279,8 @@ def _torque(space: Space) -> list[Blindness]:
     return spots
 
 
-def _mount(space: Space) -> list[Blindness]:
-    mount = space.signals.mount
+def _mount(regression: Regression) -> list[Blindness]:
+    mount = regression.signals.mount
     if mount is None:
         return [_spot(("reference_error",), "the mount of the reference was not recorded")]
     if np.ptp(mount) == 0.0:
@@ -293,8 +295,8 @@ def _mount(space: Space) -> list[Blindness]:
     return []
 
 
-def _runs(space: Space) -> list[Blindness]:
-    signals = space.signals
+def _runs(regression: Regression) -> list[Blindness]:
+    signals = regression.signals
     spots = []
     if signals.runs < 2:
         spots.append(_spot(("zero_slip",), "one run: a zero has no spread"))
@@ -304,10 +306,10 @@ def _runs(space: Space) -> list[Blindness]:
     clock = np.concatenate(
         [
             signals.clock[a:b] / max(float(np.ptp(signals.clock[a:b])), 1e-300)
-            for a, b in space.bounds
+            for a, b in regression.bounds
         ]
     )
-    if share_left(space, signals.theta[:, None], clock[:, None]) < OWN_OF_VELOCITY and (
+    if share_left(regression, signals.theta[:, None], clock[:, None]) < OWN_OF_VELOCITY and (
         np.ptp(signals.direction) == 0.0
     ):
         spots.append(
@@ -319,11 +321,11 @@ def _runs(space: Space) -> list[Blindness]:
     return spots
 
 
-def _grid(space: Space) -> list[Blindness]:
-    grid = uniform_grid(space.signals.theta)
-    if grid is None or grid.positions > 2.0 * space.lines.orders.max():
+def _grid(regression: Regression) -> list[Blindness]:
+    grid = uniform_grid(regression.signals.theta)
+    if grid is None or grid.positions > 2.0 * regression.lines.orders.max():
         return []
-    gear = _gear_lines(space)
+    gear = _gear_lines(regression)
     folded = sorted({(grid.folded(m), m) for m in gear if grid.folded(m) != m})
     if not folded:
         return []
@@ -339,21 +341,21 @@ def _grid(space: Space) -> list[Blindness]:
     ]
 
 
-def _gear_lines(space: Space) -> list[float]:
-    joint = space.belief.joint
+def _gear_lines(regression: Regression) -> list[float]:
+    joint = regression.belief.joint
     lines = {joint.output_order(shaft, k) for shaft, k in joint.gear_orders()}
     if "wave_generator" in joint.shafts:
         lines.add(joint.shafts["motor"] + joint.shafts["wave_generator"])
     return sorted(lines)
 
 
-def _doubt_about_wander(space: Space) -> Blindness | None:
+def _doubt_about_wander(regression: Regression) -> Blindness | None:
     """Why a wander in time may be an error of reversal: few runs that reverse once."""
-    signals = space.signals
+    signals = regression.signals
     if signals.runs >= RUNS_PER_LEVEL or np.ptp(signals.direction) == 0.0:
         return None
     left = power = 0.0
-    for start, stop in space.bounds:
+    for start, stop in regression.bounds:
         wander = wander_basis(signals.clock[start:stop])
         q, _ = np.linalg.qr(np.column_stack([np.ones(stop - start), wander]))
         direction = signals.direction[start:stop]
@@ -361,7 +363,7 @@ def _doubt_about_wander(space: Space) -> Blindness | None:
         left += float(np.sum((direction - q @ (q.T @ direction)) ** 2))
     if left > OWN_OF_VELOCITY * power:
         return None
-    rest = space.with_terms(t for t in space.terms if t.cause != "drift_within_run")
+    rest = regression.with_terms(t for t in regression.terms if t.cause != "drift_within_run")
     reversal = rest.propose("backlash", {}, signals.direction[:, None])
     if reversal.bic_gain <= 0.0:
         return None
@@ -375,9 +377,11 @@ def _doubt_about_wander(space: Space) -> Blindness | None:
     )
 
 
-def _doubt_about_line(order: float, space: Space, spots: list[Blindness]) -> Blindness | None:
+def _doubt_about_line(
+    order: float, regression: Regression, spots: list[Blindness]
+) -> Blindness | None:
     """Why a line found in the readings is not named a missing order of the joint."""
-    grid: UniformGrid | None = uniform_grid(space.signals.theta)
+    grid: UniformGrid | None = uniform_grid(regression.signals.theta)
     for spot in spots:
         if "sidebands" in spot.causes and "missing_order" in spot.causes and grid is not None:
             return Blindness(
@@ -386,8 +390,8 @@ def _doubt_about_line(order: float, space: Space, spots: list[Blindness]) -> Bli
                 f"the same numbers at these {grid.positions} positions; {spot.because}",
                 spot.measure,
             )
-    signals = space.signals
-    joint = space.belief.joint
+    signals = regression.signals
+    joint = regression.belief.joint
     named = joint.name_order(order)
     of_gear = named is not None and named[0] != "output"
     if not of_gear and order <= REFERENCE_ORDERS and signals.mount is not None:
@@ -411,6 +415,6 @@ def _doubt_about_line(order: float, space: Space, spots: list[Blindness]) -> Bli
                 return Blindness(
                     ("missing_order", "load_dependent_gear_error"), spot.because, spot.measure
                 )
-            if spot.causes == ("filter_lag",) and order in space.belief.pattern.orders:
+            if spot.causes == ("filter_lag",) and order in regression.belief.pattern.orders:
                 return Blindness(("missing_order", "filter_lag"), spot.because, spot.measure)
     return None

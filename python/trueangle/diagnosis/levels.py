@@ -12,10 +12,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..joint.signals import Signals
+from ..regression.regression import Regression
 from ..simulation.effects import EFFECTS
-from ..simulation.signals import Signals
 from .holdout import held_out, numbers, part, rebuilt, reducible_share
-from .space import Space
 
 __all__ = ["UNITS", "LevelGain", "gains_by_level", "run_levels"]
 
@@ -136,7 +136,7 @@ def _value(factor: str, column: Array) -> float:
 
 
 def gains_by_level(
-    space: Space,
+    regression: Regression,
     groups: Sequence[Sequence[int]],
     own_zero: bool,
     unit: NDArray[np.int64],
@@ -145,38 +145,38 @@ def gains_by_level(
     """Gain of the findings (by their place) at levels of their factor that were left out."""
     found: dict[int, LevelGain] = {}
     for factor in UNITS:
-        causes = [space.terms[group[0]].cause for group in groups]
+        causes = [regression.terms[group[0]].cause for group in groups]
         concerned = [
             k
             for k, cause in enumerate(causes)
             if EFFECTS[cause].factor == factor and EFFECTS[cause].transfers
         ]
-        split = run_levels(space.signals, factor) if concerned else None
+        split = run_levels(regression.signals, factor) if concerned else None
         if split is None:
             continue
         level, values = split
         # With the finding and without it at every level left out; NaN where it cannot be.
-        left = np.full((len(concerned), 2, space.n), np.nan)
+        left = np.full((len(concerned), 2, regression.n), np.nan)
         for j in range(len(values)):
             test = level == j
-            able = [k for k in concerned if _can_do_without(space, groups[k], test)]
+            able = [k for k in concerned if _can_do_without(regression, groups[k], test)]
             if not able:
                 continue
             # Two mounts do not tell which way a mount counts: what all tell is kept.
             after, *before = held_out(
-                space, [groups[k] for k in able], test, own_zero, search=factor != "mount"
+                regression, [groups[k] for k in able], test, own_zero, search=factor != "mount"
             )
             for k, values_before in zip(able, before, strict=True):
                 left[concerned.index(k)][:, test] = values_before, after
         for k, (before_k, after_k) in zip(concerned, left, strict=True):
-            used = ~space.wild & ~np.isnan(before_k)
+            used = ~regression.wild & ~np.isnan(before_k)
             held = [values[j] for j in np.unique(level[used])]
             if not held:
                 found[k] = LevelGain(factor, UNITS[factor], values, note=NONE_TO_SPARE)
                 continue
             _, of_unit = np.unique(unit[used], return_inverse=True)
             share, interval = reducible_share(
-                before_k[used], after_k[used], of_unit, space.variance, rng
+                before_k[used], after_k[used], of_unit, regression.variance, rng
             )
             found[k] = LevelGain(
                 factor,
@@ -205,10 +205,10 @@ def _reach(levels: list[float], held_out: list[float]) -> str:
     return reach
 
 
-def _can_do_without(space: Space, group: Sequence[int], test: Rows) -> bool:
+def _can_do_without(regression: Regression, group: Sequence[int], test: Rows) -> bool:
     """The other readings still tell the finding from all else."""
-    train = part(space, ~test)
-    terms = [rebuilt(term, ~test) for term in space.terms]
+    train = part(regression, ~test)
+    terms = [rebuilt(term, ~test) for term in regression.terms]
     rest = train.with_terms(t for k, t in enumerate(terms) if k not in group)
     columns = np.hstack([terms[k].columns for k in group])
     own = rest.whiten(columns)

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from ..joint.joint import Joint
+from ..joint.pattern import Harmonic, Pattern
+from ..joint.signals import Signals, join_runs
 from .designs import RunDesign
 from .effects import EFFECTS, Effect
 from .effects.dispersion import HeteroscedasticNoise, Outliers
@@ -12,9 +15,6 @@ from .effects.place import ArgumentShift, LocalDefect
 from .effects.reversal import Backlash, PreslidingHysteresis
 from .effects.run_level import DriftWithinRun, MissedCounts, ScaleError, ZeroSlip
 from .effects.temperature import ThermalDrift
-from .joint import Joint
-from .pattern import Harmonic, Pattern
-from .signals import Signals, join_runs
 from .simulation import Simulation, simulate
 from .simulationfile import load_simulation
 

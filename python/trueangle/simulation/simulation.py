@@ -10,12 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import ArgumentError
+from ..joint.joint import Joint
+from ..joint.pattern import Harmonic, Pattern
+from ..joint.signals import Signals, join_runs
 from ..runs import CalibrationRun, as_runs
 from .designs import RunDesign
 from .effects import Effect, Surroundings
-from .joint import Joint
-from .pattern import Harmonic, Pattern
-from .signals import Signals, join_runs
 
 __all__ = ["Simulation", "simulate"]
 

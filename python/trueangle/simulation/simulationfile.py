@@ -11,10 +11,10 @@ from typing import Any, TypeVar
 
 from ..errors import ArgumentError, FileError
 from ..files import written_atomically
+from ..joint.joint import Joint
+from ..joint.pattern import Harmonic
 from .designs import RunDesign
 from .effects import EFFECTS, Effect
-from .joint import Joint
-from .pattern import Harmonic
 from .simulation import Simulation
 
 __all__ = ["dumps", "load_simulation", "to_table", "write"]

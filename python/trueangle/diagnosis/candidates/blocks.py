@@ -7,12 +7,12 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from ...simulation.effects import Effect, Surroundings
-from ...simulation.effects.effect import line_columns
+from ...joint.pattern import Surroundings, line_columns
+from ...joint.signals import Signals
+from ...regression.regression import Extension, Regression
+from ...simulation.effects import Effect
 from ...simulation.effects.load import LoadDependentGearError, TorsionalCompliance
 from ...simulation.effects.temperature import ThermalDrift
-from ...simulation.signals import Signals
-from ..space import Proposal, Space
 from .candidate import Array, Candidate, Parameters, line_parameters, quantity
 
 __all__ = ["LoadDependentGearCandidate", "ThermalCandidate", "TorsionalCandidate"]
@@ -30,19 +30,19 @@ class FactorCandidate(Candidate):
     def factor(self, signals: Signals, kind: str) -> Array | None:
         raise NotImplementedError
 
-    def shapes(self, space: Space) -> list[dict[str, Any]]:
+    def shapes(self, regression: Regression) -> list[dict[str, Any]]:
         raise NotImplementedError
 
     def alternatives(
-        self, space: Space, shape: dict[str, Any], shapes: list[dict[str, Any]]
+        self, regression: Regression, shape: dict[str, Any], shapes: list[dict[str, Any]]
     ) -> int:
         """Shapes as likely as this one; half of the belief goes to the likeliest."""
         return 1 if shape["what"] == "zero" else len(shapes)
 
-    def propose(self, space: Space) -> Proposal | None:
-        shapes = self.shapes(space)
-        log_grids = [np.log(2.0 * self.alternatives(space, shape, shapes)) for shape in shapes]
-        return self.best(space, shapes, log_grids)
+    def propose(self, regression: Regression) -> Extension | None:
+        shapes = self.shapes(regression)
+        log_grids = [np.log(2.0 * self.alternatives(regression, shape, shapes)) for shape in shapes]
+        return self.best(regression, shapes, log_grids)
 
     def columns(self, signals: Signals, around: Surroundings, shape: dict[str, Any]) -> Array:
         factor = self.factor(signals, shape.get("kind", "signed"))
@@ -54,20 +54,20 @@ class FactorCandidate(Candidate):
         return factor[:, None] * line_columns(signals.theta, shape["order"])
 
     def lines(
-        self, terms: Sequence[tuple[Proposal, Array, Array]]
+        self, terms: Sequence[tuple[Extension, Array, Array]]
     ) -> list[tuple[float, float, float, float]]:
         """(order, amplitude, phase, std of the amplitude) of the line terms."""
         found = []
-        for proposal, coefficients, covariance in terms:
-            if proposal.shape["what"] == "line":
+        for extension, coefficients, covariance in terms:
+            if extension.shape["what"] == "line":
                 amplitude, phase, std, _ = line_parameters(coefficients, covariance)
-                found.append((float(proposal.shape["order"]), amplitude, phase, std))
+                found.append((float(extension.shape["order"]), amplitude, phase, std))
         return found
 
-    def single(self, terms: Sequence[tuple[Proposal, Array, Array]], what: str) -> Any:
+    def single(self, terms: Sequence[tuple[Extension, Array, Array]], what: str) -> Any:
         """Coefficient and standard deviation of the term ``what``, or None."""
-        for proposal, coefficients, covariance in terms:
-            if proposal.shape["what"] == what:
+        for extension, coefficients, covariance in terms:
+            if extension.shape["what"] == what:
                 return float(coefficients[0]), float(np.sqrt(covariance[0, 0]))
         return None
 
@@ -80,19 +80,19 @@ class ThermalCandidate(FactorCandidate):
     def factor(self, signals: Signals, kind: str) -> Array | None:
         return None if signals.temperature is None else signals.temperature - REFERENCE_C
 
-    def shapes(self, space: Space) -> list[dict[str, Any]]:
-        temperature = space.signals.temperature
+    def shapes(self, regression: Regression) -> list[dict[str, Any]]:
+        temperature = regression.signals.temperature
         if temperature is None or np.ptp(temperature) == 0.0:
             return []
-        pattern = space.around.pattern
+        pattern = regression.around.pattern
         shapes: list[dict[str, Any]] = [{"what": "zero"}]
         if pattern.orders.size:
             shapes.append({"what": "pattern"})
-        shapes += [{"what": "line", "order": float(m)} for m in known_orders(space)]
+        shapes += [{"what": "line", "order": float(m)} for m in known_orders(regression)]
         return shapes
 
     def report(
-        self, space: Space, terms: Sequence[tuple[Proposal, Array, Array]]
+        self, regression: Regression, terms: Sequence[tuple[Extension, Array, Array]]
     ) -> tuple[Parameters, list[Effect]]:
         lines = self.lines(terms)
         zero, pattern = self.single(terms, "zero"), self.single(terms, "pattern")
@@ -124,14 +124,14 @@ class TorsionalCandidate(FactorCandidate):
     def factor(self, signals: Signals, kind: str) -> Array | None:
         return signals.torque
 
-    def shapes(self, space: Space) -> list[dict[str, Any]]:
-        torque = space.signals.torque
-        if torque is None or not torque.any() or space.has("stiffening_compliance"):
+    def shapes(self, regression: Regression) -> list[dict[str, Any]]:
+        torque = regression.signals.torque
+        if torque is None or not torque.any() or regression.has("stiffening_compliance"):
             return []
         return [{"what": "zero"}, {"what": "line", "order": 1.0}]
 
     def report(
-        self, space: Space, terms: Sequence[tuple[Proposal, Array, Array]]
+        self, regression: Regression, terms: Sequence[tuple[Extension, Array, Array]]
     ) -> tuple[Parameters, list[Effect]]:
         direct, lines = self.single(terms, "zero"), self.lines(terms)
         parameters: Parameters = {}
@@ -158,29 +158,29 @@ class LoadDependentGearCandidate(FactorCandidate):
             return None
         return np.abs(signals.torque) if kind == "absolute" else signals.torque
 
-    def shapes(self, space: Space) -> list[dict[str, Any]]:
-        torque = space.signals.torque
+    def shapes(self, regression: Regression) -> list[dict[str, Any]]:
+        torque = regression.signals.torque
         if torque is None or not torque.any():
             return []
         both_signs = torque.min() < 0.0 < torque.max()
         return [
             {"what": "line", "order": float(m), "kind": kind}
-            for m in known_orders(space)
-            if _is_gear_order(space, m)
+            for m in known_orders(regression)
+            if _is_gear_order(regression, m)
             for kind in (("signed", "absolute") if both_signs else ("signed",))
         ]
 
     def alternatives(
-        self, space: Space, shape: dict[str, Any], shapes: list[dict[str, Any]]
+        self, regression: Regression, shape: dict[str, Any], shapes: list[dict[str, Any]]
     ) -> int:
         """The lobes pass the teeth twice a turn: these two lines grow with load first."""
-        joint = space.around.joint
+        joint = regression.around.joint
         mesh = [joint.output_order(shaft, 2) for shaft in joint.shafts if shaft != "output"]
         likely = sum(other["order"] in mesh for other in shapes)
         return likely if shape["order"] in mesh else len(shapes)
 
     def report(
-        self, space: Space, terms: Sequence[tuple[Proposal, Array, Array]]
+        self, regression: Regression, terms: Sequence[tuple[Extension, Array, Array]]
     ) -> tuple[Parameters, list[Effect]]:
         lines = self.lines(terms)
         parameters = {
@@ -194,22 +194,22 @@ class LoadDependentGearCandidate(FactorCandidate):
         for kind in ("signed", "absolute"):
             chosen = tuple(
                 line[:3]
-                for line, (proposal, _, _) in zip(lines, terms, strict=True)
-                if proposal.shape["kind"] == kind
+                for line, (extension, _, _) in zip(lines, terms, strict=True)
+                if extension.shape["kind"] == kind
             )
             if chosen:
                 effects.append(LoadDependentGearError(chosen, kind))
         return parameters, effects
 
 
-def known_orders(space: Space) -> list[float]:
+def known_orders(regression: Regression) -> list[float]:
     """Orders of the pattern and those that gears and encoders are known to have."""
-    joint = space.around.joint
-    orders = {float(m) for m in space.around.pattern.orders}
+    joint = regression.around.joint
+    orders = {float(m) for m in regression.around.pattern.orders}
     orders |= {joint.output_order(shaft, k) for shaft, k in joint.gear_orders()}
     return sorted(orders)
 
 
-def _is_gear_order(space: Space, order: float) -> bool:
-    named = space.around.joint.name_order(order)
+def _is_gear_order(regression: Regression, order: float) -> bool:
+    named = regression.around.joint.name_order(order)
     return named is not None and named[0] != "output"

@@ -8,11 +8,12 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from ...simulation.effects import Effect, Surroundings
-from ...simulation.signals import Signals
-from ..blocks import Blocks
-from ..quantity import Parameters, quantity
-from ..space import Proposal, Space
+from ...joint.pattern import Surroundings
+from ...joint.signals import Signals
+from ...regression.batch import Blocks
+from ...regression.estimate import Parameters, quantity
+from ...regression.regression import Extension, Regression
+from ...simulation.effects import Effect
 
 __all__ = ["Array", "Candidate", "Parameters", "golden_maximum", "line_parameters", "quantity"]
 
@@ -38,43 +39,45 @@ class Candidate:
     family: ClassVar[tuple[str, ...]] = ()
     located: ClassVar[bool] = False
 
-    def propose(self, space: Space) -> Proposal | None:
-        """The best extension of this cause in ``space``, or None where it cannot act."""
+    def propose(self, regression: Regression) -> Extension | None:
+        """The best extension of this cause in ``regression``, or None where it cannot act."""
         raise NotImplementedError
 
     def best(
         self,
-        space: Space,
+        regression: Regression,
         shapes: Sequence[dict[str, Any]],
         log_grids: Sequence[float],
         extra: Sequence[int] | None = None,
-    ) -> Proposal | None:
-        """The proposal of the shape with the most evidence; all are scored at once.
+    ) -> Extension | None:
+        """The extension of the shape with the most evidence; all are scored at once.
 
         ``extra`` counts the parameters of a shape that are no coefficients.
         """
         if not shapes:
             return None
-        blocks: Blocks = space.remembered(
+        blocks: Blocks = regression.remembered(
             self.cause,
             repr(shapes),
-            lambda: Blocks([self.columns(space.signals, space.around, s) for s in shapes]),
+            lambda: Blocks(
+                [self.columns(regression.signals, regression.around, s) for s in shapes]
+            ),
         )
         more = np.zeros(len(shapes)) if extra is None else np.asarray(extra)
-        price = more * space.log_n + 2.0 * np.asarray(log_grids)
+        price = more * regression.log_n + 2.0 * np.asarray(log_grids)
         for where, width, _, _ in blocks.groups:
-            price[where] += width * space.log_n
-        k = int(np.argmax(space.block_gains(blocks) - price))
-        columns = self.columns(space.signals, space.around, shapes[k])
+            price[where] += width * regression.log_n
+        k = int(np.argmax(regression.block_gains(blocks) - price))
+        columns = self.columns(regression.signals, regression.around, shapes[k])
         parameters = columns.shape[1] + int(more[k])
-        return space.propose(self.cause, shapes[k], columns, parameters, float(log_grids[k]))
+        return regression.propose(self.cause, shapes[k], columns, parameters, float(log_grids[k]))
 
     def columns(self, signals: Signals, around: Surroundings, shape: dict[str, Any]) -> Array:
         """Regressors of ``shape`` at other readings, shape (n, p)."""
         raise NotImplementedError
 
     def report(
-        self, space: Space, terms: Sequence[tuple[Proposal, Array, Array]]
+        self, regression: Regression, terms: Sequence[tuple[Extension, Array, Array]]
     ) -> tuple[Parameters, list[Effect]]:
         """Parameters of the finding and the effects to extend the simulation with.
 

@@ -7,11 +7,11 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from ...simulation.effects import Effect, Surroundings
-from ...simulation.effects.effect import line_columns
+from ...joint.pattern import Surroundings, line_columns
+from ...joint.signals import Signals
+from ...regression.regression import Extension, Regression
+from ...simulation.effects import Effect
 from ...simulation.effects.lines import MissingOrder, ReferenceLines, Sidebands
-from ...simulation.signals import Signals
-from ..space import Proposal, Space
 from .blocks import known_orders
 from .candidate import Array, Candidate, Parameters, line_parameters, quantity
 
@@ -34,9 +34,9 @@ class MissingOrderCandidate(Candidate):
     cause: ClassVar[str] = "missing_order"
     located: ClassVar[bool] = True
 
-    def propose(self, space: Space) -> Proposal | None:
-        gains = space.line_gains()
-        lines = space.lines
+    def propose(self, regression: Regression) -> Extension | None:
+        gains = regression.line_gains()
+        lines = regression.lines
         expected = int(lines.plausible.sum())
         prices = 2.0 * np.log(np.where(lines.plausible, 2 * expected, 2 * gains.size))
         best = int(np.argmax(gains - prices))
@@ -44,32 +44,33 @@ class MissingOrderCandidate(Candidate):
             return None
         # Over a part of a turn neighbouring orders are hardly told apart: a fast shaft's
         # own order is then the likelier one.
-        away = np.abs(lines.orders - lines.orders[best]) * space.signals.run_turns().max()
+        away = np.abs(lines.orders - lines.orders[best]) * regression.signals.run_turns().max()
         alike = np.flatnonzero((away < UNRESOLVED) & (gains > ALIKE * gains[best]))
-        named = [space.around.joint.name_order(float(lines.orders[k])) for k in alike]
+        named = [regression.around.joint.name_order(float(lines.orders[k])) for k in alike]
         own = [k for k, name in zip(alike, named, strict=True) if name and name[0] != "output"]
         if best not in own and own:
             best = int(max(own, key=lambda k: gains[k] - prices[k]))
         order = float(lines.orders[best])
-        return space.propose(
+        return regression.propose(
             self.cause,
             {
                 "output_order": order,
                 "alike": [float(lines.orders[k]) for k in alike if k != best],
             },
-            line_columns(space.signals.theta, order),
+            line_columns(regression.signals.theta, order),
             log_grid=float(prices[best] / 2.0),
+            line=order,
         )
 
     def columns(self, signals: Signals, around: Surroundings, shape: dict[str, Any]) -> Array:
         return line_columns(signals.theta, shape["output_order"])
 
     def report(
-        self, space: Space, terms: Sequence[tuple[Proposal, Array, Array]]
+        self, regression: Regression, terms: Sequence[tuple[Extension, Array, Array]]
     ) -> tuple[Parameters, list[Effect]]:
-        proposal, coefficients, covariance = terms[0]
-        output_order = proposal.shape["output_order"]
-        joint = space.around.joint
+        extension, coefficients, covariance = terms[0]
+        output_order = extension.shape["output_order"]
+        joint = regression.around.joint
         shaft, order = joint.name_order(output_order) or ("output", output_order)
         amplitude, phase, std, phase_std = line_parameters(coefficients, covariance)
         parameters = {
@@ -80,8 +81,8 @@ class MissingOrderCandidate(Candidate):
             "phase_deg": quantity(phase, phase_std),
             "explanations": quantity(joint.explanations(output_order)),
         }
-        if proposal.shape["alike"]:
-            parameters["hardly_told_from_output_orders"] = quantity(proposal.shape["alike"])
+        if extension.shape["alike"]:
+            parameters["hardly_told_from_output_orders"] = quantity(extension.shape["alike"])
         return parameters, [MissingOrder(shaft, order, amplitude, phase)]
 
 
@@ -91,15 +92,15 @@ class SidebandsCandidate(Candidate):
     cause: ClassVar[str] = "sidebands"
     located: ClassVar[bool] = True
 
-    def propose(self, space: Space) -> Proposal | None:
-        joint = space.around.joint
+    def propose(self, regression: Regression) -> Extension | None:
+        joint = regression.around.joint
         carriers = []
-        for m in known_orders(space):
+        for m in known_orders(regression):
             named = joint.name_order(m)
             if named is not None and named[0] != "output":
                 carriers.append(m)
-        present = {float(m) for m in space.around.pattern.orders}
-        travel = space.signals.run_turns().max()
+        present = {float(m) for m in regression.around.pattern.orders}
+        travel = regression.signals.run_turns().max()
         shapes: list[dict[str, Any]] = []
         # Over less than that the pair and the line between them are hardly told apart.
         offsets = [k for k in (1, 2) if k * travel > RESOLVED]
@@ -109,7 +110,7 @@ class SidebandsCandidate(Candidate):
                     shapes += [{"carrier": m, "offset": k, "form": f} for f in ("AM", "PM")]
                 shapes.append({"carrier": m, "offset": k, "form": "free"})
         log_grid = float(np.log(max(len(shapes), 1)))
-        return self.best(space, shapes, [log_grid] * len(shapes))
+        return self.best(regression, shapes, [log_grid] * len(shapes))
 
     def columns(self, signals: Signals, around: Surroundings, shape: dict[str, Any]) -> Array:
         theta, carrier, k = signals.theta, shape["carrier"], shape["offset"]
@@ -129,10 +130,10 @@ class SidebandsCandidate(Candidate):
         return float(pattern.cosine[k]), float(pattern.sine[k])
 
     def _bands(
-        self, around: Surroundings, proposal: Proposal, coefficients: Array, covariance: Array
+        self, around: Surroundings, extension: Extension, coefficients: Array, covariance: Array
     ) -> tuple[Array, Array]:
         """Cosine and sine of the lower and upper line and their covariance."""
-        shape = proposal.shape
+        shape = extension.shape
         if shape["form"] == "free":
             return coefficients, covariance
         a, b = self._carrier(around, shape["carrier"])
@@ -143,13 +144,13 @@ class SidebandsCandidate(Candidate):
         return map_ @ coefficients, map_ @ covariance @ map_.T
 
     def report(
-        self, space: Space, terms: Sequence[tuple[Proposal, Array, Array]]
+        self, regression: Regression, terms: Sequence[tuple[Extension, Array, Array]]
     ) -> tuple[Parameters, list[Effect]]:
         effects: list[Effect] = []
         rows = []
-        for proposal, coefficients, covariance in terms:
-            pair, spread = self._bands(space.around, proposal, coefficients, covariance)
-            k, carrier = proposal.shape["offset"], proposal.shape["carrier"]
+        for extension, coefficients, covariance in terms:
+            pair, spread = self._bands(regression.around, extension, coefficients, covariance)
+            k, carrier = extension.shape["offset"], extension.shape["carrier"]
             for j, offset in ((0, -k), (2, k)):
                 line = line_parameters(pair[j : j + 2], spread[j : j + 2, j : j + 2])
                 rows.append((carrier, offset, *line))
@@ -172,8 +173,8 @@ class ReferenceCandidate(Candidate):
     cause: ClassVar[str] = "reference_error"
     located: ClassVar[bool] = True
 
-    def propose(self, space: Space) -> Proposal | None:
-        mount = space.signals.mount
+    def propose(self, regression: Regression) -> Extension | None:
+        mount = regression.signals.mount
         if mount is None or np.ptp(mount) == 0.0:
             return None
         shapes = [
@@ -182,13 +183,13 @@ class ReferenceCandidate(Candidate):
             for sign in (1.0, -1.0)
         ]
         # Low orders are likelier by far, as of any rotary part.
-        return self.best(space, shapes, [float(np.log(4.0 * s["order"])) for s in shapes])
+        return self.best(regression, shapes, [float(np.log(4.0 * s["order"])) for s in shapes])
 
     def columns(self, signals: Signals, around: Surroundings, shape: dict[str, Any]) -> Array:
         return line_columns(ReferenceLines.angle(signals, shape["mount_sign"]), shape["order"])
 
     def report(
-        self, space: Space, terms: Sequence[tuple[Proposal, Array, Array]]
+        self, regression: Regression, terms: Sequence[tuple[Extension, Array, Array]]
     ) -> tuple[Parameters, list[Effect]]:
         rows = [
             (t.shape["order"], *line_parameters(c, v), t.shape["mount_sign"]) for t, c, v in terms

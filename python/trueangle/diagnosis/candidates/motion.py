@@ -9,11 +9,11 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from ...simulation.effects import Effect, Surroundings
+from ...joint.pattern import Pattern, Surroundings
+from ...joint.signals import Signals
+from ...regression.regression import Extension, Regression
+from ...simulation.effects import Effect
 from ...simulation.effects.motion import FilterLag, Latency
-from ...simulation.pattern import Pattern
-from ...simulation.signals import Signals
-from ..space import Proposal, Space
 from .candidate import Array, Candidate, Parameters, golden_maximum, quantity
 
 __all__ = ["FilterLagCandidate", "LatencyCandidate"]
@@ -33,19 +33,19 @@ class LatencyCandidate(Candidate):
 
     cause: ClassVar[str] = "latency"
 
-    def propose(self, space: Space) -> Proposal | None:
-        if space.signals.velocity is None or space.has(self.cause):
+    def propose(self, regression: Regression) -> Extension | None:
+        if regression.signals.velocity is None or regression.has(self.cause):
             return None
-        columns = space.remembered(
-            self.cause, None, lambda: self.columns(space.signals, space.around, {})
+        columns = regression.remembered(
+            self.cause, None, lambda: self.columns(regression.signals, regression.around, {})
         )
-        return space.propose(self.cause, {}, columns)
+        return regression.propose(self.cause, {}, columns)
 
     def columns(self, signals: Signals, around: Surroundings, shape: dict[str, Any]) -> Array:
         return Latency.regressors(signals, around)
 
     def report(
-        self, space: Space, terms: Sequence[tuple[Proposal, Array, Array]]
+        self, regression: Regression, terms: Sequence[tuple[Extension, Array, Array]]
     ) -> tuple[Parameters, list[Effect]]:
         _, (delay,), covariance = terms[0]
         std = float(np.sqrt(covariance[0, 0]))
@@ -61,14 +61,14 @@ class FilterLagCandidate(Candidate):
     cause: ClassVar[str] = "filter_lag"
     located: ClassVar[bool] = True
 
-    def propose(self, space: Space) -> Proposal | None:
-        signals, pattern = space.signals, space.around.pattern
-        if signals.velocity is None or pattern.orders.size == 0 or space.has(self.cause):
+    def propose(self, regression: Regression) -> Extension | None:
+        signals, pattern = regression.signals, regression.around.pattern
+        if signals.velocity is None or pattern.orders.size == 0 or regression.has(self.cause):
             return None
         top = float(pattern.orders.max() * np.abs(signals.turns_per_s).max())
         if top == 0.0:
             return None
-        waves, frequency = space.remembered(
+        waves, frequency = regression.remembered(
             "waves",
             None,
             lambda: (
@@ -79,25 +79,25 @@ class FilterLagCandidate(Candidate):
 
         def gain(cutoff: float, damping: float | None) -> float:
             column = _lagged(waves, frequency, cutoff, damping)
-            return float(space.fixed_gains(column[:, None])[0])
+            return float(regression.fixed_gains(column[:, None])[0])
 
         cutoffs = top * CUTOFFS
 
         def grid(damping: float | None) -> Array:
-            columns = space.remembered(
+            columns = regression.remembered(
                 f"lagged {damping}",
                 None,
                 lambda: np.column_stack(
                     [_lagged(waves, frequency, float(c), damping) for c in cutoffs]
                 ),
             )
-            return space.fixed_gains(columns)
+            return regression.fixed_gains(columns)
 
         grids: dict[float | None, Array] = {None: grid(None)}
-        if not space.hopeless(float(grids[None].max()), 1, REFINED_FROM):
+        if not regression.hopeless(float(grids[None].max()), 1, REFINED_FROM):
             grids |= {damping: grid(damping) for damping in DAMPING}
         step = float(np.log(CUTOFFS[1] / CUTOFFS[0]))
-        best: Proposal | None = None
+        best: Extension | None = None
         for order in (1, 2):
             if order == 2 and len(grids) == 1:
                 break
@@ -121,15 +121,15 @@ class FilterLagCandidate(Candidate):
                     partial(gain, cutoff), 0.7 * damping, 1.4 * damping, 8
                 )
             shape = {"cutoff_hz": cutoff, "damping": damping}
-            proposal = space.propose(
+            extension = regression.propose(
                 self.cause,
                 shape,
                 _lagged(waves, frequency, cutoff, damping)[:, None],
                 parameters=order,
                 deviance=deviance,
             )
-            if best is None or proposal.bic_gain > best.bic_gain:
-                best = proposal
+            if best is None or extension.bic_gain > best.bic_gain:
+                best = extension
         return best
 
     def columns(self, signals: Signals, around: Surroundings, shape: dict[str, Any]) -> Array:
@@ -138,12 +138,12 @@ class FilterLagCandidate(Candidate):
         return _lagged(waves, frequency, shape["cutoff_hz"], shape["damping"])[:, None]
 
     def report(
-        self, space: Space, terms: Sequence[tuple[Proposal, Array, Array]]
+        self, regression: Regression, terms: Sequence[tuple[Extension, Array, Array]]
     ) -> tuple[Parameters, list[Effect]]:
-        proposal = terms[0][0]
-        cutoff, damping = proposal.shape["cutoff_hz"], proposal.shape["damping"]
-        waves = _waves(space.around.pattern, space.signals.theta)
-        frequency = space.around.pattern.orders * space.signals.turns_per_s[:, None]
+        extension = terms[0][0]
+        cutoff, damping = extension.shape["cutoff_hz"], extension.shape["damping"]
+        waves = _waves(regression.around.pattern, regression.signals.theta)
+        frequency = regression.around.pattern.orders * regression.signals.turns_per_s[:, None]
         step = 0.01
 
         def slope(cutoff_step: float, damping_step: float) -> Array:
@@ -159,9 +159,9 @@ class FilterLagCandidate(Candidate):
             return np.asarray((up - down) / (2.0 * step))
 
         slopes = [slope(step, 0.0)] if damping is None else [slope(step, 0.0), slope(0.0, step)]
-        others = space.with_terms(term for term in space.terms if term is not proposal)
+        others = regression.with_terms(term for term in regression.terms if term is not extension)
         x, _ = others.projected(np.column_stack(slopes))
-        covariance = space.variance * np.linalg.pinv(x.T @ x)
+        covariance = regression.variance * np.linalg.pinv(x.T @ x)
         # Far below the cutoff both delay by 1/(2 pi f_c) and 2 zeta/(2 pi f_n).
         delay = np.array([1.0] if damping is None else [1.0, -1.0])
         equivalent = cutoff if damping is None else cutoff / (2.0 * damping)

@@ -7,11 +7,11 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from ...simulation.effects import Effect, Surroundings
-from ...simulation.effects.effect import line_columns
+from ...joint.pattern import Surroundings, line_columns
+from ...joint.signals import Signals
+from ...regression.regression import Extension, Regression
+from ...simulation.effects import Effect
 from ...simulation.effects.lines import NonIntegerOrder
-from ...simulation.signals import Signals
-from ..space import Proposal, Space
 from .candidate import Array, Candidate, Parameters, golden_maximum, quantity
 
 __all__ = ["NonIntegerCandidate"]
@@ -50,74 +50,75 @@ class NonIntegerCandidate(Candidate):
     cause: ClassVar[str] = "non_integer_order"
     located: ClassVar[bool] = True
 
-    def propose(self, space: Space) -> Proposal | None:
-        if space.has(self.cause):
+    def propose(self, regression: Regression) -> Extension | None:
+        if regression.has(self.cause):
             return None
-        orders, power = self._search(space)
+        orders, power = self._search(regression)
         if orders.size == 0:
             return None
-        best: Proposal | None = None
+        best: Extension | None = None
         step = orders[1] - orders[0]
-        price = self._log_grid(space, orders)
+        price = self._log_grid(regression, orders)
         worth = power - 2.0 * price
         peaks = np.flatnonzero((worth[1:-1] >= worth[:-2]) & (worth[1:-1] >= worth[2:])) + 1
         for k in peaks[np.argsort(worth[peaks])[::-1][:PEAKS]]:
-            proposal = self._at(space, float(orders[k]), float(price[k]))
-            if best is None or proposal.bic_gain > best.bic_gain:
-                best = proposal
+            extension = self._at(regression, float(orders[k]), float(price[k]))
+            if best is None or extension.bic_gain > best.bic_gain:
+                best = extension
         if best is None or best.bic_gain < 0.0:
             return best
         middle, log_grid = best.shape["order"], best.log_grid
         order, _ = golden_maximum(
-            lambda f: self._at(space, f, log_grid).deviance, middle - step, middle + step, 10
+            lambda f: self._at(regression, f, log_grid).deviance, middle - step, middle + step, 10
         )
-        best = max(best, self._at(space, float(order), log_grid), key=lambda p: p.deviance)
-        near = np.abs(space.around.pattern.orders - best.shape["order"])
-        if near.min(initial=1.0) < OWN_LINE or self._keeps_phase(space, best):
+        best = max(best, self._at(regression, float(order), log_grid), key=lambda p: p.deviance)
+        near = np.abs(regression.around.pattern.orders - best.shape["order"])
+        if near.min(initial=1.0) < OWN_LINE or self._keeps_phase(regression, best):
             return None
         return best
 
     @staticmethod
-    def _keeps_phase(space: Space, found: Proposal) -> bool:
+    def _keeps_phase(regression: Regression, found: Extension) -> bool:
         """A searched order that the travel does not resolve from it explains as much.
 
         Phases that are new in each of R runs leave a share of 1/R to one phase for all.
         """
-        orders = space.lines.orders
+        orders = regression.lines.orders
         away = np.abs(orders - found.shape["order"])
-        alike = orders[away * space.signals.run_turns().max() < UNRESOLVED]
-        share = 0.5 + 1.0 / space.signals.runs
+        alike = orders[away * regression.signals.run_turns().max() < UNRESOLVED]
+        share = 0.5 + 1.0 / regression.signals.runs
         return any(
-            space.gain(line_columns(space.signals.theta, float(m)))[0] > share * found.deviance
+            regression.gain(line_columns(regression.signals.theta, float(m)))[0]
+            > share * found.deviance
             for m in alike
         )
 
     @staticmethod
-    def _log_grid(space: Space, orders: Array) -> Array:
+    def _log_grid(regression: Regression, orders: Array) -> Array:
         """Logarithm of the independent orders searched: those of cages, or of all."""
         cages = np.zeros(orders.size, dtype=bool)
-        for cycles in space.around.joint.shafts.values():
+        for cycles in regression.around.joint.shafts.values():
             cages |= (orders > CAGE[0] * cycles) & (orders < CAGE[1] * cycles)
         # Half of the belief goes to either; the maximum over an order is like that of two
         # independent ones.
         counts = 4.0 * np.where(cages, cages.sum(), orders.size) / OVERSAMPLING
         return np.asarray(np.log(np.maximum(counts, 2.0)))
 
-    def _at(self, space: Space, order: float, log_grid: float) -> Proposal:
-        return space.propose_run_effect(
-            self.cause, {"order": order}, line_columns(space.signals.theta, order), log_grid
+    def _at(self, regression: Regression, order: float, log_grid: float) -> Extension:
+        return regression.propose_run_effect(
+            self.cause, {"order": order}, line_columns(regression.signals.theta, order), log_grid
         )
 
     @staticmethod
-    def _search(space: Space) -> tuple[Array, Array]:
+    def _search(regression: Regression) -> tuple[Array, Array]:
         """Trial orders and the deviance of a run effect there, without cross terms."""
-        theta = space.signals.theta
-        starts = np.array([start for start, _ in space.bounds])
-        sizes = np.array([stop - start for start, stop in space.bounds], dtype=np.float64)
-        turns = space.signals.run_turns()
+        theta = regression.signals.theta
+        starts = np.array([start for start, _ in regression.bounds])
+        sizes = np.array([stop - start for start, stop in regression.bounds], dtype=np.float64)
+        turns = regression.signals.run_turns()
         if sizes.min() < 8 or turns.max() <= 0.0:
             return np.zeros(0), np.zeros(0)
-        top = float(space.lines.orders.max()) * 0.75
+        top = float(regression.lines.orders.max()) * 0.75
         low = max(LOWEST, LEAST_CYCLES / float(np.median(turns)))
         # Half the mean rate of readings is as far as a run can tell.
         step = 1.0 / (OVERSAMPLING * float(np.median(turns)))
@@ -125,8 +126,8 @@ class NonIntegerCandidate(Candidate):
         if count < 3:
             return np.zeros(0), np.zeros(0)
         orders = low + step * np.arange(count, dtype=np.float64)
-        e = space.left - space.whiten.run_part(space.left)
-        e = np.where(space.wild, 0.0, e)
+        e = regression.left - regression.whiten.run_part(regression.left)
+        e = np.where(regression.wild, 0.0, e)
         turn = np.exp(-1j * step * theta).astype(np.complex64)
         wave = (e * np.exp(-1j * orders[0] * theta)).astype(np.complex64)
         power = np.empty((count, starts.size))
@@ -135,7 +136,7 @@ class NonIntegerCandidate(Candidate):
             power[k] = sums.real**2 + sums.imag**2
             wave *= turn
         # P: sum of the two squared normalised coefficients per run, 2 on average.
-        p = 2.0 * power / (sizes * space.variance)
+        p = 2.0 * power / (sizes * regression.variance)
         best = np.zeros(count)
         for ratio in np.geomspace(1e-3, 1e3, 13):
             x = ratio * sizes
@@ -147,20 +148,20 @@ class NonIntegerCandidate(Candidate):
         return np.zeros((len(signals), 0))
 
     def report(
-        self, space: Space, terms: Sequence[tuple[Proposal, Array, Array]]
+        self, regression: Regression, terms: Sequence[tuple[Extension, Array, Array]]
     ) -> tuple[Parameters, list[Effect]]:
-        proposal = terms[0][0]
-        assert proposal.run_effect is not None
-        runs = space.signals.runs
+        extension = terms[0][0]
+        assert extension.run_effect is not None
+        runs = regression.signals.runs
         # Cosine and sine each of variance s^2: a mean square amplitude of 2 s^2.
-        amplitude = float(np.sqrt(2.0 * proposal.run_effect.ratio * space.variance))
-        noise = float(np.sqrt(2.0 * space.variance / space.n))
-        turns = float(np.median(space.signals.run_turns()))
+        amplitude = float(np.sqrt(2.0 * extension.run_effect.ratio * regression.variance))
+        noise = float(np.sqrt(2.0 * regression.variance / regression.n))
+        turns = float(np.median(regression.signals.run_turns()))
         order_std = 0.780 * noise / np.sqrt(2.0) / max(amplitude, 1e-12) / turns
         parameters = {
-            "order": quantity(proposal.shape["order"], order_std),
+            "order": quantity(extension.shape["order"], order_std),
             "amplitude_arcsec": quantity(
                 amplitude, float(np.hypot(noise, amplitude / np.sqrt(4.0 * runs)))
             ),
         }
-        return parameters, [NonIntegerOrder(proposal.shape["order"], amplitude)]
+        return parameters, [NonIntegerOrder(extension.shape["order"], amplitude)]

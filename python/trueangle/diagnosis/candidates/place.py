@@ -9,11 +9,12 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from ...simulation.effects import Effect, Surroundings
+from ...joint.pattern import Surroundings
+from ...joint.signals import Signals
+from ...regression.regression import Extension, Regression
+from ...simulation.effects import Effect
 from ...simulation.effects.place import ArgumentShift, LocalDefect
 from ...simulation.effects.run_level import MissedCounts
-from ...simulation.signals import Signals
-from ..space import Proposal, Space
 from .candidate import Array, Candidate, Parameters, golden_maximum, quantity
 
 __all__ = ["ArgumentCandidate", "DefectCandidate", "MissedCountsCandidate"]
@@ -49,20 +50,20 @@ class ArgumentCandidate(Candidate):
 
     cause: ClassVar[str] = "argument_error"
 
-    def propose(self, space: Space) -> Proposal | None:
-        if space.around.pattern.orders.size == 0 or space.has(self.cause):
+    def propose(self, regression: Regression) -> Extension | None:
+        if regression.around.pattern.orders.size == 0 or regression.has(self.cause):
             return None
-        columns = space.remembered(
-            self.cause, None, lambda: self.columns(space.signals, space.around, {})
+        columns = regression.remembered(
+            self.cause, None, lambda: self.columns(regression.signals, regression.around, {})
         )
-        deviance = float(space.fixed_gains(-columns)[0])
-        return space.propose(self.cause, {}, columns, parameters=0, deviance=deviance)
+        deviance = float(regression.fixed_gains(-columns)[0])
+        return regression.propose(self.cause, {}, columns, parameters=0, deviance=deviance)
 
     def columns(self, signals: Signals, around: Surroundings, shape: dict[str, Any]) -> Array:
         return ArgumentShift.regressors(signals, around)
 
     def report(
-        self, space: Space, terms: Sequence[tuple[Proposal, Array, Array]]
+        self, regression: Regression, terms: Sequence[tuple[Extension, Array, Array]]
     ) -> tuple[Parameters, list[Effect]]:
         _, (coefficient,), covariance = terms[0]
         std = float(np.sqrt(covariance[0, 0]))
@@ -78,30 +79,32 @@ class DefectCandidate(Candidate):
     cause: ClassVar[str] = "local_defect"
     located: ClassVar[bool] = True
 
-    def propose(self, space: Space) -> Proposal | None:
-        e = space.target - space.design @ space.coefficients
-        e = e - space.whiten.run_part(e)
-        joint = space.around.joint
+    def propose(self, regression: Regression) -> Extension | None:
+        e = regression.target - regression.design @ regression.coefficients
+        e = e - regression.whiten.run_part(e)
+        joint = regression.around.joint
         log_grid = float(np.log(len(joint.shafts) * 360.0))
-        best: Proposal | None = None
+        best: Extension | None = None
         for shaft, cycles in joint.shafts.items():
-            for score, place, width in self._search(space, cycles, e):
+            for score, place, width in self._search(regression, cycles, e):
                 shape = {"shaft": shaft, "place_deg": place, "width_deg": width}
-                if not space.hopeless(score / space.variance, 3, log_grid):
-                    shape = self._refined(space, shaft, place, width)
-                columns = self.columns(space.signals, space.around, shape)
+                if not regression.hopeless(score / regression.variance, 3, log_grid):
+                    shape = self._refined(regression, shaft, place, width)
+                columns = self.columns(regression.signals, regression.around, shape)
                 power = columns[:, 0] ** 2
                 # One or two readings are wild readings, not a place of the joint.
                 if power.sum() < LEAST_READINGS * power.max(initial=0.0):
                     continue
-                proposal = space.propose(self.cause, shape, columns, 3, log_grid)
-                if best is None or proposal.deviance > best.deviance:
-                    best = proposal
+                extension = regression.propose(self.cause, shape, columns, 3, log_grid)
+                if best is None or extension.deviance > best.deviance:
+                    best = extension
         return best
 
     @staticmethod
-    def _search(space: Space, cycles: float, e: Array) -> list[tuple[float, float, float]]:
-        phase = np.mod(space.signals.theta * (cycles / (2.0 * np.pi)), 1.0)
+    def _search(
+        regression: Regression, cycles: float, e: Array
+    ) -> list[tuple[float, float, float]]:
+        phase = np.mod(regression.signals.theta * (cycles / (2.0 * np.pi)), 1.0)
         bins = np.minimum((phase * PLACES).astype(np.int64), PLACES - 1)
         count = np.bincount(bins, minlength=PLACES).astype(np.float64)
         total = np.asarray(np.bincount(bins, weights=e, minlength=PLACES))
@@ -111,8 +114,8 @@ class DefectCandidate(Candidate):
         for width in WIDTHS:
             window = np.exp(-0.5 * (away / width) ** 2)
 
-            moment = _circular(total - count * (total.sum() / space.n), window)
-            power = _circular(count, window**2) - _circular(count, window) ** 2 / space.n
+            moment = _circular(total - count * (total.sum() / regression.n), window)
+            power = _circular(count, window**2) - _circular(count, window) ** 2 / regression.n
             seen = power > 4.0
             score = np.where(seen, moment**2 / np.where(seen, power, 1.0), 0.0)
             k = int(np.argmax(score))
@@ -120,11 +123,13 @@ class DefectCandidate(Candidate):
         found.sort(reverse=True)
         return [peak for peak in found[:PEAKS] if peak[0] > 0.0]
 
-    def _refined(self, space: Space, shaft: str, place: float, width: float) -> dict[str, Any]:
+    def _refined(
+        self, regression: Regression, shaft: str, place: float, width: float
+    ) -> dict[str, Any]:
         def gain(c: float, w: float) -> float:
             shape = {"shaft": shaft, "place_deg": c, "width_deg": w}
-            columns = self.columns(space.signals, space.around, shape)
-            return float(space.gains(columns)[0])
+            columns = self.columns(regression.signals, regression.around, shape)
+            return float(regression.gains(columns)[0])
 
         for _ in range(2):
             gain_at = partial(gain, w=width)
@@ -142,10 +147,10 @@ class DefectCandidate(Candidate):
         value = gain(place, width)
         for _ in range(NEWTON_STEPS):
             shape = {"shaft": shaft, "place_deg": place, "width_deg": width}
-            x, excited = space.projected(self._tangents(space, shape, 1.0))
+            x, excited = regression.projected(self._tangents(regression, shape, 1.0))
             if not excited.all():
                 break
-            height, *moves = np.linalg.lstsq(x, space.r, rcond=1e-10)[0]
+            height, *moves = np.linalg.lstsq(x, regression.r, rcond=1e-10)[0]
             step = np.clip(np.array(moves) / height, -0.3 * width, 0.3 * width)
             following = gain(place + step[0], min(width + step[1], WIDEST))
             if not following > value:
@@ -153,12 +158,12 @@ class DefectCandidate(Candidate):
             place, width, value = place + step[0], min(width + step[1], WIDEST), following
         return {"shaft": shaft, "place_deg": float(place % 360.0), "width_deg": float(width)}
 
-    def _tangents(self, space: Space, shape: dict[str, Any], height: float) -> Array:
+    def _tangents(self, regression: Regression, shape: dict[str, Any], height: float) -> Array:
         """The bump and, for its ``height``, its derivatives by place and width."""
         step = 0.05 * shape["width_deg"]
 
         def bump(**change: float) -> Array:
-            return self.columns(space.signals, space.around, {**shape, **change})[:, 0]
+            return self.columns(regression.signals, regression.around, {**shape, **change})[:, 0]
 
         place, width = shape["place_deg"], shape["width_deg"]
         return np.column_stack(
@@ -175,15 +180,15 @@ class DefectCandidate(Candidate):
         return LocalDefect.bump(phase, shape["place_deg"], shape["width_deg"])[:, None]
 
     def report(
-        self, space: Space, terms: Sequence[tuple[Proposal, Array, Array]]
+        self, regression: Regression, terms: Sequence[tuple[Extension, Array, Array]]
     ) -> tuple[Parameters, list[Effect]]:
-        proposal, (height,), _ = terms[0]
-        shape = proposal.shape
+        extension, (height,), _ = terms[0]
+        shape = extension.shape
         # Place, width and height together.
-        columns = self._tangents(space, shape, float(height))
-        others = [term for term in space.terms if term is not proposal]
-        x, _ = space.with_terms(others).projected(columns)
-        std = np.sqrt(space.variance * np.diag(np.linalg.pinv(x.T @ x)))
+        columns = self._tangents(regression, shape, float(height))
+        others = [term for term in regression.terms if term is not extension]
+        x, _ = regression.with_terms(others).projected(columns)
+        std = np.sqrt(regression.variance * np.diag(np.linalg.pinv(x.T @ x)))
         place, width = shape["place_deg"], shape["width_deg"]
         parameters = {
             "place_deg": quantity(place, std[1]),
@@ -205,15 +210,15 @@ class MissedCountsCandidate(Candidate):
     cause: ClassVar[str] = "missed_counts"
     located: ClassVar[bool] = True
 
-    def propose(self, space: Space) -> Proposal | None:
-        e = space.target - space.design @ space.coefficients
+    def propose(self, regression: Regression) -> Extension | None:
+        e = regression.target - regression.design @ regression.coefficients
         scores, places = [], []
-        near = np.zeros(space.n, dtype=bool)
-        for term in space.terms:
+        near = np.zeros(regression.n, dtype=bool)
+        for term in regression.terms:
             if term.cause == self.cause:
-                away = np.abs(space.signals.row - term.shape["row"])
-                near |= (space.signals.run == term.shape["run"]) & (away < STEP_MARGIN)
-        for start, stop in space.bounds:
+                away = np.abs(regression.signals.row - term.shape["row"])
+                near |= (regression.signals.run == term.shape["run"]) & (away < STEP_MARGIN)
+        for start, stop in regression.bounds:
             n = stop - start
             if n < 2 * STEP_MARGIN + 1:
                 continue
@@ -227,33 +232,33 @@ class MissedCountsCandidate(Candidate):
                 best = int(np.argmax(score * ~near[start + 1 : stop][inside]))
                 scores.append(float(score[best]))
                 places.append((start, start + STEP_MARGIN + best, stop))
-        best_proposal: Proposal | None = None
+        best_extension: Extension | None = None
         for j in np.argsort(scores)[::-1][:6]:
             start, at, stop = places[int(j)]
             for row in {at - 1, at, at + 1}:
                 if not start < row < stop or near[row]:
                     continue
                 shape = {
-                    "run": int(space.signals.run[row]),
-                    "row": int(space.signals.row[row]),
+                    "run": int(regression.signals.run[row]),
+                    "row": int(regression.signals.row[row]),
                 }
-                columns = self.columns(space.signals, space.around, shape)
-                proposal = space.propose(
-                    self.cause, shape, columns, 2, float(np.log(space.signals.runs))
+                columns = self.columns(regression.signals, regression.around, shape)
+                extension = regression.propose(
+                    self.cause, shape, columns, 2, float(np.log(regression.signals.runs))
                 )
-                if best_proposal is None or proposal.deviance > best_proposal.deviance:
-                    best_proposal = proposal
-        return best_proposal
+                if best_extension is None or extension.deviance > best_extension.deviance:
+                    best_extension = extension
+        return best_extension
 
     def columns(self, signals: Signals, around: Surroundings, shape: dict[str, Any]) -> Array:
         after = (signals.run == shape["run"]) & (signals.row >= shape["row"])
         return np.asarray(after.astype(np.float64)[:, None])
 
     def report(
-        self, space: Space, terms: Sequence[tuple[Proposal, Array, Array]]
+        self, regression: Regression, terms: Sequence[tuple[Extension, Array, Array]]
     ) -> tuple[Parameters, list[Effect]]:
         rows = [(float(c[0]), float(np.sqrt(v[0, 0])), t.shape) for t, c, v in terms]
-        labels = space.signals.labels
+        labels = regression.signals.labels
 
         def one(values: list[Any]) -> Any:
             return values[0] if len(values) == 1 else values

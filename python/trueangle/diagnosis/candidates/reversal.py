@@ -7,11 +7,11 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from ...simulation.effects import Effect, Surroundings
-from ...simulation.effects.effect import line_columns
+from ...joint.pattern import Surroundings, line_columns
+from ...joint.signals import Signals
+from ...regression.regression import Extension, Regression
+from ...simulation.effects import Effect
 from ...simulation.effects.reversal import Backlash, PreslidingHysteresis
-from ...simulation.signals import Signals
-from ..space import Proposal, Space
 from .candidate import (
     Array,
     Candidate,
@@ -39,33 +39,33 @@ class BacklashCandidate(Candidate):
 
     cause: ClassVar[str] = "backlash"
 
-    def propose(self, space: Space) -> Proposal | None:
-        if space.has("presliding_hysteresis"):
+    def propose(self, regression: Regression) -> Extension | None:
+        if regression.has("presliding_hysteresis"):
             return None
         shapes: list[dict[str, Any]] = [{"order": 0}]
-        if space.has(self.cause):
+        if regression.has(self.cause):
             shapes = [{"order": k} for k in PLACE_ORDERS]
         log_grid = float(np.log(len(shapes)))
-        proposals = [
-            space.propose(
+        extensions = [
+            regression.propose(
                 self.cause,
                 shape,
-                self.columns(space.signals, space.around, shape),
+                self.columns(regression.signals, regression.around, shape),
                 log_grid=log_grid,
             )
             for shape in shapes
         ]
-        return max(proposals, key=lambda p: p.bic_gain)
+        return max(extensions, key=lambda p: p.bic_gain)
 
     def columns(self, signals: Signals, around: Surroundings, shape: dict[str, Any]) -> Array:
         return _play_columns(signals, shape["order"])
 
     def report(
-        self, space: Space, terms: Sequence[tuple[Proposal, Array, Array]]
+        self, regression: Regression, terms: Sequence[tuple[Extension, Array, Array]]
     ) -> tuple[Parameters, list[Effect]]:
         width, std = 0.0, 0.0
-        for proposal, coefficients, covariance in terms:
-            if _everywhere(proposal):
+        for extension, coefficients, covariance in terms:
+            if _everywhere(extension):
                 width, std = float(coefficients[0]), float(np.sqrt(covariance[0, 0]))
         lines = _place_lines(terms)
         parameters = {"half_width_arcsec": quantity(width, std)} | _place_parameters(lines)
@@ -83,20 +83,20 @@ class HysteresisCandidate(Candidate):
     family: ClassVar[tuple[str, ...]] = ("backlash",)
     located: ClassVar[bool] = True
 
-    def propose(self, space: Space) -> Proposal | None:
-        signals = space.signals
+    def propose(self, regression: Regression) -> Extension | None:
+        signals = regression.signals
         if np.ptp(signals.direction) == 0.0 and not signals.travel.any():
             return None
         best: tuple[float, float, float] | None = None
         for start in (0.0, 1.0):
-            columns = space.remembered(
+            columns = regression.remembered(
                 f"presliding {start}",
                 None,
                 lambda start=start: np.column_stack(  # type: ignore[misc]
                     [signals.presliding(length, start) for length in LENGTHS]
                 ),
             )
-            gains = space.gains(columns)
+            gains = regression.gains(columns)
             k = int(np.argmax(gains))
             if best is None or gains[k] > best[0] + 1e-9:
                 best = (float(gains[k]), float(LENGTHS[k]), start)
@@ -104,52 +104,56 @@ class HysteresisCandidate(Candidate):
         gain, length, start = best
         present = [
             term.shape["length_deg"]
-            for term in space.terms
+            for term in regression.terms
             if term.cause == self.cause and _everywhere(term)
         ]
         if gain <= 0.0 or len(present) >= MOST_ELEMENTS:
             return None
         step = np.log(LENGTHS[1] / LENGTHS[0])
         log_length, _ = golden_maximum(
-            lambda x: float(space.gains(signals.presliding(np.exp(x), start)[:, None])[0]),
+            lambda x: float(regression.gains(signals.presliding(np.exp(x), start)[:, None])[0]),
             np.log(length) - step,
             np.log(length) + step,
         )
         shape = {"length_deg": float(np.exp(log_length)), "start_state": start}
-        columns = self.columns(signals, space.around, shape)
-        proposal = space.propose(self.cause, shape, columns, parameters=2, log_grid=np.log(2.0))
-        if not space.has(self.cause):
-            return proposal
+        columns = self.columns(signals, regression.around, shape)
+        extension = regression.propose(
+            self.cause, shape, columns, parameters=2, log_grid=np.log(2.0)
+        )
+        if not regression.has(self.cause):
+            return extension
         # What may follow: play, play that varies with the place, another element.
-        further = [self._play(space, order) for order in (0, *PLACE_ORDERS)]
+        further = [self._play(regression, order) for order in (0, *PLACE_ORDERS)]
         apart = all(
             other == 0.0 or abs(np.log(shape["length_deg"] / other)) > np.log(APART)
             for other in present
         )
         if apart:
-            further.append(proposal)
+            further.append(extension)
         further.sort(key=lambda p: -p.bic_gain)
-        return next((p for p in further if p.bic_gain > 0.0 and self._pulls_back(space, p)), None)
+        return next(
+            (p for p in further if p.bic_gain > 0.0 and self._pulls_back(regression, p)), None
+        )
 
-    def _pulls_back(self, space: Space, proposal: Proposal) -> bool:
+    def _pulls_back(self, regression: Regression, extension: Extension) -> bool:
         """With this term all elements have one sign, as springs have.
 
         Elements of unlike signs would only be a difference of two that are alike.
         """
-        after = space.coefficients_with(proposal)
-        elements = [float(proposal.coefficients[0])] if _everywhere(proposal) else []
-        at = space.base.shape[1]
-        for term in space.terms:
+        after = regression.coefficients_with(extension)
+        elements = [float(extension.coefficients[0])] if _everywhere(extension) else []
+        at = regression.base.shape[1]
+        for term in regression.terms:
             if term.cause == self.cause and _everywhere(term):
                 elements.append(float(after[at]))
             at += term.columns.shape[1]
         return not elements or min(elements) * max(elements) > 0.0
 
-    def _play(self, space: Space, order: int) -> Proposal:
+    def _play(self, regression: Regression, order: int) -> Extension:
         shape = {"length_deg": 0.0, "order": order}
-        columns = self.columns(space.signals, space.around, shape)
+        columns = self.columns(regression.signals, regression.around, shape)
         log_grid = float(np.log(len(PLACE_ORDERS))) if order else 0.0
-        return space.propose(self.cause, shape, columns, log_grid=log_grid)
+        return regression.propose(self.cause, shape, columns, log_grid=log_grid)
 
     def columns(self, signals: Signals, around: Surroundings, shape: dict[str, Any]) -> Array:
         if shape["length_deg"] == 0.0:
@@ -157,7 +161,7 @@ class HysteresisCandidate(Candidate):
         return signals.presliding(shape["length_deg"], shape["start_state"])[:, None]
 
     def report(
-        self, space: Space, terms: Sequence[tuple[Proposal, Array, Array]]
+        self, regression: Regression, terms: Sequence[tuple[Extension, Array, Array]]
     ) -> tuple[Parameters, list[Effect]]:
         lines = _place_lines(terms)
         terms = [term for term in terms if _everywhere(term[0])]
@@ -178,7 +182,7 @@ class HysteresisCandidate(Candidate):
             "amplitude_arcsec": quantity(total, std),
             "length_deg": quantity(
                 length,
-                self._length_std(space, terms[int(np.argmax(weights))]) if terms else None,
+                self._length_std(regression, terms[int(np.argmax(weights))]) if terms else None,
             ),
         }
         if len(terms) > 1:
@@ -186,13 +190,15 @@ class HysteresisCandidate(Candidate):
             parameters["element_amplitudes_arcsec"] = quantity([float(c[0]) for _, c, _ in terms])
         return parameters | _place_parameters(lines), effects
 
-    def _length_std(self, space: Space, term: tuple[Proposal, Array, Array]) -> float | None:
+    def _length_std(
+        self, regression: Regression, term: tuple[Extension, Array, Array]
+    ) -> float | None:
         """From the curvature: the column's derivative by ln L, all else projected out."""
-        proposal, coefficients, _ = term
-        length = proposal.shape["length_deg"]
+        extension, coefficients, _ = term
+        length = extension.shape["length_deg"]
         if length == 0.0:
             return None
-        start, signals, step = proposal.shape["start_state"], space.signals, 0.02
+        start, signals, step = extension.shape["start_state"], regression.signals, 0.02
         derivative = (
             coefficients[0]
             * (
@@ -201,12 +207,14 @@ class HysteresisCandidate(Candidate):
             )
             / (2.0 * step)
         )
-        x, _ = space.projected(derivative[:, None])
+        x, _ = regression.projected(derivative[:, None])
         information = float(x[:, 0] @ x[:, 0])
-        return length * float(np.sqrt(space.variance / information)) if information > 0 else None
+        return (
+            length * float(np.sqrt(regression.variance / information)) if information > 0 else None
+        )
 
 
-def _everywhere(term: Proposal) -> bool:
+def _everywhere(term: Extension) -> bool:
     """The term is the same at every place."""
     return not term.shape.get("order")
 
@@ -218,7 +226,7 @@ def _play_columns(signals: Signals, order: int) -> Array:
 
 
 def _place_lines(
-    terms: Sequence[tuple[Proposal, Array, Array]],
+    terms: Sequence[tuple[Extension, Array, Array]],
 ) -> list[tuple[float, float, float, float, float]]:
     """(order, amplitude, phase, their standard deviations) of play that varies with place."""
     return [

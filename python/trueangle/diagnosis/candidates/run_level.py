@@ -9,11 +9,11 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from ...simulation.effects import Effect, Surroundings
+from ...joint.pattern import ARCSEC_PER_RAD, Surroundings
+from ...joint.signals import Signals
+from ...regression.regression import Extension, Regression
+from ...simulation.effects import Effect
 from ...simulation.effects.run_level import DriftWithinRun, ScaleError, ZeroSlip
-from ...simulation.pattern import ARCSEC_PER_RAD
-from ...simulation.signals import Signals
-from ..space import Proposal, Space
 from .candidate import Array, Candidate, Parameters, quantity
 
 __all__ = ["DriftCandidate", "ScaleCandidate", "ZeroSlipCandidate"]
@@ -44,21 +44,21 @@ class ZeroSlipCandidate(Candidate):
 
     cause: ClassVar[str] = "zero_slip"
 
-    def propose(self, space: Space) -> Proposal | None:
-        if space.signals.runs < 2 or space.has(self.cause):
+    def propose(self, regression: Regression) -> Extension | None:
+        if regression.signals.runs < 2 or regression.has(self.cause):
             return None
-        return space.propose_run_effect(self.cause, {}, np.ones((space.n, 1)))
+        return regression.propose_run_effect(self.cause, {}, np.ones((regression.n, 1)))
 
     def columns(self, signals: Signals, around: Surroundings, shape: dict[str, Any]) -> Array:
         return np.zeros((len(signals), 0))
 
     def report(
-        self, space: Space, terms: Sequence[tuple[Proposal, Array, Array]]
+        self, regression: Regression, terms: Sequence[tuple[Extension, Array, Array]]
     ) -> tuple[Parameters, list[Effect]]:
         effect = terms[0][0].run_effect
         assert effect is not None
-        size = float(np.sqrt(effect.ratio * space.variance))
-        std = size / np.sqrt(2.0 * max(space.signals.runs - 1, 1))
+        size = float(np.sqrt(effect.ratio * regression.variance))
+        std = size / np.sqrt(2.0 * max(regression.signals.runs - 1, 1))
         return {"standard_deviation_arcsec": quantity(size, std)}, [ZeroSlip(size)]
 
 
@@ -67,35 +67,35 @@ class DriftCandidate(Candidate):
 
     cause: ClassVar[str] = "drift_within_run"
 
-    def propose(self, space: Space) -> Proposal | None:
-        if space.has(self.cause):
+    def propose(self, regression: Regression) -> Extension | None:
+        if regression.has(self.cause):
             return None
-        proposals = [self._proposal(space, form) for form in FORMS]
-        best = max(proposals, key=lambda p: p.bic_gain)
+        extensions = [self._proposal(regression, form) for form in FORMS]
+        best = max(extensions, key=lambda p: p.bic_gain)
         if best.bic_gain <= 0.0:
             return best
         # An error that comes back at the same place on the next pass in that direction is
         # no wander in time, nor is a new zero.
-        beyond = space.without_repeats(by_direction=True)
-        if beyond is space:
+        beyond = regression.without_repeats(by_direction=True)
+        if beyond is regression:
             return best
-        if space.signals.runs > 1 and not space.has("zero_slip"):
-            zero = beyond.propose_run_effect("zero_slip", {}, np.ones((space.n, 1)))
+        if regression.signals.runs > 1 and not regression.has("zero_slip"):
+            zero = beyond.propose_run_effect("zero_slip", {}, np.ones((regression.n, 1)))
             beyond = beyond.with_terms([*beyond.terms, zero])
         deviance = self._proposal(beyond, best.shape["form"]).deviance
         return replace(best, deviance=min(best.deviance, deviance))
 
-    def _proposal(self, space: Space, form: str) -> Proposal:
-        columns = space.remembered(form, None, partial(self._shapes, space, form))
+    def _proposal(self, regression: Regression, form: str) -> Extension:
+        columns = regression.remembered(form, None, partial(self._shapes, regression, form))
         log_grid = float(np.log(UNLIKE_FORMS))
-        return space.propose_run_effect(self.cause, {"form": form}, columns, log_grid)
+        return regression.propose_run_effect(self.cause, {"form": form}, columns, log_grid)
 
     @staticmethod
-    def _shapes(space: Space, form: str) -> Array:
+    def _shapes(regression: Regression, form: str) -> Array:
         """Columns of a drift, scaled so that it ends at variance 1 or about that."""
-        u = np.zeros(space.n)
-        for start, stop in space.bounds:
-            clock = space.signals.clock[start:stop]
+        u = np.zeros(regression.n)
+        for start, stop in regression.bounds:
+            clock = regression.signals.clock[start:stop]
             u[start:stop] = (clock - clock[0]) / max(float(clock[-1] - clock[0]), 1e-300)
         k = np.arange(1, WANDER_TERMS + 1)
         if form == "ramp":
@@ -118,23 +118,23 @@ class DriftCandidate(Candidate):
         return np.zeros((len(signals), 0))
 
     def report(
-        self, space: Space, terms: Sequence[tuple[Proposal, Array, Array]]
+        self, regression: Regression, terms: Sequence[tuple[Extension, Array, Array]]
     ) -> tuple[Parameters, list[Effect]]:
-        proposal = terms[0][0]
-        assert proposal.run_effect is not None
-        size = float(np.sqrt(proposal.run_effect.ratio * space.variance))
-        clock = space.signals.clock
-        spans = [float(clock[stop - 1] - clock[start]) for start, stop in space.bounds]
+        extension = terms[0][0]
+        assert extension.run_effect is not None
+        size = float(np.sqrt(extension.run_effect.ratio * regression.variance))
+        clock = regression.signals.clock
+        spans = [float(clock[stop - 1] - clock[start]) for start, stop in regression.bounds]
         rate = size / max(float(np.mean(spans)), 1e-300)
-        share = 1.0 / np.sqrt(2.0 * max(space.signals.runs, 1))
+        share = 1.0 / np.sqrt(2.0 * max(regression.signals.runs, 1))
         parameters = {
             "arcsec_per_s": quantity(rate, rate * share),
             "arcsec_per_run": quantity(size, size * share),
-            "form": quantity(proposal.shape["form"].replace("centred ", "")),
+            "form": quantity(extension.shape["form"].replace("centred ", "")),
         }
-        if space.signals.time is None:
+        if regression.signals.time is None:
             parameters["arcsec_per_s"] = quantity(None)
-        ramp = "ramp" in proposal.shape["form"]
+        ramp = "ramp" in extension.shape["form"]
         effect = DriftWithinRun(rate, 0.0) if ramp else DriftWithinRun(0.0, size)
         return parameters, [effect]
 
@@ -144,19 +144,19 @@ class ScaleCandidate(Candidate):
 
     cause: ClassVar[str] = "scale_error"
 
-    def propose(self, space: Space) -> Proposal | None:
-        if space.has(self.cause):
+    def propose(self, regression: Regression) -> Extension | None:
+        if regression.has(self.cause):
             return None
-        proposals = [
-            space.propose(
+        extensions = [
+            regression.propose(
                 self.cause,
                 shape,
-                self.columns(space.signals, space.around, shape),
+                self.columns(regression.signals, regression.around, shape),
                 log_grid=float(np.log(2.0)),
             )
             for shape in ({"from": "zero"}, {"from": "start"})
         ]
-        return max(proposals, key=lambda p: p.bic_gain)
+        return max(extensions, key=lambda p: p.bic_gain)
 
     def columns(self, signals: Signals, around: Surroundings, shape: dict[str, Any]) -> Array:
         angle = signals.theta
@@ -167,7 +167,7 @@ class ScaleCandidate(Candidate):
         return (ARCSEC_PER_RAD * angle)[:, None]
 
     def report(
-        self, space: Space, terms: Sequence[tuple[Proposal, Array, Array]]
+        self, regression: Regression, terms: Sequence[tuple[Extension, Array, Array]]
     ) -> tuple[Parameters, list[Effect]]:
         _, (scale,), covariance = terms[0]
         std = float(np.sqrt(covariance[0, 0]))

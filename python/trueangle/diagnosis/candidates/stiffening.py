@@ -7,11 +7,11 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from ...simulation.effects import Effect, Surroundings
-from ...simulation.effects.effect import line_columns
+from ...joint.pattern import Surroundings, line_columns
+from ...joint.signals import Signals
+from ...regression.regression import Extension, Regression
+from ...simulation.effects import Effect
 from ...simulation.effects.load import StiffeningCompliance
-from ...simulation.signals import Signals
-from ..space import Proposal, Space
 from .candidate import Array, Candidate, Parameters, quantity
 
 __all__ = ["StiffeningCandidate"]
@@ -31,24 +31,24 @@ class StiffeningCandidate(Candidate):
     family: ClassVar[tuple[str, ...]] = ("torsional_compliance",)
     located: ClassVar[bool] = True
 
-    def propose(self, space: Space) -> Proposal | None:
-        torque = space.signals.torque
-        if torque is None or not torque.any() or space.has(self.cause):
+    def propose(self, regression: Regression) -> Extension | None:
+        torque = regression.signals.torque
+        if torque is None or not torque.any() or regression.has(self.cause):
             return None
         shapes: list[dict[str, Any]] = []
         if np.unique(np.round(torque / np.abs(torque).max(), 3)).size >= 3:
             shapes += [{"power": 3, "gravity_deg": None}]
             shapes += [{"knee_share": k, "gravity_deg": None} for k in KNEES]
-        if self._constant_in_runs(space.signals):
-            gravity = self._gravity(space)
+        if self._constant_in_runs(regression.signals):
+            gravity = self._gravity(regression)
             shapes += [{"power": 3, "gravity_deg": gravity}]
             shapes += [{"knee_share": k, "gravity_deg": gravity} for k in KNEES]
         for shape in shapes:
             if "knee_share" in shape:
-                moment = StiffeningCompliance.moment(space.signals, shape["gravity_deg"])
+                moment = StiffeningCompliance.moment(regression.signals, shape["gravity_deg"])
                 shape["knee_Nm"] = float(shape.pop("knee_share") * np.abs(moment).max())
         extra = [0 if shape["gravity_deg"] is None else 1 for shape in shapes]
-        return self.best(space, shapes, [float(np.log(2.0))] * len(shapes), extra)
+        return self.best(regression, shapes, [float(np.log(2.0))] * len(shapes), extra)
 
     @staticmethod
     def _constant_in_runs(signals: Signals) -> bool:
@@ -59,11 +59,11 @@ class StiffeningCandidate(Candidate):
         )
 
     @staticmethod
-    def _gravity(space: Space) -> float:
+    def _gravity(regression: Regression) -> float:
         """Angle of the vertical: where the moment's first order has no phase."""
-        assert space.signals.torque is not None
-        columns = space.signals.torque[:, None] * line_columns(space.signals.theta, 1.0)
-        _, (a, b) = space.gain(columns)
+        assert regression.signals.torque is not None
+        columns = regression.signals.torque[:, None] * line_columns(regression.signals.theta, 1.0)
+        _, (a, b) = regression.gain(columns)
         return float(-np.degrees(np.arctan2(a, b)))
 
     def columns(self, signals: Signals, around: Surroundings, shape: dict[str, Any]) -> Array:
@@ -75,11 +75,11 @@ class StiffeningCandidate(Candidate):
         return np.column_stack([moment, second])
 
     def report(
-        self, space: Space, terms: Sequence[tuple[Proposal, Array, Array]]
+        self, regression: Regression, terms: Sequence[tuple[Extension, Array, Array]]
     ) -> tuple[Parameters, list[Effect]]:
-        proposal, coefficients, covariance = terms[0]
+        extension, coefficients, covariance = terms[0]
         std = np.sqrt(np.diag(covariance))
-        shape = proposal.shape
+        shape = extension.shape
         parameters: Parameters = {"arcsec_per_Nm": quantity(coefficients[0], std[0])}
         gravity = shape["gravity_deg"]
         if "power" in shape:

@@ -3,28 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import MISSING, dataclass, fields
+from dataclasses import MISSING, fields
 from typing import Any, ClassVar, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import ArgumentError
-from ..joint import Joint
-from ..pattern import Pattern
-from ..signals import Signals
+from ...joint.pattern import Surroundings, line_columns, line_sum
+from ...joint.signals import Signals
 
 __all__ = ["Array", "Effect", "Surroundings", "line_columns", "line_sum"]
 
 Array = NDArray[np.float64]
-
-
-@dataclass(frozen=True)
-class Surroundings:
-    """What an effect may depend on beyond the readings: the joint and its pattern."""
-
-    joint: Joint
-    pattern: Pattern
 
 
 class Effect:
@@ -107,20 +98,6 @@ class Effect:
             if field.default is MISSING or value != field.default:
                 table[field.name] = _plain(value)
         return table
-
-
-def line_columns(theta: Array, order: float) -> Array:
-    """``cos`` and ``sin`` of ``order * theta``, shape (n, 2)."""
-    x = order * theta
-    return np.column_stack([np.cos(x), np.sin(x)])
-
-
-def line_sum(theta: Array, lines: tuple[tuple[float, float, float], ...]) -> Array:
-    """Sum of ``(order, amplitude, phase_deg)`` as ``C sin(m theta + phase)``."""
-    out = np.zeros_like(theta)
-    for order, amplitude, phase in lines:
-        out += amplitude * np.sin(order * theta + np.radians(phase))
-    return out
 
 
 def _checked(kind: str, name: str, value: Any, wanted: str) -> Any:

@@ -8,7 +8,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from ..signals import Signals
+from ...joint.signals import Signals
 from .effect import Array, Effect, Surroundings
 
 __all__ = ["FilterLag", "Latency", "low_pass"]

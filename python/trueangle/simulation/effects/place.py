@@ -7,7 +7,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from ..signals import Signals
+from ...joint.signals import Signals
 from .effect import Array, Effect, Surroundings
 
 __all__ = ["ArgumentShift", "LocalDefect"]

@@ -7,8 +7,8 @@ from typing import ClassVar
 
 import numpy as np
 
-from ..pattern import ARCSEC_PER_RAD
-from ..signals import Signals
+from ...joint.pattern import ARCSEC_PER_RAD
+from ...joint.signals import Signals
 from .effect import Array, Effect, Surroundings
 
 __all__ = ["DriftWithinRun", "MissedCounts", "ScaleError", "ZeroSlip"]

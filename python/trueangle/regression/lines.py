@@ -7,7 +7,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from ..simulation.joint import Joint
+from ..joint.joint import Joint
 
 __all__ = ["LineBasis", "plausible_orders"]
 

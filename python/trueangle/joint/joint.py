@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from ..errors import ArgumentError
-from ..shafts import FIXED_MEMBERS, shaft_cycles
+from .shafts import FIXED_MEMBERS, shaft_cycles
 
 __all__ = ["Joint"]
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import textwrap
 from typing import Any
 
+from ..regression.estimate import Quantity
 from .findings import Diagnosis, Finding
 from .levels import LevelGain
-from .quantity import Quantity
 
 __all__ = ["render"]
 

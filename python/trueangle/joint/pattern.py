@@ -12,7 +12,14 @@ from numpy.typing import NDArray
 from ..errors import ArgumentError
 from .joint import Joint
 
-__all__ = ["ARCSEC_PER_RAD", "Harmonic", "Pattern"]
+__all__ = [
+    "ARCSEC_PER_RAD",
+    "Harmonic",
+    "Pattern",
+    "Surroundings",
+    "line_columns",
+    "line_sum",
+]
 
 Array = NDArray[np.float64]
 
@@ -140,3 +147,25 @@ class Pattern:
             if done:
                 break
         return error
+
+
+@dataclass(frozen=True)
+class Surroundings:
+    """What an effect may depend on beyond the readings: the joint and its pattern."""
+
+    joint: Joint
+    pattern: Pattern
+
+
+def line_columns(theta: Array, order: float) -> Array:
+    """``cos`` and ``sin`` of ``order * theta``, shape (n, 2)."""
+    x = order * theta
+    return np.column_stack([np.cos(x), np.sin(x)])
+
+
+def line_sum(theta: Array, lines: tuple[tuple[float, float, float], ...]) -> Array:
+    """Sum of ``(order, amplitude, phase_deg)`` as ``C sin(m theta + phase)``."""
+    out = np.zeros_like(theta)
+    for order, amplitude, phase in lines:
+        out += amplitude * np.sin(order * theta + np.radians(phase))
+    return out

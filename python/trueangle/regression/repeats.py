@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ..simulation.signals import Signals
+from ..joint.signals import Signals
 
 __all__ = ["repeated_part"]
 

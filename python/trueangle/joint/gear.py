@@ -1,0 +1,127 @@
+"""Known lines of a joint: which physical cause an order may have."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Final
+
+from ..errors import ArgumentError
+from .shafts import FIXED_MEMBERS
+
+__all__ = ["COMMON_RATIOS", "Explanation", "explain_order", "gear_orders"]
+
+#: Gear ratios of common strain wave gears, tried where none is declared.
+COMMON_RATIOS: Final = (30, 50, 80, 100, 120, 160)
+
+
+@dataclass(frozen=True)
+class Explanation:
+    """One physical reading of an order: which line of the joint it may be.
+
+    Attributes
+    ----------
+    order : int or float
+        The order per output turn that the line has.
+    name : str
+        The line in a few words.
+    gear_ratio : float or None
+        The ratio for which this holds; None for lines of the output side.
+    assumed : bool
+        True when the ratio was not declared but is one of `COMMON_RATIOS`.
+    """
+
+    order: float
+    name: str
+    gear_ratio: float | None = None
+    assumed: bool = False
+
+    def __str__(self) -> str:
+        ratio = f", if the gear ratio is {self.gear_ratio:g}" if self.assumed else ""
+        return f"{self.order:g} ({self.name}{ratio})"
+
+
+_OUTPUT_SIDE: Final = {
+    1: "eccentricity of the output side, gravity load or the reference's mount",
+    2: "tilt or ellipticity of the output side, or the coupling of the reference",
+}
+
+
+def gear_orders(gear_ratio: float, fixed_member: str = "circular_spline") -> dict[float, str]:
+    """Orders per output turn that a gear of this ratio is known to make, with names.
+
+    ``{i, i+1, 2i, 2i+1, 2i+2, 3i, 4i}`` for i motor turns per output turn with the
+    circular spline fixed; ``i-1, 2i-1, 2i-2`` in place of the sums when the flexspline
+    is fixed; ``{i, 2i, 3i, 4i}`` for any other gear (``"none"``).
+
+    Examples
+    --------
+    >>> list(gear_orders(100))
+    [100, 101, 200, 201, 202, 300, 400]
+    >>> gear_orders(100)[202]
+    'tooth mesh with the circular spline'
+    """
+    if not (math.isfinite(gear_ratio) and gear_ratio > 0.0):
+        raise ArgumentError(
+            f"gear_ratio must be positive (motor turns per output turn), got {gear_ratio!r}"
+        )
+    if fixed_member not in FIXED_MEMBERS:
+        raise ArgumentError(
+            f"fixed_member must be one of {', '.join(FIXED_MEMBERS)}, got {fixed_member!r}"
+        )
+    i = float(gear_ratio)
+    if fixed_member == "none":
+        if i == 1.0:
+            return {}
+        names = ("once", "twice", "three times", "four times")
+        return {_whole((n + 1) * i): f"{name} per motor turn" for n, name in enumerate(names)}
+    # Circular spline fixed: the flexspline goes round with the output, the wave
+    # generator turns i + 1 times against it; flexspline fixed: i - 1 times. One tooth
+    # of difference per lobe makes 2i the teeth of the output member.
+    if fixed_member == "circular_spline":
+        sign, output, fixed = 1.0, "flexspline", "circular spline"
+    else:
+        sign, output, fixed = -1.0, "circular spline", "flexspline"
+    motor = "of the motor's encoder"
+    return {
+        _whole(i): f"once per motor turn: eccentricity or offset {motor}, or wave generator",
+        _whole(i + sign): f"wave generator against the {output}, once per turn",
+        _whole(2 * i): f"twice per motor turn: tilt, gain or quadrature error {motor}, "
+        f"or tooth mesh with the {output}",
+        _whole(2 * i + sign): "side band between the two tooth meshes",
+        _whole(2 * i + 2 * sign): f"tooth mesh with the {fixed}",
+        _whole(3 * i): f"three times per motor turn: waveform {motor}, or wave generator",
+        _whole(4 * i): f"four times per motor turn: interpolation error {motor}, or wave generator",
+    }
+
+
+def explain_order(
+    order: float,
+    aliases: Iterable[float] = (),
+    gear_ratio: float | None = None,
+    fixed_member: str = "circular_spline",
+) -> tuple[Explanation, ...]:
+    """Known lines of the joint that ``order`` or one of its ``aliases`` may be.
+
+    Without ``gear_ratio`` the common ratios are tried and each explanation says for
+    which ratio it holds.
+
+    Examples
+    --------
+    >>> [str(e) for e in explain_order(14, [22, 50, 202], gear_ratio=100)]
+    ['202 (tooth mesh with the circular spline)']
+    """
+    members = {float(order), *(float(m) for m in aliases)}
+    found = [Explanation(m, _OUTPUT_SIDE[m]) for m in sorted(_OUTPUT_SIDE) if m == float(order)]
+    ratios = COMMON_RATIOS if gear_ratio is None else (gear_ratio,)
+    for ratio in ratios:
+        for m, name in gear_orders(ratio, fixed_member).items():
+            if float(m) in members:
+                found.append(Explanation(m, name, float(ratio), gear_ratio is None))
+    return tuple(found)
+
+
+def _whole(order: float) -> float:
+    """An order as an int where it is one."""
+    return round(order) if abs(order - round(order)) < 1e-9 else order

@@ -1,0 +1,143 @@
+"""The shafts of a joint: turns per output turn, their harmonics, orders asked of them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import NamedTuple, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import ArgumentError
+
+__all__ = ["FIXED_MEMBERS", "Shaft", "ShaftOrders", "resolve_orders", "shaft_cycles"]
+
+Array: TypeAlias = NDArray[np.float64]
+
+FIXED_MEMBERS = ("circular_spline", "flexspline", "none")
+
+#: Turns of the wave generator against the output member, less those of the motor.
+_WAVE_GENERATOR = {"circular_spline": 1.0, "flexspline": -1.0, "none": 0.0}
+
+
+@dataclass(frozen=True)
+class Shaft:
+    """Harmonics of one shaft: order ``k`` is the output order ``k * cycles_per_turn``.
+
+    Parameters
+    ----------
+    name : str
+        ``"output"``, ``"motor"``, ``"wave_generator"`` or a name of your own.
+    cycles_per_turn : float
+        Turns of the shaft per output turn; any positive real.
+    orders : iterable of int
+        Whole numbers from 1, increasing.
+    cosine, sine : iterable of float
+        ``A_k`` and ``B_k``, in the unit of the model's period.
+    """
+
+    name: str
+    cycles_per_turn: float
+    orders: tuple[int, ...]
+    cosine: tuple[float, ...]
+    sine: tuple[float, ...]
+
+    def __post_init__(self) -> None:
+        put = object.__setattr__
+        put(self, "cycles_per_turn", float(self.cycles_per_turn))
+        put(self, "orders", tuple(int(k) for k in self.orders))
+        put(self, "cosine", tuple(float(a) for a in self.cosine))
+        put(self, "sine", tuple(float(b) for b in self.sine))
+
+    @property
+    def amplitudes(self) -> Array:
+        """``C_k = hypot(A_k, B_k)``."""
+        return np.hypot(self.cosine, self.sine)
+
+    @property
+    def phases(self) -> Array:
+        """``phi_k = atan2(A_k, B_k)`` in radians: the term is ``C sin(k x + phi)``."""
+        return np.arctan2(self.cosine, self.sine)
+
+
+class ShaftOrders(NamedTuple):
+    """Orders asked of one shaft."""
+
+    name: str
+    cycles_per_turn: float
+    orders: tuple[int, ...]
+
+
+def shaft_cycles(
+    gear_ratio: float | None, fixed_member: str = "circular_spline"
+) -> dict[str, float]:
+    """Turns per output turn of the shafts that a gear ratio makes known.
+
+    The output turns once, the motor ``gear_ratio`` times, the wave generator against the
+    output member ``gear_ratio + 1`` times when the circular spline is fixed and
+    ``gear_ratio - 1`` times when the flexspline is. ``gear_ratio`` is motor turns per
+    output turn in either case.
+
+    Examples
+    --------
+    >>> shaft_cycles(100.0)
+    {'output': 1.0, 'motor': 100.0, 'wave_generator': 101.0}
+    """
+    if fixed_member not in FIXED_MEMBERS:
+        raise ArgumentError(
+            f"fixed_member must be one of {', '.join(FIXED_MEMBERS)}, got {fixed_member!r}"
+        )
+    cycles = {"output": 1.0}
+    if gear_ratio is not None:
+        if not 0.0 < gear_ratio < float("inf"):
+            raise ArgumentError(
+                f"gear_ratio must be positive motor turns per output turn, got {gear_ratio!r}"
+            )
+        cycles["motor"] = float(gear_ratio)
+        if fixed_member != "none":
+            cycles["wave_generator"] = float(gear_ratio) + _WAVE_GENERATOR[fixed_member]
+    return cycles
+
+
+def resolve_orders(
+    orders: Iterable[float] | Mapping[str, Iterable[float]],
+    gear_ratio: float | None = None,
+    fixed_member: str = "circular_spline",
+    shafts: Mapping[str, float] | None = None,
+) -> list[ShaftOrders]:
+    """Shafts and their sorted orders; plain orders belong to the output.
+
+    Raises
+    ------
+    ArgumentError
+        A shaft of unknown speed, an order that is not a whole number from 1.
+    """
+    cycles = shaft_cycles(gear_ratio, fixed_member) | dict(shafts or {})
+    by_shaft = orders if isinstance(orders, Mapping) else {"output": orders}
+    for name, asked in by_shaft.items():
+        if not isinstance(asked, Iterable):
+            raise ArgumentError(
+                f"orders of shaft {name!r} must be a list such as range(1, 18), got {asked!r}"
+            )
+    wanted = []
+    for name, asked in by_shaft.items():
+        if name not in cycles:
+            raise ArgumentError(
+                f"how fast shaft {name!r} turns is not known: give gear_ratio, or "
+                f"shafts={{{name!r}: cycles per output turn}}"
+            )
+        checked = tuple(sorted({_order(order, name) for order in asked}))
+        if checked:
+            wanted.append(ShaftOrders(name, float(cycles[name]), checked))
+    return wanted
+
+
+def _order(order: object, shaft: str) -> int:
+    try:
+        whole = int(order)  # type: ignore[call-overload]
+        if whole == order and 1 <= whole < 2**31:
+            return int(whole)
+    except (TypeError, ValueError, OverflowError):
+        pass
+    raise ArgumentError(f"orders of shaft {shaft!r} must be whole numbers from 1, got {order!r}")

@@ -1,0 +1,277 @@
+"""The readings with what is already known projected out."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import replace
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..joint.pattern import Pattern, Surroundings, line_columns
+from ..joint.signals import Signals
+from .extension import Extension, penalty_of_parameter
+from .lines import LineBasis
+from .repeats import repeated_part
+from .whitening import RunEffect, Whitener, lag_correlation
+
+__all__ = ["ROUNDING", "LeastSquares", "best_ratio"]
+
+Array = NDArray[np.float64]
+
+#: Residuals are taken at most this many robust standard deviations large: wild readings
+#: must not make causes, and normal ones are not touched.
+CLIP = 4.0
+
+#: Arcsec below which what is left is the rounding of angles (1e-12 of a turn).
+ROUNDING = 1e-6
+
+#: Runs from which they, and not the readings, are what informs on a variance between runs.
+ENOUGH_RUNS = 8
+
+#: Ratios of variance (run effect to one reading) that are tried.
+RATIOS = np.geomspace(1e-5, 1e8, 53)
+
+
+class LeastSquares:
+    """Readings, what the simulation expects of them, and the terms chosen so far.
+
+    Parameters
+    ----------
+    signals : Signals
+    residual : ndarray
+        Measured minus simulated error, arcsec, unfolded.
+    around : Surroundings
+        The joint and the pattern that the simulation believes.
+    weights : ndarray, optional
+    lines : LineBasis, optional
+        Shared between regressions of the same readings.
+    """
+
+    def __init__(
+        self,
+        signals: Signals,
+        residual: Array,
+        around: Surroundings,
+        weights: Array | None = None,
+        lines: LineBasis | None = None,
+        rho: float | None = None,
+    ) -> None:
+        self.signals = signals
+        self.residual = residual
+        self.belief = around
+        self.around = around
+        self.weights = weights
+        self.fixed_rho = rho
+        self.bounds = signals.run_bounds()
+        self.n = len(signals)
+        self.log_n = penalty_of_parameter(self.n)
+        runs = len(self.bounds)
+        #: What a variance between runs costs.
+        self.log_runs = float(np.log(runs)) if runs >= ENOUGH_RUNS else self.log_n
+        self.lines = lines if lines is not None else LineBasis(signals.theta, around.joint)
+        self.base = np.column_stack(
+            [np.ones(self.n), *(line_columns(signals.theta, m) for m in around.pattern.orders)]
+        )
+        self.terms: list[Extension] = []
+        #: What causes proposed beside given terms; shared by regressions of the same readings.
+        self.memory: dict[Any, Any] = {}
+        self.update()
+        #: `deviance` without any term.
+        self.start = self.deviance
+
+    # -- model -------------------------------------------------------------------
+
+    def with_terms(self, terms: Iterable[Extension], rho: float | None = None) -> Self:
+        """The same readings with other terms (and this correlation of the noise)."""
+        other = object.__new__(type(self))
+        other.__dict__.update(self.__dict__)
+        other.terms = list(terms)
+        if rho is not None:
+            other.fixed_rho = rho
+        other.update()
+        return other
+
+    def without_repeats(self, by_direction: bool = False) -> Self:
+        """The regression without what repeats at the same place; itself where nothing does."""
+        left = np.where(self.wild, 0.0, self.left)
+        repeated = repeated_part(left, self.signals, by_direction)
+        if not repeated.any():
+            return self
+        other = object.__new__(type(self))
+        other.__dict__.update(self.__dict__)
+        other.residual = self.residual - repeated
+        other.memory = {}
+        other.update()
+        other.start = self.start + other.deviance - self.deviance
+        return other
+
+    def update(self) -> None:
+        """Fit the terms: run effects, correlation, clipping, projection."""
+        design = np.hstack([self.base, *(term.columns for term in self.terms)])
+        self.design = design
+        effects = [term.run_effect for term in self.terms if term.run_effect is not None]
+        target, rho = self.residual, self.fixed_rho or 0.0
+        self._noise: Whitener | None = None  # under which the design is projected
+        for _ in range(2):
+            self._project(target, rho, effects)
+            left = self.residual - design @ self.coefficients
+            left -= self.whiten.run_part(left)
+            scale = self.root_weights * left
+            spread = 1.4826 * float(np.median(np.abs(scale - np.median(scale))))
+            limit = CLIP * max(spread, 1e-12) / self.root_weights
+            wild = np.abs(left) > limit
+            if self.fixed_rho is None:
+                kept = np.clip(left, -limit, limit) * self.root_weights
+                rho = lag_correlation(kept, self.signals.clock, self.bounds)
+            settled = not wild.any() and rho == self.whiten.rho
+            if settled:
+                break
+            target = np.where(
+                wild, self.residual - left + np.clip(left, -limit, limit), self.residual
+            )
+        if len(effects) > 1:
+            for k in range(len(effects)):
+                effects[k] = self._refit_ratio(target, rho, effects, k)
+        if len(effects) > 1 or not settled:
+            self._project(target, rho, effects)
+        self.target, self.wild = target, wild
+        kept_effects = iter(effects)
+        self.terms = [
+            replace(term, run_effect=next(kept_effects)) if term.run_effect is not None else term
+            for term in self.terms
+        ]
+        self.left = self.residual - design @ self.coefficients
+        self.around = Surroundings(self.belief.joint, self._pattern())
+
+    @property
+    def root_weights(self) -> Array:
+        """Square roots of the weights."""
+        return np.ones(self.n) if self.weights is None else np.sqrt(self.weights)
+
+    def _project(self, target: Array, rho: float, effects: list[RunEffect]) -> None:
+        """Fit the design to ``target`` under this noise."""
+        if self._noise is None or self._noise.rho != rho or self._noise.effects != effects:
+            self._noise = self.whiten = Whitener(self.bounds, rho, effects, self.weights)
+            columns = self.whiten(self.design)
+            scale = np.sqrt(np.einsum("ij,ij->j", columns, columns))
+            scale[scale == 0.0] = 1.0
+            u, s, vt = np.linalg.svd(columns / scale, full_matrices=False)
+            kept = s > 1e-7 * s[0]
+            self.q = u[:, kept]
+            self.back = vt[kept].T / s[kept] / scale[:, None]
+            self.unscaled_covariance = self.back @ self.back.T
+        y = self.whiten(target)
+        inner = self.q.T @ y
+        self.r = y - self.q @ inner
+        self.rss = max(float(self.r @ self.r), 1e-300)
+        self.coefficients = self.back @ inner
+
+    def _refit_ratio(
+        self, target: Array, rho: float, effects: list[RunEffect], k: int
+    ) -> RunEffect:
+        others = [effect for j, effect in enumerate(effects) if j != k]
+        self._project(target, rho, others)
+        ratio, _ = best_ratio(self, effects[k].columns)
+        return RunEffect(effects[k].columns, max(ratio, 1e-9))
+
+    def _pattern(self) -> Pattern:
+        """The believed pattern with the missing orders found so far.
+
+        Not with the fitted corrections: an effect on the pattern (a filter) would be
+        taken for one in part, and then act on a pattern that it has already changed.
+        """
+        belief = self.belief.pattern
+        orders = [*belief.orders]
+        pairs = [*zip(belief.cosine, belief.sine, strict=True)]
+        for term, coefficients in self.fitted():
+            if term.line is not None:
+                orders.append(term.line)
+                pairs.append((coefficients[0], coefficients[1]))
+        array = np.array(pairs, dtype=np.float64).reshape(-1, 2)
+        return Pattern(np.array(orders, dtype=np.float64), array[:, 0], array[:, 1])
+
+    def fitted(self) -> list[tuple[Extension, Array]]:
+        """Every term with its coefficients."""
+        found = []
+        start = self.base.shape[1]
+        for term in self.terms:
+            stop = start + term.columns.shape[1]
+            found.append((term, self.coefficients[start:stop]))
+            start = stop
+        return found
+
+    def covariance(self, k: int) -> Array:
+        """Covariance of the coefficients of term ``k``."""
+        start = self.base.shape[1] + sum(t.columns.shape[1] for t in self.terms[:k])
+        stop = start + self.terms[k].columns.shape[1]
+        return np.asarray(self.unscaled_covariance[start:stop, start:stop] * self.variance)
+
+    @property
+    def variance(self) -> float:
+        """Variance of one reading's noise, arcsec squared."""
+        return float(self.rss / max(self.n - self.q.shape[1], 1))
+
+    @property
+    def is_explained(self) -> bool:
+        """Nothing but rounding is left (of simulated runs without noise)."""
+        return self.variance < ROUNDING**2
+
+    @property
+    def deviance(self) -> float:
+        """-2 ln of the likelihood, up to a constant of the readings."""
+        return float(self.n * np.log(self.rss / self.n)) + float(self.whiten.log_determinant)
+
+    @property
+    def bic(self) -> float:
+        """Deviance plus the price of the terms' parameters and searches."""
+        price = sum(t.parameters * t.log_n + 2.0 * t.log_grid for t in self.terms)
+        return self.deviance + price
+
+    def as_deviance(self, saved: float) -> float:
+        """``n ln(RSS/(RSS - saved))``."""
+        return float(self.as_deviances(np.array([saved]))[0])
+
+    def as_deviances(self, saved: Array) -> Array:
+        """`as_deviance` of each."""
+        share = np.minimum(saved / self.rss, 1.0 - 1e-15)
+        return np.asarray(-self.n * np.log1p(-share))
+
+    def has(self, cause: str) -> bool:
+        """A term of this cause is among the terms."""
+        return any(term.cause == cause for term in self.terms)
+
+
+def best_ratio(fit: LeastSquares, columns: Array) -> tuple[float, float]:
+    """Best ratio of variances of a run effect beside what is fitted, and the deviance it saves."""
+    z = fit.whiten(columns)
+    stacked = np.column_stack([fit.q, fit.r])
+    gram = np.array([z[a:b].T @ z[a:b] for a, b in fit.bounds])
+    moment = np.array([z[a:b].T @ stacked[a:b] for a, b in fit.bounds])
+    values, vectors = np.linalg.eigh(gram)
+    values = np.maximum(values, 0.0)
+    kept = values > 1e-12 * values.max(initial=1e-300)
+    turned = np.einsum("jki,jkl->jil", vectors, moment)
+    b = (turned / np.sqrt(np.where(kept, values, 1.0))[:, :, None])[kept]
+    power = values[kept]
+    bq, br = b[:, :-1], b[:, -1]
+    scale = max(float(power.max(initial=0.0)), 1e-300)
+
+    def saved(trial: float) -> float:
+        shrink = trial * power / (1.0 + trial * power)
+        cross = bq.T @ (shrink * br)
+        inner = np.eye(bq.shape[1]) - bq.T @ (shrink[:, None] * bq)
+        inner[np.diag_indices_from(inner)] += 1e-12
+        total = float(br @ (shrink * br)) + float(cross @ np.linalg.solve(inner, cross))
+        return fit.as_deviance(total) - float(np.log1p(trial * power).sum())
+
+    # Every fourth ratio first: the maximum is broad.
+    trials = RATIOS / scale
+    coarse = range(0, trials.size, 4)
+    middle = max(coarse, key=lambda k: saved(float(trials[k])))
+    near = range(max(middle - 3, 0), min(middle + 4, trials.size))
+    deviance = {k: saved(float(trials[k])) for k in near}
+    k = max(near, key=lambda k: deviance[k])
+    ratio, best = (float(trials[k]), deviance[k]) if deviance[k] > 0.0 else (0.0, 0.0)
+    return ratio, best

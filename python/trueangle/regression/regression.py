@@ -1,0 +1,164 @@
+"""Scores of candidate columns beside what the regression already knows."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .batch import Blocks, block_gram
+from .extension import Extension
+from .leastsquares import ROUNDING, LeastSquares, best_ratio
+from .whitening import RunEffect
+
+__all__ = ["ROUNDING", "Extension", "Regression"]
+
+Array = NDArray[np.float64]
+
+#: Share of a column's power that must be left after projection for it to count at all.
+EXCITED = 1e-4
+
+
+class Regression(LeastSquares):
+    """Readings, what the simulation expects of them, the terms chosen so far, and scores.
+
+    What a candidate would save is computed for its columns projected beside the others
+    (Frisch and Waugh), all of a search at once. Parameters are those of `LeastSquares`.
+    """
+
+    def projected(self, columns: Array) -> tuple[Array, NDArray[np.bool_]]:
+        """Whitened columns with what is known taken out, and which are excited."""
+        x = self.whiten(columns)
+        before = np.einsum("ij,ij->j", x, x)
+        x = x - self.q @ (self.q.T @ x)
+        after = np.einsum("ij,ij->j", x, x)
+        return x, after > EXCITED * np.maximum(before, 1e-300)
+
+    def gain(self, columns: Array) -> tuple[float, Array]:
+        """Deviance that ``columns`` save together, and their coefficients."""
+        x, excited = self.projected(columns)
+        coefficients = np.zeros(columns.shape[1])
+        if not excited.all():
+            return 0.0, coefficients
+        gram = x.T @ x
+        scale = np.sqrt(np.diag(gram))
+        values, vectors = np.linalg.eigh(gram / np.outer(scale, scale))
+        if values[0] < EXCITED * values[-1]:
+            return 0.0, coefficients
+        moment = vectors.T @ (x.T @ self.r / scale)
+        saved = float(np.sum(moment**2 / values))
+        coefficients = (vectors @ (moment / values)) / scale
+        return self.as_deviance(saved), coefficients
+
+    def coefficients_with(self, extension: Extension) -> Array:
+        """Coefficients of all terms so far if a extension joined them."""
+        moved = self.back @ (self.q.T @ self.whiten(extension.columns))
+        return np.asarray(self.coefficients - moved @ extension.coefficients)
+
+    def gains(self, columns: Array) -> Array:
+        """Deviance that each column saves alone."""
+        x, excited = self.projected(columns)
+        power = np.einsum("ij,ij->j", x, x)
+        saved = (x.T @ self.r) ** 2 / np.maximum(power, 1e-300)
+        return np.where(excited, self.as_deviances(saved), 0.0)
+
+    def block_gains(self, blocks: Blocks) -> Array:
+        """Deviance that each block of columns saves alone, as `gain` of each."""
+        found = np.zeros(blocks.count)
+        for where, width, columns, gram in blocks.groups:
+            x = self.whiten(columns)
+            before = gram if x is columns else block_gram(x, width)
+            known = (self.q.T @ x).reshape(self.q.shape[1], -1, width)
+            moment = (self.r @ x).reshape(-1, width)
+            after = before - np.einsum("kbi,kbj->bij", known, known)
+            power = np.einsum("bii->bi", after)
+            limit = EXCITED * np.maximum(np.einsum("bii->bi", before), 1e-300)
+            excited = (power > limit).all(axis=1)
+            scale = np.sqrt(np.where(excited[:, None], power, 1.0))
+            values, vectors = np.linalg.eigh(after / (scale[:, :, None] * scale[:, None, :]))
+            excited &= values[:, 0] > EXCITED * values[:, -1]
+            turned = np.einsum("bij,bi->bj", vectors, moment / scale)
+            saved = np.sum(turned**2 / np.where(excited[:, None], values, 1.0), axis=1)
+            found[where] = self.as_deviances(np.where(excited, saved, 0.0))
+        return found
+
+    def remembered(self, name: str, key: object, build: Callable[[], Any]) -> Any:
+        """What ``build`` makes for ``key``; of every name the last one is kept.
+
+        The pattern is part of the key.
+        """
+        pattern = self.around.pattern
+        key = (key, *(a.tobytes() for a in (pattern.orders, pattern.cosine, pattern.sine)))
+        kept = self.memory.get(("kept", name))
+        if kept is None or kept[0] != key:
+            kept = self.memory["kept", name] = (key, build())
+        return kept[1]
+
+    def fixed_gains(self, columns: Array) -> Array:
+        """Deviance that each column saves with the coefficient 1."""
+        x, excited = self.projected(columns)
+        saved = 2.0 * (x.T @ self.r) - np.einsum("ij,ij->j", x, x)
+        return np.where(excited, self.as_deviances(saved), 0.0)
+
+    def line_gains(self) -> Array:
+        """Deviance that a line of each order of `lines` saves (two coefficients)."""
+        whitened = None if self.whiten.is_identity else self.whiten(self.lines.values)
+        cosines, sines, mixed = self.lines.products(whitened)
+        # Cosines and sines side by side, real.
+        e = (self.lines.values if whitened is None else whitened).view(np.float32)
+        known = (self.q.astype(np.float32).T @ e).astype(np.float64)
+        moment = (self.r.astype(np.float32) @ e).astype(np.float64)
+        aa = cosines - (known[:, 0::2] ** 2).sum(axis=0)
+        bb = sines - (known[:, 1::2] ** 2).sum(axis=0)
+        ab = mixed - (known[:, 0::2] * known[:, 1::2]).sum(axis=0)
+        determinant = aa * bb - ab**2
+        c, s = moment[0::2], moment[1::2]
+        excited = determinant > 1e-3 * (0.5 * (cosines + sines)) ** 2
+        saved = (bb * c * c - 2.0 * ab * c * s + aa * s * s) / np.where(excited, determinant, 1.0)
+        return np.where(excited, self.as_deviances(np.maximum(saved, 0.0)), 0.0)
+
+    def propose(
+        self,
+        cause: str,
+        shape: dict[str, Any],
+        columns: Array,
+        parameters: int | None = None,
+        log_grid: float = 0.0,
+        deviance: float | None = None,
+        line: float | None = None,
+    ) -> Extension:
+        """Extension of regressors with their evidence in this regression."""
+        saved, coefficients = self.gain(columns)
+        return Extension(
+            cause,
+            shape,
+            columns,
+            columns.shape[1] if parameters is None else parameters,
+            log_grid,
+            saved if deviance is None else deviance,
+            self.log_n,
+            coefficients=coefficients,
+            line=line,
+        )
+
+    def propose_run_effect(
+        self, cause: str, shape: dict[str, Any], columns: Array, log_grid: float = 0.0
+    ) -> Extension:
+        """Extension of a run effect with its evidence in this regression."""
+        ratio, deviance = best_ratio(self, columns)
+        return Extension(
+            cause,
+            shape,
+            np.zeros((self.n, 0)),
+            1,
+            log_grid,
+            deviance,
+            self.log_runs,
+            RunEffect(columns, ratio),
+        )
+
+    def hopeless(self, deviance: float, parameters: int, log_grid: float = 0.0) -> bool:
+        """A coarse search this far below its price gains nothing by refining."""
+        return 1.5 * deviance + 10.0 < parameters * self.log_n + 2.0 * log_grid
