@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from .errors import ArgumentError, ModelFileError, TrueAngleError
-from .files import written_atomically
+from .files import MODEL, MODEL_BYTES, read_whole, written_atomically
 from .model import HarmonicModel
 from .records import FitRecord, Provenance
 from .runs import Source
@@ -60,8 +60,15 @@ def save_model(model: HarmonicModel, path: str | PathLike[str]) -> None:
             "package": model.provenance.package,
         },
     }
-    with written_atomically(path) as file:
-        file.write(_pretty(content) + "\n")
+    text = _pretty(content) + "\n"
+    if len(text) > MODEL_BYTES:
+        raise ArgumentError(
+            f"{path}: the model takes {len(text)} bytes, and at most {MODEL_BYTES} are read back; "
+            "save it without its covariance"
+        )
+    hashes = [source.sha256 for source in model.provenance.inputs]
+    with written_atomically(path, kind=MODEL, hashes=hashes) as file:
+        file.write(text)
 
 
 def load_model(path: str | PathLike[str]) -> HarmonicModel:
@@ -109,7 +116,7 @@ class _Reader:
             raise self.error(f"holds {name}; every number must be finite")
 
         try:
-            text = self.path.read_text(encoding="utf-8")
+            text = read_whole(self.path, MODEL_BYTES, "a model").decode("utf-8")
             value = json.loads(text, object_pairs_hook=pairs, parse_constant=constant)
         except json.JSONDecodeError as cause:
             raise ModelFileError(

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from .angles import UNIT_PERIODS
 from .errors import ArgumentError, FileError, MissingExtraError
+from .files import RUNS_BYTES, read_whole
 from .runs import CalibrationRun, Source
 from .signals import FIELDS, SIGNALS, Signal, find_signal
 
@@ -104,9 +105,12 @@ class _Table:
 
 
 def _read_file(path: Path, counts_per_turn: float | None) -> list[CalibrationRun]:
-    if path.is_dir():
-        raise FileError(path, "is a folder; name the files in it")
-    data = path.read_bytes()
+    data = read_whole(
+        path,
+        RUNS_BYTES,
+        "a table of runs",
+        "fit_logs (trueangle fit --one-pass) reads more, in constant memory",
+    )
     source = Source(path.name, hashlib.sha256(data).hexdigest())
     parquet = data[:4] == b"PAR1" or path.suffix in (".parquet", ".pq")
     table = _parquet(path, data) if parquet else _csv(path, data)

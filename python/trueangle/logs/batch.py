@@ -162,7 +162,7 @@ def correct_logs(
         joints_of(model, column, signals), unit, counts_per_turn, topic, output_topic, threads
     )
     paths = [logs] if isinstance(logs, (str, PathLike)) else list(logs)
-    found = places(paths, output, in_place)
+    found = places(paths, output, in_place, _files_of(model))
     result = BatchReport(
         [LogReport(place.source, place.target, stamp(place.source)[0]) for place in found]
     )
@@ -191,6 +191,12 @@ def correct_logs(
             shown.clear()
     result.seconds = time.monotonic() - start
     return result
+
+
+def _files_of(model: Any) -> list[str | PathLike[str]]:
+    """The model files among what was given as model."""
+    given = model.values() if isinstance(model, Mapping) else [model]
+    return [entry for entry in given if isinstance(entry, (str, PathLike))]
 
 
 def done_before(

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from .. import __version__
 from ..angles import UNIT_PERIODS
 from ..errors import ArgumentError, FileError, OutsideSpanWarning
+from ..files import sha256_of
 from ..model import HarmonicModel
 from ..modelfile import load_model
 from .columns import SIGNAL_COLUMNS, AngleColumn, find_angle_column, find_signal_column
@@ -63,8 +64,9 @@ class Joint:
         signals: Mapping[str, str] | None = None,
     ) -> Joint:
         """Joint of the model file ``path``."""
-        digest = hashlib.sha256(Path(path).read_bytes()).hexdigest()
-        return cls(load_model(path), name, column, signals or {}, Path(path).name, digest)
+        model = load_model(path)  # lets in models of a bounded size only
+        digest = sha256_of(path)
+        return cls(model, name, column, signals or {}, Path(path).name, digest)
 
     @cached_property
     def digest(self) -> str:

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import ArgumentError
+from ..files import check_output
 from .safety import Stamp, locked, stamp
 
 __all__ = ["MANIFEST", "Manifest"]
@@ -44,7 +45,10 @@ class Manifest:
         ------
         ArgumentError
             Another process is working into the same folder.
+        FileError
+            Something that is no regular file has the manifest's name.
         """
+        check_output(self.path, regular=True)
         with self.path.open("ab"):
             pass
         with locked(self.path) as free:

@@ -9,16 +9,16 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+from ..files.outputs import LONGEST as _LONGEST
+from ..files.outputs import PARTIAL as _ENDING
+from ..files.outputs import sync
+
 try:
     import fcntl
 except ImportError:  # pragma: no cover - Windows has no flock
     fcntl = None  # type: ignore[assignment]
 
 __all__ = ["Stamp", "locked", "publish", "remove_leftovers", "stamp", "workplace"]
-
-_ENDING = ".trueangle-partial"
-#: Of a name that its hidden folder repeats: names may have 255 bytes in all.
-_LONGEST = 50
 
 Stamp = tuple[int, int]
 
@@ -34,8 +34,10 @@ def stamp(path: Path) -> Stamp:
 def workplace(target: Path) -> Iterator[Path]:
     """Path of the same name in a new hidden folder beside ``target``, removed at the end.
 
+    Of a symbolic link that is the file it leads to: `publish` renames beside it.
     The folder is locked as long as its process lives: `remove_leftovers` spares it.
     """
+    target = Path(os.path.realpath(target))
     folder = Path(
         tempfile.mkdtemp(dir=target.parent, prefix=f".{target.name[:_LONGEST]}.", suffix=_ENDING)
     )
@@ -68,19 +70,24 @@ def locked(path: Path) -> Iterator[bool]:
 
 
 def publish(aside: Path, target: Path) -> None:
-    """Sync ``aside`` to the disk and give it the name ``target``, replacing what is there."""
+    """Sync ``aside`` to the disk and give it the name ``target``, replacing what is there.
+
+    A symbolic link stays; what it leads to is replaced.
+    """
+    target = Path(os.path.realpath(target))
     for file in [aside] if aside.is_file() else list(aside.rglob("*")):
-        _sync(file)
-    _sync(aside)
+        sync(file)
+    sync(aside)
     if target.is_dir() and aside.is_dir():
         # A folder cannot be replaced in one step: `remove_leftovers` undoes a half.
         os.replace(target, _replaced(aside))
     os.replace(aside, target)
-    _sync(target.parent)
+    sync(target.parent)
 
 
 def remove_leftovers(target: Path) -> None:
     """Remove what killed processes left of ``target``; put a replaced folder back."""
+    target = Path(os.path.realpath(target))
     for folder in target.parent.glob(f".{glob_escape(target.name[:_LONGEST])}.*{_ENDING}"):
         with locked(folder) as free:
             if not free:
@@ -98,13 +105,3 @@ def glob_escape(name: str) -> str:
 
 def _replaced(aside: Path) -> Path:
     return aside.with_name(aside.name + ".replaced")
-
-
-def _sync(path: Path) -> None:
-    if os.name == "nt" and path.is_dir():  # pragma: no cover - folders have no handle there
-        return
-    handle = os.open(path, os.O_RDONLY)
-    try:
-        os.fsync(handle)
-    finally:
-        os.close(handle)

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from ..angles import ARCSEC_PER_TURN, wrap
 from ..diagnosis import diagnose
 from ..errors import ArgumentError, NoModelError, TrueAngleError
-from ..files import written_atomically
+from ..files import PDF, REPORT, check_output, written_atomically
 from ..fitting.heldout import HeldOut, hold_out, hold_out_extended
 from ..plots.curves import Points, degrees, error_points, label_of
 from ..plots.simulatedcurves import left_after_causes
@@ -66,9 +66,20 @@ class Report:
         return render(self)
 
     def save(self, path: str | PathLike[str]) -> None:
-        """Write the page, complete or not at all."""
+        """Write the page, complete or not at all; a name that ends with ``.pdf``, as PDF.
+
+        Raises
+        ------
+        FileError
+            An ending of another format, a place that no file is written to, a file that
+            the runs were read from.
+        """
+        if str(path).lower().endswith(PDF.endings):
+            self.save_pdf(path)
+            return
+        check_output(path, REPORT)
         html = self.html
-        with written_atomically(path) as file:
+        with written_atomically(path, kind=REPORT, hashes=self._hashes) as file:
             file.write(html)
 
     def save_pdf(self, path: str | PathLike[str], browser: str | None = None) -> None:
@@ -81,7 +92,12 @@ class Report:
         """
         from .pdf import print_pdf
 
+        check_output(path, PDF, hashes=self._hashes)
         print_pdf(self.html, path, browser)
+
+    @property
+    def _hashes(self) -> list[str]:
+        return [entry["sha256"] for entry in self.content["provenance"]["inputs"]]
 
 
 def report(
@@ -128,6 +144,8 @@ def report(
     360.0
     """
     found = as_runs(runs)
+    if path is not None:  # before the work
+        check_output(path, REPORT, hashes=[run.source.sha256 for run in found if run.source])
     if simulation is not None:
         if gear_ratio is not None:
             raise ArgumentError("give gear_ratio or a simulation (which states it), not both")

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Final
 
 from ..errors import ArgumentError
+from ..files import PDF, check_output, publish
 
 __all__ = ["find_browser", "print_pdf"]
 
@@ -46,8 +47,9 @@ def print_pdf(html: str, path: str | PathLike[str], browser: str | None = None) 
             f"a PDF needs an installed browser ({', '.join(_BROWSERS[:3])} ...): install one, "
             "or open the HTML report and print it"
         )
-    target = Path(path)
-    with tempfile.TemporaryDirectory(dir=target.parent, prefix=".report-") as folder:
+    target = check_output(path, PDF)
+    beside = target.parent if target.is_file() or not target.exists() else None
+    with tempfile.TemporaryDirectory(dir=beside, prefix=".report-") as folder:
         page, printed = Path(folder, "report.html"), Path(folder, "report.pdf")
         page.write_text(html, encoding="utf-8")
         command = [program, "--headless", "--disable-gpu", "--no-pdf-header-footer"]
@@ -67,4 +69,4 @@ def print_pdf(html: str, path: str | PathLike[str], browser: str | None = None) 
         if not printed.is_file():
             last = (done.stderr.strip().splitlines() or ["no message"])[-1]
             raise ArgumentError(f"{program} did not print: {last}")
-        os.replace(printed, target)
+        publish(printed, target)

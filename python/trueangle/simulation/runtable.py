@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ..files import written_atomically
+from ..files import RUNS, written_atomically
 from ..runs import CalibrationRun, as_runs
 from ..signals import find_signal
 
@@ -40,7 +40,7 @@ def write_runs(runs: CalibrationRun | Iterable[CalibrationRun], path: str | Path
             is_angle = signal.kind in ("angle", "velocity")
             kept.append((signal.column.format("deg"), name, scale if is_angle else 1.0))
     has_units = any(run.unit is not None for run in found)
-    with written_atomically(path) as file:
+    with written_atomically(path, kind=RUNS) as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow([*(["unit"] if has_units else []), "run", *(name for name, _, _ in kept)])
         for j, run in enumerate(found):

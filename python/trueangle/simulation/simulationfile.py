@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from ..errors import ArgumentError, FileError
-from ..files import written_atomically
+from ..files import SIMULATION, SIMULATION_BYTES, read_whole, written_atomically
 from ..joint.joint import Joint
 from ..joint.pattern import Harmonic
 from .designs import RunDesign
@@ -55,8 +55,8 @@ def load_simulation(path: str | Path) -> Simulation:
     50.0
     """
     try:
-        with open(path, "rb") as file:
-            document = tomllib.load(file)
+        text = read_whole(path, SIMULATION_BYTES, "a simulation").decode("utf-8")
+        document = tomllib.loads(text)
     except tomllib.TOMLDecodeError as cause:
         raise FileError(path, f"not a TOML file: {cause}") from None
     except UnicodeDecodeError as cause:
@@ -198,7 +198,7 @@ def write(sim: Simulation, path: str | Path) -> None:
     is new is appended, so comments and layout stay. Otherwise the whole is written.
     """
     text = dumps(sim)
-    with written_atomically(path) as file:
+    with written_atomically(path, kind=SIMULATION) as file:
         file.write(text)
 
 

@@ -1,0 +1,35 @@
+"""The one door for files: what may be read, what may be written, and that it appears whole."""
+
+from .inputs import (
+    MODEL_BYTES,
+    RUNS_BYTES,
+    SIMULATION_BYTES,
+    check_input,
+    read_whole,
+    sha256_of,
+)
+from .kinds import MODEL, PAGE, PDF, REPORT, RUNS, SIMULATION, Kind, kind_of_log, promised_format
+from .outputs import check_output, publish, written_atomically
+from .samefile import same_file
+
+__all__ = [
+    "MODEL",
+    "MODEL_BYTES",
+    "PAGE",
+    "PDF",
+    "REPORT",
+    "RUNS",
+    "RUNS_BYTES",
+    "SIMULATION",
+    "SIMULATION_BYTES",
+    "Kind",
+    "check_input",
+    "check_output",
+    "kind_of_log",
+    "promised_format",
+    "publish",
+    "read_whole",
+    "same_file",
+    "sha256_of",
+    "written_atomically",
+]
