@@ -1,6 +1,8 @@
 """Fitting: against numpy, its uncertainties, and what must not change the model."""
 
+import copy
 import math
+import pickle
 
 import numpy as np
 import pytest
@@ -9,6 +11,7 @@ from hypothesis import strategies as st
 
 import trueangle as ta
 from trueangle import errors, reference
+from trueangle.fitting.heldout import hold_out
 
 # Two backward-stable solutions of the same well-conditioned problem.
 AGREE = 1e-12
@@ -246,3 +249,47 @@ def test_the_record_says_what_the_model_saw(tmp_path):
     assert model.provenance.inputs[0].file == "joint.csv"
     model.save(tmp_path / "joint.json")
     assert ta.load_model(tmp_path / "joint.json") == model
+
+
+@pytest.mark.parametrize("again", [copy.deepcopy, lambda x: pickle.loads(pickle.dumps(x))])
+def test_results_travel_to_other_processes(again):
+    theta, error = readings(4)
+    result = ta.fit(ta.CalibrationRun(theta, theta + error, 360.0))
+    there = again(result)
+    assert there.model == result.model
+    np.testing.assert_array_equal(there.residuals, result.residuals)
+    np.testing.assert_array_equal(there.covariance, result.covariance)
+    assert there.summary() == result.summary()
+    assert again(result.selection).orders == result.selection.orders
+
+
+def test_results_show_themselves_in_a_line_and_a_notebook():
+    theta, error = readings(4)
+    result = ta.fit(ta.CalibrationRun(theta, theta + error, 360.0))
+    for shown in (result, result.selection):
+        assert "\n" not in repr(shown)
+        assert len(repr(shown)) < 120
+        assert "arcsec" in shown._repr_html_()
+
+
+def test_an_unknown_way_of_solving_is_an_error_of_ours():
+    theta, error = readings(4)
+    with pytest.raises(errors.ArgumentError, match="method must be one of 'plain'"):
+        fitted(theta, theta + error, method="foo")
+
+
+@pytest.mark.parametrize(("member", "cycles"), [("flexspline", 29.0), ("none", 30.0)])
+def test_runs_are_held_out_with_the_gear_that_was_declared(member, cycles):
+    """Order 29.5 of one gear is 31.5 of the other: only the declared one explains it."""
+    rng = np.random.default_rng(8)
+    ratio = 30.5
+    line = ratio - 1.0 if member == "flexspline" else ratio
+    runs = []
+    for _ in range(3):
+        x = np.sort(rng.uniform(0.0, 1800.0, 600))
+        error = 0.1 * np.sin(np.radians(line * x)) + 0.01 * rng.normal(size=x.size)
+        runs.append(ta.CalibrationRun(x, x + error, 360.0))
+    result = ta.fit(runs, gear_ratio=ratio, fixed_member=member)
+    gain = hold_out(result)
+    assert all(run.model is not None and run.model.orders == (line,) for run in gain.runs)
+    assert gain.reduction > 0.8

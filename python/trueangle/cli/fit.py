@@ -26,12 +26,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="auto (default: by evidence), 1-17, 1,4,8, or per shaft: output:1-3;motor:1,2",
     )
     add_joint(parser)
-    parser.add_argument(
-        "--argument",
-        choices=("reference", "indicated"),
-        default="reference",
-        help="angle that the error is a function of (default: reference, the true angle)",
-    )
+    add_argument_choice(parser)
     parser.add_argument(
         "--loss",
         choices=("auto", "linear", "huber", "tukey"),
@@ -63,6 +58,17 @@ def add_joint(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--counts-per-turn", type=float, metavar="N", help="of an indicated_count column"
+    )
+
+
+def add_argument_choice(parser: argparse.ArgumentParser) -> None:
+    """The angle that errors are a function of; shared by several commands."""
+    parser.add_argument(
+        "--argument",
+        choices=("auto", "reference", "indicated"),
+        default="auto",
+        help="angle that the error is a function of (default: the true one, unless the "
+        "reference has an arbitrary zero in every run)",
     )
 
 

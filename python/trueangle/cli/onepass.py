@@ -85,7 +85,7 @@ def fit_in_one_pass(args: argparse.Namespace, orders: Any) -> LogFit:
         orders,
         gear_ratio=args.gear_ratio,
         fixed_member=args.fixed_member,
-        argument=getattr(args, "argument", "reference"),
+        argument="reference" if args.argument == "auto" else args.argument,
         counts_per_turn=args.counts_per_turn,
         scheduler=args.scheduler,
         checksums=getattr(args, "checksums", False),

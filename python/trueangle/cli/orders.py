@@ -7,7 +7,7 @@ import json
 import math
 from typing import TYPE_CHECKING
 
-from .fit import add_joint
+from .fit import add_argument_choice, add_joint
 from .onepass import add_one_pass, printed_orders, wants_one_pass
 from .order_lists import parse_orders
 
@@ -24,6 +24,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("runs", nargs="+", metavar="RUNS", help="CSV or Parquet files of readings")
     add("--orders", metavar="1-17,202", help="candidates (default: low orders and the gear's own)")
     add_joint(parser)
+    add_argument_choice(parser)
     add(
         "--method",
         choices=("evidence", "paper"),
@@ -57,6 +58,7 @@ def run(args: argparse.Namespace) -> int:
         args.gear_ratio,
         args.fixed_member,
         args.method,
+        argument=args.argument,
         reference_orders=reference,
     )
     print(json.dumps(as_json(selection), indent=2) if args.json else selection.summary())
@@ -73,6 +75,7 @@ def as_json(selection: OrderSelection) -> dict[str, object]:
         "samples": selection.samples,
         "runs": selection.runs,
         "method": selection.method,
+        "argument": selection.argument,
         "noise_arcsec": _finite(scale * selection.noise.standard_deviation),
         "noise_source": selection.noise.source,
         "holdout": selection.holdout,

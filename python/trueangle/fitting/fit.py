@@ -6,10 +6,11 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from ..errors import ArgumentError, NoModelError
-from ..model import Argument, check_invertible
+from ..model import check_invertible
 from ..runs import CalibrationRun, as_runs
 from ..shafts import resolve_orders
 from ..units import check_follows
+from .argument import ARGUMENTS, AnyArgument, Choice, choose_argument
 from .problem import Problem
 from .result import FitResult
 from .ridge import choose_ridge
@@ -33,7 +34,7 @@ def fit(
     gear_ratio: float | None = None,
     fixed_member: str = "circular_spline",
     shafts: Mapping[str, float] | None = None,
-    argument: Argument = "reference",
+    argument: AnyArgument = "auto",
     loss: Loss = "auto",
     ridge: float | None = None,
     method: str | None = None,
@@ -59,8 +60,10 @@ def fit(
         Of the strain wave gear: decides how fast the wave generator turns against the output.
     shafts : mapping of str to float, optional
         Further shafts and their cycles per output turn.
-    argument : {"reference", "indicated"}
-        Which angle the error is a function of. The true angle is right physically.
+    argument : {"auto", "reference", "indicated"}
+        Which angle the error is a function of. The true angle is right physically and is
+        what ``"auto"`` takes, unless the reference has an arbitrary zero in every run: then
+        the pattern repeats in the indicated angle only, and the notes say so.
     loss : {"auto", "linear", "huber", "tukey"}
         ``"auto"``: least squares, after readings more than 8 robust standard deviations
         off are set aside (and reported); ``"linear"``: least squares on all readings.
@@ -103,16 +106,21 @@ def fit(
     0.5
     """
     found = as_runs(runs)
-    if argument not in ("reference", "indicated"):
-        raise ArgumentError(f"argument must be 'reference' or 'indicated', got {argument!r}")
+    if argument not in ARGUMENTS:
+        raise ArgumentError(
+            f"argument must be 'auto', 'reference' or 'indicated', got {argument!r}"
+        )
     for run in found:
         check_follows(run)
     selection = None
     if orders is None or isinstance(orders, str):
-        selection, orders = _selected(found, orders, gear_ratio, fixed_member, loss)
-    problem = Problem(
-        found, resolve_orders(orders, gear_ratio, fixed_member, shafts), argument, method, threads
-    )
+        selection, orders = _selected(found, orders, gear_ratio, fixed_member, argument, loss)
+    wanted = resolve_orders(orders, gear_ratio, fixed_member, shafts)
+    if selection is not None:
+        choice = Choice(selection.argument)
+    else:
+        choice = choose_argument(found, argument, wanted)
+    problem = Problem(found, wanted, choice.argument, method, threads)
     weighted = weigh(problem, loss, _ROUNDING * problem.period)
     span = covered_span(problem.angles, problem.period)
     if ridge is None:
@@ -121,10 +129,11 @@ def fit(
     fitted = weighted.fitted
     if ridge > 0.0:
         fitted = problem.solve(weighted.weights or problem.base, ridge)
-    if argument == "reference":
+    if problem.argument == "reference":
         check_invertible(fitted.series.slope_bound)
     joint = (gear_ratio, fixed_member)
-    return FitResult(problem, fitted, weighted, loss, ridge, span, selection, joint)
+    remarks = tuple(note for note in (choice.note,) if note)
+    return FitResult(problem, fitted, weighted, loss, ridge, span, selection, joint, remarks)
 
 
 def _selected(
@@ -132,6 +141,7 @@ def _selected(
     orders: str | None,
     gear_ratio: float | None,
     fixed_member: str,
+    argument: AnyArgument,
     loss: Loss,
 ) -> tuple[OrderSelection, Mapping[str, Iterable[float]]]:
     """Orders with evidence, from readings without spikes."""
@@ -141,7 +151,9 @@ def _selected(
 
     if loss != "linear":
         runs = [without_spikes(run) for run in runs]
-    selection = select_orders(runs, gear_ratio=gear_ratio, fixed_member=fixed_member)
+    selection = select_orders(
+        runs, gear_ratio=gear_ratio, fixed_member=fixed_member, argument=argument
+    )
     if not selection.orders:
         raise NoModelError(f"no order is supported by the data: {selection.reason}")
     return selection, selection.by_shaft

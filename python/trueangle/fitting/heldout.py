@@ -201,17 +201,10 @@ def _refit(fit: FitResult, train: Sequence[CalibrationRun]) -> HarmonicModel:
     if fit.selection is None:
         orders = {shaft.name: shaft.orders for shaft in fit.problem.shafts}
         return fit_runs(train, orders, shafts=shafts, argument=argument, loss=loss).model
-    ratio = fit.selection.gear_ratio
-    member = _fixed_member(ratio, shafts)
+    ratio, member = fit.joint
     return fit_runs(
         train, gear_ratio=ratio, fixed_member=member, argument=argument, loss=loss
     ).model
-
-
-def _fixed_member(ratio: float | None, shafts: dict[str, float]) -> str:
-    """The member that the shafts of a fit were resolved with."""
-    generator = shafts.get("wave_generator")
-    return "flexspline" if ratio and generator and generator < ratio else "circular_spline"
 
 
 def correct_held_out(model: HarmonicModel | None, run: CalibrationRun, label: str) -> HeldOutRun:

@@ -48,6 +48,7 @@ def fit_notes(fit: FitResult) -> Iterable[str]:
     span, weighted = fit.span, fit.weighted
     if not span.full:
         yield f"Fitted on {span.start:.6g} to {span.stop:.6g} only: outside it is extrapolated."
+    yield from (_sentence(remark) for remark in fit.remarks)
     if fit.ridge > 0.0:
         yield (
             f"On this arc the orders nearly cancel: a ridge of {fit.ridge:.1e} keeps the "
@@ -62,9 +63,13 @@ def fit_notes(fit: FitResult) -> Iterable[str]:
             "turn: the error does not repeat after one turn, angles must be unwrapped."
         )
     if fit.selection is not None and fit.selection.notes:
-        yield from (f"{note[:1].upper()}{note[1:]}." for note in fit.selection.notes)
+        yield from map(_sentence, fit.selection.notes)
     elif (verified := _verified(fit)) is not None:
-        yield f"{verified[1][:1].upper()}{verified[1][1:]}."
+        yield _sentence(verified[1])
+
+
+def _sentence(note: str) -> str:
+    return f"{note[:1].upper()}{note[1:]}."
 
 
 def _record(fit: FitResult) -> FitRecord:

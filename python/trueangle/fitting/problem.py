@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from functools import cached_property
+from typing import Any, Literal, NamedTuple, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,12 +17,31 @@ from ..model import Argument
 from ..runs import CalibrationRun
 from ..shafts import ShaftOrders
 
-__all__ = ["Fitted", "Problem"]
+__all__ = ["METHODS", "Fitted", "Problem"]
 
 Array = NDArray[np.float64]
 
+#: Ways of solving; None takes the fastest that keeps QR's accuracy.
+METHODS = (None, "plain", "moments", "qr", "counts")
+
 #: Readings looked at together when residuals are only scanned: stays in cache.
 _BLOCK = 16384
+
+
+class Solution(NamedTuple):
+    """The core's solution as plain values, for pickles and copies."""
+
+    offsets: Array
+    offset_std: Array
+    constant: float
+    cosine: list[list[float]]
+    sine: list[list[float]]
+    covariance: Array
+    residual_variance: float
+    degrees_of_freedom: float
+    rank: int
+    condition_number: float
+    method: Literal["plain", "moments", "qr", "counts"]
 
 
 class Fitted:
@@ -29,12 +49,13 @@ class Fitted:
 
     def __init__(
         self,
-        solution: _core.Solution,
+        solution: _core.Solution | Solution,
         offsets: Array,
         shafts: Sequence[ShaftOrders],
         period: float,
     ) -> None:
-        self.solution = solution
+        self.solution = cast(_core.Solution, solution)
+        self.shafts, self.period = tuple(shafts), period
         #: Zero of every run; NaN for a run without any weight.
         self.offsets = offsets
         self.series = _core.Series(
@@ -45,6 +66,10 @@ class Fitted:
             solution.cosine,
             solution.sine,
         )
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        values = Solution(*(getattr(self.solution, name) for name in Solution._fields))
+        return Fitted, (values, self.offsets, self.shafts, self.period)
 
     @property
     def amplitude_sum(self) -> float:
@@ -79,6 +104,9 @@ class Problem:
     ) -> None:
         self.runs = runs
         self.shafts = shafts
+        if method not in METHODS:
+            known = ", ".join(repr(name) for name in METHODS[1:])
+            raise ArgumentError(f"method must be one of {known} or None, got {method!r}")
         self.argument = argument
         self.method = method
         self.threads = threads

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property
+from html import escape
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -28,7 +29,7 @@ __all__ = ["FitResult"]
 Array = NDArray[np.float64]
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class FitResult:
     """A fitted model and everything needed to judge it.
 
@@ -52,6 +53,8 @@ class FitResult:
         The evidence, when the orders were chosen by it.
     joint : tuple
         Gear ratio (or None) and fixed member, as told.
+    remarks : tuple of str
+        What the choice of the angle, of the weights and of the runs found; among `notes`.
     """
 
     problem: Problem
@@ -62,6 +65,7 @@ class FitResult:
     span: Span
     selection: OrderSelection | None
     joint: tuple[float | None, str]
+    remarks: tuple[str, ...] = ()
 
     @cached_property
     def model(self) -> HarmonicModel:
@@ -228,3 +232,14 @@ class FitResult:
         from .summary import fit_summary
 
         return fit_summary(self)
+
+    def __repr__(self) -> str:
+        readings = sum(len(run) for run in self.runs)
+        return (
+            f"FitResult({len(self.orders)} orders from {readings} readings in "
+            f"{len(self.runs)} runs, residual {self.residual_std:.3g}, "
+            f"period={self.model.period:g})"
+        )
+
+    def _repr_html_(self) -> str:
+        return f"<pre>{escape(self.summary())}</pre>"

@@ -64,6 +64,7 @@ def choose_forward(
     readings: int,
     noise: tuple[float, float] | None,
     forced: Sequence[int] = (),
+    barred: Sequence[int] = (),
 ) -> list[int]:
     """Indices of orders, taken one by one while the best of the rest is significant.
 
@@ -78,6 +79,8 @@ def choose_forward(
         None takes the residual of the orders chosen so far, the one on trial included.
     forced : sequence of int
         Taken first, whatever they bring.
+    barred : sequence of int
+        Never taken.
 
     Returns
     -------
@@ -91,6 +94,7 @@ def choose_forward(
     # Scale free: energy of both columns, the smaller direction counts.
     energy = 0.5 * (aa + bb)
     alive = energy > 0.0
+    alive[list(barred)] = False
     chosen: list[int] = []
     queue = list(forced)
     while alive.any():

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import replace
 from typing import Literal
 
 from ..aliasing import distinct_positions
 from ..errors import ArgumentError
+from ..fitting.argument import AnyArgument, at_indicated, choose_argument
 from ..runs import CalibrationRun, as_runs
 from .candidates import choose_candidates
 from .paper import select_by_paper
@@ -25,6 +27,7 @@ def select_orders(
     fixed_member: str = "circular_spline",
     method: Method = "evidence",
     *,
+    argument: AnyArgument = "auto",
     reference_orders: Iterable[float] = (),
     tolerance: float | None = None,
 ) -> OrderSelection:
@@ -55,6 +58,9 @@ def select_orders(
     method : {"evidence", "paper"}
         ``"paper"``: amplitude and phase range over the runs
         (`trueangle.orders.paper.select_by_paper`).
+    argument : {"auto", "reference", "indicated"}
+        Which angle the orders are sought in. ``"auto"``: the true angle, unless every run has
+        an arbitrary zero of the reference (`trueangle.fitting.argument.choose_argument`).
     reference_orders : iterable of float, optional
         Orders that the reference itself is known to make (50 and 100 for a stepper motor
         of 200 steps). They and their side bands are fitted, named and not retained.
@@ -93,13 +99,19 @@ def select_orders(
     kept = [run for run in map(_without_zero_weights, found) if run is not None]
     if not kept:
         raise ArgumentError("all readings have weight 0: nothing is left to select orders from")
+    choice = choose_argument(kept, argument)
+    if choice.argument == "indicated":
+        kept = [at_indicated(run) for run in kept]
     positions = distinct_positions(kept, tolerance)
     chosen = choose_candidates(
         positions, candidates, gear_ratio, fixed_member, tuple(reference_orders)
     )
     if method == "paper":
-        return select_by_paper(kept, positions, chosen)
-    return EvidenceSelection(kept, positions, chosen).result()
+        selection = select_by_paper(kept, positions, chosen)
+    else:
+        selection = EvidenceSelection(kept, positions, chosen).result()
+    notes = (choice.note, *selection.notes) if choice.note else selection.notes
+    return replace(selection, argument=choice.argument, notes=notes)
 
 
 def _without_zero_weights(run: CalibrationRun) -> CalibrationRun | None:

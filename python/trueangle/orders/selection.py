@@ -9,12 +9,10 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from .. import _core
 from ..aliasing import Positions
 from ..runs import CalibrationRun
 from .candidates import Candidates
 from .evidence import (
-    OrderTest,
     choose_forward,
     examine_orders,
     fit_subset,
@@ -26,8 +24,9 @@ from .harmonicsums import HarmonicSums, harmonic_sums
 from .lookalikes import find_lookalikes
 from .phases import circular_range_deg, unit_phases
 from .repeats import Noise, pure_error
+from .steepness import greatest_slope
 from .table import OrderRow, OrderSelection
-from .verdicts import explained, selection_notes
+from .verdicts import because, explained, selection_notes
 from .zerogroups import angle_blocks, units_of
 
 __all__ = ["FALSE_ALARM", "EvidenceSelection"]
@@ -52,6 +51,9 @@ NEGLIGIBLE_NOISE: Final = 0.1
 #: angle stands for several true ones, as ill-determined orders on a short arc make it.
 STEEPEST: Final = 0.95
 
+#: Searches at most after orders were left out as too steep.
+_AGAIN: Final = 3
+
 
 class EvidenceSelection:
     """One selection by evidence, step by step."""
@@ -69,6 +71,8 @@ class EvidenceSelection:
         self.free = self.samples - len(self.units)
         self.repeats = pure_error(self.units, self.positions)
         self.limits = candidates.log_limits(FALSE_ALARM)
+        #: Orders too steep to be retained.
+        self.barred: list[int] = []
         reference = set(candidates.reference)
         self.forced = [i for i, k in enumerate(self.orders) if k in reference]
         if len(self.units) > 1:
@@ -83,12 +87,30 @@ class EvidenceSelection:
 
     def result(self) -> OrderSelection:
         """The selection with its table."""
-        chosen = self._forward()
-        chosen, dropped = self._backward(chosen)
+        chosen, dropped = self._backward(self._forward())
+        # What made the error too steep held others' places: choose again without it.
+        for _ in range(_AGAIN):
+            steep = [i for i, verdict in dropped.items() if verdict == "too steep"]
+            if not steep:
+                break
+            self.barred = steep
+            again, others = self._backward(self._forward())
+            dropped |= others
+            if not any(verdict == "too steep" for verdict in others.values()):
+                chosen = again
+                break
+        dropped = {i: verdict for i, verdict in dropped.items() if i not in chosen}
         return self._report(self._lowest(chosen), dropped)
 
     def _noise(self, chosen: Sequence[int]) -> Noise:
-        """Repeats, or the residual of all candidates, or of the chosen orders."""
+        """Repeats, or the residual of all candidates, or of the chosen orders.
+
+        Real orders that may not be retained disturb the others as noise does: the residual
+        of the chosen ones holds them.
+        """
+        if self.barred:
+            dof = max(1, self.free - 2 * len(chosen))
+            return Noise(fit_subset(self.sums, chosen)[2] / dof, dof, "model")
         if self.repeats is not None and self.repeats.degrees_of_freedom >= _ENOUGH_DOF:
             return self.repeats
         everything = len(self.orders)
@@ -113,7 +135,7 @@ class EvidenceSelection:
         known = None
         if noise.source != "model":
             known = (noise.variance, float(noise.degrees_of_freedom))
-        return choose_forward(self.sums, self.limits, self.free, known, self.forced)
+        return choose_forward(self.sums, self.limits, self.free, known, self.forced, self.barred)
 
     def _backward(self, chosen: list[int]) -> tuple[list[int], dict[int, str]]:
         """Drop, worst first, what does not stand beside the others."""
@@ -135,7 +157,12 @@ class EvidenceSelection:
                 small = (share < NEGLIGIBLE_SHARE) & (amplitude < NEGLIGIBLE_NOISE * scatter_of_one)
                 verdict, failing = "negligible", np.where(small, 1.0, -1.0)
                 if not small.any():
-                    verdict, failing = "too steep", self._too_steep(chosen, mine, test)
+                    steep = self._too_steep(chosen)
+                    if steep:
+                        dropped |= dict.fromkeys(steep, "too steep")
+                        chosen = [i for i in chosen if i not in steep]
+                        continue
+                    failing = np.full(len(mine), -1.0)
                 if not (failing >= 0.0).any():
                     return chosen, dropped
             # The weaker half at once: the stronger may recover once these are gone.
@@ -146,21 +173,29 @@ class EvidenceSelection:
             gone = {mine[w] for w in worst}
             chosen = [i for i in chosen if i not in gone]
 
-    def _too_steep(self, chosen: Sequence[int], orders: Sequence[int], test: OrderTest) -> Array:
-        """0 at the weakest order while the error may be too steep to be corrected, else -1."""
-        ranks = sorted(chosen)
-        cosine, sine = fit_subset(self.sums, ranks)[0].reshape(2, -1).tolist()
-        orders_of = [self.orders[i] for i in ranks]
-        if self.candidates.whole:
-            cycles, lines, a, b = [1.0], [[int(k) for k in orders_of]], [cosine], [sine]
-        else:
-            cycles, lines = [float(k) for k in orders_of], [[1]] * len(ranks)
-            a, b = [[v] for v in cosine], [[v] for v in sine]
-        error = _core.Series(self.runs[0].period, 0.0, cycles, lines, a, b)
-        failing = np.full(len(orders), -1.0)
-        if error.slope_bound >= STEEPEST:
-            failing[int(np.argmin(test.statistic))] = 0.0
-        return failing
+    def _too_steep(self, chosen: Sequence[int]) -> list[int]:
+        """Orders to leave out so that the error can be corrected: the steepest weak ones.
+
+        One by one that order goes which adds most slope for the energy that it explains,
+        its order over its amplitude, until the greatest slope of the rest is below `STEEPEST`.
+        """
+        kept = sorted(chosen)
+        gone: list[int] = []
+        while True:
+            cosine, sine = fit_subset(self.sums, kept)[0].reshape(2, -1)
+            orders = self.orders_of(kept)
+            if greatest_slope(orders, cosine, sine, self.runs[0].period) < STEEPEST:
+                return gone
+            price = np.asarray(orders) / np.maximum(np.hypot(cosine, sine), 1e-300)
+            price[[kept.index(i) for i in self.forced if i in kept]] = -math.inf
+            worst = int(np.argmax(price))
+            if price[worst] < 0.0:
+                return gone
+            gone.append(kept.pop(worst))
+
+    def orders_of(self, chosen: Sequence[int]) -> list[float]:
+        """The orders at these places."""
+        return [self.orders[i] for i in chosen]
 
     def _gains(self, chosen: Sequence[int], orders: Sequence[int]) -> Array:
         """Part by which each order lowers the held-out mean square."""
@@ -256,8 +291,8 @@ class EvidenceSelection:
         beside = f"the strongest of {len(self.orders)} orders searched, {best.order:g},"
         if best.verdict == "reference":
             return "the only orders that stand out are the reference's own"
-        if best.verdict == "no held-out gain":
-            return f"{beside} does not lower the error of readings held out of the fit"
+        if best.verdict != "noise":
+            return f"{beside} {because(best.verdict)}"
         chance = 100.0 * 10.0**best.log10_false_alarm
         return (
             f"{beside} does not stand out of the noise "

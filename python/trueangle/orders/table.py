@@ -5,16 +5,21 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from html import escape
 from typing import TYPE_CHECKING
 
 from ..aliasing import Positions
 from ..explanations import Explanation
+from ..model import Argument
 from .repeats import Noise
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 __all__ = ["OrderRow", "OrderSelection"]
+
+#: Orders that the one line of a selection lists.
+_SHOWN = 6
 
 
 @dataclass(frozen=True)
@@ -87,7 +92,7 @@ class OrderRow:
         return min(180.0, math.degrees(ratio))
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class OrderSelection:
     """Orders that the data support, and the evidence for and against each candidate.
 
@@ -114,6 +119,8 @@ class OrderSelection:
     gear_ratio : float or None
     notes : tuple of str
         What a user must know before trusting the orders.
+    argument : {"reference", "indicated"}
+        Angle that the orders were sought in.
     """
 
     orders: tuple[float, ...]
@@ -129,6 +136,7 @@ class OrderSelection:
     holdout_rms: tuple[float, float]
     gear_ratio: float | None = None
     notes: tuple[str, ...] = ()
+    argument: Argument = "reference"
 
     @property
     def by_shaft(self) -> Mapping[str, tuple[int, ...]]:
@@ -189,3 +197,14 @@ class OrderSelection:
 
     def __str__(self) -> str:
         return self.summary()
+
+    def __repr__(self) -> str:
+        orders = ", ".join(f"{k:g}" for k in self.orders[:_SHOWN])
+        more = ", ..." if len(self.orders) > _SHOWN else ""
+        return (
+            f"OrderSelection(orders=({orders}{more}), {self.samples} readings in "
+            f"{self.runs} runs, period={self.period:g})"
+        )
+
+    def _repr_html_(self) -> str:
+        return f"<pre>{escape(self.summary())}</pre>"

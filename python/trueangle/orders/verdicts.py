@@ -18,7 +18,7 @@ from ..runs import CalibrationRun, as_runs
 from .candidates import Candidates, choose_candidates
 from .table import OrderRow, OrderSelection
 
-__all__ = ["VerifiedPositions", "explained", "selection_notes", "verified_positions"]
+__all__ = ["VerifiedPositions", "because", "explained", "selection_notes", "verified_positions"]
 
 #: Share of the energy in the upper half of the orders from which under-sampling is said.
 _UNDER_SAMPLED: Final = 0.25
@@ -31,11 +31,17 @@ _VERDICTS: Final = {
     "weak": "significant by itself, but taken up by the retained orders",
     "no held-out gain": "does not lower the error of readings held out of the fit",
     "negligible": "significant, but too small to change any reading",
-    "too steep": "with it an indicated angle would stand for several true ones",
+    "too steep": "with it an indicated angle would stand for several true ones: "
+    "it can be corrected with argument='indicated' only",
     "small": "has no prominent amplitude",
     "phase varies": "its phase varies from run to run",
     "alias": "cannot be told from retained orders at these positions",
 }
+
+
+def because(verdict: str) -> str:
+    """Why an order of this verdict is not retained, as the rest of a sentence."""
+    return _VERDICTS[verdict]
 
 
 def explained(row: OrderRow, candidates: Candidates, positions: Positions) -> OrderRow:

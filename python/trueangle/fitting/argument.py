@@ -1,0 +1,118 @@
+"""Which angle the error is a function of: the true one, or the joint's own reading."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Final, Literal, NamedTuple, TypeAlias
+
+import numpy as np
+
+from ..angles import circular_mean, wrap
+from ..errors import ArgumentError, TrueAngleError
+from ..model import Argument
+from ..runs import CalibrationRun
+from ..shafts import ShaftOrders
+from .problem import Problem
+
+__all__ = ["ARGUMENTS", "AnyArgument", "Choice", "at_indicated", "choose_argument"]
+
+AnyArgument: TypeAlias = Literal["auto", "reference", "indicated"]
+ARGUMENTS: tuple[AnyArgument, ...] = ("auto", "reference", "indicated")
+
+#: Zeros of the runs closer than this part of a turn (0.2 deg) move no order worth asking.
+_MOVED: Final = 1.0 / 1800.0
+
+#: Readings looked at, and orders where none are named.
+_LOOKED_AT: Final = 32_768
+_LOW_ORDERS: Final = tuple(range(1, 9))
+
+#: The indicated angle is taken where a common pattern explains so many times the energy
+#: there, and so many noise variances more: far beyond what chance does with 8 orders.
+_MORE: Final = 1.05
+_DECISIVE: Final = 60.0
+
+
+class Choice(NamedTuple):
+    """The angle, and why where it is not what a user expects."""
+
+    argument: Argument
+    note: str = ""
+
+
+def choose_argument(
+    runs: Sequence[CalibrationRun],
+    argument: AnyArgument,
+    shafts: Sequence[ShaftOrders] | None = None,
+) -> Choice:
+    """The angle asked for; of ``"auto"`` the true one, unless its zero is new in every run.
+
+    Where a rig homes its reference anew for every run, the same place of the joint has
+    another reference angle each time, and no order repeats in it. The joint's own reading
+    keeps its zero. It is taken where the zeros of the runs differ by more than 0.2 deg and
+    one pattern over it explains clearly more than one over the reference.
+
+    Raises
+    ------
+    ArgumentError
+        An unknown name.
+    """
+    if argument not in ARGUMENTS:
+        raise ArgumentError(
+            f"argument must be 'auto', 'reference' or 'indicated', got {argument!r}"
+        )
+    if argument != "auto":
+        return Choice(argument)
+    if len(runs) < 2:
+        return Choice("reference")
+    period = runs[0].period
+    looked_at = [_some(run, max(64, _LOOKED_AT // len(runs))) for run in runs]
+    zeros = np.array([circular_mean(r.indicated - r.reference, period) for r in looked_at])
+    moved = float(np.abs(wrap(zeros - zeros[0], period)).max())
+    if moved < _MOVED * period:
+        return Choice("reference")
+    asked = shafts or [ShaftOrders("output", 1.0, _LOW_ORDERS)]
+    left: list[float] = []
+    for angle in ("reference", "indicated"):
+        try:
+            problem = Problem(looked_at, asked, angle)
+            solution = problem.solve(problem.base).solution
+        except TrueAngleError:
+            return Choice("reference")
+        left.append(solution.residual_variance * solution.degrees_of_freedom)
+    energy = sum(_energy(run) for run in looked_at)
+    noise = left[1] / solution.degrees_of_freedom
+    true, own = (energy - rest for rest in left)
+    if not (own > _MORE * true and own - true > _DECISIVE * noise):
+        return Choice("reference")
+    return Choice(
+        "indicated",
+        "the reference has a zero of its own in every run (they differ by up to "
+        f"{moved * 360.0 / period:.3g} deg) and the pattern stays with the joint's own reading: "
+        "the error is taken at the indicated angle",
+    )
+
+
+def at_indicated(run: CalibrationRun) -> CalibrationRun:
+    """The run with its own reading as the angle, and the same errors."""
+    return replace(run, reference=run.indicated, indicated=run.indicated + run.centred_error)
+
+
+def _some(run: CalibrationRun, most: int) -> CalibrationRun:
+    """Readings of the run at random: every n-th would meet the same places of a grid."""
+    if len(run) <= most:
+        return CalibrationRun(run.reference, run.indicated, run.period, weights=run.weights)
+    rows = np.sort(np.random.default_rng(0).choice(len(run), most, replace=False))
+    weights = None if run.weights is None else run.weights[rows]
+    return CalibrationRun(run.reference[rows], run.indicated[rows], run.period, weights=weights)
+
+
+def _energy(run: CalibrationRun) -> float:
+    """Weighted sum of squares of the errors about their mean."""
+    weights = np.ones(len(run)) if run.weights is None else run.weights
+    error = run.centred_error
+    total = float(weights.sum())
+    if total == 0.0:
+        return 0.0
+    about = error - float(weights @ error) / total
+    return float(weights @ (about * about))
