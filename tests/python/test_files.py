@@ -167,7 +167,7 @@ def test_names_that_name_no_file(name, tmp_path, model, monkeypatch):
     "ending", [".csv", ".parquet", ".PDF", ".html", ".toml", ".json.gz", ".xlsx", ".png"]
 )
 def test_an_ending_of_another_format_is_refused(ending, tmp_path, model):
-    with pytest.raises(FileError, match=rf"ending .*name it .*\.json"):
+    with pytest.raises(FileError, match=r"ending .*name it .*\.json"):
         model.save(tmp_path / f"joint{ending}")
     assert list(tmp_path.iterdir()) == []
 
@@ -194,7 +194,7 @@ def test_permissions_of_what_is_replaced_are_kept(tmp_path, model):
 def test_a_failure_leaves_what_was_there(tmp_path):
     path = tmp_path / "a"
     path.write_text("old")
-    with pytest.raises(ZeroDivisionError), files.written_atomically(path) as file:
+    with pytest.raises(ZeroDivisionError), files.written_atomically(path) as file:  # noqa: PT012
         file.write("half")
         file.flush()
         raise ZeroDivisionError
@@ -235,7 +235,7 @@ def test_endless_devices_are_not_read(device):
 def test_a_pipe_is_read_to_its_end(tmp_path):
     pipe = tmp_path / "pipe"
     os.mkfifo(pipe)
-    text = "reference_deg,indicated_deg\n" + "".join(f"{k},{k}\n" for k in range(0, 36000))
+    text = "reference_deg,indicated_deg\n" + "".join(f"{k},{k}\n" for k in range(36000))
     writer = threading.Thread(target=pipe.write_text, args=(text,))
     writer.start()
     (run,) = ta.read_runs(pipe)
