@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from functools import lru_cache
 from statistics import NormalDist
 from typing import Final
 
@@ -31,6 +32,9 @@ _NEGLIGIBLE: Final = 4e-16
 
 #: Steps at most. Fractions take about sqrt(max(a, b)) of them: enough up to 1e10.
 _MOST_STEPS: Final = 200_000
+
+#: Steps of the search for a quantile at most; ten are usual.
+_MOST_HALVINGS: Final = 200
 
 #: Stands for a zero denominator in a continued fraction (Lentz).
 _TINY: Final = 1e-300
@@ -85,8 +89,9 @@ def student_tail(t: float, degrees_of_freedom: float) -> float:
     return tail if t >= 0.0 else 1.0 - tail
 
 
+@lru_cache(maxsize=1024)
 def student_quantile(p: float, degrees_of_freedom: float) -> float:
-    """The t with P(T <= t) = p, by bisection on `student_tail`, relative accuracy 1e-12.
+    """The t with P(T <= t) = p, from `student_tail`, relative accuracy 1e-12.
 
     Examples
     --------
@@ -100,7 +105,7 @@ def student_quantile(p: float, degrees_of_freedom: float) -> float:
     if p == 0.5:
         return 0.0
     smaller = min(p, 1.0 - p)
-    t = _root(lambda x: student_tail(x, nu) - smaller)
+    t = _root(lambda x: student_tail(x, nu), smaller)
     return t if p > 0.5 else -t
 
 
@@ -117,7 +122,7 @@ def chi_squared_tail(x: float, degrees_of_freedom: float) -> float:
 
 
 def chi_squared_quantile(p: float, degrees_of_freedom: float) -> float:
-    """The x with P(chi2 <= x) = p, by bisection on `chi_squared_tail`.
+    """The x with P(chi2 <= x) = p, from `chi_squared_tail`.
 
     Examples
     --------
@@ -125,7 +130,7 @@ def chi_squared_quantile(p: float, degrees_of_freedom: float) -> float:
     5.991464547
     """
     upper = 1.0 - _probability(p)
-    return _root(lambda x: chi_squared_tail(x, degrees_of_freedom) - upper)
+    return _root(lambda x: chi_squared_tail(x, degrees_of_freedom), upper)
 
 
 def f_tail(f: float, numerator: float, denominator: float) -> float:
@@ -151,7 +156,7 @@ def f_tail(f: float, numerator: float, denominator: float) -> float:
 
 
 def f_quantile(p: float, numerator: float, denominator: float) -> float:
-    """The f with P(F <= f) = p, by bisection on `f_tail`.
+    """The f with P(F <= f) = p, from `f_tail`.
 
     Examples
     --------
@@ -159,7 +164,7 @@ def f_quantile(p: float, numerator: float, denominator: float) -> float:
     4.102821
     """
     upper = 1.0 - _probability(p)
-    return _root(lambda x: f_tail(x, numerator, denominator) - upper)
+    return _root(lambda x: f_tail(x, numerator, denominator), upper)
 
 
 def incomplete_beta(a: float, b: float, x: float) -> float:
@@ -232,16 +237,41 @@ def _gamma_fraction(a: float, x: float) -> float:
     return value
 
 
-def _root(falling: Callable[[float], float]) -> float:
-    """Zero of a falling function of x > 0, to the spacing of floats or 200 halvings."""
+def _root(tail: Callable[[float], float], probability: float) -> float:
+    """The x > 0 beyond which a falling tail holds ``probability``, to rounding.
+
+    False position on the logarithm, which is close to straight in the tail (Illinois' way of
+    keeping both ends moving), after a bracket by doubling.
+    """
+
+    def missing(x: float) -> float:
+        return math.log(max(tail(x), _TINY) / probability)
+
     low, high = 0.0, 1.0
-    while falling(high) > 0.0 and high < 1e300:
-        low, high = high, 2.0 * high
-    for _ in range(200):
-        middle = 0.5 * (low + high)
-        if middle in (low, high):
+    at_low, at_high = missing(0.0), missing(high)
+    while at_high > 0.0 and high < 1e300:
+        low, at_low, high = high, at_high, 2.0 * high
+        at_high = missing(high)
+    side = 0
+    for _ in range(_MOST_HALVINGS):
+        x = (low * at_high - high * at_low) / (at_high - at_low)
+        if not low < x < high:
+            x = 0.5 * (low + high)
+        if not low < x < high:
             break
-        low, high = (middle, high) if falling(middle) > 0.0 else (low, middle)
+        at = missing(x)
+        if at == 0.0 or high - low <= _NEGLIGIBLE * x:
+            return x
+        if at > 0.0:
+            low, at_low = x, at
+            at_high *= 0.5 if side > 0 else 1.0
+            side = 1
+        else:
+            high, at_high = x, at
+            at_low *= 0.5 if side < 0 else 1.0
+            side = -1
+        if abs(at) < _NEGLIGIBLE:
+            return x
     return 0.5 * (low + high)
 
 
