@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import json
 
+from ..errors import ArgumentError
 from .fit import add_joint, orders_by_shaft
 
 HELP = "write a report on calibration runs: one HTML page, or a PDF"
@@ -20,6 +21,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--orders", default="auto", help="auto (default: by evidence), 1-17, output:1-3;motor:1,2")
     add_joint(parser)
     add("--title", help="heading of the report")
+    add(
+        "--certificate",
+        metavar="IDENTITY",
+        help="write a calibration certificate (PDF) with what this TOML file says of the item, "
+        "the laboratory and the type B uncertainties",
+    )
+    add("--positions", type=int, metavar="N", help="nominal positions of a certificate (36)")
     add("--pdf", metavar="FILE", help="print it to a PDF too, by an installed browser")
     add("--json", action="store_true", help="print the report's numbers as JSON")
 
@@ -29,6 +37,8 @@ def run(args: argparse.Namespace) -> int:
     from ..reports import report
     from ..runfiles import read_runs
 
+    if args.certificate is not None and args.pdf is not None:
+        raise ArgumentError("--pdf prints a report; a certificate is a PDF itself: give it by -o")
     runs = read_runs(args.runs, counts_per_turn=args.counts_per_turn)
     simulation = None
     if args.simulation is not None:
@@ -43,6 +53,8 @@ def run(args: argparse.Namespace) -> int:
         gear_ratio=args.gear_ratio,
         fixed_member=args.fixed_member,
         title=args.title,
+        certificate=args.certificate,
+        positions=args.positions,
     )
     if args.pdf is not None:
         made.save_pdf(args.pdf)

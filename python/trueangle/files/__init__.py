@@ -8,11 +8,23 @@ from .inputs import (
     read_whole,
     sha256_of,
 )
-from .kinds import MODEL, PAGE, PDF, REPORT, RUNS, SIMULATION, Kind, kind_of_log, promised_format
+from .kinds import (
+    CERTIFICATE,
+    MODEL,
+    PAGE,
+    PDF,
+    REPORT,
+    RUNS,
+    SIMULATION,
+    Kind,
+    kind_of_log,
+    promised_format,
+)
 from .outputs import check_output, publish, written_atomically
 from .samefile import same_file
 
 __all__ = [
+    "CERTIFICATE",
     "MODEL",
     "MODEL_BYTES",
     "PAGE",

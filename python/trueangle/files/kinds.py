@@ -129,5 +129,6 @@ SIMULATION: Final = Kind("a simulation (TOML)", (".toml",))
 RUNS: Final = Kind("a table of runs (CSV)", (".csv",))
 PAGE: Final = Kind("a report (HTML)", (".html", ".htm"))
 PDF: Final = Kind("a report (PDF)", (".pdf",))
+CERTIFICATE: Final = Kind("a certificate (PDF)", (".pdf",))
 #: What `Report.save` writes, by the ending.
 REPORT: Final = Kind("a report (HTML or PDF)", (*PAGE.endings, *PDF.endings))

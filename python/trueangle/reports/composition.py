@@ -6,22 +6,23 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from os import PathLike
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeAlias, overload
 
 from ..angles import ARCSEC_PER_TURN, wrap
+from ..certificate import Certificate, Identity, certify
 from ..diagnosis import diagnose
 from ..errors import ArgumentError, NoModelError, TrueAngleError
-from ..files import PDF, REPORT, check_output, written_atomically
+from ..files import CERTIFICATE, PDF, REPORT, check_output, written_atomically
 from ..fitting.heldout import HeldOut, hold_out, hold_out_extended
 from ..plots.curves import Points, degrees, error_points, label_of
 from ..plots.simulatedcurves import left_after_causes
+from ..provenance import provenance
 from ..runs import CalibrationRun, as_runs
 from . import diagnosisfigures, figures
 from .diagnosed import diagnosed
 from .gained import extended_model, gained
 from .measured import measured
 from .modelled import modelled, selected
-from .provenance import provenance
 from .unknowns import unknowns
 
 if TYPE_CHECKING:
@@ -31,6 +32,9 @@ if TYPE_CHECKING:
     from ..simulation import Simulation
 
 __all__ = ["Report", "report"]
+
+#: Orders as `trueangle.fit` takes them.
+Orders: TypeAlias = Iterable[float] | Mapping[str, Iterable[float]] | str | None
 
 FORMAT, VERSION = "trueangle-report", 1
 
@@ -100,17 +104,49 @@ class Report:
         return [entry["sha256"] for entry in self.content["provenance"]["inputs"]]
 
 
+@overload
 def report(
     runs: CalibrationRun | Iterable[CalibrationRun],
     path: str | PathLike[str] | None = None,
     *,
     simulation: Simulation | None = None,
-    orders: Iterable[float] | Mapping[str, Iterable[float]] | str | None = None,
+    orders: Orders = None,
     gear_ratio: float | None = None,
     fixed_member: str = "circular_spline",
     title: str | None = None,
-) -> Report:
-    """Fit, select orders, hold out, diagnose and put it all on one page.
+    certificate: None = None,
+    positions: None = None,
+) -> Report: ...
+
+
+@overload
+def report(
+    runs: CalibrationRun | Iterable[CalibrationRun],
+    path: str | PathLike[str] | None = None,
+    *,
+    simulation: Simulation | None = None,
+    orders: Orders = None,
+    gear_ratio: float | None = None,
+    fixed_member: str = "circular_spline",
+    title: None = None,
+    certificate: Identity | str | PathLike[str],
+    positions: int | None = None,
+) -> Certificate: ...
+
+
+def report(
+    runs: CalibrationRun | Iterable[CalibrationRun],
+    path: str | PathLike[str] | None = None,
+    *,
+    simulation: Simulation | None = None,
+    orders: Orders = None,
+    gear_ratio: float | None = None,
+    fixed_member: str = "circular_spline",
+    title: str | None = None,
+    certificate: Identity | str | PathLike[str] | None = None,
+    positions: int | None = None,
+) -> Report | Certificate:
+    """Fit, select orders, hold out, diagnose and put it all on one page; or certify.
 
     Parameters
     ----------
@@ -125,10 +161,15 @@ def report(
     gear_ratio, fixed_member
         As for `trueangle.fit`.
     title : str, optional
+    certificate : Identity or path, optional
+        An identity file: what is made, returned and written to ``path`` (PDF) is then a
+        calibration certificate, see `trueangle.certificate.certify`.
+    positions : int, optional
+        Nominal positions to a turn of a certificate.
 
     Returns
     -------
-    Report
+    Report or Certificate
 
     Raises
     ------
@@ -145,13 +186,30 @@ def report(
     """
     found = as_runs(runs)
     if path is not None:  # before the work
-        check_output(path, REPORT, hashes=[run.source.sha256 for run in found if run.source])
+        kind = REPORT if certificate is None else CERTIFICATE
+        check_output(path, kind, hashes=[run.source.sha256 for run in found if run.source])
     if simulation is not None:
         if gear_ratio is not None:
             raise ArgumentError("give gear_ratio or a simulation (which states it), not both")
         if "motor" in simulation.joint.shafts:
             gear_ratio = simulation.joint.gear_ratio
             fixed_member = simulation.joint.fixed_member
+    if certificate is not None:
+        if title is not None:
+            raise ArgumentError("a certificate has no title of its own: its identity names it")
+        certified = certify(
+            found,
+            certificate,
+            orders=orders,
+            gear_ratio=gear_ratio,
+            fixed_member=fixed_member,
+            positions=positions,
+        )
+        if path is not None:
+            certified.save(path)
+        return certified
+    if positions is not None:
+        raise ArgumentError("positions are those of a certificate: give certificate too")
     fit, selection, why_not = _fitted(found, orders, gear_ratio, fixed_member)
     held, why_no_gain = _held_out(fit)
     diagnosis = None if simulation is None else diagnose(found, simulation)

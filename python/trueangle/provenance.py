@@ -1,4 +1,4 @@
-"""Where a report comes from: input files with their hashes, versions, the time."""
+"""Where a report or certificate comes from: input files with their hashes, versions, the time."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from .. import __version__
-from ..runs import CalibrationRun
+from . import __version__
+from .runs import CalibrationRun
 
 __all__ = ["provenance"]
 

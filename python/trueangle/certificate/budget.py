@@ -1,0 +1,144 @@
+"""The uncertainty budget of one value: contributions, effective degrees of freedom, U."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from types import MappingProxyType
+from typing import Final
+
+from ..distributions import student_quantile
+from ..errors import ArgumentError
+
+__all__ = ["DISTRIBUTIONS", "LEVEL", "Budget", "Contribution", "coverage_factor"]
+
+#: Coverage probability of U: two standard deviations of a normal distribution.
+LEVEL: Final = 0.9545
+
+#: Half width over standard uncertainty (JCGM 100, 4.3; JCGM 101, 6.4). A normal half width
+#: is one of 95.45 %, as a calibration certificate with k = 2 states it.
+DISTRIBUTIONS: Final[Mapping[str, float]] = MappingProxyType(
+    {
+        "normal": 2.0,
+        "rectangular": math.sqrt(3.0),
+        "triangular": math.sqrt(6.0),
+        "arcsine": math.sqrt(2.0),
+        "two-point": 1.0,
+    }
+)
+
+
+@dataclass(frozen=True)
+class Contribution:
+    """One line of a budget.
+
+    Parameters
+    ----------
+    name : str
+    standard : float
+        Standard uncertainty of the input, in arcsec; not negative.
+    kind : {"A", "B"}
+        Evaluated from the readings, or otherwise known.
+    distribution : str
+        One of `DISTRIBUTIONS`, or "t" for what the readings gave.
+    degrees_of_freedom : float
+        Infinite where the standard uncertainty is taken as known.
+    sensitivity : float
+        Change of the value for a change of the input.
+    """
+
+    name: str
+    standard: float
+    kind: str = "B"
+    distribution: str = "normal"
+    degrees_of_freedom: float = math.inf
+    sensitivity: float = 1.0
+
+    def __post_init__(self) -> None:
+        if not (math.isfinite(self.standard) and self.standard >= 0.0):
+            raise ArgumentError(
+                f"contribution {self.name!r}: the standard uncertainty must be a finite number "
+                f"that is not negative, got {self.standard!r}"
+            )
+        if not self.degrees_of_freedom > 0.0:
+            raise ArgumentError(
+                f"contribution {self.name!r}: degrees_of_freedom must be positive, got "
+                f"{self.degrees_of_freedom!r}"
+            )
+
+    @property
+    def effect(self) -> float:
+        """Its part of the value's standard uncertainty, abs(sensitivity) * standard."""
+        return abs(self.sensitivity) * self.standard
+
+
+@dataclass(frozen=True)
+class Budget:
+    r"""Independent contributions to one value.
+
+    .. math:: u_c^2 = \sum_i c_i^2 u_i^2,\qquad
+              \nu_\text{eff} = \frac{u_c^4}{\sum_i (c_i u_i)^4/\nu_i},\qquad U = k\,u_c
+
+    with k the quantile of Student's distribution for `LEVEL` and :math:`\nu_\text{eff}`
+    cut to a whole number (JCGM 100, 5.1.2, G.4.1 and G.6.4); 2 where it is infinite.
+
+    Examples
+    --------
+    End gauges (JCGM 100, H.1.6): 32 nm with 16 degrees of freedom.
+
+    >>> gauge = Budget((Contribution("standard", 25.0, degrees_of_freedom=18),
+    ...                 Contribution("difference", 9.7, "A", "t", 25.6),
+    ...                 Contribution("expansion", 2.9, degrees_of_freedom=50),
+    ...                 Contribution("temperature", 16.6, degrees_of_freedom=2)))
+    >>> round(gauge.standard), int(gauge.degrees_of_freedom)
+    (32, 16)
+    """
+
+    contributions: tuple[Contribution, ...]
+
+    @cached_property
+    def standard(self) -> float:
+        """Combined standard uncertainty."""
+        return math.hypot(*(item.effect for item in self.contributions))
+
+    @cached_property
+    def degrees_of_freedom(self) -> float:
+        """Effective degrees of freedom by Welch and Satterthwaite."""
+        if self.standard == 0.0:
+            return math.inf
+        # Relative effects: fourth powers of small numbers stay above the smallest float.
+        spent = sum(
+            (item.effect / self.standard) ** 4 / item.degrees_of_freedom
+            for item in self.contributions
+        )
+        return 1.0 / spent if spent > 0.0 else math.inf
+
+    @property
+    def coverage_factor(self) -> float:
+        """K of `LEVEL`."""
+        return coverage_factor(self.degrees_of_freedom)
+
+    @property
+    def expanded(self) -> float:
+        """U, the half width of the interval that holds the value at `LEVEL`."""
+        return self.coverage_factor * self.standard
+
+    def share(self, item: Contribution) -> float:
+        """Part of the combined variance that a contribution brings."""
+        return (item.effect / self.standard) ** 2 if self.standard > 0.0 else 0.0
+
+
+def coverage_factor(degrees_of_freedom: float, level: float = LEVEL) -> float:
+    """Student's quantile for a two-sided interval; degrees of freedom cut to whole ones.
+
+    Examples
+    --------
+    >>> round(coverage_factor(16.7, 0.99), 2), round(coverage_factor(math.inf), 2)
+    (2.92, 2.0)
+    """
+    whole = (
+        max(math.floor(degrees_of_freedom), 1) if math.isfinite(degrees_of_freedom) else math.inf
+    )
+    return student_quantile(0.5 + 0.5 * level, whole)

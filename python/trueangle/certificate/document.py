@@ -1,0 +1,241 @@
+"""A certificate: its content as plain values, and the file."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from os import PathLike
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+from ..angles import ARCSEC_PER_TURN
+from ..errors import ArgumentError
+from ..provenance import provenance
+from ..runs import CalibrationRun, as_runs
+from .budget import LEVEL, Budget, Contribution
+from .identity import ENTRIES, Identity, load_identity
+from .values import left_at_places, nominal_positions, reversal, values_at
+
+if TYPE_CHECKING:
+    from ..fitting.result import FitResult
+
+__all__ = ["Certificate", "certify"]
+
+FORMAT: Final = "trueangle-certificate"
+VERSION: Final = 1
+
+
+@dataclass(frozen=True, eq=False)
+class Certificate:
+    """A calibration certificate.
+
+    Attributes
+    ----------
+    content : dict
+        Every number and word of it, plain values: `save` adds nothing but the layout.
+        ``positions`` holds ``angle_deg, error_arcsec, standard_arcsec,
+        degrees_of_freedom, coverage_factor, expanded_arcsec`` of every position.
+    """
+
+    content: dict[str, Any]
+
+    def save(self, path: str | PathLike[str]) -> None:
+        """Write it as PDF/A-2b, complete or not at all.
+
+        Raises
+        ------
+        MissingExtraError
+            typst or matplotlib is not installed (``pip install trueangle[certificate]``).
+        FileError
+            A name that ends in another format's ending, a place that no file is written to,
+            one of the files it was made from.
+        """
+        from .typesetting import write_pdf
+
+        write_pdf(self.content, path)
+
+
+def certify(
+    runs: CalibrationRun | Iterable[CalibrationRun],
+    identity: Identity | str | PathLike[str],
+    *,
+    orders: Iterable[float] | Mapping[str, Iterable[float]] | str | None = None,
+    gear_ratio: float | None = None,
+    fixed_member: str = "circular_spline",
+    positions: int | None = None,
+    fit: FitResult | None = None,
+) -> Certificate:
+    r"""Value and expanded uncertainty of the error at every nominal position.
+
+    .. math:: U(\theta) = k\,\sqrt{u_A(\theta)^2 + u_p^2 + u_h^2 + \textstyle\sum_i u_{B,i}^2}
+
+    with :math:`u_A` from the whole covariance of the fit, :math:`u_p` the error at single
+    places that the series does not hold, :math:`u_h` half of the reversal error where both
+    directions were read, :math:`u_B` as the identity file gives them, and k the quantile
+    of Student's distribution for 95.45 % and the effective degrees of freedom (JCGM 100).
+
+    Parameters
+    ----------
+    runs : CalibrationRun or iterable of them
+    identity : Identity or path
+        Who, what and where, and the type B contributions (`load_identity`).
+    orders, gear_ratio, fixed_member
+        As for `trueangle.fit`.
+    positions : int, optional
+        Nominal positions to a turn; by default those that were read where they are at most
+        36, else 36.
+    fit : FitResult, optional
+        A fit of ``runs`` that is there already.
+
+    Returns
+    -------
+    Certificate
+
+    Raises
+    ------
+    ArgumentError
+        A fit without covariance has no uncertainty to state.
+
+    Examples
+    --------
+    >>> rng = np.random.default_rng(1)
+    >>> theta = np.arange(0.0, 360.0, 10.0)
+    >>> runs = [CalibrationRun(theta, theta + 0.01 * np.sin(np.radians(theta))
+    ...                        + rng.normal(0.0, 1e-4, 36), period=360.0) for _ in range(3)]
+    >>> reference = Contribution("polygon", 0.5)
+    >>> made = certify(runs, Identity("1", "joint", contributions=(reference,)), orders=[1])
+    >>> row = made.content["positions"][9]
+    >>> row["angle_deg"], round(row["error_arcsec"]), round(row["expanded_arcsec"], 1)
+    (90.0, 36, 1.0)
+    """
+    found = as_runs(runs)
+    who = identity if isinstance(identity, Identity) else load_identity(identity)
+    if fit is None:
+        from ..fitting.fit import fit as fit_runs
+
+        fit = fit_runs(found, orders, gear_ratio=gear_ratio, fixed_member=fixed_member)
+    if fit.model.covariance is None or not math.isfinite(fit.residual_std):
+        raise ArgumentError(
+            "as many unknowns as readings leave nothing to take an uncertainty from: "
+            "read more positions, or fit fewer orders"
+        )
+    values = values_at(fit, nominal_positions(fit, positions))
+    shared = [item for item in (left_at_places(fit), reversal(fit)) if item is not None]
+    shared += list(who.contributions)
+    freedom = _degrees_of_freedom(fit)
+    budgets = [
+        Budget((Contribution("fit of the readings", float(u), "A", "t", freedom), *shared))
+        for u in values.standard
+    ]
+    widest = max(range(len(budgets)), key=lambda k: budgets[k].expanded)
+    source = None if isinstance(identity, Identity) else str(Path(identity))
+    content: dict[str, Any] = {
+        "format": FORMAT,
+        "version": VERSION,
+        "identity": {name: getattr(who, name) for name in ENTRIES},
+        "temperature_C": who.temperature_C,
+        "not_stated": list(who.not_stated),
+        "level_percent": 100.0 * LEVEL,
+        "argument": fit.model.argument,
+        "positions": [
+            {
+                "angle_deg": float(angle),
+                "error_arcsec": float(error),
+                "standard_arcsec": budget.standard,
+                "degrees_of_freedom": _finite(budget.degrees_of_freedom),
+                "coverage_factor": budget.coverage_factor,
+                "expanded_arcsec": budget.expanded,
+            }
+            for angle, error, budget in zip(
+                values.angle_deg, values.error_arcsec, budgets, strict=True
+            )
+        ],
+        "budget": _budget(budgets[widest], float(values.angle_deg[widest])),
+        "harmonics": _harmonics(fit, freedom),
+        "readings": _readings(fit),
+        "notes": list(fit.notes),
+        "aliases": _aliases(fit),
+        "provenance": provenance(found, source),
+    }
+    return Certificate(content)
+
+
+def _degrees_of_freedom(fit: FitResult) -> float:
+    """Of the fit's covariance: those of its clusters where it rests on them."""
+    return float(getattr(fit, "covariance_degrees_of_freedom", fit.degrees_of_freedom))
+
+
+def _budget(budget: Budget, angle_deg: float) -> dict[str, Any]:
+    """The budget of the position with the greatest U."""
+    return {
+        "angle_deg": angle_deg,
+        "lines": [
+            {
+                "name": item.name,
+                "type": item.kind,
+                "distribution": item.distribution,
+                "standard_arcsec": item.standard,
+                "sensitivity": item.sensitivity,
+                "degrees_of_freedom": _finite(item.degrees_of_freedom),
+                "share_percent": 100.0 * budget.share(item),
+            }
+            for item in budget.contributions
+        ],
+        "standard_arcsec": budget.standard,
+        "degrees_of_freedom": _finite(budget.degrees_of_freedom),
+        "coverage_factor": budget.coverage_factor,
+        "expanded_arcsec": budget.expanded,
+    }
+
+
+def _harmonics(fit: FitResult, freedom: float) -> list[dict[str, Any]]:
+    """Amplitude and phase of every order with the expanded uncertainty of the fit."""
+    factor = ARCSEC_PER_TURN / fit.model.period
+    k = Budget((Contribution("fit", 1.0, "A", "t", freedom),)).coverage_factor
+    rows = [(shaft, order) for shaft in fit.model.shafts for order in shaft.orders]
+    return [
+        {
+            "shaft": shaft.name,
+            "order": order,
+            "amplitude_arcsec": factor * float(fit.amplitudes[n]),
+            "amplitude_expanded_arcsec": k * factor * float(fit.amplitude_std[n]),
+            "phase_deg": math.degrees(float(fit.phases[n])) % 360.0,
+            "phase_expanded_deg": min(k * math.degrees(float(fit.phase_std[n])), 180.0),
+        }
+        for n, (shaft, order) in enumerate(rows)
+    ]
+
+
+def _readings(fit: FitResult) -> dict[str, Any]:
+    factor = ARCSEC_PER_TURN / fit.model.period
+    mounts = {
+        round(float(m) * 360.0 / fit.model.period, 6)
+        for run in fit.runs
+        if run.mount is not None
+        for m in (run.mount[0],)
+    }
+    return {
+        "readings": sum(len(run) for run in fit.runs),
+        "runs": len(fit.runs),
+        "mounts": max(len(mounts), 1),
+        "standard_deviation_arcsec": factor * fit.residual_std,
+        "zero_deg": fit.model.constant * 360.0 / fit.model.period,
+        "zero_spread_arcsec": factor * fit.offset_spread,
+        "outliers": len(fit.wild),
+    }
+
+
+def _aliases(fit: FitResult) -> list[dict[str, Any]]:
+    """Orders kept that these positions cannot tell from others."""
+    if fit.selection is None:
+        return []
+    return [
+        {"order": float(row.order), "aliases": [float(m) for m in row.aliases[:6]]}
+        for row in fit.selection.table
+        if row.retained and row.aliases
+    ]
+
+
+def _finite(value: float) -> float | None:
+    return value if math.isfinite(value) else None

@@ -1,0 +1,191 @@
+"""identity.toml: what only the laboratory knows of a calibration."""
+
+from __future__ import annotations
+
+import datetime
+import difflib
+import math
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from os import PathLike
+from typing import Any, Final
+
+from ..errors import ArgumentError, FileError
+from ..files import read_whole
+from .budget import DISTRIBUTIONS, Contribution
+
+__all__ = ["ENTRIES", "Identity", "load_identity"]
+
+#: Largest identity file that is read; a real one has a few dozen lines.
+_MOST_BYTES: Final = 1 << 20
+
+#: Contributions at most.
+_MOST_CONTRIBUTIONS: Final = 200
+
+#: Entries of ``[certificate]`` that are text, with the words a certificate uses for them.
+ENTRIES: Final[Mapping[str, str]] = {
+    "number": "Certificate number",
+    "item": "Item",
+    "serial": "Serial number",
+    "manufacturer": "Manufacturer",
+    "customer": "Customer",
+    "laboratory": "Laboratory",
+    "operator": "Operator",
+    "date": "Date of calibration",
+    "procedure": "Procedure",
+    "reference": "Reference",
+    "reference_certificate": "Certificate of the reference",
+    "place": "Place",
+}
+_REQUIRED: Final = ("number", "item")
+
+_KEYS: Final = ("name", "type", "distribution", "half_width_arcsec", "standard_arcsec",
+                "degrees_of_freedom")  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Identity:
+    """Who calibrated what, where and with which reference; empty text is "not stated".
+
+    Attributes
+    ----------
+    number, item, serial, manufacturer, customer, laboratory, operator, date, procedure,
+    reference, reference_certificate, place : str
+    temperature_C : float or None
+    contributions : tuple of Contribution
+        Type B, in arcsec, each with sensitivity 1 at every position.
+    """
+
+    number: str
+    item: str
+    serial: str = ""
+    manufacturer: str = ""
+    customer: str = ""
+    laboratory: str = ""
+    operator: str = ""
+    date: str = ""
+    procedure: str = ""
+    reference: str = ""
+    reference_certificate: str = ""
+    place: str = ""
+    temperature_C: float | None = None
+    contributions: tuple[Contribution, ...] = ()
+
+    @property
+    def not_stated(self) -> tuple[str, ...]:
+        """Names of the entries without a value."""
+        return tuple(
+            entry.name for entry in fields(self) if getattr(self, entry.name) in ("", None)
+        )
+
+
+def load_identity(path: str | PathLike[str]) -> Identity:
+    """Read an identity file.
+
+    Raises
+    ------
+    FileError
+        Not TOML, an unknown entry, a value of the wrong kind; names the entry.
+    OSError
+        Nothing of this name, no permission.
+    """
+    data = read_whole(path, _MOST_BYTES, "an identity file")
+    try:
+        table = tomllib.loads(data.decode("utf-8"))
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError) as reason:
+        raise FileError(path, f"not valid TOML: {reason}") from None
+    try:
+        return identity_from(table)
+    except ArgumentError as reason:
+        raise FileError(path, str(reason)) from None
+
+
+def identity_from(table: Mapping[str, Any]) -> Identity:
+    """Identity of a decoded file.
+
+    Raises
+    ------
+    ArgumentError
+        Names the entry at fault.
+    """
+    _known(table, ("certificate", "contribution"), "the file")
+    said = table.get("certificate")
+    if not isinstance(said, Mapping):
+        raise ArgumentError("needs a table [certificate] with at least number and item")
+    _known(said, (*ENTRIES, "temperature_C"), "[certificate]")
+    values: dict[str, Any] = {name: _text(name, said[name]) for name in ENTRIES if name in said}
+    for name in _REQUIRED:
+        if not values.get(name):
+            raise ArgumentError(f"[certificate] needs {name}")
+    if "temperature_C" in said:
+        values["temperature_C"] = _number("[certificate] temperature_C", said["temperature_C"])
+    listed = table.get("contribution", [])
+    if not isinstance(listed, list) or len(listed) > _MOST_CONTRIBUTIONS:
+        raise ArgumentError(
+            f"contributions must be tables [[contribution]], at most {_MOST_CONTRIBUTIONS}"
+        )
+    contributions = tuple(_contribution(i, entry) for i, entry in enumerate(listed, start=1))
+    return Identity(**values, contributions=contributions)
+
+
+def _contribution(position: int, entry: object) -> Contribution:
+    where = f"[[contribution]] {position}"
+    if not isinstance(entry, Mapping):
+        raise ArgumentError(f"{where} must be a table")
+    _known(entry, _KEYS, where)
+    name = _text(f"{where} name", entry.get("name", ""))
+    if not name:
+        raise ArgumentError(f"{where} needs a name")
+    where = f"{where} ({name})"
+    kind = entry.get("type", "B")
+    if kind != "B":
+        raise ArgumentError(
+            f'{where}: type must be "B", got {kind!r}: what the readings show (type A) is '
+            "evaluated from them"
+        )
+    if ("half_width_arcsec" in entry) == ("standard_arcsec" in entry):
+        raise ArgumentError(f"{where}: give either half_width_arcsec or standard_arcsec")
+    distribution = entry.get("distribution", "normal" if "standard_arcsec" in entry else None)
+    if distribution not in DISTRIBUTIONS:
+        raise ArgumentError(
+            f"{where}: distribution must be one of {', '.join(DISTRIBUTIONS)}, "
+            f"got {'none' if distribution is None else repr(distribution)}"
+        )
+    if "standard_arcsec" in entry:
+        standard = _number(f"{where} standard_arcsec", entry["standard_arcsec"])
+    else:
+        half = _number(f"{where} half_width_arcsec", entry["half_width_arcsec"])
+        standard = half / DISTRIBUTIONS[str(distribution)]
+    freedom = entry.get("degrees_of_freedom", math.inf)
+    if freedom != math.inf:
+        freedom = _number(f"{where} degrees_of_freedom", freedom)
+    return Contribution(name, standard, "B", str(distribution), freedom)
+
+
+def _known(table: Mapping[str, Any], names: tuple[str, ...], where: str) -> None:
+    for key in table:
+        if key not in names:
+            close = difflib.get_close_matches(key, names, n=1)
+            hint = f"did you mean {close[0]!r}?" if close else f"known are {', '.join(names)}"
+            raise ArgumentError(f"{where} has an unknown entry {key!r}: {hint}")
+
+
+def _text(name: str, value: object) -> str:
+    if isinstance(value, datetime.date):
+        return value.isoformat()
+    if not isinstance(value, str):
+        raise ArgumentError(f"{name} must be text in quotation marks, got {value!r}")
+    return value.strip()
+
+
+def _number(name: str, value: object) -> float:
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise ArgumentError(f"{name} must be a number, got {value!r}")
+    try:
+        number = float(value)
+    except OverflowError:
+        number = math.inf
+    if not math.isfinite(number):
+        raise ArgumentError(f"{name} must be a finite number, got {value!r}")
+    return number

@@ -1,0 +1,69 @@
+"""The PDF of a certificate, set by typst; figures are vectors."""
+
+from __future__ import annotations
+
+import io
+import json
+import os
+import tempfile
+from os import PathLike
+from pathlib import Path
+from typing import Any, Final
+
+from ..errors import MissingExtraError
+from ..files import CERTIFICATE, check_output, publish
+
+__all__ = ["write_pdf"]
+
+_TEMPLATE: Final = Path(__file__).parent / "certificate.typ"
+
+
+def write_pdf(content: dict[str, Any], path: str | PathLike[str]) -> None:
+    """Typeset ``content`` and write it; see `Certificate.save`."""
+    hashes = [entry["sha256"] for entry in content["provenance"]["inputs"]]
+    target = check_output(path, CERTIFICATE, hashes=hashes)
+    pdf = typeset(content)
+    beside = target.parent if target.is_file() or not target.exists() else None
+    with tempfile.TemporaryDirectory(dir=beside, prefix=".certificate-") as folder:
+        printed = Path(folder, "certificate.pdf")
+        printed.write_bytes(pdf)
+        publish(printed, target)
+
+
+def typeset(content: dict[str, Any]) -> bytes:
+    """The certificate as a PDF/A-2b document."""
+    try:
+        import typst
+    except ImportError:
+        raise MissingExtraError(
+            "certificates need typst: pip install 'trueangle[certificate]'"
+        ) from None
+    picture = _picture(content)
+    # typst reads below one folder only: its input stands in one of its own.
+    with tempfile.TemporaryDirectory(prefix="trueangle-certificate-") as folder:
+        place = Path(folder)
+        (place / "certificate.typ").write_bytes(_TEMPLATE.read_bytes())
+        (place / "content.json").write_text(json.dumps(content, allow_nan=False), "utf-8")
+        (place / "errors.svg").write_bytes(picture)
+        made = typst.compile(
+            os.fspath(place / "certificate.typ"),
+            root=folder,
+            ignore_system_fonts=True,
+            format="pdf",
+            pdf_standards="a-2b",
+        )
+    return bytes(made)
+
+
+def _picture(content: dict[str, Any]) -> bytes:
+    """Value and U at every position as SVG."""
+    from ..plots.certified import certified_errors
+
+    figure = certified_errors(content["positions"]).get_figure(root=True)
+    assert figure is not None
+    buffer = io.BytesIO()
+    figure.savefig(buffer, format="svg")
+    from matplotlib import pyplot
+
+    pyplot.close(figure)
+    return buffer.getvalue()

@@ -1,0 +1,198 @@
+"""What a fit says of the error at nominal positions, and what it leaves there."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..aliasing import distinct_positions
+from ..angles import ARCSEC_PER_TURN
+from ..errors import ArgumentError
+from ..reference import design_matrix
+from .budget import Contribution
+from .propagation import propagated
+
+if TYPE_CHECKING:
+    from ..fitting.result import FitResult
+
+__all__ = ["POSITIONS", "Values", "left_at_places", "nominal_positions", "reversal", "values_at"]
+
+Array = NDArray[np.float64]
+
+#: Nominal positions of a whole turn where none are asked for.
+POSITIONS: Final = 36
+
+#: Nominal positions at most: a certificate is read by people.
+_MOST_POSITIONS: Final = 720
+
+#: Places of a turn among which errors that the series lacks are looked for.
+_PLACES: Final = 360
+
+#: Standard errors beyond which what is left counts as seen. Below it is noise, and adding
+#: noise to the budget would make every U too wide.
+_SEEN: Final = 3.0
+
+
+@dataclass(frozen=True, eq=False)
+class Values:
+    """Error at nominal positions, relative to its mean over them, in arcsec.
+
+    Attributes
+    ----------
+    angle_deg : ndarray, shape (n,)
+    error_arcsec : ndarray, shape (n,)
+    covariance : ndarray, shape (n, n)
+        From the fit's whole covariance, in arcsec squared: the values are correlated, since
+        every coefficient enters all of them.
+    """
+
+    angle_deg: Array
+    error_arcsec: Array
+    covariance: Array
+
+    @property
+    def standard(self) -> Array:
+        """Type A standard uncertainty of every value."""
+        return np.sqrt(np.maximum(np.diag(self.covariance), 0.0))
+
+
+def nominal_positions(fit: FitResult, count: int | None = None) -> Array:
+    """Nominal positions in degrees.
+
+    Those that were read, where they are a grid of at most 36 and no other count is asked
+    for; else ``count`` (36) to a turn, and on partial travel those that it covers.
+
+    Raises
+    ------
+    ArgumentError
+        A count outside 2 to 720, or fewer than two positions on the travel.
+    """
+    if count is not None and not (isinstance(count, int) and 2 <= count <= _MOST_POSITIONS):
+        raise ArgumentError(
+            f"positions must be a whole number from 2 to {_MOST_POSITIONS}, got {count!r}"
+        )
+    if count is None:
+        read = distinct_positions(fit.runs)
+        if 2 <= len(read) <= POSITIONS:
+            return read.turns * 360.0
+    low, high = _seen(fit)
+    pitch = 360.0 / (count or POSITIONS)
+    first = int(np.ceil(low / pitch - 1e-9))
+    last = (
+        int(np.ceil(high / pitch - 1e-9)) if high - low >= 360.0 else int(high / pitch + 1e-9) + 1
+    )
+    angles = pitch * np.arange(first, last)
+    if angles.size < 2:
+        raise ArgumentError(
+            f"the travel from {low:.6g} to {high:.6g} deg holds fewer than two of "
+            f"{count or POSITIONS} positions to a turn: ask for more"
+        )
+    return np.asarray(angles, dtype=np.float64)
+
+
+def values_at(fit: FitResult, angles_deg: Array) -> Values:
+    r"""Error of the fitted series at ``angles_deg``, its mean over them taken away.
+
+    .. math:: e = (I - \tfrac1n 1 1^T)\,G\beta,\qquad V = (\cdot)\,\mathrm{cov}(\beta)\,(\cdot)^T
+
+    with a row of regressors G for every position. The zero of the joint is set at the
+    machine; taking the mean away leaves what a setting of the zero cannot remove.
+    """
+    model = fit.model
+    shafts = [(shaft.cycles_per_turn, shaft.orders) for shaft in model.shafts]
+    rows = design_matrix(angles_deg * (model.period / 360.0), shafts, model.period)
+    rows = rows - rows.mean(axis=0)
+    pairs = [(a, b) for s in model.shafts for a, b in zip(s.cosine, s.sine, strict=True)]
+    beta = np.array([model.constant, *np.ravel(pairs)])
+    scale = ARCSEC_PER_TURN / model.period
+    return Values(angles_deg, scale * (rows @ beta), scale**2 * propagated(rows, fit.covariance))
+
+
+def left_at_places(fit: FitResult) -> Contribution:
+    r"""Standard deviation over the places of the turn of what the series does not hold.
+
+    With :math:`m_{pr}` the mean residual of run r at place p, noise is independent from
+    run to run and the error left at a place is not:
+
+    .. math:: s^2 = \mathrm{mean}_p \frac{(\sum_r m_{pr})^2 - \sum_r m_{pr}^2}{R_p(R_p - 1)}
+
+    It counts where it exceeds three of its standard errors; one run alone cannot show it.
+    """
+    name = "error that the series does not hold"
+    places, runs, sizes, rest = _by_place(fit)
+    total, squares, count = (np.zeros(_PLACES) for _ in range(3))
+    scale = ARCSEC_PER_TURN / fit.model.period
+    means = scale * rest / sizes
+    np.add.at(total, places, means)
+    np.add.at(squares, places, means**2)
+    np.add.at(count, places, 1.0)
+    repeated = count > 1.0
+    if len(set(runs.tolist())) < 2 or repeated.sum() < 2:
+        return Contribution(name, 0.0, "A", "t")
+    pairs = (count * (count - 1.0))[repeated]
+    products = (total**2 - squares)[repeated] / pairs
+    variance = float(products.mean())
+    error = float(products.std(ddof=1) / np.sqrt(products.size))
+    seen = variance > _SEEN * error
+    return Contribution(
+        name, float(np.sqrt(variance)) if seen else 0.0, "A", "t", float(products.size)
+    )
+
+
+def reversal(fit: FitResult) -> Contribution | None:
+    r"""Half of the reversal error, where both directions were read and it is seen.
+
+    .. math:: h = \sum d\,r / \sum d^2
+
+    per run, its standard error from the scatter over the runs (over the readings for one
+    run). The values then hold for the mean of both directions, and a reading is off by
+    ``+h`` or ``-h``. None where one direction only was read.
+    """
+    scale = ARCSEC_PER_TURN / fit.model.period
+    parts = np.split(fit.residuals, np.cumsum([len(run) for run in fit.runs])[:-1])
+    halves, errors = [], []
+    for run, rest in zip(fit.runs, parts, strict=True):
+        way = run.direction - run.direction.mean()
+        energy = float(way @ way)
+        if len(run) > 2 and energy > 0.05 * len(run):
+            half = float(way @ rest) / energy
+            halves.append(scale * half)
+            spread = rest - half * way
+            errors.append(scale * float(np.sqrt(spread @ spread / (len(run) - 2) / energy)))
+    if not halves:
+        return None
+    half = float(np.mean(halves))
+    count = len(halves)
+    error = float(np.std(halves, ddof=1) / np.sqrt(count)) if count > 2 else float(np.max(errors))
+    standard = abs(half) if abs(half) > _SEEN * error else 0.0
+    return Contribution("reversal error, half of it", standard, "A", "two-point", max(count - 1, 1))
+
+
+def _seen(fit: FitResult) -> tuple[float, float]:
+    """The stretch that was travelled, in degrees."""
+    if fit.model.partial_span is None:
+        return 0.0, 360.0
+    low, high = (x * (360.0 / fit.model.period) for x in fit.model.partial_span)
+    return low, high
+
+
+def _by_place(
+    fit: FitResult,
+) -> tuple[NDArray[np.intp], NDArray[np.intp], Array, Array]:
+    """Place, run, readings and sum of residuals of every place that a run has read."""
+    place, of_run = [], []
+    for number, run in enumerate(fit.runs):
+        turns = np.mod(run.reference / run.period, 1.0)
+        place.append(np.minimum((turns * _PLACES).astype(np.intp), _PLACES - 1))
+        of_run.append(np.full(len(run), number, dtype=np.intp))
+    cell = np.concatenate(of_run) * _PLACES + np.concatenate(place)
+    used = np.ones(cell.size, dtype=bool)
+    if fit.weights is not None:
+        used = np.concatenate([weights > 0.0 for weights in fit.weights])
+    cells, inverse = np.unique(cell[used], return_inverse=True)
+    sizes = np.bincount(inverse).astype(np.float64)
+    sums = np.bincount(inverse, weights=fit.residuals[used])
+    return cells % _PLACES, cells // _PLACES, sizes, np.asarray(sums, dtype=np.float64)

@@ -1,0 +1,54 @@
+"""Certified errors with their expanded uncertainties over the angle."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from . import palette
+from .canvas import new_axes, turn_axis
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+__all__ = ["certified_errors"]
+
+
+def certified_errors(positions: Sequence[Mapping[str, float]], ax: Axes | None = None) -> Axes:
+    """Error at every nominal position with bars of its expanded uncertainty.
+
+    Parameters
+    ----------
+    positions : sequence of mappings
+        ``angle_deg, error_arcsec, expanded_arcsec``, as a certificate's content has them.
+    ax : matplotlib Axes, optional
+
+    Returns
+    -------
+    matplotlib Axes
+    """
+    ax = new_axes(ax, height=2.8)
+    angle, error, expanded = (
+        np.array([row[name] for row in positions])
+        for name in ("angle_deg", "error_arcsec", "expanded_arcsec")
+    )
+    ax.axhline(0.0, color=palette.MUTED, linewidth=0.8)
+    ax.errorbar(
+        angle,
+        error,
+        yerr=expanded,
+        linestyle="none",
+        marker="o",
+        markersize=3.0,
+        color=palette.AFTER,
+        ecolor=palette.MODEL,
+        elinewidth=0.9,
+        capsize=2.0,
+    )
+    margin = 0.02 * max(float(np.ptp(angle)), 1.0)
+    turn_axis(ax, float(angle.min()) - margin, float(angle.max()) + margin)
+    ax.set_xlabel("position / deg")
+    ax.set_ylabel("error / arcsec")
+    return ax
