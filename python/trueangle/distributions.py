@@ -74,7 +74,7 @@ def student_tail(t: float, degrees_of_freedom: float) -> float:
 
     Examples
     --------
-    >>> round(student_tail(2.228138851964939, 10), 12)
+    >>> round(student_tail(2.228138851964939, 10), 9)
     0.025
     """
     nu = _positive("degrees_of_freedom", degrees_of_freedom)
