@@ -2,7 +2,7 @@
 # PYTHON is the interpreter of an environment that has `pip install '.[test,lint]'`.
 PYTHON ?= .venv/bin/python
 
-.PHONY: check format lint types stub rust python docs bench develop aarch64
+.PHONY: check format lint types stub rust python docs bench develop aarch64 fuzz
 
 check: lint types stub rust python docs
 
@@ -41,6 +41,9 @@ python:             ## tests of the package
 
 docs:               ## documentation, warnings are errors
 	$(PYTHON) -m sphinx -W --keep-going -q docs docs/_build/html
+
+fuzz:               ## 20 000 damaged files for every loader; some hours, so apart from `check`
+	$(PYTHON) tests/fuzz --cases 20000
 
 bench:              ## benchmarks against a reference, in one run
 	cargo bench

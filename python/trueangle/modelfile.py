@@ -3,17 +3,27 @@
 from __future__ import annotations
 
 import json
-import math
+import warnings
 from collections.abc import Mapping
 from dataclasses import asdict, fields
 from os import PathLike
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
+from numpy.typing import NDArray
 
-from .errors import ArgumentError, ModelFileError, TrueAngleError
-from .files import MODEL, MODEL_BYTES, read_whole, written_atomically
+from .decoding import (
+    MAX_LINE_ORDERS,
+    MAX_LINES,
+    MAX_ORDER,
+    Decoder,
+    json_text,
+    read_text,
+    shown,
+)
+from .errors import ArgumentError, FileError, ModelFileError, OutsideSpanWarning
+from .files import MODEL, MODEL_BYTES, written_atomically
 from .model import HarmonicModel
 from .records import FitRecord, Provenance
 from .runs import Source
@@ -21,6 +31,8 @@ from .shafts import Shaft
 from .terms import TERMS, Term
 
 __all__ = ["FORMAT", "VERSION", "load_model", "save_model"]
+
+Array: TypeAlias = NDArray[np.float64]
 
 FORMAT = "trueangle-model"
 VERSION = 1
@@ -39,6 +51,19 @@ _KEYS = {
     "fit": False,
     "provenance": False,
 }
+#: Terms of a model, lines of one term, and runs or files that a record lists, at most.
+MAX_TERMS = 64
+MAX_TERM_LINES = 4096
+MAX_OFFSETS = 1_000_000
+#: Turns, at most, of angles and amplitudes: beyond, angles have no digits left.
+_MOST_TURNS = 1e9
+#: Smallest turn in the unit of angles, and the inverse of the largest.
+_LEAST_PERIOD = 1e-12
+#: Signals (velocity in turns per second) at which any model must correct.
+_NORMAL = (
+    {"velocity": 0.01, "temperature": 20.0, "torque": 1.0, "direction": 1.0},
+    {"velocity": -0.01, "temperature": 40.0, "torque": -1.0, "direction": -1.0},
+)
 _SHAFT_KEYS = ("name", "cycles_per_turn", "orders", "cosine", "sine")
 
 
@@ -80,7 +105,7 @@ def load_model(path: str | PathLike[str]) -> HarmonicModel:
         Not JSON, truncated, of a later version, unknown or missing keys, numbers that
         are not finite, a model that cannot be inverted: names the key and what to do.
     """
-    return _Reader(Path(path)).model()
+    return _Reader(Path(path), ModelFileError).model()
 
 
 def _pretty(value: Any, indent: int = 0) -> str:
@@ -96,202 +121,218 @@ def _pretty(value: Any, indent: int = 0) -> str:
     return json.dumps(value, allow_nan=False)
 
 
-class _Reader:
+class _Reader(Decoder):
     """Checks one file key by key; every refusal names file and key."""
 
-    def __init__(self, path: Path) -> None:
-        self.path = path
-
-    def error(self, problem: str, key: str | None = None) -> ModelFileError:
-        return ModelFileError(self.path, f"key '{key}': {problem}" if key else problem)
-
     def content(self) -> dict[str, Any]:
-        def pairs(items: list[tuple[str, Any]]) -> dict[str, Any]:
-            doubled = [key for i, (key, _) in enumerate(items) if key in dict(items[:i])]
-            if doubled:
-                raise self.error("appears twice", doubled[0])
-            return dict(items)
-
-        def constant(name: str) -> float:
-            raise self.error(f"holds {name}; every number must be finite")
-
-        try:
-            text = read_whole(self.path, MODEL_BYTES, "a model").decode("utf-8")
-            value = json.loads(text, object_pairs_hook=pairs, parse_constant=constant)
-        except json.JSONDecodeError as cause:
-            raise ModelFileError(
-                self.path,
-                f"is not complete JSON ({cause.msg}): truncated or not a model file; "
-                "save the model again",
-                line=cause.lineno,
-            ) from None
-        except (UnicodeDecodeError, RecursionError):
-            raise self.error("is not a model file: not JSON text") from None
-        except TrueAngleError:
-            raise
-        except ValueError as cause:  # integers of thousands of digits
-            raise self.error(f"holds a number that cannot be read: {cause}") from None
+        text = read_text(self.path, MODEL_BYTES, self.kind, "a model")
+        value = json_text(self.path, text, self.kind, "a model file")
         if not isinstance(value, dict) or value.get("format") != FORMAT:
             raise self.error(f'is not a model file: "format" must be "{FORMAT}"')
         return value
 
     def model(self) -> HarmonicModel:
         content = self.content()
-        version = content.get("version")
-        if not isinstance(version, int) or isinstance(version, bool) or version < 1:
-            raise self.error(f"must be a whole number from 1, got {version!r}", "version")
+        version = self.whole(content.get("version"), "version", 1)
         if version > VERSION:
             raise self.error(
                 f"{version} is later than {VERSION}, the latest this release reads; "
                 "upgrade trueangle",
                 "version",
             )
-        self.keys(content, _KEYS)
-        if content["argument"] not in ("reference", "indicated"):
+        self.table(content, _KEYS)
+        argument = content["argument"]
+        if argument not in ("reference", "indicated"):
             raise self.error(
-                f"must be 'reference' or 'indicated', got {content['argument']!r}", "argument"
+                f"must be 'reference' or 'indicated', got {shown(argument)}", "argument"
             )
-        covariance = content.get("covariance")
-        if covariance is not None:
-            if not isinstance(covariance, list):
-                raise self.error("must be a list of rows", "covariance")
-            rows = [self.numbers(row, f"covariance[{i}]") for i, row in enumerate(covariance)]
-            if any(len(row) != len(rows) for row in rows):
-                raise self.error("must be square", "covariance")
-            covariance = np.array(rows).reshape(len(rows), -1)
         condition = content.get("condition_number")
+        period = self.number(content["period"], "period")
+        if not _LEAST_PERIOD <= period <= 1.0 / _LEAST_PERIOD:
+            raise self.error(
+                f"one turn in the unit of the angles (360 for degrees) is needed, got {period!r}",
+                "period",
+            )
+        shafts = self.shafts(content["shafts"], _MOST_TURNS * period)
         try:
-            return HarmonicModel(
-                shafts=self.shafts(content["shafts"]),
+            model = HarmonicModel(
+                shafts=shafts,
                 constant=self.number(content["constant"], "constant"),
-                period=self.number(content["period"], "period"),
-                argument=content["argument"],
-                covariance=covariance,
-                condition_number=None
-                if condition is None
-                else self.number(condition, "condition_number"),
-                fit=self.fit(content.get("fit")),
+                period=period,
+                argument=argument,
+                covariance=self.covariance(content.get("covariance"), shafts),
+                condition_number=None if condition is None else self.condition(condition),
+                fit=self.fit(content.get("fit"), period),
                 provenance=self.provenance(content.get("provenance")),
                 terms=self.terms(content.get("terms")),
             )
-        except ModelFileError:
+            if model.terms:
+                self.check_finite(model)
+        except FileError:
             raise
         except ValueError as cause:  # the model's own checks, under the file's name
             raise self.error(str(cause)) from None
+        return model
 
-    def keys(self, content: Mapping[str, Any], known: Mapping[str, bool], where: str = "") -> None:
-        for key in content:
-            if key not in known:
-                raise self.error(f"is unknown; the keys are {', '.join(known)}", f"{where}{key}")
-        for key, needed in known.items():
-            if needed and key not in content:
-                raise self.error("is missing", f"{where}{key}")
+    def check_finite(self, model: HarmonicModel) -> None:
+        """Terms whose numbers leave no finite correction at a joint's normal signals."""
+        angles = np.arange(0.0, 1.0, 1.0 / 16.0) * model.period
+        start = 0.0 if model.fit is None else model.fit.span[0]
+        for signals in _NORMAL:
+            given: Any = {
+                name: value * model.period if name == "velocity" else value
+                for name, value in signals.items()
+                if name in model.uses_signals
+            }
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore", OutsideSpanWarning)
+                corrected = model.correct(start + angles, **given)
+            if not np.isfinite(corrected).all():
+                listed = ", ".join(f"{name} {value:g}" for name, value in given.items())
+                raise self.error(f"leave no finite correction at {listed or 'any angle'}", "terms")
 
-    def number(self, value: Any, key: str) -> float:
-        if isinstance(value, bool) or not isinstance(value, (int, float)):
-            raise self.error(f"a number is needed, got {value!r}", key)
-        try:
-            number = float(value)
-        except OverflowError:
-            number = math.inf
-        if not math.isfinite(number):
-            raise self.error("every number must be finite and within double range", key)
+    def condition(self, value: Any) -> float:
+        number = self.number(value, "condition_number")
+        if number < 0.0:
+            raise self.error(f"must not be negative, got {number!r}", "condition_number")
         return number
 
-    def numbers(self, values: Any, key: str) -> tuple[float, ...]:
-        if not isinstance(values, list):
-            raise self.error(f"a list of numbers is needed, got {type(values).__name__}", key)
-        return tuple(self.number(value, f"{key}[{i}]") for i, value in enumerate(values))
+    def covariance(self, value: Any, shafts: tuple[Shaft, ...]) -> Array | None:
+        if value is None:
+            return None
+        size = 1 + 2 * sum(len(shaft.orders) for shaft in shafts)
+        rows = self.items(value, "covariance", "rows")
+        if len(rows) != size:
+            raise self.error(
+                f"must be square, {size} x {size} for these shafts, got {len(rows)} rows",
+                "covariance",
+            )
+        found = np.empty((size, size))
+        for i, row in enumerate(rows):
+            numbers = self.numbers(row, f"covariance[{i}]")
+            if len(numbers) != size:
+                raise self.error(f"must be square, {size} x {size}", "covariance")
+            found[i] = numbers
+        return found
 
-    def shafts(self, values: Any) -> tuple[Shaft, ...]:
-        if not isinstance(values, list):
-            raise self.error("a list of shafts is needed", "shafts")
+    def shafts(self, value: Any, most: float) -> tuple[Shaft, ...]:
         shafts = []
-        for i, value in enumerate(values):
-            where = f"shafts[{i}]."
-            if not isinstance(value, dict):
-                raise self.error("an object is needed", where[:-1])
-            self.keys(value, dict.fromkeys(_SHAFT_KEYS, True), where)
-            if not isinstance(value["name"], str):
-                raise self.error("a text is needed", where + "name")
-            orders = self.numbers(value["orders"], where + "orders")
-            if any(k != int(k) or not 1 <= k < 2**32 for k in orders):
-                raise self.error("orders are whole numbers from 1", where + "orders")
+        harmonics, highest = 0, 0.0
+        for i, entry in enumerate(self.items(value, "shafts", "shafts")):
+            where = f"shafts[{i}]"
+            table = self.table(entry, dict.fromkeys(_SHAFT_KEYS, True), where)
+            cycles = self.number(table["cycles_per_turn"], f"{where}.cycles_per_turn")
+            if not cycles > 0.0:
+                raise self.error(f"must be positive, got {cycles!r}", f"{where}.cycles_per_turn")
+            listed = self.items(table["orders"], f"{where}.orders", "orders")
+            orders = tuple(
+                self.whole(k, f"{where}.orders[{j}]", 1, 2**32 - 1) for j, k in enumerate(listed)
+            )
+            harmonics += len(orders)
+            highest = max(highest, cycles * max(orders, default=0))
+            if highest > MAX_ORDER:
+                raise self.error(
+                    f"{highest:.6g} cycles per output turn are more than {MAX_ORDER:.0f}", where
+                )
+            if harmonics > MAX_LINES or harmonics * highest > MAX_LINE_ORDERS:
+                raise self.error(
+                    f"{harmonics} harmonics of up to {highest:.6g} cycles per turn are too many: "
+                    f"at most {MAX_LINES}, and {MAX_LINE_ORDERS:.0g} of their product",
+                    "shafts",
+                )
             shafts.append(
                 Shaft(
-                    value["name"],
-                    self.number(value["cycles_per_turn"], where + "cycles_per_turn"),
-                    tuple(int(k) for k in orders),
-                    self.numbers(value["cosine"], where + "cosine"),
-                    self.numbers(value["sine"], where + "sine"),
+                    self.text(table["name"], f"{where}.name"),
+                    cycles,
+                    orders,
+                    self.amplitudes(table["cosine"], f"{where}.cosine", most),
+                    self.amplitudes(table["sine"], f"{where}.sine", most),
                 )
             )
         return tuple(shafts)
 
-    def terms(self, values: Any) -> tuple[Term, ...]:
-        if values is None:
+    def amplitudes(self, value: Any, key: str, most: float) -> tuple[float, ...]:
+        found = self.numbers(value, key)
+        for i, amplitude in enumerate(found):
+            if abs(amplitude) > most:
+                raise self.error(f"more than {_MOST_TURNS:.0g} turns: {amplitude!r}", f"{key}[{i}]")
+        return found
+
+    def terms(self, value: Any) -> tuple[Term, ...]:
+        if value is None:
             return ()
-        if not isinstance(values, list):
-            raise self.error("a list of terms is needed", "terms")
         terms = []
-        for i, value in enumerate(values):
+        for i, entry in enumerate(self.items(value, "terms", "terms", MAX_TERMS)):
             where = f"terms[{i}]"
-            if not isinstance(value, dict):
-                raise self.error("an object is needed", where)
-            kind = value.get("kind")
-            if kind not in TERMS:
+            if not isinstance(entry, dict):
+                raise self.error(f"an object is needed, got {shown(entry)}", where)
+            kind = entry.get("kind")
+            if not isinstance(kind, str) or kind not in TERMS:
                 raise self.error(
-                    f"{kind!r} is unknown; the kinds are {', '.join(TERMS)}; "
+                    f"{shown(kind)} is unknown; the kinds are {', '.join(TERMS)}; "
                     "a later trueangle may know it",
                     f"{where}.kind",
                 )
-            table = {key: entry for key, entry in value.items() if key != "kind"}
+            table = {key: self.parameter(v, f"{where}.{key}") for key, v in entry.items()}
+            table.pop("kind")
             try:
                 terms.append(TERMS[kind].from_table(table))
             except ArgumentError as cause:
                 raise self.error(str(cause), where) from None
         return tuple(terms)
 
-    def fit(self, value: Any) -> FitRecord | None:
+    def parameter(self, value: Any, key: str) -> Any:
+        """A parameter of a term: a number, a text, none, or lists of numbers."""
+        if value is None or isinstance(value, str):
+            return value
+        if not isinstance(value, list):
+            number = self.number(value, key)
+            if key.endswith("order") and abs(number) > MAX_ORDER:
+                raise self.error(f"more than {MAX_ORDER:.0f} cycles per turn", key)
+            return value
+        found = self.items(value, key, "numbers", MAX_TERM_LINES)
+        for i, entry in enumerate(found):
+            if isinstance(entry, list):
+                self.numbers(entry, f"{key}[{i}]", MAX_TERM_LINES)
+            elif self.number(entry, f"{key}[{i}]") > MAX_ORDER and key.endswith("orders"):
+                raise self.error(f"more than {MAX_ORDER:.0f} cycles per turn", f"{key}[{i}]")
+        return found
+
+    def fit(self, value: Any, period: float) -> FitRecord | None:
         if value is None:
             return None
-        known = {
-            f.name: f.name in ("samples", "runs", "span", "residual") for f in fields(FitRecord)
-        }
-        if not isinstance(value, dict):
-            raise self.error("an object is needed", "fit")
-        self.keys(value, known, "fit.")
+        needed = ("samples", "runs", "span", "residual")
+        table = self.table(value, {f.name: f.name in needed for f in fields(FitRecord)}, "fit")
         checked: dict[str, Any] = {}
-        for key, entry in value.items():
+        for key, entry in table.items():
             name = f"fit.{key}"
             if key in ("method", "loss", "note"):
-                if not isinstance(entry, str):
-                    raise self.error(f"a text is needed, got {entry!r}", name)
-                checked[key] = entry
+                checked[key] = self.text(entry, name)
             elif key in ("span", "offsets"):
-                checked[key] = self.numbers(entry, name)
+                checked[key] = self.numbers(entry, name, MAX_OFFSETS)
             elif key in ("samples", "runs", "wild", "positions"):
-                whole = entry is None if key == "positions" else False
-                if not whole and (self.number(entry, name) != int(entry) or entry < 0):
-                    raise self.error(f"a count is needed, got {entry!r}", name)
-                checked[key] = entry
+                unknown = entry is None and key == "positions"
+                checked[key] = None if unknown else self.whole(entry, name)
+            elif entry is None and key == "residual":
+                checked[key] = None
             else:
                 checked[key] = self.number(entry, name)
-        if len(checked["span"]) != 2:
-            raise self.error("two angles are needed", "fit.span")
+        span = checked["span"]
+        if len(span) != 2 or span[0] > span[1] or max(map(abs, span)) > _MOST_TURNS * period:
+            raise self.error(
+                f"two angles, the first the smaller, are needed, got {span}", "fit.span"
+            )
         return FitRecord(**checked)
 
     def provenance(self, value: Any) -> Provenance:
         if value is None:
             return Provenance()
-        if not isinstance(value, dict):
-            raise self.error("an object is needed", "provenance")
-        self.keys(value, {"inputs": True, "package": True}, "provenance.")
+        table = self.table(value, {"inputs": True, "package": True}, "provenance")
         inputs = []
-        for i, entry in enumerate(value["inputs"]):
+        listed = self.items(table["inputs"], "provenance.inputs", "files", MAX_OFFSETS)
+        for i, entry in enumerate(listed):
             where = f"provenance.inputs[{i}]"
-            if not isinstance(entry, dict):
-                raise self.error("an object is needed", where)
-            self.keys(entry, {"file": True, "sha256": True}, where + ".")
-            inputs.append(Source(str(entry["file"]), str(entry["sha256"])))
-        return Provenance(tuple(inputs), str(value["package"]))
+            source = self.table(entry, {"file": True, "sha256": True}, where)
+            texts = (self.text(source[key], f"{where}.{key}") for key in ("file", "sha256"))
+            inputs.append(Source(*texts))
+        return Provenance(tuple(inputs), self.text(table["package"], "provenance.package"))

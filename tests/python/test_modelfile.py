@@ -57,6 +57,12 @@ def written(tmp_path, change=None, text=None):
     return path
 
 
+FIT = {"samples": 1, "runs": 1, "span": [0.0, 360.0], "residual": 0.1}
+MANY = {
+    "orders": list(range(1, 20_001)),
+    "cosine": [0.0] * 20_000,
+    "sine": [0.0] * 20_000,
+}
 REFUSED = {
     "truncated": ({"text": lambda s: s[: len(s) // 2]}, "truncated"),
     "empty": ({"text": lambda s: ""}, "not complete JSON"),
@@ -71,6 +77,23 @@ REFUSED = {
     "a huge integer": ({"text": lambda s: s.replace("0.5", "9" * 6000)}, "cannot be read"),
     "a big integer": ({"text": lambda s: s.replace("0.5", "9" * 400)}, r"sine\[0\].*finite"),
     "a doubled key": ({"text": lambda s: s.replace("{", '{"period": 1,', 1)}, "period.*twice"),
+    "true for a number": ({"change": lambda c: c.update(constant=True)}, "constant.*True"),
+    "a turn of no size": ({"change": lambda c: c.update(period=5e-324)}, "period"),
+    "a negative condition": ({"change": lambda c: c.update(condition_number=-1)}, "condition"),
+    "an order of 1e9": (
+        {"text": lambda s: s.replace("[1, 2]", "[1, 1000000000]")},
+        r"shafts\[0\].*cycles per output turn are more than 1000000",
+    ),
+    "too many lines": ({"change": lambda c: c["shafts"][0].update(MANY)}, "too many"),
+    "an overflow": ({"text": lambda s: s.replace("0.5", "1e308")}, r"sine\[0\].*turns"),
+    "a span backwards": (
+        {"change": lambda c: c.update(fit={**FIT, "span": [5e300, -5e300]})},
+        r"fit\.span",
+    ),
+    "no correction": (
+        {"change": lambda c: c.update(terms=[{"kind": "thermal_drift", "pattern_per_K": 1e9}])},
+        "terms",
+    ),
     "half an order": ({"text": lambda s: s.replace("[1, 2]", "[1, 2.5]")}, "orders"),
     "falling orders": ({"text": lambda s: s.replace("[1, 2]", "[2, 1]")}, "orders"),
     "text as number": ({"change": lambda c: c.update(constant="0")}, "constant.*number"),
@@ -112,3 +135,11 @@ def test_the_file_is_readable_by_people_and_states_its_convention(tmp_path):
     assert content["period"] == 360.0
     assert content["shafts"][0]["cosine"] == [0.1, 0.0]
     assert max(len(line) for line in written(tmp_path).read_text().splitlines()) < 100
+
+
+def test_a_hundred_thousand_keys_are_searched_for_doubles_at_once(tmp_path):
+    keys = ", ".join(f'"k{i}": {i}' for i in range(100_000))
+    path = tmp_path / "wide.json"
+    path.write_text("{" + keys + ', "k7": 1}')
+    with pytest.raises(ModelFileError, match=r"k7.*appears twice"):
+        ta.load_model(path)  # comparing every pair of keys would take minutes

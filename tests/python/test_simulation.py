@@ -258,3 +258,31 @@ def test_a_gear_is_a_strain_wave_gear_unless_said_otherwise(tmp_path):
     assert ta.load_simulation(path).joint == Joint(50, "none", "motor")
     path.write_text("[joint]\npole_pairs = 4\n")
     assert ta.load_simulation(path).joint.shafts == {"output": 1.0}
+
+
+ODD_FILES = {
+    "a huge number": ("[noise]\nsigma_arcsec = " + "9" * 400, "sigma_arcsec.*finite"),
+    "thousands of digits": ("[noise]\nsigma_arcsec = " + "9" * 5000, "cannot be read"),
+    "deep nesting": ("x = " + "[" * 5000 + "]" * 5000, "nested too deeply"),
+    "a date": ("[noise]\nsigma_arcsec = 1979-05-27", "sigma_arcsec"),
+    "a kind that is a list": ("[[effect]]\nkind = []", "kind must be one of"),
+    "a huge parameter": (
+        '[[effect]]\nkind = "backlash"\nhalf_width_arcsec = ' + "9" * 400,
+        "half_width_arcsec.*finite",
+    ),
+    "too many samples": ("[[run]]\nsamples = 1000000000", "samples must be from 1 to"),
+    "too many in all": ("[[run]]\nsamples = 20000000\n" * 2, "40000000 samples"),
+    "too many turns": ("[[run]]\nturns = 1e300", "turns must be"),
+    "infinite turns": ("[[run]]\nturns = inf", "turns must be a finite number"),
+    "true for a number": ("[[run]]\nsamples = true", "samples must be a finite number"),
+}
+
+
+@pytest.mark.parametrize("case", ODD_FILES)
+def test_values_that_no_joint_has_are_refused_with_their_place(case, tmp_path):
+    text, message = ODD_FILES[case]
+    path = tmp_path / "odd.toml"
+    path.write_text(text)
+    with pytest.raises(FileError, match=message) as caught:
+        ta.load_simulation(path)
+    assert str(caught.value).startswith(str(path))

@@ -9,6 +9,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+from ..decoding import finite
 from ..errors import ArgumentError
 from ..files import check_output
 from .safety import Stamp, locked, stamp
@@ -108,14 +109,59 @@ class Manifest:
         """Read what is done."""
         if not self.path.exists():
             return
-        keys = {"output", "log_stamp", "output_stamp", "settings", "result"}
         for line in self.path.read_bytes().splitlines():
-            try:
-                entry = json.loads(line)
-            except ValueError:
-                continue
-            if isinstance(entry, dict) and keys <= entry.keys():
+            entry = _decoded(line)
+            if entry is not None:
                 self._entries[entry["output"]] = entry
 
     def _name(self, target: Path) -> str:
         return target.relative_to(self.folder).as_posix()
+
+
+def _decoded(line: bytes) -> dict[str, Any] | None:
+    """The entry of a line; None for what `Manifest.record` did not write: it does not count."""
+    try:
+        entry = json.loads(line)
+        result = entry["result"]
+        stamps = (entry["log_stamp"], entry["output_stamp"])
+        texts = (entry["output"], entry["settings"])
+        numbers = [result[key] for key in ("rows", "seconds", "rows_per_second")]
+        joints, after = result["joints"], result["after"]
+    except (ValueError, LookupError, TypeError, RecursionError):
+        return None
+    good = (
+        isinstance(entry, dict)
+        and all(isinstance(text, str) for text in texts)
+        and all(_is_list_of(stamp, int) and len(stamp) == 2 for stamp in stamps)
+        and all(finite(number) is not None for number in numbers)
+        and isinstance(result["rows"], int)
+        and _is_list_of(joints, dict)
+        and all(joint.keys() >= _JOINT_KEYS for joint in joints)
+        and all(finite(joint[key]) is not None for joint in joints for key in _JOINT_NUMBERS)
+        and isinstance(after, dict)
+        and all(_is_state(state) for state in after.values())
+    )
+    return entry if good else None
+
+
+_JOINT_NUMBERS = {"rms_correction_arcsec", "max_abs_correction_arcsec", "missing"}
+_JOINT_KEYS = {"joint", "column", "corrected", "outside_span"} | _JOINT_NUMBERS
+
+
+def _is_list_of(value: Any, kind: type) -> bool:
+    return isinstance(value, list) and all(type(entry) is kind for entry in value)
+
+
+def _is_state(value: Any) -> bool:
+    """``[[last angle or null, turns], [numbers]]``, see `JointState`."""
+    try:
+        (last, turns), travel = value
+    except (TypeError, ValueError):
+        return False
+    known = last is None or finite(last) is not None
+    return (
+        known
+        and type(turns) is int
+        and isinstance(travel, list)
+        and all(type(number) in (int, float) for number in travel)  # NaN: no motion yet
+    )

@@ -12,7 +12,12 @@ from numpy.typing import NDArray
 from ..errors import ArgumentError
 from ..runs import CalibrationRun
 
-__all__ = ["SPACINGS", "RunDesign"]
+__all__ = ["MAX_SAMPLES", "SPACINGS", "RunDesign"]
+
+#: Readings of one run, at most: a simulation holds some 150 bytes of each.
+MAX_SAMPLES = 20_000_000
+#: Turns and degrees, at most: beyond, an angle has no digits left for an arcsec.
+_MOST_TURNS = 1e6
 
 SPACINGS = ("uniform", "jittered", "random")
 
@@ -76,12 +81,16 @@ class RunDesign:
             raise refuse("direction", "1 or -1")
         if not 0.0 <= self.speed_deg_s < math.inf:
             raise refuse("speed_deg_s", "0 (at rest) or positive")
-        if self.samples < 1:
-            raise refuse("samples", "at least 1")
+        if not 1 <= self.samples <= MAX_SAMPLES:
+            raise refuse("samples", f"from 1 to {MAX_SAMPLES}")
         if self.spacing not in SPACINGS:
             raise refuse("spacing", f"one of {', '.join(SPACINGS)}")
-        if not 0.0 < self.turns < math.inf:
-            raise refuse("turns", "positive")
+        if not 0.0 < self.turns <= _MOST_TURNS:
+            raise refuse("turns", f"positive, at most {_MOST_TURNS:.0g}")
+        for name in ("start_deg", "mount_deg", "gravity_deg", "shift_deg"):
+            value = getattr(self, name)
+            if value is not None and not abs(value) <= 360.0 * _MOST_TURNS:
+                raise refuse(name, f"within {_MOST_TURNS:.0g} turns")
         edges = (0.0, *self.reversals, 1.0)
         if any(b <= a for a, b in itertools.pairwise(edges)):
             raise refuse("reversals", "ascending shares of the travel between 0 and 1")

@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-import math
 import tomllib
 from collections.abc import Callable, Mapping
 from dataclasses import fields
 from pathlib import Path
 from typing import Any, TypeVar
 
+from ..decoding import finite, read_text, shown
 from ..errors import ArgumentError, FileError
-from ..files import SIMULATION, SIMULATION_BYTES, read_whole, written_atomically
+from ..files import SIMULATION, SIMULATION_BYTES, written_atomically
 from ..joint.joint import Joint
 from ..joint.pattern import Harmonic
-from .designs import RunDesign
+from .designs import MAX_SAMPLES, RunDesign
 from .effects import EFFECTS, Effect
 from .simulation import Simulation
 
@@ -21,6 +21,9 @@ __all__ = ["dumps", "load_simulation", "to_table", "write"]
 
 _TABLES = ("joint", "harmonic", "effect", "noise", "run")
 _JOINT_KEYS = ("gear_ratio", "fixed_member", "encoder_side", "pole_pairs")
+
+#: Lines, effects, runs, or numbers of one list, at most.
+MAX_TABLES = 10_000
 
 T = TypeVar("T")
 
@@ -54,20 +57,27 @@ def load_simulation(path: str | Path) -> Simulation:
     >>> load_simulation(path).joint.gear_ratio
     50.0
     """
+    text = read_text(path, SIMULATION_BYTES, FileError, "a simulation")
+    return _simulation(path, _document(path, text))
+
+
+def _document(path: str | Path, text: str) -> dict[str, Any]:
     try:
-        text = read_whole(path, SIMULATION_BYTES, "a simulation").decode("utf-8")
-        document = tomllib.loads(text)
+        return tomllib.loads(text)
     except tomllib.TOMLDecodeError as cause:
         raise FileError(path, f"not a TOML file: {cause}") from None
-    except UnicodeDecodeError as cause:
-        raise FileError(path, f"not a UTF-8 text: {cause}") from None
-    return _simulation(path, document)
+    except RecursionError:
+        raise FileError(path, "not a simulation: nested too deeply") from None
+    except ValueError:  # whole numbers of thousands of digits, dates that are none
+        raise FileError(path, "holds a number or date that cannot be read") from None
 
 
 def _simulation(path: str | Path, document: Mapping[str, Any]) -> Simulation:
     for name in document:
         if name not in _TABLES:
-            raise FileError(path, f"unknown table '{name}'; a simulation has {', '.join(_TABLES)}")
+            raise FileError(
+                path, f"unknown table {shown(name)}; a simulation has {', '.join(_TABLES)}"
+            )
     joint = _build(path, "[joint]", Joint, _geared(_table(path, document, "joint")))
     harmonics = tuple(
         _build(path, f"[[harmonic]] number {k}", Harmonic, table)
@@ -81,17 +91,21 @@ def _simulation(path: str | Path, document: Mapping[str, Any]) -> Simulation:
         _build(path, f"[[run]] number {k}", RunDesign, table)
         for k, table in enumerate(_tables(path, document, "run"), 1)
     )
+    samples = sum(design.samples for design in designs)
+    if samples > MAX_SAMPLES:
+        raise FileError(path, f"its runs have {samples} samples, more than {MAX_SAMPLES} in all")
     noise = _table(path, document, "noise")
     for name in noise:
         if name != "sigma_arcsec":
-            raise FileError(path, f"[noise]: unknown key '{name}'; it has sigma_arcsec")
-    sigma = noise.get("sigma_arcsec", 0.0)
-    if isinstance(sigma, bool) or not isinstance(sigma, int | float):
-        raise FileError(path, f"[noise]: sigma_arcsec must be a number, got {sigma!r}")
+            raise FileError(path, f"[noise]: unknown key {shown(name)}; it has sigma_arcsec")
+    sigma = finite(noise.get("sigma_arcsec", 0.0))
+    if sigma is None:
+        got = shown(noise["sigma_arcsec"])
+        raise FileError(path, f"[noise]: sigma_arcsec must be a finite number, got {got}")
     return _guarded(
         path,
         "simulation",
-        lambda: Simulation(joint, harmonics, effects, float(sigma), designs, str(path)),
+        lambda: Simulation(joint, harmonics, effects, sigma, designs, str(path)),
     )
 
 
@@ -113,6 +127,8 @@ def _tables(path: str | Path, document: Mapping[str, Any], name: str) -> list[di
     tables = document.get(name, [])
     if not isinstance(tables, list) or not all(isinstance(table, dict) for table in tables):
         raise FileError(path, f"'{name}' must be a list of tables, [[{name}]]")
+    if len(tables) > MAX_TABLES:
+        raise FileError(path, f"{len(tables)} tables [[{name}]]; at most {MAX_TABLES} are allowed")
     return tables
 
 
@@ -121,7 +137,7 @@ def _build(path: str | Path, where: str, kind: type[T], table: Mapping[str, Any]
     values = {}
     for name, value in table.items():
         if name not in known:
-            raise FileError(path, f"{where}: unknown key '{name}'; it has {', '.join(known)}")
+            raise FileError(path, f"{where}: unknown key {shown(name)}; it has {', '.join(known)}")
         values[name] = _value(path, where, name, value, known[name])
     try:
         return _guarded(path, where, lambda: kind(**values))
@@ -132,35 +148,52 @@ def _build(path: str | Path, where: str, kind: type[T], table: Mapping[str, Any]
 
 def _value(path: str | Path, where: str, name: str, value: Any, wanted: str) -> Any:
     def refuse(what: str) -> FileError:
-        return FileError(path, f"{where}: {name} must be {what}, got {value!r}")
+        return FileError(path, f"{where}: {name} must be {what}, got {shown(value)}")
 
     if wanted.startswith("str"):
         if not isinstance(value, str):
             raise refuse("a text")
         return value
     if wanted.startswith("tuple"):
-        if not isinstance(value, list) or not all(_is_number(item) for item in value):
+        numbers = tuple(map(finite, value)) if isinstance(value, list) else (None,)
+        if None in numbers:
             raise refuse("a list of finite numbers")
-        return tuple(float(item) for item in value)
-    if not _is_number(value):
+        if len(numbers) > MAX_TABLES:
+            raise refuse(f"a list of at most {MAX_TABLES} numbers")
+        return numbers
+    number = finite(value)
+    if number is None:
         raise refuse("a finite number")
     if wanted.startswith("int"):
-        if value != int(value):
+        if number != int(number):
             raise refuse("a whole number")
-        return int(value)
-    return float(value)
-
-
-def _is_number(value: Any) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
+        return int(number)
+    return number
 
 
 def _effect(path: str | Path, where: str, table: dict[str, Any]) -> Effect:
     parameters = dict(table)
     kind = parameters.pop("kind", None)
-    if kind not in EFFECTS:
-        raise FileError(path, f"{where}: kind must be one of {', '.join(EFFECTS)}, got {kind!r}")
+    if not isinstance(kind, str) or kind not in EFFECTS:
+        raise FileError(
+            path, f"{where}: kind must be one of {', '.join(EFFECTS)}, got {shown(kind)}"
+        )
+    for name, value in parameters.items():
+        parameters[name] = _checked_numbers(path, f"{where}: {shown(name)}", value)
     return _guarded(path, where, lambda: EFFECTS[kind].from_table(parameters))
+
+
+def _checked_numbers(path: str | Path, where: str, value: Any) -> Any:
+    """A parameter whose numbers, in lists of lists too, are finite and not too many."""
+    if isinstance(value, list):
+        if len(value) > MAX_TABLES:
+            raise FileError(path, f"{where} must be a list of at most {MAX_TABLES}")
+        return [_checked_numbers(path, where, item) for item in value]
+    if isinstance(value, int | float) and not isinstance(value, bool):
+        if finite(value) is None:
+            raise FileError(path, f"{where} must be a finite number, got {shown(value)}")
+        return value if abs(value) < 2**53 else float(value)
+    return value
 
 
 def _guarded(path: str | Path, where: str, build: Callable[[], T]) -> T:

@@ -1,0 +1,29 @@
+"""A short fuzz of every loader; `make fuzz` is the long one."""
+
+import random
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+FUZZ = Path(__file__).resolve().parents[1] / "fuzz"
+sys.path.insert(0, str(FUZZ))
+
+from loaders import loaders  # noqa: E402
+
+#: Damaged files of each loader.
+CASES = 60
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="memory is bounded by RLIMIT_AS")
+@pytest.mark.parametrize("name", ["model", "simulation", "manifest"])
+def test_damaged_files_are_read_or_refused(name):
+    assert name in loaders()
+    seed = random.SystemRandom().randrange(2**32)
+    print("seed", seed)
+    command = [sys.executable, str(FUZZ), "--loader", name, "--cases", str(CASES)]
+    done = subprocess.run(
+        [*command, "--seed", str(seed)], capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
