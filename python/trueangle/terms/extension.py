@@ -88,7 +88,7 @@ def without_terms(
     MissingSignalError
         A run lacks a signal that a term needs.
     """
-    from ..simulation.signals import join_runs
+    from ..joint.signals import join_runs
 
     plain = model.replace(terms=())
     delay = sum(getattr(term, "delay_s", 0.0) for term in model.terms)
