@@ -1,0 +1,245 @@
+r"""The noise of one reading and its correlation, beside whatever pattern there may be.
+
+Residuals of a fitted account tell too little of the correlation: what repeats at a place looks
+like it, and what the fit takes away lowers it. Here the readings of each run are
+
+.. math:: y = X\beta + n, \qquad \mathrm{corr}(n_i, n_j) = \rho^{|i - j|},
+
+with X a mean per run and a flexible pattern of the angle, alike and by direction, and rho
+maximises the restricted likelihood (Patterson and Thompson 1971), in which the coefficients
+cost nothing:
+
+.. math:: -2 l = (n - p)\ln \mathrm{RSS}(\rho) - R\ln(1 - \rho^2) + \ln|X^T V^{-1} X|.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .leftover import Leftover
+
+__all__ = ["Noise", "estimate_noise"]
+
+Array = NDArray[np.float64]
+
+#: Orders of the flexible pattern at most, and readings per column at least.
+MOST_ORDERS, READINGS_PER_COLUMN = 12, 12
+
+#: Readings used at most: whole runs, from the first on.
+MOST_READINGS = 12_000
+
+#: Residuals are taken at most this many robust standard deviations large.
+CLIP = 4.0
+
+#: Correlations that are tried first; the best is refined by parabolas.
+TRIALS = (0.0, 0.1, 0.2, 0.35, 0.5, 0.65, 0.8, 0.9, 0.95, 0.975, 0.99)
+
+#: Share of the power of the strongest combination of columns from which another one counts.
+DISTINCT = 1e-6
+
+#: Half the deviance that a correlation must bring to be told from none: 4 standard errors.
+TOLD = 16.0
+
+
+@dataclass(frozen=True)
+class Noise:
+    """Noise of readings.
+
+    Attributes
+    ----------
+    sigma : float
+        Standard deviation of one reading.
+    correlation : float
+        Between neighbours in a run; 0 where it is not told from none.
+    std : float
+        Standard error of the correlation.
+    deviance : float
+        2 ln of the restricted likelihood ratio against white noise.
+    freedom : float
+        Readings less coefficients.
+    """
+
+    sigma: float
+    correlation: float
+    std: float
+    deviance: float
+    freedom: float
+
+
+def estimate_noise(left: Leftover, orders: int | None = None) -> Noise:
+    """Standard deviation and correlation of the noise by restricted likelihood.
+
+    Parameters
+    ----------
+    left : Leftover
+        What is left of the readings; a pattern may still be in it.
+    orders : int, optional
+        Orders of the flexible pattern; as many as the readings carry, up to 12.
+
+    Returns
+    -------
+    Noise
+        About 30 ms for 10 000 readings.
+    """
+    bounds = _some(left.bounds)
+    stop = bounds[-1][1]
+    e = left.residual[:stop]
+    spread = 1.4826 * float(np.median(np.abs(e - np.median(e))))
+    # Wild readings would hide a correlation; what is slow keeps its size.
+    e = _without_spikes(e, max(spread, 1e-300))
+    x = _pattern(left, stop, len(bounds), orders)
+    x, e = _centred(x, bounds), _centred(e[:, None], bounds)[:, 0]
+    means = len(bounds)
+    sums = _Sums(x, e, bounds)
+    trials = np.array(TRIALS)
+    values = np.array([sums.deviance(r, means) for r in trials])
+    k = int(np.argmin(values))
+    low, high = trials[max(k - 1, 0)], trials[min(k + 1, trials.size - 1)]
+    rho, value = _refined(lambda r: sums.deviance(r, means), float(low), float(high))
+    if value > values[k]:
+        rho, value = float(trials[k]), float(values[k])
+    step = min(0.02, 0.5 * (1.0 - rho), max(rho, 0.004))
+    bend = (
+        sums.deviance(min(rho + step, 0.999), means)
+        - 2.0 * value
+        + sums.deviance(max(rho - step, 0.0), means)
+    ) / step**2
+    std = float(np.sqrt(2.0 / bend)) if bend > 0.0 else 1.0 / np.sqrt(max(stop, 1))
+    gained = float(values[0] - value)
+    if gained < TOLD:
+        rho = 0.0
+    rss, freedom = sums.fitted(rho, means)
+    innovation = rss / max(freedom, 1.0)
+    return Noise(
+        float(np.sqrt(innovation / (1.0 - rho**2))), rho, std, max(gained, 0.0), float(freedom)
+    )
+
+
+def _some(bounds: list[tuple[int, int]]) -> list[tuple[int, int]]:
+    """The first runs, as many as are needed; of a long first run the beginning."""
+    kept: list[tuple[int, int]] = []
+    for start, stop in bounds:
+        if start >= MOST_READINGS:
+            break
+        kept.append((start, min(stop, start + MOST_READINGS)))
+        if stop > MOST_READINGS:
+            break
+    return kept
+
+
+def _without_spikes(e: Array, spread: float) -> Array:
+    """Readings far from the mean of their neighbours put back to it."""
+    if e.size < 3:
+        return e
+    beside = 0.5 * (np.concatenate([e[1:2], e[:-1]]) + np.concatenate([e[1:], e[-2:-1]]))
+    away = e - beside
+    limit = CLIP * max(1.4826 * float(np.median(np.abs(away))), 1e-12 * spread)
+    return np.where(np.abs(away) > limit, beside + np.clip(away, -limit, limit), e)
+
+
+def _pattern(left: Leftover, n: int, runs: int, orders: int | None) -> Array:
+    moving = left.direction[:n]
+    both = bool(np.ptp(moving[moving != 0.0]) > 0.0) if np.any(moving != 0.0) else False
+    width = 4 if both else 2
+    most = max((n // READINGS_PER_COLUMN - runs) // width, 0)
+    orders = min(most, MOST_ORDERS) if orders is None else orders
+    step = 1.0 if left.turns > 0.9 else 1.0 / max(2.0 * left.turns, 1e-3)
+    angle = np.outer(left.theta[:n], step * np.arange(1, orders + 1))
+    columns = [np.cos(angle), np.sin(angle)]
+    if both:
+        d = moving[:, None]
+        columns += [d, d * columns[0], d * columns[1]]
+    return np.hstack(columns) if columns[0].size or both else np.zeros((n, 0))
+
+
+def _centred(x: Array, bounds: list[tuple[int, int]]) -> Array:
+    out = x.copy()
+    for a, b in bounds:
+        out[a:b] -= out[a:b].mean(axis=0)
+    return out
+
+
+class _Sums:
+    """Products from which RSS and determinant follow for every correlation.
+
+    With the run's mean taken out beforehand: for correlated noise the mean of the readings
+    is not quite the best estimate of the run's zero, by an amount that ends matter for only.
+    """
+
+    def __init__(self, x: Array, e: Array, bounds: list[tuple[int, int]]) -> None:
+        z = np.column_stack([_independent(x), e])
+        first = np.array([a for a, _ in bounds])
+        last = np.array([b - 1 for _, b in bounds])
+        self.runs = len(bounds)
+        self.n = z.shape[0]
+        self.same = z.T @ z
+        inner = np.ones(self.n, dtype=bool)
+        inner[first] = inner[last] = False
+        self.inner = z[inner].T @ z[inner]
+        follows = np.ones(self.n - 1, dtype=bool)
+        follows[last[:-1]] = False
+        cross = z[1:][follows].T @ z[:-1][follows]
+        self.cross = cross + cross.T
+
+    def products(self, rho: float) -> Array:
+        """Products z' V^-1 z times the variance of one innovation."""
+        return np.asarray(self.same + rho**2 * self.inner - rho * self.cross)
+
+    def fitted(self, rho: float, means: int) -> tuple[float, float]:
+        """RSS of the innovations and degrees of freedom."""
+        m = self.products(rho)
+        p = m.shape[0] - 1
+        rest = float(m[p, p])
+        if p:
+            rest -= float(m[p, :p] @ np.linalg.solve(m[:p, :p], m[:p, p]))
+        return max(rest, 1e-300), float(self.n - p - means)
+
+    def deviance(self, rho: float, means: int) -> float:
+        """-2 ln of the restricted likelihood, up to a constant."""
+        m = self.products(rho)
+        p = m.shape[0] - 1
+        rss, freedom = self.fitted(rho, means)
+        determinant = 0.0
+        if p:
+            determinant = float(np.linalg.slogdet(m[:p, :p])[1])
+        # The means of the runs: 1' V^-1 1 is about n (1 - rho)^2 + 2 rho (1 - rho).
+        per_run = self.n / self.runs
+        zero = (1.0 - rho) * (per_run * (1.0 - rho) + 2.0 * rho)
+        determinant += means * float(np.log(max(zero, 1e-300)))
+        return float(freedom * np.log(rss) - self.runs * np.log1p(-(rho**2)) + determinant)
+
+
+def _independent(x: Array) -> Array:
+    """Columns of length 1 at right angles that span the same; without those that hardly differ.
+
+    Over a part of a turn orders are nearly alike, and what is left of their difference would
+    be the rounding of the determinant.
+    """
+    if not x.shape[1]:
+        return x
+    scale = np.sqrt(np.maximum(np.einsum("ij,ij->j", x, x), 1e-300))
+    values, vectors = np.linalg.eigh((x / scale).T @ (x / scale))
+    kept = values > DISTINCT * values[-1]
+    return np.asarray(x @ (vectors[:, kept] / np.sqrt(values[kept]) / scale[:, None]))
+
+
+def _refined(function: Callable[[float], float], low: float, high: float) -> tuple[float, float]:
+    """Minimum of a function with one valley in [low, high], by golden section."""
+    golden = 0.5 * (5.0**0.5 - 1.0)
+    a, b = low, high
+    c, d = b - golden * (b - a), a + golden * (b - a)
+    fc, fd = function(c), function(d)
+    for _ in range(16):
+        if fc < fd:
+            b, d, fd = d, c, fc
+            c = b - golden * (b - a)
+            fc = function(c)
+        else:
+            a, c, fc = c, d, fd
+            d = a + golden * (b - a)
+            fd = function(d)
+    return (float(c), float(fc)) if fc < fd else (float(d), float(fd))

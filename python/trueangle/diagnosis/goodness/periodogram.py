@@ -1,0 +1,251 @@
+r"""Lines that every run draws anew: of one frequency in time, or of one order in angle.
+
+The periodograms of the runs, each divided by its own level about every frequency (which takes
+correlation and wander away), add up to
+
+.. math:: P(f) = \sum_j |z_j(f)|^2 / s_j^2(f) \sim \Gamma(R, 1)
+
+without asking for phases. The false-alarm probability counts the independent frequencies
+(Baluev 2008 bounds it alike). A line that is not quite steady is looked for in bands as well.
+"""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...distributions import f_tail
+from .evidence import Evidence, largest_of
+from .leftover import Leftover
+
+__all__ = ["Periodogram", "order_test", "periodogram", "time_test"]
+
+Array = NDArray[np.float64]
+
+#: Cells of the finest transform, of which a record takes half.
+MOST_BINS = 1 << 17
+
+#: Cells per period of the highest frequency: a reading is at most 1/8 period out of place.
+CELLS = 4.0
+
+#: Resolution cells that make the level, to each side; lowest frequency, in cells.
+LEVEL_CELLS, LOWEST = 48, 5
+
+#: Cells of a block that its level is worth: a median tells half of what a mean does, three
+#: neighbours share.
+SHARED = 1.2
+
+#: Independent frequencies per resolution cell, for the maximum of a line's power.
+PER_CELL = 3.0
+
+#: Widths of bands, in resolution cells.
+WIDTHS = (1, 3, 9)
+
+#: Departure of the steps from equal ones up to which a record counts as evenly sampled.
+EVEN = 0.02
+
+#: Readings below which a run has no periodogram.
+LEAST_READINGS = 32
+
+
+@dataclass(frozen=True, eq=False)
+class Periodogram:
+    """Sum over runs of periodograms divided by their levels.
+
+    Attributes
+    ----------
+    frequency : ndarray
+        Cycles per unit of the axis.
+    power : ndarray
+        Mean over runs: 1 on average for noise.
+    peak : float
+        The frequency that stands out most.
+    width : int
+        Resolution cells that it takes up.
+    statistic : float
+        Power there.
+    amplitude : float
+        Of the line, root mean square over runs, times the root of 2.
+    p : float
+        False-alarm probability.
+    even : bool
+        Equal steps: the line may be an alias.
+    """
+
+    frequency: Array
+    power: Array
+    peak: float
+    width: int
+    statistic: float
+    amplitude: float
+    p: float
+    even: bool
+
+
+def periodogram(
+    values: Array, axis: Array, bounds: list[tuple[int, int]], top: float | None = None
+) -> Periodogram | None:
+    """Periodogram of ``values`` along ``axis``, phases of the runs left out.
+
+    Parameters
+    ----------
+    values, axis : ndarray, shape (n,)
+        The axis (s, turns) may go back and forth.
+    bounds : list of (int, int)
+        The runs.
+    top : float, optional
+        Highest frequency; half of the sampling rate of even records, else what
+        2^16 cells resolve, up to 60 times the mean rate.
+
+    Returns
+    -------
+    Periodogram or None
+        None where the runs are too short.
+    """
+    kept = [(a, b) for a, b in bounds if b - a >= LEAST_READINGS and np.ptp(axis[a:b]) > 0.0]
+    if not kept:
+        return None
+    spans = np.array([float(np.ptp(axis[a:b])) for a, b in kept])
+    longest = float(spans.max())
+    even, rate = _sampling(axis, kept)
+    highest = min(0.5 * MOST_BINS / (CELLS * longest), 0.5 * rate if even else 60.0 * rate)
+    top = highest if top is None else min(top, highest)
+    cell = 1.0 / (2.0 * rate) if even and top > 0.2 * rate else 1.0 / (CELLS * top)
+    size = int(2 ** np.ceil(np.log2(2.0 * longest / cell + 2.0)))
+    frequency = np.arange(size // 2 + 1) / (size * cell)
+    over = 1.0 / (longest * float(frequency[1]))  # bins per resolution cell
+    first = int(np.ceil(LOWEST * over))
+    last = int(min(top / frequency[1], frequency.size - 1))
+    if last - first < 4 * over:
+        return None
+    total = np.zeros((len(WIDTHS), frequency.size))
+    known = np.zeros(frequency.size)
+    freedom = np.zeros(len(WIDTHS))
+    raw = np.zeros(frequency.size)
+    for (a, b), span in zip(kept, spans, strict=True):
+        place = ((axis[a:b] - axis[a:b].min()) / cell + 0.5).astype(np.int64)
+        e = values[a:b] - values[a:b].mean()
+        spectrum = np.fft.rfft(np.bincount(place, weights=e, minlength=size)[:size])
+        power = np.abs(spectrum) ** 2
+        raw += 4.0 * power / (b - a) ** 2 / len(kept)
+        level, cells = _level(power, over * longest / span)
+        relative = power / level
+        known += cells
+        for k, width in enumerate(WIDTHS):
+            held = max(1.0, width * span / longest)
+            freedom[k] += held
+            total[k] += held * _boxcar(relative, int(width * over + 0.5) if width > 1 else 1)
+    best: tuple[float, int, int] | None = None
+    blocks = np.round(known, 6)[first:last]
+    for k, width in enumerate(WIDTHS):
+        p, j = _likeliest(total[k, first:last], float(freedom[k]), blocks)
+        p = largest_of(p, (last - first) / over * PER_CELL / width)
+        if best is None or p < best[0]:
+            best = (p, k, first + j)
+    assert best is not None
+    p, k, j = best
+    reach = int(WIDTHS[k] * over)
+    near = slice(max(j - reach, first), j + reach + 1)
+    amplitude = float(np.sqrt(max(float(raw[near].max()), 0.0)))
+    return Periodogram(
+        frequency[first:last],
+        total[0, first:last] / freedom[0],
+        float(frequency[j]),
+        WIDTHS[k],
+        float(total[k, j] / freedom[k]),
+        amplitude,
+        largest_of(p, float(len(WIDTHS))),
+        even,
+    )
+
+
+def time_test(left: Leftover) -> Evidence | None:
+    """A line of one frequency in time (of one over readings where no time is known)."""
+    found = periodogram(left.residual, left.clock, left.bounds)
+    if found is None:
+        return None
+    unit = "Hz" if left.timed else "cycles per reading"
+    detail = " (or an alias of it)" if found.even else ""
+    return Evidence(
+        "time periodogram",
+        found.statistic,
+        found.p,
+        f"a line of {found.peak:.5g} {unit}{detail}, about {found.amplitude:.2g} arcsec, its "
+        "phase new in every run",
+        rms=found.amplitude / np.sqrt(2.0),
+    )
+
+
+def order_test(left: Leftover, top: float) -> Evidence | None:
+    """A line of one order in angle whose phase is new in every run."""
+    found = periodogram(left.residual, left.theta / (2.0 * np.pi), left.bounds, top)
+    if found is None:
+        return None
+    return Evidence(
+        "place within runs",
+        found.statistic,
+        found.p,
+        f"a line of order {found.peak:.5g}, about {found.amplitude:.2g} arcsec, comes back at the "
+        "same place within runs and not between them",
+        rms=found.amplitude / np.sqrt(2.0),
+    )
+
+
+def _sampling(axis: Array, bounds: list[tuple[int, int]]) -> tuple[bool, float]:
+    """Whether all steps are alike, and the mean number of readings per unit."""
+    steps = np.concatenate([np.abs(np.diff(axis[a:b])) for a, b in bounds])
+    middle = float(np.median(steps))
+    even = middle > 0.0 and float(np.mean(np.abs(steps - middle) < EVEN * middle)) > 0.95
+    rates = [(b - a - 1) / float(np.ptp(axis[a:b])) for a, b in bounds]
+    return even, 1.0 / middle if even else float(np.max(rates))
+
+
+def _boxcar(x: Array, width: int) -> Array:
+    """Running mean of ``width`` bins about each."""
+    if width <= 1:
+        return x
+    total = np.concatenate([[0.0], np.cumsum(x)])
+    k = np.arange(x.size)
+    low, high = np.maximum(k - width // 2, 0), np.minimum(k + width - width // 2, x.size)
+    return np.asarray((total[high] - total[low]) / (high - low))
+
+
+def _level(power: Array, over: float) -> tuple[Array, Array]:
+    """Level of a spectrum by the medians of blocks, which lines do not raise, and its cells.
+
+    Blocks are as wide as a third of their frequency at most, so that slopes stay slopes.
+    """
+    width = max(2.0 * LEVEL_CELLS * over, 8.0)
+    edges = [1.0]
+    while edges[-1] < power.size:
+        edges.append(edges[-1] + min(width, max(edges[-1] * 0.5, 4.0 * over)))
+    cuts = np.unique(np.minimum(np.array(edges), power.size).astype(np.int64))
+    middle = 0.5 * (cuts[:-1] + cuts[1:] - 1)
+    level = np.array(
+        [np.median(power[a:b]) / np.log(2.0) for a, b in itertools.pairwise(cuts.tolist())]
+    )
+    log_level = np.log(np.maximum(level, 1e-12 * max(float(level.max()), 1e-300)))
+    # Short blocks at the low end are uncertain: neighbours share what they know.
+    if log_level.size >= 3:
+        padded = np.concatenate([log_level[:1], log_level, log_level[-1:]])
+        log_level = 0.25 * padded[:-2] + 0.5 * padded[1:-1] + 0.25 * padded[2:]
+    k = np.arange(power.size)
+    cells = np.repeat(SHARED * np.diff(cuts) / over, np.diff(cuts))
+    cells = np.concatenate([cells[:1], cells, np.repeat(cells[-1:], power.size)])[: power.size]
+    return np.asarray(np.exp(np.interp(k, middle, log_level))), cells
+
+
+def _likeliest(total: Array, freedom: float, cells: Array) -> tuple[float, int]:
+    """Smallest p value of a bin, each against a level known from so many cells; and its bin."""
+    best = (1.0, 0)
+    cuts = np.flatnonzero(np.diff(cells)) + 1
+    edges = np.concatenate([[0], cuts, [total.size]])
+    for a, b in itertools.pairwise(edges.tolist()):
+        j = a + int(np.argmax(total[a:b]))
+        p = f_tail(float(total[j]) / freedom, 2.0 * freedom, 2.0 * float(cells[j]))
+        if p < best[0]:
+            best = (p, j)
+    return best

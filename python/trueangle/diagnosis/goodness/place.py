@@ -1,0 +1,206 @@
+r"""What comes back at the same place, alike or by direction, speed or load.
+
+Each unit u (a run, or a piece of one of few runs) gives one complex sum per order m,
+
+.. math:: z_{um} = \sum_{t \in u} g_t e_t \exp(-i m \theta_t), \qquad
+          w_{um} = z_{um} / s_{um},
+
+with a modulator g (1, direction, speed ...) and s the level of the unit's own spectrum about
+m, so that neither correlation nor unequal noise matters. What is bound to place adds up over
+units, noise does not:
+
+.. math:: T_m = \frac{|\sum_u w_{um}|^2}{U} \sim \mathrm{Exp}(1), \qquad
+          \frac{|\sum_u w_{um}|^2}{U \sum_u |w_{um}|^2} \sim \mathrm{Beta}(1, U - 1).
+
+The second holds whatever the spectrum's shape, the first where a few units are alike by
+chance; the larger p of the two counts. Orders one by one and the lowest 4, 8, 16 ... together
+are tried, which the p value includes.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...distributions import incomplete_gamma_tail, student_tail
+from .evidence import Evidence, largest_of
+from .leftover import Leftover
+
+__all__ = ["place_tests"]
+
+Array = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+#: Orders tested unless more are asked for.
+LEAST_ORDERS = 64
+
+#: Orders to each side that make the level of a unit's spectrum; times units at least so many.
+HALF_WINDOW, POOLED = 4, 40
+
+#: Widths of bands of the lowest orders.
+BANDS = (4, 8, 16, 32, 64, 128)
+
+#: Spread of a factor, in shares of its size, from which on it counts as changing.
+CHANGES = 0.05
+
+
+@dataclass(frozen=True)
+class _Modulator:
+    name: str
+    values: Array
+    what: str
+
+
+def place_tests(left: Leftover, top: float = LEAST_ORDERS) -> list[Evidence]:
+    """One test for each way in which place may matter.
+
+    Parameters
+    ----------
+    left : Leftover
+    top : float
+        Highest output order.
+
+    Returns
+    -------
+    list of Evidence
+        ``place``, ``place x direction`` where both were measured, and place by speed,
+        torque, temperature where these change, each also by direction. About 20 ns per
+        reading, order and modulator.
+    """
+    units = left.units()
+    if len(units) < 2 or not np.any(left.residual):
+        return []
+    step = _step(left)
+    count = int(max(min(top, 1024.0) / step, 8.0))
+    modulators = _modulators(left)
+    values = left.centred(units)
+    starts = np.array([start for start, _ in units])
+    sizes = np.array([stop - start for start, stop in units], dtype=np.float64)
+    modulated = np.column_stack([values * m.values for m in modulators])
+    sums = _sums(modulated, left.theta, step, count, starts)
+    found = []
+    for k, modulator in enumerate(modulators):
+        found.append(_judged(modulator, sums[:, :, k], sizes, step, left, units))
+    return found
+
+
+def _step(left: Leftover) -> float:
+    """Orders resolved by the travel: whole ones, or wider apart over a part of a turn."""
+    return 1.0 if left.turns > 0.9 else 1.0 / max(left.turns, 1e-3)
+
+
+def _modulators(left: Leftover) -> list[_Modulator]:
+    ones = np.ones(len(left))
+    found = [_Modulator("place", ones, "comes back at the same place in run after run")]
+    moving = left.direction[left.direction != 0.0]
+    both = moving.size > 0 and np.ptp(moving) > 0.0
+    if both:
+        text = "differs between the directions of travel at the same place"
+        found.append(_Modulator("place x direction", left.direction, text))
+    for name, values in left.factors.items():
+        spread = float(np.std(values))
+        if spread <= CHANGES * float(np.abs(values).max(initial=0.0)) or spread == 0.0:
+            continue
+        g = (values - values.mean()) / spread
+        text = f"comes back at the same place and follows the {name}"
+        found.append(_Modulator(f"place x {name}", g, text))
+        if both:
+            text = f"differs between the directions of travel, the more so the {name} differs"
+            found.append(_Modulator(f"place x direction x {name}", g * left.direction, text))
+    return found
+
+
+def _sums(
+    values: Array, theta: Array, step: float, count: int, starts: NDArray[np.int64]
+) -> Complex:
+    """Sums over units of ``values exp(-i m theta)``, m = step ... count step."""
+    turn = np.exp(-1j * step * theta)[:, None]
+    wave = values.astype(np.complex128)
+    out = np.empty((count, starts.size, values.shape[1]), dtype=np.complex128)
+    for k in range(count):
+        wave *= turn
+        out[k] = np.add.reduceat(wave, starts, axis=0)
+    return out
+
+
+def _level(power: Array, half: int) -> Array:
+    """Running mean over the orders, narrower at the ends so as to stay about the order."""
+    count = power.shape[0]
+    total = np.vstack([np.zeros((1, power.shape[1])), np.cumsum(power, axis=0)])
+    k = np.arange(count)
+    reach = np.minimum(half, count - 1)
+    low = np.clip(k - reach, 0, max(count - 2 * reach - 1, 0))
+    high = np.minimum(low + 2 * reach + 1, count)
+    return np.asarray((total[high] - total[low]) / (high - low)[:, None])
+
+
+def _judged(
+    modulator: _Modulator,
+    z: Complex,
+    sizes: Array,
+    step: float,
+    left: Leftover,
+    units: list[tuple[int, int]],
+) -> Evidence:
+    count, n_units = z.shape
+    half = max(HALF_WINDOW, -(-POOLED // (2 * n_units)))
+    level = np.sqrt(np.maximum(_level(np.abs(z) ** 2, half), 1e-300))
+    weight = np.sqrt(sizes / sizes.mean())
+    w = weight * z / level
+    coherent = np.abs(w.sum(axis=1)) ** 2
+    own = np.sum(np.abs(w) ** 2, axis=1)
+    share = np.minimum(coherent / np.maximum(n_units * own, 1e-300), 1.0 - 1e-16)
+    logs = np.minimum(coherent / n_units, -(n_units - 1) * np.log1p(-share))
+    k = int(np.argmax(logs))
+    trials: list[tuple[float, float, float]] = [(float(np.exp(-logs[k])), float(logs[k]), 0.0)]
+    trials[0] = (largest_of(trials[0][0], count), *trials[0][1:])
+    for width in BANDS:
+        if width < count:
+            total = float(logs[:width].sum())
+            p = incomplete_gamma_tail(float(width), total)
+            trials.append((p, total / width, float(width)))
+    if modulator.name != "place":
+        trials.append((_alike(modulator.values, left, units), 0.0, -1.0))
+    p, statistic, band = min(trials)
+    # Bands hold each other: as many as half of them are independent, about.
+    p = largest_of(p, 1.0 + 0.5 * (len(trials) - 1))
+    # Power of a line beyond what its units add up to by chance.
+    whole = max(float((modulator.values**2).sum()), 1e-300)
+    excess = np.abs(z.sum(axis=1)) ** 2 - (np.abs(z) ** 2).sum(axis=1)
+    power = 2.0 * np.maximum(excess, 0.0) / whole**2
+    if band > 0.0:
+        detail = f"strongest in the orders up to {band * step:.4g}"
+        rms = float(np.sqrt(power[: int(band)].sum()))
+    elif band < 0.0:
+        size = _size(modulator.values, left)
+        detail = f"by about {abs(size):.2g} arcsec at every place"
+        rms = abs(size) * float(np.sqrt(whole / len(left)))
+    else:
+        amplitude = float(np.sqrt(2.0 * power[k]))
+        detail = f"strongest at order {(k + 1) * step:.4g}, about {amplitude:.2g} arcsec"
+        rms = float(np.sqrt(power[np.exp(-logs) * count < 0.01].sum()))
+    says = f"what is left {modulator.what}: {detail}"
+    return Evidence(modulator.name, statistic, p, says, rms=rms)
+
+
+def _size(g: Array, left: Leftover) -> float:
+    """Least-squares coefficient of the modulator."""
+    d = g - g.mean()
+    return float(d @ left.residual) / max(float(d @ d), 1e-300)
+
+
+def _alike(g: Array, left: Leftover, units: list[tuple[int, int]]) -> float:
+    """Chance of the modulator itself, at no place in particular, by the scatter of units."""
+    # Within runs, or between them where it does not change within any.
+    inside = left.centred(left.bounds)
+    moves = sum(float(np.ptp(g[a:b]) > 0.0) for a, b in units) > 0.5 * len(units)
+    e = inside if moves else left.residual - left.residual.mean()
+    sums = np.array([float(g[a:b] @ e[a:b]) for a, b in units])
+    power = float(sums @ sums)
+    n = len(units)
+    if power == 0.0 or n < 3:
+        return 1.0
+    square = min(float(sums.sum()) ** 2 / power, n * (1.0 - 1e-12))
+    return 2.0 * student_tail(float(np.sqrt(square * (n - 1) / (n - square))), n - 1)

@@ -1,0 +1,120 @@
+"""Is something left that has no name? The decision, and how much it is."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from .evidence import Evidence
+from .leftover import Leftover
+from .noise import Noise, estimate_noise
+from .periodogram import order_test, time_test
+from .place import LEAST_ORDERS, place_tests
+from .scatter import scatter_tests
+from .zeros import run_test
+
+__all__ = ["LEVEL", "Unexplained", "goodness_of_fit"]
+
+#: Chance with which noise alone may be called unexplained, all deciding tests together.
+LEVEL = 0.01
+
+
+@dataclass(frozen=True)
+class Unexplained:
+    """What tests that need no name say of the residual.
+
+    Attributes
+    ----------
+    found : bool
+        One of the tests of place, direction, run and time fires, at 1 % for all together.
+    rms : float
+        Of the structure that the firing tests show, arcsec: at least so much is no noise.
+    share : float
+        Of the variance that is left.
+    evidence : list of Evidence
+        Every test, the firing ones first.
+    noise : Noise
+        Beside a flexible pattern.
+    """
+
+    found: bool
+    rms: float
+    share: float
+    evidence: list[Evidence]
+    noise: Noise
+
+    @property
+    def firing(self) -> list[Evidence]:
+        """The deciding tests that fire, the surest first."""
+        deciding = sum(item.decides for item in self.evidence)
+        return [item for item in self.evidence if item.decides and item.p * deciding < LEVEL]
+
+    def to_json(self) -> dict[str, Any]:
+        """The ``unexplained`` object of a diagnosis."""
+        return {
+            "found": self.found,
+            "rms_arcsec": self.rms,
+            "share": self.share,
+            "evidence": [item.to_json() for item in self.evidence],
+        }
+
+
+def goodness_of_fit(
+    left: Leftover,
+    top: float = LEAST_ORDERS,
+    sigma: float | None = None,
+    rounding: float = 0.0,
+) -> Unexplained:
+    """Test a residual for everything that is no noise, without asking for a cause.
+
+    Parameters
+    ----------
+    left : Leftover
+        What an account leaves of the readings.
+    top : float
+        Highest output order that is looked for.
+    sigma : float, optional
+        Noise of one reading that the simulation states, arcsec.
+    rounding : float
+        Step of the lattice on which the readings lie, arcsec; 0 for none.
+
+    Returns
+    -------
+    Unexplained
+        About 0.3 s for 10 000 readings and 400 orders.
+
+    Examples
+    --------
+    >>> rng = np.random.default_rng(0)
+    >>> theta = np.concatenate([rng.uniform(0, 6.28, 300) for _ in range(10)])
+    >>> run = np.repeat(np.arange(10), 300)
+    >>> clock = np.tile(np.arange(300.0), 10)
+    >>> noise = rng.normal(size=3000)
+    >>> goodness_of_fit(Leftover(noise, theta, np.ones(3000), run, clock)).found
+    False
+    >>> left = Leftover(noise + 0.5 * np.sin(7 * theta), theta, np.ones(3000), run, clock)
+    >>> goodness_of_fit(left).firing[0].test
+    'place'
+    """
+    noise = estimate_noise(left)
+    deciding = place_tests(left, top)
+    for item in (order_test(left, top), time_test(left), run_test(left, noise)):
+        if item is not None:
+            deciding.append(item)
+    describing = scatter_tests(left, noise, sigma, rounding)
+    count = len(deciding)
+    firing = [item for item in deciding if item.p * count < LEVEL]
+    # Sure is sure: of those far beyond doubt the narrower account comes first.
+    order = {id(item): k for k, item in enumerate(deciding)}
+    deciding.sort(key=lambda item: (max(item.p, 1e-9), order[id(item)]))
+    variance = float(np.var(left.residual))
+    power = min(max((item.rms**2 for item in firing), default=0.0), variance)
+    return Unexplained(
+        bool(firing),
+        float(np.sqrt(power)),
+        power / variance if variance > 0.0 else 0.0,
+        deciding + describing,
+        noise,
+    )
