@@ -194,12 +194,17 @@ def test_permissions_of_what_is_replaced_are_kept(tmp_path, model):
 def test_a_failure_leaves_what_was_there(tmp_path):
     path = tmp_path / "a"
     path.write_text("old")
-    with pytest.raises(ZeroDivisionError), files.written_atomically(path) as file:  # noqa: PT012
-        file.write("half")
-        file.flush()
-        raise ZeroDivisionError
-    with pytest.raises(OSError, match="No space left") as full, files.written_atomically(path):
-        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    def fail(error):
+        with files.written_atomically(path) as file:
+            file.write("half")
+            file.flush()
+            raise error
+
+    with pytest.raises(ZeroDivisionError):
+        fail(ZeroDivisionError())
+    with pytest.raises(OSError, match="No space left") as full:
+        fail(OSError(errno.ENOSPC, os.strerror(errno.ENOSPC)))
     assert full.value.filename == str(path)  # not the hidden name
     assert path.read_text() == "old"
     assert [p.name for p in tmp_path.iterdir()] == ["a"]

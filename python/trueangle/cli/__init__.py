@@ -3,14 +3,20 @@
 from __future__ import annotations
 
 import argparse
+import contextlib
 import importlib
+import os
 import sys
+import traceback
 import warnings
 from collections.abc import Sequence
 from typing import Protocol
 
 from .. import __version__
 from ..errors import TrueAngleError
+from .parser import Parser
+from .paths import check_paths
+from .terminal import STANDARD_OUTPUT, plain_streams, silence
 
 __all__ = ["COMMANDS", "main"]
 
@@ -41,9 +47,9 @@ class Command(Protocol):
         """Do the work; the result is the exit status."""
 
 
-def build_parser() -> argparse.ArgumentParser:
+def build_parser() -> Parser:
     """Parser of the whole command line."""
-    parser = argparse.ArgumentParser(
+    parser = Parser(
         prog="trueangle",
         description="Fit, diagnose and correct the angle error of encoders and robot joints.",
     )
@@ -59,7 +65,11 @@ def build_parser() -> argparse.ArgumentParser:
             formatter_class=argparse.RawDescriptionHelpFormatter,
         )
         command.add_arguments(subparser)
+        subparser.add_argument(
+            "--debug", action="store_true", help="print the traceback of an error too"
+        )
         subparser.set_defaults(handler=command.run)
+        parser.commands[name] = subparser
     return parser
 
 
@@ -69,28 +79,75 @@ def main(argv: Sequence[str] | None = None) -> int:
     Returns
     -------
     int
-        0 done, 1 bad input or no result (one line on stderr), 2 usage (by argparse).
+        0 done; 1 bad input or no result (one line on stderr); 2 usage (by argparse); 130
+        interrupted; 141 who read standard output has gone, as a shell says it.
     """
-    args = build_parser().parse_args(argv)
-    warnings.showwarning = _print_warning
-    try:
-        status: int = args.handler(args)
-    except (TrueAngleError, OSError) as error:
-        print(f"trueangle: error: {_one_line(error)}", file=sys.stderr)
-        return 1
-    except BrokenPipeError:
-        return 1
-    except KeyboardInterrupt:
-        print("trueangle: interrupted", file=sys.stderr)
-        return 130
+    with plain_streams():
+        args = build_parser().parse_args(argv)
+        before, warnings.showwarning = warnings.showwarning, _print_warning
+        try:
+            check_paths(args)
+            status: int = args.handler(args)
+            # What waits to be printed can fail as well: a full disk, a reader that has gone.
+            if sys.stdout is not None:
+                sys.stdout.flush()
+        except SystemExit:
+            raise
+        except BaseException as error:  # a panic of the core is no Exception
+            return _failed(error, args.debug)
+        finally:
+            warnings.showwarning = before
     return status
 
 
-def _one_line(error: Exception) -> str:
-    if isinstance(error, OSError) and error.filename is not None:
-        return f"{error.filename}: {error.strerror or error}"
+def _failed(error: BaseException, debug: bool) -> int:
+    """Tell an error in one line; the result is the exit status."""
+    if debug:
+        traceback.print_exception(error)
+    if isinstance(error, KeyboardInterrupt):
+        told = _one_line(error)
+        _say("interrupted" + (f": {told}" if told else ""))
+        return 130
+    if isinstance(error, OSError) and error.filename == STANDARD_OUTPUT:
+        silence()
+        if isinstance(error, BrokenPipeError):
+            return 141
+    if isinstance(error, TrueAngleError):
+        _say(f"error: {_one_line(error)}")
+    elif isinstance(error, OSError):
+        _say(f"error: {_system(error)}")
+    elif isinstance(error, MemoryError):
+        _say(
+            f"error: out of memory ({_one_line(error) or 'no more is given'}); take fewer "
+            "readings at a time, or --one-pass where the command has it"
+        )
+    else:
+        _say(
+            f"error: unexpected {type(error).__name__}: {_one_line(error)}; this is a defect of "
+            "trueangle: please report this line and what --debug prints"
+        )
+    return 1
+
+
+def _system(error: OSError) -> str:
+    """What the system refused, and of which file."""
+    if error.filename is None:
+        return _one_line(error)
+    name = error.filename
+    shown = os.fsdecode(name) if isinstance(name, (str, bytes, os.PathLike)) else str(name)
+    hint = "; name /dev/stdin to read a pipe" if shown == "-" else ""
+    return f"{shown}: {error.strerror or error}{hint}"
+
+
+def _one_line(error: BaseException) -> str:
     return " ".join(str(error).split())
 
 
+def _say(text: str) -> None:
+    if sys.stderr is not None:
+        with contextlib.suppress(OSError):  # a closed terminal
+            print(f"trueangle: {' '.join(text.split())}", file=sys.stderr, flush=True)
+
+
 def _print_warning(message: Warning | str, *_: object, **__: object) -> None:
-    print(f"trueangle: warning: {' '.join(str(message).split())}", file=sys.stderr)
+    _say(f"warning: {message}")

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 from ..errors import ArgumentError, TrueAngleError
+from .paths import Input, ModelInput
 
 if TYPE_CHECKING:
     from ..logs.batch import BatchReport, LogReport
@@ -22,6 +23,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add(
         "logs",
         nargs="+",
+        type=Input,
         metavar="LOG",
         help="logs or folders of them: Parquet, Arrow, CSV, HDF5, MATLAB v7.3, ROS bags, "
         "MCAP, MDF4",
@@ -31,6 +33,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--model",
         action="append",
         required=True,
+        type=ModelInput,
         metavar="[JOINT=]FILE",
         help="model file written by trueangle fit; with several joints one of each",
     )
@@ -185,9 +188,7 @@ def _status(result: BatchReport) -> int:
     if waiting:
         parts.append(f"not started: {', '.join(waiting)}")
     parts.append("run the same command again to go on")
-    if result.interrupted:
-        parts.insert(0, "interrupted")
-    raise TrueAngleError("; ".join(parts))
+    raise (KeyboardInterrupt if result.interrupted else TrueAngleError)("; ".join(parts))
 
 
 def _told(log: LogReport) -> str:

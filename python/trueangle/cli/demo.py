@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import argparse
 
+from ..files import REPORT
+from .paths import Output
+
 HELP = "fit, correct and diagnose simulated joints; needs no files"
 EXAMPLE = "trueangle demo --report demo.html"
 
@@ -11,7 +14,12 @@ EXAMPLE = "trueangle demo --report demo.html"
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command's arguments."""
     parser.add_argument("--seed", type=int, default=0, help="of the simulated noise (default: 0)")
-    parser.add_argument("--report", metavar="FILE", help="also write a report of the diagnosis")
+    parser.add_argument(
+        "--report",
+        type=Output.of(REPORT),
+        metavar="FILE",
+        help="also write a report of the diagnosis",
+    )
 
 
 def run(args: argparse.Namespace) -> int:

@@ -7,6 +7,8 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 from ..errors import ArgumentError
+from ..files import MODEL, SIMULATION
+from .paths import Input, Output
 
 if TYPE_CHECKING:
     from ..diagnosis import Diagnosis
@@ -18,11 +20,21 @@ EXAMPLE = "trueangle diagnose runs.csv --simulation joint.toml --extend better.t
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command's arguments."""
     add = parser.add_argument
-    add("runs", nargs="+", metavar="RUNS", help="calibration runs (CSV or Parquet)")
-    add("--simulation", required=True, metavar="FILE", help="simulation file (TOML)")
-    add("--extend", metavar="FILE", help="write the simulation extended by the findings")
-    add("--model", metavar="FILE", help="correction model, to extend by the findings")
-    add("--corrected-model", metavar="FILE", help="write that extended correction model")
+    add("runs", nargs="+", type=Input, metavar="RUNS", help="calibration runs (CSV or Parquet)")
+    add("--simulation", required=True, type=Input, metavar="FILE", help="simulation file (TOML)")
+    add(
+        "--extend",
+        type=Output.of(SIMULATION),
+        metavar="FILE",
+        help="write the simulation extended by the findings",
+    )
+    add("--model", type=Input, metavar="FILE", help="correction model, to extend by the findings")
+    add(
+        "--corrected-model",
+        type=Output.of(MODEL),
+        metavar="FILE",
+        help="write that extended correction model",
+    )
     add("--counts-per-turn", type=float, metavar="N", help="unit of indicated_count")
     add("--json", action="store_true", help="print the diagnosis as JSON")
 

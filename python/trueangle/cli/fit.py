@@ -7,8 +7,10 @@ import json
 from collections.abc import Mapping, Sequence
 
 from ..errors import ArgumentError
+from ..files import MODEL
 from .onepass import add_one_pass, saved, wants_one_pass
 from .order_lists import parse_orders
+from .paths import Input, Output
 
 HELP = "fit a harmonic model to calibration runs and save it"
 EXAMPLE = "trueangle fit joint_a.csv -o joint_a.json --gear-ratio 100"
@@ -16,9 +18,16 @@ EXAMPLE = "trueangle fit joint_a.csv -o joint_a.json --gear-ratio 100"
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command's arguments."""
-    parser.add_argument("runs", nargs="+", metavar="RUNS", help="CSV or Parquet files of readings")
     parser.add_argument(
-        "-o", "--output", required=True, metavar="MODEL", help="model file to write"
+        "runs", nargs="+", type=Input, metavar="RUNS", help="CSV or Parquet files of readings"
+    )
+    parser.add_argument(
+        "-o",
+        "--output",
+        required=True,
+        type=Output.of(MODEL),
+        metavar="MODEL",
+        help="model file to write",
     )
     parser.add_argument(
         "--orders",

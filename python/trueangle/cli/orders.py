@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 from .fit import add_argument_choice, add_joint
 from .onepass import add_one_pass, printed_orders, wants_one_pass
 from .order_lists import parse_orders
+from .paths import Input
 
 if TYPE_CHECKING:
     from ..orders.table import OrderRow, OrderSelection
@@ -21,7 +22,7 @@ EXAMPLE = "trueangle orders joint_a.csv --gear-ratio 100"
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command's arguments."""
     add = parser.add_argument
-    add("runs", nargs="+", metavar="RUNS", help="CSV or Parquet files of readings")
+    add("runs", nargs="+", type=Input, metavar="RUNS", help="CSV or Parquet files of readings")
     add("--orders", metavar="1-17,202", help="candidates (default: low orders and the gear's own)")
     add_joint(parser)
     add_argument_choice(parser)

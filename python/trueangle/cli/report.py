@@ -6,7 +6,9 @@ import argparse
 import json
 
 from ..errors import ArgumentError
+from ..files import PDF, REPORT
 from .fit import add_joint, orders_by_shaft
+from .paths import Input, Output
 
 HELP = "write a report on calibration runs: one HTML page, or a PDF"
 EXAMPLE = "trueangle report joint_a.csv --simulation joint.toml -o report.html"
@@ -15,20 +17,38 @@ EXAMPLE = "trueangle report joint_a.csv --simulation joint.toml -o report.html"
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command's arguments."""
     add = parser.add_argument
-    add("runs", nargs="+", metavar="RUNS", help="calibration runs, CSV or Parquet")
-    add("-o", "--output", required=True, metavar="FILE", help="the page to write (HTML)")
-    add("--simulation", metavar="FILE", help="say what this simulation gets wrong, and why")
+    add("runs", nargs="+", type=Input, metavar="RUNS", help="calibration runs, CSV or Parquet")
+    add(
+        "-o",
+        "--output",
+        required=True,
+        type=Output.of(REPORT),
+        metavar="FILE",
+        help="the report to write: HTML, or PDF where the name ends so",
+    )
+    add(
+        "--simulation",
+        type=Input,
+        metavar="FILE",
+        help="say what this simulation gets wrong, and why",
+    )
     add("--orders", default="auto", help="auto (default: by evidence), 1-17, output:1-3;motor:1,2")
     add_joint(parser)
     add("--title", help="heading of the report")
     add(
         "--certificate",
+        type=Input,
         metavar="IDENTITY",
         help="write a calibration certificate (PDF) with what this TOML file says of the item, "
         "the laboratory and the type B uncertainties",
     )
     add("--positions", type=int, metavar="N", help="nominal positions of a certificate (36)")
-    add("--pdf", metavar="FILE", help="print it to a PDF too, by an installed browser")
+    add(
+        "--pdf",
+        type=Output.of(PDF),
+        metavar="FILE",
+        help="print it to a PDF too, by an installed browser",
+    )
     add("--json", action="store_true", help="print the report's numbers as JSON")
 
 

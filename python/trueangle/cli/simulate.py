@@ -5,6 +5,9 @@ from __future__ import annotations
 import argparse
 import json
 
+from ..files import RUNS
+from .paths import Input, Output
+
 HELP = "measure a simulated joint: calibration runs from a simulation file"
 EXAMPLE = "trueangle simulate joint.toml -o runs.csv --seed 1"
 
@@ -12,8 +15,20 @@ EXAMPLE = "trueangle simulate joint.toml -o runs.csv --seed 1"
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command's arguments."""
     add = parser.add_argument
-    add("simulation", metavar="FILE", help="simulation file (TOML) with at least one [[run]]")
-    add("-o", "--output", required=True, metavar="RUNS", help="CSV file to write")
+    add(
+        "simulation",
+        type=Input,
+        metavar="FILE",
+        help="simulation file (TOML) with at least one [[run]]",
+    )
+    add(
+        "-o",
+        "--output",
+        required=True,
+        type=Output.of(RUNS),
+        metavar="RUNS",
+        help="CSV file to write",
+    )
     add("--seed", type=int, default=0, metavar="N", help="seed of the noise (default: 0)")
     add("--json", action="store_true", help="print what was written as JSON")
 

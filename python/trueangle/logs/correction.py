@@ -5,7 +5,8 @@ from __future__ import annotations
 import errno
 import shutil
 import time
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -13,11 +14,15 @@ from typing import Any
 import numpy as np
 
 from ..errors import FileError
+from ..files.outputs import PARTIAL
 from .formats import Watch, find_format
 from .joints import Channel, JointState, LogSettings
 from .manifest import Manifest
 from .safety import publish, stamp, workplace
 from .turns import TurnCounter, TurnSpan
+
+#: What the system says of writing only.
+_OF_WRITING = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 
 __all__ = ["Task", "correct_log", "count_turns", "is_disk_full", "states_after"]
 
@@ -65,7 +70,7 @@ def correct_log(task: Task, watch: Watch = lambda rows, part: None) -> dict[str,
         channels.extend(settings.channels(source, header, task.before, kind.unit))
         return channels
 
-    with workplace(target) as aside:
+    with _named(target), workplace(target) as aside:
         written = module.copy(source, aside, choose, watch, settings.topic, settings.output_topic)
         read_back = module.contents(aside, settings.topic)
         if written != read_back:
@@ -99,6 +104,18 @@ def correct_log(task: Task, watch: Watch = lambda rows, part: None) -> dict[str,
             )
         publish(aside, target)
     return result
+
+
+@contextmanager
+def _named(target: Path) -> Iterator[None]:
+    """Tell errors of the system by the output's own name, not by that of the place aside."""
+    try:
+        yield
+    except OSError as error:
+        unnamed = error.filename is None and error.errno in _OF_WRITING
+        if error.errno and (unnamed or PARTIAL in str(error.filename)):
+            raise OSError(error.errno, error.strerror, str(target)) from None
+        raise
 
 
 def states_after(result: Mapping[str, Any]) -> dict[str, JointState]:

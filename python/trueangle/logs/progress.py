@@ -36,7 +36,9 @@ class Progress:
         stream: TextIO | None = None,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
-        self._stream = sys.stderr if stream is None else stream
+        found = sys.stderr if stream is None else stream
+        # The line that rewrites itself steers the terminal, which printed text must not.
+        self._stream: TextIO = getattr(found, "steering", found)
         if style == "auto":
             style = "text" if self._stream.isatty() else "none"
         self._style = style

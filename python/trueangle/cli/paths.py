@@ -1,0 +1,81 @@
+"""Arguments that name files: marked by their type, checked before a command begins."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable, Iterator
+from typing import Any
+
+from ..errors import ArgumentError
+from ..files import Kind, check_input, check_output, same_file
+
+__all__ = ["Input", "ModelInput", "Output", "check_paths"]
+
+
+class Input(str):
+    """A file or folder that a command reads: ``type=Input`` of an argument."""
+
+    __slots__ = ()
+
+    @property
+    def file(self) -> str:
+        """The path itself."""
+        return str(self)
+
+
+class ModelInput(Input):
+    """A file, perhaps after the name of its joint: ``joint3=FILE``."""
+
+    __slots__ = ()
+
+    @property
+    def file(self) -> str:
+        """The path behind the joint's name."""
+        first, equals, rest = self.partition("=")
+        return rest if equals else first
+
+
+class Output(str):
+    """A file that a command writes: ``type=Output.of(KIND)`` of an argument."""
+
+    kind: Kind | None = None
+
+    @classmethod
+    def of(cls, kind: Kind | None) -> Callable[[str], Output]:
+        """What argparse calls with the text of an argument."""
+
+        def made(text: str) -> Output:
+            output = cls(text)
+            output.kind = kind
+            return output
+
+        return made
+
+
+def check_paths(args: argparse.Namespace) -> None:
+    """Refuse inputs that cannot be read, and outputs that are inputs or no files.
+
+    Raises
+    ------
+    FileError, OSError
+        See `files.check_input` and `files.check_output`.
+    ArgumentError
+        Two outputs are one file.
+    """
+    values = list(_values(vars(args)))
+    inputs = [value.file for value in values if isinstance(value, Input)]
+    outputs = [value for value in values if isinstance(value, Output)]
+    for path in inputs:
+        check_input(path)
+    for i, path in enumerate(outputs):
+        check_output(path, path.kind, inputs)
+        if any(same_file(path, other) for other in outputs[:i]):
+            raise ArgumentError(f"{path}: two outputs of this name; name another file for one")
+
+
+def _values(given: dict[str, Any]) -> Iterator[Any]:
+    for value in given.values():
+        if isinstance(value, list | tuple):
+            yield from value
+        else:
+            yield value

@@ -1,0 +1,114 @@
+"""Text for people: what a file holds never steers the terminal it is shown on."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import re
+import sys
+from collections.abc import Iterator
+from typing import Any, Final, TextIO
+
+__all__ = ["STANDARD_OUTPUT", "Plain", "plain_streams", "printable", "silence"]
+
+STANDARD_OUTPUT: Final = "standard output"
+
+#: Control characters but tab and line end, what turns the direction of text, and halves of
+#: surrogates, which stand for bytes of file names that are no UTF-8.
+_UNPRINTABLE: Final = re.compile(
+    "[\x00-\x08\x0b-\x1f\x7f-\x9f\u061c\u200e\u200f\u202a-\u202e\u2028\u2029"
+    "\u2066-\u2069\ufeff\ud800-\udfff]"
+)
+
+
+def printable(text: str) -> str:
+    r"""``text`` with control characters written as escapes.
+
+    Examples
+    --------
+    >>> printable("run \x1b[31mred")
+    'run \\x1b[31mred'
+    """
+    return _UNPRINTABLE.sub(_escaped, text)
+
+
+def _escaped(found: re.Match[str]) -> str:
+    code = ord(found[0])
+    if 0xDC80 <= code <= 0xDCFF:  # a byte that Python could not decode
+        return f"\\x{code - 0xDC00:02x}"
+    return f"\\x{code:02x}" if code < 0x100 else f"\\u{code:04x}"
+
+
+class Plain:
+    """A stream for text that passes on `printable` text only.
+
+    Parameters
+    ----------
+    stream : text stream
+    name : str
+        Of the stream, as the file name of errors that it meets.
+
+    Attributes
+    ----------
+    steering : text stream
+        The stream itself, for the program's own line of progress.
+    """
+
+    def __init__(self, stream: TextIO, name: str = STANDARD_OUTPUT) -> None:
+        self.steering = stream
+        self._name = name
+
+    def write(self, text: str) -> int:
+        """Write; signs that the stream's encoding lacks become escapes."""
+        shown = printable(text)
+        with self._named():
+            try:
+                self.steering.write(shown)
+            except UnicodeEncodeError:
+                encoding = self.steering.encoding or "ascii"
+                self.steering.write(shown.encode(encoding, "backslashreplace").decode(encoding))
+        return len(text)
+
+    def flush(self) -> None:
+        """Flush."""
+        with self._named():
+            self.steering.flush()
+
+    def writelines(self, lines: Any) -> None:
+        """Write one after the other."""
+        for line in lines:
+            self.write(line)
+
+    @contextlib.contextmanager
+    def _named(self) -> Iterator[None]:
+        try:
+            yield
+        except OSError as error:
+            raise OSError(error.errno, error.strerror, self._name) from None
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self.steering, name)
+
+
+@contextlib.contextmanager
+def plain_streams() -> Iterator[None]:
+    """Let everything that is printed pass `Plain`."""
+    # A process started without them (pythonw, closed descriptors) has None.
+    out, err = sys.stdout, sys.stderr
+    with contextlib.ExitStack() as stack:
+        if out is not None:
+            stack.enter_context(contextlib.redirect_stdout(Plain(out)))
+        if err is not None:
+            stack.enter_context(contextlib.redirect_stderr(Plain(err, "standard error")))
+        yield
+
+
+def silence() -> None:
+    """Send what is still to be printed nowhere: Python would complain of it at its end."""
+    try:
+        handle = sys.stdout.fileno()
+        nowhere = os.open(os.devnull, os.O_WRONLY)
+        os.dup2(nowhere, handle)
+        os.close(nowhere)
+    except (OSError, ValueError, AttributeError):
+        pass
