@@ -9,7 +9,7 @@ import math
 from collections.abc import Iterable, Iterator, Mapping
 from os import PathLike
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -104,7 +104,20 @@ class _Table:
         return FileError(self.path, problem, line=int(self.lines[row]), column=column)
 
 
-def _read_file(path: Path, counts_per_turn: float | None) -> list[CalibrationRun]:
+class RunColumns(NamedTuple):
+    """Columns of one file of runs as they were read, nothing of them judged but the numbers."""
+
+    table: _Table
+    period: float
+    reference: NDArray[np.float64]
+    indicated: NDArray[np.float64]
+    signals: dict[str, NDArray[np.float64]]
+    groups: list[tuple[str | None, str | None, NDArray[np.intp]]]  # unit, label, rows
+    source: Source
+
+
+def read_columns(path: Path, counts_per_turn: float | None) -> RunColumns:
+    """The columns of one file, grouped by run; time may run backwards."""
     data = read_whole(
         path,
         RUNS_BYTES,
@@ -120,16 +133,25 @@ def _read_file(path: Path, counts_per_turn: float | None) -> list[CalibrationRun
         for column, factor in _places(signal, period):
             if column in table.columns:
                 scalars[signal.name] = table.numbers(column) * factor
+    return RunColumns(
+        table, period, angles["reference"], angles["indicated"], scalars, _groups(table), source
+    )
+
+
+def _read_file(path: Path, counts_per_turn: float | None) -> list[CalibrationRun]:
+    table, period, reference, indicated, scalars, groups, source = read_columns(
+        path, counts_per_turn
+    )
     known = {"run", "unit", *(SIGNALS[name].column for name in ("time", "temperature", "torque"))}
     others = {k: _kept(v) for k, v in table.columns.items() if k not in known}
     runs = []
-    for unit, label, rows in _groups(table):
+    for unit, label, rows in groups:
         _check_time(table, scalars.get("time"), rows)
         fields: dict[str, Any] = {k: v[rows] for k, v in scalars.items() if k in FIELDS}
         runs.append(
             CalibrationRun(
-                angles["reference"][rows],
-                angles["indicated"][rows],
+                reference[rows],
+                indicated[rows],
                 **fields,
                 period=period,
                 label=label,

@@ -22,6 +22,7 @@ __all__ = ["COMMANDS", "main"]
 
 #: Modules of this package that each define one command of the same name.
 COMMANDS: tuple[str, ...] = (
+    "check",
     "fit",
     "correct",
     "demo",

@@ -1,0 +1,75 @@
+"""One fault of the data, told with what to do about it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+__all__ = ["UNUSABLE", "DataFault"]
+
+#: Faults with which nothing may be fitted: the angles are not what they seem.
+UNUSABLE = (
+    "unsorted_time",
+    "mixed_units",
+    "wrong_sign",
+    "wrong_gear_ratio",
+    "wrapped_reference",
+)
+
+#: Rows that are listed; more are counted.
+LISTED = 100
+
+
+@dataclass(frozen=True)
+class DataFault:
+    """What is wrong with rows or runs, before any model.
+
+    Attributes
+    ----------
+    fault : str
+        Of the fixed vocabulary: duplicate_runs, duplicate_rows, stale_samples,
+        unsorted_time, mixed_units, wrong_sign, swapped_channels, wrong_gear_ratio,
+        saturated_travel, wrapped_reference.
+    runs : tuple of str
+        Labels of the runs that have it.
+    rows : tuple of int
+        Rows, counted from 1 within each file (the header not counted) or within the run
+        where there is no file; empty where whole runs are meant.
+    says : str
+    mend : str
+        What to do.
+    """
+
+    fault: str
+    runs: tuple[str, ...]
+    rows: tuple[int, ...]
+    says: str
+    mend: str
+
+    @classmethod
+    def of(
+        cls, fault: str, runs: Iterable[str], rows: Sequence[int], says: str, mend: str
+    ) -> DataFault:
+        """A fault of plain values."""
+        return cls(fault, tuple(dict.fromkeys(runs)), tuple(int(k) for k in rows), says, mend)
+
+    @property
+    def unusable(self) -> bool:
+        """The data must not be used as they are."""
+        return self.fault in UNUSABLE
+
+    def __str__(self) -> str:
+        return f"{self.fault}: {self.says}; {self.mend}"
+
+    def to_json(self) -> dict[str, Any]:
+        """The entry of ``data_faults``."""
+        return {
+            "fault": self.fault,
+            "rows": [*self.rows[:LISTED]],
+            "rows_total": len(self.rows),
+            "runs": [*self.runs],
+            "says": self.says,
+            "mend": self.mend,
+            "unusable": self.unusable,
+        }

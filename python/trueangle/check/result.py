@@ -1,0 +1,111 @@
+"""What a check of data found."""
+
+from __future__ import annotations
+
+import json
+import textwrap
+from dataclasses import dataclass
+from typing import Any
+
+from .extent import Extent
+from .fault import DataFault
+
+__all__ = ["Check"]
+
+WIDTH = 88
+
+
+@dataclass(frozen=True)
+class Check:
+    """Whether data are fit to be used, before any model.
+
+    Attributes
+    ----------
+    data_faults : tuple of DataFault
+    ratio : float or None
+        Travel of the indicated angle per travel of the reference.
+    suggests : str
+        What that ratio suggests.
+    extent : Extent
+        Span, turns, directions, speeds, loads, temperatures and mounts.
+    can : tuple of str
+        What can be known from such data.
+    cannot : tuple of dict
+        ``what`` cannot, ``because``, and what to ``measure``.
+    """
+
+    data_faults: tuple[DataFault, ...]
+    ratio: float | None
+    suggests: str
+    extent: Extent
+    can: tuple[str, ...]
+    cannot: tuple[dict[str, str], ...]
+
+    @property
+    def usable(self) -> bool:
+        """No fault forbids to use the data as they are."""
+        return not any(fault.unusable for fault in self.data_faults)
+
+    def to_dict(self) -> dict[str, Any]:
+        """What ``trueangle check --json`` prints."""
+        e = self.extent
+        return {
+            "data_faults": [fault.to_json() for fault in self.data_faults],
+            "usable": self.usable,
+            "ratio": self.ratio,
+            "ratio_suggests": self.suggests,
+            "readings": e.readings,
+            "runs": e.runs,
+            "span_deg": e.span_deg,
+            "turns": e.turns,
+            "directions": [*e.directions],
+            "speeds": [*e.speeds],
+            "loads": [*e.loads],
+            "temperatures": [*e.temperatures],
+            "mounts": [*e.mounts],
+            "can": [*self.can],
+            "cannot": [*self.cannot],
+        }
+
+    def to_json(self) -> str:
+        """`to_dict` as JSON text."""
+        return json.dumps(self.to_dict(), indent=2, allow_nan=False)
+
+    def summary(self) -> str:
+        """The check as readable text: faults first."""
+        e = self.extent
+        lines = []
+        for fault in self.data_faults:
+            lines += _wrapped(f"{fault.fault}: {fault.says}.", 2)
+            lines += _wrapped(f"To mend: {fault.mend}.", 4, 2)
+        if not self.data_faults:
+            lines.append("No fault found in the data.")
+        elif not self.usable:
+            lines.append("The data must not be used as they are.")
+        ratio = "unknown" if self.ratio is None else f"{self.ratio:.6g}"
+        lines += [
+            "",
+            f"{e.readings} readings in {e.runs} run{'s' * (e.runs != 1)}, {e.span_deg:.4g} deg of "
+            f"places, {e.turns:.4g} turns at most.",
+            f"Indicated per reference: {ratio} ({self.suggests}).",
+            f"Directions: {_levels(e.directions)}; speeds: {_levels(e.speeds)} deg/s; loads: "
+            f"{_levels(e.loads)} Nm;",
+            f"temperatures: {_levels(e.temperatures)} C; mounts: {_levels(e.mounts)} deg.",
+            "",
+        ]
+        lines += _wrapped(f"Can be known: {'; '.join(self.can)}.", 2)
+        for entry in self.cannot:
+            lines += _wrapped(
+                f"Cannot be known: {entry['what']} ({entry['because']}). To tell: "
+                f"{entry['measure']}.",
+                2,
+            )
+        return "\n".join(lines)
+
+
+def _levels(values: tuple[float, ...] | tuple[int, ...]) -> str:
+    return ", ".join(f"{value:g}" for value in values) or "not recorded"
+
+
+def _wrapped(text: str, indent: int, first: int = 0) -> list[str]:
+    return textwrap.wrap(text, WIDTH, initial_indent=" " * first, subsequent_indent=" " * indent)

@@ -1,0 +1,150 @@
+"""Faults of the data are found before any model, and clean data have none."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import trueangle as ta
+from trueangle.cli import main
+
+FAULTS = (
+    "duplicate_runs",
+    "duplicate_rows",
+    "stale_samples",
+    "unsorted_time",
+    "mixed_units",
+    "wrong_sign",
+    "swapped_channels",
+    "wrong_gear_ratio",
+    "saturated_travel",
+    "wrapped_reference",
+)
+
+UNUSABLE = {"unsorted_time", "mixed_units", "wrong_sign", "wrong_gear_ratio", "wrapped_reference"}
+
+
+def columns(run: int, rng: np.random.Generator, count: int = 300) -> dict[str, np.ndarray]:
+    """One run of a joint with an error of a degree and noise of 10 arcsec."""
+    time = np.sort(rng.uniform(0.0, 18.0, count))
+    sign = 1.0 if run % 2 else -1.0
+    theta = 20.0 * sign * time + 5.0
+    error = np.cos(np.radians(theta)) + rng.normal(0.0, 10.0 / 3600.0, count)
+    return {
+        "time_s": time,
+        "reference_deg": theta,
+        "indicated_deg": np.round((theta + 40.0 + error) * 8192) / 8192,
+    }
+
+
+def written(folder: Path, runs: list[dict[str, np.ndarray]], labels: list[str]) -> Path:
+    path = folder / "runs.csv"
+    rows = ["run,time_s,reference_deg,indicated_deg"]
+    for label, run in zip(labels, runs, strict=True):
+        rows += [
+            f"{label},{a!r},{b!r},{c!r}"
+            for a, b, c in zip(*map(np.ndarray.tolist, run.values()), strict=True)
+        ]
+    path.write_text("\n".join(rows) + "\n", encoding="utf-8")
+    return path
+
+
+def faulty(fault: str, rng: np.random.Generator) -> tuple[list[dict[str, np.ndarray]], list[str]]:
+    runs, labels = [columns(k, rng) for k in range(4)], ["a", "b", "c", "d"]
+    one = runs[1]
+    if fault == "duplicate_runs":
+        runs[3] = {k: v.copy() for k, v in one.items()}
+    elif fault == "duplicate_rows":
+        order = np.sort(np.append(np.arange(300), [50, 51, 52]))
+        runs[1] = {k: v[order] for k, v in one.items()}
+    elif fault == "stale_samples":
+        for k in range(20, 280, 20):
+            one["indicated_deg"][k : k + 3] = one["indicated_deg"][k - 1]
+    elif fault == "unsorted_time":
+        one["time_s"][100], one["time_s"][101] = one["time_s"][101], one["time_s"][100]
+    elif fault == "mixed_units":
+        for name in ("reference_deg", "indicated_deg"):
+            one[name] = np.radians(one[name])
+    elif fault == "wrong_sign":
+        for run in runs:
+            run["indicated_deg"] = -run["indicated_deg"]
+    elif fault == "swapped_channels":
+        for run in runs:
+            run["reference_deg"], run["indicated_deg"] = run["indicated_deg"], run["reference_deg"]
+    elif fault == "wrong_gear_ratio":
+        for run in runs:
+            run["indicated_deg"] = 7.3 * run["indicated_deg"]
+    elif fault == "saturated_travel":
+        for run in runs:
+            run["indicated_deg"] = np.clip(run["indicated_deg"], -250.0, 330.0)
+    elif fault == "wrapped_reference":
+        for run in runs:
+            run["reference_deg"] = run["reference_deg"] % 180.0
+    return runs, labels
+
+
+def test_clean_data_have_no_fault(tmp_path: Path) -> None:
+    for seed in range(5):
+        rng = np.random.default_rng(seed)
+        runs, labels = faulty("none", rng)
+        found = ta.check(written(tmp_path, runs, labels))
+        assert found.data_faults == (), seed
+        assert found.usable
+        assert found.ratio == pytest.approx(1.0, abs=0.01)
+        wrapped = [{**run, "reference_deg": run["reference_deg"] % 360.0} for run in runs]
+        assert ta.check(written(tmp_path, wrapped, labels)).data_faults == ()
+
+
+@pytest.mark.parametrize("fault", FAULTS)
+def test_a_fault_is_found_alone(fault: str, tmp_path: Path) -> None:
+    for seed in range(3):
+        runs, labels = faulty(fault, np.random.default_rng(100 + seed))
+        found = ta.check(written(tmp_path, runs, labels))
+        assert {f.fault for f in found.data_faults} == {fault}, (seed, found.data_faults)
+        assert found.usable == (fault not in UNUSABLE)
+        assert all(f.says and f.mend and f.runs for f in found.data_faults)
+
+
+def test_rows_are_named(tmp_path: Path) -> None:
+    runs, labels = faulty("unsorted_time", np.random.default_rng(3))
+    fault = ta.check(written(tmp_path, runs, labels)).data_faults[0]
+    assert fault.rows == (300 + 101 + 1,)
+    assert fault.runs == ("b",)
+
+
+def test_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    rng = np.random.default_rng(1)
+    path = written(tmp_path, *faulty("wrong_gear_ratio", rng))
+    assert main(["check", str(path), "--json"]) == 1
+    found = json.loads(capsys.readouterr().out)
+    assert found["data_faults"][0]["fault"] == "wrong_gear_ratio"
+    assert found["ratio"] == pytest.approx(7.3, rel=0.01)
+    assert "73/10" in found["ratio_suggests"]
+    path = written(tmp_path, *faulty("none", rng))
+    assert main(["check", str(path)]) == 0
+    assert "No fault found" in capsys.readouterr().out
+    assert main(["check", str(path), "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["directions"] == [-1, 1]
+    assert found["speeds"] == pytest.approx([20.0], rel=0.02)
+    assert (found["loads"], found["temperatures"], found["mounts"]) == ([], [], [])
+    assert found["span_deg"] == pytest.approx(360.0, abs=10.0)
+    assert any("several loads" in entry["measure"] for entry in found["cannot"])
+
+
+def test_a_joint_at_rest_repeats_nothing() -> None:
+    rng = np.random.default_rng(7)
+    theta = np.repeat(np.arange(0.0, 360.0, 10.0), 20) + 0.0
+    indicated = np.round((theta + rng.normal(0.0, 0.01, theta.size)) / 0.088) * 0.088
+    run = ta.CalibrationRun(theta, indicated, period=360.0, time=np.arange(theta.size) * 0.01)
+    assert ta.check(run).data_faults == ()
+
+
+def test_measured_data(data_dir: Path) -> None:
+    found = ta.check(data_dir / "rm44_repeat.csv")
+    assert [(f.fault, f.runs) for f in found.data_faults] == [("duplicate_runs", ("10", "11"))]
+    for name in ("rm44_misalignment", "arm_joint_protractor", "resolver_stepper", "gear_pair_fit"):
+        assert ta.check(data_dir / f"{name}.csv").data_faults == (), name
