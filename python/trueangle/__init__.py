@@ -9,7 +9,7 @@ from ._core import __version__
 
 if TYPE_CHECKING:
     from .angles import wrap as wrap
-    from .check import check as check
+    from .checks import check as check
     from .diagnosis import Diagnosis as Diagnosis
     from .diagnosis.diagnose import diagnose as diagnose
     from .fitting.fit import fit as fit
@@ -51,7 +51,7 @@ _PUBLIC = {
     "FitResult": "fitting.result",
     "HarmonicModel": "model",
     "Shaft": "shafts",
-    "check": "check",
+    "check": "checks",
     "correct": "logs.frames",
     "correct_logs": "logs.batch",
     "fit": "fitting.fit",

@@ -18,7 +18,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Print the check; 1 where a fault makes the data unusable."""
-    from ..check import check
+    from ..checks import check
 
     found = check(args.files, counts_per_turn=args.counts_per_turn)
     print(found.to_json() if args.json else found.summary())

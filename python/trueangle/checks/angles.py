@@ -38,6 +38,9 @@ UNIT_SPREAD = 0.35
 #: Noise of the reference against that of the joint from which on the two may be swapped.
 NOISIER = 10.0
 
+#: Departure of steps, in shares of one, that are all alike.
+EVEN = 1e-3
+
 #: Roughness of steps, in shares of a step, that is none.
 EXACT = 1e-6
 
@@ -209,9 +212,12 @@ def swapped(records: list[Record]) -> Iterator[DataFault]:
             continue
         reference, indicated = record.unwrapped
         own, other = (_roughness(x, record.time) for x in (reference, indicated))
-        least = EXACT * float(np.median(np.abs(np.diff(indicated))))
+        steps = np.abs(np.diff(indicated))
+        typical = float(np.median(steps))
+        least = EXACT * typical
         # Readings taken at even counts of the joint say nothing of its noise.
-        if own > least and (other > least or record.time is not None):
+        even = float(np.mean(np.abs(steps - typical) <= EVEN * typical)) > 0.5
+        if own > least and not even:
             ratios.append(own / max(other, least, 1e-300))
     if ratios and float(np.median(ratios)) > NOISIER:
         yield DataFault.of(

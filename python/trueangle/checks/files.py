@@ -22,7 +22,7 @@ def read_records(
     FileError
         No table of runs: a missing column, text where a number belongs.
     """
-    found = []
+    found: list[Record] = []
     for path in paths:
         table = read_columns(Path(path), counts_per_turn)
         scale = 360.0 / table.period
