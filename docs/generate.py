@@ -16,9 +16,9 @@ mpl.use("Agg")
 import trueangle as ta
 from trueangle import plots
 from trueangle.diagnosis import diagnose
+from trueangle.effects import Backlash
 from trueangle.planning import plan_mounts
 from trueangle.reports.demo import demo_simulation
-from trueangle.simulation.effects.reversal import Backlash
 
 __all__ = ["everything"]
 

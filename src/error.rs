@@ -125,7 +125,7 @@ pub enum Error {
     MissingSignal {
         /// The keyword of the signal.
         signal: &'static str,
-        /// The kind of the term.
-        term: &'static str,
+        /// What the term is called.
+        term: String,
     },
 }

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use proptest::prelude::*;
 use trueangle::kernel::{Argument, Evaluator, Quantity};
-use trueangle::terms::{Columns, Corrector, Line, Signals, Term, Terms};
+use trueangle::terms::{Columns, Corrector, Form, Line, Signal, Signals, Term, Terms};
 use trueangle::{Error, HarmonicSeries, Shaft};
 
 const PERIOD: f64 = 360.0;
@@ -32,49 +32,72 @@ fn corrector(terms: &[Term]) -> Corrector {
     Corrector::new(Arc::new(Terms::new(evaluator, terms).unwrap()))
 }
 
+fn term(form: Form) -> Term {
+    let name = format!("{form:?}").to_lowercase();
+    let name = name.split(' ').next().unwrap_or_default().to_owned();
+    Term { name, form }
+}
+
 fn every_term() -> Vec<Term> {
     let line = |order, cosine, sine| Line {
         order,
         cosine,
         sine,
     };
-    vec![
-        Term::Backlash { half_width: 0.02 },
-        Term::PreslidingHysteresis {
+    let scaled = |signal, origin, absolute, level, relative, lines| Form::Scaled {
+        signal,
+        origin,
+        absolute,
+        level,
+        relative,
+        lines,
+    };
+    let lines = vec![line(1.0, 1e-3, 0.0), line(50.5, 0.0, 2e-5)];
+    let forms = vec![
+        Form::Play {
+            half_width: 0.02,
+            lines: vec![line(1.0, 0.005, 0.0), line(3.0, 0.0, 0.002)],
+        },
+        Form::Friction {
             amplitude: 0.01,
             length: 2.0,
             start: 0.5,
         },
-        Term::LocalDefect {
+        Form::Bump {
             place: 100.0,
             width: 5.0,
             height: 0.01,
             cycles: 2.0,
         },
-        Term::Latency { delay: 1e-3 },
-        Term::FilterLag { cutoff: 50.0 },
-        Term::ThermalDrift {
-            zero: 1e-3,
-            pattern: 1e-3,
-            lines: vec![line(1.0, 1e-3, 0.0), line(50.5, 0.0, 2e-5)],
-            reference: 20.0,
+        Form::Lag { delay: 1e-3 },
+        Form::Filter {
+            frequency: 50.0,
+            damping: None,
         },
-        Term::TorsionalCompliance {
-            linear: 3e-3,
-            lines: vec![],
+        Form::Filter {
+            frequency: 80.0,
+            damping: Some(0.7),
         },
-        Term::StiffeningCompliance {
+        scaled(Signal::Temperature, 20.0, false, 1e-3, 1e-3, lines),
+        scaled(Signal::Torque, 0.0, false, 3e-3, 0.0, vec![]),
+        Form::Spring {
+            signal: Signal::Torque,
             linear: 1e-3,
             cubic: 2e-6,
             beyond: -2e-4,
             knee: 3.0,
             gravity: Some(30.0),
         },
-        Term::LoadDependentGearError {
-            lines: vec![line(100.0, 1e-5, 1e-5)],
-            absolute: true,
-        },
-    ]
+        scaled(
+            Signal::Torque,
+            0.0,
+            true,
+            0.0,
+            0.0,
+            vec![line(100.0, 1e-5, 1e-5)],
+        ),
+    ];
+    forms.into_iter().map(term).collect()
 }
 
 proptest! {
@@ -87,7 +110,7 @@ proptest! {
     ) {
         let mut terms = every_term();
         if !directed {
-            terms.retain(|term| !matches!(term, Term::Latency { .. } | Term::FilterLag { .. }));
+            terms.retain(|term| !matches!(term.form, Form::Lag { .. } | Form::Filter { .. }));
         }
         let (mut forward, mut back) = (corrector(&terms), corrector(&terms));
         let mut theta = start;
@@ -110,7 +133,17 @@ proptest! {
     fn a_batch_is_its_steps(angles in prop::collection::vec(-400.0..400.0f64, 0..300)) {
         for terms in [
             every_term(),
-            vec![Term::Latency { delay: 1e-3 }, Term::TorsionalCompliance { linear: 1e-3, lines: vec![] }],
+            vec![
+                term(Form::Lag { delay: 1e-3 }),
+                term(Form::Scaled {
+                    signal: Signal::Torque,
+                    origin: 0.0,
+                    absolute: false,
+                    level: 1e-3,
+                    relative: 0.0,
+                    lines: vec![],
+                }),
+            ],
         ] {
             let velocity: Vec<f64> = angles.iter().map(|x| 3.0 * x).collect();
             let columns = Columns {
@@ -141,7 +174,7 @@ fn a_missing_signal_is_named() {
         corrector.correct(1.0, &signals),
         Err(Error::MissingSignal {
             signal: "torque",
-            term: "torsional_compliance"
+            term: "scaled".to_owned()
         })
     );
     let mut out = [0.0];
@@ -183,7 +216,10 @@ fn columns_of_another_length_are_refused() {
 
 #[test]
 fn resetting_forgets_the_past() {
-    let mut corrector = corrector(&[Term::Backlash { half_width: 1.0 }]);
+    let mut corrector = corrector(&[term(Form::Play {
+        half_width: 1.0,
+        lines: vec![],
+    })]);
     let forward = Signals {
         direction: Some(1.0),
         ..Signals::default()
@@ -198,15 +234,61 @@ fn resetting_forgets_the_past() {
 
 #[test]
 fn friction_steeper_than_the_angle_is_refused() {
-    let steep = Term::PreslidingHysteresis {
+    let steep = term(Form::Friction {
         amplitude: 1.0,
         length: 1.0,
         start: 0.0,
-    };
+    });
     let series = HarmonicSeries::new(PERIOD, 0.0, vec![]).unwrap();
     let evaluator = Arc::new(Evaluator::new(series, Argument::Reference));
     assert!(matches!(
         Terms::new(evaluator, &[steep]),
         Err(Error::NotInvertible { slope }) if slope == 2.0
     ));
+}
+
+#[test]
+fn play_that_is_negative_somewhere_needs_a_direction() {
+    let play = |half_width, swing| Form::Play {
+        half_width,
+        lines: vec![Line {
+            order: 2.0,
+            cosine: 0.0,
+            sine: swing,
+        }],
+    };
+    assert_eq!(play(1.0, 0.9).needs(), None);
+    assert_eq!(play(1.0, 1.1).needs(), Some(Signal::Direction));
+    assert_eq!(play(0.0, 0.1).needs(), Some(Signal::Direction));
+}
+
+/// A line behind a damped second-order low-pass, by complex numbers written out.
+#[test]
+fn a_damped_filter_has_the_gain_of_its_equation() {
+    let (order, amplitude, speed, frequency, damping) = (7.0, 0.5, 900.0, 40.0, 0.6);
+    let shaft = Shaft {
+        cycles: order,
+        orders: vec![1],
+        cosine: vec![amplitude],
+        sine: vec![0.0],
+    };
+    let series = HarmonicSeries::new(PERIOD, 0.0, vec![shaft]).unwrap();
+    let evaluator = Arc::new(Evaluator::new(series, Argument::Reference));
+    let filter = term(Form::Filter {
+        frequency,
+        damping: Some(damping),
+    });
+    let mut joint = Corrector::new(Arc::new(Terms::new(evaluator, &[filter]).unwrap()));
+    let signals = Signals {
+        velocity: Some(speed),
+        ..Signals::default()
+    };
+    let w = order * speed / PERIOD / frequency;
+    let size = (1.0 - w * w).hypot(2.0 * damping * w).recip();
+    let lag = (2.0 * damping * w).atan2(1.0 - w * w);
+    for theta in [0.0, 13.0, 200.5] {
+        let seen = amplitude * size * (order * f64::to_radians(theta) - lag).cos();
+        let error = joint.error(theta, &signals).unwrap();
+        assert!((error - seen).abs() < SOLVED, "{error} {seen}");
+    }
 }

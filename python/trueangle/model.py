@@ -14,14 +14,14 @@ from numpy.typing import ArrayLike, NDArray
 
 from . import _core
 from .angles import check_period
+from .correction.term import Term
 from .errors import ArgumentError, NotInvertibleError
 from .records import FitRecord, Provenance
 from .shafts import Shaft
 from .spanguard import SpanGuard
-from .terms.term import Term
 
 if TYPE_CHECKING:
-    from .terms.corrector import Corrector
+    from .correction.corrector import Corrector
 
 __all__ = ["Argument", "HarmonicModel", "check_invertible"]
 
@@ -290,7 +290,7 @@ class HarmonicModel:
         return corrected
 
     def _with_terms(self, *arguments: Any) -> float | NDArray[Any]:
-        from .terms.corrector import evaluate
+        from .correction.corrector import evaluate
 
         return evaluate(self, self._core_corrector(), *arguments)
 
@@ -298,9 +298,9 @@ class HarmonicModel:
         """`correct` that carries its state from batch to batch and step to step.
 
         For the batches of a long log, and for joints whose reversal error depends on
-        travel before; see `trueangle.terms.corrector.Corrector`.
+        travel before; see `trueangle.correction.corrector.Corrector`.
         """
-        from .terms.corrector import Corrector
+        from .correction.corrector import Corrector
 
         return Corrector(self)
 

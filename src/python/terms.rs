@@ -9,7 +9,7 @@ use super::failure::argument_error;
 use super::series::PySeries;
 use super::threads::threads;
 use crate::kernel::Quantity;
-use crate::terms::{Columns, Corrector, Line, Signals, Term, Terms};
+use crate::terms::{Columns, Corrector, Form, Line, Signal, Signals, Term, Terms};
 
 type Column<'py> = Option<PyReadonlyArray1<'py, f64>>;
 
@@ -21,8 +21,17 @@ pub struct PyCorrector(Corrector);
 impl PyCorrector {
     #[new]
     fn new(series: &PySeries, terms: Vec<Bound<'_, PyAny>>) -> PyResult<Self> {
-        let terms = terms.iter().map(term).collect::<PyResult<Vec<_>>>()?;
-        let terms = Terms::new(Arc::clone(&series.evaluator), &terms)?;
+        let mut forms = Vec::new();
+        for term in &terms {
+            let name: String = term.getattr("kind")?.extract()?;
+            for object in term.call_method0("forms")?.try_iter()? {
+                forms.push(Term {
+                    name: name.clone(),
+                    form: form(&object?)?,
+                });
+            }
+        }
+        let terms = Terms::new(Arc::clone(&series.evaluator), &forms)?;
         Ok(Self(Corrector::new(Arc::new(terms))))
     }
 
@@ -121,68 +130,73 @@ impl PyCorrector {
     }
 }
 
-/// A term of `trueangle.terms`, read attribute by attribute.
-fn term(object: &Bound<'_, PyAny>) -> PyResult<Term> {
+/// A form of `trueangle.correction.forms`, read attribute by attribute.
+fn form(object: &Bound<'_, PyAny>) -> PyResult<Form> {
     let number = |name: &str| object.getattr(name)?.extract::<f64>();
-    let kind: String = object.getattr("kind")?.extract()?;
+    let option = |name: &str| object.getattr(name)?.extract::<Option<f64>>();
+    let kind: String = object.get_type().name()?.extract()?;
     Ok(match kind.as_str() {
-        "backlash" => Term::Backlash {
+        "Play" => Form::Play {
             half_width: number("half_width")?,
+            lines: lines(object)?,
         },
-        "presliding_hysteresis" => Term::PreslidingHysteresis {
+        "Friction" => Form::Friction {
             amplitude: number("amplitude")?,
             length: number("length")?,
             start: number("start")?,
         },
-        "latency" => Term::Latency {
-            delay: number("delay_s")?,
+        "Lag" => Form::Lag {
+            delay: number("delay")?,
         },
-        "filter_lag" => Term::FilterLag {
-            cutoff: number("cutoff_hz")?,
+        "Filter" => Form::Filter {
+            frequency: number("frequency")?,
+            damping: option("damping")?,
         },
-        "thermal_drift" => Term::ThermalDrift {
-            zero: number("zero_per_K")?,
-            pattern: number("pattern_per_K")?,
+        "Scaled" => Form::Scaled {
+            signal: signal(object)?,
+            origin: number("origin")?,
+            absolute: object.getattr("absolute")?.extract()?,
+            level: number("level")?,
+            relative: number("relative")?,
             lines: lines(object)?,
-            reference: number("reference_C")?,
         },
-        "torsional_compliance" => Term::TorsionalCompliance {
-            linear: number("per_Nm")?,
-            lines: lines(object)?,
+        "Spring" => Form::Spring {
+            signal: signal(object)?,
+            linear: number("linear")?,
+            cubic: number("cubic")?,
+            beyond: number("beyond")?,
+            knee: number("knee")?,
+            gravity: option("gravity")?,
         },
-        "stiffening_compliance" => Term::StiffeningCompliance {
-            linear: number("per_Nm")?,
-            cubic: number("per_Nm3")?,
-            beyond: number("beyond_knee_per_Nm")?,
-            knee: number("knee_Nm")?,
-            gravity: object.getattr("gravity")?.extract()?,
-        },
-        "load_dependent_gear_error" => Term::LoadDependentGearError {
-            lines: lines(object)?,
-            absolute: object.getattr("torque")?.extract::<String>()? == "absolute",
-        },
-        "local_defect" => Term::LocalDefect {
+        "Bump" => Form::Bump {
             place: number("place")?,
             width: number("width")?,
             height: number("height")?,
-            cycles: number("cycles_per_turn")?,
+            cycles: number("cycles")?,
         },
         other => {
             return Err(argument_error(
                 object.py(),
-                format!("the core knows no term of kind {other:?}"),
+                format!("the core knows no form {other:?}"),
             ));
         }
     })
 }
 
+fn signal(object: &Bound<'_, PyAny>) -> PyResult<Signal> {
+    let name: String = object.getattr("signal")?.extract()?;
+    let found = Signal::ALL.into_iter().find(|signal| signal.name() == name);
+    found.ok_or_else(|| {
+        let problem = format!("a correction knows no signal {name:?}");
+        argument_error(object.py(), problem)
+    })
+}
+
 fn lines(object: &Bound<'_, PyAny>) -> PyResult<Vec<Line>> {
-    let list = |name: &str| object.getattr(name)?.extract::<Vec<f64>>();
-    let (orders, cosine, sine) = (list("orders")?, list("cosine")?, list("sine")?);
-    Ok(orders
+    let lines: Vec<(f64, f64, f64)> = object.getattr("lines")?.extract()?;
+    Ok(lines
         .into_iter()
-        .zip(cosine.into_iter().zip(sine))
-        .map(|(order, (cosine, sine))| Line {
+        .map(|(order, cosine, sine)| Line {
             order,
             cosine,
             sine,

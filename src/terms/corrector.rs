@@ -2,12 +2,13 @@
 
 use std::sync::Arc;
 
+use super::form::{Form, Line, Smooth, Term, lines_of};
 use super::signals::{Columns, Signal, Signals};
-use super::term::{Smooth, Term};
 use super::travel::{Element, Heading, Travel};
 use crate::compensator::Compensator;
 use crate::error::Error;
 use crate::kernel::{Argument, Batch, Evaluator, Quantity};
+use crate::series::HarmonicSeries;
 
 /// Steps before the signals are taken to leave no unique angle; as a rule two or three do.
 const MOST_STEPS: usize = 60;
@@ -22,14 +23,16 @@ pub struct Terms {
     plain: Compensator,
     smooth: Vec<Smooth>,
     is_shaped: bool,
-    backlash: f64,
+    /// Half of the play, and how it varies with the place.
+    play: f64,
+    place: Option<HarmonicSeries>,
     elements: Vec<Element>,
     has_travel: bool,
     delay: f64,
     /// Bound of the slope of the inverted series less 1.
     steepness: f64,
     /// Signals needed, each with the first term that needs it.
-    needs: Vec<(Signal, &'static str)>,
+    needs: Vec<(Signal, String)>,
 }
 
 impl Terms {
@@ -41,20 +44,23 @@ impl Terms {
             evaluator,
             smooth: Vec::new(),
             is_shaped: false,
-            backlash: 0.0,
+            play: 0.0,
+            place: None,
             elements: Vec::new(),
             has_travel: false,
             delay: 0.0,
             steepness: 0.0,
             needs: Vec::new(),
         };
-        for term in terms {
-            match *term {
-                Term::Backlash { half_width } => {
-                    ready.backlash += half_width;
+        let mut places: Vec<Line> = Vec::new();
+        for Term { name, form } in terms {
+            match form {
+                Form::Play { half_width, lines } => {
+                    ready.play += half_width;
+                    places.extend(lines);
                     ready.has_travel = true;
                 }
-                Term::PreslidingHysteresis {
+                &Form::Friction {
                     amplitude,
                     length,
                     start,
@@ -66,23 +72,28 @@ impl Terms {
                     });
                     ready.has_travel = true;
                 }
-                Term::Latency { delay } => ready.delay += delay,
+                Form::Lag { delay } => ready.delay += delay,
                 _ => {}
             }
-            ready.smooth.extend(Smooth::new(term, period)?);
-            if let Some(signal) = term.needs()
+            ready.smooth.extend(Smooth::new(form, period)?);
+            if let Some(signal) = form.needs()
                 && ready.needs.iter().all(|(known, _)| *known != signal)
             {
-                ready.needs.push((signal, term.kind()));
+                ready.needs.push((signal, name.clone()));
             }
         }
+        ready.place = lines_of(&places, period)?;
         ready.is_shaped = ready.smooth.iter().any(Smooth::is_shaped);
         // |dz/ds| reaches 2/length, just after a reversal.
         let steepest: f64 = ready
             .elements
             .iter()
             .map(|element| 2.0 * element.amplitude.abs() / element.length)
-            .sum();
+            .sum::<f64>()
+            + ready
+                .place
+                .as_ref()
+                .map_or(0.0, HarmonicSeries::slope_bound);
         let bound = ready.evaluator.slope_bound();
         ready.steepness = bound / (1.0 - bound).max(f64::MIN_POSITIVE);
         let slope = steepest + bound;
@@ -98,7 +109,7 @@ impl Terms {
     }
 
     /// Signals that must be given, each with a term that needs it.
-    pub fn needs(&self) -> &[(Signal, &'static str)] {
+    pub fn needs(&self) -> &[(Signal, String)] {
         &self.needs
     }
 
@@ -114,12 +125,12 @@ impl Terms {
     }
 
     fn check(&self, given: impl Fn(Signal) -> bool) -> Result<(), Error> {
-        for &(signal, term) in &self.needs {
+        for &(signal, ref term) in &self.needs {
             let implied = signal == Signal::Direction && given(Signal::Velocity);
             if !implied && !given(signal) {
                 return Err(Error::MissingSignal {
                     signal: signal.name(),
-                    term,
+                    term: term.clone(),
                 });
             }
         }
@@ -299,8 +310,8 @@ impl Corrector {
                 return f64::NAN;
             }
             let heading = travel.heading(signal);
-            error +=
-                terms.backlash * heading.direction + travel.friction(&terms.elements, heading, x).0;
+            error += heading.direction * (terms.play + terms.place(x).0)
+                + travel.friction(&terms.elements, heading, x).0;
             travel.advance(&terms.elements, heading, x);
         }
         error - delayed
@@ -330,6 +341,13 @@ impl Terms {
             .fold((0.0, 0.0), |(e, de), (f, df)| (e + f, de + df))
     }
 
+    /// How much wider the play is at a place than on average, and its slope.
+    fn place(&self, x: f64) -> (f64, f64) {
+        self.place
+            .as_ref()
+            .map_or((0.0, 0.0), |place| place.evaluate(x))
+    }
+
     /// `x` with `x + series(x) + terms(x) = goal`, NaN where the signals leave no unique
     /// angle.
     ///
@@ -343,13 +361,18 @@ impl Terms {
         invert: bool,
         signals: &Signals,
     ) -> f64 {
-        let goal = goal - self.backlash * heading.direction;
+        let goal = goal - self.play * heading.direction;
         let inverse = |goal: f64| if invert { self.plain.step(goal) } else { goal };
-        if !self.is_shaped && self.elements.is_empty() {
+        if !self.is_shaped && self.elements.is_empty() && self.place.is_none() {
             return inverse(goal);
         }
         let at = |x: f64| {
             let (mut error, mut slope) = self.shape(signals, x);
+            if self.place.is_some() {
+                let (wider, rise) = self.place(x);
+                error += heading.direction * wider;
+                slope += heading.direction * rise;
+            }
             if !self.elements.is_empty() {
                 let (friction, rise) = travel.friction(&self.elements, heading, x);
                 error += friction;

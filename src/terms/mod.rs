@@ -6,10 +6,10 @@
 //! `theta = phi + velocity * delay`.
 
 mod corrector;
+mod form;
 mod signals;
-mod term;
 mod travel;
 
 pub use corrector::{Corrector, Terms};
+pub use form::{Form, Line, Term};
 pub use signals::{Columns, Signal, Signals};
-pub use term::{Line, Term};

@@ -6,12 +6,10 @@ import numpy as np
 import pytest
 
 import trueangle as ta
-from trueangle.diagnosis.dispersion import find_outliers
+from trueangle.effects import Latency, Outliers, ThermalDrift
 from trueangle.regression.regression import Regression
 from trueangle.regression.repeats import repeated_part
 from trueangle.simulation import Joint, RunDesign, Simulation, join_runs, simulate
-from trueangle.simulation.effects.motion import Latency
-from trueangle.simulation.effects.temperature import ThermalDrift
 
 JOINT = Joint(7.3, "none", "motor")
 
@@ -92,14 +90,14 @@ def test_wild_readings_stand_alone_and_transitions_do_not():
     single.residual = single.residual.copy()
     single.residual[rows] += 80.0
     single.update()
-    found = find_outliers(single)
+    found = Outliers.find_scatter(single)
     assert found is not None
     assert len(found.parameters["rows"].value) == rows.size
     pairs.residual = pairs.residual.copy()
     for shift in (0, 1, 2):
         pairs.residual[rows + shift] += 80.0
     pairs.update()
-    assert find_outliers(pairs) is None
+    assert Outliers.find_scatter(pairs) is None
 
 
 def test_elements_of_a_spring_have_one_sign_and_play_may_depend_on_the_place():

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from trueangle.diagnosis.discrepancy import noise_from_repeats
-from trueangle.diagnosis.grid import UniformGrid, uniform_grid
+from trueangle.joint.grid import UniformGrid, uniform_grid
 from trueangle.regression.leastsquares import best_ratio
 from trueangle.regression.regression import Regression
 from trueangle.regression.whitening import RunEffect, Whitener, lag_correlation

@@ -71,7 +71,7 @@ def run(args: argparse.Namespace) -> int:
 
 def _corrected(result: Diagnosis, path: str) -> Iterator[str]:
     """What the extended correction model takes off, and what it cannot."""
-    from ..terms.extension import NOT_AT_RUN_TIME
+    from ..diagnosis.correction import NOT_AT_RUN_TIME
 
     yield f"\nExtended correction model: {path}"
     for finding in result.findings:

@@ -8,28 +8,28 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ..effects import EFFECTS, Effect
+from ..effects.missing_order import MissingOrder
+from ..effects.scatter import NEW_SCATTER, ScatterFinding
+from ..effects.search import line_parameters
 from ..errors import ArgumentError
 from ..joint.signals import join_runs
 from ..regression.estimate import Parameters, quantity
 from ..regression.regression import ROUNDING, Extension, Regression
 from ..runs import CalibrationRun, as_runs
-from ..simulation.effects import Effect
-from ..simulation.effects.lines import MissingOrder
 from ..simulation.simulation import Simulation
-from .candidates import CANDIDATES, FLEXIBLE
-from .candidates.candidate import line_parameters
 from .discrepancy import compare, noise_from_repeats, unfolded_error
-from .dispersion import NEW_SCATTER, ScatterFinding, find_outliers, find_uneven_noise
 from .findings import Diagnosis, Finding
 from .gain import Gain, measure_gain
 from .identifiability import Blindness, blind_spots, doubts_about
 from .selection import (
     NEW_CAUSE,
-    RUN_FACTORS,
     cause_terms,
     extensions,
     finding_groups,
+    is_flexible,
     misfit,
+    propose,
     select,
 )
 
@@ -43,8 +43,8 @@ MOST_READINGS = 40_000
 #: Fewest readings that can support a cause.
 LEAST_READINGS = 20
 
-#: Standard deviations beyond which readings are wild whatever the mean.
-WILD_ANYWAY = 12.0
+#: Standard deviations beyond which readings are outliers whatever the mean.
+OUTLYING_ANYWAY = 12.0
 
 #: Rivals reported for each finding.
 RIVALS = 3
@@ -64,10 +64,10 @@ def diagnose(
               = X\beta + \sum_j Z_j u_j + n
 
     with the zero and the lines of the simulation always free in X. It is chosen by the
-    likelihood with a price of :math:`k\ln n_e + 2\ln(\text{grid})`, :math:`n_e` the readings
+    likelihood with a penalty of :math:`k\ln n_e + 2\ln(\text{grid})`, :math:`n_e` the readings
     or runs that inform on a parameter, and 6 for a new cause, forward and then backward;
     a further cause must also bring 0.1 % of what the others explain, as no form is exact;
-    correlated noise is whitened, wild readings are clipped at four standard deviations,
+    correlated noise is whitened, outliers are clipped at four standard deviations,
     and errors drawn anew in every run enter as random effects. What the design of the
     runs cannot tell apart is worked out first and not named.
 
@@ -93,7 +93,7 @@ def diagnose(
     Up to 40 000 readings are used; of more, one of every so many in a row is drawn at
     random (seed 0), which keeps the angles free of a grid. About 1 to 3 s for 10 000
     readings. Source: Frisch-Waugh projection; Schwarz (1978) and Kass and Wasserman
-    (1995) for the price; Koenker
+    (1995) for the penalty; Koenker
     (1981) for the variance.
 
     Examples
@@ -119,18 +119,18 @@ def diagnose(
     spots = blind_spots(start)
     chosen = select(start)
     scatter: list[ScatterFinding] = []
-    uneven = find_uneven_noise(chosen)
+    uneven = _scatter(chosen, weighs=True)
     if uneven is not None and uneven.bic_gain > NEW_SCATTER + misfit(chosen):
         scatter.append(uneven)
         start = Regression(signals, residual, sim.surroundings, uneven.weights, start.lines)
         chosen = select(start, chosen.terms)
-    wild = find_outliers(chosen)
-    if wild is not None and wild.bic_gain > NEW_CAUSE:
-        scatter.append(wild)
+    isolated = _scatter(chosen, weighs=False)
+    if isolated is not None and isolated.bic_gain > NEW_CAUSE:
+        scatter.append(isolated)
     findings, spots = _findings(chosen, spots, gain)
     in_doubt = any(spot.supported for spot in spots)
     for item in scatter:
-        if in_doubt and item.size < WILD_ANYWAY:
+        if in_doubt and item.size < OUTLYING_ANYWAY:
             spots.append(_scatter_doubt(item))
         else:
             findings.append(_scatter_finding(item))
@@ -151,11 +151,21 @@ def diagnose(
     )
 
 
+def _scatter(regression: Regression, weighs: bool) -> ScatterFinding | None:
+    """The cause of the scatter with the most evidence, of those that weigh readings or not."""
+    found = [
+        item
+        for effect in EFFECTS.values()
+        if effect.weighs == weighs and (item := effect.find_scatter(regression)) is not None
+    ]
+    return max(found, key=lambda item: item.bic_gain, default=None)
+
+
 def _structure(start: Regression) -> dict[str, float]:
     """Share of the variance that each cause would explain alone, largest first."""
     alone = {
         cause: 1.0 - float(np.exp(-max(extension.deviance, 0.0) / start.n))
-        for cause in CANDIDATES
+        for cause in EFFECTS
         if (extension := start.memory.get((cause,))) is not None and extension.bic_gain > 0.0
     }
     return dict(sorted(alone.items(), key=lambda item: -item[1]))
@@ -194,7 +204,7 @@ def _findings(
     for group, gain in zip(named, gains, strict=True):
         terms = [(*fitted[k], regression.covariance(k)) for k in group]
         cause = terms[0][0].cause
-        parameters, effects = CANDIDATES[cause].report(regression, terms)
+        parameters, effects = EFFECTS[cause].report(regression, terms)
         rivals = _rivals(regression, group) if len(findings) < RIVALLED else []
         weight = {
             "bic_gain": float(sum(t.bic_gain for t, _, _ in terms)),
@@ -214,13 +224,15 @@ def _estimates(
     found = {}
     # Not lines: one that another hides behind is no property of the joint.
     for cause in causes:
-        candidate = CANDIDATES[cause]
-        extension = candidate.propose(rest) if cause in (*RUN_FACTORS, *FLEXIBLE) else None
+        effect = EFFECTS[cause]
+        if not (effect.acts_on_runs or is_flexible(effect)):
+            continue
+        extension = propose(effect, rest)
         if extension is None or extension.bic_gain <= 0.0:
             continue
         fitted = rest.with_terms([*rest.terms, extension])
         k = len(fitted.terms) - 1
-        parameters, _ = candidate.report(fitted, [(*fitted.fitted()[k], fitted.covariance(k))])
+        parameters, _ = effect.report(fitted, [(*fitted.fitted()[k], fitted.covariance(k))])
         found[cause] = parameters
     return found
 
@@ -230,7 +242,7 @@ def _rivals(regression: Regression, group: Sequence[int]) -> list[tuple[str, flo
     cause = regression.terms[group[0]].cause
     rest = cause_terms(regression, group)
     own = rest.bic - regression.bic
-    others = [name for name in CANDIDATES if name != cause]
+    others = [name for name in EFFECTS if name != cause]
     gaps = [(p.cause, own - gain) for p, _, gain in extensions(rest, others) if p.deviance > 0.0]
     gaps.sort(key=lambda item: item[1])
     return [(name, float(gap)) for name, gap in gaps[:RIVALS]]
@@ -241,10 +253,9 @@ def _corrected_lines(regression: Regression, spots: list[Blindness]) -> list[Fin
     belief = regression.belief.pattern
     joint = regression.belief.joint
     # Causes that act on the lines themselves take or give a part of them on average.
-    interacting = {"thermal_drift", "load_dependent_gear_error", "filter_lag", "argument_error"}
-    if belief.orders.size == 0 or interacting & {term.cause for term in regression.terms}:
+    if belief.orders.size == 0 or any(EFFECTS[t.cause].changes_lines for t in regression.terms):
         return []
-    modulated = {term.shape["carrier"] for term in regression.terms if term.cause == "sidebands"}
+    modulated = {term.shape["carrier"] for term in regression.terms if "carrier" in term.shape}
     found = []
     for k, order in enumerate(belief.orders):
         if order in modulated:
@@ -258,7 +269,7 @@ def _corrected_lines(regression: Regression, spots: list[Blindness]) -> list[Fin
         if bic_gain <= NEW_CAUSE or float(np.abs(change).max()) < ROUNDING:
             continue
         shape = {"output_order": float(order)}
-        extension = Extension("missing_order", shape, np.zeros((regression.n, 0)), 2, log_grid)
+        extension = Extension(MissingOrder.kind, shape, np.zeros((regression.n, 0)), 2, log_grid)
         doubt = doubts_about(extension, regression, spots)
         if doubt is not None:
             spots[:] = [spot for spot in spots if spot != doubt]
@@ -276,13 +287,13 @@ def _corrected_lines(regression: Regression, spots: list[Blindness]) -> list[Fin
             "simulated_amplitude_arcsec": quantity(np.hypot(belief.cosine[k], belief.sine[k])),
             "explanations": quantity(joint.explanations(float(order))),
         }
-        price = {
+        penalty = {
             "bic_gain": bic_gain,
             "deviance": deviance,
             "parameters": 2.0,
             "log_grid": log_grid,
         }
-        found.append(Finding("missing_order", parameters, price, None, [], [effect]))
+        found.append(Finding(MissingOrder.kind, parameters, penalty, None, [], [effect]))
     return found
 
 

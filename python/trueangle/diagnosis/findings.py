@@ -7,12 +7,13 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
+from ..effects import EFFECTS, Effect
+from ..effects.blindness import Blindness
 from ..regression.estimate import Parameters
-from ..simulation.effects import EFFECTS, Effect
 from ..simulation.simulation import Simulation
+from .correction import extend_model
 from .discrepancy import Discrepancy
 from .gain import Gain
-from .identifiability import Blindness
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -66,7 +67,7 @@ class Finding:
             "gain": None if self.gain is None else self.gain.to_json(),
             "rivals": [{"cause": cause, "bic_gap": gap} for cause, gap in self.rivals],
             "physics": self.sentence,
-            "correctable": EFFECTS[self.cause].correctable,
+            "correctable": not EFFECTS[self.cause].not_at_run_time,
         }
 
 
@@ -113,10 +114,8 @@ class Diagnosis:
     ) -> HarmonicModel:
         """The correction model extended by the findings and fitted anew to the runs.
 
-        See `trueangle.terms.extension.extend_model`.
+        See `trueangle.diagnosis.correction.extend_model`.
         """
-        from ..terms.extension import extend_model
-
         return extend_model(model, runs, self.extended)
 
     def to_dict(self, extended_simulation: str | None = None) -> dict[str, Any]:

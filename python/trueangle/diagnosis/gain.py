@@ -9,10 +9,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..effects import EFFECTS
 from ..joint.signals import Signals
 from ..regression.regression import Regression
-from ..simulation.effects import EFFECTS
-from .candidates import CANDIDATES
 from .holdout import held_out, numbers, reducible_share
 from .levels import LevelGain, gains_by_level
 
@@ -25,13 +24,10 @@ Rows = NDArray[np.bool_]
 FOLDS = 5
 SHUFFLES = 3
 
-#: Causes that leave each run with a zero of its own, which held-out runs then get too.
-OWN_ZERO = ("zero_slip", "drift_within_run", "missed_counts")
-
 
 @dataclass(frozen=True)
 class Gain:
-    """What a finding is worth on held-out runs.
+    """What a finding gains on held-out runs.
 
     Attributes
     ----------
@@ -90,7 +86,7 @@ def measure_gain(
     unit, what = _units(regression)
     count = int(unit.max()) + 1
     folds = rng.permutation(count) % min(FOLDS, count)
-    own_zero = any(term.cause in OWN_ZERO for term in regression.terms)
+    own_zero = any(EFFECTS[term.cause].draws_zeros for term in regression.terms)
     left = np.zeros((len(groups) + 1, regression.n))
     for fold in range(int(folds.max()) + 1):
         test = folds[unit] == fold
@@ -159,7 +155,7 @@ def _control(
         signals = _shuffled(regression.signals, EFFECTS[cause].factor, unit, rng)
         columns = np.hstack(
             [
-                CANDIDATES[cause].columns(signals, regression.around, regression.terms[k].shape)
+                EFFECTS[cause].columns(signals, regression.around, regression.terms[k].shape)
                 for k in group
             ]
         )

@@ -12,9 +12,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..effects import EFFECTS
 from ..joint.signals import Signals
 from ..regression.regression import Regression
-from ..simulation.effects import EFFECTS
 from .holdout import held_out, numbers, part, rebuilt, reducible_share
 
 __all__ = ["UNITS", "LevelGain", "gains_by_level", "run_levels"]
@@ -46,7 +46,7 @@ LEAST_OWN = 0.05
 
 @dataclass(frozen=True)
 class LevelGain:
-    """What a finding is worth at a level of its factor that was left out as a whole.
+    """What a finding gains at a level of its factor that was left out as a whole.
 
     Attributes
     ----------

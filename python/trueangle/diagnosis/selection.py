@@ -7,20 +7,24 @@ from dataclasses import replace
 
 import numpy as np
 
+from ..effects import EFFECTS, Effect
+from ..effects.effect import ALWAYS
+from ..effects.zero_slip import ZeroSlip
 from ..regression.regression import Extension, Regression
-from .candidates import CANDIDATES, FLEXIBLE, SEPARATE
 
 __all__ = [
     "NEW_CAUSE",
-    "RUN_FACTORS",
     "cause_terms",
     "extensions",
     "finding_groups",
+    "is_flexible",
     "misfit",
+    "on_runs",
+    "propose",
     "select",
 ]
 
-#: Evidence (in units of BIC) that a new cause must bring beyond its price: 6 is what
+#: Evidence (in units of BIC) that a new cause must bring beyond its penalty: 6 is what
 #: Kass and Raftery call strong, odds of 20 to 1.
 NEW_CAUSE = 6.0
 
@@ -28,23 +32,18 @@ NEW_CAUSE = 6.0
 #: must bring as well: a form known to 3 % leaves 0.1 % of its energy, and no cause.
 FORM = 1e-3
 
-#: Specific causes that act on whole runs: direction, speed, load, temperature, mount.
-RUN_FACTORS = (
-    "backlash",
-    "latency",
-    "torsional_compliance",
-    "scale_error",
-    "thermal_drift",
-    "stiffening_compliance",
-    "presliding_hysteresis",
-    "reference_error",
-)
-
-#: Travel (turns) from which on lines and bumps differ for certain.
-WHOLE_TURN = 0.9
-
 #: Terms at most.
 MOST_TERMS = 14
+
+
+def on_runs() -> list[str]:
+    """Specific causes that act on whole runs: direction, speed, load, temperature, mount."""
+    return [cause for cause, effect in EFFECTS.items() if effect.acts_on_runs]
+
+
+def is_flexible(effect: type[Effect]) -> bool:
+    """It can imitate a specific cause, whatever the travel; chosen after those had a say."""
+    return effect.flexible_below == ALWAYS
 
 
 def select(regression: Regression, known: Sequence[Extension] = ()) -> Regression:
@@ -58,46 +57,46 @@ def select(regression: Regression, known: Sequence[Extension] = ()) -> Regressio
     same readings with other weights are a start that needs no further path.
     """
     if known:
-        return _made_specific(_pruned(_forward(regression.with_terms(known), list(CANDIDATES))))
-    direct = _pruned(_forward(regression, list(CANDIDATES)))
+        return _made_specific(_pruned(_forward(regression.with_terms(known), list(EFFECTS))))
+    direct = _pruned(_forward(regression, list(EFFECTS)))
     found = {term.cause for term in direct.terms}
     # Over a part of a turn a bump, too, can stand for several lines at once: lines first.
     travel = regression.signals.run_turns().max()
-    if not found & {*FLEXIBLE, *(["local_defect"] if travel < WHOLE_TURN else [])}:
+    if not any(travel < EFFECTS[cause].flexible_below for cause in found):
         return direct
-    specific = [cause for cause in CANDIDATES if cause not in (*FLEXIBLE, "local_defect")]
-    starts = [_forward(regression, RUN_FACTORS)]
+    specific = [cause for cause, effect in EFFECTS.items() if not effect.flexible_below]
+    starts = [_forward(regression, on_runs())]
     beyond = regression.without_repeats()
     if beyond is not regression:
         # What acts on whole runs shows best beside an unknown pattern that repeats.
-        settled = _forward(_forward(beyond, RUN_FACTORS), ("zero_slip",))
+        settled = _forward(_forward(beyond, on_runs()), (ZeroSlip.kind,))
         starts.append(regression.with_terms(settled.terms))
-    elif found & {*FLEXIBLE}:
-        slip = CANDIDATES["zero_slip"].propose(regression)
+    elif any(is_flexible(EFFECTS[cause]) for cause in found):
+        slip = ZeroSlip.propose(regression)
         if slip is not None and slip.bic_gain > NEW_CAUSE:
             starts.append(regression.with_terms([slip]))
-    paths = [_pruned(_forward(_forward(s, specific), list(CANDIDATES))) for s in starts]
-    return _made_specific(min([direct, *paths], key=total_price))
+    paths = [_pruned(_forward(_forward(s, specific), list(EFFECTS))) for s in starts]
+    return _made_specific(min([direct, *paths], key=total_penalty))
 
 
 def _made_specific(regression: Regression) -> Regression:
     """With a specific cause in place of a flexible one where that explains more."""
-    for term in [term for term in regression.terms if term.cause in FLEXIBLE]:
+    for term in [t for t in regression.terms if is_flexible(EFFECTS[t.cause])]:
         rest = regression.with_terms(t for t in regression.terms if t.cause != term.cause)
         tried = [
             start.with_terms([*start.terms, extension])
-            for extension, start, gain in extensions(rest, RUN_FACTORS)
-            if total_price(rest) - gain < total_price(regression)
+            for extension, start, gain in extensions(rest, on_runs())
+            if total_penalty(rest) - gain < total_penalty(regression)
         ]
-        best = min(tried, key=total_price, default=regression)
-        if total_price(best) < total_price(regression):
-            regression = _pruned(_forward(best, list(CANDIDATES)))
+        best = min(tried, key=total_penalty, default=regression)
+        if total_penalty(best) < total_penalty(regression):
+            regression = _pruned(_forward(best, list(EFFECTS)))
     return regression
 
 
-def total_price(regression: Regression) -> float:
-    """BIC with the price of every cause: lower is better."""
-    return regression.bic + _price(regression.terms, misfit(regression))
+def total_penalty(regression: Regression) -> float:
+    """BIC with the penalty of every cause: lower is better."""
+    return regression.bic + _penalty(regression.terms, misfit(regression))
 
 
 def misfit(regression: Regression) -> float:
@@ -105,11 +104,11 @@ def misfit(regression: Regression) -> float:
     return FORM * max(regression.start - regression.deviance, 0.0)
 
 
-def _price(terms: Sequence[Extension], left: float) -> float:
+def _penalty(terms: Sequence[Extension], left: float) -> float:
     """Of causes beyond that of their parameters; their forms may leave ``left``."""
     causes = len(finding_groups(terms))
     # A cause that contains another one spends a second form on the same error.
-    forms = causes + len({term.cause for term in terms if CANDIDATES[term.cause].family})
+    forms = causes + len({term.cause for term in terms if EFFECTS[term.cause].contains})
     return NEW_CAUSE * causes + left * max(forms - 1, 0)
 
 
@@ -118,7 +117,7 @@ def finding_groups(terms: Sequence[Extension]) -> list[list[int]]:
     groups: list[list[int]] = []
     place: dict[str, int] = {}
     for k, term in enumerate(terms):
-        if term.cause in SEPARATE or term.cause not in place:
+        if EFFECTS[term.cause].is_separate or term.cause not in place:
             place[term.cause] = len(groups)
             groups.append([k])
         else:
@@ -132,29 +131,35 @@ def cause_terms(regression: Regression, group: Sequence[int], settled: bool = Fa
     return regression.with_terms(terms, regression.whiten.rho if settled else None)
 
 
+def propose(effect: type[Effect], regression: Regression) -> Extension | None:
+    """What a cause proposes; nothing where a wider one that contains it is chosen already."""
+    if any(effect in EFFECTS[term.cause].contains for term in regression.terms):
+        return None
+    return effect.propose(regression)
+
+
 def extensions(
     regression: Regression, causes: Sequence[str]
 ) -> list[tuple[Extension, Regression, float]]:
-    """What every cause proposes: the extension, the regression it extends, its net BIC gain.
+    """What every cause proposes: the extension, what it extends, its net BIC gain.
 
     A cause that contains chosen ones as special cases takes their place.
     """
     found = []
     for cause in causes:
-        candidate = CANDIDATES[cause]
-        if any(regression.has(contained) for contained in candidate.family):
-            start = regression.with_terms(
-                t for t in regression.terms if t.cause not in candidate.family
-            )
-            price = total_price(start) - total_price(regression)
+        effect = EFFECTS[cause]
+        contained = {special.kind for special in effect.contains}
+        if any(term.cause in contained for term in regression.terms):
+            start = regression.with_terms(t for t in regression.terms if t.cause not in contained)
+            penalty = total_penalty(start) - total_penalty(regression)
         else:
-            start, price = regression, 0.0
+            start, penalty = regression, 0.0
         key = (cause, *((t.cause, repr(t.shape)) for t in start.terms))
         if key not in regression.memory:
-            regression.memory[key] = candidate.propose(start)
+            regression.memory[key] = propose(effect, start)
         extension = regression.memory[key]
         if extension is not None:
-            found.append((extension, start, extension.bic_gain - price))
+            found.append((extension, start, extension.bic_gain - penalty))
     return found
 
 
@@ -163,8 +168,8 @@ def _forward(regression: Regression, causes: Sequence[str]) -> Regression:
         best: tuple[float, Regression, Extension] | None = None
         for extension, start, gain in extensions(regression, causes):
             left = misfit(start)
-            after = _price([*start.terms, extension], left + FORM * extension.deviance)
-            score = gain - (after - _price(start.terms, left))
+            after = _penalty([*start.terms, extension], left + FORM * extension.deviance)
+            score = gain - (after - _penalty(start.terms, left))
             if score > 0.0 and (best is None or score > best[0] + 1e-6):
                 best = (score, start, extension)
         if best is None:
@@ -177,9 +182,9 @@ def _forward(regression: Regression, causes: Sequence[str]) -> Regression:
 def _pruned(regression: Regression) -> Regression:
     """Without the terms that the others have made superfluous."""
     while regression.terms:
-        least = min(range(len(regression.terms)), key=lambda k: _worth(regression, k))
+        least = min(range(len(regression.terms)), key=lambda k: _net_loss(regression, k))
         without = cause_terms(regression, [least])
-        if total_price(without) > total_price(regression):
+        if total_penalty(without) > total_penalty(regression):
             break
         regression = without
     regression = _plainest(regression)
@@ -194,20 +199,20 @@ def _plainest(regression: Regression) -> Regression:
 
     What was chosen since may have explained what once spoke for the wider one.
     """
-    for cause in {term.cause for term in regression.terms if CANDIDATES[term.cause].family}:
+    for cause in {term.cause for term in regression.terms if EFFECTS[term.cause].contains}:
         rest = regression.with_terms(term for term in regression.terms if term.cause != cause)
-        plain = _forward(rest, CANDIDATES[cause].family)
-        if total_price(plain) < total_price(regression):
+        plain = _forward(rest, [special.kind for special in EFFECTS[cause].contains])
+        if total_penalty(plain) < total_penalty(regression):
             regression = plain
     return regression
 
 
-def _worth(regression: Regression, k: int) -> float:
-    """Deviance that dropping term ``k`` would cost, less the price it would save."""
+def _net_loss(regression: Regression, k: int) -> float:
+    """Deviance that dropping term ``k`` would cost, less the penalty it would save."""
     term = regression.terms[k]
     alone = any(group == [k] for group in finding_groups(regression.terms))
-    price = term.parameters * term.log_n + 2.0 * term.log_grid
-    return _lost(regression, k) - price - (NEW_CAUSE if alone else 0.0)
+    penalty = term.parameters * term.log_n + 2.0 * term.log_grid
+    return _lost(regression, k) - penalty - (NEW_CAUSE if alone else 0.0)
 
 
 def _lost(regression: Regression, k: int) -> float:

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import importlib
 import math
 import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, cast
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,16 +19,15 @@ from ..runs import CalibrationRun
 from .robust import Loss
 
 if TYPE_CHECKING:
-    from ..simulation import Simulation
     from .result import FitResult
 
-__all__ = ["HeldOut", "HeldOutRun", "correct_held_out", "hold_out", "hold_out_extended"]
+__all__ = ["HeldOut", "HeldOutRun", "correct_held_out", "folds", "hold_out", "in_order"]
 
 Array = NDArray[np.float64]
 
 #: Most refits, and most of them with a selection of orders, which costs more: with more
 #: runs several are left out together.
-_MOST_FOLDS, _MOST_SELECTIONS, _MOST_DIAGNOSES = 12, 5, 3
+_MOST_FOLDS, _MOST_SELECTIONS = 12, 5
 #: Resamples of the runs for the interval of the reduction, and the fewest runs for one.
 _RESAMPLES, _FEWEST_RUNS = 2000, 3
 
@@ -125,7 +125,7 @@ def hold_out(fit: FitResult) -> HeldOut:
         raise ArgumentError("one run only: nothing can be held out; measure another run")
     found, left_in = [], []
     most = _MOST_FOLDS if fit.selection is None else _MOST_SELECTIONS
-    for fold in _folds(len(runs), most):
+    for fold in folds(len(runs), most):
         train = [run for i, run in enumerate(runs) if i not in fold]
         labels = [runs[i].label or str(i + 1) for i in fold]
         try:
@@ -140,54 +140,17 @@ def hold_out(fit: FitResult) -> HeldOut:
         ]
     if not found:
         raise ArgumentError(f"no run can be left out: {left_in[0][1]}")
-    return HeldOut(_in_order(found, runs), tuple(left_in))
+    return HeldOut(in_order(found, runs), tuple(left_in))
 
 
-def hold_out_extended(fit: FitResult, sim: Simulation) -> HeldOut:
-    """As `hold_out`, with what a diagnosis of the other runs finds as terms of the correction.
-
-    Causes, their parameters and the harmonics come from the other runs alone (three parts).
-
-    Raises
-    ------
-    ArgumentError
-        One run only, or none that can be left out.
-    """
-    from ..diagnosis import diagnose
-    from ..terms.extension import without_terms
-
-    runs = fit.runs
-    if len(runs) < 2:
-        raise ArgumentError("one run only: nothing can be held out; measure another run")
-    found, left_in = [], []
-    for fold in _folds(len(runs), _MOST_DIAGNOSES):
-        train = [run for i, run in enumerate(runs) if i not in fold]
-        labels = [runs[i].label or str(i + 1) for i in fold]
-        try:
-            result = diagnose(train, sim, gain=False)
-            model = result.correction(fit.model, train)
-            cleaned = without_terms([runs[i] for i in fold], model)
-        except TrueAngleError as reason:
-            left_in += [(label, str(reason)) for label in labels]
-            continue
-        for i, label, run in zip(fold, labels, cleaned, strict=True):
-            after = correct_held_out(model.replace(terms=()), run, label).after
-            before = correct_held_out(None, runs[i], label).before
-            found.append(HeldOutRun(label, runs[i], model, before, after))
-    if not found:
-        raise ArgumentError(f"no run can be left out: {left_in[0][1]}")
-    return HeldOut(_in_order(found, runs), tuple(left_in))
-
-
-def _in_order(
-    found: Sequence[HeldOutRun], runs: Sequence[CalibrationRun]
-) -> tuple[HeldOutRun, ...]:
+def in_order(found: Sequence[HeldOutRun], runs: Sequence[CalibrationRun]) -> tuple[HeldOutRun, ...]:
     """Held-out runs in the order of the fit."""
     place = {id(run): i for i, run in enumerate(runs)}
     return tuple(sorted(found, key=lambda held: place[id(held.run)]))
 
 
-def _folds(count: int, most: int) -> list[list[int]]:
+def folds(count: int, most: int) -> list[list[int]]:
+    """Places of the runs that are left out together, at most ``most`` parts."""
     folds = min(count, most)
     return [list(range(start, count, folds)) for start in range(folds)]
 
@@ -234,3 +197,10 @@ def correct_held_out(model: HarmonicModel | None, run: CalibrationRun, label: st
 
 def _rms(parts: Sequence[Array]) -> float:
     return math.sqrt(sum(float(p @ p) for p in parts) / sum(p.size for p in parts))
+
+
+def __getattr__(name: str) -> Any:
+    # Its place before it moved to the diagnosis, which this room does not import.
+    if name == "hold_out_extended":
+        return importlib.import_module("trueangle.diagnosis.heldout").hold_out_extended
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

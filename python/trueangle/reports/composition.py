@@ -11,9 +11,10 @@ from typing import TYPE_CHECKING, Any, TypeAlias, overload
 from ..angles import ARCSEC_PER_TURN, wrap
 from ..certificate import Certificate, Identity, certify
 from ..diagnosis import diagnose
+from ..diagnosis.heldout import hold_out_extended
 from ..errors import ArgumentError, NoModelError, TrueAngleError
 from ..files import CERTIFICATE, PDF, REPORT, check_output, written_atomically
-from ..fitting.heldout import HeldOut, hold_out, hold_out_extended
+from ..fitting.heldout import HeldOut, hold_out
 from ..plots.curves import Points, degrees, error_points, label_of
 from ..plots.simulatedcurves import left_after_causes
 from ..provenance import provenance

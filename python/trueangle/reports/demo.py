@@ -5,9 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 from os import PathLike
 
+from ..effects import Backlash, Effect
 from ..simulation import Harmonic, Joint, RunDesign, Simulation, simulate
-from ..simulation.effects import Effect
-from ..simulation.effects.reversal import Backlash
 from .composition import Report, report
 
 __all__ = ["demo_report", "demo_simulation"]

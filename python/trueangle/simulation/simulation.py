@@ -9,13 +9,13 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from ..effects import Effect
 from ..errors import ArgumentError
 from ..joint.joint import Joint
-from ..joint.pattern import Harmonic, Pattern
+from ..joint.pattern import Harmonic, Pattern, Surroundings
 from ..joint.signals import Signals, join_runs
 from ..runs import CalibrationRun, as_runs
 from .designs import RunDesign
-from .effects import Effect, Surroundings
 
 __all__ = ["Simulation", "simulate"]
 
@@ -38,7 +38,7 @@ class Simulation:
     harmonics : tuple of Harmonic
         Lines of the pattern p.
     effects : tuple of Effect
-        Anything of `trueangle.simulation.effects.EFFECTS`.
+        Anything of `trueangle.effects.EFFECTS`.
     sigma_arcsec : float
         White noise of one reading.
     runs : tuple of RunDesign

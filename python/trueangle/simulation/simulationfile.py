@@ -9,12 +9,12 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from ..decoding import finite, read_text, shown
+from ..effects import EFFECTS, Effect
 from ..errors import ArgumentError, FileError
 from ..files import SIMULATION, SIMULATION_BYTES, written_atomically
 from ..joint.joint import Joint
 from ..joint.pattern import Harmonic
 from .designs import MAX_SAMPLES, RunDesign
-from .effects import EFFECTS, Effect
 from .simulation import Simulation
 
 __all__ = ["dumps", "load_simulation", "to_table", "write"]

@@ -7,8 +7,8 @@ from dataclasses import replace
 import pytest
 
 import trueangle as ta
+from trueangle.effects import Backlash
 from trueangle.reports.demo import demo_simulation
-from trueangle.simulation.effects.reversal import Backlash
 
 ORDERS = {"output": [1], "motor": [1, 2], "wave_generator": [2]}
 

@@ -1,0 +1,1 @@
+"""What a model corrects beyond harmonics: forms, terms, and the corrector that holds state."""

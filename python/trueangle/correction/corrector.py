@@ -1,0 +1,205 @@
+"""Correction of samples in the order they were taken, with the state that needs."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from .. import _core
+from ..errors import ArgumentError
+from .velocity import Velocity
+
+if TYPE_CHECKING:
+    from ..model import HarmonicModel
+
+__all__ = ["SIGNALS", "Corrector", "evaluate"]
+
+#: Signals in the order of the core's arguments.
+SIGNALS = ("velocity", "temperature", "torque", "direction")
+
+Array = NDArray[np.float64]
+Given = dict[str, ArrayLike | None]
+
+
+class Corrector:
+    """Corrects batches and single samples, one after the other, of one log or one joint.
+
+    Made by `HarmonicModel.corrector`. Backlash and hysteresis depend on travel before:
+    the state is carried from call to call, so that batches of a log give bit for bit what
+    the whole log gives at once, and single steps the same.
+
+    A corrector belongs to one thread: called by two at once it raises `RuntimeError` or
+    takes the samples in an order that nobody chose. Models, and `step` of a model without
+    terms, hold no state and may be shared by any number of threads.
+
+    Parameters
+    ----------
+    model : HarmonicModel
+
+    Examples
+    --------
+    A log in two batches, with the play crossed in the second one:
+
+    >>> import trueangle as ta
+    >>> model = ta.HarmonicModel([], period=360.0, terms=[ta.Backlash(0.5)])
+    >>> corrector = model.corrector()
+    >>> corrector([10.5, 11.5, 12.5], velocity=1.0)
+    array([10., 11., 12.])
+    >>> corrector([11.5, 10.5], velocity=-1.0)
+    array([12., 11.])
+    >>> corrector.reset()
+    """
+
+    def __init__(self, model: HarmonicModel) -> None:
+        self._model = model
+        self._core = model._core_corrector()
+        self._velocity = Velocity(model.period)
+
+    @property
+    def step(self) -> Callable[..., float]:
+        """``step(indicated, velocity=, temperature=, torque=, direction=) -> corrected``.
+
+        One sample, in the state of this corrector: a bound method of the compiled core
+        without allocation but the result. A signal the model needs and does not get is a
+        `MissingSignalError`; others are ignored.
+        """
+        return self._core.step
+
+    def reset(self) -> None:
+        """Forget the past: the next sample is the first one."""
+        self._core.reset()
+        self._velocity.reset()
+
+    @property
+    def state(self) -> tuple[float, ...]:
+        """All that later samples need to know of the past, as numbers to keep and to set.
+
+        Raises
+        ------
+        ArgumentError
+            When set: not the state of a corrector of this model.
+        """
+        return (*self._velocity.state, *self._core.store())
+
+    @state.setter
+    def state(self, numbers: Iterable[float]) -> None:
+        angle, time, last, *travel = (*numbers,)
+        self._core.restore(travel)
+        self._velocity.state = angle, time, last
+
+    def __call__(
+        self,
+        indicated: ArrayLike,
+        out: NDArray[Any] | None = None,
+        *,
+        direction: ArrayLike | None = None,
+        velocity: ArrayLike | None = None,
+        temperature: ArrayLike | None = None,
+        torque: ArrayLike | None = None,
+        time: ArrayLike | None = None,
+        threads: int | None = None,
+    ) -> float | NDArray[Any]:
+        """True angles behind the next indicated ones; see `HarmonicModel.correct`.
+
+        Parameters
+        ----------
+        indicated : float or array_like
+            In the order taken (C order); steps below half a turn.
+        out : ndarray, optional
+        direction, velocity, temperature, torque : float or array_like, optional
+            Signals, broadcast against ``indicated``. Those that the model does not use
+            are ignored.
+        time : array_like, optional
+            Seconds of every sample: in place of a velocity that is not given, backward
+            differences of the indicated angle. At equal times the last velocity holds; the
+            very first sample takes that of the second.
+        threads : int, optional
+
+        Returns
+        -------
+        float or ndarray
+            Of the broadcast shape. NaN for samples with an angle or a signal that is not
+            finite, which leave the state alone.
+
+        Raises
+        ------
+        MissingSignalError
+            Names the signal and the term that needs it.
+        ArgumentError
+            Shapes that do not fit.
+        """
+        if velocity is None and time is not None and "velocity" in self._model.uses_signals:
+            velocity = self._velocity(indicated, time)
+        given: Given = {
+            "velocity": velocity,
+            "temperature": temperature,
+            "torque": torque,
+            "direction": direction,
+        }
+        return evaluate(self._model, self._core, "correct", indicated, out, given, threads)
+
+
+def evaluate(
+    model: HarmonicModel,
+    core: _core.Corrector,
+    quantity: str,
+    angle: ArrayLike,
+    out: NDArray[Any] | None,
+    given: Given,
+    threads: int | None = None,
+) -> float | NDArray[Any]:
+    """``quantity`` ("error" or "correct") of samples by ``core`` and its state."""
+    x = _real(angle, "angles")
+    columns = {
+        name: _real(values, name)
+        for name, values in given.items()
+        if values is not None and name in model.uses_signals
+    }
+    try:
+        shape = np.broadcast_shapes(x.shape, *(values.shape for values in columns.values()))
+    except ValueError:
+        shapes = ", ".join(f"{name} {values.shape}" for name, values in columns.items())
+        raise ArgumentError(
+            f"signals must have the shape of the angles {x.shape} or one value, got {shapes}"
+        ) from None
+    velocity, temperature, torque, direction = (_flat(columns.get(name), shape) for name in SIGNALS)
+    angles = np.ascontiguousarray(np.broadcast_to(x, shape), dtype=np.float64).ravel()
+    if quantity == "error":
+        result = core.error(angles, velocity, temperature, torque, direction)
+    else:
+        result = core.correct(angles, velocity, temperature, torque, direction, threads)
+    kind = np.float32 if x.dtype == np.float32 else np.float64
+    shaped = result.reshape(shape).astype(kind, copy=False)
+    if out is None:
+        if shape:
+            return shaped
+        # As numpy's own functions: a scalar for an array without dimensions.
+        return shaped[()] if isinstance(angle, np.ndarray) else float(shaped)
+    if not isinstance(out, np.ndarray) or out.shape != shape or out.dtype != kind:
+        raise ArgumentError(
+            f"out must be an array of shape {shape} and dtype {np.dtype(kind)}, got "
+            f"{getattr(out, 'shape', type(out).__name__)} {getattr(out, 'dtype', '')}"
+        )
+    out[...] = shaped
+    return out
+
+
+def _real(values: ArrayLike, name: str) -> NDArray[Any]:
+    if hasattr(values, "mask"):
+        raise ArgumentError(f"{name}: fill masked arrays with NaN or compress them first")
+    array = np.asarray(values)
+    if array.dtype.kind not in "fiu":
+        raise ArgumentError(f"{name} must be real numbers, got dtype {array.dtype}")
+    return array
+
+
+def _flat(values: NDArray[Any] | None, shape: Iterable[int]) -> Array | None:
+    """One value for all, or one per sample; contiguous."""
+    if values is None:
+        return None
+    if values.size == 1:
+        return np.array([values.item()], dtype=np.float64)
+    return np.ascontiguousarray(np.broadcast_to(values, tuple(shape)), dtype=np.float64).ravel()

@@ -1,0 +1,42 @@
+"""The physical effects: one file each, and the list of them.
+
+An effect is one frozen dataclass with everything that is known of it: its parameters, the
+physics in one sentence, what it needs and is taken for, its signal (simulate), its columns
+and the search for it (diagnose), and its form or the reason why it has none (correct). To
+add one, write its file and add its line below.
+"""
+
+from __future__ import annotations
+
+# The order is that in which a diagnosis tries them: where two explain equally much the
+# first is named, and what two are confused by is declared by the later.
+# ruff: isort: off
+from .backlash import Backlash as Backlash
+from .latency import Latency as Latency
+from .torsional_compliance import TorsionalCompliance as TorsionalCompliance
+from .scale_error import ScaleError as ScaleError
+from .thermal_drift import ThermalDrift as ThermalDrift
+from .missing_order import MissingOrder as MissingOrder
+from .reference_error import ReferenceLines as ReferenceLines
+from .sidebands import Sidebands as Sidebands
+from .argument_error import ArgumentShift as ArgumentShift
+from .filter_lag import FilterLag as FilterLag
+from .load_dependent_gear_error import LoadDependentGearError as LoadDependentGearError
+from .stiffening_compliance import StiffeningCompliance as StiffeningCompliance
+from .presliding_hysteresis import PreslidingHysteresis as PreslidingHysteresis
+from .local_defect import LocalDefect as LocalDefect
+from .missed_counts import MissedCounts as MissedCounts
+from .zero_slip import ZeroSlip as ZeroSlip
+from .drift_within_run import DriftWithinRun as DriftWithinRun
+from .non_integer_order import NonIntegerOrder as NonIntegerOrder
+from .outliers import Outliers as Outliers
+from .heteroscedastic_noise import HeteroscedasticNoise as HeteroscedasticNoise
+# ruff: isort: on
+
+from .effect import EFFECTS, Effect
+
+__all__ = ["EFFECTS", "Effect"]
+
+__doc__ = "\n".join(
+    [__doc__, *(f"- ``{kind}``: {effect.sentence}" for kind, effect in EFFECTS.items())]
+)

@@ -1,0 +1,88 @@
+"""The pattern taken as a function of the wrong angle."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+
+from ..joint.pattern import Surroundings
+from ..joint.signals import Signals
+from ..regression.estimate import Parameters, quantity
+from ..regression.extension import Extension
+from ..regression.regression import Regression
+from .effect import Effect
+from .missing_order import MissingOrder
+from .search import (
+    Array,
+    Fitted,
+)
+from .sidebands import Sidebands
+
+__all__ = ["ArgumentShift"]
+
+
+@dataclass(frozen=True)
+class ArgumentShift(Effect):
+    r"""The pattern is a function of the indicated, not of the true angle.
+
+    .. math:: \varepsilon = -c\,[e - p(\theta)],\quad e = p(\theta + e)
+              \approx p + p\,p'
+
+    Parameters
+    ----------
+    coefficient : float
+        c: -1 (the pattern belongs to the indicated angle) or 0.
+    """
+
+    coefficient: float = -1.0
+
+    kind: ClassVar[str] = "argument_error"
+    sentence: ClassVar[str] = (
+        "The pattern was taken as a function of one angle and belongs to the other (indicated "
+        "against true): it differs by the product of the pattern and its slope."
+    )
+    measure: ClassVar[str] = "free angles dense enough for the sums of the gear's orders"
+    confused_with: ClassVar[Mapping[type[Effect], str]] = {
+        MissingOrder: "free angles, with lines at the sums and differences of known orders",
+        Sidebands: "free angles, with lines at the sums and differences of the known orders",
+    }
+    changes_lines: ClassVar[bool] = True
+
+    def signal(self, signals: Signals, around: Surroundings, rng: np.random.Generator) -> Array:
+        pattern = around.pattern
+        change = pattern.indicated_value(signals.theta) - pattern.value(signals.theta)
+        return np.asarray(-self.coefficient * change)
+
+    @classmethod
+    def propose(cls, regression: Regression) -> Extension | None:
+        # Nothing is free in it: the evidence is that of c = -1 itself and no parameter is
+        # paid for; c is fitted for the report only.
+        if regression.around.pattern.orders.size == 0 or regression.has(cls.kind):
+            return None
+        columns = regression.remembered(
+            cls.kind, None, lambda: cls.columns(regression.signals, regression.around, {})
+        )
+        deviance = float(regression.fixed_gains(-columns)[0])
+        return regression.propose(cls.kind, {}, columns, parameters=0, deviance=deviance)
+
+    @classmethod
+    def report(
+        cls, regression: Regression, terms: Sequence[Fitted]
+    ) -> tuple[Parameters, list[Effect]]:
+        _, (coefficient,), covariance = terms[0]
+        std = float(np.sqrt(covariance[0, 0]))
+        return {"coefficient": quantity(coefficient, std)}, [ArgumentShift(float(coefficient))]
+
+    @classmethod
+    def columns(cls, signals: Signals, around: Surroundings, shape: dict[str, Any]) -> Array:
+        """Column whose coefficient is c."""
+        pattern = around.pattern
+        change = pattern.indicated_value(signals.theta) - pattern.value(signals.theta)
+        return np.asarray(-change[:, None])
+
+    @property
+    def changes_argument(self) -> bool:
+        return self.coefficient != 0.0

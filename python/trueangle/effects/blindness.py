@@ -1,0 +1,89 @@
+"""What a design of runs cannot tell: the causes in question, why, and what to measure."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..regression.estimate import Parameters
+from ..regression.regression import Regression
+
+__all__ = [
+    "LEAST_KELVIN",
+    "OWN_OF_VELOCITY",
+    "OWN_POWER",
+    "RUNS_PER_LEVEL",
+    "Blindness",
+    "share_left",
+]
+
+Array = NDArray[np.float64]
+
+#: Share of velocity that direction must leave for latency and backlash to be told apart.
+OWN_OF_VELOCITY = 0.10
+
+#: The same for velocity against the zero, torque against order 1, its cube against it.
+OWN_POWER = 0.02
+
+#: Kelvin of change below which temperature counts as constant.
+LEAST_KELVIN = 2.0
+
+#: Runs per level that a level of a whole run needs to stand out from their own zeros.
+RUNS_PER_LEVEL = 3
+
+
+@dataclass(frozen=True)
+class Blindness:
+    """Causes that this data cannot tell apart, or not see at all.
+
+    Attributes
+    ----------
+    causes : tuple of str
+    because, measure : str
+        Why, and the measurement to add.
+    supported : bool
+        The readings do show something that one of these causes explains.
+    evidence : float or None
+        By how much BIC is better with it.
+    estimates : dict of str to Parameters
+        What each of the causes would be if it alone were the one; where something is seen.
+    factor : str
+        What in the design of the runs is at fault: "grid", "mount", "torque", "velocity",
+        "temperature", "direction", "run", "time".
+    """
+
+    causes: tuple[str, ...]
+    because: str
+    measure: str
+    supported: bool = False
+    evidence: float | None = None
+    estimates: dict[str, Parameters] = field(default_factory=dict)
+    factor: str = "run"
+
+    def to_json(self) -> dict[str, Any]:
+        """The entry of ``not_identifiable``."""
+        return {
+            "causes": list(self.causes),
+            "because": self.because,
+            "measure": self.measure,
+            "supported": self.supported,
+            "bic_gain": self.evidence,
+            "estimates": {
+                cause: {name: q.to_json() for name, q in parameters.items()}
+                for cause, parameters in self.estimates.items()
+            },
+        }
+
+
+def share_left(regression: Regression, columns: Array, *others: Array) -> float:
+    """Largest share of power that columns keep beside the simulation's lines and others."""
+    known = np.hstack([regression.base, *others])
+    u, s, _ = np.linalg.svd(known / np.linalg.norm(known, axis=0).clip(1e-300), False)
+    q = u[:, s > 1e-7 * s[0]]
+    rest = columns - q @ (q.T @ columns)
+    before = np.einsum("ij,ij->j", columns, columns)
+    after = np.einsum("ij,ij->j", rest, rest)
+    return float(np.max(np.where(before > 0.0, after / before.clip(1e-300), 0.0)))

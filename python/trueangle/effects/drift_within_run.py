@@ -1,0 +1,225 @@
+"""Ramps and wander in time, new in every run."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import ClassVar
+
+import numpy as np
+
+from ..joint.pattern import Surroundings
+from ..joint.signals import Signals
+from ..regression.estimate import Parameters, quantity
+from ..regression.extension import Extension
+from ..regression.regression import Regression
+from ..regression.whitening import wander_basis
+from .backlash import Backlash
+from .blindness import (
+    OWN_OF_VELOCITY,
+    RUNS_PER_LEVEL,
+    Blindness,
+    share_left,
+)
+from .effect import ALWAYS, Effect
+from .latency import Latency
+from .missing_order import MissingOrder
+from .presliding_hysteresis import PreslidingHysteresis
+from .scale_error import ScaleError
+from .search import (
+    Array,
+    Fitted,
+)
+from .thermal_drift import ThermalDrift
+from .zero_slip import ZeroSlip
+
+__all__ = ["DriftWithinRun"]
+
+#: Half periods over one run that make up a wander.
+WANDER_TERMS = 24
+
+#: Time constant of settling, in shares of the run.
+SETTLING = 0.4
+
+#: Forms of a drift: from the start of the run, or about its mean.
+FORMS = (
+    "ramp",
+    "settling",
+    "walk",
+    "flicker",
+    "centred ramp",
+    "centred walk",
+    "centred flicker",
+)
+
+#: Of these as many are unlike each other: a slope, a bend, a finer wander.
+UNLIKE_FORMS = 3.0
+
+
+@dataclass(frozen=True)
+class DriftWithinRun(Effect):
+    r"""Ramp and random walk in time, new in every run.
+
+    Parameters
+    ----------
+    arcsec_per_s : float
+        Standard deviation of the ramp's rate over runs.
+    wander_arcsec : float
+        Standard deviation of the random walk at the end of a run.
+    """
+
+    arcsec_per_s: float = 0.0
+    wander_arcsec: float = 0.0
+
+    kind: ClassVar[str] = "drift_within_run"
+    sentence: ClassVar[str] = (
+        "The set-up settles, warms up or creeps while a run lasts: the error follows the clock "
+        "and not the angle, differently in every run."
+    )
+    factor: ClassVar[str] = "time"
+    measure: ClassVar[str] = "sweep out and back, or several turns, in each run, with time stamps"
+    transfers: ClassVar[bool] = False
+    confused_with: ClassVar[Mapping[type[Effect], str]] = {
+        ScaleError: "reverse inside a run: a drift keeps its sign in time, a ratio in angle",
+        MissingOrder: "several turns, or an out-and-back sweep, in each run",
+        ThermalDrift: "heat twice and return, temperatures in random order",
+    }
+    flexible_below: ClassVar[float] = ALWAYS
+    draws_zeros: ClassVar[bool] = True
+    not_at_run_time: ClassVar[str] = (
+        "no signal shows the drift; log the temperature and look for its part"
+    )
+
+    def signal(self, signals: Signals, around: Surroundings, rng: np.random.Generator) -> Array:
+        out = np.zeros(len(signals))
+        for start, stop in signals.run_bounds():
+            clock = signals.clock[start:stop]
+            out[start:stop] = self.arcsec_per_s * rng.standard_normal() * clock
+            steps = np.sqrt(np.maximum(np.diff(clock, prepend=clock[0]), 0.0))
+            walk = np.cumsum(steps * rng.standard_normal(steps.size))
+            span = np.sqrt(max(float(clock[-1] - clock[0]), 1e-300))
+            out[start:stop] += self.wander_arcsec * walk / span
+        return out
+
+    @classmethod
+    def propose(cls, regression: Regression) -> Extension | None:
+        if regression.has(cls.kind):
+            return None
+        extensions = [cls._proposal(regression, form) for form in FORMS]
+        best = max(extensions, key=lambda p: p.bic_gain)
+        if best.bic_gain <= 0.0:
+            return best
+        # An error that comes back at the same place on the next pass in that direction is
+        # no wander in time, nor is a new zero.
+        beyond = regression.without_repeats(by_direction=True)
+        if beyond is regression:
+            return best
+        if regression.signals.runs > 1 and not regression.has(ZeroSlip.kind):
+            zero = beyond.propose_run_effect(ZeroSlip.kind, {}, np.ones((regression.n, 1)))
+            beyond = beyond.with_terms([*beyond.terms, zero])
+        deviance = cls._proposal(beyond, best.shape["form"]).deviance
+        return replace(best, deviance=min(best.deviance, deviance))
+
+    @classmethod
+    def _proposal(cls, regression: Regression, form: str) -> Extension:
+        columns = regression.remembered(form, None, partial(cls._shapes, regression, form))
+        log_grid = float(np.log(UNLIKE_FORMS))
+        return regression.propose_run_effect(cls.kind, {"form": form}, columns, log_grid)
+
+    @staticmethod
+    def _shapes(regression: Regression, form: str) -> Array:
+        """Columns of a drift, scaled so that it ends at variance 1 or about that."""
+        u = np.zeros(regression.n)
+        for start, stop in regression.bounds:
+            clock = regression.signals.clock[start:stop]
+            u[start:stop] = (clock - clock[0]) / max(float(clock[-1] - clock[0]), 1e-300)
+        k = np.arange(1, WANDER_TERMS + 1)
+        if form == "ramp":
+            return u[:, None]
+        if form == "centred ramp":
+            return u[:, None] - 0.5
+        if form == "settling":
+            return (1.0 - np.exp(-u / SETTLING))[:, None]
+        if form == "walk":
+            sines = np.sin(np.pi * np.outer(u, k - 0.5))
+            return np.asarray(np.sqrt(2.0) * sines / (np.pi * (k - 0.5)))
+        cosines = np.cos(np.pi * np.outer(u, k))
+        if form == "centred walk":
+            return np.asarray(np.sqrt(2.0) * cosines / (np.pi * k))
+        if form == "flicker":
+            cosines = cosines - 1.0
+        return np.asarray(cosines / np.sqrt(k * np.log(WANDER_TERMS)))
+
+    @classmethod
+    def report(
+        cls, regression: Regression, terms: Sequence[Fitted]
+    ) -> tuple[Parameters, list[Effect]]:
+        extension = terms[0][0]
+        assert extension.run_effect is not None
+        size = float(np.sqrt(extension.run_effect.ratio * regression.variance))
+        clock = regression.signals.clock
+        spans = [float(clock[stop - 1] - clock[start]) for start, stop in regression.bounds]
+        rate = size / max(float(np.mean(spans)), 1e-300)
+        share = 1.0 / np.sqrt(2.0 * max(regression.signals.runs, 1))
+        parameters = {
+            "arcsec_per_s": quantity(rate, rate * share),
+            "arcsec_per_run": quantity(size, size * share),
+            "form": quantity(extension.shape["form"].replace("centred ", "")),
+        }
+        if regression.signals.time is None:
+            parameters["arcsec_per_s"] = quantity(None)
+        ramp = "ramp" in extension.shape["form"]
+        effect = DriftWithinRun(rate, 0.0) if ramp else DriftWithinRun(0.0, size)
+        return parameters, [effect]
+
+    @classmethod
+    def blind_spots(cls, regression: Regression, found: Sequence[Blindness]) -> Iterator[Blindness]:
+        signals = regression.signals
+        clocks = (signals.clock[a:b] for a, b in regression.bounds)
+        clock = np.concatenate([c / max(float(np.ptp(c)), 1e-300) for c in clocks])
+        left = share_left(regression, signals.theta[:, None], clock[:, None])
+        if left < OWN_OF_VELOCITY and np.ptp(signals.direction) == 0.0:
+            because = "one direction: a ramp in angle is a ramp in time"
+            yield cls.blind(because, ScaleError, first=False)
+
+    @classmethod
+    def doubt(
+        cls, extension: Extension, regression: Regression, spots: Sequence[Blindness]
+    ) -> Blindness | None:
+        """A wander in time may be an error of reversal: few runs that reverse once."""
+        signals = regression.signals
+        if (
+            extension.cause != cls.kind
+            or signals.runs >= RUNS_PER_LEVEL
+            or np.ptp(signals.direction) == 0.0
+        ):
+            return None
+        left = power = 0.0
+        for start, stop in regression.bounds:
+            wander = wander_basis(signals.clock[start:stop])
+            q, _ = np.linalg.qr(np.column_stack([np.ones(stop - start), wander]))
+            direction = signals.direction[start:stop]
+            power += float(np.sum((direction - direction.mean()) ** 2))
+            left += float(np.sum((direction - q @ (q.T @ direction)) ** 2))
+        if left > OWN_OF_VELOCITY * power:
+            return None
+        rest = regression.with_terms(t for t in regression.terms if t.cause != cls.kind)
+        reversal = rest.propose(Backlash.kind, {}, signals.direction[:, None])
+        if reversal.bic_gain <= 0.0:
+            return None
+        others = [
+            Backlash,
+            PreslidingHysteresis,
+            *([] if signals.velocity is not None else [Latency]),
+        ]
+        spot = cls.blind(
+            f"{signals.runs} run(s) that reverse about once: an error that changes with the "
+            "direction of travel and one that changes with time look alike",
+            *others,
+        )
+        return replace(
+            spot,
+            measure="reverse several times within each run, at places that differ from run to run, "
+            "or repeat the runs",
+        )

@@ -1,0 +1,231 @@
+"""What every effect is: parameters, a signal, a search for it, and how it is corrected."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import MISSING, fields
+from typing import Any, ClassVar, Self
+
+import numpy as np
+
+from ..correction.term import Term
+from ..errors import ArgumentError
+from ..joint.pattern import Surroundings
+from ..joint.signals import Signals
+from ..regression.estimate import Parameters
+from ..regression.extension import Extension
+from ..regression.regression import Regression
+from .blindness import Blindness
+from .parameters import checked, plain
+from .scatter import ScatterFinding
+from .search import Array, Fitted
+
+__all__ = ["ALWAYS", "EFFECTS", "Effect", "telling_apart"]
+
+#: Every effect by its kind, in the order in which they are tried: a class joins by being
+#: defined. Where two explain equally much the first is named.
+EFFECTS: dict[str, type[Effect]] = {}
+
+#: Turns of travel up to which a flexible cause can imitate others: any.
+ALWAYS = math.inf
+
+
+class Effect:
+    """Base of the effects; each is a frozen dataclass whose fields are its parameters.
+
+    A class with a ``kind`` joins the vocabulary by being defined. What it must say is its
+    `signal`; with `propose`, `columns` and `report` a diagnosis looks for it, with a
+    ``term`` (or lines) it is corrected, otherwise ``not_at_run_time`` says why not.
+
+    Class attributes
+    ----------------
+    kind : str
+        Its name in the vocabulary of causes.
+    sentence : str
+        The physics in one sentence.
+    needs : tuple of str
+        Columns without which it cannot be seen: "time", "temperature", "torque", "mount".
+    factor : str
+        What has to take several values for it to show, and whose labels are shuffled in
+        the negative control: "direction", "velocity", "temperature", "torque", "mount",
+        "angle", "run", "time", "none".
+    confused_with : mapping of Effect class to str
+        Causes before it in the list that it can be taken for, each with the measurement
+        that tells them apart.
+    measure : str
+        What to measure where the data cannot show it at all.
+    contains : tuple of Effect classes
+        Special cases of this one: once it is chosen they are not.
+    transfers : bool
+        A model of it lowers the error of runs that were not used to fit it.
+    located : bool
+        Its search goes over a grid and is repeated inside the training part of a hold-out.
+    acts_on_runs : bool
+        A specific cause that acts on whole runs: direction, speed, load, temperature ...
+    flexible_below : float
+        Turns of travel up to which it can imitate specific causes, which are then tried
+        first: `ALWAYS` for one that always can.
+    is_separate : bool
+        Its every term is a finding of its own.
+    draws_zeros : bool
+        It leaves each run with a zero of its own, which held-out runs then get too.
+    changes_lines : bool
+        It takes or gives a part of the pattern's own lines on average.
+    is_doubted : bool
+        A blind spot that names it is reason enough not to name it.
+    weighs : bool
+        A cause of the scatter that gives the readings weights.
+    not_at_run_time : str
+        Why no corrector can take it off while the joint runs; empty where one can.
+    """
+
+    kind: ClassVar[str]
+    sentence: ClassVar[str]
+    needs: ClassVar[tuple[str, ...]] = ()
+    factor: ClassVar[str] = "angle"
+    confused_with: ClassVar[Mapping[type[Effect], str]] = {}
+    measure: ClassVar[str] = ""
+    contains: ClassVar[tuple[type[Effect], ...]] = ()
+    transfers: ClassVar[bool] = True
+    located: ClassVar[bool] = False
+    acts_on_runs: ClassVar[bool] = False
+    flexible_below: ClassVar[float] = 0.0
+    is_separate: ClassVar[bool] = False
+    draws_zeros: ClassVar[bool] = False
+    changes_lines: ClassVar[bool] = False
+    is_doubted: ClassVar[bool] = True
+    weighs: ClassVar[bool] = False
+    not_at_run_time: ClassVar[str] = ""
+
+    def __init_subclass__(cls, **options: Any) -> None:
+        super().__init_subclass__(**options)
+        if "kind" in cls.__dict__:
+            EFFECTS[cls.kind] = cls
+
+    # -- simulate ------------------------------------------------------------------
+
+    def signal(self, signals: Signals, around: Surroundings, rng: np.random.Generator) -> Array:
+        """The effect's error at every reading, arcsec; random where its nature is random."""
+        raise NotImplementedError
+
+    def expected(self, signals: Signals, around: Surroundings) -> Array:
+        """The part of `signal` that can be predicted: zeros for random effects."""
+        if not self.transfers:
+            return np.zeros(len(signals))
+        return self.signal(signals, around, np.random.default_rng(0))
+
+    def noise_factor(self, signals: Signals, around: Surroundings) -> Array | None:
+        """Factor on the standard deviation of the noise, or None."""
+        return None
+
+    # -- diagnose ------------------------------------------------------------------
+
+    @classmethod
+    def propose(cls, regression: Regression) -> Extension | None:
+        """The best extension of this cause beside what is known; None where it cannot act."""
+        return None
+
+    @classmethod
+    def find_scatter(cls, regression: Regression) -> ScatterFinding | None:
+        """Evidence of this cause in the scatter about what is known, or None."""
+        return None
+
+    @classmethod
+    def columns(cls, signals: Signals, around: Surroundings, shape: dict[str, Any]) -> Array:
+        """Regressors of ``shape`` at other readings, shape (n, p); none of a random effect."""
+        return np.zeros((len(signals), 0))
+
+    @classmethod
+    def report(
+        cls, regression: Regression, terms: Sequence[Fitted]
+    ) -> tuple[Parameters, list[Effect]]:
+        """Parameters of the finding and the effects to extend the simulation with.
+
+        ``terms`` are this cause's terms with their coefficients and covariances.
+        """
+        raise NotImplementedError
+
+    @classmethod
+    def blind_spots(cls, regression: Regression, found: Sequence[Blindness]) -> Iterator[Blindness]:
+        """What the design of the runs cannot tell of it; the readings are not looked at.
+
+        ``found`` are those of the effects before it in the list.
+        """
+        yield from ()
+
+    @classmethod
+    def doubt(
+        cls, extension: Extension, regression: Regression, spots: Sequence[Blindness]
+    ) -> Blindness | None:
+        """Why this effect may be behind what another (or it) explains, or None."""
+        return None
+
+    @classmethod
+    def blind(
+        cls, because: str, *others: type[Effect], first: bool = True, factor: str | None = None
+    ) -> Blindness:
+        """Blind spot of this effect, or of it and ``others`` which it is taken for.
+
+        ``first=False`` names the others before it; ``factor`` is what in the design is at
+        fault, where that is not the effect's own.
+        """
+        effects = (cls, *others) if first else (*others, cls)
+        measure = cls.measure
+        if others:
+            measure = telling_apart(effects[0], effects[1]) or effects[0].measure
+        causes = tuple(effect.kind for effect in effects)
+        return Blindness(causes, because, measure, factor=factor or cls.factor)
+
+    # -- correct -------------------------------------------------------------------
+
+    def to_terms(self, period: float, shafts: Mapping[str, float]) -> tuple[Term, ...]:
+        """Terms of the correction in units of ``period``; none for lines.
+
+        Raises
+        ------
+        ArgumentError
+            The effect has no form that a corrector knows, and no reason why not.
+        """
+        if self.not_at_run_time or self.to_lines() or self.changes_argument:
+            return ()
+        raise ArgumentError(
+            f"effect '{self.kind}' cannot be corrected: it has no term, and its class gives no "
+            "reason (not_at_run_time)"
+        )
+
+    def to_lines(self) -> Sequence[tuple[str, float]]:
+        """(shaft, order) of the lines that a correction has to take up."""
+        return ()
+
+    @property
+    def changes_argument(self) -> bool:
+        """The pattern is one of the indicated angle."""
+        return False
+
+    # -- files ---------------------------------------------------------------------
+
+    @classmethod
+    def from_table(cls, table: Mapping[str, Any]) -> Self:
+        """Effect from a table of the simulation file (without ``kind``).
+
+        Raises
+        ------
+        ArgumentError
+            A parameter that is unknown, missing or of the wrong kind.
+        """
+        return cls(**checked(cls, table))
+
+    def to_table(self) -> dict[str, Any]:
+        """The table `from_table` reads, ``kind`` first, defaults left out."""
+        table: dict[str, Any] = {"kind": self.kind}
+        for field in fields(self):  # type: ignore[arg-type]
+            value = getattr(self, field.name)
+            if field.default is MISSING or value != field.default:
+                table[field.name] = plain(value)
+        return table
+
+
+def telling_apart(one: type[Effect], other: type[Effect]) -> str | None:
+    """The measurement that tells two effects apart; declared by the later of them."""
+    return one.confused_with.get(other) or other.confused_with.get(one)

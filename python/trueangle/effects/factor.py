@@ -1,0 +1,80 @@
+"""A factor times a shape in angle: what effects of temperature and load share."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from ..joint.pattern import Surroundings, line_columns
+from ..joint.signals import Signals
+from ..regression.extension import Extension
+from ..regression.regression import Regression
+from .effect import Effect
+from .search import (
+    Array,
+    Fitted,
+    best_shape,
+    line_parameters,
+)
+
+__all__ = ["FactorEffect"]
+
+
+class FactorEffect(Effect):
+    """Base: tries every block ``scale * shape(theta)`` and proposes the best.
+
+    Further blocks follow as further terms of the same cause.
+    """
+
+    @classmethod
+    def scale(cls, signals: Signals, kind: str) -> Array | None:
+        """What the blocks grow with; None where it was not recorded."""
+        raise NotImplementedError
+
+    @classmethod
+    def shapes(cls, regression: Regression) -> list[dict[str, Any]]:
+        """Blocks to try."""
+        raise NotImplementedError
+
+    @classmethod
+    def alternatives(
+        cls, regression: Regression, shape: dict[str, Any], shapes: list[dict[str, Any]]
+    ) -> int:
+        """Shapes as likely as this one; half of the belief goes to the likeliest."""
+        return 1 if shape["what"] == "zero" else len(shapes)
+
+    @classmethod
+    def propose(cls, regression: Regression) -> Extension | None:
+        shapes = cls.shapes(regression)
+        log_grids = [np.log(2.0 * cls.alternatives(regression, shape, shapes)) for shape in shapes]
+        return best_shape(cls, regression, shapes, log_grids)
+
+    @classmethod
+    def columns(cls, signals: Signals, around: Surroundings, shape: dict[str, Any]) -> Array:
+        scale = cls.scale(signals, shape.get("kind", "signed"))
+        assert scale is not None
+        if shape["what"] == "zero":
+            return scale[:, None]
+        if shape["what"] == "pattern":
+            return np.asarray((scale * around.pattern.value(signals.theta))[:, None])
+        return scale[:, None] * line_columns(signals.theta, shape["order"])
+
+    @classmethod
+    def line_rows(cls, terms: Sequence[Fitted]) -> list[tuple[float, float, float, float]]:
+        """(order, amplitude, phase, std of the amplitude) of the line terms."""
+        found = []
+        for extension, coefficients, covariance in terms:
+            if extension.shape["what"] == "line":
+                amplitude, phase, std, _ = line_parameters(coefficients, covariance)
+                found.append((float(extension.shape["order"]), amplitude, phase, std))
+        return found
+
+    @classmethod
+    def single(cls, terms: Sequence[Fitted], what: str) -> Any:
+        """Coefficient and standard deviation of the term ``what``, or None."""
+        for extension, coefficients, covariance in terms:
+            if extension.shape["what"] == what:
+                return float(coefficients[0]), float(np.sqrt(covariance[0, 0]))
+        return None

@@ -1,0 +1,303 @@
+"""A filter in the encoder: the pattern low-passed with speed, without a ramp."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..correction import forms
+from ..correction.forms import Form
+from ..correction.term import Term
+from ..joint.pattern import Pattern, Surroundings
+from ..joint.signals import Signals
+from ..regression.estimate import Parameters, quantity
+from ..regression.extension import Extension
+from ..regression.regression import Regression
+from .blindness import (
+    Blindness,
+)
+from .effect import Effect
+from .latency import UNTIMED, Latency
+from .missing_order import MissingOrder
+from .search import (
+    Array,
+    Fitted,
+    golden_maximum,
+    is_gear_order,
+)
+
+__all__ = ["FilterLag", "FilterLagTerm"]
+
+#: Cutoffs searched, in multiples of the highest frequency at which a line passes.
+CUTOFFS = np.geomspace(0.2, 3000.0, 12)
+
+#: The coarse search must promise some of what a new cause needs to be worth refining.
+REFINED_FROM = 3.0
+
+#: Damping ratios of a second-order loop.
+DAMPING = (0.4, 0.7, 1.1)
+
+
+@dataclass(frozen=True)
+class FilterLag(Effect):
+    r"""Low-pass on the pattern without a ramp error (type-2 tracking loop).
+
+    A line of order m at v turns per second is multiplied by
+    :math:`1/(1 + j\,m v/f_c)` or, with a damping ratio :math:`\zeta`, by
+
+    .. math:: \frac{1}{1 - w^2 + 2 j \zeta w},\qquad w = \frac{m v}{f_n},\quad
+              f_n = 2 \zeta f_c
+
+    so that far below the cutoff both delay by :math:`1/(2\pi f_c)`.
+
+    Parameters
+    ----------
+    cutoff_hz : float
+        f_c.
+    damping : float, optional
+        zeta: a filter of second order.
+    """
+
+    cutoff_hz: float
+    damping: float | None = None
+
+    kind: ClassVar[str] = "filter_lag"
+    sentence: ClassVar[str] = (
+        "A filter or tracking loop in the encoder follows the ramp but smooths the pattern: "
+        "fast lines shrink and trail in proportion to speed."
+    )
+    needs: ClassVar[tuple[str, ...]] = ("time",)
+    factor: ClassVar[str] = "velocity"
+    measure: ClassVar[str] = (
+        "record moving at two or more speeds in both directions, densely enough for gear lines"
+    )
+    confused_with: ClassVar[Mapping[type[Effect], str]] = {
+        Latency: "three speeds, the fastest with the gear lines above a tenth of the cutoff",
+        MissingOrder: "both directions or two speeds",
+    }
+    located: ClassVar[bool] = True
+    changes_lines: ClassVar[bool] = True
+
+    def signal(self, signals: Signals, around: Surroundings, rng: np.random.Generator) -> Array:
+        pattern = around.pattern
+        seen = pattern.passed(
+            signals.theta, signals.turns_per_s, lambda f: low_pass(f, self.cutoff_hz, self.damping)
+        )
+        return np.asarray(seen - pattern.value(signals.theta))
+
+    @classmethod
+    def propose(cls, regression: Regression) -> Extension | None:
+        signals, pattern = regression.signals, regression.around.pattern
+        if signals.velocity is None or pattern.orders.size == 0 or regression.has(cls.kind):
+            return None
+        top = float(pattern.orders.max() * np.abs(signals.turns_per_s).max())
+        if top == 0.0:
+            return None
+        waves, frequency = regression.remembered(
+            "waves",
+            None,
+            lambda: (
+                _waves(pattern, signals.theta),
+                pattern.orders * signals.turns_per_s[:, None],
+            ),
+        )
+
+        def gain(cutoff: float, damping: float | None) -> float:
+            column = _lagged(waves, frequency, cutoff, damping)
+            return float(regression.fixed_gains(column[:, None])[0])
+
+        cutoffs = top * CUTOFFS
+
+        def grid(damping: float | None) -> Array:
+            columns = regression.remembered(
+                f"lagged {damping}",
+                None,
+                lambda: np.column_stack(
+                    [_lagged(waves, frequency, float(c), damping) for c in cutoffs]
+                ),
+            )
+            return regression.fixed_gains(columns)
+
+        grids: dict[float | None, Array] = {None: grid(None)}
+        if not regression.hopeless(float(grids[None].max()), 1, REFINED_FROM):
+            grids |= {damping: grid(damping) for damping in DAMPING}
+        step = float(np.log(CUTOFFS[1] / CUTOFFS[0]))
+        best: Extension | None = None
+        for order in (1, 2):
+            if order == 2 and len(grids) == 1:
+                break
+            damping = None if order == 1 else max(DAMPING, key=lambda d: float(grids[d].max()))
+            cutoff = float(cutoffs[int(np.argmax(grids[damping]))])
+            deviance = float(grids[damping].max())
+            if deviance <= 0.0:
+                continue
+            for width in (step, 0.3 * step) if len(grids) > 1 else ():
+                f = partial(gain, damping=damping)
+                x, deviance = golden_maximum(
+                    lambda x, f=f: f(float(np.exp(x))),  # type: ignore[misc]
+                    np.log(cutoff) - width,
+                    np.log(cutoff) + width,
+                    10,
+                )
+                cutoff = float(np.exp(x))
+                if damping is None:
+                    break
+                damping, deviance = golden_maximum(
+                    partial(gain, cutoff), 0.7 * damping, 1.4 * damping, 8
+                )
+            shape = {"cutoff_hz": cutoff, "damping": damping}
+            extension = regression.propose(
+                cls.kind,
+                shape,
+                _lagged(waves, frequency, cutoff, damping)[:, None],
+                parameters=order,
+                deviance=deviance,
+            )
+            if best is None or extension.bic_gain > best.bic_gain:
+                best = extension
+        return best
+
+    @classmethod
+    def columns(cls, signals: Signals, around: Surroundings, shape: dict[str, Any]) -> Array:
+        waves = _waves(around.pattern, signals.theta)
+        frequency = around.pattern.orders * signals.turns_per_s[:, None]
+        return _lagged(waves, frequency, shape["cutoff_hz"], shape["damping"])[:, None]
+
+    @classmethod
+    def report(
+        cls, regression: Regression, terms: Sequence[Fitted]
+    ) -> tuple[Parameters, list[Effect]]:
+        extension = terms[0][0]
+        cutoff, damping = extension.shape["cutoff_hz"], extension.shape["damping"]
+        waves = _waves(regression.around.pattern, regression.signals.theta)
+        frequency = regression.around.pattern.orders * regression.signals.turns_per_s[:, None]
+        step = 0.01
+
+        def slope(cutoff_step: float, damping_step: float) -> Array:
+            up, down = (
+                _lagged(
+                    waves,
+                    frequency,
+                    cutoff * float(np.exp(sign * cutoff_step)),
+                    None if damping is None else damping * float(np.exp(sign * damping_step)),
+                )
+                for sign in (1.0, -1.0)
+            )
+            return np.asarray((up - down) / (2.0 * step))
+
+        slopes = [slope(step, 0.0)] if damping is None else [slope(step, 0.0), slope(0.0, step)]
+        others = regression.with_terms(term for term in regression.terms if term is not extension)
+        x, _ = others.projected(np.column_stack(slopes))
+        covariance = regression.variance * np.linalg.pinv(x.T @ x)
+        # Far below the cutoff both delay by 1/(2 pi f_c) and 2 zeta/(2 pi f_n).
+        delay = np.array([1.0] if damping is None else [1.0, -1.0])
+        equivalent = cutoff if damping is None else cutoff / (2.0 * damping)
+        relative = float(np.sqrt(delay @ covariance @ delay))
+        parameters = {"cutoff_hz": quantity(equivalent, equivalent * relative)}
+        if damping is not None:
+            std = np.sqrt(np.diag(covariance))
+            parameters["natural_frequency_hz"] = quantity(cutoff, cutoff * std[0])
+            parameters["damping"] = quantity(damping, damping * std[1])
+        return parameters, [FilterLag(equivalent, damping)]
+
+    @classmethod
+    def blind_spots(cls, regression: Regression, found: Sequence[Blindness]) -> Iterator[Blindness]:
+        signals = regression.signals
+        if signals.velocity is None:
+            yield cls.blind(UNTIMED)
+        elif np.ptp(signals.direction) == 0.0:
+            speed = np.abs(signals.velocity)
+            # One direction at one speed filters every line by one factor: another line.
+            if np.percentile(speed, 90) < 1.5 * max(float(np.percentile(speed, 10)), 1e-12):
+                yield cls.blind(
+                    "one speed in one direction (or at rest): a filtered pattern is only another "
+                    "pattern"
+                )
+        elif not signals.velocity.any() or not regression.belief.pattern.orders.size:
+            yield cls.blind("nothing moved, or no line is known to filter")
+
+    @classmethod
+    def doubt(
+        cls, extension: Extension, regression: Regression, spots: Sequence[Blindness]
+    ) -> Blindness | None:
+        if extension.cause != MissingOrder.kind:
+            return None
+        order = float(extension.shape["output_order"])
+        known = order in regression.belief.pattern.orders
+        if known and is_gear_order(regression.belief, order):
+            for spot in spots:
+                if spot.causes == (cls.kind,):
+                    return replace(spot, causes=(MissingOrder.kind, cls.kind))
+        return None
+
+    def to_terms(self, period: float, shafts: Mapping[str, float]) -> tuple[Term, ...]:
+        return (FilterLagTerm(self.cutoff_hz, self.damping),)
+
+
+@dataclass(frozen=True, repr=False)
+class FilterLagTerm(Term):
+    r"""The harmonics behind a low-pass that has no ramp error.
+
+    At v turns per second a line of output order m is multiplied by
+    :math:`1/(1 + j\,m v/f_c)` or, with damping :math:`\zeta`, by
+    :math:`1/(1 - w^2 + 2 j \zeta w)` with :math:`w = m v/(2 \zeta f_c)`. Exact at constant
+    velocity; after a change of velocity the filter itself needs about
+    :math:`1/(2\pi f_c)` to follow.
+
+    Parameters
+    ----------
+    cutoff_hz : float
+        :math:`f_c > 0`.
+    damping : float, optional
+        :math:`\zeta > 0` of a filter of second order.
+    """
+
+    cutoff_hz: float
+    damping: float | None = None
+
+    kind: ClassVar[str] = "filter_lag"
+    signals: ClassVar[tuple[str, ...]] = ("velocity",)
+    optional: ClassVar[tuple[str, ...]] = ("damping",)
+    is_built_on_harmonics: ClassVar[bool] = True
+
+    def check(self) -> None:
+        if self.cutoff_hz <= 0.0:
+            raise self._out_of_range("cutoff_hz", "positive")
+        if self.damping is not None and self.damping <= 0.0:
+            raise self._out_of_range("damping", "positive")
+
+    def forms(self) -> tuple[Form, ...]:
+        if self.damping is None:
+            return (forms.Filter(self.cutoff_hz),)
+        return (forms.Filter(2.0 * self.damping * self.cutoff_hz, self.damping),)
+
+
+def low_pass(frequency: Array, cutoff: float, damping: float | None) -> NDArray[np.complex128]:
+    """Gain of a low-pass of first or second order at a signed frequency, both in Hz."""
+    if damping is None:
+        return np.asarray(1.0 / (1.0 + 1j * (frequency / cutoff)))
+    w = frequency / (2.0 * damping * cutoff)
+    return np.asarray(1.0 / (1.0 - w**2 + 2j * damping * w))
+
+
+def _waves(pattern: Pattern, theta: Array) -> NDArray[np.complex128]:
+    """Complex lines of a pattern, shape (n, k): their real parts add up to it."""
+    amplitudes = pattern.cosine - 1j * pattern.sine
+    return np.asarray(amplitudes * np.exp(1j * theta[:, None] * pattern.orders))
+
+
+def _lagged(
+    waves: NDArray[np.complex128], frequency: Array, cutoff: float, damping: float | None
+) -> Array:
+    """Change of the pattern by a low-pass of first or second order."""
+    w = frequency / cutoff
+    if damping is None:
+        change = -1j * w / (1.0 + 1j * w)
+    else:
+        change = (w**2 - 2j * damping * w) / (1.0 - w**2 + 2j * damping * w)
+    return np.asarray((waves * change).real.sum(axis=1))

@@ -1,0 +1,161 @@
+"""Noise that depends on angle, speed or load."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from ..joint.pattern import Surroundings
+from ..joint.signals import Signals
+from ..regression.estimate import Parameters, quantity
+from ..regression.regression import Regression
+from .effect import Effect
+from .outliers import Outliers
+from .scatter import ScatterFinding, standardised
+from .search import (
+    Array,
+)
+
+__all__ = ["HeteroscedasticNoise"]
+
+#: Squared residuals are taken at most this many variances large.
+SQUARE_CLIP = 9.0
+
+
+@dataclass(frozen=True)
+class HeteroscedasticNoise(Effect):
+    r"""Noise that depends on angle, speed or load.
+
+    .. math:: \ln\sigma^2 = a + b\cos k\theta + c\sin k\theta + e\,|v| + f\,|\tau|
+
+    Parameters
+    ----------
+    cosine, sine : float
+        b and c.
+    order : float
+        k, output order.
+    per_deg_s : float
+        e.
+    per_Nm : float
+        f.
+    """
+
+    cosine: float = 0.0
+    sine: float = 0.0
+    order: float = 1.0
+    per_deg_s: float = 0.0
+    per_Nm: float = 0.0
+
+    kind: ClassVar[str] = "heteroscedastic_noise"
+    sentence: ClassVar[str] = (
+        "Readings scatter more at some angles, speeds or loads (friction zones, weak field, "
+        "edge of the autocollimator's range)."
+    )
+    factor: ClassVar[str] = "none"
+    measure: ClassVar[str] = "at least 1000 readings spread over the angles, speeds and loads"
+    transfers: ClassVar[bool] = False
+    confused_with: ClassVar[Mapping[type[Effect], str]] = {Outliers: "more readings"}
+    weighs: ClassVar[bool] = True
+    not_at_run_time: ClassVar[str] = "scatter has no value to subtract, only a weight"
+
+    def signal(self, signals: Signals, around: Surroundings, rng: np.random.Generator) -> Array:
+        return np.zeros(len(signals))
+
+    def noise_factor(self, signals: Signals, around: Surroundings) -> Array | None:
+        log_variance = self.cosine * np.cos(self.order * signals.theta)
+        log_variance += self.sine * np.sin(self.order * signals.theta)
+        log_variance += self.per_deg_s * np.abs(signals.turns_per_s * 360.0)
+        if signals.torque is not None:
+            log_variance += self.per_Nm * np.abs(signals.torque)
+        return np.asarray(np.exp(0.5 * log_variance))
+
+    @classmethod
+    def find_scatter(cls, regression: Regression) -> ScatterFinding | None:
+        """Noise whose variance follows angle, speed or load (Koenker's score test, blockwise).
+
+        The clipped squares are regressed on each block; n R^2 is the deviance.
+        """
+        if regression.is_explained:
+            return None
+        signals, n = regression.signals, regression.n
+        square = np.minimum(standardised(regression) ** 2, SQUARE_CLIP)
+        # A reading tells half as much of the logarithm of a variance as of a mean.
+        log_n = regression.log_n - float(np.log(2.0))
+        blocks: dict[str, Array] = {}
+        prices: dict[str, float] = {}
+        for k in (1, 2, 3):
+            x = k * signals.theta
+            blocks[f"order {k}"] = np.column_stack([np.cos(x), np.sin(x)])
+            prices[f"order {k}"] = 2.0 * log_n + 2.0 * float(np.log(2.0 * k))
+        for name, values in (
+            ("per_deg_s", None if signals.velocity is None else np.abs(signals.velocity)),
+            ("per_Nm", None if signals.torque is None else np.abs(signals.torque)),
+        ):
+            if values is not None and np.ptp(values) > 0.0:
+                blocks[name] = values[:, None]
+                prices[name] = log_n + 2.0 * float(np.log(4.0))
+        chosen: list[str] = []
+        design = np.ones((n, 1))
+        total = 0.0
+        rest = square - square.mean()
+        while True:
+            power = float(rest @ rest)
+            best = (0.0, "", design)
+            for name, columns in blocks.items():
+                if name in chosen:
+                    continue
+                wider = np.hstack([design, columns])
+                q, _ = np.linalg.qr(wider)
+                saved = float(np.sum((q.T @ rest) ** 2))
+                gain = n * saved / power - prices[name]
+                if gain > best[0]:
+                    best = (gain, name, wider)
+            if best[0] <= 0.0:
+                break
+            total += best[0]
+            chosen.append(best[1])
+            design = best[2]
+            rest = square - design @ np.linalg.lstsq(design, square, rcond=None)[0]
+        if not chosen:
+            return None
+        gamma, covariance = _log_variance(design, square)
+        parameters: Parameters = {}
+        cosine = sine = 0.0
+        order, start = 1.0, 1
+        extra: dict[str, float] = {}
+        effects: list[Effect] = []
+        for name in chosen:
+            std = np.sqrt(np.diag(covariance))
+            if name.startswith("order"):
+                order = float(name.split()[1])
+                cosine, sine = float(gamma[start]), float(gamma[start + 1])
+                suffix = "" if order == 1.0 else f"_{order:.0f}"
+                parameters[f"cosine{suffix}"] = quantity(cosine, float(std[start]))
+                parameters[f"sine{suffix}"] = quantity(sine, float(std[start + 1]))
+                effects.append(HeteroscedasticNoise(cosine, sine, order))
+                start += 2
+            else:
+                parameters[name] = quantity(float(gamma[start]), float(std[start]))
+                extra[name] = float(gamma[start])
+                start += 1
+        if extra:
+            effects.append(HeteroscedasticNoise(**extra))
+        variance = np.exp(design @ gamma)
+        weights = 1.0 / variance
+        return ScatterFinding(cls.kind, total, parameters, effects, weights / weights.mean())
+
+
+def _log_variance(design: Array, square: Array) -> tuple[Array, Array]:
+    """Coefficients of the log variance by iterated weighted least squares."""
+    gamma = np.zeros(design.shape[1])
+    gamma[0] = np.log(square.mean())
+    inverse = np.linalg.inv(design.T @ design)
+    for _ in range(30):
+        step = inverse @ (design.T @ (square * np.exp(-(design @ gamma)) - 1.0))
+        gamma += step
+        if np.abs(step).max() < 1e-10:
+            break
+    return gamma, np.asarray(2.0 * inverse, dtype=np.float64)

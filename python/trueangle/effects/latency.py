@@ -1,0 +1,145 @@
+"""Pure delay: the reading is older than the reference."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+
+from ..correction import forms
+from ..correction.forms import Form
+from ..correction.term import Term
+from ..joint.pattern import Surroundings
+from ..joint.signals import Signals
+from ..regression.estimate import Parameters, quantity
+from ..regression.extension import Extension
+from ..regression.regression import Regression
+from .backlash import Backlash
+from .blindness import (
+    OWN_OF_VELOCITY,
+    OWN_POWER,
+    Blindness,
+    share_left,
+)
+from .effect import Effect
+from .search import (
+    Array,
+    Fitted,
+)
+
+__all__ = ["Latency", "LatencyTerm"]
+
+#: Arcsec in a degree.
+ARCSEC_PER_DEG = 3600.0
+
+TWO_SPEEDS = (
+    "move in both directions at two speeds at least a factor of 3 apart, or read at rest as well"
+)
+UNTIMED = "no time stamps and no velocity were recorded"
+
+
+@dataclass(frozen=True)
+class Latency(Effect):
+    r"""Pure delay: the reading is that of a time tau earlier.
+
+    .. math:: \varepsilon = -v\tau + p(\theta - v\tau) - p(\theta)
+
+    Parameters
+    ----------
+    delay_s : float
+        tau, seconds.
+    """
+
+    delay_s: float
+
+    kind: ClassVar[str] = "latency"
+    sentence: ClassVar[str] = (
+        "The joint's reading is older than the reference's: the error is proportional to "
+        "velocity and the pattern is shifted along with it."
+    )
+    needs: ClassVar[tuple[str, ...]] = ("time",)
+    factor: ClassVar[str] = "velocity"
+    measure: ClassVar[str] = (
+        "record moving, time-stamped, in both directions at two speeds a factor of 3 apart"
+    )
+    confused_with: ClassVar[Mapping[type[Effect], str]] = {Backlash: TWO_SPEEDS}
+    acts_on_runs: ClassVar[bool] = True
+
+    def signal(self, signals: Signals, around: Surroundings, rng: np.random.Generator) -> Array:
+        moved = -self.delay_s * np.radians(signals.turns_per_s * 360.0)
+        pattern = around.pattern
+        ramp = np.degrees(moved) * ARCSEC_PER_DEG
+        return np.asarray(
+            ramp + pattern.value(signals.theta + moved) - pattern.value(signals.theta)
+        )
+
+    @classmethod
+    def propose(cls, regression: Regression) -> Extension | None:
+        if regression.signals.velocity is None or regression.has(cls.kind):
+            return None
+        columns = regression.remembered(
+            cls.kind, None, lambda: cls.columns(regression.signals, regression.around, {})
+        )
+        return regression.propose(cls.kind, {}, columns)
+
+    @classmethod
+    def report(
+        cls, regression: Regression, terms: Sequence[Fitted]
+    ) -> tuple[Parameters, list[Effect]]:
+        _, (delay,), covariance = terms[0]
+        std = float(np.sqrt(covariance[0, 0]))
+        return {"delay_s": quantity(delay, std)}, [Latency(float(delay))]
+
+    @classmethod
+    def columns(cls, signals: Signals, around: Surroundings, shape: dict[str, Any]) -> Array:
+        """Column whose coefficient is tau, arcsec per second, to first order in tau."""
+        speed = signals.turns_per_s * (360.0 * ARCSEC_PER_DEG)
+        return np.asarray(-(speed * (1.0 + around.pattern.slope(signals.theta)))[:, None])
+
+    @classmethod
+    def blind_spots(cls, regression: Regression, found: Sequence[Blindness]) -> Iterator[Blindness]:
+        signals = regression.signals
+        if signals.velocity is None:
+            yield cls.blind(UNTIMED)
+            return
+        velocity = signals.velocity[:, None]
+        if share_left(regression, velocity) < OWN_POWER:
+            yield cls.blind("one speed in one direction (or at rest): a delay is part of the zero")
+        elif (
+            np.ptp(signals.direction) > 0.0
+            and share_left(regression, velocity, signals.direction[:, None]) < OWN_OF_VELOCITY
+        ):
+            yield cls.blind(
+                "one speed: the sign of velocity and velocity itself are the same regressor",
+                Backlash,
+                first=False,
+            )
+
+    def to_terms(self, period: float, shafts: Mapping[str, float]) -> tuple[Term, ...]:
+        return (LatencyTerm(self.delay_s),)
+
+
+@dataclass(frozen=True, repr=False)
+class LatencyTerm(Term):
+    r"""The indicated angle is a time :math:`\tau` old.
+
+    .. math:: \mathrm{indicated}(t) = \theta(t - \tau) + \varepsilon(\theta(t - \tau))
+
+    so :math:`\varphi = \theta - v\tau` is solved for and :math:`v\tau` added. Exact at
+    constant velocity; an acceleration a leaves :math:`a\tau^2/2`.
+
+    Parameters
+    ----------
+    delay_s : float
+        :math:`\tau` in seconds; negative where the reference is the later one.
+    """
+
+    delay_s: float
+
+    kind: ClassVar[str] = "latency"
+    signals: ClassVar[tuple[str, ...]] = ("velocity",)
+
+    def forms(self) -> tuple[Form, ...]:
+        return (forms.Lag(self.delay_s),)

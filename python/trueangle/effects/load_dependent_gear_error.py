@@ -1,0 +1,203 @@
+"""Gear lines that grow with torque."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, ClassVar
+
+import numpy as np
+
+from ..correction import forms
+from ..correction.forms import Form
+from ..correction.term import Term, line_values
+from ..joint.pattern import Surroundings, line_columns, line_sum
+from ..joint.signals import Signals
+from ..regression.estimate import Parameters, quantity
+from ..regression.extension import Extension
+from ..regression.regression import Regression
+from .blindness import (
+    OWN_OF_VELOCITY,
+    OWN_POWER,
+    Blindness,
+    share_left,
+)
+from .effect import Effect
+from .factor import FactorEffect
+from .missing_order import MissingOrder
+from .search import (
+    Array,
+    Fitted,
+    is_gear_order,
+    known_orders,
+)
+from .thermal_drift import ThermalDrift
+from .torsional_compliance import TorsionalCompliance, torque_of, unloaded
+
+__all__ = ["LoadDependentGearError", "LoadDependentGearErrorTerm"]
+
+
+@dataclass(frozen=True)
+class LoadDependentGearError(FactorEffect):
+    r"""Gear lines that grow with torque l (signed or absolute).
+
+    .. math:: \varepsilon = \ell\,\sum_m C_m \sin(m\theta + \varphi_m)
+
+    Parameters
+    ----------
+    lines_per_Nm : list of [output order, arcsec per Nm, phase_deg]
+    torque : {"signed", "absolute"}
+        Whether l is the torque or its absolute value.
+    """
+
+    lines_per_Nm: tuple[tuple[float, float, float], ...]
+    torque: str = "signed"
+
+    kind: ClassVar[str] = "load_dependent_gear_error"
+    sentence: ClassVar[str] = (
+        "Load presses the teeth of the gear into each other: its lines (motor and wave "
+        "generator orders) grow with torque."
+    )
+    needs: ClassVar[tuple[str, ...]] = ("torque",)
+    factor: ClassVar[str] = "torque"
+    measure: ClassVar[str] = "repeat the runs at a second load, densely enough for the gear's lines"
+    confused_with: ClassVar[Mapping[type[Effect], str]] = {
+        ThermalDrift: "change load and temperature independently",
+        MissingOrder: "a second load",
+    }
+    changes_lines: ClassVar[bool] = True
+
+    def signal(self, signals: Signals, around: Surroundings, rng: np.random.Generator) -> Array:
+        torque = torque_of(signals)
+        if self.torque == "absolute":
+            torque = np.abs(torque)
+        return np.asarray(torque * line_sum(signals.theta, self.lines_per_Nm))
+
+    @classmethod
+    def scale(cls, signals: Signals, kind: str) -> Array | None:
+        if signals.torque is None:
+            return None
+        return np.abs(signals.torque) if kind == "absolute" else signals.torque
+
+    @classmethod
+    def shapes(cls, regression: Regression) -> list[dict[str, Any]]:
+        torque = regression.signals.torque
+        if torque is None or not torque.any():
+            return []
+        both_signs = torque.min() < 0.0 < torque.max()
+        return [
+            {"what": "line", "order": float(m), "kind": kind}
+            for m in known_orders(regression.around)
+            if is_gear_order(regression.around, m)
+            for kind in (("signed", "absolute") if both_signs else ("signed",))
+        ]
+
+    @classmethod
+    def alternatives(
+        cls, regression: Regression, shape: dict[str, Any], shapes: list[dict[str, Any]]
+    ) -> int:
+        """The lobes pass the teeth twice a turn: these two lines grow with load first."""
+        joint = regression.around.joint
+        mesh = [joint.output_order(shaft, 2) for shaft in joint.shafts if shaft != "output"]
+        likely = sum(other["order"] in mesh for other in shapes)
+        return likely if shape["order"] in mesh else len(shapes)
+
+    @classmethod
+    def report(
+        cls, regression: Regression, terms: Sequence[Fitted]
+    ) -> tuple[Parameters, list[Effect]]:
+        lines = cls.line_rows(terms)
+        parameters = {
+            "orders": quantity([line[0] for line in lines]),
+            "amplitudes_arcsec_per_Nm": quantity(
+                [line[1] for line in lines], [line[3] for line in lines]
+            ),
+            "phases_deg": quantity([line[2] for line in lines]),
+        }
+        effects: list[Effect] = []
+        for kind in ("signed", "absolute"):
+            chosen = tuple(
+                line[:3]
+                for line, (extension, _, _) in zip(lines, terms, strict=True)
+                if extension.shape["kind"] == kind
+            )
+            if chosen:
+                effects.append(LoadDependentGearError(chosen, kind))
+        return parameters, effects
+
+    @classmethod
+    def blind_spots(cls, regression: Regression, found: Sequence[Blindness]) -> Iterator[Blindness]:
+        signals = regression.signals
+        if signals.temperature is not None and signals.torque is not None:
+            warm = (signals.temperature - signals.temperature.mean())[:, None]
+            load = np.abs(signals.torque)[:, None]
+            told = any(ThermalDrift.kind in spot.causes for spot in found)
+            if not told and share_left(regression, warm, load) < OWN_OF_VELOCITY:
+                yield cls.blind(
+                    "temperature and load change together",
+                    ThermalDrift,
+                    TorsionalCompliance,
+                    first=False,
+                    factor=ThermalDrift.factor,
+                )
+        because = unloaded(signals)
+        if because:
+            yield cls.blind(because)
+            return
+        gear = [m for m in regression.lines.orders[regression.lines.plausible] if m > 40.0][:2]
+        if gear:
+            m = float(gear[-1])
+            beside = np.hstack([line_columns(signals.theta, m + k) for k in (-1, 0, 1)])
+            loaded = torque_of(signals)[:, None] * line_columns(signals.theta, m)
+            if share_left(regression, loaded, beside) < OWN_POWER:
+                yield cls.blind(
+                    "one load: gear lines that grow with it are only other lines, or sidebands"
+                )
+
+    @classmethod
+    def doubt(
+        cls, extension: Extension, regression: Regression, spots: Sequence[Blindness]
+    ) -> Blindness | None:
+        if extension.cause != MissingOrder.kind or unloaded(regression.signals):
+            return None
+        if is_gear_order(regression.belief, float(extension.shape["output_order"])):
+            for spot in spots:
+                if spot.causes == (cls.kind,):
+                    return replace(spot, causes=(MissingOrder.kind, cls.kind))
+        return None
+
+    def to_terms(self, period: float, shafts: Mapping[str, float]) -> tuple[Term, ...]:
+        lines = line_values(self.lines_per_Nm, period)
+        return (LoadDependentGearErrorTerm(**lines, torque=self.torque),)
+
+
+@dataclass(frozen=True, repr=False)
+class LoadDependentGearErrorTerm(Term):
+    r"""Gear lines that grow with the torque.
+
+    .. math:: \varepsilon = \ell\,\sum_m A_m \cos m\varphi + B_m \sin m\varphi,
+              \qquad \ell = \tau \text{ or } |\tau|
+
+    Parameters
+    ----------
+    orders, cosine, sine : sequence of float
+        Output orders (positive) and coefficients per newton metre.
+    torque : {"signed", "absolute"}
+    """
+
+    orders: tuple[float, ...]
+    cosine: tuple[float, ...]
+    sine: tuple[float, ...]
+    torque: str = "signed"
+
+    kind: ClassVar[str] = "load_dependent_gear_error"
+    signals: ClassVar[tuple[str, ...]] = ("torque",)
+
+    def check(self) -> None:
+        self._check_lines()
+        if self.torque not in ("signed", "absolute"):
+            raise self._out_of_range("torque", "'signed' or 'absolute'")
+
+    def forms(self) -> tuple[Form, ...]:
+        absolute = self.torque == "absolute"
+        return (forms.Scaled("torque", lines=self.lines, absolute=absolute),)

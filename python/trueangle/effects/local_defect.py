@@ -1,0 +1,316 @@
+"""A bump at one place of a shaft."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..correction import forms
+from ..correction.forms import Form
+from ..correction.term import Term, from_arcsec
+from ..errors import ArgumentError
+from ..joint.grid import uniform_grid
+from ..joint.pattern import Surroundings
+from ..joint.signals import Signals
+from ..regression.estimate import Parameters, quantity
+from ..regression.extension import Extension
+from ..regression.regression import Regression
+from .argument_error import ArgumentShift
+from .blindness import (
+    Blindness,
+)
+from .effect import Effect
+from .missing_order import MissingOrder
+from .search import (
+    Array,
+    Fitted,
+    golden_maximum,
+)
+from .sidebands import Sidebands
+
+__all__ = ["LocalDefect", "LocalDefectTerm"]
+
+#: Places per turn of a shaft at which a defect is searched, and its widths in degrees.
+PLACES = 1440
+WIDTHS = (0.35, 0.7, 1.4, 2.8, 5.6, 11.0)
+
+#: Degrees of its shaft beyond which a bump is not local: its Fourier series is then a few
+#: low orders, which have causes of their own (order 7 falls to 1/e^2 at 16 deg).
+WIDEST = 16.0
+
+#: Peaks of the quick search that are scored exactly.
+PEAKS = 2
+
+#: Steps by which place and width are made exact.
+NEWTON_STEPS = 4
+
+#: Readings' worth of power that a bump must rest on.
+LEAST_READINGS = 4.0
+
+#: Travel (turns) from which on lines and bumps differ for certain: over less a bump can
+#: stand for several lines at once.
+WHOLE_TURN = 0.9
+
+
+@dataclass(frozen=True)
+class LocalDefect(Effect):
+    r"""A bump at one place of a shaft: :math:`a\,e^{-(\varphi - c)^2/2w^2}`.
+
+    Parameters
+    ----------
+    place_deg : float
+        c, in degrees of that shaft.
+    width_deg : float
+        w (one standard deviation), in degrees of that shaft.
+    height_arcsec : float
+        a.
+    shaft : str
+    """
+
+    place_deg: float
+    width_deg: float
+    height_arcsec: float
+    shaft: str = "output"
+
+    kind: ClassVar[str] = "local_defect"
+    sentence: ClassVar[str] = (
+        "A damaged tooth, pole or graduation line: a bump at one place of one shaft, the same "
+        "in every pass."
+    )
+    measure: ClassVar[str] = "a second pass over the place in steps finer than the bump"
+    confused_with: ClassVar[Mapping[type[Effect], str]] = {
+        MissingOrder: "free angles, finer than the bump",
+    }
+    located: ClassVar[bool] = True
+    is_separate: ClassVar[bool] = True
+    flexible_below: ClassVar[float] = WHOLE_TURN
+
+    def signal(self, signals: Signals, around: Surroundings, rng: np.random.Generator) -> Array:
+        cycles = around.joint.output_order(self.shaft, 1)
+        return self.height_arcsec * self.bump(
+            signals.theta * cycles, self.place_deg, self.width_deg
+        )
+
+    @staticmethod
+    def bump(phase: Array, place_deg: float, width_deg: float) -> Array:
+        """The bump of height 1 at shaft angles ``phase`` (radians)."""
+        away = np.degrees(phase) - place_deg
+        away -= 360.0 * np.round(away / 360.0)
+        return np.asarray(np.exp(-0.5 * (away / width_deg) ** 2))
+
+    @classmethod
+    def propose(cls, regression: Regression) -> Extension | None:
+        e = regression.target - regression.design @ regression.coefficients
+        e = e - regression.whiten.run_part(e)
+        joint = regression.around.joint
+        log_grid = float(np.log(len(joint.shafts) * 360.0))
+        best: Extension | None = None
+        for shaft, cycles in joint.shafts.items():
+            for score, place, width in cls._search(regression, cycles, e):
+                shape = {"shaft": shaft, "place_deg": place, "width_deg": width}
+                if not regression.hopeless(score / regression.variance, 3, log_grid):
+                    shape = cls._refined(regression, shaft, place, width)
+                columns = cls.columns(regression.signals, regression.around, shape)
+                power = columns[:, 0] ** 2
+                # One or two readings are wild readings, not a place of the joint.
+                if power.sum() < LEAST_READINGS * power.max(initial=0.0):
+                    continue
+                extension = regression.propose(cls.kind, shape, columns, 3, log_grid)
+                if best is None or extension.deviance > best.deviance:
+                    best = extension
+        return best
+
+    @staticmethod
+    def _search(
+        regression: Regression, cycles: float, e: Array
+    ) -> list[tuple[float, float, float]]:
+        phase = np.mod(regression.signals.theta * (cycles / (2.0 * np.pi)), 1.0)
+        bins = np.minimum((phase * PLACES).astype(np.int64), PLACES - 1)
+        count = np.bincount(bins, minlength=PLACES).astype(np.float64)
+        total = np.asarray(np.bincount(bins, weights=e, minlength=PLACES))
+        away = np.arange(PLACES, dtype=np.float64) * (360.0 / PLACES)
+        away = np.minimum(away, 360.0 - away)
+        found = []
+        for width in WIDTHS:
+            window = np.exp(-0.5 * (away / width) ** 2)
+
+            moment = _circular(total - count * (total.sum() / regression.n), window)
+            power = _circular(count, window**2) - _circular(count, window) ** 2 / regression.n
+            seen = power > 4.0
+            score = np.where(seen, moment**2 / np.where(seen, power, 1.0), 0.0)
+            k = int(np.argmax(score))
+            found.append((float(score[k]), (k + 0.5) * 360.0 / PLACES, width))
+        found.sort(reverse=True)
+        return [peak for peak in found[:PEAKS] if peak[0] > 0.0]
+
+    @classmethod
+    def _refined(
+        cls, regression: Regression, shaft: str, place: float, width: float
+    ) -> dict[str, Any]:
+        def gain(c: float, w: float) -> float:
+            shape = {"shaft": shaft, "place_deg": c, "width_deg": w}
+            columns = cls.columns(regression.signals, regression.around, shape)
+            return float(regression.gains(columns)[0])
+
+        for _ in range(2):
+            gain_at = partial(gain, w=width)
+            place, _ = golden_maximum(gain_at, place - width, place + width, 8)
+            gain_of = partial(gain, place)
+            log_width = float(np.log(width))
+            log_width, _ = golden_maximum(
+                lambda x, f=gain_of: f(float(np.exp(x))),  # type: ignore[misc]
+                log_width - 0.8,
+                min(log_width + 0.8, float(np.log(WIDEST))),
+                8,
+            )
+            width = float(np.exp(log_width))
+        # The searches stop at some 4 % of the width, a strong bump's place is known better.
+        value = gain(place, width)
+        for _ in range(NEWTON_STEPS):
+            shape = {"shaft": shaft, "place_deg": place, "width_deg": width}
+            x, excited = regression.projected(cls._tangents(regression, shape, 1.0))
+            if not excited.all():
+                break
+            height, *moves = np.linalg.lstsq(x, regression.r, rcond=1e-10)[0]
+            step = np.clip(np.array(moves) / height, -0.3 * width, 0.3 * width)
+            following = gain(place + step[0], min(width + step[1], WIDEST))
+            if not following > value:
+                break
+            place, width, value = place + step[0], min(width + step[1], WIDEST), following
+        return {"shaft": shaft, "place_deg": float(place % 360.0), "width_deg": float(width)}
+
+    @classmethod
+    def _tangents(cls, regression: Regression, shape: dict[str, Any], height: float) -> Array:
+        """The bump and, for its ``height``, its derivatives by place and width."""
+        step = 0.05 * shape["width_deg"]
+
+        def bump(**change: float) -> Array:
+            return cls.columns(regression.signals, regression.around, {**shape, **change})[:, 0]
+
+        place, width = shape["place_deg"], shape["width_deg"]
+        return np.column_stack(
+            [
+                bump(),
+                height * (bump(place_deg=place + step) - bump(place_deg=place - step)) / (2 * step),
+                height * (bump(width_deg=width + step) - bump(width_deg=width - step)) / (2 * step),
+            ]
+        )
+
+    @classmethod
+    def columns(cls, signals: Signals, around: Surroundings, shape: dict[str, Any]) -> Array:
+        cycles = around.joint.output_order(shape["shaft"], 1)
+        phase = signals.theta * cycles
+        return LocalDefect.bump(phase, shape["place_deg"], shape["width_deg"])[:, None]
+
+    @classmethod
+    def report(
+        cls, regression: Regression, terms: Sequence[Fitted]
+    ) -> tuple[Parameters, list[Effect]]:
+        extension, (height,), _ = terms[0]
+        shape = extension.shape
+        # Place, width and height together.
+        columns = cls._tangents(regression, shape, float(height))
+        others = [term for term in regression.terms if term is not extension]
+        x, _ = regression.with_terms(others).projected(columns)
+        std = np.sqrt(regression.variance * np.diag(np.linalg.pinv(x.T @ x)))
+        place, width = shape["place_deg"], shape["width_deg"]
+        parameters = {
+            "place_deg": quantity(place, std[1]),
+            "width_deg": quantity(width, std[2]),
+            "height_arcsec": quantity(height, std[0]),
+            "shaft": quantity(shape["shaft"]),
+        }
+        return parameters, [LocalDefect(place, width, float(height), shape["shaft"])]
+
+    @classmethod
+    def blind_spots(cls, regression: Regression, found: Sequence[Blindness]) -> Iterator[Blindness]:
+        grid = uniform_grid(regression.signals.theta)
+        if grid is None or grid.positions > 2.0 * regression.lines.orders.max():
+            return
+        gear = _gear_lines(regression.belief)
+        folded = sorted({(grid.folded(m), m) for m in gear if grid.folded(m) != m})
+        if not folded:
+            return
+        pairs = ", ".join(f"{m:g} as {low:g}" for low, m in folded[:8])
+        spot = cls.blind(
+            f"all readings lie on one uniform grid of {grid.positions} positions, where gear "
+            f"orders look like low ones ({pairs}): a model of the aliases would hold at these "
+            "positions and fail between them",
+            MissingOrder,
+            Sidebands,
+            ArgumentShift,
+            first=False,
+            factor="grid",
+        )
+        yield replace(spot, measure=MissingOrder.measure)
+
+    def to_terms(self, period: float, shafts: Mapping[str, float]) -> tuple[Term, ...]:
+        if self.shaft not in shafts:
+            raise ArgumentError(f"{self.kind}: how fast shaft {self.shaft!r} turns is not known")
+        degree = period / 360.0
+        return (
+            LocalDefectTerm(
+                self.place_deg * degree,
+                self.width_deg * degree,
+                from_arcsec(self.height_arcsec, period),
+                shafts[self.shaft],
+            ),
+        )
+
+
+@dataclass(frozen=True, repr=False)
+class LocalDefectTerm(Term):
+    r"""A damaged tooth, pole or graduation line, the same in every pass.
+
+    .. math:: \varepsilon = h\,e^{-(a - c)^2/2w^2},\qquad a = f\varphi
+
+    with a the angle of a shaft that turns f times per output turn, wrapped around the
+    place.
+
+    Parameters
+    ----------
+    place, width : float
+        c and w (one standard deviation, positive) as angles of that shaft.
+    height : float
+        h.
+    cycles_per_turn : float
+        f > 0.
+    """
+
+    place: float
+    width: float
+    height: float
+    cycles_per_turn: float = 1.0
+
+    kind: ClassVar[str] = "local_defect"
+
+    @property
+    def is_periodic(self) -> bool:
+        return self.cycles_per_turn == int(self.cycles_per_turn)
+
+    def check(self) -> None:
+        if self.width <= 0.0:
+            raise self._out_of_range("width", "positive")
+        if self.cycles_per_turn <= 0.0:
+            raise self._out_of_range("cycles_per_turn", "positive")
+
+    def forms(self) -> tuple[Form, ...]:
+        return (forms.Bump(self.place, self.width, self.height, self.cycles_per_turn),)
+
+
+def _circular(x: NDArray[Any], window: Array) -> Array:
+    """Sum of ``x`` under a symmetric window put at every place of the turn."""
+    return np.asarray(np.fft.irfft(np.fft.rfft(x) * np.fft.rfft(window), PLACES))
+
+
+def _gear_lines(around: Surroundings) -> list[float]:
+    joint = around.joint
+    lines = {joint.output_order(shaft, k) for shaft, k in joint.gear_orders()}
+    if "wave_generator" in joint.shafts:
+        lines.add(joint.shafts["motor"] + joint.shafts["wave_generator"])
+    return sorted(lines)

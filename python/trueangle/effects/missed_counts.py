@@ -1,0 +1,124 @@
+"""A step that stays until the end of a run."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+
+from ..joint.pattern import Surroundings
+from ..joint.signals import Signals
+from ..regression.estimate import Parameters, quantity
+from ..regression.extension import Extension
+from ..regression.regression import Regression
+from .effect import ALWAYS, Effect
+from .search import (
+    Array,
+    Fitted,
+)
+
+__all__ = ["MissedCounts"]
+
+#: Readings a step must have on either side of it within its run, up to the next step: a
+#: few readings that are off and come back are outliers, no lost counts.
+STEP_MARGIN = 5
+
+
+@dataclass(frozen=True)
+class MissedCounts(Effect):
+    """A step that stays until the end of its run.
+
+    Parameters
+    ----------
+    step_arcsec : float
+    run : int
+        Index of the run, from 0.
+    row : int
+        First row after the step, from 0.
+    """
+
+    step_arcsec: float
+    run: int
+    row: int
+
+    kind: ClassVar[str] = "missed_counts"
+    sentence: ClassVar[str] = (
+        "Counts or whole periods were lost at one moment: from there to the end of the run "
+        "every reading is off by the same step."
+    )
+    factor: ClassVar[str] = "time"
+    measure: ClassVar[str] = "more readings before and after in one run, closing at the start angle"
+    transfers: ClassVar[bool] = False
+    located: ClassVar[bool] = True
+    flexible_below: ClassVar[float] = ALWAYS
+    draws_zeros: ClassVar[bool] = True
+    not_at_run_time: ClassVar[str] = "a step is told from a motion only afterwards, in the log"
+
+    def signal(self, signals: Signals, around: Surroundings, rng: np.random.Generator) -> Array:
+        after = (signals.run == self.run) & (signals.row >= self.row)
+        return np.asarray(self.step_arcsec * after)
+
+    @classmethod
+    def propose(cls, regression: Regression) -> Extension | None:
+        e = regression.target - regression.design @ regression.coefficients
+        scores, places = [], []
+        near = np.zeros(regression.n, dtype=bool)
+        for term in regression.terms:
+            if term.cause == cls.kind:
+                away = np.abs(regression.signals.row - term.shape["row"])
+                near |= (regression.signals.run == term.shape["run"]) & (away < STEP_MARGIN)
+        for start, stop in regression.bounds:
+            n = stop - start
+            if n < 2 * STEP_MARGIN + 1:
+                continue
+            part = e[start:stop]
+            k = np.arange(1, n)
+            after = part.sum() - np.cumsum(part)[:-1]
+            inside = slice(STEP_MARGIN - 1, n - STEP_MARGIN)
+            own_zero = (after - (n - k) * part.mean()) ** 2 * n / (k * (n - k))
+            common_zero = after**2 / (n - k)
+            for score in (own_zero[inside], common_zero[inside]):
+                best = int(np.argmax(score * ~near[start + 1 : stop][inside]))
+                scores.append(float(score[best]))
+                places.append((start, start + STEP_MARGIN + best, stop))
+        best_extension: Extension | None = None
+        for j in np.argsort(scores)[::-1][:6]:
+            start, at, stop = places[int(j)]
+            for row in {at - 1, at, at + 1}:
+                if not start < row < stop or near[row]:
+                    continue
+                shape = {
+                    "run": int(regression.signals.run[row]),
+                    "row": int(regression.signals.row[row]),
+                }
+                columns = cls.columns(regression.signals, regression.around, shape)
+                extension = regression.propose(
+                    cls.kind, shape, columns, 2, float(np.log(regression.signals.runs))
+                )
+                if best_extension is None or extension.deviance > best_extension.deviance:
+                    best_extension = extension
+        return best_extension
+
+    @classmethod
+    def columns(cls, signals: Signals, around: Surroundings, shape: dict[str, Any]) -> Array:
+        after = (signals.run == shape["run"]) & (signals.row >= shape["row"])
+        return np.asarray(after.astype(np.float64)[:, None])
+
+    @classmethod
+    def report(
+        cls, regression: Regression, terms: Sequence[Fitted]
+    ) -> tuple[Parameters, list[Effect]]:
+        rows = [(float(c[0]), float(np.sqrt(v[0, 0])), t.shape) for t, c, v in terms]
+        labels = regression.signals.labels
+
+        def one(values: list[Any]) -> Any:
+            return values[0] if len(values) == 1 else values
+
+        parameters = {
+            "step_arcsec": quantity(one([row[0] for row in rows]), one([row[1] for row in rows])),
+            "run": quantity(one([labels[row[2]["run"]] for row in rows])),
+            "row": quantity(one([row[2]["row"] for row in rows])),
+        }
+        return parameters, [MissedCounts(row[0], row[2]["run"], row[2]["row"]) for row in rows]

@@ -1,0 +1,152 @@
+"""A periodic line that the simulation lacks."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, ClassVar
+
+import numpy as np
+
+from ..joint.grid import uniform_grid
+from ..joint.pattern import Surroundings, line_columns, line_sum
+from ..joint.signals import Signals
+from ..regression.estimate import Parameters, quantity
+from ..regression.extension import Extension
+from ..regression.regression import Regression
+from .blindness import (
+    Blindness,
+)
+from .effect import Effect
+from .scale_error import ScaleError
+from .search import (
+    Array,
+    Fitted,
+    line_parameters,
+)
+from .torsional_compliance import TorsionalCompliance
+
+__all__ = ["MissingOrder"]
+
+FREE_ANGLES = (
+    "readings at jittered or free angles, or one more round with the artefact clamped "
+    "off the grid (plan with 'trueangle plan'; about 2.14 deg for 36 positions)"
+)
+
+#: Orders closer than this share of one over the turns covered, that explain at least this
+#: much of what the best one does, are hardly told apart.
+UNRESOLVED, ALIKE = 0.5, 0.9
+
+
+@dataclass(frozen=True)
+class MissingOrder(Effect):
+    r"""A periodic line: :math:`C \sin(k f \theta + \varphi)` of a shaft that turns f times.
+
+    Parameters
+    ----------
+    shaft : str
+    order : float
+    amplitude_arcsec, phase_deg : float
+    """
+
+    shaft: str
+    order: float
+    amplitude_arcsec: float
+    phase_deg: float = 0.0
+
+    kind: ClassVar[str] = "missing_order"
+    sentence: ClassVar[str] = "A periodic error of one shaft that the simulation does not have."
+    measure: ClassVar[str] = FREE_ANGLES
+    confused_with: ClassVar[Mapping[type[Effect], str]] = {
+        TorsionalCompliance: "a second load, or the base turned by 180 deg",
+        ScaleError: "more than one turn in a run",
+    }
+    located: ClassVar[bool] = True
+    is_separate: ClassVar[bool] = True
+    is_doubted: ClassVar[bool] = False
+
+    def signal(self, signals: Signals, around: Surroundings, rng: np.random.Generator) -> Array:
+        order = around.joint.output_order(self.shaft, self.order)
+        return line_sum(signals.theta, ((order, self.amplitude_arcsec, self.phase_deg),))
+
+    @classmethod
+    def propose(cls, regression: Regression) -> Extension | None:
+        gains = regression.line_gains()
+        lines = regression.lines
+        expected = int(lines.plausible.sum())
+        prices = 2.0 * np.log(np.where(lines.plausible, 2 * expected, 2 * gains.size))
+        best = int(np.argmax(gains - prices))
+        if gains[best] <= 0.0:
+            return None
+        # Over a part of a turn neighbouring orders are hardly told apart: a fast shaft's
+        # own order is then the likelier one.
+        away = np.abs(lines.orders - lines.orders[best]) * regression.signals.run_turns().max()
+        alike = np.flatnonzero((away < UNRESOLVED) & (gains > ALIKE * gains[best]))
+        named = [regression.around.joint.name_order(float(lines.orders[k])) for k in alike]
+        own = [k for k, name in zip(alike, named, strict=True) if name and name[0] != "output"]
+        if best not in own and own:
+            best = int(max(own, key=lambda k: gains[k] - prices[k]))
+        order = float(lines.orders[best])
+        return regression.propose(
+            cls.kind,
+            {
+                "output_order": order,
+                "alike": [float(lines.orders[k]) for k in alike if k != best],
+            },
+            line_columns(regression.signals.theta, order),
+            log_grid=float(prices[best] / 2.0),
+            line=order,
+        )
+
+    @classmethod
+    def columns(cls, signals: Signals, around: Surroundings, shape: dict[str, Any]) -> Array:
+        return line_columns(signals.theta, shape["output_order"])
+
+    @classmethod
+    def report(
+        cls, regression: Regression, terms: Sequence[Fitted]
+    ) -> tuple[Parameters, list[Effect]]:
+        extension, coefficients, covariance = terms[0]
+        output_order = extension.shape["output_order"]
+        joint = regression.around.joint
+        shaft, order = joint.name_order(output_order) or ("output", output_order)
+        amplitude, phase, std, phase_std = line_parameters(coefficients, covariance)
+        parameters = {
+            "shaft": quantity(shaft),
+            "order": quantity(order),
+            "output_order": quantity(output_order),
+            "amplitude_arcsec": quantity(amplitude, std),
+            "phase_deg": quantity(phase, phase_std),
+            "explanations": quantity(joint.explanations(output_order)),
+        }
+        if extension.shape["alike"]:
+            parameters["hardly_told_from_output_orders"] = quantity(extension.shape["alike"])
+        return parameters, [MissingOrder(shaft, order, amplitude, phase)]
+
+    @classmethod
+    def doubt(
+        cls, extension: Extension, regression: Regression, spots: Sequence[Blindness]
+    ) -> Blindness | None:
+        if extension.cause != cls.kind:
+            return None
+        order = float(extension.shape["output_order"])
+        torque = regression.signals.torque
+        grid = uniform_grid(regression.signals.theta)
+        for spot in spots:
+            if spot.factor == "grid" and grid is not None:
+                aliases = ", ".join(f"{m:g}" for m in grid.aliases(order, 3))
+                because = (
+                    f"order {order:g} and {aliases} are the same numbers at these "
+                    f"{grid.positions} positions; {spot.because}"
+                )
+                return replace(spot, because=because)
+        if order == 1.0 and len(regression.belief.joint.shafts) > 1:
+            for spot in spots:
+                if spot.causes == (TorsionalCompliance.kind,) and (torque is None or torque.any()):
+                    because = f"{spot.because}: order 1 may be gravity's"
+                    causes = (cls.kind, TorsionalCompliance.kind)
+                    return replace(spot, causes=causes, because=because)
+        return None
+
+    def to_lines(self) -> Sequence[tuple[str, float]]:
+        return ((self.shaft, self.order),)

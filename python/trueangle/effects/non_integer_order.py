@@ -1,0 +1,207 @@
+"""A line of free order with a new phase in every run."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from ..joint.pattern import Surroundings, line_columns
+from ..joint.signals import Signals
+from ..regression.estimate import Parameters, quantity
+from ..regression.extension import Extension
+from ..regression.regression import Regression
+from .blindness import (
+    Blindness,
+)
+from .drift_within_run import DriftWithinRun
+from .effect import ALWAYS, Effect
+from .missing_order import MissingOrder
+from .search import (
+    Array,
+    Fitted,
+    golden_maximum,
+)
+
+__all__ = ["NonIntegerOrder"]
+
+#: Trial orders per resolution cell (one order over the turns of a run).
+OVERSAMPLING = 3
+
+#: Lowest order searched, and cycles that a run must show: fewer are a bend, not a line.
+LOWEST, LEAST_CYCLES = 0.3, 2.0
+
+#: Trial orders at most; beyond, the grid stops at a lower order.
+MOST_TRIALS = 4096
+
+#: Orders nearer than this to a known line belong to that line: it changes from run to run.
+OWN_LINE = 0.1
+
+#: Share of a resolution cell (one order over the turns of a run) within which orders are
+#: hardly told apart.
+UNRESOLVED = 0.5
+
+#: Orders per turn of a shaft at which the cage of its bearing goes round: half of 1 less
+#: the ratio of ball to pitch diameter. Expected there, they pay less for the search.
+CAGE = (0.35, 0.48)
+
+#: Peaks of the quick search that are scored exactly.
+PEAKS = 4
+
+
+@dataclass(frozen=True)
+class NonIntegerOrder(Effect):
+    r"""A line whose phase is new in every run: :math:`C\sin(f\theta + \varphi_j)`.
+
+    Parameters
+    ----------
+    order : float
+        Cycles per output turn, not a whole number.
+    amplitude_arcsec : float
+    """
+
+    order: float
+    amplitude_arcsec: float
+
+    kind: ClassVar[str] = "non_integer_order"
+    sentence: ClassVar[str] = (
+        "A bearing's cage or balls roll with slip: a line at an order that is not whole, with "
+        "another phase in every run."
+    )
+    factor: ClassVar[str] = "run"
+    measure: ClassVar[str] = "several turns in one record, and several records, at free angles"
+    transfers: ClassVar[bool] = False
+    confused_with: ClassVar[Mapping[type[Effect], str]] = {
+        MissingOrder: "several turns in each run, and several runs",
+        DriftWithinRun: "several turns in each run",
+    }
+    located: ClassVar[bool] = True
+    flexible_below: ClassVar[float] = ALWAYS
+    not_at_run_time: ClassVar[str] = "its phase is new in every run"
+
+    def signal(self, signals: Signals, around: Surroundings, rng: np.random.Generator) -> Array:
+        phase = rng.uniform(0.0, 2.0 * np.pi, signals.runs)[signals.run]
+        return np.asarray(self.amplitude_arcsec * np.sin(self.order * signals.theta + phase))
+
+    @classmethod
+    def propose(cls, regression: Regression) -> Extension | None:
+        if regression.has(cls.kind):
+            return None
+        orders, power = cls._search(regression)
+        if orders.size == 0:
+            return None
+        best: Extension | None = None
+        step = orders[1] - orders[0]
+        price = cls._log_grid(regression, orders)
+        worth = power - 2.0 * price
+        peaks = np.flatnonzero((worth[1:-1] >= worth[:-2]) & (worth[1:-1] >= worth[2:])) + 1
+        for k in peaks[np.argsort(worth[peaks])[::-1][:PEAKS]]:
+            extension = cls._at(regression, float(orders[k]), float(price[k]))
+            if best is None or extension.bic_gain > best.bic_gain:
+                best = extension
+        if best is None or best.bic_gain < 0.0:
+            return best
+        middle, log_grid = best.shape["order"], best.log_grid
+        order, _ = golden_maximum(
+            lambda f: cls._at(regression, f, log_grid).deviance, middle - step, middle + step, 10
+        )
+        best = max(best, cls._at(regression, float(order), log_grid), key=lambda p: p.deviance)
+        near = np.abs(regression.around.pattern.orders - best.shape["order"])
+        if near.min(initial=1.0) < OWN_LINE or cls._keeps_phase(regression, best):
+            return None
+        return best
+
+    @staticmethod
+    def _keeps_phase(regression: Regression, found: Extension) -> bool:
+        """A searched order that the travel does not resolve from it explains as much.
+
+        Phases that are new in each of R runs leave a share of 1/R to one phase for all.
+        """
+        orders = regression.lines.orders
+        away = np.abs(orders - found.shape["order"])
+        alike = orders[away * regression.signals.run_turns().max() < UNRESOLVED]
+        share = 0.5 + 1.0 / regression.signals.runs
+        return any(
+            regression.gain(line_columns(regression.signals.theta, float(m)))[0]
+            > share * found.deviance
+            for m in alike
+        )
+
+    @staticmethod
+    def _log_grid(regression: Regression, orders: Array) -> Array:
+        """Logarithm of the independent orders searched: those of cages, or of all."""
+        cages = np.zeros(orders.size, dtype=bool)
+        for cycles in regression.around.joint.shafts.values():
+            cages |= (orders > CAGE[0] * cycles) & (orders < CAGE[1] * cycles)
+        # Half of the belief goes to either; the maximum over an order is like that of two
+        # independent ones.
+        counts = 4.0 * np.where(cages, cages.sum(), orders.size) / OVERSAMPLING
+        return np.asarray(np.log(np.maximum(counts, 2.0)))
+
+    @classmethod
+    def _at(cls, regression: Regression, order: float, log_grid: float) -> Extension:
+        return regression.propose_run_effect(
+            cls.kind, {"order": order}, line_columns(regression.signals.theta, order), log_grid
+        )
+
+    @staticmethod
+    def _search(regression: Regression) -> tuple[Array, Array]:
+        """Trial orders and the deviance of a run effect there, without cross terms."""
+        theta = regression.signals.theta
+        starts = np.array([start for start, _ in regression.bounds])
+        sizes = np.array([stop - start for start, stop in regression.bounds], dtype=np.float64)
+        turns = regression.signals.run_turns()
+        if sizes.min() < 8 or turns.max() <= 0.0:
+            return np.zeros(0), np.zeros(0)
+        top = float(regression.lines.orders.max()) * 0.75
+        low = max(LOWEST, LEAST_CYCLES / float(np.median(turns)))
+        # Half the mean rate of readings is as far as a run can tell.
+        step = 1.0 / (OVERSAMPLING * float(np.median(turns)))
+        count = int(min((top - low) / step, MOST_TRIALS))
+        if count < 3:
+            return np.zeros(0), np.zeros(0)
+        orders = low + step * np.arange(count, dtype=np.float64)
+        e = regression.left - regression.whiten.run_part(regression.left)
+        e = np.where(regression.wild, 0.0, e)
+        turn = np.exp(-1j * step * theta).astype(np.complex64)
+        wave = (e * np.exp(-1j * orders[0] * theta)).astype(np.complex64)
+        power = np.empty((count, starts.size))
+        for k in range(count):
+            sums = np.add.reduceat(wave, starts)
+            power[k] = sums.real**2 + sums.imag**2
+            wave *= turn
+        # P: sum of the two squared normalised coefficients per run, 2 on average.
+        p = 2.0 * power / (sizes * regression.variance)
+        best = np.zeros(count)
+        for ratio in np.geomspace(1e-3, 1e3, 13):
+            x = ratio * sizes
+            deviance = (p * (x / (2.0 + x))).sum(axis=1) - 2.0 * np.log1p(x / 2.0).sum()
+            best = np.maximum(best, deviance)
+        return orders, best
+
+    @classmethod
+    def report(
+        cls, regression: Regression, terms: Sequence[Fitted]
+    ) -> tuple[Parameters, list[Effect]]:
+        extension = terms[0][0]
+        assert extension.run_effect is not None
+        runs = regression.signals.runs
+        # Cosine and sine each of variance s^2: a mean square amplitude of 2 s^2.
+        amplitude = float(np.sqrt(2.0 * extension.run_effect.ratio * regression.variance))
+        noise = float(np.sqrt(2.0 * regression.variance / regression.n))
+        turns = float(np.median(regression.signals.run_turns()))
+        order_std = 0.780 * noise / np.sqrt(2.0) / max(amplitude, 1e-12) / turns
+        parameters = {
+            "order": quantity(extension.shape["order"], order_std),
+            "amplitude_arcsec": quantity(
+                amplitude, float(np.hypot(noise, amplitude / np.sqrt(4.0 * runs)))
+            ),
+        }
+        return parameters, [NonIntegerOrder(extension.shape["order"], amplitude)]
+
+    @classmethod
+    def blind_spots(cls, regression: Regression, found: Sequence[Blindness]) -> Iterator[Blindness]:
+        if regression.signals.runs < 2:
+            yield cls.blind("one run: a phase cannot change", MissingOrder)

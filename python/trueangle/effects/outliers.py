@@ -1,0 +1,177 @@
+"""Isolated readings that are far off."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from math import lgamma
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..joint.pattern import Surroundings
+from ..joint.signals import Signals
+from ..regression.estimate import Parameters, quantity
+from ..regression.regression import Regression
+from .effect import Effect
+from .local_defect import LocalDefect
+from .scatter import ScatterFinding, standardised
+from .search import (
+    Array,
+)
+
+__all__ = ["Outliers"]
+
+#: Degrees of freedom of heavy-tailed noise, sizes of wild readings to start from.
+TAILS = (2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 12.0, 20.0, 40.0)
+SIZES = (3.0, 10.0, 100.0)
+
+#: A wild reading's neighbours are smaller by this factor; of the stretches of wild
+#: readings at least this share must be such single ones.
+BESIDE = 0.5
+ISOLATED = 0.5
+
+#: Wild readings smaller than this many standard deviations hide in the noise: of sizes
+#: spread evenly up to ``size`` that is a share of ``HIDDEN / size``, which the form of the
+#: wide normal supplies and no reading shows. It counts as the fraction's uncertainty.
+HIDDEN = 3.0
+
+#: Steps of expectation-maximisation.
+EM_STEPS = 60
+
+SCALES = np.linspace(0.85, 1.1, 11)
+
+#: Evidence by which wild readings must beat mere heavy tails.
+BEYOND_TAILS = 2.0
+
+
+@dataclass(frozen=True)
+class Outliers(Effect):
+    """Isolated wild readings: a share of the readings gets a normal error of its own.
+
+    Parameters
+    ----------
+    fraction : float
+        Share of the readings.
+    size_arcsec : float
+        Standard deviation of their error.
+    """
+
+    fraction: float
+    size_arcsec: float
+
+    kind: ClassVar[str] = "outliers"
+    sentence: ClassVar[str] = (
+        "Single readings are wild (bit flips, glitches, mistaken entries) and their neighbours "
+        "are not."
+    )
+    factor: ClassVar[str] = "none"
+    measure: ClassVar[str] = "more readings, each taken twice"
+    transfers: ClassVar[bool] = False
+    confused_with: ClassVar[Mapping[type[Effect], str]] = {
+        LocalDefect: "a second pass over the same place",
+    }
+    not_at_run_time: ClassVar[str] = "a single reading does not tell a fault from a motion"
+
+    def signal(self, signals: Signals, around: Surroundings, rng: np.random.Generator) -> Array:
+        wild = rng.random(len(signals)) < self.fraction
+        return np.asarray(wild * self.size_arcsec * rng.standard_normal(len(signals)))
+
+    @classmethod
+    def find_scatter(cls, regression: Regression) -> ScatterFinding | None:
+        """Wild readings: a narrow and a wide normal must beat one normal and heavy tails."""
+        if regression.is_explained:
+            return None
+        e = standardised(regression)
+        n = regression.n
+        normal = max(_normal(e, s) for s in np.append(SCALES, np.linspace(1.15, 3.0, 24)))
+        tails = max(_student(e, nu, s) for nu in TAILS for s in SCALES)
+        value, share, size, scale = max(_two_normals(e, start) for start in SIZES)
+        value -= 0.5 * n * np.log(2.0 * np.pi)
+        gain = 2.0 * (value - normal) - 2.0 * regression.log_n
+        beyond = 2.0 * (value - tails) - regression.log_n
+        if gain <= 0.0 or beyond <= BEYOND_TAILS:
+            return None
+        x = e / scale
+        wide = share / size * np.exp(-0.5 * (x / size) ** 2)
+        chance = wide / (wide + (1.0 - share) * np.exp(-0.5 * x**2))
+        rows = np.flatnonzero(chance > 0.5)
+        alone = rows[_isolated(regression, rows)]
+        stretches = 1 + np.count_nonzero(np.diff(rows) > 1)
+        if alone.size < ISOLATED * stretches:
+            return None
+        rows = alone
+        spread = size * scale * np.sqrt(regression.variance)
+        std = float(np.sqrt(share * (1.0 - share) / n))
+        parameters: Parameters = {
+            "fraction": quantity(
+                float(share), max(std, float(share) * float(np.clip(HIDDEN / size, 0.2, 1.0)))
+            ),
+            "size_arcsec": quantity(float(spread), None),
+            "rows": quantity(
+                [
+                    [
+                        regression.signals.labels[int(regression.signals.run[k])],
+                        int(regression.signals.row[k]),
+                    ]
+                    for k in rows
+                ]
+            ),
+        }
+        weights = np.ones(n)
+        weights[rows] = 1e-6
+        return ScatterFinding(
+            cls.kind,
+            float(gain),
+            parameters,
+            [Outliers(float(share), float(spread))],
+            weights,
+            size,
+        )
+
+
+def _isolated(regression: Regression, rows: NDArray[np.int64]) -> NDArray[np.bool_]:
+    """Which of ``rows`` are far larger than the readings next to them in their run.
+
+    A glitch is over with the next reading; what lasts (a transition at a reversal, a
+    manoeuvre) is an error of the mean.
+    """
+    size = np.abs(regression.left - regression.whiten.run_part(regression.left))
+    padded = np.concatenate([[0.0], size, [0.0]])
+    first = np.array([start for start, _ in regression.bounds])
+    before, after = padded[:-2].copy(), padded[2:].copy()
+    before[first] = after[first[1:] - 1] = 0.0
+    return np.asarray(np.maximum(before, after)[rows] < BESIDE * size[rows])
+
+
+def _normal(e: Array, scale: float) -> float:
+    n = e.size
+    return -0.5 * float(e @ e) / scale**2 - n * float(np.log(scale) + 0.5 * np.log(2.0 * np.pi))
+
+
+def _student(e: Array, nu: float, scale: float) -> float:
+    constant = lgamma(0.5 * (nu + 1.0)) - lgamma(0.5 * nu) - 0.5 * float(np.log(np.pi * nu))
+    body = -0.5 * (nu + 1.0) * float(np.sum(np.log1p((e / scale) ** 2 / nu)))
+    return body + e.size * (constant - float(np.log(scale)))
+
+
+def _two_normals(e: Array, start: float) -> tuple[float, float, float, float]:
+    """Log-likelihood, share and relative size of the wide part, scale of the narrow one.
+
+    Expectation-maximisation from a share of 1 % and a size of ``start``.
+    """
+    share, size, scale = 0.01, start, 1.0
+    square = e**2
+    for _ in range(EM_STEPS):
+        narrow = (1.0 - share) * np.exp(-0.5 * square / scale**2)
+        wide = share / size * np.exp(-0.5 * square / (scale * size) ** 2)
+        chance = wide / np.maximum(narrow + wide, 1e-300)
+        share = float(np.clip(chance.mean(), 1.0 / e.size, 0.2))
+        kept = 1.0 - chance
+        scale = float(np.sqrt((kept @ square) / kept.sum()))
+        size = max(float(np.sqrt((chance @ square) / max(chance.sum(), 1e-300))) / scale, 2.0)
+    log_narrow = np.log1p(-share) - 0.5 * square / scale**2
+    log_wide = np.log(share / size) - 0.5 * square / (scale * size) ** 2
+    value = float(np.logaddexp(log_narrow, log_wide).sum()) - e.size * float(np.log(scale))
+    return value, share, size, scale

@@ -1,0 +1,306 @@
+"""Friction that winds the gear up over a length after each reversal."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+
+from ..correction import forms
+from ..correction.forms import Form
+from ..correction.term import Term, from_arcsec
+from ..joint.pattern import Surroundings
+from ..joint.signals import Signals
+from ..regression.estimate import Parameters, quantity
+from ..regression.extension import Extension
+from ..regression.regression import Regression
+from .backlash import (
+    ONE_WAY,
+    PLACE_ORDERS,
+    Backlash,
+    everywhere,
+    goes_both_ways,
+    place_lines,
+    place_parameters,
+    play_columns,
+)
+from .blindness import (
+    Blindness,
+    share_left,
+)
+from .effect import Effect
+from .latency import TWO_SPEEDS, Latency
+from .search import (
+    Array,
+    Fitted,
+    golden_maximum,
+)
+
+__all__ = ["PreslidingHysteresis", "PreslidingHysteresisTerm"]
+
+_AFTER_REVERSAL = (
+    "record the first 10 to 30 deg after each reversal in steps of 0.3 deg or less, "
+    "with several reversal points"
+)
+
+#: Share of a presliding transition's power that plain backlash must leave: it is short by
+#: nature.
+OWN_OF_TRANSITION = 1e-3
+
+#: Elements of a Maxwell-slip model at most, and the ratio of lengths that keeps them apart.
+MOST_ELEMENTS = 3
+APART = 2.5
+
+#: Transition lengths searched, degrees.
+LENGTHS = np.geomspace(0.15, 60.0, 15)
+
+
+@dataclass(frozen=True)
+class PreslidingHysteresis(Effect):
+    r"""Reversal error with a transition length L (Dahl): :math:`\varepsilon = h\,z(s)`.
+
+    .. math:: z(s) = d - (d - z_0)\,e^{-s/L}
+
+    for travel s since the reversal, z_0 being the state there.
+
+    Parameters
+    ----------
+    amplitude_arcsec : float
+        h: half of the reversal error far from the reversal.
+    length_deg : float
+        L: travel in which it builds up.
+    start_state : float
+        Share of the wind-up that is there when a run starts: 0 relaxed, 1 run in.
+    """
+
+    amplitude_arcsec: float
+    length_deg: float
+    start_state: float = 0.0
+
+    kind: ClassVar[str] = "presliding_hysteresis"
+    sentence: ClassVar[str] = (
+        "Friction winds up the elastic parts after each reversal: the error moves from one "
+        "branch to the other over a transition length and remembers where it turned."
+    )
+    factor: ClassVar[str] = "direction"
+    measure: ClassVar[str] = _AFTER_REVERSAL
+    confused_with: ClassVar[Mapping[type[Effect], str]] = {
+        Backlash: _AFTER_REVERSAL,
+        Latency: TWO_SPEEDS,
+    }
+    contains: ClassVar[tuple[type[Effect], ...]] = (Backlash,)
+    acts_on_runs: ClassVar[bool] = True
+    located: ClassVar[bool] = True
+
+    def signal(self, signals: Signals, around: Surroundings, rng: np.random.Generator) -> Array:
+        return self.amplitude_arcsec * signals.presliding(self.length_deg, self.start_state)
+
+    @classmethod
+    def propose(cls, regression: Regression) -> Extension | None:
+        signals = regression.signals
+        if np.ptp(signals.direction) == 0.0 and not signals.travel.any():
+            return None
+        best: tuple[float, float, float] | None = None
+        for start in (0.0, 1.0):
+            columns = regression.remembered(
+                f"presliding {start}",
+                None,
+                lambda start=start: np.column_stack(  # type: ignore[misc]
+                    [signals.presliding(length, start) for length in LENGTHS]
+                ),
+            )
+            gains = regression.gains(columns)
+            k = int(np.argmax(gains))
+            if best is None or gains[k] > best[0] + 1e-9:
+                best = (float(gains[k]), float(LENGTHS[k]), start)
+        assert best is not None
+        gain, length, start = best
+        present = [
+            term.shape["length_deg"]
+            for term in regression.terms
+            if term.cause == cls.kind and everywhere(term)
+        ]
+        if gain <= 0.0 or len(present) >= MOST_ELEMENTS:
+            return None
+        step = np.log(LENGTHS[1] / LENGTHS[0])
+        log_length, _ = golden_maximum(
+            lambda x: float(regression.gains(signals.presliding(np.exp(x), start)[:, None])[0]),
+            np.log(length) - step,
+            np.log(length) + step,
+        )
+        shape = {"length_deg": float(np.exp(log_length)), "start_state": start}
+        columns = cls.columns(signals, regression.around, shape)
+        extension = regression.propose(cls.kind, shape, columns, parameters=2, log_grid=np.log(2.0))
+        if not regression.has(cls.kind):
+            return extension
+        # What may follow: play, play that varies with the place, another element.
+        further = [cls._play(regression, order) for order in (0, *PLACE_ORDERS)]
+        apart = all(
+            other == 0.0 or abs(np.log(shape["length_deg"] / other)) > np.log(APART)
+            for other in present
+        )
+        if apart:
+            further.append(extension)
+        further.sort(key=lambda p: -p.bic_gain)
+        return next(
+            (p for p in further if p.bic_gain > 0.0 and cls._pulls_back(regression, p)), None
+        )
+
+    @classmethod
+    def _pulls_back(cls, regression: Regression, extension: Extension) -> bool:
+        """With this term all elements have one sign, as springs have.
+
+        Elements of unlike signs would only be a difference of two that are alike.
+        """
+        after = regression.coefficients_with(extension)
+        elements = [float(extension.coefficients[0])] if everywhere(extension) else []
+        at = regression.base.shape[1]
+        for term in regression.terms:
+            if term.cause == cls.kind and everywhere(term):
+                elements.append(float(after[at]))
+            at += term.columns.shape[1]
+        return not elements or min(elements) * max(elements) > 0.0
+
+    @classmethod
+    def _play(cls, regression: Regression, order: int) -> Extension:
+        shape = {"length_deg": 0.0, "order": order}
+        columns = cls.columns(regression.signals, regression.around, shape)
+        log_grid = float(np.log(len(PLACE_ORDERS))) if order else 0.0
+        return regression.propose(cls.kind, shape, columns, log_grid=log_grid)
+
+    @classmethod
+    def columns(cls, signals: Signals, around: Surroundings, shape: dict[str, Any]) -> Array:
+        if shape["length_deg"] == 0.0:
+            return play_columns(signals, shape["order"])
+        return signals.presliding(shape["length_deg"], shape["start_state"])[:, None]
+
+    @classmethod
+    def report(
+        cls, regression: Regression, terms: Sequence[Fitted]
+    ) -> tuple[Parameters, list[Effect]]:
+        lines = place_lines(terms)
+        terms = [term for term in terms if everywhere(term[0])]
+        total = sum(float(c[0]) for _, c, _ in terms)
+        std = float(np.sqrt(sum(v[0, 0] for _, _, v in terms)))
+        weights = np.array([abs(float(c[0])) for _, c, _ in terms])
+        lengths = np.array([t.shape["length_deg"] for t, _, _ in terms])
+        length = float(weights @ lengths / weights.sum()) if terms else 0.0
+        effects: list[Effect] = [
+            PreslidingHysteresis(float(c[0]), t.shape["length_deg"], t.shape["start_state"])
+            if t.shape["length_deg"] > 0.0
+            else Backlash(float(c[0]))
+            for t, c, _ in terms
+        ]
+        if lines:
+            effects.append(Backlash(0.0, tuple((m, a, p) for m, a, p, _, _ in lines)))
+        parameters = {
+            "amplitude_arcsec": quantity(total, std),
+            "length_deg": quantity(
+                length,
+                cls._length_std(regression, terms[int(np.argmax(weights))]) if terms else None,
+            ),
+        }
+        if len(terms) > 1:
+            parameters["element_lengths_deg"] = quantity(lengths)
+            parameters["element_amplitudes_arcsec"] = quantity([float(c[0]) for _, c, _ in terms])
+        return parameters | place_parameters(lines), effects
+
+    @classmethod
+    def _length_std(
+        cls, regression: Regression, term: tuple[Extension, Array, Array]
+    ) -> float | None:
+        """From the curvature: the column's derivative by ln L, all else projected out."""
+        extension, coefficients, _ = term
+        length = extension.shape["length_deg"]
+        if length == 0.0:
+            return None
+        start, signals, step = extension.shape["start_state"], regression.signals, 0.02
+        derivative = (
+            coefficients[0]
+            * (
+                signals.presliding(length * np.exp(step), start)
+                - signals.presliding(length * np.exp(-step), start)
+            )
+            / (2.0 * step)
+        )
+        x, _ = regression.projected(derivative[:, None])
+        information = float(x[:, 0] @ x[:, 0])
+        return (
+            length * float(np.sqrt(regression.variance / information)) if information > 0 else None
+        )
+
+    @classmethod
+    def blind_spots(cls, regression: Regression, found: Sequence[Blindness]) -> Iterator[Blindness]:
+        signals = regression.signals
+        if signals.velocity is None and bool(np.ptp(signals.direction) > 0.0):
+            yield cls.blind(
+                "velocity is unknown: a delay looks like a reversal error, and one that builds up "
+                "where the joint gathers speed",
+                Backlash,
+                Latency,
+                first=False,
+                factor="velocity",
+            )
+        if not goes_both_ways(signals):
+            yield cls.blind(ONE_WAY)
+            return
+        direction = signals.direction[:, None]
+        transitions = np.column_stack(
+            [signals.presliding(length, 1.0) for length in (1.0, 3.0, 10.0)]
+        )
+        if share_left(regression, transitions, direction) < OWN_OF_TRANSITION:
+            yield cls.blind(
+                "no reversal inside a run is followed closely: a wound-up spring and play give "
+                "the same two branches",
+                Backlash,
+            )
+
+    def to_terms(self, period: float, shafts: Mapping[str, float]) -> tuple[Term, ...]:
+        amplitude = from_arcsec(self.amplitude_arcsec, period)
+        length = self.length_deg * (period / 360.0)
+        return (PreslidingHysteresisTerm(amplitude, length, self.start_state),)
+
+
+@dataclass(frozen=True, repr=False)
+class PreslidingHysteresisTerm(Term):
+    r"""Friction that winds the gear up over a length: :math:`\varepsilon = h\,z(s)`.
+
+    .. math:: \frac{dz}{ds} = \frac{d - z}{L},\qquad z(s) = d - (d - z_0)\,e^{-s/L}
+
+    for travel s since the last reversal, where the state was :math:`z_0` (Dahl); after a
+    long stretch :math:`z_0 = -d` and :math:`z = d\,(1 - 2e^{-s/L})`. Several elements of
+    different lengths add up to a Maxwell-slip model.
+
+    Parameters
+    ----------
+    amplitude : float
+        h: half of the reversal error far from the reversal.
+    length : float
+        L > 0: travel in which it builds up.
+    start : float
+        Share of the wind-up that is there at the first motion, in its direction: 0 for a
+        relaxed joint, 1 for one that has been run in.
+
+    Notes
+    -----
+    Without ``direction`` or ``velocity`` every step back is travel: noise at rest then
+    wears the state down. Give one of them where the joint rests between motions.
+    """
+
+    amplitude: float
+    length: float
+    start: float = 0.0
+
+    kind: ClassVar[str] = "presliding_hysteresis"
+    follows_travel: ClassVar[bool] = True
+
+    def check(self) -> None:
+        if self.length <= 0.0:
+            raise self._out_of_range("length", "positive")
+        if not 0.0 <= self.start <= 1.0:
+            raise self._out_of_range("start", "from 0 to 1")
+
+    def forms(self) -> tuple[Form, ...]:
+        return (forms.Friction(self.amplitude, self.length, self.start),)

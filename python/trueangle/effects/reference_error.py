@@ -1,0 +1,148 @@
+"""Errors of the reference, which turn with its mount."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, ClassVar
+
+import numpy as np
+
+from ..errors import ArgumentError
+from ..joint.pattern import Surroundings, line_columns, line_sum
+from ..joint.signals import Signals
+from ..regression.estimate import Parameters, quantity
+from ..regression.extension import Extension
+from ..regression.regression import Regression
+from .blindness import (
+    Blindness,
+)
+from .effect import Effect
+from .missing_order import MissingOrder
+from .search import (
+    Array,
+    Fitted,
+    best_shape,
+    is_gear_order,
+    line_parameters,
+)
+from .torsional_compliance import TorsionalCompliance
+
+__all__ = ["ReferenceLines"]
+
+#: Orders of the reference that are searched.
+REFERENCE_ORDERS = range(1, 37)
+
+
+@dataclass(frozen=True)
+class ReferenceLines(Effect):
+    r"""Error of the reference, which turns with its mount: lines in :math:`\theta + \psi`.
+
+    Parameters
+    ----------
+    orders, amplitudes_arcsec, phases_deg : list of float
+        ``C sin(h (theta + psi) + phase)`` with the mount angle psi.
+    mount_sign : {1, -1}
+        -1 where the mount angle was counted the other way.
+    """
+
+    orders: tuple[float, ...]
+    amplitudes_arcsec: tuple[float, ...]
+    phases_deg: tuple[float, ...]
+    mount_sign: float = 1.0
+
+    kind: ClassVar[str] = "reference_error"
+    sentence: ClassVar[str] = (
+        "The reference (polygon, table, encoder) has an error of its own or sits off centre: it "
+        "turns with the reference's mount and is not the joint's."
+    )
+    needs: ClassVar[tuple[str, ...]] = ("mount",)
+    factor: ClassVar[str] = "mount"
+    measure: ClassVar[str] = (
+        "turn the reference on its mount by unlike angles (0, 130, 250 deg) and repeat"
+    )
+    confused_with: ClassVar[Mapping[type[Effect], str]] = {
+        TorsionalCompliance: "a second load and a turned reference",
+        MissingOrder: "turn the reference on its mount (0, 130, 250 deg)",
+    }
+    located: ClassVar[bool] = True
+    acts_on_runs: ClassVar[bool] = True
+    not_at_run_time: ClassVar[str] = "it is an error of the reference, not of the joint"
+
+    def __post_init__(self) -> None:
+        if not len(self.orders) == len(self.amplitudes_arcsec) == len(self.phases_deg):
+            raise ArgumentError("orders, amplitudes_arcsec and phases_deg must be equally long")
+
+    def signal(self, signals: Signals, around: Surroundings, rng: np.random.Generator) -> Array:
+        lines = tuple(zip(self.orders, self.amplitudes_arcsec, self.phases_deg, strict=True))
+        return line_sum(self.angle(signals, self.mount_sign), lines)
+
+    @staticmethod
+    def angle(signals: Signals, mount_sign: float) -> Array:
+        """Angle on the reference artefact, radians."""
+        if signals.mount is None:
+            return signals.theta
+        return np.asarray(signals.theta + mount_sign * signals.mount)
+
+    @classmethod
+    def propose(cls, regression: Regression) -> Extension | None:
+        mount = regression.signals.mount
+        if mount is None or np.ptp(mount) == 0.0:
+            return None
+        shapes = [
+            {"order": float(h), "mount_sign": sign}
+            for h in REFERENCE_ORDERS
+            for sign in (1.0, -1.0)
+        ]
+        # Low orders are likelier by far, as of any rotary part.
+        return best_shape(
+            cls, regression, shapes, [float(np.log(4.0 * s["order"])) for s in shapes]
+        )
+
+    @classmethod
+    def columns(cls, signals: Signals, around: Surroundings, shape: dict[str, Any]) -> Array:
+        return line_columns(ReferenceLines.angle(signals, shape["mount_sign"]), shape["order"])
+
+    @classmethod
+    def report(
+        cls, regression: Regression, terms: Sequence[Fitted]
+    ) -> tuple[Parameters, list[Effect]]:
+        rows = [
+            (t.shape["order"], *line_parameters(c, v), t.shape["mount_sign"]) for t, c, v in terms
+        ]
+        parameters = {
+            "orders": quantity([row[0] for row in rows]),
+            "amplitudes": quantity([row[1] for row in rows], [row[3] for row in rows]),
+            "phases_deg": quantity([row[2] for row in rows], [row[4] for row in rows]),
+            "mount_sign": quantity([row[5] for row in rows]),
+        }
+        effects: list[Effect] = [
+            ReferenceLines((row[0],), (row[1],), (row[2],), row[5]) for row in rows
+        ]
+        return parameters, effects
+
+    @classmethod
+    def blind_spots(cls, regression: Regression, found: Sequence[Blindness]) -> Iterator[Blindness]:
+        mount = regression.signals.mount
+        if mount is None:
+            yield cls.blind("the mount of the reference was not recorded")
+        elif np.ptp(mount) == 0.0:
+            spot = cls.blind(
+                "the reference was never turned on its mount: its error and the joint's are the "
+                "same function of angle",
+                MissingOrder,
+            )
+            yield replace(spot, measure=cls.measure)
+
+    @classmethod
+    def doubt(
+        cls, extension: Extension, regression: Regression, spots: Sequence[Blindness]
+    ) -> Blindness | None:
+        if extension.cause != MissingOrder.kind or regression.signals.mount is None:
+            return None
+        order = float(extension.shape["output_order"])
+        if order <= REFERENCE_ORDERS[-1] and not is_gear_order(regression.belief, order):
+            for spot in spots:
+                if cls.kind in spot.causes:
+                    return replace(spot, causes=(MissingOrder.kind, cls.kind))
+        return None

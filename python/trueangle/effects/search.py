@@ -1,0 +1,110 @@
+"""What searches have in common: the best of many shapes, lines from pairs, one peak."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, Any, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..joint.pattern import Surroundings
+from ..regression.batch import Blocks
+from ..regression.extension import Extension
+from ..regression.regression import Regression
+
+if TYPE_CHECKING:
+    from .effect import Effect
+
+__all__ = [
+    "Array",
+    "Fitted",
+    "best_shape",
+    "golden_maximum",
+    "is_gear_order",
+    "known_orders",
+    "line_parameters",
+]
+
+Array: TypeAlias = NDArray[np.float64]
+
+#: A chosen term with its coefficients and their covariance.
+Fitted: TypeAlias = tuple[Extension, Array, Array]
+
+_GOLDEN = (5.0**0.5 - 1.0) / 2.0
+
+
+def best_shape(
+    effect: type[Effect],
+    regression: Regression,
+    shapes: Sequence[dict[str, Any]],
+    log_grids: Sequence[float],
+    extra: Sequence[int] | None = None,
+) -> Extension | None:
+    """The extension of the shape with the most evidence; all are scored at once.
+
+    ``extra`` counts the parameters of a shape that are no coefficients.
+    """
+    if not shapes:
+        return None
+    signals, around = regression.signals, regression.around
+    blocks: Blocks = regression.remembered(
+        effect.kind,
+        repr(shapes),
+        lambda: Blocks([effect.columns(signals, around, shape) for shape in shapes]),
+    )
+    more = np.zeros(len(shapes)) if extra is None else np.asarray(extra)
+    penalty = more * regression.log_n + 2.0 * np.asarray(log_grids)
+    for where, width, _, _ in blocks.groups:
+        penalty[where] += width * regression.log_n
+    k = int(np.argmax(regression.block_gains(blocks) - penalty))
+    columns = effect.columns(signals, around, shapes[k])
+    parameters = columns.shape[1] + int(more[k])
+    return regression.propose(effect.kind, shapes[k], columns, parameters, float(log_grids[k]))
+
+
+def line_parameters(coefficients: Array, covariance: Array) -> tuple[float, float, float, float]:
+    """Amplitude, phase (deg) and their standard deviations of ``A cos + B sin``."""
+    a, b = float(coefficients[0]), float(coefficients[1])
+    amplitude = float(np.hypot(a, b))
+    phase = float(np.degrees(np.arctan2(a, b)) % 360.0)
+    if amplitude == 0.0:
+        return 0.0, phase, float(np.sqrt(covariance[0, 0])), 180.0
+    along = np.array([a, b]) / amplitude
+    across = np.array([b, -a]) / amplitude
+    std = float(np.sqrt(along @ covariance @ along))
+    turn = float(np.degrees(np.sqrt(across @ covariance @ across) / amplitude))
+    return amplitude, phase, std, min(turn, 180.0)
+
+
+def golden_maximum(
+    function: Callable[[float], float], low: float, high: float, steps: int = 14
+) -> tuple[float, float]:
+    """Place and value of the maximum of a function with one peak in [low, high]."""
+    a, b = low, high
+    c, d = b - _GOLDEN * (b - a), a + _GOLDEN * (b - a)
+    fc, fd = function(c), function(d)
+    for _ in range(steps):
+        if fc > fd:
+            b, d, fd = d, c, fc
+            c = b - _GOLDEN * (b - a)
+            fc = function(c)
+        else:
+            a, c, fc = c, d, fd
+            d = a + _GOLDEN * (b - a)
+            fd = function(d)
+    return (c, fc) if fc > fd else (d, fd)
+
+
+def known_orders(around: Surroundings) -> list[float]:
+    """Orders of the pattern and those that gears and encoders are known to have."""
+    joint = around.joint
+    orders = {float(m) for m in around.pattern.orders}
+    orders |= {joint.output_order(shaft, k) for shaft, k in joint.gear_orders()}
+    return sorted(orders)
+
+
+def is_gear_order(around: Surroundings, order: float) -> bool:
+    """An order of the motor or the wave generator."""
+    named = around.joint.name_order(order)
+    return named is not None and named[0] != "output"

@@ -1,0 +1,146 @@
+"""Lines beside a gear order: its amplitude or phase is modulated."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+
+from ..errors import ArgumentError
+from ..joint.pattern import Surroundings, line_columns, line_sum
+from ..joint.signals import Signals
+from ..regression.estimate import Parameters, quantity
+from ..regression.extension import Extension
+from ..regression.regression import Regression
+from .effect import Effect
+from .missing_order import FREE_ANGLES, MissingOrder
+from .search import (
+    Array,
+    Fitted,
+    best_shape,
+    known_orders,
+    line_parameters,
+)
+
+__all__ = ["Sidebands"]
+
+#: Periods of the modulation that a run must cover for sidebands to be looked for.
+RESOLVED = 0.75
+
+
+@dataclass(frozen=True)
+class Sidebands(Effect):
+    """Lines beside a gear order: its amplitude or phase is modulated once or twice a turn.
+
+    Parameters
+    ----------
+    carrier : float
+        Output order of the modulated line.
+    offsets, amplitudes_arcsec, phases_deg : list of float
+        Lines at ``carrier + offset``.
+    """
+
+    carrier: float
+    offsets: tuple[float, ...]
+    amplitudes_arcsec: tuple[float, ...]
+    phases_deg: tuple[float, ...]
+
+    kind: ClassVar[str] = "sidebands"
+    sentence: ClassVar[str] = (
+        "Eccentricity or tilt at the output changes the depth of mesh as it turns: a gear line "
+        "is modulated and has neighbours one or two orders away."
+    )
+    measure: ClassVar[str] = FREE_ANGLES
+    confused_with: ClassVar[Mapping[type[Effect], str]] = {MissingOrder: FREE_ANGLES}
+    located: ClassVar[bool] = True
+
+    def __post_init__(self) -> None:
+        if not len(self.offsets) == len(self.amplitudes_arcsec) == len(self.phases_deg):
+            raise ArgumentError("offsets, amplitudes_arcsec and phases_deg must be equally long")
+
+    def signal(self, signals: Signals, around: Surroundings, rng: np.random.Generator) -> Array:
+        lines = zip(self.offsets, self.amplitudes_arcsec, self.phases_deg, strict=True)
+        return line_sum(signals.theta, tuple((self.carrier + o, a, p) for o, a, p in lines))
+
+    @classmethod
+    def propose(cls, regression: Regression) -> Extension | None:
+        joint = regression.around.joint
+        carriers = []
+        for m in known_orders(regression.around):
+            named = joint.name_order(m)
+            if named is not None and named[0] != "output":
+                carriers.append(m)
+        present = {float(m) for m in regression.around.pattern.orders}
+        travel = regression.signals.run_turns().max()
+        shapes: list[dict[str, Any]] = []
+        # Over less than that the pair and the line between them are hardly told apart.
+        offsets = [k for k in (1, 2) if k * travel > RESOLVED]
+        for m in carriers:
+            for k in offsets:
+                if m in present:
+                    shapes += [{"carrier": m, "offset": k, "form": f} for f in ("AM", "PM")]
+                shapes.append({"carrier": m, "offset": k, "form": "free"})
+        log_grid = float(np.log(max(len(shapes), 1)))
+        return best_shape(cls, regression, shapes, [log_grid] * len(shapes))
+
+    @classmethod
+    def columns(cls, signals: Signals, around: Surroundings, shape: dict[str, Any]) -> Array:
+        theta, carrier, k = signals.theta, shape["carrier"], shape["offset"]
+        if shape["form"] == "free":
+            return np.hstack([line_columns(theta, carrier - k), line_columns(theta, carrier + k)])
+        a, b = cls._carrier(around, carrier)
+        if shape["form"] == "PM":
+            a, b = b, -a
+        x = carrier * theta
+        line = a * np.cos(x) + b * np.sin(x)
+        return np.asarray(line[:, None] * line_columns(theta, k))
+
+    @staticmethod
+    def _carrier(around: Surroundings, carrier: float) -> tuple[float, float]:
+        pattern = around.pattern
+        k = int(np.argmin(np.abs(pattern.orders - carrier)))
+        return float(pattern.cosine[k]), float(pattern.sine[k])
+
+    @classmethod
+    def _bands(
+        cls, around: Surroundings, extension: Extension, coefficients: Array, covariance: Array
+    ) -> tuple[Array, Array]:
+        """Cosine and sine of the lower and upper line and their covariance."""
+        shape = extension.shape
+        if shape["form"] == "free":
+            return coefficients, covariance
+        a, b = cls._carrier(around, shape["carrier"])
+        if shape["form"] == "PM":
+            a, b = b, -a
+        # (a cos x + b sin x) cos y and sin y in cosines and sines of x - y and x + y.
+        map_ = 0.5 * np.array([[a, -b], [b, a], [a, b], [b, -a]])
+        return map_ @ coefficients, map_ @ covariance @ map_.T
+
+    @classmethod
+    def report(
+        cls, regression: Regression, terms: Sequence[Fitted]
+    ) -> tuple[Parameters, list[Effect]]:
+        effects: list[Effect] = []
+        rows = []
+        for extension, coefficients, covariance in terms:
+            pair, spread = cls._bands(regression.around, extension, coefficients, covariance)
+            k, carrier = extension.shape["offset"], extension.shape["carrier"]
+            for j, offset in ((0, -k), (2, k)):
+                line = line_parameters(pair[j : j + 2], spread[j : j + 2, j : j + 2])
+                rows.append((carrier, offset, *line))
+            lower, upper = rows[-2:]
+            effects.append(Sidebands(carrier, (-k, k), (lower[2], upper[2]), (lower[3], upper[3])))
+        parameters = {
+            "carrier": quantity(rows[0][0]),
+            "amplitudes": quantity([row[2] for row in rows], [row[4] for row in rows]),
+            "orders": quantity([row[0] + row[1] for row in rows]),
+            "phases_deg": quantity([row[3] for row in rows], [row[5] for row in rows]),
+        }
+        if any(row[0] != rows[0][0] for row in rows):
+            parameters["carriers"] = quantity([row[0] for row in rows])
+        return parameters, effects
+
+    def to_lines(self) -> Sequence[tuple[str, float]]:
+        return tuple(("output", self.carrier + offset) for offset in self.offsets)

@@ -1,0 +1,241 @@
+"""A spring that stiffens with torque."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+
+from ..correction import forms
+from ..correction.forms import Form
+from ..correction.term import Term, from_arcsec
+from ..joint.pattern import Surroundings, line_columns
+from ..joint.signals import Signals
+from ..regression.estimate import Parameters, quantity
+from ..regression.extension import Extension
+from ..regression.regression import Regression
+from .blindness import (
+    OWN_POWER,
+    Blindness,
+    share_left,
+)
+from .effect import Effect
+from .search import (
+    Array,
+    Fitted,
+    best_shape,
+)
+from .torsional_compliance import TorsionalCompliance, torque_of, unloaded
+
+__all__ = ["StiffeningCompliance", "StiffeningComplianceTerm"]
+
+#: Knees searched, in shares of the largest torque.
+KNEES = (0.2, 0.35, 0.5, 0.65, 0.8)
+
+
+@dataclass(frozen=True)
+class StiffeningCompliance(Effect):
+    r"""A spring that stiffens: :math:`\varepsilon = c_1\tau + c_3\tau^3 + c_k\,h(\tau)`.
+
+    h is the torque beyond a knee, :math:`h = \mathrm{sign}(\tau)\max(|\tau| - \tau_k, 0)`
+    (the catalogue's K1, K2).
+
+    Parameters
+    ----------
+    arcsec_per_Nm, arcsec_per_Nm3 : float
+        c_1 and c_3.
+    beyond_knee_arcsec_per_Nm, knee_Nm : float
+        c_k and the knee.
+    gravity_deg : float or NaN
+        Where finite, the moment is :math:`\tau\sin(\theta - \theta_g)` of the load in
+        the torque column.
+    """
+
+    arcsec_per_Nm: float = 0.0
+    arcsec_per_Nm3: float = 0.0
+    beyond_knee_arcsec_per_Nm: float = 0.0
+    knee_Nm: float = 0.0
+    gravity_deg: float | None = None
+
+    kind: ClassVar[str] = "stiffening_compliance"
+    sentence: ClassVar[str] = (
+        "The gear stiffens under torque, as K1 and K2 of its catalogue say: the wind-up grows "
+        "less than in proportion, which under gravity leaves orders 1 and 3."
+    )
+    needs: ClassVar[tuple[str, ...]] = ("torque",)
+    factor: ClassVar[str] = "torque"
+    measure: ClassVar[str] = "repeat the runs at three or more loads of both signs"
+    confused_with: ClassVar[Mapping[type[Effect], str]] = {
+        TorsionalCompliance: "three loads or more, of both signs",
+    }
+    contains: ClassVar[tuple[type[Effect], ...]] = (TorsionalCompliance,)
+    acts_on_runs: ClassVar[bool] = True
+    located: ClassVar[bool] = True
+
+    def signal(self, signals: Signals, around: Surroundings, rng: np.random.Generator) -> Array:
+        torque = self.moment(signals, self.gravity_deg)
+        return np.asarray(
+            self.arcsec_per_Nm * torque
+            + self.arcsec_per_Nm3 * torque**3
+            + self.beyond_knee_arcsec_per_Nm * self.beyond(torque, self.knee_Nm)
+        )
+
+    @staticmethod
+    def moment(signals: Signals, gravity_deg: float | None) -> Array:
+        """The torque itself, or the moment of the load it states."""
+        torque = torque_of(signals)
+        if gravity_deg is None:
+            return torque
+        return np.asarray(torque * np.sin(signals.theta - np.radians(gravity_deg)))
+
+    @staticmethod
+    def beyond(torque: Array, knee: float) -> Array:
+        """Torque beyond a knee, with its sign."""
+        return np.asarray(np.sign(torque) * np.maximum(np.abs(torque) - knee, 0.0))
+
+    @classmethod
+    def propose(cls, regression: Regression) -> Extension | None:
+        torque = regression.signals.torque
+        if torque is None or not torque.any() or regression.has(cls.kind):
+            return None
+        shapes: list[dict[str, Any]] = []
+        if np.unique(np.round(torque / np.abs(torque).max(), 3)).size >= 3:
+            shapes += [{"power": 3, "gravity_deg": None}]
+            shapes += [{"knee_share": k, "gravity_deg": None} for k in KNEES]
+        if cls._constant_in_runs(regression.signals):
+            gravity = cls._gravity(regression)
+            shapes += [{"power": 3, "gravity_deg": gravity}]
+            shapes += [{"knee_share": k, "gravity_deg": gravity} for k in KNEES]
+        for shape in shapes:
+            if "knee_share" in shape:
+                moment = StiffeningCompliance.moment(regression.signals, shape["gravity_deg"])
+                shape["knee_Nm"] = float(shape.pop("knee_share") * np.abs(moment).max())
+        extra = [0 if shape["gravity_deg"] is None else 1 for shape in shapes]
+        return best_shape(cls, regression, shapes, [float(np.log(2.0))] * len(shapes), extra)
+
+    @staticmethod
+    def _constant_in_runs(signals: Signals) -> bool:
+        assert signals.torque is not None
+        return all(
+            np.ptp(signals.torque[start:stop]) < 1e-6 * np.abs(signals.torque).max()
+            for start, stop in signals.run_bounds()
+        )
+
+    @staticmethod
+    def _gravity(regression: Regression) -> float:
+        """Angle of the vertical: where the moment's first order has no phase."""
+        assert regression.signals.torque is not None
+        columns = regression.signals.torque[:, None] * line_columns(regression.signals.theta, 1.0)
+        _, (a, b) = regression.gain(columns)
+        return float(-np.degrees(np.arctan2(a, b)))
+
+    @classmethod
+    def columns(cls, signals: Signals, around: Surroundings, shape: dict[str, Any]) -> Array:
+        moment = StiffeningCompliance.moment(signals, shape["gravity_deg"])
+        if "power" in shape:
+            second = moment**3
+        else:
+            second = StiffeningCompliance.beyond(moment, shape["knee_Nm"])
+        return np.column_stack([moment, second])
+
+    @classmethod
+    def report(
+        cls, regression: Regression, terms: Sequence[Fitted]
+    ) -> tuple[Parameters, list[Effect]]:
+        extension, coefficients, covariance = terms[0]
+        std = np.sqrt(np.diag(covariance))
+        shape = extension.shape
+        parameters: Parameters = {"arcsec_per_Nm": quantity(coefficients[0], std[0])}
+        gravity = shape["gravity_deg"]
+        if "power" in shape:
+            parameters["arcsec_per_Nm3"] = quantity(coefficients[1], std[1])
+            effect = StiffeningCompliance(
+                float(coefficients[0]), float(coefficients[1]), gravity_deg=gravity
+            )
+        else:
+            parameters["beyond_knee_arcsec_per_Nm"] = quantity(coefficients[1], std[1])
+            parameters["knee_Nm"] = quantity(shape["knee_Nm"])
+            effect = StiffeningCompliance(
+                float(coefficients[0]), 0.0, float(coefficients[1]), shape["knee_Nm"], gravity
+            )
+        if gravity is not None:
+            parameters["gravity_deg"] = quantity(gravity)
+        return parameters, [effect]
+
+    @classmethod
+    def blind_spots(cls, regression: Regression, found: Sequence[Blindness]) -> Iterator[Blindness]:
+        because = unloaded(regression.signals)
+        if because:
+            yield cls.blind(because)
+            return
+        theta = regression.signals.theta
+        torque = torque_of(regression.signals)[:, None]
+        low = np.hstack([line_columns(theta, k) for k in (1, 2, 3)])
+        moments = torque * line_columns(theta, 1)
+        if (
+            share_left(regression, torque**3, low, torque) < OWN_POWER
+            and share_left(regression, moments * line_columns(theta, 2), low, torque, moments)
+            < OWN_POWER
+        ):
+            yield cls.blind(
+                "too few loads: the cube of the torque is not told from the torque and "
+                "the low orders"
+            )
+
+    def to_terms(self, period: float, shafts: Mapping[str, float]) -> tuple[Term, ...]:
+        gravity = self.gravity_deg
+        return (
+            StiffeningComplianceTerm(
+                from_arcsec(self.arcsec_per_Nm, period),
+                from_arcsec(self.arcsec_per_Nm3, period),
+                from_arcsec(self.beyond_knee_arcsec_per_Nm, period),
+                self.knee_Nm,
+                None if gravity is None else gravity * (period / 360.0),
+            ),
+        )
+
+
+@dataclass(frozen=True, repr=False)
+class StiffeningComplianceTerm(Term):
+    r"""A spring that stiffens under the moment m.
+
+    .. math:: \varepsilon = c_1 m + c_3 m^3 + c_k\,\mathrm{sign}(m)\max(|m| - m_k, 0)
+
+    where m is the torque or, with ``gravity``, :math:`\tau\sin(\varphi - \varphi_g)`.
+
+    Parameters
+    ----------
+    per_Nm, per_Nm3 : float
+        :math:`c_1` and :math:`c_3`.
+    beyond_knee_per_Nm, knee_Nm : float
+        :math:`c_k` and the knee :math:`m_k \ge 0`.
+    gravity : float, optional
+        :math:`\varphi_g`, the angle at which the load has no moment.
+    """
+
+    per_Nm: float = 0.0
+    per_Nm3: float = 0.0
+    beyond_knee_per_Nm: float = 0.0
+    knee_Nm: float = 0.0
+    gravity: float | None = None
+
+    kind: ClassVar[str] = "stiffening_compliance"
+    signals: ClassVar[tuple[str, ...]] = ("torque",)
+
+    def check(self) -> None:
+        if self.knee_Nm < 0.0:
+            raise self._out_of_range("knee_Nm", "0 or more")
+
+    def forms(self) -> tuple[Form, ...]:
+        return (
+            forms.Spring(
+                "torque",
+                self.per_Nm,
+                self.per_Nm3,
+                self.beyond_knee_per_Nm,
+                self.knee_Nm,
+                self.gravity,
+            ),
+        )

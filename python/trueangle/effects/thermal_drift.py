@@ -1,0 +1,191 @@
+"""Zero and line amplitudes that follow the temperature."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+
+from ..correction import forms
+from ..correction.forms import Form
+from ..correction.term import Term, from_arcsec, line_values
+from ..joint.pattern import Surroundings, line_sum
+from ..joint.signals import Signals
+from ..regression.estimate import Parameters, quantity
+from ..regression.regression import Regression
+from .backlash import Backlash
+from .blindness import (
+    LEAST_KELVIN,
+    Blindness,
+)
+from .effect import Effect
+from .factor import FactorEffect
+from .search import (
+    Array,
+    Fitted,
+    known_orders,
+)
+from .torsional_compliance import TorsionalCompliance
+
+__all__ = ["ThermalDrift", "ThermalDriftTerm"]
+
+#: Temperature at which the simulation's lines hold, degrees Celsius.
+REFERENCE_C = 20.0
+
+
+@dataclass(frozen=True)
+class ThermalDrift(FactorEffect):
+    r"""Error that grows with :math:`\Delta T = T - T_0`.
+
+    .. math:: \varepsilon = \Delta T\,[k_0 + k_p\,p(\theta)
+              + \sum_m C_m \sin(m\theta + \varphi_m)]
+
+    Parameters
+    ----------
+    zero_arcsec_per_K : float
+        k_0.
+    pattern_per_K : float
+        k_p: relative growth of the whole pattern (field strength).
+    lines_per_K : list of [output order, arcsec per kelvin, phase_deg]
+    reference_C : float
+        T_0, where the simulation's lines hold.
+    """
+
+    zero_arcsec_per_K: float = 0.0
+    pattern_per_K: float = 0.0
+    lines_per_K: tuple[tuple[float, float, float], ...] = ()
+    reference_C: float = 20.0
+
+    kind: ClassVar[str] = "thermal_drift"
+    sentence: ClassVar[str] = (
+        "Mounts expand and the magnet weakens with temperature: the zero and the lines of the "
+        "encoder or the gear change in proportion to the temperature."
+    )
+    needs: ClassVar[tuple[str, ...]] = ("temperature",)
+    factor: ClassVar[str] = "temperature"
+    measure: ClassVar[str] = (
+        "repeat the runs at a second temperature at least 10 K away, logging the sensor's own"
+    )
+    confused_with: ClassVar[Mapping[type[Effect], str]] = {
+        Backlash: "both directions at each temperature",
+        TorsionalCompliance: "change load and temperature independently",
+    }
+    acts_on_runs: ClassVar[bool] = True
+    changes_lines: ClassVar[bool] = True
+
+    def signal(self, signals: Signals, around: Surroundings, rng: np.random.Generator) -> Array:
+        if signals.temperature is None:
+            return np.zeros(len(signals))
+        per_kelvin = self.zero_arcsec_per_K + line_sum(signals.theta, self.lines_per_K)
+        if self.pattern_per_K:
+            per_kelvin = per_kelvin + self.pattern_per_K * around.pattern.value(signals.theta)
+        return np.asarray((signals.temperature - self.reference_C) * per_kelvin)
+
+    @classmethod
+    def scale(cls, signals: Signals, kind: str) -> Array | None:
+        return None if signals.temperature is None else signals.temperature - REFERENCE_C
+
+    @classmethod
+    def shapes(cls, regression: Regression) -> list[dict[str, Any]]:
+        temperature = regression.signals.temperature
+        if temperature is None or np.ptp(temperature) == 0.0:
+            return []
+        pattern = regression.around.pattern
+        shapes: list[dict[str, Any]] = [{"what": "zero"}]
+        if pattern.orders.size:
+            shapes.append({"what": "pattern"})
+        shapes += [{"what": "line", "order": float(m)} for m in known_orders(regression.around)]
+        return shapes
+
+    @classmethod
+    def report(
+        cls, regression: Regression, terms: Sequence[Fitted]
+    ) -> tuple[Parameters, list[Effect]]:
+        lines = cls.line_rows(terms)
+        zero, pattern = cls.single(terms, "zero"), cls.single(terms, "pattern")
+        parameters: Parameters = {}
+        if zero:
+            parameters["zero_arcsec_per_K"] = quantity(*zero)
+        if pattern:
+            parameters["pattern_per_K"] = quantity(*pattern)
+        if lines:
+            parameters["orders"] = quantity([line[0] for line in lines])
+            parameters["amplitudes_arcsec_per_K"] = quantity(
+                [line[1] for line in lines], [line[3] for line in lines]
+            )
+            parameters["phases_deg"] = quantity([line[2] for line in lines])
+        effect = ThermalDrift(
+            zero[0] if zero else 0.0,
+            pattern[0] if pattern else 0.0,
+            tuple((m, c, p) for m, c, p, _ in lines),
+            REFERENCE_C,
+        )
+        return parameters, [effect]
+
+    @classmethod
+    def blind_spots(cls, regression: Regression, found: Sequence[Blindness]) -> Iterator[Blindness]:
+        temperature = regression.signals.temperature
+        if temperature is None:
+            yield cls.blind("no temperature was recorded")
+        elif np.ptp(temperature) < LEAST_KELVIN:
+            yield cls.blind(f"the temperature varies by less than {LEAST_KELVIN:g} K")
+
+    def to_terms(self, period: float, shafts: Mapping[str, float]) -> tuple[Term, ...]:
+        return (
+            ThermalDriftTerm(
+                from_arcsec(self.zero_arcsec_per_K, period),
+                self.pattern_per_K,
+                **line_values(self.lines_per_K, period),
+                reference_C=self.reference_C,
+            ),
+        )
+
+
+@dataclass(frozen=True, repr=False)
+class ThermalDriftTerm(Term):
+    r"""Error in proportion to :math:`\Delta T = T - T_0`.
+
+    .. math:: \varepsilon = \Delta T\,\bigl[k_0 + k_p\,p(\varphi)
+              + \sum_m A_m \cos m\varphi + B_m \sin m\varphi\bigr]
+
+    with p the harmonics of the model without their constant.
+
+    Parameters
+    ----------
+    zero_per_K : float
+        :math:`k_0`, angle per kelvin.
+    pattern_per_K : float
+        :math:`k_p`, relative growth of the harmonics per kelvin.
+    orders : sequence of float
+        Output orders m of the lines, positive.
+    cosine, sine : sequence of float
+        :math:`A_m, B_m`, angle per kelvin.
+    reference_C : float
+        :math:`T_0`, where the harmonics hold, degrees Celsius.
+    """
+
+    zero_per_K: float = 0.0
+    pattern_per_K: float = 0.0
+    orders: tuple[float, ...] = ()
+    cosine: tuple[float, ...] = ()
+    sine: tuple[float, ...] = ()
+    reference_C: float = 20.0
+
+    kind: ClassVar[str] = "thermal_drift"
+    signals: ClassVar[tuple[str, ...]] = ("temperature",)
+
+    def check(self) -> None:
+        self._check_lines()
+
+    @property
+    def is_built_on_harmonics(self) -> bool:  # type: ignore[override]
+        return self.pattern_per_K != 0.0
+
+    def forms(self) -> tuple[Form, ...]:
+        return (
+            forms.Scaled(
+                "temperature", self.zero_per_K, self.lines, self.pattern_per_K, self.reference_C
+            ),
+        )

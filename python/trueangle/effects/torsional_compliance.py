@@ -1,0 +1,150 @@
+"""Wind-up in proportion to torque."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+
+from ..correction import forms
+from ..correction.forms import Form
+from ..correction.term import Term, from_arcsec, line_values
+from ..joint.pattern import Surroundings, line_columns, line_sum
+from ..joint.signals import Signals
+from ..regression.estimate import Parameters, quantity
+from ..regression.regression import Regression
+from .blindness import (
+    OWN_POWER,
+    Blindness,
+    share_left,
+)
+from .effect import Effect
+from .factor import FactorEffect
+from .search import (
+    Array,
+    Fitted,
+)
+
+__all__ = ["TorsionalCompliance", "TorsionalComplianceTerm"]
+
+
+@dataclass(frozen=True)
+class TorsionalCompliance(FactorEffect):
+    r"""Wind-up in proportion to torque: :math:`\varepsilon = \tau\,[c + g(\theta)]`.
+
+    Parameters
+    ----------
+    arcsec_per_Nm : float
+        c = 1/K: the measured torque at the reading times the compliance.
+    lines_per_Nm : list of [output order, arcsec per Nm, phase_deg]
+        g: gravity, where the torque column holds the load and not its moment
+        (order 1).
+    """
+
+    arcsec_per_Nm: float = 0.0
+    lines_per_Nm: tuple[tuple[float, float, float], ...] = ()
+
+    kind: ClassVar[str] = "torsional_compliance"
+    sentence: ClassVar[str] = (
+        "The gear and its parts twist under torque: the error is proportional to the torque, "
+        "and under gravity follows it once per turn."
+    )
+    needs: ClassVar[tuple[str, ...]] = ("torque",)
+    factor: ClassVar[str] = "torque"
+    measure: ClassVar[str] = "repeat the runs at a second, known load (or with the arm off)"
+    acts_on_runs: ClassVar[bool] = True
+
+    def signal(self, signals: Signals, around: Surroundings, rng: np.random.Generator) -> Array:
+        torque = torque_of(signals)
+        return np.asarray(
+            torque * (self.arcsec_per_Nm + line_sum(signals.theta, self.lines_per_Nm))
+        )
+
+    @classmethod
+    def scale(cls, signals: Signals, kind: str) -> Array | None:
+        return signals.torque
+
+    @classmethod
+    def shapes(cls, regression: Regression) -> list[dict[str, Any]]:
+        torque = regression.signals.torque
+        if torque is None or not torque.any():
+            return []
+        return [{"what": "zero"}, {"what": "line", "order": 1.0}]
+
+    @classmethod
+    def report(
+        cls, regression: Regression, terms: Sequence[Fitted]
+    ) -> tuple[Parameters, list[Effect]]:
+        direct, lines = cls.single(terms, "zero"), cls.line_rows(terms)
+        parameters: Parameters = {}
+        if direct:
+            parameters["arcsec_per_Nm"] = quantity(*direct)
+        elif lines:
+            parameters["arcsec_per_Nm"] = quantity(lines[0][1], lines[0][3])
+        if lines:
+            parameters["gravity_arcsec_per_Nm"] = quantity(lines[0][1], lines[0][3])
+            parameters["gravity_phase_deg"] = quantity(lines[0][2])
+        effect = TorsionalCompliance(
+            direct[0] if direct else 0.0, tuple((m, c, p) for m, c, p, _ in lines)
+        )
+        return parameters, [effect]
+
+    @classmethod
+    def blind_spots(cls, regression: Regression, found: Sequence[Blindness]) -> Iterator[Blindness]:
+        because = unloaded(regression.signals)
+        if because:
+            yield cls.blind(because)
+            return
+        signals = regression.signals
+        assert signals.torque is not None
+        first = line_columns(signals.theta, 1)
+        if share_left(regression, signals.torque[:, None], first) < OWN_POWER:
+            yield cls.blind("one load: what it bends is part of the zero or of order 1")
+
+    def to_terms(self, period: float, shafts: Mapping[str, float]) -> tuple[Term, ...]:
+        lines = line_values(self.lines_per_Nm, period)
+        return (TorsionalComplianceTerm(from_arcsec(self.arcsec_per_Nm, period), **lines),)
+
+
+@dataclass(frozen=True, repr=False)
+class TorsionalComplianceTerm(Term):
+    r"""Wind-up in proportion to the torque.
+
+    .. math:: \varepsilon = \tau\,\bigl[c + \sum_m A_m \cos m\varphi + B_m \sin m\varphi\bigr]
+
+    Parameters
+    ----------
+    per_Nm : float
+        c = 1/K, angle per newton metre.
+    orders, cosine, sine : sequence of float
+        Lines per newton metre: order 1 where the torque states the load of an arm and
+        not its moment.
+    """
+
+    per_Nm: float = 0.0
+    orders: tuple[float, ...] = ()
+    cosine: tuple[float, ...] = ()
+    sine: tuple[float, ...] = ()
+
+    kind: ClassVar[str] = "torsional_compliance"
+    signals: ClassVar[tuple[str, ...]] = ("torque",)
+
+    def check(self) -> None:
+        self._check_lines()
+
+    def forms(self) -> tuple[Form, ...]:
+        return (forms.Scaled("torque", self.per_Nm, self.lines),)
+
+
+def torque_of(signals: Signals) -> Array:
+    """Torque at every reading; zeros where none was recorded."""
+    return np.zeros(len(signals)) if signals.torque is None else signals.torque
+
+
+def unloaded(signals: Signals) -> str:
+    """Why no effect of torque can be seen in any case; empty where one may be."""
+    if signals.torque is None:
+        return "no torque was recorded"
+    return "" if signals.torque.any() else "all runs are unloaded"
