@@ -15,6 +15,7 @@ __all__ = [
     "OutsideSpanWarning",
     "RankError",
     "TrueAngleError",
+    "UnlikeRunsWarning",
 ]
 
 
@@ -114,3 +115,7 @@ class MissingExtraError(TrueAngleError, ImportError):
 
 class OutsideSpanWarning(UserWarning):
     """Angles outside the span the model was fitted on were corrected."""
+
+
+class UnlikeRunsWarning(UserWarning):
+    """Runs that do not show one pattern were fitted together; the message names them."""

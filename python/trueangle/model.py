@@ -113,7 +113,7 @@ class HarmonicModel:
 
     @cached_property
     def _warn(self) -> SpanGuard:
-        return SpanGuard(self.partial_span, self.period)
+        return SpanGuard(self.partial_span, self.period if self.is_periodic else math.inf)
 
     @cached_property
     def _series(self) -> _core.Series:
@@ -370,11 +370,15 @@ class HarmonicModel:
 
     @property
     def partial_span(self) -> tuple[float, float] | None:
-        """The stretch the model was fitted on when that was not the whole turn."""
+        """The stretch the model was fitted on when that was not the whole turn.
+
+        First and last angle, whole turns kept, where the error does not repeat after a turn.
+        """
         if self.fit is None:
             return None
         start, stop = self.fit.span
-        return None if stop - start >= self.period or not self.is_periodic else (start, stop)
+        whole = self.is_periodic and stop - start >= self.period
+        return None if whole else (start, stop)
 
     def band(self, theta: ArrayLike) -> Array:
         r"""Standard deviation of the fitted error at ``theta``, from the covariance.

@@ -288,3 +288,10 @@ def test_bad_arguments_are_named():
         ta.select_orders(runs, reference_orders=[-1])
     with pytest.raises(ArgumentError, match="weight 0"):
         ta.select_orders(ta.CalibrationRun(GRID, GRID, period=360.0, weights=np.zeros(36)))
+
+
+def test_readings_without_noise_show_their_order_alone():
+    x = np.arange(120) * 3.0
+    chosen = ta.select_orders(ta.CalibrationRun(x, x + 0.1 * np.sin(np.radians(x)), 360.0))
+    assert chosen.orders == (1,)
+    assert "360" in chosen.summary()

@@ -101,14 +101,33 @@ class ReferenceLines(Effect):
 
     @classmethod
     def columns(cls, signals: Signals, around: Surroundings, shape: dict[str, Any]) -> Array:
-        return line_columns(ReferenceLines.angle(signals, shape["mount_sign"]), shape["order"])
+        both = line_columns(ReferenceLines.angle(signals, shape["mount_sign"]), shape["order"])
+        seen = both.any(axis=0)
+        return both[:, seen] if seen.any() else both
+
+    @staticmethod
+    def _both(
+        signals: Signals, shape: dict[str, Any], coefficients: Array, covariance: Array
+    ) -> tuple[Array, Array]:
+        """Cosine and sine, 0 for the one that vanishes at all these positions."""
+        angle = ReferenceLines.angle(signals, shape["mount_sign"])
+        seen = np.flatnonzero(line_columns(angle, shape["order"]).any(axis=0))
+        pair, spread = np.zeros(2), np.zeros((2, 2))
+        pair[seen] = coefficients
+        spread[np.ix_(seen, seen)] = covariance
+        return pair, spread
 
     @classmethod
     def report(
         cls, regression: Regression, terms: Sequence[Fitted]
     ) -> tuple[Parameters, list[Effect]]:
         rows = [
-            (t.shape["order"], *line_parameters(c, v), t.shape["mount_sign"]) for t, c, v in terms
+            (
+                t.shape["order"],
+                *line_parameters(*cls._both(regression.signals, t.shape, c, v)),
+                t.shape["mount_sign"],
+            )
+            for t, c, v in terms
         ]
         parameters = {
             "orders": quantity([row[0] for row in rows]),

@@ -23,8 +23,9 @@ ARGUMENTS: tuple[AnyArgument, ...] = ("auto", "reference", "indicated")
 #: Zeros of the runs closer than this part of a turn (0.2 deg) move no order worth asking.
 _MOVED: Final = 1.0 / 1800.0
 
-#: Readings looked at, and orders where none are named.
+#: Readings and runs looked at, and orders where none are named.
 _LOOKED_AT: Final = 32_768
+_MOST_RUNS: Final = 256
 _LOW_ORDERS: Final = tuple(range(1, 9))
 
 #: The indicated angle is taken where a common pattern explains so many times the energy
@@ -66,6 +67,7 @@ def choose_argument(
     if len(runs) < 2:
         return Choice("reference")
     period = runs[0].period
+    runs = runs[:: max(1, len(runs) // _MOST_RUNS)]
     looked_at = [_some(run, max(64, _LOOKED_AT // len(runs))) for run in runs]
     zeros = np.array([circular_mean(r.indicated - r.reference, period) for r in looked_at])
     moved = float(np.abs(wrap(zeros - zeros[0], period)).max())

@@ -2,20 +2,23 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING
 
-from ..errors import ArgumentError, NoModelError
+from ..errors import ArgumentError, NoModelError, UnlikeRunsWarning
 from ..model import check_invertible
 from ..runs import CalibrationRun, as_runs
 from ..shafts import resolve_orders
 from ..units import check_follows
 from .argument import ARGUMENTS, AnyArgument, Choice, choose_argument
+from .breakdown import breakdown_sentence
+from .likeness import unlike_runs, unlike_sentence
 from .problem import Problem
 from .result import FitResult
 from .ridge import choose_ridge
 from .robust import Loss, weigh, without_spikes
-from .travel import CONDITION, covered_span
+from .travel import CONDITION, travelled_span
 
 if TYPE_CHECKING:
     from ..orders.select import OrderSelection
@@ -69,7 +72,8 @@ def fit(
         off are set aside (and reported); ``"linear"``: least squares on all readings.
     ridge : float, optional
         Tikhonov penalty relative to the sum of weights. By default 0 on a full turn, and
-        chosen by held-out error on partial travel (`trueangle.fitting.ridge.choose_ridge`).
+        chosen by held-out error on partial travel and where orders of several shafts nearly
+        cancel over the travel (`trueangle.fitting.ridge.choose_ridge`).
     method : {"plain", "moments", "qr", "counts"}, optional
         Forces a way of solving: QR of all rows, one pass of piecewise moments with normal
         equations or with QR, or one mean error per count of an encoder that counts (whole
@@ -122,9 +126,11 @@ def fit(
         choice = choose_argument(found, argument, wanted)
     problem = Problem(found, wanted, choice.argument, method, threads)
     weighted = weigh(problem, loss, _ROUNDING * problem.period)
-    span = covered_span(problem.angles, problem.period)
+    span = travelled_span(problem.angles, problem.period, problem.is_periodic)
     if ridge is None:
-        tame = span.full or weighted.fitted.solution.condition_number < CONDITION
+        tame = (
+            span.full and problem.is_periodic
+        ) or weighted.fitted.solution.condition_number < CONDITION
         ridge = 0.0 if tame else choose_ridge(problem, weighted.weights or problem.base)
     fitted = weighted.fitted
     if ridge > 0.0:
@@ -132,8 +138,12 @@ def fit(
     if problem.argument == "reference":
         check_invertible(fitted.series.slope_bound)
     joint = (gear_ratio, fixed_member)
-    remarks = tuple(note for note in (choice.note,) if note)
-    return FitResult(problem, fitted, weighted, loss, ridge, span, selection, joint, remarks)
+    remarks = [note for note in (choice.note, breakdown_sentence(problem, weighted)) if note]
+    unlike = unlike_runs(problem, fitted)
+    if unlike:
+        remarks.append(unlike_sentence(problem, unlike))
+        warnings.warn(remarks[-1], UnlikeRunsWarning, stacklevel=2)
+    return FitResult(problem, fitted, weighted, loss, ridge, span, selection, joint, tuple(remarks))
 
 
 def _selected(

@@ -13,7 +13,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..angles import ARCSEC_PER_TURN, circular_mean, wrap
-from ..errors import ArgumentError, NoModelError, OutsideSpanWarning, TrueAngleError
+from ..errors import (
+    ArgumentError,
+    NoModelError,
+    OutsideSpanWarning,
+    TrueAngleError,
+    UnlikeRunsWarning,
+)
 from ..model import HarmonicModel
 from ..runs import CalibrationRun
 from .robust import Loss
@@ -129,7 +135,10 @@ def hold_out(fit: FitResult) -> HeldOut:
         train = [run for i, run in enumerate(runs) if i not in fold]
         labels = [runs[i].label or str(i + 1) for i in fold]
         try:
-            model: HarmonicModel | None = _refit(fit, train)
+            with warnings.catch_warnings():
+                # Said of all runs already.
+                warnings.simplefilter("ignore", UnlikeRunsWarning)
+                model: HarmonicModel | None = _refit(fit, train)
         except NoModelError:
             model = None
         except TrueAngleError as reason:

@@ -50,8 +50,9 @@ def fit_notes(fit: FitResult) -> Iterable[str]:
         yield f"Fitted on {span.start:.6g} to {span.stop:.6g} only: outside it is extrapolated."
     yield from (_sentence(remark) for remark in fit.remarks)
     if fit.ridge > 0.0:
+        where = "arc" if fit.problem.is_periodic else "travel"
         yield (
-            f"On this arc the orders nearly cancel: a ridge of {fit.ridge:.1e} keeps the "
+            f"On this {where} the orders nearly cancel: a ridge of {fit.ridge:.1e} keeps the "
             "amplitudes small; single coefficients have no meaning of their own."
         )
     if weighted.weights is not None and weighted.wild:

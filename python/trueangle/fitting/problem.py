@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from functools import cached_property
 from typing import Any, Literal, NamedTuple, cast
 
@@ -102,7 +103,9 @@ class Problem:
         method: str | None = None,
         threads: int | None = None,
     ) -> None:
-        self.runs = runs
+        #: False where a shaft turns a fraction of times per output turn.
+        self.is_periodic = all(float(s.cycles_per_turn).is_integer() for s in shafts)
+        self.runs = runs if self.is_periodic else [_unwrapped(run) for run in runs]
         self.shafts = shafts
         if method not in METHODS:
             known = ", ".join(repr(name) for name in METHODS[1:])
@@ -190,3 +193,17 @@ class Problem:
                 offset = circular_mean(indicated - reference - block, self.period)
             _core.residuals(indicated, reference, offset, self.period, block)
             yield block
+
+
+def _unwrapped(run: CalibrationRun) -> CalibrationRun:
+    """The run over as many turns as it took: where the error does not repeat after one."""
+    reference = run.unwrapped_reference
+    indicated = reference + run.centred_error
+    # Rounding must not move a run that was given without jumps.
+    if np.abs(reference - run.reference).max() < 0.5 * run.period:
+        reference = run.reference
+    if np.abs(indicated - run.indicated).max() < 0.5 * run.period:
+        indicated = run.indicated
+    if reference is run.reference and indicated is run.indicated:
+        return run
+    return replace(run, reference=reference, indicated=indicated)

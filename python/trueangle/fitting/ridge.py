@@ -23,6 +23,10 @@ _PENALTIES = np.array([0.0, *np.logspace(-9.0, 0.0, 19).tolist()])
 #: Parts of the arc left out in turn when there is one run only.
 _BLOCKS = 10
 
+#: The same where the error does not repeat after a turn: a joint goes on to turns that the
+#: fit has not seen, so whole stretches are left out.
+_STRETCHES = 4
+
 #: The amplitudes may add up to so many times the range of the measured error. On a full
 #: turn the sum of amplitudes of a smooth error is about half its range.
 _REACH = 3.0
@@ -46,7 +50,8 @@ def choose_ridge(problem: Problem, weights: Sequence[Array | None]) -> float:
 
     The fit minimises :math:`\sum w (y - \varepsilon)^2 + \lambda \sum w \sum_k (A_k^2 + B_k^2)`.
     Every penalty is scored on readings left out of its fit: whole runs where there are
-    several, else tenths of the arc. The best is taken, and raised until the amplitudes add
+    several, else tenths of the arc, or quarters of the travel where the error does not repeat
+    after a turn. The best is taken, and raised until the amplitudes add
     up to no more than three times the range of the measured error.
 
     Parameters
@@ -89,9 +94,10 @@ def _folds(problem: Problem, weights: Sequence[Array | None]) -> list[_Fold]:
     else:
         (run,), (weight,) = problem.runs, weights
         zero = _zero(run)
-        block = _blocks(problem.angles[0])
+        count = _BLOCKS if problem.is_periodic else _STRETCHES
+        block = _blocks(problem.angles[0], count)
         order = np.argsort(block, kind="stable")
-        pieces = np.split(order, np.cumsum(np.bincount(block, minlength=_BLOCKS))[:-1])
+        pieces = np.split(order, np.cumsum(np.bincount(block, minlength=count))[:-1])
         parts = [
             (run.reference[i], run.indicated[i], None if weight is None else weight[i], zero)
             for i in pieces
@@ -122,10 +128,10 @@ def _zero(run: CalibrationRun) -> float:
     return circular_mean(run.indicated[::stride] - run.reference[::stride], run.period)
 
 
-def _blocks(angles: Array) -> NDArray[np.uint8]:
-    """Which tenth of the readings, in the order of their angles, each belongs to."""
+def _blocks(angles: Array, count: int) -> NDArray[np.uint8]:
+    """Which of so many equal parts of the readings, by their angles, each belongs to."""
     looked_at = angles[:: max(1, angles.size // _LOOKED_AT)]
-    ends = np.quantile(looked_at, np.arange(1, _BLOCKS) / _BLOCKS)
+    ends = np.quantile(looked_at, np.arange(1, count) / count)
     block = np.zeros(angles.size, dtype=np.uint8)
     for end in ends:
         block += angles > end

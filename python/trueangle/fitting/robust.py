@@ -38,6 +38,15 @@ WILD = 8.0
 #: effect, and least squares on all of them is the honest answer.
 WILD_SHARE = 0.2
 
+#: Readings further off than this (robust standard deviations) are rare: 0.7 % of normal ones.
+FAR = 2.7
+
+#: With more than this share of them the scale itself is in doubt.
+MANY = 0.06
+
+#: Readings that hid behind the scale are wild when without them it falls by this factor.
+HIDDEN = 5.0
+
 #: Iterations of re-weighting end when no weight moves by more than this, or after `STEPS`.
 SETTLED = 1e-4
 STEPS = 50
@@ -50,11 +59,15 @@ SAMPLE = 4096
 
 
 class Weighted(NamedTuple):
-    """A robust fit: its weights (None where all are as given) and what it ended with."""
+    """A robust fit: its weights (None where all are as given) and what it ended with.
+
+    ``far`` is the share of readings beyond `FAR` robust standard deviations.
+    """
 
     fitted: Fitted
     weights: list[Array] | None
     wild: int
+    far: float = 0.0
 
 
 def robust_scale(residuals: Array) -> float:
@@ -99,13 +112,24 @@ def weigh(problem: Problem, loss: Loss, floor: float) -> Weighted:
         int(np.count_nonzero((w == 0.0) & (_given(b, w.size) > 0.0)))
         for w, b in zip(weights, problem.base, strict=True)
     )
-    return Weighted(problem.solve(weights), weights, wild)
+    fitted = problem.solve(weights)
+    everything = np.concatenate(problem.residuals(fitted))
+    return Weighted(fitted, weights, wild, _share(everything, robust_scale(everything)))
+
+
+def _share(residuals: Array, scale: float) -> float:
+    """Share of readings beyond `FAR` robust standard deviations."""
+    return np.count_nonzero(np.abs(residuals) > FAR * scale) / residuals.size
 
 
 def _set_aside(problem: Problem, floor: float) -> Weighted:
-    plain = Weighted(problem.solve(problem.base), None, 0)
-    sample, largest = problem.scan(plain.fitted)
-    if largest <= max(WILD * robust_scale(sample), floor):
+    fitted = problem.solve(problem.base)
+    sample, largest = problem.scan(fitted)
+    scale = robust_scale(sample)
+    plain = Weighted(fitted, None, 0, _share(sample, scale))
+    hidden = largest <= max(WILD * scale, floor)
+    # Many readings far off together widen the scale behind which they hide.
+    if hidden and not (plain.far > MANY and scale > floor):
         return plain
     found = plain
     wild = _wild(problem, problem.solve(_iterate(problem, _huber, problem.base, floor)), floor)
@@ -118,11 +142,14 @@ def _set_aside(problem: Problem, floor: float) -> Weighted:
             np.where(far, 0.0, _given(b, far.size))
             for far, b in zip(np.split(wild, edges), problem.base, strict=True)
         ]
-        found = Weighted(problem.solve(weights), weights, int(np.count_nonzero(wild)))
+        share = np.count_nonzero(wild) / wild.size
+        found = Weighted(problem.solve(weights), weights, int(np.count_nonzero(wild)), share)
         again = _wild(problem, found.fitted, floor)
         if (again == wild).all():
             break
         wild = again
+    if hidden and HIDDEN * robust_scale(problem.scan(found.fitted)[0]) > scale:
+        return plain  # what the model lacks does not go away with some readings
     return found
 
 

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from .. import _core
 
-__all__ = ["Span", "covered_span"]
+__all__ = ["Span", "covered_span", "travelled_span"]
 
 Array = NDArray[np.float64]
 
@@ -61,3 +61,20 @@ def covered_span(angles: Sequence[Array], period: float) -> Span:
     stride = max(1, sum(x.size for x in angles) // _LOOKED_AT)
     looked_at = angles if stride == 1 else [np.ascontiguousarray(x[::stride]) for x in angles]
     return Span(*_core.covered_span(looked_at, period))
+
+
+def travelled_span(angles: Sequence[Array], period: float, periodic: bool) -> Span:
+    """`covered_span`, or first to last angle, over the turns, of an error that has no period.
+
+    Where a shaft does not turn a whole number of times per output turn, each turn is another
+    place: what was not travelled is not known, though the same angle modulo a turn was.
+
+    Examples
+    --------
+    >>> travelled_span([np.linspace(0.0, 420.0, 96)], 360.0, periodic=False)
+    Span(start=0.0, stop=420.0, full=False)
+    """
+    if periodic:
+        return covered_span(angles, period)
+    low, high = min(float(x.min()) for x in angles), max(float(x.max()) for x in angles)
+    return Span(low, high, False)

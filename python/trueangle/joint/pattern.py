@@ -157,10 +157,20 @@ class Surroundings:
     pattern: Pattern
 
 
+#: Rounding of angles of some hundred turns, per order.
+_VANISHES = 1e-11
+
+
 def line_columns(theta: Array, order: float) -> Array:
-    """``cos`` and ``sin`` of ``order * theta``, shape (n, 2)."""
+    """``cos`` and ``sin`` of ``order * theta``, shape (n, 2).
+
+    One that vanishes at every reading (the sine of order 18 on 36 positions) is exactly 0:
+    its rounding is no regressor.
+    """
     x = order * theta
-    return np.column_stack([np.cos(x), np.sin(x)])
+    columns = np.column_stack([np.cos(x), np.sin(x)])
+    columns[:, np.abs(columns).max(axis=0, initial=0.0) < _VANISHES * max(1.0, order)] = 0.0
+    return columns
 
 
 def line_sum(theta: Array, lines: tuple[tuple[float, float, float], ...]) -> Array:

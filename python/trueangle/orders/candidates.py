@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import Final
 
 import numpy as np
@@ -18,6 +18,8 @@ from ..runs import CalibrationRun
 
 __all__ = ["Candidates", "choose_candidates", "effective_positions"]
 
+Array = NDArray[np.float64]
+
 #: Low orders looked at when no gear is declared and the angles are free.
 HIGHEST_FREE_ORDER: Final = 100
 
@@ -26,6 +28,10 @@ HIGHEST_SCANNED: Final = 450
 
 #: Part of the allowed false alarm that the scan may use up.
 _SCAN_SHARE: Final = 0.2
+
+#: Coherence from which two orders are hardly told apart: they come half a cycle apart over the
+#: travel. Fitted side by side they nearly cancel, and part again where nothing was read.
+_UNRESOLVED: Final = 2.0 / math.pi
 
 #: Coherence from which two orders are one at the positions, whatever the noise.
 _SAME: Final = 1.0 - 1e-9
@@ -57,6 +63,9 @@ class Candidates:
         Nyquist limit of the positions for orders that are not named.
     effective : Positions
         The positions as a grid even where small shifts of the zero blur it.
+    unresolved : mapping of float to float
+        Orders of the gear that are not looked at, for over this travel they are hardly told
+        from a low order, which stands for both.
     """
 
     orders: tuple[float, ...]
@@ -67,6 +76,7 @@ class Candidates:
     fixed_member: str
     highest: int
     effective: Positions
+    unresolved: Mapping[float, float] = field(default_factory=dict)
 
     @property
     def highest_alias(self) -> int:
@@ -116,8 +126,12 @@ def choose_candidates(
     gear_ratio: float | None,
     fixed_member: str,
     reference_orders: Sequence[float],
+    travelled: Array | None = None,
 ) -> Candidates:
     """Candidates as asked for, or low orders, the gear's own and a scan.
+
+    ``travelled`` are angles of the readings in turns, whole turns kept: they tell how far an
+    order that is not whole is told from its neighbours.
 
     Raises
     ------
@@ -135,12 +149,16 @@ def choose_candidates(
         | set(carriers)
     )
     scanned: list[float] = []
+    unresolved: dict[float, float] = {}
     if candidates is not None:
         main = _checked(candidates, "candidates")
     else:
-        limit = HIGHEST_FREE_ORDER if gear_ratio is None else HIGHEST_LOW_ORDER
+        unresolved = _unresolved(gear, min(HIGHEST_LOW_ORDER, highest), travelled)
+        told = [m for m in gear if m not in unresolved]
+        # A gear none of whose orders can be told says nothing about where to look.
+        limit = HIGHEST_LOW_ORDER if told else HIGHEST_FREE_ORDER
         main = [float(k) for k in range(1, min(limit, highest) + 1)]
-        for m in gear:
+        for m in told:
             if m not in main and _apart(positions, m, main):
                 main.append(m)
         if positions.span == 1.0:
@@ -157,7 +175,21 @@ def choose_candidates(
         fixed_member=fixed_member,
         highest=highest,
         effective=effective,
+        unresolved=unresolved,
     )
+
+
+def _unresolved(gear: Sequence[float], low: int, travelled: Array | None) -> dict[float, float]:
+    """Orders of the gear hardly told from a low order over the travel, and that order."""
+    found: dict[float, float] = {}
+    if travelled is None:
+        return found
+    for m in gear:
+        nearest = min(max(round(m), 0), low)
+        alike = abs(np.exp(2j * math.pi * (m - nearest) * travelled).mean())
+        if not m.is_integer() and alike > _UNRESOLVED:
+            found[m] = float(nearest)
+    return found
 
 
 def _apart(positions: Positions, order: float, others: Sequence[float]) -> bool:

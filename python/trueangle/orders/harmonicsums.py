@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .. import _core
+from .unitgroups import MOST_UNITS, columns_summed, dealt
 
 __all__ = ["HarmonicSums", "Readings", "harmonic_sums"]
 
@@ -133,7 +134,9 @@ def harmonic_sums(units: Sequence[Readings], orders: Sequence[float]) -> Harmoni
     """One pass over the readings of every unit.
 
     Memory per unit is three numbers per order where all orders are whole, else a square
-    matrix of twice the number of orders; the readings are never expanded to a matrix.
+    matrix of twice the number of orders; the readings are never expanded to a matrix. More
+    than 96 units are taken together in 32 groups, each with its zeros taken out: the sums
+    then have a unit per group.
     """
     whole = all(float(k).is_integer() for k in orders)
     count = np.array([u.turns.size for u in units], dtype=np.int64)
@@ -142,6 +145,8 @@ def harmonic_sums(units: Sequence[Readings], orders: Sequence[float]) -> Harmoni
     squares = np.array(
         [float(np.dot(u.weights, (u.error - c) ** 2)) for u, c in zip(units, centre, strict=True)]
     )
+    if whole and len(units) > MOST_UNITS:
+        return _in_groups(units, orders, weight, count, squares, centre)
     if whole:
         return _from_spectra(units, orders, weight, count, squares, centre)
     return _from_columns(units, orders, weight, count, squares, centre)
@@ -165,6 +170,44 @@ def _from_spectra(
     picked = spectra[:, index] / weight[:, None]
     means = np.concatenate([picked.real, picked.imag], axis=1)
     return HarmonicSums(orders, weight, count, squares, moments, None, spectra, means)
+
+
+def _in_groups(
+    units: Sequence[Readings],
+    orders: Sequence[float],
+    weight: Array,
+    count: NDArray[np.int64],
+    squares: Array,
+    centre: list[float],
+) -> HarmonicSums:
+    """As `_from_spectra`, many units taken together: one normal matrix a group."""
+    index = np.asarray(orders, dtype=np.int64)
+    highest, size = int(index.max(initial=0)), index.size
+    grams, moments, groups = [], [], dealt(units)
+    for members in groups:
+        group = [units[i] for i in members]
+        together = Readings(
+            np.concatenate([unit.turns for unit in group]),
+            np.concatenate([units[i].error - centre[i] for i in members]),
+            np.concatenate([unit.weights for unit in group]),
+            "",
+        )
+        spectrum, values = _spectra(together, 0.0, highest)
+        moments.append(np.concatenate([values[index].real, values[index].imag]))
+        bare = HarmonicSums(
+            orders,
+            np.zeros(1),
+            np.zeros(1, dtype=np.int64),
+            np.zeros(1),
+            np.zeros((1, 2 * size)),
+            None,
+            spectrum[None, :],
+            np.zeros((1, 2 * size)),
+        )
+        grams.append(bare.gram(0, np.arange(size)) - columns_summed(group, index.astype(float)))
+    sums = [np.array([v[m].sum() for m in groups]) for v in (weight, count, squares)]
+    means = np.zeros((len(groups), 2 * size))
+    return HarmonicSums(orders, sums[0], sums[1], sums[2], np.array(moments), grams, None, means)
 
 
 def _spectra(

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
-from typing import Literal
+from typing import Final, Literal
+
+import numpy as np
+from numpy.typing import NDArray
 
 from ..aliasing import distinct_positions
 from ..errors import ArgumentError
@@ -17,6 +20,7 @@ from .table import OrderRow, OrderSelection
 
 __all__ = ["FALSE_ALARM", "OrderRow", "OrderSelection", "select_orders"]
 
+Array = NDArray[np.float64]
 Method = Literal["evidence", "paper"]
 
 
@@ -104,7 +108,12 @@ def select_orders(
         kept = [at_indicated(run) for run in kept]
     positions = distinct_positions(kept, tolerance)
     chosen = choose_candidates(
-        positions, candidates, gear_ratio, fixed_member, tuple(reference_orders)
+        positions,
+        candidates,
+        gear_ratio,
+        fixed_member,
+        tuple(reference_orders),
+        _travelled(kept, gear_ratio),
     )
     if method == "paper":
         selection = select_by_paper(kept, positions, chosen)
@@ -129,3 +138,15 @@ def _without_zero_weights(run: CalibrationRun) -> CalibrationRun | None:
         label=run.label,
         weights=run.weights[keep],
     )
+
+
+#: Angles looked at to tell whether a gear's orders are resolved over the travel.
+_LOOKED_AT: Final = 4096
+
+
+def _travelled(runs: Sequence[CalibrationRun], gear_ratio: float | None) -> Array | None:
+    """Angles of the readings in turns, whole turns kept; None where every order is whole."""
+    if gear_ratio is None or float(gear_ratio).is_integer():
+        return None
+    turns = np.concatenate([run.unwrapped_reference for run in runs]) / runs[0].period
+    return np.asarray(turns[:: max(1, turns.size // _LOOKED_AT)])

@@ -51,6 +51,9 @@ NEGLIGIBLE_NOISE: Final = 0.1
 #: angle stands for several true ones, as ill-determined orders on a short arc make it.
 STEEPEST: Final = 0.95
 
+#: Amplitudes below this part of a turn are rounding of angles.
+_ROUNDING: Final = 1e-12
+
 #: Searches at most after orders were left out as too steep.
 _AGAIN: Final = 3
 
@@ -79,6 +82,8 @@ class EvidenceSelection:
             self.holdout = "one run at a time"
             if len(self.units) > len(runs):
                 self.holdout = "one mount at a time"
+            if self.sums.units < len(self.units):
+                self.holdout = f"one of {self.sums.units} groups of runs at a time"
             self.folds: HarmonicSums | None = self.sums
         else:
             parts = angle_blocks(self.units[0], self.positions)
@@ -128,7 +133,7 @@ class EvidenceSelection:
         if len(self.units) < 2:
             return level, None
         scatter = run_scatter(self.sums, chosen, range(len(self.orders)))
-        return pooled_scatter(scatter, len(self.units)) or level, scatter
+        return pooled_scatter(scatter, self.sums.units) or level, scatter
 
     def _forward(self) -> list[int]:
         noise = self._noise(())
@@ -155,6 +160,7 @@ class EvidenceSelection:
                 share = amplitude / math.sqrt(float((amplitude**2).sum()))
                 scatter_of_one = self._noise(chosen).standard_deviation
                 small = (share < NEGLIGIBLE_SHARE) & (amplitude < NEGLIGIBLE_NOISE * scatter_of_one)
+                small |= amplitude < _ROUNDING * self.runs[0].period
                 verdict, failing = "negligible", np.where(small, 1.0, -1.0)
                 if not small.any():
                     steep = self._too_steep(chosen)

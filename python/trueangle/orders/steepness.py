@@ -28,7 +28,7 @@ def greatest_slope(
 
     Examples
     --------
-    >>> greatest_slope([1, 3], [0.0, 0.0], [9 / 8 * 0.5, 0.5 / 8], 2 * math.pi) < 0.6
+    >>> greatest_slope([1, 3], [0.0, 0.0], [9 / 8 * 0.5, 0.5 / 8], 2 * math.pi) < 0.76
     True
     """
     m, a, b = (np.asarray(v, dtype=np.float64) for v in (orders, cosine, sine))

@@ -54,11 +54,9 @@ _HEADER = (
 
 
 def _line(row: OrderRow, period: float) -> str:
-    chance = (
-        f"1e{math.floor(row.log10_false_alarm):d}"
-        if row.log10_false_alarm < -3
-        else (f"{10.0**row.log10_false_alarm:.3g}")
-    )
+    chance = f"{10.0**row.log10_false_alarm:.3g}"
+    if -math.inf < row.log10_false_alarm < -3:
+        chance = f"1e{math.floor(row.log10_false_alarm):d}"
     spread = f"{row.phase_spread_deg:6.0f}" if math.isfinite(row.phase_spread_deg) else "     -"
     return (
         f"  {row.order:>5g} {arcsec(row.amplitude, period):11.4g} "

@@ -137,6 +137,13 @@ def selection_notes(
             )
     if aliased:
         notes.append(_sentence(positions, candidates))
+    if candidates.unresolved:
+        pairs = [f"{m:g} from {k:g}" for m, k in candidates.unresolved.items()]
+        needed = 0.5 / min(abs(m - k) for m, k in candidates.unresolved.items())
+        notes.append(
+            f"over this travel the gear's orders {', '.join(pairs)} cannot be told: the low "
+            f"order stands for both, within this travel only; {needed:.3g} turns tell them"
+        )
     if candidates.gear_ratio is not None and not candidates.whole:
         notes.append(
             f"gear ratio {candidates.gear_ratio:g} is not whole: the error is not periodic in "

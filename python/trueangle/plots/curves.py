@@ -128,6 +128,8 @@ def seen_span(model: HarmonicModel) -> tuple[float, float]:
     if model.partial_span is None:
         return 0.0, 360.0
     low, high = (360.0 / model.period * x for x in model.partial_span)
+    if high - low >= 360.0:  # several turns of an error that does not repeat
+        return 0.0, 360.0
     # An arc across zero reads better as -90 to 90 than as 270 to 450.
     turns = 360.0 * np.floor((0.5 * (low + high) + 180.0) / 360.0) if high > 360.0 else 0.0
     return low - turns, high - turns

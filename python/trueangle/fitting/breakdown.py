@@ -1,0 +1,58 @@
+"""Robust fits that may have broken down: too many readings stand apart, or stand together."""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .problem import Problem
+from .robust import FAR, MANY, Weighted, robust_scale
+
+__all__ = ["breakdown_sentence"]
+
+Array = NDArray[np.float64]
+
+#: With this share of them a robust fit of several orders is at its end wherever they are ...
+_MOST: Final = 0.15
+#: ... and with `MANY` where neighbours in angle agree so many times better than the fit:
+#: the readings that stand apart stand together, and the model has bent towards them.
+_BENT: Final = 3.0
+
+#: Of fewer readings a share says nothing.
+_FEW: Final = 50
+
+
+def breakdown_sentence(problem: Problem, weighted: Weighted) -> str:
+    """What to tell of a robust fit at the end of its powers; empty where it is not."""
+    share = weighted.far
+    if share <= MANY or sum(map(len, problem.runs)) < _FEW:
+        return ""
+    rest = problem.residuals(weighted.fitted)
+    scale, near = robust_scale(np.concatenate(rest)), _between_neighbours(problem, rest)
+    if weighted.weights is None:
+        if scale <= _BENT * near:
+            return ""
+        return (
+            f"the residuals are {scale / near:.2g} times what neighbours in angle differ by: the "
+            "model lacks an effect, or wrong readings stand together; look at the residuals"
+        )
+    if share <= _MOST and scale <= _BENT * near:
+        return ""
+    return (
+        f"{100.0 * share:.0f} % of the readings lie beyond {FAR:g} robust standard deviations "
+        "(0.7 % of normal ones do): more than a robust fit holds out against, where they stand "
+        "together; the coefficients may be off by far more than their errors. Look at the "
+        "residuals, and give the readings that are wrong weight 0"
+    )
+
+
+def _between_neighbours(problem: Problem, residuals: list[Array]) -> float:
+    """Standard deviation of a reading by how neighbours in angle differ, run by run."""
+    steps = [
+        np.diff(rest[np.argsort(np.mod(x, problem.period), kind="stable")])
+        for rest, x in zip(residuals, problem.angles, strict=True)
+    ]
+    return robust_scale(np.concatenate(steps)) / math.sqrt(2.0)
