@@ -300,6 +300,8 @@ def test_all_of_a_finding_reaches_the_corrected_model_and_its_steps(hidden, kind
     np.testing.assert_allclose(again.predict(train), found.extended.predict(train))
 
 
+# A reading at the very end of the span comes back a rounding error beyond it.
+@pytest.mark.filterwarnings("ignore::trueangle.errors.OutsideSpanWarning")
 def test_a_sideband_of_broken_order_gets_a_shaft_of_its_own():
     joint = Joint(50.5, "circular_spline", "motor")
     bands = EFFECTS["sidebands"].from_table(
