@@ -6,6 +6,7 @@ from typing import Any
 
 __all__ = [
     "ArgumentError",
+    "EmptyCellsWarning",
     "FileError",
     "MissingExtraError",
     "MissingSignalError",
@@ -71,6 +72,8 @@ class FileError(TrueAngleError):
     Attributes
     ----------
     path : str
+    problem : str
+        What was got and what to do, without the place.
     line : int or None
         Counted from 1, the header being line 1.
     column : str or None
@@ -93,10 +96,10 @@ class FileError(TrueAngleError):
         if column is not None:
             place.append(f"column '{column}'")
         super().__init__(f"{', '.join(place)}: {problem}")
-        self._problem = problem
+        self.problem = problem
 
     def __reduce__(self) -> tuple[Any, ...]:  # workers of a cluster send errors home
-        return _file_error, (type(self), self.path, self._problem, self.line, self.column)
+        return _file_error, (type(self), self.path, self.problem, self.line, self.column)
 
 
 def _file_error(
@@ -111,6 +114,10 @@ class ModelFileError(FileError):
 
 class MissingExtraError(TrueAngleError, ImportError):
     """An optional dependency is not installed; the message says how to install it."""
+
+
+class EmptyCellsWarning(UserWarning):
+    """Rows of a file were left out since a cell of theirs is empty."""
 
 
 class OutsideSpanWarning(UserWarning):

@@ -1,53 +1,71 @@
-"""Calibration runs from CSV and Parquet files, one row per reading."""
+"""Calibration runs from files of any format, one row per reading."""
 
 from __future__ import annotations
 
-import csv
-import hashlib
-import io
-import math
-from collections.abc import Iterable, Iterator, Mapping
+import os
+import re
+import stat
+import tempfile
+import warnings
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from os import PathLike
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .angles import UNIT_PERIODS
-from .errors import ArgumentError, FileError, MissingExtraError
-from .files import RUNS_BYTES, read_whole
+from .columns import Column, count_turn, find_columns, listed, wanted_columns
+from .errors import EmptyCellsWarning, FileError
+from .files import RUNS_BYTES, check_input, read_whole, sha256_of
+from .formats.csvheader import number
+from .formats.format import Batch, Format, Labels
+from .formats.formats import format_of_content
 from .runs import CalibrationRun, Source
-from .signals import FIELDS, SIGNALS, Signal, find_signal
+from .signals import FIELDS
 
-__all__ = ["read_runs"]
+__all__ = ["Readings", "RunColumns", "read_columns", "read_readings", "read_runs"]
 
-_UNITS = (*UNIT_PERIODS, "count")
+T = TypeVar("T")
+
+#: Columns that are kept although nothing is known of them, at most: a wide log has thousands.
+_KEPT = 256
+#: Unit of the run's angles where the reference has none that a run may be in.
+_PERIOD = 360.0
 
 
 def read_runs(
     path: str | PathLike[str] | Iterable[str | PathLike[str]],
     *,
     counts_per_turn: float | None = None,
+    counts_per_turn_reference: float | None = None,
+    signals: Mapping[str, Any] | None = None,
+    topic: str | None = None,
 ) -> list[CalibrationRun]:
     """Calibration runs of one file or several, in the order the files name them.
 
     Parameters
     ----------
     path : path or iterable of paths
-        CSV (comma, semicolon or tab; first line the header) or Parquet. Columns:
-        ``reference_deg`` and ``indicated_deg`` (or ``_rad``, ``_turn``; ``indicated_count``
-        with ``counts_per_turn``), and optionally ``run``, ``time_s``, ``temperature_C``,
-        ``torque_Nm``, ``mount_deg``, ``velocity_deg_s``. Others are kept in
-        `CalibrationRun.columns`.
-    counts_per_turn : float, optional
-        Counts of ``indicated_count`` in one turn of the output.
+        CSV (comma, semicolon or tab, decimal points or commas, lines before the names,
+        notes that begin with #, a line of units), Parquet, Arrow, HDF5, MATLAB, numpy, ROS
+        bags, MCAP, MDF4. Columns: ``reference_deg`` and ``indicated_deg`` (or ``_rad``,
+        ``_turn``, ``_count``, or a unit in brackets), and optionally ``run``, ``unit`` and
+        those of `trueangle.signals.SIGNALS`. Others are kept in `CalibrationRun.columns`.
+    counts_per_turn, counts_per_turn_reference : float, optional
+        Counts in one turn of the output, of an indicated angle or reference in counts.
+    signals : mapping of role to column, optional
+        Columns with other names: ``{"torque": "tau", "reference": ("pos act", "rad")}``.
+    topic : str, optional
+        JointState topic of a ROS bag (default: the only one).
 
     Returns
     -------
     list of CalibrationRun
-        One per label of ``run`` and file; rows stay in their order. The period of a run
-        is that of its reference column: 360, ``2*pi`` or 1.
+        One per unit, label of ``run`` and file; rows stay in their order. The period of a
+        run is that of its reference column: 360, ``2*pi`` or 1; 360 for other units.
 
     Raises
     ------
@@ -56,11 +74,22 @@ def read_runs(
         a non-finite value where a number belongs, units mixed within a file, time that
         runs backwards within a run, an empty file.
     MissingExtraError
-        Parquet without pyarrow.
+        A format whose library is not installed.
+
+    Warns
+    -----
+    EmptyCellsWarning
+        Rows with an empty cell were left out; `CalibrationRun.left_out` counts them.
     """
-    if isinstance(path, (str, PathLike)):
-        return _read_file(Path(path), counts_per_turn)
-    runs = [run for entry in path for run in _read_file(Path(entry), counts_per_turn)]
+    wanted = wanted_columns(signals)
+    indicated = count_turn(counts_per_turn, "counts_per_turn")
+    reference = count_turn(counts_per_turn_reference, "counts_per_turn_reference")
+    paths = [path] if isinstance(path, (str, PathLike)) else list(path)
+
+    def read(file: Path) -> list[CalibrationRun]:
+        return _runs(_columns(_readings(file, wanted, topic), indicated, reference))
+
+    runs = [run for entry in paths for run in _named(Path(entry), read)]
     units = {run.period: run for run in runs}
     if len(units) > 1:
         first, other = list(units.values())[:2]
@@ -73,251 +102,328 @@ def read_runs(
     return runs
 
 
-class _Table:
-    """Columns of one file as text or numbers, with the line every row came from."""
+class Readings(NamedTuple):
+    """Rows of one file as they are, before they are runs.
 
-    def __init__(self, path: Path, columns: Mapping[str, Any], lines: NDArray[np.int64]) -> None:
-        self.path = path
-        self.columns = columns
-        self.lines = lines
+    Attributes
+    ----------
+    path : Path
+    format : Format
+    roles : dict of str to Column
+        What is known of the columns.
+    columns : dict of str to array
+        By name; texts as arrays of objects.
+    source : Source
+    """
 
-    def numbers(self, name: str) -> NDArray[np.float64]:
-        """Column ``name`` as finite floats."""
-        column = self.columns[name]
+    path: Path
+    format: Format
+    roles: dict[str, Column]
+    columns: dict[str, NDArray[Any]]
+    source: Source
+
+    def error(self, problem: str, column: str | None = None, row: int | None = None) -> FileError:
+        """The error that says ``problem`` of a column, at the line of a row."""
+        line = 1 if row is None else self.format.line_of(self.path, row)
+        return FileError(self.path, problem, line=line, column=column)
+
+    def raw(self, column: Column) -> NDArray[np.float64]:
+        """A column as finite numbers, NaN where a cell is empty."""
+        values = self.columns[column.name]
+        if values.dtype == object:
+            row = next((i for i, value in enumerate(values) if value is not None), 0)
+            got = repr(values[row])[:60]
+            raise self.error(f"a number is needed, got {got}", column.name, row)
+        numbers = np.asarray(values, dtype=np.float64)
+        infinite = np.flatnonzero(np.isinf(numbers))
+        if infinite.size:
+            row = int(infinite[0])
+            problem = f"readings must be finite, got {numbers[row]}; drop the row"
+            raise self.error(problem, column.name, row)
+        return numbers
+
+
+def read_readings(
+    path: str | PathLike[str], signals: Mapping[str, Any] | None = None, topic: str | None = None
+) -> Readings:
+    """All rows of one file with the columns that are known, needed or not.
+
+    For logs without a reference, such as those that a self-calibration starts from.
+
+    Raises
+    ------
+    FileError
+        As `read_runs`, but no column is needed.
+    """
+    wanted = wanted_columns(signals)
+    return _named(Path(path), lambda file: _readings(file, wanted, topic))
+
+
+def _named(path: Path, read: Callable[[Path], T]) -> T:
+    """What ``read`` makes of a file; a pipe is written to a file first, and keeps its name."""
+    found = check_input(path)
+    if stat.S_ISREG(found.st_mode) or (path.is_dir() and (path / "metadata.yaml").is_file()):
+        if found.st_size > RUNS_BYTES:
+            raise FileError(
+                path,
+                f"has {found.st_size} bytes, but a table of runs is read up to "
+                f"{RUNS_BYTES >> 30} GiB; fit_logs (trueangle fit --one-pass) reads more, in "
+                "constant memory",
+            )
+        return read(path)
+    with _spooled(path) as file:
         try:
-            values = np.asarray(column).astype(np.float64)
-        except (TypeError, ValueError):
-            for row, text in enumerate(column):
-                try:
-                    float(text)
-                except (TypeError, ValueError):
-                    got = "an empty cell" if text in ("", None) else repr(text)
-                    raise self.error(row, name, f"a number is needed, got {got}") from None
-            raise
-        bad = np.flatnonzero(~np.isfinite(values))
-        if bad.size:
-            row = int(bad[0])
-            raise self.error(row, name, f"readings must be finite, got {values[row]}; drop the row")
-        return values
+            return read(file)
+        except FileError as error:
+            raise type(error)(path, error.problem, line=error.line, column=error.column) from None
 
-    def error(self, row: int, column: str, problem: str) -> FileError:
-        return FileError(self.path, problem, line=int(self.lines[row]), column=column)
+
+@contextmanager
+def _spooled(path: Path) -> Iterator[Path]:
+    data = read_whole(path, RUNS_BYTES, "a table of runs")
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder, os.path.basename(path) or "runs")
+        file.write_bytes(data)
+        yield file
+
+
+def _readings(path: Path, wanted: Mapping[str, Any], topic: str | None) -> Readings:
+    kind = format_of_content(path)
+    header = kind.module.columns(path, topic)
+    doubled = next((name for i, name in enumerate(header) if name and name in header[:i]), None)
+    if doubled is not None:
+        raise FileError(path, "the column appears twice", line=1, column=doubled)
+    roles = find_columns(path, header, wanted)
+    needed = list(dict.fromkeys(column.name for column in roles.values()))
+    others = [name for name in header if name not in needed][:_KEPT]
+    together = getattr(kind.module, "together", None)
+    if together is not None:  # formats whose columns need not be equally long
+        others = together(path, needed, others)
+    labels = {column.name for column in roles.values() if column.role in ("run", "unit")}
+    numeric = _numeric(kind, path, others, topic)
+    try:
+        columns = _joined(kind, path, [*needed, *others], labels | set(others) - numeric, topic)
+    except FileError as error:
+        if error.column not in numeric:
+            raise
+        columns = _joined(kind, path, [*needed, *others], labels | set(others), topic)
+    digest = "" if path.is_dir() else sha256_of(path)
+    return Readings(path, kind, roles, columns, Source(path.name, digest))
+
+
+def _numeric(kind: Format, path: Path, names: list[str], topic: str | None) -> set[str]:
+    """Columns of a text file that look like numbers in its first rows."""
+    if not names or not hasattr(kind.module, "line_of"):
+        return set()
+    first = next(iter(kind.module.read(path, names, topic, texts=names)), {})
+    return {name for name, labels in first.items() if all(map(_is_number, labels.names))}
+
+
+def _is_number(text: str | None) -> bool:
+    """A number that is written as one: 007 is a name."""
+    if text is None:
+        return True
+    return number(text, ",") is not None and not _NUMBERED.match(text)
+
+
+_NUMBERED = re.compile(r"[+-]?0\d")
+
+
+def _joined(
+    kind: Format, path: Path, names: list[str], texts: set[str], topic: str | None
+) -> dict[str, NDArray[Any]]:
+    """Whole columns."""
+    parts: dict[str, list[Any]] = {name: [] for name in names}
+    for batch in kind.module.read(path, names, topic, texts=texts, strict=True):
+        for name in names:
+            parts[name].append(_plain_values(batch, name))
+    return {name: np.concatenate(found) if found else np.empty(0) for name, found in parts.items()}
+
+
+def _plain_values(batch: Batch, name: str) -> NDArray[Any]:
+    """Numbers as they are; texts as objects, since an array of texts is as wide as the longest."""
+    values = batch[name]
+    if isinstance(values, Labels):
+        texts = np.empty(len(values.names) + 1, dtype=object)
+        texts[:-1] = values.names
+        return np.asarray(texts[values.codes])
+    return np.asarray(values)
 
 
 class RunColumns(NamedTuple):
-    """Columns of one file of runs as they were read, nothing of them judged but the numbers."""
+    """Columns of one file of runs as they were read, nothing of them judged but the numbers.
 
-    table: _Table
+    Angles and signals are in the unit of ``period``; ``groups`` are unit, label, and the
+    rows without an empty cell of every run, in the order of their first row.
+    """
+
+    table: Readings
     period: float
     reference: NDArray[np.float64]
     indicated: NDArray[np.float64]
     signals: dict[str, NDArray[np.float64]]
-    groups: list[tuple[str | None, str | None, NDArray[np.intp]]]  # unit, label, rows
+    groups: list[tuple[str | None, str | None, NDArray[np.intp]]]
+    left_out: list[int]
     source: Source
 
 
-def read_columns(path: Path, counts_per_turn: float | None) -> RunColumns:
-    """The columns of one file, grouped by run; time may run backwards."""
-    data = read_whole(
-        path,
-        RUNS_BYTES,
-        "a table of runs",
-        "fit_logs (trueangle fit --one-pass) reads more, in constant memory",
-    )
-    source = Source(path.name, hashlib.sha256(data).hexdigest())
-    parquet = data[:4] == b"PAR1" or path.suffix in (".parquet", ".pq")
-    table = _parquet(path, data) if parquet else _csv(path, data)
-    period, angles = _angles(table, counts_per_turn)
-    scalars = {}
-    for signal in _signals_of(table.columns):
-        for column, factor in _places(signal, period):
-            if column in table.columns:
-                scalars[signal.name] = table.numbers(column) * factor
-    return RunColumns(
-        table, period, angles["reference"], angles["indicated"], scalars, _groups(table), source
+def read_columns(
+    path: str | PathLike[str],
+    counts_per_turn: float | None = None,
+    counts_per_turn_reference: float | None = None,
+    signals: Mapping[str, Any] | None = None,
+    topic: str | None = None,
+) -> RunColumns:
+    """The columns of one file, grouped by run; time may run backwards. As `read_runs`."""
+    wanted = wanted_columns(signals)
+    indicated = count_turn(counts_per_turn, "counts_per_turn")
+    reference = count_turn(counts_per_turn_reference, "counts_per_turn_reference")
+    return _named(
+        Path(path), lambda file: _columns(_readings(file, wanted, topic), indicated, reference)
     )
 
 
-def _read_file(path: Path, counts_per_turn: float | None) -> list[CalibrationRun]:
-    table, period, reference, indicated, scalars, groups, source = read_columns(
-        path, counts_per_turn
-    )
-    known = {"run", "unit", *(SIGNALS[name].column for name in ("time", "temperature", "torque"))}
-    others = {k: _kept(v) for k, v in table.columns.items() if k not in known}
+def _columns(table: Readings, counts: float | None, reference_counts: float | None) -> RunColumns:
+    roles, path = table.roles, table.path
+    for role in ("reference", "indicated"):
+        if role not in roles:
+            _refuse_missing(table, role)
+    if not len(next(iter(table.columns.values()))):
+        raise FileError(path, "has a header but no readings", line=1)
+    period, reference, indicated = _angles(table, counts, reference_counts)
+    signals = {}
+    for role, column in roles.items():
+        if role not in ("reference", "indicated", "run", "unit"):
+            if (column.unit or "").startswith("count"):
+                raise table.error(
+                    "counts of this signal have no known turn; give it in deg, rad or turn",
+                    column.name,
+                )
+            signals[role] = column.values(table.raw(column), period)
+    missing = np.zeros(reference.size, dtype=bool)
+    for values in (reference, indicated, *signals.values()):
+        missing |= np.isnan(values)
+    groups, left_out = [], []
+    for unit, label, rows in _groups(table, reference.size):
+        present = rows[~missing[rows]]
+        if not present.size:
+            raise FileError(path, f"every row of run {label or path.name} has an empty cell")
+        groups.append((unit, label, present))
+        left_out.append(rows.size - present.size)
+    _warn_of_empty(table, missing, {"reference": reference, "indicated": indicated, **signals})
+    return RunColumns(table, period, reference, indicated, signals, groups, left_out, table.source)
+
+
+def _runs(found: RunColumns) -> list[CalibrationRun]:
+    table, signals = found.table, found.signals
+    used = {c.name for role, c in table.roles.items() if c.is_asked or role in _USED}
+    others = {name: values for name, values in table.columns.items() if name not in used}
     runs = []
-    for unit, label, rows in groups:
-        _check_time(table, scalars.get("time"), rows)
-        fields: dict[str, Any] = {k: v[rows] for k, v in scalars.items() if k in FIELDS}
+    for (unit, label, rows), left_out in zip(found.groups, found.left_out, strict=True):
+        if "time" in signals:
+            _check_time(table, signals["time"], rows)
+        fields: dict[str, Any] = {k: v[rows] for k, v in signals.items() if k in FIELDS}
         runs.append(
             CalibrationRun(
-                reference[rows],
-                indicated[rows],
+                found.reference[rows],
+                found.indicated[rows],
                 **fields,
-                period=period,
+                period=found.period,
                 label=label,
                 unit=unit,
-                signals={k: v[rows] for k, v in scalars.items() if k not in FIELDS},
+                left_out=left_out,
+                signals={k: v[rows] for k, v in signals.items() if k not in FIELDS},
                 columns={name: values[rows] for name, values in others.items()},
-                source=source,
+                source=found.source,
             )
         )
     return runs
 
 
-def _csv(path: Path, data: bytes) -> _Table:
-    try:
-        text = data.decode("utf-8-sig")
-    except UnicodeDecodeError as cause:
-        line = data.count(b"\n", 0, cause.start) + 1
-        raise FileError(path, "is not UTF-8 text; save it as CSV in UTF-8", line=line) from None
-    header_line = text.partition("\n")[0].strip()
-    if not header_line:
-        raise FileError(path, "is empty; a header line and readings are needed", line=1)
-    delimiter = max(",;\t", key=header_line.count)
-    reader = csv.reader(io.StringIO(text, newline=""), delimiter=delimiter, strict=True)
-    header = [name.strip() for name in next(reader)]
-    doubled = {name for name in header if header.count(name) > 1}
-    if doubled:
-        raise FileError(path, "the column appears twice", line=1, column=min(doubled))
-    rows, lines = [], []
-    try:
-        for row in reader:
-            if not row or (len(row) == 1 and not row[0].strip()):
-                continue
-            if len(row) != len(header):
-                raise FileError(
-                    path,
-                    f"{len(row)} values where the header has {len(header)} columns",
-                    line=reader.line_num,
-                )
-            rows.append(row)
-            lines.append(reader.line_num)
-    except csv.Error as cause:
-        raise FileError(path, f"is not readable as CSV: {cause}", line=reader.line_num) from None
-    if not rows:
-        raise FileError(path, "has a header but no readings", line=1)
-    columns = dict(zip(header, zip(*rows, strict=True), strict=True))
-    return _Table(path, columns, np.array(lines))
+#: Roles whose columns are not repeated among the other columns of a run.
+_USED = ("time", "temperature", "torque", "run", "unit")
 
 
-def _parquet(path: Path, data: bytes) -> _Table:
-    try:
-        import pyarrow as pa
-        import pyarrow.parquet as pq
-    except ImportError:
-        raise MissingExtraError(
-            f"{path}: reading Parquet needs pyarrow: pip install 'trueangle[arrow]'"
-        ) from None
-    try:
-        table = pq.read_table(pa.BufferReader(data))
-    except pa.ArrowException as cause:
-        raise FileError(path, f"is not readable as Parquet: {cause}") from None
-    columns = {
-        name: table[name].to_pylist()
-        if table[name].null_count
-        else table[name].to_numpy(zero_copy_only=False)
-        for name in table.column_names
-    }
-    if table.num_rows == 0:
-        raise FileError(path, "has no readings")
-    # There are no lines: rows counted from 1, as if under a header.
-    return _Table(path, columns, np.arange(2, table.num_rows + 2))
-
-
-def _angles(
-    table: _Table, counts_per_turn: float | None
-) -> tuple[float, dict[str, NDArray[np.float64]]]:
-    """Period of the file and its two angles in that unit."""
-    units = {what: _unit(table, what) for what in ("reference", "indicated")}
-    unit, indicated_unit = units["reference"], units["indicated"]
-    if unit == "count":
-        raise FileError(
-            table.path,
-            "a reference in counts has no fixed unit; use reference_deg, _rad or _turn",
-            line=1,
-            column="reference_count",
+def _warn_of_empty(
+    table: Readings, missing: NDArray[np.bool_], values: Mapping[str, NDArray[np.float64]]
+) -> None:
+    count = int(np.count_nonzero(missing))
+    if count:
+        row = int(np.flatnonzero(missing)[0])
+        role = next(role for role, found in values.items() if np.isnan(found[row]))
+        line = table.format.line_of(table.path, row)
+        warnings.warn(
+            f"{table.path}: {count} of {missing.size} rows have an empty cell and are left out, "
+            f"the first at line {line}, column '{table.roles[role].name}'",
+            EmptyCellsWarning,
+            stacklevel=5,
         )
-    period = UNIT_PERIODS[unit]
-    reference = table.numbers(f"reference_{unit}")
-    indicated = table.numbers(f"indicated_{indicated_unit}")
-    if indicated_unit == "count":
-        if counts_per_turn is None:
-            raise FileError(
-                table.path,
-                "counts need their number per output turn: give --counts-per-turn "
-                "(counts_per_turn= in Python)",
-                line=1,
-                column="indicated_count",
-            )
-        if not (math.isfinite(counts_per_turn) and counts_per_turn > 0):
-            raise ArgumentError(f"counts_per_turn must be positive, got {counts_per_turn!r}")
-        indicated = indicated * (period / counts_per_turn)
-    elif indicated_unit != unit:
-        raise FileError(
-            table.path,
-            f"units are mixed: reference in {unit}, indicated in {indicated_unit}; convert one",
-            line=1,
-            column=f"indicated_{indicated_unit}",
-        )
-    return period, {"reference": reference, "indicated": indicated}
 
 
-def _unit(table: _Table, what: str) -> str:
-    found = [unit for unit in _UNITS if f"{what}_{unit}" in table.columns]
-    if len(found) == 1:
-        return found[0]
-    if found:
-        raise FileError(
-            table.path,
-            f"units are mixed: {' and '.join(f'{what}_{u}' for u in found)}; keep one",
-            line=1,
-            column=f"{what}_{found[1]}",
-        )
-    wanted = ", ".join(f"{what}_{unit}" for unit in (_UNITS if what == "indicated" else _UNITS[:3]))
+def _refuse_missing(table: Readings, role: str) -> None:
+    units = (*UNIT_PERIODS, "count") if role == "indicated" else tuple(UNIT_PERIODS)
+    names = ", ".join(f"{role}_{unit}" for unit in units)
     raise FileError(
         table.path,
-        f"no column {what}_deg (one of {wanted} is needed); "
-        f"its columns are {', '.join(table.columns)}",
+        f"no column {role}_deg (one of {names} is needed, or another named with "
+        f"--signal {role}=NAME:UNIT); {listed(list(table.columns))}",
         line=1,
     )
 
 
-def _signals_of(columns: Iterable[str]) -> Iterator[Signal]:
-    """Signals that may be among the columns: those of the list, and the heads by number."""
-    yield from SIGNALS.values()
-    heads = {name.partition("_")[0] for name in columns if name.startswith("head")}
-    for name in sorted(heads):
-        try:
-            yield find_signal(name)
-        except ArgumentError:
-            continue
+def _angles(
+    table: Readings, counts: float | None, reference_counts: float | None
+) -> tuple[float, NDArray[np.float64], NDArray[np.float64]]:
+    """Period of the file and its two angles in that unit."""
+    default = table.format.unit
+    reference, indicated = (
+        column._replace(unit=column.unit or default)
+        for column in (table.roles["reference"], table.roles["indicated"])
+    )
+    if reference.unit is None:
+        raise table.error(
+            f"its unit is not known; give it: --signal reference={reference.name}:deg",
+            reference.name,
+        )
+    if reference.unit == "count" and reference_counts is None:
+        raise table.error(
+            "a reference in counts needs their number per turn: give "
+            "--counts-per-turn-reference (counts_per_turn_reference= in Python)",
+            reference.name,
+        )
+    indicated = indicated._replace(unit=indicated.unit or reference.unit)
+    if indicated.unit == "count" and counts is None:
+        raise table.error(
+            "counts need their number per output turn: give --counts-per-turn "
+            "(counts_per_turn= in Python)",
+            indicated.name,
+        )
+    by_name = not (reference.is_asked or indicated.is_asked)
+    suffixes = [c.name == f"{c.role}_{c.unit}" for c in (reference, indicated)]
+    differ = reference.unit != indicated.unit and "count" not in (reference.unit, indicated.unit)
+    if differ and by_name and all(suffixes):
+        raise table.error(
+            f"units are mixed: reference in {reference.unit}, indicated in {indicated.unit}; "
+            f"convert one, or name both with --signal",
+            indicated.name,
+        )
+    period = UNIT_PERIODS.get(reference.unit, _PERIOD)
+    return (
+        period,
+        reference.values(table.raw(reference), period, reference_counts),
+        indicated.values(table.raw(indicated), period, counts),
+    )
 
 
-def _places(signal: Signal, period: float) -> Iterator[tuple[str, float]]:
-    """Columns that may hold a signal, each with the factor to the unit of the run."""
-    if signal.kind in ("angle", "velocity"):
-        for unit, turn in UNIT_PERIODS.items():
-            yield signal.column.format(unit), period / turn
-    else:
-        yield signal.column, 1.0
-
-
-def _kept(values: Any) -> NDArray[Any]:
-    """A column as it is; texts as objects, since an array of texts is as wide as the longest."""
-    if isinstance(values, np.ndarray):
-        return values
-    return np.fromiter(values, dtype=object, count=len(values))
-
-
-def _groups(table: _Table) -> list[tuple[str | None, str | None, NDArray[np.intp]]]:
+def _groups(table: Readings, size: int) -> list[tuple[str | None, str | None, NDArray[np.intp]]]:
     """Unit, label and rows of every run, in the order of their first row."""
-    names = [name for name in ("unit", "run") if name in table.columns]
+    names = {role: table.roles[role].name for role in ("unit", "run") if role in table.roles}
+    if not names:
+        return [(None, None, np.arange(size))]
     rows: dict[tuple[str, ...], list[int]] = {}
-    keys = zip(*(map(str, table.columns[name]) for name in names), strict=True)
+    keys = zip(*(map(_label, table.columns[name].tolist()) for name in names.values()), strict=True)
     for i, key in enumerate(keys):
         rows.setdefault(key, []).append(i)
-    if not names:
-        return [(None, None, np.arange(table.lines.size))]
     found = []
     for key, places in rows.items():
         labels = dict(zip(names, key, strict=True))
@@ -325,15 +431,17 @@ def _groups(table: _Table) -> list[tuple[str | None, str | None, NDArray[np.intp
     return found
 
 
-def _check_time(table: _Table, time: NDArray[np.float64] | None, rows: NDArray[np.intp]) -> None:
-    if time is None:
-        return
+def _label(value: Any) -> str:
+    return "" if value is None else str(value)
+
+
+def _check_time(table: Readings, time: NDArray[np.float64], rows: NDArray[np.intp]) -> None:
     back = np.flatnonzero(np.diff(time[rows]) < 0.0)
     if back.size:
         row = int(rows[back[0] + 1])
         raise table.error(
-            row,
-            "time_s",
             f"time runs backwards within the run: {time[row]:g} after "
             f"{time[rows[back[0]]]:g}; sort the rows or give the part another run label",
+            table.roles["time"].name,
+            row,
         )

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import trueangle as ta
-from trueangle.errors import FileError
+from trueangle.errors import EmptyCellsWarning, FileError
 
 GOOD = "run,reference_deg,indicated_deg,time_s,note\na,0,0.5,0,x\na,90,90.5,1,y\nb,0,0.25,0,z\n"
 
@@ -61,7 +61,6 @@ REFUSED = {
     "one column": ("reference_deg\n1\n", "no column indicated_deg"),
     "no reference": ("indicated_deg,x\n1,2\n", "no column reference_deg.*indicated_deg, x"),
     "text": (GOOD.replace("90.5", "abc"), r"line 3, column 'indicated_deg'.*'abc'"),
-    "empty cell": (GOOD.replace("90.5", ""), r"line 3, column 'indicated_deg'.*empty"),
     "NaN": (GOOD.replace("90.5", "nan"), r"line 3, column 'indicated_deg'.*nan"),
     "infinity": (GOOD.replace("90.5", "inf"), r"line 3, column 'indicated_deg'.*inf"),
     "short line": (GOOD.replace(",y", ""), "line 3: 4 values where the header has 5"),
@@ -102,8 +101,9 @@ def test_parquet_reads_like_csv(tmp_path):
     (run,) = ta.read_runs(path)
     np.testing.assert_array_equal(run.indicated, [0.5, 90.5])
     pq.write_table(pa.table(table | {"indicated_deg": [0.5, None]}), path)
-    with pytest.raises(FileError, match=r"line 3, column 'indicated_deg'"):
-        ta.read_runs(path)
+    with pytest.warns(EmptyCellsWarning, match=r"1 of 2 rows.*line 3, column 'indicated_deg'"):
+        (run,) = ta.read_runs(path)
+    assert (len(run), run.left_out) == (1, 1)
 
 
 def test_signals_go_there_and_back(tmp_path):
@@ -125,3 +125,35 @@ def test_signals_go_there_and_back(tmp_path):
         for name in ("current", "shift", "motor", "head1"):
             scale = 1.0 if name == "current" else 360.0
             assert after.signal(name)[0] == pytest.approx(scale * before.signal(name)[0])
+
+
+def test_rows_with_an_empty_cell_are_counted_left_out_and_said(tmp_path):
+    path = written(tmp_path, GOOD.replace("90.5", "").replace("0.25", " "))
+    with pytest.raises(FileError, match="every row of run b has an empty cell"):
+        ta.read_runs(path)
+    path = written(tmp_path, GOOD.replace("90.5", ""))
+    with pytest.warns(EmptyCellsWarning, match=r"1 of 3 rows.*line 3, column 'indicated_deg'"):
+        first, second = ta.read_runs(path)
+    assert [first.left_out, second.left_out] == [1, 0]
+    assert first.columns["note"].tolist() == ["x"]
+
+
+NUMBERS = ["1_0", "\u0661", "0x10", "1,5", "1e", "--1", "True", "\x00", "1\u00b2"]
+
+
+@pytest.mark.parametrize("cell", NUMBERS)
+@pytest.mark.parametrize("quote", ["", '"'])
+def test_only_digits_of_ascii_are_numbers(cell, quote, tmp_path):
+    path = written(tmp_path, f"reference_deg;indicated_deg\n0;0.5\n1;{quote}{cell}{quote}\n")
+    if cell == "1,5":  # decimal commas beside semicolons
+        assert ta.read_runs(path)[0].indicated[1] == 1.5
+        return
+    with pytest.raises(FileError, match=r"line 3, column 'indicated_deg': a number is needed"):
+        ta.read_runs(path)
+
+
+def test_a_long_cell_takes_its_own_room_only(tmp_path):
+    rows = "".join(f"{i},{i},x\n" for i in range(20_000))
+    path = written(tmp_path, "reference_deg,indicated_deg,note\n" + rows + f"1,1,{'y' * 90_000}\n")
+    (run,) = ta.read_runs(path)  # as an array of texts: 7 GB
+    assert len(run.columns["note"][-1]) == 90_000

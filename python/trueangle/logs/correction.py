@@ -15,7 +15,8 @@ import numpy as np
 
 from ..errors import FileError
 from ..files.outputs import PARTIAL
-from .formats import Watch, find_format
+from ..formats.format import Watch
+from ..formats.formats import find_format
 from .joints import Channel, JointState, LogSettings
 from .manifest import Manifest
 from .safety import publish, stamp, workplace

@@ -112,7 +112,7 @@ def _from_pyarrow(pa: Any, data: Any, settings: LogSettings) -> Any:
         return _stream(pa, data, settings)
     if not isinstance(data, (pa.Table, pa.RecordBatch)):
         return NotImplemented
-    from .arrowtables import add_corrected, corrected_schema
+    from ..formats.arrowtables import add_corrected, corrected_schema
 
     channels = settings.channels(_DATA, data.schema.names)
     schema = corrected_schema(data.schema, channels, _DATA)
@@ -120,7 +120,7 @@ def _from_pyarrow(pa: Any, data: Any, settings: LogSettings) -> Any:
 
 
 def _stream(pa: Any, reader: Any, settings: LogSettings) -> Any:
-    from .arrowtables import add_corrected, corrected_schema
+    from ..formats.arrowtables import add_corrected, corrected_schema
 
     channels = settings.channels(_DATA, reader.schema.names)
     schema = corrected_schema(reader.schema, channels, _DATA)

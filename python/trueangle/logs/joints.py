@@ -16,7 +16,6 @@ from typing import Any, NamedTuple, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from .. import __version__
 from ..angles import UNIT_PERIODS
 from ..errors import ArgumentError, FileError, OutsideSpanWarning
 from ..files import sha256_of
@@ -26,7 +25,7 @@ from .columns import SIGNAL_COLUMNS, AngleColumn, find_angle_column, find_signal
 from .statistics import CorrectionStatistics
 from .turns import TurnCounter, TurnState
 
-__all__ = ["Channel", "Joint", "JointState", "LogSettings", "joints_of", "provenance"]
+__all__ = ["Channel", "Joint", "JointState", "LogSettings", "joints_of"]
 
 Array: TypeAlias = NDArray[np.floating[Any]]
 
@@ -233,6 +232,26 @@ class Channel:
         self._span = None if span is None else (span[0] / self._scale, span[1] / self._scale)
 
     @property
+    def column(self) -> str:
+        """The column that is corrected."""
+        return self.angle.name
+
+    @property
+    def added(self) -> str:
+        """The column that is added."""
+        return self.angle.corrected
+
+    @property
+    def entry(self) -> dict[str, Any]:
+        """How the added column is made, for the note that outputs carry."""
+        return {
+            "column": self.angle.corrected,
+            "from": self.angle.name,
+            "model": self.joint.file,
+            "model_sha256": self.joint.digest,
+        }
+
+    @property
     def name(self) -> str:
         """Name of the joint; empty where a log has one only."""
         return self.joint.name or ""
@@ -340,21 +359,3 @@ def _joint(entry: Any, name: str | None, column: str | None, signals: Any) -> Jo
     if isinstance(entry, (str, PathLike)):
         return Joint.load(entry, name, column, signals)
     raise ArgumentError(f"model must be a HarmonicModel or its file, got {type(entry).__name__}")
-
-
-def provenance(channels: Sequence[Channel]) -> str:
-    """How the corrected columns were made, as the JSON text that outputs carry."""
-    return json.dumps(
-        {
-            "package": f"trueangle {__version__}",
-            "corrected": [
-                {
-                    "column": channel.angle.corrected,
-                    "from": channel.angle.name,
-                    "model": channel.joint.file,
-                    "model_sha256": channel.joint.digest,
-                }
-                for channel in channels
-            ],
-        }
-    )

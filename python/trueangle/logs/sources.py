@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 from ..errors import ArgumentError, FileError
 from ..files import check_input, check_output, kind_of_log, promised_format, same_file
-from .formats import known_format
+from ..formats.formats import known_format
 from .manifest import MANIFEST
 
 __all__ = ["Place", "find_logs", "places"]

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from trueangle.logs.checksum import Checksum
+from trueangle.formats.checksum import Checksum
 
 
 def checksum(*parts):

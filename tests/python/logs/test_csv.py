@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import trueangle as ta
-from trueangle.logs import csvlog
+from trueangle.formats import csvfile as csvlog
 
 from .conftest import made_angles
 
@@ -20,7 +20,7 @@ def way(request, monkeypatch):
         monkeypatch.setattr(csvlog, "plain_block", None)
     # Small blocks put borders everywhere, also inside lines.
     monkeypatch.setattr(csvlog, "BLOCK", 701)
-    monkeypatch.setattr("trueangle.logs.csvrows.BLOCK", 701)
+    monkeypatch.setattr("trueangle.formats.csvrows.BLOCK", 701)
     return request.param
 
 

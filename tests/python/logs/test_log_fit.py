@@ -9,7 +9,7 @@ import pytest
 import trueangle as ta
 from trueangle.cli import main
 from trueangle.errors import FileError, NoModelError
-from trueangle.logs.formats import find_format
+from trueangle.formats.formats import find_format
 
 from .conftest import made_model
 
@@ -84,8 +84,8 @@ def test_one_pass_gives_any_other_orders(folder):
 
 @pytest.mark.parametrize("kind", ["parquet", "arrow"])
 def test_threads_change_no_bit(tmp_path, monkeypatch, kind):
-    monkeypatch.setattr("trueangle.logs.parquetlog._STRETCH", 4000)
-    monkeypatch.setattr("trueangle.logs.arrowlog._STRETCH", 1 << 16)
+    monkeypatch.setattr("trueangle.formats.parquet._STRETCH", 4000)
+    monkeypatch.setattr("trueangle.formats.arrow._STRETCH", 1 << 16)
     for i in range(3):
         reference, indicated = readings(20_000, i, 100.0 * i)
         indicated[100 * i] = np.nan
@@ -115,7 +115,7 @@ def test_threads_change_no_bit(tmp_path, monkeypatch, kind):
 
 @pytest.mark.parametrize("threads", [1, 2])
 def test_a_damaged_log_ends_the_fit(folder, monkeypatch, threads):
-    monkeypatch.setattr("trueangle.logs.parquetlog._STRETCH", 4000)
+    monkeypatch.setattr("trueangle.formats.parquet._STRETCH", 4000)
     path = folder / "2.parquet"
     data = bytearray(path.read_bytes())
     data[len(data) // 2 : len(data) // 2 + 20_000] = bytes(20_000)
@@ -127,9 +127,9 @@ def test_a_damaged_log_ends_the_fit(folder, monkeypatch, threads):
 @pytest.mark.parametrize("arrow", [True, False])
 def test_csv_with_runs_equals_parquet(tmp_path, monkeypatch, arrow):
     if not arrow:
-        monkeypatch.setattr("trueangle.logs.csvlog.plain_block", None)
-    monkeypatch.setattr("trueangle.logs.csvrows.BLOCK", 1 << 16)
-    monkeypatch.setattr("trueangle.logs.csvlog.BLOCK", 1 << 16)
+        monkeypatch.setattr("trueangle.formats.csvfile.plain_block", None)
+    monkeypatch.setattr("trueangle.formats.csvrows.BLOCK", 1 << 16)
+    monkeypatch.setattr("trueangle.formats.csvfile.BLOCK", 1 << 16)
     reference, indicated = readings(9000, 1, 0.0)
     indicated[4000:] += 3.0
     labels = np.repeat(["01", "1", "slow, warm"], [4000, 3000, 2000]).tolist()
@@ -237,7 +237,7 @@ def test_the_command_fits_folders_in_one_pass(folder, tmp_path, capsys):
 
 
 def test_checksums_are_kept_where_asked_for(folder, tmp_path, monkeypatch, capsys):
-    monkeypatch.setattr("trueangle.logs.parquetlog._STRETCH", 4000)
+    monkeypatch.setattr("trueangle.formats.parquet._STRETCH", 4000)
     wanted = [hashlib.sha256((folder / f"{i}.parquet").read_bytes()).hexdigest() for i in range(3)]
     path = tmp_path / "m.json"
     assert main(["fit", str(folder), "-o", str(path), "--orders", "1", "--checksums"]) == 0

@@ -14,7 +14,7 @@ ROWS = 5000
 
 @pytest.fixture(autouse=True)
 def small_blocks(monkeypatch):
-    monkeypatch.setattr("trueangle.logs.mdflog._BLOCK", 777)
+    monkeypatch.setattr("trueangle.formats.mdf._BLOCK", 777)
 
 
 def made_file(path, angles, compression=0, invalid=()):

@@ -220,7 +220,7 @@ def test_a_file_size_limit_leaves_nothing(logs, model_file, tmp_path):
 
 
 def test_an_output_that_reads_back_differently_is_not_kept(logs, model, tmp_path, monkeypatch):
-    from trueangle.logs import parquetlog
+    from trueangle.formats import parquet as parquetlog
 
     real = parquetlog.contents
 

@@ -154,7 +154,7 @@ def test_mixed_compression_and_encodings_are_kept_by_column(tmp_path, model):
 
 @pytest.mark.parametrize("codec", ["lz4", "zstd", "uncompressed"])
 def test_compression_of_arrow_files_is_kept(codec, tmp_path, model):
-    from trueangle.logs.arrowlog import _compression
+    from trueangle.formats.arrow import _compression
 
     source = write(rich_table(), tmp_path / "a.arrow", compression=codec)
     ta.correct_logs(source, model, tmp_path / "b.arrow")
@@ -163,7 +163,7 @@ def test_compression_of_arrow_files_is_kept(codec, tmp_path, model):
 
 
 def test_a_large_row_group_is_taken_in_parts(tmp_path, model, monkeypatch):
-    from trueangle.logs import parquetlog
+    from trueangle.formats import parquet as parquetlog
 
     monkeypatch.setattr(parquetlog, "_BYTES", 1 << 15)
     angles = made_angles(20_000)
@@ -233,7 +233,7 @@ def test_turns_are_counted_over_batches_and_files_for_models_that_need_it(tmp_pa
 
 
 def test_a_changed_source_is_not_taken(tmp_path, model, monkeypatch):
-    from trueangle.logs import parquetlog
+    from trueangle.formats import parquet as parquetlog
 
     source = write(rich_table(), tmp_path / "a.parquet")
     contents = parquetlog.contents

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import numpy as np
 import pyarrow as pa
+import pyarrow.compute as pc
 import pyarrow.parquet as pq
 
 from ..errors import FileError
@@ -17,15 +19,18 @@ from .arrowtables import (
     add_corrected,
     column_batches,
     corrected_schema,
-    damage_told,
 )
-from .formats import Batch, Choose, Contents, Watch
-from .joints import Channel
+from .damage import damage_told
+from .format import TEXTS, Addition, Batch, Choose, Contents, Watch
 
 __all__ = ["columns", "contents", "copy", "read", "stretches"]
 
 #: Bytes of decoded columns in hand at once; larger row groups are cut.
 _BYTES = 1 << 25
+#: Bytes of a column of the file that are in hand while it is read.
+_BUFFER = 1 << 20
+#: Rows at once of texts that take more than `_BYTES` in the file.
+_FEW = 64
 #: Rows, at least, of a stretch that is read on its own, and of the batches it is read in:
 #: these stay in the cache until they are used.
 _STRETCH = 1 << 20
@@ -61,17 +66,24 @@ def stretches(path: Path) -> list[Stretch | None]:
 
 
 def read(
-    path: Path, names: Sequence[str], topic: str | None = None, stretch: Stretch | None = None
+    path: Path,
+    names: Sequence[str],
+    topic: str | None = None,
+    stretch: Stretch | None = None,
+    *,
+    texts: Collection[str] = TEXTS,
+    strict: bool = False,
 ) -> Iterator[Batch]:
-    """Columns ``names`` in batches; see `formats.FormatModule`.
+    """Columns ``names`` in batches; see `format.FormatModule`.
 
     A stretch is read from mapped memory, by the calling thread alone.
     """
     if stretch is None:
-        with _opened(path) as file:
+        with _opened(path, read_dictionary=list(names)) as file:
             yield from ahead(column_batches(path, names, _batches(file, names)))
         return
-    with _opened(path, metadata=stretch.footer, memory_map=True) as file:
+    mapped = {"metadata": stretch.footer, "memory_map": True, "read_dictionary": list(names)}
+    with _opened(path, **mapped) as file:
         yield from column_batches(path, names, _batches(file, names, stretch.groups))
 
 
@@ -92,14 +104,14 @@ def copy(
     topic: str | None = None,
     output_topic: str | None = None,
 ) -> Contents:
-    """Write ``target`` with the corrected columns; see `formats.FormatModule`."""
+    """Write ``target`` with the corrected columns; see `format.FormatModule`."""
     digest = ArrowDigest()
-    with _opened(source) as file:
+    with _whole(source) as (file, tables):
         channels = choose(file.schema_arrow.names)
         schema = corrected_schema(file.schema_arrow, channels, source)
 
         def corrected() -> Iterator[pa.Table]:
-            for table in _tables(file):
+            for table in tables:
                 made = add_corrected(source, table, channels, schema)
                 digest.update(made)
                 yield made
@@ -119,8 +131,8 @@ def copy(
 def contents(path: Path, topic: str | None = None) -> Contents:
     """Rows and checksums of all columns as they read back."""
     digest = ArrowDigest()
-    with _opened(path) as file:
-        for table in _tables(file):
+    with _whole(path) as (_file, tables):
+        for table in tables:
             digest.update(table)
     return digest.contents()
 
@@ -128,39 +140,105 @@ def contents(path: Path, topic: str | None = None) -> Contents:
 @contextmanager
 def _opened(path: Path, **options: Any) -> Iterator[pq.ParquetFile]:
     """The file, its errors told with its name."""
-    with (
-        damage_told(path, "Parquet"),
-        pq.ParquetFile(path, page_checksum_verification=True, **options) as file,
-    ):
+    options = {"page_checksum_verification": True, "buffer_size": _BUFFER, **options}
+    with damage_told(path, "Parquet"), pq.ParquetFile(path, **options) as file:
         yield file
 
 
-def _tables(file: pq.ParquetFile) -> Iterator[pa.Table]:
-    """One table per row group, or several where it is large; empty row groups left out."""
+@contextmanager
+def _whole(path: Path) -> Iterator[tuple[pq.ParquetFile, Iterator[pa.Table]]]:
+    """The file with its own schema, and all of its rows."""
+    with _opened(path) as file:
+        schema, footer = file.schema_arrow, file.metadata
+        rows = _rows_at_once(footer, schema)
+        with _opened(path, metadata=footer, read_dictionary=_texts(schema)) as reader:
+            yield file, _tables(reader, schema, rows)
+
+
+def _tables(file: pq.ParquetFile, schema: pa.Schema, rows: int) -> Iterator[pa.Table]:
+    """The rows in tables of a bounded size in memory, none across a border of row groups.
+
+    Texts come as dictionaries, which take no more memory than the file, and are decoded
+    for as many rows as fit: pages of a few bytes can stand for gigabytes.
+    """
     for group in range(file.metadata.num_row_groups):
-        rows = file.metadata.row_group(group).num_rows
-        most = _rows_at_once(file, group)
-        if rows <= most:
-            if rows:
-                yield file.read_row_group(group)
-            continue
-        for batch in file.iter_batches(batch_size=most, row_groups=[group]):
-            yield pa.Table.from_batches([batch])
+        for batch in file.iter_batches(batch_size=rows, row_groups=[group], use_threads=False):
+            for start, stop in _cuts(batch, schema):
+                part = batch.slice(start, stop - start)
+                columns = [
+                    _decoded(column, field.type)
+                    for column, field in zip(part.columns, schema, strict=True)
+                ]
+                yield pa.Table.from_arrays(columns, schema=schema)
 
 
-def _rows_at_once(file: pq.ParquetFile, group: int) -> int:
-    meta = file.metadata.row_group(group)
-    width = int(meta.total_byte_size) // max(int(meta.num_rows), 1)
-    return max(1024, _BYTES // max(width, 1))
+def _decoded(column: pa.Array, kind: pa.DataType) -> pa.Array:
+    return column if column.type == kind else column.dictionary_decode().cast(kind)
 
 
-def _options(file: pq.ParquetFile, channels: Sequence[Channel]) -> dict[str, Any]:
+def _cuts(batch: pa.RecordBatch, schema: pa.Schema) -> Iterator[tuple[int, int]]:
+    """Stretches of rows whose texts take a bounded size once they are decoded."""
+    size = np.zeros(batch.num_rows, dtype=np.int64)
+    for column, field in zip(batch.columns, schema, strict=True):
+        if column.type != field.type:
+            lengths = pc.binary_length(column.dictionary.cast(pa.large_binary()))
+            lengths = np.append(lengths.fill_null(0).to_numpy(zero_copy_only=False), 0)
+            size += lengths[column.indices.fill_null(lengths.size - 1).to_numpy()]
+    until = np.cumsum(size)
+    start = 0
+    while start < batch.num_rows:
+        before = until[start - 1] if start else 0
+        stop = int(np.searchsorted(until, before + _BYTES, side="right"))
+        stop = min(max(stop, start + 1), batch.num_rows)
+        yield start, stop
+        start = stop
+
+
+def _rows_at_once(footer: pq.FileMetaData, schema: pa.Schema) -> int:
+    """Rows of which the columns of fixed width, decoded, take a bounded size.
+
+    Other columns (lists, long texts without a dictionary) are as wide as their file says,
+    though a few rows of them may be far wider than the others.
+    """
+    width, rows = 0, 1 << 20
+    for field in schema:
+        try:
+            width += max(int(field.type.bit_width) // 8, 1)
+        except ValueError:
+            width += 8
+            encoded = _encoded(footer, field.name)
+            width += encoded // max(footer.num_rows, 1)
+            nested = pa.types.is_nested(field.type)
+            if encoded > _BYTES or nested:
+                rows = min(rows, _FEW if encoded > _BYTES else 1024)
+    return max(min(rows, _BYTES // width), 1)
+
+
+def _encoded(footer: pq.FileMetaData, name: str) -> int:
+    """Bytes of a column as it is encoded, without the compression."""
+    total = 0
+    for group in range(footer.num_row_groups):
+        meta = footer.row_group(group)
+        for i in range(meta.num_columns):
+            column = meta.column(i)
+            if column.path_in_schema.partition(".")[0] == name:
+                total += int(column.total_uncompressed_size)
+    return total
+
+
+def _texts(schema: pa.Schema) -> list[str]:
+    """Columns of texts, which can be read as dictionaries."""
+    kinds = (pa.types.is_string, pa.types.is_large_string, pa.types.is_binary)
+    return [field.name for field in schema if any(is_kind(field.type) for is_kind in kinds)]
+
+
+def _options(file: pq.ParquetFile, channels: Sequence[Addition]) -> dict[str, Any]:
     """Settings of a writer that keep how the file is compressed and encoded.
 
     Where dictionaries of a column overflowed in the source they are not tried again.
     """
     meta = file.metadata
-    added = [channel.angle.corrected for channel in channels]
+    added = [channel.added for channel in channels]
     options: dict[str, Any] = {
         "version": meta.format_version if meta.format_version in ("1.0", "2.4", "2.6") else "2.6",
         "compression": "snappy",
@@ -170,7 +248,7 @@ def _options(file: pq.ParquetFile, channels: Sequence[Channel]) -> dict[str, Any
         return options
     chunks = [meta.row_group(0).column(i) for i in range(meta.num_columns)]
     codecs = {chunk.path_in_schema: chunk.compression for chunk in chunks}
-    angle = channels[0].angle.name
+    angle = channels[0].column
     codecs |= {name: codecs.get(angle, chunks[0].compression) for name in added}
     options["compression"] = {path: _codec(codec) for path, codec in codecs.items()}
     options["use_dictionary"] = [

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import struct
-import zlib
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -12,16 +10,17 @@ from typing import Any
 import numpy as np
 from asammdf import MDF, Signal
 from asammdf.blocks.mdf_v4 import MDF4
-from asammdf.blocks.utils import MdfException
 from numpy.typing import NDArray
 
 from ..errors import FileError
 from .checksum import Checksum
-from .formats import Choose, Contents, Watch
-from .joints import Channel, provenance
+from .damage import damage_told
+from .format import TEXTS, Addition, Batch, Choose, Contents, Watch, note
 
 __all__ = ["columns", "contents", "copy", "read"]
 
+#: Bytes that one byte of a file can stand for: deflate reaches 1032.
+_MOST_COMPRESSED = 2000
 #: Readings taken together.
 _BLOCK = 1 << 19
 #: Acquisition name of the groups of corrected channels.
@@ -39,9 +38,15 @@ def columns(path: Path, topic: str | None = None) -> list[str]:
 
 
 def read(
-    path: Path, names: Sequence[str], topic: str | None = None
-) -> Iterator[dict[str, NDArray[Any]]]:
-    """Channels ``names`` in batches; see `formats.FormatModule`."""
+    path: Path,
+    names: Sequence[str],
+    topic: str | None = None,
+    stretch: None = None,
+    *,
+    texts: Collection[str] = TEXTS,
+    strict: bool = False,
+) -> Iterator[Batch]:
+    """Channels ``names`` in batches; see `format.FormatModule`."""
     with _opened(path) as mdf:
         group = _common_group(path, mdf, names)
         for start in range(0, _cycles(mdf, group), _BLOCK):
@@ -56,7 +61,7 @@ def copy(
     topic: str | None = None,
     output_topic: str | None = None,
 ) -> Contents:
-    """Write ``target`` with the corrected channels; see `formats.FormatModule`.
+    """Write ``target`` with the corrected channels; see `format.FormatModule`.
 
     Each goes into a new channel group with the times of its source; a reading marked
     invalid stays marked.
@@ -64,7 +69,7 @@ def copy(
     with _opened(source) as mdf:
         channels = choose(_names(mdf))
         groups = [
-            _common_group(source, mdf, [channel.angle.name, *channel.signals.values()])
+            _common_group(source, mdf, [channel.column, *channel.signals.values()])
             for channel in channels
         ]
         rows = [_cycles(mdf, group) for group in groups]
@@ -75,7 +80,7 @@ def copy(
         done, total = 0, max(sum(rows), 1)
         for channel, count in zip(channels, rows, strict=True):
             check = Checksum()
-            place = _place(mdf, channel.angle.name)
+            place = _place(mdf, channel.column)
             made: int | None = None
             for start in range(0, max(count, 1), _BLOCK):
                 part = _part(source, mdf, place, start)
@@ -88,7 +93,7 @@ def copy(
                 made = _put(mdf, made, part, corrected, channel)
                 done += corrected.size
                 watch(corrected.size, done / total)
-            sums[channel.angle.corrected] = check.text()
+            sums[channel.added] = check.text()
         mdf.save(target, overwrite=True, compression=compression)
     return Contents(max(rows), sums)
 
@@ -100,24 +105,39 @@ def contents(path: Path, topic: str | None = None) -> Contents:
         return Contents(max(rows, default=0), _kept(path, mdf))
 
 
+def together(path: Path, needed: Sequence[str], others: Sequence[str]) -> list[str]:
+    """Those of ``others`` that are in the channel group of the channels ``needed``."""
+    with _opened(path) as mdf:
+        groups = {_place(mdf, name)[0] for name in needed}
+        return [name for name in others if _place(mdf, name)[0] in groups]
+
+
 @contextmanager
 def _opened(path: Path, **options: Any) -> Iterator[MDF]:
     """The file, its errors told with its name."""
     with path.open("rb") as file:
         if file.read(8) not in _MAGIC:
             raise FileError(path, "is not MDF4")
-    try:
-        with MDF(path, **options) as mdf:
-            if mdf.version < "4":
-                raise FileError(path, f"is MDF {mdf.version}; convert it to MDF 4")
-            yield mdf
-    except FileError:
-        raise
-    except OSError:
-        raise
-    except (MdfException, ValueError, KeyError, IndexError, struct.error, zlib.error) as cause:
-        _close_half_built(cause)
-        raise FileError(path, f"is damaged or not MDF4: {cause or type(cause).__name__}") from None
+    with damage_told(path, "MDF4"):
+        try:
+            with MDF(path, **options) as mdf:
+                if mdf.version < "4":
+                    raise FileError(path, f"is MDF {mdf.version}; convert it to MDF 4")
+                _check_sizes(path, mdf)
+                yield mdf
+        except Exception as cause:
+            _close_half_built(cause)
+            raise
+
+
+def _check_sizes(path: Path, mdf: MDF) -> None:
+    """Refuse groups that say they hold more than the file can: reading them would not end."""
+    size = path.stat().st_size
+    for group in mdf.groups:
+        record = group.channel_group.samples_byte_nr + group.channel_group.invalidation_bytes_nr
+        said = int(group.channel_group.cycles_nr) * max(int(record), 1)
+        if said > _MOST_COMPRESSED * size:
+            raise FileError(path, f"is damaged: of {size} bytes it says to hold {said}")
 
 
 def _close_half_built(error: Exception) -> None:
@@ -183,7 +203,7 @@ def _part(path: Path, mdf: MDF, place: tuple[int, int], start: int) -> Signal:
 
 
 def _put(
-    mdf: MDF, group: int | None, part: Signal, corrected: NDArray[Any], channel: Channel
+    mdf: MDF, group: int | None, part: Signal, corrected: NDArray[Any], channel: Addition
 ) -> int:
     """Append a batch of corrected readings to their group, which the first batch makes."""
     invalid = part.invalidation_bits
@@ -194,10 +214,10 @@ def _put(
         corrected,
         part.timestamps,
         unit=part.unit,
-        name=channel.angle.corrected,
+        name=channel.added,
         invalidation_bits=invalid,
     )
-    return int(mdf.append([signal], acq_name=_GROUP, comment=provenance([channel])))
+    return int(mdf.append([signal], acq_name=_GROUP, comment=note([channel])))
 
 
 def _is_ours(mdf: MDF, group: int) -> bool:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import struct
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -15,9 +15,9 @@ from .arrowtables import (
     add_corrected,
     column_batches,
     corrected_schema,
-    damage_told,
 )
-from .formats import Batch, Choose, Contents, Watch
+from .damage import damage_told
+from .format import TEXTS, Batch, Choose, Contents, Watch
 
 __all__ = ["columns", "contents", "copy", "read", "stretches"]
 
@@ -25,6 +25,8 @@ _FILE_MAGIC = b"ARROW1"
 #: Codecs by their number in the format's BodyCompression.
 _CODECS = {0: "lz4", 1: "zstd"}
 _RECORD_BATCH = 3
+#: Rows at once.
+_ROWS = 1 << 20
 #: Bytes of a stretch that is read on its own.
 _STRETCH = 1 << 24
 
@@ -47,9 +49,15 @@ def stretches(path: Path) -> list[range | None]:
 
 
 def read(
-    path: Path, names: Sequence[str], topic: str | None = None, stretch: range | None = None
+    path: Path,
+    names: Sequence[str],
+    topic: str | None = None,
+    stretch: range | None = None,
+    *,
+    texts: Collection[str] = TEXTS,
+    strict: bool = False,
 ) -> Iterator[Batch]:
-    """Columns ``names`` in batches; see `formats.FormatModule`."""
+    """Columns ``names`` in batches; see `format.FormatModule`."""
     if stretch is None:
         with _opened(path) as (_schema, batches, _options):
             yield from ahead(column_batches(path, names, batches))
@@ -71,7 +79,7 @@ def copy(
     topic: str | None = None,
     output_topic: str | None = None,
 ) -> Contents:
-    """Write ``target`` with the corrected columns; see `formats.FormatModule`."""
+    """Write ``target`` with the corrected columns; see `format.FormatModule`."""
     digest = ArrowDigest()
     with _opened(source) as (schema, batches, options):
         channels = choose(schema.names)
@@ -119,10 +127,20 @@ def _opened(
         if is_file:
             file = pa.ipc.open_file(source)
             batches = (file.get_batch(i) for i in range(file.num_record_batches))
-            yield file.schema, batches, options
+            yield file.schema, _cut(batches), options
         else:
             stream = pa.ipc.open_stream(source)
-            yield stream.schema, iter(stream), options
+            yield stream.schema, _cut(stream), options
+
+
+def _cut(batches: Iterable[pa.RecordBatch]) -> Iterator[pa.RecordBatch]:
+    """The same rows, not too many at once: what is computed of them stays small."""
+    for batch in batches:
+        if batch.num_rows <= _ROWS:
+            yield batch
+            continue
+        for start in range(0, batch.num_rows, _ROWS):
+            yield batch.slice(start, _ROWS)
 
 
 def _compression(path: Path, is_file: bool) -> str | None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import zlib
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
@@ -12,15 +12,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 from rosbags.rosbag1 import Reader as Reader1
-from rosbags.rosbag1 import ReaderError as Reader1Error
 from rosbags.rosbag2 import Reader as Reader2
-from rosbags.rosbag2 import ReaderError as Reader2Error
-from rosbags.serde import SerdeError
 from rosbags.typesys import Stores, get_typestore
 
 from ..errors import FileError
-from .formats import Choose, Contents, Watch
-from .joints import Channel, provenance
+from .damage import damage_told
+from .format import TEXTS, Addition, Batch, Choose, Contents, Watch, note
 from .rosbagwriter import opened_writer
 
 __all__ = ["columns", "contents", "copy", "read"]
@@ -39,9 +36,15 @@ def columns(path: Path, topic: str | None = None) -> list[str]:
 
 
 def read(
-    path: Path, names: Sequence[str], topic: str | None = None
-) -> Iterator[dict[str, NDArray[Any]]]:
-    """Positions and signals in batches; see `formats.FormatModule`."""
+    path: Path,
+    names: Sequence[str],
+    topic: str | None = None,
+    stretch: None = None,
+    *,
+    texts: Collection[str] = TEXTS,
+    strict: bool = False,
+) -> Iterator[Batch]:
+    """Positions and signals in batches; see `format.FormatModule`."""
     with _opened(path) as bag:
         connections = bag.topic(topic)
         block: list[Any] = []
@@ -62,7 +65,7 @@ def copy(
     topic: str | None = None,
     output_topic: str | None = None,
 ) -> Contents:
-    """Write ``target`` with the corrected positions; see `formats.FormatModule`.
+    """Write ``target`` with the corrected positions; see `format.FormatModule`.
 
     They go to the topic ``output_topic`` (default: that of the joint states with
     ``_corrected`` added) in messages that are otherwise the same, at the same times; an
@@ -80,7 +83,7 @@ def copy(
         total = max(bag.reader.message_count, 1)
         digest = _Digest()
         done = 0
-        with opened_writer(bag, target, provenance(channels)) as writer:
+        with opened_writer(bag, target, note(channels)) as writer:
             copies = {c.id: writer.add(c, c.topic) for c in bag.reader.connections}
             outputs = {
                 c.id: copies[c.id] if output == name else writer.add(c, output) for c in connections
@@ -164,30 +167,11 @@ class Bag:
 @contextmanager
 def _opened(path: Path) -> Iterator[Bag]:
     """The bag, its errors told with its name."""
-    try:
-        with Reader1(path) if path.suffix == ".bag" else Reader2(path) as reader:
-            yield Bag(path, reader)
-    except (Reader1Error, Reader2Error, SerdeError, AssertionError, EOFError) as cause:
-        raise FileError(path, f"is damaged or no bag: {cause}") from None
-    except _LIBRARY_ERRORS as cause:
-        raise FileError(path, f"is damaged: {cause or type(cause).__name__}") from None
-
-
-def _library_errors() -> tuple[type[Exception], ...]:
-    """What the storage libraries below rosbags raise on damage."""
-    import sqlite3
-    import struct
-
-    found: list[type[Exception]] = [sqlite3.DatabaseError, struct.error]
-    for library, name in (("zstandard", "ZstdError"), ("compression.zstd", "ZstdError")):
-        try:
-            found.append(getattr(__import__(library, fromlist=[name]), name))
-        except (ImportError, AttributeError):
-            continue
-    return tuple(found)
-
-
-_LIBRARY_ERRORS = _library_errors()
+    with (
+        damage_told(path, "a bag"),
+        Reader1(path) if path.suffix == ".bag" else Reader2(path) as bag,
+    ):
+        yield Bag(path, bag)
 
 
 class _Digest:
@@ -235,7 +219,7 @@ def _values(messages: Sequence[Any], name: str) -> NDArray[np.float64]:
 
 
 def _corrected(
-    states: Sequence[tuple[int, Any]], channels: Sequence[Channel]
+    states: Sequence[tuple[int, Any]], channels: Sequence[Addition]
 ) -> Iterator[tuple[int, Any]]:
     """The messages with the positions of the joints replaced by corrected ones."""
     messages = [message for _place, message in states]
@@ -244,7 +228,7 @@ def _corrected(
     results: list[Mapping[str, Any]] = []
     for channel in channels:
         signals = {s: _values(messages, column) for s, column in channel.signals.items()}
-        joint = channel.angle.name
+        joint = channel.column
         results.append(
             {"joint": joint, "values": channel.correct(_values(messages, joint), signals)}
         )

@@ -6,7 +6,7 @@ import errno
 import json
 import os
 import shutil
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 
 from ..errors import FileError
 from .checksum import Checksum
-from .formats import Choose, Contents, Watch
-from .joints import Channel, provenance
+from .damage import damage_told
+from .format import TEXTS, Addition, Batch, Choose, Contents, Watch, note
 
 __all__ = ["columns", "contents", "copy", "read"]
 
@@ -35,9 +35,15 @@ def columns(path: Path, topic: str | None = None) -> list[str]:
 
 
 def read(
-    path: Path, names: Sequence[str], topic: str | None = None
-) -> Iterator[dict[str, NDArray[Any]]]:
-    """Data sets ``names`` in batches; see `formats.FormatModule`."""
+    path: Path,
+    names: Sequence[str],
+    topic: str | None = None,
+    stretch: None = None,
+    *,
+    texts: Collection[str] = TEXTS,
+    strict: bool = False,
+) -> Iterator[Batch]:
+    """Data sets ``names`` in batches; see `format.FormatModule`."""
     with _opened(path) as file:
         sets = {name: _data_set(path, file, name) for name in names}
         _check_lengths(path, sets)
@@ -55,25 +61,22 @@ def copy(
     topic: str | None = None,
     output_topic: str | None = None,
 ) -> Contents:
-    """Write ``target`` with the corrected data sets; see `formats.FormatModule`."""
+    """Write ``target`` with the corrected data sets; see `format.FormatModule`."""
     with _opened(source) as file:  # refuse what cannot be corrected before it is copied
         channels = choose(_names(file))
         for channel in channels:
-            names = [channel.angle.name, *channel.signals.values()]
+            names = [channel.column, *channel.signals.values()]
             _check_lengths(source, {name: _data_set(source, file, name) for name in names})
-        total = max(sum(file[channel.angle.name].size for channel in channels), 1)
+        total = max(sum(file[channel.column].size for channel in channels), 1)
     shutil.copyfile(source, target)
     before = contents(source)  # an earlier correction, of another joint
     rows, done = before.rows, 0
     sums: dict[str, Checksum] = {}
     with _opened(target, "r+") as file:
         for channel in channels:
-            indicated = file[channel.angle.name]
+            indicated = file[channel.column]
             corrected = _like(file, indicated, channel)
-            checks = [
-                sums.setdefault(name, Checksum())
-                for name in (channel.angle.name, channel.angle.corrected)
-            ]
+            checks = [sums.setdefault(name, Checksum()) for name in (channel.column, channel.added)]
             for start in range(0, indicated.size, _BLOCK):
                 stop = min(start + _BLOCK, indicated.size)
                 given = _part(indicated, start, stop)
@@ -105,23 +108,31 @@ def contents(path: Path, topic: str | None = None) -> Contents:
     return Contents(rows, {name: found.text() for name, found in sums.items()})
 
 
+def together(path: Path, needed: Sequence[str], others: Sequence[str]) -> list[str]:
+    """Those of ``others`` that are as long as the data sets ``needed``."""
+    with _opened(path) as file:
+        sizes = {file[name].size for name in needed}
+        return [
+            name
+            for name in others
+            if file[name].size in sizes and max(file[name].shape) == file[name].size
+        ]
+
+
 @contextmanager
 def _opened(path: Path, mode: str = "r") -> Iterator[h5py.File]:
     """The file, its errors told with its name."""
-    try:
-        with h5py.File(path, mode) as file:
-            yield file
-    except OSError as cause:
-        if cause.errno is not None and not path.is_file():
+    hint = "; MATLAB saves HDF5 with -v7.3 only" if path.suffix == ".mat" else ""
+    with damage_told(path, "HDF5", hint):
+        try:
+            with h5py.File(path, mode) as file:
+                yield file
+        except (OSError, RuntimeError) as cause:  # the library tells of a full disk in words
+            if "errno = 28" in str(cause) or getattr(cause, "errno", None) == errno.ENOSPC:
+                raise _disk_full(path) from None
+            if isinstance(cause, OSError) and path.is_file():
+                raise OSError(_first_line(cause)) from None
             raise
-        if "errno = 28" in str(cause) or cause.errno == errno.ENOSPC:
-            raise _disk_full(path) from None
-        hint = "; MATLAB saves HDF5 with -v7.3 only" if path.suffix == ".mat" else ""
-        raise FileError(path, f"is damaged or not HDF5: {_first_line(cause)}{hint}") from None
-    except RuntimeError as cause:  # how the library tells of damage within
-        if "errno = 28" in str(cause):
-            raise _disk_full(path) from None
-        raise FileError(path, f"is damaged: {_first_line(cause)}") from None
 
 
 def _disk_full(path: Path) -> OSError:
@@ -178,7 +189,7 @@ def _put(data: h5py.Dataset, start: int, stop: int, values: NDArray[Any]) -> Non
     data[place] = values.reshape(shape)
 
 
-def _like(file: h5py.File, indicated: h5py.Dataset, channel: Channel) -> h5py.Dataset:
+def _like(file: h5py.File, indicated: h5py.Dataset, channel: Addition) -> h5py.Dataset:
     """An empty data set beside ``indicated``, laid out and compressed like it."""
     kind = (
         np.float32
@@ -186,7 +197,7 @@ def _like(file: h5py.File, indicated: h5py.Dataset, channel: Channel) -> h5py.Da
         else (np.float64)
     )
     made = file.create_dataset(
-        channel.angle.corrected,
+        channel.added,
         indicated.shape,
         kind,
         maxshape=indicated.maxshape if indicated.chunks else None,
@@ -201,7 +212,7 @@ def _like(file: h5py.File, indicated: h5py.Dataset, channel: Channel) -> h5py.Da
     for name in ("units", "DIMENSION_LABELS"):
         if name in indicated.attrs:
             made.attrs[name] = indicated.attrs[name]
-    made.attrs[_ATTRIBUTE] = provenance([channel])
+    made.attrs[_ATTRIBUTE] = note([channel])
     return made
 
 

@@ -17,7 +17,7 @@ from rosbags.rosbag2.enums import CompressionFormat, CompressionMode
 from ..errors import FileError
 
 if TYPE_CHECKING:
-    from .rosbaglog import Bag
+    from .rosbag import Bag
 
 __all__ = ["BagWriter", "opened_writer"]
 

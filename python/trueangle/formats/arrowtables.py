@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import zlib
 from collections.abc import Iterable, Iterator, Sequence
-from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
@@ -14,8 +13,7 @@ from numpy.typing import NDArray
 
 from ..errors import FileError
 from .checksum import Checksum
-from .formats import Batch, Contents, Labels
-from .joints import Channel, provenance
+from .format import Addition, Batch, Contents, Labels, note
 
 __all__ = [
     "METADATA_KEY",
@@ -23,7 +21,6 @@ __all__ = [
     "add_corrected",
     "column_batches",
     "corrected_schema",
-    "damage_told",
     "labels",
     "numbers",
 ]
@@ -58,33 +55,29 @@ def numbers(path: object, name: str, column: pa.Array | pa.ChunkedArray) -> NDAr
     return values
 
 
-def corrected_schema(schema: pa.Schema, channels: Sequence[Channel], path: object) -> pa.Schema:
-    """``schema`` with the corrected columns and the provenance added."""
+def corrected_schema(schema: pa.Schema, channels: Sequence[Addition], path: object) -> pa.Schema:
+    """``schema`` with the corrected columns and the note of how they were made."""
     for channel in channels:
-        kind = schema.field(channel.angle.name).type
+        kind = schema.field(channel.column).type
         if pa.types.is_dictionary(kind):
             kind = kind.value_type
         single = pa.types.is_float16(kind) or pa.types.is_float32(kind)
-        schema = schema.append(
-            pa.field(channel.angle.corrected, pa.float32() if single else pa.float64())
-        )
-    return schema.with_metadata(
-        {**(schema.metadata or {}), METADATA_KEY: provenance(channels).encode()}
-    )
+        schema = schema.append(pa.field(channel.added, pa.float32() if single else pa.float64()))
+    return schema.with_metadata({**(schema.metadata or {}), METADATA_KEY: note(channels).encode()})
 
 
-def add_corrected(path: object, table: Any, channels: Sequence[Channel], schema: pa.Schema) -> Any:
+def add_corrected(path: object, table: Any, channels: Sequence[Addition], schema: pa.Schema) -> Any:
     """A table or record batch with the corrected column of every channel.
 
     Nulls stay null, NaN stays NaN; the other columns are not touched.
     """
     columns = list(table.columns)
     for channel in channels:
-        column = table[channel.angle.name]
+        column = table[channel.column]
         signals = {
             signal: numbers(path, name, table[name]) for signal, name in channel.signals.items()
         }
-        corrected = channel.correct(numbers(path, channel.angle.name, column), signals)
+        corrected = channel.correct(numbers(path, channel.column, column), signals)
         missing = None
         if column.null_count:
             missing = np.asarray(column.is_null().to_numpy(zero_copy_only=False))
@@ -214,16 +207,3 @@ def labels(column: pa.Array | pa.ChunkedArray) -> Labels:
 
 def _is_label(kind: pa.DataType) -> bool:
     return _is_string(kind.value_type if pa.types.is_dictionary(kind) else kind)
-
-
-@contextmanager
-def damage_told(path: object, name: str) -> Iterator[None]:
-    """Errors of pyarrow told with the file they are of, which should be of format ``name``."""
-    try:
-        yield
-    except pa.ArrowException as cause:
-        raise FileError(path, f"is damaged or not {name}: {cause}") from None
-    except OSError as cause:
-        if cause.errno is not None:
-            raise
-        raise FileError(path, f"is damaged: {cause}") from None

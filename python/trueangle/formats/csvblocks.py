@@ -12,8 +12,9 @@ import pyarrow.csv
 from numpy.typing import NDArray
 
 from .arrowtables import labels
-from .csvrows import Header, QuotedBlock
-from .formats import Labels
+from .csvheader import Header
+from .csvrows import QuotedBlock
+from .format import Labels
 
 __all__ = ["PlainBlock", "plain_block"]
 
@@ -21,7 +22,9 @@ _NEWLINE = 10
 
 
 def plain_block(data: bytes, header: Header, line: int) -> PlainBlock | None:
-    """The block, or None for text that needs the standard library: blank or mixed lines."""
+    """The block, or None for text that needs the standard library: blank lines, notes."""
+    if header.trailing or data.startswith((b"#", b"EOF")) or b"\n#" in data or b"\nEOF" in data:
+        return None
     ends = np.flatnonzero(np.frombuffer(data, dtype=np.uint8) == _NEWLINE)
     width = len(header.ending)
     starts = np.concatenate([[0], ends + 1])
@@ -52,8 +55,13 @@ class PlainBlock:
         """Number of lines."""
         return int(self._starts.size)
 
+    @property
+    def lines(self) -> range:
+        """Number of the line of every row."""
+        return range(self.line, self.line + self.rows)
+
     def numbers(
-        self, names: Sequence[str], texts: Sequence[str] = ()
+        self, names: Sequence[str], texts: Sequence[str] = (), strict: bool = False
     ) -> dict[str, NDArray[np.float64]]:
         """Columns as numbers, empty cells as NaN; see `QuotedBlock.numbers`.
 
@@ -69,14 +77,17 @@ class PlainBlock:
                     column_types=dict.fromkeys(names, pa.float64())
                     | dict.fromkeys(texts, pa.dictionary(pa.int32(), pa.string())),
                     null_values=[""],
+                    decimal_point=self.header.decimal,
                 ),
             )
             if self._table.num_rows != self.rows:
                 raise pa.ArrowInvalid("rows and lines differ")
+            if strict and not all(_is_finite(self._table[name]) for name in names):
+                raise pa.ArrowInvalid("words instead of numbers")
         except pa.ArrowInvalid:
             # The standard library reads a little more (+1.5) and says what is wrong where.
             self._quoted = QuotedBlock.whole(self.data, self.header, self.line)
-            return self._quoted.numbers(names)
+            return self._quoted.numbers(names, texts, strict)
         return {name: self._table[name].to_numpy() for name in names}
 
     def labels(self, name: str) -> Labels:
@@ -97,7 +108,10 @@ class PlainBlock:
         parts = [pc.ascii_rtrim(lines, "\r\n")]
         for name, values in columns:
             empty = np.asarray(self._table[name].is_null().combine_chunks())
-            parts.append(pa.array(values, mask=empty).cast(pa.large_string()))
+            told = pa.array(values, mask=empty).cast(pa.large_string())
+            if self.header.decimal == ",":
+                told = pc.replace_substring(told, ".", ",")
+            parts.append(told)
         *bodies, last = parts
         joined = pc.binary_join_element_wise(
             *bodies,
@@ -112,3 +126,8 @@ class PlainBlock:
         )
         ends = np.frombuffer(joined.buffers()[1], dtype=np.int64)
         return memoryview(joined.buffers()[2])[: ends[len(joined)]].tobytes()
+
+
+def _is_finite(column: pa.ChunkedArray) -> bool:
+    """True where every cell that is not empty holds a finite number."""
+    return not pc.any(pc.invert(pc.is_finite(column))).as_py()

@@ -8,21 +8,20 @@ from __future__ import annotations
 
 import importlib.util
 import zlib
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from pathlib import Path
 from typing import IO, TypeAlias
 
-from .columns import RUN_COLUMN
-from .csvrows import BLOCK, Header, QuotedBlock, quoted_blocks
-from .formats import Batch, Choose, Contents, Watch
-from .joints import Channel
+from .csvheader import LONGEST_LINE, Header
+from .csvrows import BLOCK, QuotedBlock, quoted_blocks, too_long
+from .format import TEXTS, Addition, Batch, Choose, Contents, Watch
 
 if importlib.util.find_spec("pyarrow") is not None:
     from .csvblocks import PlainBlock, plain_block
 else:
     plain_block = None  # type: ignore[assignment]
 
-__all__ = ["columns", "contents", "copy", "read"]
+__all__ = ["columns", "contents", "copy", "line_of", "read"]
 
 _Block: TypeAlias = "QuotedBlock | PlainBlock"
 
@@ -30,20 +29,39 @@ _Block: TypeAlias = "QuotedBlock | PlainBlock"
 def columns(path: Path, topic: str | None = None) -> list[str]:
     """Names in the header line."""
     with path.open("rb") as file:
-        return Header(path, file.readline()).names
+        return Header(path, file).names
 
 
-def read(path: Path, names: Sequence[str], topic: str | None = None) -> Iterator[Batch]:
-    """Columns ``names`` in batches, empty cells as NaN; see `formats.FormatModule`.
+def read(
+    path: Path,
+    names: Sequence[str],
+    topic: str | None = None,
+    stretch: None = None,
+    *,
+    texts: Collection[str] = TEXTS,
+    strict: bool = False,
+) -> Iterator[Batch]:
+    """Columns ``names`` in batches, empty cells as NaN; see `format.FormatModule`.
 
-    Labels of runs are text, whatever they look like.
+    Those of ``texts`` are labels, whatever they look like.
     """
-    angles = [name for name in names if name != RUN_COLUMN]
-    texts = [name for name in names if name == RUN_COLUMN]
+    labels = [name for name in names if name in texts]
+    numbers = [name for name in names if name not in texts]
     with path.open("rb") as file:
-        header = Header(path, file.readline())
+        header = Header(path, file)
         for block in _blocks(file, header):
-            yield {**block.numbers(angles, texts), **{name: block.labels(name) for name in texts}}
+            found: Batch = dict(block.numbers(numbers, labels, strict))
+            yield found | {name: block.labels(name) for name in labels}
+
+
+def line_of(path: Path, row: int) -> int:
+    """The line of the file that a row came from."""
+    with path.open("rb") as file:
+        for block in _blocks(file, Header(path, file)):
+            if row < block.rows:
+                return block.lines[row]
+            row -= block.rows
+    return row
 
 
 def copy(
@@ -54,16 +72,14 @@ def copy(
     topic: str | None = None,
     output_topic: str | None = None,
 ) -> Contents:
-    """Write ``target`` with the corrected columns last; see `formats.FormatModule`."""
+    """Write ``target`` with the corrected columns last; see `format.FormatModule`."""
     size = max(source.stat().st_size, 1)
     rows, check = 0, 0
     with source.open("rb") as file, target.open("wb") as output:
-        header = Header(source, file.readline())
+        header = Header(source, file)
         channels = choose(header.names)
         used = _used(channels)
-        added = [channel.angle.corrected for channel in channels]
-        line = header.delimiter.join([header.text, *added]) + header.ending
-        head = header.mark + line.encode()
+        head = header.with_names([channel.added for channel in channels])
         output.write(head)
         check = zlib.crc32(head, check)
         for block in _blocks(file, header):
@@ -71,8 +87,8 @@ def copy(
             corrected = []
             for channel in channels:
                 signals = {name: values[column] for name, column in channel.signals.items()}
-                indicated = values[channel.angle.name]
-                corrected.append((channel.angle.name, channel.correct(indicated, signals)))
+                indicated = values[channel.column]
+                corrected.append((channel.column, channel.correct(indicated, signals)))
             data = block.with_columns(corrected)
             output.write(data)
             check = zlib.crc32(data, check)
@@ -85,22 +101,22 @@ def contents(path: Path, topic: str | None = None) -> Contents:
     """Rows and checksum of the bytes as they read back."""
     rows, check = 0, 0
     with path.open("rb") as file:
-        line = file.readline()
-        check = zlib.crc32(line, check)
-        for block in _blocks(file, Header(path, line)):
+        header = Header(path, file)
+        check = zlib.crc32(b"".join(header.head), check)
+        for block in _blocks(file, header):
             rows += block.rows
             check = zlib.crc32(block.data, check)
     return Contents(rows, {"bytes": f"{check:08x}"})
 
 
-def _used(channels: Sequence[Channel]) -> list[str]:
-    names = [c.angle.name for c in channels] + [n for c in channels for n in c.signals.values()]
+def _used(channels: Sequence[Addition]) -> list[str]:
+    names = [c.column for c in channels] + [n for c in channels for n in c.signals.values()]
     return list(dict.fromkeys(names))
 
 
 def _blocks(file: IO[bytes], header: Header) -> Iterator[_Block]:
     """The rest of the file in blocks of whole rows."""
-    line, held = 2, b""
+    line, held = header.line, b""
     while data := held + file.read(BLOCK):
         if plain_block is None or b'"' in data:
             # A quoted cell may hold line breaks: from here on rows are cut by csv.
@@ -110,6 +126,8 @@ def _blocks(file: IO[bytes], header: Header) -> Iterator[_Block]:
         if len(data) == len(held):  # the end of the file, its last line without an end
             cut = len(data)
         data, held = data[:cut], data[cut:]
+        if len(held) > LONGEST_LINE:
+            raise too_long(header, line)
         if data:
             yield plain_block(data, header, line) or QuotedBlock.whole(data, header, line)
             line += data.count(b"\n")

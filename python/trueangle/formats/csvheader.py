@@ -1,0 +1,316 @@
+"""What stands before the readings of a text file: preamble, names, units, and its dialect."""
+
+from __future__ import annotations
+
+import codecs
+import csv
+import re
+from collections.abc import Sequence
+from pathlib import Path
+from typing import IO, NamedTuple
+
+from ..errors import FileError
+
+__all__ = ["LONGEST_LINE", "Header", "is_comment", "number"]
+
+#: Bytes and lines within which the readings must begin.
+_HEAD = 1 << 18
+_LINES = 1000
+#: Bytes of a line, at most: memory follows the longest.
+LONGEST_LINE = 1 << 24
+#: Lines looked at to tell readings from a preamble.
+_LOOKED_AT = 4
+
+_POINT = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?", re.ASCII)
+_COMMA = re.compile(r"[+-]?(?:\d+[.,]?\d*|[.,]\d+)(?:[eE][+-]?\d+)?", re.ASCII)
+_WORDS = frozenset({"nan", "inf", "infinity", "+inf", "-inf", "+infinity", "-infinity", "-nan"})
+#: A name at the head of a time column of TwinCAT's exports, before the names it is for.
+_SCOPE = "Name"
+#: What a line of units holds: units in brackets, or short words without digits.
+_UNIT = re.compile(r"[\[(].*[\])]|[^\d\s]{0,8}(?:/[^\d\s]{1,4}\d?)?|-")
+_KNOWN_UNITS = re.compile(
+    r"[\[(]?(deg(rees?)?|rad(ians?)?|turns?|rev(olutions?)?|counts?|arcsec|arcmin|°|"
+    r"m?s|us|µs|ns|sec(onds?)?|volts?|m?v|m?a|[mc]?nm|n·?m|°?c|k|rpm|(deg|rad|turn|°)/s)[\])]?",
+    re.IGNORECASE,
+)
+
+
+class _Line(NamedTuple):
+    raw: bytes
+    text: str
+    #: Number of the line, from 1.
+    place: int
+
+
+class Header:
+    """Everything before the first reading, found in the first lines of a file.
+
+    The line of names is the last one before the readings that has as many cells; without
+    one the columns are called ``column1``, ``column2`` and so on. A line of units may
+    stand between, notes that begin with # anywhere. A file whose first line has the names
+    of this package's columns is taken at its word.
+
+    Parameters
+    ----------
+    path : path
+        For messages.
+    file : binary file
+        At its start; is left at the first line of readings.
+
+    Attributes
+    ----------
+    head : list of bytes
+        Every line before the readings, as it is.
+    place : int
+        Index in ``head`` of the line of names; -1 without.
+    names : list of str
+        With the unit in brackets where a line of units states it.
+    delimiter, decimal, ending, encoding : str
+    trailing : bool
+        Lines of readings end with a delimiter that the line of names lacks.
+    line : int
+        Number of the first line of readings.
+    """
+
+    def __init__(self, path: Path, file: IO[bytes]) -> None:
+        self.path = path
+        self.encoding = "utf-8"
+        lines = self._lines(file)
+        if not any(line.text.strip() for line in lines):
+            raise FileError(path, "is empty; a header line and readings are needed", line=1)
+        first, data = self._found(lines)
+        self.line = lines[data].place if data < len(lines) else len(lines) + 1
+        self.head = [line.raw for line in lines[:data]]
+        self.place = first
+        text = lines[first].text if first >= 0 else lines[data].text
+        raw = lines[max(first, 0)].raw
+        self.ending = "\r\n" if raw.endswith(b"\r\n") else "\n"
+        self.decimal = self._decimal(lines[data:])
+        cells = self._cells(text.removeprefix("#").strip() if is_comment(text) else text)
+        if first < 0:
+            cells = [f"column{i + 1}" for i in range(len(cells))]
+        self.names = self._named(cells, lines[first + 1 : data] if first >= 0 else [])
+        self.trailing = self._trailing(lines[data : data + 1])
+        file.seek(sum(len(line) for line in self.head))
+
+    @property
+    def width(self) -> int:
+        """Cells of a line of readings."""
+        return len(self.names) + self.trailing
+
+    def with_names(self, added: Sequence[str]) -> bytes:
+        """The lines before the readings with further names."""
+        head = list(self.head)
+        if self.place < 0:
+            return b"".join(head)
+        for i in range(self.place, len(head)):
+            if i > self.place and not self._is_units(head[i]):
+                continue
+            body = head[i].rstrip(b"\r\n")
+            ending = head[i][len(body) :] or self.ending.encode()
+            if self._is_open:
+                body = body.removesuffix(self.delimiter.encode())
+            text = self.delimiter.join(["", *(added if i == self.place else [""] * len(added))])
+            head[i] = body + text.encode(self.encoding, "replace") + ending
+        return b"".join(head)
+
+    def _is_units(self, raw: bytes) -> bool:
+        return self._units_of(raw.decode(self.encoding, "replace"), len(self.names)) is not None
+
+    def _lines(self, file: IO[bytes]) -> list[_Line]:
+        found: list[_Line] = []
+        data = file.read(_HEAD)
+        if data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
+            raise FileError(self.path, "is UTF-16 text; save it as CSV in UTF-8", line=1)
+        parts = data.splitlines(keepends=True) if b"\n" not in data else _split(data)
+        if len(data) == _HEAD:
+            while len(parts) == 1 and not parts[0].endswith(b"\n"):
+                more = file.readline(LONGEST_LINE)
+                parts[0] += more
+                if not more or len(parts[0]) > LONGEST_LINE:
+                    break
+            parts = parts[:-1] if len(parts) > 1 else parts
+        for i, raw in enumerate(parts[:_LINES]):
+            body = raw.removeprefix(codecs.BOM_UTF8) if i == 0 else raw
+            try:
+                text = body.decode(self.encoding)
+            except UnicodeDecodeError:
+                if self.encoding != "utf-8" or not _is_western(data):
+                    raise FileError(
+                        self.path, "is not UTF-8 text; save it as CSV in UTF-8", line=i + 1
+                    ) from None
+                self.encoding = "cp1252"
+                text = body.decode("cp1252", "replace")
+            found.append(_Line(raw, text.rstrip("\r\n"), i + 1))
+        return found
+
+    def _found(self, lines: list[_Line]) -> tuple[int, int]:
+        """Index of the line of names, -1 without, and of the first line of readings."""
+        solid = [i for i, line in enumerate(lines) if line.text.strip()]
+        plain = [i for i in solid if not is_comment(lines[i].text)]
+        first = plain[0] if plain else solid[0]
+        self.delimiter = max(",;\t", key=lines[first].text.count)
+        if _STANDARD.search(lines[first].text):
+            return first, self._after_units(lines, first)
+        for delimiter in (";", "\t", ","):
+            begin = self._first_reading(lines, plain, delimiter)
+            if begin is None:
+                continue
+            self.delimiter = delimiter
+            width = len(self._cells(lines[begin].text))
+            before = [i for i in solid if i < begin]
+            for i in reversed(before):
+                text = lines[i].text
+                if is_comment(text):
+                    text = text.lstrip("# ")
+                    if i != before[-1]:
+                        continue
+                cells = self._cells(text)
+                if abs(len(cells) - width) <= 1 and self._units_of(text, width) is None:
+                    return self._scope(lines, before, width, i), begin
+            return -1, begin
+        if len(plain) > 1 and number(lines[plain[1]].text.strip(), ",") is not None:
+            is_bare = number(lines[first].text.strip(), ",") is not None
+            return (-1, first) if is_bare else (first, self._after_units(lines, first))
+        if len(plain) == 1 and number(lines[first].text.strip(), ",") is not None:
+            return -1, first
+        return first, self._after_units(lines, first)
+
+    def _scope(self, lines: list[_Line], before: list[int], width: int, last: int) -> int:
+        """The line of names in a preamble of TwinCAT's exports, else ``last``."""
+        rows = {j: self._cells(lines[j].text) for j in before}
+        if not any(cells[0] == "Data-Type" for cells in rows.values()):
+            return last
+        names = [j for j, cells in rows.items() if cells[0] == _SCOPE and len(cells) == width]
+        return names[-1] if names else last
+
+    def _after_units(self, lines: list[_Line], first: int) -> int:
+        width = len(self._cells(lines[first].text))
+        for i in range(first + 1, len(lines)):
+            text = lines[i].text
+            if text.strip() and not is_comment(text):
+                return i + 1 if self._units_of(text, width) is not None else first + 1
+        return first + 1
+
+    def _first_reading(self, lines: list[_Line], plain: list[int], delimiter: str) -> int | None:
+        """The first of some lines in a row that are equally wide and hold numbers."""
+        looked_at = [(i, self._split(lines[i].text, delimiter)) for i in plain]
+        decimal = "." if delimiter == "," else ","
+        good = [len(cells) > 1 and _are_readings(cells, decimal) for _i, cells in looked_at]
+        for k in range(len(looked_at)):
+            next_ones = range(k, min(k + _LOOKED_AT, len(looked_at)))
+            width = len(looked_at[k][1])
+            if all(good[j] and len(looked_at[j][1]) == width for j in next_ones):
+                kinds = [[_kind(cell, decimal) for cell in looked_at[j][1]] for j in next_ones]
+                if all(len(set(column) - {None}) <= 1 for column in zip(*kinds, strict=True)):
+                    return looked_at[k][0]
+        return None
+
+    def _decimal(self, lines: list[_Line]) -> str:
+        if self.delimiter == ",":
+            return "."
+        for line in lines:
+            for cell in () if is_comment(line.text) else self._cells(line.text):
+                if "," in cell and _COMMA.fullmatch(cell) and not _POINT.fullmatch(cell):
+                    return ","
+        return "."
+
+    def _named(self, cells: list[str], between: list[_Line]) -> list[str]:
+        self._is_open = len(cells) > 1 and not cells[-1]
+        if self._is_open:
+            cells = cells[:-1]
+        if cells[0] == _SCOPE and len(cells) > 1:
+            return self._scope_names(cells, between)
+        for line in between:
+            units = self._units_of(line.text, len(cells))
+            if units is not None:
+                cells = [
+                    f"{name} [{unit}]" if unit and not _BRACKETED.search(name) else name
+                    for name, unit in zip(cells, units, strict=False)
+                ] + cells[len(units) :]
+        return cells
+
+    def _scope_names(self, cells: list[str], between: list[_Line]) -> list[str]:
+        """Names of TwinCAT's exports: a time column before each group of channels."""
+        rows = {self._cells(line.text)[0]: self._cells(line.text) for line in between}
+        units = rows.get("Unit", [])
+        names, times = [], 0
+        for i, cell in enumerate(cells):
+            if cell == _SCOPE:
+                times += 1
+                names.append("time [ms]" if times == 1 else f"time {times} [ms]")
+            else:
+                unit = units[i].partition(" ")[0] if i < len(units) else ""
+                known = unit if unit not in ("", "(None)") else ""
+                names.append(f"{cell} [{known}]" if known else cell)
+        return names
+
+    def _units_of(self, text: str, width: int) -> list[str] | None:
+        """Units of a line of units, or None for another line."""
+        cells = self._cells(text)
+        if abs(len(cells) - width) > 1 or not any(_KNOWN_UNITS.fullmatch(c) for c in cells):
+            return None
+        if not all(_UNIT.fullmatch(cell) for cell in cells):
+            return None
+        return [cell.strip("[]() ") for cell in cells]
+
+    def _trailing(self, first: list[_Line]) -> bool:
+        if not first:
+            return False
+        cells = self._cells(first[0].text)
+        return len(cells) == len(self.names) + 1 and not cells[-1]
+
+    def _cells(self, text: str) -> list[str]:
+        return self._split(text, self.delimiter)
+
+    def _split(self, text: str, delimiter: str) -> list[str]:
+        try:
+            cells = next(csv.reader([text], delimiter=delimiter), [""])
+        except csv.Error as cause:
+            raise FileError(
+                self.path, f"is not readable as CSV: {cause}; save it with ends of lines", line=1
+            ) from None
+        return [cell.strip() for cell in cells] or [""]
+
+
+#: Names that this package gives its columns: a line with one is the line of names.
+_STANDARD = re.compile(r"(reference|indicated|corrected)_(deg|rad|turn|count)\b|\btime_s\b")
+_BRACKETED = re.compile(r"[\[(][^\])]*[\])]\s*$")
+
+
+def is_comment(text: str) -> bool:
+    """True for a note: a line that begins with #, and the mark of an end of file."""
+    start = text.lstrip()
+    return start.startswith("#") or start.rstrip() == "EOF"
+
+
+def number(cell: str, decimal: str) -> float | None:
+    """The number that a cell holds, or None: no underscores, digits of ASCII only."""
+    pattern = _POINT if decimal == "." else _COMMA
+    if pattern.fullmatch(cell):
+        return float(cell.replace(",", ".") if decimal == "," else cell)
+    return float(cell) if cell.lower() in _WORDS else None
+
+
+def _are_readings(cells: Sequence[str], decimal: str) -> bool:
+    filled = [cell for cell in cells if cell]
+    count = sum(number(cell, decimal) is not None for cell in filled)
+    return count > 0 and 2 * count >= len(filled)
+
+
+def _kind(cell: str, decimal: str) -> bool | None:
+    """Whether a cell holds a number; None for an empty one."""
+    return number(cell, decimal) is not None if cell else None
+
+
+def _split(data: bytes) -> list[bytes]:
+    parts = data.split(b"\n")
+    return [*(part + b"\n" for part in parts[:-1]), *([parts[-1]] if parts[-1] else [])]
+
+
+def _is_western(data: bytes) -> bool:
+    """True where every byte beyond ASCII is a letter or sign of Western Europe's code page.
+
+    Then it is °, µ, ± or a letter with an accent, in a preamble or a unit.
+    """
+    return all(byte < 0x80 or byte >= 0xA0 for byte in data) and data.count(b"\xff") == 0

@@ -1,0 +1,190 @@
+"""What a format is: how its files are told, read and copied with columns added."""
+
+from __future__ import annotations
+
+import importlib
+import json
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any, NamedTuple, Protocol, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .._core import __version__
+from ..errors import MissingExtraError
+
+__all__ = [
+    "TEXTS",
+    "Addition",
+    "Batch",
+    "Choose",
+    "Contents",
+    "Format",
+    "Labels",
+    "Watch",
+    "note",
+    "row_labels",
+]
+
+#: Columns that are texts whatever they look like, in formats that do not say.
+TEXTS = ("run", "unit")
+
+#: Called after every batch with the rows done and the part of the file done, 0 to 1.
+Watch: TypeAlias = Callable[[int, float], None]
+
+
+class Labels(NamedTuple):
+    """A column of texts: the place of each one's text in ``names``."""
+
+    codes: NDArray[np.intp]
+    names: Sequence[str | None]
+
+
+#: Columns by name: numbers, or labels where the column holds text.
+Batch: TypeAlias = dict[str, Any]
+
+
+class Contents(NamedTuple):
+    """What a file holds: its rows (or messages) and a checksum by column, topic or the like."""
+
+    rows: int
+    checksums: Mapping[str, str]
+
+
+class Addition(Protocol):
+    """A column that a copy gets beside those of its source."""
+
+    @property
+    def column(self) -> str:
+        """The column that it is made from and looks like."""
+
+    @property
+    def added(self) -> str:
+        """Its own name."""
+
+    @property
+    def signals(self) -> Mapping[str, str]:
+        """Further columns that it is made from."""
+
+    @property
+    def entry(self) -> Mapping[str, Any]:
+        """How it was made, as plain values."""
+
+    def correct(
+        self, indicated: NDArray[Any], signals: Mapping[str, NDArray[Any]] | None = None
+    ) -> NDArray[Any]:
+        """Its next values, from those of the column and of the further ones."""
+
+
+#: Finds what is to be added among the columns of a file.
+Choose: TypeAlias = Callable[[Sequence[str]], Sequence[Addition]]
+
+
+def note(additions: Sequence[Addition]) -> str:
+    """How the added columns were made, as the JSON text that copies carry."""
+    entries = [dict(addition.entry) for addition in additions]
+    return json.dumps({"package": f"trueangle {__version__}", "corrected": entries})
+
+
+class FormatModule(Protocol):
+    """What the module of a format defines."""
+
+    def columns(self, path: Path, topic: str | None) -> list[str]:
+        """Names of the columns that hold numbers or labels."""
+
+    def read(
+        self,
+        path: Path,
+        names: Sequence[str],
+        topic: str | None = None,
+        stretch: Any = None,
+        *,
+        texts: Collection[str] = TEXTS,
+        strict: bool = False,
+    ) -> Iterator[Batch]:
+        """Some columns in batches of bounded size, NaN where a value is missing.
+
+        Modules that define ``stretches(path)`` take one of them: then the batches of that
+        stretch only. Stretches of a file may be read side by side. Formats of text take
+        ``texts`` for labels and refuse, where ``strict``, numbers that are not finite; those
+        that define ``line_of(path, row)`` tell the line a row came from.
+        """
+
+    def copy(
+        self,
+        source: Path,
+        target: Path,
+        choose: Choose,
+        watch: Watch,
+        topic: str | None,
+        output_topic: str | None,
+    ) -> Contents:
+        """Write ``target`` as ``source`` with the chosen columns added.
+
+        Returns what was handed to the writer, to be compared with `contents` of the file.
+        """
+
+    def contents(self, path: Path, topic: str | None) -> Contents:
+        """Read a file back whole."""
+
+
+@dataclass(frozen=True)
+class Format:
+    """A format: how its files are told, its module and the extra that it needs.
+
+    ``magics`` are first bytes of its files; ``unit`` is that of all angles of formats that
+    define it.
+    """
+
+    name: str
+    endings: tuple[str, ...]
+    module_name: str
+    extra: str | None = None
+    unit: str | None = None
+    magics: tuple[bytes, ...] = ()
+
+    @cached_property
+    def module(self) -> FormatModule:
+        """The module that reads and copies it.
+
+        Raises
+        ------
+        MissingExtraError
+            Its libraries are not installed.
+        """
+        try:
+            module: Any = importlib.import_module(f".{self.module_name}", __package__)
+        except ModuleNotFoundError as cause:
+            if self.extra is None or (cause.name or "").startswith("trueangle"):
+                raise
+            raise MissingExtraError(
+                f"{self.name} files need {cause.name}: pip install 'trueangle[{self.extra}]'"
+            ) from None
+        found: FormatModule = module
+        return found
+
+    def stretches(self, path: Path) -> list[Any]:
+        """Parts of a file, in their order, that `read` takes on their own."""
+        cut = getattr(self.module, "stretches", None)
+        return [None] if cut is None else list(cut(path))
+
+    def read(
+        self, path: Path, names: Sequence[str], topic: str | None, stretch: Any
+    ) -> Iterator[Batch]:
+        """Batches of one of the `stretches`."""
+        return self.module.read(path, names, topic, stretch)
+
+    def line_of(self, path: Path, row: int) -> int:
+        """The line of a row counted from 0; formats without lines count as if under a header."""
+        find = getattr(self.module, "line_of", None)
+        return row + 2 if find is None else int(find(path, row))
+
+
+def row_labels(texts: Sequence[Any]) -> Labels:
+    """Texts, or None, as labels."""
+    codes: dict[Any, int] = {}
+    found = [codes.setdefault(text, len(codes)) for text in texts]
+    return Labels(np.array(found, dtype=np.intp), list(codes))
