@@ -9,7 +9,6 @@ mod failure;
 mod fit;
 mod moments;
 mod series;
-mod table;
 mod terms;
 mod threads;
 
@@ -34,9 +33,6 @@ mod _core {
 
     #[pymodule_export]
     use super::moments::{PyMoments, fit_moments};
-
-    #[pymodule_export]
-    use super::table::{table_correction, table_source};
 
     #[pymodule_export]
     use super::threads::thread_count;

@@ -110,10 +110,10 @@ def error_points(fit: FitResult) -> list[Points]:
     return found
 
 
-def model_curve(model: HarmonicModel) -> Curve:
-    """The model without its constant, over the turn or the part of it that was seen."""
+def model_curve(model: HarmonicModel, span: tuple[float, float] | None = None) -> Curve:
+    """The model without its constant, over ``span`` (deg), the turn or the part that was seen."""
     highest = max(model.orders, default=1.0)
-    low, high = seen_span(model)
+    low, high = seen_span(model) if span is None else span
     count = int(np.clip(_PER_CYCLE * highest * (high - low) / 360.0, _FEWEST, _MOST_SAMPLES))
     angle = np.linspace(low, high, count)
     theta = angle * (model.period / 360.0)

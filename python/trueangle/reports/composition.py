@@ -24,6 +24,8 @@ from .diagnosed import diagnosed
 from .gained import extended_model, gained
 from .measured import measured
 from .modelled import modelled, selected
+from .phases import phases
+from .spectrum import spectrum
 from .unknowns import unknowns
 
 if TYPE_CHECKING:
@@ -50,7 +52,7 @@ class Report:
     content : dict
         Every number of the page, plain values: what the page carries as JSON.
     figures : dict of str to dict
-        Interactive figures by name, plotly specifications with an ``alt`` text.
+        Interactive figures by name: an ``alt`` text and their charts as Bokeh documents.
     """
 
     title: str
@@ -64,7 +66,7 @@ class Report:
         Raises
         ------
         MissingExtraError
-            jinja2 or plotly is not installed.
+            jinja2 or bokeh is not installed.
         """
         from .page import render
 
@@ -175,7 +177,7 @@ def report(
     Raises
     ------
     MissingExtraError
-        jinja2 or plotly is not installed (``pip install trueangle[report]``).
+        jinja2 or bokeh is not installed (``pip install trueangle[report]``).
 
     Examples
     --------
@@ -298,13 +300,13 @@ def _figures(
     points = error_points(fit) if fit is not None else [_plain(r, i) for i, r in enumerate(runs)]
     made = {"errors": figures.errors_of_runs(fit, runs, points)}
     if fit is not None or selection is not None:
-        made["spectrum"] = figures.spectrum(fit, selection)
+        made["spectrum"] = spectrum(fit, selection)
     if held is not None:
         made["before-after"] = figures.before_after(held, runs)
     if fit is not None:
-        polar = figures.phases(fit)
-        if polar is not None:
-            made["phases"] = polar
+        multiples = phases(fit)
+        if multiples is not None:
+            made["phases"] = multiples
         for signal in figures.signals_present(fit):
             made[f"residual-{signal}"] = figures.residuals(fit, signal)
     return made

@@ -1,13 +1,17 @@
-"""Interactive figures of the diagnosis."""
+"""Figures of the diagnosis: measured against simulated, what is left, gains."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-from ..plots import palette
+import numpy as np
+
+from ..plots import curves
+from ..plots.curves import Points
 from ..plots.simulatedcurves import gain_bars, simulated_points
-from .figures import Figure, figure, run_trace, turn_axis
+from .charts import Chart, Figure, figure
+from .figures import run_dots, turn
 
 if TYPE_CHECKING:
     from ..diagnosis import Diagnosis
@@ -16,8 +20,8 @@ if TYPE_CHECKING:
 
 __all__ = ["figures_of"]
 
-#: Causes from the top down.
-_CAUSES = {"autorange": "reversed", "type": "category"}
+#: Readings drawn of what is measured and of what is simulated.
+_MOST_POINTS = 3_000
 
 
 def figures_of(
@@ -26,96 +30,94 @@ def figures_of(
     sim: Simulation,
     left: Sequence[tuple[str, float]],
 ) -> dict[str, Figure]:
-    """Measured against simulated, what is left after each cause, gains."""
+    """Measured against simulated; what is left after each cause, and gains, of several causes.
+
+    A chart of one bar says less than the sentence beside it: it is left out.
+    """
     found = {"measured-simulated": _compared(runs, sim)}
-    if diagnosis.findings:
+    if len(left) > 2:
         found["error-left"] = _left(diagnosis, left)
-    if gain_bars(diagnosis):
+    if len(gain_bars(diagnosis)) > 1:
         found["gains"] = _gains(diagnosis)
     return found
 
 
 def _compared(runs: Sequence[CalibrationRun], sim: Simulation) -> Figure:
-    traces = []
+    """Both in one chart, the difference below: neither hides another."""
     pairs = simulated_points(runs, sim)
-    for name, colour, size in (
-        ("measured", palette.BEFORE, 4),
-        ("simulated", palette.MUTED, 3),
-        ("difference", palette.AFTER, 4),
-    ):
-        for number, (measured, simulated) in enumerate(pairs):
-            points = simulated if name == "simulated" else measured
-            if name == "difference":
-                points = type(measured)(measured.label, measured.x, measured.y - simulated.y)
-            trace = run_trace(number, points, 3 * len(runs))
-            trace |= {"name": name, "legendgroup": name, "showlegend": number == 0}
-            trace["marker"] = {"size": size, "color": colour, "opacity": 0.7}
-            trace["hovertemplate"] = (
-                f"run {measured.label}, {name}: %{{y:.2f}} arcsec at %{{x:.2f}}°<extra></extra>"
-            )
-            traces.append(trace)
-    alt = (
-        f"Measured error of {len(runs)} runs, the error that the simulation expects at the same "
-        "readings, and their difference, in arcsec over one turn."
+    low, high = turn(None)
+    both = Chart("", "error / arcsec", x_range=(low, high), height_rem=16.0)
+    apart = Chart(
+        "reference angle / deg",
+        "measured less simulated / arcsec",
+        x_range=(low, high),
+        height_rem=16.0,
     )
-    return figure(alt, "", "error / arcsec", traces, xaxis=turn_axis(None))
+    for chart in (both, apart):
+        chart.angle_axis(low, high)
+    most = max(50, _MOST_POINTS // len(runs))
+    for number, (measured, simulated) in enumerate(pairs):
+        for name, points, marker, hollow in (
+            ("measured", measured, "circle", True),
+            ("simulated", simulated, "circle", False),
+        ):
+            part = curves.thinned(points, most)
+            both.dots(
+                part.x,
+                part.y,
+                colour="before" if name == "measured" else "model",
+                label=name,
+                marker=marker,
+                size=5.0 if hollow else 2.0,
+                hollow=hollow,
+                run=number,
+                hover=f"run {measured.label}, {name}: @y{{0.00}} arcsec at @x{{0.00}}°",
+            )
+        rest = Points(measured.label, measured.x, measured.y - simulated.y)
+        run_dots(apart, number, rest, len(runs))
+    alt = (
+        f"Measured error of {len(runs)} runs and the error that the simulation expects at the same "
+        "readings, and below it their difference, in arcsec over one turn."
+    )
+    return figure(alt, [both, apart], "stacked")
 
 
 def _left(diagnosis: Diagnosis, left: Sequence[tuple[str, float]]) -> Figure:
     names = [name for name, _ in left]
-    bars = {
-        "type": "bar",
-        "orientation": "h",
-        "name": "left",
-        "showlegend": False,
-        "y": names,
-        "x": [rms for _, rms in left],
-        "texttemplate": "%{x:.2f}",
-        "textposition": "auto",
-        "hovertemplate": "%{y}: %{x:.2f} arcsec rms<extra></extra>",
-        "marker": {"color": [palette.BEFORE] + [palette.AFTER] * (len(left) - 1)},
-    }
-    noise = {
-        "type": "scatter",
-        "mode": "lines",
-        "name": "noise of one reading",
-        "x": [diagnosis.noise] * 2,
-        "y": [0, 1],
-        "yaxis": "y2",
-        "line": {"dash": "dash", "width": 1.5},
-        "hovertemplate": "noise %{x:.2f} arcsec<extra></extra>",
-        "meta": {"role": "model"},
-    }
+    sizes = np.array([rms for _, rms in left])
+    chart = Chart(
+        "rms of the difference / arcsec",
+        "",
+        x_range=(0.0, 1.08 * float(max(sizes.max(), diagnosis.noise))),
+        categories=names,
+        height_rem=7.0 + 2.0 * len(names),
+    )
+    chart.bars(names[:1], sizes[:1], colour="before", hover="@y: @x{0.00} arcsec rms")
+    chart.bars(names[1:], sizes[1:], colour="after", hover="@y: @x{0.00} arcsec rms")
+    chart.upright(diagnosis.noise, label=f"noise of one reading, {diagnosis.noise:.2f} arcsec")
     alt = (
         "Rms of measured less simulated error as each cause joins the simulation: "
         + ", ".join(f"{name} {rms:.2f} arcsec" for name, rms in left)
         + f". Noise of one reading {diagnosis.noise:.2f} arcsec."
     )
-    # The second axis lets the line of the noise run over the whole height.
-    over = {"overlaying": "y", "range": [0, 1], "visible": False, "fixedrange": True}
-    title = "rms of the difference / arcsec"
-    made = figure(alt, title, "", [bars, noise], yaxis=_CAUSES, yaxis2=over)
-    return made | {"rows": len(names)}
+    return figure(alt, [chart])
 
 
 def _gains(diagnosis: Diagnosis) -> Figure:
-    bars: list[Any] = gain_bars(diagnosis)
-    trace = {
-        "type": "bar",
-        "orientation": "h",
-        "y": [bar.cause for bar in bars],
-        "x": [bar.share for bar in bars],
-        "error_x": {
-            "type": "data",
-            "symmetric": False,
-            "array": [max(0.0, bar.high - bar.share) for bar in bars],
-            "arrayminus": [max(0.0, bar.share - bar.low) for bar in bars],
-        },
-        "hovertemplate": "%{y}: %{x:.1f} %<extra></extra>",
-        "marker": {"color": palette.AFTER},
-    }
+    bars = gain_bars(diagnosis)
+    names = [f"{i}. {bar.cause}" for i, bar in enumerate(bars, start=1)]
+    share = np.array([bar.share for bar in bars])
+    low = np.array([min(bar.low, bar.share) for bar in bars])
+    high = np.array([max(bar.high, bar.share) for bar in bars])
+    chart = Chart(
+        "share of the reducible error taken away / %",
+        "",
+        x_range=(min(0.0, 1.05 * float(low.min())), max(100.0, 1.05 * float(high.max()))),
+        categories=names,
+        height_rem=7.0 + 2.0 * len(names),
+    )
+    chart.bars(names, share, colour="after", hover="@y: @x{0.0} %", low=low, high=high)
     alt = "Share of the reducible error that each cause takes away on held-out runs: " + ", ".join(
         f"{bar.cause} {bar.share:.0f} % ({bar.low:.0f} to {bar.high:.0f} %)" for bar in bars
     )
-    title = "share of the reducible error taken away / %"
-    return figure(alt, title, "", [trace], yaxis=_CAUSES) | {"rows": len(bars)}
+    return figure(alt, [chart])

@@ -1,270 +1,165 @@
-"""Interactive figures of the report as plain plotly specifications.
-
-Traces of one run carry ``meta.run``: the page shows and hides a run in all figures at
-once. Colours come from the page (light, dark, print), which knows traces by ``meta.role``.
-"""
+"""Figures of readings over the angle: errors, before and after, residuals."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any, Final
+from itertools import pairwise
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..angles import ARCSEC_PER_TURN
-from ..errors import RankError
-from ..plots import curves, palette
-from ..plots.amplitudespectrum import likely_aliases, thresholds
-from ..plots.curves import CONFIDENCE, Points
+from ..plots import curves
+from ..plots.curves import CONFIDENCE, Curve, Points
+from .charts import Chart, Figure, figure, run_colour, run_marker
 
 if TYPE_CHECKING:
     from ..fitting.heldout import HeldOut
     from ..fitting.result import FitResult
     from ..model import HarmonicModel
-    from ..orders.select import OrderSelection
     from ..runs import CalibrationRun
 
-__all__ = [
-    "before_after",
-    "errors_of_runs",
-    "phases",
-    "residuals",
-    "signals_present",
-    "spectrum",
-    "swatch",
-]
+__all__ = ["before_after", "errors_of_runs", "residuals", "signals_present", "turn"]
 
 Array = NDArray[np.float64]
-Figure = dict[str, Any]
 
-#: Readings drawn in one figure at most: more do not show, and make the page slow.
-_MOST_POINTS: Final = 8_000
-#: Runs named in the legends.
+#: Readings drawn in one chart at most: more do not show, and make the page heavy and slow.
+_MOST_POINTS: Final = 4_000
+#: Runs named in the legends; the table of runs has the symbols of all.
 _MOST_IN_LEGEND: Final = 4
-_SYMBOLS: Final = ("circle", "square", "triangle-up", "diamond", "triangle-down", "cross")
-_GLYPHS: Final = ("●", "■", "▲", "◆", "▼", "✚")
+#: Orders from which on a curve fills the picture: it is drawn as an envelope.
+_DENSE: Final = 40.0
+#: Places of an envelope, and periods of the stretch that is shown beside it.
+_PLACES: Final = 180
+_PERIODS: Final = 4.0
 
 
-def figure(alt: str, x: str, y: str, traces: Sequence[dict[str, Any]], **layout: Any) -> Figure:
-    """One figure: alternative text, axis titles, traces and further layout."""
-    return {
-        "alt": alt,
-        "data": list(traces),
-        "layout": {"xaxis": {"title": {"text": x}}, "yaxis": {"title": {"text": y}}} | layout,
-    }
-
-
-def run_trace(number: int, points: Points, runs: int) -> dict[str, Any]:
-    """Readings of one run as dots."""
-    part = curves.thinned(points, max(50, _MOST_POINTS // runs))
-    return {
-        "type": "scatter",
-        "mode": "markers",
-        "name": f"run {points.label}",
-        "x": rounded(part.x, 4),
-        "y": rounded(part.y, 3),
-        "marker": {
-            "size": 4,
-            "color": palette.run_colour(number),
-            "symbol": _SYMBOLS[number % len(_SYMBOLS)],
-            "opacity": 0.75,
-        },
-        "meta": {"run": number},
+def run_dots(
+    chart: Chart, number: int, points: Points, runs: int, *, size: float = 4.0, zoomed: bool = False
+) -> None:
+    """Readings of one run."""
+    part = points if zoomed else curves.thinned(points, max(50, _MOST_POINTS // runs))
+    chart.dots(
+        part.x,
+        part.y,
+        colour=run_colour(number),
+        marker=run_marker(number),
+        size=size,
+        run=number,
         # The table of runs has their symbols; a long legend would leave no picture.
-        "showlegend": runs <= _MOST_IN_LEGEND,
-    }
+        label=f"run {points.label}" if runs <= _MOST_IN_LEGEND and not zoomed else "",
+        hover=f"run {points.label}: @y{{0.00}} arcsec at @x{{0.00}}°",
+    )
 
 
-def swatch(number: int) -> tuple[str, str]:
-    """Colour and symbol of a run, for the table of runs."""
-    return palette.run_colour(number), _GLYPHS[number % len(_GLYPHS)]
-
-
-def turn_axis(model: HarmonicModel | None) -> dict[str, Any]:
-    """Axis of the reference angle: the turn, or the part of it that the model has seen."""
-    low, high = (0.0, 360.0) if model is None else curves.seen_span(model)
-    return {
-        "title": {"text": "reference angle / deg"},
-        "range": [low, high],
-        "dtick": 45 if high - low > 180.0 else None,
-    }
-
-
-def rounded(values: Array, digits: int) -> list[float]:
-    """For drawing only: numbers on the page come from the content."""
-    return [float(v) for v in np.round(values, digits)]
+def turn(model: HarmonicModel | None) -> tuple[float, float]:
+    """The turn in degrees, or the part of it that the model has seen."""
+    return (0.0, 360.0) if model is None else curves.seen_span(model)
 
 
 def errors_of_runs(
     fit: FitResult | None, runs: Sequence[CalibrationRun], everything: list[Points]
 ) -> Figure:
-    """Measured error of every run with the model and its band."""
-    traces: list[dict[str, Any]] = []
+    """Measured error of every run with the model and its band.
+
+    A model with gear orders would be a black surface: it is drawn as the envelope of its
+    curve, and a stretch of a few periods beside it shows the curve itself.
+    """
+    low, high = turn(None if fit is None else fit.model)
+    y = "error less the run's zero / arcsec"
+    dense = fit is not None and max(fit.orders, default=0.0) > _DENSE
+    main = Chart("reference angle / deg", y, x_range=(low, high), grow=2.0)
+    main.angle_axis(low, high)
+    charts = [main]
     if fit is not None:
         curve = curves.model_curve(fit.model)
-        x = rounded(curve.angle, 3)
-        if curve.std is not None:
-            half = CONFIDENCE * curve.std
-            traces.append(
-                {
-                    "type": "scatter",
-                    "x": x + x[::-1],
-                    "y": rounded(curve.error + half, 3) + rounded(curve.error - half, 3)[::-1],
-                    "fill": "toself",
-                    "line": {"width": 0},
-                    "hoverinfo": "skip",
-                    "name": "95 % band",
-                    "meta": {"role": "band"},
-                }
-            )
-        traces.append(
-            {
-                "type": "scatter",
-                "mode": "lines",
-                "x": x,
-                "y": rounded(curve.error, 3),
-                "line": {"width": 1.2 if max(fit.orders, default=0.0) < 40 else 0.6},
-                "name": "model",
-                "meta": {"role": "model"},
-            }
-        )
-    traces += [run_trace(i, p, len(runs)) for i, p in enumerate(everything)]
+        if dense:
+            places, least, most = _envelope(curve)
+            main.band(places, least, most, colour="model", label="envelope of the model")
+        else:
+            _draw_model(main, curve)
+    for i, points in enumerate(everything):
+        run_dots(main, i, points, len(runs))
+    if fit is not None and dense:
+        charts.append(_stretch(fit, everything, y))
     what = "the fitted model with its 95 % band" if fit is not None else "no model"
-    alt = f"Measured error in arcsec over one turn for {len(runs)} run(s), with {what}."
-    x_axis = turn_axis(None if fit is None else fit.model)
-    return figure(alt, "", "error less the run's zero / arcsec", traces, xaxis=x_axis)
+    alt = f"Measured error in arcsec over one turn for {len(runs)} run(s), with {what}"
+    alt += "; a short stretch is shown larger beside it." if dense else "."
+    return figure(alt, charts)
 
 
-def spectrum(fit: FitResult | None, selection: OrderSelection | None) -> Figure:
-    """Amplitude of every order: candidates of a selection, or the orders of a fit."""
-    x_title = "order / cycles per output turn"
-    if selection is None:
-        assert fit is not None
-        factor = ARCSEC_PER_TURN / fit.model.period
-        ranks = np.argsort(fit.orders)
-        trace = {
-            "type": "bar",
-            "name": "fitted amplitude",
-            "x": [f"{fit.orders[i]:g}" for i in ranks],
-            "y": rounded(factor * fit.amplitudes[ranks], 3),
-            "hovertemplate": "order %{x}: %{y:.2f} arcsec<extra></extra>",
-            "marker": {"color": palette.AFTER},
-        }
-        if fit.model.covariance is not None:
-            half = CONFIDENCE * factor * fit.amplitude_std[ranks]
-            trace["error_y"] = {"type": "data", "array": rounded(half, 4)}
-        alt = f"Amplitudes in arcsec of {len(ranks)} fitted orders with 95 % intervals."
-        return figure(alt, x_title, "amplitude / arcsec", [trace], **_categories(len(ranks)))
-    factor = ARCSEC_PER_TURN / selection.period
-    traces = []
-    for kept, name in ((True, "retained"), (False, "not retained")):
-        rows = [row for row in selection.table if row.retained is kept]
-        if not rows:
-            continue
-        traces.append(
-            {
-                "type": "bar",
-                "name": name,
-                "x": [f"{row.order:g}" for row in rows],
-                "y": rounded(np.array([factor * row.amplitude for row in rows]), 3),
-                "text": [_hover(row) for row in rows],
-                "textposition": "none",
-                "hovertemplate": "order %{x}: %{y:.2f} arcsec<br>%{text}<extra></extra>",
-                "marker": {"color": palette.AFTER if kept else "rgba(140,140,140,0.35)"},
-            }
+def _draw_model(chart: Chart, curve: Curve, label: str = "model") -> None:
+    if curve.std is not None:
+        half = CONFIDENCE * curve.std
+        chart.band(
+            curve.angle, curve.error - half, curve.error + half, colour="model", label="95 % band"
         )
-    names = [f"{row.order:g}" for row in selection.table]
-    limit = factor * thresholds(selection)
-    traces.append(
-        {
-            "type": "scatter",
-            "mode": "markers",
-            "name": "needed to be significant",
-            "x": names,
-            "y": rounded(np.nan_to_num(limit), 3),
-            "marker": {"symbol": "line-ew-open", "size": 12, "color": palette.WARNING},
-            "hovertemplate": "order %{x}: %{y:.2f} arcsec needed<extra></extra>",
-        }
+    chart.line(curve.angle, curve.error, colour="model", label=label)
+
+
+def _envelope(curve: Curve) -> tuple[Array, Array, Array]:
+    """Least and greatest value of a curve at each of some places."""
+    edges = np.linspace(0, curve.angle.size, _PLACES + 1).astype(int)
+    parts = [slice(a, b) for a, b in pairwise(edges) if b > a]
+    return (
+        np.array([curve.angle[p].mean() for p in parts]),
+        np.array([curve.error[p].min() for p in parts]),
+        np.array([curve.error[p].max() for p in parts]),
     )
-    kept_orders = ", ".join(f"{m:g}" for m in selection.orders) or "none"
-    alt = (
-        f"Amplitude of {len(names)} candidate orders in arcsec with the threshold of "
-        f"significance. Retained: {kept_orders}."
+
+
+def _stretch(fit: FitResult, everything: list[Points], y: str) -> Chart:
+    """A few periods of the strongest gear order, as large as they are."""
+    strong = max(
+        (pair for pair in zip(fit.amplitudes, fit.orders, strict=True) if pair[1] > _DENSE),
+        default=(0.0, _DENSE),
+    )[1]
+    low, high = turn(fit.model)
+    width = min(_PERIODS * 360.0 / float(strong), high - low)
+    # In the middle of the travel: both ends may be thin.
+    start = 0.5 * (low + high) - 0.5 * width
+    chart = Chart(
+        "reference angle / deg",
+        y,
+        x_range=(start, start + width),
+        title=f"A stretch of {width:.3g}°: {_PERIODS:g} periods of order {strong:g}",
     )
-    order = {"categoryorder": "array", "categoryarray": names}
-    layout = _categories(len(names))
-    layout["xaxis"] = {"title": {"text": x_title}, "type": "category"} | order
-    return figure(alt, x_title, "amplitude / arcsec", traces, **layout)
-
-
-def _hover(row: Any) -> str:
-    lines = [row.verdict]
-    if row.aliases:
-        lines.append("looks like order " + ", ".join(f"{m:g}" for m in likely_aliases(row)[:4]))
-    lines += [str(e) for e in row.explanations[:3]]
-    return "<br>".join(lines)
-
-
-def _categories(count: int) -> dict[str, Any]:
-    axis = {"title": {"text": "order / cycles per output turn"}, "type": "category"}
-    return {"xaxis": axis, "barmode": "overlay", "bargap": 0.25 if count < 60 else 0.1}
-
-
-def phases(fit: FitResult) -> Figure | None:
-    """Phase and amplitude of every order in every run; None where no run holds them."""
-    try:
-        found = sorted(curves.run_phases(fit), key=lambda p: -float(p.amplitude.mean()))[:12]
-    except RankError:
-        return None
-    traces = [
-        {
-            "type": "scatterpolar",
-            "mode": "markers",
-            "name": f"order {p.order:g}",
-            "theta": rounded(np.degrees(p.phase) % 360.0, 2),
-            "r": rounded(p.amplitude, 3),
-            "text": [f"run {label}" for label in p.labels],
-            "hovertemplate": "%{text}: %{r:.2f} arcsec at %{theta:.1f}°",
-            "marker": {
-                "size": 8,
-                "color": palette.run_colour(i),
-                "symbol": _SYMBOLS[(i + i // len(palette.RUNS)) % len(_SYMBOLS)],
-            },
-        }
-        for i, p in enumerate(sorted(found, key=lambda p: p.order))
-    ]
-    alt = (
-        f"Polar picture of {len(traces)} orders: phase as the angle, amplitude in arcsec as the "
-        "radius, one dot per run. Dots of one order close together are a systematic error."
-    )
-    polar = {"radialaxis": {"angle": 112.5, "nticks": 5, "tickangle": 0, "rangemode": "tozero"}}
-    return {"alt": alt, "data": traces, "layout": {"polar": polar}}
+    whole = curves.model_curve(fit.model, (start, start + width))
+    _draw_model(chart, whole, "model there")
+    for i, points in enumerate(everything):
+        inside = (points.x >= start) & (points.x <= start + width)
+        part = Points(points.label, points.x[inside], points.y[inside])
+        run_dots(chart, i, part, len(everything), size=6.0, zoomed=True)
+    return chart
 
 
 def before_after(held: HeldOut, runs: Sequence[CalibrationRun]) -> Figure:
     """Error of every held-out run before and after correction."""
-    traces = []
-    for name, colour, symbol in (
-        ("before", palette.BEFORE, "square"),
-        ("after", palette.AFTER, "circle"),
-    ):
-        for number, run in enumerate(held.runs):
-            low = 0.0 if run.model is None else curves.seen_span(run.model)[0]
-            points = Points(run.label, curves.degrees(run.run, low), getattr(run, name))
+    model = next((run.model for run in held.runs if run.model is not None), None)
+    low, high = turn(model)
+    chart = Chart("reference angle / deg", "error of held-out runs / arcsec", x_range=(low, high))
+    chart.angle_axis(low, high)
+    most = max(50, _MOST_POINTS // (2 * len(held.runs)))
+    for name, marker in (("before", "square"), ("after", "circle")):
+        for run in held.runs:
+            first = 0.0 if run.model is None else curves.seen_span(run.model)[0]
+            points = Points(run.label, curves.degrees(run.run, first), getattr(run, name))
             index = next(i for i, known in enumerate(runs) if known is run.run)
-            trace = run_trace(index, points, 2 * len(held.runs))
-            trace |= {"name": name, "legendgroup": name, "showlegend": number == 0}
-            trace["marker"] = {"size": 4, "color": colour, "symbol": symbol, "opacity": 0.75}
-            trace["hovertemplate"] = f"run {run.label}, {name}: %{{y:.2f}} arcsec at %{{x:.2f}}°"
-            trace["hovertemplate"] += "<extra></extra>"
-            traces.append(trace)
+            part = curves.thinned(points, most)
+            chart.dots(
+                part.x,
+                part.y,
+                colour=name,
+                marker=marker,
+                run=index,
+                label=name,
+                hover=f"run {run.label}, {name}: @y{{0.00}} arcsec at @x{{0.00}}°",
+            )
     alt = (
         f"Error of {len(held.runs)} runs over one turn before and after correction by a model "
         "that was fitted without them."
     )
-    model = next((run.model for run in held.runs if run.model is not None), None)
-    return figure(alt, "", "error of held-out runs / arcsec", traces, xaxis=turn_axis(model))
+    return figure(alt, [chart])
 
 
 def signals_present(fit: FitResult) -> list[str]:
@@ -286,12 +181,21 @@ def residuals(fit: FitResult, against: str) -> Figure:
     """What the model leaves, against one signal."""
     points = curves.residual_points(fit, against)
     by_label = {(run.label or str(i + 1)): i for i, run in enumerate(fit.runs)}
-    traces = [run_trace(by_label[p.label], p, len(points)) for p in points]
+    x_range = {"angle": turn(fit.model), "direction": (-1.5, 1.5)}.get(against)
+    chart = Chart(curves.SIGNALS[against], "residual / arcsec", x_range=x_range)
+    if against == "angle":
+        chart.angle_axis(*turn(fit.model))
     if against == "direction":
-        for trace in traces:
-            trace["type"] = "box"
-            trace["boxpoints"] = False
-            del trace["mode"]
+        chart.whole_axis(-1.0, 1.0, 3)
+    for part in points:
+        number = by_label[part.label]
+        drawn = _beside(part, number, len(points)) if against == "direction" else part
+        run_dots(chart, number, drawn, len(points))
     alt = f"Residual of the fitted model in arcsec against {against}, {len(points)} run(s)."
-    more = {"xaxis": turn_axis(fit.model)} if against == "angle" else {}
-    return figure(alt, curves.SIGNALS[against], "residual / arcsec", traces, **more)
+    return figure(alt, [chart])
+
+
+def _beside(points: Points, number: int, runs: int) -> Points:
+    """Readings of the same direction, the runs next to each other instead of on one line."""
+    shift = 0.8 * ((number + 0.5) / runs - 0.5)
+    return Points(points.label, points.x + shift, points.y)

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..errors import MissingExtraError
-from . import figures, wording
+from . import charts, wording
 
 if TYPE_CHECKING:
     from .composition import Report
@@ -30,7 +30,7 @@ def render(report: Report) -> str:
         from markupsafe import Markup
     except ImportError:
         raise MissingExtraError(
-            "reports need jinja2 and plotly: pip install 'trueangle[report]'"
+            "reports need bokeh and jinja2: pip install 'trueangle[report]'"
         ) from None
     content = report.content
 
@@ -47,12 +47,12 @@ def render(report: Report) -> str:
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    environment.globals |= {"n": number, "wording": wording, "swatch": figures.swatch}
+    environment.globals |= {"n": number, "wording": wording, "swatch": charts.swatch}
     return environment.get_template("report.html.j2").render(
         c=content,
         figures=report.figures,
         result_json=Markup(_embedded(content)),
-        figures_json=Markup(_embedded(report.figures)),
+        figures_packed=Markup(_packed(json.dumps(report.figures, separators=(",", ":")))),
         style=Markup((_TEMPLATES / "report.css").read_text("utf-8")),
         script=Markup((_TEMPLATES / "report.js").read_text("utf-8")),
         library=Markup(_library()),
@@ -94,10 +94,17 @@ def _embedded(value: Any) -> str:
 
 @lru_cache(maxsize=1)
 def _library() -> str:
-    """The plotting library, compressed: its Python package holds the full build only."""
+    """The charting library, compressed; without its widgets, tables and typesetting."""
     try:
-        from plotly.offline import get_plotlyjs
+        import bokeh
     except ImportError:
-        raise MissingExtraError("reports need plotly: pip install 'trueangle[report]'") from None
-    packed = gzip.compress(get_plotlyjs().encode("utf-8"), 9, mtime=0)
-    return base64.b64encode(packed).decode("ascii")
+        raise MissingExtraError(
+            "reports need bokeh and jinja2: pip install 'trueangle[report]'"
+        ) from None
+    script = Path(bokeh.__file__).parent / "server" / "static" / "js" / "bokeh.min.js"
+    return _packed(script.read_text("utf-8"))
+
+
+def _packed(text: str) -> str:
+    """Text as the page's script unpacks it: gzip in base64."""
+    return base64.b64encode(gzip.compress(text.encode("utf-8"), 9, mtime=0)).decode("ascii")

@@ -21,5 +21,5 @@ def runs() -> list[ta.CalibrationRun]:
 @pytest.fixture(scope="session")
 def made(runs: list[ta.CalibrationRun]):
     pytest.importorskip("jinja2")
-    pytest.importorskip("plotly")
+    pytest.importorskip("bokeh")
     return ta.report(runs, orders=ORDERS, gear_ratio=100.0, title="A <joint> & its error")

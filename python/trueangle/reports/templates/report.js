@@ -1,100 +1,136 @@
 "use strict";
 (() => {
-  const figures = JSON.parse(document.getElementById("figures").textContent);
   const plots = [...document.querySelectorAll(".plot")];
   const root = document.documentElement;
   const paper = location.hash === "#print";
   const dark = matchMedia("(prefers-color-scheme: dark)");
+  const drawn = new Map();   // plot -> its charts: {models, figure, home}
+  let figures = {};
   let chosen = null;   // a theme chosen by the button wins over the system's
 
   const theme = () => (paper ? "light" : chosen || (dark.matches ? "dark" : "light"));
-  const colour = (name) => getComputedStyle(root).getPropertyValue(name).trim();
+  const colour = (name) => getComputedStyle(root).getPropertyValue(`--${name}`).trim();
+  const tagged = (model, kind) => {
+    const tag = (model.tags || []).find((t) => String(t).startsWith(`${kind}:`));
+    return tag === undefined ? null : tag.slice(kind.length + 1);
+  };
 
-  function axis(own, extra) {
-    return { gridcolor: colour("--grid"), zerolinecolor: colour("--line"), linecolor: colour("--line"),
-      automargin: true, ...own, ...extra };
+  /* Set what a model has of these properties; the rest is not its own. */
+  function set(model, values) {
+    const own = Object.fromEntries(Object.entries(values).filter(([name]) => name in model.properties));
+    if (Object.keys(own).length) model.setv(own);
   }
 
-  function layout(figure) {
-    const narrow = innerWidth < 640;
-    const own = figure.layout;
-    const polar = own.polar && { ...own.polar, bgcolor: "rgba(0,0,0,0)",
-      angularaxis: { gridcolor: colour("--grid"), linecolor: colour("--line"), ticksuffix: "°" },
-      radialaxis: { gridcolor: colour("--grid"), linecolor: colour("--line"), ...own.polar.radialaxis } };
-    return { ...own, ...(polar ? { polar } : { xaxis: axis(own.xaxis), yaxis: axis(own.yaxis) }),
-      paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)",
-      font: { color: colour("--fore"), size: narrow ? 11 : 12 },
-      margin: polar ? { l: 40, r: 40, t: 30, b: 40 } : { l: 60, r: 15, t: 10, b: 50 },
-      hoverlabel: { align: "left" }, hovermode: "closest",
-      showlegend: figure.data.length > 1,
-      legend: polar && !narrow ? {} : { orientation: "h", y: polar ? -0.1 : 1.02, yanchor: polar ? "top" : "bottom" } };
-  }
-
-  /* Lines of a role take the theme's colours; runs keep theirs. */
-  function traces(figure) {
-    return figure.data.map((trace) => {
-      const role = trace.meta && trace.meta.role;
-      const hidden = trace.meta && trace.meta.run !== undefined && !shown(trace.meta.run);
-      const made = hidden ? { ...trace, visible: false } : { ...trace };
-      for (const bar of ["error_x", "error_y"])
-        if (trace[bar]) made[bar] = { ...trace[bar], color: colour("--fore"), thickness: 1.2 };
-      if (role === "model") made.line = { ...trace.line, color: colour("--model") };
-      if (role === "band") made.fillcolor = theme() === "dark" ? "rgba(255,255,255,0.25)" : "rgba(0,0,0,0.2)";
-      return made;
-    });
+  /* Colours of the theme, and what boxes hide. */
+  function paint({ models }) {
+    const fore = colour("fore"), grid = colour("grid"), line = colour("line");
+    for (const model of models) {
+      const name = tagged(model, "colour");
+      const run = tagged(model, "run");
+      if (name !== null) {
+        const shade = colour(name);
+        const own = { line_color: shade, fill_color: shade, text_color: shade };
+        set(model.glyph || model, own);
+      }
+      if (run !== null) model.visible = shown(run);
+      if (model.type === "Figure")
+        set(model, { background_fill_color: null, border_fill_color: null, outline_line_color: line });
+      else if (/Axis$/.test(model.type))
+        set(model, { axis_label_text_color: fore, major_label_text_color: fore, axis_line_color: line,
+          major_tick_line_color: line, minor_tick_line_color: null, axis_label_text_font_style: "normal",
+          axis_label_text_font_size: "12px", major_label_text_font_size: "12px" });
+      else if (model.type === "Grid") set(model, { grid_line_color: grid });
+      else if (model.type === "Legend") set(model, { label_text_color: fore });
+    }
   }
 
   const box = (run) => document.querySelector(`.run-toggle[data-run="${run}"]`);
   const shown = (run) => !box(run) || box(run).checked;
 
-  function draw(plot) {
-    const figure = figures[plot.dataset.figure];
-    plot.setAttribute("aria-label", figure.alt);
-    return Plotly.react(plot, traces(figure), layout(figure),
-      { responsive: true, displaylogo: false, displayModeBar: paper ? false : "hover", modeBarButtonsToRemove: ["select2d", "lasso2d", "sendDataToCloud"] });
+  async function chart(specification, place) {
+    const item = structuredClone(specification.document);
+    const attributes = item.doc.roots[0].attributes;
+    // Vectors on paper; on the screen a canvas is drawn faster.
+    if (paper) attributes.output_backend = "svg";
+    place.replaceChildren();
+    const views = await Bokeh.embed.embed_item(item, place);
+    const view = Array.isArray(views) ? views[0] : [...views][0];
+    const figure = view.model;
+    const made = { models: [...figure.references()], figure };
+    // A finger that moves over a chart scrolls the page.
+    if (matchMedia("(pointer: coarse)").matches) figure.toolbar.active_drag = null;
+    paint(made);
+    return made;
   }
 
-  function drawAll() {
-    root.dataset.theme = theme();
-    return Promise.all(plots.map(draw));
+  async function draw(plot) {
+    const figure = figures[plot.dataset.figure];
+    plot.setAttribute("aria-label", figure.alt);
+    const places = [...plot.querySelectorAll(".canvas")];
+    drawn.set(plot, await Promise.all(figure.charts.map((c, i) => chart(c, places[i]))));
   }
+
+  function repaint() {
+    root.dataset.theme = theme();
+    for (const charts of drawn.values()) charts.forEach(paint);
+  }
+
+  const resetAll = (plot) => drawn.get(plot).forEach(({ figure }) => {
+    for (const range of [figure.x_range, figure.y_range]) range.reset();
+  });
 
   /* Zoom (factor < 1), move or reset the angle axis by keys. */
   function key(event) {
-    const full = event.currentTarget._fullLayout;
-    if (!full || !full.xaxis || full.xaxis.type === "category") return;
-    const [low, high] = full.xaxis.range.map(Number), width = high - low, middle = (low + high) / 2;
+    const plot = event.currentTarget;
+    const range = drawn.get(plot)[0].figure.x_range;
+    const low = range.start, high = range.end, width = high - low, middle = (low + high) / 2;
     const move = { ArrowLeft: -0.1, ArrowRight: 0.1 }[event.key];
     const zoom = { "+": 0.7, "=": 0.7, "-": 1 / 0.7 }[event.key];
-    if (move) Plotly.relayout(event.currentTarget, { "xaxis.range": [low + move * width, high + move * width] });
-    else if (zoom) Plotly.relayout(event.currentTarget, { "xaxis.range": [middle - zoom * width / 2, middle + zoom * width / 2] });
-    else if (event.key === "0") Plotly.relayout(event.currentTarget, { "xaxis.autorange": true, "yaxis.autorange": true });
+    if (move) range.setv({ start: low + move * width, end: high + move * width });
+    else if (zoom) range.setv({ start: middle - zoom * width / 2, end: middle + zoom * width / 2 });
+    else if (event.key === "0") resetAll(plot);
     else return;
     event.preventDefault();
   }
 
+  /* Text that was packed with gzip in base64. */
+  async function unpacked(id) {
+    const bytes = Uint8Array.from(atob(document.getElementById(id).textContent), (c) => c.charCodeAt(0));
+    return new Response(new Blob([bytes]).stream().pipeThrough(new DecompressionStream("gzip"))).text();
+  }
+
   async function load() {
-    const packed = document.getElementById("library").textContent;
-    const bytes = Uint8Array.from(atob(packed), (c) => c.charCodeAt(0));
-    const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("gzip"));
     const script = document.createElement("script");
-    script.textContent = await new Response(stream).text();
+    script.textContent = await unpacked("library");
     document.head.append(script);
+    Bokeh.logger.set_level("error");
+    figures = JSON.parse(await unpacked("figures"));
+  }
+
+  /* Tables that are wider than the page say so. */
+  function mark() {
+    for (const table of document.querySelectorAll(".scroll"))
+      table.classList.toggle("wide", table.scrollWidth > table.clientWidth + 1);
   }
 
   async function start() {
     root.dataset.theme = theme();
+    mark();
+    addEventListener("resize", mark);
     if (paper) document.querySelectorAll("details").forEach((d) => { d.open = true; });
     if (paper) document.body.style.width = "680px";
     await load();
-    await drawAll();
-    plots.forEach((plot) => plot.addEventListener("keydown", key));
-    document.querySelectorAll(".run-toggle").forEach((b) => b.addEventListener("change", drawAll));
+    await Promise.all(plots.map(draw));
+    for (const plot of plots) {
+      plot.addEventListener("keydown", key);
+      plot.addEventListener("dblclick", () => resetAll(plot));
+    }
+    document.querySelectorAll(".run-toggle").forEach((b) => b.addEventListener("change", repaint));
     document.getElementById("theme").addEventListener("click", () => {
       chosen = theme() === "dark" ? "light" : "dark";
-      drawAll();
+      repaint();
     });
-    dark.addEventListener("change", drawAll);
+    dark.addEventListener("change", repaint);
     const signal = document.getElementById("signal");
     if (signal) signal.addEventListener("change", () => {
       const plot = document.getElementById("figure-residual");
@@ -102,7 +138,7 @@
       draw(plot);
     });
     addEventListener("beforeprint", () => { root.dataset.theme = "light"; });
-    addEventListener("afterprint", drawAll);
+    addEventListener("afterprint", repaint);
     root.dataset.ready = "true";
   }
 

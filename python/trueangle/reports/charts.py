@@ -1,0 +1,305 @@
+"""Interactive charts of the report: plain dots, lines, bands and bars on two axes.
+
+A chart is a Bokeh document as JSON, which the page's script draws. Colours come from the
+page (light, dark, print): what is drawn carries ``colour:NAME`` of a CSS variable, and
+what belongs to one run ``run:NUMBER``, by which the page shows and hides it everywhere.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import MissingExtraError
+
+__all__ = ["Chart", "Figure", "figure", "run_colour", "run_marker", "swatch"]
+
+Array = NDArray[np.float64]
+
+#: A figure of the report: its alternative text and the charts that it consists of.
+Figure = dict[str, Any]
+
+#: Colours of runs in the style sheet, and markers that tell more runs apart.
+_COLOURS: Final = 6
+_MARKERS: Final = ("circle", "square", "triangle", "diamond", "inverted_triangle", "cross")
+_GLYPHS: Final = ("●", "■", "▲", "◆", "▼", "✚")
+
+
+def run_colour(number: int) -> str:
+    """CSS variable of a run's colour."""
+    return f"run-{number % _COLOURS}"
+
+
+def run_marker(number: int) -> str:
+    """Marker of a run; with the colours it tells the first six apart."""
+    return _MARKERS[number % len(_MARKERS)]
+
+
+def swatch(number: int) -> tuple[str, str]:
+    """Colour and symbol of a run, for the table of runs."""
+    return f"var(--{run_colour(number)})", _GLYPHS[number % len(_GLYPHS)]
+
+
+def figure(alt: str, charts: Sequence[Chart], arrangement: str = "row") -> Figure:
+    """One figure: alternative text, and its charts in a row, stacked or as small multiples."""
+    drawn = [chart.drawn() for chart in charts]
+    return {"alt": alt, "charts": drawn, "arrangement": arrangement}
+
+
+class Chart:
+    """One pair of axes.
+
+    Parameters
+    ----------
+    x, y : str
+        Titles of the axes, with units.
+    x_range, y_range : (float, float), optional
+        By default what the data cover.
+    log_y : bool
+    categories : list of str, optional
+        The y axis lists these, from the top down, instead of numbers.
+    title : str
+        Stands above the chart, as text of the page.
+    grow : float
+        Share of the width beside other charts of the figure.
+    height_rem : float
+        Height in units of the page's text.
+    joined : bool
+        It goes on with the y axis of the chart before it and shows none of its own.
+    """
+
+    def __init__(
+        self,
+        x: str,
+        y: str,
+        *,
+        x_range: tuple[float, float] | None = None,
+        y_range: tuple[float, float] | None = None,
+        log_y: bool = False,
+        categories: Sequence[str] | None = None,
+        title: str = "",
+        grow: float = 1.0,
+        height_rem: float = 22.0,
+        joined: bool = False,
+    ) -> None:
+        try:
+            from bokeh import models, plotting
+        except ImportError:
+            raise MissingExtraError(
+                "reports need bokeh and jinja2: pip install 'trueangle[report]'"
+            ) from None
+        self._models = models
+        self.title, self.grow, self.height_rem = title, grow, height_rem
+        ranges: dict[str, Any] = {}
+        if x_range is not None:
+            ranges["x_range"] = x_range
+        if y_range is not None:
+            ranges["y_range"] = y_range
+        if categories is not None:
+            ranges["y_range"] = models.FactorRange(factors=list(reversed(list(categories))))
+        self._figure = plotting.figure(
+            sizing_mode="stretch_both",
+            toolbar_location=None,
+            # The last number of the axis reaches beyond it.
+            min_border_right=14,
+            tools=[],
+            y_axis_type="log" if log_y else "auto",
+            x_axis_label=x,
+            y_axis_label=y,
+            **ranges,
+        )
+        if joined:
+            self._figure.yaxis.visible = False
+        zoom = models.BoxZoomTool()
+        self._figure.add_tools(zoom, models.PanTool(), models.ResetTool())
+        self._figure.toolbar.active_drag = zoom
+        #: Legend, set as text of the page: label -> colour and sign.
+        self._legend: dict[str, tuple[str, str]] = {}
+        self._hover: list[Any] = []
+
+    def dots(
+        self,
+        x: Array,
+        y: Array,
+        *,
+        colour: str,
+        label: str = "",
+        run: int | None = None,
+        marker: str = "circle",
+        size: float = 4.0,
+        hover: str = "",
+        columns: Mapping[str, Sequence[Any]] | None = None,
+        hollow: bool = False,
+    ) -> None:
+        """Dots; ``hover`` is a line of text with ``@{column}`` in it."""
+        drawn = self._figure.scatter(
+            "x",
+            "y",
+            source=self._source(x, y, columns),
+            size=size,
+            marker=marker,
+            fill_alpha=0.0 if hollow else 1.0,
+            line_alpha=1.0 if hollow or marker == "cross" else 0.0,
+        )
+        sign = "○" if hollow else _GLYPHS[_MARKERS.index(marker)]
+        self._add(drawn, colour, label, run, hover, sign)
+
+    def line(
+        self, x: Array, y: Array, *, colour: str, label: str = "", width: float = 1.5,
+        dash: str = "solid", run: int | None = None, hover: str = "",
+    ) -> None:  # fmt: skip
+        """A line through the points."""
+        drawn = self._figure.line(
+            "x", "y", source=self._source(x, y), line_width=width, line_dash=dash
+        )
+        self._add(drawn, colour, label, run, hover, "━" if dash == "solid" else "╍")
+
+    def band(
+        self,
+        x: Array,
+        low: Array,
+        high: Array,
+        *,
+        colour: str,
+        label: str = "",
+        alpha: float = 0.25,
+    ) -> None:
+        """The area between two curves."""
+        source = self._models.ColumnDataSource(
+            {"x": _short(x), "low": _short(low), "y": _short(high)}
+        )
+        drawn = self._figure.varea("x", "low", "y", source=source, fill_alpha=0.25)
+        self._add(drawn, colour, label, None, "", "▒")
+
+    def stems(
+        self, x: Array, low: float | Array, high: Array, *, colour: str, label: str = "",
+        width: float = 3.0,
+    ) -> None:  # fmt: skip
+        """Upright lines from ``low`` to ``high``."""
+        source = self._source(x, high)
+        source.data["low"] = _short(np.broadcast_to(np.asarray(low, dtype=np.float64), high.shape))
+        drawn = self._figure.segment(
+            x0="x", y0="low", x1="x", y1="y", source=source, line_width=width, line_cap="butt"
+        )
+        self._add(drawn, colour, label, None, "", "┃")
+
+    def ticks(self, x: Array, y: Array, half: float, *, colour: str, label: str = "") -> None:
+        """Short level lines of half width ``half`` at every point."""
+        source = self._models.ColumnDataSource(
+            {"x0": _short(x - half), "x1": _short(x + half), "y": _short(y)}
+        )
+        drawn = self._figure.segment(
+            x0="x0", y0="y", x1="x1", y1="y", source=source, line_width=2.0
+        )
+        self._add(drawn, colour, label, None, "", "━")
+
+    def bars(
+        self, names: Sequence[str], values: Array, *, colour: str, hover: str = "",
+        low: Array | None = None, high: Array | None = None,
+    ) -> None:  # fmt: skip
+        """Level bars of the categories, with intervals where given."""
+        source = self._models.ColumnDataSource({"y": list(names), "x": _short(values)})
+        drawn = self._figure.hbar(y="y", right="x", height=0.6, source=source, line_alpha=0.0)
+        self._add(drawn, colour, "", None, hover)
+        if low is not None and high is not None:
+            ends = self._models.ColumnDataSource(
+                {"y": list(names), "x0": _short(low), "x1": _short(high)}
+            )
+            error = self._figure.segment(
+                x0="x0", x1="x1", y0="y", y1="y", source=ends, line_width=2.0
+            )
+            self._add(error, "fore", "", None, "")
+
+    def upright(self, x: float, *, label: str) -> None:
+        """A dashed line over the whole height."""
+        span = _span(x)
+        span.tags = ["colour:fore"]
+        self._figure.add_layout(span)
+        self._legend[label] = ("fore", "╍")
+
+    def labels(self, x: Array, y: Array, texts: Sequence[str]) -> None:
+        """Texts above points."""
+        source = self._models.ColumnDataSource(
+            {"x": _short(x), "y": _short(y), "text": list(texts)}
+        )
+        drawn = self._figure.text(
+            "x", "y", "text", source=source, text_align="center", text_baseline="bottom",
+            y_offset=-7, text_font_size="11px",
+        )  # fmt: skip
+        self._add(drawn, "fore", "", None, "")
+
+    def angle_axis(self, low: float, high: float) -> None:
+        """Ticks at whole parts of a turn."""
+        for step in (1.0, 5.0, 15.0, 30.0, 45.0, 90.0, 360.0, 1800.0):
+            if (high - low) / step <= 9.0:
+                first = np.ceil(low / step)
+                ticks = step * np.arange(first, np.floor(high / step) + 1.0)
+                self._figure.xaxis.ticker = self._models.FixedTicker(ticks=ticks.tolist())
+                return
+
+    def whole_axis(self, low: float, high: float, most: int) -> None:
+        """Ticks at whole numbers, at most so many."""
+        step = next(
+            s for s in (1, 2, 5, 10, 20, 50, 100, 200, 500, 10**9) if (high - low) / s < most
+        )
+        ticks = np.arange(step * np.ceil(low / step), high + 1e-9, step)
+        self._figure.xaxis.ticker = self._models.FixedTicker(ticks=ticks.tolist())
+
+    def drawn(self) -> dict[str, Any]:
+        """The chart as plain values, ready for JSON."""
+        from bokeh.embed import json_item
+
+        for text, renderers in _grouped(self._hover):
+            self._figure.add_tools(
+                self._models.HoverTool(renderers=renderers, tooltips=text, mode="mouse")
+            )
+        return {
+            "title": self.title,
+            "grow": self.grow,
+            "height_rem": self.height_rem,
+            "legend": [
+                {"label": label, "colour": colour, "sign": sign}
+                for label, (colour, sign) in self._legend.items()
+            ],
+            "document": json_item(self._figure),
+        }
+
+    def _source(
+        self, x: Array, y: Array, columns: Mapping[str, Sequence[Any]] | None = None
+    ) -> Any:
+        return self._models.ColumnDataSource(
+            {"x": _short(x), "y": _short(y)} | {k: list(v) for k, v in (columns or {}).items()}
+        )
+
+    def _add(
+        self, drawn: Any, colour: str, label: str, run: int | None, hover: str, sign: str = ""
+    ) -> None:
+        drawn.tags = [f"colour:{colour}"] + ([f"run:{run}"] if run is not None else [])
+        # Selections and hovering change nothing: one glyph is enough.
+        drawn.nonselection_glyph = drawn.muted_glyph = None
+        if label:
+            self._legend.setdefault(label, (colour, sign))
+        if hover:
+            self._hover.append((hover, drawn))
+
+
+def _span(x: float) -> Any:
+    from bokeh.models.annotations import Span
+
+    return Span(location=x, dimension="height", line_dash="dashed", line_width=1.5)
+
+
+def _grouped(hover: Sequence[tuple[str, Any]]) -> list[tuple[str, list[Any]]]:
+    """Renderers of the same text together: one tool for all of them."""
+    found: dict[str, list[Any]] = {}
+    for text, drawn in hover:
+        found.setdefault(text, []).append(drawn)
+    return list(found.items())
+
+
+def _short(values: Array) -> NDArray[np.float32]:
+    """For drawing only, half the bytes: numbers on the page come from the content."""
+    return np.asarray(values, dtype=np.float32)
