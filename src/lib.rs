@@ -26,3 +26,5 @@ mod python;
 
 pub use error::Error;
 pub use series::{HarmonicSeries, Shaft};
+/// Tables as firmware evaluates them: no std, no allocation.
+pub use trueangle_table as table;

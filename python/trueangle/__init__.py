@@ -12,6 +12,9 @@ if TYPE_CHECKING:
     from .checks import check as check
     from .diagnosis import Diagnosis as Diagnosis
     from .diagnosis.diagnose import diagnose as diagnose
+    from .export import compare as compare
+    from .export import export_model as export_model
+    from .export import import_model as import_model
     from .fitting.fit import fit as fit
     from .fitting.result import FitResult as FitResult
     from .logs.batch import correct_logs as correct_logs
@@ -54,6 +57,9 @@ _PUBLIC = {
     "check": "checks",
     "correct": "logs.frames",
     "correct_logs": "logs.batch",
+    "compare": "export",
+    "export_model": "export",
+    "import_model": "export",
     "fit": "fitting.fit",
     "fit_logs": "logs.fitting",
     "load_model": "modelfile",

@@ -30,7 +30,7 @@ from .runs import Source
 from .shafts import Shaft
 from .terms import TERMS, Term
 
-__all__ = ["FORMAT", "VERSION", "load_model", "save_model"]
+__all__ = ["FORMAT", "VERSION", "load_model", "model_text", "save_model"]
 
 Array: TypeAlias = NDArray[np.float64]
 
@@ -67,8 +67,8 @@ _NORMAL = (
 _SHAFT_KEYS = ("name", "cycles_per_turn", "orders", "cosine", "sine")
 
 
-def save_model(model: HarmonicModel, path: str | PathLike[str]) -> None:
-    """Write ``model``; see `HarmonicModel.save`."""
+def model_text(model: HarmonicModel) -> str:
+    """What the file of a model holds."""
     content = {
         "format": FORMAT,
         "version": VERSION,
@@ -85,7 +85,12 @@ def save_model(model: HarmonicModel, path: str | PathLike[str]) -> None:
             "package": model.provenance.package,
         },
     }
-    text = _pretty(content) + "\n"
+    return _pretty(content) + "\n"
+
+
+def save_model(model: HarmonicModel, path: str | PathLike[str]) -> None:
+    """Write ``model``; see `HarmonicModel.save`."""
+    text = model_text(model)
     if len(text) > MODEL_BYTES:
         raise ArgumentError(
             f"{path}: the model takes {len(text)} bytes, and at most {MODEL_BYTES} are read back; "

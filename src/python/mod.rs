@@ -9,6 +9,7 @@ mod failure;
 mod fit;
 mod moments;
 mod series;
+mod table;
 mod terms;
 mod threads;
 
@@ -33,6 +34,9 @@ mod _core {
 
     #[pymodule_export]
     use super::moments::{PyMoments, fit_moments};
+
+    #[pymodule_export]
+    use super::table::{table_correction, table_source};
 
     #[pymodule_export]
     use super::threads::thread_count;

@@ -10,6 +10,7 @@ import sys
 import traceback
 import warnings
 from collections.abc import Sequence
+from keyword import iskeyword
 from typing import Protocol
 
 from .. import __version__
@@ -31,6 +32,9 @@ COMMANDS: tuple[str, ...] = (
     "simulate",
     "diagnose",
     "report",
+    "export",
+    "import",
+    "compare",
     "bench",
 )
 
@@ -57,7 +61,7 @@ def build_parser() -> Parser:
     parser.add_argument("--version", action="version", version=f"trueangle {__version__}")
     subparsers = parser.add_subparsers(dest="command", metavar="COMMAND", required=True)
     for name in COMMANDS:
-        command: Command = importlib.import_module(f".{name}", __name__)
+        command: Command = importlib.import_module(f".{name}{'_' * iskeyword(name)}", __name__)
         subparser = subparsers.add_parser(
             name,
             help=command.HELP,

@@ -92,7 +92,7 @@ def measure_gain(
         test = folds[unit] == fold
         for k, values in enumerate(held_out(regression, groups, test, own_zero)):
             left[k, test] = values
-    clean = ~regression.wild
+    clean = ~regression.outlying
     by_level = gains_by_level(regression, groups, own_zero, unit, rng)
     found = []
     for k, group in enumerate(groups):
@@ -148,7 +148,7 @@ def _control(
     cause = regression.terms[group[0]].cause
     rest = regression.with_terms(t for k, t in enumerate(regression.terms) if k not in group)
     y = rest.left - rest.whiten.run_part(rest.left)
-    y = np.where(regression.wild, 0.0, y)
+    y = np.where(regression.outlying, 0.0, y)
     test = unit % 2 == 0
     shares = []
     for _ in range(SHUFFLES):

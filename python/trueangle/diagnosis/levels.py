@@ -169,7 +169,7 @@ def gains_by_level(
             for k, values_before in zip(able, before, strict=True):
                 left[concerned.index(k)][:, test] = values_before, after
         for k, (before_k, after_k) in zip(concerned, left, strict=True):
-            used = ~regression.wild & ~np.isnan(before_k)
+            used = ~regression.outlying & ~np.isnan(before_k)
             held = [values[j] for j in np.unique(level[used])]
             if not held:
                 found[k] = LevelGain(factor, UNITS[factor], values, note=NONE_TO_SPARE)

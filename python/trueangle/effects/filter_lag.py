@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
@@ -41,6 +42,14 @@ REFINED_FROM = 3.0
 
 #: Damping ratios of a second-order loop.
 DAMPING = (0.4, 0.7, 1.1)
+
+#: Steps by which cutoff and damping are made exact, and the change of their logarithms by
+#: which slopes are taken.
+NEWTON_STEPS = 8
+STEP = 0.01
+
+#: Change of a logarithm below which it is settled.
+ENOUGH = 1e-4
 
 
 @dataclass(frozen=True)
@@ -107,8 +116,8 @@ class FilterLag(Effect):
             ),
         )
 
-        def gain(cutoff: float, damping: float | None) -> float:
-            column = _lagged(waves, frequency, cutoff, damping)
+        def gain(cutoff_hz: float, damping: float | None) -> float:
+            column = _lagged(waves, frequency, cutoff_hz, damping)
             return float(regression.fixed_gains(column[:, None])[0])
 
         cutoffs = top * CUTOFFS
@@ -150,11 +159,15 @@ class FilterLag(Effect):
                 damping, deviance = golden_maximum(
                     partial(gain, cutoff), 0.7 * damping, 1.4 * damping, 8
                 )
-            shape = {"cutoff_hz": cutoff, "damping": damping}
+            shape: dict[str, Any] = {"cutoff_hz": cutoff, "damping": damping}
+            if len(grids) > 1:
+                # Cutoff and damping delay alike: together they go where each alone stops.
+                shape = _settled(regression, waves, frequency, shape, cls.kind)
+                deviance = max(deviance, gain(**shape))
             extension = regression.propose(
                 cls.kind,
                 shape,
-                _lagged(waves, frequency, cutoff, damping)[:, None],
+                _lagged(waves, frequency, **shape)[:, None],
                 parameters=order,
                 deviance=deviance,
             )
@@ -166,7 +179,7 @@ class FilterLag(Effect):
     def columns(cls, signals: Signals, around: Surroundings, shape: dict[str, Any]) -> Array:
         waves = _waves(around.pattern, signals.theta)
         frequency = around.pattern.orders * signals.turns_per_s[:, None]
-        return _lagged(waves, frequency, shape["cutoff_hz"], shape["damping"])[:, None]
+        return _lagged(waves, frequency, **shape)[:, None]
 
     @classmethod
     def report(
@@ -176,23 +189,9 @@ class FilterLag(Effect):
         cutoff, damping = extension.shape["cutoff_hz"], extension.shape["damping"]
         waves = _waves(regression.around.pattern, regression.signals.theta)
         frequency = regression.around.pattern.orders * regression.signals.turns_per_s[:, None]
-        step = 0.01
-
-        def slope(cutoff_step: float, damping_step: float) -> Array:
-            up, down = (
-                _lagged(
-                    waves,
-                    frequency,
-                    cutoff * float(np.exp(sign * cutoff_step)),
-                    None if damping is None else damping * float(np.exp(sign * damping_step)),
-                )
-                for sign in (1.0, -1.0)
-            )
-            return np.asarray((up - down) / (2.0 * step))
-
-        slopes = [slope(step, 0.0)] if damping is None else [slope(step, 0.0), slope(0.0, step)]
+        slopes = _slopes(waves, frequency, cutoff, damping)
         others = regression.with_terms(term for term in regression.terms if term is not extension)
-        x, _ = others.projected(np.column_stack(slopes))
+        x, _ = others.projected(slopes)
         covariance = regression.variance * np.linalg.pinv(x.T @ x)
         # Far below the cutoff both delay by 1/(2 pi f_c) and 2 zeta/(2 pi f_n).
         delay = np.array([1.0] if damping is None else [1.0, -1.0])
@@ -291,11 +290,55 @@ def _waves(pattern: Pattern, theta: Array) -> NDArray[np.complex128]:
     return np.asarray(amplitudes * np.exp(1j * theta[:, None] * pattern.orders))
 
 
+def _slopes(
+    waves: NDArray[np.complex128], frequency: Array, cutoff_hz: float, damping: float | None
+) -> Array:
+    """Slopes of `_lagged` by the logarithms of the cutoff and, of second order, the damping."""
+
+    def at(x: float, y: float) -> Array:
+        d = None if damping is None else damping * float(np.exp(y))
+        return _lagged(waves, frequency, cutoff_hz * float(np.exp(x)), d)
+
+    steps = ((STEP, 0.0),) if damping is None else ((STEP, 0.0), (0.0, STEP))
+    return np.column_stack([(at(x, y) - at(-x, -y)) / (2.0 * STEP) for x, y in steps])
+
+
+def _settled(
+    regression: Regression,
+    waves: NDArray[np.complex128],
+    frequency: Array,
+    shape: dict[str, Any],
+    kind: str,
+) -> dict[str, Any]:
+    """Cutoff and damping after Gauss-Newton steps on both together.
+
+    The filter is in the model at every step, so that what it explains is not clipped.
+    """
+    best, lowest = shape, math.inf
+    for _ in range(NEWTON_STEPS):
+        column = _lagged(waves, frequency, **shape)[:, None]
+        extension = regression.propose(kind, shape, column)
+        full = regression.with_terms([*regression.terms, extension])
+        if full.rss < lowest:
+            best, lowest = shape, full.rss
+        _, (size,) = full.fitted()[-1]
+        x, _ = full.projected(_slopes(waves, frequency, **shape))
+        moves = np.linalg.lstsq(x, full.r, rcond=1e-10)[0] / max(float(size), 0.5)
+        if np.abs(moves).max() < ENOUGH:
+            return shape
+        factors = np.exp(np.clip(moves, -0.5, 0.5)).tolist()
+        shape = {
+            "cutoff_hz": shape["cutoff_hz"] * factors[0],
+            "damping": None if shape["damping"] is None else shape["damping"] * factors[1],
+        }
+    return best
+
+
 def _lagged(
-    waves: NDArray[np.complex128], frequency: Array, cutoff: float, damping: float | None
+    waves: NDArray[np.complex128], frequency: Array, cutoff_hz: float, damping: float | None
 ) -> Array:
     """Change of the pattern by a low-pass of first or second order."""
-    w = frequency / cutoff
+    w = frequency / cutoff_hz
     if damping is None:
         change = -1j * w / (1.0 + 1j * w)
     else:

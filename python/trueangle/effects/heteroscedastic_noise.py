@@ -85,18 +85,18 @@ class HeteroscedasticNoise(Effect):
         # A reading tells half as much of the logarithm of a variance as of a mean.
         log_n = regression.log_n - float(np.log(2.0))
         blocks: dict[str, Array] = {}
-        prices: dict[str, float] = {}
+        penalties: dict[str, float] = {}
         for k in (1, 2, 3):
             x = k * signals.theta
             blocks[f"order {k}"] = np.column_stack([np.cos(x), np.sin(x)])
-            prices[f"order {k}"] = 2.0 * log_n + 2.0 * float(np.log(2.0 * k))
+            penalties[f"order {k}"] = 2.0 * log_n + 2.0 * float(np.log(2.0 * k))
         for name, values in (
             ("per_deg_s", None if signals.velocity is None else np.abs(signals.velocity)),
             ("per_Nm", None if signals.torque is None else np.abs(signals.torque)),
         ):
             if values is not None and np.ptp(values) > 0.0:
                 blocks[name] = values[:, None]
-                prices[name] = log_n + 2.0 * float(np.log(4.0))
+                penalties[name] = log_n + 2.0 * float(np.log(4.0))
         chosen: list[str] = []
         design = np.ones((n, 1))
         total = 0.0
@@ -110,7 +110,7 @@ class HeteroscedasticNoise(Effect):
                 wider = np.hstack([design, columns])
                 q, _ = np.linalg.qr(wider)
                 saved = float(np.sum((q.T @ rest) ** 2))
-                gain = n * saved / power - prices[name]
+                gain = n * saved / power - penalties[name]
                 if gain > best[0]:
                     best = (gain, name, wider)
             if best[0] <= 0.0:

@@ -117,7 +117,7 @@ class LocalDefect(Effect):
                     shape = cls._refined(regression, shaft, place, width)
                 columns = cls.columns(regression.signals, regression.around, shape)
                 power = columns[:, 0] ** 2
-                # One or two readings are wild readings, not a place of the joint.
+                # One or two readings are outliers, not a place of the joint.
                 if power.sum() < LEAST_READINGS * power.max(initial=0.0):
                     continue
                 extension = regression.propose(cls.kind, shape, columns, 3, log_grid)

@@ -74,8 +74,8 @@ class MissingOrder(Effect):
         gains = regression.line_gains()
         lines = regression.lines
         expected = int(lines.plausible.sum())
-        prices = 2.0 * np.log(np.where(lines.plausible, 2 * expected, 2 * gains.size))
-        best = int(np.argmax(gains - prices))
+        penalties = 2.0 * np.log(np.where(lines.plausible, 2 * expected, 2 * gains.size))
+        best = int(np.argmax(gains - penalties))
         if gains[best] <= 0.0:
             return None
         # Over a part of a turn neighbouring orders are hardly told apart: a fast shaft's
@@ -85,7 +85,7 @@ class MissingOrder(Effect):
         named = [regression.around.joint.name_order(float(lines.orders[k])) for k in alike]
         own = [k for k, name in zip(alike, named, strict=True) if name and name[0] != "output"]
         if best not in own and own:
-            best = int(max(own, key=lambda k: gains[k] - prices[k]))
+            best = int(max(own, key=lambda k: gains[k] - penalties[k]))
         order = float(lines.orders[best])
         return regression.propose(
             cls.kind,
@@ -94,7 +94,7 @@ class MissingOrder(Effect):
                 "alike": [float(lines.orders[k]) for k in alike if k != best],
             },
             line_columns(regression.signals.theta, order),
-            log_grid=float(prices[best] / 2.0),
+            log_grid=float(penalties[best] / 2.0),
             line=order,
         )
 

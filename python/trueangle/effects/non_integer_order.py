@@ -94,11 +94,11 @@ class NonIntegerOrder(Effect):
             return None
         best: Extension | None = None
         step = orders[1] - orders[0]
-        price = cls._log_grid(regression, orders)
-        worth = power - 2.0 * price
-        peaks = np.flatnonzero((worth[1:-1] >= worth[:-2]) & (worth[1:-1] >= worth[2:])) + 1
-        for k in peaks[np.argsort(worth[peaks])[::-1][:PEAKS]]:
-            extension = cls._at(regression, float(orders[k]), float(price[k]))
+        penalty = cls._log_grid(regression, orders)
+        net = power - 2.0 * penalty
+        peaks = np.flatnonzero((net[1:-1] >= net[:-2]) & (net[1:-1] >= net[2:])) + 1
+        for k in peaks[np.argsort(net[peaks])[::-1][:PEAKS]]:
+            extension = cls._at(regression, float(orders[k]), float(penalty[k]))
             if best is None or extension.bic_gain > best.bic_gain:
                 best = extension
         if best is None or best.bic_gain < 0.0:
@@ -164,7 +164,7 @@ class NonIntegerOrder(Effect):
             return np.zeros(0), np.zeros(0)
         orders = low + step * np.arange(count, dtype=np.float64)
         e = regression.left - regression.whiten.run_part(regression.left)
-        e = np.where(regression.wild, 0.0, e)
+        e = np.where(regression.outlying, 0.0, e)
         turn = np.exp(-1j * step * theta).astype(np.complex64)
         wave = (e * np.exp(-1j * orders[0] * theta)).astype(np.complex64)
         power = np.empty((count, starts.size))

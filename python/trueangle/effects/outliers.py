@@ -23,16 +23,16 @@ from .search import (
 
 __all__ = ["Outliers"]
 
-#: Degrees of freedom of heavy-tailed noise, sizes of wild readings to start from.
+#: Degrees of freedom of heavy-tailed noise, sizes of outliers to start from.
 TAILS = (2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 12.0, 20.0, 40.0)
 SIZES = (3.0, 10.0, 100.0)
 
-#: A wild reading's neighbours are smaller by this factor; of the stretches of wild
-#: readings at least this share must be such single ones.
+#: An outlier's neighbours are smaller by this factor; of the stretches of
+#: outliers at least this share must be such single ones.
 BESIDE = 0.5
 ISOLATED = 0.5
 
-#: Wild readings smaller than this many standard deviations hide in the noise: of sizes
+#: Outliers smaller than this many standard deviations hide in the noise: of sizes
 #: spread evenly up to ``size`` that is a share of ``HIDDEN / size``, which the form of the
 #: wide normal supplies and no reading shows. It counts as the fraction's uncertainty.
 HIDDEN = 3.0
@@ -42,13 +42,13 @@ EM_STEPS = 60
 
 SCALES = np.linspace(0.85, 1.1, 11)
 
-#: Evidence by which wild readings must beat mere heavy tails.
+#: Evidence by which outliers must beat mere heavy tails.
 BEYOND_TAILS = 2.0
 
 
 @dataclass(frozen=True)
 class Outliers(Effect):
-    """Isolated wild readings: a share of the readings gets a normal error of its own.
+    """Isolated outliers: a share of the readings gets a normal error of its own.
 
     Parameters
     ----------
@@ -63,7 +63,7 @@ class Outliers(Effect):
 
     kind: ClassVar[str] = "outliers"
     sentence: ClassVar[str] = (
-        "Single readings are wild (bit flips, glitches, mistaken entries) and their neighbours "
+        "Single readings are far off (bit flips, glitches, mistaken entries) and their neighbours "
         "are not."
     )
     factor: ClassVar[str] = "none"
@@ -75,8 +75,8 @@ class Outliers(Effect):
     not_at_run_time: ClassVar[str] = "a single reading does not tell a fault from a motion"
 
     def signal(self, signals: Signals, around: Surroundings, rng: np.random.Generator) -> Array:
-        wild = rng.random(len(signals)) < self.fraction
-        return np.asarray(wild * self.size_arcsec * rng.standard_normal(len(signals)))
+        far_off = rng.random(len(signals)) < self.fraction
+        return np.asarray(far_off * self.size_arcsec * rng.standard_normal(len(signals)))
 
     @classmethod
     def find_scatter(cls, regression: Regression) -> ScatterFinding | None:

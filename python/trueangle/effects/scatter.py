@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 __all__ = ["NEW_SCATTER", "ScatterFinding", "standardised"]
 
-#: Evidence that uneven noise must bring beyond its price. Half of what other causes must:
+#: Evidence that uneven noise must bring beyond its penalty. Half of what other causes must:
 #: nothing in the mean of the readings imitates it.
 NEW_SCATTER = 3.0
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -47,8 +47,8 @@ class Signals:
         The stretch opens its run.
     clock : ndarray
         Seconds since the start of the run, or the row number without time.
-    velocity, time, temperature, torque, mount : ndarray or None
-        Degrees per second, s, Celsius, Nm, radians; None where no run recorded it.
+    velocity, time, temperature, torque, mount, current : ndarray or None
+        Degrees per second, s, Celsius, Nm, radians, A; None where not every run recorded it.
     labels : tuple of str
         Names of the runs.
     """
@@ -69,6 +69,7 @@ class Signals:
     torque: Array | None
     mount: Array | None
     labels: tuple[str, ...]
+    current: Array | None = None
 
     def __len__(self) -> int:
         return int(self.theta.size)
@@ -94,7 +95,7 @@ class Signals:
             name: getattr(self, name)[rows]
             for name in ("theta", "run", "row", "direction", "travel", "segment", "clock")
         }
-        for name in ("velocity", "time", "temperature", "torque", "mount"):
+        for name in RECORDED:
             values = getattr(self, name)
             changes[name] = None if values is None else values[rows]
         return replace(self, **changes)
@@ -156,16 +157,7 @@ def join_runs(runs: Sequence[CalibrationRun]) -> Signals:
         segment_length=_joined([part[4] for part in parts]),
         segment_first=np.concatenate([np.arange(part[3].size) == 0 for part in parts]),
         clock=_joined([_clock(run) for run in runs]),
-        velocity=_all([_velocity(run) for run in runs]),
-        time=_all([run.time for run in runs]),
-        temperature=_all([run.temperature for run in runs]),
-        torque=_all([run.torque for run in runs]),
-        mount=_all(
-            [
-                None if run.mount is None else run.mount * (2.0 * math.pi / run.period)
-                for run in runs
-            ]
-        ),
+        **{name: _all([read(run) for run in runs]) for name, read in RECORDED.items()},
         labels=tuple(run.label or str(j + 1) for j, run in enumerate(runs)),
     )
 
@@ -188,6 +180,21 @@ def _clock(run: CalibrationRun) -> Array:
 def _velocity(run: CalibrationRun) -> Array | None:
     speed = run.speed
     return None if speed is None else np.asarray(speed * (360.0 / run.period))
+
+
+def _mount(run: CalibrationRun) -> Array | None:
+    return None if run.mount is None else run.mount * (2.0 * math.pi / run.period)
+
+
+#: How each signal that runs may record is read from one of them.
+RECORDED: dict[str, Callable[[CalibrationRun], Array | None]] = {
+    "velocity": _velocity,
+    "time": lambda run: run.time,
+    "temperature": lambda run: run.temperature,
+    "torque": lambda run: run.torque,
+    "mount": _mount,
+    "current": lambda run: run.signals.get("current"),
+}
 
 
 def _travel(run: CalibrationRun) -> tuple[Array, Array, Index, Array, Array]:

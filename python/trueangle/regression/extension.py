@@ -15,7 +15,7 @@ __all__ = ["Extension", "penalty_of_parameter"]
 Array = NDArray[np.float64]
 
 #: Size at which an effect is expected, in standard deviations of one reading. A coefficient
-#: costs ln(size^2 n) (Kass and Wasserman 1995; size 1 is Schwarz's price). Up to
+#: costs ln(size^2 n) (Kass and Wasserman 1995; size 1 is Schwarz's penalty). Up to
 #: `FEW_READINGS` effects must be as large as the noise to matter; of many more are taken
 #: because effects are smaller.
 EXPECTED_SIZE = 0.3
@@ -62,7 +62,7 @@ class Extension:
 
     @property
     def bic_gain(self) -> float:
-        """Evidence: the deviance less the price of its parameters and of the search."""
+        """Evidence: the deviance less the penalty of its parameters and of the search."""
         return self.deviance - self.parameters * self.log_n - 2.0 * self.log_grid
 
 

@@ -20,7 +20,7 @@ __all__ = ["ROUNDING", "LeastSquares", "best_ratio"]
 
 Array = NDArray[np.float64]
 
-#: Residuals are taken at most this many robust standard deviations large: wild readings
+#: Residuals are taken at most this many robust standard deviations large: outliers
 #: must not make causes, and normal ones are not touched.
 CLIP = 4.0
 
@@ -95,7 +95,7 @@ class LeastSquares:
 
     def without_repeats(self, by_direction: bool = False) -> Self:
         """The regression without what repeats at the same place; itself where nothing does."""
-        left = np.where(self.wild, 0.0, self.left)
+        left = np.where(self.outlying, 0.0, self.left)
         repeated = repeated_part(left, self.signals, by_direction)
         if not repeated.any():
             return self
@@ -121,22 +121,22 @@ class LeastSquares:
             scale = self.root_weights * left
             spread = 1.4826 * float(np.median(np.abs(scale - np.median(scale))))
             limit = CLIP * max(spread, 1e-12) / self.root_weights
-            wild = np.abs(left) > limit
+            outlying = np.abs(left) > limit
             if self.fixed_rho is None:
                 kept = np.clip(left, -limit, limit) * self.root_weights
                 rho = lag_correlation(kept, self.signals.clock, self.bounds)
-            settled = not wild.any() and rho == self.whiten.rho
+            settled = not outlying.any() and rho == self.whiten.rho
             if settled:
                 break
             target = np.where(
-                wild, self.residual - left + np.clip(left, -limit, limit), self.residual
+                outlying, self.residual - left + np.clip(left, -limit, limit), self.residual
             )
         if len(effects) > 1:
             for k in range(len(effects)):
                 effects[k] = self._refit_ratio(target, rho, effects, k)
         if len(effects) > 1 or not settled:
             self._project(target, rho, effects)
-        self.target, self.wild = target, wild
+        self.target, self.outlying = target, outlying
         kept_effects = iter(effects)
         self.terms = [
             replace(term, run_effect=next(kept_effects)) if term.run_effect is not None else term
@@ -225,9 +225,9 @@ class LeastSquares:
 
     @property
     def bic(self) -> float:
-        """Deviance plus the price of the terms' parameters and searches."""
-        price = sum(t.parameters * t.log_n + 2.0 * t.log_grid for t in self.terms)
-        return self.deviance + price
+        """Deviance plus the penalty of the terms' parameters and searches."""
+        penalty = sum(t.parameters * t.log_n + 2.0 * t.log_grid for t in self.terms)
+        return self.deviance + penalty
 
     def as_deviance(self, saved: float) -> float:
         """``n ln(RSS/(RSS - saved))``."""

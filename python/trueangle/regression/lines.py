@@ -13,7 +13,7 @@ __all__ = ["LineBasis", "plausible_orders"]
 
 Array = NDArray[np.float64]
 
-#: Orders searched at least, and at most: bounds memory and the price of the search.
+#: Orders searched at least, and at most: bounds memory and the penalty of the search.
 LEAST_ORDERS, MOST_ORDERS = 128, 1024
 
 #: Orders of each shaft (per pole pair of the encoder) searched beyond the whole ones.
@@ -33,7 +33,7 @@ class LineBasis:
     ----------
     orders : ndarray, shape (k,)
     plausible : ndarray of bool, shape (k,)
-        Orders that physics expects; they pay a lower price for the search.
+        Orders that physics expects; they pay a lower penalty for the search.
     """
 
     def __init__(

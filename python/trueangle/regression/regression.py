@@ -160,5 +160,5 @@ class Regression(LeastSquares):
         )
 
     def hopeless(self, deviance: float, parameters: int, log_grid: float = 0.0) -> bool:
-        """A coarse search this far below its price gains nothing by refining."""
+        """A coarse search this far below its penalty gains nothing by refining."""
         return 1.5 * deviance + 10.0 < parameters * self.log_n + 2.0 * log_grid

@@ -1,0 +1,38 @@
+"""``trueangle compare``: the difference of two models."""
+
+from __future__ import annotations
+
+import argparse
+import json
+
+from .paths import Input
+
+HELP = "difference of two models per order and over the turn"
+EXAMPLE = "trueangle compare present.json joint_a.json"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the command's arguments."""
+    add = parser.add_argument
+    add(
+        "first",
+        type=Input,
+        metavar="A",
+        help="model file: today's table, or the joint before a repair",
+    )
+    add(
+        "second",
+        type=Input,
+        metavar="B",
+        help="model file: the new calibration; B less A is printed",
+    )
+    add("--json", action="store_true", help="print the result as JSON")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Print the difference."""
+    from ..export import compare
+
+    result = compare(args.first, args.second)
+    print(json.dumps(result.as_json(), allow_nan=False) if args.json else result.summary())
+    return 0

@@ -1,0 +1,80 @@
+"""``trueangle export``: a model as a table that firmware reads."""
+
+from __future__ import annotations
+
+import argparse
+import json
+
+from .paths import Input, Output
+
+HELP = "write a model as a table for firmware, with a proven bound of its difference"
+EXAMPLE = "trueangle export joint_a.json --to c --max-arcsec 2 -o joint_a.h"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the command's arguments."""
+    from ..export.targets import TARGETS
+
+    add = parser.add_argument
+    add("model", type=Input, metavar="MODEL", help="model file written by trueangle fit")
+    add("--to", required=True, choices=tuple(TARGETS), metavar="TARGET", help=_targets())
+    add("-o", "--output", required=True, type=Output.of(None), metavar="FILE", help="file to write")
+    add(
+        "--max-arcsec",
+        type=float,
+        metavar="E",
+        help="take the smallest table that differs from the model by at most this",
+    )
+    add_target_options(parser)
+    add("--json", action="store_true", help="print the result as JSON")
+
+
+def add_target_options(parser: argparse.ArgumentParser) -> None:
+    """Options of the targets, each once; a target refuses those it does not have."""
+    from ..export.targets import TARGETS
+
+    options: dict[str, dict[str, list[str]]] = {}
+    for target in TARGETS.values():
+        for name, option in target.options.items():
+            options.setdefault(name, {}).setdefault(option.help, []).append(target.name)
+    for name, helps in sorted(options.items()):
+        parser.add_argument(
+            *([f"--{name.replace('_', '-')}"] + (["--table"] if name == "entries" else [])),
+            dest=f"option_{name}",
+            metavar=name.upper().replace("_", "-"),
+            help="; ".join(f"{', '.join(names)}: {text}" for text, names in helps.items()),
+        )
+
+
+def target_options(args: argparse.Namespace) -> dict[str, str]:
+    """Those that were given."""
+    prefix = "option_"
+    return {
+        name.removeprefix(prefix): value
+        for name, value in vars(args).items()
+        if name.startswith(prefix) and value is not None
+    }
+
+
+def _targets() -> str:
+    from ..export.targets import TARGETS
+
+    return "; ".join(f"{target.name}: {target.what}" for target in TARGETS.values())
+
+
+def run(args: argparse.Namespace) -> int:
+    """Write the table."""
+    import sys
+
+    from ..export import export_model
+
+    made = export_model(
+        args.model, args.to, args.output, max_arcsec=args.max_arcsec, **target_options(args)
+    )
+    if args.json:
+        print(json.dumps(made.as_json(), allow_nan=False))
+        for note in made.notes:
+            print(f"trueangle: note: {note}", file=sys.stderr)
+    else:
+        print(made.summary())
+    return 0

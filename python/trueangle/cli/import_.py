@@ -1,0 +1,77 @@
+"""``trueangle import``: what a present table does."""
+
+from __future__ import annotations
+
+import argparse
+import json
+
+from ..files import MODEL
+from .export import add_target_options, target_options
+from .paths import Input, Output
+
+HELP = "read a table that firmware has, as a model: what does my present table do?"
+EXAMPLE = "trueangle import printer.cfg --from klipper -o present.json"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the command's arguments."""
+    from ..export.targets import TARGETS
+
+    add = parser.add_argument
+    add(
+        "file",
+        type=Input,
+        metavar="FILE",
+        help="source, configuration or registers that hold the table",
+    )
+    add("--from", required=True, dest="source", choices=tuple(TARGETS), metavar="TARGET",
+        help=f"what it is of: {', '.join(TARGETS)}")  # fmt: skip
+    add(
+        "-o",
+        "--output",
+        required=True,
+        type=Output.of(MODEL),
+        metavar="MODEL",
+        help="model file to write",
+    )
+    add_target_options(parser)
+    add("--json", action="store_true", help="print what the table corrects as JSON")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Read the table and write the model."""
+    import math
+
+    from ..angles import ARCSEC_PER_TURN
+    from ..export import import_model
+
+    model = import_model(args.file, args.source, args.output, **target_options(args))
+    unit = ARCSEC_PER_TURN / model.period
+    rows = [
+        {"order": order, "amplitude_arcsec": c * unit, "phase_deg": math.degrees(phase)}
+        for order, c, phase in zip(model.orders, model.amplitudes, model.phases, strict=True)
+    ]
+    if args.json:
+        content = {
+            "source": args.source,
+            "output": args.output,
+            "orders": rows,
+            "zero_deg": model.constant / model.period * 360.0,
+            "terms": [term.kind for term in model.terms],
+            "resolution_arcsec": (model.fit.residual or 0.0) * unit if model.fit else None,
+        }
+        print(json.dumps(content, allow_nan=False))
+        return 0
+    print(
+        f"{args.output}: {len(rows)} orders, zero {model.constant / model.period * 360.0:.6g} deg"
+    )
+    for row in sorted(rows, key=lambda row: -row["amplitude_arcsec"])[:_SHOWN]:
+        print(
+            f"  order {row['order']:g}: {row['amplitude_arcsec']:.4g} arcsec at "
+            f"{row['phase_deg']:.1f} deg"
+        )
+    return 0
+
+
+#: Orders that are printed, the largest ones.
+_SHOWN = 12

@@ -1,0 +1,10 @@
+"""Corrections into machines and back: tables that firmware reads, each with a proven bound.
+
+A target is one file in this package and one line in `trueangle.export.targets`.
+"""
+
+from .comparison import Comparison, compare
+from .export import Exported, export_model, import_model
+from .targets import TARGETS
+
+__all__ = ["TARGETS", "Comparison", "Exported", "compare", "export_model", "import_model"]

@@ -1,0 +1,198 @@
+"""Difference of two models: before and after a repair, today's table against a calibration."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from os import PathLike
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..angles import ARCSEC_PER_TURN
+from ..errors import ArgumentError
+from ..model import HarmonicModel
+from ..modelfile import load_model
+from .pattern import Pattern
+
+__all__ = ["Comparison", "compare"]
+
+Array = NDArray[np.float64]
+
+#: Points per cycle of the fastest order over which the difference is taken.
+_POINTS = 32
+_MOST_POINTS = 1 << 22
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """Second model less first, in what they correct.
+
+    Attributes
+    ----------
+    orders : list of dict
+        ``{"order", "amplitude_arcsec", "phase_deg", "std_arcsec"}`` of the difference of the
+        errors, ``C sin(order * angle + phase)``; ``std_arcsec`` is of the amplitude in any
+        one phase, None where neither model states a covariance.
+    rms_arcsec, max_abs_arcsec : float
+        Of the difference over a turn, its zero taken out.
+    zero_deg : float
+        Difference of the constants.
+    argument : str
+        Angle of which it is a function.
+    differ_in : list of str
+        Terms that only one of them has, or with other parameters: not compared.
+    """
+
+    orders: list[dict[str, float | None]]
+    rms_arcsec: float
+    max_abs_arcsec: float
+    zero_deg: float
+    argument: str
+    differ_in: list[str]
+
+    def as_json(self) -> dict[str, Any]:
+        """All of it."""
+        return dict(vars(self))
+
+    def summary(self) -> str:
+        """The numbers as lines of text."""
+        lines = [
+            f"difference: {self.rms_arcsec:.4g} arcsec rms, {self.max_abs_arcsec:.4g} max abs, "
+            f"zero {self.zero_deg:.6g} deg",
+            "  order  amplitude/arcsec  phase/deg  std/arcsec",
+        ]
+        for row in self.orders:
+            std = "-" if row["std_arcsec"] is None else f"{row['std_arcsec']:.3g}"
+            lines.append(
+                f"{row['order']:7g}  {row['amplitude_arcsec']:16.4g}  {row['phase_deg']:9.1f}  "
+                f"{std:>10}"
+            )
+        lines += [f"not compared: {kind}" for kind in self.differ_in]
+        return "\n".join(lines)
+
+
+def compare(
+    a: HarmonicModel | str | PathLike[str], b: HarmonicModel | str | PathLike[str]
+) -> Comparison:
+    r"""Difference of two models per order and over the turn, with its uncertainty.
+
+    .. math:: \Delta(\theta) = \varepsilon_b(\theta) - \varepsilon_a(\theta)
+
+    at the true angle, also of a model whose argument is the indicated one.
+
+    Parameters
+    ----------
+    a, b : HarmonicModel or path
+        Their units may differ.
+
+    Returns
+    -------
+    Comparison
+
+    Raises
+    ------
+    ArgumentError
+        Shafts of which one turn of the output does not come back to the start.
+
+    Examples
+    --------
+    >>> import trueangle as ta
+    >>> a = ta.HarmonicModel([ta.Shaft("output", 1, [1], [0.0], [0.5])], period=360.0)
+    >>> b = ta.HarmonicModel([ta.Shaft("output", 1, [1], [0.0], [0.4])], period=360.0)
+    >>> round(ta.compare(a, b).orders[0]["amplitude_arcsec"], 6)
+    360.0
+    """
+    first, second = (m if isinstance(m, HarmonicModel) else load_model(m) for m in (a, b))
+    one, two = Pattern(first), Pattern(second)
+    orders = sorted({*one.lines, *two.lines})
+    if not (one.is_periodic and two.is_periodic) and first.argument != second.argument:
+        raise ArgumentError(
+            "models of other arguments, with shafts that do not come back to their start after "
+            "one output turn, cannot be compared per order: fit both with the same --argument"
+        )
+    same = first.argument == second.argument
+    turns = 1 if one.is_periodic and two.is_periodic else _TURNS
+    top = max(orders, default=1.0)
+    points = 1 << math.ceil(math.log2(max(4096.0, _POINTS * top * turns)))
+    if points > _MOST_POINTS:
+        raise ArgumentError(f"order {top:g} is too high to be compared over a turn")
+    theta = np.arange(points, dtype=np.float64) * (turns / points)
+    if same:
+        difference = two.error(theta) - one.error(theta)
+    else:
+        difference = _at_truth(two, theta) - _at_truth(one, theta)
+    zero = float(np.mean(difference)) if turns == 1 else 0.0
+    difference = difference - zero
+    rows: list[dict[str, float | None]] = []
+    for order in orders:
+        if same:
+            z = _line(second, order) - _line(first, order)
+        else:
+            z = complex(2.0 * np.mean(difference * np.exp(-2j * np.pi * order * theta)))
+            z = complex(z.real, -z.imag)
+        rows.append(
+            {
+                "order": order,
+                "amplitude_arcsec": abs(z) * ARCSEC_PER_TURN,
+                "phase_deg": math.degrees(math.atan2(z.real, z.imag)),
+                "std_arcsec": _std(first, second, order),
+            }
+        )
+    terms = [
+        kind
+        for kind in dict.fromkeys(t.kind for t in (*first.terms, *second.terms))
+        if _terms(first, kind) != _terms(second, kind)
+    ]
+    return Comparison(
+        orders=rows,
+        rms_arcsec=float(np.sqrt(np.mean(difference**2))) * ARCSEC_PER_TURN,
+        max_abs_arcsec=float(np.max(np.abs(difference))) * ARCSEC_PER_TURN,
+        zero_deg=(two.zero - one.zero + zero) * 360.0,
+        argument=first.argument if same else "reference",
+        differ_in=terms,
+    )
+
+
+#: Turns over which shafts that do not come back are looked at.
+_TURNS = 32
+
+
+def _at_truth(pattern: Pattern, theta: Array) -> Array:
+    return pattern.reading(theta) - theta - pattern.zero
+
+
+def _line(model: HarmonicModel, order: float) -> complex:
+    """``A + iB`` of an output order, in turns."""
+    return complex(
+        sum(
+            complex(a, b)
+            for shaft in model.shafts
+            for k, a, b in zip(shaft.orders, shaft.cosine, shaft.sine, strict=True)
+            if k * shaft.cycles_per_turn == order
+        )
+        / model.period
+    )
+
+
+def _std(first: HarmonicModel, second: HarmonicModel, order: float) -> float | None:
+    """Of one coefficient of the difference, in arcsec."""
+    total, known = 0.0, False
+    for model in (first, second):
+        if model.covariance is None:
+            continue
+        at = 1
+        for shaft in model.shafts:
+            for k in shaft.orders:
+                if k * shaft.cycles_per_turn == order:
+                    known = True
+                    variance = (model.covariance[at, at] + model.covariance[at + 1, at + 1]) / 2.0
+                    total += float(variance) / model.period**2
+                at += 2
+    return math.sqrt(total) * ARCSEC_PER_TURN if known else None
+
+
+def _terms(model: HarmonicModel, kind: str) -> list[Any]:
+    turn = 1.0 / model.period
+    return [(turn, term.to_table()) for term in model.terms if term.kind == kind]

@@ -1,0 +1,95 @@
+"""Corrections as a plain table of text, for anything that interpolates between lines."""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any, ClassVar
+
+import numpy as np
+
+from ..angles import ARCSEC_PER_TURN
+from ..errors import ArgumentError
+from ..files import Kind
+from ..model import HarmonicModel
+from .knots import linear_knots
+from .pattern import Pattern
+from .reading import failed, sampled_model
+from .target import Header, Made, Option, Part, Target
+
+__all__ = ["CsvTable"]
+
+#: Distance of two printed numbers, in degrees: 9 decimals.
+_LAST_DIGIT = 1e-9
+_SIZES = (36, 45, 60, 72, 90, 120, 180, 240, 360, 720, 1440, 3600, 7200, 36000)
+
+
+class CsvTable(Target):
+    """``--to csv``: ``indicated_deg, correction_deg``, to be interpolated linearly."""
+
+    name = "csv"
+    what = "lines of indicated_deg,correction_deg to interpolate between"
+    kind: ClassVar[Kind] = Kind("a table of corrections (CSV)", (".csv",))
+    sign = "subtract"
+    options = {
+        "bits": Option(int, 24, "bits of a reading: so many are all evaluated, up to 24"),
+        "entries": Option(int, 360, "lines to a turn (the first one is repeated at 360)"),
+    }
+
+    def sizes(self, options: Mapping[str, Any]) -> Sequence[int]:
+        return _SIZES
+
+    def make(self, pattern: Pattern, options: Mapping[str, Any]) -> Made:
+        entries = options["entries"]
+        if not 4 <= entries <= 1_000_000:
+            raise ArgumentError(f"--entries must be from 4 to 1000000, got {entries}")
+        pattern.check_one_turn(self.name)
+        top = max(pattern.lines, default=0.0)
+        pattern.check_orders(entries, self.name, f"use --entries {int(2 * top) + 1} or more")
+        values = np.round(linear_knots(pattern.correction, entries) * 360.0, 9)
+        knots = np.concatenate([values, values[:1]])
+        places = np.arange(entries + 1) * 360.0 / entries
+
+        def correction(angles: Any) -> Any:
+            return np.interp(angles * (360.0 / 2.0**32), places, knots) / 360.0
+
+        def text(header: Header) -> str:
+            out = io.StringIO()
+            writer = csv.writer(out, lineterminator="\n")
+            writer.writerow(["indicated_deg", "correction_deg"])
+            writer.writerows((f"{x:.9f}", f"{y:.9f}") for x, y in zip(places, knots, strict=True))
+            return out.getvalue()
+
+        return Made(
+            text=text,
+            entries=entries,
+            bytes=16 * (entries + 1),
+            parts=(Part((correction,), pattern.correction, 2.0 * pattern.slope),),
+            floor_arcsec=_LAST_DIGIT / math.sqrt(18.0) / 360.0 * ARCSEC_PER_TURN,
+            step=_LAST_DIGIT / 360.0,
+            zero_deg=pattern.zero * 360.0,
+        )
+
+    def read(self, text: str, path: str, options: Mapping[str, Any]) -> HarmonicModel:
+        rows = list(csv.reader(io.StringIO(text)))
+        if not rows or [cell.strip() for cell in rows[0]] != ["indicated_deg", "correction_deg"]:
+            raise failed(path, "no table of indicated_deg,correction_deg: it is the header", 1)
+        numbers = []
+        for i, row in enumerate(rows[1:], 2):
+            try:
+                place, value = map(float, row)
+            except ValueError:
+                raise failed(path, f"two numbers are needed, got {','.join(row)!r}", i) from None
+            if not (math.isfinite(place) and math.isfinite(value)):
+                raise failed(path, f"finite numbers are needed, got {','.join(row)!r}", i)
+            numbers.append((place, value))
+        table = np.array(numbers)
+        if len(table) < 5 or not np.allclose(
+            table[:, 0], np.arange(len(table)) * 360.0 / (len(table) - 1), atol=1e-6
+        ):
+            raise failed(path, "lines must stand at equal distances from 0 to 360 degrees")
+        return sampled_model(
+            table[:-1, 1] / 360.0, path, text, step=_LAST_DIGIT / 360.0, name=self.name
+        )

@@ -1,0 +1,77 @@
+r"""Least-squares knots of tables: the best continuous line or cubic through a function.
+
+Linear interpolation of exact samples leaves :math:`h^2|g''|/\sqrt{120}` rms; the continuous
+piecewise line that is nearest in the mean square leaves :math:`h^2|g''|/\sqrt{720}`, a factor
+2.45 less from a table of the same size. The basis functions of one knot are those of its
+neighbour shifted, so the normal equations are block-circulant and one FFT solves them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["cubic_knots", "linear_knots"]
+
+Array = NDArray[np.float64]
+Function = Callable[[Array], Array]
+
+#: Gauss points per segment: a cubic times a function whose shortest wave is two segments.
+_POINTS = 16
+
+
+def linear_knots(g: Function, entries: int) -> Array:
+    """Values at ``i / entries`` of the continuous piecewise line nearest to ``g``.
+
+    Parameters
+    ----------
+    g : callable
+        Of angles in turns; one turn is its period.
+    entries : int
+
+    Returns
+    -------
+    ndarray, shape (entries,)
+
+    Examples
+    --------
+    >>> knots = linear_knots(lambda x: np.cos(2 * np.pi * x), 64)
+    >>> round(float(knots[0]), 4)  # outside the function where it bends
+    1.0008
+    """
+    return _nearest(g, entries, 1)[:, 0]
+
+
+def cubic_knots(g: Function, entries: int) -> Array:
+    """Values, and slopes per segment, of the smooth piecewise cubic nearest to ``g``.
+
+    Returns
+    -------
+    ndarray, shape (entries, 2)
+    """
+    return _nearest(g, entries, 2)
+
+
+def _basis(t: Array, count: int) -> tuple[Array, Array]:
+    """Functions of a segment's lower and of its upper knot, ``(count, points)`` each."""
+    if count == 1:
+        return np.stack([1.0 - t]), np.stack([t])
+    lower = np.stack([(1.0 + 2.0 * t) * (1.0 - t) ** 2, t * (1.0 - t) ** 2])
+    upper = np.stack([t**2 * (3.0 - 2.0 * t), t**2 * (t - 1.0)])
+    return lower, upper
+
+
+def _nearest(g: Function, entries: int, count: int) -> Array:
+    nodes, weights = np.polynomial.legendre.leggauss(_POINTS)
+    t, w = (nodes + 1.0) / 2.0, weights / 2.0
+    values = g((np.arange(entries)[:, None] + t).ravel() / entries).reshape(entries, _POINTS)
+    lower, upper = _basis(t, count)
+    right = (values * w) @ lower.T + np.roll((values * w) @ upper.T, 1, axis=0)
+    same = (lower * w) @ lower.T + (upper * w) @ upper.T
+    following = (lower * w) @ upper.T  # of a knot with the next one
+    turn = np.exp(2j * np.pi * np.arange(entries) / entries)[:, None, None]
+    matrix = same + following * turn + following.T * np.conj(turn)
+    solved = np.linalg.solve(matrix, np.fft.fft(right, axis=0)[:, :, None])
+    return np.asarray(np.fft.ifft(solved[:, :, 0], axis=0).real)

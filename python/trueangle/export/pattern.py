@@ -1,0 +1,216 @@
+"""What of a model a table of the angle alone can hold: the pattern, in turns."""
+
+from __future__ import annotations
+
+import math
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..angles import ARCSEC_PER_TURN
+from ..errors import ArgumentError
+from ..joint.shafts import Shaft
+from ..model import HarmonicModel
+from ..terms import LocalDefect
+
+__all__ = ["Pattern"]
+
+Array = NDArray[np.float64]
+
+
+class Pattern:
+    r"""The part of a model that follows the angle alone, with every angle in turns.
+
+    .. math:: g(r) = r - C_0 - \theta(r), \qquad r = \theta + \varepsilon(\theta)
+
+    is what a device subtracts from its reading r. The constant :math:`C_0` is kept out:
+    it is the zero, which a device sets by other means.
+
+    Parameters
+    ----------
+    model : HarmonicModel
+
+    Attributes
+    ----------
+    left_out : tuple of (str, bool)
+        Kinds of the model's terms that no table of the angle can hold, and whether two
+        tables, one a direction, could.
+    """
+
+    def __init__(self, model: HarmonicModel) -> None:
+        held = [term for term in model.terms if isinstance(term, LocalDefect)]
+        self.left_out = tuple(
+            (term.kind, _of_direction(term))
+            for term in model.terms
+            if not isinstance(term, LocalDefect)
+        )
+        self.source = model
+        #: Without the record of the fit: a table covers the turn, and warns in words.
+        self.model = model.replace(terms=tuple(held), fit=None, covariance=None)
+        self.period = model.period
+        self.zero = model.constant / model.period
+        self._defects = tuple(held)
+
+    # -- the functions --------------------------------------------------------------
+
+    def correction(self, indicated: Array) -> Array:
+        """``g`` at readings in turns."""
+        corrected = np.asarray(self.model.correct(indicated * self.period)) / self.period
+        return np.asarray(indicated - corrected - self.zero)
+
+    def error(self, theta: Array) -> Array:
+        """The error without its constant at true angles in turns (or the model's argument)."""
+        return np.asarray(self.model.error(theta * self.period)) / self.period - self.zero
+
+    def reading(self, theta: Array) -> Array:
+        """What the device indicates at true angles, the constant included."""
+        if self.model.argument == "reference":
+            return theta + self.error(theta) + self.zero
+        # r - error(r) = theta: a fixed point, found as fast as the slope is small.
+        reading = theta + self.zero
+        for _ in range(_FIXED_POINT_STEPS):
+            reading = theta + self.error(reading) + self.zero
+        return reading
+
+    def directed(self, theta: Array, direction: int) -> Array:
+        """The error without its constant far from a reversal, travelling one way.
+
+        ``theta`` is one turn or more of increasing angles: what winds up with travel is
+        taken as wound up.
+        """
+        model = self.source.replace(
+            fit=None,
+            covariance=None,
+            terms=tuple(
+                t for t in self.source.terms if isinstance(t, LocalDefect) or _of_direction(t)
+            ),
+        )
+        way = theta if direction > 0 else theta[::-1]
+        ahead = np.sign(direction) * np.ceil(np.ptp(theta) + 1.0)
+        travelled = np.concatenate([way - ahead, way]) * self.period
+        error = np.asarray(model.error(travelled, direction=float(direction)))[len(way) :]
+        error = error / self.period - self.zero
+        return error if direction > 0 else error[::-1]
+
+    @property
+    def has_direction(self) -> bool:
+        """Whether something of what is left out follows the direction of travel alone."""
+        return any(_of_direction(term) for term in self.source.terms)
+
+    # -- what it consists of ----------------------------------------------------------
+
+    @property
+    def lines(self) -> dict[float, float]:
+        """Amplitude in turns of every output order."""
+        found: dict[float, float] = {}
+        for order, amplitude in zip(self.model.orders, self.model.amplitudes, strict=True):
+            found[order] = math.hypot(found.get(order, 0.0), amplitude / self.period)
+        return dict(sorted(found.items()))
+
+    @cached_property
+    def slope(self) -> float:
+        """A bound of ``|g'|``: s / (1 - s), with s the sum of k C_k in radians."""
+        s = sum(2.0 * math.pi * k * c for k, c in self.lines.items())
+        s += sum(abs(t.height) * t.cycles_per_turn / t.width for t in self._defects)
+        if self.model.argument == "indicated":
+            return s
+        return s / (1.0 - s) if s < 1.0 else math.inf
+
+    @property
+    def uncertainty_arcsec(self) -> float | None:
+        """Standard deviation of the model over a turn without its zero, where it is known."""
+        covariance = self.source.covariance
+        if covariance is None or len(covariance) < 2:
+            return None
+        variance = float(np.sum(np.diag(covariance)[1:])) / 2.0
+        return math.sqrt(max(variance, 0.0)) / self.period * ARCSEC_PER_TURN
+
+    @property
+    def is_periodic(self) -> bool:
+        """Whether one turn of the output holds all of it."""
+        return self.model.is_periodic
+
+    def check_orders(self, entries: int, target: str, smallest: str) -> None:
+        """Refuse orders at or above the Nyquist order of a table.
+
+        Raises
+        ------
+        ArgumentError
+            Names the orders and what can hold them.
+        """
+        limit = (entries - 1) // 2
+        beyond = [order for order in self.lines if order > limit]
+        if beyond:
+            raise ArgumentError(
+                f"{target}: {entries} entries hold orders up to {limit}, the model has "
+                f"{_orders(beyond)}: {smallest}"
+            )
+
+    def check_one_turn(self, target: str) -> None:
+        """Refuse shafts that do not come back to their start after one output turn.
+
+        Raises
+        ------
+        ArgumentError
+            Names the shafts.
+        """
+        if not self.is_periodic:
+            strangers = [s.name for s in self.model.shafts if s.cycles_per_turn % 1.0]
+            raise ArgumentError(
+                f"{target} holds one turn of the output, and shaft {', '.join(strangers)} does "
+                "not come back to its start in one: export its model from the shaft's own "
+                "encoder, or use --to c, which writes one function per shaft"
+            )
+
+    def shafts(self) -> list[tuple[str, float, Pattern]]:
+        """``(name, cycles, pattern in turns of that shaft)``, slow shafts first.
+
+        The pattern of a shaft is inverted as a function of the shaft's own reading; its
+        corrections are in turns of the shaft.
+        """
+        parts = []
+        ordered = sorted(self.model.shafts, key=lambda shaft: shaft.cycles_per_turn)
+        cycles = {shaft.cycles_per_turn for shaft in ordered}
+        for defect in self._defects:
+            if defect.cycles_per_turn not in cycles:
+                ordered.append(Shaft("defect", defect.cycles_per_turn, (), (), ()))
+                cycles.add(defect.cycles_per_turn)
+        for shaft in sorted(ordered, key=lambda shaft: shaft.cycles_per_turn):
+            f = shaft.cycles_per_turn
+            alone = HarmonicModel(
+                (
+                    Shaft(
+                        shaft.name,
+                        1.0,
+                        shaft.orders,
+                        tuple(a * f / self.period for a in shaft.cosine),
+                        tuple(b * f / self.period for b in shaft.sine),
+                    ),
+                ),
+                period=1.0,
+                argument=self.model.argument,
+                terms=tuple(
+                    type(t)(
+                        t.place / self.period, t.width / self.period, t.height * f / self.period
+                    )
+                    for t in self._defects
+                    if t.cycles_per_turn == f
+                ),
+            )
+            parts.append((shaft.name, f, Pattern(alone)))
+        return parts
+
+
+#: Passes until a fixed point with a slope of 1/2 is within 1e-15.
+_FIXED_POINT_STEPS = 50
+
+
+def _of_direction(term: object) -> bool:
+    needs = set(getattr(term, "needs", ()))
+    return bool(getattr(term, "follows_travel", False)) and needs <= {"direction"}
+
+
+def _orders(orders: list[float]) -> str:
+    shown = ", ".join(f"{order:g}" for order in orders[:8])
+    return f"order{'s'[: len(orders) != 1]} {shown}{', ...' if len(orders) > 8 else ''}"

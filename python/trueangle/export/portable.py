@@ -1,0 +1,239 @@
+"""What the C and the Rust export have in common: options, sizes, tables, self-test."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Mapping, Sequence
+from functools import partial
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..angles import ARCSEC_PER_TURN
+from ..errors import ArgumentError
+from ..model import HarmonicModel
+from .chain import Chain, make_chain
+from .pattern import Pattern
+from .proof import lost_orders
+from .table import METHODS, NUMBERS, TURN, Table
+from .target import Header, Made, Option, Part, Target
+
+__all__ = ["PortableTarget", "identifier", "self_test", "table_lines"]
+
+#: Sizes that are tried, where none is asked for up to the largest default.
+_SIZES = tuple(1 << bits for bits in range(3, 17))
+_LARGEST_DEFAULT = 4096
+
+#: Of the model's uncertainty that a default table may add: a twentieth more in all.
+_SHARE = 1.0 / 3.0
+
+#: Readings of the self-test: spread, and none of them a knot.
+_TEST_ANGLES = tuple((i * 0x1F123BB5 + 0x01234567) % 2**32 for i in range(8))
+
+
+class PortableTarget(Target):
+    """Tables in the arithmetic of `trueangle-table`, one function per shaft."""
+
+    sign = "subtract"
+    options = {
+        "bits": Option(int, 24, "bits of a reading: so many are all evaluated, up to 24"),
+        "entries": Option(int, None, "of each table, a power of two (default: by the model)"),
+        "method": Option(METHODS, None, "of interpolation"),
+        "number": Option(NUMBERS, None, "int16, int32 or float (default: q15, else q31)"),
+        "name": Option(str, None, "of the functions (default: the file's)"),
+    }
+
+    def sizes(self, options: Mapping[str, Any]) -> Sequence[int]:
+        return () if options["entries"] else _SIZES
+
+    def make(self, pattern: Pattern, options: Mapping[str, Any]) -> Made:
+        chain = _chain(pattern, options)
+        bits = options["bits"]
+        if not 1 <= bits <= 32:
+            raise ArgumentError(f"--bits must be from 1 to 32, got {bits}")
+        floating = any(table.number == "f32" for table in chain.tables)
+        notes = []
+        if not chain.whole:
+            notes.append(
+                "a shaft does not turn a whole number of times per output turn: pass each "
+                "function the unwrapped angle of its own shaft; no function corrects the output "
+                "angle alone"
+            )
+        if floating:
+            notes.append(
+                "float: the same bits everywhere with -ffp-contract=off; the stated maximum holds "
+                "without it"
+            )
+        parts, neglected = _parts(chain, pattern, floating)
+        return Made(
+            text=lambda header: self.write(chain, header),
+            entries=sum(table.entries for table in chain.tables),
+            bytes=sum(table.bytes for table in chain.tables),
+            parts=parts,
+            floor_arcsec=math.hypot(*(table.floor_arcsec for table in chain.tables), 0.0),
+            step=1.0 / TURN,
+            lost=lambda: _lost(chain, pattern),
+            notes=tuple(notes),
+            tables=tuple(
+                {
+                    "shaft": table.shaft,
+                    "cycles_per_turn": table.cycles,
+                    "entries": table.entries,
+                    "bytes": table.bytes,
+                    "method": table.method,
+                    "number": table.number,
+                }
+                for table in chain.tables
+            ),
+            neglected=neglected,
+        )
+
+    def write(self, chain: Chain, header: Header) -> str:
+        """The file's text."""
+        raise NotImplementedError
+
+    def read(self, text: str, path: str, options: Mapping[str, Any]) -> HarmonicModel:
+        from .reading import portable_model
+
+        return portable_model(text, path)
+
+
+def identifier(name: str) -> str:
+    """A name that C and Rust take: lower case, digits and underscores.
+
+    Examples
+    --------
+    >>> identifier("Joint-A 3"), identifier("3rd")
+    ('joint_a_3', 'angle_3rd')
+    """
+    found = re.sub(r"[^0-9a-z]+", "_", name.lower()).strip("_")
+    return found if found and found[0].isalpha() else f"angle_{found}".rstrip("_")
+
+
+def table_lines(chain: Chain) -> list[str]:
+    """What the comment says of each table; `import` reads it back."""
+    lines = [
+        f"Table {identifier(table.shaft)}: {table.entries} entries, {table.bytes} bytes, "
+        f"{table.method}, {table.number}, shift {table.shift}, {table.cycles:.17g} cycles per "
+        "output turn."
+        for table in chain.tables
+    ]
+    return [*lines, f"Zero: {chain.zero % 2**32} is subtracted first."]
+
+
+def self_test(chain: Chain) -> list[tuple[int, int]]:
+    """Eight readings and what the device makes of them."""
+    angles = np.array(_TEST_ANGLES, dtype=np.uint32)
+    return list(zip(_TEST_ANGLES, (int(a) for a in chain.corrected(angles)), strict=True))
+
+
+def _chain(pattern: Pattern, options: Mapping[str, Any]) -> Chain:
+    shafts = pattern.shafts()
+    if not shafts:
+        raise ArgumentError("the model has no harmonics: there is nothing to put into a table")
+    method, number, entries = (options[key] for key in ("method", "number", "entries"))
+    if entries is not None:
+        _check(shafts, entries)
+        return _first_that_fits(pattern, method, number, [entries] * len(shafts))
+    # The smallest tables that leave less than the model itself does not know.
+    known = pattern.uncertainty_arcsec
+    allowed = None if known is None else known * _SHARE
+    sizes = []
+    for _, cycles, part in shafts:
+        sizes.append(_smallest(part, cycles, method or "linear", number or "q15", allowed))
+    if method is None and number is None and max(sizes) > 256:
+        # Cubic tables of 32 bits hold fine patterns in less flash than lines do.
+        sizes = [_smallest(part, cycles, "cubic", "q31", allowed) for _, cycles, part in shafts]
+        return make_chain(pattern, "cubic", "q31", sizes)
+    return _first_that_fits(pattern, method, number, sizes)
+
+
+def _first_that_fits(
+    pattern: Pattern, method: str | None, number: str | None, sizes: list[int]
+) -> Chain:
+    """int16 lines where their floor is below the model's uncertainty, else int32."""
+    if number is None:
+        allowed = pattern.uncertainty_arcsec
+        try:
+            chain = make_chain(pattern, method or "linear", "q15", sizes)
+            floor = math.hypot(*(table.floor_arcsec for table in chain.tables), 0.0)
+            if allowed is None or floor <= allowed:
+                return chain
+        except ArgumentError:
+            pass
+        number = "q31"
+    return make_chain(pattern, method or "linear", number, sizes)
+
+
+def _check(shafts: Sequence[tuple[str, float, Pattern]], entries: int) -> None:
+    for name, _, part in shafts:
+        top = max(part.lines, default=0.0)
+        needed = 1 << (int(2 * top) + 1).bit_length() if top else 4
+        part.check_orders(entries, f"shaft {name}", f"use --entries {max(needed, 4)} or more")
+
+
+def _smallest(part: Pattern, cycles: float, method: str, number: str, allowed: float | None) -> int:
+    """Entries for which a rough rms is below what is allowed, or a thousandth of the pattern."""
+    amplitude = math.sqrt(sum(c * c for c in part.lines.values()) / 2.0) / cycles
+    wanted = 1e-3 * amplitude * ARCSEC_PER_TURN if allowed is None else allowed
+    probe = (np.arange(4096) * 0x9E3779B1 % 2**32).astype(np.uint32)
+    top = max(part.lines, default=0.0)
+    for size in _SIZES:
+        if size <= 2.0 * top or (size > _LARGEST_DEFAULT and size > 8.0 * top):
+            continue
+        chain = make_chain(part, method, "f32" if number == "q15" else number, size)
+        difference = chain.correction(probe) - part.correction(probe / TURN)
+        if float(np.sqrt(np.mean(difference**2))) / cycles * ARCSEC_PER_TURN <= wanted:
+            return size
+        largest = size
+    return largest
+
+
+def _lost(chain: Chain, pattern: Pattern) -> list[dict[str, float]]:
+    rows = []
+    for table, (_, cycles, part) in zip(chain.tables, pattern.shafts(), strict=True):
+        alone = _alone(table, part, cycles, chain, pattern, False)
+        found = lost_orders(alone.corrections[0], alone.exact, part.lines)
+        rows += [{"order": k * cycles, "arcsec": lost} for k, lost in found.items()]
+    return sorted(rows, key=lambda row: row["order"])
+
+
+def _alone(
+    table: Table, part: Pattern, cycles: float, chain: Chain, pattern: Pattern, floating: bool
+) -> Part:
+    """One table and its shaft's exact correction, both in turns of the output."""
+    move = pattern.zero * cycles if chain.at_indicated else 0.0
+    # With and without contracted products: the maximum holds for both.
+    return Part(
+        tuple(partial(_turns, table, contracted) for contracted in (False, True)[: 1 + floating]),
+        lambda x: part.correction(x + move) / cycles,
+        2.0 * part.slope / cycles,
+        2.0 / TURN,
+    )
+
+
+def _turns(table: Table, contracted: bool, angles: NDArray[np.uint32]) -> NDArray[np.float64]:
+    return np.asarray(table.correction(angles, contracted) / TURN)
+
+
+def _parts(chain: Chain, pattern: Pattern, floating: bool) -> tuple[tuple[Part, ...], float]:
+    if chain.whole:
+        variants = (False, True)[: 1 + floating]
+        whole = Part(
+            tuple(partial(chain.correction, contracted=c) for c in variants),
+            pattern.correction,
+            2.0 * pattern.slope,
+            2.0 * len(chain.tables) / TURN,
+        )
+        return (whole,), 0.0
+    # No output angle finds every table's place: each is proven on its own shaft. The chain
+    # neglects the slopes of the slower patterns times the faster correction.
+    parts, neglected, slope = [], 0.0, 0.0
+    grid = np.arange(_LARGEST_DEFAULT) / _LARGEST_DEFAULT
+    for table, (_, cycles, part) in zip(chain.tables, pattern.shafts(), strict=True):
+        parts.append(_alone(table, part, cycles, chain, pattern, floating))
+        neglected += slope * float(np.max(np.abs(part.correction(grid)))) / cycles
+        slope += part.slope
+    return tuple(parts), 0.0 if chain.at_indicated else neglected

@@ -1,0 +1,154 @@
+"""Tables that come back as models, and the difference of two models."""
+
+import json
+
+import numpy as np
+import pytest
+
+import trueangle as ta
+from trueangle.cli import main
+
+
+@pytest.mark.parametrize(
+    ("target", "ending", "options"),
+    [
+        ("c", ".h", {"number": "q15", "entries": 128}),
+        ("c", ".h", {"number": "q31", "method": "cubic", "entries": 64}),
+        ("c", ".h", {"number": "f32", "entries": 256}),
+        ("rust", ".rs", {"number": "q15", "method": "cubic", "entries": 64}),
+        ("rust", ".rs", {"number": "f32", "method": "cubic", "entries": 64}),
+        ("csv", ".csv", {"entries": 90}),
+    ],
+)
+@pytest.mark.parametrize("argument", ["reference", "indicated"])
+def test_an_exported_table_is_the_model_again(target, ending, options, argument, model, tmp_path):
+    moved = model.replace(argument=argument, constant=0.0 if target == "csv" else -0.4)
+    path = tmp_path / f"a{ending}"
+    made = ta.export_model(moved, target, path, bits=16, **options)
+    back = ta.import_model(path, target)
+    result = ta.compare(moved, back)
+    assert result.max_abs_arcsec <= made.max_difference_arcsec + 0.01
+    assert abs(result.zero_deg) < 1e-4
+    x = np.linspace(0.0, 360.0, 4001)
+    far = np.asarray(back.correct(x)) - np.degrees(moved.correct(np.radians(x)))
+    assert np.max(np.abs(far)) * 3600 <= made.max_difference_arcsec + 0.5
+
+
+def test_the_resolution_is_the_uncertainty(model, tmp_path):
+    ta.export_model(model, "c", tmp_path / "a.h", number="q15", entries=128, bits=12)
+    back = ta.import_model(tmp_path / "a.h", "c")
+    step = 2.0**9 / 2.0**32 * 360.0
+    assert back.fit.residual == pytest.approx(step / 12**0.5)
+    assert back.covariance is not None
+    assert back.provenance.inputs[0].file.endswith("a.h")
+
+
+def test_two_shafts_come_back(joint, tmp_path):
+    ta.export_model(joint, "rust", tmp_path / "a.rs", method="cubic", entries=128, bits=16)
+    result = ta.compare(joint, ta.import_model(tmp_path / "a.rs", "rust"))
+    assert result.max_abs_arcsec < 0.01
+
+
+@pytest.mark.parametrize(
+    ("text", "target"),
+    [
+        ("", "c"),
+        ("int main(void) { return 0; }", "c"),
+        ("indicated_deg,correction_deg\n0,0\n90,x\n", "csv"),
+        ("indicated_deg,correction_deg\n0,0\n90,1\n100,1\n200,1\n360,0\n", "csv"),
+        ("indicated_deg,correction_deg\n0,0\n90,nan\n180,1\n270,1\n360,0\n", "csv"),
+        ("a,b\n", "csv"),
+    ],
+)
+def test_what_is_no_table_is_refused(text, target, tmp_path):
+    path = tmp_path / "table"
+    path.write_text(text)
+    with pytest.raises(ta.errors.FileError, match="table"):
+        ta.import_model(path, target)
+
+
+def test_a_cut_table_is_refused(model, tmp_path):
+    path = tmp_path / "a.h"
+    ta.export_model(model, "c", path, entries=64, bits=12)
+    path.write_text(path.read_text().replace("    ", "", 1).replace(", ", " ", 1))
+    path.write_text("\n".join(path.read_text().split("\n")[:40]))
+    with pytest.raises(ta.errors.FileError, match="does not hold 65 numbers"):
+        ta.import_model(path, "c")
+
+
+def test_comparison_of_models_of_one_angle_is_of_their_coefficients():
+    a = ta.HarmonicModel((ta.Shaft("output", 1, (1, 3), (0.1, 0.0), (0.0, 0.2)),), period=360.0)
+    b = ta.HarmonicModel((ta.Shaft("output", 1, (1, 3), (0.1, 0.2), (0.0, 0.2)),), 0.5, 360.0)
+    result = ta.compare(a, b)
+    first, third = result.orders
+    assert first["amplitude_arcsec"] == 0.0
+    assert third["amplitude_arcsec"] == pytest.approx(720.0)
+    assert third["phase_deg"] == pytest.approx(90.0)
+    assert result.zero_deg == pytest.approx(0.5)
+    assert result.rms_arcsec == pytest.approx(720.0 / 2**0.5)
+    assert result.max_abs_arcsec == pytest.approx(720.0, rel=1e-4)
+
+
+def test_comparison_adds_variances_and_names_terms():
+    def one(scale, terms=()):
+        return ta.HarmonicModel(
+            (ta.Shaft("output", 1, (2,), (0.1,), (0.0,)),),
+            period=360.0,
+            covariance=np.diag([1.0, scale**2, scale**2]),
+            terms=terms,
+        )
+
+    result = ta.compare(one(3e-4), one(4e-4, (ta.Backlash(0.1),)))
+    assert result.orders[0]["std_arcsec"] == pytest.approx(1.8)
+    assert result.differ_in == ["backlash"]
+
+
+def test_comparison_of_other_units_and_arguments(model):
+    other = ta.HarmonicModel(
+        tuple(
+            ta.Shaft(s.name, 1, s.orders, np.degrees(s.cosine), np.degrees(s.sine))
+            for s in model.shafts
+        ),
+        period=360.0,
+        argument="indicated",
+    )
+    assert ta.compare(model, other.replace(argument="reference")).max_abs_arcsec < 1e-6
+    result = ta.compare(model, other)
+    theta = np.linspace(0, 2 * np.pi, 7201)
+    other_error = np.radians([x - other.correct(x) for x in np.degrees(theta + model.error(theta))])
+    # at the reading the one would give: near enough to tell the size of the difference
+    size = np.max(np.abs(other_error - model.error(theta))) * 648_000 / np.pi
+    assert result.max_abs_arcsec == pytest.approx(size, rel=0.1)
+
+
+def test_commands(model, tmp_path, capsys):
+    path = tmp_path / "m.json"
+    model.save(path)
+    out = tmp_path / "m.h"
+    assert main(["export", str(path), "--to", "c", "-o", str(out), "--bits", "14", "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["target"] == "c"
+    assert out.is_file()
+    back = tmp_path / "back.json"
+    assert main(["import", str(out), "--from", "c", "-o", str(back), "--json"]) == 0
+    assert [row["order"] for row in json.loads(capsys.readouterr().out)["orders"]][:2] == [1, 2]
+    assert main(["compare", str(path), str(back), "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert set(found) >= {"orders", "rms_arcsec", "max_abs_arcsec", "zero_deg"}
+    assert main(["compare", str(path), str(back)]) == 0
+    assert "arcsec rms" in capsys.readouterr().out
+
+
+def test_an_input_is_not_overwritten(model, tmp_path, capsys):
+    path = tmp_path / "m"
+    model.save(path)
+    before = path.read_bytes()
+    assert main(["export", str(path), "--to", "c", "-o", str(path), "--bits", "12"]) == 1
+    assert "overwritten" in capsys.readouterr().err
+    assert main(["export", str(path), "--to", "c", "-o", str(tmp_path / "m.json")]) == 1
+    assert path.read_bytes() == before
+    table = tmp_path / "table"
+    ta.export_model(model, "c", table, bits=12)
+    before = table.read_bytes()
+    assert main(["import", str(table), "--from", "c", "-o", str(table)]) == 1
+    assert table.read_bytes() == before

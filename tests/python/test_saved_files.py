@@ -1,0 +1,55 @@
+"""Files written by earlier versions load unchanged: what they say is what was said then.
+
+The files in ``saved`` carry the version and the commit that wrote them, and beside them
+stands what that version computed from them.
+"""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import trueangle as ta
+from trueangle.effects import EFFECTS
+
+SAVED = Path(__file__).parent / "saved"
+
+# Both versions solve to 1e-12 of a turn of 360 degrees.
+SOLVED = 2 * 360e-12
+# Sums of a few hundred arcsec in double precision.
+ROUNDING = 1e-9
+
+
+@pytest.mark.parametrize("path", sorted(SAVED.glob("model-*0550211.json")), ids=lambda p: p.stem)
+def test_models_of_before_correct_as_they_did(path, tmp_path):
+    model = ta.load_model(path)
+    then = json.loads((SAVED / f"{path.stem}-corrected.json").read_text())
+    expected = np.array(then.pop("corrected"))
+    indicated = np.array(then.pop("indicated"))
+    signals = {name: np.array(values) for name, values in then.items()}
+    np.testing.assert_allclose(model.correct(indicated, **signals), expected, rtol=0, atol=SOLVED)
+    step = model.compensator()
+    rows = zip(*signals.values(), strict=True)
+    stepped = [
+        step(x, **dict(zip(signals, row, strict=True)))
+        for x, row in zip(indicated, rows, strict=True)
+    ]
+    np.testing.assert_allclose(stepped, expected, rtol=0, atol=SOLVED)
+    # Written again it says the same, key for key.
+    model.save(tmp_path / "again.json")
+    then, again = json.loads(path.read_text()), json.loads((tmp_path / "again.json").read_text())
+    assert again["terms"] == then["terms"]
+    assert again["shafts"] == then["shafts"]
+
+
+@pytest.mark.parametrize("path", sorted(SAVED.glob("simulation-*.toml")), ids=lambda p: p.stem)
+def test_simulations_of_before_predict_as_they_did(path):
+    sim = ta.load_simulation(path)
+    then = json.loads((SAVED / f"{path.stem}-predicted.json").read_text())
+    runs = ta.simulate(sim, 3)
+    np.testing.assert_allclose(sim.predict(runs), then["expected_arcsec"], rtol=0, atol=ROUNDING)
+    error = np.concatenate([run.error for run in runs])
+    np.testing.assert_allclose(error, then["error_deg"], rtol=0, atol=ROUNDING)
+    # Every cause of that version is in it.
+    assert len({effect.kind for effect in sim.effects} & set(EFFECTS)) == 20
