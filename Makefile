@@ -2,12 +2,12 @@
 # PYTHON is the interpreter of an environment that has `pip install '.[test,lint]'`.
 PYTHON ?= .venv/bin/python
 
-.PHONY: check format lint types stub rust python docs bench develop aarch64 fuzz
+.PHONY: check format lint types stub rust python docs bench develop aarch64 fuzz nightly
 
 check: lint types stub rust python docs
 
 develop:            ## build the core in place, for work on it
-	$(PYTHON) -m maturin develop --release --extras test,lint,docs
+	$(PYTHON) -m pip install --editable '.[test,lint,docs]'
 
 format:             ## rewrite the code in the project's style
 	cargo fmt
@@ -21,6 +21,7 @@ lint:               ## style and lints, warnings are errors
 	RUSTDOCFLAGS="-D warnings" cargo doc --no-deps --locked
 	$(PYTHON) -m ruff check .
 	$(PYTHON) -m ruff format --check .
+	$(PYTHON) -m check_jsonschema --builtin-schema vendor.github-workflows .github/workflows/*.yml
 
 types:              ## types of the whole package
 	$(PYTHON) -m mypy
@@ -44,6 +45,9 @@ docs:               ## documentation, warnings are errors
 
 fuzz:               ## 20 000 damaged files for every loader; some hours, so apart from `check`
 	$(PYTHON) tests/fuzz --cases 20000
+
+nightly: aarch64 fuzz ## what takes hours: the exam at full size, fuzzing, the emulated aarch64
+	TRUEANGLE_NIGHTLY=1 $(PYTHON) -m pytest
 
 bench:              ## benchmarks against a reference, in one run
 	cargo bench
