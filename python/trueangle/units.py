@@ -7,6 +7,8 @@ import math
 import numpy as np
 
 from . import _core
+from .checks.angles import AGREES, ratio_of, suggestion
+from .checks.record import records_of
 from .errors import ArgumentError
 from .runs import CalibrationRun
 
@@ -22,15 +24,13 @@ _FOLLOWS = 0.5
 #: A remedy is only named when it makes the differences agree this well.
 _REMEDIED = 0.95
 
-_REMEDIES = {
-    "it runs backwards: change its sign": -1.0,
-    "it looks like radians in a column of degrees": 180.0 / math.pi,
-    "it looks like degrees in a column of radians": math.pi / 180.0,
-    "it looks like turns in a column of degrees": 360.0,
-    "it looks like degrees in a column of turns": 1.0 / 360.0,
-    "it looks like turns in a column of radians": 2.0 * math.pi,
-    "it looks like radians in a column of turns": 0.5 / math.pi,
-}
+#: How near a measured ratio is to that of two units.
+_NEAR = 0.01
+
+#: Step of the indicated angle (degrees) that may be a turn more or less.
+_FAST = 120.0
+
+_TURNS = {"degrees": 360.0, "radians": 2.0 * math.pi, "turns": 1.0}
 
 
 def check_follows(run: CalibrationRun) -> None:
@@ -46,16 +46,56 @@ def check_follows(run: CalibrationRun) -> None:
     indicated = np.ascontiguousarray(run.indicated[::stride])
     if reference.size < 4 or _core.resultant(indicated, reference, run.period) >= _FOLLOWS:
         return
-    remedy = next(
-        (
+    ratio = _ratio(run)
+    if ratio is None:
+        # Too coarse to follow its travel: what would make the differences agree?
+        found = (
             text
-            for text, factor in _REMEDIES.items()
+            for text, factor in _remedies(run.period).items()
             if _core.resultant(factor * indicated, reference, run.period) > _REMEDIED
-        ),
-        "check units, sign, gear ratio and that the rows belong together",
-    )
+        )
+    else:
+        found = (
+            text
+            for text, factor in _remedies(run.period).items()
+            if abs(factor * ratio - 1.0) < _NEAR
+        )
+    remedy = next(found, None) or _moves(ratio)
     named = f" of run {run.label}" if run.label else ""
     raise ArgumentError(
         f"the indicated angle{named} does not follow the reference "
         f"(their differences are spread over the whole turn): {remedy}"
+    )
+
+
+def _remedies(period: float) -> dict[str, float]:
+    """What the indicated angle may be instead, with the factor that puts it right."""
+    found = {"it runs backwards: change its sign": -1.0}
+    column = next((unit for unit, turn in _TURNS.items() if math.isclose(turn, period)), None)
+    if column is not None:
+        for unit, turn in _TURNS.items():
+            if unit != column:
+                found[f"it looks like {unit} in a column of {column}"] = period / turn
+    return found
+
+
+def _ratio(run: CalibrationRun) -> float | None:
+    """Travel of the indicated angle per travel of the reference, where readings tell it."""
+    (record,) = records_of([run])
+    ratio = ratio_of([record])
+    if ratio is None or ratio == 0.0:
+        return None
+    reference, indicated = record.unwrapped
+    fast = float(np.quantile(np.abs(np.diff(indicated)), 0.9)) > _FAST
+    agree = _core.resultant(indicated / ratio, reference, 360.0) > _REMEDIED
+    return ratio if agree and not fast else None
+
+
+def _moves(ratio: float | None) -> str:
+    if ratio is None or abs(ratio - 1.0) < AGREES:
+        return "check units, sign, gear ratio and that the rows belong together"
+    return (
+        f"it moves {ratio:.6g} times as far as the reference, which looks like "
+        f"{suggestion(ratio)}; unwrap it and divide it by {ratio:.6g}, so that it is reduced to "
+        "the output"
     )

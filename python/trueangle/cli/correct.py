@@ -160,7 +160,7 @@ def _print(log: LogReport) -> None:
         return
     print(
         f"{log.log}: {result['rows']} readings corrected at "
-        f"{result['rows_per_second']:.3g} rows/s -> {log.output}"
+        f"{result['rows_per_second']:,.0f} rows/s -> {log.output}"
     )
     for joint in result["joints"]:
         text = (

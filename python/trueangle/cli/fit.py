@@ -4,12 +4,10 @@ from __future__ import annotations
 
 import argparse
 import json
-from collections.abc import Mapping, Sequence
 
-from ..errors import ArgumentError
 from ..files import MODEL
 from .onepass import add_one_pass, saved, wants_one_pass
-from .order_lists import parse_orders
+from .order_lists import orders_by_shaft
 from .paths import Input, Output
 
 HELP = "fit a harmonic model to calibration runs and save it"
@@ -79,21 +77,6 @@ def add_argument_choice(parser: argparse.ArgumentParser) -> None:
         help="angle that the error is a function of (default: the true one, unless the "
         "reference has an arbitrary zero in every run)",
     )
-
-
-def orders_by_shaft(text: str) -> str | Sequence[float] | Mapping[str, Sequence[float]]:
-    """``auto``, ``1-17``, ``1,4,8`` or ``output:1-3;motor:1,2`` as orders."""
-    if text == "auto":
-        return text
-    if ":" not in text:
-        return parse_orders(text)
-    by_shaft: dict[str, Sequence[float]] = {}
-    for part in text.split(";"):
-        shaft, _, orders = part.partition(":")
-        if shaft.strip() in by_shaft:
-            raise ArgumentError(f"--orders names shaft {shaft.strip()!r} twice: {text!r}")
-        by_shaft[shaft.strip()] = parse_orders(orders)
-    return by_shaft
 
 
 def run(args: argparse.Namespace) -> int:

@@ -2,9 +2,15 @@
 
 from __future__ import annotations
 
-from ..errors import ArgumentError
+from collections.abc import Iterable, Mapping, Sequence
 
-__all__ = ["parse_orders"]
+from ..errors import ArgumentError
+from .parser import did_you_mean
+
+__all__ = ["SHAFTS", "orders_by_shaft", "parse_orders"]
+
+#: Shafts that every joint may have.
+SHAFTS = ("output", "motor", "wave_generator")
 
 
 def parse_orders(text: str) -> tuple[float, ...]:
@@ -33,3 +39,40 @@ def parse_orders(text: str) -> tuple[float, ...]:
     if not all(0.0 < k < 1e6 for k in found):
         raise ArgumentError(f"orders must be positive and below a million, got {text!r}")
     return tuple(int(k) if k.is_integer() else k for k in sorted(found))
+
+
+def orders_by_shaft(
+    text: str, further: Iterable[str] = ()
+) -> str | Sequence[float] | Mapping[str, Sequence[float]]:
+    """``auto``, ``1-17``, ``1,4,8`` or ``output:1-3;motor:1,2`` as orders.
+
+    ``further`` names shafts beside those of `SHAFTS`.
+
+    Raises
+    ------
+    ArgumentError
+        A list that is none, a shaft that is named twice or is none.
+
+    Examples
+    --------
+    >>> orders_by_shaft("output:1-3;motor:2")
+    {'output': (1, 2, 3), 'motor': (2,)}
+    """
+    if text == "auto":
+        return text
+    if ":" not in text:
+        return parse_orders(text)
+    known = [*SHAFTS, *further]
+    by_shaft: dict[str, Sequence[float]] = {}
+    for part in text.split(";"):
+        name, _, orders = part.partition(":")
+        shaft = name.strip()
+        if shaft not in known:
+            raise ArgumentError(
+                f"--orders: there is no shaft {shaft!r}{did_you_mean(shaft, known)}; "
+                f"the shafts are {', '.join(known)}"
+            )
+        if shaft in by_shaft:
+            raise ArgumentError(f"--orders names shaft {shaft!r} twice: {text!r}")
+        by_shaft[shaft] = parse_orders(orders)
+    return by_shaft

@@ -7,7 +7,8 @@ import json
 
 from ..errors import ArgumentError
 from ..files import PDF, REPORT
-from .fit import add_joint, orders_by_shaft
+from .fit import add_joint
+from .order_lists import orders_by_shaft
 from .paths import Input, Output
 
 HELP = "write a report on calibration runs: one HTML page, or a PDF"

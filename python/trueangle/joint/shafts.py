@@ -124,7 +124,7 @@ def resolve_orders(
     for name, asked in by_shaft.items():
         if name not in cycles:
             raise ArgumentError(
-                f"how fast shaft {name!r} turns is not known: give gear_ratio, or "
+                f"how fast shaft {name!r} turns is not known: give gear_ratio (--gear-ratio), or "
                 f"shafts={{{name!r}: cycles per output turn}}"
             )
         checked = tuple(sorted({_order(order, name) for order in asked}))

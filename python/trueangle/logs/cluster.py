@@ -120,9 +120,10 @@ def _submitted(
         if log.is_done:
             before = _Outcome(log.result)
             continue
-        manifest = None if place.manifest is None else place.manifest.resolve()
+        # Not resolved: links are followed where files are written, and the manifest's names stay.
+        manifest = None if place.manifest is None else place.manifest.absolute()
         begin = begins.get(place.source)
-        task = Task(place.source.resolve(), place.target.resolve(), settings, begin, manifest)
+        task = Task(place.source.absolute(), place.target.absolute(), settings, begin, manifest)
         before = client.submit(
             _correct, task, before if settings.follows_travel else None, pure=False
         )

@@ -103,8 +103,8 @@ class Progress:
             self._stream.write(json.dumps(state) + "\n")
         else:
             text = (
-                f"{self.files}/{self._files} files, {self.rows:.3g} rows, "
-                f"{rate:.3g} rows/s, {100 * size / self._total:.0f} %"
+                f"{self.files}/{self._files} files, {self.rows:,} rows, "
+                f"{rate:,.0f} rows/s, {100 * size / self._total:.0f} %"
             )
             text += "" if left is None else f", {_clock_text(left)} left"
             self._stream.write("\r" + text.ljust(self._width))
