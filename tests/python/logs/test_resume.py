@@ -7,6 +7,7 @@ import pytest
 
 import trueangle as ta
 from trueangle.cli import main
+from trueangle.terms import Backlash
 
 from .conftest import made_angles, made_model
 
@@ -67,7 +68,7 @@ CHANGES = {
                 made_model().shafts,
                 constant=0.2,
                 period=360.0,
-                terms=[ta.terms.Backlash(half_width=0.01)],
+                terms=[Backlash(half_width=0.01)],
             )
         },
     ),
@@ -164,9 +165,7 @@ def test_a_lost_output_is_made_anew_in_its_own_turns(lost, logs, angles, tmp_pat
 def test_a_log_after_a_damaged_one_begins_its_own_travel(logs, tmp_path):
     """Of a model that asks for the direction only: the others are corrected nevertheless."""
     shafts = made_model().shafts
-    model = ta.HarmonicModel(
-        shafts, constant=0.2, period=360.0, terms=[ta.terms.Backlash(half_width=0.02)]
-    )
+    model = ta.HarmonicModel(shafts, constant=0.2, period=360.0, terms=[Backlash(half_width=0.02)])
     damaged = (logs / "1.csv").read_bytes()
     (logs / "1.csv").write_bytes(damaged.replace(b"\n", b"\nx", 300))
     report = ta.correct_logs(logs, model, tmp_path / "out")
