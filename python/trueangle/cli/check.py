@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import argparse
 
+from .paths import Input
+
 HELP = "say whether data are fit to be used, and what they can tell, before anything is fitted"
 EXAMPLE = "trueangle check runs.csv"
 
@@ -11,7 +13,7 @@ EXAMPLE = "trueangle check runs.csv"
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command's arguments."""
     add = parser.add_argument
-    add("files", nargs="+", metavar="FILES", help="calibration runs (CSV or Parquet)")
+    add("files", nargs="+", type=Input, metavar="FILES", help="calibration runs (CSV or Parquet)")
     add("--counts-per-turn", type=float, metavar="N", help="unit of indicated_count")
     add("--json", action="store_true", help="print the result as JSON")
 
