@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..errors import ArgumentError, TrueAngleError
 from .paths import Input, ModelInput
+from .terminal import own_interrupts
 
 if TYPE_CHECKING:
     from ..logs.batch import BatchReport, LogReport
@@ -89,6 +90,7 @@ def run(args: argparse.Namespace) -> int:
 
     from ..logs.batch import correct_logs
 
+    own_interrupts()
     progress = args.progress
     if progress == "auto" and args.json and sys.stderr.isatty():
         progress = "json"

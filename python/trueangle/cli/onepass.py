@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..errors import ArgumentError
+from .terminal import own_interrupts
 
 if TYPE_CHECKING:
     from ..logs.fitting import LogFit
@@ -80,6 +81,7 @@ def fit_in_one_pass(args: argparse.Namespace, orders: Any) -> LogFit:
     """Fit by the arguments of a command."""
     from ..logs.fitting import fit_logs
 
+    own_interrupts()
     return fit_logs(
         args.runs,
         orders,

@@ -9,7 +9,7 @@ import sys
 from collections.abc import Iterator
 from typing import Any, Final, TextIO
 
-__all__ = ["STANDARD_OUTPUT", "Plain", "plain_streams", "printable", "silence"]
+__all__ = ["STANDARD_OUTPUT", "Plain", "own_interrupts", "plain_streams", "printable", "silence"]
 
 STANDARD_OUTPUT: Final = "standard output"
 
@@ -101,6 +101,18 @@ def plain_streams() -> Iterator[None]:
         if err is not None:
             stack.enter_context(contextlib.redirect_stderr(Plain(err, "standard error")))
         yield
+
+
+def own_interrupts() -> None:
+    """Let Ctrl-C reach Python alone, before logs are read.
+
+    While it parses a block, pyarrow takes signals itself, and now and then loses one.
+    """
+    try:
+        import pyarrow
+    except ImportError:
+        return
+    pyarrow.enable_signal_handlers(False)
 
 
 def silence() -> None:
