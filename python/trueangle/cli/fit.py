@@ -4,11 +4,17 @@ from __future__ import annotations
 
 import argparse
 import json
+import math
+from typing import TYPE_CHECKING
 
+from ..angles import arcsec
 from ..files import MODEL
 from .onepass import add_one_pass, saved, wants_one_pass
 from .order_lists import orders_by_shaft
 from .paths import Input, Output
+
+if TYPE_CHECKING:
+    from ..fitting.result import FitResult
 
 HELP = "fit a harmonic model to calibration runs and save it"
 EXAMPLE = "trueangle fit joint_a.csv -o joint_a.json --gear-ratio 100"
@@ -34,6 +40,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     add_joint(parser)
     add_argument_choice(parser)
+    add_covariance(parser)
     parser.add_argument(
         "--loss",
         choices=("auto", "linear", "huber", "tukey"),
@@ -79,6 +86,18 @@ def add_argument_choice(parser: argparse.ArgumentParser) -> None:
     )
 
 
+def add_covariance(parser: argparse.ArgumentParser) -> None:
+    """How standard errors are taken; shared by several commands."""
+    parser.add_argument(
+        "--covariance",
+        choices=("auto", "white", "cluster", "hac"),
+        default="auto",
+        help="standard errors of independent readings (white), by the scatter between runs "
+        "(cluster) or between stretches of readings (hac); default: white unless correlation "
+        "is found",
+    )
+
+
 def run(args: argparse.Namespace) -> int:
     """Fit, save, print."""
     from ..fitting.fit import fit
@@ -93,6 +112,7 @@ def run(args: argparse.Namespace) -> int:
         fixed_member=args.fixed_member,
         argument=args.argument,
         loss=args.loss,
+        covariance=args.covariance,
     )
     result.model.save(args.output)
     if args.json:
@@ -103,11 +123,7 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
-def _as_json(result: object, path: str) -> dict[str, object]:
-    from ..angles import arcsec
-    from ..fitting.result import FitResult
-
-    assert isinstance(result, FitResult)
+def _as_json(result: FitResult, path: str) -> dict[str, object]:
     model = result.model
     return {
         "model": path,
@@ -118,16 +134,30 @@ def _as_json(result: object, path: str) -> dict[str, object]:
         "method": result.method,
         "ridge": result.ridge,
         "offset_spread_arcsec": arcsec(result.offset_spread, model.period),
+        "covariance": result.uncertainty.kind,
         "wild": [list(place) for place in result.wild],
         "orders": [
             {
                 "shaft": shaft.name,
                 "order": order,
                 "amplitude_arcsec": arcsec(float(shaft.amplitudes[i]), model.period),
-                "phase_deg": float(shaft.phases[i]) * 57.29577951308232 % 360.0,
+                "phase_deg": math.degrees(float(shaft.phases[i])) % 360.0,
+                **_spread(result, n),
             }
-            for shaft in model.shafts
-            for i, order in enumerate(shaft.orders)
+            for n, (shaft, i, order) in enumerate(
+                (shaft, i, order) for shaft in model.shafts for i, order in enumerate(shaft.orders)
+            )
         ],
         "notes": list(result.notes),
+    }
+
+
+def _spread(result: FitResult, n: int) -> dict[str, object]:
+    """Standard error and 95 % interval of one amplitude; null where nothing tells them."""
+    if result.model.covariance is None:
+        return {"std_arcsec": None, "interval_arcsec": None}
+    period = result.model.period
+    return {
+        "std_arcsec": arcsec(float(result.amplitude_std[n]), period),
+        "interval_arcsec": [arcsec(v, period) for v in result.amplitude_interval()[n].tolist()],
     }

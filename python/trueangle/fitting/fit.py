@@ -19,6 +19,7 @@ from .result import FitResult
 from .ridge import choose_ridge
 from .robust import Loss, weigh, without_spikes
 from .travel import CONDITION, travelled_span
+from .uncertainty import CovarianceKind, check_covariance
 
 if TYPE_CHECKING:
     from ..orders.select import OrderSelection
@@ -40,6 +41,7 @@ def fit(
     argument: AnyArgument = "auto",
     loss: Loss = "auto",
     ridge: float | None = None,
+    covariance: CovarianceKind = "auto",
     method: str | None = None,
     threads: int | None = None,
 ) -> FitResult:
@@ -74,6 +76,12 @@ def fit(
         Tikhonov penalty relative to the sum of weights. By default 0 on a full turn, and
         chosen by held-out error on partial travel and where orders of several shafts nearly
         cancel over the travel (`trueangle.fitting.ridge.choose_ridge`).
+    covariance : {"auto", "white", "cluster", "hac"}
+        ``"white"``: independent readings; ``"cluster"``: by the scatter between whole runs,
+        right for any correlation within them; ``"hac"``: by stretches of readings, right
+        where the correlation dies out. ``"auto"``: white unless the residuals correlate in
+        time or the runs scatter by more, then clusters (three runs and more) or stretches;
+        the notes say so. Intervals: `FitResult.interval`.
     method : {"plain", "moments", "qr", "counts"}, optional
         Forces a way of solving: QR of all rows, one pass of piecewise moments with normal
         equations or with QR, or one mean error per count of an encoder that counts (whole
@@ -114,6 +122,7 @@ def fit(
         raise ArgumentError(
             f"argument must be 'auto', 'reference' or 'indicated', got {argument!r}"
         )
+    check_covariance(covariance, len(found))
     for run in found:
         check_follows(run)
     selection = None
@@ -143,7 +152,9 @@ def fit(
     if unlike:
         remarks.append(unlike_sentence(problem, unlike))
         warnings.warn(remarks[-1], UnlikeRunsWarning, stacklevel=2)
-    return FitResult(problem, fitted, weighted, loss, ridge, span, selection, joint, tuple(remarks))
+    return FitResult(
+        problem, fitted, weighted, loss, ridge, span, selection, joint, tuple(remarks), covariance
+    )
 
 
 def _selected(

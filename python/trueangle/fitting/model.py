@@ -26,7 +26,7 @@ _COUNTED = 20_000
 def build_model(fit: FitResult) -> HarmonicModel:
     """The fitted series with its covariance, record and provenance."""
     problem, solution = fit.problem, fit.fitted.solution
-    covariance = np.asarray(solution.covariance)
+    covariance = fit.uncertainty.covariance
     sources = dict.fromkeys(run.source for run in problem.runs if run.source is not None)
     return HarmonicModel(
         shafts=tuple(
@@ -57,6 +57,8 @@ def fit_notes(fit: FitResult) -> Iterable[str]:
         )
     if weighted.weights is not None and weighted.wild:
         yield f"{weighted.wild} wild reading{'s' if weighted.wild > 1 else ''} set aside."
+    if fit.uncertainty.note:
+        yield _sentence(fit.uncertainty.note)
     fractional = [s.name for s in fit.problem.shafts if s.cycles_per_turn % 1.0]
     if fractional:
         yield (

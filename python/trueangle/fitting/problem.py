@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
 from functools import cached_property
 from typing import Any, Literal, NamedTuple, cast
 
@@ -17,6 +16,7 @@ from ..errors import ArgumentError
 from ..model import Argument
 from ..runs import CalibrationRun
 from ..shafts import ShaftOrders
+from .travel import over_turns
 
 __all__ = ["METHODS", "Fitted", "Problem"]
 
@@ -105,7 +105,7 @@ class Problem:
     ) -> None:
         #: False where a shaft turns a fraction of times per output turn.
         self.is_periodic = all(float(s.cycles_per_turn).is_integer() for s in shafts)
-        self.runs = runs if self.is_periodic else [_unwrapped(run) for run in runs]
+        self.runs = runs if self.is_periodic else [over_turns(run) for run in runs]
         self.shafts = shafts
         if method not in METHODS:
             known = ", ".join(repr(name) for name in METHODS[1:])
@@ -193,17 +193,3 @@ class Problem:
                 offset = circular_mean(indicated - reference - block, self.period)
             _core.residuals(indicated, reference, offset, self.period, block)
             yield block
-
-
-def _unwrapped(run: CalibrationRun) -> CalibrationRun:
-    """The run over as many turns as it took: where the error does not repeat after one."""
-    reference = run.unwrapped_reference
-    indicated = reference + run.centred_error
-    # Rounding must not move a run that was given without jumps.
-    if np.abs(reference - run.reference).max() < 0.5 * run.period:
-        reference = run.reference
-    if np.abs(indicated - run.indicated).max() < 0.5 * run.period:
-        indicated = run.indicated
-    if reference is run.reference and indicated is run.indicated:
-        return run
-    return replace(run, reference=reference, indicated=indicated)

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..distributions import student_quantile
 from ..errors import ArgumentError
 from ..model import HarmonicModel
 from ..runs import CalibrationRun
@@ -18,6 +19,7 @@ from .model import build_model, fit_notes
 from .problem import Fitted, Problem
 from .robust import Weighted
 from .travel import Span
+from .uncertainty import CovarianceKind, Uncertainty, uncertainty
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -55,6 +57,8 @@ class FitResult:
         Gear ratio (or None) and fixed member, as told.
     remarks : tuple of str
         What the choice of the angle, of the weights and of the runs found; among `notes`.
+    covariance_asked : {"auto", "white", "cluster", "hac"}
+        The covariance asked for; `uncertainty` has the one taken.
     """
 
     problem: Problem
@@ -66,6 +70,7 @@ class FitResult:
     selection: OrderSelection | None
     joint: tuple[float | None, str]
     remarks: tuple[str, ...] = ()
+    covariance_asked: CovarianceKind = "auto"
 
     @cached_property
     def model(self) -> HarmonicModel:
@@ -142,6 +147,65 @@ class FitResult:
                 "no covariance: as many unknowns as readings leave no residual to take it from"
             )
         return self.model.covariance
+
+    @cached_property
+    def uncertainty(self) -> Uncertainty:
+        """Covariance, its kind and the degrees of freedom of each coefficient's variance."""
+        weights = self.weights or self.problem.base
+        return uncertainty(self.problem, self.fitted, weights, self.ridge, self.covariance_asked)
+
+    def interval(self, level: float = 0.95) -> Array:
+        r"""Intervals that hold the true coefficients at this level.
+
+        .. math:: b_i \pm t_{(1 + p) / 2,\, \nu_i} \, u(b_i)
+
+        with Student's quantile for the effective degrees of freedom of each standard error:
+        few runs tell a standard error roughly.
+
+        Parameters
+        ----------
+        level : float
+            Between 0 and 1.
+
+        Returns
+        -------
+        ndarray, shape (coefficients, 2)
+            Low and high end for ``[constant, A, B of each order of each shaft in turn]``.
+
+        Examples
+        --------
+        >>> theta = np.arange(0.0, 360.0, 5.0)
+        >>> noise = np.random.default_rng(1).normal(0.0, 0.01, theta.size)
+        >>> run = CalibrationRun(theta, theta + 0.5 * np.sin(np.radians(theta)) + noise, 360.0)
+        >>> import trueangle as ta
+        >>> low, high = ta.fit(run, orders=[1]).interval()[2]
+        >>> bool(low < 0.5 < high)
+        True
+        """
+        pairs = [(a, b) for s in self.model.shafts for a, b in zip(s.cosine, s.sine, strict=True)]
+        values = np.concatenate([[self.model.constant], np.ravel(pairs)])
+        return self._around(values, np.sqrt(np.diag(self.covariance)), self.freedom, level)
+
+    def amplitude_interval(self, level: float = 0.95) -> Array:
+        """Intervals of `amplitudes`, as `interval`; the low end is 0 at least.
+
+        Right where the amplitude is well above its standard error (`amplitude_std`).
+        """
+        both = self.freedom[1:].reshape(-1, 2).min(axis=1)
+        found = self._around(self.amplitudes, self.amplitude_std, both, level)
+        return np.asarray(np.maximum(found, 0.0))
+
+    @property
+    def freedom(self) -> Array:
+        """Effective degrees of freedom of each variance in the diagonal of `covariance`."""
+        return self.uncertainty.freedom
+
+    @staticmethod
+    def _around(values: Array, std: Array, freedom: Array, level: float) -> Array:
+        if not 0.0 < level < 1.0:
+            raise ArgumentError(f"level must lie between 0 and 1, got {level!r}")
+        times = np.array([student_quantile(0.5 + 0.5 * level, float(v)) for v in freedom])
+        return np.asarray(np.column_stack([values - times * std, values + times * std]))
 
     @cached_property
     def residuals(self) -> Array:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..angles import arcsec, unit_name
+from ..distributions import student_quantile
 
 if TYPE_CHECKING:
     from .result import FitResult
@@ -32,6 +33,8 @@ def fit_summary(fit: FitResult) -> str:
     ]
     label, text = head[3]
     head[3] = (label, text + f"{fit.degrees_of_freedom:.6g} degrees of freedom")
+    if model.covariance is not None:
+        head.append(("intervals", _intervals(fit)))
     lines = ["Harmonic model of the angle error (error = indicated - reference)", ""]
     lines += [f"  {label:<10} {text}" for label, text in head]
     lines += ["", *_table(fit)]
@@ -47,6 +50,22 @@ def _spread(fit: FitResult) -> str:
         f", circular mean of {len(fit.runs)} runs that differ by "
         f"{arcsec(fit.offset_spread, fit.model.period):.2f} arcsec (standard deviation)"
     )
+
+
+def _intervals(fit: FitResult) -> str:
+    """By how many standard errors 95 % intervals reach, and whose covariance it is."""
+    found = fit.uncertainty
+    least, most = float(found.freedom.min()), float(found.freedom.max())
+    near, far = (student_quantile(0.975, v) for v in (most, least))
+    times = f"{far:.3g}" if far < near + 0.05 else f"{near:.3g} to {far:.3g}"
+    return f"95 % within {times} standard errors, {_KINDS[found.kind]}"
+
+
+_KINDS = {
+    "white": "white noise",
+    "cluster": "by the scatter between runs",
+    "hac": "by the scatter of stretches of the readings",
+}
 
 
 def _table(fit: FitResult) -> list[str]:

@@ -8,14 +8,16 @@ a hundred degrees that run wild outside the arc.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .. import _core
+from ..runs import CalibrationRun
 
-__all__ = ["Span", "covered_span", "travelled_span"]
+__all__ = ["Span", "covered_span", "over_turns", "travelled_span"]
 
 Array = NDArray[np.float64]
 
@@ -25,6 +27,10 @@ _LOOKED_AT = 65_536
 #: Below this condition number of the design plain least squares is harmless on an arc.
 #: Orders 0..8 reach 31 on 300 deg of travel, 274 on 270 deg.
 CONDITION = 30.0
+
+
+#: Angles are a sweep when they jump over a turn's border in fewer than this share of steps.
+_JUMPS = 0.1
 
 
 class Span(NamedTuple):
@@ -78,3 +84,22 @@ def travelled_span(angles: Sequence[Array], period: float, periodic: bool) -> Sp
         return covered_span(angles, period)
     low, high = min(float(x.min()) for x in angles), max(float(x.max()) for x in angles)
     return Span(low, high, False)
+
+
+def over_turns(run: CalibrationRun) -> CalibrationRun:
+    """The run with its angles over as many turns as it took, where they were given within one.
+
+    Angles beyond one turn are taken as they are, and so are readings in no order: how many
+    turns lie between them is not known.
+
+    Examples
+    --------
+    >>> run = CalibrationRun([200.0, 300.0, 40.0, 140.0], [200.0, 300.0, 40.0, 140.0], 360.0)
+    >>> over_turns(run).reference
+    array([200., 300., 400., 500.])
+    """
+    jumps = np.count_nonzero(np.abs(np.diff(run.reference)) > 0.5 * run.period)
+    if np.ptp(run.reference) > run.period or not 0 < jumps <= max(1.0, _JUMPS * len(run)):
+        return run
+    reference = run.unwrapped_reference
+    return replace(run, reference=reference, indicated=reference + run.centred_error)

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from ..aliasing import distinct_positions
 from ..errors import ArgumentError
 from ..fitting.argument import AnyArgument, at_indicated, choose_argument
+from ..fitting.travel import over_turns
 from ..runs import CalibrationRun, as_runs
 from .candidates import choose_candidates
 from .paper import select_by_paper
@@ -148,5 +149,5 @@ def _travelled(runs: Sequence[CalibrationRun], gear_ratio: float | None) -> Arra
     """Angles of the readings in turns, whole turns kept; None where every order is whole."""
     if gear_ratio is None or float(gear_ratio).is_integer():
         return None
-    turns = np.concatenate([run.unwrapped_reference for run in runs]) / runs[0].period
+    turns = np.concatenate([over_turns(run).reference for run in runs]) / runs[0].period
     return np.asarray(turns[:: max(1, turns.size // _LOOKED_AT)])

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..aliasing import Positions
+from ..fitting.travel import over_turns
 from ..runs import CalibrationRun
 from .harmonicsums import Readings
 
@@ -25,12 +26,12 @@ def units_of(
     """Units with a zero of their own: runs, split where the mount changes within one.
 
     Returns the units and the place of each of their readings among all readings of the
-    runs. Angles are unwrapped unless ``whole`` (all orders are whole).
+    runs. Angles are taken over turns unless ``whole`` (all orders are whole).
     """
     units, places, start = [], [], 0
     for number, run in enumerate(runs):
         label = run.label or str(number + 1)
-        angle = run.reference if whole else run.unwrapped_reference
+        angle = (run if whole else over_turns(run)).reference
         weights = np.ones(len(run)) if run.weights is None else run.weights
         everything = Readings(angle / run.period, run.centred_error, weights, label)
         place = np.arange(start, start + len(run))

@@ -1,0 +1,177 @@
+"""Covariances that hold: intervals under white and correlated noise, bounded from both sides."""
+
+import json
+
+import numpy as np
+import pytest
+
+import trueangle as ta
+from trueangle.cli import main
+from trueangle.distributions import student_quantile
+from trueangle.errors import ArgumentError
+from trueangle.fitting.clusters import Cluster, robust_covariance
+
+#: Order, amplitude (deg), phase (deg).
+LINES = ((1, 0.1, 30.0), (2, 0.05, 200.0), (5, 0.03, 100.0))
+TRUE = np.ravel([[c * np.sin(np.radians(p)), c * np.cos(np.radians(p))] for _, c, p in LINES])
+SIGMA = 0.02
+#: Sets of a case, and the shares of intervals that hold the truth: 95 % within 3 standard
+#: deviations of 360 coefficients. Errors 1.3 times too large or too small fall out.
+SETS, LOW, HIGH = 60, 0.915, 0.985
+
+
+def correlated(rng, memory, n):
+    """AR(1) noise of variance 1, or (None) noise of spectrum 1/f."""
+    if memory is None:
+        f = np.fft.rfftfreq(4 * n)
+        f[0] = f[1]
+        x = np.fft.irfft((rng.normal(size=f.size) + 1j * rng.normal(size=f.size)) / np.sqrt(f))
+        return x[:n] / x.std()
+    e = rng.normal(size=n)
+    for i in range(1, n):
+        e[i] = memory * e[i - 1] + np.sqrt(1.0 - memory**2) * e[i]
+    return e
+
+
+def some_runs(seed, design, memory, count=8):
+    rng = np.random.default_rng(seed)
+    runs = []
+    for r in range(count):
+        if design == "grid":
+            x = np.arange(72) * 5.0
+        elif design == "arc":
+            x = np.linspace(20.0, 300.0, 150)[:: 1 if r % 2 else -1]
+        else:
+            first = rng.uniform(0.0, 360.0)
+            x = np.linspace(first, first + rng.uniform(300.0, 900.0), int(rng.integers(100, 300)))
+        error = sum(c * np.sin(np.radians(k * x + p)) for k, c, p in LINES)
+        error = error + SIGMA * correlated(rng, memory, x.size)
+        runs.append(ta.CalibrationRun(x, x + error + rng.uniform(-5, 5), 360.0, label=f"r{r}"))
+    return runs
+
+
+def coverage(design, memory, **options):
+    """Share of the coefficients in their 95 % intervals, and the kinds of covariance taken."""
+    hit, kinds = [], []
+    for seed in range(SETS):
+        found = ta.fit(some_runs(seed, design, memory), orders=[1, 2, 5], **options)
+        low, high = found.interval()[1:].T
+        hit.append((low < TRUE) & (high > TRUE))
+        kinds.append(found.uncertainty.kind)
+    return float(np.mean(hit)), kinds
+
+
+@pytest.mark.parametrize("design", ["grid", "arc", "sweeps"])
+@pytest.mark.parametrize("memory", [0.0, 0.9, None])
+def test_intervals_hold_the_truth_as_often_as_they_say(design, memory):
+    found, kinds = coverage(design, memory)
+    assert LOW <= found <= HIGH
+    taken = "white" if memory == 0.0 else "cluster"
+    assert kinds.count(taken) >= 0.9 * SETS
+
+
+def test_white_covariances_do_not_hold_under_correlated_noise():
+    assert coverage("sweeps", 0.9, covariance="white")[0] < 0.75
+
+
+def test_stretches_of_one_long_run_hold_where_the_correlation_dies_out():
+    hit = []
+    for seed in range(SETS):
+        rng = np.random.default_rng(seed)
+        x = np.linspace(0.0, 3600.0, 3000)
+        error = sum(c * np.sin(np.radians(k * x + p)) for k, c, p in LINES)
+        run = ta.CalibrationRun(x, x + error + SIGMA * correlated(rng, 0.6, x.size), 360.0)
+        found = ta.fit(run, orders=[1, 2, 5])
+        assert found.uncertainty.kind == "hac"
+        low, high = found.interval()[1:].T
+        hit.append((low < TRUE) & (high > TRUE))
+    assert LOW - 0.02 <= np.mean(hit) <= HIGH
+    assert any("cannot be known from one run" in note for note in found.notes)
+
+
+def test_few_readings_say_that_they_cannot_tell():
+    rng = np.random.default_rng(3)
+    x = np.arange(72) * 5.0
+    found = ta.fit(
+        ta.CalibrationRun(x, x + 0.1 * np.sin(np.radians(x)) + 0.01 * rng.normal(size=72), 360.0),
+        [1],
+    )
+    assert any("do not tell whether neighbours correlate" in note for note in found.notes)
+
+
+def test_the_sandwich_is_that_of_the_readings_one_by_one():
+    """CR2 and its degrees of freedom by dense matrices, as Bell and McCaffrey wrote them."""
+    rng = np.random.default_rng(4)
+    sizes = (12, 20, 30, 9)
+    parts = [rng.normal(size=(n, 3)) for n in sizes]
+    left = [rng.normal(size=n) for n in sizes]
+    x = np.vstack(parts)
+    inverse = np.linalg.inv(x.T @ x)
+    hat = np.eye(len(x)) - x @ inverse @ x.T
+    edges = np.cumsum((0, *sizes))
+    meat, rows = np.zeros((3, 3)), []
+    for part, e, a, b in zip(parts, left, edges[:-1], edges[1:], strict=True):
+        values, vectors = np.linalg.eigh(hat[a:b, a:b])
+        adjust = vectors @ np.diag(values**-0.5) @ vectors.T
+        score = part.T @ adjust @ e
+        meat += np.outer(score, score)
+        rows.append(np.zeros((3, len(x))))
+        rows[-1][:, a:b] = inverse @ part.T @ adjust
+    found = robust_covariance([Cluster(p.T @ p, p.T @ e) for p, e in zip(parts, left, strict=True)])
+    np.testing.assert_allclose(found.covariance, inverse @ meat @ inverse, rtol=1e-9)
+    for j in range(3):
+        g = np.array([row[j] @ hat for row in rows])
+        form = g @ g.T
+        assert found.freedom[j] == pytest.approx(np.trace(form) ** 2 / np.sum(form**2), rel=1e-9)
+
+
+def test_equal_runs_have_one_degree_of_freedom_less_than_runs():
+    found = ta.fit(some_runs(1, "grid", 0.0), orders=[1, 2, 5], covariance="cluster")
+    np.testing.assert_allclose(found.freedom, 7.0, rtol=1e-6)
+    std = np.sqrt(np.diag(found.covariance))
+    low, high = found.interval(0.99).T
+    np.testing.assert_allclose(high - low, 2.0 * student_quantile(0.995, 7.0) * std, rtol=1e-6)
+    assert "by the scatter between runs" in found.summary()
+    assert "2.36 standard errors" in found.summary()
+
+
+def test_amplitude_intervals_hold_the_amplitudes():
+    hit = []
+    for seed in range(SETS):
+        found = ta.fit(some_runs(seed, "sweeps", 0.9), orders=[1, 2, 5])
+        low, high = found.amplitude_interval().T
+        hit.append([a < c < b for a, b, (_, c, _) in zip(low, high, LINES, strict=True)])
+    # Few of 180: 3 standard deviations of the share.
+    assert 0.90 <= np.mean(hit) <= 0.995
+
+
+def test_what_is_asked_for_is_taken_or_refused():
+    runs = some_runs(2, "sweeps", 0.9)
+    for kind in ("white", "cluster", "hac"):
+        assert ta.fit(runs, [1, 2, 5], covariance=kind).uncertainty.kind == kind
+    with pytest.raises(ArgumentError, match="covariance must be one of"):
+        ta.fit(runs, [1], covariance="robust")
+    with pytest.raises(ArgumentError, match="two at least"):
+        ta.fit(runs[0], [1], covariance="cluster")
+    with pytest.raises(ArgumentError, match="level must lie between"):
+        ta.fit(runs, [1]).interval(95)
+
+
+def test_the_command_takes_a_covariance(tmp_path, capsys):
+    lines = ["run,reference_deg,indicated_deg"]
+    for run in some_runs(5, "sweeps", 0.9):
+        pairs = zip(run.reference.tolist(), run.indicated.tolist(), strict=True)
+        lines += [f"{run.label},{x!r},{y!r}" for x, y in pairs]
+    path, model = tmp_path / "runs.csv", tmp_path / "model.json"
+    path.write_text("\n".join(lines) + "\n")
+    command = ["fit", str(path), "-o", str(model), "--orders", "1,2,5", "--json"]
+    found = {}
+    for kind in ("auto", "white"):
+        assert main([*command, "--covariance", kind]) == 0
+        found[kind] = json.loads(capsys.readouterr().out)
+    assert found["auto"]["covariance"] == "cluster"
+    assert found["white"]["covariance"] == "white"
+    wide, narrow = (found[kind]["orders"][0]["std_arcsec"] for kind in ("auto", "white"))
+    assert wide > 1.5 * narrow
+    low, high = found["auto"]["orders"][0]["interval_arcsec"]
+    assert low < found["auto"]["orders"][0]["amplitude_arcsec"] < high
