@@ -1,0 +1,302 @@
+"""Questions of the exam and how their answers are judged."""
+
+from __future__ import annotations
+
+import zlib
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from trueangle import CalibrationRun
+
+from ..hidden.answer import diagnose
+from ..hidden.case import Case as HiddenCase
+from ..hidden.case import Question
+from ..hidden.causes import CAUSES, draw
+from ..hidden.designs import DESIGNS
+from ..hidden.joint import Joint, Line, random_joint
+from ..hidden.measurement import ARCSEC, Habit, measure, random_habit
+from ..hidden.reversal import Backlash
+from ..hidden.source import Source
+from .structures import SHAPES, structure
+
+#: Noise of the exam beyond what the logger of the hidden exam knows, and bits of rounding.
+NOISES = ("normal", "heavy", "ar 0.5", "ar 0.9", "uniform", "wander")
+BITS = (12, 13, 14, 15, 16)
+
+#: Wrong beliefs: how the simulation differs from the joint, and the verdict that is right.
+BELIEFS = {
+    "absent line": "absent",
+    "twice": "overestimated",
+    "half": "underestimated",
+    "phase": "wrong_phase",
+    "sign": "wrong_phase",
+    "absent backlash": "absent",
+    "backlash twice": "overestimated",
+    "gear ratio": "wrong_gear_ratio",
+}
+
+#: Large and small effects that stand together at 1 : 0.2.
+SEVERAL = (
+    ("backlash", "thermal_drift"),
+    ("torsional_compliance", "backlash"),
+    ("presliding_hysteresis", "zero_slip"),
+    ("latency", "missing_order"),
+    ("missing_order", "backlash"),
+    ("thermal_drift", "sidebands", "torsional_compliance"),
+    ("torsional_compliance", "missing_order", "outliers"),
+)
+
+#: Causes asked at eight sigma: those whose forms the library knows to a few percent.
+HIGH = (
+    "presliding_hysteresis",
+    "thermal_drift",
+    "torsional_compliance",
+    "stiffening_compliance",
+    "load_dependent_gear_error",
+    "drift_within_run",
+    "sidebands",
+    "reference_error",
+    "backlash",
+    "latency",
+)
+
+#: Outliers and local defects take too few readings, non-integer orders slip: not at 8 sigma.
+SIGMAS = 8.0
+
+
+@dataclass(frozen=True)
+class Case:
+    """One question: a group, what is hidden, how strongly, and a seed."""
+
+    group: str  # "outside", "nothing", "belief", "several", "high"
+    kind: str
+    scale: float = 1.0
+    seed: int = 0
+
+    def __str__(self) -> str:
+        return f"{self.group}: {self.kind} x{self.scale:g}, seed {self.seed}"
+
+    def rng(self) -> np.random.Generator:
+        return np.random.default_rng([self.seed, 71, zlib.crc32((self.group + self.kind).encode())])
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """The judged answer."""
+
+    case: Case
+    right: bool
+    confirmed: tuple[str, ...]
+    listed: tuple[str, ...]
+    unexplained: bool
+    evidence: str
+    seconds: float
+
+    def __str__(self) -> str:
+        return (
+            f"{'ok  ' if self.right else 'FAIL'} {self.case}: {list(self.confirmed)}"
+            f"{' listed ' + str(list(self.listed)) if self.listed else ''} "
+            f"{'unexplained: ' + self.evidence if self.unexplained else ''} {self.seconds:.1f} s"
+        )
+
+
+def ask(case: Case) -> Verdict:
+    """Pose a case, diagnose it and judge the answer."""
+    question, truth, text = POSERS[case.group](case)
+    report, seconds = diagnose(question, text)
+    found = report["findings"]
+    confirmed = tuple(f["cause"] for f in found if f.get("status", "confirmed") == "confirmed")
+    listed = tuple(f["cause"] for f in found if f.get("status", "confirmed") != "confirmed")
+    unexplained = report.get("unexplained") or {"found": False, "evidence": []}
+    firing = unexplained["evidence"][0]["says"] if unexplained["found"] else ""
+    right = JUDGES[case.group](case, report, confirmed, bool(unexplained["found"]), truth)
+    return Verdict(case, right, confirmed, listed, bool(unexplained["found"]), firing, seconds)
+
+
+def _question(
+    case: Case, joint: Joint, habit: Habit, sources: tuple[Source, ...], rng: np.random.Generator
+) -> Question:
+    name = "rich" if rng.integers(2) else "rich_constant_load"
+    if any(isinstance(s, Source) and s.cause == "stiffening_compliance" for s in sources):
+        name = "rich"
+    design = DESIGNS[name]
+    scenes = design.scenes(rng)
+    sized = tuple(s.sized(joint, scenes, rms) for s, rms in ((s, s.size) for s in sources))
+    for source in sized:
+        joint = source.adapt(joint)
+    runs = measure(joint, design, scenes, sized, habit, rng)
+    return Question(HiddenCase((), design=name), joint, scenes, sized, habit, runs)
+
+
+Posed = tuple[Question, Any, str | None]
+
+
+def outside(case: Case) -> Posed:
+    rng = case.rng()
+    joint, habit = random_joint(rng), random_habit(rng)
+    hidden = replace(structure(case.kind, rng), size=case.scale * habit.sigma)
+    question = _question(case, joint, habit, (hidden,), rng)
+    return question, SHAPES[case.kind][1], None
+
+
+def nothing(case: Case) -> Posed:
+    rng = case.rng()
+    joint, habit = random_joint(rng), random_habit(rng)
+    if case.kind.startswith("bits"):
+        step = 1_296_000.0 / 2 ** int(case.kind.split()[1]) / joint.gear_ratio
+        habit = replace(habit, resolution=step)
+    elif case.kind in ("normal", "heavy"):
+        habit = replace(habit, noise=case.kind)
+    else:
+        habit = replace(habit, sigma=1e-9)
+    question = _question(case, joint, habit, (), rng)
+    if habit.sigma == 1e-9:
+        sigma = float(rng.uniform(1.0, 2.0))
+        runs = [_noisy(run, case.kind, sigma, rng) for run in question.runs]
+        question = replace(question, runs=runs, habit=replace(habit, sigma=sigma))
+    return question, None, None
+
+
+def _noisy(
+    run: CalibrationRun, kind: str, sigma: float, rng: np.random.Generator
+) -> CalibrationRun:
+    """A run with noise of another kind added."""
+    n = len(run)
+    if kind == "uniform":
+        noise = rng.uniform(-np.sqrt(3.0), np.sqrt(3.0), n)
+    elif kind == "wander":
+        assert run.time is not None
+        u = (run.time - run.time[0]) / (run.time[-1] - run.time[0])
+        k = np.arange(1, 31)
+        waves = np.cos(np.pi * np.outer(u, k) + rng.uniform(0.0, 6.28, 30)) / np.sqrt(k)
+        noise = rng.normal(size=n) + waves @ rng.normal(size=30)
+    else:
+        rho = float(kind.split()[1])
+        noise = rng.normal(size=n)
+        for i in range(1, n):
+            noise[i] = rho * noise[i - 1] + np.sqrt(1.0 - rho**2) * noise[i]
+    return replace(run, indicated=run.indicated + sigma * ARCSEC * noise)
+
+
+def belief(case: Case) -> Posed:
+    """The simulation believes something that the joint does otherwise."""
+    rng = case.rng()
+    joint, habit = random_joint(rng), random_habit(rng)
+    k = int(rng.integers(len(joint.lines)))
+    line, believed, sources, extra = joint.lines[k], joint, (), ""
+    if case.kind == "absent line":
+        believed = replace(joint, lines=(*joint.lines, Line("output", 7, 6.0, 40.0)))
+        line = believed.lines[-1]
+    elif case.kind in ("twice", "half", "phase", "sign"):
+        wrong = {
+            "twice": replace(line, amplitude=2.0 * line.amplitude),
+            "half": replace(line, amplitude=0.5 * line.amplitude),
+            "phase": replace(line, phase=line.phase + float(rng.uniform(50.0, 120.0))),
+            "sign": replace(line, phase=line.phase + 180.0),
+        }[case.kind]
+        believed = replace(joint, lines=tuple(wrong if x is line else x for x in joint.lines))
+    elif case.kind == "gear ratio":
+        believed = replace(joint, gear_ratio=joint.gear_ratio + float(rng.choice([-0.5, 0.5, 1.0])))
+    else:
+        width = 3.0
+        extra = f'\n[[effect]]\nkind = "backlash"\nhalf_width_arcsec = {2.0 * width}\n'
+        if case.kind == "backlash twice":
+            sources = (replace(Backlash(), size=width),)
+    question = _question(case, joint, habit, sources, rng)
+    return question, line, believed.simulation(habit.sigma) + extra
+
+
+def several(case: Case) -> Posed:
+    """A large effect and one or two of a fifth of its size."""
+    rng = case.rng()
+    joint, habit = random_joint(rng), random_habit(rng)
+    causes = case.kind.split("+")
+    rich = DESIGNS["rich"].scenes(rng)
+    drawn = []
+    for k, cause in enumerate(causes):
+        source = draw(cause, 1.0, joint, rich, rng)
+        rms = 4.0 * case.scale * CAUSES[cause][1] * (1.0 if k == 0 else 0.2)
+        drawn.append(replace(source, size=rms))
+    return _question(case, joint, habit, tuple(drawn), rng), frozenset(causes), None
+
+
+def high(case: Case) -> Posed:
+    """One effect of eight sigma."""
+    rng = case.rng()
+    joint, habit = random_joint(rng), random_habit(rng)
+    source = draw(case.kind, 1.0, joint, DESIGNS["rich"].scenes(rng), rng)
+    hidden = replace(source, size=SIGMAS * habit.sigma)
+    return _question(case, joint, habit, (hidden,), rng), frozenset({case.kind}), None
+
+
+POSERS: dict[str, Callable[[Case], Posed]] = {
+    "outside": outside,
+    "nothing": nothing,
+    "belief": belief,
+    "several": several,
+    "high": high,
+}
+
+
+def _outside_right(
+    case: Case, report: Any, confirmed: tuple[str, ...], unexplained: bool, names: Any
+) -> bool:
+    """The right broader name or `unexplained`, and no false confirmed name."""
+    return set(confirmed) <= names and (bool(set(confirmed) & names) or unexplained)
+
+
+def _nothing_right(
+    case: Case, report: Any, confirmed: tuple[str, ...], unexplained: bool, names: Any
+) -> bool:
+    allowed = {"quantisation"} if case.kind.startswith("bits") else set()
+    if case.kind == "wander":  # drift, or unexplained, and nothing else
+        return set(confirmed) <= {"drift_within_run"}
+    return set(confirmed) <= allowed and not unexplained
+
+
+def _belief_right(
+    case: Case, report: Any, confirmed: tuple[str, ...], unexplained: bool, line: Any
+) -> bool:
+    wanted = BELIEFS[case.kind]
+    if wanted == "wrong_gear_ratio":
+        return "wrong_gear_ratio" in confirmed and "missing_order" not in confirmed
+    judged = {b["what"]: b["verdict"] for b in report.get("beliefs", [])}
+    wrong = {what: verdict for what, verdict in judged.items() if verdict != "confirmed"}
+    return list(wrong.values()) == [wanted] and not confirmed
+
+
+def _all_and_only(
+    case: Case, report: Any, confirmed: tuple[str, ...], unexplained: bool, names: Any
+) -> bool:
+    return set(confirmed) == set(names)
+
+
+def _no_companion(
+    case: Case, report: Any, confirmed: tuple[str, ...], unexplained: bool, names: Any
+) -> bool:
+    """The cause, and nothing else confirmed."""
+    return set(confirmed) == set(names)
+
+
+JUDGES = {
+    "outside": _outside_right,
+    "nothing": _nothing_right,
+    "belief": _belief_right,
+    "several": _all_and_only,
+    "high": _no_companion,
+}
+
+
+def cases(group: str, seeds: range, scale: float = 1.0) -> list[Case]:
+    """All questions of a group."""
+    kinds = {
+        "outside": [*SHAPES],
+        "nothing": [*NOISES, *(f"bits {b}" for b in BITS)],
+        "belief": [*BELIEFS],
+        "several": ["+".join(s) for s in SEVERAL],
+        "high": [*HIGH],
+    }[group]
+    return [Case(group, kind, scale, seed) for kind in kinds for seed in seeds]
