@@ -169,11 +169,16 @@ def test_a_believed_line_of_another_size_is_corrected():
     sim = believed(rich(1))
     truth = Simulation(JOINT, (*LINES[:-1], Harmonic("wave_generator", 2, 36.0, 115.0)), (), 1.5)
     result = ta.diagnose(simulate(truth, 1, sim.runs), sim)
-    assert causes(result) == ["missing_order"]
-    found = result.findings[0].parameters
-    assert found["output_order"].value == 102.0
-    assert found["amplitude_arcsec"].value == pytest.approx(3.0, abs=4 * 0.04)
-    assert found["simulated_amplitude_arcsec"].value == pytest.approx(33.0)
+    # What the simulation has already is corrected, and is no missing order.
+    assert causes(result) == []
+    (wrong,) = [belief for belief in result.beliefs if belief.verdict != "confirmed"]
+    assert (wrong.what, wrong.verdict) == ("wave_generator order 2", "underestimated")
+    assert wrong.believed["amplitude_arcsec"] == pytest.approx(33.0)
+    assert wrong.measured["amplitude_arcsec"] == pytest.approx(36.0, abs=4 * 0.04)
+    assert wrong.gain.interval[0] > 0.0
+    assert "Wrong in the simulation" in result.summary()
+    (line,) = [h for h in result.extended.harmonics if (h.shaft, h.order) == ("wave_generator", 2)]
+    assert line.amplitude_arcsec == pytest.approx(36.0, abs=4 * 0.04)
 
 
 def test_gear_orders_behind_the_paper_grid_are_not_accepted():

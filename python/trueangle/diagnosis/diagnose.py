@@ -2,36 +2,30 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from dataclasses import replace
+from collections.abc import Iterable
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..effects import EFFECTS, Effect
-from ..effects.missing_order import MissingOrder
+from ..checks.check import faults_of
+from ..checks.record import records_of
+from ..effects import EFFECTS
+from ..effects.blindness import Blindness
 from ..effects.scatter import NEW_SCATTER, ScatterFinding
-from ..effects.search import line_parameters
 from ..errors import ArgumentError
-from ..joint.signals import join_runs
-from ..regression.estimate import Parameters, quantity
-from ..regression.regression import ROUNDING, Extension, Regression
+from ..joint.signals import Signals, join_runs
+from ..regression.regression import Regression
 from ..runs import CalibrationRun, as_runs
 from ..simulation.simulation import Simulation
-from .discrepancy import compare, noise_from_repeats, unfolded_error
-from .findings import Diagnosis, Finding
-from .gain import Gain, measure_gain
-from .identifiability import Blindness, blind_spots, doubts_about
-from .selection import (
-    NEW_CAUSE,
-    cause_terms,
-    extensions,
-    finding_groups,
-    is_flexible,
-    misfit,
-    propose,
-    select,
-)
+from .believed import corrected_effects, judged_beliefs
+from .discrepancy import compare, unfolded_error
+from .findings import Diagnosis
+from .goodness import goodness_of_fit
+from .identifiability import blind_spots
+from .named import findings_of, scatter_doubt, scatter_finding
+from .remainder import leftover_of, unexplained_after
+from .selection import NEW_CAUSE, misfit, select, total_penalty
 
 __all__ = ["MOST_READINGS", "diagnose"]
 
@@ -45,12 +39,6 @@ LEAST_READINGS = 20
 
 #: Standard deviations beyond which readings are outliers whatever the mean.
 OUTLYING_ANYWAY = 12.0
-
-#: Rivals reported for each finding.
-RIVALS = 3
-
-#: Findings, in the order found, for which rivals are tried.
-RIVALLED = 4
 
 
 def diagnose(
@@ -111,10 +99,72 @@ def diagnose(
         raise ArgumentError(
             f"{len(every)} readings cannot support a diagnosis: give at least {LEAST_READINGS}"
         )
-    residual_all = unfolded_error(found) - sim.predict(every)
+    error = unfolded_error(found)
     rows = _subsample(len(every))
     signals = every if rows is None else every.take(rows)
-    residual = residual_all if rows is None else residual_all[rows]
+    part = error if rows is None else error[rows]
+    account = _account(signals, part, sim)
+    # Effects that the simulation claims, and the readings do not show as claimed.
+    believed = sim
+    for _ in range(len(sim.effects)):
+        other = corrected_effects(account.chosen, believed, sim)
+        if other is None:
+            break
+        tried = _account(signals, part, other)
+        if total_penalty(tried.chosen) >= total_penalty(account.chosen):
+            break
+        account, believed = tried, other
+    start, chosen = account.start, account.chosen
+    rest = unexplained_after(chosen, sim.sigma_arcsec or None)
+    findings, spots = findings_of(chosen, account.spots, gain, rest.found)
+    beliefs, corrected = judged_beliefs(chosen, sim, believed, spots, gain)
+    in_doubt = any(spot.supported for spot in spots)
+    for item in account.scatter:
+        if in_doubt and item.size < OUTLYING_ANYWAY:
+            spots.append(scatter_doubt(item))
+        else:
+            findings.append(scatter_finding(item, rest.found))
+    findings.sort(key=lambda finding: (not finding.confirmed, -finding.evidence["bic_gain"]))
+    extended = corrected.with_effects(
+        effect for finding in findings if finding.confirmed for effect in finding.effects
+    )
+    residual = error - sim.predict(every)
+    before = goodness_of_fit(
+        leftover_of(signals, residual if rows is None else residual[rows]),
+        float(start.lines.orders.max()),
+        sim.sigma_arcsec or None,
+    )
+    return Diagnosis(
+        compare(every, residual),
+        _structure(start),
+        rest.noise.sigma,
+        findings,
+        spots,
+        extended,
+        _overall(start, chosen),
+        len(every),
+        len(signals),
+        rest.noise.correlation,
+        rest,
+        before,
+        beliefs,
+        faults_of(records_of(found)),
+    )
+
+
+@dataclass(frozen=True)
+class _Account:
+    """What was chosen for readings against a simulation."""
+
+    start: Regression
+    chosen: Regression
+    scatter: list[ScatterFinding]
+    spots: list[Blindness]
+
+
+def _account(signals: Signals, error: Array, sim: Simulation) -> _Account:
+    """Choose the causes by which readings differ from a simulation."""
+    residual = error - sim.predict(signals)
     start = Regression(signals, residual, sim.surroundings)
     spots = blind_spots(start)
     chosen = select(start)
@@ -127,28 +177,7 @@ def diagnose(
     isolated = _scatter(chosen, weighs=False)
     if isolated is not None and isolated.bic_gain > NEW_CAUSE:
         scatter.append(isolated)
-    findings, spots = _findings(chosen, spots, gain)
-    in_doubt = any(spot.supported for spot in spots)
-    for item in scatter:
-        if in_doubt and item.size < OUTLYING_ANYWAY:
-            spots.append(_scatter_doubt(item))
-        else:
-            findings.append(_scatter_finding(item))
-    findings.sort(key=lambda finding: -finding.evidence["bic_gain"])
-    extended = sim.with_effects(effect for finding in findings for effect in finding.effects)
-    noise = noise_from_repeats(signals, chosen.left - chosen.whiten.run_part(chosen.left))
-    return Diagnosis(
-        compare(every, residual_all),
-        _structure(start),
-        noise if noise is not None else float(np.sqrt(chosen.variance)),
-        findings,
-        spots,
-        extended,
-        _overall(start, chosen),
-        len(every),
-        len(signals),
-        chosen.whiten.rho,
-    )
+    return _Account(start, chosen, scatter, spots)
 
 
 def _scatter(regression: Regression, weighs: bool) -> ScatterFinding | None:
@@ -178,140 +207,6 @@ def _subsample(n: int) -> NDArray[np.int64] | None:
     edges = np.linspace(0, n, MOST_READINGS + 1).astype(np.int64)
     rng = np.random.default_rng(0)
     return edges[:-1] + (rng.random(MOST_READINGS) * np.diff(edges)).astype(np.int64)
-
-
-def _findings(
-    regression: Regression, spots: list[Blindness], with_gain: bool
-) -> tuple[list[Finding], list[Blindness]]:
-    """Findings of the chosen terms; those in doubt become entries of what is not told."""
-    spots = list(spots)
-    groups = finding_groups(regression.terms)
-    named = []
-    for group in groups:
-        doubt = doubts_about(regression.terms[group[0]], regression, spots)
-        if doubt is None:
-            named.append(group)
-            continue
-        evidence = sum(regression.terms[k].bic_gain for k in group)
-        spots = [spot for spot in spots if spot != doubt]
-        estimates = _estimates(regression, group, doubt.causes)
-        spots.append(replace(doubt, supported=True, evidence=evidence, estimates=estimates))
-    gains: Sequence[Gain | None] = [None] * len(named)
-    if with_gain and named:
-        gains = measure_gain(regression, named)
-    fitted = regression.fitted()
-    findings: list[Finding] = []
-    for group, gain in zip(named, gains, strict=True):
-        terms = [(*fitted[k], regression.covariance(k)) for k in group]
-        cause = terms[0][0].cause
-        parameters, effects = EFFECTS[cause].report(regression, terms)
-        rivals = _rivals(regression, group) if len(findings) < RIVALLED else []
-        weight = {
-            "bic_gain": float(sum(t.bic_gain for t, _, _ in terms)),
-            "deviance": float(sum(t.deviance for t, _, _ in terms)),
-            "parameters": float(sum(t.parameters for t, _, _ in terms)),
-            "log_grid": float(sum(t.log_grid for t, _, _ in terms)),
-        }
-        findings.append(Finding(cause, parameters, weight, gain, rivals, effects))
-    return findings + _corrected_lines(regression, spots), spots
-
-
-def _estimates(
-    regression: Regression, group: Sequence[int], causes: Sequence[str]
-) -> dict[str, Parameters]:
-    """Parameters of every cause that may be the one, each alone in place of a finding."""
-    rest = cause_terms(regression, group, settled=True)
-    found = {}
-    # Not lines: one that another hides behind is no property of the joint.
-    for cause in causes:
-        effect = EFFECTS[cause]
-        if not (effect.acts_on_runs or is_flexible(effect)):
-            continue
-        extension = propose(effect, rest)
-        if extension is None or extension.bic_gain <= 0.0:
-            continue
-        fitted = rest.with_terms([*rest.terms, extension])
-        k = len(fitted.terms) - 1
-        parameters, _ = effect.report(fitted, [(*fitted.fitted()[k], fitted.covariance(k))])
-        found[cause] = parameters
-    return found
-
-
-def _rivals(regression: Regression, group: Sequence[int]) -> list[tuple[str, float]]:
-    """The best other causes in place of a finding, and how much less they explain."""
-    cause = regression.terms[group[0]].cause
-    rest = cause_terms(regression, group)
-    own = rest.bic - regression.bic
-    others = [name for name in EFFECTS if name != cause]
-    gaps = [(p.cause, own - gain) for p, _, gain in extensions(rest, others) if p.deviance > 0.0]
-    gaps.sort(key=lambda item: item[1])
-    return [(name, float(gap)) for name, gap in gaps[:RIVALS]]
-
-
-def _corrected_lines(regression: Regression, spots: list[Blindness]) -> list[Finding]:
-    """Lines that the simulation has, with another amplitude or phase."""
-    belief = regression.belief.pattern
-    joint = regression.belief.joint
-    # Causes that act on the lines themselves take or give a part of them on average.
-    if belief.orders.size == 0 or any(EFFECTS[t.cause].changes_lines for t in regression.terms):
-        return []
-    modulated = {term.shape["carrier"] for term in regression.terms if "carrier" in term.shape}
-    found = []
-    for k, order in enumerate(belief.orders):
-        if order in modulated:
-            continue  # modulation takes from its carrier what it gives to the sidebands
-        where = slice(1 + 2 * k, 3 + 2 * k)
-        change = regression.coefficients[where]
-        spread = regression.unscaled_covariance[where, where] * regression.variance
-        deviance = float(change @ np.linalg.pinv(spread) @ change)
-        log_grid = float(np.log(belief.orders.size))
-        bic_gain = deviance - 2.0 * regression.log_n - 2.0 * log_grid
-        if bic_gain <= NEW_CAUSE or float(np.abs(change).max()) < ROUNDING:
-            continue
-        shape = {"output_order": float(order)}
-        extension = Extension(MissingOrder.kind, shape, np.zeros((regression.n, 0)), 2, log_grid)
-        doubt = doubts_about(extension, regression, spots)
-        if doubt is not None:
-            spots[:] = [spot for spot in spots if spot != doubt]
-            spots.append(replace(doubt, supported=True, evidence=bic_gain))
-            continue
-        amplitude, phase, std, phase_std = line_parameters(change, spread)
-        shaft, number = joint.name_order(float(order)) or ("output", float(order))
-        effect: Effect = MissingOrder(shaft, number, amplitude, phase)
-        parameters = {
-            "shaft": quantity(shaft),
-            "order": quantity(number),
-            "output_order": quantity(float(order)),
-            "amplitude_arcsec": quantity(amplitude, std),
-            "phase_deg": quantity(phase, phase_std),
-            "simulated_amplitude_arcsec": quantity(np.hypot(belief.cosine[k], belief.sine[k])),
-            "explanations": quantity(joint.explanations(float(order))),
-        }
-        penalty = {
-            "bic_gain": bic_gain,
-            "deviance": deviance,
-            "parameters": 2.0,
-            "log_grid": log_grid,
-        }
-        found.append(Finding(MissingOrder.kind, parameters, penalty, None, [], [effect]))
-    return found
-
-
-def _scatter_finding(item: ScatterFinding) -> Finding:
-    evidence = {"bic_gain": item.bic_gain}
-    return Finding(item.cause, item.parameters, evidence, None, [], item.effects)
-
-
-def _scatter_doubt(item: ScatterFinding) -> Blindness:
-    """Scatter about a mean that is itself in doubt."""
-    return Blindness(
-        (item.cause,),
-        "the error that the readings show has no certain cause yet, so what scatters about it "
-        "has none either",
-        "the measurements named above, then diagnose again",
-        True,
-        item.bic_gain,
-    )
 
 
 def _overall(before: Regression, after: Regression) -> dict[str, float]:

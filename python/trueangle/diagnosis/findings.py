@@ -7,13 +7,17 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
+from ..checks import DataFault
 from ..effects import EFFECTS, Effect
 from ..effects.blindness import Blindness
 from ..regression.estimate import Parameters
 from ..simulation.simulation import Simulation
+from .beliefs import Belief
+from .confirmation import CONFIRMED
 from .correction import extend_model
 from .discrepancy import Discrepancy
 from .gain import Gain
+from .goodness import Unexplained
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -43,7 +47,12 @@ class Finding:
         Other causes and how much less each explains in its place (BIC); tried for the
         first four findings.
     effects : list of Effect
-        What extends the simulation.
+        What extends the simulation, where it is confirmed.
+    status : str
+        "confirmed", or "not_confirmed" where its gain on held-out data does not exclude
+        zero: listed, and kept out of the extended simulation and of corrections.
+    reason : str
+        Why it is not confirmed.
     """
 
     cause: str
@@ -52,6 +61,13 @@ class Finding:
     gain: Gain | None
     rivals: list[tuple[str, float]]
     effects: list[Effect] = field(repr=False, default_factory=list)
+    status: str = CONFIRMED
+    reason: str = ""
+
+    @property
+    def confirmed(self) -> bool:
+        """Fit to extend the simulation and to correct."""
+        return self.status == CONFIRMED
 
     @property
     def sentence(self) -> str:
@@ -62,6 +78,8 @@ class Finding:
         """The entry of ``findings``."""
         return {
             "cause": self.cause,
+            "status": self.status,
+            "status_reason": self.reason,
             "parameters": {name: q.to_json() for name, q in self.parameters.items()},
             "evidence": self.evidence,
             "gain": None if self.gain is None else self.gain.to_json(),
@@ -96,6 +114,14 @@ class Diagnosis:
     readings, readings_used : int
     correlation : float
         Of the noise of neighbouring readings.
+    unexplained : Unexplained or None
+        What is left beyond the noise after all findings, by tests that need no name.
+    unexplained_before : Unexplained or None
+        The same tests before anything was added to the simulation.
+    beliefs : list of Belief
+        Verdicts on what the simulation already claims.
+    data_faults : list of DataFault
+        As `trueangle.check` tells them.
     """
 
     discrepancy: Discrepancy
@@ -108,6 +134,19 @@ class Diagnosis:
     readings: int
     readings_used: int
     correlation: float
+    unexplained: Unexplained | None = None
+    unexplained_before: Unexplained | None = None
+    beliefs: list[Belief] = field(default_factory=list)
+    data_faults: list[DataFault] = field(default_factory=list)
+
+    @property
+    def is_enough(self) -> bool:
+        """The simulation is enough: no finding, nothing unexplained, every belief confirmed."""
+        return (
+            not self.findings
+            and not (self.unexplained is not None and self.unexplained.found)
+            and all(belief.verdict == "confirmed" for belief in self.beliefs)
+        )
 
     def correction(
         self, model: HarmonicModel, runs: CalibrationRun | Iterable[CalibrationRun]
@@ -133,10 +172,22 @@ class Diagnosis:
             "noise_correlation": self.correlation,
             "readings": self.readings,
             "readings_used": self.readings_used,
+            "unexplained": self._unexplained(),
             "findings": [finding.to_json() for finding in self.findings],
+            "beliefs": [belief.to_json() for belief in self.beliefs],
+            "data_faults": [fault.to_json() for fault in self.data_faults],
             "gain": self.gain,
             "not_identifiable": [spot.to_json() for spot in self.not_identifiable],
             "extended_simulation": extended_simulation,
+        }
+
+    def _unexplained(self) -> dict[str, Any]:
+        if self.unexplained is None:
+            return {"found": False, "rms_arcsec": 0.0, "share": 0.0, "evidence": [], "before": None}
+        before = self.unexplained_before
+        return {
+            **self.unexplained.to_json(),
+            "before": None if before is None else before.to_json(),
         }
 
     def to_json(self, extended_simulation: str | None = None) -> str:

@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 from ..effects import EFFECTS
 from ..joint.signals import Signals
 from ..regression.regression import Regression
-from .holdout import held_out, numbers, reducible_share
+from .holdout import held_out, numbers, part, rebuilt, reducible_share, residual_at
 from .levels import LevelGain, gains_by_level
 
-__all__ = ["Gain", "measure_gain"]
+__all__ = ["Gain", "measure_belief_gains", "measure_gain"]
 
 Array = NDArray[np.float64]
 Rows = NDArray[np.bool_]
@@ -117,6 +117,39 @@ def measure_gain(
             )
         )
     return found
+
+
+def measure_belief_gains(
+    regression: Regression, columns: Sequence[slice], seed: int = 0
+) -> list[Gain]:
+    """Gain of measured lines in place of believed ones, by leaving out runs.
+
+    ``columns`` are those of the lines among the regressors of the simulation's own pattern.
+    """
+    rng = np.random.default_rng(seed)
+    unit, what = _units(regression)
+    folds = rng.permutation(int(unit.max()) + 1) % min(FOLDS, int(unit.max()) + 1)
+    own_zero = any(EFFECTS[term.cause].draws_zeros for term in regression.terms)
+    left = np.zeros((len(columns) + 1, regression.n))
+    for fold in range(int(folds.max()) + 1):
+        test = folds[unit] == fold
+        fitted = part(regression, ~test).with_terms(rebuilt(t, ~test) for t in regression.terms)
+        left[0, test] = residual_at(
+            fitted, regression.signals.take(test), regression.residual[test], own_zero
+        )
+        for k, where in enumerate(columns):
+            change = regression.base[test, where] @ fitted.coefficients[where]
+            left[k + 1, test] = left[0, test] + change
+    clean = ~regression.outlying
+    gains = []
+    for k in range(len(columns)):
+        before, after = left[k + 1][clean], left[0][clean]
+        share, interval = reducible_share(before, after, unit[clean], regression.variance, rng)
+        holdout = f"{what} ({int(folds.max()) + 1} parts)"
+        gains.append(
+            Gain(holdout, numbers(before), numbers(after), share, interval, None, _note(share))
+        )
+    return gains
 
 
 def _note(share: float | None) -> str:

@@ -14,7 +14,7 @@ from ..joint.signals import Signals
 from ..regression.regression import Extension, Regression
 from ..regression.whitening import RunEffect
 
-__all__ = ["held_out", "numbers", "part", "rebuilt", "reducible_share"]
+__all__ = ["held_out", "numbers", "part", "rebuilt", "reducible_share", "residual_at"]
 
 Array = NDArray[np.float64]
 Rows = NDArray[np.bool_]
@@ -45,10 +45,10 @@ def held_out(
         if EFFECTS[cause].located and EFFECTS[cause].transfers:
             full = _searched_again(full, group)
     signals = regression.signals.take(test)
-    results = [_residual(full, signals, regression.residual[test], own_zero)]
+    results = [residual_at(full, signals, regression.residual[test], own_zero)]
     for group in groups:
         rest = full.with_terms(t for k, t in enumerate(full.terms) if k not in group)
-        results.append(_residual(rest, signals, regression.residual[test], own_zero))
+        results.append(residual_at(rest, signals, regression.residual[test], own_zero))
     return results
 
 
@@ -91,7 +91,7 @@ def _searched_again(full: Regression, group: Sequence[int]) -> Regression:
     return full.with_terms(terms)
 
 
-def _residual(fitted: Regression, signals: Signals, residual: Array, own_zero: bool) -> Array:
+def residual_at(fitted: Regression, signals: Signals, residual: Array, own_zero: bool) -> Array:
     """Residual at other readings: lines and every regressor that can be rebuilt there."""
     base = np.column_stack(
         [

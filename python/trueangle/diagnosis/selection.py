@@ -22,6 +22,7 @@ __all__ = [
     "on_runs",
     "propose",
     "select",
+    "total_penalty",
 ]
 
 #: Evidence (in units of BIC) that a new cause must bring beyond its penalty: 6 is what

@@ -5,11 +5,13 @@ from __future__ import annotations
 import textwrap
 from typing import Any
 
+from ..effects.blindness import Blindness
 from ..regression.estimate import Quantity
+from .beliefs import Belief
 from .findings import Diagnosis, Finding
 from .levels import LevelGain
 
-__all__ = ["render"]
+__all__ = ["headline", "render"]
 
 WIDTH = 88
 
@@ -18,6 +20,7 @@ def render(diagnosis: Diagnosis) -> str:
     """The account of a diagnosis: what is wrong, why, the evidence, the gain, what is open."""
     d = diagnosis.discrepancy
     lines = [
+        *headline(diagnosis),
         f"Measured minus simulated: rms {d.rms:.2f} arcsec, peak-to-peak "
         f"{d.peak_to_peak:.2f}, max abs {d.max_abs:.2f} ({diagnosis.readings} readings).",
         f"Noise of one reading: {diagnosis.noise:.2f} arcsec"
@@ -32,10 +35,13 @@ def render(diagnosis: Diagnosis) -> str:
         lines += _wrapped(f"Each alone would explain: {', '.join(shares[:6])}.", 0)
     if diagnosis.readings_used < diagnosis.readings:
         lines.append(f"{diagnosis.readings_used} of the readings, spread evenly, were used.")
-    if not diagnosis.findings:
-        lines += ["", "Nothing beyond the simulation is supported by the readings."]
     for k, finding in enumerate(diagnosis.findings, 1):
         lines += ["", *_finding(k, finding)]
+    wrong = [belief for belief in diagnosis.beliefs if belief.verdict != "confirmed"]
+    if wrong:
+        lines += ["", "What the simulation claims and the readings do not show:"]
+        for belief in wrong:
+            lines += _wrapped(f"- {_belief(belief)}", 2)
     g = diagnosis.gain
     lines += [
         "",
@@ -58,8 +64,77 @@ def render(diagnosis: Diagnosis) -> str:
     return "\n".join(lines)
 
 
+def headline(diagnosis: Diagnosis) -> list[str]:
+    """What a reader must know first: faults, what is not understood, what is seen or wrong."""
+    lines: list[str] = []
+    for fault in diagnosis.data_faults:
+        lines += _wrapped(f"Fault of the data, {fault}.", 2)
+    rest = diagnosis.unexplained
+    if rest is not None and rest.found:
+        lines += _wrapped(
+            f"NOT UNDERSTOOD: at least {rest.rms:.2f} arcsec rms ({100.0 * rest.share:.0f} % of "
+            "the variance that is left) is no noise and has no name.",
+            2,
+        )
+        for item in rest.firing[:3]:
+            lines += _wrapped(f"- {item.says} (p {_chance(item.p)})", 4, 2)
+    confirmed = [finding.cause for finding in diagnosis.findings if finding.confirmed]
+    doubtful = [finding.cause for finding in diagnosis.findings if not finding.confirmed]
+    wrong = [belief for belief in diagnosis.beliefs if belief.verdict != "confirmed"]
+    if confirmed:
+        lines += _wrapped(f"Confirmed: {', '.join(confirmed)}.", 2)
+    if doubtful:
+        lines += _wrapped(f"Listed and not confirmed: {', '.join(doubtful)}.", 2)
+    if wrong:
+        told = "; ".join(f"{b.what} {b.verdict.replace('_', ' ')}" for b in wrong[:4])
+        lines += _wrapped(f"Wrong in the simulation: {told}.", 2)
+    for spot in diagnosis.not_identifiable:
+        if spot.supported:
+            lines += _wrapped(f"Seen, and not told apart: {_seen(spot)}.", 2)
+    if not lines:
+        lines = ["Nothing beyond the simulation: no test of the readings fires."]
+    return [*lines, ""]
+
+
+def _seen(spot: Blindness) -> str:
+    """Causes of which one is seen, each with the size that it would have."""
+    sizes = []
+    for cause in spot.causes:
+        first = next(
+            (
+                f" {name} {_quantity(q)}"
+                for name, q in spot.estimates.get(cause, {}).items()
+                if isinstance(q.value, float)
+            ),
+            "",
+        )
+        sizes.append(f"{cause}{' (' + first.strip() + ')' if first else ''}")
+    return " or ".join(sizes)
+
+
+def _belief(belief: Belief) -> str:
+    measured, believed, std = belief.measured, belief.believed, belief.std
+    text = f"{belief.what}: {belief.verdict.replace('_', ' ')}; "
+    parts = [
+        f"{name.replace('_', ' ')} {measured[name]:.4g} +- {std[name]:.2g}, believed {value:.4g}"
+        for name, value in believed.items()
+    ]
+    text += "; ".join(parts)
+    gain = belief.gain
+    if gain is not None:
+        text += f"; held out, rms {gain.before[0]:.2f} -> {gain.after[0]:.2f} arcsec"
+    return text
+
+
+def _chance(p: float) -> str:
+    return "below 1e-12" if p < 1e-12 else f"{p:.1g}"
+
+
 def _finding(number: int, finding: Finding) -> list[str]:
     lines = [f"{number}. {finding.cause}"]
+    if not finding.confirmed:
+        lines[0] += f" (NOT CONFIRMED: {finding.reason})"
+        lines = _wrapped(lines[0], 3)
     lines += _wrapped(finding.sentence, 3, first=3)
     for name, entry in finding.parameters.items():
         lines += _wrapped(f"{name}: {_quantity(entry)}", 7, first=5)

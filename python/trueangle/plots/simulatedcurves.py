@@ -59,7 +59,8 @@ def left_after_causes(
     """
     steps, effects = [("simulation as it is", sim)], []
     for finding in diagnosis.findings:
-        effects += finding.effects
+        if finding.confirmed:
+            effects += finding.effects
         steps.append((f"+ {finding.cause.replace('_', ' ')}", sim.with_effects(effects)))
     found = []
     for name, extended in steps:

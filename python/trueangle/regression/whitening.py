@@ -92,6 +92,7 @@ class Whitener:
         self.effects = list(effects or ())
         self.root_weights = None if weights is None else np.sqrt(weights)
         self._rotations: list[tuple[Array, Array]] = []
+        self._log_determinants: list[float] = []
         self.log_determinant: float = -len(bounds) * float(np.log1p(-(rho**2)))
         if weights is not None:
             self.log_determinant -= float(np.log(weights).sum())
@@ -102,7 +103,14 @@ class Whitener:
             for start, stop in bounds:
                 u, s, _ = np.linalg.svd(stacked[start:stop], full_matrices=False)
                 self._rotations.append((u, 1.0 - 1.0 / np.sqrt(1.0 + s**2)))
-                self.log_determinant += float(np.log1p(s**2).sum())
+                log_determinant = float(np.log1p(s**2).sum())
+                self._log_determinants.append(log_determinant)
+                self.log_determinant += log_determinant
+
+    def log_determinant_of(self, run: int) -> float:
+        """The part of `log_determinant` of one run, without that of the weights."""
+        part = -float(np.log1p(-(self.rho**2)))
+        return part + (self._log_determinants[run] if self._log_determinants else 0.0)
 
     @property
     def is_identity(self) -> bool:

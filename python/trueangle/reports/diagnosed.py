@@ -31,7 +31,10 @@ def diagnosed(diagnosis: Diagnosis, left: list[tuple[str, float]]) -> dict[str, 
     Parameters are listed; a value that is no single number is given as ``text``.
     """
     content = diagnosis.to_dict()
-    content["findings_count"] = len(content["findings"])
+    content["findings_count"] = sum(finding.confirmed for finding in diagnosis.findings)
+    content["nothing"] = diagnosis.is_enough and not any(
+        spot.supported for spot in diagnosis.not_identifiable
+    )
     for finding, (_, rms) in zip(content["findings"], left[1:], strict=True):
         finding["sentence"] = finding.pop("physics")
         finding["rms_left_arcsec"] = rms

@@ -1,0 +1,219 @@
+"""The lines and effects that a simulation claims, held against the readings."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import fields, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..distributions import normal_tail
+from ..effects import EFFECTS, Effect
+from ..effects.blindness import Blindness
+from ..effects.missing_order import MissingOrder
+from ..joint.pattern import Harmonic, Surroundings
+from ..joint.signals import Signals
+from ..regression.extension import Extension
+from ..regression.regression import ROUNDING, Regression
+from ..simulation.simulation import Simulation
+from .beliefs import LEVEL, Belief, judge_line, verdict_of_factor
+from .gain import measure_belief_gains
+from .identifiability import doubts_about
+from .selection import NEW_CAUSE
+
+__all__ = ["corrected_effects", "judged_beliefs", "scaled"]
+
+Array = NDArray[np.float64]
+
+#: Fields of effects, beside those in arcsec, that their signal is proportional to.
+LINEAR = ("delay_s", "relative_error", "pattern_per_K", "coefficient")
+
+#: Departure of a scaled effect's signal from the scaled signal, of its largest value.
+PROPORTIONAL = 1e-3
+
+#: A factor nearer to nothing than this drops the effect.
+NOTHING = 0.05
+
+
+def scaled(effect: Effect, factor: float, signals: Signals, around: Surroundings) -> Effect | None:
+    """The effect ``factor`` times as strong; None where its signal is not proportional."""
+    changes: dict[str, object] = {}
+    for entry in fields(effect):  # type: ignore[arg-type]
+        value = getattr(effect, entry.name)
+        if isinstance(value, float) and ("arcsec" in entry.name or entry.name in LINEAR):
+            changes[entry.name] = factor * value
+        elif isinstance(value, tuple) and value and isinstance(value[0], tuple):
+            changes[entry.name] = tuple((m, factor * a, phase) for m, a, phase in value)
+    other = replace(effect, **changes)  # type: ignore[type-var]
+    before, after = effect.expected(signals, around), other.expected(signals, around)
+    limit = PROPORTIONAL * max(float(np.abs(before).max()), 1e-300)
+    return other if float(np.abs(after - factor * before).max()) <= limit else None
+
+
+def corrected_effects(
+    regression: Regression, believed: Simulation, sim: Simulation
+) -> Simulation | None:
+    """The simulation with the strength of one refuted effect as measured; None where none is.
+
+    A term of the same cause counts with it: a correction of a belief is no further cause.
+    """
+    signals, around = regression.signals, sim.surroundings
+    worst: tuple[float, Simulation] | None = None
+    for k, effect in enumerate(believed.effects):
+        if not EFFECTS[effect.kind].transfers:
+            continue
+        column = effect.expected(signals, around)
+        rest = regression
+        if regression.has(effect.kind):
+            rest = regression.with_terms(t for t in regression.terms if t.cause != effect.kind)
+        found = _factor(rest, column)
+        if found is None:
+            continue
+        factor, std = found
+        z = abs(factor) / max(std, 1e-300)
+        if 2.0 * normal_tail(z) > LEVEL or (worst is not None and z <= worst[0]):
+            continue
+        total = 1.0 + factor
+        other = scaled(effect, total, signals, around)
+        if other is None:
+            continue
+        kept = list(believed.effects)
+        if abs(total) < max(NOTHING, 3.0 * std):
+            other = scaled(effect, 0.0, signals, around) or other
+        kept[k] = other
+        worst = (z, replace(believed, effects=tuple(kept)))
+    return None if worst is None else worst[1]
+
+
+def _factor(regression: Regression, column: Array) -> tuple[float, float] | None:
+    """How many times a column is in the readings beside all else, and its standard error."""
+    if not np.any(column) or float(np.abs(column).max()) < ROUNDING:
+        return None
+    x, excited = regression.projected(column[:, None])
+    if not excited.all():
+        return None
+    power = float(x[:, 0] @ x[:, 0])
+    return float(x[:, 0] @ regression.r) / power, float(np.sqrt(regression.variance / power))
+
+
+def judged_beliefs(
+    regression: Regression,
+    sim: Simulation,
+    believed: Simulation,
+    spots: list[Blindness],
+    with_gain: bool,
+) -> tuple[list[Belief], Simulation]:
+    """Verdicts on every line and effect, and the simulation with refuted ones as measured.
+
+    Lines that something else acts on, or that may hide behind another cause in these runs,
+    are not judged; the latter become entries of what cannot be told.
+    """
+    lines, harmonics = _lines(regression, sim, spots, with_gain)
+    effects = []
+    for old, new in zip(sim.effects, believed.effects, strict=True):
+        belief = _effect(regression, sim, old, new)
+        if belief is not None:
+            effects.append(belief)
+    kept = tuple(
+        new
+        for new in believed.effects
+        if not EFFECTS[new.kind].transfers
+        or np.any(new.expected(regression.signals, sim.surroundings))
+        or new in sim.effects
+    )
+    return [*lines, *effects], replace(sim, harmonics=harmonics, effects=kept)
+
+
+def _effect(regression: Regression, sim: Simulation, old: Effect, new: Effect) -> Belief | None:
+    if not EFFECTS[old.kind].transfers:
+        return None
+    signals, around = regression.signals, sim.surroundings
+    column = old.expected(signals, around)
+    found = _factor(regression, column)
+    if found is None:
+        return None
+    change, std = found
+    power = float(column @ column)
+    told = float(new.expected(signals, around) @ column) / power
+    factor = told + change
+    size = float(np.sqrt(power / column.size))
+    return Belief(
+        old.kind,
+        verdict_of_factor(factor, std),
+        {"factor": 1.0, "rms_arcsec": size},
+        {"factor": factor, "rms_arcsec": abs(factor) * size},
+        {"factor": std, "rms_arcsec": std * size},
+    )
+
+
+def _lines(
+    regression: Regression, sim: Simulation, spots: list[Blindness], with_gain: bool
+) -> tuple[list[Belief], tuple[Harmonic, ...]]:
+    pattern, joint = regression.belief.pattern, regression.belief.joint
+    if pattern.orders.size == 0 or any(EFFECTS[t.cause].changes_lines for t in regression.terms):
+        return [], sim.harmonics
+    modulated = {term.shape["carrier"] for term in regression.terms if "carrier" in term.shape}
+    found: list[Belief] = []
+    refuted: list[tuple[int, slice]] = []
+    harmonics = list(sim.harmonics)
+    for k, order in enumerate(pattern.orders):
+        if order in modulated:
+            continue  # modulation takes from its carrier what it gives to the sidebands
+        where = slice(1 + 2 * k, 3 + 2 * k)
+        change = regression.coefficients[where]
+        spread = regression.unscaled_covariance[where, where] * regression.variance
+        shaft, number = joint.name_order(float(order)) or ("output", float(order))
+        what = f"{shaft} order {number:g}"
+        belief = judge_line(what, (pattern.cosine[k], pattern.sine[k]), change, spread)
+        if belief.verdict != "confirmed":
+            doubt = _doubt(regression, float(order), change, spread, spots)
+            if doubt:
+                continue
+            refuted.append((len(found), where))
+            harmonics = _corrected(harmonics, sim, float(order), shaft, number, belief)
+        found.append(belief)
+    if with_gain and refuted:
+        gains = measure_belief_gains(regression, [where for _, where in refuted])
+        for (k, _), gain in zip(refuted, gains, strict=True):
+            found[k] = replace(found[k], gain=gain)
+    return found, tuple(harmonics)
+
+
+def _doubt(
+    regression: Regression, order: float, change: Array, spread: Array, spots: list[Blindness]
+) -> bool:
+    """Whether another cause may be behind the change of a line; it is then told among spots."""
+    log_grid = float(np.log(regression.belief.pattern.orders.size))
+    extension = Extension(
+        MissingOrder.kind, {"output_order": order}, np.zeros((regression.n, 0)), 2, log_grid
+    )
+    doubt = doubts_about(extension, regression, spots)
+    if doubt is None:
+        return False
+    deviance = float(change @ np.linalg.pinv(spread) @ change)
+    evidence = deviance - 2.0 * regression.log_n - 2.0 * log_grid
+    if evidence > NEW_CAUSE:
+        spots[:] = [spot for spot in spots if spot != doubt]
+        spots.append(replace(doubt, supported=True, evidence=evidence))
+    return True
+
+
+def _corrected(
+    harmonics: Sequence[Harmonic],
+    sim: Simulation,
+    order: float,
+    shaft: str,
+    number: float,
+    belief: Belief,
+) -> list[Harmonic]:
+    """The lines with the measured one in place of those of its order."""
+    kept = [
+        line
+        for line in harmonics
+        if abs(sim.joint.output_order(line.shaft, line.order) - order) > 1e-9 * order
+    ]
+    if belief.verdict == "absent":
+        return kept
+    measured = belief.measured
+    return [*kept, Harmonic(shaft, number, measured["amplitude_arcsec"], measured["phase_deg"])]

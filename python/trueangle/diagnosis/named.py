@@ -1,0 +1,113 @@
+"""Findings of the terms that were chosen: parameters, gain, rivals, status."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from ..effects import EFFECTS
+from ..effects.blindness import Blindness
+from ..effects.scatter import ScatterFinding
+from ..regression.estimate import Parameters
+from ..regression.regression import Regression
+from .confirmation import status_of
+from .findings import Finding
+from .gain import Gain, measure_gain
+from .identifiability import doubts_about
+from .selection import cause_terms, extensions, finding_groups, is_flexible, propose
+
+__all__ = ["findings_of", "scatter_doubt", "scatter_finding"]
+
+#: Rivals reported for each finding.
+RIVALS = 3
+
+#: Findings, in the order found, for which rivals are tried.
+RIVALLED = 4
+
+
+def findings_of(
+    regression: Regression, spots: list[Blindness], with_gain: bool, unexplained: bool
+) -> tuple[list[Finding], list[Blindness]]:
+    """Findings of the chosen terms; those in doubt become entries of what is not told."""
+    spots = list(spots)
+    groups = finding_groups(regression.terms)
+    named = []
+    for group in groups:
+        doubt = doubts_about(regression.terms[group[0]], regression, spots)
+        if doubt is None:
+            named.append(group)
+            continue
+        evidence = sum(regression.terms[k].bic_gain for k in group)
+        spots = [spot for spot in spots if spot != doubt]
+        estimates = _estimates(regression, group, doubt.causes)
+        spots.append(replace(doubt, supported=True, evidence=evidence, estimates=estimates))
+    gains: Sequence[Gain | None] = [None] * len(named)
+    if with_gain and named:
+        gains = measure_gain(regression, named)
+    fitted = regression.fitted()
+    findings: list[Finding] = []
+    for group, gain in zip(named, gains, strict=True):
+        terms = [(*fitted[k], regression.covariance(k)) for k in group]
+        cause = terms[0][0].cause
+        parameters, effects = EFFECTS[cause].report(regression, terms)
+        rivals = _rivals(regression, group) if len(findings) < RIVALLED else []
+        weight = {
+            "bic_gain": float(sum(t.bic_gain for t, _, _ in terms)),
+            "deviance": float(sum(t.deviance for t, _, _ in terms)),
+            "parameters": float(sum(t.parameters for t, _, _ in terms)),
+            "log_grid": float(sum(t.log_grid for t, _, _ in terms)),
+        }
+        status, reason = status_of(cause, gain, regression, group, unexplained)
+        findings.append(Finding(cause, parameters, weight, gain, rivals, effects, status, reason))
+    return findings, spots
+
+
+def _estimates(
+    regression: Regression, group: Sequence[int], causes: Sequence[str]
+) -> dict[str, Parameters]:
+    """Parameters of every cause that may be the one, each alone in place of a finding."""
+    rest = cause_terms(regression, group, settled=True)
+    found = {}
+    # Not lines: one that another hides behind is no property of the joint.
+    for cause in causes:
+        effect = EFFECTS[cause]
+        if not (effect.acts_on_runs or is_flexible(effect)):
+            continue
+        extension = propose(effect, rest)
+        if extension is None or extension.bic_gain <= 0.0:
+            continue
+        fitted = rest.with_terms([*rest.terms, extension])
+        k = len(fitted.terms) - 1
+        parameters, _ = effect.report(fitted, [(*fitted.fitted()[k], fitted.covariance(k))])
+        found[cause] = parameters
+    return found
+
+
+def _rivals(regression: Regression, group: Sequence[int]) -> list[tuple[str, float]]:
+    """The best other causes in place of a finding, and how much less they explain."""
+    cause = regression.terms[group[0]].cause
+    rest = cause_terms(regression, group)
+    own = rest.bic - regression.bic
+    others = [name for name in EFFECTS if name != cause]
+    gaps = [(p.cause, own - gain) for p, _, gain in extensions(rest, others) if p.deviance > 0.0]
+    gaps.sort(key=lambda item: item[1])
+    return [(name, float(gap)) for name, gap in gaps[:RIVALS]]
+
+
+def scatter_finding(item: ScatterFinding, unexplained: bool) -> Finding:
+    """Finding of a cause of the scatter."""
+    evidence = {"bic_gain": item.bic_gain}
+    status, reason = status_of(item.cause, None, None, (), unexplained)
+    return Finding(item.cause, item.parameters, evidence, None, [], item.effects, status, reason)
+
+
+def scatter_doubt(item: ScatterFinding) -> Blindness:
+    """Scatter about a mean that is itself in doubt."""
+    return Blindness(
+        (item.cause,),
+        "the error that the readings show has no certain cause yet, so what scatters about it "
+        "has none either",
+        "the measurements named above, then diagnose again",
+        True,
+        item.bic_gain,
+    )

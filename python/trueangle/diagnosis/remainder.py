@@ -1,0 +1,52 @@
+"""What an account leaves of the readings, as goodness of fit asks for it."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..joint.signals import Signals
+from ..regression.regression import Regression
+from .goodness import Leftover, Unexplained, goodness_of_fit
+
+__all__ = ["leftover_of", "remainder_of", "unexplained_after"]
+
+Array = NDArray[np.float64]
+
+
+def leftover_of(signals: Signals, residual: Array) -> Leftover:
+    """Residuals with the signals of their readings; speed, load and temperature as factors."""
+    factors: dict[str, Array] = {}
+    if signals.velocity is not None:
+        factors["speed"] = np.abs(signals.velocity)
+    if signals.torque is not None and signals.torque.any():
+        factors["torque"] = signals.torque
+    if signals.temperature is not None:
+        factors["temperature"] = signals.temperature
+    return Leftover(
+        residual,
+        signals.theta,
+        signals.direction,
+        signals.run,
+        signals.clock,
+        signals.time is not None,
+        factors,
+    )
+
+
+def remainder_of(regression: Regression) -> Leftover:
+    """What a regression leaves: run effects taken off, outliers put to the limit."""
+    left = regression.left - regression.whiten.run_part(regression.left)
+    kept = left[~regression.outlying]
+    if regression.outlying.any() and kept.size:
+        left = np.clip(left, float(kept.min()), float(kept.max()))
+    return leftover_of(regression.signals, left * regression.root_weights)
+
+
+def unexplained_after(
+    regression: Regression, sigma: float | None = None, rounding: float = 0.0
+) -> Unexplained:
+    """Goodness of fit of what a regression leaves, up to the orders that it looks for."""
+    return goodness_of_fit(
+        remainder_of(regression), float(regression.lines.orders.max()), sigma, rounding
+    )
