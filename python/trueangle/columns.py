@@ -214,7 +214,7 @@ def matching(path: object, header: Sequence[str], name: str) -> str:
             raise FileError(
                 path, f"several columns may be meant ({', '.join(found)})", line=1, column=name
             )
-    by_plain = {_plain(column): column for column in header}
+    by_plain = {plain(column): column for plain in (_plain, _bare) for column in header}
     near = difflib.get_close_matches(_plain(name), by_plain, 1)
     hint = f"did you mean {by_plain[near[0]]!r}? " if near else ""
     raise FileError(path, f"no such column; {hint}{listed(header)}", line=1, column=name)

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from os import PathLike
+from typing import Any
 
 from ..errors import ArgumentError
 from ..runs import CalibrationRun
@@ -42,6 +43,9 @@ def check(
     | Iterable[CalibrationRun],
     *,
     counts_per_turn: float | None = None,
+    counts_per_turn_reference: float | None = None,
+    signals: Mapping[str, Any] | None = None,
+    topic: str | None = None,
 ) -> Check:
     """Say whether data are fit to be used before anything is fitted.
 
@@ -49,8 +53,8 @@ def check(
     ----------
     data : path, run, or iterable of either
         Files as `trueangle.read_runs` takes them, which may be faulty, or runs.
-    counts_per_turn : float, optional
-        Unit of ``indicated_count``.
+    counts_per_turn, counts_per_turn_reference, signals, topic
+        As in `trueangle.read_runs`.
 
     Returns
     -------
@@ -73,7 +77,13 @@ def check(
     >>> [fault.fault for fault in check(run).data_faults]
     ['wrong_sign']
     """
-    records = _records(data, counts_per_turn)
+    given = {
+        "counts_per_turn": counts_per_turn,
+        "counts_per_turn_reference": counts_per_turn_reference,
+        "signals": signals,
+        "topic": topic,
+    }
+    records = _records(data, given)
     if not records:
         raise ArgumentError("no data: give at least one file or run")
     extent = extent_of(records)
@@ -94,14 +104,14 @@ def faults_of(records: list[Record]) -> list[DataFault]:
     return found
 
 
-def _records(data: object, counts_per_turn: float | None) -> list[Record]:
+def _records(data: object, given: Mapping[str, Any]) -> list[Record]:
     if isinstance(data, CalibrationRun):
         return records_of([data])
     if isinstance(data, (str, PathLike)):
-        return read_records([data], counts_per_turn)
+        return read_records([data], **given)
     if not isinstance(data, Iterable):
         raise ArgumentError(f"data must be files or runs, got {type(data).__name__}")
     entries = list(data)
     if all(isinstance(entry, CalibrationRun) for entry in entries):
         return records_of(entries)
-    return read_records(entries, counts_per_turn)
+    return read_records(entries, **given)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from os import PathLike
 from pathlib import Path
+from typing import Any
 
 from ..runfiles import read_columns
 from .record import Record
@@ -12,10 +13,8 @@ from .record import Record
 __all__ = ["read_records"]
 
 
-def read_records(
-    paths: Iterable[str | PathLike[str]], counts_per_turn: float | None = None
-) -> list[Record]:
-    """One record per run and file; time may run backwards.
+def read_records(paths: Iterable[str | PathLike[str]], **given: Any) -> list[Record]:
+    """One record per run and file; time may run backwards. ``given`` as in `read_columns`.
 
     Raises
     ------
@@ -24,7 +23,7 @@ def read_records(
     """
     found: list[Record] = []
     for path in paths:
-        table = read_columns(Path(path), counts_per_turn)
+        table = read_columns(Path(path), **given)
         scale = 360.0 / table.period
         for _, label, rows in table.groups:
             signals = {name: values[rows] for name, values in table.signals.items()}

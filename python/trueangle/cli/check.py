@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 
 from .paths import Input
+from .signal_options import add_signals, reading
 
 HELP = "say whether data are fit to be used, and what they can tell, before anything is fitted"
 EXAMPLE = "trueangle check runs.csv"
@@ -13,8 +14,8 @@ EXAMPLE = "trueangle check runs.csv"
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command's arguments."""
     add = parser.add_argument
-    add("files", nargs="+", type=Input, metavar="FILES", help="calibration runs (CSV or Parquet)")
-    add("--counts-per-turn", type=float, metavar="N", help="unit of indicated_count")
+    add("files", nargs="+", type=Input, metavar="FILES", help="calibration runs of any format")
+    add_signals(parser)
     add("--json", action="store_true", help="print the result as JSON")
 
 
@@ -22,6 +23,6 @@ def run(args: argparse.Namespace) -> int:
     """Print the check; 1 where a fault makes the data unusable."""
     from ..checks import check
 
-    found = check(args.files, counts_per_turn=args.counts_per_turn)
+    found = check(args.files, **reading(args))
     print(found.to_json() if args.json else found.summary())
     return 0 if found.usable else 1

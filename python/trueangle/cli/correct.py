@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..errors import ArgumentError, TrueAngleError
 from .paths import Input, ModelInput
+from .signal_options import add_signals, signals_by_joint
 from .terminal import own_interrupts
 
 if TYPE_CHECKING:
@@ -51,19 +52,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="of the angle (default: indicated_*, of a joint JOINT_indicated_* or the like)",
     )
     add(
-        "--signal",
-        action="append",
-        metavar="[JOINT.]SIGNAL=NAME",
-        help="column of a signal that the model needs: velocity, temperature, torque, time "
-        "(default: velocity_deg_s, temperature_C, torque_Nm, time_s)",
-    )
-    add(
         "--unit",
-        choices=("deg", "rad", "turn", "count"),
+        choices=("deg", "rad", "turn", "count", "arcsec", "arcmin"),
         help="of the angle (default: the ending of its name, else the model's)",
     )
     add("--counts-per-turn", type=float, metavar="N", help="of an angle in counts")
-    add("--topic", metavar="NAME", help="JointState topic of a ROS bag (default: the only one)")
+    add_signals(parser, counts=False)
     add(
         "--output-topic",
         metavar="NAME",
@@ -94,6 +88,14 @@ def run(args: argparse.Namespace) -> int:
     progress = args.progress
     if progress == "auto" and args.json and sys.stderr.isatty():
         progress = "json"
+    named = any(role == "indicated" for _, role, _, _ in args.signal or ())
+    if named and (args.column or args.unit):
+        option = "--column" if args.column else "--unit"
+        print(
+            f"trueangle: error: {option} and --signal indicated=NAME:UNIT say the same; give one",
+            file=sys.stderr,
+        )
+        return 2
     models: dict[Any, Any] = by_joint(args.model, "--model")
     result = correct_logs(
         args.logs,
@@ -101,7 +103,7 @@ def run(args: argparse.Namespace) -> int:
         args.output,
         in_place=args.in_place,
         column=_columns(args.column, None in models),
-        signals=_signals(args.signal, None in models),
+        signals=signals_by_joint(args.signal, None in models),
         unit=args.unit,
         counts_per_turn=args.counts_per_turn,
         topic=args.topic,
@@ -139,18 +141,6 @@ def _columns(entries: Sequence[str] | None, single: bool) -> Any:
             raise ArgumentError("--column: one model corrects one column")
         return entries[0]
     return by_joint(entries, "--column")
-
-
-def _signals(entries: Sequence[str] | None, single: bool) -> Any:
-    signals: dict[str, Any] = {}
-    for entry in entries or ():
-        signal, equals, column = entry.partition("=")
-        joint, dot, name = signal.rpartition(".")
-        if not equals or not column or bool(dot) == single:
-            wanted = "SIGNAL=NAME" if single else "JOINT.SIGNAL=NAME"
-            raise ArgumentError(f"--signal: {wanted} is needed, got {entry!r}")
-        (signals if single else signals.setdefault(joint, {}))[name] = column
-    return signals or None
 
 
 def _print(log: LogReport) -> None:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from ..errors import ArgumentError
 from ..files import MODEL, SIMULATION
 from .paths import Input, Output
+from .signal_options import add_signals, reading
 
 if TYPE_CHECKING:
     from ..diagnosis import Diagnosis
@@ -35,7 +36,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="FILE",
         help="write that extended correction model",
     )
-    add("--counts-per-turn", type=float, metavar="N", help="unit of indicated_count")
+    add_signals(parser)
     add("--json", action="store_true", help="print the diagnosis as JSON")
 
 
@@ -52,7 +53,7 @@ def run(args: argparse.Namespace) -> int:
             "belong together"
         )
     simulation = load_simulation(args.simulation)
-    runs = read_runs(args.runs, counts_per_turn=args.counts_per_turn)
+    runs = read_runs(args.runs, **reading(args))
     result = diagnose(runs, simulation)
     if args.extend:
         result.extended.save(args.extend)

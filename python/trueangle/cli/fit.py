@@ -12,6 +12,7 @@ from ..files import MODEL
 from .onepass import add_one_pass, saved, wants_one_pass
 from .order_lists import orders_by_shaft
 from .paths import Input, Output
+from .signal_options import add_signals
 
 if TYPE_CHECKING:
     from ..fitting.result import FitResult
@@ -23,7 +24,11 @@ EXAMPLE = "trueangle fit joint_a.csv -o joint_a.json --gear-ratio 100"
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command's arguments."""
     parser.add_argument(
-        "runs", nargs="+", type=Input, metavar="RUNS", help="CSV or Parquet files of readings"
+        "runs",
+        nargs="+",
+        type=Input,
+        metavar="RUNS",
+        help="files of readings: CSV, Parquet, HDF5, MATLAB, numpy, ROS bags and others",
     )
     parser.add_argument(
         "-o",
@@ -70,9 +75,7 @@ def add_joint(parser: argparse.ArgumentParser) -> None:
         default="circular_spline",
         help="of the strain wave gear (default: circular_spline)",
     )
-    parser.add_argument(
-        "--counts-per-turn", type=float, metavar="N", help="of an indicated_count column"
-    )
+    add_signals(parser)
 
 
 def add_argument_choice(parser: argparse.ArgumentParser) -> None:
@@ -106,7 +109,7 @@ def run(args: argparse.Namespace) -> int:
     if wants_one_pass(args):
         return saved(args, orders_by_shaft(args.orders))
     result = fit(
-        read_selected(args.runs, args.counts_per_turn, args.run),
+        read_selected(args),
         orders=orders_by_shaft(args.orders),
         gear_ratio=args.gear_ratio,
         fixed_member=args.fixed_member,

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..errors import ArgumentError
+from .signal_options import reading
 from .terminal import own_interrupts
 
 if TYPE_CHECKING:
@@ -34,7 +35,7 @@ def add_one_pass(parser: argparse.ArgumentParser) -> None:
         "--one-pass",
         action="store_true",
         help="constant memory, one pass, without setting wild readings aside: so for folders, "
-        "log formats other than CSV and Parquet, a --scheduler, and more than 256 MiB",
+        "a --scheduler, and more than 256 MiB",
     )
     add(
         "--scheduler",
@@ -59,10 +60,7 @@ def wants_one_pass(args: argparse.Namespace) -> bool:
     """
     paths = [Path(path) for path in args.runs]
     asked = bool(args.one_pass or args.scheduler)
-    asked = asked or any(
-        path.is_dir() or path.suffix.lower() not in (".csv", ".parquet", ".pq", "")
-        for path in paths
-    )
+    asked = asked or any(path.is_dir() for path in paths)
     if not asked:
         existing = [path for path in paths if path.is_file()]
         asked = sum(path.stat().st_size for path in existing) > _LARGE
@@ -88,7 +86,7 @@ def fit_in_one_pass(args: argparse.Namespace, orders: Any) -> LogFit:
         gear_ratio=args.gear_ratio,
         fixed_member=args.fixed_member,
         argument="reference" if args.argument == "auto" else args.argument,
-        counts_per_turn=args.counts_per_turn,
+        **reading(args),
         scheduler=args.scheduler,
         checksums=getattr(args, "checksums", False),
         progress=args.progress,

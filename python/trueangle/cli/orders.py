@@ -22,7 +22,7 @@ EXAMPLE = "trueangle orders joint_a.csv --gear-ratio 100"
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command's arguments."""
     add = parser.add_argument
-    add("runs", nargs="+", type=Input, metavar="RUNS", help="CSV or Parquet files of readings")
+    add("runs", nargs="+", type=Input, metavar="RUNS", help="files of readings")
     add("--orders", metavar="1-17,202", help="candidates (default: low orders and the gear's own)")
     add_joint(parser)
     add_argument_choice(parser)
@@ -51,7 +51,7 @@ def run(args: argparse.Namespace) -> int:
 
     if wants_one_pass(args):
         return printed_orders(args)
-    runs = read_selected(args.runs, args.counts_per_turn, args.run)
+    runs = read_selected(args)
     reference = () if args.reference_orders is None else parse_orders(args.reference_orders)
     selection = select_orders(
         [without_spikes(run) for run in runs],

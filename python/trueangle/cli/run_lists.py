@@ -2,27 +2,28 @@
 
 from __future__ import annotations
 
+import argparse
 from collections.abc import Sequence
 
 from ..errors import ArgumentError
 from ..runfiles import read_runs
 from ..runs import CalibrationRun
 from .parser import did_you_mean
+from .signal_options import reading
 
 __all__ = ["listed", "read_selected"]
 
 
-def read_selected(
-    paths: Sequence[str], counts_per_turn: float | None, labels: Sequence[str] | None
-) -> list[CalibrationRun]:
-    """Runs of the files, those of ``labels`` only where labels are given.
+def read_selected(args: argparse.Namespace) -> list[CalibrationRun]:
+    """Runs of a command's files, those of ``--run`` only where labels are given.
 
     Raises
     ------
     ArgumentError
         A label that no run has; names those there are.
     """
-    runs = read_runs(paths, counts_per_turn=counts_per_turn)
+    runs = read_runs(args.runs, **reading(args))
+    labels: list[str] = args.run or []
     if not labels:
         return runs
     known = list(dict.fromkeys(run.label for run in runs if run.label is not None))
@@ -30,7 +31,7 @@ def read_selected(
     if missing and not known:
         raise ArgumentError(
             f"--run {missing[0]}: the files name no runs (there is no column 'run'): "
-            "leave --run out, or add the column"
+            "leave --run out, or name the column of their labels with --signal run=NAME"
         )
     if missing:
         raise ArgumentError(

@@ -159,6 +159,7 @@ class Header:
             self.delimiter = delimiter
             width = len(self._cells(lines[begin].text))
             before = [i for i in solid if i < begin]
+            units = -1
             for i in reversed(before):
                 text = lines[i].text
                 if is_comment(text):
@@ -166,9 +167,12 @@ class Header:
                     if i != before[-1]:
                         continue
                 cells = self._cells(text)
-                if abs(len(cells) - width) <= 1 and self._units_of(text, width) is None:
+                if abs(len(cells) - width) > 1:
+                    continue
+                if self._units_of(text, width) is None:
                     return self._scope(lines, before, width, i), begin
-            return -1, begin
+                units = i
+            return units, begin  # names that look like units are names where nothing else is
         if len(plain) > 1 and number(lines[plain[1]].text.strip(), ",") is not None:
             is_bare = number(lines[first].text.strip(), ",") is not None
             return (-1, first) if is_bare else (first, self._after_units(lines, first))

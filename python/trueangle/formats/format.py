@@ -172,10 +172,15 @@ class Format:
         return [None] if cut is None else list(cut(path))
 
     def read(
-        self, path: Path, names: Sequence[str], topic: str | None, stretch: Any
+        self,
+        path: Path,
+        names: Sequence[str],
+        topic: str | None,
+        stretch: Any,
+        texts: Collection[str] = TEXTS,
     ) -> Iterator[Batch]:
         """Batches of one of the `stretches`."""
-        return self.module.read(path, names, topic, stretch)
+        return self.module.read(path, names, topic, stretch, texts=texts)
 
     def line_of(self, path: Path, row: int) -> int:
         """The line of a row counted from 0; formats without lines count as if under a header."""

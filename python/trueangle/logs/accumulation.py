@@ -16,13 +16,14 @@ from numpy.typing import NDArray
 
 from .. import _core
 from ..angles import UNIT_PERIODS
+from ..columns import matching
 from ..errors import FileError
 from ..model import Argument
 from ..moments import Moments
 from ..runs import CalibrationRun
 from ..units import check_follows
 from .ahead import side_by_side
-from .columns import RUN_COLUMN, find_angle_column, find_reference_column
+from .columns import RUN_COLUMN, find_angle_column, find_reference
 from .formats import Labels, LogFormat, find_format
 
 __all__ = ["Accumulated", "LogFitSettings", "accumulate", "accumulate_each", "merged"]
@@ -52,6 +53,8 @@ class LogFitSettings:
     shafts: Mapping[str, float]
     argument: Argument = "reference"
     counts_per_turn: float | None = None
+    counts_per_turn_reference: float | None = None
+    signals: Mapping[str, tuple[str, str | None]] = field(default_factory=dict)
     topic: str | None = None
     threads: int | None = None
     checksums: bool = False
@@ -99,6 +102,7 @@ class _Stretch(NamedTuple):
     size: float
     names: Sequence[str]
     period: float
+    reference_scale: float
     scale: float
 
 
@@ -140,17 +144,41 @@ def accumulate_each(
 def _stretches(path: Path, settings: LogFitSettings) -> Iterator[_Stretch]:
     kind = find_format(path)
     header = kind.module.columns(path, settings.topic)
-    reference = find_reference_column(path, header)
-    period = UNIT_PERIODS[reference.rpartition("_")[2]]
+    wanted = dict(settings.signals)
+    reference = find_reference(path, header, wanted)
+    reference = reference._replace(unit=reference.unit or kind.unit)
+    period = UNIT_PERIODS.get(reference.unit or "", 360.0)
+    if reference.unit is None or (
+        reference.unit == "count" and settings.counts_per_turn_reference is None
+    ):
+        raise FileError(
+            path,
+            "its unit is not known: give it as --signal reference=NAME:UNIT, counts with "
+            "--counts-per-turn-reference",
+            line=1,
+            column=reference.name,
+        )
+    asked, unit = wanted.get("indicated", (None, None))
     indicated = find_angle_column(
-        path, period, header, counts_per_turn=settings.counts_per_turn, fresh=False
+        path,
+        period,
+        header,
+        column=asked,
+        unit=unit or kind.unit,
+        counts_per_turn=settings.counts_per_turn,
+        fresh=False,
     )
-    names = [reference, indicated.name, *([RUN_COLUMN] if RUN_COLUMN in header else [])]
+    run = wanted["run"][0] if "run" in wanted else RUN_COLUMN
+    run = matching(path, header, run) if "run" in wanted else run
+    names = [reference.name, indicated.name, *([run] if run in header else [])]
     parts = kind.stretches(path)
     size = path.stat().st_size / len(parts)
+    scales = (
+        reference.scale(period, settings.counts_per_turn_reference)[0],
+        period / indicated.period,
+    )
     for i, part in enumerate(parts):
-        scale = period / indicated.period
-        yield _Stretch(path, kind, part, i == 0, size, names, period, scale)
+        yield _Stretch(path, kind, part, i == 0, size, names, period, *scales)
 
 
 def _accumulate(stretch: _Stretch, settings: LogFitSettings, advance: Advance) -> Accumulated:
@@ -163,8 +191,12 @@ def _accumulate(stretch: _Stretch, settings: LogFitSettings, advance: Advance) -
     )
     reference, indicated, *run = stretch.names
     left = stretch.size
-    for batch in stretch.kind.read(path, stretch.names, settings.topic, stretch.part):
+    for batch in stretch.kind.read(
+        path, stretch.names, settings.topic, stretch.part, texts=stretch.names[2:]
+    ):
         true, said = batch[reference], batch[indicated]
+        if stretch.reference_scale != 1.0:
+            true = true * stretch.reference_scale
         if stretch.is_first and found.rows == 0:
             _check_follows(path, true, said * stretch.scale, period)
         runs = batch[run[0]] if run else None

@@ -6,7 +6,9 @@ from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 from ..angles import UNIT_PERIODS, unit_name
+from ..columns import ANGLE_UNITS, Column, Wanted, find_columns, listed, matching, unit_in_name
 from ..errors import FileError
+from ..signals import SIGNALS
 
 __all__ = [
     "RUN_COLUMN",
@@ -14,7 +16,9 @@ __all__ = [
     "UNITS",
     "AngleColumn",
     "find_angle_column",
+    "find_reference",
     "find_reference_column",
+    "find_signal",
     "find_signal_column",
 ]
 
@@ -25,11 +29,10 @@ RUN_COLUMN = "run"
 
 #: Column endings of the signals that terms of a model may need.
 SIGNAL_COLUMNS = {
-    "time": ("time_s",),
-    "temperature": ("temperature_C",),
-    "torque": ("torque_Nm",),
-    "direction": ("direction",),
-    "velocity": tuple(f"velocity_{unit}_s" for unit in UNITS),
+    signal.name: tuple(signal.column.format(unit) for unit in UNITS)
+    if "{}" in signal.column
+    else (signal.column,)
+    for signal in SIGNALS.values()
 }
 
 
@@ -67,12 +70,9 @@ def find_angle_column(
         No such column, or several; counts without ``counts_per_turn``; a column of the
         result's name is there already.
     """
-    if column is None:
-        column = _search(path, header, joint)
-    elif column not in header:
-        raise FileError(path, f"no such column; {_listed(header)}", line=1, column=column)
+    column = _search(path, header, joint) if column is None else matching(path, header, column)
     unit = unit or _unit_of(column, joint) or unit_name(model_period)
-    period = UNIT_PERIODS.get(unit) or counts_per_turn
+    period = ANGLE_UNITS.get(unit) or counts_per_turn
     if period is None and unit_name(model_period) == "count":
         period = model_period
     if period is None:
@@ -90,45 +90,62 @@ def find_angle_column(
     return AngleColumn(column, unit, float(period), corrected)
 
 
-def find_reference_column(path: object, header: Sequence[str]) -> str:
-    """The true angle of a calibration log: ``reference_deg``, ``_rad`` or ``_turn``.
+def find_reference(path: object, header: Sequence[str], wanted: Wanted) -> Column:
+    """The true angle of a calibration log: ``reference_deg`` and so on, or that asked for.
 
     Raises
     ------
     FileError
-        None of them, or several.
+        None, or several; its unit is not known.
     """
-    found = [name for name in (f"reference_{unit}" for unit in UNIT_PERIODS) if name in header]
-    if len(found) != 1:
-        problem = f"several of them ({', '.join(found)})" if found else "there is none"
+    found = find_columns(path, header, {k: v for k, v in wanted.items() if k == "reference"})
+    column = found.get("reference")
+    if column is None:
         raise FileError(
             path,
-            f"one column reference_deg, _rad or _turn is needed and {problem}; {_listed(header)}",
+            "one column reference_deg, _rad or _turn is needed and there is none: name another "
+            f"with --signal reference=NAME:UNIT; {listed(header)}",
             line=1,
         )
-    return found[0]
+    return column
+
+
+def find_reference_column(path: object, header: Sequence[str]) -> str:
+    """The name of the true angle of a calibration log; see `find_reference`."""
+    return find_reference(path, header, {}).name
 
 
 def find_signal_column(
     path: object, header: Sequence[str], signal: str, joint: str | None, column: str | None
 ) -> str | None:
+    """The name of the column of ``signal``; see `find_signal`."""
+    found = find_signal(path, header, signal, joint, None if column is None else (column, None))
+    return None if found is None else found.name
+
+
+def find_signal(
+    path: object,
+    header: Sequence[str],
+    signal: str,
+    joint: str | None,
+    column: tuple[str, str | None] | None,
+) -> Column | None:
     """The column of ``signal`` (velocity, temperature, ...) of ``joint``, or None.
 
     Without ``column`` it is ``JOINT_velocity_deg_s``, ``velocity_deg_s_JOINT`` or
     ``velocity_deg_s`` and so on, those of the joint first.
     """
     if column is not None:
-        if column not in header:
-            raise FileError(path, f"no such column; {_listed(header)}", line=1, column=column)
-        return column
+        name = matching(path, header, column[0])
+        return Column(signal, name, column[1] or unit_in_name(name, signal), True)
     patterns = (
         ["{}"] if joint is None else [f"{joint}_{{}}", f"{{}}_{joint}", f"{joint}/{{}}", "{}"]
     )
     for pattern in patterns:
         for ending in SIGNAL_COLUMNS.get(signal, (signal,)):
             if pattern.format(ending) in header:
-                return pattern.format(ending)
-    return None
+                return Column(signal, pattern.format(ending), unit_in_name(ending, signal))
+    return find_columns(path, header, {}).get(signal) if joint is None else None
 
 
 def _search(path: object, header: Sequence[str], joint: str | None) -> str:
@@ -142,7 +159,7 @@ def _search(path: object, header: Sequence[str], joint: str | None) -> str:
             if found
             else "no indicated_deg (_rad, _turn, _count) column"
         )
-        raise FileError(path, f"{problem}: name the angle with --column; {_listed(header)}", line=1)
+        raise FileError(path, f"{problem}: name the angle with --column; {listed(header)}", line=1)
     for candidates in _joint_names(joint):
         found = [name for name in candidates if name in header]
         if len(found) == 1:
@@ -157,7 +174,7 @@ def _search(path: object, header: Sequence[str], joint: str | None) -> str:
     raise FileError(
         path,
         f"no column of joint {joint}, such as {joint}_indicated_deg: name it with "
-        f"--column {joint}=NAME; {_listed(header)}",
+        f"--column {joint}=NAME; {listed(header)}",
         line=1,
     )
 
@@ -175,6 +192,8 @@ def _joint_names(joint: str) -> Iterator[list[str]]:
 
 
 def _unit_of(column: str, joint: str | None) -> str | None:
+    if column.endswith(("]", ")")):
+        return unit_in_name(column, "indicated")
     name = column.rpartition("/")[2]
     ending = name.rpartition("_")[2]
     if ending not in UNITS and joint is not None:
@@ -191,8 +210,3 @@ def _corrected_name(column: str, unit: str, joint: str | None) -> str:
     else:
         corrected = f"corrected_{unit}"
     return group + slash + corrected
-
-
-def _listed(header: Sequence[str]) -> str:
-    shown = ", ".join(header[:20])
-    return f"its columns are {shown}" + (f" and {len(header) - 20} more" if header[20:] else "")

@@ -7,11 +7,13 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from .. import __version__
 from ..angles import arcsec, wrap
+from ..columns import wanted_columns
 from ..errors import ArgumentError, NoModelError
 from ..fitting.travel import Span, covered_span
 from ..model import Argument, HarmonicModel
@@ -123,6 +125,9 @@ def fit_logs(
     shafts: Mapping[str, float] | None = None,
     argument: Argument = "reference",
     counts_per_turn: float | None = None,
+    counts_per_turn_reference: float | None = None,
+    signals: Mapping[str, Any] | None = None,
+    topic: str | None = None,
     scheduler: str | None = None,
     threads: int | None = None,
     checksums: bool = False,
@@ -147,7 +152,11 @@ def fit_logs(
         runs and are not negligible.
     gear_ratio, fixed_member, shafts, argument
         As in `fit`.
-    counts_per_turn : float, optional
+    counts_per_turn, counts_per_turn_reference : float, optional
+    signals : mapping of role to column, optional
+        Columns with other names, as in `read_runs`.
+    topic : str, optional
+        JointState topic of ROS bags.
     scheduler : str, optional
         Address of a Dask scheduler whose workers share the file system: a log on each, the
         moments merged in a tree; the numbers are the same, bit for bit.
@@ -201,6 +210,9 @@ def fit_logs(
         {name: cycles[name] for name in asked},
         argument,
         counts_per_turn,
+        counts_per_turn_reference,
+        wanted_columns(signals),
+        topic,
         threads=threads,
         checksums=checksums,
     )

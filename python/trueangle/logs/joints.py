@@ -16,12 +16,12 @@ from typing import Any, NamedTuple, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from ..angles import UNIT_PERIODS
+from ..columns import Column, wanted_columns
 from ..errors import ArgumentError, FileError, OutsideSpanWarning
 from ..files import sha256_of
 from ..model import HarmonicModel
 from ..modelfile import load_model
-from .columns import SIGNAL_COLUMNS, AngleColumn, find_angle_column, find_signal_column
+from .columns import SIGNAL_COLUMNS, AngleColumn, find_angle_column, find_signal
 from .statistics import CorrectionStatistics
 from .turns import TurnCounter, TurnState
 
@@ -41,8 +41,11 @@ class Joint:
         Needed where a log holds several joints.
     column : str, optional
         Of the indicated angle; searched by name where None.
-    signals : mapping of str to str
-        Columns of the signals that terms of the model need, where their names do not say.
+    signals : mapping of str to (str, str or None)
+        Columns of the signals that terms of the model need, and their units, where their
+        names do not say.
+    unit : str, optional
+        Of the indicated angle.
     file, sha256 : str
         Of the model file, for the provenance of the output.
     """
@@ -50,9 +53,10 @@ class Joint:
     model: HarmonicModel
     name: str | None = None
     column: str | None = None
-    signals: Mapping[str, str] = field(default_factory=dict)
+    signals: Mapping[str, tuple[str, str | None]] = field(default_factory=dict)
     file: str = ""
     sha256: str = ""
+    unit: str | None = None
 
     @classmethod
     def load(
@@ -60,12 +64,13 @@ class Joint:
         path: str | PathLike[str],
         name: str | None = None,
         column: str | None = None,
-        signals: Mapping[str, str] | None = None,
+        signals: Mapping[str, tuple[str, str | None]] | None = None,
+        unit: str | None = None,
     ) -> Joint:
         """Joint of the model file ``path``."""
         model = load_model(path)  # lets in models of a bounded size only
         digest = sha256_of(path)
-        return cls(model, name, column, signals or {}, Path(path).name, digest)
+        return cls(model, name, column, signals or {}, Path(path).name, digest, unit)
 
     @cached_property
     def digest(self) -> str:
@@ -119,7 +124,7 @@ class LogSettings:
                 taken,
                 joint=joint.name,
                 column=joint.column,
-                unit=self.unit or unit,
+                unit=joint.unit or self.unit or unit,
                 counts_per_turn=self.counts_per_turn,
             )
             taken.append(angle.corrected)
@@ -131,7 +136,7 @@ class LogSettings:
     def digest(self) -> str:
         """Changes with everything that changes the output."""
         content = [
-            [[j.name, j.column, sorted(j.signals.items()), j.digest] for j in self.joints],
+            [[j.name, j.column, sorted(j.signals.items()), j.digest, j.unit] for j in self.joints],
             [self.unit, self.counts_per_turn, self.topic, self.output_topic],
         ]
         return hashlib.sha256(json.dumps(content).encode()).hexdigest()
@@ -152,7 +157,7 @@ class LogSettings:
         return self.counts_turns or self.follows_travel
 
 
-def signal_columns(path: object, header: Sequence[str], joint: Joint) -> dict[str, str]:
+def signal_columns(path: object, header: Sequence[str], joint: Joint) -> dict[str, Column]:
     """Columns of the signals that the joint's model uses; time stands in for velocity.
 
     Raises
@@ -161,11 +166,11 @@ def signal_columns(path: object, header: Sequence[str], joint: Joint) -> dict[st
         Names the column of a signal that the model cannot do without.
     """
     model = joint.model
-    found: dict[str, str] = {}
+    found: dict[str, Column] = {}
     for signal in (*model.uses_signals, *(["time"] if "velocity" in model.uses_signals else [])):
         if signal == "time" and "velocity" in found:
             continue
-        column = find_signal_column(path, header, signal, joint.name, joint.signals.get(signal))
+        column = find_signal(path, header, signal, joint.name, joint.signals.get(signal))
         if column is not None:
             found[signal] = column
     for term in model.terms:
@@ -212,19 +217,20 @@ class Channel:
         self,
         joint: Joint,
         angle: AngleColumn,
-        signals: Mapping[str, str],
+        signals: Mapping[str, Column],
         before: JointState,
         settings: LogSettings,
     ) -> None:
         self.joint = joint
         self.angle = angle
-        self.signals = dict(signals)
+        self.signals = {signal: column.name for signal, column in signals.items()}
         self.statistics = CorrectionStatistics()
         self._threads = settings.threads
         model = joint.model
         self._scale = model.period / angle.period
         self._corrector = model.corrector() if model.terms else None
-        self._velocity_scale = _velocity_scale(self.signals.get("velocity"), model, self._scale)
+        self._signal_columns = {s: _with_unit(c, angle.unit) for s, c in signals.items()}
+        self._counts = settings.counts_per_turn
         if self._corrector is not None and before.travel:
             self._corrector.state = before.travel
         self._counter = None if model.is_periodic else TurnCounter(angle.period, before.turns)
@@ -291,9 +297,10 @@ class Channel:
             # Rows outside the span are counted in the summary instead.
             if self._span is not None:
                 warnings.simplefilter("ignore", OutsideSpanWarning)
-            given: Any = dict(signals or {})
-            if "velocity" in given:
-                given["velocity"] = given["velocity"] * self._velocity_scale
+            given: Any = {
+                signal: self._signal_columns[signal].values(values, model.period, self._counts)
+                for signal, values in (signals or {}).items()
+            }
             apply: Any = model.correct if self._corrector is None else self._corrector
             corrected: Array = apply(values, threads=self._threads, **given)
         return corrected if scale == 1.0 else corrected / scale
@@ -312,11 +319,11 @@ class Channel:
         }
 
 
-def _velocity_scale(column: str | None, model: HarmonicModel, angle_scale: float) -> float:
-    """From the unit that the column's name states, else that of the angle, to the model's."""
-    unit = (column or "").removesuffix("_s").rpartition("_")[2]
-    period = UNIT_PERIODS.get(unit)
-    return angle_scale if period is None else model.period / period
+def _with_unit(column: Column, angle_unit: str) -> Column:
+    """A velocity whose column does not state a unit has that of the angle, per second."""
+    if column.role == "velocity" and column.unit is None:
+        return column._replace(unit=f"{angle_unit}/s")
+    return column
 
 
 def joints_of(
@@ -340,7 +347,7 @@ def joints_of(
         by_joint = {None: signals}
     _check_known(by_joint, by_name, "signals")
     return tuple(
-        _joint(entry, name, columns.get(name), by_joint.get(name))
+        _joint(entry, name, columns.get(name), wanted_columns(by_joint.get(name)))
         for name, entry in by_name.items()
     )
 
@@ -353,9 +360,18 @@ def _check_known(names: Iterable[Any], known: Mapping[Any, Any], argument: str) 
             raise ArgumentError(f"{argument}: no joint {name!r} has a model; {hint}")
 
 
-def _joint(entry: Any, name: str | None, column: str | None, signals: Any) -> Joint:
+def _joint(
+    entry: Any, name: str | None, column: str | None, signals: dict[str, tuple[str, str | None]]
+) -> Joint:
+    unit = None
+    if "indicated" in signals:
+        if column is not None:
+            raise ArgumentError(
+                "column= and signals={'indicated': ...} both name the angle; give one"
+            )
+        column, unit = signals.pop("indicated")
     if isinstance(entry, HarmonicModel):
-        return Joint(entry, name, column, signals or {})
+        return Joint(entry, name, column, signals, unit=unit)
     if isinstance(entry, (str, PathLike)):
-        return Joint.load(entry, name, column, signals)
+        return Joint.load(entry, name, column, signals, unit)
     raise ArgumentError(f"model must be a HarmonicModel or its file, got {type(entry).__name__}")

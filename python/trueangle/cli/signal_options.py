@@ -1,0 +1,100 @@
+"""Options that tell which column holds what; shared by every command that reads runs or logs."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Sequence
+from typing import Any
+
+from ..columns import role_kind, wanted_unit
+from ..errors import ArgumentError
+
+__all__ = ["ROLES", "add_signals", "reading", "signal_argument", "signals_by_joint"]
+
+#: The roles, as every help names them.
+ROLES = (
+    "reference, indicated, time, velocity, direction, temperature, torque, current, mount, "
+    "run, unit, motor, head1, head2 ..., shift"
+)
+
+
+def add_signals(parser: argparse.ArgumentParser, counts: bool = True) -> None:
+    """Declare ``--signal`` and what belongs to it."""
+    add = parser.add_argument
+    add(
+        "--signal",
+        action="append",
+        type=signal_argument,
+        metavar="[JOINT.]ROLE=NAME[:UNIT]",
+        help=f"column that holds a role, and its unit (deg, rad, turn, count, arcsec, arcmin; "
+        f"s, ms, us, ns; deg/s, rad/s, turn/s); may be repeated. Roles: {ROLES}. Without it "
+        "columns are found by their names: reference_deg, time_s, 'pos act [rad]'",
+    )
+    if counts:
+        add("--counts-per-turn", type=float, metavar="N", help="of an indicated angle in counts")
+    add(
+        "--counts-per-turn-reference",
+        type=float,
+        metavar="N",
+        help="of a reference in counts",
+    )
+    add("--topic", metavar="NAME", help="JointState topic of a ROS bag (default: the only one)")
+
+
+class _Entry(tuple[str | None, str, str, str | None]):
+    """Joint, role, column and unit of one ``--signal``."""
+
+    __slots__ = ()
+
+
+def signal_argument(text: str) -> _Entry:
+    """What argparse makes of one ``[JOINT.]ROLE=NAME[:UNIT]``; mistakes are of usage.
+
+    Examples
+    --------
+    >>> signal_argument("arm.torque=tau"), signal_argument("reference=IOC:m1.RBV")
+    (('arm', 'torque', 'tau', None), (None, 'reference', 'IOC:m1.RBV', None))
+    """
+    left, equals, name = text.partition("=")
+    joint, _, role = left.rpartition(".")
+    if not equals or not name or not role:
+        raise argparse.ArgumentTypeError(f"[JOINT.]ROLE=NAME[:UNIT] is needed, got {text!r}")
+    try:
+        role_kind(role)
+    except ArgumentError as error:
+        raise argparse.ArgumentTypeError(str(error)) from None
+    column, colon, ending = name.rpartition(":")
+    unit = wanted_unit(ending, role) if colon and column else None
+    return _Entry((joint or None, role, column if unit else name, unit))
+
+
+def signals_by_joint(
+    entries: Sequence[_Entry] | None, single: bool = True
+) -> dict[str, Any] | None:
+    """Columns by role of the one joint, or such mappings by joint.
+
+    Raises
+    ------
+    ArgumentError
+        A joint is named where there is one, or missing where there are several; a role twice.
+    """
+    found: dict[str, Any] = {}
+    for joint, role, name, unit in entries or ():
+        if single == (joint is not None):
+            wanted = "ROLE=NAME" if single else "JOINT.ROLE=NAME"
+            raise ArgumentError(f"--signal: {wanted} is needed, got {joint or ''}.{role}={name}")
+        roles = found if joint is None else found.setdefault(joint, {})
+        if role in roles:
+            raise ArgumentError(f"--signal: {role} is named twice, {roles[role][0]!r} and {name!r}")
+        roles[role] = (name, unit)
+    return found or None
+
+
+def reading(args: argparse.Namespace) -> dict[str, Any]:
+    """Keywords of `trueangle.read_runs` from the options of a command."""
+    return {
+        "counts_per_turn": args.counts_per_turn,
+        "counts_per_turn_reference": args.counts_per_turn_reference,
+        "signals": signals_by_joint(args.signal),
+        "topic": args.topic,
+    }

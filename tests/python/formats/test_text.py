@@ -1,0 +1,198 @@
+"""Text files as loggers, scopes and spreadsheets write them."""
+
+import math
+
+import numpy as np
+import pytest
+
+import trueangle as ta
+from trueangle.errors import FileError
+
+ROWS = 24
+REFERENCE = np.arange(ROWS) * 15.0
+INDICATED = REFERENCE + 0.5
+TIMES = np.arange(ROWS) * 0.125
+
+
+def table(delimiter=",", decimal=".", end="", columns=(TIMES, REFERENCE, INDICATED)):
+    """Lines of readings."""
+    cells = [[repr(float(x)).replace(".", decimal) for x in column] for column in columns]
+    return "".join(delimiter.join(row) + end + "\n" for row in zip(*cells, strict=True))
+
+
+NAMES = {"reference": "ref", "indicated": "enc", "time": "t"}
+SCOPE = "\t".join(["Name", "Axis.Ref", "Name", "Axis.Enc"])
+TWINCAT = (
+    "Name\trecord\nFile\tC:\\x.tcscopex\nStarttime of export\t132959733843760000\tMontag\n\n"
+    f"{SCOPE}\nSymbolComment\t\tSymbolComment\t\nData-Type\tREAL64\tData-Type\tREAL64\n"
+    "SampleTime[ms]\t125\tSampleTime[ms]\t125\nVariableSize\t8\tVariableSize\t8\n"
+    "NetID\t1.2.3.4.1.1\tNetID\t1.2.3.4.1.1\nPort\t851\tPort\t851\nOffset\t0\tOffset\t0\n"
+    "ScaleFactor\t1\tScaleFactor\t1\nUnit\tdeg (Angle)\tUnit\tdeg (Angle)\n"
+    "Unit ScaleFactor\t1\tUnit ScaleFactor\t1\nUnit Offset\t0\tUnit Offset\t0\n\n"
+)
+FILES = {
+    "plain": ("time_s,reference_deg,indicated_deg\n" + table(), {}),
+    "brackets": ("time [s],Reference (deg),INDICATED [deg]\n" + table(), {}),
+    "milliseconds": (
+        "t [ms];ref [deg];enc [deg]\n"
+        + table(";", ",", columns=(1e3 * TIMES, REFERENCE, INDICATED)),
+        NAMES,
+    ),
+    "a preamble": (
+        "Rig 7\noperator: N. N.\ndate,2026-11-21\n\nt,ref,enc\n" + table(),
+        {**NAMES, "reference": ("ref", "deg")},
+    ),
+    "decimal commas with tabs": (
+        "Rig 7\nt\tref [deg]\tenc [deg]\n" + table("\t", ","),
+        NAMES,
+    ),
+    "notes": (
+        "# made by a logger; with, delimiters\nt,ref,enc\n# 24 rows\n" + table() + "# end\n",
+        {**NAMES, "reference": ("ref", "deg")},
+    ),
+    "names in a note": ("# 2026\n# t,ref [deg],enc [deg]\n" + table(), NAMES),
+    "a line of units": ("t,ref,enc\ns,deg,deg\n" + table(), NAMES),
+    "units in brackets below": ("t;ref;enc\n[s];[deg];[deg]\n\n" + table(";"), NAMES),
+    "ends of lines": ("t,ref [deg],enc [deg]\n" + table(end=","), NAMES),
+    "ends of all lines": ("t;ref [deg];enc [deg];\n" + table(";", end=";"), NAMES),
+    "an end of the names": ("t,ref [deg],enc [deg],\n" + table(), NAMES),
+    "no names": (
+        table(),
+        {"time": "column1", "reference": ("column2", "deg"), "indicated": "column3"},
+    ),
+    "an oscilloscope": (
+        "Model,DSO-X\nSource,CH1,CH2\nt,ref,enc\nsecond,deg,deg\n" + table(),
+        NAMES,
+    ),
+    "TwinCAT": (
+        TWINCAT
+        + table("\t", ",", columns=(1e3 * TIMES, REFERENCE, 1e3 * TIMES, INDICATED))
+        + "EOF\n",
+        {"reference": "axis.ref", "indicated": "Axis.Enc"},
+    ),
+    "blanks around": (
+        "time_s , reference_deg , indicated_deg\n" + table(" , "),
+        {},
+    ),
+    "blank lines": ("time_s,reference_deg,indicated_deg\n\n" + table().replace("\n", "\n\n"), {}),
+}
+
+
+@pytest.mark.parametrize("way", ["fast", "slow"])
+@pytest.mark.parametrize("case", FILES)
+def test_columns_are_found_whatever_stands_around_them(case, way, tmp_path, monkeypatch):
+    if way == "slow":
+        monkeypatch.setattr("trueangle.formats.csvfile.plain_block", None)
+    text, signals = FILES[case]
+    path = tmp_path / "rig.csv"
+    path.write_text(text)
+    (run,) = ta.read_runs(path, signals=signals)
+    assert run.period == 360.0
+    np.testing.assert_allclose(run.reference, REFERENCE, rtol=1e-15)
+    np.testing.assert_allclose(run.indicated, INDICATED, rtol=1e-15)
+    np.testing.assert_allclose(run.time, TIMES, rtol=1e-12)
+
+
+@pytest.mark.parametrize("case", FILES)
+def test_a_correction_keeps_every_byte_that_it_does_not_change(case, tmp_path):
+    text, signals = FILES[case]
+    path = tmp_path / "rig.csv"
+    path.write_text(text)
+    name = signals.get("indicated", "INDICATED [deg]" if case == "brackets" else "indicated_deg")
+    model = ta.HarmonicModel([ta.Shaft("output", 1, [1], [0.0], [0.25])], 0.5, 360.0)
+    unit = {"indicated": (name if isinstance(name, str) else name[0], "deg")}
+    report = ta.correct_logs(path, model, tmp_path / "out.csv", signals=unit)
+    assert report.is_done, report.logs[0].error
+    before, after = text.split("\n"), (tmp_path / "out.csv").read_text().split("\n")
+    assert len(before) == len(after)
+    for one, other in zip(before, after, strict=True):
+        assert other.startswith((one, one[:-1]))
+    names = {"reference": "corrected_deg", "indicated": "corrected_deg"}
+    if case == "no names":
+        names = dict.fromkeys(names, "column4")
+    (run,) = ta.read_runs(tmp_path / "out.csv", signals={k: (v, "deg") for k, v in names.items()})
+    np.testing.assert_allclose(run.reference, model.correct(INDICATED), rtol=1e-14)
+
+
+def test_counts_on_both_sides(tmp_path):
+    path = tmp_path / "counts.csv"
+    path.write_text("reference_count,indicated_count\n0,0\n100,1024\n")
+    with pytest.raises(FileError, match="--counts-per-turn-reference"):
+        ta.read_runs(path, counts_per_turn=4096)
+    (run,) = ta.read_runs(path, counts_per_turn=4096, counts_per_turn_reference=400)
+    np.testing.assert_allclose(run.reference, [0.0, 90.0])
+    np.testing.assert_allclose(run.indicated, [0.0, 90.0])
+
+
+UNITS = {
+    "arcsec": 1_296_000.0,
+    "arcmin": 21_600.0,
+    "deg": 360.0,
+    "rad": 2.0 * math.pi,
+    "turn": 1.0,
+}
+
+
+@pytest.mark.parametrize("unit", UNITS)
+def test_named_units_are_converted(unit, tmp_path):
+    path = tmp_path / "units.csv"
+    path.write_text("a:b,enc,v,T,tau\n" + f"0,{UNITS[unit] / 8},2,300,1500\n")
+    (run,) = ta.read_runs(
+        path,
+        signals={
+            "reference": ("a:b", "deg"),
+            "indicated": ("enc", unit),
+            "velocity": ("v", "rad/s"),
+            "temperature": ("T", "K"),
+            "torque": ("tau", "mNm"),
+        },
+    )
+    assert run.indicated[0] == pytest.approx(45.0)
+    assert run.velocity[0] == pytest.approx(math.degrees(2.0))
+    assert run.temperature[0] == pytest.approx(26.85)
+    assert run.torque[0] == pytest.approx(1.5)
+
+
+@pytest.mark.parametrize(
+    ("signals", "message"),
+    [
+        ({"reference": "posact"}, r"did you mean 'pos act \[rad\]'"),
+        ({"refrence": "x"}, "did you mean reference"),
+        ({"reference": ("pos act", "parsec")}, "no unit"),
+        ({"reference": "pos"}, "no such column"),
+        ({"reference": 3}, "must be the name"),
+    ],
+)
+def test_what_cannot_be_found_suggests_what_was_meant(signals, message, tmp_path):
+    path = tmp_path / "rig.csv"
+    path.write_text("pos act [rad],indicated_rad\n0,0\n")
+    if signals == {"reference": "posact"}:  # blanks are forgiven
+        assert ta.read_runs(path, signals=signals)[0].period == 2.0 * math.pi
+        signals = {"reference": "pos akt"}
+    with pytest.raises(ValueError, match=message):
+        ta.read_runs(path, signals=signals)
+
+
+@pytest.mark.parametrize(
+    ("text", "problem"),
+    [
+        (b"\xff\xfer\x00e\x00f\x00", "UTF-16"),
+        (b"reference_deg,indicated_deg\r1,1\r2,2\r", "CSV"),
+        (b"reference_deg,indicated_deg\n" + b"1" * (1 << 25), "longer than 16 MiB"),
+        (b"reference_deg,indicated_deg\n1,1\n1,1,1\n", "line 3: 3 values"),
+        (b"# only\n# notes\n", "no column reference_deg|no readings"),
+    ],
+)
+def test_what_is_no_table_is_told_in_one_line(text, problem, tmp_path):
+    path = tmp_path / "odd.csv"
+    path.write_bytes(text)
+    with pytest.raises(FileError, match=problem) as caught:
+        ta.read_runs(path)
+    assert len(str(caught.value)) < 1000
+
+
+def test_a_degree_sign_of_an_old_code_page(tmp_path):
+    path = tmp_path / "old.csv"
+    path.write_bytes("t,ref [°],enc [°]\n".encode("cp1252") + table().encode())
+    (run,) = ta.read_runs(path, signals=NAMES)
+    np.testing.assert_allclose(run.reference, REFERENCE)
