@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import zlib
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from trueangle import CalibrationRun
 
 from .causes import draw
-from .designs import DESIGNS, RICH, Scene
+from .designs import DESIGNS, RICH, Design, Scene
 from .joint import Joint, random_joint
 from .measurement import Habit, measure, random_habit
 from .source import Source
@@ -94,3 +94,21 @@ def pose(case: Case) -> Question:
     habit = Habit(**{**vars(habit), "noise": case.noise})
     runs = measure(joint, design, scenes, sources, habit, rng)
     return Question(case, joint, scenes, sources, habit, runs)
+
+
+def hide(
+    build: Callable[[np.random.Generator], Source],
+    rms: float,
+    seed: int,
+    design: Design = RICH,
+) -> Question:
+    """A question with one hidden effect of any form, ``rms`` arcsec over the rich design."""
+    rng = np.random.default_rng([seed, zlib.crc32(build.__name__.encode())])
+    joint = random_joint(rng)
+    habit = random_habit(rng)
+    scenes = design.scenes(rng)
+    source = build(rng).sized(joint, scenes, rms)
+    joint = source.adapt(joint)
+    runs = measure(joint, design, scenes, (source,), habit, rng)
+    case = Case((source.cause,), 1.0, seed, design.name)
+    return Question(case, joint, scenes, (source,), habit, runs)
