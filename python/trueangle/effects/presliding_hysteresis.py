@@ -36,6 +36,7 @@ from .search import (
     Array,
     Fitted,
     golden_maximum,
+    of_one_sign,
 )
 
 __all__ = ["PreslidingHysteresis", "PreslidingHysteresisTerm"]
@@ -145,23 +146,9 @@ class PreslidingHysteresis(Effect):
             further.append(extension)
         further.sort(key=lambda p: -p.bic_gain)
         return next(
-            (p for p in further if p.bic_gain > 0.0 and cls._pulls_back(regression, p)), None
+            (p for p in further if p.bic_gain > 0.0 and of_one_sign(regression, p, everywhere)),
+            None,
         )
-
-    @classmethod
-    def _pulls_back(cls, regression: Regression, extension: Extension) -> bool:
-        """With this term all elements have one sign, as springs have.
-
-        Elements of unlike signs would only be a difference of two that are alike.
-        """
-        after = regression.coefficients_with(extension)
-        elements = [float(extension.coefficients[0])] if everywhere(extension) else []
-        at = regression.base.shape[1]
-        for term in regression.terms:
-            if term.cause == cls.kind and everywhere(term):
-                elements.append(float(after[at]))
-            at += term.columns.shape[1]
-        return not elements or min(elements) * max(elements) > 0.0
 
     @classmethod
     def _play(cls, regression: Regression, order: int) -> Extension:

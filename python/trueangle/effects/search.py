@@ -24,6 +24,7 @@ __all__ = [
     "is_gear_order",
     "known_orders",
     "line_parameters",
+    "of_one_sign",
 ]
 
 Array: TypeAlias = NDArray[np.float64]
@@ -94,6 +95,23 @@ def golden_maximum(
             d = a + _GOLDEN * (b - a)
             fd = function(d)
     return (c, fc) if fc > fd else (d, fd)
+
+
+def of_one_sign(
+    regression: Regression, extension: Extension, is_element: Callable[[Extension], bool]
+) -> bool:
+    """With this term all elements of its cause have one sign, as springs have.
+
+    Elements of unlike signs would only be a difference of two that are alike.
+    """
+    after = regression.coefficients_with(extension)
+    elements = [float(extension.coefficients[0])] if is_element(extension) else []
+    at = regression.base.shape[1]
+    for term in regression.terms:
+        if term.cause == extension.cause and is_element(term):
+            elements.append(float(after[at]))
+        at += term.columns.shape[1]
+    return not elements or min(elements) * max(elements) > 0.0
 
 
 def known_orders(around: Surroundings) -> list[float]:
