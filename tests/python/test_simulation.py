@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import MISSING, fields
 
 import numpy as np
 import pytest
@@ -70,6 +71,20 @@ SAMPLES = {
 }
 
 
+def sample(kind):
+    """An effect of any kind; one that is not listed has every parameter at 1 or once."""
+    effect = EFFECTS[kind]
+    plain = {
+        "tuple[tuple": [[2.0, 1.0, 30.0]], "tuple[float": [1.0], "str": "output"
+    }  # fmt: skip
+    generic = {
+        field.name: next((v for start, v in plain.items() if field.type.startswith(start)), 1)
+        for field in fields(effect)
+        if field.default is MISSING
+    }
+    return effect.from_table(SAMPLES.get(kind, generic))
+
+
 def errors(effect, design=THERE_AND_BACK, harmonics=LINES, seed=1):
     """Error of the effect alone in arcsec, and the signals of its run."""
     sim = Simulation(JOINT, harmonics, sigma_arcsec=0.0)
@@ -79,9 +94,15 @@ def errors(effect, design=THERE_AND_BACK, harmonics=LINES, seed=1):
 
 
 def test_every_kind_round_trips_through_the_file_and_leaves_a_trace(tmp_path):
-    effects = [EFFECTS[kind].from_table(SAMPLES[kind]) for kind in EFFECTS]
+    effects = [sample(kind) for kind in EFFECTS]
     design = RunDesign(
-        reversals=(0.4,), torque_Nm=5.0, temperature_C=30.0, mount_deg=130.0, label='a "b"\\'
+        reversals=(0.4,),
+        torque_Nm=5.0,
+        gravity_Nm=4.0,
+        temperature_C=30.0,
+        mount_deg=130.0,
+        current_A=3.0,
+        label='a "b"\\',
     )
     sim = Simulation(JOINT, LINES, tuple(effects), 1.5, (design,))
     sim.save(tmp_path / "joint.toml")
