@@ -1,0 +1,183 @@
+"""A loop in torque: loading and unloading leave the gear at two angles."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+
+from ..joint.pattern import Surroundings, line_columns
+from ..joint.signals import Signals
+from ..regression.estimate import Parameters, quantity
+from ..regression.extension import Extension
+from ..regression.regression import Regression
+from .backlash import Backlash
+from .blindness import OWN_POWER, Blindness, share_left
+from .effect import Effect
+from .search import Array, Fitted, golden_maximum, of_one_sign
+from .torsional_compliance import TorsionalCompliance, torque_of, unloaded
+
+__all__ = ["TorqueHysteresis"]
+
+#: Torque in which the loop builds up, in shares of the largest torque: those searched.
+SPANS = np.geomspace(0.02, 1.0, 8)
+
+#: Elements of different spans at most, and the ratio of spans that keeps them apart.
+MOST_ELEMENTS = 3
+APART = 2.5
+
+#: Share of the largest torque by which it must come back to have turned: less is noise.
+TURNED = 0.06
+
+
+@dataclass(frozen=True)
+class TorqueHysteresis(Effect):
+    r"""Friction in the teeth beside the compliance: :math:`\varepsilon = h\,z(\tau)`.
+
+    .. math:: z = \sigma - (\sigma - z_0)\,e^{-|\tau - \tau_0|/T}
+
+    with :math:`\sigma` the sign in which the torque changes and :math:`z_0` the state at the
+    torque :math:`\tau_0` where it last turned round (the loop of a gear's catalogue; Dahl).
+
+    Parameters
+    ----------
+    half_width_arcsec : float
+        h: half of the loop's width, loading less unloading.
+    span_Nm : float
+        T: change of torque in which the loop builds up.
+    """
+
+    half_width_arcsec: float
+    span_Nm: float
+
+    kind: ClassVar[str] = "torque_hysteresis"
+    sentence: ClassVar[str] = (
+        "Friction between teeth holds back the wind-up: at one torque the gear stands at two "
+        "angles, one while the load grows and one while it falls."
+    )
+    needs: ClassVar[tuple[str, ...]] = ("torque",)
+    factor: ClassVar[str] = "torque"
+    confused_with: ClassVar[Mapping[type[Effect], str]] = {
+        Backlash: "turn the torque round without turning the joint, or carry two loads",
+        TorsionalCompliance: "load and unload at one place, to two values of one torque",
+    }
+    measure: ClassVar[str] = (
+        "load and unload in steps at one place, both signs, or move in both directions under "
+        "two loads"
+    )
+    located: ClassVar[bool] = True
+    not_at_run_time: ClassVar[str] = (
+        "a corrector follows the history of travel, not that of the torque"
+    )
+
+    def signal(self, signals: Signals, around: Surroundings, rng: np.random.Generator) -> Array:
+        return self.half_width_arcsec * self.loop(signals, self.span_Nm)
+
+    @classmethod
+    def propose(cls, regression: Regression) -> Extension | None:
+        torque = regression.signals.torque
+        present = [t.shape["span_Nm"] for t in regression.terms if t.cause == cls.kind]
+        if torque is None or not torque.any() or len(present) >= MOST_ELEMENTS:
+            return None
+        spans = SPANS * float(np.abs(torque).max())
+        loops = regression.remembered(
+            cls.kind,
+            None,
+            lambda: np.column_stack([cls.loop(regression.signals, float(s)) for s in spans]),
+        )
+        apart = [all(abs(np.log(s / p)) > np.log(APART) for p in present) for s in spans]
+        gains = np.where(apart, regression.gains(loops), 0.0)
+        k = int(np.argmax(gains))
+        if gains[k] <= 0.0:
+            return None
+        span = float(spans[k])
+        if not regression.hopeless(float(gains[k]), 2):
+            step = float(np.log(SPANS[1] / SPANS[0]))
+            log_span, _ = golden_maximum(
+                lambda x: float(
+                    regression.gains(cls.loop(regression.signals, float(np.exp(x)))[:, None])[0]
+                ),
+                np.log(span) - step,
+                np.log(span) + step,
+                8,
+            )
+            span = float(np.exp(log_span))
+        shape = {"span_Nm": span}
+        columns = cls.columns(regression.signals, regression.around, shape)
+        extension = regression.propose(cls.kind, shape, columns, parameters=2)
+        return extension if of_one_sign(regression, extension, lambda _: True) else None
+
+    @classmethod
+    def columns(cls, signals: Signals, around: Surroundings, shape: dict[str, Any]) -> Array:
+        return cls.loop(signals, shape["span_Nm"])[:, None]
+
+    @classmethod
+    def report(
+        cls, regression: Regression, terms: Sequence[Fitted]
+    ) -> tuple[Parameters, list[Effect]]:
+        widths = np.array([float(c[0]) for _, c, _ in terms])
+        spans = np.array([t.shape["span_Nm"] for t, _, _ in terms])
+        std = float(np.sqrt(sum(v[0, 0] for _, _, v in terms)))
+        parameters = {
+            "half_width_arcsec": quantity(float(widths.sum()), std),
+            "span_Nm": quantity(float(np.abs(widths) @ spans / np.abs(widths).sum())),
+        }
+        if len(terms) > 1:
+            parameters["element_spans_Nm"] = quantity(spans)
+            parameters["element_half_widths_arcsec"] = quantity(widths)
+        return parameters, [
+            TorqueHysteresis(float(w), float(s)) for w, s in zip(widths, spans, strict=True)
+        ]
+
+    @classmethod
+    def blind_spots(cls, regression: Regression, found: Sequence[Blindness]) -> Iterator[Blindness]:
+        signals = regression.signals
+        because = unloaded(signals)
+        if because:
+            yield cls.blind(because)
+            return
+        torque = torque_of(signals)[:, None]
+        loop = cls.loop(signals, 0.2 * float(np.abs(torque).max()))[:, None]
+        if not loop.any():
+            yield cls.blind("the torque turns round in no run: a loop in it is never closed")
+            return
+        low = np.hstack([line_columns(signals.theta, k) for k in (1, 2, 3, 5)])
+        if share_left(regression, loop, torque, signals.direction[:, None], low) < OWN_POWER:
+            yield cls.blind(
+                "the torque follows the angle: its loop looks like low orders and play",
+                Backlash,
+            )
+
+    @staticmethod
+    def loop(signals: Signals, span_Nm: float) -> Array:
+        """State z in [-1, 1] of the loop, 0 at the start of every run."""
+        state = np.zeros(len(signals))
+        torque = torque_of(signals)
+        zone = TURNED * float(np.abs(torque).max(initial=0.0))
+        for start, stop in signals.run_bounds():
+            sign, since = _branches(torque[start:stop], zone)
+            begun = 0.0
+            cuts = np.flatnonzero(np.diff(since) != 0.0) + 1
+            for a, b in zip([0, *cuts], [*cuts, stop - start], strict=True):
+                gone = np.abs(torque[start + a : start + b] - since[a]) / span_Nm
+                branch = sign[a] - (sign[a] - begun) * np.exp(-np.minimum(gone, 700.0))
+                state[start + a : start + b] = branch if sign[a] else begun
+                begun = float(state[start + b - 1])
+        return state
+
+
+def _branches(torque: Array, zone: float) -> tuple[Array, Array]:
+    """Sign of change of the torque at every reading, and the torque where that began."""
+    sign, since = np.zeros(torque.size), np.full(torque.size, torque[0])
+    way, extreme, at = 0.0, float(torque[0]), 0
+    for k, value in enumerate(torque.tolist()):
+        if way * (value - extreme) >= 0.0 and (way or value == extreme):
+            extreme, at = value, k
+        elif abs(value - extreme) > zone:
+            # It turned where it was farthest.
+            way = 1.0 if value > extreme else -1.0
+            sign[at:], since[at:] = way, extreme
+            extreme, at = value, k
+    return sign, since
