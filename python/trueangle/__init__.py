@@ -29,6 +29,8 @@ if TYPE_CHECKING:
     from .reports import report as report
     from .runfiles import read_runs as read_runs
     from .runs import CalibrationRun as CalibrationRun
+    from .selfcalibration import SelfCalibration as SelfCalibration
+    from .selfcalibration import selfcal as selfcal
     from .shafts import Shaft as Shaft
     from .simulation import Simulation as Simulation
     from .simulation import load_simulation as load_simulation
@@ -53,6 +55,7 @@ _PUBLIC = {
     "select_orders": "orders",
     "FitResult": "fitting.result",
     "HarmonicModel": "model",
+    "SelfCalibration": "selfcalibration",
     "Shaft": "shafts",
     "check": "checks",
     "correct": "logs.frames",
@@ -66,6 +69,7 @@ _PUBLIC = {
     "Moments": "moments",
     "read_runs": "runfiles",
     "report": "reports",
+    "selfcal": "selfcalibration",
     "Simulation": "simulation",
     "diagnose": "diagnosis",
     "load_simulation": "simulation",

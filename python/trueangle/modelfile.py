@@ -59,6 +59,8 @@ MAX_OFFSETS = 1_000_000
 _MOST_TURNS = 1e9
 #: Smallest turn in the unit of angles, and the inverse of the largest.
 _LEAST_PERIOD = 1e-12
+#: Sentences that a record says of what its model is blind to.
+_MOST_SENTENCES = 1000
 #: Signals (velocity in turns per second) at which any model must correct.
 _NORMAL = (
     {"velocity": 0.01, "temperature": 20.0, "torque": 1.0, "direction": 1.0},
@@ -79,7 +81,7 @@ def model_text(model: HarmonicModel) -> str:
         "terms": [term.to_table() for term in model.terms],
         "covariance": None if model.covariance is None else model.covariance.tolist(),
         "condition_number": model.condition_number,
-        "fit": None if model.fit is None else asdict(model.fit),
+        "fit": None if model.fit is None else _record(model.fit),
         "provenance": {
             "inputs": [source._asdict() for source in model.provenance.inputs],
             "package": model.provenance.package,
@@ -99,6 +101,14 @@ def save_model(model: HarmonicModel, path: str | PathLike[str]) -> None:
     hashes = [source.sha256 for source in model.provenance.inputs]
     with written_atomically(path, kind=MODEL, hashes=hashes) as file:
         file.write(text)
+
+
+def _record(record: FitRecord) -> dict[str, Any]:
+    """The record; what only a calibration without a reference says, only of one."""
+    table = asdict(record)
+    if not record.calibrated_without_reference:
+        del table["calibrated_without_reference"], table["blind"]
+    return table
 
 
 def load_model(path: str | PathLike[str]) -> HarmonicModel:
@@ -313,6 +323,13 @@ class _Reader(Decoder):
             name = f"fit.{key}"
             if key in ("method", "loss", "note"):
                 checked[key] = self.text(entry, name)
+            elif key == "calibrated_without_reference":
+                if not isinstance(entry, bool):
+                    raise self.error(f"true or false is needed, got {shown(entry)}", name)
+                checked[key] = entry
+            elif key == "blind":
+                texts = self.items(entry, name, "texts", _MOST_SENTENCES)
+                checked[key] = tuple(self.text(t, f"{name}[{i}]") for i, t in enumerate(texts))
             elif key in ("span", "offsets"):
                 checked[key] = self.numbers(entry, name, MAX_OFFSETS)
             elif key in ("samples", "runs", "wild", "positions"):

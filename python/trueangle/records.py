@@ -18,6 +18,8 @@ class FitRecord:
     take it from), ``offsets`` the zero of every run and ``offset_spread`` their standard
     deviation, all in the unit of the model's period. ``positions`` counts the distinct
     angles within a turn; ``note`` says where the model is verified and where not.
+    ``calibrated_without_reference`` marks a model of `trueangle.selfcal`, and ``blind`` what
+    such a model cannot know, one sentence each.
     """
 
     samples: int
@@ -32,6 +34,8 @@ class FitRecord:
     offset_spread: float = 0.0
     positions: int | None = None
     note: str = ""
+    calibrated_without_reference: bool = False
+    blind: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,92 @@
+"""``trueangle selfcal``: calibrate without a reference."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+
+from ..errors import ArgumentError
+from .order_lists import parse_orders
+from .paths import Input, Output
+
+HELP = "calibrate without a reference: from time stamps, heads, shifts or the motor"
+EXAMPLE = "trueangle selfcal coast.csv -o joint.json --loop open"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the command's arguments."""
+    from ..files import MODEL
+    from ..selfcalibration.calibrate import METHODS
+    from ..selfcalibration.loop import LOOPS
+
+    add = parser.add_argument
+    add("logs", nargs="+", type=Input, metavar="LOGS", help="CSV or Parquet logs of the joint")
+    add(
+        "-o",
+        "--output",
+        required=True,
+        type=Output.of(MODEL),
+        metavar="MODEL",
+        help="model file to write",
+    )
+    add(
+        "--method",
+        choices=METHODS,
+        default="auto",
+        help="auto (default) looks at the columns: time_s, head1_deg, shift_deg, motor_deg",
+    )
+    add("--orders", default="auto", help="auto (default: those that stand out), 1-24 or 1,4,8")
+    add(
+        "--loop",
+        choices=LOOPS,
+        default="unknown",
+        help="was the speed held by a loop closed on this encoder? (default: %(default)s)",
+    )
+    add("--loop-bandwidth", type=float, metavar="HZ", help="of that loop")
+    add("--gear-ratio", type=float, metavar="R", help="motor turns per output turn")
+    add(
+        "--ripple",
+        default="auto",
+        metavar="auto|none|1-4",
+        help="orders at which the speed may ripple (default: all, weighed by the evidence)",
+    )
+    add("--counts-per-turn", type=float, metavar="N", help="of _count columns")
+    add("--json", action="store_true", help="print the result as JSON")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Calibrate, save, print."""
+    from ..selfcalibration import selfcal
+
+    ripple = args.ripple
+    result = selfcal(
+        args.logs,
+        method=args.method,
+        orders=args.orders if args.orders == "auto" else _whole(args.orders, "--orders"),
+        loop=args.loop,
+        loop_bandwidth=args.loop_bandwidth,
+        gear_ratio=args.gear_ratio,
+        ripple=ripple if ripple in ("auto", "none") else _whole(ripple, "--ripple"),
+        counts_per_turn=args.counts_per_turn,
+    )
+    result.model.save(args.output)
+    if not result.model.shafts:
+        print(
+            "trueangle: warning: no order can be given as the encoder's: the model corrects "
+            "nothing",
+            file=sys.stderr,
+        )
+    if args.json:
+        print(json.dumps({"model": args.output, **result.as_json()}, allow_nan=False))
+    else:
+        print(result.summary())
+        print(f"\nsaved {args.output}")
+    return 0
+
+
+def _whole(text: str, option: str) -> tuple[float, ...]:
+    orders = parse_orders(text)
+    if any(k != int(k) for k in orders):
+        raise ArgumentError(f"{option}: orders of a self-calibration are whole, got {text!r}")
+    return orders

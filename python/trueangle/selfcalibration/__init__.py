@@ -1,0 +1,6 @@
+"""Calibration without a reference: patterns beside what the log does not know."""
+
+from .calibrate import METHODS, selfcal
+from .result import Blind, HeldOut, OrderEstimate, SelfCalibration
+
+__all__ = ["METHODS", "Blind", "HeldOut", "OrderEstimate", "SelfCalibration", "selfcal"]

@@ -1,0 +1,96 @@
+"""Which orders the readings show: found in what is left, kept by their significance."""
+
+from __future__ import annotations
+
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..distributions import chi_squared_quantile
+from .colour import spectrum_at
+from .projected import pairs
+from .steady import ENCODER, Readings, SteadyFit, fit_steady, pattern_series
+
+__all__ = ["HIGHEST", "choose_orders", "highest_order"]
+
+Array = NDArray[Any]
+
+#: Highest order looked for.
+HIGHEST: Final = 128
+
+#: Orders that are always tried first.
+_FIRST: Final = 8
+
+#: Probability of taking up any order that is not there.
+_CHANCE: Final = 0.01
+
+_ROUNDS: Final = 5
+
+
+def highest_order(readings: Readings) -> int:
+    """Highest order that is read at least twice per wave at the usual speed."""
+    usual = float(np.median(readings.speed))
+    step = float(np.median(np.diff(readings.time)[np.diff(readings.stretch) == 0]))
+    return max(1, min(HIGHEST, int(0.45 / (usual * max(step, 1e-12)))))
+
+
+def choose_orders(readings: Readings, highest: int | None = None) -> tuple[float, ...]:
+    """Orders that stand out of the noise beside them.
+
+    The lowest eight are fitted first, then those at which what is left peaks, until none
+    does; at last those that are not significant are dropped.
+    """
+    most = highest_order(readings) if highest is None else highest
+    orders = tuple(float(k) for k in range(1, min(_FIRST, most) + 1))
+    limit = chi_squared_quantile(1.0 - _CHANCE / most, 2.0)
+    fit: SteadyFit | None = None
+    stride = max(1, readings.size // 100_000)
+    for _ in range(_ROUNDS):
+        fit = fit_steady(readings, orders, start=fit, thorough=False, smooth=True)
+        good = np.flatnonzero(fit.valid)[:100_000] if stride == 1 else _runs(fit.valid)
+        theta = readings.angle[good] - _series(fit, good)
+        others = np.array([k for k in range(1, most + 1) if k not in orders], dtype=np.float64)
+        if others.size == 0:
+            break
+        power = spectrum_at(theta, fit.residuals[good], others)
+        beside = spectrum_at(theta, fit.residuals[good], others + 0.37)
+        level = np.maximum(1.0, _running_mean(beside / 2.0))
+        new = others[power / level > limit]
+        if new.size == 0:
+            break
+        orders = tuple(sorted({*orders, *(float(k) for k in new)}))
+    assert fit is not None
+    if fit.orders != orders:
+        fit = fit_steady(readings, orders, start=fit, thorough=False, smooth=True)
+    projected = fit.projected
+    covariance = projected.covariance
+    kept = []
+    for order in orders:
+        i = projected.columns.index(pairs(ENCODER, [order])[0])
+        block = covariance[i : i + 2, i : i + 2]
+        value = fit.unknowns[i : i + 2]
+        size = float(value @ np.linalg.solve(block, value)) if np.linalg.det(block) > 0.0 else 0.0
+        if size > limit:
+            kept.append(order)
+    return tuple(kept)
+
+
+def _series(fit: SteadyFit, rows: Array) -> Array:
+    angle = fit.readings.angle[rows]
+    return pattern_series(fit.orders, fit.pattern, angle)
+
+
+def _runs(valid: Array) -> Array:
+    """A hundred pieces of a thousand neighbours, over the whole log."""
+    starts = np.linspace(0, valid.size - 1000, 100).astype(np.int64)
+    rows = (starts[:, None] + np.arange(1000)).ravel()
+    return np.unique(rows[valid[rows]])
+
+
+def _running_mean(values: Array, width: int = 9) -> Array:
+    width = min(width, values.size)
+    kernel = np.ones(width)
+    return np.asarray(
+        np.convolve(values, kernel, "same") / np.convolve(np.ones(values.size), kernel, "same")
+    )

@@ -1,0 +1,72 @@
+"""Was the speed held by the encoder under test? Then it hides its own error."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Final
+
+from ..errors import ArgumentError
+from .result import Blind
+
+__all__ = ["LOOPS", "check_loop", "followed_orders"]
+
+LOOPS: Final = ("open", "closed", "unknown")
+
+#: Below so many bandwidths a velocity loop follows more than a tenth of what it sees.
+FOLLOWS_BELOW: Final = 2.0
+
+
+def check_loop(loop: str, bandwidth: float | None) -> None:
+    """Raise on a loop that is none of `LOOPS` and on an impossible bandwidth."""
+    if loop not in LOOPS:
+        raise ArgumentError(f"loop must be one of {', '.join(LOOPS)}, got {loop!r}")
+    if bandwidth is not None:
+        if not (isinstance(bandwidth, (int, float)) and math.isfinite(bandwidth) and bandwidth > 0):
+            raise ArgumentError(f"loop_bandwidth must be positive hertz, got {bandwidth!r}")
+        if loop == "open":
+            raise ArgumentError("loop_bandwidth is given for an open loop: which is it?")
+
+
+def followed_orders(
+    orders: Sequence[float], loop: str, bandwidth: float | None, slowest: float
+) -> tuple[tuple[float, ...], Blind | None]:
+    r"""Orders that the loop may have followed, and how to say so.
+
+    With closed-loop transfer T the shaft moves by :math:`-T\varepsilon` and the log shows
+    :math:`(1 - T)\varepsilon`: hidden where T = 1, amplified where T has turned in phase.
+
+    Parameters
+    ----------
+    orders : sequence of float
+    loop : {"open", "closed", "unknown"}
+    bandwidth : float, optional
+        Hertz; with ``"unknown"`` it is taken for what it would be if the loop was closed.
+    slowest : float
+        Slowest speed in the readings, turns per second.
+    """
+    if loop == "open":
+        return (), None
+    if bandwidth is None or loop == "unknown":
+        how = (
+            "the speed was held by a loop of unknown bandwidth"
+            if loop == "closed"
+            else "how the speed was held is not known"
+        )
+        return tuple(orders), Blind(
+            tuple(orders),
+            f"encoder or loop: {how}; a loop closed on this encoder moves the shaft by its error, "
+            "and the log shows what is left",
+            "coast down with the drive off or turn by an open-loop field (--loop open), or state "
+            "the loop's bandwidth (--loop closed --loop-bandwidth HZ)",
+        )
+    refused = tuple(k for k in orders if k * slowest < FOLLOWS_BELOW * bandwidth)
+    if not refused:
+        return (), None
+    fast = FOLLOWS_BELOW * bandwidth / min(refused)
+    return refused, Blind(
+        refused,
+        f"encoder or loop: at {slowest:.3g} turns/s these orders pass below twice the loop's "
+        f"bandwidth of {bandwidth:g} Hz, where it follows more than a tenth of them",
+        f"coast down with the drive off, drive open loop, or turn faster than {fast:.3g} turns/s",
+    )

@@ -1,0 +1,74 @@
+"""The model of a calibration without a reference, and what its record says of it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+
+from .._core import __version__
+from ..model import HarmonicModel
+from ..records import FitRecord, Provenance
+from ..shafts import Shaft
+from .recording import Recording
+from .result import ARCSEC, OrderEstimate
+
+__all__ = ["made_model"]
+
+
+def made_model(
+    orders: Iterable[OrderEstimate],
+    method: str,
+    blind: Sequence[str],
+    notes: Sequence[str],
+    recordings: Sequence[Recording],
+    *,
+    readings: int,
+    noise: float,
+    period: float,
+    motor: tuple[float, Sequence[OrderEstimate]] | None = None,
+    span: tuple[float, float] | None = None,
+) -> HarmonicModel:
+    """Whole orders of the output, and of a motor that turns ``motor[0]`` times as fast.
+
+    The constant is zero by definition: no reading shows it.
+    """
+    factor = period / (2.0 * math.pi) / ARCSEC
+    shafts = []
+    variances = [0.0]
+    groups = [("output", 1.0, sorted(orders, key=lambda o: o.order))]
+    if motor is not None:
+        groups.append(("motor", motor[0], sorted(motor[1], key=lambda o: o.order)))
+    for name, cycles, members in groups:
+        if not members:
+            continue
+        shafts.append(
+            Shaft(
+                name,
+                cycles,
+                tuple(round(o.order / cycles) for o in members),
+                tuple(o.cosine * factor for o in members),
+                tuple(o.sine * factor for o in members),
+            )
+        )
+        for o in members:
+            variances += [(o.std * factor) ** 2] * 2
+    sources = dict.fromkeys(r.source for r in recordings if r.source is not None)
+    return HarmonicModel(
+        tuple(shafts),
+        0.0,
+        period,
+        covariance=np.diag(variances),
+        fit=FitRecord(
+            samples=readings,
+            runs=len(recordings),
+            span=(0.0, period) if span is None else span,
+            residual=noise * period / (2.0 * math.pi),
+            method=method,
+            note=" ".join(f"{note[:1].upper()}{note[1:]}." for note in notes),
+            calibrated_without_reference=True,
+            blind=tuple(blind),
+        ),
+        provenance=Provenance(tuple(sources), f"trueangle {__version__}"),
+    )

@@ -1,0 +1,435 @@
+"""Sums over readings of patterns beside a smooth motion, and the motion's stiffness.
+
+The motion of each stretch is a cubic spline in time under a prior: smooth trends are free,
+beside them the acceleration wanders, with a memory. The stiffness (the ratio of noise to that
+wander), the memory and the knot spacing maximise the evidence, that is the likelihood with
+motion and patterns integrated out.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .banded import BandedFactor
+from .projected import Column, Projected
+from .splines import (
+    BAND,
+    Knots,
+    Wander,
+    banded_product,
+    basis,
+    coarser_bands,
+    coarser_rows,
+    finer_coefficients,
+    smooth_trends,
+)
+
+__all__ = ["MotionFit", "MotionSearch", "MotionSums", "accumulate"]
+
+Array = NDArray[np.float64]
+
+#: Readings whose columns are made at once: some MB, so that they stay in cache.
+_CHUNK = 4096
+
+#: Stiffness looked at, as a power of ten relative to the readings per knot.
+_STIFFEST, _SOFTEST = 7.0, -5.0
+
+#: Grids that bring no more evidence than this in a row end the search (log likelihood).
+_WORTH = 1.0
+_BEHIND = 2
+
+#: A combination of common columns of which motion leaves less is the motion's own.
+_GONE = 1e-13
+
+#: Close knots may show a rougher wander than distant ones allow by this factor (wander that
+#: has a memory), not by more: what coloured noise would ask for is no motion.
+_ROUGHER = 100.0
+
+#: Memories of the acceleration that are tried, as shares of the longest stretch.
+_MEMORIES = (0.1, 0.01)
+
+#: Stiffnesses of evidence within this of the best are still possible (log likelihood).
+_DOUBT = 4.0
+
+#: Stiffness is found to this power of ten: standard errors change by less than 1 %.
+_STIFFNESS_STEP = 0.2
+
+
+class MotionSums(NamedTuple):
+    """Normal equations of splines (banded) and common columns, for one target."""
+
+    knots: Knots
+    bands: Array
+    """``S^T S``, shape (size, 4)."""
+    cross: Array
+    """``S^T X``, shape (size, m)."""
+    spline_right: Array
+    """``S^T e``."""
+    common: Array
+    """``X^T X``."""
+    common_right: Array
+    """``X^T e``."""
+    squares: float
+    """``e^T e``."""
+    weighty: float
+    """Readings of weight."""
+
+    @property
+    def bare(self) -> MotionSums:
+        """The splines alone, as if the patterns were settled."""
+        return self._replace(
+            cross=self.cross[:, :0], common=self.common[:0, :0], common_right=self.common_right[:0]
+        )
+
+
+def accumulate(
+    knots: Knots,
+    index: NDArray[np.int64],
+    place: Array,
+    target: Array,
+    weight: Array,
+    columns: Callable[[slice, Array], None],
+    width: int,
+    valid: NDArray[np.bool_] | None = None,
+) -> MotionSums:
+    """Sums over readings in order of time.
+
+    Parameters
+    ----------
+    knots : Knots
+    index, place : ndarray
+        Of `Knots.place`; ``index`` must not decrease.
+    target : ndarray
+        ``e``, what is left of each reading.
+    weight : ndarray
+        Factor of the splines in each row: ``1 + error'``.
+    columns : callable
+        Writes the common columns of a slice of readings into an array (m, n).
+    width : int
+        ``m``.
+    valid : ndarray of bool, optional
+        Readings that count.
+    """
+    size, n = knots.size, target.size
+    bands, cross = np.zeros((size, BAND)), np.zeros((size, width + 1))
+    common = np.zeros((width + 1, width + 1))
+    edges = np.concatenate([[0], np.flatnonzero(np.diff(index)) + 1, [n]])
+    chunk_edges = np.unique(
+        np.concatenate([edges[np.searchsorted(edges, np.arange(0, n, _CHUNK))], [n]])
+    )
+    upper = [(p, q) for p in range(4) for q in range(p, 4)]
+    for a, b in itertools.pairwise(chunk_edges):
+        rows = np.empty((width + 5, b - a))
+        columns(slice(a, b), rows[:width])
+        rows[width] = target[a:b]
+        rows[width + 1 :] = basis(place[a:b]) * weight[a:b]
+        if valid is not None:
+            rows *= valid[a:b]
+        x = rows[: width + 1]
+        common += x @ x.T
+        splines = rows[width + 1 :]
+        inner = edges[np.searchsorted(edges, a) : np.searchsorted(edges, b) + 1] - a
+        for i, j in itertools.pairwise(inner):
+            first = int(index[a + i])
+            block = splines[:, i:j] @ rows[:, i:j].T
+            cross[first : first + 4] += block[:, : width + 1]
+            square = block[:, width + 1 :]
+            for p, q in upper:
+                bands[first + p, q - p] += square[p, q]
+    return MotionSums(
+        knots,
+        bands,
+        cross[:, :width],
+        cross[:, width],
+        common[:width, :width],
+        common[:width, width],
+        float(common[width, width]),
+        float(n if valid is None else valid.sum()),
+    )
+
+
+@dataclass(frozen=True)
+class MotionFit:
+    """Motion and common columns at one knot spacing and stiffness."""
+
+    level: int
+    """Halvings from the finest grid."""
+    stiffness: float
+    memory: float
+    """Of the acceleration, in seconds."""
+    coefficients: Array
+    """On the finest grid."""
+    unknowns: Array
+    projected: Projected
+    evidence: float
+    """Restricted log likelihood, comparable between grids and stiffnesses."""
+    knots: Knots
+
+    @property
+    def roughness(self) -> float:
+        """Spectral density of the wander: variance of the third differences by spacing^5."""
+        return self.projected.variance / (self.stiffness * self.knots.spacing**5)
+
+
+class _Grid:
+    """The sums on one grid, with the motion so far in terms of it.
+
+    Smooth trends of each stretch (coasting down, say) are taken out of the prior: columns
+    whose third differences are Legendre polynomials join the common ones.
+    """
+
+    def __init__(
+        self, sums: MotionSums, right: Array, chain: list[NDArray[np.int64]], trends: Sequence[int]
+    ) -> None:
+        self.sums = sums
+        self.right = right  # S^T (e + S c)
+        self.chain = chain  # parents from the finest grid down to this one
+        self.wander = Wander(sums.knots)
+        self.trend = smooth_trends(sums.knots, trends)
+        moved = (
+            np.stack([banded_product(sums.bands, z) for z in self.trend.T], axis=1)
+            if (self.trend.shape[1])
+            else np.zeros((sums.knots.size, 0))
+        )
+        self.cross = np.concatenate([sums.cross, moved], axis=1)
+        low = self.trend.T @ sums.cross
+        self.common = np.block([[sums.common, low.T], [low, self.trend.T @ moved]])
+
+    def finest(self, grids: Sequence[_Grid], spline: Array) -> Array:
+        """The spline on the finest grid."""
+        for level in range(len(self.chain) - 1, -1, -1):
+            spline = finer_coefficients(self.chain[level], grids[level].sums.knots.size, spline)
+        return spline
+
+    def coarsened(self, fine: Array) -> Array:
+        """Sums with the finest splines as sums with these."""
+        for parents in self.chain:
+            fine = coarser_rows(parents, fine)
+        return fine
+
+
+class MotionSearch:
+    """Fits of motion and common columns to the sums over readings, on any coarser grid.
+
+    Parameters
+    ----------
+    sums : MotionSums
+        On the finest grid, with ``e = reading - motion``.
+    motion : ndarray
+        Coefficients of the motion so far, on the finest grid.
+    columns : sequence of Column
+        Names of the common columns.
+    trends : sequence of int
+        Smooth trends that each stretch is free to follow.
+
+    Notes
+    -----
+    Coarser grids need no second look at the readings: twice the spacing is a linear
+    combination of the finer splines.
+    """
+
+    def __init__(
+        self, sums: MotionSums, motion: Array, columns: Sequence[Column], trends: Sequence[int]
+    ) -> None:
+        self.sums, self.motion, self.columns = sums, motion, tuple(columns)
+        self.trends = tuple(trends)
+        self.memory = max(sums.knots.intervals) * sums.knots.spacing
+        right = sums.spline_right + banded_product(sums.bands, motion)
+        self.grids = [_Grid(sums, right, [], trends)]
+
+    def grid(self, level: int) -> _Grid | None:
+        """The grid of ``2**level`` times the spacing, None where it would be too coarse."""
+        while len(self.grids) <= level:
+            last = self.grids[-1]
+            knots = last.sums.knots
+            if min(knots.intervals) < 8 or any(n % 2 for n in knots.intervals):
+                return None
+            parents, coarse = knots.parents(), knots.coarser
+            sums = last.sums._replace(
+                knots=coarse,
+                bands=coarser_bands(parents, last.sums.bands, coarse),
+                cross=coarser_rows(parents, last.sums.cross),
+                spline_right=coarser_rows(parents, last.sums.spline_right),
+            )
+            right = coarser_rows(parents, last.right)
+            self.grids.append(_Grid(sums, right, [*last.chain, parents], self.trends))
+        return self.grids[level]
+
+    def best(self, shortest: float = 0.0, near: MotionFit | None = None) -> MotionFit:
+        """Stiffness and grid of the greatest evidence, from coarse to fine.
+
+        After a fit ``near`` it, only the coarsest grid and its neighbours are looked at.
+        Knots closer than ``shortest`` seconds are not looked at; where all are, the
+        stiffest motion on the coarsest grid is taken.
+        """
+        level = 0
+        while (coarser := self.grid(level + 1)) is not None:
+            # Coarser than this, trends and splines would be the same thing.
+            intervals = coarser.sums.knots.intervals
+            if any(n < 2 * t + 4 for n, t in zip(intervals, self.trends, strict=True)):
+                break
+            level += 1
+        coarsest = self.grids[level].sums.knots
+        if coarsest.spacing < shortest:
+            per_knot = self.sums.weighty / sum(coarsest.intervals)
+            return self.fit(level, per_knot * 10.0**_STIFFEST, self.memory)
+        best: MotionFit | None = None
+        behind, roughest = 0, math.inf
+        for here in range(level, -1, -1):
+            spacing = self.grids[here].sums.knots.spacing
+            if spacing < shortest:
+                break
+            if near is not None and near.level + 1 < here < level:
+                continue
+            found, possible = self._stiffness(here, roughest, self.memory)
+            if here == level:
+                roughest = possible * _ROUGHER
+            worth = best is None or found.evidence > best.evidence + _WORTH
+            behind = 0 if worth else behind + 1
+            if best is None or found.evidence > best.evidence:
+                best = found
+            if behind == _BEHIND:
+                break
+        assert best is not None
+        for share in _MEMORIES:
+            if share * self.memory < best.knots.spacing:
+                break
+            found, _ = self._stiffness(best.level, roughest, share * self.memory)
+            if found.evidence > best.evidence + _WORTH:
+                best = found
+        return best
+
+    def _stiffness(self, level: int, roughest: float, memory: float) -> tuple[MotionFit, float]:
+        """Best stiffness by golden section, and the greatest roughness still possible."""
+        grid = self.grid(level)
+        assert grid is not None
+        per_knot = self.sums.weighty / max(1, sum(grid.sums.knots.intervals))
+        tried: dict[float, MotionFit] = {}
+
+        def at(power: float) -> float:
+            if power not in tried:
+                tried[power] = self.fit(level, per_knot * 10.0**power, memory)
+            found = tried[power]
+            return found.evidence if found.roughness <= roughest else -math.inf
+
+        powers = [float(p) for p in np.linspace(_SOFTEST, _STIFFEST, 7)]
+        k = int(np.argmax([at(p) for p in powers]))
+        low, high = powers[max(k - 1, 0)], powers[min(k + 1, 6)]
+        ratio = 0.5 * (math.sqrt(5.0) - 1.0)
+        a, b = high - ratio * (high - low), low + ratio * (high - low)
+        while high - low > _STIFFNESS_STEP:
+            if at(a) > at(b):
+                high, b = b, a
+                a = high - ratio * (high - low)
+            else:
+                low, a = a, b
+                b = low + ratio * (high - low)
+        best = tried[max(tried, key=at)]
+        possible = [f.roughness for f in tried.values() if f.evidence > best.evidence - _DOUBT]
+        return best, max(possible)
+
+    def fit(self, level: int, stiffness: float, memory: float) -> MotionFit:
+        """Motion and columns at one grid and stiffness."""
+        grid, sums, motion = self.grid(level), self.sums, self.motion
+        assert grid is not None
+        m = len(self.columns)
+        try:
+            factor = BandedFactor(grid.sums.bands + grid.wander.bands(stiffness, memory))
+        except np.linalg.LinAlgError:  # stiffer than the working precision can hold
+            return MotionFit(
+                level,
+                stiffness,
+                memory,
+                motion,
+                np.zeros(m),
+                _nothing(self.columns),
+                -math.inf,
+                grid.sums.knots,
+            )
+        eliminated = factor.solve(grid.cross)
+        information = grid.common - grid.cross.T @ eliminated
+        information = 0.5 * (information + information.T)
+        scale = np.sqrt(np.maximum(np.diagonal(grid.common), 1e-300))
+        values, vectors = np.linalg.eigh(information / np.outer(scale, scale))
+        kept = values > _GONE
+        half = vectors[:, kept] / np.sqrt(values[kept]) / scale[:, None]
+
+        def step(spline_right: Array, common_right: Array) -> tuple[Array, Array]:
+            first = factor.solve(spline_right)
+            found = half @ (half.T @ (common_right - grid.cross.T @ first))
+            return first - eliminated @ found, found
+
+        def common(left: Array, gap: Array) -> Array:
+            # Right side of the common columns from e + S gap, the trends by their splines.
+            fine = sums.spline_right + banded_product(sums.bands, gap)
+            trend = grid.trend.T @ grid.coarsened(fine)
+            return np.concatenate([left + sums.cross.T @ gap, trend])
+
+        spline, unknowns = step(grid.right, common(sums.common_right, motion))
+        # A second step works on what the first has left, free of the rounding of large angles.
+        for again in (True, False):
+            fine = grid.finest(self.grids, spline + grid.trend @ unknowns[m:])
+            gap = motion - fine
+            if again:
+                left = (
+                    sums.spline_right + banded_product(sums.bands, gap) - sums.cross @ unknowns[:m]
+                )
+                pull = stiffness * grid.wander.pull(spline, memory)
+                rest = common(sums.common_right - sums.common @ unknowns[:m], gap)
+                rest[m:] -= grid.trend.T @ grid.coarsened(sums.cross @ unknowns[:m])
+                more, extra = step(grid.coarsened(left) - pull, rest)
+                spline, unknowns = spline + more, unknowns + extra
+        found = unknowns[:m]
+        squares = (
+            sums.squares
+            + 2.0 * float(gap @ sums.spline_right)
+            + float(gap @ banded_product(sums.bands, gap))
+            - 2.0 * float(found @ (sums.common_right + sums.cross.T @ gap))
+            + float(found @ sums.common @ found)
+        )
+        penalised = max(squares, 1e-300) + stiffness * grid.wander.energy(spline, memory)
+        fixed = 2 * len(grid.sums.knots.intervals) + int(kept.sum())
+        freedom = max(sums.weighty - fixed, 1.0)
+        twice = (
+            freedom * math.log(penalised / freedom)
+            + factor.log_determinant
+            + float(np.log(values[kept]).sum())
+            + 2.0 * float(np.log(scale).sum())
+            - grid.wander.log_determinant(stiffness, memory)
+        )
+        projected = Projected(
+            self.columns,
+            _without(information, np.diagonal(grid.common), m),
+            np.zeros(m),
+            np.diagonal(sums.common).copy(),
+            penalised / freedom,
+            freedom,
+        )
+        return MotionFit(
+            level, stiffness, memory, fine, found, projected, -0.5 * twice, grid.sums.knots
+        )
+
+
+def _without(information: Array, alone: Array, m: int) -> Array:
+    """Information of the first ``m`` columns with the further ones eliminated."""
+    if m == len(information):
+        return information
+    scale = 1.0 / np.sqrt(np.maximum(alone[m:], 1e-300))
+    values, vectors = np.linalg.eigh(information[m:, m:] * np.outer(scale, scale))
+    kept = values > _GONE
+    half = (scale[:, None] * vectors[:, kept]) / np.sqrt(values[kept])
+    moved = information[:m, m:] @ half
+    return np.asarray(information[:m, :m] - moved @ moved.T)
+
+
+def _nothing(columns: Sequence[Column]) -> Projected:
+    m = len(columns)
+    zero = np.zeros((m, m))
+    return Projected(tuple(columns), zero, np.zeros(m), np.ones(m), math.inf, 1.0)

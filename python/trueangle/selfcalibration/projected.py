@@ -1,0 +1,172 @@
+"""The one estimator: patterns beside nuisances, covariance of what is left, null vectors."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["Column", "Projected", "harmonic_rows", "names_in_words"]
+
+Array = NDArray[np.float64]
+
+#: A column is not seen where nuisances and other columns leave less of its square.
+#: Below this share rounding in the sums (1e-16 of a column, times its condition) decides.
+NOT_SEEN = 1e-9
+
+
+class Column(NamedTuple):
+    """What an unknown is: ``order`` 3 of ``"the encoder"``, its cosine or sine."""
+
+    source: str
+    order: float
+    part: str
+    """``"cos"`` or ``"sin"``; ``""`` for a column that is not a harmonic."""
+
+    def __str__(self) -> str:
+        return f"order {self.order:g} of {self.source}" if self.part else self.source
+
+
+def pairs(source: str, orders: Iterable[float]) -> list[Column]:
+    """Cosine and sine columns of each order of one source."""
+    return [Column(source, float(k), part) for k in orders for part in ("cos", "sin")]
+
+
+def harmonic_rows(theta: Array, orders: Sequence[float], out: Array | None = None) -> Array:
+    """``cos k theta, sin k theta`` of each order in turn, shape (2 orders, n).
+
+    Neighbouring orders are made by one complex product each: within ``k`` roundings.
+    """
+    rows = np.empty((2 * len(orders), theta.size)) if out is None else out
+    unit = np.exp(1j * theta)
+    power, reached = np.ones_like(unit), 0.0
+    for i, k in enumerate(orders):
+        power = power * unit if k == reached + 1.0 else np.exp(1j * (k * theta))
+        reached = k
+        rows[2 * i], rows[2 * i + 1] = power.real, power.imag
+    return rows
+
+
+@dataclass(frozen=True)
+class Projected:
+    r"""Least squares for the columns that matter, after the nuisances are eliminated.
+
+    Parameters
+    ----------
+    columns : sequence of Column
+    information : ndarray, shape (m, m)
+        :math:`X^T (I - \Pi) X`, with the nuisances (and their priors) projected out.
+    right : ndarray, shape (m,)
+        :math:`X^T (I - \Pi) y`.
+    alone : ndarray, shape (m,)
+        :math:`x_j^T x_j`: what each column would have with nothing beside it.
+    variance : float
+        Of one reading, about the fit.
+    freedom : float
+        Degrees of freedom behind it.
+    """
+
+    columns: tuple[Column, ...]
+    information: Array
+    right: Array
+    alone: Array
+    variance: float
+    freedom: float
+
+    @cached_property
+    def _eigen(self) -> tuple[Array, Array, Array]:
+        scale = 1.0 / np.sqrt(np.where(self.alone > 0.0, self.alone, 1.0))
+        values, vectors = np.linalg.eigh(self.information * np.outer(scale, scale))
+        return scale, values, vectors
+
+    @cached_property
+    def seen(self) -> NDArray[np.bool_]:
+        """Columns that take part in no combination that is not seen."""
+        _, values, vectors = self._eigen
+        lost = (vectors[:, values < NOT_SEEN] ** 2).sum(axis=1)
+        # A half of the share: what is not seen is split evenly over those who share it.
+        return np.asarray(lost < 1e-6)
+
+    @cached_property
+    def inverse(self) -> Array:
+        """Pseudo-inverse of the information over the combinations that are seen."""
+        scale, values, vectors = self._eigen
+        kept = values >= NOT_SEEN
+        half = (scale[:, None] * vectors[:, kept]) / np.sqrt(values[kept])
+        return np.asarray(half @ half.T)
+
+    @property
+    def solution(self) -> Array:
+        """The unknowns; of least norm along what is not seen."""
+        return np.asarray(self.inverse @ self.right)
+
+    @property
+    def covariance(self) -> Array:
+        """``variance * inverse``."""
+        return self.variance * self.inverse
+
+    def retained(self, among: Sequence[int] | None = None) -> Array:
+        r"""Share of each column's square that nothing else explains.
+
+        :math:`1 / (A^{-1}_{jj}\, x_j^T x_j)`: 1 where it stands alone, 0 where it is not seen.
+        """
+        with np.errstate(divide="ignore", invalid="ignore"):
+            share = 1.0 / (np.diagonal(self.inverse) * self.alone)
+        share = np.where(self.seen, np.minimum(share, 1.0), 0.0)
+        return share if among is None else share[list(among)]
+
+    @property
+    def rank(self) -> int:
+        """Combinations that are seen."""
+        return int((self._eigen[1] >= NOT_SEEN).sum())
+
+    def index(self, source: str, order: float) -> tuple[int, int]:
+        """Places of the cosine and sine columns."""
+        first = self.columns.index(Column(source, float(order), "cos"))
+        return first, first + 1
+
+    def null_vectors(self) -> list[list[tuple[str, float]]]:
+        """Each combination that is not seen, as names with their shares, largest first.
+
+        Cosine and sine of one harmonic count as one name; combinations of the same names
+        are given once.
+        """
+        _, values, vectors = self._eigen
+        lost = np.flatnonzero(values < NOT_SEEN)
+        if lost.size == 0:
+            return []
+        # Rotate within the space to vectors of few columns: reduce by the largest entries.
+        space = vectors[:, lost].T.copy()
+        for row in range(len(space)):
+            pivot = int(np.argmax(np.abs(space[row])))
+            space[row] /= space[row, pivot]
+            for other in range(len(space)):
+                if other != row:
+                    space[other] -= space[other, pivot] * space[row]
+        found: dict[tuple[str, ...], list[tuple[str, float]]] = {}
+        for vector in space:
+            shares: dict[str, float] = {}
+            for column, value in zip(self.columns, vector, strict=True):
+                if abs(value) > 1e-3:
+                    name = str(column)
+                    if abs(value) > abs(shares.get(name, 0.0)):
+                        shares[name] = float(value)
+            ordered = sorted(shares.items(), key=lambda item: -abs(item[1]))
+            found.setdefault(tuple(sorted(shares)), ordered)
+        return list(found.values())
+
+
+def names_in_words(shares: Sequence[tuple[str, float]]) -> str:
+    """A combination that is not seen: ``order 1 of the encoder against order 1 of the ripple``.
+
+    Examples
+    --------
+    >>> names_in_words([("order 2 of a", 1.0), ("order 2 of b", 1.0)])
+    'order 2 of a together with order 2 of b'
+    """
+    names = [name for name, _ in shares[:4]]
+    return " together with ".join(names)

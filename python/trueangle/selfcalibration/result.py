@@ -1,0 +1,218 @@
+"""What a self-calibration found: numbers, what each is a number of, and what stays unseen."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..angles import ARCSEC_PER_TURN
+from ..model import HarmonicModel
+
+__all__ = ["Blind", "HeldOut", "OrderEstimate", "SelfCalibration", "ranges"]
+
+Array = NDArray[np.float64]
+
+#: Seconds of arc in a radian.
+ARCSEC = ARCSEC_PER_TURN / (2.0 * math.pi)
+
+
+@dataclass(frozen=True)
+class OrderEstimate:
+    """One order: ``cosine``, ``sine`` and their standard error in arcsec."""
+
+    order: float
+    cosine: float
+    sine: float
+    std: float
+    """Standard error of the amplitude (and of the sine along it), arcsec."""
+    retained: float
+    """Share of the order that motion and other unknowns leave: 1 all, 0 none."""
+    std_factor: float
+    """Standard error over the limit of white noise with the true angle known."""
+    of: str = "the encoder"
+    """What the number is a number of: one thing, or several that cannot be told apart."""
+
+    @property
+    def amplitude(self) -> float:
+        """``C = hypot(A, B)`` in arcsec."""
+        return math.hypot(self.cosine, self.sine)
+
+    @property
+    def phase_deg(self) -> float:
+        """``phi = atan2(A, B)`` in degrees from 0: the term is ``C sin(k x + phi)``."""
+        return math.degrees(math.atan2(self.cosine, self.sine)) % 360.0
+
+    def as_json(self) -> dict[str, Any]:
+        """Plain values."""
+        return {
+            "order": int(self.order) if float(self.order).is_integer() else self.order,
+            "amplitude_arcsec": self.amplitude,
+            "phase_deg": self.phase_deg,
+            "std_arcsec": self.std,
+            "retained": self.retained,
+            "std_factor": self.std_factor if math.isfinite(self.std_factor) else None,
+            "of": self.of,
+        }
+
+
+@dataclass(frozen=True)
+class Blind:
+    """Orders that cannot be given as the encoder's, why, and what would show them."""
+
+    orders: tuple[float, ...]
+    because: str
+    measure: str
+
+    def as_json(self) -> dict[str, Any]:
+        """Plain values."""
+        return {
+            "orders": [int(k) if float(k).is_integer() else k for k in self.orders],
+            "because": self.because,
+            "measure": self.measure,
+        }
+
+
+@dataclass(frozen=True)
+class HeldOut:
+    """A pattern found on one part of the readings, judged on another."""
+
+    fitted_on: str
+    judged_on: str
+    rms_before: float
+    rms_after: float
+    """Error of single readings on the part held out, arcsec, noise included."""
+    p: float
+    """Probability of so great a difference between the two patterns by noise alone."""
+
+    def as_json(self) -> dict[str, Any]:
+        """Plain values."""
+        return {
+            "fitted_on": self.fitted_on,
+            "judged_on": self.judged_on,
+            "rms_before_arcsec": self.rms_before,
+            "rms_after_arcsec": self.rms_after,
+            "p": self.p,
+            "agrees": self.p > 0.001,
+        }
+
+
+@dataclass(frozen=True)
+class SelfCalibration:
+    """Result of `trueangle.selfcal`.
+
+    Attributes
+    ----------
+    method : str
+        ``"spin-down"``, ``"heads"``, ``"shifts"`` or ``"dual"``.
+    model : HarmonicModel
+        Of what may be corrected; its record says that there was no reference.
+    orders : tuple of OrderEstimate
+        Numbers that are given, each with the name of what it is.
+    sums : tuple of OrderEstimate
+        Numbers that are not the encoder's alone, with all names.
+    blind : tuple of Blind
+    held_out : dict of str to HeldOut
+        ``"odd_even_turns"``, ``"speeds"``, ``"directions"`` and the like.
+    notes : tuple of str
+    noise_arcsec : float
+        Standard deviation of one reading about the fit.
+    readings : int
+    turns : float
+    beside : dict
+        What was fitted beside: ripple, reversal error, head angles, facets ...
+    """
+
+    method: str
+    model: HarmonicModel
+    orders: tuple[OrderEstimate, ...]
+    sums: tuple[OrderEstimate, ...]
+    blind: tuple[Blind, ...]
+    held_out: Mapping[str, HeldOut]
+    notes: tuple[str, ...]
+    noise_arcsec: float
+    readings: int
+    turns: float
+    beside: Mapping[str, Any] = field(default_factory=dict)
+
+    def as_json(self) -> dict[str, Any]:
+        """The result as plain values, angles in arcsec."""
+        return {
+            "method": self.method,
+            "calibrated_without_reference": True,
+            "orders": [o.as_json() for o in self.orders],
+            "sums": [o.as_json() for o in self.sums],
+            "blind": [b.as_json() for b in self.blind],
+            "held_out": {name: test.as_json() for name, test in self.held_out.items()},
+            "noise_arcsec": self.noise_arcsec,
+            "readings": self.readings,
+            "turns": self.turns,
+            "beside": dict(self.beside),
+            "notes": list(self.notes),
+        }
+
+    def summary(self) -> str:
+        """The result as text."""
+        from .summary import summary
+
+        return summary(self)
+
+
+def estimates(
+    orders: Sequence[float],
+    coefficients: Array,
+    covariance: Array,
+    retained: Array,
+    limit: float,
+    of: Sequence[str] | str = "the encoder",
+) -> list[OrderEstimate]:
+    """Orders from cosine and sine in turn (radians), with their covariance.
+
+    ``limit`` is the standard error of a coefficient in white noise with the true angle
+    known, in radians.
+    """
+    found = []
+    for i, order in enumerate(orders):
+        pair = slice(2 * i, 2 * i + 2)
+        a, b = (float(v) for v in coefficients[pair])
+        block = covariance[pair, pair]
+        size = math.hypot(a, b)
+        along = np.array([a, b]) / size if size > 0.0 else np.array([1.0, 0.0])
+        std = math.sqrt(max(float(along @ block @ along), 0.0))
+        mean = math.sqrt(max(0.5 * float(np.trace(block)), 0.0))
+        found.append(
+            OrderEstimate(
+                order=float(order),
+                cosine=a * ARCSEC,
+                sine=b * ARCSEC,
+                std=std * ARCSEC,
+                retained=float(np.min(retained[pair])),
+                std_factor=mean / limit if limit > 0.0 else math.inf,
+                of=of if isinstance(of, str) else of[i],
+            )
+        )
+    return found
+
+
+def ranges(orders: Sequence[float]) -> str:
+    """Orders in words: ``1-4, 8``.
+
+    Examples
+    --------
+    >>> ranges([1, 2, 3, 4, 8, 7.3])
+    '1-4, 7.3, 8'
+    """
+    parts: list[str] = []
+    run: list[float] = []
+    for order in [*sorted(orders), math.inf]:
+        if run and (order != run[-1] + 1.0):
+            parts.append(
+                f"{run[0]:g}-{run[-1]:g}" if len(run) > 2 else ", ".join(f"{k:g}" for k in run)
+            )
+            run = []
+        run.append(order)
+    return ", ".join(parts)

@@ -1,0 +1,310 @@
+"""``spin-down``: one log of a turning encoder, its time stamps as the only reference.
+
+What it can never see: the zero; an error that moves with the speed as a true pattern does
+(windage torque with a pattern grows as the square of the speed); orders that a loop closed on
+the encoder follows; at one speed, ripple of the motion at the encoder's own orders.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import NoModelError
+from .choice import choose_orders, highest_order
+from .colour import noise_beside
+from .loop import followed_orders
+from .modelling import made_model
+from .recording import Recording
+from .result import ARCSEC, Blind, OrderEstimate, SelfCalibration, estimates, ranges
+from .ripple import LARGEST_COST, averaged_over_ripple, cost_of_ripple
+from .steady import ENCODER, Readings, SteadyFit, fit_steady, pattern_series
+from .stretches import cut_stretches
+from .verification import held_out
+
+__all__ = ["spin_down"]
+
+Array = NDArray[np.float64]
+
+#: An order of which motion leaves less is not the encoder's to say.
+LEAST_RETAINED: Final = 0.02
+
+#: Below this many turns per knot's own wave a warning is due.
+_CURRENT: Final = "the motor current"
+
+
+def spin_down(
+    recordings: Sequence[Recording],
+    orders: str | Sequence[float] = "auto",
+    *,
+    loop: str = "unknown",
+    bandwidth: float | None = None,
+    ripple: str | Sequence[float] = "auto",
+    period: float = 360.0,
+) -> SelfCalibration:
+    """Patterns from time stamps; see `trueangle.selfcal`."""
+    stretches = cut_stretches(recordings)
+    readings = Readings(stretches)
+    notes: list[str] = []
+    most = highest_order(readings)
+    chosen = choose_orders(readings) if isinstance(orders, str) else tuple(map(float, orders))
+    if any(k > 2.0 * most for k in chosen):
+        raise NoModelError(
+            f"order {max(chosen):g} passes faster than half the rate of readings: read more often, "
+            f"turn slower, or ask for orders up to {most}"
+        )
+    if not chosen:
+        raise NoModelError(
+            "no order stands out of the noise: record more turns, or name the orders (--orders 1-8)"
+        )
+    with_current = _add_current(readings, loop)
+    rippling, separable = _ripple_orders(readings, chosen, ripple)
+    fit = fit_steady(readings, chosen, rippling)
+    unknowns, covariance = fit.unknowns, fit.projected.covariance
+    beside: dict[str, Any] = {}
+    if rippling and ripple == "auto":
+        unknowns, covariance, probable = averaged_over_ripple(
+            unknowns, covariance, chosen, rippling
+        )
+    else:
+        probable = np.ones(len(rippling))
+    theta = readings.angle - pattern_series(chosen, fit.pattern, readings.angle)
+    colour = noise_beside(theta, fit.residuals, chosen, sum(s.turns for s in stretches))
+    m = 2 * len(chosen)
+    scale = np.sqrt(np.repeat(colour, 2))
+    pattern_covariance = covariance[:m, :m] * np.outer(scale, scale)
+    noise = math.sqrt(fit.projected.variance)
+    limit = noise * math.sqrt(2.0 / float(fit.valid.sum()))
+    alone = fit.projected.alone[:m]
+    with np.errstate(divide="ignore"):
+        retained = np.minimum(fit.projected.variance / (np.diagonal(covariance)[:m] * alone), 1.0)
+    retained = np.where(fit.projected.seen[:m], retained, 0.0)
+    table = estimates(chosen, unknowns[:m], pattern_covariance, retained, limit)
+    if rippling:
+        rows = slice(m, m + 2 * len(rippling))
+        found = estimates(
+            rippling,
+            unknowns[rows],
+            covariance[rows, rows],
+            np.ones(2 * len(rippling)),
+            limit,
+            "the speed ripple",
+        )
+        beside["ripple"] = [
+            {**entry.as_json(), "probability": float(p)}
+            for entry, p in zip(found, probable, strict=True)
+        ]
+        beside["ripple_at_turns_per_s"] = readings.mean_speed
+    given, sums, blind = _sorted_out(
+        table, readings, loop, bandwidth, separable, ripple, with_current
+    )
+    notes += _notes(fit, readings, colour, chosen, given, sums, separable, ripple)
+    tests = held_out(fit, [o.order for o in given or sums or table], float(colour.max()))
+    notes += _test_notes(tests, rippling)
+    in_model = list(given)
+    if loop == "open":
+        in_model += sums
+        if sums:
+            summed = ranges([o.order for o in sums])
+            notes.append(f"the model corrects the sum of encoder and ripple at orders {summed}")
+    model = made_model(
+        in_model,
+        "spin-down",
+        [*(f"{_listed(b.orders)}: {b.because}" for b in blind)],
+        notes,
+        recordings,
+        readings=readings.size,
+        noise=noise,
+        period=period,
+    )
+    return SelfCalibration(
+        method="spin-down",
+        model=model,
+        orders=tuple(given),
+        sums=tuple(sums),
+        blind=tuple(blind),
+        held_out=tests,
+        notes=tuple(notes),
+        noise_arcsec=noise * ARCSEC,
+        readings=readings.size,
+        turns=sum(s.turns for s in stretches),
+        beside=beside,
+    )
+
+
+def _listed(orders: Sequence[float]) -> str:
+    return f"orders {ranges(orders)}" if any(orders) else "zero"
+
+
+def _ripple_orders(
+    readings: Readings, orders: tuple[float, ...], ripple: str | Sequence[float]
+) -> tuple[tuple[float, ...], bool]:
+    """Orders that get ripple columns, and whether the speeds tell ripple from pattern."""
+    separable = cost_of_ripple(readings.ripple) <= LARGEST_COST
+    if isinstance(ripple, str):
+        return (orders if ripple == "auto" and separable else ()), separable
+    return (tuple(map(float, ripple)) if separable else ()), separable
+
+
+def _add_current(readings: Readings, loop: str) -> bool:
+    """The motion that the motor current makes, where the log has it and a loop is closed."""
+    if loop != "closed":
+        return False
+    parts = []
+    for stretch in readings.stretches:
+        current = stretch.recording.current
+        if current is None:
+            return False
+        i = current[stretch.rows] - current[stretch.rows].mean()
+        dt = np.diff(stretch.time, prepend=stretch.time[0])
+        speed = np.cumsum(i * dt)
+        parts.append(np.cumsum((speed - speed.mean()) * dt))
+    extra = np.concatenate(parts)
+    size = float(np.sqrt(np.mean(extra**2)))
+    if size == 0.0:
+        return False
+    readings.extra = extra[None, :] / size
+    readings.extra_names = (_CURRENT,)
+    return True
+
+
+def _sorted_out(
+    table: list[OrderEstimate],
+    readings: Readings,
+    loop: str,
+    bandwidth: float | None,
+    separable: bool,
+    ripple: str | Sequence[float],
+    with_current: bool,
+) -> tuple[list[OrderEstimate], list[OrderEstimate], list[Blind]]:
+    """Numbers that are the encoder's, numbers of several things, and the blind orders."""
+    blind = [
+        Blind(
+            (0.0,),
+            "the zero: no reading without a reference shows it; order k turns by k times the "
+            "difference of two zeros",
+            "set the zero at a mark or an index pulse",
+        )
+    ]
+    orders = [o.order for o in table]
+    slowest = float(np.quantile(readings.speed, 0.02))
+    followed: tuple[float, ...] = ()
+    if not with_current:
+        followed, why = followed_orders(orders, loop, bandwidth, slowest)
+        if why is not None:
+            blind.append(why)
+    lost = tuple(o.order for o in table if o.retained < LEAST_RETAINED and o.order not in followed)
+    if lost:
+        what = "the motion that the current explains" if with_current else "the shaft's own wander"
+        blind.append(
+            Blind(
+                lost,
+                f"order {ranges(lost)} of {ENCODER} together with {what}: less than "
+                f"{LEAST_RETAINED:.0%} of them is left beside it",
+                "turn faster or more steadily, with more inertia",
+            )
+        )
+    given, sums = [], []
+    first = next((o for o in table if o.order == 1.0), None)
+    may_ripple: list[OrderEstimate] = []
+    for o in table:
+        if o.order in lost:
+            continue
+        if o.order in followed:
+            sums.append(_renamed(o, f"{ENCODER} or the loop"))
+        elif ripple != "none" and not separable and _may_be_ripple(o, first):
+            may_ripple.append(o)
+            sums.append(_renamed(o, f"{ENCODER} or the speed ripple"))
+        else:
+            given.append(o)
+    if may_ripple:
+        low, high = np.quantile(readings.speed, [0.05, 0.95])
+        blind.append(
+            Blind(
+                tuple(o.order for o in may_ripple),
+                f"encoder or ripple: at one speed (ratio {high / low:.2f}) order k of {ENCODER} "
+                "together with order k of the speed ripple is all that is seen",
+                "let it coast from this speed to a third of it or below, or add a stretch at "
+                "another speed (ratio 3 or more)",
+            )
+        )
+    return given, sums, blind
+
+
+def _renamed(o: OrderEstimate, of: str) -> OrderEstimate:
+    return OrderEstimate(o.order, o.cosine, o.sine, o.std, o.retained, o.std_factor, of)
+
+
+def _may_be_ripple(o: OrderEstimate, first: OrderEstimate | None) -> bool:
+    """Whether torque at this order, no greater than at order 1, could explain all of it.
+
+    The same torque moves the shaft by 1/k^2 of what it does at order 1, and order 1 is all
+    that is seen there.
+    """
+    if o.order <= 1.0 or first is None:
+        return True
+    return o.amplitude <= max(first.amplitude, 2.0 * first.std) / o.order**2
+
+
+def _notes(
+    fit: SteadyFit,
+    readings: Readings,
+    colour: Array,
+    chosen: Sequence[float],
+    given: Sequence[OrderEstimate],
+    sums: Sequence[OrderEstimate],
+    separable: bool,
+    ripple: str | Sequence[float],
+) -> list[str]:
+    notes = []
+    loud = [(k, c) for k, c in zip(chosen, colour, strict=True) if c > 1.5]
+    if loud:
+        k, c = max(loud, key=lambda pair: pair[1])
+        notes.append(
+            f"what is left is not white: {c:.1f} times the white noise beside order {k:g}; the "
+            "standard errors allow for it"
+        )
+    wild = int((~fit.valid).sum())
+    if wild:
+        notes.append(f"{wild} wild reading{'s' if wild > 1 else ''} set aside")
+    seconds = fit.motion.knots.spacing
+    per_turn = 1.0 / (seconds * readings.mean_speed)
+    notes.append(
+        f"motion: {len(readings.stretches)} stretch{'es' if len(readings.stretches) > 1 else ''}, "
+        f"{per_turn:.2g} knots per turn, stiffness by evidence"
+    )
+    if not separable and ripple != "none" and given:
+        first = max((o.amplitude for o in (*given, *sums) if o.order == 1.0), default=math.nan)
+        bound = "" if math.isnan(first) else f" ({first:.3g}/k^2 arcsec)"
+        notes.append(
+            f"one speed: orders {ranges([o.order for o in given])} are the encoder's as far as "
+            f"torque at them ripples no more than at order 1{bound}"
+        )
+    if not given and sums:
+        notes.append("no order can be given as the encoder's")
+    return notes
+
+
+def _test_notes(tests: dict[str, Any], rippling: Sequence[float]) -> list[str]:
+    notes = []
+    for name, test in tests.items():
+        if test.p > 0.001:
+            continue
+        if name == "speeds":
+            says = (
+                "ripple columns allow for it"
+                if rippling
+                else "the speed ripples: record a ratio of speeds of 3 or more"
+            )
+            notes.append(f"slow and fast parts show different patterns: {says}")
+        elif name == "odd_even_turns":
+            notes.append(
+                "odd and even turns show different patterns: the error does not repeat every turn"
+            )
+        elif name == "directions":
+            notes.append("forward and backward show different patterns: play or friction")
+    return notes

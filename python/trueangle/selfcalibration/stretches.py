@@ -1,0 +1,225 @@
+"""Stretches of roughly steady motion, cut from running logs."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import FileError, NoModelError
+from .recording import Recording
+
+__all__ = ["Stretch", "cut_stretches", "ripple_lead"]
+
+Array = NDArray[np.float64]
+
+#: Motion slower than this share of the median speed is left out, as are reversals.
+SLOWEST: Final = 0.2
+
+#: Steps between readings beyond this part of a turn cannot be told from the other way round.
+_LARGEST_STEP: Final = 0.4
+
+#: A stretch shorter than this shows no pattern of its own (turns, readings).
+_SHORTEST: Final = (0.8, 48)
+
+#: Turns in all without which motion and pattern cannot be told apart.
+TURNS_NEEDED: Final = 2.0
+
+_BLOCKS: Final = 400  # a log is looked at in about so many pieces
+
+
+@dataclass(frozen=True)
+class Stretch:
+    """Readings of one stretch: time in seconds, reading in radians without jumps."""
+
+    time: Array
+    angle: Array
+    recording: Recording
+    rows: slice
+
+    @property
+    def turns(self) -> float:
+        """Turns travelled."""
+        return float(abs(self.angle[-1] - self.angle[0]) / (2.0 * math.pi))
+
+    @property
+    def direction(self) -> int:
+        """Sign of the travel."""
+        return 1 if self.angle[-1] >= self.angle[0] else -1
+
+    @property
+    def speed(self) -> float:
+        """Mean speed in turns per second, positive."""
+        return self.turns / float(self.time[-1] - self.time[0])
+
+    def turn_speed(self) -> Array:
+        """Speed of every reading in turns per second, averaged over one turn around it.
+
+        The reading's own error is the same one turn later, so it does not enter.
+        """
+        t, x = self.time, np.abs(self.angle - self.angle[0])
+        x = np.maximum.accumulate(x)
+        turn = 2.0 * math.pi
+        last = float(x[-1])
+        if last <= 1.25 * turn:
+            return np.full(t.size, self.speed)
+        at = np.linspace(0.0, last - turn, min(4000, max(8, int(16 * last / turn))))
+        # Where readings stand still, the mean of their times is as good as any.
+        left, right = np.interp(at, x, t), np.interp(at + turn, x, t)
+        speed = np.log(1.0 / (right - left))
+        middle = 0.5 * (left + right)
+        result = np.interp(t, middle, speed)
+        for outside, edge in ((t < middle[0], 0), (t > middle[-1], -1)):
+            near = slice(0, 16) if edge == 0 else slice(-16, None)
+            slope = np.polyfit(middle[near] - middle[edge], speed[near], 1)[0]
+            result[outside] = speed[edge] + slope * (t[outside] - middle[edge])
+        return np.asarray(np.exp(result))
+
+
+def ripple_lead(stretch: Stretch, speed: Array) -> Array:
+    r"""Phase by which the ripple of order 1 leads that of a shaft at constant speed.
+
+    A rotor of friction :math:`f(\omega)` answers the torque :math:`T e^{ik\theta}` by
+    :math:`-\frac{T}{k^2\omega^2} e^{i(k\theta + \varphi/k)}` with
+    :math:`\varphi = (f'\omega - 3\dot\omega)/\omega^2`, to first order in the deceleration.
+    """
+    if stretch.turns < 6.0:
+        return np.zeros(speed.size)
+    step = max(1, speed.size // 2000)
+    t = stretch.time[::step]
+    omega = 2.0 * math.pi * speed[::step]
+    middle, half = 0.5 * (t[0] + t[-1]), 0.5 * (t[-1] - t[0])
+    x = (t - middle) / half
+    degree = int(min(6.0, stretch.turns // 5.0))
+    logarithm = np.polynomial.Polynomial.fit(x, np.log(omega), degree, domain=[-1.0, 1.0])
+    rate = logarithm.deriv()(x) / half * omega
+    # Friction that grows with speed, by how the deceleration does.
+    spread = omega - omega.mean()
+    law = float(spread @ spread)
+    damping = max(0.0, -float(spread @ rate) / law) if law > 0.0 else 0.0
+    lead = (damping * omega - 3.0 * rate) / omega**2
+    return np.asarray(stretch.direction * np.interp(stretch.time, t, lead))
+
+
+def cut_stretches(recordings: Iterable[Recording]) -> list[Stretch]:
+    """Stretches of motion in one direction, neither slow nor reversing.
+
+    Raises
+    ------
+    FileError, NoModelError
+        No time stamps, too few readings or turns, motion that is too fast for the rate
+        of readings: each says what to record.
+    """
+    found: list[Stretch] = []
+    recordings = list(recordings)
+    for recording in recordings:
+        found += _cut(recording)
+    turns = sum(s.turns for s in found)
+    if not found or turns < TURNS_NEEDED - 0.01:
+        held = f"{turns:.2g} turn{'' if abs(turns - 1.0) < 0.05 else 's'}" if found else "no turn"
+        raise NoModelError(
+            f"{recordings[0].named}: {held} of steady motion: what happened once may be the "
+            "motion as well as the encoder; record at least 10 turns in one direction"
+        )
+    if sum(s.time.size for s in found) < 200:
+        raise NoModelError(
+            f"{recordings[0].named}: only {sum(s.time.size for s in found)} readings in motion; "
+            "record at least 10 turns with 100 readings each"
+        )
+    return found
+
+
+def _cut(recording: Recording) -> list[Stretch]:
+    if recording.indicated is None:
+        raise _fault(
+            recording, "no column indicated_deg (or _rad, _turn, _count): the reading is needed"
+        )
+    if recording.time is None:
+        raise _fault(
+            recording,
+            "no column time_s: record a time stamp in seconds with every reading, taken where "
+            "the reading is latched",
+        )
+    time, angle = recording.time, recording.indicated
+    if time.size < 2:
+        return []
+    back = np.flatnonzero(np.diff(time) < 0.0)
+    if back.size:
+        raise _fault(
+            recording,
+            f"time runs backwards at {time[back[0] + 1]:g} s; sort the rows or give the part "
+            "another run label",
+        )
+    if time[-1] <= time[0]:
+        raise _fault(recording, "all time stamps are equal: record one with every reading")
+    angle = _unwrapped(recording, time, angle)
+    steps = np.diff(time)
+    usual = float(np.median(steps[steps > 0.0]))
+    pauses = np.flatnonzero(steps > max(20.0 * usual, 1e-9))
+    edges = [0, *(int(p) + 1 for p in pauses), time.size]
+    pieces = [(a, b) for a, b in itertools.pairwise(edges) if b - a >= _SHORTEST[1]]
+    moving = [_moving(time[a:b], angle[a:b], a) for a, b in pieces]
+    speeds = np.concatenate([np.zeros(0), *(np.abs(v) for _, v in moving)])
+    if speeds.size == 0:
+        return []
+    slow = SLOWEST * float(np.median(speeds))
+    found = []
+    for (a, b), (starts, speed) in zip(pieces, moving, strict=True):
+        state = np.where(np.abs(speed) > slow, np.sign(speed), 0.0)
+        change = np.concatenate([[0], np.flatnonzero(np.diff(state)) + 1, [state.size]])
+        for i, j in itertools.pairwise(change):
+            if state[i] == 0.0:
+                continue
+            rows = slice(int(starts[i]), int(starts[j]) if j < state.size else b)
+            stretch = Stretch(time[rows], angle[rows], recording, rows)
+            if rows.stop - rows.start >= _SHORTEST[1] and stretch.turns >= _SHORTEST[0]:
+                found.append(stretch)
+        del a
+    return found
+
+
+def _moving(time: Array, angle: Array, offset: int) -> tuple[NDArray[np.int64], Array]:
+    """Starts of equal pieces of a log and the speed of each in radians per second."""
+    size = max(12, time.size // _BLOCKS)
+    starts = np.arange(0, max(time.size - size // 2, 1), size)
+    ends = np.append(starts[1:], time.size)
+    half = np.maximum((ends - starts) // 3, 1)
+    speed = np.empty(starts.size)
+    for i, (a, b, h) in enumerate(zip(starts, ends, half, strict=True)):
+        dt = time[b - h : b].mean() - time[a : a + h].mean()
+        speed[i] = (angle[b - h : b].mean() - angle[a : a + h].mean()) / dt if dt > 0.0 else 0.0
+    return starts + offset, speed
+
+
+def _unwrapped(recording: Recording, time: Array, angle: Array) -> Array:
+    turn = 2.0 * math.pi
+    if angle.max() - angle.min() > 1.02 * turn:
+        # Counted over turns already.
+        return np.asarray(angle - turn * math.floor(angle[0] / turn))
+    steps = np.diff(angle) / turn
+    steps -= np.round(steps)
+    usual = float(np.median(np.abs(steps)))
+    # A wild reading steps out and back; motion that is too fast does so all the time.
+    often = float(np.mean(np.abs(steps) > _LARGEST_STEP))
+    if usual > 0.25 or often > 0.002:
+        rate = 1.0 / float(np.median(np.diff(time)[np.diff(time) > 0.0]))
+        raise _fault(
+            recording,
+            f"steps of {max(usual, 0.4):.2g} turn between readings at {rate:.3g} Hz cannot be told "
+            f"from motion the other way: read at least {4.0 * rate:.3g} times a second or turn "
+            "slower",
+        )
+    return np.asarray(np.unwrap(angle, period=turn))
+
+
+def _fault(recording: Recording, problem: str) -> Exception:
+    if recording.file:
+        return FileError(
+            recording.file, f"run {recording.label}: {problem}" if recording.label else problem
+        )
+    return NoModelError(f"{recording.named}: {problem}")

@@ -1,0 +1,48 @@
+"""A self-calibration as text."""
+
+from __future__ import annotations
+
+from .result import OrderEstimate, SelfCalibration, ranges
+
+__all__ = ["summary"]
+
+
+def summary(result: SelfCalibration) -> str:
+    """Numbers, what they are numbers of, what is blind, tests, notes."""
+    lines = [
+        f"calibrated without a reference ({result.method}): {result.readings} readings, "
+        f"{result.turns:.1f} turns, noise {result.noise_arcsec:.3g} arcsec",
+    ]
+    if result.orders:
+        lines += ["", *_table(result.orders)]
+    if result.sums:
+        lines += ["", "not the encoder's alone:", *_table(result.sums)]
+    lines += ["", "blind to"]
+    for blind in result.blind:
+        what = "zero" if blind.orders == (0.0,) else f"orders {ranges(blind.orders)}"
+        lines.append(f"  {what}: {blind.because}")
+        lines.append(f"    to see it: {blind.measure}")
+    if result.held_out:
+        lines += ["", "held out"]
+        for test in result.held_out.values():
+            agree = "agree" if test.p > 0.001 else "DISAGREE"
+            lines.append(
+                f"  {test.fitted_on} predict {test.judged_on}: {test.rms_before:.4g} -> "
+                f"{test.rms_after:.4g} arcsec rms, they {agree} (p = {test.p:.2g})"
+            )
+    lines += [f"note: {note}" for note in result.notes]
+    return "\n".join(lines)
+
+
+def _table(orders: tuple[OrderEstimate, ...]) -> list[str]:
+    names = {o.of for o in orders} != {"the encoder"}
+    lines = [
+        "   order  amplitude/arcsec     std  phase/deg  retained  factor"
+        + ("  of" if names else "")
+    ]
+    for o in orders:
+        lines.append(
+            f"{o.order:8g} {o.amplitude:17.3f} {o.std:7.3f} {o.phase_deg:10.2f} {o.retained:9.3f} "
+            f"{o.std_factor:7.2f}" + (f"  {o.of}" if names else "")
+        )
+    return lines

@@ -1,0 +1,118 @@
+"""Honest tests of a pattern: one part of the readings predicts another."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..distributions import chi_squared_tail
+from .result import ARCSEC, HeldOut
+from .steady import Readings, SteadyFit, fit_steady
+
+__all__ = ["held_out", "judged"]
+
+Array = NDArray[np.float64]
+
+#: Speeds that differ by less than this ratio test nothing.
+_SPEEDS: Final = 1.3
+
+#: Turns in all from which odd ones are compared with even ones.
+_TURNS: Final = 4.0
+
+
+def judged(
+    first: Array, second: Array, covariance: Array, noise: float, names: tuple[str, str]
+) -> HeldOut:
+    """Two patterns (cosine and sine in turn, radians) of two parts of the readings.
+
+    ``covariance`` is that of ``second - first``.
+    """
+    gap = second - first
+    inverse = np.linalg.pinv(covariance, hermitian=True)
+    size = float(gap @ inverse @ gap)
+    return HeldOut(
+        fitted_on=names[0],
+        judged_on=names[1],
+        rms_before=math.hypot(noise, math.sqrt(0.5 * float(second @ second))) * ARCSEC,
+        rms_after=math.hypot(noise, math.sqrt(0.5 * float(gap @ gap))) * ARCSEC,
+        p=chi_squared_tail(size, float(max(gap.size, 1))),
+    )
+
+
+def held_out(fit: SteadyFit, tested: Sequence[float], colour: float = 1.0) -> dict[str, HeldOut]:
+    """Odd turns against even ones, fast against slow, one direction against the other.
+
+    Both parts share the motion; each has a pattern of its own. Slow against fast is made
+    without ripple columns: it is the only test that shows ripple.
+    """
+    readings = fit.readings
+    found = {}
+    turn = _turn_numbers(readings)
+    turns = sum(s.turns for s in readings.stretches)
+    if turns >= _TURNS:
+        found["odd_even_turns"] = _compare(
+            fit, turn & 1, tested, ("odd turns", "even turns"), colour
+        )
+    low, high = np.quantile(readings.speed, [0.05, 0.95])
+    if high / low >= _SPEEDS:
+        middle = math.sqrt(low * high)
+        slow = (readings.speed < middle).astype(np.int64)
+        if 0.1 < slow.mean() < 0.9:
+            found["speeds"] = _compare(
+                fit, slow, tested, ("the faster part", "the slower part"), colour, ripple=False
+            )
+    directions = np.array([s.direction for s in readings.stretches])
+    if (directions > 0).any() and (directions < 0).any():
+        back = (directions[readings.stretch] < 0).astype(np.int64)
+        found["directions"] = _compare(fit, back, tested, ("forward", "backward"), colour)
+    return found
+
+
+def _turn_numbers(readings: Readings) -> NDArray[np.int64]:
+    """Turns counted from the start of each stretch, and on from stretch to stretch.
+
+    A part of a turn at the end of a stretch counts with the turn before.
+    """
+    found, before = [], 0
+    for stretch in readings.stretches:
+        whole = max(1, round(stretch.turns))
+        number = np.abs(stretch.angle - stretch.angle[0]) / (2.0 * math.pi)
+        found.append(before + np.minimum(number.astype(np.int64), whole - 1))
+        before += whole
+    return np.concatenate(found)
+
+
+def _compare(
+    fit: SteadyFit,
+    groups: NDArray[np.int64],
+    tested: Sequence[float],
+    names: tuple[str, str],
+    colour: float,
+    *,
+    ripple: bool = True,
+) -> HeldOut:
+    parts = fit_steady(
+        fit.readings,
+        fit.orders,
+        fit.ripple_orders if ripple else (),
+        start=fit,
+        groups=groups,
+        thorough=False,
+    )
+    m = 2 * len(fit.orders)
+    rows = np.array(
+        [2 * i + j for i, k in enumerate(fit.orders) if k in tested for j in (0, 1)], dtype=np.int64
+    )
+    covariance = parts.projected.covariance
+    difference = (
+        covariance[np.ix_(rows, rows)]
+        + covariance[np.ix_(rows + m, rows + m)]
+        - covariance[np.ix_(rows, rows + m)]
+        - covariance[np.ix_(rows + m, rows)]
+    )
+    noise = math.sqrt(parts.projected.variance)
+    return judged(parts.unknowns[rows], parts.unknowns[rows + m], colour * difference, noise, names)
