@@ -38,7 +38,7 @@ def cost_of_ripple(ripple: Array) -> float:
     Examples
     --------
     >>> round(cost_of_ripple(np.exp(np.linspace(0.0, 2.0 * np.log(5.0), 1000))), 2)
-    1.54
+    1.53
     """
     share = 1.0 - float(ripple.mean()) ** 2 / float((ripple**2).mean())
     return float(1.0 / np.sqrt(max(share, 1e-16)))
