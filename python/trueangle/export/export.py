@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from os import PathLike, fspath
 from pathlib import Path
 from typing import Any
@@ -161,6 +161,7 @@ def export_model(
     found = target_of(target)
     given = found.checked(options)
     loaded, sha256, inputs = _model(model)
+    inputs += [given[name] for name in found.files if given[name] is not None]
     if path is not None:
         check_output(path, found.kind, inputs, [sha256])
         if given.get("name", "") is None:
@@ -188,7 +189,7 @@ def export_model(
             file.write(text)
     return Exported(
         target=target,
-        sign=found.sign,
+        sign=found.sign_of(given),
         argument=found.argument,
         entries=made.entries,
         bytes=made.bytes,
@@ -269,6 +270,7 @@ def _model(
 
 
 def _proven(made: Made, bits: int) -> Proof:
+    bits = made.bits or bits
     if not 1 <= bits <= 32:
         raise ArgumentError(f"--bits must be from 1 to 32, got {bits}")
     found = [
@@ -302,7 +304,7 @@ def _smallest(target: Target, pattern: Pattern, options: dict[str, Any], max_arc
         except TrueAngleError as error:
             refused = error
             continue
-        rough = _proven(made, min(_ROUGH_BITS, bits)).max_arcsec
+        rough = _proven(replace(made, bits=min(_ROUGH_BITS, made.bits or bits)), 1).max_arcsec
         best = min(best, rough)
         if rough <= max_arcsec:
             exact = _proven(made, bits).max_arcsec

@@ -13,7 +13,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["cubic_knots", "linear_knots"]
+__all__ = ["cubic_knots", "linear_knots", "rounded_knots"]
 
 Array = NDArray[np.float64]
 Function = Callable[[Array], Array]
@@ -52,6 +52,43 @@ def cubic_knots(g: Function, entries: int) -> Array:
     ndarray, shape (entries, 2)
     """
     return _nearest(g, entries, 2)
+
+
+def rounded_knots(knots: Array) -> Array:
+    r"""Whole numbers whose lines are nearest to the lines between ``knots``.
+
+    Errors :math:`e_i` of the knots leave :math:`\sum \tfrac23 e_i^2 + \tfrac13 e_i e_{i+1}`
+    between them, so neighbours that err to opposite sides leave less: each knot is rounded for
+    what its neighbours have left, until none changes. Never worse than rounding each alone.
+
+    Examples
+    --------
+    >>> rounded_knots(np.array([0.47, 0.47, 0.47, 0.47]))
+    array([1., 0., 1., 0.])
+    """
+    count = len(knots)
+    found = np.rint(knots)
+    # Knots that are no neighbours of each other are moved at once.
+    groups = [np.arange(0, count - 1, 2), np.arange(1, count, 2), np.arange(count - 1, count)]
+    for _ in range(_SWEEPS):
+        before = found.copy()
+        for group in groups:
+            error = found - knots
+            pull = (error[group - 1] + error[(group + 1) % count]) / 4.0
+            moved = np.rint(knots[group] - pull)
+            near = np.abs(moved - knots[group]) <= _FARTHEST
+            found[group] = np.where(near, moved, np.rint(knots[group]))
+        if np.array_equal(found, before):
+            break
+    return found
+
+
+#: Farthest that a knot is moved from where it should be, in units of its last digit: a little
+#: beyond the half takes most of the gain in rms, and the maximum grows with it.
+_FARTHEST = 0.55
+
+#: Sweeps after which rounding ends; each lowers what is left, and ten are enough.
+_SWEEPS = 50
 
 
 def _basis(t: Array, count: int) -> tuple[Array, Array]:

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
+import os
 from collections.abc import Callable, Iterable
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,6 +20,8 @@ EVERY_INPUT_BITS = 24
 
 #: Readings evaluated at once: they fit the caches together with what is made of them.
 _BATCH = 1 << 16
+
+_THREADS = min(8, os.cpu_count() or 1)
 
 Array = NDArray[np.float64]
 Angles = NDArray[np.uint32]
@@ -88,18 +92,26 @@ def prove(
     variants = tuple(corrections)
     width = min(bits, EVERY_INPUT_BITS)
     inputs = 1 << width
-    worst, at, squares = 0.0, 0, np.zeros(len(variants))
-    for start in range(0, inputs, _BATCH):
+
+    def batch(start: int) -> tuple[float, int, list[float]]:
+        worst, at, squares = 0.0, 0, []
         counts = np.arange(start, min(start + _BATCH, inputs), dtype=np.uint32)
         angles = counts << np.uint32(32 - width)
         truth = exact(counts / inputs)
-        for i, correction in enumerate(variants):
+        for correction in variants:
             difference = correction(angles) - truth
             difference -= np.rint(difference)
-            squares[i] += float(difference @ difference)
+            squares.append(float(difference @ difference))
             k = int(np.argmax(np.abs(difference)))
             if abs(difference[k]) > worst:
                 worst, at = abs(float(difference[k])), int(angles[k])
+        return worst, at, squares
+
+    # numpy and the core work without the interpreter's lock.
+    with ThreadPoolExecutor(_THREADS) as pool:
+        found = list(pool.map(batch, range(0, inputs, _BATCH)))
+    worst, at, _ = max(found, key=lambda part: part[0])
+    squares = np.sum([part[2] for part in found], axis=0)
     every = bits <= EVERY_INPUT_BITS
     margin = 0.0 if every else 0.5 / inputs * slope + resolution
     return Proof(

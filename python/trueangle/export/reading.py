@@ -36,6 +36,11 @@ _SETTLED = 1e-6
 _SIGNIFICANT = 3.0
 
 
+#: Largest number of orders of a model made of a table, the strongest ones: its covariance is
+#: a matrix.
+_MOST_ORDERS = 256
+
+
 class ReadTable(NamedTuple):
     """One shaft's correction as its table makes it, in turns of the output.
 
@@ -109,7 +114,8 @@ def function_model(
         constant += mean
         sigma = table.step / math.sqrt(12.0)
         std = sigma * math.sqrt(2.0 / table.entries)
-        keep = np.hypot(cosine, sine) > _SIGNIFICANT * std
+        size = np.hypot(cosine, sine)
+        keep = size > max(_SIGNIFICANT * std, np.sort(size)[-_MOST_ORDERS:][0])
         orders = np.flatnonzero(keep) + 1
         shafts.append(
             Shaft(

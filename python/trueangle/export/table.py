@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from .. import _core
 from ..angles import ARCSEC_PER_TURN
 from ..errors import ArgumentError
-from .knots import cubic_knots, linear_knots
+from .knots import cubic_knots, linear_knots, rounded_knots
 
 __all__ = ["METHODS", "NUMBERS", "Table", "make_table"]
 
@@ -161,6 +161,11 @@ def make_table(
                 f"shaft {shaft}: 16 bits do not hold its corrections of up to "
                 f"{largest / TURN * 360.0:.3g} deg with {entries} entries; use --number q31"
             )
+    if method == "linear":
+        whole = rounded_knots(values[:-1] / 2.0**shift)
+        if _fits_short(np.append(whole, whole[0]), method):
+            rounded = np.append(whole, whole[0]).astype(np.int16)
+            return Table(shaft, cycles, method, number, bits, shift, rounded)
     rounded = np.rint(values / 2.0**shift).astype(np.int16)
     return Table(shaft, cycles, method, number, bits, shift, rounded)
 

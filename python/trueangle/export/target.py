@@ -89,6 +89,8 @@ class Made:
         One line on each table, where there are several.
     neglected : float
         Turns by which several parts together may differ more than each alone.
+    bits : int, optional
+        Of a reading, where the target fixes them.
     """
 
     text: Callable[[Header], str]
@@ -102,6 +104,7 @@ class Made:
     notes: tuple[str, ...] = ()
     tables: tuple[dict[str, Any], ...] = ()
     neglected: float = 0.0
+    bits: int | None = None
 
 
 class Target(ABC):
@@ -131,6 +134,8 @@ class Target(ABC):
     argument: ClassVar[str] = "indicated"
     unknown: ClassVar[str] = ""
     options: ClassVar[Mapping[str, Option]] = {}
+    #: Options that name files: read, never written.
+    files: ClassVar[tuple[str, ...]] = ()
 
     #: Kinds of terms that the target takes besides the pattern: "direction".
     takes_direction: ClassVar[bool] = False
@@ -142,6 +147,10 @@ class Target(ABC):
     @abstractmethod
     def read(self, text: str, path: str, options: Mapping[str, Any]) -> HarmonicModel:
         """A model of what a table that is there does."""
+
+    def sign_of(self, options: Mapping[str, Any]) -> str:
+        """The sign, where it depends on an option."""
+        return self.sign
 
     def sizes(self, options: Mapping[str, Any]) -> Sequence[int]:
         """Entries to try for ``max_arcsec``, increasing; none where the size is fixed."""

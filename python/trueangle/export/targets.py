@@ -3,10 +3,18 @@
 from __future__ import annotations
 
 from ..errors import ArgumentError
+from .admt4000 import Admt4000
 from .c import CHeader
 from .csvtable import CsvTable
+from .klipper import Klipper
+from .linuxcnc import LinuxCnc
+from .mechaduino import Mechaduino
+from .moteus import Moteus
 from .rust import RustModule
+from .simplefoc import SimpleFoc
 from .target import Target
+from .tinymovr import Tinymovr
+from .twincat import TwinCat
 
 __all__ = ["TARGETS", "target_of"]
 
@@ -17,6 +25,14 @@ TARGETS: dict[str, Target] = {
         CHeader(),
         RustModule(),
         CsvTable(),
+        SimpleFoc(),
+        Moteus(),
+        LinuxCnc(),
+        TwinCat(),
+        Klipper(),
+        Admt4000(),
+        Mechaduino(),
+        Tinymovr(),
     )
 }
 

@@ -1,0 +1,130 @@
+"""LinuxCNC: a ``COMP_FILE``, forward and reverse, for a rotary joint in degrees."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any, ClassVar
+
+import numpy as np
+
+from ..errors import ArgumentError
+from ..files import Kind
+from ..model import HarmonicModel
+from .oneturn import line_floor
+from .pattern import Pattern
+from .reading import failed
+from .setpoint import Travel, steepness
+from .setpointreading import travel_model
+from .target import Header, Made, Option, Target
+
+__all__ = ["LinuxCnc"]
+
+#: EMCMOT_COMP_SIZE.
+MOST = 256
+#: Decimals of a degree that are printed.
+_DECIMALS = 7
+_SIZES = (12, 18, 24, 36, 48, 60, 72, 90, 120, 180, 240)
+
+
+class LinuxCnc(Target):
+    """``--to linuxcnc``: the file that ``COMP_FILE`` of a joint names."""
+
+    name = "linuxcnc"
+    what = "a COMP_FILE of a rotary joint, forward and reverse"
+    kind: ClassVar[Kind] = Kind("a compensation file of LinuxCNC", (".comp", ".txt", ".dat"))
+    sign = "add"
+    argument = "reference"
+    takes_direction = True
+    unknown = (
+        "BACKLASH of the joint is ignored where a COMP_FILE is given; outside the table the first "
+        "and the last value hold"
+    )
+    options = {
+        "type": Option(("0", "1"), "1", "COMP_FILE_TYPE: 0 positions, 1 trims"),
+        "entries": Option(int, 180, "to a turn; 256 in all"),
+        "start": Option(float, 0.0, "of the travel, degrees"),
+        "stop": Option(float, 360.0, "of the travel, degrees"),
+        "bits": Option(int, 24, "bits of a position over the travel"),
+    }
+
+    def sizes(self, options: Mapping[str, Any]) -> Sequence[int]:
+        return _SIZES
+
+    def make(self, pattern: Pattern, options: Mapping[str, Any]) -> Made:
+        travel = Travel.of(
+            pattern, self.name, options["start"], options["stop"], options["entries"], MOST
+        )
+        # The motor is told position + trim: the trim is the error.
+        forward, reverse = (
+            np.round(values * 360.0, _DECIMALS) for values in (travel.forward, travel.reverse)
+        )
+        nominal = np.round(travel.nominal, _DECIMALS)
+        positions = options["type"] == "0"
+
+        def text(header: Header) -> str:
+            rows = []
+            for x, f, r in zip(nominal, forward, reverse, strict=True):
+                a, b = (x - f, x - r) if positions else (f, r)
+                rows.append(f"{x:.{_DECIMALS}f} {a:.{_DECIMALS}f} {b:.{_DECIMALS}f}")
+            return "\n".join(rows) + "\n"
+
+        slope, bend = steepness(travel)
+        step = 10.0**-_DECIMALS / 360.0
+        return Made(
+            text=text,
+            entries=len(nominal),
+            bytes=24 * len(nominal),
+            parts=(travel.part(pattern, forward / 360.0, reverse / 360.0),),
+            floor_arcsec=line_floor(step),
+            step=step,
+            zero_deg=pattern.zero * 360.0,
+            lost=lambda: travel.lost(pattern),
+            notes=(
+                f"set COMP_FILE_TYPE = {options['type']} of the joint",
+                f"at v deg/s the trim moves at up to {slope:.3g} v deg/s and bends at up to "
+                f"{bend:.3g} v^2 deg/s^2 at its corners: LinuxCNC gives it half of the joint's "
+                "MAX_ACCELERATION",
+            ),
+        )
+
+    def read(self, text: str, path: str, options: Mapping[str, Any]) -> HarmonicModel:
+        rows: list[list[float]] = []
+        for number, line in enumerate(text.split("\n"), 1):
+            words = line.split()
+            try:
+                triplet = [float(word) for word in words[:3]]
+                if len(triplet) != 3 or not all(map(math.isfinite, triplet)):
+                    raise ValueError
+            except ValueError:
+                if any(part.strip() for part in text.split("\n")[number - 1 :]):
+                    raise failed(
+                        path,
+                        f"three numbers are wanted, got {line.strip()[:40]!r}: LinuxCNC stops "
+                        "reading here",
+                        number,
+                    ) from None
+                break
+            if rows and triplet[0] <= rows[-1][0]:
+                raise failed(path, "nominal positions must increase", number)
+            rows.append(triplet)
+        if not 4 <= len(rows) <= MOST:
+            raise failed(path, f"{len(rows)} lines: LinuxCNC takes 4 to {MOST} here")
+        table = np.array(rows)
+        if options["type"] == "0":
+            table[:, 1:] = table[:, :1] - table[:, 1:]
+        largest = float(np.max(np.abs(table[:, 1:])))
+        if largest > _LARGEST:
+            raise ArgumentError(
+                f"{path}: trims of up to {largest:.4g} deg: are these positions? give --type "
+                f"{'1' if options['type'] == '0' else '0'}"
+            )
+        return travel_model(table, path, self.name, 10.0 ** -_decimals(text))
+
+
+#: Degrees: no trim of an axis that works is larger.
+_LARGEST = 30.0
+
+
+def _decimals(text: str) -> int:
+    return max((len(word.partition(".")[2]) for word in text.split()), default=0)

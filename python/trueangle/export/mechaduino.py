@@ -1,0 +1,115 @@
+"""Mechaduino: the ``lookup`` array of 16384 corrected angles in degrees."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..angles import ARCSEC_PER_TURN
+from ..errors import ArgumentError
+from ..files import Kind, read_whole
+from ..model import HarmonicModel
+from .oneturn import array_of, rows
+from .pattern import Pattern
+from .reading import failed, sampled_model
+from .target import Header, Made, Option, Part, Target, comment_lines
+
+__all__ = ["Mechaduino"]
+
+ENTRIES = 16384
+_BITS = 14
+_DECIMALS = 4
+_SOURCE_BYTES = 8 << 20
+
+Array = NDArray[np.float64]
+
+
+class Mechaduino(Target):
+    """``--to mechaduino``: the array to paste into ``Parameters.cpp``."""
+
+    name = "mechaduino"
+    what = "the lookup array of Mechaduino's Parameters.cpp"
+    kind: ClassVar[Kind] = Kind("a C++ source for Mechaduino", (".h", ".cpp", ".ino"))
+    sign = "absolute"
+    files = ("existing",)
+    options = {
+        "existing": Option(str, None, "Parameters.cpp whose lookup gives the zero to keep"),
+    }
+
+    def make(self, pattern: Pattern, options: Mapping[str, Any]) -> Made:
+        pattern.check_one_turn(self.name)
+        pattern.check_orders(ENTRIES, self.name, "use --to c")
+        counts = np.arange(ENTRIES) / ENTRIES
+        exact = counts - pattern.correction(counts)
+        zero = 0.0
+        notes = []
+        if options["existing"] is None:
+            notes.append(
+                "the zero of lookup sets the phase of the motor's currents: give --existing "
+                "Parameters.cpp to keep the one that the motor's own calibration found"
+            )
+        else:
+            path = options["existing"]
+            raw = read_whole(path, _SOURCE_BYTES, "a source with the lookup array")
+            present = _lookup(raw.decode("utf-8", "replace"), path)[0] / 360.0
+            away = np.exp(2j * np.pi * (present - exact))
+            zero = float(np.angle(np.mean(away))) / (2.0 * math.pi)
+            notes.append(f"the zero of {path} is kept: {zero * 360.0:.6g} deg")
+        table = np.round((exact + zero) % 1.0 * 360.0, _DECIMALS) % 360.0
+        single = table.astype(np.float32).astype(np.float64) / 360.0
+
+        def correction(angles: NDArray[np.uint32]) -> Array:
+            return np.asarray(angles / 2.0**32 - single[angles >> np.uint32(18)] + zero)
+
+        def text(header: Header) -> str:
+            comment = [
+                "Corrected angle in degrees of every count of the encoder, the indicated angle. "
+                f"Made by {header.package}.",
+                f"Differs from the model by at most {header.proof.max_arcsec:.4g} arcsec, rms "
+                f"{header.proof.rms_arcsec:.3g} ({header.proof.how}).",
+                f"Model: sha256 {header.sha256}",
+                *(f"Note: {note}." for note in header.notes),
+            ]
+            lines = [line for part in comment for line in comment_lines(98, part, "// ")]
+            body = rows([f"{value:.{_DECIMALS}f}" for value in table], lead="")
+            return "\n".join(
+                [*lines, f"const PROGMEM float lookup[{ENTRIES}] = {{", body, "};", ""]
+            )
+
+        step = 10.0**-_DECIMALS / 360.0
+        return Made(
+            text=text,
+            entries=ENTRIES,
+            bytes=4 * ENTRIES,
+            parts=(Part((correction,), pattern.correction),),
+            floor_arcsec=step / math.sqrt(12.0) * ARCSEC_PER_TURN,
+            step=step,
+            zero_deg=(pattern.zero - zero) * 360.0,
+            notes=tuple(notes),
+            bits=_BITS,
+        )
+
+    def read(self, text: str, path: str, options: Mapping[str, Any]) -> HarmonicModel:
+        table, decimals = _lookup(text, path)
+        away = np.arange(ENTRIES) * (360.0 / ENTRIES) - table
+        away = (away - away[0] + 180.0) % 360.0 - 180.0
+        if np.max(np.abs(np.diff(np.append(away, away[0])))) > 180.0:
+            raise ArgumentError(f"{path}: the angles of lookup do not go once around")
+        step = 10.0 ** -min(decimals, 6)
+        # Its zero is the motor's phase.
+        return sampled_model(
+            (away - np.mean(away)) / 360.0, path, text, step=step / 360.0, name=self.name
+        )
+
+
+def _lookup(text: str, path: str) -> tuple[Array, int]:
+    table, line, decimals = array_of(text, path, Mechaduino.name)
+    if len(table) != ENTRIES or np.any((table < 0.0) | (table > 360.0)):
+        raise failed(
+            path, f"lookup must hold {ENTRIES} angles from 0 to 360, got {len(table)} numbers", line
+        )
+    return table, decimals

@@ -1,0 +1,169 @@
+"""moteus: the compensation table of one position source, as ``conf set`` lines."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from functools import partial
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import ArgumentError
+from ..files import Kind
+from ..model import HarmonicModel
+from .knots import rounded_knots
+from .oneturn import line_floor, one_turn_knots
+from .pattern import Pattern
+from .reading import failed, sampled_model
+from .target import Header, Made, Option, Part, Target
+
+__all__ = ["Moteus", "compensated"]
+
+ENTRIES = 256
+#: Scales tried above the least, for the one whose rounding is kindest to these knots.
+_SCALES = np.linspace(1.0, 1.05, 401)
+
+_LINE = re.compile(
+    r"^(?:conf set )?motor_position\.sources\.(\d+)\.compensation_(?:table\.(\d+)|(scale))"
+    r"\s+(\S+)\s*$"
+)
+
+
+class Moteus(Target):
+    """``--to moteus``: lines for ``moteus_tool --write-config``."""
+
+    name = "moteus"
+    what = "conf set lines of a position source's compensation table"
+    kind: ClassVar[Kind] = Kind("a configuration of moteus", (".cfg", ".txt", ".conf"))
+    sign = "add"
+    unknown = (
+        "firmware 0x0109 or later is wanted (before, 32 floats without a scale). On the source "
+        "that commutates, the motor's own calibration was made with the old table: calibrate the "
+        "motor again (moteus_tool --calibrate) after writing"
+    )
+    options = {
+        "source": Option(int, 0, "position source 0, 1 or 2 that reads this encoder"),
+        "bits": Option(int, 24, "bits of a reading: so many are all evaluated, up to 24"),
+    }
+
+    def make(self, pattern: Pattern, options: Mapping[str, Any]) -> Made:
+        source = options["source"]
+        if source not in (0, 1, 2):
+            raise ArgumentError(f"--source must be 0, 1 or 2, got {source}")
+        if options["bits"] > 24:
+            raise ArgumentError("--bits must be at most 24: moteus takes readings as floats")
+        knots = -one_turn_knots(pattern, ENTRIES, self.name, True)
+        scale, table = _scaled(knots)
+
+        def correction(angles: NDArray[np.uint32], contracted: bool) -> NDArray[np.float64]:
+            cpr = 1 << options["bits"]
+            reading = angles >> np.uint32(32 - options["bits"])
+            out = compensated(reading, table, scale, cpr, contracted)
+            return np.asarray((reading - out) / cpr)
+
+        def text(header: Header) -> str:
+            lead = f"conf set motor_position.sources.{source}.compensation_"
+            lines = [f"{lead}scale {float(scale):.9g}"]
+            lines += [f"{lead}table.{i} {int(value)}" for i, value in enumerate(table)]
+            return "\n".join([*lines, "conf write", ""])
+
+        step = float(scale) / 127.0
+        return Made(
+            text=text,
+            entries=ENTRIES,
+            bytes=ENTRIES + 4,
+            parts=(
+                Part(
+                    tuple(partial(correction, contracted=c) for c in (False, True)),
+                    pattern.correction,
+                    2.0 * pattern.slope,
+                ),
+            ),
+            floor_arcsec=line_floor(step),
+            step=step,
+            zero_deg=pattern.zero * 360.0,
+            notes=(
+                "the reading is that of the source with its offset and sign applied, in its own "
+                "turns: calibrate the model with that",
+            ),
+        )
+
+    def read(self, text: str, path: str, options: Mapping[str, Any]) -> HarmonicModel:
+        source = options["source"]
+        table = np.zeros(ENTRIES)
+        scale, seen = 0.0, 0
+        for number, line in enumerate(text.split("\n"), 1):
+            found = _LINE.match(line.strip())
+            if found is None or int(found[1]) != source:
+                continue
+            try:
+                value = float(found[4])
+                if not np.isfinite(value):
+                    raise ValueError
+            except ValueError:
+                raise failed(path, f"{found[4]!r} is no number", number) from None
+            if found[3]:
+                scale = value
+            elif int(found[2]) >= ENTRIES or abs(value) > 128 or value != int(value):
+                raise failed(path, f"{line.strip()!r} is no entry of a table of int8", number)
+            else:
+                table[int(found[2])] = value
+                seen += 1
+        if seen != ENTRIES:
+            raise failed(
+                path,
+                f"{seen} of {ENTRIES} lines of motor_position.sources.{source}."
+                "compensation_table are there; write them by moteus_tool --dump-config",
+            )
+        return sampled_model(
+            -table * scale / 127.0, path, text, step=abs(scale) / 127.0 or 2**-24, name=self.name
+        )
+
+
+def _scaled(knots: NDArray[np.float64]) -> tuple[np.float32, NDArray[np.int8]]:
+    """Scale and int8 entries whose rounding leaves least."""
+    largest = float(np.max(np.abs(knots)))
+    if largest == 0.0:
+        return np.float32(0.0), np.zeros(len(knots), np.int8)
+    best, chosen, table = np.inf, np.float32(0.0), np.zeros(len(knots))
+    for factor in _SCALES:
+        scale = np.float32(largest * factor)
+        rounded = np.clip(rounded_knots(knots / float(scale) * 127.0), -127, 127)
+        error = rounded * float(scale) / 127.0 - knots
+        left = float(np.sum(error * (2.0 * error + np.roll(error, 1))))
+        if left < best:
+            best, chosen, table = left, scale, rounded
+    return chosen, table.astype(np.int8)
+
+
+def compensated(
+    reading: NDArray[np.uint32],
+    table: NDArray[np.int8],
+    scale: np.float32,
+    cpr: int,
+    contracted: bool = False,
+) -> NDArray[np.float64]:
+    """``compensated_value`` of readings in counts: the firmware's lerp and wrap, in float32.
+
+    ``contracted`` rounds sums of products once only, as a compiler may.
+    """
+    size = len(table)
+    turn = np.float32(cpr)
+    value = reading.astype(np.float32)
+    ratio = value / turn
+    left = np.minimum(size - 1, (ratio * np.float32(size)).astype(np.int32))
+    right = (left + 1) % size
+    fraction = (ratio - left.astype(np.float32) / np.float32(size)) * np.float32(size)
+    step = np.float32(np.float32(scale) / np.float32(127.0))
+    low, high = table[left].astype(np.float32) * step, table[right].astype(np.float32) * step
+    weight = np.float32(1.0) - fraction
+    if contracted:
+        wide = low.astype(np.float64) * weight + high.astype(np.float64) * fraction
+        out = (value + wide.astype(np.float32).astype(np.float64) * turn).astype(np.float32)
+    else:
+        out = value + (low * weight + high * fraction) * turn
+    whole = (out / turn).astype(np.int32).astype(np.float32)
+    wrapped = out - whole * turn
+    return np.asarray(np.where(wrapped >= 0, wrapped, wrapped + turn), dtype=np.float64)

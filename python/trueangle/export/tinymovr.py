@@ -1,0 +1,104 @@
+"""Tinymovr: the rectification table of a sensor, in its ticks."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import ArgumentError
+from ..files import Kind
+from ..model import HarmonicModel
+from .knots import rounded_knots
+from .oneturn import array_of, line_floor, one_turn_knots, rows
+from .pattern import Pattern
+from .reading import failed, sampled_model
+from .target import Header, Made, Option, Part, Target, comment_lines
+
+__all__ = ["Tinymovr", "rectified"]
+
+Whole = NDArray[np.int64]
+
+
+class Tinymovr(Target):
+    """``--to tinymovr``: ``rec_table`` of a sensor's configuration."""
+
+    name = "tinymovr"
+    what = "the rec_table of a Tinymovr sensor"
+    kind: ClassVar[Kind] = Kind("a C source for Tinymovr", (".h", ".c"))
+    sign = "add"
+    unknown = (
+        "no command that writes rec_table from outside is known: the firmware fills it by its own "
+        "calibration; paste the lines where the sensor's configuration is made and set "
+        "rec_calibrated"
+    )
+    options = {
+        "bits": Option(int, 13, "bits of the sensor: 13 or 14, as its driver has them"),
+        "entries": Option(int, 64, "ECN_SIZE of the firmware, a power of two"),
+    }
+
+    def make(self, pattern: Pattern, options: Mapping[str, Any]) -> Made:
+        bits, entries = options["bits"], options["entries"]
+        if not 8 <= bits <= 20:
+            raise ArgumentError(f"--bits must be from 8 to 20, got {bits}")
+        if entries & (entries - 1) or not 4 <= entries <= 1 << bits:
+            raise ArgumentError(f"--entries must be a power of two up to 2^bits, got {entries}")
+        ticks = 1 << bits
+        knots = -one_turn_knots(pattern, entries, self.name, False) * ticks
+        # The shift between two entries cuts down: half a tick less on the mean.
+        tried = [rounded_knots(knots + lift).astype(np.int64) for lift in (0.0, 0.5)]
+        readings = np.arange(ticks)
+        exact = pattern.correction(readings / ticks) * ticks
+        left = [
+            float(np.sum((readings - rectified(readings, t, bits) - exact) ** 2)) for t in tried
+        ]
+        table = tried[int(np.argmin(left))]
+
+        def correction(angles: NDArray[np.uint32]) -> NDArray[np.float64]:
+            reading = (angles >> np.uint32(32 - bits)).astype(np.int64)
+            return np.asarray((reading - rectified(reading, table, bits)) / ticks)
+
+        def text(header: Header) -> str:
+            comment = [
+                f"rec_table for a sensor of {bits} bits and ECN_SIZE {entries}: ticks that are "
+                f"added at the indicated angle. Made by {header.package}.",
+                f"Differs from the model by at most {header.proof.max_arcsec:.4g} arcsec, rms "
+                f"{header.proof.rms_arcsec:.3g} ({header.proof.how}).",
+                f"Model: sha256 {header.sha256}",
+                *(f"Note: {note}." for note in header.notes),
+            ]
+            lines = [line for part in comment for line in comment_lines(98, part, "// ")]
+            values = rows([str(int(value)) for value in table])
+            return "\n".join(
+                [*lines, ".rec_table = {", values, "},", ".rec_calibrated = true,", ""]
+            )
+
+        return Made(
+            text=text,
+            entries=entries,
+            bytes=4 * entries,
+            parts=(Part((correction,), pattern.correction),),
+            # Whole ticks: of the entries, and of what is between them.
+            floor_arcsec=line_floor(1.0 / ticks) * 2.5**0.5,
+            step=1.0 / ticks,
+            zero_deg=pattern.zero * 360.0,
+            bits=bits,
+        )
+
+    def read(self, text: str, path: str, options: Mapping[str, Any]) -> HarmonicModel:
+        table, line, _ = array_of(text, path, self.name)
+        if len(table) & (len(table) - 1) or np.any(table != np.rint(table)):
+            raise failed(path, "rec_table holds whole ticks, a power of two of them", line)
+        ticks = 1 << options["bits"]
+        return sampled_model(-table / ticks, path, text, step=1.0 / ticks, name=self.name)
+
+
+def rectified(reading: Whole, table: Whole, bits: int) -> Whole:
+    """``sensor_get_angle_rectified``: the firmware's interpolation, in whole ticks."""
+    size = len(table)
+    shift = bits - (size.bit_length() - 1)
+    i = reading >> shift
+    low, high = table[i % size], table[(i + 1) % size]
+    return np.asarray(reading + low + (((high - low) * (reading - (i << shift))) >> shift))
