@@ -254,7 +254,7 @@ def test_servo_has_a_reversal_error_and_an_offset_under_load(servo, tmp_path) ->
     (reversal,) = {"backlash", "presliding_hysteresis"} & set(found)
     # It depends on the place, about as much as it is large: nothing in the middle.
     half = next(iter(found[reversal].values())).value
-    place = found[reversal]["place_amplitudes_arcsec"].value
+    place = found["direction_dependent_pattern"]["amplitudes"].value
     assert half < 0.0
     assert 0.5 < max(place) / -half < 2.0
-    assert "place_amplitudes_arcsec" in result.summary()
+    assert "direction_dependent_pattern" in result.summary()

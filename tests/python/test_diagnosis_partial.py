@@ -126,9 +126,10 @@ def test_elements_of_a_spring_have_one_sign_and_play_may_depend_on_the_place():
     found = ta.diagnose(made, Simulation(JOINT, sigma_arcsec=1.0), gain=False).findings
     (play,) = [f for f in found if f.cause in ("backlash", "presliding_hysteresis")]
     assert next(iter(play.parameters.values())).value == pytest.approx(60.0, abs=1.0)
-    assert play.parameters["place_orders"].value == [1.0]
-    assert play.parameters["place_amplitudes_arcsec"].value[0] == pytest.approx(50.0, abs=1.5)
-    assert play.parameters["place_phases_deg"].value[0] == pytest.approx(320.0, abs=2.0)
+    (place,) = [f for f in found if f.cause == "direction_dependent_pattern"]
+    assert place.parameters["orders"].value == [1.0]
+    assert place.parameters["amplitudes"].value[0] == pytest.approx(50.0, abs=1.5)
+    assert place.parameters["phases_deg"].value[0] == pytest.approx(320.0, abs=2.0)
 
 
 def test_gain_is_measured_on_levels_that_were_left_out():

@@ -32,6 +32,9 @@ TABLES = {
     "backlash": {
         "half_width_arcsec": 15.0, "lines": [[1.0, 3.0, 40.0], [2.0, 1.5, 200.0]]
     },
+    "direction_dependent_pattern": {
+        "orders": [1.0, 3.0], "amplitudes_arcsec": [6.0, 2.0], "phases_deg": [40.0, 200.0]
+    },
     "presliding_hysteresis": {"amplitude_arcsec": 20.0, "length_deg": 3.0, "start_state": 1.0},
     "latency": {"delay_s": 4e-4},
     "filter_lag": {"cutoff_hz": 60.0, "damping": 0.7},
@@ -126,7 +129,7 @@ def test_no_parameter_of_an_effect_is_dropped_on_the_way_to_its_term(kind):
         if isinstance(value, str):
             other = {"absolute": "signed", "motor": "output"}[value]
         elif isinstance(value, list):
-            other = [[order, 1.5 * size, phase] for order, size, phase in value]
+            other = [[x[0], 1.5 * x[1], x[2]] if isinstance(x, list) else 1.5 * x for x in value]
         else:
             other = 0.5 * value
         changed = EFFECTS[kind].from_table(table | {name: other})
@@ -214,7 +217,8 @@ def test_a_pattern_of_the_indicated_angle_changes_the_argument():
 def test_diagnosing_extends_the_correction(tmp_path, capsys):
     """From runs to a better model on the command line, measured on runs held out."""
     sigma = 1.0
-    effects = [effect(k) for k in ("backlash", "latency", "torsional_compliance")]
+    play = EFFECTS["backlash"].from_table({"half_width_arcsec": 15.0})
+    effects = [play, effect("latency"), effect("torsional_compliance")]
     truth = simulation(*effects, sigma=sigma)
     train = ta.simulate(truth, seed=1, runs=designs(0.0, samples=400))
     held_out = ta.simulate(truth, seed=2, runs=designs(3.3))

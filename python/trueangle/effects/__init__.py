@@ -24,6 +24,7 @@ from .filter_lag import FilterLag as FilterLag
 from .load_dependent_gear_error import LoadDependentGearError as LoadDependentGearError
 from .stiffening_compliance import StiffeningCompliance as StiffeningCompliance
 from .presliding_hysteresis import PreslidingHysteresis as PreslidingHysteresis
+from .direction_dependent_pattern import DirectionalPattern as DirectionalPattern
 from .torque_hysteresis import TorqueHysteresis as TorqueHysteresis
 from .local_defect import LocalDefect as LocalDefect
 from .missed_counts import MissedCounts as MissedCounts

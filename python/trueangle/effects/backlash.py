@@ -12,7 +12,7 @@ import numpy as np
 from ..correction import forms
 from ..correction.forms import Form
 from ..correction.term import Term, from_arcsec, line_values
-from ..joint.pattern import Surroundings, line_columns, line_sum
+from ..joint.pattern import Surroundings, line_sum
 from ..joint.signals import Signals
 from ..regression.estimate import Parameters, quantity
 from ..regression.extension import Extension
@@ -24,15 +24,11 @@ from .effect import Effect
 from .search import (
     Array,
     Fitted,
-    line_parameters,
 )
 
 __all__ = ["Backlash", "BacklashTerm"]
 
 ONE_WAY = "all runs go in one direction: a constant reversal error is part of the zero"
-
-#: Orders of the angle with which play may vary from place to place.
-PLACE_ORDERS = (1, 2, 3)
 
 
 @dataclass(frozen=True)
@@ -44,7 +40,7 @@ class Backlash(Effect):
     half_width_arcsec : float
         b: half of forward minus reverse, on average over a turn.
     lines : list of [output order, arcsec, phase_deg]
-        How b varies with the place.
+        How b varies with the place (as a cause of its own: a pattern of the direction).
     """
 
     half_width_arcsec: float
@@ -65,36 +61,22 @@ class Backlash(Effect):
 
     @classmethod
     def propose(cls, regression: Regression) -> Extension | None:
-        shapes: list[dict[str, Any]] = [{"order": 0}]
         if regression.has(cls.kind):
-            shapes = [{"order": k} for k in PLACE_ORDERS]
-        log_grid = float(np.log(len(shapes)))
-        extensions = [
-            regression.propose(
-                cls.kind,
-                shape,
-                cls.columns(regression.signals, regression.around, shape),
-                log_grid=log_grid,
-            )
-            for shape in shapes
-        ]
-        return max(extensions, key=lambda p: p.bic_gain)
+            return None
+        columns = cls.columns(regression.signals, regression.around, {})
+        return regression.propose(cls.kind, {}, columns)
 
     @classmethod
     def columns(cls, signals: Signals, around: Surroundings, shape: dict[str, Any]) -> Array:
-        return play_columns(signals, shape["order"])
+        return signals.direction[:, None]
 
     @classmethod
     def report(
         cls, regression: Regression, terms: Sequence[Fitted]
     ) -> tuple[Parameters, list[Effect]]:
-        width, std = 0.0, 0.0
-        for extension, coefficients, covariance in terms:
-            if everywhere(extension):
-                width, std = float(coefficients[0]), float(np.sqrt(covariance[0, 0]))
-        lines = place_lines(terms)
-        parameters = {"half_width_arcsec": quantity(width, std)} | place_parameters(lines)
-        return parameters, [Backlash(width, tuple((m, a, p) for m, a, p, _, _ in lines))]
+        _, (width,), covariance = terms[0]
+        std = float(np.sqrt(covariance[0, 0]))
+        return {"half_width_arcsec": quantity(width, std)}, [Backlash(float(width))]
 
     @classmethod
     def blind_spots(cls, regression: Regression, found: Sequence[Blindness]) -> Iterator[Blindness]:
@@ -152,33 +134,3 @@ def goes_both_ways(signals: Signals) -> bool:
     """The joint moved in both directions."""
     moving = signals.direction[signals.direction != 0.0]
     return moving.size > 0 and bool(np.ptp(moving) > 0.0)
-
-
-def everywhere(term: Extension) -> bool:
-    """The term is the same at every place."""
-    return not term.shape.get("order")
-
-
-def play_columns(signals: Signals, order: int) -> Array:
-    if order == 0:
-        return signals.direction[:, None]
-    return signals.direction[:, None] * line_columns(signals.theta, order)
-
-
-def place_lines(
-    terms: Sequence[Fitted],
-) -> list[tuple[float, float, float, float, float]]:
-    """(order, amplitude, phase, their standard deviations) of play that varies with place."""
-    return [
-        (float(t.shape["order"]), *line_parameters(c, v)) for t, c, v in terms if not everywhere(t)
-    ]
-
-
-def place_parameters(lines: list[tuple[float, float, float, float, float]]) -> Parameters:
-    if not lines:
-        return {}
-    return {
-        "place_orders": quantity([line[0] for line in lines]),
-        "place_amplitudes_arcsec": quantity([line[1] for line in lines], [x[3] for x in lines]),
-        "place_phases_deg": quantity([line[2] for line in lines], [x[4] for x in lines]),
-    }

@@ -18,13 +18,8 @@ from ..regression.extension import Extension
 from ..regression.regression import Regression
 from .backlash import (
     ONE_WAY,
-    PLACE_ORDERS,
     Backlash,
-    everywhere,
     goes_both_ways,
-    place_lines,
-    place_parameters,
-    play_columns,
 )
 from .blindness import (
     Blindness,
@@ -118,11 +113,7 @@ class PreslidingHysteresis(Effect):
                 best = (float(gains[k]), float(LENGTHS[k]), start)
         assert best is not None
         gain, length, start = best
-        present = [
-            term.shape["length_deg"]
-            for term in regression.terms
-            if term.cause == cls.kind and everywhere(term)
-        ]
+        present = [t.shape["length_deg"] for t in regression.terms if t.cause == cls.kind]
         if gain <= 0.0 or len(present) >= MOST_ELEMENTS:
             return None
         step = np.log(LENGTHS[1] / LENGTHS[0])
@@ -136,8 +127,8 @@ class PreslidingHysteresis(Effect):
         extension = regression.propose(cls.kind, shape, columns, parameters=2, log_grid=np.log(2.0))
         if not regression.has(cls.kind):
             return extension
-        # What may follow: play, play that varies with the place, another element.
-        further = [cls._play(regression, order) for order in (0, *PLACE_ORDERS)]
+        # What may follow: play, another element.
+        further = [] if 0.0 in present else [cls._play(regression)]
         apart = all(
             other == 0.0 or abs(np.log(shape["length_deg"] / other)) > np.log(APART)
             for other in present
@@ -145,54 +136,47 @@ class PreslidingHysteresis(Effect):
         if apart:
             further.append(extension)
         further.sort(key=lambda p: -p.bic_gain)
-        return next(
-            (p for p in further if p.bic_gain > 0.0 and of_one_sign(regression, p, everywhere)),
-            None,
-        )
+        alike = (p for p in further if p.bic_gain > 0.0 and of_one_sign(regression, p))
+        return next(alike, None)
 
     @classmethod
-    def _play(cls, regression: Regression, order: int) -> Extension:
-        shape = {"length_deg": 0.0, "order": order}
+    def _play(cls, regression: Regression) -> Extension:
+        shape = {"length_deg": 0.0}
         columns = cls.columns(regression.signals, regression.around, shape)
-        log_grid = float(np.log(len(PLACE_ORDERS))) if order else 0.0
-        return regression.propose(cls.kind, shape, columns, log_grid=log_grid)
+        return regression.propose(cls.kind, shape, columns)
 
     @classmethod
     def columns(cls, signals: Signals, around: Surroundings, shape: dict[str, Any]) -> Array:
         if shape["length_deg"] == 0.0:
-            return play_columns(signals, shape["order"])
+            return signals.direction[:, None]
         return signals.presliding(shape["length_deg"], shape["start_state"])[:, None]
 
     @classmethod
     def report(
         cls, regression: Regression, terms: Sequence[Fitted]
     ) -> tuple[Parameters, list[Effect]]:
-        lines = place_lines(terms)
-        terms = [term for term in terms if everywhere(term[0])]
         total = sum(float(c[0]) for _, c, _ in terms)
         std = float(np.sqrt(sum(v[0, 0] for _, _, v in terms)))
         weights = np.array([abs(float(c[0])) for _, c, _ in terms])
         lengths = np.array([t.shape["length_deg"] for t, _, _ in terms])
-        length = float(weights @ lengths / weights.sum()) if terms else 0.0
+        length = float(weights @ lengths / weights.sum())
         effects: list[Effect] = [
             PreslidingHysteresis(float(c[0]), t.shape["length_deg"], t.shape["start_state"])
             if t.shape["length_deg"] > 0.0
             else Backlash(float(c[0]))
             for t, c, _ in terms
         ]
-        if lines:
-            effects.append(Backlash(0.0, tuple((m, a, p) for m, a, p, _, _ in lines)))
         parameters = {
             "amplitude_arcsec": quantity(total, std),
             "length_deg": quantity(
                 length,
-                cls._length_std(regression, terms[int(np.argmax(weights))]) if terms else None,
+                cls._length_std(regression, terms[int(np.argmax(weights))]),
             ),
         }
         if len(terms) > 1:
             parameters["element_lengths_deg"] = quantity(lengths)
             parameters["element_amplitudes_arcsec"] = quantity([float(c[0]) for _, c, _ in terms])
-        return parameters | place_parameters(lines), effects
+        return parameters, effects
 
     @classmethod
     def _length_std(

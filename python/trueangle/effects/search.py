@@ -97,21 +97,19 @@ def golden_maximum(
     return (c, fc) if fc > fd else (d, fd)
 
 
-def of_one_sign(
-    regression: Regression, extension: Extension, is_element: Callable[[Extension], bool]
-) -> bool:
+def of_one_sign(regression: Regression, extension: Extension) -> bool:
     """With this term all elements of its cause have one sign, as springs have.
 
     Elements of unlike signs would only be a difference of two that are alike.
     """
     after = regression.coefficients_with(extension)
-    elements = [float(extension.coefficients[0])] if is_element(extension) else []
+    elements = [float(extension.coefficients[0])]
     at = regression.base.shape[1]
     for term in regression.terms:
-        if term.cause == extension.cause and is_element(term):
+        if term.cause == extension.cause:
             elements.append(float(after[at]))
         at += term.columns.shape[1]
-    return not elements or min(elements) * max(elements) > 0.0
+    return min(elements) * max(elements) > 0.0
 
 
 def known_orders(around: Surroundings) -> list[float]:

@@ -15,6 +15,7 @@ from ..regression.extension import Extension
 from ..regression.regression import Regression
 from .backlash import Backlash
 from .blindness import OWN_POWER, Blindness, share_left
+from .direction_dependent_pattern import DirectionalPattern
 from .effect import Effect
 from .search import Array, Fitted, golden_maximum, of_one_sign
 from .torsional_compliance import TorsionalCompliance, torque_of, unloaded
@@ -62,6 +63,7 @@ class TorqueHysteresis(Effect):
     confused_with: ClassVar[Mapping[type[Effect], str]] = {
         Backlash: "turn the torque round without turning the joint, or carry two loads",
         TorsionalCompliance: "load and unload at one place, to two values of one torque",
+        DirectionalPattern: "two loads in both directions, or load and unload at one place",
     }
     measure: ClassVar[str] = (
         "load and unload in steps at one place, both signs, or move in both directions under "
@@ -107,7 +109,7 @@ class TorqueHysteresis(Effect):
         shape = {"span_Nm": span}
         columns = cls.columns(regression.signals, regression.around, shape)
         extension = regression.propose(cls.kind, shape, columns, parameters=2)
-        return extension if of_one_sign(regression, extension, lambda _: True) else None
+        return extension if of_one_sign(regression, extension) else None
 
     @classmethod
     def columns(cls, signals: Signals, around: Surroundings, shape: dict[str, Any]) -> Array:

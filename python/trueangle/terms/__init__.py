@@ -15,6 +15,7 @@ from __future__ import annotations
 from ..correction.term import TERMS, Term
 from ..effects import EFFECTS
 from ..effects.backlash import BacklashTerm as Backlash
+from ..effects.direction_dependent_pattern import DirectionalPatternTerm as DirectionalPattern
 from ..effects.filter_lag import FilterLagTerm as FilterLag
 from ..effects.latency import LatencyTerm as Latency
 from ..effects.load_dependent_gear_error import LoadDependentGearErrorTerm as LoadDependentGearError
@@ -27,6 +28,7 @@ from ..effects.torsional_compliance import TorsionalComplianceTerm as TorsionalC
 __all__ = [
     "TERMS",
     "Backlash",
+    "DirectionalPattern",
     "FilterLag",
     "Latency",
     "LoadDependentGearError",

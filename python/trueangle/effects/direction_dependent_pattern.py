@@ -1,0 +1,151 @@
+"""A pattern of the angle whose sign is the direction of travel."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+
+from ..correction import forms
+from ..correction.forms import Form
+from ..correction.term import Term, line_values
+from ..errors import ArgumentError
+from ..joint.pattern import Surroundings, line_columns, line_sum
+from ..joint.signals import Signals
+from ..regression.estimate import Parameters, quantity
+from ..regression.extension import Extension
+from ..regression.regression import Regression
+from .backlash import ONE_WAY, Backlash, goes_both_ways
+from .blindness import Blindness
+from .effect import Effect
+from .latency import Latency
+from .presliding_hysteresis import PreslidingHysteresis
+from .search import Array, Fitted, best_shape, line_parameters
+
+__all__ = ["DirectionalPattern", "DirectionalPatternTerm"]
+
+#: Orders that play has where a gear is eccentric or worn on one side: half of the belief.
+LIKELY = 3
+
+#: Lines at most.
+MOST_LINES = 6
+
+#: Travel (turns) from which on orders of the two directions are told apart.
+TOLD_APART = 0.5
+
+
+@dataclass(frozen=True)
+class DirectionalPattern(Effect):
+    r"""Forward and backward curves of different shape.
+
+    .. math:: \varepsilon = d\,\sum_m C_m \sin(m\theta + \varphi_m)
+
+    with the direction of travel d. Its mean over the turn is `Backlash`, a cause of its own.
+
+    Parameters
+    ----------
+    orders, amplitudes_arcsec, phases_deg : list of float
+        Output orders m, half of forward minus backward, and phases.
+    """
+
+    orders: tuple[float, ...]
+    amplitudes_arcsec: tuple[float, ...]
+    phases_deg: tuple[float, ...]
+
+    kind: ClassVar[str] = "direction_dependent_pattern"
+    sentence: ClassVar[str] = (
+        "Play or friction differs from place to place (an eccentric or worn gear): the curves "
+        "forward and backward have different shapes."
+    )
+    factor: ClassVar[str] = "direction"
+    confused_with: ClassVar[Mapping[type[Effect], str]] = {
+        Backlash: "both directions over the whole turn",
+        Latency: "two speeds at least a factor of 3 apart: play does not grow with speed",
+        PreslidingHysteresis: "reversals at several places, and both directions over whole turns",
+    }
+    measure: ClassVar[str] = "pass every position in both directions, within each run"
+    located: ClassVar[bool] = True
+
+    def __post_init__(self) -> None:
+        if not len(self.orders) == len(self.amplitudes_arcsec) == len(self.phases_deg):
+            raise ArgumentError("orders, amplitudes_arcsec and phases_deg must be equally long")
+
+    @property
+    def lines(self) -> tuple[tuple[float, float, float], ...]:
+        """``(order, arcsec, phase_deg)`` of every line."""
+        return tuple(zip(self.orders, self.amplitudes_arcsec, self.phases_deg, strict=True))
+
+    def signal(self, signals: Signals, around: Surroundings, rng: np.random.Generator) -> Array:
+        return np.asarray(signals.direction * line_sum(signals.theta, self.lines))
+
+    @classmethod
+    def propose(cls, regression: Regression) -> Extension | None:
+        signals = regression.signals
+        present = [t.shape["order"] for t in regression.terms if t.cause == cls.kind]
+        if not goes_both_ways(signals) or len(present) >= MOST_LINES:
+            return None
+        if float(signals.run_turns().max()) < TOLD_APART:
+            return None
+        orders = regression.lines.orders[regression.lines.plausible]
+        shapes = [{"order": float(m)} for m in orders if m not in present]
+        others = float(np.log(2.0 * len(shapes)))
+        likely = float(np.log(2.0 * LIKELY))
+        log_grids = [likely if shape["order"] <= LIKELY else others for shape in shapes]
+        return best_shape(cls, regression, shapes, log_grids)
+
+    @classmethod
+    def columns(cls, signals: Signals, around: Surroundings, shape: dict[str, Any]) -> Array:
+        return signals.direction[:, None] * line_columns(signals.theta, shape["order"])
+
+    @classmethod
+    def report(
+        cls, regression: Regression, terms: Sequence[Fitted]
+    ) -> tuple[Parameters, list[Effect]]:
+        rows = [(t.shape["order"], *line_parameters(c, v)) for t, c, v in terms]
+        orders, amplitudes, phases, stds, phase_stds = zip(*rows, strict=True)
+        parameters = {
+            "orders": quantity(orders),
+            "amplitudes": quantity(amplitudes, stds),
+            "phases_deg": quantity(phases, phase_stds),
+        }
+        return parameters, [DirectionalPattern(orders, amplitudes, phases)]
+
+    @classmethod
+    def blind_spots(cls, regression: Regression, found: Sequence[Blindness]) -> Iterator[Blindness]:
+        if not goes_both_ways(regression.signals):
+            yield cls.blind(ONE_WAY)
+
+    def to_terms(self, period: float, shafts: Mapping[str, float]) -> tuple[Term, ...]:
+        return (DirectionalPatternTerm(**line_values(self.lines, period)),)
+
+
+@dataclass(frozen=True, repr=False)
+class DirectionalPatternTerm(Term):
+    r"""Play that differs from place to place, without its mean.
+
+    .. math:: \varepsilon = d\,\sum_m A_m \cos m\varphi + B_m \sin m\varphi
+
+    It needs the direction of travel d (or the velocity), which the angle alone does not tell
+    where the play is negative.
+
+    Parameters
+    ----------
+    orders, cosine, sine : sequence of float
+        Output orders (positive) and coefficients.
+    """
+
+    orders: tuple[float, ...]
+    cosine: tuple[float, ...]
+    sine: tuple[float, ...]
+
+    kind: ClassVar[str] = "direction_dependent_pattern"
+    signals: ClassVar[tuple[str, ...]] = ("direction",)
+    follows_travel: ClassVar[bool] = True
+
+    def check(self) -> None:
+        self._check_lines()
+
+    def forms(self) -> tuple[Form, ...]:
+        return (forms.Play(0.0, self.lines),)
