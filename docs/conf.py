@@ -1,10 +1,11 @@
 """Sphinx configuration; the figures and the numbers of the pages are made by the build."""
 
+import html
 import sys
 from pathlib import Path
 
+import ziamath
 from docutils.nodes import SkipNode
-from latex2mathml.converter import convert
 
 HERE = Path(__file__).parent
 sys.path.insert(0, str(HERE))
@@ -24,8 +25,10 @@ extensions = [
     "sphinx.ext.autodoc",
     "sphinx.ext.napoleon",
     "sphinx.ext.viewcode",
+    "sphinx_copybutton",
+    "sphinx_design",
 ]
-myst_enable_extensions = ["deflist", "dollarmath", "amsmath"]
+myst_enable_extensions = ["deflist", "dollarmath", "amsmath", "colon_fence"]
 myst_heading_anchors = 3
 exclude_patterns = ["_build"]
 html_theme = "furo"
@@ -37,19 +40,35 @@ autodoc_typehints = "none"
 napoleon_google_docstring = False
 napoleon_use_ivar = True
 napoleon_use_rtype = False
-html_math_renderer = "mathml"
+html_math_renderer = "drawn"
+html_static_path = ["static"]
+html_css_files = ["formulas.css"]
+# Copied is what is typed: neither prompts nor output.
+copybutton_exclude = ".linenos, .gp, .go"
+
+#: Size of formulas in px: the height of the letters is that of the text beside them.
+FORMULA_PX = 17.0
+ziamath.config.svg2 = False  # no identifiers, which would repeat over the page
+
+
+def _drawn(tex, block):
+    """A formula as outlines of STIX Two Math, in the colour of the text; its TeX is the text."""
+    formula = ziamath.Latex(tex.strip(), size=FORMULA_PX, color="currentColor", inline=not block)
+    picture = formula.svg().replace("<svg ", f'<svg role="img" aria-label="{html.escape(tex)}" ', 1)
+    below = formula.getyofst() if not block else 0.0
+    return picture.replace("<svg ", f'<svg style="vertical-align:{below:.2f}px" ', 1)
 
 
 def _inline(translator, node):
-    translator.body.append(convert(node.astext(), display="inline"))
+    translator.body.append(f'<span class="formula">{_drawn(node.astext(), False)}</span>')
     raise SkipNode
 
 
 def _display(translator, node):
-    translator.body.append(f'<p class="math">{convert(node.astext(), display="block")}</p>')
+    translator.body.append(f'<div class="formula">{_drawn(node.astext(), True)}</div>')
     raise SkipNode
 
 
 def setup(app):
-    """Formulas as MathML, which browsers set themselves: the pages need no network."""
-    app.add_html_math_renderer("mathml", (_inline, None), (_display, None))
+    """Formulas are drawn by the build: they look alike everywhere and need no network."""
+    app.add_html_math_renderer("drawn", (_inline, None), (_display, None))

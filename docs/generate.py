@@ -56,6 +56,51 @@ def figures(folder: Path) -> None:
     for name, ax in drawn.items():
         ax.figure.savefig(folder / f"{name}.svg")
         mpl.pyplot.close(ax.figure)
+    told = story()
+    told.savefig(folder / "story.svg")
+    mpl.pyplot.close(told)
+
+
+def story() -> mpl.figure.Figure:
+    """The error of a joint, what a correction from 36 positions leaves, and what it hid."""
+    joint = replace(demo_simulation(), sigma_arcsec=1.0)
+
+    def measure(angles, seed):
+        rng = np.random.default_rng(seed)
+        error = joint.pattern.value(np.radians(angles)) + rng.normal(0.0, 1.0, angles.size)
+        return ta.CalibrationRun(angles, angles + error / 3600.0, period=360.0)
+
+    positions = np.arange(0.0, 360.0, 10.0)
+    everywhere = np.linspace(0.0, 360.0, 7201)[:-1]
+    once = ta.fit([measure(positions, k) for k in range(4)], range(1, 18), loss="linear").model
+    mounts = plan_mounts(100, positions=36, mounts=2).mount_offsets_deg
+    planned = ta.fit([measure(positions + mounts[k % 2], k) for k in range(4)], gear_ratio=100.0)
+
+    def left(model, angles):
+        return 3600.0 * ta.wrap(model.error(angles) - model.constant, 360.0)
+
+    truth = joint.pattern.value(np.radians(everywhere))
+    figure, axes = mpl.pyplot.subplots(1, 3, figsize=(10.0, 3.0), sharey=True, layout="constrained")
+    axes[0].plot(everywhere, truth, color="#B8C4CE", linewidth=0.4)
+    axes[0].plot(positions, joint.pattern.value(np.radians(positions)), ".", color="#B06A00")
+    axes[0].set_title("1. the error,\nand 36 positions of it")
+    rest = joint.pattern.value(np.radians(positions)) - left(once, positions)
+    axes[1].plot(everywhere, truth - left(once, everywhere), color="#C04A00", linewidth=0.4)
+    axes[1].plot(positions, rest, ".", color="#0072B2")
+    between = (truth - left(once, everywhere)).std()
+    axes[1].set_title(
+        f"2. corrected from these: {rest.std():.0f} arcsec\nthere, {between:.0f} between"
+    )
+    rest = truth - left(planned.model, everywhere)
+    axes[2].plot(everywhere, rest, color="#0072B2", linewidth=0.4)
+    axes[2].set_title(f"3. from two mounts as planned:\n{rest.std():.1f} arcsec everywhere")
+    for ax in axes:
+        ax.set_xticks([0, 90, 180, 270, 360])
+        ax.set_xlabel("output angle / deg")
+        ax.title.set_fontsize("medium")
+        ax.grid(True, color="#00000018")
+    axes[0].set_ylabel("error / arcsec")
+    return figure
 
 
 def folded() -> mpl.axes.Axes:

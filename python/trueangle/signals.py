@@ -50,6 +50,7 @@ class Signal(NamedTuple):
     meaning: str
 
 
+#: Every signal by its name.
 SIGNALS: Mapping[str, Signal] = {
     signal.name: signal
     for signal in (
