@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from .export import import_model as import_model
     from .fitting.fit import fit as fit
     from .fitting.result import FitResult as FitResult
+    from .joining import join as join
     from .logs.batch import correct_logs as correct_logs
     from .logs.fitting import fit_logs as fit_logs
     from .logs.frames import correct as correct
@@ -63,6 +64,7 @@ _PUBLIC = {
     "compare": "export",
     "export_model": "export",
     "import_model": "export",
+    "join": "joining",
     "fit": "fitting.fit",
     "fit_logs": "logs.fitting",
     "load_model": "modelfile",

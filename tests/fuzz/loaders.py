@@ -191,7 +191,9 @@ def _make_manifest(folder: Path, rng: random.Random) -> Path:
 def _use_manifest(path: Path) -> None:
     with Manifest(path.parent).opened() as manifest:
         for name, entry in manifest._entries.items():
-            manifest.done(path.parent.parent / "log.csv", path.parent / name, entry["settings"])
+            if len(name) < 200:  # outputs are named by logs, never by the manifest
+                log = path.parent.parent / "log.csv"
+                manifest.done(log, path.parent / name, entry["settings"])
 
 
 # -- runs and logs --------------------------------------------------------------------

@@ -103,7 +103,7 @@ def mutated_document(document: Any, rng: random.Random) -> Any:
         path = rng.choice(places(made))
         if not path:
             if rng.random() < 0.1:
-                made = rng.choice(NASTY)
+                made = copy.deepcopy(rng.choice(NASTY))
             continue
         holder = made
         for step in path[:-1]:

@@ -24,6 +24,7 @@ __all__ = ["COMMANDS", "main"]
 #: Modules of this package that each define one command of the same name.
 COMMANDS: tuple[str, ...] = (
     "check",
+    "join",
     "fit",
     "correct",
     "demo",

@@ -1,0 +1,77 @@
+"""``trueangle join``: two logs with two clocks in, calibration runs out."""
+
+from __future__ import annotations
+
+import argparse
+import json
+from typing import Any
+
+from ..files import RUNS
+from .paths import Input, Output
+from .signal_options import add_signals, signals_by_joint
+
+HELP = "join an indicated and a reference log that have clocks of their own"
+EXAMPLE = "trueangle join joint.csv laser.csv -o runs.csv --signal b.reference='angle (rad)'"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the command's arguments."""
+    add = parser.add_argument
+    add("first", type=Input, metavar="A", help="log of the indicated angle (or the reference)")
+    add("second", type=Input, metavar="B", help="log of the other; both with their times")
+    add(
+        "-o",
+        "--output",
+        required=True,
+        type=Output.of(RUNS),
+        metavar="RUNS",
+        help="CSV file to write",
+    )
+    add(
+        "--offset",
+        type=float,
+        metavar="S",
+        help="seconds to add to the time of the indicated log to get that of the reference "
+        "(default: from the motion; 0 for one clock)",
+    )
+    add("--rate", type=float, metavar="PPM", help="of the reference's clock against the other")
+    add(
+        "--max-gap",
+        type=float,
+        metavar="S",
+        help="longest pause of the reference that is interpolated over "
+        "(default: five times its typical step)",
+    )
+    add_signals(parser)
+    add("--json", action="store_true", help="print the result as JSON")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Join, write, print."""
+    from ..joining import join
+
+    found = join(
+        args.first,
+        args.second,
+        offset_s=args.offset,
+        rate_ppm=args.rate,
+        max_gap_s=args.max_gap,
+        counts_per_turn=args.counts_per_turn,
+        counts_per_turn_reference=args.counts_per_turn_reference,
+        signals=_signals(args.signal),
+        topic=args.topic,
+    )
+    found.save(args.output)
+    if args.json:
+        print(json.dumps({"output": args.output, **found.as_json()}, allow_nan=False))
+    else:
+        print(found.summary())
+        print(f"\nsaved {args.output}")
+    return 0
+
+
+def _signals(entries: Any) -> dict[str, Any]:
+    """Columns of either log, and of ``a`` and ``b`` alone."""
+    plain = signals_by_joint([e for e in entries or () if e[0] is None]) or {}
+    own = signals_by_joint([e for e in entries or () if e[0] is not None], single=False) or {}
+    return {**plain, **own}

@@ -1,0 +1,145 @@
+"""Two logs with two clocks, joined: against a motion that is known at every time."""
+
+import json
+import math
+
+import numpy as np
+import pytest
+
+import trueangle as ta
+from trueangle.cli import main
+from trueangle.errors import ArgumentError, FileError
+
+#: Seeds of noise and jitter; printed by a failing test through its parameters.
+SEEDS = (1, 2)
+OFFSET, RATE = 1234.5678, 80.0
+NOISE = 0.01
+
+
+def motion(t):
+    return 200.0 * np.sin(0.4 * t) + 60.0 * np.sin(1.1 * t + 1.0)
+
+
+def pattern(theta):
+    return 0.4 * np.sin(np.radians(theta)) + 0.1 * np.cos(2.0 * np.radians(theta))
+
+
+def log(path, role, time, angle, unit="deg"):
+    rows = zip(time.tolist(), angle.tolist(), strict=True)
+    path.write_text("\n".join([f"time_s,{role}_{unit}", *(f"{t!r},{x!r}" for t, x in rows)]))
+    return path
+
+
+def logs(folder, seed, gap=True):
+    rng = np.random.default_rng(seed)
+    t = np.arange(0.0, 60.0, 0.01) + rng.uniform(0.0, 0.002, 6000)
+    said = motion(t) + pattern(motion(t)) + rng.normal(0.0, NOISE, t.size)
+    s = np.arange(0.0, 62.0, 0.004)
+    s = s[~((s > 20.0) & (s < 21.5))] if gap else s
+    other = s + OFFSET + 1e-6 * RATE * (s - t[0])
+    true = motion(s) + rng.normal(0.0, 0.001, s.size)
+    return (
+        log(folder / "joint.csv", "indicated", t, np.mod(said, 360.0)),
+        log(folder / "laser.csv", "reference", other, true),
+    )
+
+
+def rest(run):
+    error = run.indicated - run.reference
+    return error - 360.0 * np.round(error / 360.0) - pattern(run.reference)
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_offset_and_rate_are_found_within_their_errors(seed, tmp_path):
+    joint, laser = logs(tmp_path, seed)
+    found = ta.join(joint, laser)
+    #: Four standard errors: one test in 16 000 fails by chance.
+    assert abs(found.offset_s - OFFSET) < 4.0 * found.offset_std_s < 1e-4
+    assert abs(found.rate_ppm - RATE) < 4.0 * found.rate_std_ppm < 2.0
+    (run,) = found.runs
+    added = math.sqrt(max(float(np.var(rest(run))) - NOISE**2, 0.0)) * 3600.0
+    # The noise's own standard deviation is known to a 1/sqrt(2 n) of it.
+    assert added < 4.0 * found.std_arcsec + 3600.0 * NOISE * math.sqrt(4.0 / math.sqrt(12_000.0))
+    assert found.std_arcsec < 2.0
+
+
+def test_nothing_is_made_up_over_a_gap(tmp_path):
+    joint, laser = logs(tmp_path, 1)
+    found = ta.join(joint, laser)
+    (gap,) = found.gaps
+    assert gap.end_s - gap.start_s == pytest.approx(1.5, abs=0.02)
+    assert gap.left_out == found.left_out == pytest.approx(150, abs=3)
+    there = found.runs[0].time + OFFSET
+    assert not ((there > gap.start_s + 0.01) & (there < gap.end_s - 0.01)).any()
+    assert not ta.join(joint, laser, max_gap_s=2.0).gaps
+
+
+def test_declared_clocks_and_the_other_order(tmp_path):
+    joint, laser = logs(tmp_path, 2)
+    found = ta.join(laser, joint, offset_s=OFFSET, rate_ppm=RATE)
+    assert (found.offset_s, found.rate_ppm, found.offset_std_s) == (OFFSET, RATE, None)
+    assert np.std(rest(found.runs[0])) == pytest.approx(NOISE, rel=0.05)
+
+
+def test_one_speed_tells_no_offset_and_says_so(tmp_path):
+    t = np.arange(0.0, 60.0, 0.01)
+    joint = log(tmp_path / "a.csv", "indicated", t, np.mod(30.0 * t, 360.0))
+    laser = log(tmp_path / "b.csv", "reference", t[::2] + 0.003, np.mod(30.0 * t[::2], 360.0))
+    found = ta.join(joint, laser)
+    assert found.offset_s == 0.0
+    assert any("one speed only" in note for note in found.notes)
+    apart = log(tmp_path / "c.csv", "reference", t + 500.0, np.mod(30.0 * t, 360.0))
+    with pytest.raises(ArgumentError, match=r"share no time.*--offset"):
+        ta.join(joint, apart)
+
+
+def test_a_log_on_change_is_held_in_its_pauses(tmp_path):
+    step = 0.05
+    t = np.arange(0.0, 60.0, 0.01)
+    s = np.arange(0.0, 60.0, 0.02)
+
+    def angle(time):
+        return np.clip(100.0 * np.sin(0.3 * time), -60.0, 60.0)
+
+    monitored = np.round(angle(s) / step) * step
+    changed = np.flatnonzero(np.diff(monitored, prepend=np.inf) != 0.0)
+    joint = log(tmp_path / "a.csv", "indicated", t, angle(t))
+    epics = log(tmp_path / "b.csv", "reference", s[changed] + 7.0, monitored[changed])
+    found = ta.join(joint, epics, offset_s=7.0, rate_ppm=0.0)
+    assert found.on_change == ("reference",)
+    assert not found.gaps
+    error = found.runs[0].indicated - found.runs[0].reference
+    # One step each way and the rounding; a line over a pause would be off by 40 deg.
+    assert np.abs(error).max() < 2.5 * step
+    assert 0.3 * found.std_arcsec < 3600.0 * np.std(error) < 1.5 * found.std_arcsec
+    estimated = ta.join(joint, epics)
+    assert estimated.offset_s == pytest.approx(7.0, abs=0.01)
+    assert any("repeats itself" in note for note in estimated.notes)
+
+
+def test_the_command_writes_runs_and_tells_what_it_did(tmp_path, capsys):
+    joint, laser = logs(tmp_path, 1)
+    text = joint.read_text().replace("time_s,indicated_deg", "t [s],enc (deg)")
+    joint.write_text(text)
+    output = tmp_path / "runs.csv"
+    signals = ["--signal", "a.time=t", "--signal", "indicated=ENC"]
+    assert main(["join", str(joint), str(laser), "-o", str(output), "--json", *signals]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert {"offset_s", "rate_ppm", "std_arcsec", "gaps"} <= found.keys()
+    (run,) = ta.read_runs(output)
+    assert len(run) == found["readings"]
+    assert main(["join", str(joint), str(laser), "-o", str(joint), *signals]) == 1  # an input
+
+
+def test_logs_that_cannot_be_joined(tmp_path):
+    joint, laser = logs(tmp_path, 1)
+    with pytest.raises(ArgumentError, match=r"one log must hold indicated_deg"):
+        ta.join(joint, joint)
+    bare = tmp_path / "bare.csv"
+    bare.write_text("reference_deg\n1\n2\n3\n4\n5\n")
+    with pytest.raises(FileError, match=r"bare\.csv.*no column time_s"):
+        ta.join(joint, bare)
+    with pytest.raises(ArgumentError, match="have a reference at their time"):
+        ta.join(joint, laser, offset_s=1e6, rate_ppm=0.0)
+    with pytest.raises(FileError, match=r"did you mean 'indicated_deg'"):
+        ta.join(joint, laser, signals={"indicated": "indicatd_deg"})
