@@ -28,7 +28,7 @@ MAX_ORDER = 1_000_000.0
 #: Harmonics, at most, of a model or simulation.
 MAX_LINES = 65_536
 #: Highest order times number of harmonics: checks sample each several times in a cycle.
-MAX_LINE_ORDERS = 4e6
+MAX_LINE_ORDERS = 1e7
 
 
 def shown(value: Any, most: int = 60) -> str:

@@ -61,6 +61,9 @@ _MOST_TURNS = 1e9
 _LEAST_PERIOD = 1e-12
 #: Sentences that a record says of what its model is blind to.
 _MOST_SENTENCES = 1000
+#: Highest order times number of harmonics up to which the greatest slope of a steep model is
+#: looked for: a second of work.
+_STEEP_LINE_ORDERS = 3e5
 #: Signals (velocity in turns per second) at which any model must correct.
 _NORMAL = (
     {"velocity": 0.01, "temperature": 20.0, "torque": 1.0, "direction": 1.0},
@@ -169,6 +172,8 @@ class _Reader(Decoder):
                 "period",
             )
         shafts = self.shafts(content["shafts"], _MOST_TURNS * period)
+        if argument == "reference":
+            self.check_steepness(shafts, period)
         try:
             model = HarmonicModel(
                 shafts=shafts,
@@ -188,6 +193,25 @@ class _Reader(Decoder):
         except ValueError as cause:  # the model's own checks, under the file's name
             raise self.error(str(cause)) from None
         return model
+
+    def check_steepness(self, shafts: tuple[Shaft, ...], period: float) -> None:
+        """Refuse steep models of so high orders that nobody waits for their proof."""
+        harmonics = sum(len(shaft.orders) for shaft in shafts)
+        highest = max((s.cycles_per_turn * max(s.orders, default=0) for s in shafts), default=0.0)
+        if harmonics * highest <= _STEEP_LINE_ORDERS:
+            return
+        slope = sum(
+            float(np.dot(np.asarray(s.orders) * s.cycles_per_turn, sizes))
+            for s in shafts
+            if (sizes := _sizes(s)).size == len(s.orders)
+        )
+        if slope * 2.0 * np.pi / period >= 1.0:
+            raise self.error(
+                f"|error'| may reach {slope * 2.0 * np.pi / period:.3g}, and {harmonics} "
+                f"harmonics of up to {highest:.6g} cycles per turn are too many to look for its "
+                "greatest value; use fewer or lower orders",
+                "shafts",
+            )
 
     def check_finite(self, model: HarmonicModel) -> None:
         """Terms whose numbers leave no finite correction at a joint's normal signals."""
@@ -358,3 +382,9 @@ class _Reader(Decoder):
             texts = (self.text(source[key], f"{where}.{key}") for key in ("file", "sha256"))
             inputs.append(Source(*texts))
         return Provenance(tuple(inputs), self.text(table["package"], "provenance.package"))
+
+
+def _sizes(shaft: Shaft) -> Array:
+    """Amplitudes; none where cosines and sines differ in number, which is refused elsewhere."""
+    same = len(shaft.cosine) == len(shaft.sine)
+    return np.asarray(np.hypot(shaft.cosine, shaft.sine)) if same else np.empty(0)
