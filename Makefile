@@ -21,6 +21,7 @@ lint:               ## style and lints, warnings are errors
 	RUSTDOCFLAGS="-D warnings" cargo doc --no-deps --locked
 	$(PYTHON) -m ruff check .
 	$(PYTHON) -m ruff format --check .
+	$(PYTHON) .ci/arrows
 	$(PYTHON) -m check_jsonschema --builtin-schema vendor.github-workflows .github/workflows/*.yml
 
 types:              ## types of the whole package

@@ -411,7 +411,7 @@ class HarmonicModel:
 
         Floats are written so that they read back bit for bit.
         """
-        from .modelfile import save_model
+        from .modeltext import save_model
 
         save_model(self, path)
 

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from . import __version__
+from ._core import __version__
 from .runs import CalibrationRun
 
 __all__ = ["provenance"]

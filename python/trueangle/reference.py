@@ -9,13 +9,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .model import HarmonicModel
 from .runs import CalibrationRun, as_runs
+
+if TYPE_CHECKING:
+    from .model import HarmonicModel
 
 __all__ = ["ReferenceFit", "correct", "design_matrix", "error", "fit", "slope"]
 

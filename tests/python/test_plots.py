@@ -10,6 +10,7 @@ import pytest
 import trueangle as ta
 from trueangle import plots, simulation
 from trueangle.errors import ArgumentError, MissingExtraError, RankError
+from trueangle.fitting.phases import run_phases
 from trueangle.planning import plan_mounts, plan_tilts
 from trueangle.plots import curves, palette
 from trueangle.simulation import Harmonic, Joint, RunDesign, Simulation
@@ -116,7 +117,7 @@ def test_spectrum_of_a_fit_shows_amplitudes_in_order(fit: ta.FitResult) -> None:
 def test_phases_of_systematic_orders_stay_together(fit: ta.FitResult) -> None:
     ax = plots.phases_over_runs(fit)
     check_labels(ax)
-    found = {p.order: p for p in curves.run_phases(fit)}
+    found = {p.order: p for p in run_phases(fit)}
     # Order 100, 18 arcsec at 46.5 deg; noise 2 arcsec over 180 readings: 0.7 deg per run.
     np.testing.assert_allclose(np.degrees(found[100.0].phase), 46.5, atol=4.0)
     np.testing.assert_allclose(found[100.0].amplitude, 18.0, atol=1.0)

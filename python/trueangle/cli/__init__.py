@@ -13,7 +13,7 @@ from collections.abc import Sequence
 from keyword import iskeyword
 from typing import Protocol
 
-from .. import __version__
+from .._core import __version__
 from ..errors import TrueAngleError
 from .parser import Parser
 from .paths import check_paths

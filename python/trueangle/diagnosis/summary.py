@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import textwrap
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from ..effects.blindness import Blindness
 from ..regression.estimate import Quantity
 from .beliefs import Belief
-from .findings import Diagnosis, Finding
 from .levels import LevelGain
+
+if TYPE_CHECKING:
+    from .findings import Diagnosis, Finding
 
 __all__ = ["headline", "render"]
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .. import __version__
+from .._core import __version__
 from ..angles import wrap
 from ..model import HarmonicModel
 from ..records import FitRecord, Provenance

@@ -5,7 +5,6 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import ExitStack
-from dataclasses import dataclass, field
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -16,74 +15,11 @@ from .correction import Task, correct_log, is_disk_full, states_after
 from .joints import JointState, LogSettings, joints_of
 from .manifest import Manifest
 from .progress import Progress
+from .report import BatchReport, LogReport, done_before
 from .safety import remove_leftovers, stamp
 from .sources import Place, places
 
 __all__ = ["BatchReport", "LogReport", "correct_logs"]
-
-
-@dataclass
-class LogReport:
-    """What became of one log.
-
-    Attributes
-    ----------
-    log, output : Path
-    size : int
-        Bytes of the log.
-    status : {"done", "done before", "failed", "not started"}
-    result : dict
-        Rows, rate and the joints' summaries, see `correction.correct_log`.
-    error : Exception or None
-    """
-
-    log: Path
-    output: Path
-    size: int = 0
-    status: str = "not started"
-    result: Mapping[str, Any] = field(default_factory=dict)
-    error: Exception | None = None
-
-    @property
-    def is_done(self) -> bool:
-        """True when the output is complete and verified."""
-        return self.status.startswith("done")
-
-    def as_json(self) -> dict[str, Any]:
-        """Plain values."""
-        known = {key: value for key, value in self.result.items() if key != "after"}
-        error = {} if self.error is None else {"error": str(self.error)}
-        return {
-            "log": str(self.log),
-            "output": str(self.output),
-            "status": self.status,
-            **known,
-            **error,
-        }
-
-
-@dataclass
-class BatchReport:
-    """What became of all logs, in the order they were given."""
-
-    logs: list[LogReport]
-    seconds: float = 0.0
-    interrupted: bool = False
-
-    @property
-    def is_done(self) -> bool:
-        """True when every log is."""
-        return all(log.is_done for log in self.logs)
-
-    def as_json(self) -> dict[str, Any]:
-        """Plain values."""
-        done = [log for log in self.logs if log.status == "done"]
-        return {
-            "files": [log.as_json() for log in self.logs],
-            "rows": sum(log.result["rows"] for log in done),
-            "seconds": self.seconds,
-            "complete": self.is_done,
-        }
 
 
 def correct_logs(
@@ -197,18 +133,6 @@ def _files_of(model: Any) -> list[str | PathLike[str]]:
     """The model files among what was given as model."""
     given = model.values() if isinstance(model, Mapping) else [model]
     return [entry for entry in given if isinstance(entry, (str, PathLike))]
-
-
-def done_before(
-    place: Place, log: LogReport, settings: LogSettings, manifests: Mapping[Path, Manifest]
-) -> bool:
-    """Whether the manifest knows the output; the report is then filled from it."""
-    if place.manifest is None:
-        return False
-    known = manifests[place.manifest].done(place.source, place.target, settings.digest)
-    if known is not None:
-        log.status, log.result = "done before", known
-    return known is not None
 
 
 def _one_by_one(

@@ -10,11 +10,11 @@ from typing import Any, NamedTuple
 
 from ..errors import ArgumentError, FileError, MissingExtraError, TrueAngleError
 from .accumulation import Accumulated, LogFitSettings, accumulate, merged
-from .batch import LogReport, done_before
 from .correction import Task, correct_log, count_turns, is_disk_full, states_after
 from .joints import JointState, LogSettings
 from .manifest import Manifest
 from .progress import Progress
+from .report import LogReport, done_before
 from .sources import Place
 from .turns import TurnSpan, TurnState
 

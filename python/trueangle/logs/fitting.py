@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from .. import __version__
+from .._core import __version__
 from ..angles import arcsec, wrap
 from ..columns import wanted_columns
 from ..errors import ArgumentError, NoModelError

@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import math
 import textwrap
+from typing import TYPE_CHECKING
 
 from ..angles import arcsec
-from .table import OrderRow, OrderSelection
+
+if TYPE_CHECKING:
+    from .table import OrderRow, OrderSelection
 
 __all__ = ["summarise"]
 

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..angles import ARCSEC_PER_TURN
+from ..orders.selection import FALSE_ALARM
 from ..orders.table import OrderRow, OrderSelection
 from . import palette
 from .canvas import legend, new_axes
@@ -138,8 +139,6 @@ def thresholds(selection: OrderSelection) -> Array:
     alpha of a false alarm shared by the K orders of the table. Orders found by a wider scan
     had to pass more.
     """
-    from ..orders.select import FALSE_ALARM
-
     v = float(selection.noise.degrees_of_freedom)
     log_share = math.log(max(1, len(selection.table)) / FALSE_ALARM)
     needed = v * math.expm1(2.0 / v * log_share) if v > 0.0 else math.nan

@@ -4,15 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final, cast
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..angles import ARCSEC_PER_TURN, wrap
-from ..errors import ArgumentError, RankError, TrueAngleError
+from ..errors import ArgumentError
 from ..fitting.heldout import correct_held_out
-from ..fitting.robust import Loss
 from ..model import HarmonicModel
 from ..runs import CalibrationRun
 
@@ -23,13 +22,11 @@ __all__ = [
     "CONFIDENCE",
     "SIGNALS",
     "Curve",
-    "Phases",
     "Points",
     "error_points",
     "held_out_points",
     "model_curve",
     "residual_points",
-    "run_phases",
     "seen_span",
     "thinned",
 ]
@@ -69,16 +66,6 @@ class Curve:
     angle: Array
     error: Array
     std: Array | None
-
-
-@dataclass(frozen=True)
-class Phases:
-    """One order in every run: amplitude in arcsec, phase in radians."""
-
-    order: float
-    labels: tuple[str, ...]
-    amplitude: Array
-    phase: Array
 
 
 def thinned(points: Points, most: int) -> Points:
@@ -175,38 +162,3 @@ def residual_points(fit: FitResult, against: str = "angle") -> list[Points]:
     if not found:
         raise ArgumentError(f"no run has {against}: it cannot be drawn against the residual")
     return found
-
-
-def run_phases(fit: FitResult) -> list[Phases]:
-    """Amplitude and phase of the model's orders in every run fitted alone.
-
-    Runs whose readings cannot hold the orders by themselves are left out.
-
-    Raises
-    ------
-    RankError
-        That holds for all of them.
-    """
-    from ..fitting.fit import fit as fit_runs
-
-    orders = {shaft.name: shaft.orders for shaft in fit.model.shafts}
-    shafts = {shaft.name: shaft.cycles_per_turn for shaft in fit.model.shafts}
-    labels, coefficients = [], []
-    for number, run in enumerate(fit.runs):
-        try:
-            alone = fit_runs(
-                run, orders, shafts=shafts, argument=fit.model.argument, loss=cast(Loss, fit.loss)
-            )
-        except TrueAngleError:
-            continue
-        labels.append(label_of(run, number))
-        coefficients.append((alone.amplitudes, alone.phases))
-    if not labels:
-        raise RankError("no run holds these orders by itself: their phases cannot be compared")
-    factor = ARCSEC_PER_TURN / fit.model.period
-    amplitude = factor * np.array([a for a, _ in coefficients])
-    phase = np.array([p for _, p in coefficients])
-    return [
-        Phases(order, tuple(labels), amplitude[:, i], phase[:, i])
-        for i, order in enumerate(fit.orders)
-    ]

@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..fitting.phases import run_phases
 from . import palette
 from .canvas import new_axes
-from .curves import run_phases
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

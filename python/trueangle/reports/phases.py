@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from ..errors import RankError
-from ..plots import curves
-from ..plots.curves import Phases
+from ..fitting.phases import Phases, run_phases
 from .charts import Chart, Figure, figure, run_colour, run_marker
 
 if TYPE_CHECKING:
@@ -25,7 +24,7 @@ _LEAST: Final = 15.0
 def phases(fit: FitResult) -> Figure | None:
     """Phase of every order in every run; None where no run holds them, or there is one."""
     try:
-        found = sorted(curves.run_phases(fit), key=lambda p: -float(p.amplitude.mean()))[:_MOST]
+        found = sorted(run_phases(fit), key=lambda p: -float(p.amplitude.mean()))[:_MOST]
     except RankError:
         return None
     if not found or len(found[0].labels) < 2:

@@ -98,8 +98,8 @@ class Simulation:
         return error
 
     def save(self, path: str | Path) -> None:
-        """Write the simulation as TOML (`trueangle.simulation.simulationfile.write`)."""
-        from .simulationfile import write
+        """Write the simulation as TOML (`trueangle.simulation.simulationtext.write`)."""
+        from .simulationtext import write
 
         write(self, path)
 

@@ -1,0 +1,253 @@
+"""The text of a simulation file: TOML decoded with checks, and written."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Callable, Mapping
+from dataclasses import fields
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
+
+from ..decoding import finite, read_text, shown
+from ..effects import EFFECTS, Effect
+from ..errors import ArgumentError, FileError
+from ..files import SIMULATION, SIMULATION_BYTES, written_atomically
+from ..joint.joint import Joint
+from ..joint.pattern import Harmonic
+from .designs import MAX_SAMPLES, RunDesign
+
+if TYPE_CHECKING:
+    from .simulation import Simulation
+
+__all__ = ["Decoded", "decoded", "dumps", "guarded", "to_table", "write"]
+
+_TABLES = ("joint", "harmonic", "effect", "noise", "run")
+_JOINT_KEYS = ("gear_ratio", "fixed_member", "encoder_side", "pole_pairs")
+
+#: Lines, effects, runs, or numbers of one list, at most.
+MAX_TABLES = 10_000
+
+T = TypeVar("T")
+
+
+class Decoded(NamedTuple):
+    """What a simulation file says, the arguments of `Simulation` in their order."""
+
+    joint: Joint
+    harmonics: tuple[Harmonic, ...]
+    effects: tuple[Effect, ...]
+    sigma_arcsec: float
+    runs: tuple[RunDesign, ...]
+    source: str
+
+
+def decoded(path: str | Path) -> Decoded:
+    """The checked parts of a simulation file; see `load_simulation`."""
+    text = read_text(path, SIMULATION_BYTES, FileError, "a simulation")
+    return _decoded(path, _document(path, text))
+
+
+def _document(path: str | Path, text: str) -> dict[str, Any]:
+    try:
+        return tomllib.loads(text)
+    except tomllib.TOMLDecodeError as cause:
+        raise FileError(path, f"not a TOML file: {cause}") from None
+    except RecursionError:
+        raise FileError(path, "not a simulation: nested too deeply") from None
+    except ValueError:  # whole numbers of thousands of digits, dates that are none
+        raise FileError(path, "holds a number or date that cannot be read") from None
+
+
+def _decoded(path: str | Path, document: Mapping[str, Any]) -> Decoded:
+    for name in document:
+        if name not in _TABLES:
+            raise FileError(
+                path, f"unknown table {shown(name)}; a simulation has {', '.join(_TABLES)}"
+            )
+    joint = _build(path, "[joint]", Joint, _geared(_table(path, document, "joint")))
+    harmonics = tuple(
+        _build(path, f"[[harmonic]] number {k}", Harmonic, table)
+        for k, table in enumerate(_tables(path, document, "harmonic"), 1)
+    )
+    effects = tuple(
+        _effect(path, f"[[effect]] number {k}", table)
+        for k, table in enumerate(_tables(path, document, "effect"), 1)
+    )
+    designs = tuple(
+        _build(path, f"[[run]] number {k}", RunDesign, table)
+        for k, table in enumerate(_tables(path, document, "run"), 1)
+    )
+    samples = sum(design.samples for design in designs)
+    if samples > MAX_SAMPLES:
+        raise FileError(path, f"its runs have {samples} samples, more than {MAX_SAMPLES} in all")
+    noise = _table(path, document, "noise")
+    for name in noise:
+        if name != "sigma_arcsec":
+            raise FileError(path, f"[noise]: unknown key {shown(name)}; it has sigma_arcsec")
+    sigma = finite(noise.get("sigma_arcsec", 0.0))
+    if sigma is None:
+        got = shown(noise["sigma_arcsec"])
+        raise FileError(path, f"[noise]: sigma_arcsec must be a finite number, got {got}")
+    return Decoded(joint, harmonics, effects, sigma, designs, str(path))
+
+
+def _geared(joint: Mapping[str, Any]) -> Mapping[str, Any]:
+    """A gear is a strain wave gear behind a motor encoder unless the file says otherwise."""
+    if joint.get("gear_ratio", 1.0) == 1.0:
+        return joint
+    return {"fixed_member": "circular_spline", "encoder_side": "motor"} | dict(joint)
+
+
+def _table(path: str | Path, document: Mapping[str, Any], name: str) -> Mapping[str, Any]:
+    table = document.get(name, {})
+    if not isinstance(table, dict):
+        raise FileError(path, f"'{name}' must be one table, [{name}]")
+    return table
+
+
+def _tables(path: str | Path, document: Mapping[str, Any], name: str) -> list[dict[str, Any]]:
+    tables = document.get(name, [])
+    if not isinstance(tables, list) or not all(isinstance(table, dict) for table in tables):
+        raise FileError(path, f"'{name}' must be a list of tables, [[{name}]]")
+    if len(tables) > MAX_TABLES:
+        raise FileError(path, f"{len(tables)} tables [[{name}]]; at most {MAX_TABLES} are allowed")
+    return tables
+
+
+def _build(path: str | Path, where: str, kind: type[T], table: Mapping[str, Any]) -> T:
+    known = {field.name: str(field.type) for field in fields(kind)}  # type: ignore[arg-type]
+    values = {}
+    for name, value in table.items():
+        if name not in known:
+            raise FileError(path, f"{where}: unknown key {shown(name)}; it has {', '.join(known)}")
+        values[name] = _value(path, where, name, value, known[name])
+    try:
+        return guarded(path, where, lambda: kind(**values))
+    except TypeError as cause:
+        missing = str(cause).rpartition(": ")[2]
+        raise FileError(path, f"{where}: missing {missing}") from None
+
+
+def _value(path: str | Path, where: str, name: str, value: Any, wanted: str) -> Any:
+    def refuse(what: str) -> FileError:
+        return FileError(path, f"{where}: {name} must be {what}, got {shown(value)}")
+
+    if wanted.startswith("str"):
+        if not isinstance(value, str):
+            raise refuse("a text")
+        return value
+    if wanted.startswith("tuple"):
+        numbers = tuple(map(finite, value)) if isinstance(value, list) else (None,)
+        if None in numbers:
+            raise refuse("a list of finite numbers")
+        if len(numbers) > MAX_TABLES:
+            raise refuse(f"a list of at most {MAX_TABLES} numbers")
+        return numbers
+    number = finite(value)
+    if number is None:
+        raise refuse("a finite number")
+    if wanted.startswith("int"):
+        if number != int(number):
+            raise refuse("a whole number")
+        return int(number)
+    return number
+
+
+def _effect(path: str | Path, where: str, table: dict[str, Any]) -> Effect:
+    parameters = dict(table)
+    kind = parameters.pop("kind", None)
+    if not isinstance(kind, str) or kind not in EFFECTS:
+        raise FileError(
+            path, f"{where}: kind must be one of {', '.join(EFFECTS)}, got {shown(kind)}"
+        )
+    for name, value in parameters.items():
+        parameters[name] = _checked_numbers(path, f"{where}: {shown(name)}", value)
+    return guarded(path, where, lambda: EFFECTS[kind].from_table(parameters))
+
+
+def _checked_numbers(path: str | Path, where: str, value: Any) -> Any:
+    """A parameter whose numbers, in lists of lists too, are finite and not too many."""
+    if isinstance(value, list):
+        if len(value) > MAX_TABLES:
+            raise FileError(path, f"{where} must be a list of at most {MAX_TABLES}")
+        return [_checked_numbers(path, where, item) for item in value]
+    if isinstance(value, int | float) and not isinstance(value, bool):
+        if finite(value) is None:
+            raise FileError(path, f"{where} must be a finite number, got {shown(value)}")
+        return value if abs(value) < 2**53 else float(value)
+    return value
+
+
+def guarded(path: str | Path, where: str, build: Callable[[], T]) -> T:
+    """What ``build`` makes; its refusals name the file and the place in it."""
+    try:
+        return build()
+    except FileError:
+        raise
+    except ArgumentError as cause:
+        raise FileError(path, f"{where}: {cause}") from None
+
+
+def to_table(sim: Simulation | Decoded) -> dict[str, Any]:
+    """The tables of a simulation file; keys at their defaults are left out of ``run``."""
+    runs = []
+    for design in sim.runs:
+        values = {field.name: getattr(design, field.name) for field in fields(design)}
+        plain = {field.name: field.default for field in fields(design)}
+        runs.append({k: v for k, v in values.items() if v is not None and v != plain[k]})
+    return {
+        "joint": {name: getattr(sim.joint, name) for name in _JOINT_KEYS},
+        "harmonic": [
+            {field.name: getattr(line, field.name) for field in fields(line)}
+            for line in sim.harmonics
+        ],
+        "effect": [effect.to_table() for effect in sim.effects],
+        "noise": {"sigma_arcsec": sim.sigma_arcsec},
+        "run": runs,
+    }
+
+
+def write(sim: Simulation, path: str | Path) -> None:
+    """Write a simulation file, beside and then renamed; floats round-trip exactly.
+
+    Where the simulation was read from a file, that file's text is kept and only what
+    is new is appended, so comments and layout stay. Otherwise the whole is written.
+    """
+    text = dumps(sim)
+    with written_atomically(path, kind=SIMULATION) as file:
+        file.write(text)
+
+
+def dumps(sim: Simulation) -> str:
+    """The text of a simulation file, as `write` writes it."""
+    whole = to_table(sim)
+    if sim.source is not None and Path(sim.source).is_file():
+        original = decoded(sim.source)
+        old = to_table(original)
+        appended = {name: whole[name][len(old[name]) :] for name in ("harmonic", "effect", "run")}
+        kept = {name: [*old[name], *appended[name]] for name in appended}
+        if {**old, **kept} == whole:
+            text = Path(sim.source).read_text(encoding="utf-8").rstrip("\n")
+            return text + "\n" + "".join(_dump(name, appended[name]) for name in appended)
+    return "".join(_dump(name, whole[name]) for name in _TABLES).lstrip("\n")
+
+
+def _dump(name: str, content: Any) -> str:
+    if isinstance(content, list):
+        return "".join(f"\n[[{name}]]\n{_lines(table)}" for table in content)
+    return f"\n[{name}]\n{_lines(content)}"
+
+
+def _lines(table: Mapping[str, Any]) -> str:
+    return "".join(f"{name} = {_literal(value)}\n" for name, value in table.items())
+
+
+def _literal(value: Any) -> str:
+    if isinstance(value, str):
+        escaped = value.replace("\\", "\\\\").replace('"', '\\"')
+        return '"' + "".join(c if c >= " " else f"\\u{ord(c):04x}" for c in escaped) + '"'
+    if isinstance(value, list | tuple):
+        return "[" + ", ".join(_literal(item) for item in value) + "]"
+    if isinstance(value, int):
+        return str(value)
+    return repr(float(value))

@@ -1,0 +1,103 @@
+"""Imports point one way, and the check of that sees what is planted."""
+
+import importlib.util
+import shutil
+import subprocess
+import sys
+from importlib.machinery import SourceFileLoader
+
+import pytest
+
+from conftest import ROOT
+
+CHECK = ROOT / ".ci" / "arrows"
+
+
+loader = SourceFileLoader("arrows", str(CHECK))
+arrows = importlib.util.module_from_spec(importlib.util.spec_from_loader("arrows", loader))
+sys.modules["arrows"] = arrows
+loader.exec_module(arrows)
+
+
+@pytest.fixture
+def package(tmp_path):
+    """A copy of the package with the rules and the core's text where they belong."""
+    shutil.copytree(
+        ROOT / "python" / "trueangle",
+        tmp_path / "python" / "trueangle",
+        ignore=shutil.ignore_patterns("*.so", "__pycache__"),
+    )
+    shutil.copytree(ROOT / "src", tmp_path / "src")
+    (tmp_path / ".ci").mkdir()
+    shutil.copy(ROOT / ".ci" / "arrows.toml", tmp_path / ".ci")
+    return tmp_path / "python" / "trueangle"
+
+
+def check(package):
+    return arrows.check(package, package.parents[1] / ".ci" / "arrows.toml")
+
+
+def plant(path, text):
+    path.write_text(path.read_text("utf-8") + text, "utf-8")
+
+
+def test_all_arrows_point_one_way():
+    done = subprocess.run([sys.executable, str(CHECK)], capture_output=True, text=True)
+    assert done.returncode == 0, done.stdout
+
+
+def test_make_lint_runs_it():
+    assert "$(PYTHON) .ci/arrows\n" in (ROOT / "Makefile").read_text("utf-8")
+
+
+def test_a_circle_inside_functions_is_seen(package):
+    plant(package / "angles.py", "\n\ndef planted():\n    from .runs import as_runs\n")
+    (said,) = (line for line in check(package) if "circle" in line)
+    assert "angles:" in said
+    assert "runs:" in said
+
+
+#: Arrows that must never be: the file, an import, and a word of the reason.
+FORBIDDEN = {
+    "face": ("orders/verdicts.py", "from .. import fit", "face"),
+    "face, by its name": ("orders/verdicts.py", "import trueangle", "face"),
+    "drawing": ("correction/corrector.py", "from ..plots import curves", "draw"),
+    "drawing, by the full name": ("model.py", "import trueangle.plots.palette", "draw"),
+    "reports": ("diagnosis/levels.py", "from ..reports import page", "report"),
+    "a fit by a picture": ("plots/gains.py", "from ..fitting import fit", "do not fit"),
+    "a format and a model": ("formats/__init__.py", "from ..model import HarmonicModel", "format"),
+    "an effect and a diagnosis": ("effects/backlash.py", "from .. import diagnosis", "effect"),
+    "a fit and a cause": ("fitting/fit.py", "from ..effects import backlash", "causes"),
+    "the ground": ("files/outputs.py", "from ..model import HarmonicModel", "ground"),
+}
+
+
+@pytest.mark.parametrize(
+    ("case", "where"),
+    [
+        *((case, "def planted():\n    {}") for case in FORBIDDEN),
+        ("face", "{}"),
+        ("drawing", "if TYPE_CHECKING:\n    {}"),
+    ],
+)
+def test_a_forbidden_arrow_is_seen(case, where, package):
+    name, statement, reason = FORBIDDEN[case]
+    plant(package / name, "\n\n" + where.format(statement) + "\n")
+    said = check(package)
+    module = name.removesuffix(".py").removesuffix("/__init__").replace("/", ".")
+    assert any(line.startswith(f"{module}:") and reason in line for line in said), said
+
+
+def test_python_in_the_core_is_seen(package):
+    plant(package.parents[1] / "src" / "angle.rs", "\nuse pyo3::prelude::*;\n")
+    (said,) = check(package)
+    assert said.startswith("src/angle.rs:")
+    assert "knows no Python" in said
+
+
+def test_an_exception_that_is_no_more_must_go(package):
+    path = package / "orders" / "table.py"
+    text = path.read_text("utf-8")
+    assert "from ..plots import amplitude_spectrum" in text
+    path.write_text(text.replace("from ..plots import amplitude_spectrum", "pass"), "utf-8")
+    assert "arrows.toml: 'orders.table -> plots' is declared and is no more" in check(package)

@@ -1,0 +1,106 @@
+"""Names and import paths that documentation and changelog promise work."""
+
+import importlib
+import re
+
+import pytest
+
+from conftest import ROOT
+
+#: Rooms of the first release that the reference named, and what they held.
+EARLIER = {
+    "trueangle.simulation.effects": """
+        EFFECTS Effect Surroundings
+    """,
+    "trueangle.terms": """
+        TERMS Backlash FilterLag Latency LoadDependentGearError LocalDefect PreslidingHysteresis
+        StiffeningCompliance Term ThermalDrift TorsionalCompliance
+    """,
+    "trueangle.plots": """
+        amplitude_spectrum before_after error_curves error_left fit_plot gains
+        measured_and_simulated phases_over_runs plan_factors plan_positions residuals
+    """,
+    "trueangle.planning": """
+        HIGHEST_LOW_ORDER CalibrationPlan plan_encoder plan_mounts plan_tilts readings_needed
+        wanted_orders
+    """,
+    "trueangle.fitting.heldout": """
+        HeldOut HeldOutRun correct_held_out hold_out hold_out_extended
+    """,
+    "trueangle.errors": """
+        ArgumentError FileError MissingExtraError MissingSignalError ModelFileError NoModelError
+        NotInvertibleError OutsideSpanWarning RankError TrueAngleError
+    """,
+    "trueangle.reports": """
+        Report demo_report report
+    """,
+    "trueangle.simulation": """
+        EFFECTS ArgumentShift Backlash DriftWithinRun Effect FilterLag Harmonic
+        HeteroscedasticNoise Joint Latency LoadDependentGearError LocalDefect MissedCounts
+        MissingOrder NonIntegerOrder Outliers Pattern PreslidingHysteresis ReferenceLines
+        RunDesign ScaleError Sidebands Signals Simulation StiffeningCompliance ThermalDrift
+        TorsionalCompliance ZeroSlip join_runs load_simulation simulate
+    """,
+    "trueangle.diagnosis": """
+        Diagnosis Finding diagnose
+    """,
+    "trueangle.orders": """
+        FALSE_ALARM OrderRow OrderSelection select_orders
+    """,
+}
+
+
+def resolved(path):
+    """What a dotted path names; the longest part that is a module is imported."""
+    parts = path.split(".")
+    for cut in range(len(parts), 0, -1):
+        try:
+            found = importlib.import_module(".".join(parts[:cut]))
+        except ModuleNotFoundError as missing:
+            if missing.name is None or not missing.name.startswith("trueangle"):
+                pytest.skip(f"{missing.name} is not installed")
+            continue
+        for name in parts[cut:]:
+            found = getattr(found, name)
+        return found
+    raise AssertionError(f"{path}: no such module")
+
+
+def documented():
+    """Everything that the reference lists, members that are named included."""
+    text = (ROOT / "docs" / "reference.md").read_text("utf-8")
+    paths = []
+    for match in re.finditer(r"^\.\. auto\w+:: (\S+)\n((?:   :.*\n)*)", text, re.MULTILINE):
+        paths.append(match[1])
+        members = re.search(r":members: (\S.*)", match[2])
+        paths += [f"{match[1]}.{name.strip()}" for name in members[1].split(",")] if members else []
+    assert len(paths) > 50
+    return paths
+
+
+def told_in_changelog():
+    text = (ROOT / "CHANGELOG.md").read_text("utf-8")
+    paths = {
+        path.rstrip(".")
+        for quoted in re.findall(r"`([^`]+)`", text)
+        for path in re.findall(r"(?<![\w/-])(?:ta|trueangle)(?:\.[A-Za-z_]\w*)+", quoted)
+    }
+    assert len(paths) > 15
+    return sorted({re.sub(r"^ta\b", "trueangle", path) for path in paths})
+
+
+@pytest.mark.parametrize("path", documented())
+def test_the_reference_names_what_there_is(path):
+    assert resolved(path) is not None
+
+
+@pytest.mark.parametrize("path", told_in_changelog())
+def test_the_changelog_names_what_there_is(path):
+    assert resolved(path) is not None
+
+
+@pytest.mark.parametrize(
+    "path", [f"{room}.{name}" for room, names in EARLIER.items() for name in names.split()]
+)
+def test_paths_of_earlier_releases_stay(path):
+    assert resolved(path) is not None
