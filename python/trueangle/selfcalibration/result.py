@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from ..angles import ARCSEC_PER_TURN
 from ..model import HarmonicModel
 
-__all__ = ["Blind", "HeldOut", "OrderEstimate", "SelfCalibration", "ranges"]
+__all__ = ["Blind", "HeldOut", "OrderEstimate", "SelfCalibration"]
 
 Array = NDArray[np.float64]
 
@@ -196,23 +196,3 @@ def estimates(
             )
         )
     return found
-
-
-def ranges(orders: Sequence[float]) -> str:
-    """Orders in words: ``1-4, 8``.
-
-    Examples
-    --------
-    >>> ranges([1, 2, 3, 4, 8, 7.3])
-    '1-4, 7.3, 8'
-    """
-    parts: list[str] = []
-    run: list[float] = []
-    for order in [*sorted(orders), math.inf]:
-        if run and (order != run[-1] + 1.0):
-            parts.append(
-                f"{run[0]:g}-{run[-1]:g}" if len(run) > 2 else ", ".join(f"{k:g}" for k in run)
-            )
-            run = []
-        run.append(order)
-    return ", ".join(parts)

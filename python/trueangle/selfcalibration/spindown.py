@@ -20,10 +20,11 @@ from .colour import noise_beside
 from .loop import followed_orders
 from .modelling import made_model
 from .recording import Recording
-from .result import ARCSEC, Blind, OrderEstimate, SelfCalibration, estimates, ranges
+from .result import ARCSEC, Blind, OrderEstimate, SelfCalibration, estimates
 from .ripple import LARGEST_COST, averaged_over_ripple, cost_of_ripple
 from .steady import ENCODER, Readings, SteadyFit, fit_steady, pattern_series
 from .stretches import cut_stretches
+from .summary import ranges
 from .verification import held_out
 
 __all__ = ["spin_down"]

@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
-from .result import OrderEstimate, SelfCalibration, ranges
+import math
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
-__all__ = ["summary"]
+if TYPE_CHECKING:
+    from .result import OrderEstimate, SelfCalibration
+
+__all__ = ["ranges", "summary"]
 
 
 def summary(result: SelfCalibration) -> str:
@@ -46,3 +51,23 @@ def _table(orders: tuple[OrderEstimate, ...]) -> list[str]:
             f"{o.std_factor:7.2f}" + (f"  {o.of}" if names else "")
         )
     return lines
+
+
+def ranges(orders: Sequence[float]) -> str:
+    """Orders in words: ``1-4, 8``.
+
+    Examples
+    --------
+    >>> ranges([1, 2, 3, 4, 8, 7.3])
+    '1-4, 7.3, 8'
+    """
+    parts: list[str] = []
+    run: list[float] = []
+    for order in [*sorted(orders), math.inf]:
+        if run and (order != run[-1] + 1.0):
+            parts.append(
+                f"{run[0]:g}-{run[-1]:g}" if len(run) > 2 else ", ".join(f"{k:g}" for k in run)
+            )
+            run = []
+        run.append(order)
+    return ", ".join(parts)
