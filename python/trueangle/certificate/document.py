@@ -162,8 +162,8 @@ def certify(
 
 
 def _degrees_of_freedom(fit: FitResult) -> float:
-    """Of the fit's covariance: those of its clusters where it rests on them."""
-    return float(getattr(fit, "covariance_degrees_of_freedom", fit.degrees_of_freedom))
+    """Of the fit's covariance: the fewest of any coefficient, so that no U is too narrow."""
+    return float(fit.freedom.min())
 
 
 def _budget(budget: Budget, angle_deg: float) -> dict[str, Any]:
