@@ -104,13 +104,9 @@ def _comment(name: str, chain: Chain, header: Header) -> str:
 
 def _number(value: float, number: str) -> str:
     if number == "f32":
-        return f"{float(np.float32(value)):.9g}".replace("inf", "") + _float_end(value)
+        text = f"{float(np.float32(value)):.9g}"
+        return text + ("f" if any(c in text for c in ".e") else ".0f")
     return str(int(value))
-
-
-def _float_end(value: float) -> str:
-    text = f"{float(np.float32(value)):.9g}"
-    return "f" if any(c in text for c in ".e") else ".0f"
 
 
 def _rows(values: list[str], width: int = 8) -> str:
@@ -141,7 +137,7 @@ def _table(name: str, table: Table) -> str:
         "scale": 1 << table.shift,
         "down": 16 - table.shift,
         "half": 1 << (15 - table.shift),
-        "per_radian": f"{float(PER_RADIAN):.9g}f",
+        "per_radian": f"{float(PER_RADIAN):.1f}f",
     }
     for key, value in fill.items():
         code = code.replace(f"@{key}@", str(value))
@@ -155,8 +151,9 @@ static inline int32_t @name@_correction(uint32_t angle)
     const int16_t *knot = @name@_knots + (@index@);
     const uint16_t t = (uint16_t)((angle << @bits@) >> 16);
     const int16_t low = @read@(knot);
-    const int16_t step = (int16_t)(@read@(knot + 1) - low);
-    return (low * INT32_C(65536) + (int32_t)step * (int32_t)t + INT32_C(@half@)) >> @down@;
+    const int32_t step = @read@(knot + 1) - low;
+    const int32_t base = low * INT32_C(65536) + INT32_C(@half@);
+    return (base + step * (int32_t)t) >> @down@;
 }
 """,
     "q31": """\
