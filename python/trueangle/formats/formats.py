@@ -30,6 +30,7 @@ FORMATS = (
         magics=(b"#ROSBAG", b"SQLite format 3", b"\x89MCAP"),
     ),
     Format("MDF4", (".mf4", ".mdf"), "mdf", "mdf", magics=(b"MDF     ", b"UnFinMF ")),
+    Format("numpy archive", (".npz",), "npz", magics=(b"PK\x03\x04",)),
     Format("CSV", (".csv", ".tsv", ".txt"), "csvfile"),
 )
 

@@ -1,0 +1,192 @@
+"""Tables of numpy: archives (.npz) of one array a column, read and copied in parts."""
+
+from __future__ import annotations
+
+import io
+import shutil
+import zipfile
+import zlib
+from collections.abc import Collection, Iterator, Sequence
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+from typing import IO, Any, NamedTuple
+
+import numpy as np
+from numpy.lib import format as npy
+from numpy.typing import NDArray
+
+from ..errors import FileError
+from .damage import damage_told
+from .format import TEXTS, Addition, Batch, Choose, Contents, Watch, note, row_labels
+
+__all__ = ["columns", "contents", "copy", "read", "together"]
+
+#: Readings taken together.
+_BLOCK = 1 << 18
+#: Member of a copy that tells how its arrays were made.
+_NOTE = "trueangle.json"
+
+
+class _Column(NamedTuple):
+    """An array of one dimension: its type and length."""
+
+    kind: np.dtype[Any]
+    size: int
+
+
+def columns(path: Path, topic: str | None = None) -> list[str]:
+    """Names of the arrays that are vectors of numbers or texts."""
+    with _opened(path) as archive:
+        return list(_columns(archive))
+
+
+def together(path: Path, needed: Sequence[str], others: Sequence[str]) -> list[str]:
+    """Those of ``others`` that are as long as the arrays ``needed``."""
+    with _opened(path) as archive:
+        found = _columns(archive)
+    sizes = {found[name].size for name in needed}
+    return [name for name in others if found[name].size in sizes]
+
+
+def read(
+    path: Path,
+    names: Sequence[str],
+    topic: str | None = None,
+    stretch: None = None,
+    *,
+    texts: Collection[str] = TEXTS,
+    strict: bool = False,
+) -> Iterator[Batch]:
+    """Arrays ``names`` in batches; see `format.FormatModule`."""
+    with _opened(path) as archive:
+        yield from _batches(path, archive, names)
+
+
+def copy(
+    source: Path,
+    target: Path,
+    choose: Choose,
+    watch: Watch,
+    topic: str | None = None,
+    output_topic: str | None = None,
+) -> Contents:
+    """Write ``target`` with the corrected arrays; see `format.FormatModule`."""
+    sums: dict[str, str] = {}
+    with _opened(source) as archive, zipfile.ZipFile(target, "w", allowZip64=True) as output:
+        found = _columns(archive)
+        additions = choose(list(found))
+        for member in archive.infolist():
+            if member.filename == _NOTE:
+                continue
+            kept = zipfile.ZipInfo(member.filename, member.date_time)
+            kept.compress_type = member.compress_type
+            with archive.open(member) as given, output.open(kept, "w", force_zip64=True) as put:
+                shutil.copyfileobj(given, put, 1 << 20)
+            sums[member.filename] = f"{member.CRC:08x}"
+        total = max(sum(found[a.column].size for a in additions), 1)
+        rows = done = 0
+        for addition in additions:
+            size = found[addition.column].size
+            name = f"{addition.added}.npy"
+            kept = zipfile.ZipInfo(name)
+            kept.compress_type = archive.getinfo(f"{addition.column}.npy").compress_type
+            with output.open(kept, "w", force_zip64=True) as put:
+                check = 0
+                for part in _corrected(source, archive, addition, found[addition.column]):
+                    put.write(part)
+                    check = zlib.crc32(part, check)
+                    done += len(part) // 8
+                    watch(len(part) // 8, min(done / total, 1.0))
+            sums[name] = f"{check:08x}"
+            rows = max(rows, size)
+        told = note(additions).encode()
+        output.writestr(_NOTE, told)
+        sums[_NOTE] = f"{zlib.crc32(told):08x}"
+    return Contents(rows, sums)
+
+
+def contents(path: Path, topic: str | None = None) -> Contents:
+    """Rows, and a checksum of every member as it reads back."""
+    sums = {}
+    with _opened(path) as archive:
+        rows = max((column.size for column in _columns(archive).values()), default=0)
+        for member in archive.infolist():
+            check = 0
+            with archive.open(member) as given:
+                while part := given.read(1 << 20):
+                    check = zlib.crc32(part, check)
+            sums[member.filename] = f"{check:08x}"
+    return Contents(rows, sums)
+
+
+@contextmanager
+def _opened(path: Path) -> Iterator[zipfile.ZipFile]:
+    """The archive, its errors told with its name."""
+    with damage_told(path, "an archive of numpy"), zipfile.ZipFile(path) as archive:
+        yield archive
+
+
+def _columns(archive: zipfile.ZipFile) -> dict[str, _Column]:
+    found = {}
+    for member in archive.infolist():
+        if member.filename.endswith(".npy"):
+            with archive.open(member) as given:
+                column = _header(given)
+            if column is not None:
+                found[member.filename.removesuffix(".npy")] = column
+    return found
+
+
+def _header(given: IO[bytes]) -> _Column | None:
+    """Type and length of a vector of numbers or texts; None for other arrays."""
+    version = npy.read_magic(given)
+    reading = npy.read_array_header_1_0 if version == (1, 0) else npy.read_array_header_2_0
+    shape, _, kind = reading(given)
+    size = int(np.prod(shape, dtype=object))
+    if kind.hasobject or kind.kind not in "fiuSU" or not shape or max(shape) != size:
+        return None
+    return _Column(kind, size)
+
+
+def _batches(path: Path, archive: zipfile.ZipFile, names: Sequence[str]) -> Iterator[Batch]:
+    with ExitStack() as stack:
+        streams = {}
+        for name in names:
+            given = stack.enter_context(archive.open(f"{name}.npy"))
+            column = _header(given)
+            assert column is not None  # `columns` lists no other
+            streams[name] = (given, column)
+        sizes = {name: column.size for name, (_given, column) in streams.items()}
+        if len(set(sizes.values())) > 1:
+            listed = ", ".join(f"{name} {size}" for name, size in sizes.items())
+            raise FileError(path, f"arrays that belong together differ in length: {listed}")
+        size = next(iter(sizes.values()), 0)
+        for start in range(0, size, _BLOCK):
+            count = min(_BLOCK, size - start)
+            yield {name: _part(path, name, *stream, count) for name, stream in streams.items()}
+
+
+def _part(path: Path, name: str, given: IO[bytes], column: _Column, count: int) -> Any:
+    data = given.read(count * column.kind.itemsize)
+    if len(data) != count * column.kind.itemsize:
+        raise FileError(path, "is shorter than its header says: it is damaged", column=name)
+    values: NDArray[Any] = np.frombuffer(data, column.kind)
+    if column.kind.kind in "fiu":
+        return values.astype(column.kind.newbyteorder("="), copy=False)
+    decoded = [v.decode("utf-8", "replace") if isinstance(v, bytes) else v for v in values.tolist()]
+    return row_labels(decoded)
+
+
+def _corrected(
+    path: Path, archive: zipfile.ZipFile, addition: Addition, column: _Column
+) -> Iterator[bytes]:
+    """The bytes of a corrected array: float32 where its source is, else float64."""
+    kind = np.dtype(np.float32 if column.kind.newbyteorder("=") == np.float32 else np.float64)
+    head = io.BytesIO()
+    described = {"descr": npy.dtype_to_descr(kind), "fortran_order": False, "shape": (column.size,)}
+    npy.write_array_header_1_0(head, described)
+    yield head.getvalue()
+    names = [addition.column, *addition.signals.values()]
+    for batch in _batches(path, archive, list(dict.fromkeys(names))):
+        signals = {signal: batch[name] for signal, name in addition.signals.items()}
+        yield addition.correct(batch[addition.column], signals).astype(kind).tobytes()
