@@ -2,36 +2,27 @@
 
 from __future__ import annotations
 
-import os
-import re
-import stat
-import tempfile
 import warnings
-from collections.abc import Callable, Iterable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Iterable, Mapping
 from os import PathLike
 from pathlib import Path
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .angles import UNIT_PERIODS
-from .columns import Column, count_turn, find_columns, listed, wanted_columns
+from .columns import Column, count_turn, listed, unit_in_name, wanted_columns
 from .errors import EmptyCellsWarning, FileError
-from .files import RUNS_BYTES, check_input, read_whole, sha256_of
-from .formats.csvheader import number
-from .formats.format import Batch, Format, Labels
-from .formats.formats import format_of_content
+from .readings import Readings, named, read_readings, readings_of
 from .runs import CalibrationRun, Source
 from .signals import FIELDS
 
 __all__ = ["Readings", "RunColumns", "read_columns", "read_readings", "read_runs"]
 
-T = TypeVar("T")
+#: Unit, label and rows of every run.
+Groups: TypeAlias = list[tuple[str | None, str | None, NDArray[np.intp]]]
 
-#: Columns that are kept although nothing is known of them, at most: a wide log has thousands.
-_KEPT = 256
 #: Unit of the run's angles where the reference has none that a run may be in.
 _PERIOD = 360.0
 
@@ -87,9 +78,9 @@ def read_runs(
     paths = [path] if isinstance(path, (str, PathLike)) else list(path)
 
     def read(file: Path) -> list[CalibrationRun]:
-        return _runs(_columns(_readings(file, wanted, topic), indicated, reference))
+        return _runs(_columns(readings_of(file, wanted, topic), indicated, reference))
 
-    runs = [run for entry in paths for run in _named(Path(entry), read)]
+    runs = [run for entry in paths for run in named(Path(entry), read)]
     units = {run.period: run for run in runs}
     if len(units) > 1:
         first, other = list(units.values())[:2]
@@ -100,154 +91,6 @@ def read_runs(
             f"(period {first.period:g}); convert one of them",
         )
     return runs
-
-
-class Readings(NamedTuple):
-    """Rows of one file as they are, before they are runs.
-
-    Attributes
-    ----------
-    path : Path
-    format : Format
-    roles : dict of str to Column
-        What is known of the columns.
-    columns : dict of str to array
-        By name; texts as arrays of objects.
-    source : Source
-    """
-
-    path: Path
-    format: Format
-    roles: dict[str, Column]
-    columns: dict[str, NDArray[Any]]
-    source: Source
-
-    def error(self, problem: str, column: str | None = None, row: int | None = None) -> FileError:
-        """The error that says ``problem`` of a column, at the line of a row."""
-        line = 1 if row is None else self.format.line_of(self.path, row)
-        return FileError(self.path, problem, line=line, column=column)
-
-    def raw(self, column: Column) -> NDArray[np.float64]:
-        """A column as finite numbers, NaN where a cell is empty."""
-        values = self.columns[column.name]
-        if values.dtype == object:
-            row = next((i for i, value in enumerate(values) if value is not None), 0)
-            got = repr(values[row])[:60]
-            raise self.error(f"a number is needed, got {got}", column.name, row)
-        numbers = np.asarray(values, dtype=np.float64)
-        infinite = np.flatnonzero(np.isinf(numbers))
-        if infinite.size:
-            row = int(infinite[0])
-            problem = f"readings must be finite, got {numbers[row]}; drop the row"
-            raise self.error(problem, column.name, row)
-        return numbers
-
-
-def read_readings(
-    path: str | PathLike[str], signals: Mapping[str, Any] | None = None, topic: str | None = None
-) -> Readings:
-    """All rows of one file with the columns that are known, needed or not.
-
-    For logs without a reference, such as those that a self-calibration starts from.
-
-    Raises
-    ------
-    FileError
-        As `read_runs`, but no column is needed.
-    """
-    wanted = wanted_columns(signals)
-    return _named(Path(path), lambda file: _readings(file, wanted, topic))
-
-
-def _named(path: Path, read: Callable[[Path], T]) -> T:
-    """What ``read`` makes of a file; a pipe is written to a file first, and keeps its name."""
-    found = check_input(path)
-    if stat.S_ISREG(found.st_mode) or (path.is_dir() and (path / "metadata.yaml").is_file()):
-        if found.st_size > RUNS_BYTES:
-            raise FileError(
-                path,
-                f"has {found.st_size} bytes, but a table of runs is read up to "
-                f"{RUNS_BYTES >> 30} GiB; fit_logs (trueangle fit --one-pass) reads more, in "
-                "constant memory",
-            )
-        return read(path)
-    with _spooled(path) as file:
-        try:
-            return read(file)
-        except FileError as error:
-            raise type(error)(path, error.problem, line=error.line, column=error.column) from None
-
-
-@contextmanager
-def _spooled(path: Path) -> Iterator[Path]:
-    data = read_whole(path, RUNS_BYTES, "a table of runs")
-    with tempfile.TemporaryDirectory() as folder:
-        file = Path(folder, os.path.basename(path) or "runs")
-        file.write_bytes(data)
-        yield file
-
-
-def _readings(path: Path, wanted: Mapping[str, Any], topic: str | None) -> Readings:
-    kind = format_of_content(path)
-    header = kind.module.columns(path, topic)
-    doubled = next((name for i, name in enumerate(header) if name and name in header[:i]), None)
-    if doubled is not None:
-        raise FileError(path, "the column appears twice", line=1, column=doubled)
-    roles = find_columns(path, header, wanted)
-    needed = list(dict.fromkeys(column.name for column in roles.values()))
-    others = [name for name in header if name not in needed][:_KEPT]
-    together = getattr(kind.module, "together", None)
-    if together is not None:  # formats whose columns need not be equally long
-        others = together(path, needed, others)
-    labels = {column.name for column in roles.values() if column.role in ("run", "unit")}
-    numeric = _numeric(kind, path, others, topic)
-    try:
-        columns = _joined(kind, path, [*needed, *others], labels | set(others) - numeric, topic)
-    except FileError as error:
-        if error.column not in numeric:
-            raise
-        columns = _joined(kind, path, [*needed, *others], labels | set(others), topic)
-    digest = "" if path.is_dir() else sha256_of(path)
-    return Readings(path, kind, roles, columns, Source(path.name, digest))
-
-
-def _numeric(kind: Format, path: Path, names: list[str], topic: str | None) -> set[str]:
-    """Columns of a text file that look like numbers in its first rows."""
-    if not names or not hasattr(kind.module, "line_of"):
-        return set()
-    first = next(iter(kind.module.read(path, names, topic, texts=names)), {})
-    return {name for name, labels in first.items() if all(map(_is_number, labels.names))}
-
-
-def _is_number(text: str | None) -> bool:
-    """A number that is written as one: 007 is a name."""
-    if text is None:
-        return True
-    return number(text, ",") is not None and not _NUMBERED.match(text)
-
-
-_NUMBERED = re.compile(r"[+-]?0\d")
-
-
-def _joined(
-    kind: Format, path: Path, names: list[str], texts: set[str], topic: str | None
-) -> dict[str, NDArray[Any]]:
-    """Whole columns."""
-    parts: dict[str, list[Any]] = {name: [] for name in names}
-    for batch in kind.module.read(path, names, topic, texts=texts, strict=True):
-        for name in names:
-            parts[name].append(_plain_values(batch, name))
-    return {name: np.concatenate(found) if found else np.empty(0) for name, found in parts.items()}
-
-
-def _plain_values(batch: Batch, name: str) -> NDArray[Any]:
-    """Numbers as they are; texts as objects, since an array of texts is as wide as the longest."""
-    values = batch[name]
-    if isinstance(values, Labels):
-        texts = np.empty(len(values.names) + 1, dtype=object)
-        texts[:-1] = values.names
-        return np.asarray(texts[values.codes])
-    return np.asarray(values)
 
 
 class RunColumns(NamedTuple):
@@ -262,7 +105,7 @@ class RunColumns(NamedTuple):
     reference: NDArray[np.float64]
     indicated: NDArray[np.float64]
     signals: dict[str, NDArray[np.float64]]
-    groups: list[tuple[str | None, str | None, NDArray[np.intp]]]
+    groups: Groups
     left_out: list[int]
     source: Source
 
@@ -278,12 +121,17 @@ def read_columns(
     wanted = wanted_columns(signals)
     indicated = count_turn(counts_per_turn, "counts_per_turn")
     reference = count_turn(counts_per_turn_reference, "counts_per_turn_reference")
-    return _named(
-        Path(path), lambda file: _columns(_readings(file, wanted, topic), indicated, reference)
+    return named(
+        Path(path), lambda file: _columns(readings_of(file, wanted, topic), indicated, reference)
     )
 
 
 def _columns(table: Readings, counts: float | None, reference_counts: float | None) -> RunColumns:
+    asked = {role for role, column in table.roles.items() if column.is_asked}
+    filled = len(next(iter(table.columns.values()))) > 0
+    # A log of an angle called indicated_deg is no table.
+    if len(table.columns) == 1 and filled and table.roles.keys() <= asked & {"indicated"}:
+        return _entries(table, counts)
     roles, path = table.roles, table.path
     for role in ("reference", "indicated"):
         if role not in roles:
@@ -312,6 +160,29 @@ def _columns(table: Readings, counts: float | None, reference_counts: float | No
         left_out.append(rows.size - present.size)
     _warn_of_empty(table, missing, {"reference": reference, "indicated": indicated, **signals})
     return RunColumns(table, period, reference, indicated, signals, groups, left_out, table.source)
+
+
+def _entries(table: Readings, counts: float | None) -> RunColumns:
+    """A table of a turn as firmware holds it: entry i of n is the reading at i/n of a turn."""
+    (name,) = table.columns
+    column = table.roles.get("indicated", Column("indicated", name, None))
+    unit = column.unit or unit_in_name(name, "indicated") or (None if counts is None else "count")
+    if unit is None or (unit == "count" and counts is None):
+        raise table.error(
+            "one column is taken for a table whose entry i of n is the reading at i/n of a turn, "
+            f"and its unit is not known: give --signal indicated={name}:deg (or another unit), or "
+            "--counts-per-turn; or name the file's reference column",
+            name,
+        )
+    indicated = column._replace(unit=unit).values(table.raw(column), _PERIOD, counts)
+    reference = np.linspace(0.0, _PERIOD, indicated.size, endpoint=False, dtype=np.float64)
+    rows = np.flatnonzero(~np.isnan(indicated))
+    if not rows.size:
+        raise FileError(table.path, "has a header but no readings", line=1)
+    left_out = indicated.size - rows.size
+    _warn_of_empty(table, np.isnan(indicated), {"indicated": indicated})
+    groups: Groups = [(None, None, rows)]
+    return RunColumns(table, _PERIOD, reference, indicated, {}, groups, [left_out], table.source)
 
 
 def _runs(found: RunColumns) -> list[CalibrationRun]:
@@ -354,10 +225,14 @@ def _warn_of_empty(
         line = table.format.line_of(table.path, row)
         warnings.warn(
             f"{table.path}: {count} of {missing.size} rows have an empty cell and are left out, "
-            f"the first at line {line}, column '{table.roles[role].name}'",
+            f"the first at line {line}, column '{_column_of(table, role)}'",
             EmptyCellsWarning,
             stacklevel=5,
         )
+
+
+def _column_of(table: Readings, role: str) -> str:
+    return table.roles[role].name if role in table.roles else next(iter(table.columns))
 
 
 def _refuse_missing(table: Readings, role: str) -> None:
@@ -415,7 +290,7 @@ def _angles(
     )
 
 
-def _groups(table: Readings, size: int) -> list[tuple[str | None, str | None, NDArray[np.intp]]]:
+def _groups(table: Readings, size: int) -> Groups:
     """Unit, label and rows of every run, in the order of their first row."""
     names = {role: table.roles[role].name for role in ("unit", "run") if role in table.roles}
     if not names:

@@ -314,6 +314,35 @@ def _make_hdf5(folder: Path, rng: random.Random) -> Path:
     return _damaged(path, rng)
 
 
+def _make_npz(folder: Path, rng: random.Random) -> Path:
+    path = folder / "log.npz"
+    columns = {name: np.array(values) for name, values in _columns().items()}
+    name = rng.choice(list(columns))
+    columns[name] = rng.choice((columns[name], columns[name][:5], columns[name][:, None]))
+    rng.choice((np.savez, np.savez_compressed))(path, **columns)
+    return _damaged(path, rng)
+
+
+def _make_npy(folder: Path, rng: random.Random) -> Path:
+    path = folder / "log.npy"
+    columns = {k: np.array(v) for k, v in _columns().items() if k != rng.choice(("run", "note"))}
+    table = np.empty(_ROWS, dtype=[(name, values.dtype) for name, values in columns.items()])
+    for name, values in columns.items():
+        table[name] = values
+    np.save(path, rng.choice((table, columns["indicated_deg"], np.eye(4))))
+    return _damaged(path, rng)
+
+
+def _make_matlab(folder: Path, rng: random.Random) -> Path:
+    from scipy.io import savemat
+
+    path = folder / "log.mat"
+    columns = {name: np.array(values) for name, values in _columns().items()}
+    nested = {"rig": columns, "indicated_deg": columns["indicated_deg"]}
+    savemat(path, rng.choice((columns, nested)), do_compression=rng.random() < 0.5)
+    return _damaged(path, rng)
+
+
 def _make_mdf(folder: Path, rng: random.Random) -> Path:
     from asammdf import MDF, Signal
 
@@ -409,6 +438,13 @@ def loaders() -> dict[str, Loader]:
         ]
     if _has("h5py"):
         found += [Loader("log-hdf5", _make_hdf5, _use_log)]
+    found += [
+        Loader("runs-npz", _make_npz, _use_runs),
+        Loader("log-npz", _make_npz, _use_log),
+        Loader("log-npy", _make_npy, _use_log),
+    ]
+    if _has("scipy"):
+        found += [Loader("log-matlab", _make_matlab, _use_log)]
     if _has("asammdf"):
         found += [Loader("log-mdf", _make_mdf, _use_log)]
     if _has("rosbags"):

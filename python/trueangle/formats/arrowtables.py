@@ -201,8 +201,10 @@ def labels(column: pa.Array | pa.ChunkedArray) -> Labels:
     if not pa.types.is_dictionary(column.type):
         column = column.dictionary_encode()
     names = column.dictionary.to_pylist()
-    codes = column.indices.fill_null(len(names))
-    return Labels(codes.to_numpy(zero_copy_only=False).astype(np.intp), [*names, None])
+    codes = column.indices.fill_null(len(names)).to_numpy(zero_copy_only=False).astype(np.intp)
+    if codes.size and not 0 <= int(codes.min()) <= int(codes.max()) <= len(names):
+        raise pa.ArrowInvalid("indices beyond their dictionary")
+    return Labels(codes, [*names, None])
 
 
 def _is_label(kind: pa.DataType) -> bool:

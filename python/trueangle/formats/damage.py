@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 from collections.abc import Iterator
 from contextlib import contextmanager
 
@@ -27,7 +28,8 @@ def damage_told(path: object, name: str, hint: str = "") -> Iterator[None]:
             path, "asks for more memory than there is: it is damaged, or its parts are too large"
         ) from None
     except OSError as cause:
-        if cause.errno is not None and cause.errno > 0:
+        # An invalid argument is a place that a damaged file named.
+        if cause.errno is not None and cause.errno > 0 and cause.errno != errno.EINVAL:
             raise
         raise FileError(path, f"is damaged or not {name}: {_told(cause)}{hint}") from cause
     except Exception as cause:

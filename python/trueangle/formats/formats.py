@@ -19,8 +19,9 @@ FORMATS = (
         (".h5", ".hdf5", ".hdf", ".he5", ".mat", ".nc"),
         "hdf5",
         "hdf5",
-        magics=(b"\x89HDF\r\n\x1a\n",),
+        magics=(b"\x89HDF\r\n\x1a\n", b"MATLAB 7.3"),
     ),
+    Format("MATLAB", (".mat",), "matlab", "matlab", magics=(b"MATLAB 5.0",)),
     Format(
         "ROS bag",
         (".bag", ".db3", ".mcap"),
@@ -30,6 +31,7 @@ FORMATS = (
         magics=(b"#ROSBAG", b"SQLite format 3", b"\x89MCAP"),
     ),
     Format("MDF4", (".mf4", ".mdf"), "mdf", "mdf", magics=(b"MDF     ", b"UnFinMF ")),
+    Format("numpy array", (".npy",), "npy", magics=(b"\x93NUMPY",)),
     Format("numpy archive", (".npz",), "npz", magics=(b"PK\x03\x04",)),
     Format("CSV", (".csv", ".tsv", ".txt"), "csvfile"),
 )
@@ -58,14 +60,22 @@ def known_format(path: Path) -> Format | None:
     ending = path.suffix.lower()
     if path.is_dir():
         ending = ".db3" if (path / "metadata.yaml").is_file() else "/"
-    return next((entry for entry in FORMATS if ending in entry.endings), None)
+    found = [entry for entry in FORMATS if ending in entry.endings]
+    if len(found) > 1 and path.is_file():  # MATLAB's ending stands for two formats
+        head = _head(path)
+        found.sort(key=lambda entry: not head.startswith(entry.magics))
+    return found[0] if found else None
+
+
+def _head(path: Path) -> bytes:
+    with path.open("rb") as file:
+        return file.read(_HEAD)
 
 
 def format_of_content(path: Path) -> Format:
     """Format of ``path`` by its first bytes, else by its ending, else text."""
     if not path.is_dir():
-        with path.open("rb") as file:
-            head = file.read(_HEAD)
+        head = _head(path)
         for entry in FORMATS:
             if head.startswith(entry.magics):
                 return entry

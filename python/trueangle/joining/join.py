@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from ..angles import ARCSEC_PER_TURN
 from ..columns import count_turn, matching
 from ..errors import ArgumentError, FileError
-from ..runfiles import Readings, read_readings
+from ..readings import Readings, read_readings
 from ..runs import CalibrationRun
 from ..signals import FIELDS
 from .clocks import Clocks, estimated_clocks

@@ -1,0 +1,146 @@
+"""MATLAB files up to v7: variables that are vectors; copies get further variables at the end."""
+
+from __future__ import annotations
+
+import io
+import zlib
+from collections.abc import Collection, Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.io import loadmat, savemat
+
+from ..errors import FileError
+from .damage import damage_told
+from .format import TEXTS, Batch, Choose, Contents, Watch, note, row_labels
+
+__all__ = ["columns", "contents", "copy", "read", "together"]
+
+#: Bytes of the header of a file, whose last two tell the order of bytes.
+_HEADER = 128
+#: Variable of a copy that tells how its corrected ones were made.
+_NOTE = "trueangle_note"
+
+
+def columns(path: Path, topic: str | None = None) -> list[str]:
+    """Names of the variables that are vectors, fields of structures as ``structure/field``."""
+    return list(_vectors(path))
+
+
+def together(path: Path, needed: Sequence[str], others: Sequence[str]) -> list[str]:
+    """Those of ``others`` that are as long as the variables ``needed``."""
+    found = _vectors(path)
+    sizes = {len(found[name]) for name in needed}
+    return [name for name in others if len(found[name]) in sizes]
+
+
+def read(
+    path: Path,
+    names: Sequence[str],
+    topic: str | None = None,
+    stretch: None = None,
+    *,
+    texts: Collection[str] = TEXTS,
+    strict: bool = False,
+) -> Iterator[Batch]:
+    """Variables ``names`` as one batch: this format has no parts; see `format.FormatModule`."""
+    found = _vectors(path)
+    sizes = {name: len(found[name]) for name in names}
+    if len(set(sizes.values())) > 1:
+        listed = ", ".join(f"{name} {size}" for name, size in sizes.items())
+        raise FileError(path, f"variables that belong together differ in length: {listed}")
+    yield {name: _values(found[name]) for name in names}
+
+
+def copy(
+    source: Path,
+    target: Path,
+    choose: Choose,
+    watch: Watch,
+    topic: str | None = None,
+    output_topic: str | None = None,
+) -> Contents:
+    """Write ``target`` with the corrected variables; see `format.FormatModule`.
+
+    The bytes of the source stay as they are.
+    """
+    data = source.read_bytes()
+    if data[_HEADER - 2 : _HEADER] != b"IM":
+        raise FileError(
+            source,
+            "has a damaged header or its bytes the other way round; save it with -v7 or -v7.3",
+        )
+    found = _vectors(source)
+    additions = choose(list(found))
+    made: dict[str, Any] = {}
+    rows = 0
+    for addition in additions:
+        column = found[addition.column]
+        signals = {signal: _values(found[name]) for signal, name in addition.signals.items()}
+        after = addition.correct(_values(column), signals)
+        name = addition.added.replace("/", "_")
+        if name in found:
+            raise FileError(source, "is there already: corrected before", column=name)
+        made[name] = after[:, None]
+        rows = max(rows, len(column))
+        watch(len(column), 1.0)
+    extra = io.BytesIO()
+    savemat(extra, {**made, _NOTE: note(additions)}, do_compression=False, long_field_names=True)
+    with target.open("wb") as file:
+        file.write(data)
+        file.write(extra.getvalue()[_HEADER:])
+    sums = {"source": f"{zlib.crc32(data):08x}:{len(data)}"}
+    return Contents(rows, sums | {name: _sum(values) for name, values in made.items()})
+
+
+def contents(path: Path, topic: str | None = None) -> Contents:
+    """Checksums of the corrected variables and of all bytes before them."""
+    data = path.read_bytes()
+    found = {name: values for name, values in _vectors(path).items() if "corrected" in name}
+    extra = io.BytesIO()
+    with damage_told(path, "a MATLAB file"):
+        variables = loadmat(path, variable_names=[*found, _NOTE])
+    kept = {name: variables[name] for name in found}
+    savemat(extra, {**kept, _NOTE: str(variables[_NOTE][0])}, long_field_names=True)
+    size = len(data) - (len(extra.getvalue()) - _HEADER)
+    sums = {"source": f"{zlib.crc32(data[:size]):08x}:{size}"}
+    rows = max((len(values) for values in found.values()), default=0)
+    return Contents(rows, sums | {name: _sum(kept[name]) for name in kept})
+
+
+def _sum(values: NDArray[Any]) -> str:
+    return f"{zlib.crc32(np.ascontiguousarray(values).tobytes()):08x}"
+
+
+def _vectors(path: Path) -> dict[str, NDArray[Any]]:
+    with damage_told(path, "a MATLAB file", "; save it again, with -v7 or -v7.3"):
+        variables = loadmat(path, struct_as_record=True, squeeze_me=False, chars_as_strings=True)
+    found: dict[str, NDArray[Any]] = {}
+    for name, value in variables.items():
+        if not name.startswith("__") and name != _NOTE:
+            _add(found, name, value)
+    return found
+
+
+def _add(found: dict[str, NDArray[Any]], name: str, value: Any) -> None:
+    if not isinstance(value, np.ndarray):
+        return
+    if value.dtype.names is not None and value.size == 1:
+        for field in value.dtype.names:
+            _add(found, f"{name}/{field}", value[field].reshape(-1)[0])
+    elif value.dtype.kind in "fiu" and value.size > 1 and max(value.shape) == value.size:
+        found[name] = value.reshape(-1)
+    elif value.dtype.kind == "U" and value.ndim == 1 and value.size > 1:
+        found[name] = value
+    elif value.dtype.hasobject and value.size > 1 and max(value.shape) == value.size:
+        cells = [np.asarray(cell).reshape(-1) for cell in value.reshape(-1)]
+        if all(cell.size == 1 and cell.dtype.kind == "U" for cell in cells):
+            found[name] = np.array([str(cell[0]) for cell in cells], dtype=object)
+
+
+def _values(vector: NDArray[Any]) -> Any:
+    if vector.dtype.kind in "UO":
+        return row_labels([str(text).strip() for text in vector])
+    return vector.astype(vector.dtype.newbyteorder("="), copy=False)

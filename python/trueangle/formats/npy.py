@@ -1,0 +1,131 @@
+"""One array of numpy (.npy): a column, several side by side, or records with names."""
+
+from __future__ import annotations
+
+import zlib
+from collections.abc import Collection, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.lib.format import open_memmap
+from numpy.typing import NDArray
+
+from ..errors import FileError
+from .damage import damage_told
+from .format import TEXTS, Addition, Batch, Choose, Contents, Watch, row_labels
+
+__all__ = ["columns", "contents", "copy", "read"]
+
+#: Readings taken together.
+_BLOCK = 1 << 18
+
+
+def columns(path: Path, topic: str | None = None) -> list[str]:
+    """Names of the fields, else ``column1``, ``column2`` and so on."""
+    with _opened(path) as array:
+        return _names(array)
+
+
+def read(
+    path: Path,
+    names: Sequence[str],
+    topic: str | None = None,
+    stretch: None = None,
+    *,
+    texts: Collection[str] = TEXTS,
+    strict: bool = False,
+) -> Iterator[Batch]:
+    """Columns ``names`` in batches; see `format.FormatModule`."""
+    with _opened(path) as array:
+        for start in range(0, len(array), _BLOCK):
+            part = array[start : start + _BLOCK]
+            yield {name: _values(part, array, name) for name in names}
+
+
+def copy(
+    source: Path,
+    target: Path,
+    choose: Choose,
+    watch: Watch,
+    topic: str | None = None,
+    output_topic: str | None = None,
+) -> Contents:
+    """Write ``target`` with the corrected columns last; see `format.FormatModule`.
+
+    Records get further fields; plain columns become those of one table, whose order is kept.
+    """
+    with _opened(source) as array:
+        additions = choose(_names(array))
+        kind, width = _enlarged(array, additions)
+        shape = (len(array),) if kind.names else (len(array), width + len(additions))
+        made = open_memmap(target, "w+", kind, shape)
+        check = 0
+        for start in range(0, len(array), _BLOCK):
+            part = array[start : start + _BLOCK]
+            put = made[start : start + _BLOCK]
+            if kind.names:
+                for name in array.dtype.names or ():
+                    put[name] = part[name]
+            else:
+                put[:, :width] = part.reshape(len(part), -1)
+            for i, addition in enumerate(additions):
+                signals = {s: _values(part, array, n) for s, n in addition.signals.items()}
+                after = addition.correct(_values(part, array, addition.column), signals)
+                put[addition.added if kind.names else (slice(None), width + i)] = after
+            check = zlib.crc32(np.ascontiguousarray(put).tobytes(), check)
+            watch(len(part), (start + len(part)) / len(array))
+        made.flush()
+        return Contents(len(array), {"bytes": f"{check:08x}"})
+
+
+def contents(path: Path, topic: str | None = None) -> Contents:
+    """Rows and a checksum of the array as it reads back."""
+    check = 0
+    with _opened(path) as array:
+        for start in range(0, len(array), _BLOCK):
+            part = np.ascontiguousarray(array[start : start + _BLOCK])
+            check = zlib.crc32(part.tobytes(), check)
+        return Contents(len(array), {"bytes": f"{check:08x}"})
+
+
+@contextmanager
+def _opened(path: Path) -> Iterator[NDArray[Any]]:
+    """The array in mapped memory, its errors told with its name."""
+    with damage_told(path, "an array of numpy"):
+        array = np.load(path, mmap_mode="r", allow_pickle=False)
+        if not isinstance(array, np.ndarray) or array.ndim not in (1, 2) or not array.size:
+            raise FileError(path, "one column, or several side by side, are needed")
+        if array.ndim == 2 and array.shape[0] == 1:
+            array = array.T  # a row is a column
+        if array.dtype.names is None and array.dtype.kind not in "fiu":
+            raise FileError(path, f"numbers are needed, the array holds {array.dtype}")
+        yield array
+
+
+def _names(array: NDArray[Any]) -> list[str]:
+    if array.dtype.names is not None:
+        return list(array.dtype.names)
+    return [f"column{i + 1}" for i in range(1 if array.ndim == 1 else array.shape[1])]
+
+
+def _values(part: NDArray[Any], array: NDArray[Any], name: str) -> Any:
+    if array.dtype.names is not None:
+        values = np.asarray(part[name])
+        if values.dtype.kind in "SU":
+            texts = [v.decode("utf-8", "replace") if isinstance(v, bytes) else v for v in values]
+            return row_labels([str(text) for text in texts])
+    else:
+        values = np.asarray(part.reshape(len(part), -1)[:, _names(array).index(name)])
+    return np.ascontiguousarray(values.astype(values.dtype.newbyteorder("="), copy=False))
+
+
+def _enlarged(array: NDArray[Any], additions: Sequence[Addition]) -> tuple[np.dtype[Any], int]:
+    """Type of the copy, and its columns before the added ones."""
+    if array.dtype.names is not None:
+        fields: list[Any] = [(name, array.dtype.fields[name][0]) for name in array.dtype.names]  # type: ignore[index]
+        return np.dtype([*fields, *((a.added, "<f8") for a in additions)]), 0
+    width = 1 if array.ndim == 1 else array.shape[1]
+    single = array.dtype.newbyteorder("=") == np.float32
+    return np.dtype(np.float32 if single else np.float64), width

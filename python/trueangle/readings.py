@@ -1,0 +1,180 @@
+"""All readings of one file, of any format, before they are runs."""
+
+from __future__ import annotations
+
+import os
+import re
+import stat
+import tempfile
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from os import PathLike
+from pathlib import Path
+from typing import Any, NamedTuple, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .columns import Column, find_columns, wanted_columns
+from .errors import FileError
+from .files import RUNS_BYTES, check_input, read_whole, sha256_of
+from .formats.csvheader import number
+from .formats.format import Batch, Format, Labels
+from .formats.formats import format_of_content
+from .runs import Source
+
+__all__ = ["Readings", "named", "read_readings", "readings_of"]
+
+T = TypeVar("T")
+
+#: Columns that are kept although nothing is known of them, at most: a wide log has thousands.
+_KEPT = 256
+
+
+class Readings(NamedTuple):
+    """Rows of one file as they are, before they are runs.
+
+    Attributes
+    ----------
+    path : Path
+    format : Format
+    roles : dict of str to Column
+        What is known of the columns.
+    columns : dict of str to array
+        By name; texts as arrays of objects.
+    source : Source
+    """
+
+    path: Path
+    format: Format
+    roles: dict[str, Column]
+    columns: dict[str, NDArray[Any]]
+    source: Source
+
+    def error(self, problem: str, column: str | None = None, row: int | None = None) -> FileError:
+        """The error that says ``problem`` of a column, at the line of a row."""
+        line = 1 if row is None else self.format.line_of(self.path, row)
+        return FileError(self.path, problem, line=line, column=column)
+
+    def raw(self, column: Column) -> NDArray[np.float64]:
+        """A column as finite numbers, NaN where a cell is empty."""
+        values = self.columns[column.name]
+        if values.dtype == object:
+            row = next((i for i, value in enumerate(values) if value is not None), 0)
+            got = repr(values[row])[:60]
+            raise self.error(f"a number is needed, got {got}", column.name, row)
+        numbers = np.asarray(values, dtype=np.float64)
+        infinite = np.flatnonzero(np.isinf(numbers))
+        if infinite.size:
+            row = int(infinite[0])
+            problem = f"readings must be finite, got {numbers[row]}; drop the row"
+            raise self.error(problem, column.name, row)
+        return numbers
+
+
+def read_readings(
+    path: str | PathLike[str], signals: Mapping[str, Any] | None = None, topic: str | None = None
+) -> Readings:
+    """All rows of one file with the columns that are known, needed or not.
+
+    For logs without a reference, such as those that a self-calibration starts from.
+
+    Raises
+    ------
+    FileError
+        As `read_runs`, but no column is needed.
+    """
+    wanted = wanted_columns(signals)
+    return named(Path(path), lambda file: readings_of(file, wanted, topic))
+
+
+def named(path: Path, read: Callable[[Path], T]) -> T:
+    """What ``read`` makes of a file; a pipe is written to a file first, and keeps its name."""
+    found = check_input(path)
+    if stat.S_ISREG(found.st_mode) or (path.is_dir() and (path / "metadata.yaml").is_file()):
+        if found.st_size > RUNS_BYTES:
+            raise FileError(
+                path,
+                f"has {found.st_size} bytes, but a table of runs is read up to "
+                f"{RUNS_BYTES >> 30} GiB; fit_logs (trueangle fit --one-pass) reads more, in "
+                "constant memory",
+            )
+        return read(path)
+    with _spooled(path) as file:
+        try:
+            return read(file)
+        except FileError as error:
+            raise type(error)(path, error.problem, line=error.line, column=error.column) from None
+
+
+@contextmanager
+def _spooled(path: Path) -> Iterator[Path]:
+    data = read_whole(path, RUNS_BYTES, "a table of runs")
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder, os.path.basename(path) or "runs")
+        file.write_bytes(data)
+        yield file
+
+
+def readings_of(path: Path, wanted: Mapping[str, Any], topic: str | None) -> Readings:
+    """All rows of a regular file; ``wanted`` as `columns.wanted_columns` makes it."""
+    kind = format_of_content(path)
+    header = kind.module.columns(path, topic)
+    doubled = next((name for i, name in enumerate(header) if name and name in header[:i]), None)
+    if doubled is not None:
+        raise FileError(path, "the column appears twice", line=1, column=doubled)
+    roles = find_columns(path, header, wanted)
+    needed = list(dict.fromkeys(column.name for column in roles.values()))
+    others = [name for name in header if name not in needed][:_KEPT]
+    together = getattr(kind.module, "together", None)
+    if together is not None:  # formats whose columns need not be equally long
+        others = together(path, needed, others)
+    labels = {column.name for column in roles.values() if column.role in ("run", "unit")}
+    numeric = _numeric(kind, path, others, topic)
+    try:
+        columns = _joined(kind, path, [*needed, *others], labels | set(others) - numeric, topic)
+    except FileError as error:
+        if error.column not in numeric:
+            raise
+        columns = _joined(kind, path, [*needed, *others], labels | set(others), topic)
+    digest = "" if path.is_dir() else sha256_of(path)
+    return Readings(path, kind, roles, columns, Source(path.name, digest))
+
+
+def _numeric(kind: Format, path: Path, names: list[str], topic: str | None) -> set[str]:
+    """Columns of a text file that look like numbers in its first rows."""
+    if not names or not hasattr(kind.module, "line_of"):
+        return set()
+    first = next(iter(kind.module.read(path, names, topic, texts=names)), {})
+    return {name for name, labels in first.items() if all(map(_is_number, labels.names))}
+
+
+def _is_number(text: str | None) -> bool:
+    """A number that is written as one: 007 is a name."""
+    if text is None:
+        return True
+    return number(text, ",") is not None and not _NUMBERED.match(text)
+
+
+_NUMBERED = re.compile(r"[+-]?0\d")
+
+
+def _joined(
+    kind: Format, path: Path, names: list[str], texts: set[str], topic: str | None
+) -> dict[str, NDArray[Any]]:
+    """Whole columns."""
+    parts: dict[str, list[Any]] = {name: [] for name in names}
+    for batch in kind.module.read(path, names, topic, texts=texts, strict=True):
+        for name in names:
+            parts[name].append(_plain_values(batch, name))
+    return {name: np.concatenate(found) if found else np.empty(0) for name, found in parts.items()}
+
+
+def _plain_values(batch: Batch, name: str) -> NDArray[Any]:
+    """Numbers as they are; texts as objects, since an array of texts is as wide as the longest."""
+    values = batch[name]
+    if isinstance(values, Labels):
+        texts = np.empty(len(values.names) + 1, dtype=object)
+        texts[:-1] = values.names
+        return np.asarray(texts[values.codes])
+    return np.asarray(values)
