@@ -31,6 +31,7 @@ from .missed_counts import MissedCounts as MissedCounts
 from .zero_slip import ZeroSlip as ZeroSlip
 from .drift_within_run import DriftWithinRun as DriftWithinRun
 from .non_integer_order import NonIntegerOrder as NonIntegerOrder
+from .time_periodic import TimePeriodic as TimePeriodic
 from .outliers import Outliers as Outliers
 from .heteroscedastic_noise import HeteroscedasticNoise as HeteroscedasticNoise
 # ruff: isort: on

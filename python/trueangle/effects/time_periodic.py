@@ -1,0 +1,272 @@
+"""A line of fixed frequency in time, with a new phase in every run."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..joint.pattern import Surroundings, line_columns
+from ..joint.signals import Signals
+from ..regression.estimate import Parameters, quantity
+from ..regression.extension import Extension
+from ..regression.regression import Regression
+from .blindness import Blindness
+from .drift_within_run import DriftWithinRun
+from .effect import ALWAYS, Effect
+from .missing_order import MissingOrder
+from .non_integer_order import NonIntegerOrder
+from .search import Array, Fitted, golden_maximum
+
+__all__ = ["TimePeriodic"]
+
+#: Trial frequencies per resolution cell (one over the length of a run), and at most.
+OVERSAMPLING = 3
+MOST_TRIALS = 2**17
+
+#: Bins of time per period of the highest frequency: the quick search then loses 2 % there.
+BINS = 8
+
+#: Cycles that a run must show: fewer are a bend, not a line.
+LEAST_CYCLES = 3.0
+
+#: Share of its frequency by which a line may differ from run to run (a converter's clock).
+WANDER = 0.015
+
+#: Readings that a run must have to be searched.
+LEAST_READINGS = 16
+
+#: Orders of the fastest shaft beyond which no bearing has lines: at one speed a line up
+#: there is one of time.
+BEARINGS = 12.0
+
+#: Share of its level by which the speed must change to tell a line in time from an order.
+ONE_SPEED = 0.1
+
+#: Share of a resolution cell within which an order and a frequency are hardly told apart.
+UNRESOLVED = 0.5
+
+
+@dataclass(frozen=True)
+class TimePeriodic(Effect):
+    r"""A disturbance of fixed frequency: :math:`\varepsilon = C \sin(2\pi f t + \varphi_j)`.
+
+    Parameters
+    ----------
+    frequency_hz : float
+        f, or the frequency it appears at where the sampling folds it.
+    amplitude_arcsec : float
+    """
+
+    frequency_hz: float
+    amplitude_arcsec: float
+
+    kind: ClassVar[str] = "time_periodic"
+    sentence: ClassVar[str] = (
+        "Mains, a converter's clock, vibration or the alias of one of them: a line of fixed "
+        "frequency in time, at every speed and at rest, with another phase in every run."
+    )
+    needs: ClassVar[tuple[str, ...]] = ("time",)
+    factor: ClassVar[str] = "run"
+    confused_with: ClassVar[Mapping[type[Effect], str]] = {
+        MissingOrder: "a second speed, or several runs that start at one angle",
+        DriftWithinRun: "longer runs",
+        NonIntegerOrder: "a second speed: an order moves in hertz, a line in time does not",
+    }
+    measure: ClassVar[str] = "time stamps, several runs, two speeds or a record at rest"
+    transfers: ClassVar[bool] = False
+    flexible_below: ClassVar[float] = ALWAYS
+    not_at_run_time: ClassVar[str] = "its phase is new in every run; shield or filter its source"
+
+    def signal(self, signals: Signals, around: Surroundings, rng: np.random.Generator) -> Array:
+        phase = rng.uniform(0.0, 2.0 * np.pi, signals.runs)[signals.run]
+        turn = 2.0 * np.pi * self.frequency_hz * signals.clock
+        return np.asarray(self.amplitude_arcsec * np.sin(turn + phase))
+
+    @classmethod
+    def propose(cls, regression: Regression) -> Extension | None:
+        if regression.signals.time is None or regression.has(cls.kind):
+            return None
+        found = _periodogram(regression)
+        if found is None:
+            return None
+        frequencies, p, sizes = found
+        tried = [_fixed(frequencies, p, sizes), _wandering(frequencies, p)]
+        best: Extension | None = None
+        for place, deviance, log_grid in tried:
+            if regression.hopeless(deviance, 1, log_grid):
+                continue
+            shape = {"frequency_hz": frequencies[place].tolist()}
+            step = frequencies[1] - frequencies[0]
+            shape["frequency_hz"] = _refined(regression, shape["frequency_hz"], float(step))
+            waves = cls.waves(regression.signals, shape["frequency_hz"])
+            extension = regression.propose_run_effect(cls.kind, shape, waves, log_grid)
+            if best is None or extension.bic_gain > best.bic_gain:
+                best = extension
+        if best is None or best.bic_gain <= 0.0 or cls._keeps_phase(regression, best):
+            return None
+        return best
+
+    @staticmethod
+    def waves(signals: Signals, frequencies: Sequence[float]) -> Array:
+        """Cosine and sine of the line in every run, shape (n, 2)."""
+        _, run = np.unique(signals.run, return_inverse=True)
+        turn = 2.0 * np.pi * np.asarray(frequencies)[run] * signals.clock
+        return np.column_stack([np.cos(turn), np.sin(turn)])
+
+    @staticmethod
+    def _keeps_phase(regression: Regression, found: Extension) -> bool:
+        """An order of the angle with one phase for all runs explains as much of it.
+
+        Phases that are new in each of R runs leave a share of 1/R to one phase for all.
+        """
+        signals = regression.signals
+        speed = float(np.median(np.abs(signals.turns_per_s)))
+        if speed == 0.0:
+            return False
+        order = float(np.median(found.shape["frequency_hz"])) / speed
+        near = max(UNRESOLVED / max(float(np.median(signals.run_turns())), 1e-9), WANDER * order)
+        orders = regression.lines.orders
+        known = np.concatenate([orders, regression.around.pattern.orders])
+        share = 0.5 + 1.0 / signals.runs
+        return any(
+            regression.gain(line_columns(signals.theta, float(m)))[0] > share * found.deviance
+            for m in known[np.abs(known - order) < near]
+        )
+
+    @classmethod
+    def report(
+        cls, regression: Regression, terms: Sequence[Fitted]
+    ) -> tuple[Parameters, list[Effect]]:
+        extension = terms[0][0]
+        assert extension.run_effect is not None
+        frequencies = np.array(extension.shape["frequency_hz"])
+        frequency = float(np.median(frequencies))
+        amplitude = float(np.sqrt(2.0 * extension.run_effect.ratio * regression.variance))
+        noise = float(np.sqrt(2.0 * regression.variance / regression.n))
+        spans = [np.ptp(regression.signals.clock[a:b]) for a, b in regression.bounds]
+        span = max(float(np.median(spans)), 1e-300)
+        std = 0.780 * noise / np.sqrt(2.0) / max(amplitude, 1e-12) / span
+        runs = frequencies.size
+        parameters = {
+            "frequency_hz": quantity(frequency, max(std, float(frequencies.std()) / runs**0.5)),
+            "amplitude_arcsec": quantity(
+                amplitude, float(np.hypot(noise, amplitude / np.sqrt(4.0 * runs)))
+            ),
+        }
+        if np.ptp(frequencies) > 0.0:
+            parameters["frequencies_hz"] = quantity(frequencies)
+        return parameters, [TimePeriodic(frequency, amplitude)]
+
+    @classmethod
+    def blind_spots(cls, regression: Regression, found: Sequence[Blindness]) -> Iterator[Blindness]:
+        signals = regression.signals
+        if signals.time is None:
+            yield cls.blind("no time stamps were recorded")
+
+    @classmethod
+    def doubt(
+        cls, extension: Extension, regression: Regression, spots: Sequence[Blindness]
+    ) -> Blindness | None:
+        if extension.cause != cls.kind or regression.signals.velocity is None:
+            return None
+        speed = np.abs(regression.signals.turns_per_s)
+        moving = speed[speed > 0.0]
+        level = float(np.median(moving)) if moving.size else 0.0
+        if not level or np.percentile(moving, 90) - np.percentile(moving, 10) > ONE_SPEED * level:
+            return None
+        order = float(np.median(extension.shape["frequency_hz"])) / level
+        if order > BEARINGS * max(regression.belief.joint.shafts.values()):
+            return None
+        return cls.blind(
+            f"one speed: a line of {order * level:.4g} Hz and one of order {order:.4g} with a "
+            "phase of its own in every run are the same",
+            NonIntegerOrder,
+        )
+
+
+def _periodogram(
+    regression: Regression,
+) -> tuple[Array, Array, Array] | None:
+    """Frequencies, normalised power (frequency, run) of what is left, readings per run."""
+    signals, bounds = regression.signals, regression.bounds
+    sizes = np.array([stop - start for start, stop in bounds], dtype=np.float64)
+    spans = np.array([float(np.ptp(signals.clock[a:b])) for a, b in bounds])
+    if sizes.min() < LEAST_READINGS or spans.min() <= 0.0:
+        return None
+    span = float(np.median(spans))
+    top = 0.5 * float(np.median((sizes - 1.0) / spans))
+    step = 1.0 / (OVERSAMPLING * span)
+    count = min(int(top / step), MOST_TRIALS)
+    low = int(np.ceil(LEAST_CYCLES / span / step))
+    if count <= low + 2:
+        return None
+    # Bins of a time that wraps after one over the step: exact at multiples of the step.
+    bins = 1 << int(np.ceil(np.log2(BINS * count)))
+    e = regression.left - regression.whiten.run_part(regression.left)
+    e = np.where(regression.outlying, 0.0, e)
+    power = np.empty((count - low, len(bounds)))
+    for j, (start, stop) in enumerate(bounds):
+        clock = signals.clock[start:stop]
+        part = e[start:stop]
+        place = np.round((clock - clock[0]) * step * bins).astype(np.int64) % bins
+        wave = np.fft.rfft(np.bincount(place, part - part.mean(), minlength=bins))[low:count]
+        power[:, j] = wave.real**2 + wave.imag**2
+    # The sum of the two squared normalised coefficients in a run, 2 on average.
+    p = 2.0 * power / (sizes * regression.variance)
+    return np.asarray(step * np.arange(low, count)), p, sizes
+
+
+def _fixed(frequencies: Array, p: Array, sizes: Array) -> tuple[NDArray[np.int64], float, float]:
+    """Places of one frequency for all runs, its deviance and the price of the search."""
+    best = np.zeros(frequencies.size)
+    for ratio in np.geomspace(1e-3, 1e3, 13):
+        x = ratio * sizes
+        deviance = (p * (x / (2.0 + x))).sum(axis=1) - 2.0 * np.log1p(x / 2.0).sum()
+        best = np.maximum(best, deviance)
+    k = int(np.argmax(best))
+    log_grid = float(np.log(2.0 * frequencies.size / OVERSAMPLING))
+    return np.full(sizes.size, k), float(best[k]), log_grid
+
+
+def _wandering(frequencies: Array, p: Array) -> tuple[NDArray[np.int64], float, float]:
+    """Places of a frequency that differs a little from run to run."""
+    best = (np.zeros(p.shape[1], dtype=np.int64), -np.inf, 0.0)
+    middle = float(frequencies[0]) * (1.0 + WANDER)
+    bands = np.log(frequencies[-1] / frequencies[0]) / WANDER
+    while middle < frequencies[-1]:
+        low, high = np.searchsorted(frequencies, middle * np.array([1.0 - WANDER, 1.0 + WANDER]))
+        if high - low > OVERSAMPLING:
+            band = p[low:high]
+            cells = (high - low) / OVERSAMPLING
+            deviance = float(band.max(axis=0).sum())
+            log_grid = float(np.log(2.0 * bands) + p.shape[1] * np.log(cells))
+            if deviance - 2.0 * log_grid > best[1] - 2.0 * best[2]:
+                best = (low + band.argmax(axis=0), deviance, log_grid)
+        middle *= 1.0 + WANDER
+    return best
+
+
+def _refined(regression: Regression, frequencies: list[float], step: float) -> list[float]:
+    """Frequencies between the trial ones: one for all runs, or one a run."""
+    e = regression.left - regression.whiten.run_part(regression.left)
+    e = np.where(regression.outlying, 0.0, e)
+
+    def power(f: float, runs: Sequence[tuple[int, int]]) -> float:
+        turn = -2j * np.pi * f
+        return sum(
+            float(np.abs(e[a:b] @ np.exp(turn * regression.signals.clock[a:b])) ** 2)
+            for a, b in runs
+        )
+
+    if len({*frequencies}) == 1:
+        f = frequencies[0]
+        found, _ = golden_maximum(lambda x: power(x, regression.bounds), f - step, f + step, 12)
+        return [float(found)] * len(frequencies)
+    return [
+        float(golden_maximum(lambda x, r=run: power(x, [r]), f - step, f + step, 10)[0])  # type: ignore[misc]
+        for f, run in zip(frequencies, regression.bounds, strict=True)
+    ]
