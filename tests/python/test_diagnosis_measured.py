@@ -14,6 +14,7 @@ import pytest
 from numpy.typing import NDArray
 
 import trueangle as ta
+from trueangle.simulation import Harmonic
 
 Array = NDArray[np.float64]
 
@@ -258,3 +259,19 @@ def test_servo_has_a_reversal_error_and_an_offset_under_load(servo, tmp_path) ->
     assert half < 0.0
     assert 0.5 < max(place) / -half < 2.0
     assert "direction_dependent_pattern" in result.summary()
+
+
+def test_a_line_in_time_is_no_order(data_dir):
+    """Twelve runs at one turn a second: a line at 255 to 258 Hz, new in every run."""
+    runs = ta.read_runs(data_dir / "rm44_repeat.csv")
+    (shaft,) = ta.fit(runs, range(1, 18)).model.shafts
+    lines = tuple(
+        Harmonic("output", k, 3600.0 * float(c), float(np.degrees(phase)))
+        for k, c, phase in zip(shaft.orders, shaft.amplitudes, shaft.phases, strict=True)
+    )
+    found = ta.diagnose(runs, ta.Simulation(harmonics=lines), gain=False).findings
+    (line,) = [f for f in found if f.cause == "time_periodic"]
+    assert 254.0 < line.parameters["frequency_hz"].value < 259.0
+    # 0.046 to 0.062 deg in single runs.
+    assert 150.0 < line.parameters["amplitude_arcsec"].value < 250.0
+    assert not {"non_integer_order", "drift_within_run"} & {f.cause for f in found}

@@ -32,7 +32,7 @@ LIKELY = 3
 #: Lines at most.
 MOST_LINES = 6
 
-#: Travel (turns) from which on orders of the two directions are told apart.
+#: Travel (turns) over less than which only low orders are told apart.
 TOLD_APART = 0.5
 
 
@@ -86,9 +86,9 @@ class DirectionalPattern(Effect):
         present = [t.shape["order"] for t in regression.terms if t.cause == cls.kind]
         if not goes_both_ways(signals) or len(present) >= MOST_LINES:
             return None
-        if float(signals.run_turns().max()) < TOLD_APART:
-            return None
         orders = regression.lines.orders[regression.lines.plausible]
+        if float(signals.run_turns().max()) < TOLD_APART:
+            orders = orders[orders <= LIKELY]
         shapes = [{"order": float(m)} for m in orders if m not in present]
         others = float(np.log(2.0 * len(shapes)))
         likely = float(np.log(2.0 * LIKELY))
