@@ -277,7 +277,7 @@ WRITES = {
 @pytest.mark.parametrize("command", WRITES)
 def test_a_full_disk_leaves_what_was_there(command, there, desk):
     if command == "report":
-        pytest.importorskip("plotly")
+        pytest.importorskip("bokeh")
     arguments, output = WRITES[command]
     if there:
         (desk / output).write_text("old")
@@ -428,7 +428,7 @@ def test_progress_may_rewrite_its_own_line():
 
 
 def test_a_report_shows_labels_as_text(desk):
-    pytest.importorskip("plotly")
+    pytest.importorskip("bokeh")
     label = "<script>alert(1)</script>"
     (desk / "evil.csv").write_text(runs_text(label))
     assert main(["report", "evil.csv", "--orders", "1", "-o", "x.html", "--title", label]) == 0

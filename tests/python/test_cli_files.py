@@ -2,6 +2,7 @@
 
 import argparse
 import os
+import shutil
 import socket
 import stat
 import subprocess
@@ -34,19 +35,30 @@ samples = 120
 """
 
 
-@pytest.fixture
-def desk(tmp_path, monkeypatch):
-    """A folder with a file of each kind, which is the working folder."""
-    folder = tmp_path / "desk"
-    folder.mkdir()
-    monkeypatch.chdir(folder)
+@pytest.fixture(scope="module")
+def furnished(tmp_path_factory):
+    """A folder with a file of each kind, made once."""
+    folder = tmp_path_factory.mktemp("furnished")
     (folder / "b.toml").write_text(SIMULATION)
+    (folder / "p.cfg").write_text("[angle a]\n")
+    (folder / "i.toml").write_text("[item]\n")
     theta, noise = np.arange(0.0, 360.0, 3.0), np.random.default_rng(7)
     for name, zero in (("r.csv", 0.2), ("t.csv", 0.1)):
         error = 0.1 * np.sin(np.radians(theta)) + zero + noise.normal(0.0, 5e-4, theta.size)
         rows = [f"{t!r},{t + e!r}" for t, e in zip(theta.tolist(), error.tolist(), strict=True)]
         (folder / name).write_text("\n".join(["reference_deg,indicated_deg", *rows]) + "\n")
-    assert main(["fit", "r.csv", "-o", "m.json", "--orders", "1"]) == 0
+    model = str(folder / "m.json")
+    assert main(["fit", str(folder / "r.csv"), "-o", model, "--orders", "1"]) == 0
+    assert main(["export", model, "--to", "csv", "-o", str(folder / "e.csv")]) == 0
+    return folder
+
+
+@pytest.fixture
+def desk(furnished, tmp_path, monkeypatch):
+    """Its copy, which is the working folder."""
+    folder = tmp_path / "desk"
+    shutil.copytree(furnished, folder)
+    monkeypatch.chdir(folder)
     return folder
 
 
@@ -78,6 +90,18 @@ WRITING = {
         ["r.csv", "b.toml", "m.json"],
     ),
     "report": (["report", "r.csv", "--simulation", "b.toml", "-o", "OUT"], ["r.csv", "b.toml"]),
+    "join": (["join", "r.csv", "t.csv", "-o", "OUT"], ["r.csv", "t.csv"]),
+    "selfcal": (["selfcal", "r.csv", "-o", "OUT"], ["r.csv"]),
+    "export": (["export", "m.json", "--to", "csv", "-o", "OUT"], ["m.json"]),
+    "export --existing": (
+        ["export", "m.json", "--to", "klipper", "--existing", "p.cfg", "-o", "OUT"],
+        ["m.json", "p.cfg"],
+    ),
+    "import": (["import", "e.csv", "--from", "csv", "-o", "OUT"], ["e.csv"]),
+    "report --certificate": (
+        ["report", "r.csv", "--certificate", "i.toml", "-o", "OUT"],
+        ["r.csv", "i.toml"],
+    ),
     "report --pdf": (["report", "r.csv", "-o", "p.html", "--pdf", "OUT"], ["r.csv"]),
 }
 
@@ -151,6 +175,20 @@ def test_an_input_named_by_a_link_is_not_overwritten_by_its_own_name(command, de
         assert contents(desk) == before
 
 
+def test_every_command_that_writes_is_tried():
+    """Also by those that are added: `demo --report` alone reads nothing."""
+    writing = {
+        command
+        for command in COMMANDS
+        for action in build_parser().commands[command]._actions
+        if action.type is not None
+        and callable(action.type)
+        and getattr(action.type, "__qualname__", "").startswith("Output")
+    }
+    tried = {name.split()[0].rstrip(",") for name in WRITING} | {"demo"}
+    assert writing <= tried
+
+
 def test_two_outputs_are_not_one_file(desk, capsys):
     os.symlink("x.pdf", "y.pdf")
     assert main(["report", "r.csv", "-o", "x.pdf", "--pdf", "y.pdf"]) == 1
@@ -202,15 +240,20 @@ def test_only_files_are_written(command, node, link, desk, capsys):
     assert contents(desk) == before
 
 
-# Printing needs a browser: tests/python/report tries it.
-@pytest.mark.parametrize("command", [c for c in WRITING if "correct" not in c and "pdf" not in c])
+# Those need a browser, typst or data of their own; their own tests try them.
+ELSEWHERE = ("report --pdf", "report --certificate", "selfcal", "join", "export --existing")
+
+
+@pytest.mark.parametrize(
+    "command", [c for c in WRITING if "correct" not in c and c not in ELSEWHERE]
+)
 def test_the_null_device_takes_the_output_and_stays(command, desk):
     try:
         os.mknod("node", stat.S_IFCHR | 0o666, os.stat(os.devnull).st_rdev)
     except PermissionError:
         pytest.skip("devices cannot be made here")
     if command.startswith("report"):
-        pytest.importorskip("plotly")
+        pytest.importorskip("bokeh")
     assert main(named(WRITING[command][0], "node")) == 0
     assert stat.S_ISCHR(os.stat("node").st_mode)
 
@@ -283,7 +326,7 @@ def test_endless_devices_are_refused_as_inputs(arguments, device, desk, capsys):
 def test_runs_may_come_through_a_pipe(command, desk):
     """As ``trueangle orders <(zcat a.csv.gz)`` does, and ``... | trueangle fit /dev/stdin``."""
     if command == "report":
-        pytest.importorskip("plotly")
+        pytest.importorskip("bokeh")
     arguments = {
         "fit": ["fit", "/dev/stdin", "--orders", "1", "-o", "x.json"],
         "orders": ["orders", "/dev/stdin"],
@@ -384,7 +427,7 @@ def test_an_ending_of_another_format_is_refused(arguments, advice, desk, capsys)
 
 
 def test_a_report_named_pdf_is_one(desk, monkeypatch):
-    pytest.importorskip("plotly")
+    pytest.importorskip("bokeh")
     from trueangle.reports import pdf
 
     def printed(html, path, browser=None):
@@ -398,7 +441,7 @@ def test_a_report_named_pdf_is_one(desk, monkeypatch):
 
 
 def test_a_report_named_pdf_without_a_browser_is_refused(desk, monkeypatch, capsys):
-    pytest.importorskip("plotly")
+    pytest.importorskip("bokeh")
     monkeypatch.setenv("PATH", "/nowhere")
     assert main(["report", "r.csv", "--orders", "1", "-o", "x.pdf"]) == 1
     assert "needs an installed browser" in one_line(capsys)
@@ -406,7 +449,19 @@ def test_a_report_named_pdf_without_a_browser_is_refused(desk, monkeypatch, caps
 
 
 #: Words by which the help of a command calls a file; others name no files.
-FILES = {"FILE", "RUNS", "MODEL", "LOG", "LOGS", "FILES", "A", "B", "SIMULATION", "IDENTITY"}
+FILES = {
+    "FILE",
+    "RUNS",
+    "MODEL",
+    "LOG",
+    "LOGS",
+    "FILES",
+    "A",
+    "B",
+    "SIMULATION",
+    "IDENTITY",
+    "EXISTING",
+}
 
 
 @pytest.mark.parametrize("command", COMMANDS)

@@ -34,6 +34,7 @@ def add_target_options(parser: argparse.ArgumentParser) -> None:
     from ..export.targets import TARGETS
 
     options: dict[str, dict[str, list[str]]] = {}
+    read = {name for target in TARGETS.values() for name in target.files}
     for target in TARGETS.values():
         for name, option in target.options.items():
             options.setdefault(name, {}).setdefault(option.help, []).append(target.name)
@@ -41,6 +42,7 @@ def add_target_options(parser: argparse.ArgumentParser) -> None:
         parser.add_argument(
             *([f"--{name.replace('_', '-')}"] + (["--table"] if name == "entries" else [])),
             dest=f"option_{name}",
+            type=Input if name in read else str,
             metavar=name.upper().replace("_", "-"),
             help="; ".join(f"{', '.join(names)}: {text}" for text, names in helps.items()),
         )
