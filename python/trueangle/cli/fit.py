@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from ..angles import arcsec
 from ..files import MODEL
 from .onepass import add_one_pass, saved, wants_one_pass
-from .order_lists import orders_by_shaft
+from .order_lists import declared_shafts, orders_by_shaft, parse_orders
 from .paths import Input, Output
 from .signal_options import add_signals
 
@@ -46,6 +46,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_joint(parser)
     add_argument_choice(parser)
     add_covariance(parser)
+    add_nuisance(parser)
     parser.add_argument(
         "--loss",
         choices=("auto", "linear", "huber", "tukey"),
@@ -75,6 +76,12 @@ def add_joint(parser: argparse.ArgumentParser) -> None:
         default="circular_spline",
         help="of the strain wave gear (default: circular_spline)",
     )
+    parser.add_argument(
+        "--shaft",
+        action="append",
+        metavar="NAME=CYCLES",
+        help="further shaft and its turns per output turn, as worm=144 (may be repeated)",
+    )
     add_signals(parser)
 
 
@@ -86,6 +93,22 @@ def add_argument_choice(parser: argparse.ArgumentParser) -> None:
         default="auto",
         help="angle that the error is a function of (default: the true one, unless the "
         "reference has an arbitrary zero in every run)",
+    )
+
+
+def add_nuisance(parser: argparse.ArgumentParser) -> None:
+    """What is fitted beside the pattern; shared by several commands."""
+    parser.add_argument(
+        "--nuisance",
+        default="none",
+        metavar="auto|none|LIST",
+        help="fit beside the pattern, and keep out of the model: ramp, direction, velocity, drift "
+        "(a list with commas), or those that lower the held-out error (auto); default: none",
+    )
+    parser.add_argument(
+        "--reference-orders",
+        metavar="50,100",
+        help="orders that the reference itself makes: fitted beside the pattern, not retained",
     )
 
 
@@ -116,6 +139,9 @@ def run(args: argparse.Namespace) -> int:
         argument=args.argument,
         loss=args.loss,
         covariance=args.covariance,
+        nuisance=args.nuisance,
+        reference_orders=parse_orders(args.reference_orders) if args.reference_orders else (),
+        shafts=declared_shafts(args.shaft),
     )
     result.model.save(args.output)
     if args.json:

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..errors import ArgumentError
+from .order_lists import declared_shafts
 from .signal_options import reading
 from .terminal import own_interrupts
 
@@ -87,6 +88,7 @@ def fit_in_one_pass(args: argparse.Namespace, orders: Any) -> LogFit:
         fixed_member=args.fixed_member,
         argument="reference" if args.argument == "auto" else args.argument,
         **reading(args),
+        shafts=declared_shafts(args.shaft),
         scheduler=args.scheduler,
         checksums=getattr(args, "checksums", False),
         progress=args.progress,

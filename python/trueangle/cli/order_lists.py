@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping, Sequence
 
 from ..errors import ArgumentError
 from .parser import did_you_mean
 
-__all__ = ["SHAFTS", "orders_by_shaft", "parse_orders"]
+__all__ = ["SHAFTS", "declared_shafts", "orders_by_shaft", "parse_orders"]
 
 #: Shafts that every joint may have.
 SHAFTS = ("output", "motor", "wave_generator")
@@ -76,3 +77,27 @@ def orders_by_shaft(
             raise ArgumentError(f"--orders names shaft {shaft!r} twice: {text!r}")
         by_shaft[shaft] = parse_orders(orders)
     return by_shaft
+
+
+def declared_shafts(given: Sequence[str] | None) -> dict[str, float]:
+    """Shafts of ``NAME=CYCLES``.
+
+    Raises
+    ------
+    ArgumentError
+        Something else, cycles that are not positive, a name twice.
+    """
+    found: dict[str, float] = {}
+    for text in given or ():
+        name, _, cycles = (part.strip() for part in text.partition("="))
+        try:
+            value = float(cycles)
+        except ValueError:
+            value = math.nan
+        if not name or not 0.0 < value < 1e6 or name in found:
+            raise ArgumentError(
+                f"--shaft must look like worm=144, a name once and its turns per output turn, "
+                f"got {text!r}"
+            )
+        found[name] = value
+    return found

@@ -7,9 +7,9 @@ import json
 import math
 from typing import TYPE_CHECKING
 
-from .fit import add_argument_choice, add_joint
+from .fit import add_argument_choice, add_covariance, add_joint, add_nuisance
 from .onepass import add_one_pass, printed_orders, wants_one_pass
-from .order_lists import parse_orders
+from .order_lists import declared_shafts, parse_orders
 from .paths import Input
 
 if TYPE_CHECKING:
@@ -26,6 +26,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--orders", metavar="1-17,202", help="candidates (default: low orders and the gear's own)")
     add_joint(parser)
     add_argument_choice(parser)
+    add_covariance(parser)
     add(
         "--method",
         choices=("evidence", "paper"),
@@ -33,11 +34,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="evidence (default): significance and held-out error; paper: amplitude and phase "
         "range over the runs",
     )
-    add(
-        "--reference-orders",
-        metavar="50,100",
-        help="orders that the reference itself makes: named, with their side bands, not retained",
-    )
+    add_nuisance(parser)
     add("--run", action="append", metavar="LABEL", help="use this run only (may be repeated)")
     add_one_pass(parser)
     add("--json", action="store_true", help="print the table as JSON")
@@ -60,6 +57,9 @@ def run(args: argparse.Namespace) -> int:
         args.fixed_member,
         args.method,
         argument=args.argument,
+        covariance=args.covariance,
+        nuisance=args.nuisance,
+        shafts=declared_shafts(args.shaft),
         reference_orders=reference,
     )
     print(json.dumps(as_json(selection), indent=2) if args.json else selection.summary())

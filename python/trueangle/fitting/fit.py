@@ -4,16 +4,17 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Iterable, Mapping, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from ..errors import ArgumentError, NoModelError, UnlikeRunsWarning
-from ..model import check_invertible
+from ..model import Argument, check_invertible
 from ..runs import CalibrationRun, as_runs
 from ..shafts import resolve_orders
 from ..units import check_follows
 from .argument import ARGUMENTS, AnyArgument, Choice, choose_argument
 from .breakdown import breakdown_sentence
 from .likeness import unlike_runs, unlike_sentence
+from .nuisance import asked_nuisance, likely_orders, take_out
 from .problem import Problem
 from .result import FitResult
 from .ridge import choose_ridge
@@ -42,6 +43,8 @@ def fit(
     loss: Loss = "auto",
     ridge: float | None = None,
     covariance: CovarianceKind = "auto",
+    nuisance: str | Iterable[str] = "none",
+    reference_orders: Iterable[float] = (),
     method: str | None = None,
     threads: int | None = None,
 ) -> FitResult:
@@ -64,7 +67,7 @@ def fit(
     fixed_member : {"circular_spline", "flexspline", "none"}
         Of the strain wave gear: decides how fast the wave generator turns against the output.
     shafts : mapping of str to float, optional
-        Further shafts and their cycles per output turn.
+        Further shafts and their cycles per output turn; a selection looks at their harmonics.
     argument : {"auto", "reference", "indicated"}
         Which angle the error is a function of. The true angle is right physically and is
         what ``"auto"`` takes, unless the reference has an arbitrary zero in every run: then
@@ -82,6 +85,14 @@ def fit(
         where the correlation dies out. ``"auto"``: white unless the residuals correlate in
         time or the runs scatter by more, then clusters (three runs and more) or stretches;
         the notes say so. Intervals: `FitResult.interval`.
+    nuisance : {"none", "auto"} or iterable of str
+        What is fitted beside the pattern and kept out of the model (`FitResult.nuisance`):
+        ``"ramp"`` in the angle, ``"direction"``, ``"velocity"``, ``"drift"`` in time.
+        ``"auto"``: those that lower the error of stretches held out and can be told from the
+        pattern; the notes say which.
+    reference_orders : iterable of float, optional
+        Lines that the reference makes (50 and 100 of a stepper of 200 steps): fitted beside
+        the pattern, and not in the model.
     method : {"plain", "moments", "qr", "counts"}, optional
         Forces a way of solving: QR of all rows, one pass of piecewise moments with normal
         equations or with QR, or one mean error per count of an encoder that counts (whole
@@ -126,9 +137,25 @@ def fit(
     for run in found:
         check_follows(run)
     selection = None
+    beside = _Beside(asked_nuisance(nuisance), tuple(float(k) for k in reference_orders))
+    given = found
     if orders is None or isinstance(orders, str):
-        selection, orders = _selected(found, orders, gear_ratio, fixed_member, argument, loss)
+        if beside.wanted:
+            likely = likely_orders(found, gear_ratio, fixed_member, shafts)
+            found, _ = take_out(given, beside.kinds, likely, _angle(argument), beside.reference)
+        sought = {
+            "gear_ratio": gear_ratio,
+            "fixed_member": fixed_member,
+            "argument": argument,
+            "covariance": covariance,
+            "shafts": shafts,
+            "reference_orders": beside.reference,
+        }
+        selection, orders = _selected(found, orders, loss, sought)
     wanted = resolve_orders(orders, gear_ratio, fixed_member, shafts)
+    taken = None
+    if beside.wanted:
+        found, taken = take_out(given, beside.kinds, wanted, _angle(argument), beside.reference)
     if selection is not None:
         choice = Choice(selection.argument)
     else:
@@ -148,22 +175,45 @@ def fit(
         check_invertible(fitted.series.slope_bound)
     joint = (gear_ratio, fixed_member)
     remarks = [note for note in (choice.note, breakdown_sentence(problem, weighted)) if note]
+    if taken is not None:
+        remarks += taken.sentences(problem.period)
     unlike = unlike_runs(problem, fitted)
     if unlike:
         remarks.append(unlike_sentence(problem, unlike))
         warnings.warn(remarks[-1], UnlikeRunsWarning, stacklevel=2)
     return FitResult(
-        problem, fitted, weighted, loss, ridge, span, selection, joint, tuple(remarks), covariance
+        problem,
+        fitted,
+        weighted,
+        loss,
+        ridge,
+        span,
+        selection,
+        joint,
+        tuple(remarks),
+        covariance,
+        taken,
     )
 
 
+class _Beside(NamedTuple):
+    """Nuisances asked for (None: to be chosen), and lines of the reference."""
+
+    kinds: tuple[str, ...] | None
+    reference: tuple[float, ...]
+
+    @property
+    def wanted(self) -> bool:
+        """Whether anything is fitted beside the pattern."""
+        return self.kinds != () or bool(self.reference)
+
+
+def _angle(argument: AnyArgument) -> Argument:
+    return "indicated" if argument == "indicated" else "reference"
+
+
 def _selected(
-    runs: Sequence[CalibrationRun],
-    orders: str | None,
-    gear_ratio: float | None,
-    fixed_member: str,
-    argument: AnyArgument,
-    loss: Loss,
+    runs: Sequence[CalibrationRun], orders: str | None, loss: Loss, sought: dict[str, Any]
 ) -> tuple[OrderSelection, Mapping[str, Iterable[float]]]:
     """Orders with evidence, from readings without spikes."""
     if orders not in (None, "auto"):
@@ -172,9 +222,7 @@ def _selected(
 
     if loss != "linear":
         runs = [without_spikes(run) for run in runs]
-    selection = select_orders(
-        runs, gear_ratio=gear_ratio, fixed_member=fixed_member, argument=argument
-    )
+    selection = select_orders(runs, **sought)
     if not selection.orders:
         raise NoModelError(f"no order is supported by the data: {selection.reason}")
     return selection, selection.by_shaft

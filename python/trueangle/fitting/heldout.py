@@ -175,7 +175,12 @@ def _refit(fit: FitResult, train: Sequence[CalibrationRun]) -> HarmonicModel:
         return fit_runs(train, orders, shafts=shafts, argument=argument, loss=loss).model
     ratio, member = fit.joint
     return fit_runs(
-        train, gear_ratio=ratio, fixed_member=member, argument=argument, loss=loss
+        train,
+        gear_ratio=ratio,
+        fixed_member=member,
+        shafts=fit.selection.shafts,
+        argument=argument,
+        loss=loss,
     ).model
 
 

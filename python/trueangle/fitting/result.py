@@ -16,6 +16,7 @@ from ..errors import ArgumentError
 from ..model import HarmonicModel
 from ..runs import CalibrationRun
 from .model import build_model, fit_notes
+from .nuisance import Nuisance
 from .problem import Fitted, Problem
 from .robust import Weighted
 from .travel import Span
@@ -59,6 +60,8 @@ class FitResult:
         What the choice of the angle, of the weights and of the runs found; among `notes`.
     covariance_asked : {"auto", "white", "cluster", "hac"}
         The covariance asked for; `uncertainty` has the one taken.
+    nuisance : Nuisance or None
+        What was taken out of the readings beside the pattern: `runs` are without it.
     """
 
     problem: Problem
@@ -71,6 +74,7 @@ class FitResult:
     joint: tuple[float | None, str]
     remarks: tuple[str, ...] = ()
     covariance_asked: CovarianceKind = "auto"
+    nuisance: Nuisance | None = None
 
     @cached_property
     def model(self) -> HarmonicModel:
@@ -89,7 +93,7 @@ class FitResult:
 
     @property
     def runs(self) -> tuple[CalibrationRun, ...]:
-        """The runs fitted, as given."""
+        """The runs fitted, as given but for `nuisance`."""
         return tuple(self.problem.runs)
 
     @property
@@ -152,7 +156,11 @@ class FitResult:
     def uncertainty(self) -> Uncertainty:
         """Covariance, its kind and the degrees of freedom of each coefficient's variance."""
         weights = self.weights or self.problem.base
-        return uncertainty(self.problem, self.fitted, weights, self.ridge, self.covariance_asked)
+        found = uncertainty(self.problem, self.fitted, weights, self.ridge, self.covariance_asked)
+        if self.nuisance is None or not self.nuisance.inflation:
+            return found
+        wider = np.array([1.0, *self.nuisance.inflation])
+        return found._replace(covariance=found.covariance * np.outer(wider, wider))
 
     def interval(self, level: float = 0.95) -> Array:
         r"""Intervals that hold the true coefficients at this level.

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Final
 
 from ..errors import ArgumentError
 from .shafts import FIXED_MEMBERS
 
-__all__ = ["COMMON_RATIOS", "Explanation", "explain_order", "gear_orders"]
+__all__ = ["COMMON_RATIOS", "Explanation", "explain_by_shafts", "explain_order", "gear_orders"]
 
 #: Gear ratios of common strain wave gears, tried where none is declared.
 COMMON_RATIOS: Final = (30, 50, 80, 100, 120, 160)
@@ -120,6 +120,25 @@ def explain_order(
             if float(m) in members:
                 found.append(Explanation(m, name, float(ratio), gear_ratio is None))
     return tuple(found)
+
+
+def explain_by_shafts(order: float, shafts: Mapping[str, float]) -> tuple[Explanation, ...]:
+    """Declared shafts (name and cycles per output turn) that ``order`` is a harmonic of.
+
+    Examples
+    --------
+    >>> [str(e) for e in explain_by_shafts(288, {"worm": 144.0})]
+    ['288 (twice per turn of the worm)']
+    """
+    found = []
+    for name, cycles in shafts.items():
+        times = order / cycles
+        if abs(times - round(times)) < 1e-9 and 1 <= round(times) <= len(_TIMES):
+            found.append(Explanation(order, f"{_TIMES[round(times) - 1]} per turn of the {name}"))
+    return tuple(found)
+
+
+_TIMES: Final = ("once", "twice", "three times", "four times")
 
 
 def _whole(order: float) -> float:

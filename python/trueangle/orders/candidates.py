@@ -23,6 +23,9 @@ Array = NDArray[np.float64]
 #: Low orders looked at when no gear is declared and the angles are free.
 HIGHEST_FREE_ORDER: Final = 100
 
+#: Harmonics of a declared shaft that are looked at.
+_SHAFT_HARMONICS: Final = (1, 2, 3, 4)
+
 #: Orders scanned beyond the low ones where the angles are free.
 HIGHEST_SCANNED: Final = 450
 
@@ -66,6 +69,8 @@ class Candidates:
     unresolved : mapping of float to float
         Orders of the gear that are not looked at, for over this travel they are hardly told
         from a low order, which stands for both.
+    shafts : mapping of str to float
+        Further shafts that were declared, and their cycles per output turn.
     """
 
     orders: tuple[float, ...]
@@ -77,6 +82,7 @@ class Candidates:
     highest: int
     effective: Positions
     unresolved: Mapping[float, float] = field(default_factory=dict)
+    shafts: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def highest_alias(self) -> int:
@@ -127,6 +133,7 @@ def choose_candidates(
     fixed_member: str,
     reference_orders: Sequence[float],
     travelled: Array | None = None,
+    shafts: Mapping[str, float] | None = None,
 ) -> Candidates:
     """Candidates as asked for, or low orders, the gear's own and a scan.
 
@@ -139,6 +146,7 @@ def choose_candidates(
         Orders that are not positive and finite.
     """
     gear = [] if gear_ratio is None else [float(m) for m in gear_orders(gear_ratio, fixed_member)]
+    gear += [k * float(f) for f in (shafts or {}).values() for k in _SHAFT_HARMONICS]
     effective = effective_positions(positions)
     highest = effective.highest_order
     if effective.divisions is None:
@@ -176,6 +184,7 @@ def choose_candidates(
         highest=highest,
         effective=effective,
         unresolved=unresolved,
+        shafts=dict(shafts or {}),
     )
 
 

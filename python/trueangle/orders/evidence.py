@@ -25,6 +25,7 @@ __all__ = [
     "fit_subset",
     "held_out_gains",
     "log_tail",
+    "neighbour_scatter",
     "pooled_scatter",
     "run_scatter",
 ]
@@ -41,6 +42,9 @@ _REGULAR: Final = 1e-4
 
 #: Least degrees of freedom that a residual must keep.
 _LEAST_DOF: Final = 3
+
+#: Orders next to one that tell the noise there.
+NEIGHBOURS: Final = 12
 
 #: Scatter between runs counts as an order's own where chance makes it rarer than this.
 _OVERDISPERSED: Final = 1e-3
@@ -213,6 +217,48 @@ class OrderTest:
     log_p: Array
 
 
+def neighbour_scatter(sums: HarmonicSums, chosen: Sequence[int]) -> Array | None:
+    r"""Variance of one reading as the orders next to each say it, for noise that has a colour.
+
+    .. math:: s_k^2 = \mathrm{median}_{j \sim k}\{T_j\} / (2 \ln 2)
+
+    with the reduction ``T`` of the sum of squares by each of the `NEIGHBOURS` nearest orders
+    that are not chosen: two squares of normal numbers each, the noise at about that order. None
+    where there are too few of them.
+    """
+    taken = set(chosen)
+    others = np.array([i for i in range(sums.orders.size) if i not in taken], dtype=np.intp)
+    if others.size < 2 * NEIGHBOURS:
+        return None
+    total, rhs, _ = sums.total()
+    coefficients, inverse, _ = fit_subset(sums, chosen)
+    base = sums.columns(chosen)
+    n = sums.orders.size
+    cosine, sine = others, others + n
+    to_cosine, to_sine = total[np.ix_(base, cosine)], total[np.ix_(base, sine)]
+    by_cosine, by_sine = inverse @ to_cosine, inverse @ to_sine
+    aa = total[cosine, cosine] - np.einsum("bk,bk->k", to_cosine, by_cosine)
+    bb = total[sine, sine] - np.einsum("bk,bk->k", to_sine, by_sine)
+    ab = total[cosine, sine] - np.einsum("bk,bk->k", to_cosine, by_sine)
+    a = rhs[cosine] - to_cosine.T @ coefficients
+    b = rhs[sine] - to_sine.T @ coefficients
+    det = aa * bb - ab * ab
+    seen = det > (_COLLINEAR * (total[cosine, cosine] + total[sine, sine])) ** 2
+    others, gain = others[seen], (bb * a * a - 2.0 * ab * a * b + aa * b * b)[seen] / det[seen]
+    if others.size < 2 * NEIGHBOURS:
+        return None
+    places = sums.orders[others]
+    found = np.empty(n)
+    half = NEIGHBOURS // 2
+    for k in range(n):
+        low = int(np.searchsorted(places, sums.orders[k]))
+        first = min(max(0, low - half), others.size - NEIGHBOURS - 1)
+        window = np.arange(first, first + NEIGHBOURS + 1)
+        window = window[others[window] != k][:NEIGHBOURS]
+        found[k] = np.median(gain[window])
+    return np.asarray(np.maximum(found, 0.0) / (2.0 * math.log(2.0)))
+
+
 def pooled_scatter(scatter: Array, units: int) -> tuple[float, float] | None:
     """Noise common to most orders: mean of their scatter, the overdispersed left out."""
     finite = scatter[np.isfinite(scatter)]
@@ -242,19 +288,20 @@ def examine_orders(
     orders: Sequence[int],
     noise: tuple[float, float],
     scatter: Array | None,
+    freedom: int | None = None,
 ) -> OrderTest:
     """Significance of ``orders``, each beside the other chosen ones.
 
-    ``scatter`` (from `run_scatter`) replaces the noise for an order that varies between
-    the units by more than the noise.
+    ``scatter`` (from `run_scatter`, or `neighbour_scatter` with its ``freedom``) replaces the
+    noise for an order where it is more than the noise.
     """
     total, rhs, _ = sums.total()
     n = len(orders)
     cosine, sine, variance, statistic = np.empty((4, n))
     level = np.full(n, noise[0])
     dof = np.full(n, noise[1])
-    if scatter is not None and sums.units > 1:
-        each = 2 * (sums.units - 1)
+    if scatter is not None:
+        each = 2 * (sums.units - 1) if freedom is None else freedom
         ratio = np.maximum(scatter, 0.0) / noise[0] * each
         own = np.isfinite(scatter) & (_log_chi2_tail(ratio, each) < math.log(_OVERDISPERSED))
         np.copyto(level, scatter, where=own)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import Final, Literal
 
@@ -12,7 +12,9 @@ from numpy.typing import NDArray
 from ..aliasing import distinct_positions
 from ..errors import ArgumentError
 from ..fitting.argument import AnyArgument, at_indicated, choose_argument
+from ..fitting.nuisance import asked_nuisance, likely_orders, take_out
 from ..fitting.travel import over_turns
+from ..fitting.uncertainty import CovarianceKind, check_covariance
 from ..runs import CalibrationRun, as_runs
 from .candidates import choose_candidates
 from .paper import select_by_paper
@@ -33,6 +35,9 @@ def select_orders(
     method: Method = "evidence",
     *,
     argument: AnyArgument = "auto",
+    covariance: CovarianceKind = "auto",
+    shafts: Mapping[str, float] | None = None,
+    nuisance: str | Iterable[str] = "none",
     reference_orders: Iterable[float] = (),
     tolerance: float | None = None,
 ) -> OrderSelection:
@@ -66,6 +71,16 @@ def select_orders(
     argument : {"auto", "reference", "indicated"}
         Which angle the orders are sought in. ``"auto"``: the true angle, unless every run has
         an arbitrary zero of the reference (`trueangle.fitting.argument.choose_argument`).
+    covariance : {"auto", "white", "cluster", "hac"}
+        Of what an order must stand out: of independent noise (``"white"``), of its own scatter
+        between the runs (``"cluster"``), or of what its neighbours among the orders scatter
+        (``"hac"``), where that is more. ``"auto"``: between runs where there are several, of
+        independent noise in a single run, where the held-out gain alone guards against its memory.
+    shafts : mapping of str to float, optional
+        Further shafts and their cycles per output turn (a worm: 144): once, twice, three and
+        four times per turn of theirs are candidates, and are named.
+    nuisance : {"none", "auto"} or iterable of str
+        What is taken out of the readings first, as in `trueangle.fit`.
     reference_orders : iterable of float, optional
         Orders that the reference itself is known to make (50 and 100 for a stepper motor
         of 200 steps). They and their side bands are fitted, named and not retained.
@@ -101,9 +116,16 @@ def select_orders(
     if method not in ("evidence", "paper"):
         raise ArgumentError(f"method must be 'evidence' or 'paper', got {method!r}")
     found = as_runs(runs)
+    check_covariance(covariance, len(found))
     kept = [run for run in map(_without_zero_weights, found) if run is not None]
     if not kept:
         raise ArgumentError("all readings have weight 0: nothing is left to select orders from")
+    said: tuple[str, ...] = ()
+    if (kinds := asked_nuisance(nuisance)) != ():
+        likely = likely_orders(kept, gear_ratio, fixed_member, shafts)
+        angle = "indicated" if argument == "indicated" else "reference"
+        kept, taken = take_out(kept, kinds, likely, angle)
+        said = tuple(taken.sentences(kept[0].period))
     choice = choose_argument(kept, argument)
     if choice.argument == "indicated":
         kept = [at_indicated(run) for run in kept]
@@ -114,14 +136,15 @@ def select_orders(
         gear_ratio,
         fixed_member,
         tuple(reference_orders),
-        _travelled(kept, gear_ratio),
+        _travelled(kept, gear_ratio, shafts),
+        shafts,
     )
     if method == "paper":
         selection = select_by_paper(kept, positions, chosen)
     else:
-        selection = EvidenceSelection(kept, positions, chosen).result()
-    notes = (choice.note, *selection.notes) if choice.note else selection.notes
-    return replace(selection, argument=choice.argument, notes=notes)
+        selection = EvidenceSelection(kept, positions, chosen, covariance).result()
+    notes = (*filter(None, (choice.note,)), *said, *selection.notes)
+    return replace(selection, argument=choice.argument, notes=notes, shafts=dict(shafts or {}))
 
 
 def _without_zero_weights(run: CalibrationRun) -> CalibrationRun | None:
@@ -145,9 +168,14 @@ def _without_zero_weights(run: CalibrationRun) -> CalibrationRun | None:
 _LOOKED_AT: Final = 4096
 
 
-def _travelled(runs: Sequence[CalibrationRun], gear_ratio: float | None) -> Array | None:
+def _travelled(
+    runs: Sequence[CalibrationRun],
+    gear_ratio: float | None,
+    shafts: Mapping[str, float] | None,
+) -> Array | None:
     """Angles of the readings in turns, whole turns kept; None where every order is whole."""
-    if gear_ratio is None or float(gear_ratio).is_integer():
+    cycles = [*(shafts or {}).values(), *(() if gear_ratio is None else (gear_ratio,))]
+    if all(float(f).is_integer() for f in cycles):
         return None
     turns = np.concatenate([over_turns(run).reference for run in runs]) / runs[0].period
     return np.asarray(turns[:: max(1, turns.size // _LOOKED_AT)])

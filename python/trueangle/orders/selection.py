@@ -4,19 +4,23 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..aliasing import Positions
+from ..fitting.uncertainty import CovarianceKind
 from ..runs import CalibrationRun
 from .candidates import Candidates
 from .evidence import (
+    NEIGHBOURS,
+    OrderTest,
     choose_forward,
     examine_orders,
     fit_subset,
     held_out_gains,
+    neighbour_scatter,
     pooled_scatter,
     run_scatter,
 )
@@ -58,13 +62,26 @@ _ROUNDING: Final = 1e-12
 _AGAIN: Final = 3
 
 
+class _Level(NamedTuple):
+    """Variance of a reading and its freedom; each order's own, and the freedom of that."""
+
+    noise: tuple[float, float]
+    scatter: Array | None
+    freedom: int | None
+
+
 class EvidenceSelection:
     """One selection by evidence, step by step."""
 
     def __init__(
-        self, runs: Sequence[CalibrationRun], positions: Positions, candidates: Candidates
+        self,
+        runs: Sequence[CalibrationRun],
+        positions: Positions,
+        candidates: Candidates,
+        covariance: CovarianceKind = "auto",
     ) -> None:
         self.runs = runs
+        self.covariance = covariance
         self.candidates = candidates
         self.orders = candidates.orders
         self.units, places = units_of(runs, candidates.whole)
@@ -126,14 +143,22 @@ class EvidenceSelection:
         dof = max(1, self.free - 2 * len(chosen))
         return Noise(fit_subset(self.sums, chosen)[2] / dof, dof, "model")
 
-    def _level(self, chosen: Sequence[int]) -> tuple[tuple[float, float], Array | None]:
+    def _level(self, chosen: Sequence[int]) -> _Level:
         """Noise of the coefficients: common to all orders, and each order's own."""
         noise = self._noise(chosen)
         level = (noise.variance, float(noise.degrees_of_freedom))
-        if len(self.units) < 2:
-            return level, None
+        if self.covariance == "hac":
+            return _Level(level, neighbour_scatter(self.sums, chosen), NEIGHBOURS)
+        if len(self.units) < 2 or self.covariance == "white":
+            return _Level(level, None, None)
         scatter = run_scatter(self.sums, chosen, range(len(self.orders)))
-        return pooled_scatter(scatter, self.sums.units) or level, scatter
+        return _Level(pooled_scatter(scatter, self.sums.units) or level, scatter, None)
+
+    def _examined(self, chosen: Sequence[int], orders: Sequence[int]) -> OrderTest:
+        """Significance of orders under the noise that each has."""
+        level = self._level(chosen)
+        own = None if level.scatter is None else level.scatter[list(orders)]
+        return examine_orders(self.sums, chosen, orders, level.noise, own, level.freedom)
 
     def _forward(self) -> list[int]:
         noise = self._noise(())
@@ -149,9 +174,7 @@ class EvidenceSelection:
             mine = [i for i in chosen if i not in self.forced]
             if not mine:
                 return chosen, dropped
-            level, scatter = self._level(chosen)
-            own = None if scatter is None else scatter[mine]
-            test = examine_orders(self.sums, chosen, mine, level, own)
+            test = self._examined(chosen, mine)
             verdict, failing = "noise", test.log_p - self.limits[mine]
             if not (failing > 0.0).any():
                 verdict, failing = "no held-out gain", -self._gains(chosen, mine)
@@ -239,9 +262,7 @@ class EvidenceSelection:
 
     def _report(self, chosen: list[int], dropped: Mapping[int, str]) -> OrderSelection:
         shown = sorted({*chosen, *dropped, *self.candidates.main_indices})
-        level, scatter = self._level(chosen)
-        own = None if scatter is None else scatter[shown]
-        test = examine_orders(self.sums, chosen, shown, level, own)
+        test = self._examined(chosen, shown)
         gains, model = self._gains_and_model(chosen, shown)
         phases = unit_phases(self.sums, chosen, shown)
         lookalikes = self._lookalikes(chosen)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from html import escape
 from typing import TYPE_CHECKING
 
@@ -121,6 +121,8 @@ class OrderSelection:
         What a user must know before trusting the orders.
     argument : {"reference", "indicated"}
         Angle that the orders were sought in.
+    shafts : mapping of str to float
+        Further shafts that were declared, and their cycles per output turn.
     """
 
     orders: tuple[float, ...]
@@ -137,6 +139,7 @@ class OrderSelection:
     gear_ratio: float | None = None
     notes: tuple[str, ...] = ()
     argument: Argument = "reference"
+    shafts: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def by_shaft(self) -> Mapping[str, tuple[int, ...]]:
@@ -152,6 +155,7 @@ class OrderSelection:
                 continue
             ratio = float(self.gear_ratio or math.nan)
             for shaft, cycles in (
+                *self.shafts.items(),
                 ("motor", ratio),
                 ("wave_generator", ratio + 1.0),
                 ("wave_generator", ratio - 1.0),

@@ -11,7 +11,7 @@ import numpy as np
 
 from ..aliasing import Positions, closure_errors, distinct_positions, energy_near_nyquist, fold
 from ..angles import arcsec
-from ..explanations import explain_order
+from ..joint.gear import explain_by_shafts, explain_order
 from ..planning.noisefactors import mount_noise_factors
 from ..planning.plan import HIGHEST_LOW_ORDER, plan_mounts, wanted_orders
 from ..runs import CalibrationRun, as_runs
@@ -51,7 +51,10 @@ def explained(row: OrderRow, candidates: Candidates, positions: Positions) -> Or
         return replace(row, reason=_reference_reason(row.order, candidates.carriers))
     if not row.retained:
         return replace(row, reason=_VERDICTS[row.verdict])
-    explanations = explain_order(row.order, row.aliases, ratio, member)
+    explanations = (
+        *explain_order(row.order, row.aliases, ratio, member),
+        *explain_by_shafts(row.order, candidates.shafts),
+    )
     reason = "significant, and lowers the error of readings held out of the fit"
     rivals = [str(e) for e in explanations if e.order != row.order]
     named = {e.order for e in explanations}
