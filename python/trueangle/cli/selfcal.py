@@ -51,6 +51,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="auto|none|1-4",
         help="orders at which the speed may ripple (default: all, weighed by the evidence)",
     )
+    add(
+        "--head-angles",
+        metavar="0,119.2,203.7",
+        help="where the heads stand, degrees, if their readings share one zero",
+    )
     add("--counts-per-turn", type=float, metavar="N", help="of _count columns")
     add("--json", action="store_true", help="print the result as JSON")
 
@@ -68,6 +73,7 @@ def run(args: argparse.Namespace) -> int:
         loop_bandwidth=args.loop_bandwidth,
         gear_ratio=args.gear_ratio,
         ripple=ripple if ripple in ("auto", "none") else _whole(ripple, "--ripple"),
+        head_angles=None if args.head_angles is None else _numbers(args.head_angles),
         counts_per_turn=args.counts_per_turn,
     )
     result.model.save(args.output)
@@ -90,3 +96,10 @@ def _whole(text: str, option: str) -> tuple[float, ...]:
     if any(k != int(k) for k in orders):
         raise ArgumentError(f"{option}: orders of a self-calibration are whole, got {text!r}")
     return orders
+
+
+def _numbers(text: str) -> list[float]:
+    try:
+        return [float(part) for part in text.split(",")]
+    except ValueError:
+        raise ArgumentError(f"--head-angles: degrees such as 0,119.2,203.7, got {text!r}") from None

@@ -11,13 +11,17 @@ from numpy.typing import ArrayLike
 from ..angles import check_period
 from ..errors import ArgumentError, NoModelError
 from ..runs import CalibrationRun
+from .dual import dual
+from .heads import heads
 from .loop import check_loop
 from .recording import Recording, as_recordings
 from .result import SelfCalibration
+from .shifts import shifts
+from .spindown import spin_down
 
 __all__ = ["METHODS", "selfcal"]
 
-METHODS: Final = ("auto", "spin-down")
+METHODS: Final = ("auto", "spin-down", "heads", "shifts", "dual")
 
 Log = str | PathLike[str] | Mapping[str, ArrayLike] | CalibrationRun
 
@@ -31,6 +35,7 @@ def selfcal(
     loop_bandwidth: float | None = None,
     gear_ratio: float | None = None,
     ripple: str | Sequence[float] = "auto",
+    head_angles: Sequence[float] | None = None,
     counts_per_turn: float | None = None,
     signals: Mapping[str, Any] | None = None,
     period: float = 360.0,
@@ -58,6 +63,8 @@ def selfcal(
     ripple : {"auto", "none"} or sequence of int
         Orders at which the speed may ripple. ``"auto"``: all, weighed by the evidence;
         ``"none"``: the motion is known to be smooth.
+    head_angles : sequence of float, optional
+        Where the heads stand, in degrees, when their readings were set to one zero.
     counts_per_turn : float, optional
         Of ``_count`` columns.
     signals : mapping of role to column, optional
@@ -104,10 +111,12 @@ def selfcal(
     wanted = _orders(orders)
     recordings = as_recordings(logs, counts_per_turn=counts_per_turn, signals=signals)
     chosen = _method(recordings) if method == "auto" else method
-    del gear_ratio
-    from .spindown import spin_down
-
-    assert chosen == "spin-down"
+    if chosen == "heads":
+        return heads(recordings, wanted, angles=head_angles, period=period)
+    if chosen == "shifts":
+        return shifts(recordings, wanted, period=period)
+    if chosen == "dual":
+        return dual(recordings, wanted, gear_ratio=gear_ratio, period=period)
     return spin_down(
         recordings,
         wanted,
@@ -121,6 +130,12 @@ def selfcal(
 def _method(recordings: Sequence[Recording]) -> str:
     """The method that the columns allow."""
     first = recordings[0]
+    if first.motor is not None and (first.indicated is not None or first.reference is not None):
+        return "dual"
+    if len(first.heads) >= 2:
+        return "heads"
+    if first.shift is not None and first.reference is not None and first.indicated is not None:
+        return "shifts"
     if first.indicated is not None and first.time is not None:
         return "spin-down"
     raise NoModelError(

@@ -10,13 +10,17 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Column", "Projected", "harmonic_rows", "names_in_words"]
+__all__ = ["NOT_SEEN", "Column", "Projected", "harmonic_rows", "names_in_words"]
 
 Array = NDArray[np.float64]
 
 #: A column is not seen where nuisances and other columns leave less of its square.
 #: Below this share rounding in the sums (1e-16 of a column, times its condition) decides.
 NOT_SEEN = 1e-9
+
+
+#: A column that has more of its square in combinations that are not seen is not seen.
+_SHARE = 0.01
 
 
 class Column(NamedTuple):
@@ -76,6 +80,8 @@ class Projected:
     alone: Array
     variance: float
     freedom: float
+    floor: float = NOT_SEEN
+    """Combinations of which less is left count as not seen."""
 
     @cached_property
     def _eigen(self) -> tuple[Array, Array, Array]:
@@ -87,15 +93,14 @@ class Projected:
     def seen(self) -> NDArray[np.bool_]:
         """Columns that take part in no combination that is not seen."""
         _, values, vectors = self._eigen
-        lost = (vectors[:, values < NOT_SEEN] ** 2).sum(axis=1)
-        # A half of the share: what is not seen is split evenly over those who share it.
-        return np.asarray(lost < 1e-6)
+        lost = (vectors[:, values < self.floor] ** 2).sum(axis=1)
+        return np.asarray(lost < _SHARE)
 
     @cached_property
     def inverse(self) -> Array:
         """Pseudo-inverse of the information over the combinations that are seen."""
         scale, values, vectors = self._eigen
-        kept = values >= NOT_SEEN
+        kept = values >= self.floor
         half = (scale[:, None] * vectors[:, kept]) / np.sqrt(values[kept])
         return np.asarray(half @ half.T)
 
@@ -122,7 +127,7 @@ class Projected:
     @property
     def rank(self) -> int:
         """Combinations that are seen."""
-        return int((self._eigen[1] >= NOT_SEEN).sum())
+        return int((self._eigen[1] >= self.floor).sum())
 
     def index(self, source: str, order: float) -> tuple[int, int]:
         """Places of the cosine and sine columns."""
@@ -136,7 +141,7 @@ class Projected:
         are given once.
         """
         _, values, vectors = self._eigen
-        lost = np.flatnonzero(values < NOT_SEEN)
+        lost = np.flatnonzero(values < self.floor)
         if lost.size == 0:
             return []
         # Rotate within the space to vectors of few columns: reduce by the largest entries.

@@ -24,7 +24,7 @@ from .result import ARCSEC, Blind, OrderEstimate, SelfCalibration, estimates
 from .ripple import LARGEST_COST, averaged_over_ripple, cost_of_ripple
 from .steady import ENCODER, Readings, SteadyFit, fit_steady, pattern_series
 from .stretches import cut_stretches
-from .summary import ranges
+from .summary import listed, ranges
 from .verification import held_out
 
 __all__ = ["spin_down"]
@@ -115,7 +115,7 @@ def spin_down(
     model = made_model(
         in_model,
         "spin-down",
-        [*(f"{_listed(b.orders)}: {b.because}" for b in blind)],
+        [*(f"{listed(b.orders)}: {b.because}" for b in blind)],
         notes,
         recordings,
         readings=readings.size,
@@ -135,10 +135,6 @@ def spin_down(
         turns=sum(s.turns for s in stretches),
         beside=beside,
     )
-
-
-def _listed(orders: Sequence[float]) -> str:
-    return f"orders {ranges(orders)}" if any(orders) else "zero"
 
 
 def _ripple_orders(

@@ -9,7 +9,12 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from .result import OrderEstimate, SelfCalibration
 
-__all__ = ["ranges", "summary"]
+__all__ = ["listed", "ranges", "summary"]
+
+
+def listed(orders: Sequence[float]) -> str:
+    """What is blind, in words: orders, or the zero."""
+    return f"orders {ranges(orders)}" if any(orders) else "zero"
 
 
 def summary(result: SelfCalibration) -> str:
@@ -24,8 +29,7 @@ def summary(result: SelfCalibration) -> str:
         lines += ["", "not the encoder's alone:", *_table(result.sums)]
     lines += ["", "blind to"]
     for blind in result.blind:
-        what = "zero" if blind.orders == (0.0,) else f"orders {ranges(blind.orders)}"
-        lines.append(f"  {what}: {blind.because}")
+        lines.append(f"  {listed(blind.orders)}: {blind.because}")
         lines.append(f"    to see it: {blind.measure}")
     if result.held_out:
         lines += ["", "held out"]

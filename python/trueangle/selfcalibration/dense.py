@@ -1,0 +1,238 @@
+"""Patterns beside plain nuisances: zeros of runs, ratios, couplings that change with clamping."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .projected import NOT_SEEN, Column, Projected
+
+__all__ = ["DenseFit", "Rows", "fit_dense"]
+
+Array = NDArray[np.float64]
+
+#: Variances of random terms that are tried, relative to the noise (powers of ten).
+_VARIANCES: Final = np.concatenate([[-math.inf], np.linspace(-4.0, 10.0, 57)])
+
+#: Correlation of neighbouring residuals from which standard errors are taken from blocks.
+_CORRELATED: Final = 0.1
+_BLOCKS: Final = 40
+
+
+@dataclass(frozen=True)
+class Rows:
+    """A part of the readings: patterns (n, m), nuisances (n, p), target (n)."""
+
+    patterns: Array
+    nuisances: Array
+    target: Array
+    alone: Array | None = None
+    """Sum of squares of each pattern by itself, where the rows hold differences."""
+
+    @property
+    def squares(self) -> Array:
+        """Of each pattern with nothing beside it."""
+        if self.alone is not None:
+            return self.alone
+        return np.asarray(np.einsum("ij,ij->j", self.patterns, self.patterns))
+
+
+@dataclass(frozen=True)
+class DenseFit:
+    """Patterns, nuisances and what is left."""
+
+    projected: Projected
+    patterns: Array
+    nuisances: Array
+    nuisance_std: Array
+    random_variance: float
+    """Variance of a random term relative to the noise."""
+    residuals: Array
+    covariance: Array
+    """Of the patterns; from blocks where neighbouring residuals agree."""
+    correlated: bool
+
+
+def fit_dense(
+    parts: Sequence[Rows],
+    columns: Sequence[Column],
+    random: Sequence[int] = (),
+    freedom_lost: float = 0.0,
+    floor: float = NOT_SEEN,
+) -> DenseFit:
+    """Least squares by orthogonal triangles, the nuisances eliminated first.
+
+    Parameters
+    ----------
+    parts : sequence of Rows
+        In the order they were read.
+    columns : sequence of Column
+        Names of the patterns.
+    random : sequence of int
+        Nuisances that are drawn anew in every run, with one variance, found by evidence.
+    freedom_lost : float
+        Rows that say nothing of their own (differences to a mean).
+    floor : float
+        Combinations of patterns of which less is left count as not seen.
+    """
+    p, m = parts[0].nuisances.shape[1], len(columns)
+    triangle = _triangle(parts)
+    count = sum(part.target.size for part in parts) - freedom_lost
+    alone = np.sum([part.squares for part in parts], axis=0)
+    variance = 0.0
+    if len(random):
+        variance = _best_variance(triangle, p, m, random, count)
+    solved = _solve(triangle, p, m, random, variance, count)
+    projected = Projected(
+        tuple(columns),
+        solved.root.T @ solved.root,
+        solved.root.T @ solved.right,
+        np.where(alone > 1e-12 * max(float(alone.max(initial=0.0)), 1e-300), alone, 0.0),
+        solved.noise,
+        solved.freedom,
+        floor,
+    )
+    patterns = projected.solution
+    inverse: Array = np.asarray(np.linalg.pinv(solved.corner, 1e-12), dtype=np.float64)
+    nuisances: Array = np.asarray(inverse @ (solved.corner_right - solved.beside @ patterns))
+    # Standard errors of the nuisances with the patterns fitted beside.
+    through = inverse @ solved.beside
+    spread = inverse @ inverse.T + through @ projected.inverse @ through.T
+    residuals = np.concatenate(
+        [q.target - q.patterns @ patterns - q.nuisances @ nuisances for q in parts]
+    )
+    covariance, correlated = projected.covariance, False
+    size = float(residuals @ residuals)
+    if residuals.size > 200 and size > 0.0:
+        lag = float(residuals[:-1] @ residuals[1:]) / size
+        correlated = lag > _CORRELATED
+    if correlated:
+        covariance = _from_blocks(parts, projected, inverse, solved.beside, residuals)
+    return DenseFit(
+        projected,
+        patterns,
+        nuisances,
+        np.sqrt(np.maximum(solved.noise * np.diagonal(spread), 0.0)),
+        variance,
+        residuals,
+        covariance,
+        correlated,
+    )
+
+
+def _triangle(parts: Iterable[Rows]) -> Array:
+    """The triangle of ``[nuisances | patterns | target]``, part by part."""
+    triangle: Array | None = None
+    for part in parts:
+        block = np.concatenate([part.nuisances, part.patterns, part.target[:, None]], axis=1)
+        if triangle is not None:
+            block = np.concatenate([triangle, block])
+        triangle = np.asarray(np.linalg.qr(block, mode="r"))
+    assert triangle is not None
+    return triangle
+
+
+@dataclass(frozen=True)
+class _Solved:
+    corner: Array  # of the nuisances
+    beside: Array  # nuisances against patterns
+    corner_right: Array
+    root: Array  # of the patterns
+    right: Array
+    noise: float
+    freedom: float
+    evidence: float
+
+
+def _solve(
+    triangle: Array, p: int, m: int, random: Sequence[int], variance: float, count: float
+) -> _Solved:
+    rows = [triangle]
+    if len(random):
+        prior = np.zeros((len(random), triangle.shape[1]))
+        # No variance at all: a prior so tight that the term is nothing.
+        prior[np.arange(len(random)), list(random)] = 1.0 / math.sqrt(max(variance, 1e-24))
+        rows.append(prior)
+    r: Array = np.asarray(np.linalg.qr(np.concatenate(rows), mode="r"))
+    root, right = r[p : p + m, p : p + m], r[p : p + m, -1]
+    left = r[p + m :, -1]
+    corner = r[:p, :p]
+    # Patterns that nothing shows leave the sum of squares as it is: pseudo-inverse.
+    values = np.linalg.svd(root, compute_uv=False) if m else np.zeros(0)
+    rank = int((values > 1e-9 * max(float(values.max(initial=0.0)), 1e-300)).sum())
+    fixed = p - len(random) + rank
+    freedom = max(count - fixed, 1.0)
+    squares = float(left @ left)
+    squares += _out_of_reach(root, right)
+    diagonal = np.abs(np.diagonal(corner))
+    seen = diagonal > 1e-12 * max(float(diagonal.max(initial=0.0)), 1e-300)
+    twice = (
+        freedom * math.log(max(squares, 1e-300) / freedom)
+        + 2.0 * float(np.log(diagonal[seen]).sum())
+        + 2.0 * float(np.log(values[values > 1e-9 * values.max(initial=1e-300)]).sum())
+        + len(random) * math.log(max(variance, 1e-24))
+    )
+    return _Solved(
+        corner,
+        r[:p, p : p + m],
+        r[:p, -1],
+        root,
+        right,
+        squares / freedom,
+        freedom,
+        -0.5 * twice,
+    )
+
+
+def _out_of_reach(root: Array, right: Array) -> float:
+    """Squares along directions in which the patterns have no information."""
+    if root.size == 0:
+        return 0.0
+    u, s, _ = np.linalg.svd(root)
+    lost = s <= 1e-9 * s.max(initial=1e-300)
+    return float(((u[:, lost].T @ right) ** 2).sum())
+
+
+def _best_variance(triangle: Array, p: int, m: int, random: Sequence[int], count: float) -> float:
+    found = [
+        (_solve(triangle, p, m, random, 10.0**power if math.isfinite(power) else 0.0, count), power)
+        for power in _VARIANCES
+    ]
+    best = max(found, key=lambda pair: pair[0].evidence)[1]
+    return 10.0**best if math.isfinite(best) else 0.0
+
+
+def _from_blocks(
+    parts: Sequence[Rows], projected: Projected, inverse: Array, beside: Array, residuals: Array
+) -> Array:
+    """Covariance of the patterns from scores summed over blocks of neighbours."""
+    through = inverse @ beside  # what the nuisances take of the patterns
+    scores = []
+    at = 0
+    for chunk, values in _blocks(parts, residuals):
+        x = chunk.patterns - chunk.nuisances @ through
+        scores.append(x.T @ values)
+        at += values.size
+    stacked = np.array(scores)
+    middle = stacked.T @ stacked * (len(scores) / max(len(scores) - 1.0, 1.0))
+    return np.asarray(projected.inverse @ middle @ projected.inverse)
+
+
+def _blocks(parts: Sequence[Rows], residuals: Array) -> Iterator[tuple[Rows, Array]]:
+    total = residuals.size
+    size = max(1, total // _BLOCKS)
+    at = 0
+    for part in parts:
+        n = part.target.size
+        for a in range(0, n, size):
+            b = min(a + size, n)
+            yield (
+                Rows(part.patterns[a:b], part.nuisances[a:b], part.target[a:b]),
+                residuals[at + a : at + b],
+            )
+        at += n

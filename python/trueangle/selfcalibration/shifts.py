@@ -1,0 +1,402 @@
+"""``shifts``: two encoders, or an encoder and a polygon, clamped at several angles.
+
+``d_j = z_j + error_a(s_a) - error_b(s_b)``: each reads its own pattern at its own place, and
+turning one against the other moves the patterns apart. Coupling errors that change with every
+clamping are random terms of orders 1 and 2.
+
+What it can never see: the zero; orders at which all shifts are whole turns, ``k (phi_i -
+phi_j)``; what changes with the clamping in the same way for both.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..angles import wrap
+from ..distributions import f_tail
+from ..errors import NoModelError
+from .dense import DenseFit, Rows, fit_dense
+from .modelling import made_model
+from .projected import Column, harmonic_rows, pairs
+from .recording import Recording
+from .result import ARCSEC, Blind, HeldOut, SelfCalibration, estimates
+from .significance import chosen_orders
+from .steady import ENCODER, pattern_model
+from .summary import listed, ranges
+
+__all__ = ["shifts"]
+
+Array = NDArray[np.float64]
+
+OTHER: Final = "the other encoder"
+FACETS: Final = "the polygon's facets"
+
+_HIGHEST: Final = 32
+_ROUNDS: Final = 8
+
+#: Share of an order that is left beside the other pattern, below which it is refused.
+_LEAST: Final = 1e-3
+
+#: Shifts that differ by less (radians) are one shift.
+_APART: Final = math.radians(0.5)
+
+#: Readings of a polygon stand within this share of the pitch of its facets.
+_ON_FACET: Final = 0.1
+_MOST_FACETS: Final = 720
+
+#: Orders of a coupling that changes with the clamping.
+_COUPLING: Final = (1.0, 2.0)
+
+
+@dataclass(frozen=True)
+class _Design:
+    """Readings of all mounts, radians: joint, other scale, shift of each run."""
+
+    joint: list[Array]
+    other: list[Array]
+    shift: Array
+    facets: int  # 0 for an encoder
+    notes: tuple[str, ...]
+
+
+def shifts(
+    recordings: Sequence[Recording],
+    orders: str | Sequence[float] = "auto",
+    *,
+    period: float = 360.0,
+) -> SelfCalibration:
+    """Both patterns from readings at several shifts; see `trueangle.selfcal`."""
+    design = _design(recordings)
+    if isinstance(orders, str):
+        highest = design.facets // 2 if design.facets else _HIGHEST
+        wanted = tuple(float(k) for k in range(1, highest + 1))
+    else:
+        wanted = tuple(orders)
+    if design.facets and any(k > design.facets / 2 for k in wanted):
+        raise NoModelError(
+            f"{recordings[0].named}: {design.facets} facets show orders up to "
+            f"{design.facets // 2}, order {max(wanted):g} looks like order "
+            f"{abs(max(wanted) - design.facets):g} there"
+        )
+    fit = _fit(design, wanted)
+    lost = _lost(fit, wanted)
+    kept = tuple(k for k in wanted if k not in lost)
+    if isinstance(orders, str) and not design.facets:
+        kept = chosen_orders(fit.projected, fit.patterns, fit.covariance, kept, None)
+        kept = tuple(sorted({*kept, *lost}))
+        fit = _fit(design, kept)
+        kept = tuple(k for k in kept if k not in lost)
+    if not kept:
+        raise NoModelError(
+            f"{recordings[0].named}: no order can be told: "
+            + (f"all shifts are alike at orders {ranges(lost)}" if lost else "none stands out")
+        )
+    count = sum(a.size for a in design.joint)
+    noise = math.sqrt(fit.projected.variance)
+    limit = noise * math.sqrt(2.0 / count)
+    at = [i for k in kept for i in fit.projected.index(ENCODER, k)]
+    retained = fit.projected.retained()
+    # Cosine alone is seen of the order at half the number of facets.
+    for first in at[::2]:
+        if fit.projected.alone[first + 1] == 0.0:
+            retained[first + 1] = retained[first]
+    covariance = fit.covariance[np.ix_(at, at)]
+    table = estimates(kept, fit.patterns[at], covariance, retained[at], limit)
+    blind = [
+        Blind(
+            (0.0,),
+            "the zero: only differences of two readings are seen",
+            "set the zero at a mark or an index pulse",
+        )
+    ]
+    if lost:
+        where = ", ".join(f"{math.degrees(s) % 360.0:.4g}" for s in design.shift)
+        what = FACETS if design.facets else OTHER
+        blind.append(
+            Blind(
+                lost,
+                f"at shifts of {where} deg order k of {ENCODER} together with order k of {what} is "
+                "all that is seen: k times every shift is the same part of a turn",
+                "clamp at one more angle, off the equal spacing (plan --self shifts)",
+            )
+        )
+    notes = [*design.notes, *_notes(design, fit)]
+    beside = _beside(design, fit, lost, limit)
+    model = made_model(
+        table,
+        "shifts",
+        [f"{listed(b.orders)}: {b.because}" for b in blind],
+        notes,
+        recordings,
+        readings=count,
+        noise=noise,
+        period=period,
+    )
+    return SelfCalibration(
+        method="shifts",
+        model=model,
+        orders=tuple(table),
+        sums=(),
+        blind=tuple(blind),
+        held_out=_held_out(design, tuple(sorted({*kept, *lost})), fit),
+        notes=tuple(notes),
+        noise_arcsec=noise * ARCSEC,
+        readings=count,
+        turns=sum(float(np.ptp(np.unwrap(a))) for a in design.joint) / (2.0 * math.pi),
+        beside=beside,
+    )
+
+
+def _design(recordings: Sequence[Recording]) -> _Design:
+    first = recordings[0]
+    for r in recordings:
+        if r.indicated is None or r.reference is None:
+            raise NoModelError(
+                f"{r.named}: two readings are needed, indicated_deg and reference_deg (the other "
+                "encoder, or the polygon's nominal angles)"
+            )
+    if len(recordings) < 2:
+        raise NoModelError(
+            f"{first.named}: one clamping shows the sum of both patterns only; record at least two "
+            "(three are better), each as a run of its own with its shift_deg"
+        )
+    joint = [np.asarray(r.indicated) for r in recordings]
+    other = [np.asarray(r.reference) for r in recordings]
+    told = [r.shift if r.shift is not None else r.mount for r in recordings]
+    gap = np.array(
+        [float(np.angle(np.exp(1j * (b - a)).mean())) for a, b in zip(joint, other, strict=True)]
+    )
+    gap = np.asarray(wrap(gap - gap[0]))
+    notes: list[str] = []
+    if any(t is None for t in told):
+        shift = gap
+        if np.abs(wrap(gap)).max() < _APART:
+            raise NoModelError(
+                f"{first.named}: all clampings are at one angle, which shows the sum of both "
+                "patterns only; turn one of the two between runs and record by how much (shift_deg)"
+            )
+        notes.append("the shifts are estimated from the mean differences of the two readings")
+        return _Design(joint, other, shift, _facets(other), tuple(notes))
+    given = np.array([float(np.angle(np.exp(1j * np.asarray(t)).mean())) for t in told])
+    given = np.asarray(wrap(given - given[0]))
+    if np.abs(given).max() < _APART and np.abs(gap).max() < _APART:
+        raise NoModelError(
+            f"{first.named}: all clampings have one shift, which shows the sum of both patterns "
+            "only; turn one of the two between runs"
+        )
+    follows = min(float(np.abs(wrap(gap - s * given)).max()) for s in (1.0, -1.0))
+    still = float(np.abs(gap).max())
+    if still < follows:
+        # Both readings were set to one zero at every clamping: the place on the other scale
+        # is its reading and the shift.
+        raw = np.array([float(np.asarray(t).mean()) for t in told])
+        other = [b + s for b, s in zip(other, raw, strict=True)]
+        shift = given
+    else:
+        shift = gap
+        if follows > math.radians(2.0):
+            notes.append(
+                f"the readings' differences are off shift_deg by up to "
+                f"{math.degrees(follows):.3g} deg: the differences are taken"
+            )
+    return _Design(joint, other, shift, _facets(other), tuple(notes))
+
+
+def _facets(other: Sequence[Array]) -> int:
+    """Facets of a polygon: readings that stand at a few equal steps of the turn; else 0."""
+    places = np.mod(np.concatenate(list(other)), 2.0 * math.pi)
+    offset = float(np.angle(np.exp(1j * places[:1]).mean()))
+    x = np.mod(places - offset, 2.0 * math.pi) / (2.0 * math.pi)
+    steps = np.unique(np.round(x * 36_000.0) % 36_000)
+    if steps.size > min(_MOST_FACETS, x.size // 2):
+        return 0
+    for n in range(max(2, steps.size), _MOST_FACETS + 1):
+        if (
+            float(np.abs(x * n - np.round(x * n)).max()) < _ON_FACET
+            and np.unique(np.round(x * n) % n).size >= 0.8 * n
+        ):
+            return n
+    return 0
+
+
+def _columns(design: _Design, orders: Sequence[float]) -> list[Column]:
+    columns = pairs(ENCODER, orders)
+    if design.facets:
+        return columns + [Column(f"facet {i}", 0.0, "") for i in range(design.facets)]
+    return columns + pairs(OTHER, orders)
+
+
+def _fit(design: _Design, orders: Sequence[float], runs: Sequence[int] | None = None) -> DenseFit:
+    """Fixed point over the places on both scales."""
+    runs = range(len(design.joint)) if runs is None else runs
+    columns = _columns(design, orders)
+    coefficients = np.zeros(len(columns))
+    coupling = len(runs) >= 3
+    fit = None
+    for _ in range(_ROUNDS):
+        parts = [
+            _rows(design, j, i, len(runs), orders, coefficients, coupling)
+            for i, j in enumerate(runs)
+        ]
+        random = list(range(len(runs), parts[0].nuisances.shape[1]))
+        fit = fit_dense(parts, columns, random, floor=_LEAST)
+        # What is hardly seen is noise of any size: it moves no place.
+        found = np.where(fit.projected.seen, fit.patterns, 0.0)
+        std = np.sqrt(np.maximum(np.diagonal(fit.covariance), 1e-300))
+        still = np.abs((found - coefficients) / std).max(initial=0.0) < 0.02
+        coefficients = found
+        if still:
+            break
+    assert fit is not None
+    return fit
+
+
+def _rows(
+    design: _Design,
+    j: int,
+    i: int,
+    runs: int,
+    orders: Sequence[float],
+    coefficients: Array,
+    coupling: bool,
+) -> Rows:
+    """Patterns of one clamping; nuisances: its zero and its coupling."""
+    a, b = design.joint[j], design.other[j]
+    m = 2 * len(orders)
+    place = pattern_model(orders, coefficients[:m]).correct(a)
+    mine = harmonic_rows(place, orders)
+    if design.facets and orders and max(orders) * 2 == design.facets:
+        # At half the number of facets the sine is the same at every position.
+        flat = np.abs(mine[m - 1]).max() < 0.05
+        if flat:
+            mine[m - 1] = 0.0
+    if design.facets:
+        origin = float(np.mod(design.other[0][0], 2.0 * math.pi))
+        index = np.round(np.mod(b - origin, 2.0 * math.pi) * design.facets / (2.0 * math.pi))
+        theirs = np.zeros((design.facets, a.size))
+        theirs[index.astype(np.int64) % design.facets, np.arange(a.size)] = -1.0
+    else:
+        other = pattern_model(orders, coefficients[m:]).correct(b)
+        theirs = -harmonic_rows(other, orders)
+    zero = float(np.angle(np.exp(1j * (a - b)).mean()))
+    width = runs * (5 if coupling else 1)
+    nuisances = np.zeros((a.size, width))
+    nuisances[:, i] = 1.0
+    if coupling:
+        nuisances[:, runs + 4 * i : runs + 4 * i + 4] = harmonic_rows(place, _COUPLING).T
+    target = zero + wrap(a - b - zero)
+    return Rows(np.concatenate([mine, theirs]).T, nuisances, np.asarray(target))
+
+
+def _lost(fit: DenseFit, orders: Sequence[float]) -> tuple[float, ...]:
+    retained = fit.projected.retained()
+    lost = []
+    for k in orders:
+        i, j = fit.projected.index(ENCODER, k)
+        both = [n for n in (i, j) if fit.projected.alone[n] > 0.0]
+        if not both or min(float(retained[n]) for n in both) < _LEAST:
+            lost.append(k)
+    return tuple(lost)
+
+
+def _beside(design: _Design, fit: DenseFit, lost: Sequence[float], limit: float) -> dict[str, Any]:
+    found: dict[str, Any] = {"shifts_deg": [math.degrees(s) % 360.0 for s in design.shift]}
+    noise = math.sqrt(fit.projected.variance)
+    found["coupling_arcsec"] = math.sqrt(fit.random_variance) * noise * ARCSEC
+    m = len(fit.patterns) - (design.facets or 0)
+    if design.facets:
+        values = fit.patterns[m:]
+        covariance = fit.covariance[m:, m:]
+        centre = np.eye(values.size) - 1.0 / values.size
+        spread = np.diagonal(centre @ covariance @ centre)
+        # Positions of the joint by the same fit; what is blind is split evenly between both.
+        places = np.mod(design.joint[0], 2.0 * math.pi)
+        orders = [c.order for c in fit.projected.columns if c.part == "cos"]
+        error = fit.patterns[:m] @ harmonic_rows(places, orders)
+        found["positions_deg"] = np.degrees(places).tolist()
+        found["positions_arcsec"] = ((error - error.mean()) * ARCSEC).tolist()
+        found["facets_arcsec"] = ((values - values.mean()) * ARCSEC).tolist()
+        found["facets_std_arcsec"] = (np.sqrt(np.maximum(spread, 0.0)) * ARCSEC).tolist()
+        return found
+    orders = [c.order for c in fit.projected.columns if c.source == OTHER and c.part == "cos"]
+    kept = [k for k in orders if k not in lost]
+    at = [i for k in kept for i in fit.projected.index(OTHER, k)]
+    table = estimates(
+        kept,
+        fit.patterns[at],
+        fit.covariance[np.ix_(at, at)],
+        fit.projected.retained(at),
+        limit,
+        OTHER,
+    )
+    found["other"] = [o.as_json() for o in table]
+    return found
+
+
+def _notes(design: _Design, fit: DenseFit) -> list[str]:
+    notes = []
+    if design.facets:
+        notes.append(f"the other is a polygon of {design.facets} facets, each with its own error")
+    if len(design.joint) < 3:
+        notes.append(
+            "two clampings: a coupling that changes with the clamping passes for orders 1 and 2; "
+            "three or more would show it"
+        )
+    size = math.sqrt(fit.random_variance * fit.projected.variance) * ARCSEC
+    if fit.random_variance > 0.0:
+        notes.append(
+            f"the coupling changes by {size:.3g} arcsec (rms, orders 1 and 2) from clamping to "
+            "clamping"
+        )
+    if fit.correlated:
+        notes.append("neighbouring residuals agree: standard errors are taken from blocks")
+    return notes
+
+
+def _held_out(design: _Design, orders: Sequence[float], whole: DenseFit) -> dict[str, HeldOut]:
+    """Each clamping predicted by the others."""
+    runs = len(design.joint)
+    if runs < 3:
+        return {}
+    before = after = expected = 0.0
+    count = 0
+    for j in range(runs):
+        fit = _fit(design, orders, [i for i in range(runs) if i != j])
+        rows = _rows(design, j, 0, 1, orders, whole.patterns, False)
+        # What the others cannot tell is fitted here: it is not theirs to predict.
+        seen = fit.projected.seen
+        here = np.concatenate([rows.patterns[:, ~seen], rows.nuisances], axis=1)
+        basis = np.linalg.svd(here, full_matrices=False)
+        basis_rows = basis[0][:, basis[1] > 1e-6 * basis[1].max()]
+        told = rows.patterns[:, seen]
+
+        def clear(values: Array, basis_rows: Array = basis_rows) -> Array:
+            return np.asarray(values - basis_rows @ (basis_rows.T @ values))
+
+        plain, left = clear(rows.target), clear(rows.target - told @ fit.patterns[seen])
+        cleared = clear(told)
+        spread = fit.covariance[np.ix_(seen, seen)]
+        before += float(plain @ plain)
+        after += float(left @ left)
+        count += plain.size - basis_rows.shape[1]
+        # A prediction is off by the errors of the patterns as well.
+        expected += float(np.einsum("ij,jk,ik->", cleared, spread, cleared))
+    if count < runs:
+        return {}
+    variance = whole.projected.variance
+    ratio = after / (count * variance + expected)
+    return {
+        "clampings": HeldOut(
+            "all clampings but one",
+            "the one left out",
+            math.sqrt(before / count) * ARCSEC,
+            math.sqrt(after / count) * ARCSEC,
+            f_tail(ratio, float(count), whole.projected.freedom),
+        )
+    }
