@@ -199,6 +199,9 @@ class NonIntegerOrder(Effect):
                 amplitude, float(np.hypot(noise, amplitude / np.sqrt(4.0 * runs)))
             ),
         }
+        known = regression.around.joint.bearing_lines(extension.shape["order"])
+        if known:
+            parameters["explanations"] = quantity(known)
         return parameters, [NonIntegerOrder(extension.shape["order"], amplitude)]
 
     @classmethod

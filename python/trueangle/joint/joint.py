@@ -5,11 +5,18 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from ..errors import ArgumentError
+from .declared import Bearing, DeclaredShaft
 from .shafts import FIXED_MEMBERS, shaft_cycles
 
 __all__ = ["Joint"]
 
 ENCODER_SIDES = ("motor", "output")
+
+#: Multiples of a declared shaft that are expected of it.
+DECLARED_ORDERS = (1, 2, 3, 4)
+
+#: Share of its order by which slip moves a bearing's line.
+SLIP = 0.02
 
 
 @dataclass(frozen=True)
@@ -26,6 +33,9 @@ class Joint:
         The shaft that carries the joint's own encoder.
     pole_pairs : int
         Electrical periods of the encoder in one turn of its shaft.
+    declared : tuple of DeclaredShaft
+        Further shafts: a worm, a belt, the wheels of a gear train.
+    bearings : tuple of Bearing
 
     Examples
     --------
@@ -37,6 +47,8 @@ class Joint:
     fixed_member: str = "none"
     encoder_side: str = "output"
     pole_pairs: int = 1
+    declared: tuple[DeclaredShaft, ...] = ()
+    bearings: tuple[Bearing, ...] = ()
 
     def __post_init__(self) -> None:
         if not 0.0 < self.gear_ratio < float("inf"):
@@ -51,6 +63,11 @@ class Joint:
             )
         if self.pole_pairs < 1:
             raise ArgumentError(f"pole_pairs must be at least 1, got {self.pole_pairs!r}")
+        names = [shaft.name for shaft in self.declared]
+        if len(set(names)) < len(names):
+            raise ArgumentError(f"shafts are declared twice: {', '.join(names)}")
+        for bearing in self.bearings:
+            self.output_order(bearing.shaft, 1.0)
 
     @property
     def shafts(self) -> dict[str, float]:
@@ -59,9 +76,10 @@ class Joint:
         The wave generator is counted against the output member: ``gear_ratio + 1``
         with the circular spline fixed, ``gear_ratio - 1`` with the flexspline fixed.
         """
+        further = {shaft.name: shaft.cycles for shaft in self.declared}
         if self.fixed_member == "none" and self.gear_ratio == 1.0:
-            return {"output": 1.0}
-        return shaft_cycles(self.gear_ratio, self.fixed_member)
+            return {"output": 1.0} | further
+        return shaft_cycles(self.gear_ratio, self.fixed_member) | further
 
     def output_order(self, shaft: str, order: float) -> float:
         """Cycles per output turn of ``order`` of ``shaft``."""
@@ -83,14 +101,24 @@ class Joint:
             found += [("motor", k) for k in sorted({1, 2, 3, 4} | poles)]
         if "wave_generator" in self.shafts:
             found += [("wave_generator", k) for k in (1, 2, 4)]
+        found += [(shaft.name, k) for shaft in self.declared for k in DECLARED_ORDERS]
         return found
+
+    def bearing_lines(self, order: float) -> list[str]:
+        """Lines of bearings that stand, slip allowed for, at an output order."""
+        return [
+            f"bearing on {bearing.shaft.replace('_', ' ')}: {what}"
+            for bearing in self.bearings
+            for what, rate in bearing.lines()
+            if abs(order - (line := rate * self.shafts[bearing.shaft])) <= SLIP * line
+        ]
 
     def name_order(self, order: float, tolerance: float = 1e-6) -> tuple[str, int] | None:
         """The shaft that an output order belongs to, the slowest name last: (shaft, order).
 
         None where ``order`` is no whole multiple of any shaft.
         """
-        for shaft in ("motor", "wave_generator", "output"):
+        for shaft in ("motor", "wave_generator", *self._slow_last, "output"):
             cycles = self.shafts.get(shaft)
             if cycles is None:
                 continue
@@ -99,6 +127,11 @@ class Joint:
             if k >= 1 and low_multiple and abs(order - k * cycles) <= tolerance * max(order, 1.0):
                 return shaft, k
         return None
+
+    @property
+    def _slow_last(self) -> list[str]:
+        """Declared shafts, the fastest first."""
+        return [shaft.name for shaft in sorted(self.declared, key=lambda s: -s.cycles)]
 
     def explanations(self, order: float, tolerance: float = 1e-6) -> list[str]:
         """Every physical explanation on record for a line at an output order."""
@@ -126,6 +159,13 @@ class Joint:
                 found.append("wave generator, twice per turn: meeting the teeth of a spline")
             if min(abs(order - 4.0 * motor), abs(order - 4.0 * generator)) <= near:
                 found.append("wave generator, four times per turn: its shape")
+        found += [
+            shaft.explanation(k)
+            for shaft in self.declared
+            for k in DECLARED_ORDERS
+            if abs(order - k * shaft.cycles) <= near
+        ]
+        found += self.bearing_lines(order)
         if motor is not None and not found:
             multiple = order / motor
             if multiple > 0.5 and abs(multiple - round(multiple)) * motor <= near:

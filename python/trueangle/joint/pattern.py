@@ -33,7 +33,7 @@ class Harmonic:
     Parameters
     ----------
     shaft : str
-        "output", "motor" or "wave_generator".
+        "output", "motor", "wave_generator" or a shaft that the joint declares.
     order : int or float
         Cycles per turn of that shaft.
     amplitude_arcsec : float

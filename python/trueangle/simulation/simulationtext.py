@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import tomllib
 from collections.abc import Callable, Mapping
-from dataclasses import fields
+from dataclasses import fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
@@ -12,6 +12,7 @@ from ..decoding import finite, read_text, shown
 from ..effects import EFFECTS, Effect
 from ..errors import ArgumentError, FileError
 from ..files import SIMULATION, SIMULATION_BYTES, written_atomically
+from ..joint.declared import Bearing, DeclaredShaft
 from ..joint.joint import Joint
 from ..joint.pattern import Harmonic
 from .designs import MAX_SAMPLES, RunDesign
@@ -21,7 +22,7 @@ if TYPE_CHECKING:
 
 __all__ = ["Decoded", "decoded", "dumps", "guarded", "to_table", "write"]
 
-_TABLES = ("joint", "harmonic", "effect", "noise", "run")
+_TABLES = ("joint", "shaft", "bearing", "harmonic", "effect", "noise", "run")
 _JOINT_KEYS = ("gear_ratio", "fixed_member", "encoder_side", "pole_pairs")
 
 #: Lines, effects, runs, or numbers of one list, at most.
@@ -64,7 +65,7 @@ def _decoded(path: str | Path, document: Mapping[str, Any]) -> Decoded:
             raise FileError(
                 path, f"unknown table {shown(name)}; a simulation has {', '.join(_TABLES)}"
             )
-    joint = _build(path, "[joint]", Joint, _geared(_table(path, document, "joint")))
+    joint = _joint(path, document)
     harmonics = tuple(
         _build(path, f"[[harmonic]] number {k}", Harmonic, table)
         for k, table in enumerate(_tables(path, document, "harmonic"), 1)
@@ -89,6 +90,29 @@ def _decoded(path: str | Path, document: Mapping[str, Any]) -> Decoded:
         got = shown(noise["sigma_arcsec"])
         raise FileError(path, f"[noise]: sigma_arcsec must be a finite number, got {got}")
     return Decoded(joint, harmonics, effects, sigma, designs, str(path))
+
+
+def _joint(path: str | Path, document: Mapping[str, Any]) -> Joint:
+    """The gear, with the further shafts and the bearings that the file declares."""
+    table = _table(path, document, "joint")
+    for name in table:
+        if name not in _JOINT_KEYS:
+            raise FileError(
+                path, f"[joint]: unknown key {shown(name)}; it has {', '.join(_JOINT_KEYS)}"
+            )
+    gear = _build(path, "[joint]", Joint, _geared(table))
+    declared = tuple(
+        _build(path, f"[[shaft]] number {k}", DeclaredShaft, entry)
+        for k, entry in enumerate(_tables(path, document, "shaft"), 1)
+    )
+    bearings = tuple(
+        _build(path, f"[[bearing]] number {k}", Bearing, entry)
+        for k, entry in enumerate(_tables(path, document, "bearing"), 1)
+    )
+    if not declared and not bearings:
+        return gear
+    where = "[[shaft]] and [[bearing]]"
+    return guarded(path, where, lambda: replace(gear, declared=declared, bearings=bearings))
 
 
 def _geared(joint: Mapping[str, Any]) -> Mapping[str, Any]:
@@ -197,14 +221,19 @@ def to_table(sim: Simulation | Decoded) -> dict[str, Any]:
         runs.append({k: v for k, v in values.items() if v is not None and v != plain[k]})
     return {
         "joint": {name: getattr(sim.joint, name) for name in _JOINT_KEYS},
-        "harmonic": [
-            {field.name: getattr(line, field.name) for field in fields(line)}
-            for line in sim.harmonics
-        ],
+        "shaft": [_given(shaft) for shaft in sim.joint.declared],
+        "bearing": [_given(bearing) for bearing in sim.joint.bearings],
+        "harmonic": [_given(line) for line in sim.harmonics],
         "effect": [effect.to_table() for effect in sim.effects],
         "noise": {"sigma_arcsec": sim.sigma_arcsec},
         "run": runs,
     }
+
+
+def _given(entry: Any) -> dict[str, Any]:
+    """Fields of one table that have a value."""
+    values = {field.name: getattr(entry, field.name) for field in fields(entry)}
+    return {name: value for name, value in values.items() if value is not None}
 
 
 def write(sim: Simulation, path: str | Path) -> None:
