@@ -43,7 +43,7 @@ def add_target_options(parser: argparse.ArgumentParser) -> None:
             *([f"--{name.replace('_', '-')}"] + (["--table"] if name == "entries" else [])),
             dest=f"option_{name}",
             type=Input if name in read else str,
-            metavar=name.upper().replace("_", "-"),
+            metavar="FILE" if name in read else name.upper().replace("_", "-"),
             help="; ".join(f"{', '.join(names)}: {text}" for text, names in helps.items()),
         )
 

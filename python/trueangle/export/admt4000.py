@@ -47,6 +47,7 @@ class Admt4000(Target):
         "format checked, device not: sign and phase are those of the maker's own tool, and no "
         "model of the device's arithmetic exists; measure after writing"
     )
+    arithmetic_known = False
     options = {"bits": Option(int, 24, "bits of a reading: so many are all evaluated, up to 24")}
 
     def make(self, pattern: Pattern, options: Mapping[str, Any]) -> Made:

@@ -8,6 +8,7 @@ leaves 4.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -17,7 +18,7 @@ from numpy.typing import NDArray
 from .pattern import Pattern
 from .table import TURN, Table, make_table
 
-__all__ = ["Chain", "make_chain"]
+__all__ = ["Chain", "identifier", "make_chain"]
 
 Array = NDArray[np.float64]
 Angles = NDArray[np.uint32]
@@ -66,8 +67,8 @@ def make_chain(pattern: Pattern, method: str, number: str, entries: int | Sequen
     shafts = pattern.shafts()
     sizes = [entries] * len(shafts) if isinstance(entries, int) else list(entries)
     at_indicated = pattern.model.argument == "indicated"
+    tables: list[Table] = []
     zero = round(pattern.zero * TURN)
-    tables = []
     for (name, cycles, part), size in zip(shafts, sizes, strict=True):
         # Looked up at the zeroed reading: the place of an indicated-argument pattern moves.
         move = pattern.zero * cycles if at_indicated else 0.0
@@ -75,5 +76,27 @@ def make_chain(pattern: Pattern, method: str, number: str, entries: int | Sequen
         def moved(x: Array, part: Pattern = part, move: float = move) -> Array:
             return part.correction(x + move)
 
+        name = _unlike(name, [table.shaft for table in tables])
         tables.append(make_table(name, cycles, moved, method, number, size))
     return Chain(zero, tuple(tables), at_indicated)
+
+
+def identifier(name: str) -> str:
+    """A name that C and Rust take: lower case, digits and underscores.
+
+    Examples
+    --------
+    >>> identifier("Joint-A 3"), identifier("3rd")
+    ('joint_a_3', 'angle_3rd')
+    """
+    found = re.sub(r"[^0-9a-z]+", "_", name.lower()).strip("_")
+    return found if found and found[0].isalpha() else f"angle_{found}".rstrip("_")
+
+
+def _unlike(name: str, others: Sequence[str]) -> str:
+    """The name as an identifier, with a number where another shaft has the same."""
+    plain, number = identifier(name), 2
+    found = plain
+    while found in others:
+        found, number = f"{plain}_{number}", number + 1
+    return found

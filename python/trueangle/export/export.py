@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from os import PathLike, fspath
 from pathlib import Path
@@ -169,6 +170,11 @@ def export_model(
     if "name" in given and given["name"] is None:
         given["name"] = "angle"
     pattern = Pattern(loaded)
+    if pattern.is_empty and not (found.takes_direction and pattern.has_direction):
+        raise ArgumentError(
+            "the model has no harmonics and nothing else that follows the angle: there is nothing "
+            "to put into a table"
+        )
     if max_arcsec is None:
         made = found.make(pattern, given)
     else:
@@ -197,8 +203,10 @@ def export_model(
         rms_difference_arcsec=proof.rms_arcsec,
         floor_arcsec=made.floor_arcsec,
         lost=_lost(made, pattern),
-        proven=True,
-        proof=proof.how,
+        proven=found.arithmetic_known,
+        proof=proof.how
+        if found.arithmetic_known
+        else f"{proof.how} as its description has it, the device's own arithmetic is not known",
         zero_deg=made.zero_deg,
         left_out=_left_out(found, pattern),
         notes=notes,
@@ -296,6 +304,22 @@ def _smallest(target: Target, pattern: Pattern, options: dict[str, Any], max_arc
     sizes = target.sizes(options)
     if not sizes:
         return target.make(pattern, options)
+    finer = target.finer(options)
+    if finer is not None:
+        try:
+            return _first(target, pattern, options, max_arcsec, sizes)
+        except TrueAngleError:
+            options, sizes = dict(finer), target.sizes(finer)
+    return _first(target, pattern, options, max_arcsec, sizes)
+
+
+def _first(
+    target: Target,
+    pattern: Pattern,
+    options: dict[str, Any],
+    max_arcsec: float,
+    sizes: Sequence[int],
+) -> Made:
     best, refused = math.inf, None
     bits = options.get("bits", 24)
     for size in sizes:

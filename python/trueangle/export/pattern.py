@@ -127,6 +127,11 @@ class Pattern:
         return math.sqrt(max(variance, 0.0)) / self.period * ARCSEC_PER_TURN
 
     @property
+    def is_empty(self) -> bool:
+        """Whether nothing in it follows the angle."""
+        return not any(self.lines.values()) and not self._defects
+
+    @property
     def is_periodic(self) -> bool:
         """Whether one turn of the output holds all of it."""
         return self.model.is_periodic

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Mapping, Sequence
 from functools import partial
 from typing import Any
@@ -14,7 +13,7 @@ from numpy.typing import NDArray
 from ..angles import ARCSEC_PER_TURN
 from ..errors import ArgumentError
 from ..model import HarmonicModel
-from .chain import Chain, make_chain
+from .chain import Chain, identifier, make_chain
 from .pattern import Pattern
 from .proof import lost_orders
 from .table import METHODS, NUMBERS, TURN, Table
@@ -25,6 +24,9 @@ __all__ = ["PortableTarget", "identifier", "self_test", "table_lines"]
 #: Sizes that are tried, where none is asked for up to the largest default.
 _SIZES = tuple(1 << bits for bits in range(3, 17))
 _LARGEST_DEFAULT = 4096
+
+#: Lines of more segments take more flash than cubics that are as near.
+_LARGEST_LINES = 1024
 
 #: Of the model's uncertainty that a default table may add: a twentieth more in all.
 _SHARE = 1.0 / 3.0
@@ -46,7 +48,15 @@ class PortableTarget(Target):
     }
 
     def sizes(self, options: Mapping[str, Any]) -> Sequence[int]:
-        return () if options["entries"] else _SIZES
+        if options["entries"]:
+            return ()
+        free = options["method"] is None and options["number"] is None
+        return tuple(size for size in _SIZES if not free or size <= _LARGEST_LINES)
+
+    def finer(self, options: Mapping[str, Any]) -> Mapping[str, Any] | None:
+        if options["entries"] or options["method"] or options["number"]:
+            return None
+        return {**options, "method": "cubic", "number": "q31"}
 
     def make(self, pattern: Pattern, options: Mapping[str, Any]) -> Made:
         chain = _chain(pattern, options)
@@ -98,18 +108,6 @@ class PortableTarget(Target):
         from .reading import portable_model
 
         return portable_model(text, path)
-
-
-def identifier(name: str) -> str:
-    """A name that C and Rust take: lower case, digits and underscores.
-
-    Examples
-    --------
-    >>> identifier("Joint-A 3"), identifier("3rd")
-    ('joint_a_3', 'angle_3rd')
-    """
-    found = re.sub(r"[^0-9a-z]+", "_", name.lower()).strip("_")
-    return found if found and found[0].isalpha() else f"angle_{found}".rstrip("_")
 
 
 def table_lines(chain: Chain) -> list[str]:

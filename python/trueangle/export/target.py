@@ -137,7 +137,10 @@ class Target(ABC):
     #: Options that name files: read, never written.
     files: ClassVar[tuple[str, ...]] = ()
 
-    #: Kinds of terms that the target takes besides the pattern: "direction".
+    #: The target's arithmetic is known: what is stated is proven.
+    arithmetic_known: ClassVar[bool] = True
+
+    #: It takes what follows the direction of travel besides the pattern.
     takes_direction: ClassVar[bool] = False
 
     @abstractmethod
@@ -155,6 +158,10 @@ class Target(ABC):
     def sizes(self, options: Mapping[str, Any]) -> Sequence[int]:
         """Entries to try for ``max_arcsec``, increasing; none where the size is fixed."""
         return ()
+
+    def finer(self, options: Mapping[str, Any]) -> Mapping[str, Any] | None:
+        """Options to try where no size keeps ``max_arcsec``."""
+        return None
 
     def checked(self, given: Mapping[str, Any]) -> dict[str, Any]:
         """All options with their defaults.
