@@ -14,6 +14,8 @@ Array = NDArray[np.float64]
 
 #: Times the typical step in time from which on a pause is a gap.
 GAP = 5.0
+#: Part of a step by which a time may lie outside.
+EDGE = 1e-3
 #: Share of neighbours that may be equal in a log on change (time stamps collide).
 EQUAL = 0.01
 #: Longest pause over the typical step from which on a log without repeats is one on change.
@@ -87,7 +89,8 @@ class Stream:
 
     def covers(self, time: Array, longest: float | None = None) -> NDArray[np.bool_]:
         """Which times lie within the stream and in none of its gaps."""
-        inside = (time >= self.time[0]) & (time <= self.time[-1])
+        edge = EDGE * self.step  # times are rounded on the way from one clock to the other
+        inside = (time >= self.time[0] - edge) & (time <= self.time[-1] + edge)
         for start, end in self.gaps(longest):
             inside &= (time <= start) | (time >= end)
         return np.asarray(inside)
