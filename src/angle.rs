@@ -13,6 +13,9 @@ const TAU_LOW: f64 = 2.449_293_598_294_706_4e-16;
 /// Beyond this many turns a double no longer carries a place within the turn.
 const MANY_TURNS: f64 = (1u64 << 51) as f64;
 
+/// Turns that anybody measures in: within these, no product of a few of them overflows.
+const PERIODS: std::ops::RangeInclusive<f64> = 1e-30..=1e30;
+
 /// The length of one turn in the unit of the angles, as an unevaluated sum.
 ///
 /// The double nearest to `2 pi` stands for `2 pi` itself; any other value is exact.
@@ -25,7 +28,7 @@ pub struct Period {
 impl Period {
     /// One turn of `value` units: `TAU`, 360, 1, or the counts per turn.
     pub fn new(value: f64) -> Result<Self, Error> {
-        if !(value.is_finite() && value > 0.0) {
+        if !PERIODS.contains(&value) {
             return Err(Error::Period(value));
         }
         let low = if value == TAU { TAU_LOW } else { 0.0 };

@@ -2,7 +2,11 @@
 
 use crate::angle::Period;
 use crate::error::Error;
+use crate::memory;
 use crate::series::{Rotation, check_frequencies};
+
+/// Most orders of one fit: its triangle takes half a gigabyte and its solution minutes.
+pub const MOST_ORDERS: usize = 4096;
 
 /// The orders of one shaft.
 #[derive(Clone, Debug, PartialEq)]
@@ -28,6 +32,23 @@ impl Design {
             check_frequencies(index, shaft.cycles, &shaft.orders)?;
         }
         Ok(Self { period, shafts })
+    }
+
+    /// An error where the harmonics are too many to be fitted together, or too many for the
+    /// memory.
+    pub fn room(&self) -> Result<(), Error> {
+        /// Triangles, and rows above and below them, that live at the same time.
+        const TRIANGLES: usize = 8;
+        const ROWS: usize = 1024;
+        if self.columns() > 2 * MOST_ORDERS {
+            return Err(Error::Limit {
+                what: "the number of orders fitted together".into(),
+                most: MOST_ORDERS as f64,
+                got: self.columns() as f64 / 2.0,
+            });
+        }
+        let columns = self.columns() + 2;
+        memory::room(size_of::<f64>() * columns * (TRIANGLES * columns + ROWS))
     }
 
     /// One turn of the angles.

@@ -7,9 +7,28 @@ use thiserror::Error;
 pub enum Error {
     /// A turn must be a positive finite number.
     #[error(
-        "period must be a positive finite number (2*pi, 360, 1 or the counts per turn), got {0}"
+        "period must be a positive finite number (2*pi, 360, 1 or the counts per turn; \
+         1e-30 to 1e30), got {0}"
     )]
     Period(f64),
+
+    /// A number that decides about work or memory is beyond what is done for anybody.
+    #[error("{what} must be at most {most}, got {got}")]
+    Limit {
+        /// What is limited.
+        what: String,
+        /// The limit.
+        most: f64,
+        /// The offending number.
+        got: f64,
+    },
+
+    /// There is no memory for what was asked.
+    #[error("not enough memory: {bytes} bytes are needed at once")]
+    Memory {
+        /// What was asked of the system.
+        bytes: usize,
+    },
 
     /// A number that must be finite was not.
     #[error("{what}[{index}] must be finite, got {got}")]
@@ -36,7 +55,9 @@ pub enum Error {
     },
 
     /// Shaft speeds are positive finite cycles per output turn.
-    #[error("cycles_per_turn of shaft {shaft} must be positive and finite, got {got}")]
+    #[error(
+        "cycles_per_turn of shaft {shaft} must be positive and finite (1e-9 to 1e9), got {got}"
+    )]
     Cycles {
         /// Index of the shaft.
         shaft: usize,

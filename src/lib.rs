@@ -8,6 +8,9 @@ pub mod series;
 
 pub mod direct;
 
+pub mod interrupt;
+pub mod memory;
+pub mod once;
 pub mod threads;
 
 pub mod kernel;

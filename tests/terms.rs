@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use proptest::prelude::*;
-use trueangle::kernel::{Argument, Evaluator, Quantity};
+use trueangle::kernel::{Argument, Batch, Evaluator, Quantity};
 use trueangle::terms::{Columns, Corrector, Form, Line, Signal, Signals, Term, Terms};
 use trueangle::{Error, HarmonicSeries, Shaft};
 
@@ -153,7 +153,8 @@ proptest! {
                 direction: None,
             };
             let mut batch = vec![0.0; angles.len()];
-            corrector(&terms).run(Quantity::Correction, &angles, &columns, None, &mut batch).unwrap();
+            let pairs = Batch::apart(&angles, &mut batch).unwrap();
+            corrector(&terms).run(Quantity::Correction, pairs, &columns, None, None).unwrap();
             let mut steps = corrector(&terms);
             for (i, &x) in angles.iter().enumerate() {
                 prop_assert_eq!(steps.correct(x, &columns.at(i)).unwrap(), batch[i]);
@@ -182,7 +183,8 @@ fn a_missing_signal_is_named() {
         velocity: Some(&[1.0]),
         ..Columns::default()
     };
-    let failure = corrector.run(Quantity::Correction, &[1.0], &columns, None, &mut out);
+    let batch = Batch::in_place(&mut out);
+    let failure = corrector.run(Quantity::Correction, batch, &columns, None, None);
     assert!(
         failure
             .unwrap_err()
@@ -201,7 +203,13 @@ fn columns_of_another_length_are_refused() {
         ..Columns::default()
     };
     let failure = corrector(&every_term())
-        .run(Quantity::Correction, &[1.0; 3], &columns, None, &mut out)
+        .run(
+            Quantity::Correction,
+            Batch::in_place(&mut out),
+            &columns,
+            None,
+            None,
+        )
         .unwrap_err();
     assert_eq!(
         failure,

@@ -8,10 +8,14 @@ from typing import TYPE_CHECKING, Any
 from ._core import __version__
 
 if TYPE_CHECKING:
+    from . import errors as errors
+    from . import plots as plots
+    from . import terms as terms
     from .angles import wrap as wrap
     from .checks import check as check
     from .diagnosis import Diagnosis as Diagnosis
     from .diagnosis.diagnose import diagnose as diagnose
+    from .errors import TrueAngleError as TrueAngleError
     from .export import compare as compare
     from .export import export_model as export_model
     from .export import import_model as import_model
@@ -48,6 +52,7 @@ if TYPE_CHECKING:
 
 #: Public names and the modules that define them; a module is imported at first use.
 _PUBLIC = {
+    "TrueAngleError": "errors",
     "wrap": "angles",
     "CalibrationRun": "runs",
     "Diagnosis": "diagnosis",
@@ -92,10 +97,15 @@ _PUBLIC = {
     ),
 }
 
-__all__ = ["__version__", *sorted(_PUBLIC)]
+#: Modules that are reached as attributes, likewise imported at first use.
+_MODULES = ("errors", "plots", "terms")
+
+__all__ = ["__version__", *sorted([*_PUBLIC, *_MODULES])]
 
 
 def __getattr__(name: str) -> Any:
+    if name in _MODULES:
+        return importlib.import_module(f".{name}", __name__)
     module = _PUBLIC.get(name)
     if module is None:
         raise AttributeError(f"module 'trueangle' has no attribute {name!r}")
@@ -105,4 +115,4 @@ def __getattr__(name: str) -> Any:
 
 
 def __dir__() -> list[str]:
-    return sorted({*globals(), *_PUBLIC})
+    return sorted(__all__)  # what completion shows

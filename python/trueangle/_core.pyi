@@ -1,11 +1,14 @@
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Any, Literal, final, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from .step import Step
+
 __version__: str
 
+_Corrected = float | NDArray[Any]  # or labelled data, where that went in
 _Path = str  # "table", "cubics", "exact", "direct", "counts"; "-avx2" and the like force a set
 
 @final
@@ -71,6 +74,14 @@ class Series:
         threads: int | None = None,
         path: _Path | None = None,
     ) -> NDArray[np.floating[Any]]: ...
+    def correct_within(
+        self,
+        indicated: ArrayLike,
+        stretch: tuple[float, float, bool],
+        out: NDArray[np.floating[Any]] | None = None,
+        threads: int | None = None,
+        path: _Path | None = None,
+    ) -> tuple[_Corrected, int]: ...
     def compensator(self) -> Compensator: ...
     @property
     def path(self) -> str: ...
@@ -96,7 +107,7 @@ class Compensator:
     """Correction of one sample at a time."""
 
     @property
-    def step(self) -> Callable[[float], float]: ...
+    def step(self) -> Step: ...
     def _empty_step(self, indicated: float, /) -> float: ...
 
 _Array = NDArray[np.float64]
@@ -120,21 +131,29 @@ class Corrector:
     def reset(self) -> None: ...
     def correct(
         self,
-        indicated: _Array,
-        velocity: _Array | None,
-        temperature: _Array | None,
-        torque: _Array | None,
-        direction: _Array | None,
-        threads: int | None,
-    ) -> _Array: ...
+        indicated: ArrayLike,
+        out: NDArray[Any] | None = None,
+        *,
+        velocity: ArrayLike | None = None,
+        temperature: ArrayLike | None = None,
+        torque: ArrayLike | None = None,
+        direction: ArrayLike | None = None,
+        threads: int | None = None,
+        path: _Path | None = None,
+        stretch: tuple[float, float, bool] | None = None,
+    ) -> tuple[_Corrected, int]: ...
     def error(
         self,
-        theta: _Array,
-        velocity: _Array | None,
-        temperature: _Array | None,
-        torque: _Array | None,
-        direction: _Array | None,
-    ) -> _Array: ...
+        theta: ArrayLike,
+        out: NDArray[Any] | None = None,
+        *,
+        velocity: ArrayLike | None = None,
+        temperature: ArrayLike | None = None,
+        torque: ArrayLike | None = None,
+        direction: ArrayLike | None = None,
+        threads: int | None = None,
+        path: _Path | None = None,
+    ) -> _Corrected: ...
 
 @final
 class Solution:
@@ -225,6 +244,7 @@ class Moments:
         of_indicated: bool,
         travel: NDArray[np.int64],
     ) -> int: ...
+    def copy(self) -> Moments: ...
     def merge(self, other: Moments) -> None: ...
     def spectrum(
         self,

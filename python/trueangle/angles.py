@@ -32,10 +32,10 @@ def check_period(period: float) -> float:
         value = float(period)
     except (TypeError, ValueError):
         value = math.nan
-    if not (math.isfinite(value) and value > 0.0):
+    if not 1e-30 <= value <= 1e30:  # nor NaN
         raise ArgumentError(
             "period must be a positive finite number "
-            f"(2*pi, 360, 1 or the counts per turn), got {period!r}"
+            f"(2*pi, 360, 1 or the counts per turn; 1e-30 to 1e30), got {period!r}"
         )
     return value
 

@@ -8,6 +8,7 @@ __all__ = [
     "ArgumentError",
     "EmptyCellsWarning",
     "FileError",
+    "KindError",
     "MissingExtraError",
     "MissingSignalError",
     "ModelFileError",
@@ -26,6 +27,10 @@ class TrueAngleError(ValueError):
 
 class ArgumentError(TrueAngleError):
     """An argument is out of range, not finite, of the wrong length or kind."""
+
+
+class KindError(ArgumentError, TypeError):
+    """An argument is of a kind that is no number, or not the one that is wanted."""
 
 
 class RankError(TrueAngleError):

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from os import PathLike
@@ -13,24 +12,31 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from . import _core
-from .angles import check_period
+from .angles import arcsec, check_period, unit_name
 from .correction.term import Term
 from .errors import ArgumentError, NotInvertibleError
 from .records import FitRecord, Provenance
 from .shafts import Shaft
 from .spanguard import SpanGuard
+from .step import Step
 
 if TYPE_CHECKING:
     from .correction.corrector import Corrector
 
-__all__ = ["Argument", "HarmonicModel", "check_invertible"]
+__all__ = ["Argument", "HarmonicModel", "Step", "check_invertible"]
 
 Argument: TypeAlias = Literal["reference", "indicated"]
 Path: TypeAlias = Literal["table", "cubics", "exact", "direct", "counts"]
 Array: TypeAlias = NDArray[np.float64]
 
+#: Ends of a span are within so many turns.
+_MOST_TURNS = 1e9
 
-@dataclass(frozen=True, eq=False)
+#: Lines that a summary lists before it says how many more there are.
+_LISTED = 40
+
+
+@dataclass(frozen=True, eq=False, repr=False)
 class HarmonicModel:
     r"""Angle error as a constant, harmonics of one or more shafts and terms; immutable.
 
@@ -93,12 +99,30 @@ class HarmonicModel:
             raise ArgumentError(
                 f"argument must be 'reference' or 'indicated', got {self.argument!r}"
             )
+        series = self._series  # refuses numbers that no series may have
         if self.argument == "reference":
-            check_invertible(self._series.slope_bound)
+            check_invertible(series.slope_bound)
         if self.covariance is not None:
             put(self, "covariance", self._checked_covariance(self.covariance))
+        if self.condition_number is not None:
+            _check_number("condition_number", self.condition_number, 1.0 - _ROUNDING, math.inf)
+        if self.fit is not None:
+            self._check_fit(self.fit)
         if self.terms:
             self._check_terms()
+
+    def _check_fit(self, fit: FitRecord) -> None:
+        far = _MOST_TURNS * self.period
+        for what, value in zip(("start", "stop"), fit.span, strict=True):
+            _check_number(f"fit.span's {what}", value, -far, far)
+        if fit.span[0] > fit.span[1]:
+            raise ArgumentError(f"fit.span must not stop before it starts, got {fit.span!r}")
+        if fit.residual is not None:
+            _check_number("fit.residual", fit.residual, 0.0, far)
+        for what in ("samples", "runs", "ridge", "offset_spread"):
+            _check_number(f"fit.{what}", getattr(fit, what), 0.0, math.inf)
+        for i, offset in enumerate(fit.offsets):
+            _check_number(f"fit.offsets[{i}]", offset, -far, far)
 
     def _check_terms(self) -> None:
         for i, term in enumerate(self.terms):
@@ -113,7 +137,7 @@ class HarmonicModel:
 
     @cached_property
     def _warn(self) -> SpanGuard:
-        return SpanGuard(self.partial_span, self.period if self.is_periodic else math.inf)
+        return SpanGuard(self.partial_span, self.is_periodic)
 
     @cached_property
     def _series(self) -> _core.Series:
@@ -224,8 +248,16 @@ class HarmonicModel:
         ``path="table"`` computes it in double precision and rounds once.
         """
         if self.terms:
-            given = _given(direction, velocity, temperature, torque)
-            return self._with_terms("error", theta, out, given)
+            return self._core_corrector().error(
+                theta,
+                out,
+                direction=direction,
+                velocity=velocity,
+                temperature=temperature,
+                torque=torque,
+                threads=threads,
+                path=path,
+            )
         return self._series.error(theta, out, threads, path)
 
     @overload
@@ -280,19 +312,26 @@ class HarmonicModel:
             Once per model, when it was fitted on part of a turn only and a corrected
             angle lies outside that part.
         """
+        stretch = self._warn.stretch
         if self.terms:
-            given = _given(direction, velocity, temperature, torque)
-            corrected = self._with_terms("correct", indicated, out, given, threads)
+            corrected, outside = self._core_corrector().correct(
+                indicated,
+                out,
+                direction=direction,
+                velocity=velocity,
+                temperature=temperature,
+                torque=torque,
+                threads=threads,
+                path=path,
+                stretch=stretch,
+            )
+        elif stretch is None:
+            return self._series.correct(indicated, out, threads, path)
         else:
-            corrected = self._series.correct(indicated, out, threads, path)
-        if self._warn.armed:
-            self._warn(corrected)
+            corrected, outside = self._series.correct_within(indicated, stretch, out, threads, path)
+        if outside:
+            self._warn(outside, np.size(corrected))
         return corrected
-
-    def _with_terms(self, *arguments: Any) -> float | NDArray[Any]:
-        from .correction.corrector import evaluate
-
-        return evaluate(self, self._core_corrector(), *arguments)
 
     def corrector(self) -> Corrector:
         """`correct` that carries its state from batch to batch and step to step.
@@ -304,14 +343,15 @@ class HarmonicModel:
 
         return Corrector(self)
 
-    def compensator(self) -> Callable[..., float]:
+    def compensator(self) -> Step:
         """``step(indicated) -> corrected`` for one sample at a time.
 
         The cheapest call there is: a bound method of the compiled core, no allocation
         but the result, the same number as `correct`. It does not warn about the span.
 
         With terms it is ``step(indicated, velocity=, temperature=, torque=, direction=)``
-        and keeps the state of travel; `corrector` gives the same step and a ``reset``.
+        and keeps the state of travel; `corrector` gives the same step and a ``reset``. Signals
+        that the model does not need are ignored, as by `correct`. A step can be pickled.
 
         Examples
         --------
@@ -325,6 +365,47 @@ class HarmonicModel:
         return self._series.compensator().step
 
     # -- description --------------------------------------------------------------
+
+    def __repr__(self) -> str:
+        lines = sum(len(shaft.orders) for shaft in self.shafts)
+        parts = [
+            f"{lines} {'order' if lines == 1 else 'orders'}"
+            + (f" of {_listed([shaft.name for shaft in self.shafts])}" if self.shafts else ""),
+            f"period {self.period:g}",
+            f"argument {self.argument}",
+        ]
+        if self.terms:
+            parts.append(f"with {_listed([term.kind for term in self.terms])}")
+        return f"<HarmonicModel: {', '.join(parts)}>"
+
+    def summary(self) -> str:
+        """The harmonics by shaft and order, in arcseconds, and what is known of the fit."""
+        unit = unit_name(self.period)
+        lines = [
+            repr(self)[1:-1],
+            f"constant {self.constant:.6g} {unit}, {arcsec(self.constant, self.period):.6g} arcsec",
+            f"{'shaft':16s} {'order':>10s} {'amplitude, arcsec':>18s} {'phase, deg':>11s}",
+        ]
+        rows = [
+            f"{shaft.name:16.16s} {k:10d} {arcsec(c, self.period):18.4f} {math.degrees(p):11.2f}"
+            for shaft in self.shafts
+            for k, c, p in zip(shaft.orders, shaft.amplitudes, shaft.phases, strict=True)
+        ]
+        lines += rows[:_LISTED]
+        if len(rows) > _LISTED:
+            lines.append(f"... and {len(rows) - _LISTED} more")
+        if self.fit is not None:
+            start, stop = self.fit.span
+            lines.append(
+                f"fitted to {self.fit.samples} readings of {self.fit.runs} runs "
+                f"between {start:.6g} and {stop:.6g} {unit}"
+            )
+        return "\n".join(lines)
+
+    def _repr_html_(self) -> str:
+        from html import escape
+
+        return f"<pre>{escape(self.summary())}</pre>"
 
     @property
     def orders(self) -> tuple[float, ...]:
@@ -436,9 +517,20 @@ class HarmonicModel:
 
 _SIGNALS = ("direction", "velocity", "temperature", "torque")
 
+#: What a condition number may be below 1 by rounding.
+_ROUNDING = 1e-6
 
-def _given(*signals: ArrayLike | None) -> dict[str, ArrayLike | None]:
-    return dict(zip(_SIGNALS, signals, strict=True))
+
+def _check_number(what: str, value: object, least: float, most: float) -> None:
+    number = isinstance(value, (int, float, np.integer, np.floating))
+    if not (number and math.isfinite(value) and least <= value <= most):  # type: ignore[arg-type,operator]
+        bounds = f"at least {least:g}" if math.isinf(most) else f"from {least:g} to {most:g}"
+        raise ArgumentError(f"{what} must be a finite number, {bounds}, got {value!r}")
+
+
+def _listed(names: list[str], most: int = 4) -> str:
+    more = f" and {len(names) - most} more" if len(names) > most else ""
+    return ", ".join(name[:24] for name in names[:most]) + more
 
 
 def check_invertible(slope: float) -> None:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+import os
+import threading
 from collections.abc import Hashable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any, NamedTuple
@@ -102,6 +104,33 @@ class MomentsFit:
         )
 
 
+class _Turn:
+    """One thread at a time; the others wait, unless nobody can ever be done.
+
+    A process that is forked while another of its threads is at it inherits sums that are
+    half added: there it is told so.
+    """
+
+    #: Seconds between two looks at whose turn it is.
+    _PATIENCE = 0.05
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._process = os.getpid()
+
+    def __enter__(self) -> None:
+        while not self._lock.acquire(timeout=self._PATIENCE):
+            if self._process != os.getpid():
+                raise ArgumentError(
+                    "this process was forked while another thread updated these moments: "
+                    "make new ones here"
+                )
+        self._process = os.getpid()
+
+    def __exit__(self, *_: object) -> None:
+        self._lock.release()
+
+
 class Moments:
     r"""Sums over readings, taken in one pass, from which any of the orders can be fitted.
 
@@ -126,8 +155,9 @@ class Moments:
     -----
     About 4 ns per reading and core, whatever the number of orders; 900 bytes per segment
     and run, whatever the number of readings. Sums are compensated: a billion readings lose
-    no digits. Results do not depend on ``threads``. An accumulator belongs to one thread
-    at a time: give each its own and merge them.
+    no digits. Results do not depend on ``threads``. Threads may share an accumulator: they
+    take turns, and nothing is lost; an accumulator for each, merged in the end, lets them
+    work at the same time. Orders go up to 65 536 cycles of the shafts' common turn.
 
     Examples
     --------
@@ -151,6 +181,7 @@ class Moments:
         self._shafts = resolve_orders(orders, gear_ratio, fixed_member, shafts)
         self._period = float(period)
         self._runs: dict[Hashable, _core.Moments] = {}
+        self._turn = _Turn()
         self._new()  # a wrong period or shaft is named here, not at the first update
 
     def _new(self) -> _core.Moments:
@@ -170,7 +201,8 @@ class Moments:
     @property
     def count(self) -> int:
         """Readings of positive weight."""
-        return sum(run.count for run in self._runs.values())
+        with self._turn:
+            return sum(run.count for run in self._runs.values())
 
     def update(
         self,
@@ -212,15 +244,22 @@ class Moments:
                 raise ArgumentError(
                     f"{what} has shape {np.shape(values)}, theta has {shape}: they must agree"
                 )
-        sums = self._runs.get(run)
-        if sums is None:
-            sums = self._new()
-        sums.update(
-            _flat(theta), _flat(error), None if weights is None else _flat(weights), threads
+        columns = (
+            _flat(theta),
+            _flat(error),
+            None if weights is None else _flat(weights),
+            threads,
         )
-        if sums.count:
-            self._runs[run] = sums
+        with self._turn:
+            sums = self._of(run)
+            sums.update(*columns)
+            if sums.count:
+                self._runs[run] = sums
         return self
+
+    def _of(self, run: Hashable) -> _core.Moments:
+        sums = self._runs.get(run)
+        return self._new() if sums is None else sums
 
     def update_known(
         self,
@@ -249,12 +288,11 @@ class Moments:
         int
             Readings that are known.
         """
-        sums = self._runs.get(run)
-        if sums is None:
-            sums = self._new()
-        known = sums.update_known(reference, indicated, argument == "indicated", travel)
-        if known:
-            self._runs[run] = sums
+        with self._turn:
+            sums = self._of(run)
+            known = sums.update_known(reference, indicated, argument == "indicated", travel)
+            if known:
+                self._runs[run] = sums
         return known
 
     def merge(self, other: Moments) -> Moments:
@@ -263,12 +301,19 @@ class Moments:
             raise ArgumentError(f"moments merge with moments, got {type(other).__name__}")
         if (self._shafts, self._period) != (other._shafts, other._period):
             raise ArgumentError("moments merge when their orders, shafts and period agree")
-        for label, sums in other._runs.items():
-            mine = self._runs.get(label)
-            if mine is None:
-                mine = self._runs[label] = self._new()
-            mine.merge(sums)
+        theirs = other._copies()  # not both turns at once: the other may be merging this
+        with self._turn:
+            for label, sums in theirs.items():
+                mine = self._runs.get(label)
+                if mine is None:
+                    self._runs[label] = sums
+                else:
+                    mine.merge(sums)
         return self
+
+    def _copies(self) -> dict[Hashable, _core.Moments]:
+        with self._turn:
+            return {label: sums.copy() for label, sums in self._runs.items()}
 
     def __add__(self, other: Moments) -> Moments:
         if not isinstance(other, Moments):
@@ -281,15 +326,17 @@ class Moments:
     def copy(self) -> Moments:
         """An accumulator of its own with the same readings."""
         fresh = Moments.__new__(Moments)
-        fresh._shafts, fresh._period, fresh._runs = self._shafts, self._period, {}
-        return fresh.merge(self)
+        fresh._shafts, fresh._period = self._shafts, self._period
+        fresh._runs, fresh._turn = self._copies(), _Turn()
+        return fresh
 
     def spectrum(self, run: Hashable = None) -> Spectrum:
         """All sums of one run: the input of order selection and of transforms."""
-        if run not in self._runs:
-            raise ArgumentError(f"there is no run {run!r}; the runs are {list(self._runs)!r}")
-        sums = self._runs[run]
-        return Spectrum(*sums.spectrum(), cycles=sums.cycles)
+        with self._turn:
+            if run not in self._runs:
+                raise ArgumentError(f"there is no run {run!r}; the runs are {list(self._runs)!r}")
+            sums = self._runs[run]
+            return Spectrum(*sums.spectrum(), cycles=sums.cycles)
 
     def solve(self, orders: _Orders | None = None) -> MomentsFit:
         """Least-squares fit of some of the orders, or of all.
@@ -303,15 +350,17 @@ class Moments:
         """
         wanted = self._shafts if orders is None else self._subset(orders)
         cycles, lists = _lists(wanted)
-        found = _core.fit_moments(list(self._runs.values()), self._period, cycles, lists)
+        with self._turn:
+            labels = list(self._runs)
+            found = _core.fit_moments(list(self._runs.values()), self._period, cycles, lists)
         pairs = zip(wanted, found.cosine, found.sine, strict=True)
         return MomentsFit(
             shafts=tuple(
                 Shaft(s.name, s.cycles_per_turn, s.orders, tuple(a), tuple(b)) for s, a, b in pairs
             ),
             constant=found.constant,
-            offsets=dict(zip(self._runs, found.offsets.tolist(), strict=True)),
-            offset_std=dict(zip(self._runs, found.offset_std.tolist(), strict=True)),
+            offsets=dict(zip(labels, found.offsets.tolist(), strict=True)),
+            offset_std=dict(zip(labels, found.offset_std.tolist(), strict=True)),
             covariance=found.covariance,
             residual_variance=found.residual_variance,
             degrees_of_freedom=found.degrees_of_freedom,
@@ -333,11 +382,13 @@ class Moments:
         return wanted
 
     def __getstate__(self) -> dict[str, Any]:
-        runs = {label: sums.store() for label, sums in self._runs.items()}
+        with self._turn:
+            runs = {label: sums.store() for label, sums in self._runs.items()}
         return {"shafts": self._shafts, "period": self._period, "runs": runs}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         self._shafts, self._period, self._runs = state["shafts"], state["period"], {}
+        self._turn = _Turn()
         for label, numbers in state["runs"].items():
             self._runs[label] = self._new()
             # Buffers that come over a network need not be aligned.

@@ -3,35 +3,36 @@
 from __future__ import annotations
 
 import warnings
-
-import numpy as np
-from numpy.typing import ArrayLike
+from typing import TypeAlias
 
 from .errors import OutsideSpanWarning
 
-__all__ = ["SpanGuard"]
+__all__ = ["SpanGuard", "Stretch"]
+
+#: Start, stop, and whether every turn looks the same.
+Stretch: TypeAlias = tuple[float, float, bool]
 
 
 class SpanGuard:
-    """Warns once when corrected angles leave the stretch a model was fitted on."""
+    """Warns once when corrected angles leave the stretch a model was fitted on.
 
-    def __init__(self, span: tuple[float, float] | None, period: float) -> None:
-        self.span = span
-        self.period = period
-        self.armed = self.span is not None
+    The core counts them while it corrects.
+    """
 
-    def __call__(self, corrected: ArrayLike) -> None:
-        """Look at corrected angles; says nothing more once it has warned."""
-        if self.span is None:
+    def __init__(self, span: tuple[float, float] | None, repeats: bool = True) -> None:
+        #: What the core is to look at; None where there is nothing to say (any more).
+        self.stretch: Stretch | None = None if span is None else (*span, repeats)
+
+    def __call__(self, outside: int, total: int) -> None:
+        """Tell of ``outside`` of ``total`` angles; says nothing more once it has warned."""
+        if not outside or self.stretch is None:
             return
-        start, stop = self.span
-        outside = np.mod(np.asarray(corrected) - start, self.period) > stop - start
-        if outside.any():
-            self.armed = False
-            warnings.warn(
-                f"{np.count_nonzero(outside)} of {outside.size} corrected angles lie outside "
-                f"the {start:.6g} to {stop:.6g} the model was fitted on: there it is "
-                "extrapolated and may be far off (said once per model)",
-                OutsideSpanWarning,
-                stacklevel=3,
-            )
+        start, stop, _ = self.stretch
+        self.stretch = None
+        warnings.warn(
+            f"{outside} of {total} corrected angles lie outside the {start:.6g} to {stop:.6g} "
+            "the model was fitted on: there it is extrapolated and may be far off (said once "
+            "per model)",
+            OutsideSpanWarning,
+            stacklevel=3,
+        )

@@ -3,6 +3,7 @@
 use super::{Method, Options};
 use crate::design::Design;
 use crate::error::Error;
+use crate::interrupt;
 use crate::lstsq::{Reduction, System, Triangle};
 use crate::moments::accumulator::{Accumulator, segments};
 use crate::moments::readings::Readings;
@@ -87,8 +88,8 @@ pub fn reduce(
         let segments = segments(highest);
         let readings: usize = runs.iter().map(|run| run.angle.len()).sum();
         let per_segment = readings / (segments * runs.len());
-        let pays = per_segment >= READINGS_PER_SEGMENT && segments <= MOST_SEGMENTS;
-        if pays || asked.is_some() {
+        let fits = segments <= MOST_SEGMENTS;
+        if fits && (per_segment >= READINGS_PER_SEGMENT || asked.is_some()) {
             let sum = |(run, &centre): (&Readings, &f64)| {
                 let mut sums = Accumulator::new(design.period(), cycles, highest, centre);
                 sums.update(*run, options.threads);
@@ -180,6 +181,7 @@ fn run_rows(design: &Design, run: &Readings, centre: f64) -> Triangle {
     let mut rows = Vec::with_capacity(BLOCK_ROWS.min(run.angle.len()) * columns);
     let mut reduction = Reduction::default();
     for (block, angles) in run.angle.chunks(BLOCK_ROWS).enumerate() {
+        interrupt::point();
         rows.clear();
         for (i, &angle) in angles.iter().enumerate() {
             let i = BLOCK_ROWS * block + i;

@@ -192,6 +192,24 @@ impl<'a, X: Copy> Batch<'a, X, X> {
     }
 }
 
+/// A batch that threads take disjoint parts of.
+pub struct Shared<'a, X, Y>(Batch<'a, X, Y>);
+
+// SAFETY: only `part` is called through the shared reference, on disjoint ranges.
+unsafe impl<X: Sync, Y: Send> Sync for Shared<'_, X, Y> {}
+
+impl<'a, X, Y> Shared<'a, X, Y> {
+    /// To be taken apart by `Batch::part`.
+    pub fn new(batch: Batch<'a, X, Y>) -> Self {
+        Self(batch)
+    }
+
+    /// The whole.
+    pub fn get(&self) -> &Batch<'a, X, Y> {
+        &self.0
+    }
+}
+
 macro_rules! counts {
     ($($int:ty),*) => {$(
         impl Sample for $int {

@@ -1,17 +1,21 @@
 //! A series made ready for batches: chooses how to compute and spreads it over threads.
 
-use std::sync::{Arc, OnceLock};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
 
-use super::batch::{Batch, Real, Sample, is_single};
+use super::batch::{Batch, Real, Sample, Shared, is_single};
 use super::counts::{Counts, MOST_COUNTS};
 use super::cubics::{self, Cubics};
 use super::exact::Exact;
 use super::lanes::InstructionSet;
 use super::route::{Path, Route};
-use super::table::{Scalar, Table};
+use super::stretch::Stretch;
+use super::table::{MOST_SEGMENTS, Scalar, Table};
 use super::{Argument, Quantity, expansion, inverse};
 use crate::direct;
 use crate::error::Error;
+use crate::memory;
+use crate::once::Once;
 use crate::series::HarmonicSeries;
 use crate::threads;
 
@@ -20,6 +24,14 @@ pub const THREADED: usize = 100_000;
 
 /// Samples of one piece of work for a thread.
 const PART: usize = 1 << 15;
+
+/// Least samples of such a piece, where each of them takes long.
+const LEAST_PART: usize = 256;
+
+/// Orders that the exact path computes in the time of one sample by a table, and samples
+/// by a table in the time that the slow truth takes for one order.
+const LINES_PER_SAMPLE: usize = 16;
+const DIRECT_PER_LINE: usize = 8;
 
 /// Integers per entry from which it pays to compute an entry for every count.
 const PAYING_SHARE: f64 = 0.25;
@@ -37,9 +49,9 @@ const ROUNDING: f64 = 1e-15;
 /// What is looked up for one quantity, built at the first use.
 #[derive(Debug, Default)]
 struct Tables {
-    polynomials: OnceLock<Option<Arc<Table>>>,
-    counts: OnceLock<Counts>,
-    cubics: OnceLock<Option<Cubics>>,
+    polynomials: Once<Option<Arc<Table>>>,
+    counts: Once<Counts>,
+    cubics: Once<Option<Cubics>>,
 }
 
 /// What a route computes with.
@@ -58,6 +70,7 @@ pub struct Evaluator {
     series: HarmonicSeries,
     argument: Argument,
     tolerance: f64,
+    lines: usize,
     reach: f64,
     slope_bound: f64,
     best: InstructionSet,
@@ -71,6 +84,7 @@ impl Evaluator {
     /// Takes the series over; tables are built when first needed.
     pub fn new(series: HarmonicSeries, argument: Argument) -> Self {
         Self {
+            lines: series.lines().count(),
             reach: series.amplitude_sum(),
             slope_bound: series.slope_bound(),
             exact_error: Exact::error(&series),
@@ -253,6 +267,20 @@ impl Evaluator {
         threads: Option<usize>,
         batch: Batch<'_, X, Y>,
     ) -> Result<(), Error> {
+        self.run_watched(quantity, route, threads, batch, None)
+            .map(|_| ())
+    }
+
+    /// The same, and how many results lie outside a stretch: looked at while they are in
+    /// the cache.
+    pub fn run_watched<X: Sample, Y: Real>(
+        &self,
+        quantity: Quantity,
+        route: Option<Route>,
+        threads: Option<usize>,
+        batch: Batch<'_, X, Y>,
+        stretch: Option<&Stretch>,
+    ) -> Result<usize, Error> {
         if quantity == Quantity::Correction {
             self.check_invertible()?;
         }
@@ -264,19 +292,58 @@ impl Evaluator {
                 path: route.to_string(),
                 reason,
             })?;
-        if len < THREADED {
+        let outside = AtomicUsize::new(0);
+        let run = |batch: Batch<'_, X, Y>| {
+            // SAFETY: the results are looked at after they were written, by one thread.
+            let results = unsafe { batch.part(0, batch.len()) };
             self.run_part(quantity, method, route.set, batch);
-            return Ok(());
+            if let Some(stretch) = stretch {
+                let count = stretch.outside(self.best, results);
+                outside.fetch_add(count, Ordering::Relaxed);
+            }
+        };
+        let price = self.price(method);
+        if len.saturating_mul(price) < THREADED {
+            run(batch);
+            return Ok(outside.into_inner());
         }
         let threads = threads.unwrap_or_else(threads::available);
-        let batch = Shared(batch);
-        threads::for_each_part(len.div_ceil(PART), threads, |i| {
-            let start = i * PART;
+        let size = (PART / price).max(LEAST_PART);
+        let batch = Shared::new(batch);
+        threads::for_each_part(len.div_ceil(size), threads, |i| {
+            let start = i * size;
             // SAFETY: parts lie within the batch, and each is handed out once.
-            let part = unsafe { batch.get().part(start, PART.min(len - start)) };
-            self.run_part(quantity, method, route.set, part);
+            let part = unsafe { batch.get().part(start, size.min(len - start)) };
+            run(part);
         });
-        Ok(())
+        Ok(outside.into_inner())
+    }
+
+    /// About what a sample costs by a method, in samples by a table.
+    fn price(&self, method: Method<'_>) -> usize {
+        match method {
+            Method::Table(_) | Method::Counts(_) | Method::Cubics(_) => 1,
+            Method::Exact => 1 + self.lines / LINES_PER_SAMPLE,
+            Method::Direct => 1 + DIRECT_PER_LINE * self.lines,
+        }
+    }
+
+    /// An error where there is no memory to build what a batch needs.
+    pub fn room(&self) -> Result<(), Error> {
+        /// Bytes per segment, of the table and of what it is made from.
+        const BYTES: usize = 512;
+        /// Segments per order of a table of the default tolerance.
+        const SEGMENTS: f64 = 64.0;
+        let highest = self.series.lines().map(|line| line.order);
+        let segments = SEGMENTS * highest.fold(16.0, f64::max);
+        memory::room(BYTES * (segments as usize).min(MOST_SEGMENTS))
+    }
+
+    /// True when what a batch needs is there, so that it takes as long as its samples.
+    pub fn is_ready(&self, quantity: Quantity) -> bool {
+        quantity == Quantity::Slope
+            || !self.series.is_periodic()
+            || self.tables(quantity).polynomials.get().is_some()
     }
 
     fn run_part<X: Sample, Y: Real>(
@@ -362,17 +429,5 @@ impl Evaluator {
         batch.map_blocks(|x, out| {
             newton.solve(x, out, |x| self.correct_one(x));
         });
-    }
-}
-
-/// A batch that threads take disjoint parts of.
-struct Shared<'a, X, Y>(Batch<'a, X, Y>);
-
-// SAFETY: only `part` is called through the shared reference, on disjoint ranges.
-unsafe impl<X: Sync, Y: Send> Sync for Shared<'_, X, Y> {}
-
-impl<'a, X, Y> Shared<'a, X, Y> {
-    fn get(&self) -> &Batch<'a, X, Y> {
-        &self.0
     }
 }

@@ -19,16 +19,18 @@ mod portable;
 mod route;
 mod segments;
 mod sincos;
+mod stretch;
 mod sweep;
 mod table;
 #[cfg(target_arch = "x86_64")]
 mod x86;
 
-pub use batch::{Batch, Real, Sample};
+pub use batch::{Batch, Real, Sample, Shared};
 pub use cubics::Cubics;
 pub use evaluator::{Evaluator, THREADED, TOLERANCE};
 pub use lanes::InstructionSet;
 pub use route::{Path, Route};
+pub use stretch::Stretch;
 pub use table::{Scalar, Table};
 
 /// Which angle the series takes.

@@ -5,7 +5,8 @@ use super::kernel::accumulate;
 use super::readings::Readings;
 use super::segment::Segment;
 use crate::angle::{Period, two_sum};
-use crate::threads;
+use crate::error::Error;
+use crate::{memory, threads};
 
 /// Readings per segment summed plainly before they join the compensated total: rounding
 /// stays that of a few hundred additions, whatever the number of readings.
@@ -16,6 +17,12 @@ const THREADED: usize = 1 << 17;
 
 /// Bytes that the tables of the parts of one update may take together.
 const PART_BYTES: usize = 4 << 20;
+
+/// Bytes of a table beyond which an update does with one part.
+const MOST_PART_BYTES: usize = 16 << 20;
+
+/// Highest order of the base shaft: 400 MB of sums.
+pub const MOST_ORDER: u32 = 1 << 16;
 
 /// Segments per order: half an order turns by `pi / SEGMENTS_PER_ORDER / 2 < 1/4` within a
 /// segment, where a Chebyshev series of 12 terms is exact to 3e-16.
@@ -68,6 +75,20 @@ impl Accumulator {
         }
     }
 
+    /// An error where orders up to `highest` are too many, or too many for the memory.
+    pub fn room(highest: u32) -> Result<(), Error> {
+        /// Tables of an accumulator, and of what an update makes beside it.
+        const TABLES: usize = 6;
+        if highest > MOST_ORDER {
+            return Err(Error::Limit {
+                what: "the highest order of moments, in cycles of their base shaft,".into(),
+                most: f64::from(MOST_ORDER),
+                got: f64::from(highest),
+            });
+        }
+        memory::room(TABLES * size_of::<Segment>() * segments(highest) + 2 * PART_BYTES)
+    }
+
     /// Turns of the base shaft per turn.
     pub fn cycles(&self) -> f64 {
         self.cycles
@@ -96,13 +117,15 @@ impl Accumulator {
     /// Adds readings; the result does not depend on `threads`.
     pub fn update(&mut self, readings: Readings<'_>, threads: usize) {
         let len = readings.angle.len();
-        self.count += readings.count();
         if len < THREADED {
-            return self.add(readings);
+            self.add(readings);
+            self.count += readings.count();
+            return;
         }
         let table = size_of::<Segment>() * self.total.len();
+        let least = if table > MOST_PART_BYTES { 1 } else { 4 };
         let parts = (PART_BYTES / table)
-            .clamp(4, 16)
+            .clamp(least, 16)
             .min(len.div_ceil(THREADED));
         let bounds: Vec<_> = (0..=parts).map(|i| len * i / parts).collect();
         let empty = {
@@ -115,9 +138,12 @@ impl Accumulator {
             part.add(readings.part(bounds[i], bounds[i + 1]));
             part
         });
+        // Work that is called off is called off before here: nothing is added by halves.
+        let sums: Vec<_> = sums.collect();
         for part in sums {
             self.absorb(part);
         }
+        self.count += readings.count();
     }
 
     /// Adds readings block by block.

@@ -4,17 +4,17 @@
 //! Any other is copied into one that is, and a result that has to go into such an array
 //! is copied there by numpy.
 
-use numpy::npyffi::npy_intp;
+use numpy::npyffi::{PY_ARRAY_API, npy_intp};
 use numpy::{
-    Element, PyArrayDescr, PyArrayDescrMethods, PyArrayDyn, PyArrayMethods, PyUntypedArray,
-    PyUntypedArrayMethods,
+    Element, PyArray1, PyArray2, PyArrayDescr, PyArrayDescrMethods, PyArrayDyn, PyArrayMethods,
+    PyUntypedArray, PyUntypedArrayMethods, dtype,
 };
 use pyo3::intern;
 use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
-use pyo3::types::{IntoPyDict, PyBool};
+use pyo3::types::{IntoPyDict, PyBool, PyList, PyTuple};
 
-use super::failure::argument_error;
+use super::failure::{argument_error, kind_error};
 
 /// The numpy module, imported once.
 pub fn numpy_module(py: Python<'_>) -> PyResult<&Bound<'_, PyModule>> {
@@ -82,6 +82,48 @@ impl Kind {
     }
 }
 
+/// A new array whose elements are to be written before they are seen, or `MemoryError`.
+pub fn empty<'py, T: Element>(
+    py: Python<'py>,
+    shape: &[usize],
+    fortran: bool,
+) -> PyResult<Bound<'py, PyUntypedArray>> {
+    let mut lengths: Vec<npy_intp> = shape.iter().map(|&n| n as npy_intp).collect();
+    // SAFETY: numpy takes over the reference to the dtype, and reads the lengths.
+    unsafe {
+        let array = PY_ARRAY_API.PyArray_Empty(
+            py,
+            lengths.len() as _,
+            lengths.as_mut_ptr(),
+            dtype::<T>(py).into_dtype_ptr(),
+            fortran.into(),
+        );
+        Ok(Bound::from_owned_ptr_or_err(py, array)?.cast_into_unchecked())
+    }
+}
+
+/// Values as an array of their own, or `MemoryError`.
+pub fn vector<'py, T: Element + Copy>(
+    py: Python<'py>,
+    values: &[T],
+) -> PyResult<Bound<'py, PyArray1<T>>> {
+    let array = empty::<T>(py, &[values.len()], false)?;
+    // SAFETY: a fresh contiguous array of this type and length.
+    unsafe {
+        std::ptr::copy_nonoverlapping(values.as_ptr(), data::<T>(&array), values.len());
+        Ok(array.into_any().cast_into_unchecked())
+    }
+}
+
+/// Rows one after the other as a square matrix, or `MemoryError`.
+pub fn square<'py>(
+    py: Python<'py>,
+    rows: &[f64],
+    size: usize,
+) -> PyResult<Bound<'py, PyArray2<f64>>> {
+    vector(py, rows)?.reshape([size, size])
+}
+
 /// Angles as an array of a known kind, aligned, in native order, C- or F-contiguous.
 pub struct Angles<'py> {
     /// The array the caller gave.
@@ -89,7 +131,12 @@ pub struct Angles<'py> {
     /// The array to read: the same, or a plain copy.
     pub plain: Bound<'py, PyUntypedArray>,
     pub kind: Kind,
+    /// What puts the labels of the caller's data on results.
+    pub labels: Option<Bound<'py, PyAny>>,
 }
+
+/// An array, and what puts the labels of the data it came from on results.
+pub type Labelled<'py> = (Bound<'py, PyUntypedArray>, Option<Bound<'py, PyAny>>);
 
 /// True when the kernels can use the memory as it is.
 fn is_plain(array: &Bound<'_, PyUntypedArray>) -> bool {
@@ -113,65 +160,79 @@ pub fn data<T: Element>(array: &Bound<'_, PyUntypedArray>) -> *mut T {
 impl<'py> Angles<'py> {
     /// Accepts whatever numpy makes an array of real numbers from.
     pub fn new(value: &Bound<'py, PyAny>) -> PyResult<Self> {
-        let given = if let Ok(array) = value.cast_exact::<PyUntypedArray>() {
-            array.clone()
-        } else {
-            as_array(value)?
-        };
+        if let Ok(array) = value.cast_exact::<PyUntypedArray>() {
+            return Self::of_array(array.clone(), None, false);
+        }
+        let (array, labels) = as_array(value, "angles")?;
+        Self::of_array(array, labels, false)
+    }
+
+    /// Angles of an array; `in_order` where elements are to be read as numpy counts them
+    /// (C order).
+    pub fn of_array(
+        given: Bound<'py, PyUntypedArray>,
+        labels: Option<Bound<'py, PyAny>>,
+        in_order: bool,
+    ) -> PyResult<Self> {
         let dtype = given.dtype();
         let kind = match Kind::of(&dtype) {
             Some(kind) => kind,
             None if dtype.kind() == b'f' && dtype.itemsize() < 4 => Kind::F32,
             None if dtype.kind() == b'f' => Kind::F64,
             None => {
-                return Err(argument_error(
-                    value.py(),
+                return Err(kind_error(
+                    given.py(),
                     format!("angles must be real numbers, got an array of dtype {dtype}"),
                 ));
             }
         };
-        let plain = if is_plain(&given) && Kind::of(&dtype).is_some() {
+        let usable = is_plain(&given) && (!in_order || given.is_c_contiguous());
+        let plain = if usable && Kind::of(&dtype).is_some() {
             given.clone()
         } else {
             plain_copy(&given, kind)?
         };
-        Ok(Self { given, plain, kind })
+        Ok(Self {
+            given,
+            plain,
+            kind,
+            labels,
+        })
     }
 
     /// The array to write results to and, where that is not the caller's own, the
-    /// caller's array to copy it to afterwards.
+    /// caller's array to copy it to afterwards. Nothing is written to what is read `beside`.
     pub fn output(
         &self,
         out: Option<&Bound<'py, PyAny>>,
+        beside: &[&Bound<'py, PyUntypedArray>],
     ) -> PyResult<(
         Bound<'py, PyUntypedArray>,
         Option<Bound<'py, PyUntypedArray>>,
     )> {
         let Some(out) = out else {
-            return Ok((self.fresh_output(), None));
+            return Ok((self.fresh_output()?, None));
         };
         let out = self.check_output(out)?;
-        if is_plain(&out) && same_order(&self.plain, &out) {
+        let (low, high) = extent(&out);
+        let apart = |other: &&Bound<'py, PyUntypedArray>| {
+            let (other_low, other_high) = extent(other);
+            other_high <= low || high <= other_low
+        };
+        if is_plain(&out) && same_order(&self.plain, &out) && beside.iter().all(apart) {
             Ok((out, None))
         } else {
-            Ok((self.fresh_output(), Some(out)))
+            Ok((self.fresh_output()?, Some(out)))
         }
     }
 
     /// A new array of the result's kind, laid out like the one that is read.
-    fn fresh_output(&self) -> Bound<'py, PyUntypedArray> {
+    fn fresh_output(&self) -> PyResult<Bound<'py, PyUntypedArray>> {
         let (py, shape) = (self.plain.py(), self.plain.shape());
         let fortran = !self.plain.is_c_contiguous();
-        // SAFETY: floats may hold any bits; every element is written before it is seen.
-        unsafe {
-            match self.kind.of_result() {
-                Kind::F32 => PyArrayDyn::<f32>::new(py, shape, fortran)
-                    .as_untyped()
-                    .clone(),
-                _ => PyArrayDyn::<f64>::new(py, shape, fortran)
-                    .as_untyped()
-                    .clone(),
-            }
+        match self.kind.of_result() {
+            Kind::F32 => empty::<f32>(py, shape, fortran),
+            _ => empty::<f64>(py, shape, fortran),
         }
     }
 
@@ -220,25 +281,42 @@ impl<'py> Angles<'py> {
     }
 }
 
-/// `numpy.asarray`, without losing a mask or taking truth values for numbers.
-fn as_array<'py>(value: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyUntypedArray>> {
+/// `numpy.asarray`, without losing a mask or the labels of data that have some, and without
+/// taking truth values for numbers.
+pub fn as_array<'py>(value: &Bound<'py, PyAny>, what: &str) -> PyResult<Labelled<'py>> {
     let py = value.py();
-    if value.hasattr(intern!(py, "mask"))? {
-        return Err(argument_error(
-            py,
-            "masked arrays are not supported: fill them with NaN or compress them first".to_owned(),
-        ));
-    }
+    let numpy = numpy_module(py)?;
     if value.is_instance_of::<PyBool>() {
-        return Err(argument_error(
-            py,
-            format!("angles must be real numbers, got {value}"),
-        ));
+        let problem = format!("{what} must be real numbers, got {value}");
+        return Err(kind_error(py, problem));
     }
-    numpy_module(py)?
-        .call_method1(intern!(py, "asarray"), (value,))
+    let (mut source, mut labels) = (value.clone(), None);
+    if value.cast::<PyUntypedArray>().is_ok() {
+        let masked = numpy.getattr(intern!(py, "ma"))?.getattr("MaskedArray")?;
+        if value.is_instance(&masked)? {
+            return Err(argument_error(
+                py,
+                format!(
+                    "{what}: masked arrays are not supported: fill them with NaN \
+                     (array.filled(numpy.nan)) or compress them first"
+                ),
+            ));
+        }
+    } else if !value.is_instance_of::<PyList>() && !value.is_instance_of::<PyTuple>() {
+        (source, labels) = PyModule::import(py, "trueangle.labelled")?
+            .call_method1(intern!(py, "take_apart"), (value,))?
+            .extract()?;
+    }
+    let array = numpy
+        .call_method1(intern!(py, "asarray"), (source,))
         .and_then(|array| Ok(array.cast_into::<PyUntypedArray>()?))
-        .map_err(|cause| argument_error(py, format!("angles must be numbers in an array: {cause}")))
+        .map_err(|cause| {
+            if cause.is_instance_of::<pyo3::exceptions::PyMemoryError>(py) {
+                return cause;
+            }
+            argument_error(py, format!("{what} must be numbers in an array: {cause}"))
+        })?;
+    Ok((array, labels))
 }
 
 fn plain_copy<'py>(

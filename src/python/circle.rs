@@ -3,36 +3,27 @@
 use numpy::{PyReadonlyArray1, PyReadwriteArray1};
 use pyo3::prelude::*;
 
+use super::release::detached;
 use crate::circle;
-use crate::error::Error;
-
-fn same_length(what: &'static str, got: usize, wanted: usize) -> Result<(), Error> {
-    if got == wanted {
-        return Ok(());
-    }
-    Err(Error::Length {
-        what,
-        got,
-        other: "indicated",
-        wanted,
-    })
-}
+use crate::fit::check::same_length;
 
 /// Length of the mean unit vector at indicated - reference.
 #[pyfunction]
 pub fn resultant(
+    py: Python<'_>,
     indicated: PyReadonlyArray1<'_, f64>,
     reference: PyReadonlyArray1<'_, f64>,
     period: f64,
 ) -> PyResult<f64> {
     let (indicated, reference) = (indicated.as_slice()?, reference.as_slice()?);
-    same_length("reference", reference.len(), indicated.len())?;
-    Ok(circle::resultant(indicated, reference, period))
+    same_length("reference", reference.len(), "indicated", indicated.len())?;
+    detached(py, || circle::resultant(indicated, reference, period))
 }
 
 /// Turns fitted errors into residuals, in place.
 #[pyfunction]
 pub fn residuals(
+    py: Python<'_>,
     indicated: PyReadonlyArray1<'_, f64>,
     reference: PyReadonlyArray1<'_, f64>,
     offset: f64,
@@ -41,15 +32,17 @@ pub fn residuals(
 ) -> PyResult<()> {
     let (indicated, reference) = (indicated.as_slice()?, reference.as_slice()?);
     let fitted = fitted.as_slice_mut()?;
-    same_length("reference", reference.len(), indicated.len())?;
-    same_length("fitted", fitted.len(), indicated.len())?;
-    circle::residuals(indicated, reference, offset, period, fitted);
-    Ok(())
+    same_length("reference", reference.len(), "indicated", indicated.len())?;
+    same_length("fitted", fitted.len(), "indicated", indicated.len())?;
+    detached(py, || {
+        circle::residuals(indicated, reference, offset, period, fitted)
+    })
 }
 
 /// Start and stop of the stretch travelled, and whether that is the whole turn.
 #[pyfunction]
 pub fn covered_span(
+    py: Python<'_>,
     angles: Vec<PyReadonlyArray1<'_, f64>>,
     period: f64,
 ) -> PyResult<(f64, f64, bool)> {
@@ -57,6 +50,6 @@ pub fn covered_span(
         .iter()
         .map(|array| array.as_slice())
         .collect::<Result<Vec<_>, _>>()?;
-    let span = circle::covered_span(&slices, period);
+    let span = detached(py, || circle::covered_span(&slices, period))?;
     Ok((span.start, span.stop, span.full))
 }

@@ -1,5 +1,6 @@
 //! Core errors as the classes of `trueangle.errors`.
 
+use pyo3::exceptions::PyMemoryError;
 use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
 
@@ -16,8 +17,23 @@ impl From<Error> for PyErr {
 
 /// `ArgumentError(message)`, for what only the bindings can find wrong.
 pub fn argument_error(py: Python<'_>, message: String) -> PyErr {
+    made(py, "ArgumentError", message)
+}
+
+/// `KindError(message)`: an argument is no number at all.
+pub fn kind_error(py: Python<'_>, message: String) -> PyErr {
+    made(py, "KindError", message)
+}
+
+/// What only a mistake of ours can lead to.
+pub fn defect(py: Python<'_>, what: &str) -> PyErr {
+    let message = format!("a defect of trueangle, please report it: {what}");
+    made(py, "TrueAngleError", message)
+}
+
+fn made(py: Python<'_>, class: &str, message: String) -> PyErr {
     errors(py)
-        .and_then(|module| module.getattr("ArgumentError")?.call1((message,)))
+        .and_then(|module| module.getattr(class)?.call1((message,)))
         .map_or_else(|failure| failure, PyErr::from_value)
 }
 
@@ -30,8 +46,11 @@ fn errors(py: Python<'_>) -> PyResult<&Bound<'_, PyModule>> {
 }
 
 fn raise(py: Python<'_>, error: &Error) -> PyResult<PyErr> {
-    let module = errors(py)?;
     let message = error.to_string();
+    if let Error::Memory { .. } = error {
+        return Ok(PyMemoryError::new_err(message));
+    }
+    let module = errors(py)?;
     let instance = match error {
         Error::Rank { orders, .. } => {
             let class = module.getattr("RankError")?;

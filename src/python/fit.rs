@@ -1,20 +1,28 @@
 //! `_core.fit` and `_core.Solution`.
 
-use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, ToPyArray};
-use pyo3::exceptions::PyValueError;
+use numpy::{PyArray1, PyArray2, PyReadonlyArray1};
 use pyo3::prelude::*;
 
+use super::array::{square, vector};
+use super::failure::argument_error;
+use super::number;
+use super::release::{attached, detached};
 use super::series::PySeries;
-use super::threads;
+use super::threads::{self, Asked};
 use crate::design::{Design, Frequencies};
 use crate::fit as core;
+use crate::fit::check::same_length;
 use crate::fit::{Argument, Method, Options, Run};
+use crate::memory;
 
 type Readings<'py> = (
     PyReadonlyArray1<'py, f64>,
     PyReadonlyArray1<'py, f64>,
     Option<PyReadonlyArray1<'py, f64>>,
 );
+
+/// Matrices of its size that are made beside a covariance.
+const COVARIANCES: usize = 5;
 
 /// What a fit found; see `trueangle.fit`.
 #[pyclass(frozen, module = "trueangle._core")]
@@ -27,13 +35,13 @@ pub struct Solution {
 #[pymethods]
 impl Solution {
     #[getter]
-    fn offsets<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
-        self.inner.offsets.to_pyarray(py)
+    fn offsets<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<f64>>> {
+        vector(py, &self.inner.offsets)
     }
 
     #[getter]
-    fn offset_std<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
-        self.inner.offset_std.to_pyarray(py)
+    fn offset_std<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<f64>>> {
+        vector(py, &self.inner.offset_std)
     }
 
     #[getter]
@@ -54,7 +62,9 @@ impl Solution {
     #[getter]
     fn covariance<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
         let size = 1 + self.inner.coefficients().len();
-        self.inner.covariance().to_pyarray(py).reshape([size, size])
+        memory::room(COVARIANCES * size_of::<f64>() * size * size)?;
+        let covariance = attached(py, || self.inner.covariance())?;
+        square(py, &covariance, size)
     }
 
     #[getter]
@@ -106,13 +116,13 @@ pub fn fit(
     runs: Vec<Readings<'_>>,
     period: f64,
     cycles: Vec<f64>,
-    orders: Vec<Vec<u32>>,
+    orders: &Bound<'_, PyAny>,
     argument: &str,
     method: Option<&str>,
     ridge: Option<Vec<f64>>,
-    threads: Option<i64>,
+    threads: Asked<'_>,
 ) -> PyResult<Solution> {
-    let argument = argument_named(argument)?;
+    let argument = argument_named(py, argument)?;
     let method = match method {
         None => None,
         Some("plain") => Some(Method::Plain),
@@ -121,21 +131,22 @@ pub fn fit(
         Some("counts") => Some(Method::Counts),
         Some(other) => {
             let wanted = "\"plain\", \"moments\", \"qr\", \"counts\" or None";
-            return Err(unknown("method", other, wanted));
+            return Err(unknown(py, "method", other, wanted));
         }
     };
-    let sizes = orders.iter().map(Vec::len).collect();
     let design = design(period, cycles, orders)?;
+    let sizes = sizes(&design);
     let runs = runs.iter().map(slices).collect::<PyResult<Vec<_>>>()?;
     let readings = runs.iter().map(|run| run.reference.len()).sum();
-    let threads = threads::count(py, threads, readings)?;
+    let threads = threads::count(py, threads.as_ref(), readings)?;
     let options = Options {
         argument,
         method,
         ridge: ridge.as_deref(),
         threads,
     };
-    let inner = py.detach(|| core::fit(&design, &runs, options))?;
+    design.room()?;
+    let inner = detached(py, || core::fit(&design, &runs, options))??;
     Ok(Solution { inner, sizes })
 }
 
@@ -147,18 +158,21 @@ pub fn triangle<'py>(
     run: Readings<'py>,
     period: f64,
     cycles: Vec<f64>,
-    orders: Vec<Vec<u32>>,
+    orders: &Bound<'_, PyAny>,
     argument: &str,
     zero: f64,
-    threads: Option<i64>,
+    threads: Asked<'_>,
 ) -> PyResult<Bound<'py, PyArray2<f64>>> {
-    let argument = argument_named(argument)?;
+    let argument = argument_named(py, argument)?;
     let design = design(period, cycles, orders)?;
     let size = design.columns() + 2;
     let run = slices(&run)?;
-    let threads = threads::count(py, threads, run.reference.len())?;
-    let rows = py.detach(|| core::triangle(&design, &run, argument, zero, threads))?;
-    rows.to_pyarray(py).reshape([size, size])
+    let threads = threads::count(py, threads.as_ref(), run.reference.len())?;
+    design.room()?;
+    let rows = detached(py, || {
+        core::triangle(&design, &run, argument, zero, threads)
+    })??;
+    square(py, &rows, size)
 }
 
 /// A sample of the residuals of one run, and the largest.
@@ -171,37 +185,48 @@ pub fn scan_residuals<'py>(
     argument: &str,
     offset: f64,
     stride: usize,
-    threads: Option<i64>,
+    threads: Asked<'_>,
 ) -> PyResult<(Bound<'py, PyArray1<f64>>, f64)> {
-    let argument = argument_named(argument)?;
+    let argument = argument_named(py, argument)?;
     let run = slices(&run)?;
-    let threads = threads::count(py, threads, run.reference.len())?;
+    let threads = threads::count(py, threads.as_ref(), run.reference.len())?;
     let evaluator = &series.evaluator;
-    let found =
-        py.detach(|| core::scan(evaluator, &run, argument, offset, stride.max(1), threads))?;
-    Ok((found.sample.to_pyarray(py), found.largest))
+    let stride = stride.max(1);
+    memory::room(2 * size_of::<f64>() * (run.reference.len() / stride))?;
+    let look = || core::scan(evaluator, &run, argument, offset, stride, threads);
+    let found = detached(py, look)??;
+    Ok((vector(py, &found.sample)?, found.largest))
 }
 
-fn argument_named(name: &str) -> PyResult<Argument> {
+fn argument_named(py: Python<'_>, name: &str) -> PyResult<Argument> {
     match name {
         "reference" => Ok(Argument::Reference),
         "indicated" => Ok(Argument::Indicated),
-        other => Err(unknown("argument", other, "\"reference\" or \"indicated\"")),
+        other => Err(unknown(
+            py,
+            "argument",
+            other,
+            "\"reference\" or \"indicated\"",
+        )),
     }
 }
 
 /// The harmonics of several shafts.
-pub fn design(period: f64, cycles: Vec<f64>, orders: Vec<Vec<u32>>) -> PyResult<Design> {
-    if cycles.len() != orders.len() {
-        return Err(PyValueError::new_err(format!(
-            "cycles has {} shafts, orders has {}: they must be equally many",
-            cycles.len(),
-            orders.len()
-        )));
-    }
+pub fn design(period: f64, cycles: Vec<f64>, orders: &Bound<'_, PyAny>) -> PyResult<Design> {
+    let orders = number::orders(orders)?;
+    same_length("orders", orders.len(), "cycles", cycles.len())?;
     let shafts = cycles.into_iter().zip(orders);
     let shafts = shafts.map(|(cycles, orders)| Frequencies { cycles, orders });
     Ok(Design::new(period, shafts.collect())?)
+}
+
+/// Number of orders of each shaft.
+pub fn sizes(design: &Design) -> Vec<usize> {
+    design
+        .shafts()
+        .iter()
+        .map(|shaft| shaft.orders.len())
+        .collect()
 }
 
 fn slices<'a>(run: &'a Readings<'_>) -> PyResult<Run<'a>> {
@@ -216,6 +241,6 @@ fn slices<'a>(run: &'a Readings<'_>) -> PyResult<Run<'a>> {
     })
 }
 
-fn unknown(what: &str, got: &str, wanted: &str) -> PyErr {
-    PyValueError::new_err(format!("{what} must be {wanted}, got {got:?}"))
+fn unknown(py: Python<'_>, what: &str, got: &str, wanted: &str) -> PyErr {
+    argument_error(py, format!("{what} must be {wanted}, got {got:?}"))
 }

@@ -5,10 +5,15 @@
 
 mod array;
 mod circle;
+mod corrector;
+mod door;
 mod failure;
 mod fit;
 mod moments;
+mod number;
+mod release;
 mod series;
+mod step;
 mod table;
 mod terms;
 mod threads;
@@ -21,13 +26,16 @@ mod _core {
     use super::*;
 
     #[pymodule_export]
-    use super::series::{PyCompensator, PySeries};
+    use super::series::PySeries;
+
+    #[pymodule_export]
+    use super::step::PyCompensator;
 
     #[pymodule_export]
     use super::circle::{covered_span, residuals, resultant};
 
     #[pymodule_export]
-    use super::terms::PyCorrector;
+    use super::corrector::PyCorrector;
 
     #[pymodule_export]
     use super::fit::{Solution, fit, scan_residuals, triangle};
@@ -44,6 +52,7 @@ mod _core {
     #[pymodule_init]
     fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
         module.add("__version__", env!("CARGO_PKG_VERSION"))?;
+        crate::threads::prepare();
         // The stub lists the names; a second list would have to be kept in step with it.
         module.delattr("__all__")
     }

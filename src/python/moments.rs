@@ -1,11 +1,13 @@
 //! `_core.Moments`: the sums of one run, and `_core.fit_moments`.
 
-use numpy::{Complex64, PyArray1, PyReadonlyArray1, PyReadwriteArray1, ToPyArray};
+use numpy::{Complex64, PyArray1, PyReadonlyArray1, PyReadwriteArray1};
 use pyo3::prelude::*;
 
+use super::array::vector;
 use super::failure::argument_error;
-use super::fit::{Solution, design};
-use super::threads;
+use super::fit::{Solution, design, sizes};
+use super::release::{attached, detached};
+use super::threads::{self, Asked};
 use crate::angle::Period;
 use crate::error::Error;
 use crate::fit::{check, fit_moments as core_fit};
@@ -29,6 +31,7 @@ pub struct PyMoments {
 impl PyMoments {
     fn fresh(&self, centre: f64) -> Result<Accumulator, Error> {
         let period = Period::new(self.period)?;
+        Accumulator::room(self.highest)?;
         Ok(Accumulator::new(period, self.cycles, self.highest, centre))
     }
 }
@@ -36,13 +39,15 @@ impl PyMoments {
 #[pymethods]
 impl PyMoments {
     #[new]
-    fn new(period: f64, cycles: Vec<f64>, orders: Vec<Vec<u32>>) -> PyResult<Self> {
+    fn new(period: f64, cycles: Vec<f64>, orders: &Bound<'_, PyAny>) -> PyResult<Self> {
         let design = design(period, cycles, orders)?;
         let (cycles, orders) = design.common_turn().ok_or(Error::Method)?;
+        let highest = orders.into_iter().max().unwrap_or(0);
+        Accumulator::room(highest)?;
         Ok(Self {
             period,
             cycles,
-            highest: orders.into_iter().max().unwrap_or(0),
+            highest,
             sums: None,
         })
     }
@@ -65,7 +70,7 @@ impl PyMoments {
         theta: PyReadonlyArray1<'_, f64>,
         error: PyReadonlyArray1<'_, f64>,
         weights: Option<PyReadonlyArray1<'_, f64>>,
-        threads: Option<i64>,
+        threads: Asked<'_>,
     ) -> PyResult<()> {
         let readings = Readings {
             angle: theta.as_slice()?,
@@ -87,13 +92,16 @@ impl PyMoments {
         if readings.count() == 0 {
             return Ok(());
         }
-        let threads = threads::count(py, threads, len)?;
-        let mut sums = match self.sums.take() {
-            Some(sums) => sums,
-            None => self.fresh(readings.centre(Period::new(self.period)?))?,
-        };
-        py.detach(|| sums.update(readings, threads));
-        self.sums = Some(sums);
+        let threads = threads::count(py, threads.as_ref(), len)?;
+        // Work that is called off has changed nothing (`Accumulator::update`).
+        match &mut self.sums {
+            Some(sums) => detached(py, || sums.update(readings, threads))?,
+            None => {
+                let mut sums = self.fresh(readings.centre(Period::new(self.period)?))?;
+                detached(py, || sums.update(readings, threads))?;
+                self.sums = Some(sums);
+            }
+        }
         Ok(())
     }
 
@@ -116,15 +124,30 @@ impl PyMoments {
         let travel = travel.as_slice_mut()?;
         let period = Period::new(self.period)?;
         let (cycles, highest) = (self.cycles, self.highest);
+        if self.sums.is_none() {
+            Accumulator::room(highest)?;
+        }
         let fresh = |centre| Accumulator::new(period, cycles, highest, centre);
         let sums = &mut self.sums;
-        Ok(py.detach(|| add_known(sums, fresh, period, angles, travel)))
+        detached(py, || add_known(sums, fresh, period, angles, travel))
+    }
+
+    /// Sums of their own with the same readings.
+    fn copy(&self) -> PyResult<Self> {
+        if self.sums.is_some() {
+            Accumulator::room(self.highest)?;
+        }
+        Ok(Self {
+            sums: self.sums.clone(),
+            ..*self
+        })
     }
 
     fn merge(&mut self, other: &Self) -> PyResult<()> {
         if (self.period, self.cycles, self.highest) != (other.period, other.cycles, other.highest) {
             return Err(Error::Merge("period or orders").into());
         }
+        Accumulator::room(self.highest)?;
         match (&mut self.sums, &other.sums) {
             (Some(sums), Some(other)) => sums.merge(other),
             (sums @ None, Some(other)) => *sums = Some(other.clone()),
@@ -138,13 +161,13 @@ impl PyMoments {
         &self,
         py: Python<'py>,
     ) -> PyResult<(Complexes<'py>, Complexes<'py>, f64, usize, f64)> {
-        let spectrum = match &self.sums {
-            Some(sums) => Spectrum::new(sums, self.highest),
-            None => Spectrum::new(&self.fresh(0.0)?, self.highest),
-        };
+        Accumulator::room(self.highest)?;
+        let empty = self.fresh(0.0)?;
+        let sums = self.sums.as_ref().unwrap_or(&empty);
+        let spectrum = attached(py, || Spectrum::new(sums, self.highest))?;
         Ok((
-            spectrum.weight.to_pyarray(py),
-            spectrum.error.to_pyarray(py),
+            vector(py, &spectrum.weight)?,
+            vector(py, &spectrum.error)?,
             spectrum.squares,
             spectrum.count,
             spectrum.centre,
@@ -152,8 +175,10 @@ impl PyMoments {
     }
 
     /// All sums as numbers, for pickling.
-    fn store<'py>(&self, py: Python<'py>) -> Option<Array<'py>> {
-        Some(self.sums.as_ref()?.store().to_pyarray(py))
+    fn store<'py>(&self, py: Python<'py>) -> PyResult<Option<Array<'py>>> {
+        Accumulator::room(self.highest)?;
+        let sums = self.sums.as_ref();
+        sums.map(|sums| vector(py, &sums.store())).transpose()
     }
 
     fn restore(&mut self, py: Python<'_>, numbers: PyReadonlyArray1<'_, f64>) -> PyResult<()> {
@@ -171,11 +196,12 @@ pub fn fit_moments(
     runs: Vec<PyRef<'_, PyMoments>>,
     period: f64,
     cycles: Vec<f64>,
-    orders: Vec<Vec<u32>>,
+    orders: &Bound<'_, PyAny>,
 ) -> PyResult<Solution> {
-    let sizes = orders.iter().map(Vec::len).collect();
     let design = design(period, cycles, orders)?;
+    let sizes = sizes(&design);
     let sums: Vec<_> = runs.iter().filter_map(|run| run.sums.as_ref()).collect();
-    let inner = py.detach(|| core_fit(&design, &sums))?;
+    design.room()?;
+    let inner = detached(py, || core_fit(&design, &sums))??;
     Ok(Solution { inner, sizes })
 }

@@ -3,19 +3,24 @@
 use pyo3::intern;
 use pyo3::prelude::*;
 
-use super::failure::argument_error;
+use super::number::whole;
+use crate::threads::MOST_THREADS;
+
+/// As many threads as a caller asks for; `None` leaves it to the core.
+pub type Asked<'py> = Option<Bound<'py, PyAny>>;
 
 /// Threads to use: as asked, or one in a worker process (its siblings have the other
 /// cores), or `None` for as many as the core sees fit.
-pub fn threads(py: Python<'_>, asked: Option<i64>, samples: usize) -> PyResult<Option<usize>> {
+pub fn threads(
+    py: Python<'_>,
+    asked: Option<&Bound<'_, PyAny>>,
+    samples: usize,
+) -> PyResult<Option<usize>> {
     match asked {
-        Some(n) => match usize::try_from(n) {
-            Ok(n) if n > 0 => Ok(Some(n)),
-            _ => Err(argument_error(
-                py,
-                format!("threads must be 1 or more, or None for all cores, got {n}"),
-            )),
-        },
+        Some(n) => {
+            let wanted = "threads must be 1 or more, at most 1024, or None for all cores";
+            whole(n, 1..=MOST_THREADS, wanted).map(Some)
+        }
         None if samples >= crate::kernel::THREADED && in_worker_process(py)? => Ok(Some(1)),
         None => Ok(None),
     }
@@ -24,13 +29,13 @@ pub fn threads(py: Python<'_>, asked: Option<i64>, samples: usize) -> PyResult<O
 /// How many threads work that is worth splitting may use.
 #[pyfunction]
 #[pyo3(signature = (threads=None))]
-pub fn thread_count(py: Python<'_>, threads: Option<i64>) -> PyResult<usize> {
-    count(py, threads, usize::MAX)
+pub fn thread_count(py: Python<'_>, threads: Asked<'_>) -> PyResult<usize> {
+    count(py, threads.as_ref(), usize::MAX)
 }
 
 /// As [`threads`], for work that takes a number of threads. Few samples get one without
 /// a look at the cores, which takes longer than they do.
-pub fn count(py: Python<'_>, asked: Option<i64>, samples: usize) -> PyResult<usize> {
+pub fn count(py: Python<'_>, asked: Option<&Bound<'_, PyAny>>, samples: usize) -> PyResult<usize> {
     let few = samples < crate::kernel::THREADED;
     let own = || if few { 1 } else { crate::threads::available() };
     Ok(threads(py, asked, samples)?.unwrap_or_else(own))

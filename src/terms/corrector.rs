@@ -1,14 +1,24 @@
 //! Correction by a series and its terms, sample by sample, with the state it needs.
 
 use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 use super::form::{Form, Line, Smooth, Term, lines_of};
 use super::signals::{Columns, Signal, Signals};
 use super::travel::{Element, Heading, Travel};
 use crate::compensator::Compensator;
 use crate::error::Error;
-use crate::kernel::{Argument, Batch, Evaluator, Quantity};
+use crate::kernel::{
+    Argument, Batch, Evaluator, InstructionSet, Quantity, Real, Sample, Shared, Stretch,
+};
 use crate::series::HarmonicSeries;
+use crate::{interrupt, threads};
+
+/// Samples that are corrected between two looks at the clock, and by one thread at a time.
+const PART: usize = 4096;
+
+/// Samples from which threads are worth starting: each takes longer than by a table.
+const THREADED: usize = 1 << 14;
 
 /// Steps before the signals are taken to leave no unique angle; as a rule two or three do.
 const MOST_STEPS: usize = 60;
@@ -103,6 +113,11 @@ impl Terms {
         Ok(ready)
     }
 
+    /// The series.
+    pub fn evaluator(&self) -> &Evaluator {
+        &self.evaluator
+    }
+
     /// True when corrections depend on samples before.
     pub fn has_state(&self) -> bool {
         self.has_travel
@@ -111,6 +126,12 @@ impl Terms {
     /// Signals that must be given, each with a term that needs it.
     pub fn needs(&self) -> &[(Signal, String)] {
         &self.needs
+    }
+
+    /// True when corrections depend on the signal where it is given.
+    pub fn takes(&self, signal: Signal) -> bool {
+        let travels = matches!(signal, Signal::Direction | Signal::Velocity) && self.has_travel;
+        travels || self.needs.iter().any(|(needed, _)| *needed == signal)
     }
 
     fn level(&self, signals: &Signals) -> f64 {
@@ -152,6 +173,11 @@ impl Corrector {
         Self { terms, travel }
     }
 
+    /// The series and its terms.
+    pub fn terms(&self) -> &Arc<Terms> {
+        &self.terms
+    }
+
     /// Forgets the past.
     pub fn reset(&mut self) {
         self.travel = Travel::new(self.terms.elements.len());
@@ -183,55 +209,98 @@ impl Corrector {
         Ok(self.indicate(theta, signals))
     }
 
-    /// `correct` of many samples, or `error` of them.
-    pub fn run(
+    /// `correct` of many samples, or `error` of them; returns how many results lie outside
+    /// a stretch.
+    ///
+    /// Where the work is called off the state is that of before.
+    pub fn run<X: Sample, Y: Real>(
         &mut self,
         quantity: Quantity,
-        angles: &[f64],
+        batch: Batch<'_, X, Y>,
         columns: &Columns<'_>,
         threads: Option<usize>,
-        out: &mut [f64],
-    ) -> Result<(), Error> {
-        if out.len() != angles.len() {
-            return Err(Error::Length {
-                what: "out",
-                got: out.len(),
-                other: "angle",
-                wanted: angles.len(),
+        stretch: Option<&Stretch>,
+    ) -> Result<usize, Error> {
+        let len = batch.len();
+        columns.check(len)?;
+        self.terms.check(|signal| columns.of(signal).is_some())?;
+        let outside = AtomicUsize::new(0);
+        let shared = Shared::new(batch);
+        let part = |corrector: &mut Self, i: usize| {
+            let start = i * PART;
+            let some = PART.min(len - start);
+            // SAFETY: parts lie within the batch, and each is taken once.
+            let (part, results) = unsafe {
+                let batch = shared.get();
+                (batch.part(start, some), batch.part(start, some))
+            };
+            corrector.run_part(quantity, part, columns, start);
+            if let Some(stretch) = stretch {
+                let count = stretch.outside(InstructionSet::best(), results);
+                outside.fetch_add(count, Ordering::Relaxed);
+            }
+        };
+        let parts = len.div_ceil(PART);
+        if self.terms.has_travel {
+            let mut own = self.clone();
+            for i in 0..parts {
+                part(&mut own, i);
+                interrupt::point();
+            }
+            *self = own;
+        } else {
+            let few = || {
+                if len < THREADED {
+                    1
+                } else {
+                    threads::available()
+                }
+            };
+            let threads = threads.unwrap_or_else(few);
+            threads::for_each_part(parts, threads, |i| part(&mut self.clone(), i));
+        }
+        Ok(outside.into_inner())
+    }
+
+    /// Samples `start..` of all.
+    fn run_part<X: Sample, Y: Real>(
+        &mut self,
+        quantity: Quantity,
+        mut batch: Batch<'_, X, Y>,
+        columns: &Columns<'_>,
+        start: usize,
+    ) {
+        let terms = Arc::clone(&self.terms);
+        let alone = !terms.has_travel && !terms.is_shaped && !terms.is_indicated();
+        let mut at = start..;
+        let mut next = || columns.at(at.next().unwrap_or_default());
+        if quantity != Quantity::Correction {
+            batch.map(|x| Y::narrow(self.indicate(x.widen(), &next())));
+        } else if !alone {
+            batch.map(|x| Y::narrow(self.solve(x.widen(), &next())));
+        } else {
+            // The terms do not depend on the angle: many samples at once.
+            let mut done = start;
+            batch.map_blocks(|x, y| {
+                for (i, (x, y)) in x.iter().zip(y.iter_mut()).enumerate() {
+                    *y = x - terms.level(&columns.at(done + i));
+                }
+                let all = Batch::in_place(&mut *y);
+                let corrected = terms
+                    .evaluator
+                    .run(Quantity::Correction, None, Some(1), all);
+                debug_assert!(
+                    corrected.is_ok(),
+                    "`Terms::new` refuses what cannot be inverted"
+                );
+                if terms.delay != 0.0 {
+                    for (i, y) in y.iter_mut().enumerate() {
+                        *y += terms.delayed(&columns.at(done + i));
+                    }
+                }
+                done += x.len();
             });
         }
-        columns.check(angles.len())?;
-        self.terms.check(|signal| match signal {
-            Signal::Direction => columns.direction.is_some(),
-            Signal::Velocity => columns.velocity.is_some(),
-            Signal::Temperature => columns.temperature.is_some(),
-            Signal::Torque => columns.torque.is_some(),
-        })?;
-        let terms = Arc::clone(&self.terms);
-        if quantity != Quantity::Correction {
-            for (i, (&x, y)) in angles.iter().zip(out).enumerate() {
-                *y = self.indicate(x, &columns.at(i));
-            }
-        } else if terms.has_travel || terms.is_shaped || terms.is_indicated() {
-            for (i, (&x, y)) in angles.iter().zip(out).enumerate() {
-                *y = self.solve(x, &columns.at(i));
-            }
-        } else {
-            // The terms do not depend on the angle: all samples at once.
-            for (i, (&x, y)) in angles.iter().zip(out.iter_mut()).enumerate() {
-                *y = x - terms.level(&columns.at(i));
-            }
-            let batch = Batch::in_place(&mut *out);
-            terms
-                .evaluator
-                .run(Quantity::Correction, None, threads, batch)?;
-            if terms.delay != 0.0 {
-                for (i, y) in out.iter_mut().enumerate() {
-                    *y += terms.delayed(&columns.at(i));
-                }
-            }
-        }
-        Ok(())
     }
 
     fn solve(&mut self, indicated: f64, signals: &Signals) -> f64 {

@@ -86,9 +86,8 @@ pub struct Columns<'a> {
 impl Columns<'_> {
     /// Refuses columns that are neither of length `len` nor 1.
     pub fn check(&self, len: usize) -> Result<(), Error> {
-        let columns = [self.direction, self.velocity, self.temperature, self.torque];
-        for (signal, column) in Signal::ALL.into_iter().zip(columns) {
-            match column {
+        for signal in Signal::ALL {
+            match self.of(signal) {
                 Some(values) if values.len() != len && values.len() != 1 => {
                     return Err(Error::Length {
                         what: signal.name(),
@@ -101,6 +100,16 @@ impl Columns<'_> {
             }
         }
         Ok(())
+    }
+
+    /// The column of one signal.
+    pub fn of(&self, signal: Signal) -> Option<&[f64]> {
+        match signal {
+            Signal::Direction => self.direction,
+            Signal::Velocity => self.velocity,
+            Signal::Temperature => self.temperature,
+            Signal::Torque => self.torque,
+        }
     }
 
     /// Signals of sample `i`.

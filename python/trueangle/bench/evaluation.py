@@ -125,7 +125,7 @@ def single(rounds: int = 200) -> list[Row]:
     """One float in, one float out; the loop around it is in every figure."""
     compensator = harmonics(ORDERS["17 orders"])._series.compensator()
     calls = range(_CALLS)
-    functions = {
+    functions: dict[str, Callable[[float], float]] = {
         "step": compensator.step,
         "math.sin": math.sin,
         "empty C function (math.fabs)": math.fabs,

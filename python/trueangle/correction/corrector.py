@@ -2,25 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .. import _core
-from ..errors import ArgumentError
 from .velocity import Velocity
 
 if TYPE_CHECKING:
-    from ..model import HarmonicModel
+    from ..model import HarmonicModel, Step
 
 __all__ = ["SIGNALS", "Corrector", "evaluate"]
 
 #: Signals in the order of the core's arguments.
 SIGNALS = ("velocity", "temperature", "torque", "direction")
 
-Array = NDArray[np.float64]
 Given = dict[str, ArrayLike | None]
 
 
@@ -59,7 +56,7 @@ class Corrector:
         self._velocity = Velocity(model.period)
 
     @property
-    def step(self) -> Callable[..., float]:
+    def step(self) -> Step:
         """``step(indicated, velocity=, temperature=, torque=, direction=) -> corrected``.
 
         One sample, in the state of this corrector: a bound method of the compiled core
@@ -67,6 +64,9 @@ class Corrector:
         `MissingSignalError`; others are ignored.
         """
         return self._core.step
+
+    def __reduce__(self) -> tuple[Any, ...]:  # copies go on from where this one stands
+        return _rebuild, (self._model, self.state)
 
     def reset(self) -> None:
         """Forget the past: the next sample is the first one."""
@@ -142,6 +142,12 @@ class Corrector:
         return evaluate(self._model, self._core, "correct", indicated, out, given, threads)
 
 
+def _rebuild(model: HarmonicModel, state: tuple[float, ...]) -> Corrector:
+    corrector = model.corrector()
+    corrector.state = state
+    return corrector
+
+
 def evaluate(
     model: HarmonicModel,
     core: _core.Corrector,
@@ -152,54 +158,7 @@ def evaluate(
     threads: int | None = None,
 ) -> float | NDArray[Any]:
     """``quantity`` ("error" or "correct") of samples by ``core`` and its state."""
-    x = _real(angle, "angles")
-    columns = {
-        name: _real(values, name)
-        for name, values in given.items()
-        if values is not None and name in model.uses_signals
-    }
-    try:
-        shape = np.broadcast_shapes(x.shape, *(values.shape for values in columns.values()))
-    except ValueError:
-        shapes = ", ".join(f"{name} {values.shape}" for name, values in columns.items())
-        raise ArgumentError(
-            f"signals must have the shape of the angles {x.shape} or one value, got {shapes}"
-        ) from None
-    velocity, temperature, torque, direction = (_flat(columns.get(name), shape) for name in SIGNALS)
-    angles = np.ascontiguousarray(np.broadcast_to(x, shape), dtype=np.float64).ravel()
+    signals: dict[str, Any] = dict(given)
     if quantity == "error":
-        result = core.error(angles, velocity, temperature, torque, direction)
-    else:
-        result = core.correct(angles, velocity, temperature, torque, direction, threads)
-    kind = np.float32 if x.dtype == np.float32 else np.float64
-    shaped = result.reshape(shape).astype(kind, copy=False)
-    if out is None:
-        if shape:
-            return shaped
-        # As numpy's own functions: a scalar for an array without dimensions.
-        return shaped[()] if isinstance(angle, np.ndarray) else float(shaped)
-    if not isinstance(out, np.ndarray) or out.shape != shape or out.dtype != kind:
-        raise ArgumentError(
-            f"out must be an array of shape {shape} and dtype {np.dtype(kind)}, got "
-            f"{getattr(out, 'shape', type(out).__name__)} {getattr(out, 'dtype', '')}"
-        )
-    out[...] = shaped
-    return out
-
-
-def _real(values: ArrayLike, name: str) -> NDArray[Any]:
-    if hasattr(values, "mask"):
-        raise ArgumentError(f"{name}: fill masked arrays with NaN or compress them first")
-    array = np.asarray(values)
-    if array.dtype.kind not in "fiu":
-        raise ArgumentError(f"{name} must be real numbers, got dtype {array.dtype}")
-    return array
-
-
-def _flat(values: NDArray[Any] | None, shape: Iterable[int]) -> Array | None:
-    """One value for all, or one per sample; contiguous."""
-    if values is None:
-        return None
-    if values.size == 1:
-        return np.array([values.item()], dtype=np.float64)
-    return np.ascontiguousarray(np.broadcast_to(values, tuple(shape)), dtype=np.float64).ravel()
+        return core.error(angle, out, **signals, threads=threads)
+    return core.correct(angle, out, **signals, threads=threads)[0]

@@ -26,7 +26,7 @@ _COUNTED = 20_000
 def build_model(fit: FitResult) -> HarmonicModel:
     """The fitted series with its covariance, record and provenance."""
     problem, solution = fit.problem, fit.fitted.solution
-    covariance = fit.uncertainty.covariance
+    covariance, condition = fit.uncertainty.covariance, solution.condition_number
     sources = dict.fromkeys(run.source for run in problem.runs if run.source is not None)
     return HarmonicModel(
         shafts=tuple(
@@ -37,7 +37,7 @@ def build_model(fit: FitResult) -> HarmonicModel:
         period=problem.period,
         argument=problem.argument,
         covariance=covariance if np.isfinite(covariance).all() else None,
-        condition_number=solution.condition_number,
+        condition_number=condition if np.isfinite(condition) else None,
         fit=_record(fit),
         provenance=Provenance(tuple(sources), f"trueangle {__version__}"),
     )

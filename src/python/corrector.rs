@@ -1,0 +1,310 @@
+//! `_core.Corrector`.
+
+use std::sync::Arc;
+
+use numpy::{PyArrayDescrMethods, PyArrayDyn, PyUntypedArray, PyUntypedArrayMethods};
+use pyo3::intern;
+use pyo3::prelude::*;
+use pyo3::types::PyTuple;
+
+use super::array::{Angles, as_array, data, numpy_module};
+use super::door::{self, Computation, Computed};
+use super::failure::{argument_error, kind_error};
+use super::number::{is_number, single};
+use super::release::attached;
+use super::series::PySeries;
+use super::terms::forms;
+use super::threads::{Asked, threads};
+use crate::error::Error;
+use crate::kernel::{Batch, Quantity, Real, Sample, Stretch};
+use crate::terms::{Columns, Corrector, Signal, Signals, Terms};
+
+/// Correction by a series and its terms, in the order the samples were taken.
+#[pyclass(name = "Corrector", module = "trueangle._core")]
+pub struct PyCorrector {
+    inner: Corrector,
+    /// What it was made of.
+    parts: Py<PyTuple>,
+}
+
+/// A signal as the caller gave it.
+type Given<'a, 'py> = Option<&'a Bound<'py, PyAny>>;
+
+#[pymethods]
+impl PyCorrector {
+    #[new]
+    fn new(series: &Bound<'_, PySeries>, terms: Vec<Bound<'_, PyAny>>) -> PyResult<Self> {
+        let py = series.py();
+        let parts = (series, terms.clone()).into_pyobject(py)?.unbind();
+        let series = series.get();
+        let terms = forms(&terms)?;
+        if !series.evaluator.is_ready(Quantity::Correction) {
+            series.evaluator.room()?;
+        }
+        let evaluator = Arc::clone(&series.evaluator);
+        let terms = attached(py, || Terms::new(evaluator, &terms))??;
+        Ok(Self {
+            inner: Corrector::new(Arc::new(terms)),
+            parts,
+        })
+    }
+
+    fn __reduce__<'py>(
+        slf: &Bound<'py, Self>,
+    ) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyTuple>, Vec<f64>)> {
+        let own = slf.borrow();
+        let parts = own.parts.bind(slf.py()).clone();
+        Ok((slf.get_type().into_any(), parts, own.store()))
+    }
+
+    fn __setstate__(&mut self, py: Python<'_>, numbers: Vec<f64>) -> PyResult<()> {
+        self.restore(py, numbers)
+    }
+
+    #[pyo3(signature = (indicated, /, velocity=None, temperature=None, torque=None, direction=None))]
+    fn step(
+        &mut self,
+        indicated: &Bound<'_, PyAny>,
+        velocity: Given<'_, '_>,
+        temperature: Given<'_, '_>,
+        torque: Given<'_, '_>,
+        direction: Given<'_, '_>,
+    ) -> PyResult<f64> {
+        let py = indicated.py();
+        let angle = single(indicated, "the angle of a step")?;
+        let terms = self.inner.terms();
+        let value = |signal: Signal, given: Given<'_, '_>| match given {
+            Some(given) if terms.takes(signal) => single(given, signal.name()).map(Some),
+            _ => Ok(None),
+        };
+        let signals = Signals {
+            direction: value(Signal::Direction, direction)?,
+            velocity: value(Signal::Velocity, velocity)?,
+            temperature: value(Signal::Temperature, temperature)?,
+            torque: value(Signal::Torque, torque)?,
+        };
+        Ok(attached(py, || self.inner.correct(angle, &signals))??)
+    }
+
+    fn reset(&mut self) {
+        self.inner.reset();
+    }
+
+    fn store(&self) -> Vec<f64> {
+        self.inner.store()
+    }
+
+    fn restore(&mut self, py: Python<'_>, numbers: Vec<f64>) -> PyResult<()> {
+        if self.inner.restore(&numbers) {
+            return Ok(());
+        }
+        let problem = "this is not the state of a corrector with such terms";
+        Err(argument_error(py, problem.to_owned()))
+    }
+
+    /// True angles, and how many of them lie outside a stretch.
+    #[pyo3(signature = (indicated, out=None, *, velocity=None, temperature=None, torque=None, direction=None, threads=None, path=None, stretch=None))]
+    fn correct<'py>(
+        &mut self,
+        indicated: &Bound<'py, PyAny>,
+        out: Option<&Bound<'py, PyAny>>,
+        velocity: Given<'_, 'py>,
+        temperature: Given<'_, 'py>,
+        torque: Given<'_, 'py>,
+        direction: Given<'_, 'py>,
+        threads: Asked<'py>,
+        path: Option<&str>,
+        stretch: Option<(f64, f64, bool)>,
+    ) -> PyResult<Computed<'py>> {
+        let signals = [direction, velocity, temperature, torque];
+        let quantity = Quantity::Correction;
+        self.compute(quantity, indicated, out, signals, threads, path, stretch)
+    }
+
+    /// Errors; of nothing else, so none lies outside anything.
+    #[pyo3(signature = (theta, out=None, *, velocity=None, temperature=None, torque=None, direction=None, threads=None, path=None))]
+    fn error<'py>(
+        &mut self,
+        theta: &Bound<'py, PyAny>,
+        out: Option<&Bound<'py, PyAny>>,
+        velocity: Given<'_, 'py>,
+        temperature: Given<'_, 'py>,
+        torque: Given<'_, 'py>,
+        direction: Given<'_, 'py>,
+        threads: Asked<'py>,
+        path: Option<&str>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let signals = [direction, velocity, temperature, torque];
+        let quantity = Quantity::Error;
+        Ok(self
+            .compute(quantity, theta, out, signals, threads, path, None)?
+            .0)
+    }
+}
+
+/// A batch through a corrector, as the caller wants it.
+struct Wish<'c> {
+    corrector: &'c mut Corrector,
+    quantity: Quantity,
+    columns: Columns<'c>,
+    threads: Option<usize>,
+    stretch: Option<Stretch>,
+}
+
+impl Computation for Wish<'_> {
+    fn run<X: Sample, Y: Real>(&mut self, batch: Batch<'_, X, Y>) -> Result<usize, Error> {
+        let stretch = self.stretch.as_ref();
+        let (columns, threads) = (&self.columns, self.threads);
+        self.corrector
+            .run(self.quantity, batch, columns, threads, stretch)
+    }
+
+    fn prepare(&self) -> Result<(), Error> {
+        self.corrector.terms().evaluator().room()
+    }
+
+    fn is_ready(&self) -> bool {
+        self.corrector.terms().evaluator().is_ready(self.quantity)
+    }
+}
+
+impl PyCorrector {
+    fn compute<'py>(
+        &mut self,
+        quantity: Quantity,
+        x: &Bound<'py, PyAny>,
+        out: Option<&Bound<'py, PyAny>>,
+        given: [Given<'_, 'py>; 4],
+        asked: Asked<'py>,
+        path: Option<&str>,
+        stretch: Option<(f64, f64, bool)>,
+    ) -> PyResult<Computed<'py>> {
+        let py = x.py();
+        if door::route(py, path)?.is_some() {
+            let problem = "path is a choice of models without terms: leave it out";
+            return Err(argument_error(py, problem.to_owned()));
+        }
+        let terms = self.inner.terms();
+        let mut signals = [const { None }; 4];
+        for ((signal, given), place) in Signal::ALL.into_iter().zip(given).zip(&mut signals) {
+            if let Some(given) = given
+                && terms.takes(signal)
+            {
+                *place = Some(as_signal(given, signal.name())?);
+            }
+        }
+        let period = terms.evaluator().series().period().value();
+        let stretch = door::stretch(period, stretch);
+        let alone = signals.iter().flatten().all(|signal| signal.len() == 1);
+        let angles = if out.is_none() && is_number(x) && alone {
+            None
+        } else {
+            Some(broadcast(x, &mut signals)?)
+        };
+        let slice = |signal: &'_ Option<Bound<'py, PyUntypedArray>>| {
+            signal.as_ref().map(|signal| {
+                // SAFETY: a contiguous array of doubles that is kept while the slice is used.
+                unsafe { std::slice::from_raw_parts(data::<f64>(signal), signal.len()) }
+            })
+        };
+        let [direction, velocity, temperature, torque] = &signals;
+        let samples = angles.as_ref().map_or(1, |angles| angles.plain.len());
+        let mut wish = Wish {
+            quantity,
+            columns: Columns {
+                direction: slice(direction),
+                velocity: slice(velocity),
+                temperature: slice(temperature),
+                torque: slice(torque),
+            },
+            threads: threads(py, asked.as_ref(), samples)?,
+            stretch,
+            corrector: &mut self.inner,
+        };
+        match &angles {
+            None => door::number(x, &mut wish),
+            Some(angles) => {
+                let beside: Vec<_> = signals.iter().flatten().collect();
+                door::array(angles, out, &beside, &mut wish)
+            }
+        }
+    }
+}
+
+/// A signal as doubles in the order they were taken; one value stays one.
+fn as_signal<'py>(given: &Bound<'py, PyAny>, name: &str) -> PyResult<Bound<'py, PyUntypedArray>> {
+    let py = given.py();
+    let (array, _) = as_array(given, name)?;
+    let dtype = array.dtype();
+    if !matches!(dtype.kind(), b'f' | b'i' | b'u') {
+        let problem = format!("{name} must be real numbers, got an array of dtype {dtype}");
+        return Err(kind_error(py, problem));
+    }
+    in_order(&array)
+}
+
+/// Contiguous doubles in C order.
+fn in_order<'py>(array: &Bound<'py, PyUntypedArray>) -> PyResult<Bound<'py, PyUntypedArray>> {
+    let py = array.py();
+    if let Ok(doubles) = array.cast::<PyArrayDyn<f64>>()
+        && doubles.is_c_contiguous()
+        && array.is_aligned()
+    {
+        return Ok(array.clone());
+    }
+    let made = numpy_module(py)?.call_method1(
+        intern!(py, "ascontiguousarray"),
+        (array, intern!(py, "float64")),
+    )?;
+    Ok(made.cast_into()?)
+}
+
+/// Angles and signals of one shape.
+fn broadcast<'py>(
+    x: &Bound<'py, PyAny>,
+    signals: &mut [Option<Bound<'py, PyUntypedArray>>; 4],
+) -> PyResult<Angles<'py>> {
+    let py = x.py();
+    let (given, labels) = match x.cast_exact::<PyUntypedArray>() {
+        Ok(array) => (array.clone(), None),
+        Err(_) => as_array(x, "angles")?,
+    };
+    let fits = |signal: &Bound<'py, PyUntypedArray>| {
+        signal.shape() == given.shape() || (signal.len() == 1 && signal.ndim() == 0)
+    };
+    if signals.iter().flatten().all(fits) {
+        return Angles::of_array(given, labels, true);
+    }
+    let numpy = numpy_module(py)?;
+    let shapes: Vec<_> = std::iter::once(&given)
+        .chain(signals.iter().flatten())
+        .map(|array| PyTuple::new(py, array.shape()))
+        .collect::<PyResult<_>>()?;
+    let shape = numpy
+        .call_method1(intern!(py, "broadcast_shapes"), PyTuple::new(py, &shapes)?)
+        .map_err(|_| {
+            let others: Vec<_> = Signal::ALL
+                .iter()
+                .zip(signals.iter())
+                .filter_map(|(name, signal)| Some((name.name(), signal.as_ref()?)))
+                .map(|(name, signal)| format!("{name} {:?}", signal.shape()))
+                .collect();
+            let (own, others) = (given.shape(), others.join(", "));
+            let problem = format!(
+                "signals must have the shape of the angles {own:?} or one value, got {others}"
+            );
+            argument_error(py, problem)
+        })?;
+    let spread = |array: &Bound<'py, PyUntypedArray>| -> PyResult<Bound<'py, PyUntypedArray>> {
+        let spread = numpy.call_method1(intern!(py, "broadcast_to"), (array, &shape))?;
+        Ok(spread.cast_into()?)
+    };
+    for signal in signals.iter_mut().flatten() {
+        if signal.len() != 1 {
+            *signal = in_order(&spread(signal)?)?;
+        }
+    }
+    let wide = spread(&given)?;
+    let labels = labels.filter(|_| wide.shape() == given.shape());
+    Angles::of_array(wide, labels, true)
+}

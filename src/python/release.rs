@@ -1,0 +1,48 @@
+//! Work of the core between two moments of Python: the interpreter released, Ctrl-C heard,
+//! panics turned into errors.
+
+use std::any::Any;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::{Arc, Mutex, PoisonError};
+
+use pyo3::prelude::*;
+
+use super::failure::defect;
+use crate::interrupt;
+
+/// Work that takes no time worth releasing the interpreter for.
+pub fn attached<T>(py: Python<'_>, work: impl FnOnce() -> T) -> PyResult<T> {
+    catch_unwind(AssertUnwindSafe(work)).map_err(|payload| panicked(py, payload))
+}
+
+/// Work without the interpreter, which Ctrl-C ends.
+pub fn detached<T: Send>(py: Python<'_>, work: impl FnOnce() -> T + Send) -> PyResult<T> {
+    let raised = Arc::new(Mutex::new(None));
+    let seen = Arc::clone(&raised);
+    let check = move || {
+        Python::attach(|py| match py.check_signals() {
+            Ok(()) => false,
+            Err(error) => {
+                *seen.lock().unwrap_or_else(PoisonError::into_inner) = Some(error);
+                true
+            }
+        })
+    };
+    let work = AssertUnwindSafe(|| interrupt::within(check, work));
+    match py.detach(move || catch_unwind(work)) {
+        Ok(Ok(value)) => Ok(value),
+        Ok(Err(interrupt::Interrupted)) => {
+            let mut raised = raised.lock().unwrap_or_else(PoisonError::into_inner);
+            Err(raised
+                .take()
+                .unwrap_or_else(|| defect(py, "interrupted by nobody")))
+        }
+        Err(payload) => Err(panicked(py, payload)),
+    }
+}
+
+fn panicked(py: Python<'_>, payload: Box<dyn Any + Send>) -> PyErr {
+    let text = payload.downcast_ref::<String>().map(String::as_str);
+    let text = text.or_else(|| payload.downcast_ref::<&str>().copied());
+    defect(py, text.unwrap_or("a panic without a message"))
+}
