@@ -107,3 +107,13 @@ def test_a_line_of_a_declared_shaft_is_found_as_its_own() -> None:
     amplitude = lines[0].parameters["amplitude_arcsec"].value
     # First harmonic of that wave.
     assert amplitude == pytest.approx(11.1, rel=0.25)
+
+
+def test_the_worm_of_a_telescope_comes_before_its_wander(data_dir: Path) -> None:
+    sim = ta.Simulation(joint=Joint(declared=(DeclaredShaft("worm", teeth=144),)))
+    found = ta.diagnose(ta.read_runs(data_dir / "telescope_worm.csv"), sim)
+    first = found.findings[0]
+    assert (first.cause, first.status) == ("missing_order", "confirmed"), found.summary()
+    assert first.parameters["output_order"].value == 144.0
+    # About 9 arcsec by a spline and two orders; the wander beside it takes a part.
+    assert 6.0 < first.parameters["amplitude_arcsec"].value < 11.0

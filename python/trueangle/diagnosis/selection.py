@@ -9,6 +9,7 @@ import numpy as np
 
 from ..effects import EFFECTS, Effect
 from ..effects.effect import ALWAYS
+from ..effects.missing_order import MissingOrder
 from ..effects.zero_slip import ZeroSlip
 from ..regression.regression import Extension, Regression
 
@@ -54,8 +55,9 @@ def select(regression: Regression, known: Sequence[Extension] = ()) -> Regressio
     imitate any effect of a run) or, over a part of a turn, a bump, further paths take
     those only after the specific ones had their say, without and with a zero of each
     run's own (or with what acts on whole runs beside an error that repeats at the same
-    angle). All are pruned backward; the best by BIC is kept. Terms ``known`` from the
-    same readings with other weights are a start that needs no further path.
+    angle, or with the lines of shafts that the joint declares). All are pruned
+    backward; the best by BIC is kept. Terms ``known`` from the same readings with other
+    weights are a start that needs no further path.
     """
     if known:
         return _made_specific(_pruned(_forward(regression.with_terms(known), list(EFFECTS))))
@@ -76,8 +78,24 @@ def select(regression: Regression, known: Sequence[Extension] = ()) -> Regressio
         slip = ZeroSlip.propose(regression)
         if slip is not None and slip.bic_gain > NEW_CAUSE:
             starts.append(regression.with_terms([slip]))
+    declared = _with_declared_lines(regression)
+    if declared is not regression:
+        starts.append(declared)
     paths = [_pruned(_forward(_forward(s, specific), list(EFFECTS))) for s in starts]
     return _made_specific(min([direct, *paths], key=total_penalty))
+
+
+def _with_declared_lines(regression: Regression) -> Regression:
+    """With the lines of the shafts that the joint declares, before a wander may take them.
+
+    What a random walk is fitted beside it leaves alone; those without evidence are pruned.
+    """
+    joint = regression.around.joint
+    known = {shaft.name for shaft in joint.declared}
+    if not known:
+        return regression
+    orders = [joint.output_order(name, k) for name, k in joint.gear_orders() if name in known]
+    return regression.with_terms([MissingOrder.at(regression, order) for order in orders])
 
 
 def _made_specific(regression: Regression) -> Regression:

@@ -87,14 +87,23 @@ class MissingOrder(Effect):
         if best not in own and own:
             best = int(max(own, key=lambda k: gains[k] - penalties[k]))
         order = float(lines.orders[best])
+        others = [float(lines.orders[k]) for k in alike if k != best]
+        return cls.at(regression, order, float(penalties[best] / 2.0), others)
+
+    @classmethod
+    def at(
+        cls,
+        regression: Regression,
+        order: float,
+        log_grid: float = 0.0,
+        alike: Sequence[float] = (),
+    ) -> Extension:
+        """A line at one output order; ``log_grid`` of the search, none where it is declared."""
         return regression.propose(
             cls.kind,
-            {
-                "output_order": order,
-                "alike": [float(lines.orders[k]) for k in alike if k != best],
-            },
+            {"output_order": order, "alike": list(alike)},
             line_columns(regression.signals.theta, order),
-            log_grid=float(penalties[best] / 2.0),
+            log_grid=log_grid,
             line=order,
         )
 
