@@ -115,7 +115,15 @@ class SimpleFoc(Target):
             else step / math.sqrt(12.0) * ARCSEC_PER_TURN,
             step=step,
             zero_deg=zero_deg,
-            notes=(f"variant {variant}: {VARIANTS[variant]}",),
+            notes=(
+                f"variant {variant}: {VARIANTS[variant]}"
+                + (
+                    "; its arithmetic is restated from what is told of that change, while that of "
+                    "the float tables was run"
+                    if variant == "minus-u16"
+                    else ""
+                ),
+            ),
         )
 
     def _text(self, header: Header, variant: str, table: NDArray[Any]) -> str:

@@ -8,8 +8,10 @@ import pytest
 
 import trueangle as ta
 from trueangle import _core
-from trueangle.export.knots import cubic_knots, linear_knots
+from trueangle.export.chain import make_chain
+from trueangle.export.knots import cubic_knots, linear_knots, rounded_knots
 from trueangle.export.pattern import Pattern
+from trueangle.export.proof import prove
 from trueangle.export.table import make_table
 
 from .conftest import ARCSEC, truth
@@ -260,3 +262,65 @@ def test_a_shaft_that_does_not_come_back_gets_a_function_of_its_own(joint):
     assert any("unwrapped angle of its own shaft" in note for note in made.notes)
     with pytest.raises(ta.errors.ArgumentError, match="shaft motor does not come back"):
         ta.export_model(odd, "csv")
+
+
+def test_cubics_are_tried_where_lines_do_not_keep_the_maximum(model):
+    made = ta.export_model(model, "c", max_arcsec=0.05, bits=14)
+    assert made.max_difference_arcsec <= 0.05
+    assert made.tables[0]["method"] == "cubic"
+    assert made.bytes < 2000
+    with pytest.raises(ta.errors.ArgumentError, match=r"does not keep 0\.05"):
+        ta.export_model(model, "c", max_arcsec=0.05, bits=14, method="linear", number="q15")
+
+
+def test_a_model_of_nothing_is_refused():
+    for target in ("c", "simplefoc", "linuxcnc"):
+        with pytest.raises(ta.errors.ArgumentError, match="no harmonics"):
+            ta.export_model(ta.HarmonicModel(()), target)
+
+
+def test_what_is_not_known_is_not_called_proven(model):
+    made = ta.export_model(model, "admt4000", bits=12)
+    assert made.proven is False
+    assert "not known" in made.proof
+
+
+def test_shafts_of_one_name_after_cleaning_get_two(joint):
+    motor = joint.shafts[1]
+    both = joint.replace(
+        shafts=(
+            ta.Shaft("Wheel 1", 1, (1,), (0.1,), (0.0,)),
+            ta.Shaft("wheel_1", 100, motor.orders, motor.cosine, motor.sine),
+        )
+    )
+    text = ta.export_model(both, "c", bits=12).text
+    assert "angle_wheel_1_correction(" in text
+    assert "angle_wheel_1_2_correction(" in text
+
+
+def test_a_lowered_maximum_is_not_kept(model):
+    """The bound is tight: a tenth less is exceeded by the very input that was found worst."""
+    pattern = Pattern(model)
+    chain = make_chain(pattern, "linear", "q15", 128)
+    proof = prove([chain.correction], pattern.correction, 20, 1.0)
+    at = np.array([proof.worst], dtype=np.uint32)
+    left = abs(float((chain.correction(at) - pattern.correction(at / 2.0**32))[0])) * 1_296_000
+    assert left == pytest.approx(proof.max_arcsec)
+    assert left > 0.9 * proof.max_arcsec
+
+
+def test_whole_knots_are_never_worse_than_rounded_ones():
+    seed = 7
+    print(f"seed {seed}")
+    rng = np.random.default_rng(seed)
+
+    def left(knots, whole):
+        error = whole - knots
+        return float(np.sum(error * (2.0 * error + np.roll(error, 1))))
+
+    for count in (5, 64, 129, 256):
+        knots = rng.normal(0.0, 40.0, count)
+        whole = rounded_knots(knots)
+        assert np.array_equal(whole, np.rint(whole))
+        assert np.max(np.abs(whole - knots)) <= 0.55
+        assert left(knots, whole) <= left(knots, np.rint(knots))
