@@ -319,11 +319,13 @@ def _settled(
         column = _lagged(waves, frequency, **shape)[:, None]
         extension = regression.propose(kind, shape, column)
         full = regression.with_terms([*regression.terms, extension])
-        if full.rss < lowest:
-            best, lowest = shape, full.rss
-        _, (size,) = full.fitted()[-1]
-        x, _ = full.projected(_slopes(waves, frequency, **shape))
-        moves = np.linalg.lstsq(x, full.r, rcond=1e-10)[0] / max(float(size), 0.5)
+        # With the coefficient 1: a free one stands for the cutoff far below it.
+        left = regression.whiten(full.target - column[:, 0])
+        left -= regression.q @ (regression.q.T @ left)
+        if float(left @ left) < lowest:
+            best, lowest = shape, float(left @ left)
+        x, _ = regression.projected(_slopes(waves, frequency, **shape))
+        moves = np.linalg.lstsq(x, left, rcond=1e-10)[0]
         if np.abs(moves).max() < ENOUGH:
             return shape
         factors = np.exp(np.clip(moves, -0.5, 0.5)).tolist()
