@@ -37,6 +37,7 @@ TABLES = {
     },
     "presliding_hysteresis": {"amplitude_arcsec": 20.0, "length_deg": 3.0, "start_state": 1.0},
     "latency": {"delay_s": 4e-4},
+    "channel_skew": {"delay_s": 2e-4, "order": 100.0, "phase_deg": 40.0},
     "filter_lag": {"cutoff_hz": 60.0, "damping": 0.7},
     "thermal_drift": {
         "zero_arcsec_per_K": 0.8,

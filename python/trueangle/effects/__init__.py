@@ -21,6 +21,7 @@ from .reference_error import ReferenceLines as ReferenceLines
 from .sidebands import Sidebands as Sidebands
 from .argument_error import ArgumentShift as ArgumentShift
 from .filter_lag import FilterLag as FilterLag
+from .channel_skew import ChannelSkew as ChannelSkew
 from .load_dependent_gear_error import LoadDependentGearError as LoadDependentGearError
 from .stiffening_compliance import StiffeningCompliance as StiffeningCompliance
 from .presliding_hysteresis import PreslidingHysteresis as PreslidingHysteresis

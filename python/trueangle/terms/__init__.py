@@ -15,6 +15,7 @@ from __future__ import annotations
 from ..correction.term import TERMS, Term
 from ..effects import EFFECTS
 from ..effects.backlash import BacklashTerm as Backlash
+from ..effects.channel_skew import ChannelSkewTerm as ChannelSkew
 from ..effects.direction_dependent_pattern import DirectionalPatternTerm as DirectionalPattern
 from ..effects.filter_lag import FilterLagTerm as FilterLag
 from ..effects.latency import LatencyTerm as Latency
@@ -28,6 +29,7 @@ from ..effects.torsional_compliance import TorsionalComplianceTerm as TorsionalC
 __all__ = [
     "TERMS",
     "Backlash",
+    "ChannelSkew",
     "DirectionalPattern",
     "FilterLag",
     "Latency",

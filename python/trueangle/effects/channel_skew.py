@@ -1,0 +1,181 @@
+"""Sine and cosine read one after the other: an error in proportion to speed."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+
+from ..correction import forms
+from ..correction.forms import Form
+from ..correction.term import Term
+from ..joint.joint import Joint
+from ..joint.pattern import Surroundings, line_columns
+from ..joint.signals import Signals
+from ..regression.estimate import Parameters, quantity
+from ..regression.extension import Extension
+from ..regression.regression import Regression
+from .blindness import OWN_POWER, Blindness, share_left
+from .effect import Effect
+from .filter_lag import FilterLag
+from .latency import UNTIMED, Latency
+from .missing_order import MissingOrder
+from .search import Array, Fitted, line_parameters
+
+__all__ = ["ChannelSkew", "ChannelSkewTerm"]
+
+#: Arcsec in a degree.
+ARCSEC_PER_DEG = 3600.0
+
+
+@dataclass(frozen=True)
+class ChannelSkew(Effect):
+    r"""The cosine is read a time :math:`\Delta t` before the sine.
+
+    .. math:: \varepsilon = \frac{v\,\Delta t}{2}\,[1 + \sin(m\theta + \varphi)]
+
+    with m twice the sensor's electrical periods in one turn of the output.
+
+    Parameters
+    ----------
+    delay_s : float
+        :math:`\Delta t`; negative where the sine is read first.
+    order : float
+        m.
+    phase_deg : float
+        Where the sensor's periods stand on the joint.
+    """
+
+    delay_s: float
+    order: float
+    phase_deg: float = 0.0
+
+    kind: ClassVar[str] = "channel_skew"
+    sentence: ClassVar[str] = (
+        "The two channels of a sine and cosine sensor are read one after the other: a constant "
+        "and twice the sensor's order, both in proportion to speed."
+    )
+    needs: ClassVar[tuple[str, ...]] = ("time",)
+    factor: ClassVar[str] = "velocity"
+    confused_with: ClassVar[Mapping[type[Effect], str]] = {
+        Latency: "two speeds at angles dense enough for twice the sensor's order",
+        MissingOrder: "both directions or two speeds",
+        FilterLag: "three speeds: a filter's lines bend with speed",
+    }
+    measure: ClassVar[str] = (
+        "two speeds or both directions, at angles dense enough for twice the sensor's order"
+    )
+
+    def signal(self, signals: Signals, around: Surroundings, rng: np.random.Generator) -> Array:
+        line = np.sin(self.order * signals.theta + np.radians(self.phase_deg))
+        half = 0.5 * self.delay_s * ARCSEC_PER_DEG * 360.0 * signals.turns_per_s
+        return np.asarray(half * (1.0 + line))
+
+    @classmethod
+    def propose(cls, regression: Regression) -> Extension | None:
+        if regression.signals.velocity is None or regression.has(cls.kind):
+            return None
+        signals, around = regression.signals, regression.around
+        pair = cls.columns(signals, around, {})
+        free, coefficients = regression.gain(pair)
+        if regression.hopeless(free, 2):
+            return None
+        # The constant part is as large as the line: which of the two signs, the data say.
+        phase = float(np.arctan2(*coefficients))
+        tried = []
+        for sign in (1.0, -1.0):
+            shape = {"phase": phase if sign > 0.0 else phase + np.pi}
+            columns = cls.columns(signals, around, shape)
+            tried.append(regression.propose(cls.kind, shape, columns, parameters=2))
+        best = max(tried, key=lambda extension: extension.bic_gain)
+        return best if best.bic_gain > 0.0 else None
+
+    @classmethod
+    def columns(cls, signals: Signals, around: Surroundings, shape: dict[str, Any]) -> Array:
+        """Column whose coefficient is the delay; without a phase the pair of the line alone."""
+        half = 0.5 * ARCSEC_PER_DEG * 360.0 * signals.turns_per_s[:, None]
+        line = line_columns(signals.theta, sensor_order(around.joint))
+        if "phase" not in shape:
+            return np.asarray(half * line)
+        turned = line @ np.array([np.sin(shape["phase"]), np.cos(shape["phase"])])
+        return np.asarray(half * (1.0 + turned[:, None]))
+
+    @classmethod
+    def report(
+        cls, regression: Regression, terms: Sequence[Fitted]
+    ) -> tuple[Parameters, list[Effect]]:
+        extension, (delay,), covariance = terms[0]
+        phase = float(np.degrees(extension.shape["phase"]) % 360.0)
+        order = sensor_order(regression.around.joint)
+        rest = regression.with_terms(t for t in regression.terms if t is not extension)
+        pair = rest.projected(cls.columns(regression.signals, regression.around, {}))[0]
+        spread = np.asarray(regression.variance * np.linalg.pinv(pair.T @ pair), dtype=np.float64)
+        _, _, _, phase_std = line_parameters(
+            abs(float(delay)) * np.array([np.sin(np.radians(phase)), np.cos(np.radians(phase))]),
+            spread,
+        )
+        parameters = {
+            "delay_s": quantity(delay, float(np.sqrt(covariance[0, 0]))),
+            "phase_deg": quantity(phase, phase_std),
+            "order": quantity(order),
+        }
+        return parameters, [ChannelSkew(float(delay), order, phase)]
+
+    @classmethod
+    def blind_spots(cls, regression: Regression, found: Sequence[Blindness]) -> Iterator[Blindness]:
+        signals = regression.signals
+        if signals.velocity is None:
+            yield cls.blind(UNTIMED)
+            return
+        line = line_columns(signals.theta, sensor_order(regression.belief.joint))
+        if share_left(regression, signals.velocity[:, None] * line, line) < OWN_POWER:
+            yield cls.blind("one speed in one direction (or at rest): it is part of a line")
+
+    def to_terms(self, period: float, shafts: Mapping[str, float]) -> tuple[Term, ...]:
+        return (ChannelSkewTerm(self.delay_s, self.order, self.phase_deg),)
+
+
+@dataclass(frozen=True, repr=False)
+class ChannelSkewTerm(Term):
+    r"""Half of the way during the delay, and the line at twice the sensor's order.
+
+    .. math:: \varepsilon = \frac{v\,\Delta t}{2}\,[1 + \sin(m\varphi + \varphi_0)]
+
+    Parameters
+    ----------
+    delay_s : float
+        :math:`\Delta t`.
+    order : float
+        m > 0, of the output.
+    phase_deg : float
+        :math:`\varphi_0`, degrees.
+    """
+
+    delay_s: float
+    order: float
+    phase_deg: float = 0.0
+
+    kind: ClassVar[str] = "channel_skew"
+    signals: ClassVar[tuple[str, ...]] = ("velocity",)
+
+    def check(self) -> None:
+        if self.order <= 0.0:
+            raise self._out_of_range("order", "positive")
+
+    @property
+    def is_periodic(self) -> bool:
+        return self.order == int(self.order)
+
+    def forms(self) -> tuple[Form, ...]:
+        half, phase = 0.5 * self.delay_s, math.radians(self.phase_deg)
+        line = (self.order, half * math.sin(phase), half * math.cos(phase))
+        return (forms.Scaled("velocity", half, (line,)),)
+
+
+def sensor_order(joint: Joint) -> float:
+    """Twice the electrical periods of the sensor in one turn of the output."""
+    cycles = joint.shafts.get("motor", 1.0) if joint.encoder_side == "motor" else 1.0
+    return 2.0 * joint.pole_pairs * cycles
