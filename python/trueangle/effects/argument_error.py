@@ -23,6 +23,9 @@ from .sidebands import Sidebands
 
 __all__ = ["ArgumentShift"]
 
+#: How far from -1 the coefficient may be found.
+ALLOWED = 0.5
+
 
 @dataclass(frozen=True)
 class ArgumentShift(Effect):
@@ -66,7 +69,9 @@ class ArgumentShift(Effect):
             cls.kind, None, lambda: cls.columns(regression.signals, regression.around, {})
         )
         deviance = float(regression.fixed_gains(-columns)[0])
-        return regression.propose(cls.kind, {}, columns, parameters=0, deviance=deviance)
+        extension = regression.propose(cls.kind, {}, columns, parameters=0, deviance=deviance)
+        # The pattern belongs to one angle or to the other: nothing lies beyond.
+        return extension if abs(extension.coefficients[0] + 1.0) < ALLOWED else None
 
     @classmethod
     def report(

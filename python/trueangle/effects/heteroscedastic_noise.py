@@ -90,6 +90,11 @@ class HeteroscedasticNoise(Effect):
             x = k * signals.theta
             blocks[f"order {k}"] = np.column_stack([np.cos(x), np.sin(x)])
             penalties[f"order {k}"] = 2.0 * log_n + 2.0 * float(np.log(2.0 * k))
+        turns = [c for c in regression.around.joint.shafts.values() if c != 1.0]
+        for order in sorted({k * cycles for cycles in turns for k in (1, 2)}):
+            x = order * signals.theta
+            blocks[f"order {order:g}"] = np.column_stack([np.cos(x), np.sin(x)])
+            penalties[f"order {order:g}"] = 2.0 * log_n + 2.0 * float(np.log(8.0 * len(turns)))
         for name, values in (
             ("per_deg_s", None if signals.velocity is None else np.abs(signals.velocity)),
             ("per_Nm", None if signals.torque is None else np.abs(signals.torque)),

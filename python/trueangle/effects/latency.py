@@ -56,8 +56,9 @@ class Latency(Effect):
 
     kind: ClassVar[str] = "latency"
     sentence: ClassVar[str] = (
-        "The joint's reading is older than the reference's: the error is proportional to "
-        "velocity and the pattern is shifted along with it."
+        "One of the two readings is older than the other, the joint's (a positive delay) or the "
+        "reference's (a negative one): the error is proportional to velocity and the pattern "
+        "is shifted along with it."
     )
     needs: ClassVar[tuple[str, ...]] = ("time",)
     factor: ClassVar[str] = "velocity"

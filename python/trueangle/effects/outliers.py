@@ -32,6 +32,14 @@ SIZES = (3.0, 10.0, 100.0)
 BESIDE = 0.5
 ISOLATED = 0.5
 
+#: Pairs of outliers in a row, beyond three times those by chance, that tell a burst from a
+#: manoeuvre, and the share of them that must change sides: half do so at random.
+LEAST_PAIRS = 8
+TURNING = 0.3
+
+#: Readings on either side of a reversal that are near it.
+NEAR_REVERSAL = 3
+
 #: Outliers smaller than this many standard deviations hide in the noise: of sizes
 #: spread evenly up to ``size`` that is a share of ``HIDDEN / size``, which the form of the
 #: wide normal supplies and no reading shows. It counts as the fraction's uncertainty.
@@ -99,9 +107,15 @@ class Outliers(Effect):
         rows = np.flatnonzero(chance > 0.5)
         alone = rows[_isolated(regression, rows)]
         stretches = 1 + np.count_nonzero(np.diff(rows) > 1)
-        if alone.size < ISOLATED * stretches:
+        bursts = 0
+        if _is_scattered(regression, rows):
+            bursts = int(np.count_nonzero(_lengths(rows) > 1))
+        elif alone.size >= ISOLATED * stretches:
+            rows = alone
+        else:
             return None
-        rows = alone
+        if _at_reversals(regression, rows):
+            return None
         spread = size * scale * np.sqrt(regression.variance)
         std = float(np.sqrt(share * (1.0 - share) / n))
         parameters: Parameters = {
@@ -109,6 +123,7 @@ class Outliers(Effect):
                 float(share), max(std, float(share) * float(np.clip(HIDDEN / size, 0.2, 1.0)))
             ),
             "size_arcsec": quantity(float(spread), None),
+            **({"bursts": quantity(bursts)} if bursts else {}),
             "rows": quantity(
                 [
                     [
@@ -143,6 +158,33 @@ def _isolated(regression: Regression, rows: NDArray[np.int64]) -> NDArray[np.boo
     before, after = padded[:-2].copy(), padded[2:].copy()
     before[first] = after[first[1:] - 1] = 0.0
     return np.asarray(np.maximum(before, after)[rows] < BESIDE * size[rows])
+
+
+def _lengths(rows: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Lengths of the stretches of rows that follow each other."""
+    edges = np.flatnonzero(np.diff(rows) > 1) + 1
+    return np.diff(np.concatenate([[0], edges, [rows.size]]))
+
+
+def _is_scattered(regression: Regression, rows: NDArray[np.int64]) -> bool:
+    """Rows that follow each other lie on both sides at random: bursts, no manoeuvre."""
+    # Not whitened: that would make neighbours change sides.
+    e = regression.left - regression.whiten.run_part(regression.left)
+    next_to = np.flatnonzero(np.diff(rows) == 1)
+    turns = e[rows[next_to]] * e[rows[next_to + 1]] < 0.0
+    by_chance = rows.size**2 / regression.n
+    return turns.size > LEAST_PAIRS + 3.0 * by_chance and float(turns.mean()) > TURNING
+
+
+def _at_reversals(regression: Regression, rows: NDArray[np.int64]) -> bool:
+    """Most of the rows lie where the joint reverses: a transition, no outliers."""
+    segment = regression.signals.segment
+    cuts = np.flatnonzero((np.diff(segment) != 0) & (np.diff(regression.signals.run) == 0)) + 1
+    near = np.zeros(regression.n, dtype=bool)
+    for shift in range(-NEAR_REVERSAL, NEAR_REVERSAL):
+        near[np.clip(cuts + shift, 0, regression.n - 1)] = True
+    share = float(near[rows].mean())
+    return share > ISOLATED and share > 2.0 * float(near.mean())
 
 
 def _normal(e: Array, scale: float) -> float:

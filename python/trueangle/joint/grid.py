@@ -7,10 +7,15 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["UniformGrid", "uniform_grid"]
+__all__ = ["UniformGrid", "lattice_step", "uniform_grid"]
 
 #: Departure from the grid, in shares of its step, up to which readings lie on it.
 ON_GRID = 0.02
+
+#: Departure of differences from a lattice, in shares of its step; differences below this
+#: share of the largest value are the rounding of sums.
+ON_LATTICE = 0.05
+LEAST_STEP = 1e-9
 
 #: Positions beyond which a grid is not looked for.
 MOST_POSITIONS = 10_000
@@ -60,3 +65,27 @@ def uniform_grid(theta: NDArray[np.float64]) -> UniformGrid | None:
     away = turns * positions - shift
     away -= np.round(away)
     return UniformGrid(positions) if float(np.abs(away).max()) < ON_GRID else None
+
+
+def lattice_step(values: NDArray[np.float64]) -> float:
+    """Step of the lattice that all values lie on; 0 where they lie on none.
+
+    Examples
+    --------
+    >>> lattice_step(np.array([0.5, 1.25, 3.0, 2.5]))
+    0.25
+    >>> lattice_step(np.array([0.5, 1.25, 3.0, 2.6]))
+    0.0
+    """
+    steps = np.diff(np.unique(values))
+    rounding = LEAST_STEP * float(np.abs(values).max(initial=1.0))
+    steps = steps[steps > rounding]
+    if steps.size < 3:
+        return 0.0
+    step = float(steps.min())
+    # The finest difference may be several counts: a whole part of it then.
+    for parts in (1, 2, 3):
+        away = steps * (parts / step)
+        if np.abs(away - np.round(away)).max() < ON_LATTICE:
+            return step / parts
+    return 0.0

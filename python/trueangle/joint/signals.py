@@ -10,7 +10,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ..angles import ARCSEC_PER_TURN
 from ..runs import CalibrationRun
+from .grid import lattice_step
 
 __all__ = ["Signals", "join_runs"]
 
@@ -49,6 +51,8 @@ class Signals:
         Seconds since the start of the run, or the row number without time.
     velocity, time, temperature, torque, mount, current : ndarray or None
         Degrees per second, s, Celsius, Nm, radians, A; None where not every run recorded it.
+    count : float
+        Arcsec of one count, where the indicated angles lie on a lattice; else 0.
     labels : tuple of str
         Names of the runs.
     """
@@ -70,6 +74,7 @@ class Signals:
     mount: Array | None
     labels: tuple[str, ...]
     current: Array | None = None
+    count: float = 0.0
 
     def __len__(self) -> int:
         return int(self.theta.size)
@@ -158,6 +163,8 @@ def join_runs(runs: Sequence[CalibrationRun]) -> Signals:
         segment_first=np.concatenate([np.arange(part[3].size) == 0 for part in parts]),
         clock=_joined([_clock(run) for run in runs]),
         **{name: _all([read(run) for run in runs]) for name, read in RECORDED.items()},
+        count=lattice_step(np.concatenate([run.indicated / run.period for run in runs]))
+        * ARCSEC_PER_TURN,
         labels=tuple(run.label or str(j + 1) for j, run in enumerate(runs)),
     )
 

@@ -17,6 +17,9 @@ __all__ = ["ROUNDING", "Extension", "Regression"]
 
 Array = NDArray[np.float64]
 
+#: Times the standard deviation of the residual beyond which no cause is as large.
+BEYOND_SHOWN = 3.0
+
 #: Share of a column's power that must be left after projection for it to count at all.
 EXCITED = 1e-4
 
@@ -129,8 +132,15 @@ class Regression(LeastSquares):
         deviance: float | None = None,
         line: float | None = None,
     ) -> Extension:
-        """Extension of regressors with their evidence in this regression."""
+        """Extension of regressors with their evidence in this regression.
+
+        None is given for an error larger than the readings show: it would only be there to
+        be taken off again by another one.
+        """
         saved, coefficients = self.gain(columns)
+        if float(np.std(columns @ coefficients)) > BEYOND_SHOWN * float(np.std(self.residual)):
+            saved = 0.0
+            deviance = None if deviance is None else 0.0
         return Extension(
             cause,
             shape,
