@@ -90,7 +90,13 @@ def check(
     ratio = ratio_of(records)
     can, cannot = verdicts(extent)
     return Check(
-        tuple(faults_of(records)), ratio, suggestion(ratio), extent, tuple(can), tuple(cannot)
+        tuple(faults_of(records)),
+        ratio,
+        suggestion(ratio),
+        extent,
+        tuple(can),
+        tuple(cannot),
+        {role: found for record in records for role, found in record.columns.items()},
     )
 
 

@@ -25,6 +25,7 @@ def read_records(paths: Iterable[str | PathLike[str]], **given: Any) -> list[Rec
     for path in paths:
         table = read_columns(Path(path), **given)
         scale = 360.0 / table.period
+        columns = {role: (c.name, c.unit) for role, c in table.table.roles.items()}
         for _, label, rows in table.groups:
             signals = {name: values[rows] for name, values in table.signals.items()}
             velocity, mount = signals.get("velocity"), signals.get("mount")
@@ -39,6 +40,7 @@ def read_records(paths: Iterable[str | PathLike[str]], **given: Any) -> list[Rec
                     signals.get("temperature"),
                     signals.get("torque"),
                     None if mount is None else mount * scale,
+                    columns,
                 )
             )
     return found

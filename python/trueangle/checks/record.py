@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,6 +28,8 @@ class Record:
         Row of each reading in its file, from 1.
     time, velocity, temperature, torque, mount : ndarray or None
         s, deg/s, Celsius, Nm, degrees.
+    columns : mapping of role to (name, unit)
+        The columns of the file that were understood.
     """
 
     label: str
@@ -39,6 +41,7 @@ class Record:
     temperature: Array | None = None
     torque: Array | None = None
     mount: Array | None = None
+    columns: Mapping[str, tuple[str, str | None]] = field(default_factory=dict)
 
     def __len__(self) -> int:
         return int(self.reference.size)

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import json
 import textwrap
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from typing import Any
 
 from .extent import Extent
@@ -32,6 +33,8 @@ class Check:
         What can be known from such data.
     cannot : tuple of dict
         ``what`` cannot, ``because``, and what to ``measure``.
+    columns : mapping of role to (name, unit)
+        The columns of files that were understood; empty for runs.
     """
 
     data_faults: tuple[DataFault, ...]
@@ -40,6 +43,7 @@ class Check:
     extent: Extent
     can: tuple[str, ...]
     cannot: tuple[dict[str, str], ...]
+    columns: Mapping[str, tuple[str, str | None]] = field(default_factory=dict)
 
     @property
     def usable(self) -> bool:
@@ -63,6 +67,10 @@ class Check:
             "loads": [*e.loads],
             "temperatures": [*e.temperatures],
             "mounts": [*e.mounts],
+            "columns": [
+                {"role": role, "name": name, "unit": unit}
+                for role, (name, unit) in self.columns.items()
+            ],
             "can": [*self.can],
             "cannot": [*self.cannot],
         }
@@ -82,6 +90,12 @@ class Check:
             lines.append("No fault found in the data.")
         elif not self.usable:
             lines.append("The data must not be used as they are.")
+        if self.columns:
+            told = [
+                f"{role} is '{name}'" + (f" in {unit}" if unit else "")
+                for role, (name, unit) in self.columns.items()
+            ]
+            lines += ["", *_wrapped(f"Understood: {'; '.join(told)}.", 2)]
         ratio = "unknown" if self.ratio is None else f"{self.ratio:.6g}"
         lines += [
             "",

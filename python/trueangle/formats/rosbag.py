@@ -25,12 +25,14 @@ __all__ = ["columns", "contents", "copy", "read"]
 _JOINT_STATE = "sensor_msgs/msg/JointState"
 #: Signals of a joint in the message, under the names of columns.
 _FIELDS = {"velocity_rad_s": "velocity", "torque_Nm": "effort"}
+#: The time of a message, by the stamp in its header.
+_TIME = "time_s"
 #: Messages corrected together.
 _BLOCK = 4096
 
 
 def columns(path: Path, topic: str | None = None) -> list[str]:
-    """Joint names of the JointState topic, and their signals as ``JOINT/velocity_rad_s``."""
+    """Joints of the JointState topic, their signals as ``JOINT/velocity_rad_s``, the time."""
     with _opened(path) as bag:
         return bag.columns(bag.topic(topic))
 
@@ -150,7 +152,8 @@ class Bag:
             joints |= dict.fromkeys(self.decoded(data).name)
             if i == _BLOCK:
                 break
-        return [*joints, *(f"{joint}/{field}" for joint in joints for field in _FIELDS)]
+        fields = (f"{joint}/{field}" for joint in joints for field in _FIELDS)
+        return [*joints, *fields, *([] if _TIME in joints else [_TIME])]
 
     def decoded(self, data: bytes) -> Any:
         """A JointState message."""
@@ -205,6 +208,9 @@ def _blocks(messages: Iterator[Any]) -> Iterator[list[Any]]:
 
 def _values(messages: Sequence[Any], name: str) -> NDArray[np.float64]:
     """A joint's positions, or its velocity or effort; NaN in messages without it."""
+    if name == _TIME and not any(_TIME in message.name for message in messages[:1]):
+        stamps = (message.header.stamp for message in messages)
+        return np.array([stamp.sec + 1e-9 * stamp.nanosec for stamp in stamps])
     joint, slash, field = name.rpartition("/")
     if not slash or field not in _FIELDS:
         joint, attribute = name, "position"

@@ -220,3 +220,16 @@ def test_truncated_bags_are_refused(kind, positions, tmp_path):
     report = ta.correct_logs(source, models, tmp_path / f"out_{name}")
     assert isinstance(report.logs[0].error, ta.errors.FileError), report.logs[0]
     assert not (tmp_path / f"out_{name}").exists()
+
+
+@pytest.mark.parametrize("storage", [StoragePlugin.MCAP, StoragePlugin.SQLITE3])
+def test_a_bag_is_read_as_runs_with_the_times_of_its_messages(storage, tmp_path):
+    turns = np.linspace(0.0, 12.0, MESSAGES)
+    path = write_ros2(tmp_path / "bag", np.column_stack([turns, turns + 0.01]), storage)
+    signals = {"reference": "elbow", "indicated": "wrist"}
+    with pytest.warns(ta.errors.EmptyCellsWarning, match="30 of 300 rows"):
+        (run,) = ta.read_runs(path, signals=signals)
+    assert run.period == 2.0 * np.pi
+    assert run.left_out == 30
+    np.testing.assert_allclose(run.error, 0.01, atol=1e-9)
+    np.testing.assert_array_equal(run.time[:5], np.arange(5.0))
