@@ -4,8 +4,12 @@ from __future__ import annotations
 
 import argparse
 import json
+from typing import TYPE_CHECKING
 
 from .paths import Input, Output
+
+if TYPE_CHECKING:
+    from ..export.target import Option
 
 HELP = "write a model as a table for firmware, with a proven bound of its difference"
 EXAMPLE = "trueangle export joint_a.json --to c --max-arcsec 2 -o joint_a.h"
@@ -37,7 +41,7 @@ def add_target_options(parser: argparse.ArgumentParser) -> None:
     read = {name for target in TARGETS.values() for name in target.files}
     for target in TARGETS.values():
         for name, option in target.options.items():
-            options.setdefault(name, {}).setdefault(option.help, []).append(target.name)
+            options.setdefault(name, {}).setdefault(_help(option), []).append(target.name)
     for name, helps in sorted(options.items()):
         parser.add_argument(
             *([f"--{name.replace('_', '-')}"] + (["--table"] if name == "entries" else [])),
@@ -46,6 +50,12 @@ def add_target_options(parser: argparse.ArgumentParser) -> None:
             metavar="FILE" if name in read else name.upper().replace("_", "-"),
             help="; ".join(f"{', '.join(names)}: {text}" for text, names in helps.items()),
         )
+
+
+def _help(option: Option) -> str:
+    words = f": {' or '.join(option.values)}" if isinstance(option.values, tuple) else ""
+    default = "" if option.default is None else f" (default: {option.default})"
+    return f"{option.help}{words}{default}"
 
 
 def target_options(args: argparse.Namespace) -> dict[str, str]:

@@ -37,6 +37,9 @@ class Comparison:
         one phase, None where neither model states a covariance.
     rms_arcsec, max_abs_arcsec : float
         Of the difference over a turn, its zero taken out.
+    std_arcsec : float or None
+        Standard deviation of the difference over a turn, without its zero, from the
+        covariances of both; None where neither states one.
     zero_deg : float
         Difference of the constants.
     argument : str
@@ -48,6 +51,7 @@ class Comparison:
     orders: list[dict[str, float | None]]
     rms_arcsec: float
     max_abs_arcsec: float
+    std_arcsec: float | None
     zero_deg: float
     argument: str
     differ_in: list[str]
@@ -60,7 +64,8 @@ class Comparison:
         """The numbers as lines of text."""
         lines = [
             f"difference: {self.rms_arcsec:.4g} arcsec rms, {self.max_abs_arcsec:.4g} max abs, "
-            f"zero {self.zero_deg:.6g} deg",
+            f"zero {self.zero_deg:.6g} deg"
+            + ("" if self.std_arcsec is None else f"; known to {self.std_arcsec:.3g} arcsec"),
             "  order  amplitude/arcsec  phase/deg  std/arcsec",
         ]
         for row in self.orders:
@@ -149,6 +154,7 @@ def compare(
         orders=rows,
         rms_arcsec=float(np.sqrt(np.mean(difference**2))) * ARCSEC_PER_TURN,
         max_abs_arcsec=float(np.max(np.abs(difference))) * ARCSEC_PER_TURN,
+        std_arcsec=_over_a_turn(one, two),
         zero_deg=(two.zero - one.zero + zero) * 360.0,
         argument=first.argument if same else "reference",
         differ_in=terms,
@@ -191,6 +197,11 @@ def _std(first: HarmonicModel, second: HarmonicModel, order: float) -> float | N
                     total += float(variance) / model.period**2
                 at += 2
     return math.sqrt(total) * ARCSEC_PER_TURN if known else None
+
+
+def _over_a_turn(one: Pattern, two: Pattern) -> float | None:
+    known = [p.uncertainty_arcsec for p in (one, two) if p.uncertainty_arcsec is not None]
+    return math.hypot(*known) if known else None
 
 
 def _terms(model: HarmonicModel, kind: str) -> list[Any]:

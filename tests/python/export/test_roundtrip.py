@@ -100,6 +100,8 @@ def test_comparison_adds_variances_and_names_terms():
 
     result = ta.compare(one(3e-4), one(4e-4, (ta.Backlash(0.1),)))
     assert result.orders[0]["std_arcsec"] == pytest.approx(1.8)
+    # one order: its cosine and sine, half of the turn each
+    assert result.std_arcsec == pytest.approx(1.8)
     assert result.differ_in == ["backlash"]
 
 
