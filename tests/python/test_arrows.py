@@ -95,6 +95,13 @@ def test_python_in_the_core_is_seen(package):
     assert "knows no Python" in said
 
 
+def test_a_cause_named_in_another_file_is_seen(package):
+    plant(package / "diagnosis" / "gain.py", '\nPLANTED = ("backlash",)\n')
+    (said,) = check(package)
+    assert said.startswith("diagnosis.gain:")
+    assert "'backlash': a cause's name" in said
+
+
 def test_an_exception_that_is_no_more_must_go(package):
     path = package / "orders" / "table.py"
     text = path.read_text("utf-8")
