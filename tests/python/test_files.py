@@ -281,9 +281,9 @@ def test_files_have_a_size_limit_that_the_message_names(tmp_path, monkeypatch):
 
 
 def test_what_is_written_is_small_enough_to_be_read(tmp_path, model, monkeypatch):
-    from trueangle import modelfile
+    from trueangle import modeltext
 
-    monkeypatch.setattr(modelfile, "MODEL_BYTES", 100)
+    monkeypatch.setattr(modeltext, "MODEL_BYTES", 100)
     with pytest.raises(ta.errors.ArgumentError, match="covariance"):
         model.save(tmp_path / "m.json")
     assert list(tmp_path.iterdir()) == []
