@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import ArgumentError, MissingExtraError
+from ..labelled import take_apart
 from ..model import HarmonicModel
 from .joints import Channel, JointState, LogSettings, joints_of
 
@@ -37,8 +38,9 @@ def correct(
     data : array or table
         A pyarrow Table, RecordBatch or RecordBatchReader; a polars DataFrame or LazyFrame;
         a pandas DataFrame; a Dask DataFrame; any object with the Arrow PyCapsule stream
-        (``__arrow_c_stream__``), such as a relation of duckdb; or a numpy or Dask array of
-        angles in the model's unit.
+        (``__arrow_c_stream__``), such as a relation of duckdb; an xarray Dataset; or a numpy
+        or Dask array, a series of pandas or polars, or an xarray DataArray of angles in the
+        model's unit, whose names, index and coordinates are kept.
     model : HarmonicModel, path, or mapping of joint names to them
     column : str or mapping of joint names to str, optional
         The indicated angle; by default ``indicated_deg`` (``_rad``, ``_turn``, ``_count``),
@@ -87,13 +89,16 @@ def correct(
             result = convert(library, data, settings)
             if result is not NotImplemented:
                 return result
+    values, put_back = take_apart(data)
+    if put_back is not None:
+        return put_back(_array_channel(settings).correct(np.asarray(values)))
     if isinstance(data, np.ndarray):
         return _array_channel(settings).correct(data)
     if hasattr(data, "__arrow_c_stream__"):
         return _stream(_pyarrow(), _pyarrow().RecordBatchReader.from_stream(data), settings)
     raise ArgumentError(
-        "data must be an array, a pyarrow, polars, pandas or Dask table, or an object with "
-        f"__arrow_c_stream__, got {type(data).__name__}"
+        "data must be an array or series, a pyarrow, polars, pandas, xarray or Dask table, or an "
+        f"object with __arrow_c_stream__, got {type(data).__name__}"
     )
 
 
@@ -184,6 +189,22 @@ def _numpy(series: Any) -> Any:
     return series.to_numpy(dtype=np.float64, na_value=np.nan)
 
 
+def _from_xarray(xr: Any, data: Any, settings: LogSettings) -> Any:
+    if not isinstance(data, xr.Dataset):
+        return NotImplemented
+    added = {}
+    for channel in settings.channels(_DATA, [str(name) for name in data.variables]):
+        angle = data[channel.angle.name]
+        if angle.ndim != 1:
+            raise ArgumentError(
+                f"turns and travel are followed along one dimension, {channel.angle.name} has "
+                f"{angle.ndim}"
+            )
+        used = {signal: data[name].to_numpy() for signal, name in channel.signals.items()}
+        added[channel.angle.corrected] = (angle.dims, channel.correct(angle.to_numpy(), used))
+    return data.assign(added)
+
+
 def _from_dask_frame(dd: Any, data: Any, settings: LogSettings) -> Any:
     if not isinstance(data, dd.DataFrame):
         return NotImplemented
@@ -272,5 +293,6 @@ _KINDS: Sequence[tuple[str, Callable[[Any, Any, LogSettings], Any]]] = (
     ("dask.array", _from_dask_array),
     ("polars", _from_polars),
     ("pandas", _from_pandas),
+    ("xarray", _from_xarray),
     ("pyarrow", _from_pyarrow),
 )

@@ -149,3 +149,27 @@ def test_what_cannot_be_corrected_is_refused(model):
     pa = pytest.importorskip("pyarrow")
     with pytest.raises(FileError, match="data, line 1: no indicated_deg"):
         ta.correct(pa.table({"x": ANGLES}), model)
+
+
+def test_series_and_labelled_arrays_keep_what_they_are(model):
+    pd, pl = pytest.importorskip("pandas"), pytest.importorskip("polars")
+    xr = pytest.importorskip("xarray")
+    angles = made_angles(100)
+    expected = model.correct(angles)
+    series = pd.Series(angles, index=np.arange(100) * 2, name="elbow")
+    after = ta.correct(series, model)
+    assert (after.name, list(after.index)) == ("elbow", list(series.index))
+    np.testing.assert_array_equal(after, expected)
+    assert ta.correct(pl.Series("wrist", angles), model).to_list() == expected.tolist()
+    time = np.arange(100) / 1e3
+    array = xr.DataArray(angles, coords={"time": time}, dims="time", attrs={"units": "deg"})
+    after = ta.correct(array, model)
+    assert after.attrs == {"units": "deg"}
+    np.testing.assert_array_equal(after.time, time)
+    np.testing.assert_array_equal(after, expected)
+    data = xr.Dataset({"indicated_deg": array, "other": ("time", time)})
+    after = ta.correct(data, model)
+    assert set(after.data_vars) == {"indicated_deg", "other", "corrected_deg"}
+    np.testing.assert_array_equal(after.corrected_deg, expected)
+    with pytest.raises(ta.errors.ArgumentError, match="one dimension"):
+        ta.correct(xr.Dataset({"indicated_deg": (("a", "b"), np.zeros((2, 2)))}), model)
