@@ -12,8 +12,13 @@ from trueangle.effects.effect import telling_apart
 
 PACKAGE = Path(trueangle.__file__).parent
 
-#: Places where a word that is also a cause means something else: readings left out of a run.
-WORDS = {("outliers", "certificate/document.py")}
+#: Places where a word that is also a cause means something else: readings left out of a run,
+#: and the fault of data whose columns are at another ratio.
+WORDS = {
+    ("outliers", "certificate/document.py"),
+    ("wrong_gear_ratio", "checks/angles.py"),
+    ("wrong_gear_ratio", "checks/fault.py"),
+}
 
 #: Most lines of an effect's file.
 MOST_LINES = 400

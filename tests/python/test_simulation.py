@@ -67,6 +67,11 @@ SAMPLES = {
     "outliers": {"fraction": 0.02, "size_arcsec": 40.0},
     "missed_counts": {"step_arcsec": 12.0, "run": 0, "row": 100},
     "heteroscedastic_noise": {"cosine": 0.5},
+    "current_coupling": {"arcsec_per_A": 1.0},
+    "clock_drift": {"ppm": 50.0},
+    "wrong_gear_ratio": {"gear_ratio": 80.0},
+    "timestamp_jitter": {"sigma_s": 2e-5},
+    "quantisation": {"step_arcsec": 5.0},
     "local_defect": {"place_deg": 90.0, "width_deg": 2.0, "height_arcsec": 6.0},
 }
 

@@ -20,6 +20,7 @@ from .missing_order import MissingOrder as MissingOrder
 from .reference_error import ReferenceLines as ReferenceLines
 from .sidebands import Sidebands as Sidebands
 from .argument_error import ArgumentShift as ArgumentShift
+from .wrong_gear_ratio import WrongGearRatio as WrongGearRatio
 from .filter_lag import FilterLag as FilterLag
 from .channel_skew import ChannelSkew as ChannelSkew
 from .load_dependent_gear_error import LoadDependentGearError as LoadDependentGearError

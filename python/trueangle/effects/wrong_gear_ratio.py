@@ -1,0 +1,130 @@
+"""All lines of the geared shafts at another ratio than the simulation's."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+
+from ..joint.joint import Joint
+from ..joint.pattern import Pattern, Surroundings, line_columns
+from ..joint.shafts import shaft_cycles
+from ..joint.signals import Signals
+from ..regression.estimate import Parameters, quantity
+from ..regression.extension import Extension
+from ..regression.regression import Regression
+from .effect import Effect
+from .missing_order import MissingOrder
+from .search import Array, Fitted
+from .sidebands import Sidebands
+
+__all__ = ["WrongGearRatio"]
+
+#: Lines of geared shafts that one ratio must explain at once: one alone is a missing order.
+LEAST_LINES = 2
+
+#: Share of the power of the believed lines that may be left at their own places.
+ABSENT = 0.3
+
+
+@dataclass(frozen=True)
+class WrongGearRatio(Effect):
+    r"""The geared lines stand at the orders of another ratio.
+
+    .. math:: \varepsilon = p_{r}(\theta) - p(\theta)
+
+    with :math:`p_r` the simulation's pattern on a joint of ratio r.
+
+    Parameters
+    ----------
+    gear_ratio : float
+        r: motor turns per output turn as the readings have it.
+    """
+
+    gear_ratio: float
+
+    kind: ClassVar[str] = "wrong_gear_ratio"
+    sentence: ClassVar[str] = (
+        "The simulation counts with another gear ratio than the joint has: all lines of the "
+        "motor and the wave generator stand at other orders, together."
+    )
+    confused_with: ClassVar[Mapping[type[Effect], str]] = {
+        MissingOrder: "count the motor's turns in one turn of the output",
+        Sidebands: "count the motor's turns in one turn of the output",
+    }
+    measure: ClassVar[str] = "free angles, dense enough for the orders of the gear"
+    located: ClassVar[bool] = True
+    changes_lines: ClassVar[bool] = True
+    not_at_run_time: ClassVar[str] = (
+        "put the ratio right in the joint's description: a fit then has its lines"
+    )
+
+    def signal(self, signals: Signals, around: Surroundings, rng: np.random.Generator) -> Array:
+        orders = _moved(around.joint, around.pattern, self.gear_ratio)
+        pattern = Pattern(np.array(orders), around.pattern.cosine, around.pattern.sine)
+        return pattern.value(signals.theta) - around.pattern.value(signals.theta)
+
+    @classmethod
+    def propose(cls, regression: Regression) -> Extension | None:
+        joint, pattern = regression.belief.joint, regression.belief.pattern
+        geared = _geared(joint, pattern)
+        if geared.size < LEAST_LINES or regression.has(cls.kind) or cls._are_there(regression):
+            return None
+        gains = dict(zip(regression.lines.orders.tolist(), regression.line_gains(), strict=True))
+        top = int(max(gains) / max(pattern.orders[geared] / joint.shafts["motor"]))
+        ratios = [float(r) for r in range(2, top + 1) if r != joint.gear_ratio]
+
+        def score(ratio: float) -> float:
+            orders = np.array(_moved(joint, pattern, ratio))[geared]
+            return float(sum(gains.get(float(m), 0.0) for m in orders))
+
+        if not ratios:
+            return None
+        ratio = max(ratios, key=score)
+        orders = np.array(_moved(joint, pattern, ratio))[geared]
+        shape = {"gear_ratio": ratio, "orders": orders.tolist()}
+        columns = cls.columns(regression.signals, regression.around, shape)
+        log_grid = float(np.log(len(ratios)))
+        return regression.propose(cls.kind, shape, columns, columns.shape[1] + 1, log_grid)
+
+    @staticmethod
+    def _are_there(regression: Regression) -> bool:
+        """The believed lines are where they are believed to be."""
+        pattern = regression.belief.pattern
+        geared = _geared(regression.belief.joint, pattern)
+        # Measured less simulated, so a line that is not there leaves its negative.
+        change = regression.coefficients[1 : 1 + 2 * pattern.orders.size].reshape(-1, 2)[geared]
+        believed = np.column_stack([pattern.cosine, pattern.sine])[geared]
+        return float(((change + believed) ** 2).sum()) > ABSENT * float((believed**2).sum())
+
+    @classmethod
+    def columns(cls, signals: Signals, around: Surroundings, shape: dict[str, Any]) -> Array:
+        return np.hstack([line_columns(signals.theta, m) for m in shape["orders"]])
+
+    @classmethod
+    def report(
+        cls, regression: Regression, terms: Sequence[Fitted]
+    ) -> tuple[Parameters, list[Effect]]:
+        shape = terms[0][0].shape
+        return (
+            {"gear_ratio": quantity(shape["gear_ratio"]), "orders": quantity(shape["orders"])},
+            [WrongGearRatio(shape["gear_ratio"])],
+        )
+
+
+def _geared(joint: Joint, pattern: Pattern) -> np.ndarray[Any, np.dtype[np.int64]]:
+    """Places of the lines of geared shafts in the pattern."""
+    named = [joint.name_order(float(m)) for m in pattern.orders]
+    return np.array([k for k, n in enumerate(named) if n and n[0] != "output"], dtype=np.int64)
+
+
+def _moved(joint: Joint, pattern: Pattern, ratio: float) -> list[float]:
+    """Orders of the pattern on a joint of another ratio."""
+    cycles = shaft_cycles(ratio, joint.fixed_member)
+    named = [joint.name_order(float(m)) for m in pattern.orders]
+    return [
+        name[1] * cycles[name[0]] if name and name[0] in cycles else float(m)
+        for name, m in zip(named, pattern.orders, strict=True)
+    ]
