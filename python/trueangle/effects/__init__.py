@@ -33,6 +33,7 @@ from .local_defect import LocalDefect as LocalDefect
 from .missed_counts import MissedCounts as MissedCounts
 from .zero_slip import ZeroSlip as ZeroSlip
 from .drift_within_run import DriftWithinRun as DriftWithinRun
+from .clock_drift import ClockDrift as ClockDrift
 from .non_integer_order import NonIntegerOrder as NonIntegerOrder
 from .time_periodic import TimePeriodic as TimePeriodic
 from .outliers import Outliers as Outliers

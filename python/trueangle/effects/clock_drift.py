@@ -1,0 +1,93 @@
+"""Reference and joint on clocks that run apart: a ramp in time, in proportion to speed."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+
+from ..joint.pattern import Surroundings
+from ..joint.signals import Signals
+from ..regression.estimate import Parameters, quantity
+from ..regression.extension import Extension
+from ..regression.regression import Regression
+from .blindness import OWN_OF_VELOCITY, Blindness, share_left
+from .drift_within_run import DriftWithinRun
+from .effect import Effect
+from .latency import UNTIMED, Latency
+from .scale_error import ScaleError
+from .search import Array, Fitted
+
+__all__ = ["ClockDrift"]
+
+#: Arcsec that one degree per second makes of a second's millionth.
+ARCSEC_PER_PPM = 3600.0 * 1e-6
+
+
+@dataclass(frozen=True)
+class ClockDrift(Effect):
+    r"""Clocks that differ by a share: :math:`\varepsilon = v\,t\,r`.
+
+    Parameters
+    ----------
+    ppm : float
+        r in parts per million: the joint's stamps run ahead where it is positive.
+    """
+
+    ppm: float
+
+    kind: ClassVar[str] = "clock_drift"
+    sentence: ClassVar[str] = (
+        "The reference and the joint are stamped by clocks that run apart: a delay that grows "
+        "while a run lasts, and so an error in proportion to time and speed, none at rest."
+    )
+    needs: ClassVar[tuple[str, ...]] = ("time",)
+    factor: ClassVar[str] = "velocity"
+    confused_with: ClassVar[Mapping[type[Effect], str]] = {
+        Latency: "longer runs: a delay is the same at their end",
+        ScaleError: "out and back in one run, with a stop in between",
+        DriftWithinRun: "two speeds, and a stop: at rest it stands still",
+    }
+    measure: ClassVar[str] = "out and back in one run at two speeds, with a stop in between"
+    acts_on_runs: ClassVar[bool] = True
+    not_at_run_time: ClassVar[str] = (
+        "it lies between two records, not in the joint: put both on one clock"
+    )
+
+    def signal(self, signals: Signals, around: Surroundings, rng: np.random.Generator) -> Array:
+        return self.ppm * self.columns(signals, around, {})[:, 0]
+
+    @classmethod
+    def propose(cls, regression: Regression) -> Extension | None:
+        signals = regression.signals
+        if signals.velocity is None or signals.time is None or regression.has(cls.kind):
+            return None
+        return regression.propose(cls.kind, {}, cls.columns(signals, regression.around, {}))
+
+    @classmethod
+    def columns(cls, signals: Signals, around: Surroundings, shape: dict[str, Any]) -> Array:
+        speed = signals.turns_per_s * 360.0
+        return np.asarray((ARCSEC_PER_PPM * speed * signals.clock)[:, None])
+
+    @classmethod
+    def report(
+        cls, regression: Regression, terms: Sequence[Fitted]
+    ) -> tuple[Parameters, list[Effect]]:
+        _, (ppm,), covariance = terms[0]
+        return {"ppm": quantity(ppm, float(np.sqrt(covariance[0, 0])))}, [ClockDrift(float(ppm))]
+
+    @classmethod
+    def blind_spots(cls, regression: Regression, found: Sequence[Blindness]) -> Iterator[Blindness]:
+        signals = regression.signals
+        if signals.velocity is None or signals.time is None:
+            yield cls.blind(UNTIMED)
+            return
+        column = cls.columns(signals, regression.belief, {})
+        ramps = (signals.theta[:, None], signals.velocity[:, None], signals.clock[:, None])
+        if share_left(regression, column, *ramps) < OWN_OF_VELOCITY:
+            yield cls.blind(
+                "one speed in one direction: a ramp in time times speed is a ramp in angle",
+                ScaleError,
+            )
