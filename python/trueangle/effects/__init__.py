@@ -38,6 +38,7 @@ from .non_integer_order import NonIntegerOrder as NonIntegerOrder
 from .time_periodic import TimePeriodic as TimePeriodic
 from .outliers import Outliers as Outliers
 from .heteroscedastic_noise import HeteroscedasticNoise as HeteroscedasticNoise
+from .timestamp_jitter import TimestampJitter as TimestampJitter
 # ruff: isort: on
 
 from .effect import EFFECTS, Effect
