@@ -169,25 +169,23 @@ def _account(signals: Signals, error: Array, sim: Simulation) -> _Account:
     spots = blind_spots(start)
     chosen = select(start)
     scatter: list[ScatterFinding] = []
-    uneven = _scatter(chosen, weighs=True)
+    uneven = next(iter(_scatter(chosen, weighs=True)), None)
     if uneven is not None and uneven.bic_gain > NEW_SCATTER + misfit(chosen):
         scatter.append(uneven)
         start = Regression(signals, residual, sim.surroundings, uneven.weights, start.lines)
         chosen = select(start, chosen.terms)
-    isolated = _scatter(chosen, weighs=False)
-    if isolated is not None and isolated.bic_gain > NEW_CAUSE:
-        scatter.append(isolated)
+    scatter += [i for i in _scatter(chosen, weighs=False) if i.bic_gain > NEW_CAUSE]
     return _Account(start, chosen, scatter, spots)
 
 
-def _scatter(regression: Regression, weighs: bool) -> ScatterFinding | None:
-    """The cause of the scatter with the most evidence, of those that weigh readings or not."""
+def _scatter(regression: Regression, weighs: bool) -> list[ScatterFinding]:
+    """Causes of the scatter, of those that weigh readings or not, strongest first."""
     found = [
         item
         for effect in EFFECTS.values()
         if effect.weighs == weighs and (item := effect.find_scatter(regression)) is not None
     ]
-    return max(found, key=lambda item: item.bic_gain, default=None)
+    return sorted(found, key=lambda item: -item.bic_gain)
 
 
 def _structure(start: Regression) -> dict[str, float]:

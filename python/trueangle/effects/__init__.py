@@ -39,6 +39,7 @@ from .time_periodic import TimePeriodic as TimePeriodic
 from .outliers import Outliers as Outliers
 from .heteroscedastic_noise import HeteroscedasticNoise as HeteroscedasticNoise
 from .timestamp_jitter import TimestampJitter as TimestampJitter
+from .quantisation import Quantisation as Quantisation
 # ruff: isort: on
 
 from .effect import EFFECTS, Effect

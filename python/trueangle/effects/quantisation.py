@@ -1,0 +1,69 @@
+"""A lattice of readings coarse enough to be the noise."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from ..joint.pattern import Surroundings
+from ..joint.signals import Signals
+from ..regression.estimate import quantity
+from ..regression.regression import Regression
+from .effect import Effect
+from .heteroscedastic_noise import HeteroscedasticNoise
+from .scatter import ScatterFinding
+from .search import Array
+
+__all__ = ["Quantisation"]
+
+#: Share of the noise's variance from which on the rounding of the readings is its cause.
+LEAST_SHARE = 0.2
+
+
+@dataclass(frozen=True)
+class Quantisation(Effect):
+    r"""The reading is rounded to whole steps: noise of :math:`q/\sqrt{12}`.
+
+    Parameters
+    ----------
+    step_arcsec : float
+        q.
+    """
+
+    step_arcsec: float
+
+    kind: ClassVar[str] = "quantisation"
+    sentence: ClassVar[str] = (
+        "The reading comes in steps: what is left is the rounding to them, flat and without "
+        "spread at rest."
+    )
+    factor: ClassVar[str] = "none"
+    confused_with: ClassVar[Mapping[type[Effect], str]] = {
+        HeteroscedasticNoise: "several readings at rest at each place: rounding does not scatter",
+    }
+    measure: ClassVar[str] = "readings with the full resolution of the sensor"
+    transfers: ClassVar[bool] = False
+    not_at_run_time: ClassVar[str] = "what was rounded away is not in the reading"
+
+    def signal(self, signals: Signals, around: Surroundings, rng: np.random.Generator) -> Array:
+        pattern = around.pattern.value(signals.theta)
+        exact = signals.theta * (180.0 * 3600.0 / np.pi) + pattern
+        return np.asarray(np.round(exact / self.step_arcsec) * self.step_arcsec - exact)
+
+    @classmethod
+    def find_scatter(cls, regression: Regression) -> ScatterFinding | None:
+        step = regression.signals.count
+        share = step**2 / 12.0 / max(regression.variance, 1e-300)
+        if regression.is_explained or share < LEAST_SHARE:
+            return None
+        # Of n readings each falls on the lattice by a chance of its tolerance.
+        gain = 2.0 * regression.n * float(np.log(10.0)) - regression.log_n
+        parameters = {
+            "step_arcsec": quantity(step, 0.0),
+            "share_of_noise": quantity(min(share, 1.0)),
+        }
+        weights = np.ones(regression.n)
+        return ScatterFinding(cls.kind, gain, parameters, [Quantisation(step)], weights)
