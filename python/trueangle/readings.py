@@ -164,10 +164,33 @@ def _joined(
 ) -> dict[str, NDArray[Any]]:
     """Whole columns."""
     parts: dict[str, list[Any]] = {name: [] for name in names}
+    rows = 0
     for batch in kind.module.read(path, names, topic, texts=texts, strict=True):
         for name in names:
+            bad = _undecoded(batch[name])
+            if bad is not None:
+                line = kind.line_of(path, rows + bad)
+                problem = "is not UTF-8 text; save it as CSV in UTF-8"
+                raise FileError(path, problem, line=line, column=name)
             parts[name].append(_plain_values(batch, name))
+        rows += len(parts[names[0]][-1])
     return {name: np.concatenate(found) if found else np.empty(0) for name, found in parts.items()}
+
+
+def _undecoded(values: Any) -> int | None:
+    """The first row of a text that no output could hold; None without."""
+    if not isinstance(values, Labels) or _is_text("".join(map(str, values.names))):
+        return None
+    code = next(i for i, text in enumerate(values.names) if not _is_text(str(text)))
+    return int(np.argmax(values.codes == code))
+
+
+def _is_text(text: str) -> bool:
+    try:
+        text.encode()
+    except UnicodeEncodeError:  # bytes that were no UTF-8 stand in it as halves of characters
+        return False
+    return True
 
 
 def _plain_values(batch: Batch, name: str) -> NDArray[Any]:

@@ -13,7 +13,7 @@ sys.path.insert(0, str(FUZZ))
 from loaders import loaders  # noqa: E402
 
 #: Damaged files of each loader.
-CASES = 60
+CASES = 40
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="memory is bounded by RLIMIT_AS")

@@ -70,7 +70,8 @@ class Report:
         """
         from .page import render
 
-        return render(self)
+        # Names of files may hold bytes that are no text.
+        return render(self).encode("utf-8", "replace").decode("utf-8")
 
     def save(self, path: str | PathLike[str]) -> None:
         """Write the page, complete or not at all; a name that ends with ``.pdf``, as PDF.

@@ -196,3 +196,20 @@ def test_a_degree_sign_of_an_old_code_page(tmp_path):
     path.write_bytes("t,ref [°],enc [°]\n".encode("cp1252") + table().encode())
     (run,) = ta.read_runs(path, signals=NAMES)
     np.testing.assert_allclose(run.reference, REFERENCE)
+
+
+@pytest.mark.parametrize("way", ["fast", "slow"])
+@pytest.mark.parametrize("column", [0, 2])
+def test_bytes_that_are_no_text_are_refused_wherever_they_stand(way, column, tmp_path, monkeypatch):
+    if way == "slow":
+        monkeypatch.setattr("trueangle.formats.csvfile.plain_block", None)
+    rows = [[b"a", b"%d" % (i % 360), b"x"] for i in range(3000)]
+    bad = [list(row) for row in rows]
+    bad[2500] = [b"a", b"1", b"x"]
+    bad[2500][column] = b"\xff\xfe"
+    head = b"run,reference_deg,indicated_deg,note\n"
+    path = tmp_path / "late.csv"
+    path.write_bytes(head + b"".join(b",".join([r[0], r[1], r[1], r[2]]) + b"\n" for r in bad))
+    name = "run" if column == 0 else "note"
+    with pytest.raises(FileError, match=rf"late\.csv, line 2502, column '{name}'.*UTF-8"):
+        ta.read_runs(path)
