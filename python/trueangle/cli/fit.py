@@ -4,18 +4,13 @@ from __future__ import annotations
 
 import argparse
 import json
-import math
-from typing import TYPE_CHECKING
 
-from ..angles import arcsec
 from ..files import MODEL
+from .fit_json import fit_as_json
 from .onepass import add_one_pass, saved, wants_one_pass
 from .order_lists import declared_shafts, orders_by_shaft, parse_orders
 from .paths import Input, Output
 from .signal_options import add_signals
-
-if TYPE_CHECKING:
-    from ..fitting.result import FitResult
 
 HELP = "fit a harmonic model to calibration runs and save it"
 EXAMPLE = "trueangle fit joint_a.csv -o joint_a.json --gear-ratio 100"
@@ -145,48 +140,8 @@ def run(args: argparse.Namespace) -> int:
     )
     result.model.save(args.output)
     if args.json:
-        print(json.dumps(_as_json(result, args.output)))
+        print(json.dumps({"model": args.output, **fit_as_json(result)}))
     else:
         print(result.summary())
         print(f"\nsaved {args.output}")
     return 0
-
-
-def _as_json(result: FitResult, path: str) -> dict[str, object]:
-    model = result.model
-    return {
-        "model": path,
-        "readings": sum(len(found) for found in result.runs),
-        "runs": len(result.runs),
-        "residual_arcsec": arcsec(result.residual_std, model.period),
-        "condition_number": result.condition_number,
-        "method": result.method,
-        "ridge": result.ridge,
-        "offset_spread_arcsec": arcsec(result.offset_spread, model.period),
-        "covariance": result.uncertainty.kind,
-        "wild": [list(place) for place in result.wild],
-        "orders": [
-            {
-                "shaft": shaft.name,
-                "order": order,
-                "amplitude_arcsec": arcsec(float(shaft.amplitudes[i]), model.period),
-                "phase_deg": math.degrees(float(shaft.phases[i])) % 360.0,
-                **_spread(result, n),
-            }
-            for n, (shaft, i, order) in enumerate(
-                (shaft, i, order) for shaft in model.shafts for i, order in enumerate(shaft.orders)
-            )
-        ],
-        "notes": list(result.notes),
-    }
-
-
-def _spread(result: FitResult, n: int) -> dict[str, object]:
-    """Standard error and 95 % interval of one amplitude; null where nothing tells them."""
-    if result.model.covariance is None:
-        return {"std_arcsec": None, "interval_arcsec": None}
-    period = result.model.period
-    return {
-        "std_arcsec": arcsec(float(result.amplitude_std[n]), period),
-        "interval_arcsec": [arcsec(v, period) for v in result.amplitude_interval()[n].tolist()],
-    }

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import argparse
 import json
-import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..errors import ArgumentError
+from .fit_json import fit_as_json
 from .order_lists import declared_shafts
 from .signal_options import reading
 from .terminal import own_interrupts
@@ -18,7 +18,6 @@ if TYPE_CHECKING:
 
 __all__ = [
     "add_one_pass",
-    "as_json",
     "fit_in_one_pass",
     "printed_orders",
     "saved",
@@ -65,6 +64,11 @@ def wants_one_pass(args: argparse.Namespace) -> bool:
     if not asked:
         existing = [path for path in paths if path.is_file()]
         asked = sum(path.stat().st_size for path in existing) > _LARGE
+    if asked and (args.nuisance != "none" or args.reference_orders):
+        raise ArgumentError(
+            "--nuisance and --reference-orders need the readings more than once: they do not go "
+            "with logs in one pass"
+        )
     if asked and (getattr(args, "run", None) or getattr(args, "loss", "auto") not in _LINEAR):
         raise ArgumentError(
             "--run and the losses huber and tukey need the readings more than once: they do "
@@ -87,6 +91,7 @@ def fit_in_one_pass(args: argparse.Namespace, orders: Any) -> LogFit:
         gear_ratio=args.gear_ratio,
         fixed_member=args.fixed_member,
         argument="reference" if args.argument == "auto" else args.argument,
+        covariance=args.covariance,
         **reading(args),
         shafts=declared_shafts(args.shaft),
         scheduler=args.scheduler,
@@ -95,51 +100,12 @@ def fit_in_one_pass(args: argparse.Namespace, orders: Any) -> LogFit:
     )
 
 
-def as_json(found: LogFit) -> dict[str, object]:
-    """The fit as plain values, named as those of a fit of runs."""
-    from ..angles import arcsec
-
-    model = found.model
-    return {
-        "readings": found.rows,
-        "missing": found.missing,
-        "runs": len(found.moments.runs),
-        "residual_arcsec": arcsec(math.sqrt(found.fit.residual_variance), model.period),
-        "condition_number": found.fit.condition_number,
-        "method": found.fit.method,
-        "orders": [
-            {
-                "shaft": shaft.name,
-                "order": order,
-                "amplitude_arcsec": arcsec(float(shaft.amplitudes[i]), model.period),
-                "phase_deg": math.degrees(float(shaft.phases[i])) % 360.0,
-            }
-            for shaft in model.shafts
-            for i, order in enumerate(shaft.orders)
-        ],
-        "evidence": [
-            {
-                "shaft": row.shaft,
-                "order": row.order,
-                "retained": row.retained,
-                "amplitude_arcsec": arcsec(row.amplitude, model.period),
-                "std_arcsec": arcsec(row.std, model.period),
-                "phase_deg": row.phase_deg,
-                "holdout_gain": None if math.isnan(row.held_out_gain) else row.held_out_gain,
-                "reason": row.reason,
-            }
-            for row in found.table
-        ],
-        "notes": list(found.notes),
-    }
-
-
 def saved(args: argparse.Namespace, orders: Any) -> int:
     """Fit, save, print."""
     found = fit_in_one_pass(args, orders)
     found.model.save(args.output)
     if args.json:
-        print(json.dumps({"model": args.output, **as_json(found)}))
+        print(json.dumps({"model": args.output, **fit_as_json(found)}))
     else:
         print(found.summary())
         print(f"\nsaved {args.output}")
@@ -153,7 +119,7 @@ def printed_orders(args: argparse.Namespace) -> int:
             "--orders, --method and --reference-orders do not go with logs in one pass"
         )
     found = fit_in_one_pass(args, None)
-    result = as_json(found)
+    result = fit_as_json(found)
     if args.json:
         renamed = {"samples": result["readings"], "noise_arcsec": result["residual_arcsec"]}
         print(json.dumps(renamed | {"runs": result["runs"], "orders": result["evidence"]}))

@@ -179,7 +179,8 @@ def fit(
         remarks += taken.sentences(problem.period)
     unlike = unlike_runs(problem, fitted)
     if unlike:
-        remarks.append(unlike_sentence(problem, unlike))
+        labels = [found[i].label or str(i + 1) for i in unlike]
+        remarks.append(unlike_sentence(labels, len(found)))
         warnings.warn(remarks[-1], UnlikeRunsWarning, stacklevel=2)
     return FitResult(
         problem,

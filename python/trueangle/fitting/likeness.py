@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +12,7 @@ from .. import _core
 from ..angles import circular_mean
 from .problem import Fitted, Problem
 
-__all__ = ["unlike_runs", "unlike_sentence"]
+__all__ = ["RunSums", "far_runs", "unlike_runs", "unlike_sentence"]
 
 Array = NDArray[np.float64]
 
@@ -36,8 +36,31 @@ _SPEAKS: Final = 0.1
 _NAMED: Final = 8
 
 
+class RunSums(NamedTuple):
+    """Normal equations of a run about its own zero, and its readings."""
+
+    gram: Array
+    moment: Array
+    squares: float
+    readings: float
+
+
 def unlike_runs(problem: Problem, fitted: Fitted) -> list[int]:
-    r"""Runs whose own coefficients are far from those of all, in order.
+    """Runs whose own coefficients are far from those of all, in order; see `far_runs`.
+
+    Of every run 512 readings at most are looked at; the correlation of neighbours in time
+    widens what counts as noise.
+    """
+    count = len(problem.runs)
+    if count < 2 or not problem.shafts:
+        return []
+    chosen = [i for i in range(0, count, max(1, count // _RUNS)) if not np.isnan(fitted.offsets[i])]
+    far = far_runs([_sums(problem, i) for i in chosen])
+    return [chosen[i] for i, times in far if times > _SCATTER * _correlated(problem, chosen[i])]
+
+
+def far_runs(runs: Sequence[RunSums]) -> list[tuple[int, float]]:
+    r"""Places of runs that are unlike the others, and by how many times their noise.
 
     With :math:`S_r(b)` the sum of squares of run r about its own zero, the runs for which
 
@@ -45,47 +68,56 @@ def unlike_runs(problem: Problem, fitted: Fitted) -> list[int]:
 
     and 25 times what noise alone would make of it, where ``b`` are the common coefficients,
     ``b_r`` those of the run alone; with three runs and more that each hold all orders ``b`` is
-    their median. Of every run 512 readings at most are looked at; the
-    correlation of neighbours in time widens what counts as noise.
+    their median.
     """
-    count = len(problem.runs)
-    if count < 2 or not problem.shafts:
+    if len(runs) < 2:
         return []
-    chosen = [i for i in range(0, count, max(1, count // _RUNS)) if not np.isnan(fitted.offsets[i])]
-    parts = [_rows(problem, i) for i in chosen]
-    alone = [np.linalg.lstsq(rows[:, :-1], rows[:, -1], rcond=_SEEN) for rows, _ in parts]
+    alone = [_solved(run.gram, run.moment) for run in runs]
     # Most runs decide where each can speak: one that is unlike moves the mean of all.
-    if len(alone) > 2 and all(s.min() > _SPEAKS * s.max() for *_, s in alone):
-        common = np.median([solution for solution, *_ in alone], axis=0)
+    if len(runs) > 2 and all(clear for _, _, clear in alone):
+        common = np.median([solution for solution, _, _ in alone], axis=0)
     else:
-        every = np.vstack([rows for rows, _ in parts])
-        common = np.linalg.lstsq(every[:, :-1], every[:, -1], rcond=_SEEN)[0]
+        grams = np.sum([run.gram for run in runs], axis=0)
+        common, _, _ = _solved(grams, np.sum([run.moment for run in runs], axis=0))
     # The common pattern of two holds half of each.
-    without = 4.0 if len(chosen) == 2 else 1.0
-    missed, own, noise, free, rank = np.zeros((5, count))
-    for i, (rows, used), (solution, _, seen, _) in zip(chosen, parts, alone, strict=True):
-        left = rows[:, -1] - rows[:, :-1] @ common
-        rest = rows[:, -1] - rows[:, :-1] @ solution
-        noise[i], rank[i], free[i] = rest @ rest, seen, max(0.0, used - 1.0 - seen)
-        missed[i] = max(0.0, without * (left @ left - noise[i]))
-        own[i] = rows[:, -1] @ rows[:, -1] - noise[i]
+    without = 4.0 if len(runs) == 2 else 1.0
+    missed, own, noise, free, rank = np.zeros((5, len(runs)))
+    for i, (run, (solution, seen, _)) in enumerate(zip(runs, alone, strict=True)):
+        apart = solution - common
+        own[i] = run.moment @ solution
+        noise[i], rank[i] = max(0.0, run.squares - own[i]), seen
+        free[i] = max(0.0, run.readings - 1.0 - seen)
+        missed[i] = without * max(0.0, float(apart @ run.gram @ apart))
     if free.sum() < 1.0:
         return []
     noisy = noise.sum() / free.sum() * np.maximum(rank, 1.0)
     far = np.flatnonzero((missed > _SHARE * own) & (missed > _SCATTER * noisy))
-    return [i for i in far.tolist() if missed[i] > _SCATTER * noisy[i] * _correlated(problem, i)]
+    return [(i, float(missed[i] / max(noisy[i], 1e-300))) for i in far.tolist()]
 
 
-def unlike_sentence(problem: Problem, runs: Sequence[int]) -> str:
-    """What to tell of runs that are unlike the others."""
-    labels = [problem.runs[i].label or str(i + 1) for i in runs]
+def _solved(gram: Array, moment: Array) -> tuple[Array, int, bool]:
+    """Least squares from normal equations: directions seen, and whether all clearly."""
+    values, vectors = np.linalg.eigh(gram)
+    seen = values > _SEEN**2 * values[-1]
+    solution = vectors[:, seen] @ ((vectors[:, seen].T @ moment) / values[seen])
+    return solution, int(np.count_nonzero(seen)), bool(values[0] > _SPEAKS**2 * values[-1])
+
+
+def unlike_sentence(labels: Sequence[str], count: int) -> str:
+    """What to tell of runs, out of so many, that are unlike the others."""
     more = f" and {len(labels) - _NAMED} more" if len(labels) > _NAMED else ""
     which = f"run{'s' if len(labels) > 1 else ''} {', '.join(labels[:_NAMED])}{more}"
     return (
-        f"the runs do not show one pattern: the coefficients of {which} (of {len(problem.runs)}) "
+        f"the runs do not show one pattern: the coefficients of {which} (of {count}) "
         "differ from the common ones far beyond their errors; fit apart what is not one joint, "
         "or look for what changed between the runs"
     )
+
+
+def _sums(problem: Problem, index: int) -> RunSums:
+    rows, used = _rows(problem, index)
+    design, error = rows[:, :-1], rows[:, -1]
+    return RunSums(design.T @ design, design.T @ error, float(error @ error), used)
 
 
 def _rows(problem: Problem, index: int) -> tuple[Array, float]:

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Final, NamedTuple
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from ..errors import ArgumentError
 from ..runs import CalibrationRun
 from ..shafts import ShaftOrders, shaft_cycles
+from .nuisancechoice import FOLDS, Rows, choose, inflation, solved, stiffest
 
 __all__ = ["KINDS", "Nuisance", "asked_nuisance", "likely_orders", "take_out"]
 
@@ -34,26 +35,16 @@ _INTERVALS: Final = (1, 2, 4, 6)
 #: Stretches of each run that are held out, every third together: twice as long as the memory
 #: of the stiffest spline that they may judge. An odd number: way and return differ in fold.
 _STRETCHES: Final = 13
-_FOLDS: Final = 3
 
 #: Readings that the choice is made from.
 _LOOKED_AT: Final = 24_000
 
-#: A nuisance must lower the held-out sum of squares by this share, in most of the folds, ...
-_GAIN: Final = 0.01
-#: ... and this share of it must be left beside the pattern: else the design cannot tell them.
-_TOLD: Final = 0.02
-#: Of nuisances that leave nearly the same the simplest is taken.
-_ALIKE: Final = 0.02
 
 #: Runs of which each may drift by itself.
 _MOST_DRIFTING: Final = 24
 
 #: Orders of each shaft that nuisances are looked for beside.
 _LIKELY: Final = tuple(range(1, 9))
-
-#: Part of the greatest eigenvalue below which a combination of columns is not seen.
-_SEEN: Final = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
@@ -163,15 +154,6 @@ def likely_orders(
     ]
 
 
-class _Columns(NamedTuple):
-    """Columns by name, each about its run's mean, the errors, and the fold of each reading."""
-
-    pattern: Array
-    groups: dict[str, Array]
-    error: Array
-    fold: NDArray[np.intp]
-
-
 def take_out(
     runs: Sequence[CalibrationRun],
     kinds: tuple[str, ...] | None,
@@ -193,7 +175,7 @@ def take_out(
     shares: list[tuple[str, float]] = []
     unseparated: list[str] = []
     if kinds is None:
-        chosen, shares, unseparated = _choose(rows, forced)
+        chosen, shares, unseparated = choose(rows, forced)
     else:
         missing = [k for k in kinds if not any(name.startswith(k) for name in rows.groups)]
         if missing:
@@ -201,10 +183,10 @@ def take_out(
         named = [name for name in rows.groups if name in kinds]
         chosen = [*forced, *named]
         if "drift" in kinds:
-            chosen.append(_stiffest(rows, chosen))
+            chosen.append(stiffest(rows, chosen))
     if not chosen:
         return list(runs), Nuisance(unseparated=tuple(unseparated))
-    found = _solved(rows, chosen)
+    found = solved(rows, chosen)
     nuisance = Nuisance(
         kinds=tuple(name.rstrip("0123456789") for name in chosen),
         slope=float(found["ramp"][0]) if "ramp" in found else 0.0,
@@ -219,7 +201,7 @@ def take_out(
         else (),
         shares=tuple(shares),
         unseparated=tuple(unseparated),
-        inflation=tuple(_inflation(rows, chosen)),
+        inflation=tuple(inflation(rows, chosen)),
     )
     drifts = next((found[n] for n in chosen if n.startswith("drift")), None)
     return [_without(run, i, nuisance, drifts) for i, run in enumerate(runs)], nuisance
@@ -254,7 +236,7 @@ def _columns(
     stride: int,
     kinds: tuple[str, ...] | None,
     reference_orders: Sequence[float],
-) -> _Columns:
+) -> Rows:
     wanted = KINDS if kinds is None else kinds
     timed = all(run.time is not None and np.ptp(run.time) > 0.0 for run in runs)
     speeds = [run.speed for run in runs] if "velocity" in wanted else []
@@ -285,9 +267,9 @@ def _columns(
             parts.setdefault(name, []).append(_about(columns, used))
         patterns.append(_about(np.hstack([np.cos(angular), np.sin(angular)]), used))
         errors.append(_about(run.centred_error[take, None], used)[:, 0])
-        folds.append((np.arange(len(x)) * _STRETCHES // len(x) + i) % _FOLDS)
+        folds.append((np.arange(len(x)) * _STRETCHES // len(x) + i) % FOLDS)
     groups = {name: np.vstack(v) for name, v in parts.items()}
-    return _Columns(
+    return Rows(
         np.vstack(patterns),
         {name: v for name, v in groups.items() if np.abs(v).max() > 0.0},
         np.concatenate(errors),
@@ -307,108 +289,3 @@ def _spline(time: Array, whole: Array, intervals: int) -> Array:
     knots = np.arange(1, intervals) / intervals
     powers = [2.0 * t - 1.0, (2.0 * t - 1.0) ** 2, (2.0 * t - 1.0) ** 3]
     return np.column_stack([*powers, *(np.maximum(0.0, t - k) ** 3 for k in knots)])
-
-
-def _design(rows: _Columns, chosen: Sequence[str]) -> Array:
-    return np.hstack([rows.pattern, *(rows.groups[name] for name in chosen)])
-
-
-def _solution(gram: Array, moment: Array) -> Array:
-    if not gram.size:
-        return np.zeros(0)
-    scale = np.sqrt(np.maximum(np.diag(gram), 1e-300))
-    values, vectors = np.linalg.eigh(gram / np.outer(scale, scale))
-    seen = values > _SEEN * values[-1]
-    turned = vectors[:, seen].T @ (moment / scale)
-    return np.asarray(vectors[:, seen] @ (turned / values[seen]) / scale)
-
-
-def _held_out(rows: _Columns, chosen: Sequence[str]) -> Array:
-    """Sum of squares of each fold under the fit of the others."""
-    design = _design(rows, chosen)
-    masks = [rows.fold == f for f in range(_FOLDS)]
-    grams = [design[m].T @ design[m] for m in masks]
-    moments = [design[m].T @ rows.error[m] for m in masks]
-    found = []
-    for f, mask in enumerate(masks):
-        others = [i for i in range(_FOLDS) if i != f]
-        solution = _solution(sum(grams[i] for i in others), sum(moments[i] for i in others))
-        left = rows.error[mask] - design[mask] @ solution
-        found.append(float(left @ left))
-    return np.array(found)
-
-
-def _told(rows: _Columns, chosen: Sequence[str], name: str) -> float:
-    """Part of a group's energy that the pattern and the chosen ones leave."""
-    design, columns = _design(rows, chosen), rows.groups[name]
-    gram, cross = design.T @ design, design.T @ columns
-    left = columns - design @ np.column_stack(
-        [_solution(gram, cross[:, j]) for j in range(cross.shape[1])]
-    )
-    return float((left**2).sum() / (columns**2).sum())
-
-
-def _choose(
-    rows: _Columns, forced: list[str]
-) -> tuple[list[str], list[tuple[str, float]], list[str]]:
-    """Groups taken one by one while the best lowers the held-out error."""
-    chosen = list(forced)
-    shares: list[tuple[str, float]] = []
-    unseparated: list[str] = []
-    before = _held_out(rows, chosen)
-    total = float(before.sum())
-    barred: set[str] = set()
-    while True:
-        trials = {
-            name: _held_out(rows, [*chosen, name])
-            for name in rows.groups
-            if name not in chosen and name.rstrip("0123456789") not in barred
-        }
-        good = {
-            name: after
-            for name, after in trials.items()
-            if after.sum() < (1.0 - _GAIN) * before.sum()
-            and np.count_nonzero(after < before) > _FOLDS // 2
-        }
-        if not good:
-            return chosen, shares, unseparated
-        least = min(float(after.sum()) for after in good.values())
-        # A kinked drift imitates a ramp there and back: of those alike the simplest.
-        alike = [name for name, after in good.items() if after.sum() <= (1.0 + _ALIKE) * least]
-        best = min(alike, key=lambda name: rows.groups[name].shape[1])
-        kind = best.rstrip("0123456789")
-        barred.add(kind)
-        if _told(rows, chosen, best) < _TOLD:
-            unseparated.append(kind)
-            continue
-        shares.append((kind, float(before.sum() - good[best].sum()) / total))
-        chosen.append(best)
-        before = good[best]
-
-
-def _stiffest(rows: _Columns, chosen: Sequence[str]) -> str:
-    """The spline that lowers the held-out error most."""
-    names = [name for name in rows.groups if name.startswith("drift")]
-    return min(names, key=lambda name: float(_held_out(rows, [*chosen, name]).sum()))
-
-
-def _inflation(rows: _Columns, chosen: Sequence[str]) -> list[float]:
-    """Standard errors of ``A, B`` of each order beside the chosen groups, over those without."""
-    pattern, design = rows.pattern, _design(rows, chosen)
-    size = pattern.shape[1]
-    if not size:
-        return []
-    alone, beside = (
-        np.diag(np.linalg.pinv(x.T @ x, rcond=_SEEN, hermitian=True))[:size]
-        for x in (pattern, design)
-    )
-    ratio = np.sqrt(np.maximum(beside / np.maximum(alone, 1e-300), 1.0))
-    return [float(v) for v in ratio.reshape(2, -1).T.ravel()]
-
-
-def _solved(rows: _Columns, chosen: Sequence[str]) -> dict[str, Array]:
-    """Coefficients of the chosen groups beside the pattern."""
-    design = _design(rows, chosen)
-    solution = _solution(design.T @ design, design.T @ rows.error)
-    ends = np.cumsum([rows.pattern.shape[1], *(rows.groups[n].shape[1] for n in chosen)])
-    return dict(zip(chosen, np.split(solution, ends[:-1])[1:], strict=True))

@@ -16,7 +16,14 @@ from ..errors import ArgumentError
 from .clusters import Cluster, robust_covariance, scatter_statistic
 from .problem import Fitted, Problem
 
-__all__ = ["COVARIANCES", "CovarianceKind", "Uncertainty", "check_covariance", "uncertainty"]
+__all__ = [
+    "COVARIANCES",
+    "CovarianceKind",
+    "Uncertainty",
+    "check_covariance",
+    "uncertainty",
+    "uncertainty_of_sums",
+]
 
 Array = NDArray[np.float64]
 CovarianceKind: TypeAlias = Literal["auto", "white", "cluster", "hac"]
@@ -102,15 +109,12 @@ def uncertainty(
         if not found:
             return Uncertainty("white", white, freedom, _untold(problem, used))
         kind = "cluster" if len(used) >= _FEWEST_RUNS else "hac"
-        said = f"the residuals are no white noise ({found}): "
+        said = _said(found)
     else:
         said = ""
     if kind == "cluster":
         clusters = _runs_together([_clusters(problem, fitted, weights, i, 1)[0] for i in used])
-        note = f"{said}standard errors by the scatter between {len(clusters)} "
-        note += "runs" if len(clusters) == len(used) else f"groups of the {len(used)} runs"
-        if len(clusters) < _ENOUGH_RUNS:
-            note += f"; so few tell them roughly: {_ENOUGH_RUNS} runs and more tell them well"
+        note = said + _between(len(clusters), len(used))
     else:
         memory, stretches = _memory(problem, fitted, weights, used)
         clusters = [
@@ -130,9 +134,7 @@ def uncertainty(
         total = sum(_weight(w, len(problem.runs[i])) for i, w in enumerate(weights) if i in used)
         robust = robust_covariance(clusters, penalty * total)
     except np.linalg.LinAlgError:
-        return Uncertainty(
-            "white", white, freedom, "the covariance is that of white noise: orders nearly cancel"
-        )
+        return Uncertainty("white", white, freedom, _CANCEL)
     covariance = robust.covariance
     if penalty > 0.0:
         covariance = covariance + _bias(problem, fitted, weights, penalty)[1:, 1:]
@@ -174,6 +176,65 @@ def _untold(problem: Problem, used: Sequence[int]) -> str:
         "neighbours correlate: the standard errors hold if they do not, else the covariance is not "
         f"known; measure {_ENOUGH_RUNS} runs and more"
     )
+
+
+def uncertainty_of_sums(
+    white: Array, freedom: float, clusters: Sequence[Cluster], variance: float, kind: CovarianceKind
+) -> Uncertainty:
+    """Covariance from the sums of each run: of logs that were read once.
+
+    The order of the readings is gone: correlation shows in the scatter between runs alone.
+
+    Raises
+    ------
+    ArgumentError
+        ``"hac"``, which needs the readings in their order.
+    """
+    if kind == "hac":
+        raise ArgumentError(
+            "covariance='hac' needs the readings in their order, which one pass does not keep: "
+            "take 'cluster', or fit the runs in memory"
+        )
+    plain = Uncertainty("white", white, np.full(len(white), freedom))
+    if kind == "white" or len(white) == 1 or not np.isfinite(white).all():
+        return plain
+    said = ""
+    if kind == "auto":
+        if len(clusters) < _FEWEST_RUNS:
+            return plain._replace(
+                note="one pass over so few runs does not tell whether neighbours correlate: the "
+                "standard errors hold if they do not, else the covariance is not known; measure "
+                f"{_ENOUGH_RUNS} runs and more"
+            )
+        statistic, dof = scatter_statistic(_runs_together(list(clusters)), variance)
+        if not variance > 0.0 or chi_squared_tail(statistic, dof) >= _SCATTER:
+            return plain
+        said = _said(
+            f"coefficients scatter {math.sqrt(statistic / dof):.2g} times as much between runs"
+        )
+    together = _runs_together(list(clusters))
+    try:
+        robust = robust_covariance(together)
+    except np.linalg.LinAlgError:
+        return plain._replace(note=_CANCEL)
+    note = said + _between(len(together), len(clusters))
+    return Uncertainty("cluster", *_with_constant(white, *robust), note)
+
+
+def _said(found: str) -> str:
+    return f"the residuals are no white noise ({found}): "
+
+
+def _between(clusters: int, runs: int) -> str:
+    """Standard errors by whole runs, in words."""
+    note = f"standard errors by the scatter between {clusters} "
+    note += "runs" if clusters == runs else f"groups of the {runs} runs"
+    if clusters < _ENOUGH_RUNS:
+        note += f"; so few tell them roughly: {_ENOUGH_RUNS} runs and more tell them well"
+    return note
+
+
+_CANCEL: Final = "the covariance is that of white noise: orders nearly cancel"
 
 
 def _with_constant(white: Array, covariance: Array, freedom: Array) -> tuple[Array, Array]:

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
+import warnings
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -12,18 +12,27 @@ from typing import Any
 import numpy as np
 
 from .._core import __version__
-from ..angles import arcsec, wrap
+from ..angles import wrap
 from ..columns import wanted_columns
-from ..errors import ArgumentError, NoModelError
+from ..errors import ArgumentError, NoModelError, UnlikeRunsWarning
+from ..fitting.clusters import Cluster
+from ..fitting.likeness import RunSums, far_runs, unlike_sentence
 from ..fitting.travel import Span, covered_span
-from ..model import Argument, HarmonicModel
+from ..fitting.uncertainty import (
+    CovarianceKind,
+    Uncertainty,
+    check_covariance,
+    uncertainty_of_sums,
+)
+from ..model import Argument
 from ..moments import Moments, MomentsFit
-from ..orders.evidence import choose_forward, examine_orders, fit_subset, held_out_gains
-from ..orders.selection import FALSE_ALARM, NEGLIGIBLE_NOISE, NEGLIGIBLE_SHARE
+from ..orders.search import FALSE_ALARM, EvidenceSearch
+from ..orders.verdicts import because
 from ..records import FitRecord, Provenance
 from ..runs import Source
 from ..shafts import resolve_orders, shaft_cycles
 from .accumulation import Accumulated, LogFitSettings, accumulate_each, merged
+from .logfit import LogFit, LogOrder
 from .momentsums import sums_of
 from .progress import Progress
 from .sources import find_logs
@@ -35,87 +44,6 @@ _OUTPUT_ORDERS = tuple(range(1, 18))
 _SHAFT_ORDERS = (1, 2, 4)
 
 
-@dataclass(frozen=True)
-class LogOrder:
-    """Evidence for one order: a row of `LogFit.table`.
-
-    Attributes
-    ----------
-    shaft : str
-    order : int
-        Of the shaft.
-    retained : bool
-    amplitude, std : float
-        And its standard error, in the unit of the model.
-    phase_deg : float
-    held_out_gain : float
-        Part of the held-out mean square error that the order takes away; NaN with one run.
-    reason : str
-        Why it was left out; empty for a retained one.
-    """
-
-    shaft: str
-    order: int
-    retained: bool
-    amplitude: float
-    std: float
-    phase_deg: float
-    held_out_gain: float
-    reason: str
-
-
-@dataclass(frozen=True)
-class LogFit:
-    """A model fitted to logs in one pass.
-
-    Attributes
-    ----------
-    model : HarmonicModel
-    fit : MomentsFit
-        Coefficients with their covariance, zeros of the runs.
-    moments : Moments
-        From which any other set of the accumulated orders can be solved at once.
-    table : tuple of LogOrder
-        Evidence for every order; empty where the orders were given.
-    rows, missing : int
-    notes : tuple of str
-    """
-
-    model: HarmonicModel
-    fit: MomentsFit
-    moments: Moments
-    table: tuple[LogOrder, ...]
-    rows: int
-    missing: int
-    notes: tuple[str, ...]
-
-    def summary(self) -> str:
-        """The result as text."""
-        period = self.model.period
-        residual = arcsec(math.sqrt(self.fit.residual_variance), period)
-        lines = [
-            "Harmonic model of the angle error (error = indicated - reference), one pass",
-            "",
-            f"  readings   {self.rows} in {len(self.moments.runs)} runs, {self.missing} missing",
-            f"  residual   {residual:.2f} arcsec standard deviation",
-            f"  solved by  {self.fit.method}, condition number {self.fit.condition_number:.3g}",
-            "",
-            "  shaft           order   amplitude     +-     phase",
-            "                             arcsec  arcsec       deg",
-        ]
-        std = self.fit.std[1:].reshape(-1, 2)
-        rows = [(shaft, i) for shaft in self.model.shafts for i in range(len(shaft.orders))]
-        for n, (shaft, i) in enumerate(rows):
-            spread = arcsec(float(np.hypot(*std[n]) / math.sqrt(2.0)), period)
-            lines.append(
-                f"  {shaft.name:<15} {shaft.orders[i]:5d}  "
-                f"{arcsec(float(shaft.amplitudes[i]), period):10.3f} {spread:7.3f}  "
-                f"{math.degrees(float(shaft.phases[i])) % 360.0:8.2f}"
-            )
-        lines += ["", *(f"  [{i}] {note}" for i, note in enumerate(self.notes, 1))]
-        return "\n".join(lines).rstrip()
-
-
 def fit_logs(
     logs: str | PathLike[str] | Iterable[str | PathLike[str]],
     orders: Iterable[int] | Mapping[str, Iterable[int]] | str | None = None,
@@ -124,6 +52,7 @@ def fit_logs(
     fixed_member: str = "circular_spline",
     shafts: Mapping[str, float] | None = None,
     argument: Argument = "reference",
+    covariance: CovarianceKind = "auto",
     counts_per_turn: float | None = None,
     counts_per_turn_reference: float | None = None,
     signals: Mapping[str, Any] | None = None,
@@ -152,6 +81,9 @@ def fit_logs(
         runs and are not negligible.
     gear_ratio, fixed_member, shafts, argument
         As in `fit`.
+    covariance : {"auto", "white", "cluster"}
+        As in `fit`; by the scatter between the runs only, for one pass does not keep the order
+        of the readings.
     counts_per_turn, counts_per_turn_reference : float, optional
     signals : mapping of role to column, optional
         Columns with other names, as in `read_runs`.
@@ -194,6 +126,7 @@ def fit_logs(
     >>> round(float(fit_logs(folder, orders=[1, 2]).model.amplitudes[0]), 9)
     0.5
     """
+    check_covariance(covariance, 2)
     given = [logs] if isinstance(logs, (str, PathLike)) else list(logs)
     paths = [path for path, _name in find_logs(given)]
     cycles = shaft_cycles(gear_ratio, fixed_member) | dict(shafts or {})
@@ -217,7 +150,7 @@ def fit_logs(
         checksums=checksums,
     )
     found = _accumulated(paths, settings, scheduler, progress)
-    table = _judged(found.moments, asked, cycles) if automatic else ()
+    table = _judged(found.moments, asked, cycles, covariance) if automatic else ()
     retained = asked
     if automatic:
         retained = {
@@ -228,7 +161,7 @@ def fit_logs(
         if not retained:
             raise NoModelError("no order is supported by the logs: none is significant")
     fit = found.moments.solve(retained)
-    return _result(found, fit, argument, table)
+    return _result(found, fit, argument, table, covariance)
 
 
 def _accumulated(
@@ -250,59 +183,58 @@ def _accumulated(
 
 
 def _judged(
-    moments: Moments, asked: Mapping[str, Sequence[int]], cycles: Mapping[str, float]
+    moments: Moments,
+    asked: Mapping[str, Sequence[int]],
+    cycles: Mapping[str, float],
+    covariance: CovarianceKind,
 ) -> tuple[LogOrder, ...]:
-    """Every order with its evidence: significance, held-out runs, size."""
+    """Every order with its evidence, by the search that runs in memory take."""
     pairs = [(name, k) for name, orders in asked.items() for k in orders]
     sums = sums_of(moments, [k * cycles[name] for name, k in pairs])
-    limits = np.full(len(pairs), math.log(FALSE_ALARM / len(pairs)))
-    readings = int(sums.count.sum()) - sums.units
-    chosen = choose_forward(sums, limits, readings, None)
-    reasons = {i: "not significant" for i in range(len(pairs)) if i not in chosen}
     several = sums.units > 1
-    while several and chosen:
-        without, with_, _ = held_out_gains(sums, chosen, chosen)
-        worst = int(np.argmin(without - with_))
-        if without[worst] > with_[worst]:
-            break
-        reasons[chosen[worst]] = "does not lower the error of runs left out of the fit"
-        del chosen[worst]
+    search = EvidenceSearch(
+        sums,
+        np.full(len(pairs), math.log(FALSE_ALARM / len(pairs))),
+        moments.period,
+        int(sums.count.sum()) - sums.units,
+        sums if several else None,
+        covariance=covariance,
+    )
+    chosen, dropped = search.search()
     everything = list(range(len(pairs)))
-    _, _, rest = fit_subset(sums, chosen)
-    noise = rest / max(readings - 2 * len(chosen), 1)
-    test = examine_orders(sums, chosen, everything, (noise, math.inf), None)
-    sizes = np.hypot(test.cosine, test.sine)
-    whole = math.sqrt(float(sum(sizes[i] ** 2 for i in chosen))) or 1.0
-    for i in list(chosen):
-        if sizes[i] < NEGLIGIBLE_SHARE * whole and sizes[i] < NEGLIGIBLE_NOISE * math.sqrt(noise):
-            reasons[i] = "negligible: correcting it would change no reading noticeably"
-            chosen.remove(i)
-    gains = np.full(len(pairs), math.nan)
-    if several:
-        without, with_, _ = held_out_gains(sums, chosen, everything)
-        gains = (without - with_) / without
+    test = search.examined(chosen, everything)
+    gains, _ = search.gains_and_model(chosen, everything)
+    reasons = {i: because(verdict) for i, verdict in dropped.items() if verdict != "noise"}
     return tuple(
         LogOrder(
             name,
             k,
             i in chosen,
-            float(sizes[i]),
+            float(np.hypot(test.cosine[i], test.sine[i])),
             math.sqrt(float(test.variance[i])) if test.variance[i] >= 0.0 else math.nan,
             math.degrees(math.atan2(test.cosine[i], test.sine[i])) % 360.0,
             float(gains[i]),
-            reasons.get(i, ""),
+            "" if i in chosen else reasons.get(i, "not significant"),
         )
         for i, (name, k) in enumerate(pairs)
     )
 
 
 def _result(
-    found: Accumulated, fit: MomentsFit, argument: Argument, table: tuple[LogOrder, ...]
+    found: Accumulated,
+    fit: MomentsFit,
+    argument: Argument,
+    table: tuple[LogOrder, ...],
+    covariance: CovarianceKind,
 ) -> LogFit:
     span = _span(found)
     offsets = np.array(list(fit.offsets.values()))
     around = wrap(offsets - fit.constant, fit.period)
-    notes = tuple(_notes(found, span, table))
+    runs = _run_sums(found.moments, fit)
+    how = _uncertainty(fit, runs, covariance)
+    notes = (*_notes(found, span, table), *_unlike(found.moments, runs))
+    if how.note:
+        notes = (*notes, f"{how.note[:1].upper()}{how.note[1:]}.")
     record = FitRecord(
         samples=found.moments.count,
         runs=len(found.moments.runs),
@@ -316,9 +248,59 @@ def _result(
     files = zip(found.files, found.sha256, strict=True)
     sources = tuple(Source(Path(file).name, sha256) for file, sha256 in files)
     model = fit.model(argument).replace(
-        fit=record, provenance=Provenance(sources, f"trueangle {__version__}")
+        fit=record,
+        covariance=how.covariance,
+        provenance=Provenance(sources, f"trueangle {__version__}"),
     )
-    return LogFit(model, fit, found.moments, table, found.rows, found.missing, notes)
+    return LogFit(model, fit, found.moments, table, found.rows, found.missing, notes, how)
+
+
+def _run_sums(moments: Moments, fit: MomentsFit) -> list[RunSums]:
+    """Normal equations of every run; none where they are not of whole orders."""
+    orders = [k * s.cycles_per_turn for s in fit.shafts for k in s.orders]
+    try:
+        sums = sums_of(moments, orders)
+    except ArgumentError:
+        return []
+    every = range(len(orders))
+    # Cosines, then sines: as A, B of each order in turn.
+    turn = np.arange(2 * len(orders)).reshape(2, -1).T.ravel()
+    return [
+        RunSums(
+            sums.gram(unit, every)[np.ix_(turn, turn)],
+            sums.rhs(unit, every)[turn],
+            float(sums.squares[unit]),
+            float(sums.count[unit]),
+        )
+        for unit in range(sums.units)
+    ]
+
+
+def _uncertainty(
+    fit: MomentsFit, runs: Sequence[RunSums], covariance: CovarianceKind
+) -> Uncertainty:
+    coefficients = np.column_stack([fit.cosine, fit.sine]).ravel()
+    clusters = [Cluster(run.gram, run.moment - run.gram @ coefficients) for run in runs]
+    kind: CovarianceKind = covariance if clusters or covariance == "hac" else "white"
+    return uncertainty_of_sums(
+        fit.covariance, fit.degrees_of_freedom, clusters, fit.residual_variance, kind
+    )
+
+
+def _unlike(moments: Moments, runs: Sequence[RunSums]) -> Iterable[str]:
+    """A warning, and its words, where runs do not show one pattern."""
+    far = [place for place, _ in far_runs(runs)]
+    if far:
+        labels = [_label(moments.runs[place]) for place in far]
+        said = unlike_sentence(labels, len(runs))
+        warnings.warn(said, UnlikeRunsWarning, stacklevel=4)
+        yield f"{said[:1].upper()}{said[1:]}."
+
+
+def _label(run: object) -> str:
+    """A run's name: of its file, and of its label where the file has several."""
+    file, label = run if isinstance(run, tuple) else (run, None)
+    return Path(str(file)).name if label is None else f"{Path(str(file)).name}:{label}"
 
 
 def _span(found: Accumulated) -> Span:

@@ -269,3 +269,58 @@ def test_the_orders_command_prints_the_evidence_of_logs(folder, capsys):
     assert main(["orders", str(folder), "--gear-ratio", "50"]) == 0
     assert "not significant" in capsys.readouterr().out
     assert main(["orders", str(folder), "--method", "paper"]) == 1
+
+
+def logs_of(folder, patterns, memory=0.0, seed=1):
+    """A log for each pattern ``(order, amplitude, phase)``, with noise that remembers."""
+    rng = np.random.default_rng(seed)
+    for i, lines in enumerate(patterns):
+        reference = np.linspace(0.0, 720.0, 2000)
+        noise = rng.normal(size=reference.size)
+        for j in range(1, noise.size):
+            noise[j] = memory * noise[j - 1] + np.sqrt(1.0 - memory**2) * noise[j]
+        error = sum(a * np.sin(np.radians(k * reference + p)) for k, a, p in lines)
+        table = {"reference_deg": reference, "indicated_deg": reference + error + NOISE * noise}
+        pq.write_table(pa.table(table), folder / f"unit{i}.parquet")
+    return folder
+
+
+SAME, OTHER = [(1, 0.2, 10.0), (2, 0.1, 70.0)], [(1, 0.2, 130.0), (2, 0.05, 200.0)]
+
+
+def test_a_folder_of_unlike_units_raises_a_warning_that_names_them(tmp_path):
+    logs_of(tmp_path, [SAME, SAME, OTHER, SAME])
+    with pytest.warns(ta.errors.UnlikeRunsWarning, match=r"unit2\.parquet \(of 4\)"):
+        found = ta.fit_logs(tmp_path, [1, 2])
+    assert any("unit2.parquet" in note for note in found.notes)
+
+
+def test_one_pass_takes_the_scatter_between_runs_under_correlated_noise(tmp_path):
+    logs_of(tmp_path, [SAME] * 8, memory=0.95)
+    found = ta.fit_logs(tmp_path, [1, 2])
+    runs = ta.read_runs([tmp_path / f"unit{i}.parquet" for i in range(8)])
+    expected = ta.fit(runs, [1, 2], covariance="cluster")
+    assert found.uncertainty.kind == "cluster"
+    np.testing.assert_allclose(found.covariance, expected.covariance, rtol=1e-6)
+    np.testing.assert_allclose(found.interval(), expected.interval(), rtol=0, atol=1e-9)
+    assert any("scatter between 8 runs" in note for note in found.notes)
+    assert ta.fit_logs(tmp_path, [1, 2], covariance="white").uncertainty.kind == "white"
+    with pytest.raises(ta.errors.ArgumentError, match="which one pass does not keep"):
+        ta.fit_logs(tmp_path, [1, 2], covariance="hac")
+
+
+def test_one_pass_and_memory_print_the_same_json(tmp_path, capsys):
+    logs_of(tmp_path, [SAME] * 4)
+    files = [str(tmp_path / f"unit{i}.parquet") for i in range(4)]
+    printed = []
+    for more in ([], ["--one-pass"]):
+        model = tmp_path / "m.json"
+        assert main(["fit", *files, "-o", str(model), "--loss", "linear", "--json", *more]) == 0
+        printed.append(json.loads(capsys.readouterr().out))
+    memory, once = printed
+    assert memory.keys() == once.keys()
+    for mine, theirs in zip(once["orders"], memory["orders"], strict=True):
+        assert mine.keys() == theirs.keys()
+        assert mine["amplitude_arcsec"] == pytest.approx(theirs["amplitude_arcsec"], abs=1e-6)
+        assert mine["std_arcsec"] == pytest.approx(theirs["std_arcsec"], rel=1e-3)
+    assert once["evidence"][0].keys() == memory["evidence"][0].keys()

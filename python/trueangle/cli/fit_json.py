@@ -1,0 +1,85 @@
+"""A fit as plain values, of runs in memory and of logs in one pass alike."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+from ..angles import arcsec
+
+if TYPE_CHECKING:
+    from ..fitting.result import FitResult
+    from ..logs.fitting import LogFit
+
+__all__ = ["evidence_as_json", "fit_as_json"]
+
+
+def fit_as_json(found: FitResult | LogFit) -> dict[str, object]:
+    """The fit with the same names whatever way it took; angles in arcsec."""
+    period = found.model.period
+    record = found.model.fit
+    return {
+        "readings": found.readings,
+        "missing": getattr(found, "missing", 0),
+        "runs": 0 if record is None else record.runs,
+        "residual_arcsec": _finite(arcsec(found.residual_std, period)),
+        "condition_number": _finite(found.condition_number),
+        "method": found.method,
+        "argument": found.model.argument,
+        "ridge": getattr(found, "ridge", 0.0),
+        "offset_spread_arcsec": arcsec(found.offset_spread, period),
+        "covariance": found.uncertainty.kind,
+        "wild": [list(place) for place in getattr(found, "wild", ())],
+        "orders": [
+            {
+                "shaft": shaft,
+                "order": order,
+                "amplitude_arcsec": arcsec(float(found.amplitudes[n]), period),
+                "phase_deg": math.degrees(float(found.phases[n])) % 360.0,
+                **_spread(found, n),
+            }
+            for n, (shaft, order) in enumerate(
+                (shaft.name, order) for shaft in found.model.shafts for order in shaft.orders
+            )
+        ],
+        "evidence": evidence_as_json(found),
+        "notes": list(found.notes),
+    }
+
+
+def evidence_as_json(found: FitResult | LogFit) -> list[dict[str, object]]:
+    """The evidence for every order that was looked at; empty where the orders were given."""
+    scale = arcsec(1.0, found.model.period)
+    selection = getattr(found, "selection", None)
+    if selection is not None:
+        rows = [("output", r.order, r, r.standard_error, r.holdout_gain) for r in selection.table]
+    else:
+        rows = [(r.shaft, r.order, r, r.std, r.held_out_gain) for r in getattr(found, "table", ())]
+    return [
+        {
+            "shaft": shaft,
+            "order": order,
+            "retained": row.retained,
+            "amplitude_arcsec": _finite(scale * row.amplitude),
+            "std_arcsec": _finite(scale * std),
+            "phase_deg": _finite(row.phase_deg % 360.0),
+            "holdout_gain": _finite(gain),
+            "reason": row.reason,
+        }
+        for shaft, order, row, std, gain in rows
+    ]
+
+
+def _spread(found: FitResult | LogFit, n: int) -> dict[str, object]:
+    """Standard error and 95 % interval of one amplitude; null where nothing tells them."""
+    if found.model.covariance is None:
+        return {"std_arcsec": None, "interval_arcsec": None}
+    period = found.model.period
+    return {
+        "std_arcsec": _finite(arcsec(float(found.amplitude_std[n]), period)),
+        "interval_arcsec": [arcsec(v, period) for v in found.amplitude_interval()[n].tolist()],
+    }
+
+
+def _finite(value: float) -> float | None:
+    return value if math.isfinite(value) else None

@@ -1,0 +1,138 @@
+"""Choosing nuisances by the error of stretches held out, and fitting them beside a pattern."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Final, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["FOLDS", "Rows", "choose", "inflation", "solved", "stiffest"]
+
+Array = NDArray[np.float64]
+
+#: Parts that are held out one by one.
+FOLDS: Final = 3
+
+#: A nuisance must lower the held-out sum of squares by this share, in most of the folds, ...
+_GAIN: Final = 0.01
+#: ... and this share of it must be left beside the pattern: else the design cannot tell them.
+_TOLD: Final = 0.02
+#: Of nuisances that leave nearly the same the simplest is taken.
+_ALIKE: Final = 0.02
+
+#: Part of the greatest eigenvalue below which a combination of columns is not seen.
+_SEEN: Final = 1e-9
+
+
+class Rows(NamedTuple):
+    """Columns by name, each about its run's mean, the errors, and the fold of each reading."""
+
+    pattern: Array
+    groups: dict[str, Array]
+    error: Array
+    fold: NDArray[np.intp]
+
+
+def _design(rows: Rows, chosen: Sequence[str]) -> Array:
+    return np.hstack([rows.pattern, *(rows.groups[name] for name in chosen)])
+
+
+def _solution(gram: Array, moment: Array) -> Array:
+    if not gram.size:
+        return np.zeros(0)
+    scale = np.sqrt(np.maximum(np.diag(gram), 1e-300))
+    values, vectors = np.linalg.eigh(gram / np.outer(scale, scale))
+    seen = values > _SEEN * values[-1]
+    turned = vectors[:, seen].T @ (moment / scale)
+    return np.asarray(vectors[:, seen] @ (turned / values[seen]) / scale)
+
+
+def _held_out(rows: Rows, chosen: Sequence[str]) -> Array:
+    """Sum of squares of each fold under the fit of the others."""
+    design = _design(rows, chosen)
+    masks = [rows.fold == f for f in range(FOLDS)]
+    grams = [design[m].T @ design[m] for m in masks]
+    moments = [design[m].T @ rows.error[m] for m in masks]
+    found = []
+    for f, mask in enumerate(masks):
+        others = [i for i in range(FOLDS) if i != f]
+        solution = _solution(sum(grams[i] for i in others), sum(moments[i] for i in others))
+        left = rows.error[mask] - design[mask] @ solution
+        found.append(float(left @ left))
+    return np.array(found)
+
+
+def _told(rows: Rows, chosen: Sequence[str], name: str) -> float:
+    """Part of a group's energy that the pattern and the chosen ones leave."""
+    design, columns = _design(rows, chosen), rows.groups[name]
+    gram, cross = design.T @ design, design.T @ columns
+    left = columns - design @ np.column_stack(
+        [_solution(gram, cross[:, j]) for j in range(cross.shape[1])]
+    )
+    return float((left**2).sum() / (columns**2).sum())
+
+
+def choose(rows: Rows, forced: list[str]) -> tuple[list[str], list[tuple[str, float]], list[str]]:
+    """Groups taken one by one while the best lowers the held-out error."""
+    chosen = list(forced)
+    shares: list[tuple[str, float]] = []
+    unseparated: list[str] = []
+    before = _held_out(rows, chosen)
+    total = float(before.sum())
+    barred: set[str] = set()
+    while True:
+        trials = {
+            name: _held_out(rows, [*chosen, name])
+            for name in rows.groups
+            if name not in chosen and name.rstrip("0123456789") not in barred
+        }
+        good = {
+            name: after
+            for name, after in trials.items()
+            if after.sum() < (1.0 - _GAIN) * before.sum()
+            and np.count_nonzero(after < before) > FOLDS // 2
+        }
+        if not good:
+            return chosen, shares, unseparated
+        least = min(float(after.sum()) for after in good.values())
+        # A kinked drift imitates a ramp there and back: of those alike the simplest.
+        alike = [name for name, after in good.items() if after.sum() <= (1.0 + _ALIKE) * least]
+        best = min(alike, key=lambda name: rows.groups[name].shape[1])
+        kind = best.rstrip("0123456789")
+        barred.add(kind)
+        if _told(rows, chosen, best) < _TOLD:
+            unseparated.append(kind)
+            continue
+        shares.append((kind, float(before.sum() - good[best].sum()) / total))
+        chosen.append(best)
+        before = good[best]
+
+
+def stiffest(rows: Rows, chosen: Sequence[str]) -> str:
+    """The spline that lowers the held-out error most."""
+    names = [name for name in rows.groups if name.startswith("drift")]
+    return min(names, key=lambda name: float(_held_out(rows, [*chosen, name]).sum()))
+
+
+def inflation(rows: Rows, chosen: Sequence[str]) -> list[float]:
+    """Standard errors of ``A, B`` of each order beside the chosen groups, over those without."""
+    pattern, design = rows.pattern, _design(rows, chosen)
+    size = pattern.shape[1]
+    if not size:
+        return []
+    alone, beside = (
+        np.diag(np.linalg.pinv(x.T @ x, rcond=_SEEN, hermitian=True))[:size]
+        for x in (pattern, design)
+    )
+    ratio = np.sqrt(np.maximum(beside / np.maximum(alone, 1e-300), 1.0))
+    return [float(v) for v in ratio.reshape(2, -1).T.ravel()]
+
+
+def solved(rows: Rows, chosen: Sequence[str]) -> dict[str, Array]:
+    """Coefficients of the chosen groups beside the pattern."""
+    design = _design(rows, chosen)
+    solution = _solution(design.T @ design, design.T @ rows.error)
+    ends = np.cumsum([rows.pattern.shape[1], *(rows.groups[n].shape[1] for n in chosen)])
+    return dict(zip(chosen, np.split(solution, ends[:-1])[1:], strict=True))
