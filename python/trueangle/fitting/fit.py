@@ -14,7 +14,7 @@ from ..units import check_follows
 from .argument import ARGUMENTS, AnyArgument, Choice, choose_argument
 from .breakdown import breakdown_sentence
 from .likeness import unlike_runs, unlike_sentence
-from .nuisance import asked_nuisance, likely_orders, take_out
+from .nuisance import asked_nuisance, likely_orders, take_out, take_out_beside
 from .problem import Problem
 from .result import FitResult
 from .ridge import choose_ridge
@@ -155,7 +155,10 @@ def fit(
     wanted = resolve_orders(orders, gear_ratio, fixed_member, shafts)
     taken = None
     if beside.wanted:
-        found, taken = take_out(given, beside.kinds, wanted, _angle(argument), beside.reference)
+        likely = likely_orders(given, gear_ratio, fixed_member, shafts)
+        found, taken = take_out_beside(
+            given, beside.kinds, wanted, likely, _angle(argument), beside.reference
+        )
     if selection is not None:
         choice = Choice(selection.argument)
     else:

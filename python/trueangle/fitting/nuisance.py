@@ -22,7 +22,7 @@ from ..runs import CalibrationRun
 from ..shafts import ShaftOrders, shaft_cycles
 from .nuisancechoice import FOLDS, Rows, choose, inflation, solved, stiffest
 
-__all__ = ["KINDS", "Nuisance", "asked_nuisance", "likely_orders", "take_out"]
+__all__ = ["KINDS", "Nuisance", "asked_nuisance", "likely_orders", "take_out", "take_out_beside"]
 
 Array = NDArray[np.float64]
 
@@ -205,6 +205,30 @@ def take_out(
     )
     drifts = next((found[n] for n in chosen if n.startswith("drift")), None)
     return [_without(run, i, nuisance, drifts) for i, run in enumerate(runs)], nuisance
+
+
+def take_out_beside(
+    runs: Sequence[CalibrationRun],
+    kinds: tuple[str, ...] | None,
+    wanted: Sequence[ShaftOrders],
+    likely: Sequence[ShaftOrders],
+    argument: str,
+    reference_orders: Sequence[float] = (),
+) -> tuple[list[CalibrationRun], Nuisance]:
+    """`take_out` beside the orders wanted, chosen beside the likely ones as well.
+
+    What an order that is not in the model leaves is no ramp, though a ramp lowers it.
+    """
+    if kinds is not None:
+        return take_out(runs, kinds, wanted, argument, reference_orders)
+    both = {s.name: s for s in likely}
+    for shaft in wanted:
+        more = both[shaft.name].orders if shaft.name in both else ()
+        both[shaft.name] = shaft._replace(orders=tuple(sorted({*shaft.orders, *more})))
+    _, first = take_out(runs, None, list(both.values()), argument, reference_orders)
+    chosen = tuple(kind for kind in first.kinds if kind in KINDS)
+    cleaned, taken = take_out(runs, chosen, wanted, argument, reference_orders)
+    return cleaned, replace(taken, shares=first.shares, unseparated=first.unseparated)
 
 
 _MISSING: Final = {
