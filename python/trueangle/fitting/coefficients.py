@@ -64,10 +64,10 @@ class Coefficients:
 
         Examples
         --------
+        >>> import trueangle as ta
         >>> theta = np.arange(0.0, 360.0, 5.0)
         >>> noise = np.random.default_rng(1).normal(0.0, 0.01, theta.size)
-        >>> run = CalibrationRun(theta, theta + 0.5 * np.sin(np.radians(theta)) + noise, 360.0)
-        >>> import trueangle as ta
+        >>> run = ta.CalibrationRun(theta, theta + 0.5 * np.sin(np.radians(theta)) + noise, 360.0)
         >>> low, high = ta.fit(run, orders=[1]).interval()[2]
         >>> bool(low < 0.5 < high)
         True
