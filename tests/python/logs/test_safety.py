@@ -291,7 +291,6 @@ def test_permissions_are_kept_in_place(logs, model):
         ([], "either an output"),
         (["-o", "LOGS"], "overwrite"),
         (["-o", "OUT", "--column", "j1=x"], "j1"),
-        (["-o", "OUT", "--signal", "x"], "SIGNAL=NAME"),
     ],
 )
 def test_impossible_requests_are_refused_before_anything_is_done(
@@ -301,4 +300,13 @@ def test_impossible_requests_are_refused_before_anything_is_done(
     named = {"OUT": tmp_path / "out", "LOGS": logs}
     assert main(command(logs, model_file, *(named.get(a, a) for a in more))) == 1
     assert message in capsys.readouterr().err
+    assert tree(tmp_path) == before
+
+
+def test_a_signal_without_a_column_is_a_usage_error(logs, model_file, tmp_path, capsys):
+    before = tree(tmp_path)
+    with pytest.raises(SystemExit) as left:
+        main(command(logs, model_file, "-o", tmp_path / "out", "--signal", "x"))
+    assert left.value.code == 2
+    assert "ROLE=NAME" in capsys.readouterr().err
     assert tree(tmp_path) == before
