@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use crate::kernel::lanes::ROUNDER;
+use crate::simd::ROUNDER;
 
 /// Length (0 to 1) of the mean of unit vectors at `indicated - reference`: 1 where all
 /// differences are one, near 0 where they are spread over the turn.

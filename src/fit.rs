@@ -3,11 +3,10 @@
 //! `indicated - reference = zero of the run + sum of A cos + B sin + noise`: the
 //! harmonics are shared by all runs, the zero is each run's own.
 
-pub(crate) mod check;
+mod check;
 mod counts;
-mod path;
-mod run;
-mod scan;
+mod reduction;
+mod residuals;
 
 use std::f64::consts::TAU;
 
@@ -16,13 +15,13 @@ use crate::design::Design;
 use crate::error::Error;
 use crate::lstsq::{Estimate, System};
 use crate::moments::accumulator::Accumulator;
-use crate::moments::readings::Readings;
+use crate::readings::Readings;
 use crate::{rank, threads};
 
+pub use crate::readings::{Argument, Run};
 use counts::Counts;
-use path::Reduced;
-pub use run::{Argument, Run};
-pub use scan::{Scan, scan};
+use reduction::Reduced;
+pub use residuals::{Scan, scan};
 
 /// How the least-squares problem was solved.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -140,10 +139,10 @@ pub fn fit(design: &Design, runs: &[Run], options: Options) -> Result<Solution, 
             if !scatter.is_finite() {
                 inspect()?;
             }
-            let reduced = path::reduce(design, &means, &centres, options, inspect)?;
+            let reduced = reduction::reduce(design, &means, &centres, options, inspect)?;
             reduced.counted(scatter)
         }
-        None => path::reduce(design, &readings, &centres, options, inspect)?,
+        None => reduction::reduce(design, &readings, &centres, options, inspect)?,
     };
     if ridge.is_none() {
         let angles = || readings.iter().flat_map(Readings::angles);
@@ -162,8 +161,8 @@ pub fn fit(design: &Design, runs: &[Run], options: Options) -> Result<Solution, 
 /// and not too high ones, of the moments' base shaft.
 pub fn fit_moments(design: &Design, runs: &[&Accumulator]) -> Result<Solution, Error> {
     check::have_readings(design, runs.iter().map(|run| run.count()))?;
-    let reduced = path::reduce_moments(design, runs)?;
-    let rounding = || path::FACTOR_ROUNDING;
+    let reduced = reduction::reduce_moments(design, runs)?;
+    let rounding = || reduction::FACTOR_ROUNDING;
     let known = reduced.condition_number;
     rank::check(design, &reduced.system, known, rounding, std::iter::empty)?;
     let centres: Vec<_> = runs.iter().map(|run| run.centre()).collect();
@@ -182,7 +181,7 @@ pub fn triangle(
 ) -> Result<Vec<f64>, Error> {
     check::lengths(run)?;
     check::angles(std::slice::from_ref(run))?;
-    let found = path::triangle(design, &run.readings(argument), zero, threads);
+    let found = reduction::triangle(design, &run.readings(argument), zero, threads);
     Ok(found.to_rows())
 }
 

@@ -3,7 +3,10 @@
 pub mod error;
 
 pub mod angle;
+pub mod chebyshev;
+pub mod check;
 pub mod circle;
+pub mod readings;
 pub mod series;
 
 pub mod direct;
@@ -13,11 +16,14 @@ pub mod memory;
 pub mod once;
 pub mod threads;
 
+pub mod simd;
+
 pub mod kernel;
 
 pub mod compensator;
 pub mod terms;
 
+pub mod band;
 pub mod design;
 pub mod fit;
 pub mod lstsq;

@@ -6,8 +6,8 @@ use rustfft::FftPlanner;
 use rustfft::num_complex::Complex64;
 
 use crate::angle::{Period, sin_cos_turns};
+use crate::check::finite;
 use crate::error::Error;
-use crate::fit::check::finite;
 
 /// Most cycles of a harmonic per output turn, far beyond what any encoder resolves: up to
 /// here phases are exact at any angle.

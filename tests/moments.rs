@@ -5,8 +5,8 @@ use std::f64::consts::TAU;
 use proptest::prelude::*;
 use trueangle::angle::Period;
 use trueangle::moments::accumulator::Accumulator;
-use trueangle::moments::readings::Readings;
 use trueangle::moments::spectrum::Spectrum;
+use trueangle::readings::Readings;
 
 /// Of the sum of weights: the series is exact to 3e-16, a block of sums adds some ulp.
 const EXACT: f64 = 2e-15;

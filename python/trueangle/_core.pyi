@@ -190,6 +190,13 @@ def fit(
     ridge: Sequence[float] | None = None,
     threads: int | None = None,
 ) -> Solution: ...
+def band(
+    theta: _Array,
+    period: float,
+    cycles: Sequence[float],
+    orders: Sequence[Sequence[int]],
+    covariance: _Array,
+) -> _Array: ...
 def resultant(
     indicated: NDArray[np.float64], reference: NDArray[np.float64], period: float
 ) -> float: ...

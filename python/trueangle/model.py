@@ -473,14 +473,16 @@ class HarmonicModel:
         ArgumentError
             The model has no covariance.
         """
-        from .reference import design_matrix
-
         if self.covariance is None:
             raise ArgumentError("the model has no covariance: it was not made by a fit")
         x = np.asarray(theta, dtype=np.float64)
-        shafts = [(shaft.cycles_per_turn, shaft.orders) for shaft in self.shafts]
-        rows = design_matrix(x.ravel(), shafts, self.period)
-        band: Array = np.sqrt(np.einsum("ij,jk,ik->i", rows, self.covariance, rows))
+        band = _core.band(
+            np.ascontiguousarray(x).reshape(-1),
+            self.period,
+            [shaft.cycles_per_turn for shaft in self.shafts],
+            [list(shaft.orders) for shaft in self.shafts],
+            self.covariance.reshape(-1),
+        )
         return band.reshape(x.shape)
 
     def replace(self, **changes: Any) -> HarmonicModel:

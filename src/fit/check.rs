@@ -1,9 +1,9 @@
 //! What must hold of readings before they are fitted.
 
-use super::{Argument, Run};
+use crate::check::{finite, not_negative, same_length};
 use crate::design::Design;
 use crate::error::Error;
-use crate::moments::known::all_finite;
+use crate::readings::{Argument, Run};
 
 /// Lengths, weights, and that every run has a reading that counts.
 pub fn shapes(design: &Design, runs: &[Run], ridge: Option<&[f64]>) -> Result<(), Error> {
@@ -53,50 +53,4 @@ pub fn angles(runs: &[Run]) -> Result<(), Error> {
         finite("indicated", run.indicated)?;
     }
     Ok(())
-}
-
-/// That two arguments are equally long.
-pub fn same_length(
-    what: &'static str,
-    got: usize,
-    other: &'static str,
-    wanted: usize,
-) -> Result<(), Error> {
-    if got == wanted {
-        return Ok(());
-    }
-    Err(Error::Length {
-        what,
-        got,
-        other,
-        wanted,
-    })
-}
-
-/// That every element is a finite number.
-pub fn finite(what: &'static str, values: &[f64]) -> Result<(), Error> {
-    if all_finite(values) {
-        return Ok(());
-    }
-    match values.iter().position(|v| !v.is_finite()) {
-        Some(index) => Err(Error::NotFinite {
-            what,
-            index,
-            got: values[index],
-        }),
-        None => Ok(()),
-    }
-}
-
-/// That every element is finite and not negative.
-pub fn not_negative(what: &'static str, values: &[f64]) -> Result<(), Error> {
-    let bad = |v: &f64| !(v.is_finite() && *v >= 0.0);
-    match values.iter().position(bad) {
-        Some(index) => Err(Error::Weight {
-            what,
-            index,
-            got: values[index],
-        }),
-        None => Ok(()),
-    }
 }

@@ -6,8 +6,8 @@
 
 use crate::angle::Period;
 use crate::circle::whole_number;
-use crate::kernel::lanes::{InstructionSet, Kernel, Lanes, ROUNDER, dispatch};
-use crate::moments::readings::Readings;
+use crate::readings::Readings;
+use crate::simd::{InstructionSet, Kernel, Lanes, ROUNDER, dispatch};
 use crate::threads;
 
 /// Counts per turn up to which the sums stay in the cache of a core: 17 bits, 2 MiB.

@@ -1,8 +1,8 @@
 //! One entry per count of an encoder whose turn is a whole number of counts.
 
 use super::batch::{Batch, Real, Sample};
-use super::lanes::InstructionSet;
 use super::table::Table;
+use crate::simd::InstructionSet;
 
 /// Most counts per turn: 8 MiB of entries.
 pub const MOST_COUNTS: f64 = (1u32 << 20) as f64;

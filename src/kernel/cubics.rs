@@ -5,10 +5,10 @@
 //! and twice as many samples fit into a vector.
 
 use super::Batch;
-use super::chebyshev;
-use super::lanes::{InstructionSet, Kernel, Lanes, MOST_LANES, Quad, dispatch};
 use super::segments::Segments;
 use super::table::{MOST_SEGMENTS, Table};
+use crate::chebyshev;
+use crate::simd::{InstructionSet, Kernel, Lanes, MOST_LANES, Quad, dispatch};
 
 /// Degree of the polynomials.
 pub const DEGREE: usize = 3;

@@ -4,19 +4,18 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use super::batch::{Batch, Real, Sample, Shared, is_single};
-use super::counts::{Counts, MOST_COUNTS};
+use super::counts::Counts;
 use super::cubics::{self, Cubics};
 use super::exact::Exact;
-use super::lanes::InstructionSet;
 use super::route::{Path, Route};
 use super::stretch::Stretch;
-use super::table::{MOST_SEGMENTS, Scalar, Table};
-use super::{Argument, Quantity, expansion, inverse};
+use super::table::{Scalar, Table};
+use super::tables::Tables;
+use super::{Argument, Quantity, inverse};
 use crate::direct;
 use crate::error::Error;
-use crate::memory;
-use crate::once::Once;
 use crate::series::HarmonicSeries;
+use crate::simd::InstructionSet;
 use crate::threads;
 
 /// Samples below which threads cost more than they save.
@@ -44,15 +43,7 @@ const TOLERANCES: (f64, f64) = (2e-15, 1e-2);
 
 /// The part of it that rounding may take: the transform that builds a table (4e-16 at
 /// most in tests up to order 512), its rows, and three roundings of the result.
-const ROUNDING: f64 = 1e-15;
-
-/// What is looked up for one quantity, built at the first use.
-#[derive(Debug, Default)]
-struct Tables {
-    polynomials: Once<Option<Arc<Table>>>,
-    counts: Once<Counts>,
-    cubics: Once<Option<Cubics>>,
-}
+pub(super) const ROUNDING: f64 = 1e-15;
 
 /// What a route computes with.
 #[derive(Clone, Copy)]
@@ -67,17 +58,17 @@ enum Method<'e> {
 /// A series made ready for batches: immutable, shared between threads.
 #[derive(Debug)]
 pub struct Evaluator {
-    series: HarmonicSeries,
-    argument: Argument,
-    tolerance: f64,
+    pub(super) series: HarmonicSeries,
+    pub(super) argument: Argument,
+    pub(super) tolerance: f64,
     lines: usize,
-    reach: f64,
-    slope_bound: f64,
-    best: InstructionSet,
+    pub(super) reach: f64,
+    pub(super) slope_bound: f64,
+    pub(super) best: InstructionSet,
     exact_error: Exact,
     exact_slope: Exact,
-    errors: Tables,
-    corrections: Tables,
+    pub(super) errors: Tables,
+    pub(super) corrections: Tables,
 }
 
 impl Evaluator {
@@ -134,66 +125,6 @@ impl Evaluator {
             });
         }
         Ok(())
-    }
-
-    /// Where a quantity is looked up: the correction of a series of the indicated angle
-    /// subtracts the error itself.
-    fn tables(&self, quantity: Quantity) -> &Tables {
-        match (quantity, self.argument) {
-            (Quantity::Correction, Argument::Reference) => &self.corrections,
-            _ => &self.errors,
-        }
-    }
-
-    /// The table a quantity is looked up in, built at the first call; `None` where the
-    /// series is not periodic or too rough for one.
-    pub fn table(&self, quantity: Quantity) -> Option<&Arc<Table>> {
-        if !self.series.is_periodic() || quantity == Quantity::Slope {
-            return None;
-        }
-        let tables = self.tables(quantity);
-        let tolerance = (self.tolerance - ROUNDING) * self.reach;
-        let build = || {
-            if std::ptr::eq(tables, &self.errors) {
-                expansion::table(&self.series, tolerance, 8)
-            } else {
-                inverse::table(&self.series, self.slope_bound, tolerance)
-            }
-        };
-        tables
-            .polynomials
-            .get_or_init(|| build().map(Arc::new))
-            .as_ref()
-    }
-
-    /// The cubics that f32 is looked up in; `None` where there is no table, or they would
-    /// be too many.
-    pub fn cubics(&self, quantity: Quantity) -> Option<&Cubics> {
-        let table = self.table(quantity)?;
-        let tables = self.tables(quantity);
-        let tolerance = self.tolerance.max(cubics::ROUNDING) * self.reach;
-        let interpolation = |segments| {
-            if std::ptr::eq(tables, &self.errors) {
-                expansion::cubic_bound(&self.series, segments)
-            } else {
-                inverse::bound(&self.series, self.slope_bound, segments, cubics::DEGREE)
-            }
-        };
-        tables
-            .cubics
-            .get_or_init(|| Cubics::new(table, tolerance, interpolation))
-            .as_ref()
-    }
-
-    /// Entries per count; `None` where the turn is not a whole number of them.
-    fn counts(&self, quantity: Quantity) -> Option<&Counts> {
-        let per_turn = self.series.period().value();
-        if per_turn.fract() != 0.0 || per_turn > MOST_COUNTS {
-            return None;
-        }
-        let table = self.table(quantity)?;
-        let counts = &self.tables(quantity).counts;
-        Some(counts.get_or_init(|| Counts::new(table, self.best)))
     }
 
     /// The path and instruction set that batches of so many samples take.
@@ -326,24 +257,6 @@ impl Evaluator {
             Method::Exact => 1 + self.lines / LINES_PER_SAMPLE,
             Method::Direct => 1 + DIRECT_PER_LINE * self.lines,
         }
-    }
-
-    /// An error where there is no memory to build what a batch needs.
-    pub fn room(&self) -> Result<(), Error> {
-        /// Bytes per segment, of the table and of what it is made from.
-        const BYTES: usize = 512;
-        /// Segments per order of a table of the default tolerance.
-        const SEGMENTS: f64 = 64.0;
-        let highest = self.series.lines().map(|line| line.order);
-        let segments = SEGMENTS * highest.fold(16.0, f64::max);
-        memory::room(BYTES * (segments as usize).min(MOST_SEGMENTS))
-    }
-
-    /// True when what a batch needs is there, so that it takes as long as its samples.
-    pub fn is_ready(&self, quantity: Quantity) -> bool {
-        quantity == Quantity::Slope
-            || !self.series.is_periodic()
-            || self.tables(quantity).polynomials.get().is_some()
     }
 
     fn run_part<X: Sample, Y: Real>(

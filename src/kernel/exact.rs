@@ -7,12 +7,12 @@
 
 use std::f64::consts::TAU;
 
-use super::lanes::{InstructionSet, Lanes, dispatch};
 use super::sincos::{Phase, sin_cos};
 use super::sweep::{Map, Sweep};
 use super::{Batch, Real, Sample};
 use crate::angle::Period;
 use crate::series::HarmonicSeries;
+use crate::simd::{InstructionSet, Lanes, dispatch};
 
 /// Orders a group may span above its lowest: 16 steps of Horner's rule lose about 1e-15.
 const MOST_SPAN: u32 = 16;

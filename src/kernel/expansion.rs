@@ -12,7 +12,8 @@ use rustfft::num_complex::Complex;
 
 use super::segments::OVERSHOOT;
 use super::table::{DEGREE, MOST_SEGMENTS, Table};
-use crate::series::HarmonicSeries;
+use crate::chebyshev::bessel;
+use crate::series::{HarmonicSeries, Line};
 
 /// Greatest difference between a periodic series and its table of `segments`.
 pub fn bound(series: &HarmonicSeries, segments: usize) -> f64 {
@@ -56,13 +57,14 @@ pub fn table(series: &HarmonicSeries, tolerance: f64, least: usize) -> Option<Ta
 }
 
 fn expand(series: &HarmonicSeries, segments: usize) -> Table {
+    let line = |line: Line| (line, bessel(PI * line.order / segments as f64));
+    let lines: Vec<(Line, [f64; DEGREE + 1])> = series.lines().map(line).collect();
     let transform = FftPlanner::new().plan_fft_inverse(segments);
     let mut rows = vec![[0.0; DEGREE + 1]; segments];
     // Two real Fourier series are one complex one: columns j and j + 1 go together.
     for pair in (0..=DEGREE).step_by(2) {
         let mut spectrum = vec![Complex::new(0.0, 0.0); segments];
-        for line in series.lines() {
-            let bessel = bessel(PI * line.order / segments as f64);
+        for (line, bessel) in &lines {
             // A cos + B sin is the real part of (A - iB) exp(i ...).
             let amplitude = Complex::new(line.cosine, -line.sine);
             let even = amplitude * power_of_i(pair) * bessel[pair];
@@ -93,24 +95,4 @@ fn expand(series: &HarmonicSeries, segments: usize) -> Table {
 /// `i^j`.
 fn power_of_i(j: usize) -> Complex<f64> {
     [(1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0)].map(|(re, im)| Complex::new(re, im))[j % 4]
-}
-
-/// `J_0(z)..J_7(z)` for `0 <= z <= pi/2`, by the power series (DLMF 10.2.2).
-fn bessel(z: f64) -> [f64; DEGREE + 1] {
-    let half = 0.5 * z;
-    let mut leading = 1.0;
-    std::array::from_fn(|j| {
-        if j > 0 {
-            leading *= half / j as f64;
-        }
-        let mut term = leading;
-        let mut sum = term;
-        let mut m = 1.0;
-        while term.abs() > f64::EPSILON * 0.1 * sum.abs() {
-            term *= -half * half / (m * (m + j as f64));
-            sum += term;
-            m += 1.0;
-        }
-        sum
-    })
 }

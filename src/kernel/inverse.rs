@@ -3,19 +3,23 @@
 use std::f64::consts::{PI, TAU};
 
 use super::Batch;
-use super::chebyshev;
 use super::exact::Exact;
 use super::expansion;
-use super::lanes::InstructionSet;
 use super::segments::OVERSHOOT;
 use super::table::{DEGREE, MOST_SEGMENTS, Table};
+use crate::chebyshev;
+use crate::interrupt;
 use crate::series::HarmonicSeries;
+use crate::simd::InstructionSet;
 
 /// Steps before giving up on another ulp: bisection alone needs about 60.
 const MOST_STEPS: usize = 100;
 
 /// What the forward table may add while the inverse is built, of the sum of amplitudes.
 const FORWARD_TOLERANCE: f64 = 1e-16;
+
+/// Segments made between two looks at whether anybody still waits for them.
+const SEGMENTS_AT_ONCE: usize = 1024;
 
 /// Root of `g - error(y - g)` in `[low, high]`, where `error` gives value and slope at
 /// `y - g`. Newton's method in a shrinking bracket: it converges wherever `|error'| < 1`.
@@ -132,6 +136,7 @@ pub fn bound(series: &HarmonicSeries, slope: f64, segments: usize, degree: usize
     let highest = series.lines().map(|line| line.order).fold(1.0, f64::max);
     let mut best = f64::INFINITY;
     for i in 0..STRIPS {
+        interrupt::point();
         let strip = 20.0 / highest / 1.2f64.powi(i);
         let (mut steepness, mut size) = (slope, 0.0);
         for line in series.lines() {
@@ -169,6 +174,9 @@ pub fn table(series: &HarmonicSeries, slope: f64, tolerance: f64) -> Option<Tabl
     let transform = chebyshev::transform();
     let mut g = 0.0;
     let expansions = (0..segments).map(|n| {
+        if n % SEGMENTS_AT_ONCE == 0 {
+            interrupt::point();
+        }
         let values = points.map(|u| {
             let offset = u * half - series.constant();
             let error = |g: f64| forward.at(n * per_segment, offset - g);

@@ -3,7 +3,7 @@
 use std::fmt;
 use std::str::FromStr;
 
-use super::lanes::InstructionSet;
+use crate::simd::InstructionSet;
 
 /// How to compute a quantity.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -1,7 +1,7 @@
 //! A turn divided into equal segments, and the place of an angle among them.
 
-use super::lanes::{Lanes, ROUNDER};
 use crate::angle::Period;
+use crate::simd::{Lanes, ROUNDER};
 
 /// Segments an angle may be away from zero: its place within a segment is exact, and `u`
 /// exceeds 1 by at most `FAR_SEGMENTS * 2^-52`, which `OVERSHOOT` allows for.

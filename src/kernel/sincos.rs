@@ -2,8 +2,8 @@
 
 use std::f64::consts::TAU;
 
-use super::lanes::Lanes;
 use crate::angle::Period;
+use crate::simd::Lanes;
 
 /// `2 pi - TAU`.
 const TAU_LOW: f64 = 2.449_293_598_294_706_4e-16;

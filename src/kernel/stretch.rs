@@ -1,8 +1,8 @@
 //! A stretch of angles, and how many of a batch lie outside it.
 
 use super::batch::{Batch, Real, Sample};
-use super::lanes::{InstructionSet, Kernel, Lanes, dispatch};
 use crate::circle::whole_number;
+use crate::simd::{InstructionSet, Kernel, Lanes, dispatch};
 
 /// Part of a turn by which an angle may be beyond the ends: rounding is no excursion.
 const SLACK: f64 = 1e-9;

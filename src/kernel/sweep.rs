@@ -1,7 +1,7 @@
 //! Carries a batch through a function of vectors.
 
 use super::batch::{Batch, Real, Sample};
-use super::lanes::{Kernel, Lanes, MOST_LANES};
+use crate::simd::{Kernel, Lanes, MOST_LANES};
 
 /// A function of every sample.
 pub trait Map {

@@ -1,11 +1,11 @@
 //! Piecewise polynomials over one turn: the cost of a sample does not depend on the series.
 
-use super::lanes::{InstructionSet, Lanes, MOST_LANES, Row, dispatch};
-use super::portable::{Portable, TARGET_FUSES};
 use super::segments::Segments;
 use super::sweep::{Map, Sweep};
 use super::{Batch, Real, Sample};
 use crate::angle::Period;
+use crate::simd::{InstructionSet, Lanes, MOST_LANES, Row, dispatch};
+use crate::simd::{Portable, TARGET_FUSES};
 
 /// Degree of the polynomials: a row of coefficients fills a cache line.
 pub const DEGREE: usize = 7;

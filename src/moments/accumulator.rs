@@ -1,11 +1,11 @@
 //! Moments of one run: constant memory, mergeable, one pass.
 
-use super::frame::{Around, Frame};
-use super::kernel::accumulate;
-use super::readings::Readings;
+use super::accumulate::accumulate;
+use super::place::{Around, Frame};
 use super::segment::Segment;
 use crate::angle::{Period, two_sum};
 use crate::error::Error;
+use crate::readings::Readings;
 use crate::{memory, threads};
 
 /// Readings per segment summed plainly before they join the compensated total: rounding

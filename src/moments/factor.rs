@@ -8,8 +8,8 @@
 use std::f64::consts::PI;
 
 use super::accumulator::Accumulator;
-use super::bessel::jacobi_anger;
 use super::segment::{ERROR_TERMS, Segment};
+use crate::chebyshev::jacobi_anger;
 use crate::lstsq::{Reduction, System, Triangle};
 
 /// Pivots below this part of the greatest diagonal element are rounding: the readings

@@ -6,8 +6,8 @@ use rustfft::FftPlanner;
 use rustfft::num_complex::Complex64;
 
 use super::accumulator::Accumulator;
-use super::bessel::jacobi_anger;
 use super::segment::Segment;
+use crate::chebyshev::jacobi_anger;
 
 /// What the normal equations of any orders up to `error.len() - 1` are made of.
 #[derive(Clone, Debug)]

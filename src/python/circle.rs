@@ -4,8 +4,8 @@ use numpy::{PyReadonlyArray1, PyReadwriteArray1};
 use pyo3::prelude::*;
 
 use super::release::detached;
+use crate::check::same_length;
 use crate::circle;
-use crate::fit::check::same_length;
 
 /// Length of the mean unit vector at indicated - reference.
 #[pyfunction]

@@ -11,7 +11,7 @@ use super::array::{Angles, as_array, data, numpy_module};
 use super::door::{self, Computation, Computed};
 use super::failure::{argument_error, kind_error};
 use super::number::{is_number, single};
-use super::release::attached;
+use super::release::{attached, detached};
 use super::series::PySeries;
 use super::terms::forms;
 use super::threads::{Asked, threads};
@@ -42,7 +42,8 @@ impl PyCorrector {
             series.evaluator.room()?;
         }
         let evaluator = Arc::clone(&series.evaluator);
-        let terms = attached(py, || Terms::new(evaluator, &terms))??;
+        // Tables may be made here, which takes a while.
+        let terms = detached(py, || Terms::new(evaluator, &terms))??;
         Ok(Self {
             inner: Corrector::new(Arc::new(terms)),
             parts,

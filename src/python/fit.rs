@@ -3,15 +3,15 @@
 use numpy::{PyArray1, PyArray2, PyReadonlyArray1};
 use pyo3::prelude::*;
 
-use super::array::{square, vector};
+use super::array::{data, empty, square, vector};
 use super::failure::argument_error;
 use super::number;
 use super::release::{attached, detached};
 use super::series::PySeries;
 use super::threads::{self, Asked};
+use crate::check::same_length;
 use crate::design::{Design, Frequencies};
 use crate::fit as core;
-use crate::fit::check::same_length;
 use crate::fit::{Argument, Method, Options, Run};
 use crate::memory;
 
@@ -175,6 +175,28 @@ pub fn triangle<'py>(
     square(py, &rows, size)
 }
 
+/// Standard deviations of a fitted series at some angles, from its covariance.
+#[pyfunction]
+pub fn band<'py>(
+    py: Python<'py>,
+    theta: PyReadonlyArray1<'py, f64>,
+    period: f64,
+    cycles: Vec<f64>,
+    orders: &Bound<'_, PyAny>,
+    covariance: PyReadonlyArray1<'py, f64>,
+) -> PyResult<Bound<'py, PyAny>> {
+    let design = design(period, cycles, orders)?;
+    let (theta, covariance) = (theta.as_slice()?, covariance.as_slice()?);
+    let out = empty::<f64>(py, &[theta.len()], false)?;
+    // SAFETY: a fresh contiguous array of doubles that nobody else has seen.
+    let values = unsafe { std::slice::from_raw_parts_mut(data::<f64>(&out), theta.len()) };
+    // Each angle costs as much as a hundred samples of a series.
+    let threads = threads::count(py, None, theta.len().saturating_mul(100))?;
+    let work = || crate::band::band(&design, covariance, theta, threads, values);
+    detached(py, work)??;
+    Ok(out.into_any())
+}
+
 /// A sample of the residuals of one run, and the largest.
 #[pyfunction]
 #[pyo3(signature = (series, run, argument, offset, stride, threads=None))]
@@ -198,17 +220,10 @@ pub fn scan_residuals<'py>(
     Ok((vector(py, &found.sample)?, found.largest))
 }
 
-fn argument_named(py: Python<'_>, name: &str) -> PyResult<Argument> {
-    match name {
-        "reference" => Ok(Argument::Reference),
-        "indicated" => Ok(Argument::Indicated),
-        other => Err(unknown(
-            py,
-            "argument",
-            other,
-            "\"reference\" or \"indicated\"",
-        )),
-    }
+/// The argument of a name.
+pub fn argument_named(py: Python<'_>, name: &str) -> PyResult<Argument> {
+    let wanted = "'reference' or 'indicated'";
+    Argument::named(name).ok_or_else(|| unknown(py, "argument", name, wanted))
 }
 
 /// The harmonics of several shafts.

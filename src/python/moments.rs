@@ -9,12 +9,14 @@ use super::fit::{Solution, design, sizes};
 use super::release::{attached, detached};
 use super::threads::{self, Asked};
 use crate::angle::Period;
+use crate::check;
 use crate::error::Error;
-use crate::fit::{check, fit_moments as core_fit};
+use crate::fit::fit_moments as core_fit;
 use crate::moments::accumulator::Accumulator;
-use crate::moments::known::{Angles, add_known};
-use crate::moments::readings::Readings;
 use crate::moments::spectrum::Spectrum;
+use crate::moments::stream::add_known;
+use crate::readings::Readings;
+use crate::readings::{Argument, Run};
 
 type Array<'py> = Bound<'py, PyArray1<f64>>;
 type Complexes<'py> = Bound<'py, PyArray1<Complex64>>;
@@ -114,13 +116,18 @@ impl PyMoments {
         of_indicated: bool,
         mut travel: PyReadwriteArray1<'_, i64>,
     ) -> PyResult<usize> {
-        let angles = Angles {
+        let run = Run {
             reference: reference.as_slice()?,
             indicated: indicated.as_slice()?,
-            of_indicated,
+            weights: None,
         };
-        let wanted = angles.reference.len();
-        check::same_length("indicated", angles.indicated.len(), "reference", wanted)?;
+        let argument = if of_indicated {
+            Argument::Indicated
+        } else {
+            Argument::Reference
+        };
+        let wanted = run.reference.len();
+        check::same_length("indicated", run.indicated.len(), "reference", wanted)?;
         let travel = travel.as_slice_mut()?;
         let period = Period::new(self.period)?;
         let (cycles, highest) = (self.cycles, self.highest);
@@ -129,7 +136,7 @@ impl PyMoments {
         }
         let fresh = |centre| Accumulator::new(period, cycles, highest, centre);
         let sums = &mut self.sums;
-        detached(py, || add_known(sums, fresh, period, angles, travel))
+        detached(py, || add_known(sums, fresh, period, run, argument, travel))
     }
 
     /// Sums of their own with the same readings.

@@ -6,14 +6,13 @@ use pyo3::prelude::*;
 
 use super::door::{self, Computation, Computed};
 use super::failure::argument_error;
+use super::fit::argument_named;
 use super::number::{self, is_number};
 use super::release::attached;
 use super::step::PyCompensator;
 use super::threads::{Asked, threads};
 use crate::error::Error;
-use crate::kernel::{
-    Argument, Batch, Evaluator, Quantity, Real, Route, Sample, Stretch, TOLERANCE,
-};
+use crate::kernel::{Batch, Evaluator, Quantity, Real, Route, Sample, Stretch, TOLERANCE};
 use crate::series::{HarmonicSeries, Shaft};
 
 /// A harmonic series made ready; see `trueangle.HarmonicModel`.
@@ -90,16 +89,7 @@ impl PySeries {
                 ));
             }
         }
-        let argument = match argument {
-            "reference" => Argument::Reference,
-            "indicated" => Argument::Indicated,
-            other => {
-                return Err(argument_error(
-                    py,
-                    format!("argument must be 'reference' or 'indicated', got {other:?}"),
-                ));
-            }
-        };
+        let argument = argument_named(py, argument)?;
         let shafts = cycles
             .into_iter()
             .zip(orders)
@@ -133,10 +123,7 @@ impl PySeries {
             series.shafts().iter().map(|s| s.orders.clone()).collect(),
             of_shafts(|s| s.cosine.clone()),
             of_shafts(|s| s.sine.clone()),
-            match evaluator.argument() {
-                Argument::Reference => "reference",
-                Argument::Indicated => "indicated",
-            },
+            evaluator.argument().name(),
             *tolerance,
         );
         Ok((slf.get_type().into_any(), parts))

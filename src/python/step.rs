@@ -8,6 +8,7 @@ use pyo3::ffi;
 use pyo3::prelude::*;
 
 use super::number::single;
+use super::release::detached;
 use super::series::PySeries;
 use crate::compensator::Compensator;
 
@@ -20,7 +21,8 @@ pub struct PyCompensator {
 
 impl PyCompensator {
     pub fn new(series: &Bound<'_, PySeries>) -> PyResult<Self> {
-        let inner = Compensator::new(Arc::clone(&series.get().evaluator))?;
+        let evaluator = Arc::clone(&series.get().evaluator);
+        let inner = detached(series.py(), || Compensator::new(evaluator))??;
         Ok(Self {
             inner,
             series: series.clone().unbind(),

@@ -7,18 +7,8 @@ use std::f64::consts::TAU;
 use super::signals::{Signal, Signals};
 use crate::angle::{Period, sin_cos_turns};
 use crate::error::Error;
+pub use crate::series::Line;
 use crate::series::{HarmonicSeries, Shaft};
-
-/// One line `cosine cos(order x) + sine sin(order x)`; `order` counts output turns.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Line {
-    /// Cycles per output turn, any positive real.
-    pub order: f64,
-    /// Coefficient of the cosine.
-    pub cosine: f64,
-    /// Coefficient of the sine.
-    pub sine: f64,
-}
 
 /// A form and what its user calls it: the name stands in messages.
 #[derive(Clone, Debug, PartialEq)]

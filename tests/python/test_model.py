@@ -3,6 +3,7 @@
 import copy
 import math
 import pickle
+import tracemalloc
 
 import numpy as np
 import pytest
@@ -159,3 +160,26 @@ def test_band_is_the_standard_deviation_of_the_fitted_curve():
     theta = np.array([0.0, 90.0, 45.0])
     expected = np.sqrt([0.13, 0.05, 0.04 + 0.05])
     np.testing.assert_allclose(model.band(theta), expected, rtol=1e-12)
+    assert model.band(90.0).shape == ()
+    assert math.isnan(model.band(math.nan))
+
+
+def test_band_takes_the_memory_of_its_result():
+    orders = list(range(1, 101))
+    size = 1 + 2 * len(orders)
+    rng = np.random.default_rng(seed := 7)
+    print(f"seed {seed}")
+    factor = 1e-6 * rng.standard_normal((size, size))
+    zeros = [0.0] * len(orders)
+    model = ta.HarmonicModel(
+        [ta.Shaft("output", 1, orders, zeros, zeros)], period=360.0, covariance=factor @ factor.T
+    )
+    theta = np.linspace(-400.0, 800.0, 20_000)
+    tracemalloc.start()
+    band = model.band(theta)
+    _, peak = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert peak < 3 * theta.nbytes  # a row of regressors for each would be 200 times as much
+    rows = reference.design_matrix(theta[::97], [(1.0, orders)], 360.0)
+    expected = np.linalg.norm(rows @ factor, axis=1)
+    np.testing.assert_allclose(band[::97], expected, rtol=1e-9)

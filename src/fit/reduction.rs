@@ -6,9 +6,9 @@ use crate::error::Error;
 use crate::interrupt;
 use crate::lstsq::{Reduction, System, Triangle};
 use crate::moments::accumulator::{Accumulator, segments};
-use crate::moments::readings::Readings;
 use crate::moments::spectrum::Spectrum;
 use crate::moments::{factor, normal};
+use crate::readings::Readings;
 
 /// Rows reduced at a time: enough to hide the triangle above them, few enough for the cache.
 const BLOCK_ROWS: usize = 512;

@@ -1,4 +1,4 @@
-//! Readings as the sums take them.
+//! Readings: both angles of a run, and the angle and error that sums are taken of.
 
 use std::f64::consts::TAU;
 
@@ -69,5 +69,71 @@ impl Readings<'_> {
             cosine += self.weight(i) * c;
         }
         sine.atan2(cosine) / turn
+    }
+}
+
+/// Readings of one run, in any one unit.
+#[derive(Clone, Copy, Debug)]
+pub struct Run<'a> {
+    /// True output angles.
+    pub reference: &'a [f64],
+    /// What the joint's own encoder says.
+    pub indicated: &'a [f64],
+    /// Reciprocal variances up to a factor; a reading of weight 0 does not count.
+    pub weights: Option<&'a [f64]>,
+}
+
+/// Which angle the harmonics are functions of.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Argument {
+    /// The true angle: correcting solves `theta + error(theta) = indicated`.
+    Reference,
+    /// The encoder's own angle: correcting subtracts.
+    Indicated,
+}
+
+impl Argument {
+    /// Both, by their names.
+    const NAMES: [(&str, Self); 2] = [
+        ("reference", Self::Reference),
+        ("indicated", Self::Indicated),
+    ];
+
+    /// Its name.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Reference => "reference",
+            Self::Indicated => "indicated",
+        }
+    }
+
+    /// The one of a name.
+    pub fn named(name: &str) -> Option<Self> {
+        let found = Self::NAMES.iter().find(|(own, _)| *own == name);
+        found.map(|&(_, argument)| argument)
+    }
+}
+
+impl<'a> Run<'a> {
+    /// Readings `start..end`.
+    pub fn part(&self, start: usize, end: usize) -> Self {
+        Self {
+            reference: &self.reference[start..end],
+            indicated: &self.indicated[start..end],
+            weights: self.weights.map(|weights| &weights[start..end]),
+        }
+    }
+
+    /// The run as harmonics of its argument.
+    pub fn readings(&self, argument: Argument) -> Readings<'a> {
+        Readings {
+            angle: match argument {
+                Argument::Reference => self.reference,
+                Argument::Indicated => self.indicated,
+            },
+            error: self.indicated,
+            reference: Some(self.reference),
+            weights: self.weights,
+        }
     }
 }

@@ -3,8 +3,8 @@
 use super::{Argument, Run, check};
 use crate::circle::residuals;
 use crate::error::Error;
-use crate::kernel::lanes::InstructionSet;
 use crate::kernel::{Batch, Evaluator, Path, Quantity, Route};
+use crate::simd::InstructionSet;
 use crate::threads;
 
 /// Readings worked on at a time: residuals stay in the fastest cache.

@@ -38,7 +38,7 @@ mod _core {
     use super::corrector::PyCorrector;
 
     #[pymodule_export]
-    use super::fit::{Solution, fit, scan_residuals, triangle};
+    use super::fit::{Solution, band, fit, scan_residuals, triangle};
 
     #[pymodule_export]
     use super::moments::{PyMoments, fit_moments};

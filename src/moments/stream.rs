@@ -1,25 +1,15 @@
 //! Readings of a log: missing ones left out, the travel noted, block by block.
 
 use super::accumulator::Accumulator;
-use super::readings::Readings;
 use crate::angle::Period;
+use crate::check::all_finite;
+use crate::readings::{Argument, Run};
 
 /// Readings taken together: they stay in the first cache.
 const BLOCK: usize = 1024;
 
 /// Every so many readings one is looked at for the travel covered.
 const STRIDE: usize = 16;
-
-/// Both angles of readings, some of which may be missing (not finite).
-#[derive(Clone, Copy, Debug)]
-pub struct Angles<'a> {
-    /// True angles.
-    pub reference: &'a [f64],
-    /// Indicated angles, as many.
-    pub indicated: &'a [f64],
-    /// True when the error is a function of the indicated angle.
-    pub of_indicated: bool,
-}
 
 /// Adds the readings of which both angles are known; returns how many those are.
 ///
@@ -29,30 +19,31 @@ pub fn add_known(
     sums: &mut Option<Accumulator>,
     fresh: impl Fn(f64) -> Accumulator,
     period: Period,
-    angles: Angles<'_>,
+    run: Run<'_>,
+    argument: Argument,
     travel: &mut [i64],
 ) -> usize {
     let mut known = 0;
-    let blocks = angles.reference.chunks(BLOCK);
-    for (mut all, mut said) in blocks.zip(angles.indicated.chunks(BLOCK)) {
+    let blocks = run.reference.chunks(BLOCK);
+    for (mut reference, mut indicated) in blocks.zip(run.indicated.chunks(BLOCK)) {
         let kept: (Vec<f64>, Vec<f64>);
-        if !(all_finite(all) && all_finite(said)) {
-            let pairs = all.iter().zip(said);
+        if !(all_finite(reference) && all_finite(indicated)) {
+            let pairs = reference.iter().zip(indicated);
             kept = pairs
                 .filter(|(a, b)| a.is_finite() && b.is_finite())
                 .unzip();
-            (all, said) = (&kept.0, &kept.1);
+            (reference, indicated) = (&kept.0, &kept.1);
         }
-        if all.is_empty() {
+        if reference.is_empty() {
             continue;
         }
-        known += all.len();
-        let readings = Readings {
-            angle: if angles.of_indicated { said } else { all },
-            error: said,
-            reference: Some(all),
+        known += reference.len();
+        let part = Run {
+            reference,
+            indicated,
             weights: None,
         };
+        let readings = part.readings(argument);
         note(travel, readings.angle, period);
         sums.get_or_insert_with(|| fresh(readings.centre(period)))
             .update(readings, 1);
@@ -73,15 +64,6 @@ fn note(travel: &mut [i64], angles: &[f64], period: Period) {
     }
 }
 
-/// Whether every value is finite; told without a branch for each.
-pub fn all_finite(values: &[f64]) -> bool {
-    let finite = |part: &[f64]| {
-        let bad = part.iter().map(|v| i64::from(!v.is_finite()));
-        bad.fold(0, |any, one| any | one) == 0
-    };
-    values.chunks(BLOCK).all(finite)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -96,12 +78,13 @@ mod tests {
         let mut indicated: Vec<f64> = reference.iter().map(|x| x + 0.01 * x.cos()).collect();
         let sums_of = |reference: &[f64], indicated: &[f64]| {
             let (mut sums, mut travel) = (None, [0; 360]);
-            let angles = Angles {
+            let run = Run {
                 reference,
                 indicated,
-                of_indicated: false,
+                weights: None,
             };
-            let known = add_known(&mut sums, fresh, period, angles, &mut travel);
+            let argument = Argument::Reference;
+            let known = add_known(&mut sums, fresh, period, run, argument, &mut travel);
             (sums.unwrap().store(), known, travel)
         };
         let (whole, known, travel) = sums_of(&reference, &indicated);
@@ -135,21 +118,5 @@ mod tests {
         let places: Vec<_> = (0..360).filter(|&i| travel[i] > 0).collect();
         assert_eq!(places, [0, 90, 359]);
         assert_eq!(travel[359], 2);
-    }
-
-    #[test]
-    fn one_value_that_is_not_finite_is_seen() {
-        let mut values = vec![1.0; 3 * BLOCK + 7];
-        assert!(all_finite(&values) && all_finite(&[]));
-        for (at, bad) in [
-            (0, f64::NAN),
-            (2000, f64::INFINITY),
-            (3 * BLOCK + 6, f64::NEG_INFINITY),
-        ] {
-            values[at] = bad;
-            assert!(!all_finite(&values));
-            values[at] = -f64::MAX;
-        }
-        assert!(all_finite(&values));
     }
 }

@@ -5,13 +5,12 @@
 //! Chebyshev moments of their segment, at a cost that does not depend on the number of
 //! orders; the sums that a fit needs are assembled from the segments once, at the end.
 
+pub mod accumulate;
 pub mod accumulator;
-mod bessel;
+mod chunk;
 pub mod factor;
-pub mod frame;
-pub mod kernel;
-pub mod known;
 pub mod normal;
-pub mod readings;
+pub mod place;
 pub mod segment;
 pub mod spectrum;
+pub mod stream;

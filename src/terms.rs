@@ -7,9 +7,11 @@
 
 mod corrector;
 mod form;
+mod prepared;
 mod signals;
 mod travel;
 
-pub use corrector::{Corrector, Terms};
+pub use corrector::Corrector;
 pub use form::{Form, Line, Term};
+pub use prepared::Terms;
 pub use signals::{Columns, Signal, Signals};

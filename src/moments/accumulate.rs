@@ -1,0 +1,208 @@
+//! The inner loop: every reading is added to the moments of its segment.
+//!
+//! A reading at `u` in its segment, `-1 <= u <= 1`, adds `w phi_j(u)` and `w y phi_j(u)`,
+//! where `phi_j` is the product of the Chebyshev polynomials `T_1, T_2, T_4, T_8, T_16`
+//! that the binary digits of `j` name. The products span the same polynomials as
+//! `T_0, T_1, ...`, never exceed 1, and eight of them cost two vector multiplications.
+//!
+//! Readings that follow each other in one segment, as those of a joint that moves slowly,
+//! are taken side by side in the lanes of vectors; others one by one.
+
+use super::chunk::{CHUNK, Chunk};
+use super::place::{Around, Frame};
+use super::segment::{LANES, Segment};
+use crate::readings::Readings;
+use crate::simd::{InstructionSet, Kernel, Lanes, dispatch};
+
+/// One call of the inner loop.
+struct Call<'a, 'b> {
+    frame: &'a Frame,
+    around: &'a Around,
+    readings: Readings<'a>,
+    table: &'b mut [Segment],
+    squares: &'b mut f64,
+}
+
+/// Adds readings to their segments; returns the weighted sum of squared errors.
+pub fn accumulate(
+    frame: &Frame,
+    around: &Around,
+    readings: Readings<'_>,
+    table: &mut [Segment],
+) -> f64 {
+    let mut squares = 0.0;
+    let call = Call {
+        frame,
+        around,
+        readings,
+        table,
+        squares: &mut squares,
+    };
+    dispatch(InstructionSet::best(), call);
+    squares
+}
+
+impl Kernel for Call<'_, '_> {
+    /// The shapes of readings, each compiled on its own.
+    #[inline(always)]
+    fn run<L: Lanes>(self) {
+        match (self.readings.reference, self.readings.weights) {
+            (None, None) => run::<L, false, false>(self),
+            (None, Some(_)) => run::<L, false, true>(self),
+            (Some(_), None) => run::<L, true, false>(self),
+            (Some(_), Some(_)) => run::<L, true, true>(self),
+        }
+    }
+}
+
+#[inline(always)]
+fn run<L: Lanes, const DIFFERENCE: bool, const WEIGHTED: bool>(call: Call<'_, '_>) {
+    let Call {
+        frame,
+        around,
+        readings,
+        table,
+        squares: sum,
+    } = call;
+    let mut chunk = Chunk::new();
+    let mut squares = [0.0; LANES];
+    for start in (0..readings.angle.len()).step_by(CHUNK) {
+        let len = CHUNK.min(readings.angle.len() - start);
+        let angle = load(readings.angle, start, len);
+        let error = load(readings.error, start, len);
+        let reference = match readings.reference {
+            Some(values) if DIFFERENCE => load(values, start, len),
+            _ => [0.0; CHUNK],
+        };
+        chunk.weight = match readings.weights {
+            Some(values) if WEIGHTED => load(values, start, len),
+            _ => [1.0; CHUNK],
+        };
+        // What stands in for readings beyond the last does not count.
+        chunk.weight[len..].fill(0.0);
+        chunk.prepare(frame, around, &angle, &error, &reference);
+        chunk.square(&mut squares);
+        chunk.add_all::<L>(table);
+    }
+    *sum = squares.iter().sum();
+}
+
+/// `CHUNK` values from `start`, the last repeated where there are only `len`.
+#[inline(always)]
+fn load(values: &[f64], start: usize, len: usize) -> [f64; CHUNK] {
+    if let Some(full) = values[start..].first_chunk() {
+        return *full;
+    }
+    std::array::from_fn(|i| values[start + i.min(len - 1)])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::angle::Period;
+
+    /// Of sums of 1000 terms up to 1.
+    const ROUNDING: f64 = 1e-12;
+
+    fn sets() -> impl Iterator<Item = InstructionSet> {
+        use InstructionSet::{Avx2, Avx512, Portable};
+        [Avx512, Avx2, Portable]
+            .into_iter()
+            .filter(|set| set.is_available())
+    }
+
+    /// Readings in order of angle, of which many follow each other in a segment, give the
+    /// sums of the same readings in disorder, with every set of instructions.
+    #[test]
+    fn readings_side_by_side_give_the_sums_of_single_ones() {
+        let period = Period::new(360.0).unwrap();
+        let (frame, around) = (Frame::new(period, 34), Around::new(period, 0.0));
+        let of = |order: &dyn Fn(usize) -> usize, set| {
+            let angle: Vec<f64> = (0..1009).map(|i| 0.1 * order(i) as f64 - 50.0).collect();
+            let error: Vec<f64> = angle.iter().map(|x| (0.1 * x).sin()).collect();
+            let weights: Vec<f64> = angle.iter().map(|x| 2.0 + (3.0 * x).cos()).collect();
+            let (mut squares, mut table) = (0.0, vec![Segment::EMPTY; 34]);
+            let readings = Readings {
+                angle: &angle,
+                error: &error,
+                reference: None,
+                weights: Some(&weights),
+            };
+            let call = Call {
+                frame: &frame,
+                around: &around,
+                readings,
+                table: &mut table,
+                squares: &mut squares,
+            };
+            dispatch(set, call);
+            table
+        };
+        for set in sets() {
+            // 397 and the prime 1009: neighbours are far apart.
+            let (sweep, disorder) = (of(&|i| i, set), of(&|i| i * 397 % 1009, set));
+            for (a, b) in sweep.iter().zip(&disorder) {
+                for (a, b) in a.values().zip(b.values()) {
+                    assert!((a - b).abs() < ROUNDING, "{set:?}: {a} {b}");
+                }
+            }
+        }
+    }
+
+    /// Every set of instructions and every shape of readings gives the same sums.
+    #[test]
+    fn instruction_sets_agree() {
+        let sets: Vec<_> = sets().collect();
+        let period = Period::new(360.0).unwrap();
+        let frame = Frame::new(period, 34);
+        let around = Around::new(period, 2.0);
+        let angle: Vec<f64> = (0..1003)
+            .map(|i| 700.0 * (f64::from(i) * 0.618).sin())
+            .collect();
+        let error: Vec<f64> = angle.iter().map(|x| 1.5 + (0.1 * x).sin()).collect();
+        let indicated: Vec<f64> = angle
+            .iter()
+            .zip(&error)
+            .map(|(x, e)| x + e - 720.0)
+            .collect();
+        let ones = vec![1.0; angle.len()];
+        let sums = |set, readings| {
+            let (mut squares, mut table) = (0.0, vec![Segment::EMPTY; 34]);
+            let call = Call {
+                frame: &frame,
+                around: &around,
+                readings,
+                table: &mut table,
+                squares: &mut squares,
+            };
+            dispatch(set, call);
+            (squares, table)
+        };
+        let plain = Readings {
+            angle: &angle,
+            error: &error,
+            reference: None,
+            weights: None,
+        };
+        let (squares, table) = sums(sets[0], plain);
+        for set in sets {
+            for (error, reference) in [(&error, None), (&indicated, Some(&angle[..]))] {
+                for weights in [None, Some(&ones[..])] {
+                    let readings = Readings {
+                        angle: &angle,
+                        error,
+                        reference,
+                        weights,
+                    };
+                    let found = sums(set, readings);
+                    assert!((found.0 - squares).abs() < ROUNDING, "{set:?}");
+                    for (a, b) in found.1.iter().zip(&table) {
+                        for (a, b) in a.values().zip(b.values()) {
+                            assert!((a - b).abs() < ROUNDING, "{set:?}: {a} {b}");
+                        }
+                    }
+                }
+            }
+        }
+    }
+}
