@@ -93,8 +93,8 @@ impl Evaluator {
 
     /// True when what a batch needs is there, so that it takes as long as its samples.
     pub fn is_ready(&self, quantity: Quantity) -> bool {
-        quantity == Quantity::Slope
+        self.tables(quantity).polynomials.get().is_some()
+            || quantity == Quantity::Slope
             || !self.series.is_periodic()
-            || self.tables(quantity).polynomials.get().is_some()
     }
 }

@@ -4,7 +4,7 @@
 //! Any other is copied into one that is, and a result that has to go into such an array
 //! is copied there by numpy.
 
-use numpy::npyffi::{PY_ARRAY_API, npy_intp};
+use numpy::npyffi::{NpyTypes, PY_ARRAY_API, get_type_object, npy_intp};
 use numpy::{
     Element, PyArray1, PyArray2, PyArrayDescr, PyArrayDescrMethods, PyArrayDyn, PyArrayMethods,
     PyUntypedArray, PyUntypedArrayMethods, dtype,
@@ -82,21 +82,33 @@ impl Kind {
     }
 }
 
+/// Most dimensions of an array of numpy.
+const MOST_DIMENSIONS: usize = 64;
+
 /// A new array whose elements are to be written before they are seen, or `MemoryError`.
 pub fn empty<'py, T: Element>(
     py: Python<'py>,
     shape: &[usize],
     fortran: bool,
 ) -> PyResult<Bound<'py, PyUntypedArray>> {
-    let mut lengths: Vec<npy_intp> = shape.iter().map(|&n| n as npy_intp).collect();
-    // SAFETY: numpy takes over the reference to the dtype, and reads the lengths.
+    // As many dimensions as numpy has, without an allocation.
+    let mut lengths: [npy_intp; MOST_DIMENSIONS] = [0; MOST_DIMENSIONS];
+    for (length, &n) in lengths.iter_mut().zip(shape) {
+        *length = n as npy_intp;
+    }
+    // SAFETY: numpy takes over the reference to the dtype, and reads as many lengths as
+    // there are dimensions, which are those of an array that exists.
     unsafe {
-        let array = PY_ARRAY_API.PyArray_Empty(
+        let array = PY_ARRAY_API.PyArray_NewFromDescr(
             py,
-            lengths.len() as _,
-            lengths.as_mut_ptr(),
+            get_type_object(py, NpyTypes::PyArray_Type),
             dtype::<T>(py).into_dtype_ptr(),
+            shape.len() as _,
+            lengths.as_mut_ptr(),
+            std::ptr::null_mut(),
+            std::ptr::null_mut(),
             fortran.into(),
+            std::ptr::null_mut(),
         );
         Ok(Bound::from_owned_ptr_or_err(py, array)?.cast_into_unchecked())
     }

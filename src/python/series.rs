@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use numpy::{PyUntypedArray, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 
 use super::door::{self, Computation, Computed};
@@ -254,10 +255,10 @@ impl PySeries {
         stretch: Option<(f64, f64, bool)>,
     ) -> PyResult<Computed<'py>> {
         let py = x.py();
-        let samples = if is_number(x) {
-            1
-        } else {
-            x.len().unwrap_or(1)
+        let samples = match x.cast_exact::<PyUntypedArray>() {
+            Ok(array) => array.len(),
+            Err(_) if is_number(x) => 1,
+            Err(_) => usize::MAX, // not known yet
         };
         let period = self.evaluator.series().period().value();
         let mut wish = Wish {
