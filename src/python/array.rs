@@ -127,6 +127,13 @@ pub fn vector<'py, T: Element + Copy>(
     }
 }
 
+/// The elements of a contiguous array.
+pub fn slice<'a>(array: &'a Bound<'_, PyArray1<f64>>) -> PyResult<&'a [f64]> {
+    // SAFETY: as everywhere in numpy, a caller who changes an array in another thread
+    // meanwhile gets undefined values.
+    Ok(unsafe { array.as_slice() }?)
+}
+
 /// Rows one after the other as a square matrix, or `MemoryError`.
 pub fn square<'py>(
     py: Python<'py>,

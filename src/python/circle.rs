@@ -1,8 +1,9 @@
 //! Statistics of angles on the circle.
 
-use numpy::{PyReadonlyArray1, PyReadwriteArray1};
+use numpy::{PyArray1, PyReadonlyArray1, PyReadwriteArray1};
 use pyo3::prelude::*;
 
+use super::array::slice;
 use super::release::detached;
 use crate::check::same_length;
 use crate::circle;
@@ -43,13 +44,10 @@ pub fn residuals(
 #[pyfunction]
 pub fn covered_span(
     py: Python<'_>,
-    angles: Vec<PyReadonlyArray1<'_, f64>>,
+    angles: Vec<Bound<'_, PyArray1<f64>>>,
     period: f64,
 ) -> PyResult<(f64, f64, bool)> {
-    let slices = angles
-        .iter()
-        .map(|array| array.as_slice())
-        .collect::<Result<Vec<_>, _>>()?;
+    let slices = angles.iter().map(slice).collect::<PyResult<Vec<_>>>()?;
     let span = detached(py, || circle::covered_span(&slices, period))?;
     Ok((span.start, span.stop, span.full))
 }

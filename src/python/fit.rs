@@ -3,7 +3,7 @@
 use numpy::{PyArray1, PyArray2, PyReadonlyArray1};
 use pyo3::prelude::*;
 
-use super::array::{data, empty, square, vector};
+use super::array::{data, empty, slice, square, vector};
 use super::failure::argument_error;
 use super::number;
 use super::release::{attached, detached};
@@ -15,10 +15,13 @@ use crate::fit as core;
 use crate::fit::{Argument, Method, Options, Run};
 use crate::memory;
 
+/// Columns of one run. They are not borrowed one by one: the book that `numpy` keeps of
+/// borrows is searched from one end for arrays of one memory, and runs are often parts of
+/// one table.
 type Readings<'py> = (
-    PyReadonlyArray1<'py, f64>,
-    PyReadonlyArray1<'py, f64>,
-    Option<PyReadonlyArray1<'py, f64>>,
+    Bound<'py, PyArray1<f64>>,
+    Bound<'py, PyArray1<f64>>,
+    Option<Bound<'py, PyArray1<f64>>>,
 );
 
 /// Matrices of its size that are made beside a covariance.
@@ -247,12 +250,9 @@ pub fn sizes(design: &Design) -> Vec<usize> {
 fn slices<'a>(run: &'a Readings<'_>) -> PyResult<Run<'a>> {
     let (reference, indicated, weights) = run;
     Ok(Run {
-        reference: reference.as_slice()?,
-        indicated: indicated.as_slice()?,
-        weights: match weights {
-            Some(weights) => Some(weights.as_slice()?),
-            None => None,
-        },
+        reference: slice(reference)?,
+        indicated: slice(indicated)?,
+        weights: weights.as_ref().map(slice).transpose()?,
     })
 }
 
