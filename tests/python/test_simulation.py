@@ -69,6 +69,7 @@ SAMPLES = {
     "heteroscedastic_noise": {"cosine": 0.5},
     "current_coupling": {"arcsec_per_A": 1.0},
     "clock_drift": {"ppm": 50.0},
+    "varying_line": {"order": 3.0, "follows": "speed", "amplitude_arcsec": 0.2},
     "wrong_gear_ratio": {"gear_ratio": 80.0},
     "timestamp_jitter": {"sigma_s": 2e-5},
     "quantisation": {"step_arcsec": 5.0},

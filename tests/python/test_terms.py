@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 import trueangle as ta
 from trueangle import errors
-from trueangle.terms import TERMS, ChannelSkew, DirectionalPattern
+from trueangle.terms import TERMS, ChannelSkew, DirectionalPattern, VaryingLine
 
 numbers = st.floats(-1e-3, 1e-3)
 lines = st.lists(st.tuples(st.floats(0.5, 500.0), numbers, numbers), max_size=3).map(
@@ -29,6 +29,7 @@ def any_terms(draw):
         ),
         DirectionalPattern(**draw(lines)),
         ChannelSkew(draw(numbers), draw(st.floats(0.5, 500.0)), draw(numbers)),
+        VaryingLine(**draw(lines), follows=draw(st.sampled_from(["speed", "torque"]))),
         ta.Latency(draw(numbers)),
         ta.FilterLag(draw(st.floats(0.1, 1e4))),
         ta.ThermalDrift(draw(numbers), draw(numbers), **draw(lines), reference_C=draw(numbers)),

@@ -37,6 +37,9 @@ TABLES = {
     },
     "presliding_hysteresis": {"amplitude_arcsec": 20.0, "length_deg": 3.0, "start_state": 1.0},
     "latency": {"delay_s": 4e-4},
+    "varying_line": {
+        "order": 3.0, "follows": "speed", "amplitude_arcsec": 0.4, "phase_deg": 70.0
+    },
     "channel_skew": {"delay_s": 2e-4, "order": 100.0, "phase_deg": 40.0},
     "filter_lag": {"cutoff_hz": 60.0, "damping": 0.7},
     "thermal_drift": {
@@ -128,7 +131,7 @@ def test_no_parameter_of_an_effect_is_dropped_on_the_way_to_its_term(kind):
     as_it_is = terms_from_effects([effect(kind)], 360.0, JOINT.shafts)
     for name, value in table.items():
         if isinstance(value, str):
-            other = {"absolute": "signed", "motor": "output"}[value]
+            other = {"absolute": "signed", "motor": "output", "speed": "velocity"}[value]
         elif isinstance(value, list):
             other = [[x[0], 1.5 * x[1], x[2]] if isinstance(x, list) else 1.5 * x for x in value]
         else:

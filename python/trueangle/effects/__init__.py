@@ -36,6 +36,7 @@ from .drift_within_run import DriftWithinRun as DriftWithinRun
 from .clock_drift import ClockDrift as ClockDrift
 from .non_integer_order import NonIntegerOrder as NonIntegerOrder
 from .time_periodic import TimePeriodic as TimePeriodic
+from .varying_line import VaryingLine as VaryingLine
 from .outliers import Outliers as Outliers
 from .heteroscedastic_noise import HeteroscedasticNoise as HeteroscedasticNoise
 from .timestamp_jitter import TimestampJitter as TimestampJitter

@@ -25,6 +25,7 @@ from ..effects.presliding_hysteresis import PreslidingHysteresisTerm as Preslidi
 from ..effects.stiffening_compliance import StiffeningComplianceTerm as StiffeningCompliance
 from ..effects.thermal_drift import ThermalDriftTerm as ThermalDrift
 from ..effects.torsional_compliance import TorsionalComplianceTerm as TorsionalCompliance
+from ..effects.varying_line import VaryingLineTerm as VaryingLine
 
 __all__ = [
     "TERMS",
@@ -40,6 +41,7 @@ __all__ = [
     "Term",
     "ThermalDrift",
     "TorsionalCompliance",
+    "VaryingLine",
 ]
 
 __doc__ = "\n".join(

@@ -1,0 +1,162 @@
+"""A line whose amplitude or phase follows speed or load, and that no narrower cause explains."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+
+from ..correction import forms
+from ..correction.forms import Form
+from ..correction.term import Term, line_values
+from ..joint.pattern import Surroundings, line_columns, line_sum
+from ..joint.signals import Signals
+from ..regression.estimate import Parameters, quantity
+from ..regression.extension import Extension
+from ..regression.regression import Regression
+from .channel_skew import ChannelSkew, sensor_order
+from .effect import ALWAYS, Effect
+from .filter_lag import FilterLag
+from .load_dependent_gear_error import LoadDependentGearError
+from .search import Array, Fitted, best_shape, is_gear_order, line_parameters
+
+__all__ = ["VaryingLine", "VaryingLineTerm"]
+
+#: Lines at most, and the price of a broad cause: one of so many beside every narrow one.
+MOST_LINES = 2
+BROAD = 8.0
+
+
+@dataclass(frozen=True)
+class VaryingLine(Effect):
+    r"""A line times a factor: :math:`\varepsilon = x\,C \sin(m\theta + \varphi)`.
+
+    Parameters
+    ----------
+    order : float
+        m, of the output.
+    follows : {"speed", "velocity", "torque"}
+        x: the absolute or the signed speed in deg/s, or the torque in Nm.
+    amplitude_arcsec : float
+        C, per unit of x.
+    phase_deg : float
+    """
+
+    order: float
+    follows: str
+    amplitude_arcsec: float
+    phase_deg: float = 0.0
+
+    kind: ClassVar[str] = "varying_line"
+    sentence: ClassVar[str] = (
+        "A line of a shaft grows, shrinks or turns with speed or load, in a form that no "
+        "narrower cause has."
+    )
+    factor: ClassVar[str] = "velocity"
+    confused_with: ClassVar[Mapping[type[Effect], str]] = {
+        FilterLag: "three speeds: a filter's lines bend with speed, and all of them",
+        ChannelSkew: "angles dense enough for twice the sensor's order",
+        LoadDependentGearError: "three loads of both signs",
+    }
+    measure: ClassVar[str] = "three speeds and three loads, at free angles"
+    flexible_below: ClassVar[float] = ALWAYS
+    changes_lines: ClassVar[bool] = True
+    located: ClassVar[bool] = True
+
+    def signal(self, signals: Signals, around: Surroundings, rng: np.random.Generator) -> Array:
+        scale = _scale(signals, self.follows)
+        if scale is None:
+            return np.zeros(len(signals))
+        return scale * line_sum(
+            signals.theta, ((self.order, self.amplitude_arcsec, self.phase_deg),)
+        )
+
+    @classmethod
+    def propose(cls, regression: Regression) -> Extension | None:
+        signals, around = regression.signals, regression.around
+        if sum(term.cause == cls.kind for term in regression.terms) >= MOST_LINES:
+            return None
+        orders = regression.lines.orders[regression.lines.plausible]
+        shapes: list[dict[str, Any]] = []
+        for follows in ("speed", "velocity", "torque"):
+            scale = _scale(signals, follows)
+            if scale is None or np.ptp(scale) == 0.0:
+                continue
+            shapes += [
+                {"order": float(m), "follows": follows}
+                for m in orders
+                if not (follows == "velocity" and m == sensor_order(around.joint))
+                and not (follows == "torque" and (m == 1.0 or is_gear_order(around, float(m))))
+            ]
+        log_grid = float(np.log(BROAD * max(len(shapes), 1)))
+        return best_shape(cls, regression, shapes, [log_grid] * len(shapes))
+
+    @classmethod
+    def columns(cls, signals: Signals, around: Surroundings, shape: dict[str, Any]) -> Array:
+        scale = _scale(signals, shape["follows"])
+        assert scale is not None
+        return scale[:, None] * line_columns(signals.theta, shape["order"])
+
+    @classmethod
+    def report(
+        cls, regression: Regression, terms: Sequence[Fitted]
+    ) -> tuple[Parameters, list[Effect]]:
+        rows = [(t.shape["order"], t.shape["follows"], *line_parameters(c, v)) for t, c, v in terms]
+        orders, follows, amplitudes, phases, stds, phase_stds = zip(*rows, strict=True)
+        parameters = {
+            "order": quantity(orders[0] if len(rows) == 1 else orders),
+            "factor": quantity(follows[0] if len(rows) == 1 else follows),
+            "coefficients": quantity(amplitudes, stds),
+            "phases_deg": quantity(phases, phase_stds),
+        }
+        return parameters, [VaryingLine(*row[:4]) for row in rows]
+
+    def to_terms(self, period: float, shafts: Mapping[str, float]) -> tuple[Term, ...]:
+        per_unit = 1.0 if self.follows == "torque" else 360.0 / period
+        lines = ((self.order, self.amplitude_arcsec * per_unit, self.phase_deg),)
+        return (VaryingLineTerm(follows=self.follows, **line_values(lines, period)),)
+
+
+@dataclass(frozen=True, repr=False)
+class VaryingLineTerm(Term):
+    r"""A line times a signal.
+
+    .. math:: \varepsilon = x\,\sum_m A_m \cos m\varphi + B_m \sin m\varphi
+
+    Parameters
+    ----------
+    orders, cosine, sine : sequence of float
+        Output orders (positive) and coefficients per unit of x.
+    follows : {"speed", "velocity", "torque"}
+        x: the absolute or the signed velocity in the model's unit, or the torque in Nm.
+    """
+
+    orders: tuple[float, ...]
+    cosine: tuple[float, ...]
+    sine: tuple[float, ...]
+    follows: str = "velocity"
+
+    kind: ClassVar[str] = "varying_line"
+
+    @property
+    def needs(self) -> tuple[str, ...]:
+        return ("torque",) if self.follows == "torque" else ("velocity",)
+
+    def check(self) -> None:
+        self._check_lines()
+        if self.follows not in ("speed", "velocity", "torque"):
+            raise self._out_of_range("follows", "'speed', 'velocity' or 'torque'")
+
+    def forms(self) -> tuple[Form, ...]:
+        (signal,) = self.needs
+        return (forms.Scaled(signal, lines=self.lines, absolute=self.follows == "speed"),)
+
+
+def _scale(signals: Signals, follows: str) -> Array | None:
+    if follows == "torque":
+        return signals.torque
+    if signals.velocity is None:
+        return None
+    return np.abs(signals.velocity) if follows == "speed" else signals.velocity
