@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from ..errors import ArgumentError
 from ..files import MODEL, SIMULATION
 from .paths import Input, Output
-from .signal_options import add_signals, reading
+from .signal_options import add_signals
 
 if TYPE_CHECKING:
     from ..diagnosis import Diagnosis
@@ -44,8 +44,8 @@ def run(args: argparse.Namespace) -> int:
     """Print the diagnosis."""
     from ..diagnosis import diagnose
     from ..modelfile import load_model
-    from ..runfiles import read_runs
     from ..simulation import load_simulation
+    from .run_lists import read_checked
 
     if (args.model is None) != (args.corrected_model is None):
         raise ArgumentError(
@@ -53,7 +53,7 @@ def run(args: argparse.Namespace) -> int:
             "belong together"
         )
     simulation = load_simulation(args.simulation)
-    runs = read_runs(args.runs, **reading(args))
+    runs = read_checked(args)
     result = diagnose(runs, simulation)
     if args.extend:
         result.extended.save(args.extend)

@@ -10,7 +10,6 @@ from ..files import PDF, REPORT
 from .fit import add_joint
 from .order_lists import orders_by_shaft
 from .paths import Input, Output
-from .signal_options import reading
 
 HELP = "write a report on calibration runs: one HTML page, or a PDF"
 EXAMPLE = "trueangle report joint_a.csv --simulation joint.toml -o report.html"
@@ -57,11 +56,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Write the report."""
     from ..reports import report
-    from ..runfiles import read_runs
+    from .run_lists import read_checked
 
     if args.certificate is not None and args.pdf is not None:
         raise ArgumentError("--pdf prints a report; a certificate is a PDF itself: give it by -o")
-    runs = read_runs(args.runs, **reading(args))
+    runs = read_checked(args)
     simulation = None
     if args.simulation is not None:
         from ..simulation import load_simulation

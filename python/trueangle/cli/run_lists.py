@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import sys
 from collections.abc import Sequence
 
 from ..errors import ArgumentError
@@ -22,7 +23,7 @@ def read_selected(args: argparse.Namespace) -> list[CalibrationRun]:
     ArgumentError
         A label that no run has; names those there are.
     """
-    runs = read_runs(args.runs, **reading(args))
+    runs = read_checked(args)
     labels: list[str] = args.run or []
     if not labels:
         return runs
@@ -39,6 +40,17 @@ def read_selected(args: argparse.Namespace) -> list[CalibrationRun]:
             f"the runs are {listed(known)}"
         )
     return [run for run in runs if run.label in labels]
+
+
+def read_checked(args: argparse.Namespace) -> list[CalibrationRun]:
+    """Runs of the files; faults of the data are told on stderr, in the words of ``check``."""
+    from ..checks.check import faults_of
+    from ..checks.record import records_of
+
+    runs = read_runs(args.runs, **reading(args))
+    for fault in faults_of(records_of(runs)):
+        print(f"trueangle: warning: {fault}", file=sys.stderr)
+    return runs
 
 
 def listed(names: Sequence[str], most: int = 12) -> str:

@@ -21,6 +21,7 @@ from .beliefs import LEVEL, Belief, judge_line, verdict_of_factor
 from .gain import measure_belief_gains
 from .identifiability import doubts_about
 from .selection import NEW_CAUSE
+from .unnamed import effect_of
 
 __all__ = ["corrected_effects", "judged_beliefs", "scaled"]
 
@@ -151,7 +152,7 @@ def _lines(
     regression: Regression, sim: Simulation, spots: list[Blindness], with_gain: bool
 ) -> tuple[list[Belief], tuple[Harmonic, ...]]:
     pattern, joint = regression.belief.pattern, regression.belief.joint
-    if pattern.orders.size == 0 or any(EFFECTS[t.cause].changes_lines for t in regression.terms):
+    if pattern.orders.size == 0 or any(effect_of(t.cause).changes_lines for t in regression.terms):
         return [], sim.harmonics
     modulated = {term.shape["carrier"] for term in regression.terms if "carrier" in term.shape}
     found: list[Belief] = []
@@ -162,7 +163,7 @@ def _lines(
             continue  # modulation takes from its carrier what it gives to the sidebands
         where = slice(1 + 2 * k, 3 + 2 * k)
         change = regression.coefficients[where]
-        spread = regression.unscaled_covariance[where, where] * regression.variance
+        spread = regression.robust(where)
         shaft, number = joint.name_order(float(order)) or ("output", float(order))
         what = f"{shaft} order {number:g}"
         belief = judge_line(what, (pattern.cosine[k], pattern.sine[k]), change, spread)

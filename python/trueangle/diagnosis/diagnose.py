@@ -15,17 +15,21 @@ from ..effects.blindness import Blindness
 from ..effects.scatter import NEW_SCATTER, ScatterFinding
 from ..errors import ArgumentError
 from ..joint.signals import Signals, join_runs
+from ..regression.estimate import quantity
 from ..regression.regression import Regression
 from ..runs import CalibrationRun, as_runs
 from ..simulation.simulation import Simulation
 from .believed import corrected_effects, judged_beliefs
 from .discrepancy import compare, unfolded_error
-from .findings import Diagnosis
+from .findings import Diagnosis, Finding
+from .gearratio import CAUSE as WRONG_RATIO
+from .gearratio import Ratio, aligned, find_ratio
 from .goodness import goodness_of_fit
 from .identifiability import blind_spots
 from .named import findings_of, scatter_doubt, scatter_finding
 from .remainder import leftover_of, unexplained_after
 from .selection import NEW_CAUSE, misfit, select, total_penalty
+from .unnamed import is_named
 
 __all__ = ["MOST_READINGS", "diagnose"]
 
@@ -100,6 +104,11 @@ def diagnose(
             f"{len(every)} readings cannot support a diagnosis: give at least {LEAST_READINGS}"
         )
     error = unfolded_error(found)
+    stated = sim
+    ratio = find_ratio(sim, every, error)
+    if ratio is not None:
+        sim = ratio.simulation
+        every = aligned(sim, every, error)
     rows = _subsample(len(every))
     signals = every if rows is None else every.take(rows)
     part = error if rows is None else error[rows]
@@ -124,11 +133,13 @@ def diagnose(
             spots.append(scatter_doubt(item))
         else:
             findings.append(scatter_finding(item, rest.found))
+    if ratio is not None:
+        findings.append(_ratio_finding(ratio))
     findings.sort(key=lambda finding: (not finding.confirmed, -finding.evidence["bic_gain"]))
     extended = corrected.with_effects(
         effect for finding in findings if finding.confirmed for effect in finding.effects
     )
-    residual = error - sim.predict(every)
+    residual = error - stated.predict(every)
     before = goodness_of_fit(
         leftover_of(signals, residual if rows is None else residual[rows]),
         float(start.lines.orders.max()),
@@ -150,6 +161,17 @@ def diagnose(
         beliefs,
         faults_of(records_of(found)),
     )
+
+
+def _ratio_finding(ratio: Ratio) -> Finding:
+    """All lines of the geared shafts at another ratio, as one cause."""
+    parameters = {
+        "gear_ratio": quantity(ratio.gear_ratio, ratio.std),
+        "believed_gear_ratio": quantity(ratio.believed),
+        "share_found": quantity(ratio.found),
+    }
+    z = (ratio.gear_ratio - ratio.believed) / max(ratio.std, 1e-300)
+    return Finding(WRONG_RATIO, parameters, {"bic_gain": min(z * z, 1e12)}, None, [])
 
 
 @dataclass(frozen=True)
@@ -174,6 +196,8 @@ def _account(signals: Signals, error: Array, sim: Simulation) -> _Account:
         scatter.append(uneven)
         start = Regression(signals, residual, sim.surroundings, uneven.weights, start.lines)
         chosen = select(start, chosen.terms)
+    if not all(map(is_named, chosen.terms)) and not unexplained_after(chosen).found:
+        chosen = select(start, unnamed=False)
     scatter += [i for i in _scatter(chosen, weighs=False) if i.bic_gain > NEW_CAUSE]
     return _Account(start, chosen, scatter, spots)
 

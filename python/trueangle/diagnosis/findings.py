@@ -17,6 +17,7 @@ from .confirmation import CONFIRMED
 from .correction import extend_model
 from .discrepancy import Discrepancy
 from .gain import Gain
+from .gearratio import SENTENCE as WRONG_RATIO_SENTENCE
 from .goodness import Unexplained
 
 if TYPE_CHECKING:
@@ -72,7 +73,7 @@ class Finding:
     @property
     def sentence(self) -> str:
         """The physics in one sentence."""
-        return EFFECTS[self.cause].sentence
+        return EFFECTS[self.cause].sentence if self.cause in EFFECTS else WRONG_RATIO_SENTENCE
 
     def to_json(self) -> dict[str, Any]:
         """The entry of ``findings``."""
@@ -85,7 +86,7 @@ class Finding:
             "gain": None if self.gain is None else self.gain.to_json(),
             "rivals": [{"cause": cause, "bic_gap": gap} for cause, gap in self.rivals],
             "physics": self.sentence,
-            "correctable": not EFFECTS[self.cause].not_at_run_time,
+            "correctable": self.cause not in EFFECTS or not EFFECTS[self.cause].not_at_run_time,
         }
 
 

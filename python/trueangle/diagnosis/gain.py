@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..effects import EFFECTS
 from ..joint.signals import Signals
 from ..regression.regression import Regression
 from .holdout import held_out, numbers, part, rebuilt, reducible_share, residual_at
 from .levels import LevelGain, gains_by_level
+from .unnamed import effect_of
 
 __all__ = ["Gain", "measure_belief_gains", "measure_gain"]
 
@@ -86,7 +86,7 @@ def measure_gain(
     unit, what = _units(regression)
     count = int(unit.max()) + 1
     folds = rng.permutation(count) % min(FOLDS, count)
-    own_zero = any(EFFECTS[term.cause].draws_zeros for term in regression.terms)
+    own_zero = any(effect_of(term.cause).draws_zeros for term in regression.terms)
     left = np.zeros((len(groups) + 1, regression.n))
     for fold in range(int(folds.max()) + 1):
         test = folds[unit] == fold
@@ -98,7 +98,7 @@ def measure_gain(
     for k, group in enumerate(groups):
         cause = regression.terms[group[0]].cause
         before, after = left[k + 1][clean], left[0][clean]
-        transfers = EFFECTS[cause].transfers
+        transfers = effect_of(cause).transfers
         share = interval = control = None
         if transfers:
             share, interval = reducible_share(before, after, unit[clean], regression.variance, rng)
@@ -129,7 +129,7 @@ def measure_belief_gains(
     rng = np.random.default_rng(seed)
     unit, what = _units(regression)
     folds = rng.permutation(int(unit.max()) + 1) % min(FOLDS, int(unit.max()) + 1)
-    own_zero = any(EFFECTS[term.cause].draws_zeros for term in regression.terms)
+    own_zero = any(effect_of(term.cause).draws_zeros for term in regression.terms)
     left = np.zeros((len(columns) + 1, regression.n))
     for fold in range(int(folds.max()) + 1):
         test = folds[unit] == fold
@@ -185,10 +185,10 @@ def _control(
     test = unit % 2 == 0
     shares = []
     for _ in range(SHUFFLES):
-        signals = _shuffled(regression.signals, EFFECTS[cause].factor, unit, rng)
+        signals = _shuffled(regression.signals, effect_of(cause).factor, unit, rng)
         columns = np.hstack(
             [
-                EFFECTS[cause].columns(signals, regression.around, regression.terms[k].shape)
+                effect_of(cause).columns(signals, regression.around, regression.terms[k].shape)
                 for k in group
             ]
         )

@@ -8,11 +8,11 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..effects import EFFECTS
 from ..joint.pattern import line_columns
 from ..joint.signals import Signals
 from ..regression.regression import Extension, Regression
 from ..regression.whitening import RunEffect
+from .unnamed import effect_of
 
 __all__ = ["held_out", "numbers", "part", "rebuilt", "reducible_share", "residual_at"]
 
@@ -42,7 +42,7 @@ def held_out(
     full = train.with_terms(terms)
     for group in groups[: SEARCHED if search else 0]:
         cause = regression.terms[group[0]].cause
-        if EFFECTS[cause].located and EFFECTS[cause].transfers:
+        if effect_of(cause).located and effect_of(cause).transfers:
             full = _searched_again(full, group)
     signals = regression.signals.take(test)
     results = [residual_at(full, signals, regression.residual[test], own_zero)]
@@ -79,7 +79,7 @@ def _searched_again(full: Regression, group: Sequence[int]) -> Regression:
     current = full.with_terms(kept)
     found: list[Extension] = []
     for k in group:
-        extension = EFFECTS[terms[k].cause].propose(current)
+        extension = effect_of(terms[k].cause).propose(current)
         if extension is None or extension.cause != terms[k].cause:
             break
         found.append(extension)
@@ -101,8 +101,8 @@ def residual_at(fitted: Regression, signals: Signals, residual: Array, own_zero:
     )
     left = residual - base @ fitted.coefficients[: base.shape[1]]
     for term, coefficients in fitted.fitted():
-        if coefficients.size and EFFECTS[term.cause].transfers:
-            columns = EFFECTS[term.cause].columns(signals, fitted.around, term.shape)
+        if coefficients.size and effect_of(term.cause).transfers:
+            columns = effect_of(term.cause).columns(signals, fitted.around, term.shape)
             left = left - columns @ coefficients
     if own_zero:
         for start, stop in signals.run_bounds():

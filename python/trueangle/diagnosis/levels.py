@@ -12,10 +12,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..effects import EFFECTS
 from ..joint.signals import Signals
 from ..regression.regression import Regression
 from .holdout import held_out, numbers, part, rebuilt, reducible_share
+from .unnamed import effect_of
 
 __all__ = ["UNITS", "LevelGain", "gains_by_level", "run_levels"]
 
@@ -149,7 +149,7 @@ def gains_by_level(
         concerned = [
             k
             for k, cause in enumerate(causes)
-            if EFFECTS[cause].factor == factor and EFFECTS[cause].transfers
+            if effect_of(cause).factor == factor and effect_of(cause).transfers
         ]
         split = run_levels(regression.signals, factor) if concerned else None
         if split is None:

@@ -15,6 +15,7 @@ from .findings import Finding
 from .gain import Gain, measure_gain
 from .identifiability import doubts_about
 from .selection import cause_terms, extensions, finding_groups, is_flexible, propose
+from .unnamed import is_named
 
 __all__ = ["findings_of", "scatter_doubt", "scatter_finding"]
 
@@ -33,6 +34,8 @@ def findings_of(
     groups = finding_groups(regression.terms)
     named = []
     for group in groups:
+        if not is_named(regression.terms[group[0]]):
+            continue
         doubt = doubts_about(regression.terms[group[0]], regression, spots)
         if doubt is None:
             named.append(group)
@@ -47,7 +50,7 @@ def findings_of(
     fitted = regression.fitted()
     findings: list[Finding] = []
     for group, gain in zip(named, gains, strict=True):
-        terms = [(*fitted[k], regression.covariance(k)) for k in group]
+        terms = [(*fitted[k], regression.robust_covariance(k)) for k in group]
         cause = terms[0][0].cause
         parameters, effects = EFFECTS[cause].report(regression, terms)
         rivals = _rivals(regression, group) if len(findings) < RIVALLED else []

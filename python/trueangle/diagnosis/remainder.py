@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from ..joint.signals import Signals
 from ..regression.regression import Regression
 from .goodness import Leftover, Unexplained, goodness_of_fit
+from .unnamed import is_named
 
 __all__ = ["leftover_of", "remainder_of", "unexplained_after"]
 
@@ -35,8 +36,15 @@ def leftover_of(signals: Signals, residual: Array) -> Leftover:
 
 
 def remainder_of(regression: Regression) -> Leftover:
-    """What a regression leaves: run effects taken off, outliers put to the limit."""
-    left = regression.left - regression.whiten.run_part(regression.left)
+    """What a regression leaves: run effects taken off, outliers put to the limit.
+
+    Structure without a name is left in it.
+    """
+    effects = [is_named(term) for term in regression.terms if term.run_effect is not None]
+    left = regression.left - regression.whiten.run_part(regression.left, effects)
+    for term, coefficients in regression.fitted():
+        if not is_named(term) and coefficients.size:
+            left = left + term.columns @ coefficients
     kept = left[~regression.outlying]
     if regression.outlying.any() and kept.size:
         left = np.clip(left, float(kept.min()), float(kept.max()))

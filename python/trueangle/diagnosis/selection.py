@@ -12,6 +12,9 @@ from ..effects.effect import ALWAYS
 from ..effects.missing_order import MissingOrder
 from ..effects.zero_slip import ZeroSlip
 from ..regression.regression import Extension, Regression
+from .goodness import estimate_noise
+from .remainder import remainder_of
+from .unnamed import UNNAMED, effect_of, is_named
 
 __all__ = [
     "NEW_CAUSE",
@@ -30,12 +33,21 @@ __all__ = [
 #: Kass and Raftery call strong, odds of 20 to 1.
 NEW_CAUSE = 6.0
 
-#: Share of the deviance explained so far that a further cause, or a form of its own for one,
+#: Share of the energy explained so far that a further cause, or a form of its own for one,
 #: must bring as well: a form known to 3 % leaves 0.1 % of its energy, and no cause.
 FORM = 1e-3
 
 #: Terms at most.
 MOST_TERMS = 14
+
+#: Findings from which on an account is suspected of taking up what has no name.
+MANY = 3
+
+#: Evidence by which structure without a name must win for other paths not to be tried.
+DECISIVE = 100.0
+
+#: Correlations of the noise that are one.
+SAME_CORRELATION = 0.02
 
 
 def on_runs() -> list[str]:
@@ -48,24 +60,73 @@ def is_flexible(effect: type[Effect]) -> bool:
     return effect.flexible_below == ALWAYS
 
 
-def select(regression: Regression, known: Sequence[Extension] = ()) -> Regression:
-    """The regression with the causes that its readings support.
+def select(
+    regression: Regression, known: Sequence[Extension] = (), unnamed: bool = True
+) -> Regression:
+    """The regression with the causes that its readings support, priced by the noise found.
 
-    Forward selection with every candidate; where that takes a flexible cause (which can
+    Where flexible causes were taken, or many, structure without a name competes with all
+    (`trueangle.diagnosis.unnamed`): what it explains better has no name. Terms ``known`` from
+    the same readings with other weights are a start that needs no further path.
+    """
+    if known:
+        known_too = _pruned(_forward(regression.with_terms(known), list(EFFECTS)))
+        return _priced_with_noise(_made_specific(known_too))
+    direct = _pruned(_forward(regression, list(EFFECTS)))
+    if not (unnamed and _doubtful(direct)):
+        return _priced_with_noise(_by_other_paths(regression, direct))
+    opened = _pruned(_forward(regression, [*EFFECTS, *UNNAMED]))
+    if all(map(is_named, opened.terms)):
+        return _priced_with_noise(_by_other_paths(regression, direct))
+    # The other paths take long: the first of them tells whether they stand a chance.
+    specific_first = _pruned(_forward(_forward(regression, on_runs()), list(EFFECTS)))
+    chosen = min(direct, specific_first, key=total_penalty)
+    if total_penalty(opened) > total_penalty(chosen) - DECISIVE:
+        chosen = _by_other_paths(regression, chosen)
+    return _priced_with_noise(min(chosen, opened, key=total_penalty))
+
+
+def _doubtful(regression: Regression) -> bool:
+    """Flexible causes, or many: what an effect without a name is taken for."""
+    terms = regression.terms
+    flexible = any(is_flexible(effect_of(term.cause)) for term in terms)
+    return flexible or len(finding_groups(terms)) >= MANY
+
+
+def _priced_with_noise(regression: Regression) -> Regression:
+    """Causes that the noise's own correlation does not pay for are dropped.
+
+    It is estimated beside a flexible pattern; what selection took for it, with wander taken
+    out, is too low for noise that is correlated over many readings, and run means then look
+    significant. A wander in time competes with correlation alone.
+    """
+    noise = estimate_noise(remainder_of(regression))
+    tried = [regression]
+    if noise.correlation > regression.whiten.rho + SAME_CORRELATION:
+        tried.append(_pruned(regression.with_terms(regression.terms, noise.correlation)))
+    plain = [t for t in regression.terms if t.run_effect is None or not is_named(t)]
+    if len(plain) < len(regression.terms):
+        rest = regression.with_terms(plain)
+        noise = estimate_noise(remainder_of(rest))
+        if noise.correlation > 0.0:
+            tried.append(_pruned(rest.with_terms(plain, noise.correlation)))
+    return min(tried, key=total_penalty)
+
+
+def _by_other_paths(regression: Regression, direct: Regression) -> Regression:
+    """The best of a first choice among all causes and of choices by other paths.
+
+    Where forward selection with every candidate takes a flexible cause (which can
     imitate any effect of a run) or, over a part of a turn, a bump, further paths take
     those only after the specific ones had their say, without and with a zero of each
     run's own (or with what acts on whole runs beside an error that repeats at the same
     angle, or with the lines of shafts that the joint declares). All are pruned
-    backward; the best by BIC is kept. Terms ``known`` from the same readings with other
-    weights are a start that needs no further path.
+    backward; the best by BIC is kept.
     """
-    if known:
-        return _made_specific(_pruned(_forward(regression.with_terms(known), list(EFFECTS))))
-    direct = _pruned(_forward(regression, list(EFFECTS)))
     found = {term.cause for term in direct.terms}
     # Over a part of a turn a bump, too, can stand for several lines at once: lines first.
     travel = regression.signals.run_turns().max()
-    if not any(travel < EFFECTS[cause].flexible_below for cause in found):
+    if not any(travel < effect_of(cause).flexible_below for cause in found):
         return direct
     specific = [cause for cause, effect in EFFECTS.items() if not effect.flexible_below]
     starts = [_forward(regression, on_runs())]
@@ -74,7 +135,7 @@ def select(regression: Regression, known: Sequence[Extension] = ()) -> Regressio
         # What acts on whole runs shows best beside an unknown pattern that repeats.
         settled = _forward(_forward(beyond, on_runs()), (ZeroSlip.kind,))
         starts.append(regression.with_terms(settled.terms))
-    elif any(is_flexible(EFFECTS[cause]) for cause in found):
+    elif any(is_flexible(effect_of(cause)) for cause in found):
         slip = ZeroSlip.propose(regression)
         if slip is not None and slip.bic_gain > NEW_CAUSE:
             starts.append(regression.with_terms([slip]))
@@ -100,7 +161,7 @@ def _with_declared_lines(regression: Regression) -> Regression:
 
 def _made_specific(regression: Regression) -> Regression:
     """With a specific cause in place of a flexible one where that explains more."""
-    for term in [t for t in regression.terms if is_flexible(EFFECTS[t.cause])]:
+    for term in [t for t in regression.terms if is_flexible(effect_of(t.cause))]:
         rest = regression.with_terms(t for t in regression.terms if t.cause != term.cause)
         tried = [
             start.with_terms([*start.terms, extension])
@@ -120,14 +181,24 @@ def total_penalty(regression: Regression) -> float:
 
 def misfit(regression: Regression) -> float:
     """Deviance that the causes found may leave because their forms are not exact."""
-    return FORM * max(regression.start - regression.deviance, 0.0)
+    return _left_by_forms(regression.start - regression.deviance, regression.n)
+
+
+def _left_by_forms(deviance: float, readings: int) -> float:
+    r"""Deviance of a share of the energy that a deviance stands for.
+
+    n readings of noise 1 with an error of energy n E give a deviance of
+    :math:`n\ln(1 + E)`; `FORM` of that energy one of :math:`n\ln(1 + \mathrm{FORM}\,E)`.
+    """
+    energy = np.expm1(min(max(deviance, 0.0) / readings, 500.0))
+    return float(readings * np.log1p(FORM * energy))
 
 
 def _penalty(terms: Sequence[Extension], left: float) -> float:
     """Of causes beyond that of their parameters; their forms may leave ``left``."""
     causes = len(finding_groups(terms))
     # A cause that contains another one spends a second form on the same error.
-    forms = causes + len({term.cause for term in terms if EFFECTS[term.cause].contains})
+    forms = causes + len({term.cause for term in terms if effect_of(term.cause).contains})
     return NEW_CAUSE * causes + left * max(forms - 1, 0)
 
 
@@ -136,7 +207,7 @@ def finding_groups(terms: Sequence[Extension]) -> list[list[int]]:
     groups: list[list[int]] = []
     place: dict[str, int] = {}
     for k, term in enumerate(terms):
-        if EFFECTS[term.cause].is_separate or term.cause not in place:
+        if effect_of(term.cause).is_separate or term.cause not in place:
             place[term.cause] = len(groups)
             groups.append([k])
         else:
@@ -152,7 +223,7 @@ def cause_terms(regression: Regression, group: Sequence[int], settled: bool = Fa
 
 def propose(effect: type[Effect], regression: Regression) -> Extension | None:
     """What a cause proposes; nothing where a wider one that contains it is chosen already."""
-    if any(effect in EFFECTS[term.cause].contains for term in regression.terms):
+    if any(effect in effect_of(term.cause).contains for term in regression.terms):
         return None
     return effect.propose(regression)
 
@@ -166,7 +237,7 @@ def extensions(
     """
     found = []
     for cause in causes:
-        effect = EFFECTS[cause]
+        effect = effect_of(cause)
         contained = {special.kind for special in effect.contains}
         if any(term.cause in contained for term in regression.terms):
             start = regression.with_terms(t for t in regression.terms if t.cause not in contained)
@@ -187,7 +258,8 @@ def _forward(regression: Regression, causes: Sequence[str]) -> Regression:
         best: tuple[float, Regression, Extension] | None = None
         for extension, start, gain in extensions(regression, causes):
             left = misfit(start)
-            after = _penalty([*start.terms, extension], left + FORM * extension.deviance)
+            explained = start.start - start.deviance + extension.deviance
+            after = _penalty([*start.terms, extension], _left_by_forms(explained, regression.n))
             score = gain - (after - _penalty(start.terms, left))
             if score > 0.0 and (best is None or score > best[0] + 1e-6):
                 best = (score, start, extension)
@@ -218,9 +290,9 @@ def _plainest(regression: Regression) -> Regression:
 
     What was chosen since may have explained what once spoke for the wider one.
     """
-    for cause in {term.cause for term in regression.terms if EFFECTS[term.cause].contains}:
+    for cause in {term.cause for term in regression.terms if effect_of(term.cause).contains}:
         rest = regression.with_terms(term for term in regression.terms if term.cause != cause)
-        plain = _forward(rest, [special.kind for special in EFFECTS[cause].contains])
+        plain = _forward(rest, [special.kind for special in effect_of(cause).contains])
         if total_penalty(plain) < total_penalty(regression):
             regression = plain
     return regression

@@ -208,6 +208,31 @@ class LeastSquares:
         stop = start + self.terms[k].columns.shape[1]
         return np.asarray(self.unscaled_covariance[start:stop, start:stop] * self.variance)
 
+    def robust_covariance(self, k: int) -> Array:
+        """Covariance of the coefficients of term ``k``, widened by what its form leaves."""
+        start = self.base.shape[1] + sum(t.columns.shape[1] for t in self.terms[:k])
+        return self.robust(slice(start, start + self.terms[k].columns.shape[1]))
+
+    def robust(self, where: slice) -> Array:
+        r"""Covariance of some coefficients, at least as wide as runs disagree on them.
+
+        .. math:: V_s = \frac{R}{R - 1}\sum_j s_j s_j^T, \quad s_j = X^+_j r_j
+
+        with the residuals r of run j: no form is exact, and what it leaves is alike within a
+        run. Coefficients whose variance is larger by this than by the noise alone are
+        widened to it; from `ENOUGH_RUNS` runs on.
+        """
+        plain = self.unscaled_covariance[where, where] * self.variance
+        runs = len(self.bounds)
+        if runs < ENOUGH_RUNS or not plain.size:
+            return np.asarray(plain)
+        scores = np.array(
+            [self.back[where] @ (self.q[a:b].T @ self.r[a:b]) for a, b in self.bounds]
+        )
+        between = (scores**2).sum(axis=0) * runs / (runs - 1.0)
+        wider = np.sqrt(np.maximum(between / np.maximum(np.diag(plain), 1e-300), 1.0))
+        return np.asarray(plain * np.outer(wider, wider))
+
     @property
     def variance(self) -> float:
         """Variance of one reading's noise, arcsec squared."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -149,14 +150,18 @@ class Whitener:
             block -= v @ (inner * (factor if inner.ndim == 1 else factor[:, None]))
         return out
 
-    def run_part(self, residual: Array) -> Array:
-        """Best guess of the run effects' own share of a raw residual."""
+    def run_part(self, residual: Array, chosen: Sequence[bool] | None = None) -> Array:
+        """Best guess of the run effects' own share of a raw residual, of all or some."""
         if not self.effects:
             return np.zeros_like(residual)
         part = np.zeros_like(residual)
+        kept: Array | None = None
+        if chosen is not None:
+            widths = [effect.columns.shape[1] for effect in self.effects]
+            kept = np.repeat(np.asarray(chosen, dtype=np.float64), widths)
         stacked = np.hstack([np.sqrt(effect.ratio) * effect.columns for effect in self.effects])
         for start, stop in self.bounds:
             a = stacked[start:stop]
             inner = np.linalg.solve(np.eye(a.shape[1]) + a.T @ a, a.T @ residual[start:stop])
-            part[start:stop] = a @ inner
+            part[start:stop] = (a if kept is None else a * kept) @ inner
         return part

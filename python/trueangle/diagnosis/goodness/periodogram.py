@@ -139,7 +139,8 @@ def periodogram(
             freedom[k] += held
             total[k] += held * _boxcar(relative, int(width * over + 0.5) if width > 1 else 1)
     best: tuple[float, int, int] | None = None
-    blocks = np.round(known, 6)[first:last]
+    # Rounded down to a few values, each of which is one test of a maximum.
+    blocks = 2.0 ** (np.floor(2.0 * np.log2(np.maximum(known[first:last], 1.0))) / 2.0)
     for k, width in enumerate(WIDTHS):
         p, j = _likeliest(total[k, first:last], float(freedom[k]), blocks)
         p = largest_of(p, (last - first) / over * PER_CELL / width)

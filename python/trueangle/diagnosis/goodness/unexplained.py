@@ -106,9 +106,13 @@ def goodness_of_fit(
     describing = scatter_tests(left, noise, sigma, rounding)
     count = len(deciding)
     firing = [item for item in deciding if item.p * count < LEVEL]
-    # Sure is sure: of those far beyond doubt the narrower account comes first.
-    order = {id(item): k for k, item in enumerate(deciding)}
-    deciding.sort(key=lambda item: (max(item.p, 1e-9), order[id(item)]))
+    # Sure is sure: of those far beyond doubt the narrower account comes first, and of a line
+    # in angle or in time the one that stands out more.
+    rank = {id(item): float(k) for k, item in enumerate(deciding)}
+    lines = [item for item in deciding if item.test in ("place within runs", "time periodogram")]
+    if len(lines) == 2 and lines[1].statistic > lines[0].statistic:
+        rank[id(lines[1])] = rank[id(lines[0])] - 0.5
+    deciding.sort(key=lambda item: (max(item.p, 1e-9), rank[id(item)]))
     variance = float(np.var(left.residual))
     power = min(max((item.rms**2 for item in firing), default=0.0), variance)
     return Unexplained(
