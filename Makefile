@@ -2,7 +2,7 @@
 # PYTHON is the interpreter of an environment that has `pip install '.[test,lint]'`.
 PYTHON ?= .venv/bin/python
 
-.PHONY: check format lint types stub rust python docs bench develop aarch64 fuzz nightly
+.PHONY: check format lint types stub rust python docs bench develop aarch64 fuzz nightly exam
 
 check: lint types stub rust python docs
 
@@ -40,6 +40,10 @@ aarch64:            ## tests of the core on an emulated aarch64; apart from `che
 
 python:             ## tests of the package
 	$(PYTHON) -m pytest
+
+exam:               ## the diagnosis' own exam at full size: an hour or more, figures asserted
+	TRUEANGLE_NIGHTLY=1 TRUEANGLE_EXAM_SEEDS=20 $(PYTHON) -m pytest -s \
+	  tests/python/hidden tests/python/test_diagnosis.py
 
 docs:               ## documentation, warnings are errors
 	$(PYTHON) -m sphinx -W --keep-going -q docs docs/_build/html

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import os
 import secrets
+from functools import cache
 
 import pytest
 
@@ -41,6 +42,10 @@ HONEST = 0.99
 COVERED = 0.95
 
 
+#: Answers of this process; several tests look at the same ones.
+asked = cache(ask)
+
+
 def share(flags: list[bool]) -> float:
     return sum(flags) / len(flags)
 
@@ -51,8 +56,19 @@ def told(found: list[Answer]) -> str:
 
 @pytest.mark.parametrize("cause", CAUSES)
 def test_a_hidden_cause_is_named(cause: str) -> None:
-    answer = ask(Case((cause,), 1.0, FIXED))
+    answer = asked(Case((cause,), 1.0, FIXED))
     assert answer.exact, exam.describe(answer)
+
+
+def test_parameters_of_hidden_causes_are_within_their_standard_errors() -> None:
+    """Of the same answers: what the large run asserts of 20 seeds holds for the fixed one."""
+    found = [asked(Case((cause,), 1.0, FIXED)) for cause in CAUSES]
+    scores = {n: s for a in found for n, s in a.scores.items()}
+    far = {name: score for name, score in scores.items() if abs(score) > 3.0}
+    assert len(scores) >= 8
+    assert len(far) <= max(1.0 - COVERED, 1.0 / len(scores)) * len(scores) + 1e-9, far
+    # Standard errors that are too large would hide everything: some scores must exceed a half.
+    assert any(abs(score) > 0.5 for score in scores.values()), scores
 
 
 def test_a_weak_cause_is_named() -> None:

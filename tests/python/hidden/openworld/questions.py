@@ -11,15 +11,15 @@ import numpy as np
 
 from trueangle import CalibrationRun
 
-from ..hidden.answer import diagnose
-from ..hidden.case import Case as HiddenCase
-from ..hidden.case import Question
-from ..hidden.causes import CAUSES, draw
-from ..hidden.designs import DESIGNS
-from ..hidden.joint import Joint, Line, random_joint
-from ..hidden.measurement import ARCSEC, Habit, measure, random_habit
-from ..hidden.reversal import Backlash
-from ..hidden.source import Source
+from ..answer import diagnose
+from ..case import Case as HiddenCase
+from ..case import Question
+from ..causes import CAUSES, draw
+from ..designs import DESIGNS
+from ..joint import Joint, Line, random_joint
+from ..measurement import ARCSEC, Habit, measure, random_habit
+from ..reversal import Backlash
+from ..source import Source
 from .structures import SHAPES, structure
 
 #: Noise of the exam beyond what the logger of the hidden exam knows, and bits of rounding.

@@ -2,8 +2,8 @@
 
 Run it from the repository root, for instance
 
-    python -m tests.python.openworld.exam outside nothing --seeds 10 --jobs 2
-    python -m tests.python.openworld.exam high --kinds backlash latency --seeds 3 --show
+    python -m tests.python.hidden.openworld.exam outside nothing --seeds 10 --jobs 2
+    python -m tests.python.hidden.openworld.exam high --kinds backlash latency --seeds 3 --show
 """
 
 from __future__ import annotations

@@ -8,9 +8,9 @@ from typing import ClassVar
 
 import numpy as np
 
-from ..hidden.designs import Scene
-from ..hidden.joint import Joint
-from ..hidden.source import Array, Source
+from ..designs import Scene
+from ..joint import Joint
+from ..source import Array, Source
 
 Shape = Callable[["Structure", Joint, Scene, int], Array]
 
