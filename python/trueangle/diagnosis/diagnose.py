@@ -26,7 +26,7 @@ from .gearratio import CAUSE as WRONG_RATIO
 from .gearratio import Ratio, aligned, find_ratio
 from .goodness import goodness_of_fit
 from .identifiability import blind_spots
-from .named import findings_of, scatter_doubt, scatter_finding
+from .named import findings_of, reconsidered, scatter_doubt, scatter_finding
 from .remainder import leftover_of, unexplained_after
 from .selection import NEW_CAUSE, misfit, select, total_penalty
 from .unnamed import is_named
@@ -125,7 +125,12 @@ def diagnose(
         account, believed = tried, other
     start, chosen = account.start, account.chosen
     rest = unexplained_after(chosen, sim.sigma_arcsec or None)
-    findings, spots = findings_of(chosen, account.spots, gain, rest.found)
+    findings, spots, doubtful = findings_of(chosen, account.spots, gain, rest.found)
+    if doubtful and not rest.found:
+        # What is not confirmed explains nothing.
+        rest = unexplained_after(chosen, sim.sigma_arcsec or None, without=doubtful)
+        if rest.found:
+            findings = reconsidered(chosen, findings)
     beliefs, corrected = judged_beliefs(chosen, sim, believed, spots, gain)
     in_doubt = any(spot.supported for spot in spots)
     for item in account.scatter:

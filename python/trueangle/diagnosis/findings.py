@@ -54,6 +54,8 @@ class Finding:
         zero: listed, and kept out of the extended simulation and of corrections.
     reason : str
         Why it is not confirmed.
+    group : tuple of int
+        Its terms in the regression.
     """
 
     cause: str
@@ -64,6 +66,7 @@ class Finding:
     effects: list[Effect] = field(repr=False, default_factory=list)
     status: str = CONFIRMED
     reason: str = ""
+    group: tuple[int, ...] = field(repr=False, default=())
 
     @property
     def confirmed(self) -> bool:

@@ -10,14 +10,14 @@ from ..effects.blindness import Blindness
 from ..effects.scatter import ScatterFinding
 from ..regression.estimate import Parameters
 from ..regression.regression import Regression
-from .confirmation import status_of
+from .confirmation import CONFIRMED, status_of
 from .findings import Finding
 from .gain import Gain, measure_gain
 from .identifiability import doubts_about
 from .selection import cause_terms, extensions, finding_groups, is_flexible, propose
 from .unnamed import is_named
 
-__all__ = ["findings_of", "scatter_doubt", "scatter_finding"]
+__all__ = ["findings_of", "reconsidered", "scatter_doubt", "scatter_finding"]
 
 #: Rivals reported for each finding.
 RIVALS = 3
@@ -28,8 +28,11 @@ RIVALLED = 4
 
 def findings_of(
     regression: Regression, spots: list[Blindness], with_gain: bool, unexplained: bool
-) -> tuple[list[Finding], list[Blindness]]:
-    """Findings of the chosen terms; those in doubt become entries of what is not told."""
+) -> tuple[list[Finding], list[Blindness], list[int]]:
+    """Findings of the chosen terms; those in doubt become entries of what is not told.
+
+    Also the indices of the terms of findings that are not confirmed.
+    """
     spots = list(spots)
     groups = finding_groups(regression.terms)
     named = []
@@ -49,6 +52,7 @@ def findings_of(
         gains = measure_gain(regression, named)
     fitted = regression.fitted()
     findings: list[Finding] = []
+    doubtful: list[int] = []
     for group, gain in zip(named, gains, strict=True):
         terms = [(*fitted[k], regression.robust_covariance(k)) for k in group]
         cause = terms[0][0].cause
@@ -61,8 +65,33 @@ def findings_of(
             "log_grid": float(sum(t.log_grid for t, _, _ in terms)),
         }
         status, reason = status_of(cause, gain, regression, group, unexplained)
-        findings.append(Finding(cause, parameters, weight, gain, rivals, effects, status, reason))
-    return findings, spots
+        if status != CONFIRMED:
+            doubtful += group
+        findings.append(
+            Finding(
+                cause,
+                parameters,
+                weight,
+                gain,
+                rivals,
+                effects,
+                status,
+                reason,
+                tuple(group),
+            )
+        )
+    return findings, spots, doubtful
+
+
+def reconsidered(regression: Regression, findings: Sequence[Finding]) -> list[Finding]:
+    """Findings once it is known that something is unexplained."""
+    found = []
+    for finding in findings:
+        if finding.confirmed and finding.group:
+            status, reason = status_of(finding.cause, finding.gain, regression, finding.group, True)
+            finding = replace(finding, status=status, reason=reason)
+        found.append(finding)
+    return found
 
 
 def _estimates(

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -35,15 +37,20 @@ def leftover_of(signals: Signals, residual: Array) -> Leftover:
     )
 
 
-def remainder_of(regression: Regression) -> Leftover:
+def remainder_of(regression: Regression, without: Collection[int] = ()) -> Leftover:
     """What a regression leaves: run effects taken off, outliers put to the limit.
 
-    Structure without a name is left in it.
+    Structure without a name is left in it, and so are the terms ``without``.
     """
-    effects = [is_named(term) for term in regression.terms if term.run_effect is not None]
+    kept_in = [is_named(t) and k not in without for k, t in enumerate(regression.terms)]
+    effects = [
+        taken
+        for term, taken in zip(regression.terms, kept_in, strict=True)
+        if term.run_effect is not None
+    ]
     left = regression.left - regression.whiten.run_part(regression.left, effects)
-    for term, coefficients in regression.fitted():
-        if not is_named(term) and coefficients.size:
+    for (term, coefficients), taken in zip(regression.fitted(), kept_in, strict=True):
+        if not taken and coefficients.size:
             left = left + term.columns @ coefficients
     kept = left[~regression.outlying]
     if regression.outlying.any() and kept.size:
@@ -52,9 +59,15 @@ def remainder_of(regression: Regression) -> Leftover:
 
 
 def unexplained_after(
-    regression: Regression, sigma: float | None = None, rounding: float = 0.0
+    regression: Regression,
+    sigma: float | None = None,
+    rounding: float = 0.0,
+    without: Collection[int] = (),
 ) -> Unexplained:
-    """Goodness of fit of what a regression leaves, up to the orders that it looks for."""
+    """Goodness of fit of what a regression leaves, up to the orders that it looks for.
+
+    Terms ``without`` count as left: those of findings that were not confirmed.
+    """
     return goodness_of_fit(
-        remainder_of(regression), float(regression.lines.orders.max()), sigma, rounding
+        remainder_of(regression, without), float(regression.lines.orders.max()), sigma, rounding
     )

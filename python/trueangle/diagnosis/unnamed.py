@@ -20,7 +20,7 @@ from ..regression.extension import Extension
 from ..regression.regression import Regression
 from .goodness.periodogram import periodogram
 
-__all__ = ["UNNAMED", "effect_of", "is_named", "modulators"]
+__all__ = ["UNNAMED", "effect_of", "is_named", "modulator", "modulators"]
 
 Array = NDArray[np.float64]
 
@@ -71,7 +71,7 @@ def _channel(signals: Signals, name: str) -> Array | None:
     return signals.temperature if name == "temperature" else signals.torque
 
 
-def _modulator(signals: Signals, name: str, mean: float, spread: float) -> Array | None:
+def modulator(signals: Signals, name: str, mean: float, spread: float) -> Array | None:
     """The modulator at readings, in units of its spread where it was found."""
     if name == "direction":
         return signals.direction
@@ -100,7 +100,7 @@ class UnnamedPattern(Effect):
         trials: list[tuple[float, dict[str, Any]]] = []
         r = (regression.left - regression.whiten.run_part(regression.left)) * (~regression.outlying)
         for name, (mean, spread) in known.items():
-            g = _modulator(signals, name, mean, spread)
+            g = modulator(signals, name, mean, spread)
             assert g is not None
             by = {"by": name, "mean": mean, "spread": spread}
             moment = ((g * r).astype(np.float32) @ wave).astype(np.float64)
@@ -128,7 +128,7 @@ class UnnamedPattern(Effect):
     @classmethod
     def columns(cls, signals: Signals, around: Surroundings, shape: dict[str, Any]) -> Array:
         """The modulator times cosine and sine of every order."""
-        g = _modulator(signals, shape["by"], shape["mean"], shape["spread"])
+        g = modulator(signals, shape["by"], shape["mean"], shape["spread"])
         if g is None:
             return np.zeros((len(signals), max(2 * len(shape["orders"]), 1)))
         if not shape["orders"]:
