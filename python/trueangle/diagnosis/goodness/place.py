@@ -42,6 +42,9 @@ HALF_WINDOW, POOLED = 4, 40
 #: Widths of bands of the lowest orders.
 BANDS = (4, 8, 16, 32, 64, 128)
 
+#: Share of the sum of sizes below which a sum of products is the rounding of nothing.
+ROUNDED = 1e-9
+
 #: Spread of a factor, in shares of its size, from which on it counts as changing.
 CHANGES = 0.05
 
@@ -154,6 +157,7 @@ def _judged(
     share = np.minimum(coherent / np.maximum(n_units * own, 1e-300), 1.0 - 1e-16)
     logs = np.minimum(coherent / n_units, -(n_units - 1) * np.log1p(-share))
     k = int(np.argmax(logs))
+    size = 0.0
     trials: list[tuple[float, float, float]] = [(float(np.exp(-logs[k])), float(logs[k]), 0.0)]
     trials[0] = (largest_of(trials[0][0], count), *trials[0][1:])
     for width in BANDS:
@@ -162,7 +166,8 @@ def _judged(
             p = incomplete_gamma_tail(float(width), total)
             trials.append((p, total / width, float(width)))
     if modulator.name != "place":
-        trials.append((_alike(modulator.values, left, units), 0.0, -1.0))
+        chance, size = _alike(modulator.values, left, units)
+        trials.append((chance, 0.0, -1.0))
     p, statistic, band = min(trials)
     # Bands hold each other: as many as half of them are independent, about.
     p = largest_of(p, 1.0 + 0.5 * (len(trials) - 1))
@@ -174,7 +179,6 @@ def _judged(
         detail = f"strongest in the orders up to {band * step:.4g}"
         rms = float(np.sqrt(power[: int(band)].sum()))
     elif band < 0.0:
-        size = _size(modulator.values, left)
         detail = f"by about {abs(size):.2g} arcsec at every place"
         rms = abs(size) * float(np.sqrt(whole / len(left)))
     else:
@@ -185,14 +189,8 @@ def _judged(
     return Evidence(modulator.name, statistic, p, says, rms=rms)
 
 
-def _size(g: Array, left: Leftover) -> float:
-    """Least-squares coefficient of the modulator."""
-    d = g - g.mean()
-    return float(d @ left.residual) / max(float(d @ d), 1e-300)
-
-
-def _alike(g: Array, left: Leftover, units: list[tuple[int, int]]) -> float:
-    """Chance of the modulator itself, at no place in particular, by the scatter of units."""
+def _alike(g: Array, left: Leftover, units: list[tuple[int, int]]) -> tuple[float, float]:
+    """Chance of the modulator itself, at no place in particular, by the scatter of units; size."""
     # Within runs, or between them where it does not change within any.
     inside = left.centred(left.bounds)
     moves = sum(float(np.ptp(g[a:b]) > 0.0) for a, b in units) > 0.5 * len(units)
@@ -200,7 +198,18 @@ def _alike(g: Array, left: Leftover, units: list[tuple[int, int]]) -> float:
     sums = np.array([float(g[a:b] @ e[a:b]) for a, b in units])
     power = float(sums @ sums)
     n = len(units)
-    if power == 0.0 or n < 3:
-        return 1.0
+    centre = g.mean()
+    own = sum(
+        float(np.sum((g[a:b] - (g[a:b].mean() if moves else centre)) ** 2))
+        for a, b in (left.bounds if moves else units)
+    )
+    if (
+        power == 0.0
+        or n < 3
+        or own == 0.0
+        or abs(float(g @ e)) <= ROUNDED * float(np.abs(g) @ np.abs(e))
+    ):
+        return 1.0, 0.0
     square = min(float(sums.sum()) ** 2 / power, n * (1.0 - 1e-12))
-    return 2.0 * student_tail(float(np.sqrt(square * (n - 1) / (n - square))), n - 1)
+    p = 2.0 * student_tail(float(np.sqrt(square * (n - 1) / (n - square))), n - 1)
+    return p, float(g @ e) / own
