@@ -13,6 +13,7 @@ from ..checks.record import records_of
 from ..effects import EFFECTS
 from ..effects.blindness import Blindness
 from ..effects.scatter import NEW_SCATTER, ScatterFinding
+from ..effects.wrong_gear_ratio import WrongGearRatio
 from ..errors import ArgumentError
 from ..joint.signals import Signals, join_runs
 from ..regression.estimate import quantity
@@ -22,7 +23,6 @@ from ..simulation.simulation import Simulation
 from .believed import corrected_effects, judged_beliefs
 from .discrepancy import compare, unfolded_error
 from .findings import Diagnosis, Finding
-from .gearratio import CAUSE as WRONG_RATIO
 from .gearratio import Ratio, aligned, find_ratio
 from .goodness import goodness_of_fit
 from .identifiability import blind_spots
@@ -176,7 +176,7 @@ def _ratio_finding(ratio: Ratio) -> Finding:
         "share_found": quantity(ratio.found),
     }
     z = (ratio.gear_ratio - ratio.believed) / max(ratio.std, 1e-300)
-    return Finding(WRONG_RATIO, parameters, {"bic_gain": min(z * z, 1e12)}, None, [])
+    return Finding(WrongGearRatio.kind, parameters, {"bic_gain": min(z * z, 1e12)}, None, [])
 
 
 @dataclass(frozen=True)

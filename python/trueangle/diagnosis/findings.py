@@ -17,7 +17,6 @@ from .confirmation import CONFIRMED
 from .correction import extend_model
 from .discrepancy import Discrepancy
 from .gain import Gain
-from .gearratio import SENTENCE as WRONG_RATIO_SENTENCE
 from .goodness import Unexplained
 
 if TYPE_CHECKING:
@@ -76,7 +75,7 @@ class Finding:
     @property
     def sentence(self) -> str:
         """The physics in one sentence."""
-        return EFFECTS[self.cause].sentence if self.cause in EFFECTS else WRONG_RATIO_SENTENCE
+        return EFFECTS[self.cause].sentence
 
     def to_json(self) -> dict[str, Any]:
         """The entry of ``findings``."""

@@ -23,15 +23,9 @@ from ..joint.pattern import Harmonic, Pattern
 from ..joint.signals import Signals
 from ..simulation.simulation import Simulation
 
-__all__ = ["CAUSE", "SENTENCE", "Ratio", "aligned", "find_ratio"]
+__all__ = ["Ratio", "aligned", "find_ratio"]
 
 Array = NDArray[np.float64]
-
-CAUSE = "wrong_gear_ratio"
-SENTENCE = (
-    "The gear has another ratio than the simulation says: all lines of its shafts stand at other "
-    "orders of the output, together."
-)
 
 #: Share of the believed power that must be missing at the believed ratio, and be found at
 #: another one, for that to be the ratio.
