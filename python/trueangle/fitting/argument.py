@@ -41,6 +41,9 @@ class Choice(NamedTuple):
     note: str = ""
 
 
+_REFERENCE: Final = Choice("reference")
+
+
 def choose_argument(
     runs: Sequence[CalibrationRun],
     argument: AnyArgument,
@@ -58,14 +61,14 @@ def choose_argument(
     ArgumentError
         An unknown name.
     """
+    if argument == "auto" and len(runs) < 2:
+        return _REFERENCE
     if argument not in ARGUMENTS:
         raise ArgumentError(
             f"argument must be 'auto', 'reference' or 'indicated', got {argument!r}"
         )
     if argument != "auto":
         return Choice(argument)
-    if len(runs) < 2:
-        return Choice("reference")
     period = runs[0].period
     runs = runs[:: max(1, len(runs) // _MOST_RUNS)]
     looked_at = [_some(run, max(64, _LOOKED_AT // len(runs))) for run in runs]

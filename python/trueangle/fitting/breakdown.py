@@ -21,14 +21,11 @@ _MOST: Final = 0.15
 #: the readings that stand apart stand together, and the model has bent towards them.
 _BENT: Final = 3.0
 
-#: Of fewer readings a share says nothing.
-_FEW: Final = 50
-
 
 def breakdown_sentence(problem: Problem, weighted: Weighted) -> str:
     """What to tell of a robust fit at the end of its powers; empty where it is not."""
     share = weighted.far
-    if share <= MANY or sum(map(len, problem.runs)) < _FEW:
+    if share <= MANY:
         return ""
     rest = problem.residuals(weighted.fitted)
     scale, near = robust_scale(np.concatenate(rest)), _between_neighbours(problem, rest)

@@ -137,7 +137,7 @@ def fit(
     for run in found:
         check_follows(run)
     selection = None
-    beside = _Beside(asked_nuisance(nuisance), tuple(float(k) for k in reference_orders))
+    beside = _Beside(asked_nuisance(nuisance), tuple(map(float, reference_orders)))
     given = found
     if orders is None or isinstance(orders, str):
         if beside.wanted:
@@ -177,7 +177,7 @@ def fit(
     if problem.argument == "reference":
         check_invertible(fitted.series.slope_bound)
     joint = (gear_ratio, fixed_member)
-    remarks = [note for note in (choice.note, breakdown_sentence(problem, weighted)) if note]
+    remarks = list(filter(None, (choice.note, breakdown_sentence(problem, weighted))))
     if taken is not None:
         remarks += taken.sentences(problem.period)
     unlike = unlike_runs(problem, fitted)

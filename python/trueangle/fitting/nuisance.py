@@ -123,6 +123,8 @@ def asked_nuisance(asked: str | Iterable[str]) -> tuple[str, ...] | None:
     ArgumentError
         Unknown names.
     """
+    if asked == "none":
+        return ()
     if asked == "auto":
         return None
     names = asked.split(",") if isinstance(asked, str) else list(asked)

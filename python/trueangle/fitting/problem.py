@@ -104,7 +104,7 @@ class Problem:
         threads: int | None = None,
     ) -> None:
         #: False where a shaft turns a fraction of times per output turn.
-        self.is_periodic = all(float(s.cycles_per_turn).is_integer() for s in shafts)
+        self.is_periodic = all(s.cycles_per_turn % 1.0 == 0.0 for s in shafts)
         self.runs = runs if self.is_periodic else [over_turns(run) for run in runs]
         self.shafts = shafts
         if method not in METHODS:

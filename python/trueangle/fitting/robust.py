@@ -41,6 +41,9 @@ WILD_SHARE = 0.2
 #: Readings further off than this (robust standard deviations) are rare: 0.7 % of normal ones.
 FAR = 2.7
 
+#: Of fewer readings a share says nothing.
+FEW = 50
+
 #: With more than this share of them the scale itself is in doubt.
 MANY = 0.06
 
@@ -118,7 +121,9 @@ def weigh(problem: Problem, loss: Loss, floor: float) -> Weighted:
 
 
 def _share(residuals: Array, scale: float) -> float:
-    """Share of readings beyond `FAR` robust standard deviations."""
+    """Share of readings beyond `FAR` robust standard deviations; 0 of a few, which tell none."""
+    if residuals.size < FEW:
+        return 0.0
     return np.count_nonzero(np.abs(residuals) > FAR * scale) / residuals.size
 
 
