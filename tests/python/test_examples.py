@@ -58,3 +58,17 @@ def test_rig_report_of_the_measured_encoder(tmp_path, data_dir):
     out = run("rig_report.py", str(data_dir / "rm44_repeat.csv"), "-o", str(tmp_path / "rig"))
     before, after = map(float, re.search(r"rms ([\d.]+) -> ([\d.]+)", out).groups())
     assert after < 0.3 * before
+
+
+def test_spin_down_comes_from_a_coasting_shaft_to_a_corrected_loop():
+    out = run("spin_down.py", "--seconds", "8")
+    assert "calibrated without a reference (spin-down)" in out
+    whole, left = map(
+        float, re.search(r"pattern: ([\d.]+) arcsec rms, left ([\d.]+)", out).groups()
+    )
+    assert whole > 200.0
+    assert left < 4.0
+    before, after = map(
+        float, re.search(r"angle ([\d.]+) arcsec .* corrected ([\d.]+)", out).groups()
+    )
+    assert after < 0.1 * before

@@ -7,6 +7,8 @@ import json
 import math
 from typing import TYPE_CHECKING
 
+from .selfplan import add_self_arguments, run_self
+
 if TYPE_CHECKING:
     from ..planning.plan import CalibrationPlan
 
@@ -45,6 +47,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--noise-arcsec", type=float, metavar="S", help="scatter of one reading")
     add("--std-arcsec", type=float, metavar="U", help="standard error wanted: gives the readings")
     add("--json", action="store_true", help="print the plan as JSON")
+    add_self_arguments(parser)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -53,6 +56,8 @@ def run(args: argparse.Namespace) -> int:
     from .order_lists import parse_orders
 
     orders = None if args.orders is None else parse_orders(args.orders)
+    if args.self_method is not None:
+        return run_self(args, orders)
     common = {
         "fixed_member": args.fixed_member,
         "orders": orders,

@@ -37,6 +37,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_joint(parser)
     add("--title", help="heading of the report")
     add(
+        "--model",
+        type=Input,
+        metavar="MODEL",
+        help="say of this model how it was made, what it is blind to and leaves of the runs",
+    )
+    add(
         "--certificate",
         type=Input,
         metavar="IDENTITY",
@@ -76,6 +82,7 @@ def run(args: argparse.Namespace) -> int:
         title=args.title,
         certificate=args.certificate,
         positions=args.positions,
+        model=args.model,
     )
     if args.pdf is not None:
         made.save_pdf(args.pdf)

@@ -9,6 +9,7 @@ import sys
 from ..errors import ArgumentError
 from .order_lists import parse_orders
 from .paths import Input, Output
+from .signal_options import add_signals, reading
 
 HELP = "calibrate without a reference: from time stamps, heads, shifts or the motor"
 EXAMPLE = "trueangle selfcal coast.csv -o joint.json --loop open"
@@ -56,7 +57,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="0,119.2,203.7",
         help="where the heads stand, degrees, if their readings share one zero",
     )
-    add("--counts-per-turn", type=float, metavar="N", help="of _count columns")
+    add_signals(parser)
     add("--json", action="store_true", help="print the result as JSON")
 
 
@@ -74,7 +75,7 @@ def run(args: argparse.Namespace) -> int:
         gear_ratio=args.gear_ratio,
         ripple=ripple if ripple in ("auto", "none") else _whole(ripple, "--ripple"),
         head_angles=None if args.head_angles is None else _numbers(args.head_angles),
-        counts_per_turn=args.counts_per_turn,
+        **reading(args),
     )
     result.model.save(args.output)
     if not result.model.shafts:

@@ -15,6 +15,7 @@ from ..diagnosis.heldout import hold_out_extended
 from ..errors import ArgumentError, NoModelError, TrueAngleError
 from ..files import CERTIFICATE, PDF, REPORT, check_output, written_atomically
 from ..fitting.heldout import HeldOut, hold_out
+from ..model import HarmonicModel
 from ..plots.curves import Points, degrees, error_points, label_of
 from ..plots.simulatedcurves import left_after_causes
 from ..provenance import provenance
@@ -22,6 +23,7 @@ from ..runs import CalibrationRun, as_runs
 from . import diagnosisfigures, figures
 from .diagnosed import diagnosed
 from .gained import extended_model, gained
+from .givenmodel import given_model
 from .measured import measured
 from .modelled import modelled, selected
 from .phases import phases
@@ -120,6 +122,7 @@ def report(
     title: str | None = None,
     certificate: None = None,
     positions: None = None,
+    model: HarmonicModel | str | PathLike[str] | None = None,
 ) -> Report: ...
 
 
@@ -149,6 +152,7 @@ def report(
     title: str | None = None,
     certificate: Identity | str | PathLike[str] | None = None,
     positions: int | None = None,
+    model: HarmonicModel | str | PathLike[str] | None = None,
 ) -> Report | Certificate:
     """Fit, select orders, hold out, diagnose and put it all on one page; or certify.
 
@@ -170,6 +174,10 @@ def report(
         calibration certificate, see `trueangle.certificate.certify`.
     positions : int, optional
         Nominal positions to a turn of a certificate.
+    model : HarmonicModel or path, optional
+        A model that is there already, such as one calibrated without a reference: the
+        report says in its first lines how it was made, what it is blind to, and what it
+        leaves of these runs.
 
     Returns
     -------
@@ -226,6 +234,7 @@ def report(
         "selection": None if selection is None else selected(selection),
         "model": None if fit is None else modelled(fit),
         "why_no_model": why_not,
+        "given_model": None if model is None else given_model(model, found),
         "gain": None if held is None else gained(held),
         "why_no_gain": why_no_gain,
         "diagnosis": None,

@@ -14,7 +14,7 @@ from ..runs import CalibrationRun
 from .dual import dual
 from .heads import heads
 from .loop import check_loop
-from .recording import Recording, as_recordings
+from .recording import Counts, Recording, as_recordings
 from .result import SelfCalibration
 from .shifts import shifts
 from .spindown import spin_down
@@ -37,7 +37,9 @@ def selfcal(
     ripple: str | Sequence[float] = "auto",
     head_angles: Sequence[float] | None = None,
     counts_per_turn: float | None = None,
+    counts_per_turn_reference: float | None = None,
     signals: Mapping[str, Any] | None = None,
+    topic: str | None = None,
     period: float = 360.0,
 ) -> SelfCalibration:
     r"""Calibrate a joint without a reference: from time stamps, heads, shifts or a motor.
@@ -65,10 +67,12 @@ def selfcal(
         ``"none"``: the motion is known to be smooth.
     head_angles : sequence of float, optional
         Where the heads stand, in degrees, when their readings were set to one zero.
-    counts_per_turn : float, optional
-        Of ``_count`` columns.
+    counts_per_turn, counts_per_turn_reference : float, optional
+        Of ``_count`` columns, of the reference's.
     signals : mapping of role to column, optional
         Columns with other names, as for `trueangle.read_runs`.
+    topic : str, optional
+        Of a ROS bag.
     period : float
         One turn in the unit of the model.
 
@@ -109,7 +113,12 @@ def selfcal(
     if method not in METHODS:
         raise ArgumentError(f"method must be one of {', '.join(METHODS)}, got {method!r}")
     wanted = _orders(orders)
-    recordings = as_recordings(logs, counts_per_turn=counts_per_turn, signals=signals)
+    recordings = as_recordings(
+        logs,
+        counts=Counts(counts_per_turn, counts_per_turn_reference),
+        signals=signals,
+        topic=topic,
+    )
     chosen = _method(recordings) if method == "auto" else method
     if chosen == "heads":
         return heads(recordings, wanted, angles=head_angles, period=period)

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from os import PathLike
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -16,7 +16,7 @@ from ..columns import Column, find_columns, role_kind, wanted_columns
 from ..errors import ArgumentError, FileError
 from ..runs import CalibrationRun, Source
 
-__all__ = ["Recording", "as_recordings"]
+__all__ = ["Counts", "Recording", "as_recordings"]
 
 Array = NDArray[np.float64]
 
@@ -55,11 +55,19 @@ class Recording:
         return ", ".join(part for part in (self.file, run) if part) or "the log"
 
 
+class Counts(NamedTuple):
+    """Counts per turn of the readings and of a reference."""
+
+    reading: float | None = None
+    reference: float | None = None
+
+
 def as_recordings(
     logs: Any,
     *,
-    counts_per_turn: float | None = None,
+    counts: Counts | None = None,
     signals: Mapping[str, Any] | None = None,
+    topic: str | None = None,
 ) -> list[Recording]:
     """Recordings of files, calibration runs, or mappings of column names to arrays.
 
@@ -72,6 +80,7 @@ def as_recordings(
         logs = [logs]
     if not isinstance(logs, Iterable):
         raise ArgumentError(f"logs must be files or tables, got {type(logs).__name__}")
+    counts = counts or Counts()
     found: list[Recording] = []
     for log in logs:
         if isinstance(log, Recording):
@@ -79,9 +88,9 @@ def as_recordings(
         elif isinstance(log, CalibrationRun):
             found.append(_of_run(log))
         elif isinstance(log, Mapping):
-            found += _of_mapping(log, counts_per_turn)
+            found += _of_mapping(log, counts)
         else:
-            found += _of_file(Path(log), counts_per_turn, signals)
+            found += _of_file(Path(log), counts, signals, topic)
     if not found:
         raise ArgumentError("logs is empty: at least one log is needed")
     return found
@@ -109,7 +118,7 @@ def _of_run(run: CalibrationRun) -> Recording:
     )
 
 
-def _of_mapping(table: Mapping[str, ArrayLike], counts: float | None) -> list[Recording]:
+def _of_mapping(table: Mapping[str, ArrayLike], counts: Counts) -> list[Recording]:
     columns = {str(name): np.asarray(values) for name, values in table.items()}
     shapes = {values.shape for values in columns.values()}
     if len(shapes) != 1 or any(len(shape) != 1 for shape in shapes):
@@ -126,13 +135,20 @@ def _of_mapping(table: Mapping[str, ArrayLike], counts: float | None) -> list[Re
 
 
 def _of_file(
-    path: Path, counts: float | None, signals: Mapping[str, Any] | None
+    path: Path, counts: Counts, signals: Mapping[str, Any] | None, topic: str | None
 ) -> list[Recording]:
     from ..runfiles import read_readings
 
-    table = read_readings(path, signals)
+    table = read_readings(path, signals, topic)
     channels = {
-        role: _in_radians(column, table.raw(column), counts, str(path))
+        role: _in_radians(
+            column._replace(unit=column.unit or table.format.unit)
+            if role_kind(role) == "angle"
+            else column,
+            table.raw(column),
+            counts,
+            str(path),
+        )
         for role, column in table.roles.items()
         if role not in _LABELS
     }
@@ -147,14 +163,20 @@ def _of_file(
     return _split(channels, labels, str(path), table.source)
 
 
-def _in_radians(column: Column, raw: Array, counts: float | None, file: str) -> Array:
+def _in_radians(column: Column, raw: Array, counts: Counts, file: str) -> Array:
     """A channel in radians, seconds or the unit of its only column."""
-    if column.unit == "count" and counts is None and role_kind(column.role) == "angle":
-        message = "counts need their number per turn: give --counts-per-turn"
+    turn = counts.reference if column.role == "reference" else counts.reading
+    message = ""
+    if role_kind(column.role) == "angle" and column.unit is None:
+        message = f"its unit is not known; give it: --signal {column.role}={column.name}:deg"
+    elif column.unit == "count" and turn is None:
+        option = "-reference" if column.role == "reference" else ""
+        message = f"counts need their number per turn: give --counts-per-turn{option}"
+    if message:
         if file:
             raise FileError(file, message, line=1, column=column.name)
-        raise ArgumentError(f"column {column.name!r}: {message} (counts_per_turn= in Python)")
-    return column.values(raw, 2.0 * np.pi, counts)
+        raise ArgumentError(f"column {column.name!r}: {message}")
+    return column.values(raw, 2.0 * np.pi, turn)
 
 
 def _split(

@@ -33,6 +33,9 @@ class RunDesign:
         Sense in which the run starts.
     speed_deg_s : float
         0: every position is read at rest, one a second.
+    speed_end_deg_s : float, optional
+        The shaft coasts to this speed with viscous friction: linearly in travel,
+        exponentially in time.
     samples : int
     spacing : {"jittered", "uniform", "random"}
         Equal steps, equal steps each moved at random within its own, or random angles.
@@ -72,6 +75,7 @@ class RunDesign:
     mount_deg: float = 0.0
     current_A: float | None = None
     shift_deg: float | None = None
+    speed_end_deg_s: float | None = None
 
     def __post_init__(self) -> None:
         def refuse(name: str, wanted: str) -> ArgumentError:
@@ -81,6 +85,9 @@ class RunDesign:
             raise refuse("direction", "1 or -1")
         if not 0.0 <= self.speed_deg_s < math.inf:
             raise refuse("speed_deg_s", "0 (at rest) or positive")
+        end = self.speed_end_deg_s
+        if end is not None and not (0.0 < end < math.inf and self.speed_deg_s > 0.0):
+            raise refuse("speed_end_deg_s", "positive, and speed_deg_s too")
         if not 1 <= self.samples <= MAX_SAMPLES:
             raise refuse("samples", f"from 1 to {MAX_SAMPLES}")
         if self.spacing not in SPACINGS:
@@ -117,7 +124,13 @@ class RunDesign:
         stretch = np.searchsorted(knots, travel, side="right") - 1
         signs = self.direction * (-1.0) ** stretch
         at_rest = self.speed_deg_s == 0.0
+        speed = np.full(n, self.speed_deg_s)
         time = np.arange(n, dtype=np.float64) if at_rest else travel / self.speed_deg_s
+        end = self.speed_end_deg_s
+        if end is not None and end != self.speed_deg_s:
+            loss = (self.speed_deg_s - end) / (360.0 * self.turns)
+            speed = self.speed_deg_s - loss * travel
+            time = -np.log(speed / self.speed_deg_s) / loss
         temperature = np.full(n, self.temperature_C)
         if self.temperature_end_C is not None:
             share = travel / (360.0 * self.turns)
@@ -133,6 +146,6 @@ class RunDesign:
             torque=self.torque_Nm + moment,
             mount=np.full(n, self.mount_deg),
             label=self.label or label,
-            velocity=np.asarray(signs * self.speed_deg_s, dtype=np.float64),
+            velocity=np.asarray(signs * speed, dtype=np.float64),
             signals={name: value for name, value in constant.items() if value is not None},
         )

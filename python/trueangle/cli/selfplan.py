@@ -1,0 +1,129 @@
+"""``trueangle plan --self METHOD``: arguments and words of a plan without a reference."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+from typing import TYPE_CHECKING, Any
+
+from ..errors import ArgumentError
+
+if TYPE_CHECKING:
+    from ..planning.selfplan import SelfPlan
+
+__all__ = ["add_self_arguments", "run_self"]
+
+
+def add_self_arguments(parser: argparse.ArgumentParser) -> None:
+    """Options of ``--self``."""
+    from ..planning.selfplan import SELF_METHODS
+
+    add = parser.add_argument_group("without a reference").add_argument
+    add(
+        "--self",
+        dest="self_method",
+        choices=SELF_METHODS,
+        metavar="METHOD",
+        help=f"plan a calibration without a reference: {', '.join(SELF_METHODS)}",
+    )
+    add("--count", type=int, default=3, metavar="N", help="heads or shifts (default: %(default)s)")
+    add("--angles", metavar="0,90,180", help="angles of heads or shifts that are there")
+    add("--speed-ratio", type=float, default=5.0, metavar="R", help="start over end speed (5)")
+    add("--start-speed", type=float, metavar="F", help="turns per second at the start")
+    add("--rate", type=float, metavar="HZ", help="readings per second")
+
+
+def run_self(args: argparse.Namespace, orders: tuple[float, ...] | None) -> int:
+    """Print the plan."""
+    from ..planning.selfplan import plan_self
+
+    plan = plan_self(
+        args.self_method,
+        orders,
+        count=args.count,
+        angles=None if args.angles is None else _angles(args.angles),
+        speed_ratio=args.speed_ratio,
+        start_speed=args.start_speed,
+        rate=args.rate,
+        gear_ratio=args.gear_ratio,
+        noise=args.noise_arcsec,
+        standard_error=args.std_arcsec,
+    )
+    print(json.dumps(as_json(plan), indent=2, allow_nan=False) if args.json else render(plan))
+    return 0
+
+
+def _angles(text: str) -> list[float]:
+    try:
+        found = [float(part) for part in text.split(",")]
+    except ValueError:
+        found = []
+    if len(found) < 2 or not all(map(math.isfinite, found)):
+        raise ArgumentError(f"--angles: two angles or more in degrees, such as 0,90, got {text!r}")
+    return found
+
+
+def as_json(plan: SelfPlan) -> dict[str, Any]:
+    """The plan as plain values; an infinite factor becomes null."""
+    return {
+        "method": plan.method,
+        "orders": list(plan.orders),
+        "noise_factors": _plain(plan.noise_factors),
+        "worst_noise_factor": _plain(plan.worst_noise_factor),
+        "blind_orders": list(plan.blind_orders),
+        "angles_deg": list(plan.angles_deg),
+        "given": _plain(plan.given),
+        "speed_ratio": plan.speed_ratio,
+        "speed_ratio_factors": _plain(plan.speed_ratio_factors),
+        "turns": plan.turns,
+        "readings": plan.readings,
+        "seconds": plan.seconds,
+        "knots_per_turn": plan.knots_per_turn,
+        "notes": list(plan.notes),
+    }
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {
+            (f"{k:g}" if isinstance(k, float) else k): _plain(entry) for k, entry in value.items()
+        }
+    if isinstance(value, list):
+        return [_plain(entry) for entry in value]
+    return value if not isinstance(value, float) or math.isfinite(value) else None
+
+
+def render(plan: SelfPlan) -> str:
+    """The plan as text."""
+    lines = [f"{plan.method}, without a reference"]
+    if plan.angles_deg:
+        lines.append(f"  angles                 {', '.join(f'{a:g}' for a in plan.angles_deg)} deg")
+    if plan.speed_ratio is not None:
+        table = ", ".join(f"{r:g}: {f:.2g}" for r, f in plan.speed_ratio_factors.items())
+        lines += [
+            f"  speed ratio            {plan.speed_ratio:g}",
+            f"  factor by ratio        {table}",
+            f"  knots per turn         at most {plan.knots_per_turn:g}, in the slowest part",
+        ]
+    lines.append(f"  worst noise factor     {plan.worst_noise_factor:.2f}")
+    if plan.turns is not None:
+        lines.append(f"  turns                  {plan.turns:.3g}")
+    if plan.readings is not None:
+        lines.append(f"  readings needed        {plan.readings}")
+    if plan.seconds is not None:
+        lines.append(f"  seconds                {plan.seconds:.3g}")
+    if plan.given:
+        given: Any = plan.given
+        lines.append(
+            f"  the given angles       factor {given['worst_noise_factor']:.2f}, "
+            f"{given['worse_by']:.2f} times the best"
+        )
+        if given["blind_orders"]:
+            names = ", ".join(f"{k:g}" for k in given["blind_orders"])
+            lines.append(f"                         blind to {names}")
+    entries = [f"{k:>5g} {f:5.2f}" for k, f in plan.noise_factors.items()]
+    lines.append("  noise factor per order")
+    lines += ["  " + "  ".join(entries[i : i + 6]) for i in range(0, len(entries), 6)]
+    lines += [f"  note: {note}" for note in plan.notes]
+    return "\n".join(lines)

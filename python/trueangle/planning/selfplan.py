@@ -1,0 +1,326 @@
+"""Plans of calibrations without a reference: speeds, angles of heads and shifts, readings."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+from typing import Final
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..errors import ArgumentError
+from .plan import readings_needed
+
+__all__ = ["SELF_METHODS", "SelfPlan", "angle_factors", "best_angles", "plan_self", "speed_factor"]
+
+Array = NDArray[np.float64]
+
+SELF_METHODS: Final = ("spin-down", "heads", "shifts", "dual")
+
+#: Ratios of start to end speed whose costs are told.
+_RATIOS: Final = (1.1, 1.25, 1.5, 2.0, 3.0, 5.0, 10.0)
+#: Turns below which neighbouring turns are too few to be told apart from the motion.
+_TURNS: Final = 10.0
+#: Knots per turn of a motion that leaves order 1 to within half a percent.
+_KNOTS: Final = 0.5
+#: Angles are found to this many degrees; blind below this share.
+_STEP: Final = 0.1
+_BLIND: Final = 1e-3
+
+_STARTS: Final = 400
+_SWEEPS: Final = 6
+
+
+@dataclass(frozen=True)
+class SelfPlan:
+    """What to record, and how well each order will be known.
+
+    Attributes
+    ----------
+    method : str
+    orders : tuple of float
+    noise_factors : dict of order to float
+        Standard error over that of all readings with the true angle known; infinite where
+        blind.
+    angles_deg : tuple of float
+        Best angles of heads or shifts; empty for the others.
+    given : dict
+        Angles that were given, their ``worst_noise_factor``, ``worse_by`` and
+        ``blind_orders``.
+    speed_ratio : float or None
+        Start over end speed.
+    speed_ratio_factors : dict of ratio to float
+    turns, readings, seconds : float or int or None
+    knots_per_turn : float or None
+        At most so many, in the slowest part.
+    notes : tuple of str
+    """
+
+    method: str
+    orders: tuple[float, ...]
+    noise_factors: dict[float, float]
+    angles_deg: tuple[float, ...] = ()
+    given: dict[str, object] = field(default_factory=dict)
+    speed_ratio: float | None = None
+    speed_ratio_factors: dict[float, float] = field(default_factory=dict)
+    turns: float | None = None
+    readings: int | None = None
+    seconds: float | None = None
+    knots_per_turn: float | None = None
+    notes: tuple[str, ...] = ()
+
+    @property
+    def worst_noise_factor(self) -> float:
+        """The largest factor of the orders that are seen."""
+        seen = [f for f in self.noise_factors.values() if math.isfinite(f)]
+        return max(seen, default=math.inf)
+
+    @property
+    def blind_orders(self) -> tuple[float, ...]:
+        """Wanted orders that are not seen."""
+        return tuple(k for k, f in self.noise_factors.items() if not math.isfinite(f))
+
+
+def angle_factors(angles_deg: ArrayLike, orders: Sequence[float]) -> Array:
+    r"""Noise factor of each order for heads or shifts at ``angles_deg``.
+
+    .. math:: f_k = (1 - |S_k/n|^2)^{-1/2},\quad S_k = \sum_i e^{ik\alpha_i}
+
+    Parameters
+    ----------
+    angles_deg : array_like, shape (..., n)
+    orders : sequence of float
+
+    Returns
+    -------
+    ndarray, shape (..., len(orders))
+        Infinite where all angles see the order alike.
+
+    Examples
+    --------
+    >>> angle_factors([0.0, 120.0, 240.0], [1, 2, 3]).round(3)
+    array([ 1.,  1., inf])
+    """
+    angles = np.radians(np.asarray(angles_deg, dtype=np.float64))
+    k = np.asarray(orders, dtype=np.float64)
+    mean = np.exp(1j * angles[..., None] * k).mean(axis=-2)
+    share = 1.0 - np.abs(mean) ** 2
+    with np.errstate(divide="ignore"):
+        return np.asarray(
+            np.where(share > _BLIND, 1.0 / np.sqrt(np.maximum(share, 1e-300)), np.inf)
+        )
+
+
+def best_angles(count: int, orders: Sequence[float]) -> tuple[float, ...]:
+    """Angles of ``count`` heads or shifts with the least worst factor, the first one 0.
+
+    Two stand at ``360/(K + 1)`` (closed form for orders 1 to K); more are searched from fixed
+    random starts, to a tenth of a degree.
+
+    Examples
+    --------
+    >>> best_angles(2, range(1, 9))
+    (0.0, 40.0)
+    """
+    if count < 2:
+        raise ArgumentError(f"two angles or more are needed, got {count}")
+    k = sorted(orders)
+    if count == 2 and k == list(range(1, len(k) + 1)):
+        return 0.0, round(360.0 / (len(k) + 1), 4)
+    steps = np.arange(0.0, 360.0, _STEP)
+    random = np.random.default_rng(0)
+    trial: Array = np.zeros((_STARTS * 10, count))
+    trial[:, 1:] = random.uniform(0.0, 360.0, (_STARTS * 10, count - 1))
+    start = trial[np.argsort(angle_factors(trial, k).max(axis=-1))[:8]]
+    best, score = start[0], math.inf
+    for angles in start:
+        here = angles.copy()
+        for _ in range(_SWEEPS):
+            before = here.copy()
+            for i in range(1, count):
+                tried = np.repeat(here[None], steps.size, axis=0)
+                tried[:, i] = steps
+                here = tried[int(np.argmin(angle_factors(tried, k).max(axis=-1)))]
+            if (here == before).all():
+                break
+        worst = float(angle_factors(here, k).max())
+        if worst < score - 1e-9:
+            best, score = here, worst
+    return tuple(round(float(a), 4) for a in np.sort(best))
+
+
+def speed_factor(ratio: float) -> float:
+    """Noise factor when ripple columns stand beside the pattern, coasting by ``ratio``.
+
+    Examples
+    --------
+    >>> round(speed_factor(5.0), 2), round(speed_factor(1.25), 1)
+    (1.53, 7.8)
+    """
+    # Imported here: the fitting side of self-calibration is no part of a plan's import.
+    from ..selfcalibration.ripple import cost_of_ripple
+
+    if not (math.isfinite(ratio) and ratio > 1.0):
+        raise ArgumentError(f"speed_ratio must be greater than 1, got {ratio!r}")
+    return cost_of_ripple(np.exp(np.linspace(0.0, 2.0 * math.log(ratio), 4001)))
+
+
+def plan_self(
+    method: str,
+    orders: Iterable[float] | None = None,
+    *,
+    count: int = 3,
+    angles: Sequence[float] | None = None,
+    speed_ratio: float = 5.0,
+    start_speed: float | None = None,
+    rate: float | None = None,
+    gear_ratio: float | None = None,
+    noise: float | None = None,
+    standard_error: float | None = None,
+) -> SelfPlan:
+    """What to record so that a calibration without a reference knows the wanted orders.
+
+    Parameters
+    ----------
+    method : {"spin-down", "heads", "shifts", "dual"}
+    orders : iterable of int, optional
+        Default 1 to 8.
+    count : int
+        Heads or shifts.
+    angles : sequence of float, optional
+        Angles that are there, in degrees: how much worse are they?
+    speed_ratio : float
+        Start over end speed of a spin-down.
+    start_speed, rate : float, optional
+        Turns per second at the start, readings per second.
+    gear_ratio : float, optional
+        For ``"dual"``.
+    noise, standard_error : float, optional
+        Scatter of one reading and the standard error wanted, in one unit.
+
+    Examples
+    --------
+    >>> plan = plan_self("heads", range(1, 9), count=2, noise=5.0, standard_error=0.5)
+    >>> plan.angles_deg, round(plan.worst_noise_factor, 2), plan.readings
+    ((0.0, 40.0), 2.92, 1710)
+    """
+    if method not in SELF_METHODS:
+        raise ArgumentError(f"method must be one of {', '.join(SELF_METHODS)}, got {method!r}")
+    wanted = tuple(sorted({float(k) for k in (range(1, 9) if orders is None else orders)}))
+    if not wanted or any(not (math.isfinite(k) and k > 0.0) for k in wanted):
+        raise ArgumentError(f"orders must be positive numbers, got {orders!r}")
+    if method == "spin-down":
+        return _spin_down(wanted, speed_ratio, start_speed, rate, noise, standard_error)
+    if method == "dual":
+        return _dual(wanted, gear_ratio, noise, standard_error)
+    best = best_angles(count, wanted)
+    factors = dict(zip(wanted, angle_factors(best, wanted).tolist(), strict=True))
+    worst = max(factors.values())
+    given: dict[str, object] = {}
+    if angles is not None:
+        mine = dict(zip(wanted, angle_factors(list(angles), wanted).tolist(), strict=True))
+        seen = [f for f in mine.values() if math.isfinite(f)]
+        given = {
+            "angles_deg": list(angles),
+            "noise_factors": mine,
+            "worst_noise_factor": max(seen, default=math.inf),
+            "worse_by": max(mine.values()) / worst,
+            "blind_orders": [k for k, f in mine.items() if not math.isfinite(f)],
+        }
+    what = "heads" if method == "heads" else "shifts"
+    notes = [
+        f"{count} equispaced {what} are blind to multiples of {count}",
+        "the zero is never seen",
+    ]
+    if method == "shifts":
+        notes.append(
+            "angles need to be known to a degree only: they are estimated from the readings"
+        )
+        if count < 3:
+            notes.append("three clampings or more show what the coupling changes")
+    return SelfPlan(
+        method,
+        wanted,
+        factors,
+        angles_deg=best,
+        given=given,
+        turns=1.0 if method == "heads" else float(count),
+        readings=_readings(noise, standard_error, worst),
+        notes=tuple(notes),
+    )
+
+
+def _spin_down(
+    orders: tuple[float, ...],
+    ratio: float,
+    start: float | None,
+    rate: float | None,
+    noise: float | None,
+    error: float | None,
+) -> SelfPlan:
+    factor = speed_factor(ratio)
+    readings = _readings(noise, error, factor)
+    notes = [
+        "coast with the drive off: a loop closed on the encoder hides the orders it follows",
+        "without a change of speed each order is encoder or ripple: ask for a ratio of 3 or more",
+        "the zero is never seen",
+    ]
+    turns, seconds = _TURNS, None
+    if start is not None and rate is not None:
+        if rate / start < 2.2 * max(orders):
+            notes.append(
+                f"at {start:g} turns/s order {max(orders):g} needs {2.2 * max(orders) * start:.3g} "
+                f"readings per second, not {rate:g}: start slower or read faster"
+            )
+        mean = start * (1.0 - 1.0 / ratio) / math.log(ratio)
+        seconds = max((readings or 0) / rate, _TURNS / mean)
+        turns = mean * seconds
+        readings = max(readings or 0, math.ceil(seconds * rate))
+    return SelfPlan(
+        "spin-down",
+        orders,
+        dict.fromkeys(orders, factor),
+        speed_ratio=ratio,
+        speed_ratio_factors={r: speed_factor(r) for r in _RATIOS},
+        turns=turns,
+        readings=readings,
+        seconds=seconds,
+        knots_per_turn=_KNOTS * min(orders),
+        notes=tuple(notes),
+    )
+
+
+def _dual(
+    orders: tuple[float, ...], ratio: float | None, noise: float | None, error: float | None
+) -> SelfPlan:
+    notes = ["only sums are seen: output encoder with gear, motor encoder with gear"]
+    turns = 3.0
+    if ratio is not None:
+        if not (math.isfinite(ratio) and ratio > 0.0):
+            raise ArgumentError(f"gear_ratio must be positive, got {ratio!r}")
+        gap = min(abs(j * ratio - k) for j in range(1, 9) for k in orders)
+        if abs(ratio - round(ratio)) < 1e-9:
+            notes.append(
+                f"the ratio of {ratio:g} is whole: output order {ratio:g} and motor order 1 are "
+                "one number; a spin-down of the motor alone tells them apart"
+            )
+        elif gap > 0.0:
+            # Two lines part when they differ by a whole wave over the travel.
+            turns = max(turns, math.ceil(1.0 / gap))
+    notes.append("travel both ways: reversal error and delay stand beside the orders")
+    return SelfPlan(
+        "dual",
+        orders,
+        dict.fromkeys(orders, 1.0),
+        turns=turns,
+        readings=_readings(noise, error, 1.0),
+        notes=tuple(notes),
+    )
+
+
+def _readings(noise: float | None, error: float | None, factor: float) -> int | None:
+    if noise is None or error is None or not math.isfinite(factor):
+        return None
+    return readings_needed(noise, error, factor)

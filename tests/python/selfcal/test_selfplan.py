@@ -1,0 +1,58 @@
+"""Plans without a reference: closed forms, published optima, what is there against the best."""
+
+import json
+
+import numpy as np
+import pytest
+
+from trueangle import cli
+from trueangle.errors import ArgumentError
+from trueangle.planning.selfplan import angle_factors, best_angles, plan_self, speed_factor
+
+
+@pytest.mark.parametrize(
+    ("count", "highest", "variance"), [(3, 8, 1.72), (3, 16, 2.58), (4, 8, 1.24)]
+)
+def test_best_angles_reach_the_known_optima(count, highest, variance):
+    angles = best_angles(count, range(1, highest + 1))
+    worst = float(angle_factors(angles, range(1, highest + 1)).max()) ** 2
+    assert worst < 1.03 * variance
+
+
+def test_two_angles_have_a_closed_form():
+    assert best_angles(2, range(1, 17)) == (0.0, round(360.0 / 17.0, 4))
+    worst = angle_factors(best_angles(2, range(1, 9)), range(1, 9)).max()
+    assert worst**2 == pytest.approx(1.0 / np.sin(np.pi / 9.0) ** 2, rel=1e-6)
+
+
+def test_factors_are_those_of_a_least_squares_fit():
+    # Differences of heads at a thousand angles: the information of one order.
+    angles, order = np.radians([0.0, 35.0, 160.0]), 5
+    theta = np.linspace(0.0, 2.0 * np.pi, 1000, endpoint=False)
+    rows = np.stack([np.cos(order * (theta + a)) for a in angles])
+    rows -= rows.mean(axis=0)
+    factor = np.sqrt(3 * 500.0 / (rows**2).sum())
+    assert angle_factors([0.0, 35.0, 160.0], [order])[0] == pytest.approx(factor, rel=1e-9)
+
+
+@pytest.mark.parametrize(("ratio", "cost"), [(1.1, 18), (1.25, 7.8), (2.0, 2.7), (5.0, 1.5)])
+def test_a_small_change_of_speed_is_dear(ratio, cost):
+    assert speed_factor(ratio) == pytest.approx(cost, rel=0.03)
+
+
+def test_the_command_says_how_much_worse_the_present_heads_are(capsys):
+    arguments = ["plan", "--self", "heads", "--orders", "1-8", "--angles", "0,120,240", "--json"]
+    assert cli.main(arguments) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert told["given"]["blind_orders"] == [3.0, 6.0]
+    assert told["given"]["worse_by"] is None
+    assert told["worst_noise_factor"] < 1.33
+
+
+def test_wrong_wishes_are_refused():
+    with pytest.raises(ArgumentError, match="method"):
+        plan_self("gyro")
+    with pytest.raises(ArgumentError, match="speed_ratio"):
+        plan_self("spin-down", speed_ratio=0.9)
+    with pytest.raises(ArgumentError, match="two angles"):
+        plan_self("heads", count=1)
