@@ -98,7 +98,8 @@ class EvidenceSearch:
         covariance: CovarianceKind = "auto",
     ) -> None:
         self.sums, self.folds, self.repeats = sums, folds, repeats
-        self.orders: list[float] = sums.orders.tolist()
+        # Whole orders as whole numbers: results show and compare them.
+        self.orders: list[float] = [int(m) if m == int(m) else m for m in sums.orders.tolist()]
         self.limits, self.period, self.free = limits, period, free
         self.forced, self.covariance = list(forced), covariance
         #: Orders too steep to be retained.
