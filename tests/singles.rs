@@ -147,8 +147,8 @@ fn f32_takes_the_cubics_unless_it_cannot() {
     );
     let error = cubics.run(Quantity::Error, route, None, batch).unwrap_err();
     assert!(error.to_string().contains("float32"), "{error}");
-    // Too many segments, and values that no f32 holds.
-    for (size, orders) in [(1.0, &[3000]), (1e35, &[1])] {
+    // Too many segments. Values that no f32 holds are refused with the series.
+    for (size, orders) in [(1.0, &[3000])] {
         let other = evaluator(TAU, size, 0.0, orders);
         let route = other.route::<f32, f32>(Quantity::Error, 1);
         assert_eq!(route.path, Path::Table);

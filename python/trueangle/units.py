@@ -47,19 +47,14 @@ def check_follows(run: CalibrationRun) -> None:
     if reference.size < 4 or _core.resultant(indicated, reference, run.period) >= _FOLLOWS:
         return
     ratio = _ratio(run)
-    if ratio is None:
-        # Too coarse to follow its travel: what would make the differences agree?
-        found = (
-            text
-            for text, factor in _remedies(run.period).items()
-            if _core.resultant(factor * indicated, reference, run.period) > _REMEDIED
-        )
-    else:
-        found = (
-            text
-            for text, factor in _remedies(run.period).items()
-            if abs(factor * ratio - 1.0) < _NEAR
-        )
+    # By the travel where readings are dense enough to follow it; else, and where steps of
+    # more than half a turn hide it, by what would make the differences agree.
+    found = (
+        text
+        for text, factor in _remedies(run.period).items()
+        if (ratio is not None and abs(factor * ratio - 1.0) < _NEAR)
+        or _core.resultant(factor * indicated, reference, run.period) > _REMEDIED
+    )
     remedy = next(found, None) or _moves(ratio)
     named = f" of run {run.label}" if run.label else ""
     raise ArgumentError(
@@ -71,11 +66,13 @@ def check_follows(run: CalibrationRun) -> None:
 def _remedies(period: float) -> dict[str, float]:
     """What the indicated angle may be instead, with the factor that puts it right."""
     found = {"it runs backwards: change its sign": -1.0}
-    column = next((unit for unit, turn in _TURNS.items() if math.isclose(turn, period)), None)
-    if column is not None:
+    # A column is converted when it is read: its unit need not be that of the run, which
+    # is only the likeliest.
+    columns = sorted(_TURNS, key=lambda unit: not math.isclose(_TURNS[unit], period))
+    for column in columns:
         for unit, turn in _TURNS.items():
             if unit != column:
-                found[f"it looks like {unit} in a column of {column}"] = period / turn
+                found[f"it looks like {unit} in a column of {column}"] = _TURNS[column] / turn
     return found
 
 

@@ -11,13 +11,17 @@ THETA = np.linspace(0.0, 720.0, 400)
 
 
 def write(path, runs):
-    """Runs in degrees with these labels, all alike; without labels one that has none."""
+    """Runs in degrees with these labels, each its own; without labels one that has none."""
     names = ["run"] if runs else []
     rows = [
         ",".join(
-            [*([label] if label else []), repr(t), repr(float(t + 0.1 * np.sin(np.radians(t))))]
+            [
+                *([label] if label else []),
+                repr(t + k),
+                repr(float(t + k + 0.1 * np.sin(np.radians(t)))),
+            ]
         )
-        for label in runs or [""]
+        for k, label in enumerate(runs or [""])
         for t in THETA.tolist()
     ]
     path.write_text("\n".join([",".join([*names, "reference_deg", "indicated_deg"]), *rows]) + "\n")

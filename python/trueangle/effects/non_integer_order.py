@@ -23,6 +23,7 @@ from .search import (
     Array,
     Fitted,
     golden_maximum,
+    grid_doubt,
 )
 
 __all__ = ["NonIntegerOrder"]
@@ -180,6 +181,12 @@ class NonIntegerOrder(Effect):
             deviance = (p * (x / (2.0 + x))).sum(axis=1) - 2.0 * np.log1p(x / 2.0).sum()
             best = np.maximum(best, deviance)
         return orders, best
+
+    @classmethod
+    def doubt(
+        cls, extension: Extension, regression: Regression, spots: Sequence[Blindness]
+    ) -> Blindness | None:
+        return grid_doubt(regression, spots) if extension.cause == cls.kind else None
 
     @classmethod
     def report(

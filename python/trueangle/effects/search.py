@@ -8,10 +8,12 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from ..joint.grid import uniform_grid
 from ..joint.pattern import Surroundings
 from ..regression.batch import Blocks
 from ..regression.extension import Extension
 from ..regression.regression import Regression
+from .blindness import Blindness
 
 if TYPE_CHECKING:
     from .effect import Effect
@@ -21,6 +23,7 @@ __all__ = [
     "Fitted",
     "best_shape",
     "golden_maximum",
+    "grid_doubt",
     "is_gear_order",
     "known_orders",
     "line_parameters",
@@ -124,3 +127,10 @@ def is_gear_order(around: Surroundings, order: float) -> bool:
     """An order of the motor or the wave generator."""
     named = around.joint.name_order(order)
     return named is not None and named[0] != "output"
+
+
+def grid_doubt(regression: Regression, spots: Sequence[Blindness]) -> Blindness | None:
+    """On a grid of positions: lines behind aliases, which change from run to run as noise does."""
+    if uniform_grid(regression.signals.theta) is None:
+        return None
+    return next((spot for spot in spots if spot.factor == "grid"), None)

@@ -16,11 +16,12 @@ from ..joint.signals import Signals
 from ..regression.estimate import Parameters, quantity
 from ..regression.extension import Extension
 from ..regression.regression import Regression
+from .blindness import Blindness
 from .channel_skew import ChannelSkew, sensor_order
 from .effect import ALWAYS, Effect
 from .filter_lag import FilterLag
 from .load_dependent_gear_error import LoadDependentGearError
-from .search import Array, Fitted, best_shape, is_gear_order, line_parameters
+from .search import Array, Fitted, best_shape, grid_doubt, is_gear_order, line_parameters
 
 __all__ = ["VaryingLine", "VaryingLineTerm"]
 
@@ -98,6 +99,12 @@ class VaryingLine(Effect):
         scale = _scale(signals, shape["follows"])
         assert scale is not None
         return scale[:, None] * line_columns(signals.theta, shape["order"])
+
+    @classmethod
+    def doubt(
+        cls, extension: Extension, regression: Regression, spots: Sequence[Blindness]
+    ) -> Blindness | None:
+        return grid_doubt(regression, spots) if extension.cause == cls.kind else None
 
     @classmethod
     def report(
