@@ -178,7 +178,7 @@ def begun_reading(pipe):
 
 
 @pytest.mark.xfail(
-    run=False, strict=False, reason="depends on the signals that the suite's own process inherits"
+    run=False, strict=False, reason="times out in longer runs; passes alone; cause not known"
 )
 @pytest.mark.parametrize("command", WAITING)
 def test_waiting_for_a_pipe_ends_with_ctrl_c(command, desk):
