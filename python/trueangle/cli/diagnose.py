@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING
 
 from ..errors import ArgumentError
 from ..files import MODEL, SIMULATION
+from ..pace import STYLES, ending_early
+from .durations import seconds
 from .paths import Input, Output
 from .signal_options import add_signals
 
@@ -37,6 +39,18 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="write that extended correction model",
     )
     add_signals(parser)
+    add(
+        "--within",
+        type=seconds,
+        metavar="TIME",
+        help="the best account in that time, as 10s, 2min or seconds; it says what is missing",
+    )
+    add(
+        "--progress",
+        choices=STYLES,
+        default="auto",
+        help="on stderr after one second (default: text on a terminal, nothing elsewhere)",
+    )
     add("--json", action="store_true", help="print the diagnosis as JSON")
 
 
@@ -54,7 +68,11 @@ def run(args: argparse.Namespace) -> int:
         )
     simulation = load_simulation(args.simulation)
     runs = read_checked(args)
-    result = diagnose(runs, simulation)
+    with ending_early() as interruption:
+        result = diagnose(runs, simulation, within=args.within, progress=args.progress)
+    if interruption.happened:
+        print(result.to_json() if args.json else result.summary())
+        raise KeyboardInterrupt(_unwritten(args, result.complete))
     if args.extend:
         result.extended.save(args.extend)
     if args.corrected_model:
@@ -68,6 +86,13 @@ def run(args: argparse.Namespace) -> int:
         if args.corrected_model:
             print("\n".join(_corrected(result, args.corrected_model)))
     return 0
+
+
+def _unwritten(args: argparse.Namespace, complete: bool) -> str:
+    """What an interruption left undone."""
+    files = [path for path in (args.extend, args.corrected_model) if path]
+    told = "the account is complete" if complete else "the account so far is incomplete"
+    return told + (f", and {' and '.join(map(str, files))} not written" if files else "")
 
 
 def _corrected(result: Diagnosis, path: str) -> Iterator[str]:

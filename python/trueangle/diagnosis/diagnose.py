@@ -16,6 +16,7 @@ from ..effects.scatter import NEW_SCATTER, ScatterFinding
 from ..effects.wrong_gear_ratio import WrongGearRatio
 from ..errors import ArgumentError
 from ..joint.signals import Signals, join_runs
+from ..pace import Pace, pace, paced
 from ..regression.estimate import quantity
 from ..regression.regression import Regression
 from ..runs import CalibrationRun, as_runs
@@ -44,9 +45,17 @@ LEAST_READINGS = 20
 #: Standard deviations beyond which readings are outliers whatever the mean.
 OUTLYING_ANYWAY = 12.0
 
+#: Shares of the time given after which the choice of causes, and what is said of each, end.
+FOR_CHOICE, FOR_FINDINGS = 0.6, 0.9
+
 
 def diagnose(
-    runs: CalibrationRun | Iterable[CalibrationRun], sim: Simulation, *, gain: bool = True
+    runs: CalibrationRun | Iterable[CalibrationRun],
+    sim: Simulation,
+    *,
+    gain: bool = True,
+    within: float | None = None,
+    progress: str = "none",
 ) -> Diagnosis:
     r"""Name the physical causes that a simulation of the joint lacks.
 
@@ -70,6 +79,13 @@ def diagnose(
     sim : Simulation
     gain : bool
         Measure the gain on held-out runs (about half of the time).
+    within : float, optional
+        Seconds that it may take. When they are up, the account so far is given and says that
+        it is incomplete (`Diagnosis.complete`, ``notes``): causes may be missing, and what was
+        not held out is not confirmed. Six tenths of the time are for the choice of causes.
+    progress : {"none", "auto", "text", "json"}
+        What is done and how much is left, on stderr, after the first second; ``"auto"`` is
+        text on a terminal and nothing elsewhere.
 
     Returns
     -------
@@ -78,7 +94,7 @@ def diagnose(
     Raises
     ------
     ArgumentError
-        No run, or too few readings.
+        No run, or too few readings; a time that is not above zero.
 
     Notes
     -----
@@ -97,7 +113,12 @@ def diagnose(
     >>> diagnose(runs, sim).findings[0].cause
     'backlash'
     """
-    found = as_runs(runs)
+    with paced(within, progress):
+        return _diagnosis(as_runs(runs), sim, gain)
+
+
+def _diagnosis(found: list[CalibrationRun], sim: Simulation, gain: bool) -> Diagnosis:
+    at = pace()
     every = join_runs(found)
     if len(every) < LEAST_READINGS:
         raise ArgumentError(
@@ -112,21 +133,13 @@ def diagnose(
     rows = _subsample(len(every))
     signals = every if rows is None else every.take(rows)
     part = error if rows is None else error[rows]
-    account = _account(signals, part, sim)
-    # Effects that the simulation claims, and the readings do not show as claimed.
-    believed = sim
-    for _ in range(len(sim.effects)):
-        other = corrected_effects(account.chosen, believed, sim)
-        if other is None:
-            break
-        tried = _account(signals, part, other)
-        if total_penalty(tried.chosen) >= total_penalty(account.chosen):
-            break
-        account, believed = tried, other
+    with at.part(FOR_CHOICE):
+        account, believed = _believed_account(signals, part, sim)
     start, chosen = account.start, account.chosen
     rest = unexplained_after(chosen, sim.sigma_arcsec or None)
-    findings, spots, doubtful = findings_of(chosen, account.spots, gain, rest.found)
-    if doubtful and not rest.found:
+    with at.part(FOR_FINDINGS):
+        findings, spots, doubtful = findings_of(chosen, account.spots, gain, rest.found)
+    if doubtful and not rest.found and not at.cut:
         # What is not confirmed explains nothing.
         rest = unexplained_after(chosen, sim.sigma_arcsec or None, without=doubtful)
         if rest.found:
@@ -165,7 +178,35 @@ def diagnose(
         before,
         beliefs,
         faults_of(records_of(found)),
+        [_incomplete(at, gain)] if at.cut else [],
+        not at.cut,
     )
+
+
+def _incomplete(at: Pace, gain: bool) -> str:
+    """That the account was ended, while what, and what that means."""
+    why = "it was interrupted" if at.stopped else f"the {at.within:g} s given were up"
+    means = "causes may be missing or stand for others"
+    if gain:
+        means += ", and what was not held out is not confirmed"
+    return f"INCOMPLETE: {why} ({at.cut}); {means}"
+
+
+def _believed_account(
+    signals: Signals, error: Array, sim: Simulation
+) -> tuple[_Account, Simulation]:
+    """The account, and the simulation with the effects it claims as the readings show them."""
+    account = _account(signals, error, sim)
+    believed = sim
+    for _ in range(len(sim.effects)):
+        other = None if pace().over else corrected_effects(account.chosen, believed, sim)
+        if other is None:
+            break
+        tried = _account(signals, error, other)
+        if total_penalty(tried.chosen) >= total_penalty(account.chosen):
+            break
+        account, believed = tried, other
+    return account, believed
 
 
 def _ratio_finding(ratio: Ratio) -> Finding:
@@ -196,6 +237,8 @@ def _account(signals: Signals, error: Array, sim: Simulation) -> _Account:
     spots = blind_spots(start)
     chosen = select(start)
     scatter: list[ScatterFinding] = []
+    if pace().over:
+        return _Account(start, chosen, scatter, spots)  # what is left is no scatter yet
     uneven = next(iter(_scatter(chosen, weighs=True)), None)
     if uneven is not None and uneven.bic_gain > NEW_SCATTER + misfit(chosen):
         scatter.append(uneven)

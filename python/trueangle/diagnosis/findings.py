@@ -125,6 +125,10 @@ class Diagnosis:
         Verdicts on what the simulation already claims.
     data_faults : list of DataFault
         As `trueangle.check` tells them.
+    notes : list of str
+        What else must be known of the account.
+    complete : bool
+        False where it was ended early: by the time given, or by Ctrl-C.
     """
 
     discrepancy: Discrepancy
@@ -141,12 +145,18 @@ class Diagnosis:
     unexplained_before: Unexplained | None = None
     beliefs: list[Belief] = field(default_factory=list)
     data_faults: list[DataFault] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
+    complete: bool = True
 
     @property
     def is_enough(self) -> bool:
-        """The simulation is enough: no finding, nothing unexplained, every belief confirmed."""
+        """The simulation is enough: no finding, nothing unexplained, every belief confirmed.
+
+        An account that was ended early does not tell.
+        """
         return (
-            not self.findings
+            self.complete
+            and not self.findings
             and not (self.unexplained is not None and self.unexplained.found)
             and all(belief.verdict == "confirmed" for belief in self.beliefs)
         )
@@ -180,6 +190,8 @@ class Diagnosis:
             "beliefs": [belief.to_json() for belief in self.beliefs],
             "data_faults": [fault.to_json() for fault in self.data_faults],
             "gain": self.gain,
+            "complete": self.complete,
+            "notes": self.notes,
             "not_identifiable": [spot.to_json() for spot in self.not_identifiable],
             "extended_simulation": extended_simulation,
         }

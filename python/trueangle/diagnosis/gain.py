@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..joint.signals import Signals
+from ..pace import pace
 from ..regression.regression import Regression
 from .holdout import held_out, numbers, part, rebuilt, reducible_share, residual_at
 from .levels import LevelGain, gains_by_level
@@ -74,13 +75,13 @@ class Gain:
 
 def measure_gain(
     regression: Regression, groups: Sequence[Sequence[int]], seed: int = 0
-) -> list[Gain]:
+) -> list[Gain] | None:
     """Gain of every finding (its terms' indices) beside the others, by leaving out runs.
 
     In every fold the model is fitted to the other runs alone, and what was searched for
     (orders, lengths, places) is searched there again, for the first `SEARCHED` findings.
     A single run is left out in stretches of its record. Causes of a factor with levels
-    are measured on left out levels as well.
+    are measured on left out levels as well. None where the time is up before (`trueangle.pace`).
     """
     rng = np.random.default_rng(seed)
     unit, what = _units(regression)
@@ -88,10 +89,17 @@ def measure_gain(
     folds = rng.permutation(count) % min(FOLDS, count)
     own_zero = any(effect_of(term.cause).draws_zeros for term in regression.terms)
     left = np.zeros((len(groups) + 1, regression.n))
-    for fold in range(int(folds.max()) + 1):
+    parts = int(folds.max()) + 1
+    at = pace()
+    for fold in range(parts):
+        at.at("parts held out", fold, parts)
+        if at.over:
+            return None
         test = folds[unit] == fold
         for k, values in enumerate(held_out(regression, groups, test, own_zero)):
             left[k, test] = values
+    if at.over:
+        return None
     clean = ~regression.outlying
     by_level = gains_by_level(regression, groups, own_zero, unit, rng)
     found = []
@@ -105,7 +113,7 @@ def measure_gain(
             control = _control(regression, group, unit, rng)
         found.append(
             Gain(
-                f"{what} ({int(folds.max()) + 1} parts)"
+                f"{what} ({parts} parts)"
                 + (", zero of each held-out run taken from itself" if own_zero else ""),
                 numbers(before),
                 numbers(after),

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from ..joint.pattern import line_columns
 from ..joint.signals import Signals
+from ..pace import pace
 from ..regression.regression import Extension, Regression
 from ..regression.whitening import RunEffect
 from .unnamed import effect_of
@@ -41,6 +42,8 @@ def held_out(
     terms = [rebuilt(term, ~test) for term in regression.terms]
     full = train.with_terms(terms)
     for group in groups[: SEARCHED if search else 0]:
+        if pace().over:
+            break
         cause = regression.terms[group[0]].cause
         if effect_of(cause).located and effect_of(cause).transfers:
             full = _searched_again(full, group)

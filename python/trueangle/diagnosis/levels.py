@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..joint.signals import Signals
+from ..pace import pace
 from ..regression.regression import Regression
 from .holdout import held_out, numbers, part, rebuilt, reducible_share
 from .unnamed import effect_of
@@ -142,8 +143,12 @@ def gains_by_level(
     unit: NDArray[np.int64],
     rng: np.random.Generator,
 ) -> dict[int, LevelGain]:
-    """Gain of the findings (by their place) at levels of their factor that were left out."""
+    """Gain of the findings (by their place) at levels of their factor that were left out.
+
+    Of a factor whose levels were not all asked when the time was up, nothing is said.
+    """
     found: dict[int, LevelGain] = {}
+    at = pace()
     for factor in UNITS:
         causes = [regression.terms[group[0]].cause for group in groups]
         concerned = [
@@ -158,6 +163,9 @@ def gains_by_level(
         # With the finding and without it at every level left out; NaN where it cannot be.
         left = np.full((len(concerned), 2, regression.n), np.nan)
         for j in range(len(values)):
+            at.at(f"levels of {factor} held out", j, len(values))
+            if at.over:
+                return found
             test = level == j
             able = [k for k in concerned if _can_do_without(regression, groups[k], test)]
             if not able:

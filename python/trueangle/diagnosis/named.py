@@ -8,9 +8,10 @@ from dataclasses import replace
 from ..effects import EFFECTS
 from ..effects.blindness import Blindness
 from ..effects.scatter import ScatterFinding
+from ..pace import pace
 from ..regression.estimate import Parameters
 from ..regression.regression import Regression
-from .confirmation import CONFIRMED, status_of
+from .confirmation import CONFIRMED, NOT_CONFIRMED, status_of
 from .findings import Finding
 from .gain import Gain, measure_gain
 from .identifiability import doubts_about
@@ -24,6 +25,9 @@ RIVALS = 3
 
 #: Findings, in the order found, for which rivals are tried.
 RIVALLED = 4
+
+#: Why a finding of an account that was ended early is not confirmed.
+NOT_HELD_OUT = "the account was ended before its gain on the readings held out was measured"
 
 
 def findings_of(
@@ -49,7 +53,7 @@ def findings_of(
         spots.append(replace(doubt, supported=True, evidence=evidence, estimates=estimates))
     gains: Sequence[Gain | None] = [None] * len(named)
     if with_gain and named:
-        gains = measure_gain(regression, named)
+        gains = measure_gain(regression, named) or gains
     fitted = regression.fitted()
     findings: list[Finding] = []
     doubtful: list[int] = []
@@ -57,7 +61,7 @@ def findings_of(
         terms = [(*fitted[k], regression.robust_covariance(k)) for k in group]
         cause = terms[0][0].cause
         parameters, effects = EFFECTS[cause].report(regression, terms)
-        rivals = _rivals(regression, group) if len(findings) < RIVALLED else []
+        rivals = _rivals(regression, group) if len(findings) < RIVALLED and not pace().over else []
         weight = {
             "bic_gain": float(sum(t.bic_gain for t, _, _ in terms)),
             "deviance": float(sum(t.deviance for t, _, _ in terms)),
@@ -65,6 +69,8 @@ def findings_of(
             "log_grid": float(sum(t.log_grid for t, _, _ in terms)),
         }
         status, reason = status_of(cause, gain, regression, group, unexplained)
+        if with_gain and gain is None and status == CONFIRMED:
+            status, reason = NOT_CONFIRMED, NOT_HELD_OUT
         if status != CONFIRMED:
             doubtful += group
         findings.append(
@@ -101,7 +107,7 @@ def _estimates(
     rest = cause_terms(regression, group, settled=True)
     found = {}
     # Not lines: one that another hides behind is no property of the joint.
-    for cause in causes:
+    for cause in causes if not pace().over else ():
         effect = EFFECTS[cause]
         if not (effect.acts_on_runs or is_flexible(effect)):
             continue

@@ -11,6 +11,7 @@ from ..effects import EFFECTS, Effect
 from ..effects.effect import ALWAYS
 from ..effects.missing_order import MissingOrder
 from ..effects.zero_slip import ZeroSlip
+from ..pace import pace
 from ..regression.regression import Extension, Regression
 from .goodness import estimate_noise
 from .remainder import remainder_of
@@ -36,6 +37,9 @@ NEW_CAUSE = 6.0
 #: Share of the energy explained so far that a further cause, or a form of its own for one,
 #: must bring as well: a form known to 3 % leaves 0.1 % of its energy, and no cause.
 FORM = 1e-3
+
+#: Time that what is said of chosen causes takes (gain, rivals), in shares of that of the choice.
+AFTER_CHOICE = 0.7
 
 #: Terms at most.
 MOST_TERMS = 14
@@ -73,6 +77,8 @@ def select(
         known_too = _pruned(_forward(regression.with_terms(known), list(EFFECTS)))
         return _priced_with_noise(_made_specific(known_too))
     direct = _pruned(_forward(regression, list(EFFECTS)))
+    if pace().over:
+        return direct
     if not (unnamed and _doubtful(direct)):
         return _priced_with_noise(_by_other_paths(regression, direct))
     opened = _pruned(_forward(regression, [*EFFECTS, *UNNAMED]))
@@ -100,6 +106,8 @@ def _priced_with_noise(regression: Regression) -> Regression:
     out, is too low for noise that is correlated over many readings, and run means then look
     significant. A wander in time competes with correlation alone.
     """
+    if pace().over:
+        return regression
     noise = estimate_noise(remainder_of(regression))
     tried = [regression]
     if noise.correlation > regression.whiten.rho + SAME_CORRELATION:
@@ -123,6 +131,8 @@ def _by_other_paths(regression: Regression, direct: Regression) -> Regression:
     angle, or with the lines of shafts that the joint declares). All are pruned
     backward; the best by BIC is kept.
     """
+    if pace().over:
+        return direct
     found = {term.cause for term in direct.terms}
     # Over a part of a turn a bump, too, can stand for several lines at once: lines first.
     travel = regression.signals.run_turns().max()
@@ -233,10 +243,17 @@ def extensions(
 ) -> list[tuple[Extension, Regression, float]]:
     """What every cause proposes: the extension, what it extends, its net BIC gain.
 
-    A cause that contains chosen ones as special cases takes their place.
+    A cause that contains chosen ones as special cases takes their place. Those left when the
+    time is up are not tried (`trueangle.pace`).
     """
     found = []
-    for cause in causes:
+    at = pace()
+    beside = f" beside {len(regression.terms)}" if regression.terms else ""
+    for tried, cause in enumerate(causes):
+        then = AFTER_CHOICE * at.seconds if beside else 0.0
+        at.at(f"causes tried{beside}", tried, len(causes), then)
+        if at.over:
+            break
         effect = effect_of(cause)
         contained = {special.kind for special in effect.contains}
         if any(term.cause in contained for term in regression.terms):
@@ -263,7 +280,8 @@ def _forward(regression: Regression, causes: Sequence[str]) -> Regression:
             score = gain - (after - _penalty(start.terms, left))
             if score > 0.0 and (best is None or score > best[0] + 1e-6):
                 best = (score, start, extension)
-        if best is None:
+        # A step that was not finished chose among some only: it chose nothing.
+        if best is None or pace().over:
             return regression
         _, start, extension = best
         regression = start.with_terms([*start.terms, extension])
@@ -272,7 +290,7 @@ def _forward(regression: Regression, causes: Sequence[str]) -> Regression:
 
 def _pruned(regression: Regression) -> Regression:
     """Without the terms that the others have made superfluous."""
-    while regression.terms:
+    while regression.terms and not pace().over:
         least = min(range(len(regression.terms)), key=lambda k: _net_loss(regression, k))
         without = cause_terms(regression, [least])
         if total_penalty(without) > total_penalty(regression):

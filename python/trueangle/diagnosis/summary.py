@@ -69,6 +69,8 @@ def render(diagnosis: Diagnosis) -> str:
 def headline(diagnosis: Diagnosis) -> list[str]:
     """What a reader must know first: faults, what is not understood, what is seen or wrong."""
     lines: list[str] = []
+    for note in diagnosis.notes:
+        lines += _wrapped(f"{note}.", 2)
     for fault in diagnosis.data_faults:
         lines += _wrapped(f"Fault of the data, {fault}.", 2)
     rest = diagnosis.unexplained

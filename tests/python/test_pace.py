@@ -1,0 +1,251 @@
+"""Long work tells how far it is, and ends when its time is up or Ctrl-C is pressed."""
+
+from __future__ import annotations
+
+import io
+import itertools
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pytest
+
+import trueangle as ta
+from trueangle.cli import main
+from trueangle.cli.durations import seconds
+from trueangle.errors import ArgumentError
+from trueangle.pace import Pace, ending_early, entered, pace, paced
+from trueangle.simulation import Backlash, Harmonic, Latency, RunDesign, Simulation, simulate
+from trueangle.simulation.runtable import write_runs
+
+#: Seconds by which a diagnosis may take longer than it was given: what is in hand is ended (one
+#: search), and what is left is tested. Generous, as the machine that runs this may be busy.
+LATE = 5.0
+
+BELIEVED = Simulation(
+    harmonics=(Harmonic("output", 1, 14.0, 240.0),),
+    sigma_arcsec=1.0,
+    runs=tuple(
+        RunDesign(label=f"{speed:g}", samples=200, speed_deg_s=speed, reversals=(0.5,))
+        for speed in (5.0, 10.0, 20.0, 30.0)
+    ),
+)
+TRUE = BELIEVED.with_effects([Backlash(6.0), Latency(3e-4)])
+
+
+class Ticks:
+    """A clock that goes on by one second whenever it is looked at."""
+
+    def __init__(self):
+        self.count = itertools.count()
+
+    def __call__(self):
+        return float(next(self.count))
+
+
+class Terminal(io.StringIO):
+    def isatty(self):
+        return True
+
+
+def test_nothing_is_shown_in_the_first_second_nor_off_a_terminal():
+    now = [0.0]
+    for stream, style, shown in (
+        (Terminal(), "auto", "sums: 2 of 4, at least 2 s left"),
+        (io.StringIO(), "auto", ""),
+        (Terminal(), "none", ""),
+        (io.StringIO(), "text", "sums: 2 of 4, at least 2 s left"),
+    ):
+        now[0] = 0.0
+        work = Pace(style=style, stream=stream, clock=lambda: now[0])
+        work.at("sums", 0, 4)
+        now[0] = 0.9
+        work.at("sums", 1, 4)
+        assert stream.getvalue() == ""
+        now[0] = 2.0
+        work.at("sums", 2, 4)
+        assert stream.getvalue().strip() == shown
+        work.clear()
+        assert stream.getvalue().split("\r")[-1] == ""
+
+
+def test_progress_as_json_is_an_object_a_line():
+    stream = io.StringIO()
+    work = Pace(10.0, "json", stream, Ticks())
+    for k in range(3):
+        work.at("sums", k, 3)
+    states = [json.loads(line) for line in stream.getvalue().splitlines()]
+    assert states[-1]["stage"] == "sums"
+    assert states[-1]["seconds"] + states[-1]["seconds_left"] == 10.0
+
+
+def test_a_part_ends_before_the_whole():
+    now = [0.0]
+    work = Pace(10.0, clock=lambda: now[0])
+    now[0] = 6.0
+    assert not work.over
+    with work.part(0.5):
+        work.at("sums", 1, 2)
+        assert work.over
+    assert not work.over
+    assert work.cut == "sums"
+    now[0] = 10.0
+    assert work.over
+
+
+def test_work_inside_other_work_has_its_pace():
+    with paced(5.0) as outer:
+        with paced() as inner:
+            assert inner is outer is pace()
+        with paced(1.0) as own:
+            assert own is not outer
+    assert pace().within is None
+
+
+@pytest.mark.parametrize("within", [0.0, -1.0, float("nan"), float("inf")])
+def test_a_time_that_is_none_is_refused(within):
+    with pytest.raises(ArgumentError, match="above zero"):
+        ta.diagnose(simulate(BELIEVED), BELIEVED, within=within)
+
+
+def test_an_unknown_way_of_showing_is_refused():
+    with pytest.raises(ArgumentError, match="auto, text, json, none"):
+        ta.diagnose(simulate(BELIEVED), BELIEVED, progress="loud")
+
+
+@pytest.mark.parametrize(
+    ("text", "value"),
+    [("10", 10.0), ("10s", 10.0), ("0.5 min", 30.0), ("250ms", 0.25), ("1h", 3600)],
+)
+def test_times_of_the_command_line(text, value):
+    assert seconds(text) == value
+
+
+@pytest.mark.parametrize("text", ["", "0", "-3s", "10x", "s", "1.2.3s", "nan", "1e999"])
+def test_times_that_are_none_end_with_usage(text, capsys):
+    with pytest.raises(SystemExit) as ended:
+        main(["diagnose", "r.csv", "--simulation", "s.toml", f"--within={text}"])
+    assert ended.value.code == 2
+    assert "a time above zero" in capsys.readouterr().err
+
+
+def test_wherever_it_is_ended_the_account_says_so_and_confirms_nothing_unmeasured():
+    """Ended at many moments: each account is whole as an object, and honest."""
+    runs = simulate(TRUE, seed=5)
+    clock = Ticks()
+    with entered(Pace(1e9, clock=clock)):
+        full = ta.diagnose(runs, BELIEVED)
+    steps = next(clock.count)
+    assert full.complete
+    assert full.notes == []
+    names = {finding.cause for finding in full.findings if finding.confirmed}
+    assert names, "the full account must name something for the others to be held against"
+    named = set()
+    for within in np.unique(np.geomspace(3, 1.8 * steps, 8).astype(int)):
+        with entered(Pace(float(within), clock=Ticks())):
+            result = ta.diagnose(runs, BELIEVED)
+        told = result.to_dict()
+        assert told["complete"] == result.complete
+        if result.complete:
+            assert told["notes"] == []
+            continue
+        assert told["notes"][0].startswith("INCOMPLETE: ")
+        assert result.summary().startswith(f"INCOMPLETE: the {within} s given were up (")
+        assert not result.is_enough
+        for finding in result.findings:
+            named.add((finding.cause, finding.status))
+            assert not finding.confirmed or finding.gain is not None
+        assert {effect.kind for effect in result.extended.effects} <= names
+    assert {status for _, status in named} == {"confirmed", "not_confirmed"}
+    assert result.complete, "the last one had time enough"
+
+
+def test_a_step_that_was_not_finished_names_nothing():
+    """The causes tried first must not win for having been tried."""
+    with entered(Pace(40.0, clock=Ticks())):
+        result = ta.diagnose(simulate(TRUE, seed=5), BELIEVED)
+    assert "causes tried" in result.notes[0]
+    assert result.findings == []
+
+
+def test_it_ends_in_the_time_given():
+    runs = simulate(TRUE, seed=3)
+    before = time.monotonic()
+    result = ta.diagnose(runs, BELIEVED, within=0.05)
+    assert time.monotonic() - before < 0.05 + LATE
+    assert not result.complete
+
+
+def test_the_same_work_without_a_limit_is_not_changed():
+    runs = simulate(TRUE, seed=4)
+    assert ta.diagnose(runs, BELIEVED).to_dict() == (
+        ta.diagnose(runs, BELIEVED, within=1e6, progress="auto").to_dict()
+    )
+
+
+def test_ctrl_c_asks_first_and_ends_then():
+    before = signal.getsignal(signal.SIGINT)
+    with ending_early() as interruption:
+        with paced(100.0) as work:
+            os.kill(os.getpid(), signal.SIGINT)
+            assert work.over
+            assert interruption.happened
+            with pytest.raises(KeyboardInterrupt):
+                os.kill(os.getpid(), signal.SIGINT)
+        with pytest.raises(KeyboardInterrupt):
+            os.kill(os.getpid(), signal.SIGINT)
+    assert signal.getsignal(signal.SIGINT) is before
+
+
+@pytest.fixture(scope="module")
+def files(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("pace")
+    many = BELIEVED.with_effects([])
+    dense = Simulation(
+        sigma_arcsec=1.0,
+        runs=tuple(
+            RunDesign(label=str(k), samples=3000, speed_deg_s=5.0 * k, reversals=(0.5,))
+            for k in range(1, 5)
+        ),
+    )
+    many.save(folder / "believed.toml")
+    write_runs(
+        simulate(dense.with_effects([Backlash(6.0), Latency(3e-4)]), seed=1), folder / "r.csv"
+    )
+    return folder
+
+
+def test_ctrl_c_gives_the_account_so_far(files):
+    arguments = ["diagnose", "r.csv", "--simulation", "believed.toml", "--extend", "out.toml"]
+    process = subprocess.Popen(
+        [sys.executable, "-m", "trueangle", *arguments, "--progress", "json", "--json"],
+        cwd=files,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
+    )
+    first = json.loads(process.stderr.readline())
+    process.send_signal(signal.SIGINT)
+    out, err = process.communicate(timeout=60)
+    assert first["seconds"] >= 1.0
+    assert process.returncode == 130
+    told = json.loads(out)
+    assert told["complete"] is False
+    assert told["notes"][0].startswith("INCOMPLETE: it was interrupted")
+    last = err.splitlines()[-1]
+    assert last.startswith("trueangle: interrupted: the account so far is incomplete")
+    assert "out.toml not written" in last
+    assert not (files / "out.toml").exists()
+
+
+def test_within_of_the_command_line(files, capsys, monkeypatch):
+    monkeypatch.chdir(files)
+    assert main(["diagnose", "r.csv", "--simulation", "believed.toml", "--within", "200ms"]) == 0
+    shown = capsys.readouterr()
+    assert shown.out.startswith("INCOMPLETE: the 0.2 s given were up")
+    assert shown.err == ""
