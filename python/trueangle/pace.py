@@ -92,7 +92,7 @@ class Pace:
         """The work must end now: its time is up, or Ctrl-C was pressed."""
         late = self.within is not None and self.seconds >= self._share * self.within
         if (late or self.stopped) and not self._cut:
-            self._cut = self._stage or "at the start"
+            self._cut = self._stage or "starting"
         return late or self.stopped
 
     @property

@@ -154,7 +154,7 @@ def test_wherever_it_is_ended_the_account_says_so_and_confirms_nothing_unmeasure
             assert told["notes"] == []
             continue
         assert told["notes"][0].startswith("INCOMPLETE: ")
-        assert result.summary().startswith(f"INCOMPLETE: the {within} s given were up (")
+        assert result.summary().startswith(f"INCOMPLETE: the {within} s given were up while ")
         assert not result.is_enough
         for finding in result.findings:
             named.add((finding.cause, finding.status))
@@ -168,7 +168,7 @@ def test_a_step_that_was_not_finished_names_nothing():
     """The causes tried first must not win for having been tried."""
     with entered(Pace(40.0, clock=Ticks())):
         result = ta.diagnose(simulate(TRUE, seed=5), BELIEVED)
-    assert "causes tried" in result.notes[0]
+    assert "trying causes" in result.notes[0]
     assert result.findings == []
 
 

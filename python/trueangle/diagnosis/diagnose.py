@@ -189,7 +189,7 @@ def _incomplete(at: Pace, gain: bool) -> str:
     means = "causes may be missing or stand for others"
     if gain:
         means += ", and what was not held out is not confirmed"
-    return f"INCOMPLETE: {why} ({at.cut}); {means}"
+    return f"INCOMPLETE: {why} while {at.cut}; {means}"
 
 
 def _believed_account(

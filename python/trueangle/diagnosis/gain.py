@@ -92,7 +92,7 @@ def measure_gain(
     parts = int(folds.max()) + 1
     at = pace()
     for fold in range(parts):
-        at.at("parts held out", fold, parts)
+        at.at("holding out parts", fold, parts)
         if at.over:
             return None
         test = folds[unit] == fold

@@ -163,7 +163,7 @@ def gains_by_level(
         # With the finding and without it at every level left out; NaN where it cannot be.
         left = np.full((len(concerned), 2, regression.n), np.nan)
         for j in range(len(values)):
-            at.at(f"levels of {factor} held out", j, len(values))
+            at.at(f"holding out levels of {factor}", j, len(values))
             if at.over:
                 return found
             test = level == j

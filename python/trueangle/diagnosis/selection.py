@@ -251,7 +251,7 @@ def extensions(
     beside = f" beside {len(regression.terms)}" if regression.terms else ""
     for tried, cause in enumerate(causes):
         then = AFTER_CHOICE * at.seconds if beside else 0.0
-        at.at(f"causes tried{beside}", tried, len(causes), then)
+        at.at(f"trying causes{beside}", tried, len(causes), then)
         if at.over:
             break
         effect = effect_of(cause)
