@@ -12,6 +12,7 @@ sys.path.insert(0, str(HERE))
 
 
 import generate  # noqa: E402
+import reference_pages  # noqa: E402
 
 import trueangle  # noqa: E402
 
@@ -23,6 +24,7 @@ version = release = trueangle.__version__
 extensions = [
     "myst_parser",
     "sphinx.ext.autodoc",
+    "sphinx.ext.autosummary",
     "sphinx.ext.napoleon",
     "sphinx.ext.viewcode",
     "sphinx_copybutton",
@@ -30,7 +32,8 @@ extensions = [
 ]
 myst_enable_extensions = ["deflist", "dollarmath", "amsmath", "colon_fence"]
 myst_heading_anchors = 3
-exclude_patterns = ["_build"]
+exclude_patterns = ["_build", "_generated"]
+autosummary_generate = False
 html_theme = "furo"
 html_title = "trueangle"
 # Angles and shapes in docstrings are in single backticks: code, not cross-references.
@@ -69,6 +72,11 @@ def _display(translator, node):
     raise SkipNode
 
 
+def _with_reference(app, name, source):
+    source[0] = reference_pages.expanded(source[0])
+
+
 def setup(app):
     """Formulas are drawn by the build: they look alike everywhere and need no network."""
+    app.connect("source-read", _with_reference)
     app.add_html_math_renderer("drawn", (_inline, None), (_display, None))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import platform
 import subprocess
 import sys
@@ -13,8 +14,11 @@ import numpy as np
 
 mpl.use("Agg")
 
+from causes import causes_page
+
 import trueangle as ta
 from trueangle import plots
+from trueangle.cli import COMMANDS, build_parser
 from trueangle.diagnosis import diagnose
 from trueangle.effects import Backlash
 from trueangle.planning import plan_mounts
@@ -31,6 +35,8 @@ def everything(folder: Path) -> None:
     folder.mkdir(exist_ok=True)
     figures(folder)
     (folder / "performance.md").write_text(performance(), encoding="utf-8")
+    (folder / "causes.md").write_text(causes_page(), encoding="utf-8")
+    (folder / "commands.md").write_text(commands(), encoding="utf-8")
 
 
 def figures(folder: Path) -> None:
@@ -125,3 +131,12 @@ def performance() -> str:
     done = subprocess.run(command, capture_output=True, text=True, check=True)
     head = f"Nanoseconds per sample, measured by this build ({platform.machine()}):"
     return f"{head}\n\n```text\n{done.stdout}```\n"
+
+
+def commands() -> str:
+    """What every command says of itself."""
+    os.environ["COLUMNS"] = "92"  # the width that argparse wraps to
+    parsers = build_parser().commands
+    return "\n".join(
+        f"## {name}\n\n```text\n{parsers[name].format_help()}```\n" for name in COMMANDS
+    )

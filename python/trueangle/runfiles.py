@@ -17,6 +17,7 @@ from .errors import EmptyCellsWarning, FileError
 from .readings import Readings, named, read_readings, readings_of
 from .runs import CalibrationRun, Source
 from .signals import FIELDS
+from .suggestions import did_you_mean
 
 __all__ = ["Readings", "RunColumns", "read_columns", "read_readings", "read_runs"]
 
@@ -238,10 +239,12 @@ def _column_of(table: Readings, role: str) -> str:
 def _refuse_missing(table: Readings, role: str) -> None:
     units = (*UNIT_PERIODS, "count") if role == "indicated" else tuple(UNIT_PERIODS)
     names = ", ".join(f"{role}_{unit}" for unit in units)
+    header = list(table.columns)
+    guess = next(filter(None, (did_you_mean(f"{role}_{unit}", header) for unit in units)), "")
     raise FileError(
         table.path,
         f"no column {role}_deg (one of {names} is needed, or another named with "
-        f"--signal {role}=NAME:UNIT); {listed(list(table.columns))}",
+        f"--signal {role}=NAME:UNIT){guess}; {listed(header)}",
         line=1,
     )
 

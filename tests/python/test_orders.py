@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 import trueangle as ta
 from trueangle.errors import ArgumentError
+from trueangle.joint.gear import explain_as_harmonic
 from trueangle.orders.verdicts import verified_positions
 
 GRID = np.arange(36) * 10.0
@@ -295,3 +296,25 @@ def test_readings_without_noise_show_their_order_alone():
     chosen = ta.select_orders(ta.CalibrationRun(x, x + 0.1 * np.sin(np.radians(x)), 360.0))
     assert chosen.orders == (1,)
     assert "360" in chosen.summary()
+
+
+def test_what_an_order_may_be_is_printed():
+    """A sensor whose order 4 is no sine, displaced from its axis: orders 2, 4 and 12."""
+    theta = np.radians(np.linspace(0.0, 360.0, 721)[:-1])
+    error = 0.02 * np.sin(2 * theta) + 0.2 * np.sin(4 * theta) + 0.01 * np.cos(12 * theta)
+    rng = np.random.default_rng(12)
+    runs = [
+        ta.CalibrationRun(np.degrees(theta), np.degrees(theta) + error + noise, 360.0)
+        for noise in rng.normal(0.0, 0.002, (3, theta.size))
+    ]
+    selection = ta.select_orders(runs, range(1, 18))
+    assert selection.orders == (2, 4, 12)
+    told = " ".join(selection.summary().split("What they may be:")[1].split())
+    assert "2: sensor displaced or tilted from the axis" in told
+    assert "4: interpolation error" in told
+    assert "12: harmonic 3 of order 4" in told
+
+
+def test_a_multiple_of_a_small_order_is_no_harmonic_of_it():
+    assert explain_as_harmonic(12, {1: 90.0, 4: 5.0, 12: 2.0}) == ()
+    assert explain_as_harmonic(12, {4: 5.0, 6: 7.0, 12: 2.0})[0].name.startswith("harmonic 2 of")

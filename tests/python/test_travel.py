@@ -6,7 +6,7 @@ import pytest
 import trueangle as ta
 from trueangle.fitting import ridge
 from trueangle.fitting.problem import Problem
-from trueangle.fitting.travel import covered_span
+from trueangle.fitting.travel import Span, covered_span
 from trueangle.shafts import resolve_orders
 
 
@@ -46,7 +46,21 @@ def test_an_arc_gives_a_usable_model_with_small_amplitudes(arc, runs):
     assert difference.std() < 0.1
     assert result.model.amplitudes.sum() < 5.0
     assert result.model.partial_span == pytest.approx((0.0, arc), abs=5.0)
-    assert any("extrapolated" in note for note in result.notes)
+    (told,) = (note for note in result.notes if "extrapolated" in note)
+    assert " deg only" in told
+
+
+@pytest.mark.parametrize(
+    ("span", "period", "told"),
+    [
+        ((3.45, 9.11), 2 * np.pi, "-2.833 to 2.827 rad"),
+        ((260.0, 450.0), 360.0, "-100 to 90 deg"),
+        ((10.0, 200.0), 360.0, "10 to 200 deg"),
+        ((0.5, 2.75), 1.0, "0.5 to 2.75 turn"),  # several turns are not folded
+    ],
+)
+def test_a_span_is_told_with_its_unit_within_a_turn(span, period, told):
+    assert Span(*span, False).describe(period) == told
 
 
 @pytest.mark.parametrize("runs", [1, 3])

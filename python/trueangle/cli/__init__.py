@@ -38,6 +38,7 @@ COMMANDS: tuple[str, ...] = (
     "compare",
     "selfcal",
     "bench",
+    "completion",
 )
 
 

@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 
 from ..errors import ArgumentError
-from .parser import did_you_mean
+from ..suggestions import did_you_mean
 
 __all__ = ["SHAFTS", "declared_shafts", "orders_by_shaft", "parse_orders"]
 

@@ -1,39 +1,56 @@
-"""The parser of the command line: usage errors that suggest what was meant."""
+"""The parser of the command line: grouped help, and errors that suggest what was meant."""
 
 from __future__ import annotations
 
 import argparse
-import difflib
 import re
-from collections.abc import Iterable, Sequence
-from typing import Any, NoReturn
+from collections.abc import Sequence
+from typing import Any, Final, NoReturn
 
-__all__ = ["Parser", "did_you_mean"]
+from ..suggestions import did_you_mean
+from .paths import Input
+
+__all__ = ["GROUPS", "Parser"]
 
 _CHOICE = re.compile(r"invalid choice: '(?P<got>.*)' \(choose from (?P<known>.*)\)")
 
+#: Headings of a command's help, in this order.
+GROUPS: Final = ("input", "model", "output", "other")
 
-def did_you_mean(got: str, known: Iterable[str]) -> str:
-    """``; did you mean X?``, or nothing where no known word is near.
+#: Options that tell how files are read.
+_INPUT: Final = (
+    "--signal --column --unit --counts-per-turn --counts-per-turn-reference --topic --run --joint"
+)
 
-    Examples
-    --------
-    >>> did_you_mean("moter", ["output", "motor", "wave_generator"])
-    '; did you mean motor?'
-    >>> did_you_mean("elbow", ["output", "motor"])
-    ''
-    """
-    near = difflib.get_close_matches(got.lower(), list(known), n=1, cutoff=0.7)
-    return f"; did you mean {near[0]}?" if near else ""
+#: Options that tell what is printed or written, and how.
+_OUTPUT: Final = (
+    "--output --output-topic --in-place --json --errors-in --progress --title --checksums"
+)
 
 
 class Parser(argparse.ArgumentParser):
-    """`argparse.ArgumentParser` whose errors suggest the option or command meant."""
+    """`argparse.ArgumentParser` with grouped help whose errors suggest what was meant.
+
+    An argument belongs to the group of its type, `Input` or `Output`, or to that of its
+    name; what is neither read nor written says what is asked of the model.
+    """
 
     def __init__(self, *args: Any, **kwargs: Any) -> None:
+        self._headed: dict[str, argparse._ArgumentGroup] = {}
         super().__init__(*args, **kwargs)
         #: Parsers of the commands, by name; those of a command have none.
         self.commands: dict[str, Parser] = {}
+
+    def add_argument(self, *args: Any, **kwargs: Any) -> argparse.Action:
+        """As `argparse.ArgumentParser.add_argument`, under the heading that fits."""
+        if not self._headed:
+            self._headed.update({name: self.add_argument_group(name) for name in GROUPS})
+        return self._headed[_group(args, kwargs)].add_argument(*args, **kwargs)
+
+    def format_help(self) -> str:
+        """The help, with what every command has at its end."""
+        self._action_groups.sort(key=lambda group: group.title == "other")
+        return super().format_help()
 
     def parse_args(  # type: ignore[override]
         self, args: Sequence[str] | None = None, namespace: argparse.Namespace | None = None
@@ -54,3 +71,15 @@ class Parser(argparse.ArgumentParser):
             known = re.findall(r"[\w-]+", found["known"])
             message += did_you_mean(found["got"], known)
         super().error(message)
+
+
+def _group(names: Sequence[str], options: dict[str, Any]) -> str:
+    """The heading of an argument, by what it is declared with."""
+    kind, name = options.get("type"), names[-1] if names else ""
+    if options.get("action") in ("help", "version") or name == "--debug":
+        return "other"
+    if isinstance(kind, type) and issubclass(kind, Input):
+        return "input" if name != "--model" else "model"
+    if getattr(kind, "output", False) or name in _OUTPUT.split():
+        return "output"
+    return "input" if name in _INPUT.split() else "model"

@@ -49,6 +49,7 @@ class Output(str):
             output.kind = kind
             return output
 
+        made.output = True  # type: ignore[attr-defined]  # tells help that it is written
         return made
 
 

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from ..errors import ArgumentError
 from ..runfiles import read_runs
 from ..runs import CalibrationRun
-from .parser import did_you_mean
+from ..suggestions import did_you_mean
 from .signal_options import reading
 
 __all__ = ["listed", "read_selected"]

@@ -47,7 +47,7 @@ def fit_notes(fit: FitResult) -> Iterable[str]:
     """What not to trust and why, one sentence each."""
     span, weighted = fit.span, fit.weighted
     if not span.full:
-        yield f"Fitted on {span.start:.6g} to {span.stop:.6g} only: outside it is extrapolated."
+        yield f"Fitted on {span.describe(fit.problem.period)} only: outside it is extrapolated."
     yield from (_sentence(remark) for remark in fit.remarks)
     if fit.ridge > 0.0:
         where = "arc" if fit.problem.is_periodic else "travel"

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .. import _core
+from ..angles import unit_name
 from ..runs import CalibrationRun
 
 __all__ = ["Span", "covered_span", "over_turns", "travelled_span"]
@@ -39,6 +40,18 @@ class Span(NamedTuple):
     start: float
     stop: float
     full: bool
+
+    def describe(self, period: float) -> str:
+        """The stretch with its unit, a turn off where it ends beyond the first.
+
+        Examples
+        --------
+        >>> Span(200.0, 500.0, False).describe(360.0)
+        '-160 to 140 deg'
+        """
+        within_a_turn = self.stop - self.start < period
+        turn = period if within_a_turn and self.stop > period else 0.0
+        return f"{self.start - turn:.4g} to {self.stop - turn:.4g} {unit_name(period)}"
 
 
 def covered_span(angles: Sequence[Array], period: float) -> Span:

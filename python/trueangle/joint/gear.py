@@ -10,7 +10,14 @@ from typing import Final
 from ..errors import ArgumentError
 from .shafts import FIXED_MEMBERS
 
-__all__ = ["COMMON_RATIOS", "Explanation", "explain_by_shafts", "explain_order", "gear_orders"]
+__all__ = [
+    "COMMON_RATIOS",
+    "Explanation",
+    "explain_as_harmonic",
+    "explain_by_shafts",
+    "explain_order",
+    "gear_orders",
+]
 
 #: Gear ratios of common strain wave gears, tried where none is declared.
 COMMON_RATIOS: Final = (30, 50, 80, 100, 120, 160)
@@ -43,9 +50,20 @@ class Explanation:
 
 
 _OUTPUT_SIDE: Final = {
-    1: "eccentricity of the output side, gravity load or the reference's mount",
-    2: "tilt or ellipticity of the output side, or the coupling of the reference",
+    1: "eccentricity of the output side, gravity load or the reference's mount; offset of a "
+    "sensor's signals",
+    2: "sensor displaced or tilted from the axis, ellipticity, gain or quadrature error of its "
+    "signals, or the coupling of the reference",
+    3: "second harmonic in the signals of a sensor of one period a turn",
+    4: "interpolation error: third or fifth harmonic in the signals of a sensor of one period "
+    "a turn",
 }
+
+#: A line this many times larger than its multiple makes that one too.
+_LARGER: Final = 3.0
+
+#: Highest multiple of a line that is put down to it.
+_HIGHEST_MULTIPLE: Final = 8
 
 
 def gear_orders(gear_ratio: float, fixed_member: str = "circular_spline") -> dict[float, str]:
@@ -120,6 +138,30 @@ def explain_order(
             if float(m) in members:
                 found.append(Explanation(m, name, float(ratio), gear_ratio is None))
     return tuple(found)
+
+
+def explain_as_harmonic(order: float, amplitudes: Mapping[float, float]) -> tuple[Explanation, ...]:
+    """The larger line that ``order`` is a multiple of: what is not sinusoidal has harmonics.
+
+    Parameters
+    ----------
+    order : float
+    amplitudes : mapping of float to float
+        Of every retained order, in any unit. Order 1 is left out: all are multiples of it.
+
+    Examples
+    --------
+    >>> [str(e) for e in explain_as_harmonic(12, {1: 9.0, 4: 80.0, 12: 2.0})]
+    ['12 (harmonic 3 of order 4, whose waveform is no sine)']
+    """
+    own = amplitudes.get(order, math.inf)
+    for base in sorted(amplitudes, key=lambda k: -amplitudes[k]):
+        times = order / base
+        whole = abs(times - round(times)) < 1e-9 and 2 <= round(times) <= _HIGHEST_MULTIPLE
+        if base > 1 and whole and amplitudes[base] >= _LARGER * own:
+            name = f"harmonic {round(times)} of order {base:g}, whose waveform is no sine"
+            return (Explanation(order, name),)
+    return ()
 
 
 def explain_by_shafts(order: float, shafts: Mapping[str, float]) -> tuple[Explanation, ...]:

@@ -143,7 +143,7 @@ class Joint:
         if abs(order - encoder) <= near:
             found.append("eccentricity of the encoder's magnet or scale")
         if abs(order - 2.0 * encoder) <= near:
-            found.append("tilt or ellipticity of the encoder's magnet or scale")
+            found.append("encoder displaced or tilted from the axis, or ellipticity of its scale")
         for k, what in (
             (1, "offset of the sine and cosine signals"),
             (2, "gain mismatch or quadrature error of the sine and cosine signals"),
@@ -152,6 +152,9 @@ class Joint:
         ):
             if abs(order - k * self.pole_pairs * encoder) <= near:
                 found.append(f"interpolation error: {what}")
+        quadrants = order / (4.0 * self.pole_pairs * encoder)
+        if 1.5 < quadrants < 8.5 and abs(quadrants - round(quadrants)) * 4.0 * encoder <= near:
+            found.append(f"harmonic {round(quadrants)} of the interpolation error of order 4")
         if generator is not None and motor is not None:
             if min(abs(order - motor), abs(order - generator)) <= near:
                 found.append("wave generator, once per turn: eccentricity, bearing")

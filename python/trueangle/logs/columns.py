@@ -9,6 +9,7 @@ from ..angles import UNIT_PERIODS, unit_name
 from ..columns import ANGLE_UNITS, Column, Wanted, find_columns, listed, matching, unit_in_name
 from ..errors import FileError
 from ..signals import SIGNALS
+from ..suggestions import did_you_mean
 
 __all__ = [
     "RUN_COLUMN",
@@ -159,7 +160,11 @@ def _search(path: object, header: Sequence[str], joint: str | None) -> str:
             if found
             else "no indicated_deg (_rad, _turn, _count) column"
         )
-        raise FileError(path, f"{problem}: name the angle with --column; {listed(header)}", line=1)
+        guesses = (did_you_mean(name, header) for name in sorted(wanted) if not found)
+        guess = next(filter(None, guesses), "")
+        raise FileError(
+            path, f"{problem}: name the angle with --column{guess}; {listed(header)}", line=1
+        )
     for candidates in _joint_names(joint):
         found = [name for name in candidates if name in header]
         if len(found) == 1:

@@ -312,7 +312,8 @@ def _span(found: Accumulated) -> Span:
 
 def _notes(found: Accumulated, span: Span, table: Sequence[LogOrder]) -> Iterable[str]:
     if not span.full:
-        yield f"Fitted on {span.start:.6g} to {span.stop:.6g} only: outside it is extrapolated."
+        stretch = span.describe(found.moments.period)
+        yield f"Fitted on {stretch} only: outside it is extrapolated."
     if found.missing:
         yield f"{found.missing} readings without a reference or indicated angle left out."
     if table and len(found.moments.runs) < 2:

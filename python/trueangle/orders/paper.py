@@ -141,7 +141,9 @@ def select_by_paper(
             phase_spread_deg=float(spread[n]),
             aliases=tuple(aliases.get(k, ())),
         )
-        rows.append(explained(row, candidates, placed))
+        rows.append(row)
+    amplitudes = {row.order: row.amplitude for row in rows if row.retained}
+    rows = [explained(row, candidates, placed, amplitudes) for row in rows]
     before, after = (_residual(held, orders, mean, which) for which in (np.zeros_like(kept), kept))
     selection = OrderSelection(
         orders=tuple(retained),

@@ -121,8 +121,9 @@ class EvidenceSelection(EvidenceSearch):
                     aliases=tuple(lookalikes.get(i, ())),
                 )
             )
-        rows = [explained(row, self.candidates, self.positions) for row in rows]
-        orders = tuple(row.order for row in rows if row.retained)
+        retained = {row.order: row.amplitude for row in rows if row.retained}
+        rows = [explained(row, self.candidates, self.positions, retained) for row in rows]
+        orders = tuple(retained)
         without, with_ = self._held_out_rms(model)
         selection = OrderSelection(
             orders=orders,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import textwrap
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from ..angles import arcsec
@@ -42,6 +43,7 @@ def summarise(selection: OrderSelection) -> str:
     lines.append("")
     if not retained:
         lines.append(f"NO ORDER RETAINED: {selection.reason}")
+    lines += _explanations(retained)
     for row in selection.table:
         if row.doubtful or row.verdict == "reference":
             text = row.reason if row.doubtful else f"{row.order:g}: {row.reason}"
@@ -67,6 +69,17 @@ def _line(row: OrderRow, period: float) -> str:
         f"{row.phase_error_deg:6.1f}  {spread} {chance:>12} {100.0 * row.holdout_gain:12.3g} %"
         f"  {row.verdict}"
     )
+
+
+def _explanations(rows: Sequence[OrderRow]) -> list[str]:
+    """What each retained order may be by itself; aliases are told with what they hinder."""
+    lines = []
+    for row in rows:
+        names = [e.name for e in row.explanations if e.order == row.order and not e.assumed]
+        if names:
+            text = f"{row.order:g}: {'; or '.join(names)}"
+            lines += textwrap.wrap(text, _WIDTH, initial_indent="  ", subsequent_indent="     ")
+    return ["What they may be:", *lines, ""] if lines else []
 
 
 def _source(selection: OrderSelection) -> str:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Final
@@ -11,7 +11,7 @@ import numpy as np
 
 from ..aliasing import Positions, closure_errors, distinct_positions, energy_near_nyquist, fold
 from ..angles import arcsec
-from ..joint.gear import explain_by_shafts, explain_order
+from ..joint.gear import explain_as_harmonic, explain_by_shafts, explain_order
 from ..planning.noisefactors import mount_noise_factors
 from ..planning.plan import HIGHEST_LOW_ORDER, plan_mounts, wanted_orders
 from ..runs import CalibrationRun, as_runs
@@ -44,8 +44,13 @@ def because(verdict: str) -> str:
     return _VERDICTS[verdict]
 
 
-def explained(row: OrderRow, candidates: Candidates, positions: Positions) -> OrderRow:
-    """The row with its explanations and the reason of its verdict."""
+def explained(
+    row: OrderRow, candidates: Candidates, positions: Positions, retained: Mapping[float, float]
+) -> OrderRow:
+    """The row with its explanations and the reason of its verdict.
+
+    ``retained`` are the amplitudes of the retained orders.
+    """
     ratio, member = candidates.gear_ratio, candidates.fixed_member
     if row.verdict == "reference":
         return replace(row, reason=_reference_reason(row.order, candidates.carriers))
@@ -54,6 +59,7 @@ def explained(row: OrderRow, candidates: Candidates, positions: Positions) -> Or
     explanations = (
         *explain_order(row.order, row.aliases, ratio, member),
         *explain_by_shafts(row.order, candidates.shafts),
+        *explain_as_harmonic(row.order, retained),
     )
     reason = "significant, and lowers the error of readings held out of the fit"
     rivals = [str(e) for e in explanations if e.order != row.order]

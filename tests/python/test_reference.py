@@ -1,0 +1,76 @@
+"""The reference: every name it lists can be imported, and it lists what is public."""
+
+import inspect
+import sys
+
+import pytest
+
+import trueangle as ta
+from conftest import ROOT
+
+sys.path.insert(0, str(ROOT / "docs"))
+import causes
+import reference_pages
+
+FOLDER = ROOT / "docs" / "reference"
+LISTED = list(reference_pages.pages(FOLDER))
+
+
+def test_there_is_a_page_for_every_room():
+    assert len({page for page, _ in LISTED}) >= 15
+    assert len(LISTED) >= 90
+
+
+@pytest.mark.parametrize("name", sorted({name for _, name in LISTED}))
+def test_what_is_listed_can_be_imported_and_is_described(name):
+    what = reference_pages.imported(name)
+    if callable(what):
+        assert inspect.getdoc(what), f"{name} has no docstring"
+
+
+def test_a_name_that_is_gone_is_noticed():
+    with pytest.raises(ImportError, match="no_such_thing"):
+        reference_pages.imported("trueangle.no_such_thing")
+
+
+def test_the_pages_list_everything_that_the_package_shows():
+    listed = {reference_pages.imported(name) for _, name in LISTED if callable_(name)}
+    shown = {name: getattr(ta, name) for name in ta.__all__ if callable(getattr(ta, name))}
+    assert [name for name, what in shown.items() if what not in listed] == []
+
+
+def callable_(name):
+    return callable(reference_pages.imported(name))
+
+
+def test_every_page_is_in_the_menu_and_in_the_index():
+    menu = (ROOT / "docs" / "index.md").read_text()
+    index = (FOLDER / "index.md").read_text()
+    for page in FOLDER.glob("*.md"):
+        assert f"\nreference/{page.stem}\n" in menu
+        assert page.stem == "index" or f"({page.name})" in index
+
+
+def test_a_page_begins_with_its_summary():
+    text = reference_pages.expanded("```{reference}\ntrueangle.fit\ntrueangle.Shaft: order\n```\n")
+    summary, details = text.split(".. autofunction:: trueangle.fit")
+    assert "autosummary" in summary
+    assert "   trueangle.Shaft\n" in summary
+    assert ".. autoclass:: trueangle.Shaft\n   :members: order\n" in details
+
+
+def test_every_cause_stands_under_the_measurement_that_shows_it():
+    page = causes.causes_page()
+    for kind, effect in causes.EFFECTS.items():
+        heading = causes.MEASUREMENTS[causes.measurement(effect)][0]
+        section = page.split(f"## {heading}\n")[1].split("\n## ")[0]
+        assert f"\n`{kind}`\n" in section
+
+
+def test_a_cause_that_needs_a_column_stands_under_it():
+    places = {kind: causes.measurement(effect) for kind, effect in causes.EFFECTS.items()}
+    assert places["backlash"] == "direction"
+    assert places["torsional_compliance"] == "torque"
+    assert places["current_coupling"] == "current"
+    assert places["reference_error"] == "mount"
+    assert places["latency"] == "velocity"
