@@ -7,9 +7,11 @@ import pytest
 
 from trueangle.diagnosis.discrepancy import noise_from_repeats
 from trueangle.joint.grid import UniformGrid, uniform_grid
-from trueangle.regression.leastsquares import best_ratio
+from trueangle.regression.batch import Blocks
+from trueangle.regression.factor import Factor
+from trueangle.regression.ratio import best_ratio
 from trueangle.regression.regression import Regression
-from trueangle.regression.whitening import RunEffect, Whitener, lag_correlation
+from trueangle.regression.whitening import LagCorrelation, RunEffect, Whitener
 from trueangle.simulation import Harmonic, Joint, RunDesign, Simulation, join_runs, simulate
 
 #: Relative rounding of double precision sums over a few hundred readings.
@@ -68,6 +70,68 @@ def test_whitening_inverts_the_covariance(space):
     assert np.abs(w @ x - whiten(x)).max() < ROUNDING
 
 
+@pytest.fixture(params=["white", "correlated", "weighted", "run effects", "everything"])
+def noise(request, space):
+    """A noise of each kind: correlation, run effects, weights."""
+    rng = np.random.default_rng(7)
+    rho = 0.6 if request.param in ("correlated", "everything") else 0.0
+    weights = rng.uniform(0.5, 2.0, space.n)
+    # Many columns in a run, of which some are alike, and one by itself.
+    wide = np.cumsum(rng.standard_normal((space.n, 5)), axis=0)
+    effects = [RunEffect(wide @ rng.standard_normal((5, 8)), 30.0), RunEffect(wide[:, :1], 0.4)]
+    return {
+        "rho": rho,
+        "effects": effects if request.param in ("run effects", "everything") else [],
+        "weights": weights if request.param in ("weighted", "everything") else None,
+    }
+
+
+def test_products_under_a_noise_need_no_mapped_columns(space, noise):
+    rng = np.random.default_rng(3)
+    whiten = Whitener(space.bounds, noise["rho"], noise["effects"], noise["weights"])
+    x, y = rng.standard_normal((space.n, 6)), rng.standard_normal((space.n, 2))
+    assert x.T @ whiten.transposed(y) == pytest.approx(whiten(x).T @ y, rel=ROUNDING, abs=ROUNDING)
+    blocks = Blocks([x[:, :2], x[:, 2:3], x[:, 3:5], x[:, 5:]])
+    for (where, width, _, _), grams in zip(blocks.groups, blocks.grams(whiten), strict=True):
+        for k, gram in zip(where, grams, strict=True):
+            start = (0, 2, 3, 5)[k]
+            mapped = whiten(x[:, start : start + width])
+            assert gram == pytest.approx(mapped.T @ mapped, rel=ROUNDING, abs=ROUNDING)
+
+
+def test_gains_of_blocks_are_those_of_each(space, noise):
+    rng = np.random.default_rng(4)
+    columns = [rng.standard_normal((space.n, 1 + k % 2)) for k in range(7)]
+    space.weights = noise["weights"]
+    space = space.with_terms([], rho=noise["rho"])
+    space._project(space.target, noise["rho"], noise["effects"])
+    singly = [space.gain(block)[0] for block in columns]
+    assert space.block_gains(Blocks(columns)) == pytest.approx(singly, rel=1e-7)
+
+
+def test_a_factor_that_grows_is_the_one_made_at_once(space, noise):
+    rng = np.random.default_rng(5)
+    base = np.column_stack([np.ones(space.n), rng.standard_normal((space.n, 3)) * [1e-6, 1.0, 1e6]])
+    blocks = [base, base[:, 1:3] + 1e4 * rng.standard_normal((space.n, 2)), base[:, :0]]
+    near = base[:, 3:] + 1e-3 * rng.standard_normal((space.n, 1))  # beyond doubt alike
+    y = rng.standard_normal(space.n)
+    factors: list[Factor] = []
+    for many in (1, 2, 3, 4, 2):
+        parts = [*blocks, near][:many]
+        factor = Factor.of(parts, space.bounds, **noise, before=factors[-1:])
+        factors.append(factor)
+        whole = factor.whiten(np.hstack(parts))
+        lengths = np.linalg.norm(whole, axis=0)
+        u, s, vt = np.linalg.svd(whole / lengths, full_matrices=False)
+        kept = s > 1e-7 * s[0]
+        slow = vt[kept].T @ ((u[:, kept].T @ y) / s[kept]) / lengths
+        assert factor.q.shape[1] == kept.sum() == whole.shape[1] - (many == 4)
+        assert factor.q.T @ factor.q == pytest.approx(np.eye(kept.sum()), abs=ROUNDING)
+        assert factor.back @ (factor.q.T @ y) == pytest.approx(slow, rel=1e-7)
+        assert factor.whiten is factors[0].whiten
+    assert np.array_equal(factors[1].q[:, :4], factors[0].q)
+
+
 def test_gains_are_those_of_least_squares(space):
     rng = np.random.default_rng(2)
     columns = rng.standard_normal((space.n, 4))
@@ -96,7 +160,7 @@ def test_gains_are_those_of_least_squares(space):
 
 def test_run_effects_have_the_likelihood_of_the_dense_covariance(space):
     z = np.column_stack([np.ones(space.n), space.signals.clock / 10.0])
-    ratio, deviance = best_ratio(space, z)
+    ratio, deviance = best_ratio(space.factor, space.r, space.as_deviances, z)
 
     def minus_two_log_likelihood(ratio):
         v = dense_covariance(space, 0.0, [RunEffect(z, ratio)], np.ones(space.n))
@@ -113,18 +177,44 @@ def test_run_effects_have_the_likelihood_of_the_dense_covariance(space):
     assert deviance > max(none - minus_two_log_likelihood(t) for t in trials) - 0.05
 
 
+@pytest.mark.parametrize("width", [2, 20])
+def test_squares_saved_at_every_ratio_are_those_of_a_ridge(space, width):
+    """Few columns go by their eigensystem, many by systems of the size of what is fitted."""
+    rng = np.random.default_rng(6)
+    z = np.cumsum(rng.standard_normal((space.n, width)), axis=0)
+    # Residual and columns of one run are ridged alike: saved is r'Z (I/t + Z'MZ)^-1 Z'r.
+    own = np.zeros((space.n, width * len(space.bounds)))
+    for k, (start, stop) in enumerate(space.bounds):
+        own[start:stop, k * width : (k + 1) * width] = z[start:stop]
+    left = own @ rng.standard_normal(own.shape[1])
+    beside, left = (x - space.q @ (space.q.T @ x) for x in (own, left))
+    seen = []
+
+    def deviances(saved):
+        seen.extend(saved)
+        return 2.0 * saved
+
+    ratio, deviance = best_ratio(space.factor, left, deviances, z)
+    moment = own.T @ left
+    saved = moment @ np.linalg.solve(np.eye(own.shape[1]) / ratio + beside.T @ own, moment)
+    assert min(abs(s / saved - 1.0) for s in seen) < 1e-7
+    paid = np.linalg.slogdet(np.eye(own.shape[1]) + ratio * own.T @ own)[1]
+    assert deviance == pytest.approx(2.0 * saved - paid, rel=1e-7)
+
+
 @pytest.mark.parametrize("seed", [1, 2, 3])
 def test_correlation_is_estimated_and_white_noise_is_white(seed):
     rng = np.random.default_rng(seed)
     bounds = [(400 * k, 400 * k + 400) for k in range(20)]
     clock = np.tile(np.arange(400.0), 20)
     white = rng.standard_normal(8000)
-    assert lag_correlation(white, clock, bounds) == 0.0
+    correlation = LagCorrelation(clock, bounds)
+    assert correlation(white) == 0.0
     noise = np.zeros(8000)
     for k in range(1, 8000):
         noise[k] = 0.5 * noise[k - 1] + white[k]
     # Standard error sqrt((1 - rho^2)/n) = 0.01, and the bias of the wander's removal.
-    assert lag_correlation(noise, clock, bounds) == pytest.approx(0.5, abs=0.06)
+    assert correlation(noise) == pytest.approx(0.5, abs=0.06)
 
 
 def test_grids_are_seen_and_orders_fold_as_the_paper_counts():

@@ -12,11 +12,13 @@ from numpy.typing import NDArray
 from ..joint.pattern import Pattern, Surroundings, line_columns
 from ..joint.signals import Signals
 from .extension import Extension, penalty_of_parameter
+from .factor import Factor
 from .lines import LineBasis
+from .ratio import best_ratio
 from .repeats import repeated_part
-from .whitening import RunEffect, Whitener, lag_correlation
+from .whitening import LagCorrelation, RunEffect
 
-__all__ = ["ROUNDING", "LeastSquares", "best_ratio"]
+__all__ = ["ROUNDING", "LeastSquares"]
 
 Array = NDArray[np.float64]
 
@@ -29,9 +31,6 @@ ROUNDING = 1e-6
 
 #: Runs from which they, and not the readings, are what informs on a variance between runs.
 ENOUGH_RUNS = 8
-
-#: Ratios of variance (run effect to one reading) that are tried.
-RATIOS = np.geomspace(1e-5, 1e8, 53)
 
 
 class LeastSquares:
@@ -75,6 +74,8 @@ class LeastSquares:
             [np.ones(self.n), *(line_columns(signals.theta, m) for m in around.pattern.orders)]
         )
         self.terms: list[Extension] = []
+        self.correlation = LagCorrelation(signals.clock, self.bounds)
+        self._factors: tuple[Factor, ...] = ()
         #: What causes proposed beside given terms; shared by regressions of the same readings.
         self.memory: dict[Any, Any] = {}
         self.update()
@@ -113,7 +114,6 @@ class LeastSquares:
         self.design = design
         effects = [term.run_effect for term in self.terms if term.run_effect is not None]
         target, rho = self.residual, self.fixed_rho or 0.0
-        self._noise: Whitener | None = None  # under which the design is projected
         for _ in range(2):
             self._project(target, rho, effects)
             left = self.residual - design @ self.coefficients
@@ -124,7 +124,7 @@ class LeastSquares:
             outlying = np.abs(left) > limit
             if self.fixed_rho is None:
                 kept = np.clip(left, -limit, limit) * self.root_weights
-                rho = lag_correlation(kept, self.signals.clock, self.bounds)
+                rho = self.correlation(kept)
             settled = not outlying.any() and rho == self.whiten.rho
             if settled:
                 break
@@ -152,28 +152,29 @@ class LeastSquares:
 
     def _project(self, target: Array, rho: float, effects: list[RunEffect]) -> None:
         """Fit the design to ``target`` under this noise."""
-        if self._noise is None or self._noise.rho != rho or self._noise.effects != effects:
-            self._noise = self.whiten = Whitener(self.bounds, rho, effects, self.weights)
-            columns = self.whiten(self.design)
-            scale = np.sqrt(np.einsum("ij,ij->j", columns, columns))
-            scale[scale == 0.0] = 1.0
-            u, s, vt = np.linalg.svd(columns / scale, full_matrices=False)
-            kept = s > 1e-7 * s[0]
-            self.q = u[:, kept]
-            self.back = vt[kept].T / s[kept] / scale[:, None]
-            self.unscaled_covariance = self.back @ self.back.T
+        blocks = [self.base, *(term.columns for term in self.terms)]
+        factor = Factor.of(blocks, self.bounds, rho, effects, self.weights, self._factors)
+        # White and correlated noise take turns: the last two are kept.
+        self._factors = (factor, *(f for f in self._factors if f.whiten is not factor.whiten))[:2]
+        self.factor, self.whiten = factor, factor.whiten
+        self.q, self.back = factor.q, factor.back
         y = self.whiten(target)
         inner = self.q.T @ y
         self.r = y - self.q @ inner
         self.rss = max(float(self.r @ self.r), 1e-300)
         self.coefficients = self.back @ inner
 
+    @property
+    def unscaled_covariance(self) -> Array:
+        """Covariance of all coefficients over the variance of one reading."""
+        return np.asarray(self.back @ self.back.T)
+
     def _refit_ratio(
         self, target: Array, rho: float, effects: list[RunEffect], k: int
     ) -> RunEffect:
         others = [effect for j, effect in enumerate(effects) if j != k]
         self._project(target, rho, others)
-        ratio, _ = best_ratio(self, effects[k].columns)
+        ratio, _ = best_ratio(self.factor, self.r, self.as_deviances, effects[k].columns)
         return RunEffect(effects[k].columns, max(ratio, 1e-9))
 
     def _pattern(self) -> Pattern:
@@ -266,37 +267,3 @@ class LeastSquares:
     def has(self, cause: str) -> bool:
         """A term of this cause is among the terms."""
         return any(term.cause == cause for term in self.terms)
-
-
-def best_ratio(fit: LeastSquares, columns: Array) -> tuple[float, float]:
-    """Best ratio of variances of a run effect beside what is fitted, and the deviance it saves."""
-    z = fit.whiten(columns)
-    stacked = np.column_stack([fit.q, fit.r])
-    gram = np.array([z[a:b].T @ z[a:b] for a, b in fit.bounds])
-    moment = np.array([z[a:b].T @ stacked[a:b] for a, b in fit.bounds])
-    values, vectors = np.linalg.eigh(gram)
-    values = np.maximum(values, 0.0)
-    kept = values > 1e-12 * values.max(initial=1e-300)
-    turned = np.einsum("jki,jkl->jil", vectors, moment)
-    b = (turned / np.sqrt(np.where(kept, values, 1.0))[:, :, None])[kept]
-    power = values[kept]
-    bq, br = b[:, :-1], b[:, -1]
-    scale = max(float(power.max(initial=0.0)), 1e-300)
-
-    def saved(trial: float) -> float:
-        shrink = trial * power / (1.0 + trial * power)
-        cross = bq.T @ (shrink * br)
-        inner = np.eye(bq.shape[1]) - bq.T @ (shrink[:, None] * bq)
-        inner[np.diag_indices_from(inner)] += 1e-12
-        total = float(br @ (shrink * br)) + float(cross @ np.linalg.solve(inner, cross))
-        return fit.as_deviance(total) - float(np.log1p(trial * power).sum())
-
-    # Every fourth ratio first: the maximum is broad.
-    trials = RATIOS / scale
-    coarse = range(0, trials.size, 4)
-    middle = max(coarse, key=lambda k: saved(float(trials[k])))
-    near = range(max(middle - 3, 0), min(middle + 4, trials.size))
-    deviance = {k: saved(float(trials[k])) for k in near}
-    k = max(near, key=lambda k: deviance[k])
-    ratio, best = (float(trials[k]), deviance[k]) if deviance[k] > 0.0 else (0.0, 0.0)
-    return ratio, best

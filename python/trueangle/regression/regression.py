@@ -8,9 +8,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .batch import Blocks, block_gram
+from .batch import Blocks
 from .extension import Extension
-from .leastsquares import ROUNDING, LeastSquares, best_ratio
+from .leastsquares import ROUNDING, LeastSquares
+from .ratio import best_ratio
 from .whitening import RunEffect
 
 __all__ = ["ROUNDING", "Extension", "Regression"]
@@ -70,11 +71,12 @@ class Regression(LeastSquares):
     def block_gains(self, blocks: Blocks) -> Array:
         """Deviance that each block of columns saves alone, as `gain` of each."""
         found = np.zeros(blocks.count)
-        for where, width, columns, gram in blocks.groups:
-            x = self.whiten(columns)
-            before = gram if x is columns else block_gram(x, width)
-            known = (self.q.T @ x).reshape(self.q.shape[1], -1, width)
-            moment = (self.r @ x).reshape(-1, width)
+        q, r = self.whiten.transposed(self.q), self.whiten.transposed(self.r)
+        for (where, width, columns, _), before in zip(
+            blocks.groups, blocks.grams(self.whiten), strict=True
+        ):
+            known = (q.T @ columns).reshape(q.shape[1], -1, width)
+            moment = (r @ columns).reshape(-1, width)
             after = before - np.einsum("kbi,kbj->bij", known, known)
             power = np.einsum("bii->bi", after)
             limit = EXCITED * np.maximum(np.einsum("bii->bi", before), 1e-300)
@@ -157,7 +159,7 @@ class Regression(LeastSquares):
         self, cause: str, shape: dict[str, Any], columns: Array, log_grid: float = 0.0
     ) -> Extension:
         """Extension of a run effect with its evidence in this regression."""
-        ratio, deviance = best_ratio(self, columns)
+        ratio, deviance = best_ratio(self.factor, self.r, self.as_deviances, columns)
         return Extension(
             cause,
             shape,

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["RunEffect", "Whitener", "lag_correlation", "wander_basis"]
+__all__ = ["LagCorrelation", "RunEffect", "Whitener", "principal", "wander_basis"]
 
 Array = NDArray[np.float64]
 
@@ -18,6 +18,9 @@ WANDER_TERMS = 8
 
 #: Correlation between neighbours below which the noise counts as white.
 WHITE_BELOW = 0.05
+
+#: Share of the power of the strongest combination of columns below which one is rounding.
+VANISHES = 1e-14
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,28 +46,57 @@ def wander_basis(clock: Array, terms: int = WANDER_TERMS) -> Array:
     return np.asarray(np.cos(np.pi * np.outer(u, np.arange(1, terms + 1))))
 
 
-def lag_correlation(residual: Array, clock: Array, bounds: list[tuple[int, int]]) -> float:
+def principal(columns: Array, bounds: list[tuple[int, int]]) -> tuple[Array, Array]:
+    """Columns turned so that within every run they are at right angles, and their power.
+
+    Shapes (R, k) and (n, k), weakest first.
+    """
+    grams = np.array([columns[a:b].T @ columns[a:b] for a, b in bounds])
+    power, vectors = np.linalg.eigh(grams)
+    turned = np.empty_like(columns)
+    for (start, stop), v in zip(bounds, vectors, strict=True):
+        np.matmul(columns[start:stop], v, out=turned[start:stop])
+    return np.maximum(power, 0.0), turned
+
+
+class LagCorrelation:
     """Correlation between neighbours within runs, after wander is taken out.
 
-    Pooled over runs and at least 0; 0 below `WHITE_BELOW` or within four standard
-    errors of it, so white noise stays exactly white.
+    Parameters
+    ----------
+    clock : ndarray, shape (n,)
+        Increasing within a run.
+    bounds : list of (int, int)
+        The runs.
     """
-    product = power = 0.0
-    pairs = 0
-    for start, stop in bounds:
-        if stop - start <= 2 * WANDER_TERMS:
-            continue
-        basis = np.column_stack([np.ones(stop - start), wander_basis(clock[start:stop])])
-        q, _ = np.linalg.qr(basis)
-        e = residual[start:stop] - q @ (q.T @ residual[start:stop])
-        product += float(e[1:] @ e[:-1])
-        power += float(e @ e)
-        pairs += stop - start - 1
-    if pairs == 0 or power == 0.0:
-        return 0.0
-    # The basis takes out a share of the slow part: about K/n of the correlation.
-    rho = product / power
-    return min(rho, 0.98) if rho > max(WHITE_BELOW, 4.0 / np.sqrt(pairs)) else 0.0
+
+    def __init__(self, clock: Array, bounds: list[tuple[int, int]]) -> None:
+        #: First and one-past-last reading of every run, and its mean and wander at right angles.
+        self.bases: list[tuple[int, int, Array]] = []
+        for start, stop in bounds:
+            if stop - start > 2 * WANDER_TERMS:
+                basis = [np.ones(stop - start), wander_basis(clock[start:stop])]
+                self.bases.append((start, stop, np.linalg.qr(np.column_stack(basis))[0]))
+
+    def __call__(self, residual: Array) -> float:
+        """Pooled over runs and at least 0.
+
+        0 below `WHITE_BELOW` or within four standard errors of it, so white noise stays
+        exactly white.
+        """
+        product = power = 0.0
+        pairs = 0
+        for start, stop, q in self.bases:
+            part = residual[start:stop]
+            e = part - q @ (q.T @ part)
+            product += float(e[1:] @ e[:-1])
+            power += float(e @ e)
+            pairs += stop - start - 1
+        if pairs == 0 or power == 0.0:
+            return 0.0
+        # The basis takes out a share of the slow part: about K/n of the correlation.
+        rho = product / power
+        return min(rho, 0.98) if rho > max(WHITE_BELOW, 4.0 / np.sqrt(pairs)) else 0.0
 
 
 class Whitener:
@@ -91,7 +123,9 @@ class Whitener:
         self.bounds = bounds
         self.rho = rho
         self.effects = list(effects or ())
+        self.weights = weights
         self.root_weights = None if weights is None else np.sqrt(weights)
+        self._first = [start for start, _ in bounds]
         self._rotations: list[tuple[Array, Array]] = []
         self._log_determinants: list[float] = []
         self.log_determinant: float = -len(bounds) * float(np.log1p(-(rho**2)))
@@ -101,10 +135,14 @@ class Whitener:
             stacked = self._filtered(
                 np.hstack([np.sqrt(effect.ratio) * effect.columns for effect in self.effects])
             )
-            for start, stop in bounds:
-                u, s, _ = np.linalg.svd(stacked[start:stop], full_matrices=False)
-                self._rotations.append((u, 1.0 - 1.0 / np.sqrt(1.0 + s**2)))
-                log_determinant = float(np.log1p(s**2).sum())
+            power, turned = principal(stacked, bounds)
+            shrink = 1.0 - 1.0 / np.sqrt(1.0 + power)
+            for j, (start, stop) in enumerate(bounds):
+                # Columns that add nothing to the others point nowhere.
+                kept = power[j] > VANISHES * power[j].max(initial=0.0)
+                u = turned[start:stop, kept] / np.sqrt(power[j, kept])
+                self._rotations.append((u, shrink[j, kept]))
+                log_determinant = float(np.log1p(power[j, kept]).sum())
                 self._log_determinants.append(log_determinant)
                 self.log_determinant += log_determinant
 
@@ -118,17 +156,74 @@ class Whitener:
         """Nothing to do: white noise, no run effects."""
         return self.rho == 0.0 and not self.effects and self.root_weights is None
 
+    def has(self, rho: float, effects: Sequence[RunEffect], weights: Array | None) -> bool:
+        """It is the map of this noise; told without looking at the readings."""
+        return (
+            self.rho == rho
+            and len(self.effects) == len(effects)
+            and all(a is b for a, b in zip(self.effects, effects, strict=True))
+            and self.weights is weights
+        )
+
     def _filtered(self, x: NDArray[Any]) -> NDArray[Any]:
         if self.root_weights is not None:
             scale = self.root_weights.astype(x.real.dtype)
             x = x * (scale if x.ndim == 1 else scale[:, None])
         if self.rho == 0.0:
             return x
-        out = x.copy()
-        out[1:] -= x.dtype.type(self.rho) * x[:-1]
-        first = [start for start, _ in self.bounds]
-        out[first] = x[first] * x.dtype.type(np.sqrt(1.0 - self.rho**2))
+        out = np.empty_like(x)
+        np.multiply(x[:-1], x.dtype.type(-self.rho), out=out[1:])
+        out[1:] += x[1:]
+        out[self._first] = x[self._first] * x.dtype.type(np.sqrt(1.0 - self.rho**2))
         return out
+
+    def _filtered_back(self, y: Array) -> Array:
+        """The transpose of `_filtered` applied to columns."""
+        if self.rho != 0.0:
+            out = y.copy()
+            out[self._first] *= np.sqrt(1.0 - self.rho**2)
+            follows = self.rho * y[1:]
+            follows[[start - 1 for start in self._first[1:]]] = 0.0
+            out[:-1] -= follows
+            y = out
+        if self.root_weights is not None:
+            y = y * (self.root_weights if y.ndim == 1 else self.root_weights[:, None])
+        return y
+
+    def transposed(self, y: Array) -> Array:
+        """The transpose of the map applied to a column or to columns.
+
+        Products ``map(X).T @ y`` of many columns X are ``X.T @ transposed(y)``: the many
+        need not be mapped.
+        """
+        if self.effects:
+            y = y.copy()
+            self._shrink(y)
+        return self._filtered_back(y)
+
+    def taken(self) -> tuple[Array, Array]:
+        """What run effects take from products of columns, as columns w and shares c.
+
+        With F the filter alone, ``map(x) @ map(y)`` is ``F x @ F y`` less, run by run,
+        ``(w @ x) c (w @ y)``. Runs have their columns side by side, shape (n, k) and (R, k).
+        """
+        width = max((u.shape[1] for u, _ in self._rotations), default=0)
+        w = np.zeros((self.bounds[-1][1], width))
+        c = np.zeros((len(self.bounds), width))
+        for j, ((start, stop), (u, shrink)) in enumerate(
+            zip(self.bounds, self._rotations, strict=True)
+        ):
+            w[start:stop, : u.shape[1]] = u
+            c[j, : u.shape[1]] = shrink * (2.0 - shrink)
+        return self._filtered_back(w), c
+
+    def _shrink(self, out: NDArray[Any]) -> None:
+        for (start, stop), (u, shrink) in zip(self.bounds, self._rotations, strict=True):
+            block = out[start:stop]
+            v = u.astype(out.real.dtype, copy=False)
+            inner = v.T @ block
+            factor = shrink.astype(out.real.dtype, copy=False)
+            block -= v @ (inner * (factor if inner.ndim == 1 else factor[:, None]))
 
     def __call__(self, x: NDArray[Any]) -> NDArray[Any]:
         """The map applied to a column or to columns, shape (n,) or (n, k)."""
@@ -142,12 +237,7 @@ class Whitener:
             return out
         if out is x:
             out = x.copy()
-        for (start, stop), (u, shrink) in zip(self.bounds, self._rotations, strict=True):
-            block = out[start:stop]
-            v = u.astype(x.real.dtype, copy=False)
-            inner = v.T @ block
-            factor = shrink.astype(x.real.dtype, copy=False)
-            block -= v @ (inner * (factor if inner.ndim == 1 else factor[:, None]))
+        self._shrink(out)
         return out
 
     def run_part(self, residual: Array, chosen: Sequence[bool] | None = None) -> Array:

@@ -1,0 +1,100 @@
+"""How large an error that every run draws anew is: the best ratio of its variance."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .factor import Factor
+from .whitening import principal
+
+__all__ = ["best_ratio"]
+
+Array = NDArray[np.float64]
+
+#: Ratios of variance (run effect to one reading) that are tried; every so many first, as the
+#: maximum is broad.
+RATIOS = np.geomspace(1e-5, 1e8, 53)
+COARSE = 4
+
+#: Share of the strongest column's power from which on one counts.
+COUNTS = 1e-12
+
+#: Columns up to which all ratios follow from one eigensystem of theirs.
+FEW_COLUMNS = 40
+
+
+def best_ratio(
+    factor: Factor, left: Array, deviances: Callable[[Array], Array], columns: Array
+) -> tuple[float, float]:
+    r"""Best ratio of variances of a run effect beside what is fitted, and what it saves.
+
+    With the columns of all runs turned to right angles, of power D, and B their share in
+    the fitted ones, a ratio t saves
+
+    .. math:: b^T \Bigl(\frac{I}{t} + D - D^{1/2} B B^T D^{1/2}\Bigr)^{-1} b
+
+    of the squares, b their products with the residual.
+
+    Parameters
+    ----------
+    factor : Factor
+        What is fitted.
+    left : ndarray, shape (n,)
+        What it leaves of the whitened readings.
+    deviances : callable
+        Deviance that so many squares saved are worth.
+    columns : ndarray, shape (n, k)
+        Shapes of the run effect.
+
+    Returns
+    -------
+    float, float
+        The ratio, 0 where none saves anything, and the deviance saved.
+    """
+    bounds = factor.whiten.bounds
+    values, turned = principal(factor.whiten(columns), bounds)
+    stacked = np.column_stack([factor.q, left])
+    moment = np.array([turned[a:b].T @ stacked[a:b] for a, b in bounds])
+    kept = values > COUNTS * values.max(initial=1e-300)
+    power = values[kept]
+    b = (moment / np.sqrt(np.where(kept, values, 1.0))[:, :, None])[kept]
+    trials = RATIOS / max(float(power.max(initial=0.0)), 1e-300)
+    squares = _few if power.size <= FEW_COLUMNS else _many
+    saved = squares(power, b[:, :-1], b[:, -1])
+
+    def deviance(chosen: Array) -> Array:
+        paid = np.log1p(np.outer(chosen, power)).sum(axis=1)
+        return np.asarray(deviances(saved(chosen)) - paid)
+
+    middle = COARSE * int(np.argmax(deviance(trials[::COARSE])))
+    near = trials[max(middle - COARSE + 1, 0) : middle + COARSE]
+    found = deviance(near)
+    k = int(np.argmax(found))
+    return (float(near[k]), float(found[k])) if found[k] > 0.0 else (0.0, 0.0)
+
+
+def _few(power: Array, bq: Array, br: Array) -> Callable[[Array], Array]:
+    """Squares saved at ratios, by the eigensystem of the columns beside the fitted ones."""
+    root = np.sqrt(power)
+    values, vectors = np.linalg.eigh(np.outer(root, root) * (np.eye(power.size) - bq @ bq.T))
+    values = np.maximum(values, 0.0)
+    squares = (vectors.T @ (root * br)) ** 2
+    return lambda t: np.asarray((t[:, None] / (1.0 + np.outer(t, values))) @ squares)
+
+
+def _many(power: Array, bq: Array, br: Array) -> Callable[[Array], Array]:
+    """As `_few`, by a system of the size of the fitted columns for every ratio."""
+
+    def saved(t: Array) -> Array:
+        x = np.outer(t, power)
+        shrink = x / (1.0 + x)
+        cross = (shrink * br) @ bq
+        inner = np.eye(bq.shape[1]) - (bq.T[None] * shrink[:, None, :]) @ bq
+        inner += 1e-12 * np.eye(bq.shape[1])
+        solved = np.linalg.solve(inner, cross[:, :, None])[:, :, 0]
+        return np.asarray(shrink @ br**2 + np.einsum("tp,tp->t", cross, solved))
+
+    return saved
