@@ -176,7 +176,6 @@ def test_arm_joint_has_a_reversal_error_that_is_not_named_but_estimated(data_dir
     assert 0.0 < half["std"] / 3600.0 < 0.03
 
 
-@pytest.mark.xfail(reason="an uneven noise in doubt takes the wild reading up")
 def test_arm_joint_has_one_wild_reading(data_dir, tmp_path) -> None:
     runs = [r for r in ta.read_runs(data_dir / "arm_joint_protractor.csv") if "joint2" in r.label]
     (wild,) = [f for f in findings(runs, simulation(tmp_path)) if f["cause"] == "outliers"]
@@ -263,7 +262,6 @@ def test_servo_has_a_reversal_error_and_an_offset_under_load(servo, tmp_path) ->
     assert "direction_dependent_pattern" in result.summary()
 
 
-@pytest.mark.xfail(reason="a line without a name at nearly its frequency inflates it")
 def test_a_line_in_time_is_no_order(data_dir):
     """Twelve runs at one turn a second: a line at 255 to 258 Hz, new in every run."""
     runs = ta.read_runs(data_dir / "rm44_repeat.csv")

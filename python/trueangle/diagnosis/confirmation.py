@@ -13,8 +13,10 @@ from ..effects.non_integer_order import NonIntegerOrder
 from ..joint.pattern import line_columns
 from ..regression.regression import Regression
 from .gain import Gain
+from .goodness.periodogram import order_test, time_test
+from .remainder import remainder_of
 from .selection import NEW_CAUSE, cause_terms, is_flexible
-from .unnamed import is_named, modulator, modulators
+from .unnamed import is_line_in_time, is_line_of, is_named, modulator, modulators
 
 __all__ = ["CONFIRMED", "NOT_CONFIRMED", "status_of"]
 
@@ -27,6 +29,9 @@ NEAR = 0.4
 
 #: Deviance from which on a line follows a channel: a chance of 1e-6 for two coefficients.
 FOLLOWS = 28.0
+
+#: Chance from which on a line in time is there, whatever else is.
+SEEN = 1e-6
 
 #: Runs from which on the evidence of each can be asked for.
 ENOUGH_RUNS = 4
@@ -47,10 +52,12 @@ def status_of(
     A cause that transfers is confirmed by a gain on held-out data whose interval excludes
     zero. One that every run draws anew has none: it must explain the noise of the runs one
     by one. Whatever takes up what is left (`is_flexible`, causes of the scatter) is not
-    confirmed while something is unexplained.
+    confirmed while something is unexplained, but for a line in time that a test which needs
+    no name sees at the same frequency.
     """
     effect = EFFECTS[cause]
-    if unexplained and (is_flexible(effect) or _of_scatter(cause)):
+    takes_up = is_flexible(effect) or _of_scatter(cause)
+    if unexplained and takes_up and not _is_seen_without_a_name(regression, group):
         return NOT_CONFIRMED, ("something is unexplained, and this cause takes up whatever is left")
     if unexplained and regression is not None and group:
         follows = _follows(regression, group)
@@ -71,6 +78,20 @@ def status_of(
             return CONFIRMED, ""
         return NOT_CONFIRMED, "it explains the noise of some runs only"
     return CONFIRMED, ""
+
+
+def _is_seen_without_a_name(regression: Regression | None, group: Sequence[int]) -> bool:
+    """Without it the surest of what is left is a line in time at its frequency."""
+    if regression is None or not group or not is_line_in_time(regression.terms[group[0]]):
+        return False
+    left = remainder_of(regression, without=group)
+    line = time_test(left)
+    if line is None or line.p > SEEN or line.at is None:
+        return False
+    other = order_test(left, float(regression.lines.orders.max()))
+    if other is not None and other.p < SEEN and other.statistic > line.statistic:
+        return False
+    return is_line_of(regression.terms[group[0]], line.at)
 
 
 def _is_whole(regression: Regression, group: Sequence[int], order: float) -> bool:

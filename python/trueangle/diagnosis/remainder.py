@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from ..joint.signals import Signals
 from ..regression.regression import Regression
+from ..regression.whitening import Whitener
 from .goodness import Leftover, Unexplained, goodness_of_fit
 from .unnamed import is_named
 
@@ -43,15 +44,18 @@ def remainder_of(regression: Regression, without: Collection[int] = ()) -> Lefto
     Structure without a name is left in it, and so are the terms ``without``.
     """
     kept_in = [is_named(t) and k not in without for k, t in enumerate(regression.terms)]
-    effects = [
-        taken
-        for term, taken in zip(regression.terms, kept_in, strict=True)
-        if term.run_effect is not None
-    ]
-    left = regression.left - regression.whiten.run_part(regression.left, effects)
+    left = regression.left
     for (term, coefficients), taken in zip(regression.fitted(), kept_in, strict=True):
         if not taken and coefficients.size:
             left = left + term.columns @ coefficients
+    effects = [
+        term.run_effect
+        for term, taken in zip(regression.terms, kept_in, strict=True)
+        if taken and term.run_effect is not None
+    ]
+    # Those kept alone: beside ones that are left in, each would take what the other gives.
+    noise = Whitener(regression.bounds, regression.whiten.rho, effects, regression.weights)
+    left = left - noise.run_part(left)
     kept = left[~regression.outlying]
     if regression.outlying.any() and kept.size:
         left = np.clip(left, float(kept.min()), float(kept.max()))

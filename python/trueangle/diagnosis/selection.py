@@ -9,6 +9,7 @@ import numpy as np
 
 from ..effects import EFFECTS, Effect
 from ..effects.effect import ALWAYS
+from ..effects.local_defect import LocalDefect
 from ..effects.missing_order import MissingOrder
 from ..effects.zero_slip import ZeroSlip
 from ..pace import pace
@@ -79,9 +80,10 @@ def select(
     direct = _pruned(_forward(regression, list(EFFECTS)))
     if pace().over:
         return direct
+    direct = _with_lines_for_bumps(direct)
     if not (unnamed and _doubtful(direct)):
         return _priced_with_noise(_by_other_paths(regression, direct))
-    opened = _pruned(_forward(regression, [*EFFECTS, *UNNAMED]))
+    opened = _with_lines_for_bumps(_pruned(_forward(regression, [*EFFECTS, *UNNAMED])))
     if all(map(is_named, opened.terms)):
         return _priced_with_noise(_by_other_paths(regression, direct))
     # The other paths take long: the first of them tells whether they stand a chance.
@@ -154,6 +156,21 @@ def _by_other_paths(regression: Regression, direct: Regression) -> Regression:
         starts.append(declared)
     paths = [_pruned(_forward(_forward(s, specific), list(EFFECTS))) for s in starts]
     return _made_specific(min([direct, *paths], key=total_penalty))
+
+
+def _with_lines_for_bumps(regression: Regression) -> Regression:
+    """With lines in place of bumps where these explain more: a wide bump stands for several.
+
+    One after the other each line saves less than a bump that imitates all of them at once.
+    """
+    plain = [term for term in regression.terms if term.cause != LocalDefect.kind]
+    if len(plain) == len(regression.terms):
+        return regression
+    lines = _forward(regression.with_terms(plain), [MissingOrder.kind])
+    if len(lines.terms) < len(plain) + 2:
+        return regression
+    tried = _pruned(_forward(lines, list(EFFECTS)))
+    return min(regression, tried, key=total_penalty)
 
 
 def _with_declared_lines(regression: Regression) -> Regression:

@@ -14,13 +14,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..effects import EFFECTS, Effect
+from ..effects.time_periodic import WANDER, TimePeriodic
 from ..joint.pattern import Surroundings, line_columns
 from ..joint.signals import Signals
 from ..regression.extension import Extension
 from ..regression.regression import Regression
 from .goodness.periodogram import periodogram
 
-__all__ = ["UNNAMED", "effect_of", "is_named", "modulator", "modulators"]
+__all__ = [
+    "UNNAMED",
+    "effect_of",
+    "is_line_in_time",
+    "is_line_of",
+    "is_named",
+    "modulator",
+    "modulators",
+]
 
 Array = NDArray[np.float64]
 
@@ -147,32 +156,41 @@ class UnnamedLine(Effect):
     @classmethod
     def propose(cls, regression: Regression) -> Extension | None:
         """Low orders of the angle of each run's own, or the line in time that stands out."""
-        signals = regression.signals
-        if signals.runs < 2:
+        if regression.signals.runs < 2:
             return None
-        theta = signals.theta
-        trials: list[Extension] = []
-        for top in OWN_ORDERS:
-            columns = np.hstack([line_columns(theta, m) for m in range(1, top + 1)])
-            trials.append(
-                regression.propose_run_effect(
-                    UNNAMED_LINE, {"orders": top}, columns / np.sqrt(top), float(np.log(3.0))
-                )
-            )
+        trials = [cls._own_orders(regression, top) for top in OWN_ORDERS]
+        line = cls._line_in_time(regression)
+        if line is not None:
+            trials.append(line)
+        return max(trials, key=lambda t: t.bic_gain)
+
+    @staticmethod
+    def _own_orders(regression: Regression, top: int) -> Extension:
+        """Orders of the angle, beside those that all runs have in common: these have names."""
+        theta = regression.signals.theta
+        columns = np.hstack([line_columns(theta, m) for m in range(1, top + 1)])
+        return regression.beside(columns).propose_run_effect(
+            UNNAMED_LINE, {"orders": top}, columns / np.sqrt(top), float(np.log(3.0))
+        )
+
+    @staticmethod
+    def _line_in_time(regression: Regression) -> Extension | None:
+        """The line that stands out, unless one with a name is hardly told from it."""
+        signals = regression.signals
         left = regression.left - regression.whiten.run_part(regression.left)
         left = left * ~regression.outlying
-        line = periodogram(left, signals.clock, regression.bounds)
-        if line is not None and line.p < LINE:
-            x = 2.0 * np.pi * line.peak * signals.clock
-            trials.append(
-                regression.propose_run_effect(
-                    UNNAMED_LINE,
-                    {"frequency": line.peak},
-                    np.column_stack([np.cos(x), np.sin(x)]),
-                    float(np.log(max(line.frequency.size, 2))),
-                )
-            )
-        return max(trials, key=lambda t: t.bic_gain)
+        found = periodogram(left, signals.clock, regression.bounds)
+        if found is None or found.p > LINE:
+            return None
+        if any(is_line_of(term, found.peak) for term in regression.terms):
+            return None
+        x = 2.0 * np.pi * found.peak * signals.clock
+        return regression.propose_run_effect(
+            UNNAMED_LINE,
+            {"frequency": found.peak},
+            np.column_stack([np.cos(x), np.sin(x)]),
+            float(np.log(max(found.frequency.size, 2))),
+        )
 
 
 UNNAMED_PATTERN, UNNAMED_LINE = "unnamed pattern", "unnamed line"
@@ -193,3 +211,16 @@ def effect_of(cause: str) -> type[Effect]:
 def is_named(term: Extension) -> bool:
     """The term is one of the vocabulary."""
     return term.cause in EFFECTS
+
+
+def is_line_in_time(term: Extension) -> bool:
+    """The term is a line in time that has a name."""
+    return term.cause == TimePeriodic.kind
+
+
+def is_line_of(term: Extension, frequency: float) -> bool:
+    """The term is a line in time whose frequencies wander about as far as this one."""
+    if not is_line_in_time(term):
+        return False
+    own = np.asarray(term.shape["frequency_hz"], dtype=np.float64)
+    return bool(own.min() * (1.0 - WANDER) <= frequency <= own.max() * (1.0 + WANDER))

@@ -45,6 +45,9 @@ NEAR_REVERSAL = 3
 #: wide normal supplies and no reading shows. It counts as the fraction's uncertainty.
 HIDDEN = 3.0
 
+#: Standard deviations from which on a reading that stands out alone is not its neighbours'.
+WILD = 6.0
+
 #: Steps of expectation-maximisation.
 EM_STEPS = 60
 
@@ -91,7 +94,7 @@ class Outliers(Effect):
         """Wild readings: a narrow and a wide normal must beat one normal and heavy tails."""
         if regression.is_explained:
             return None
-        e = standardised(regression)
+        e = _beside_neighbours(regression)
         n = regression.n
         normal = max(_normal(e, s) for s in np.append(SCALES, np.linspace(1.15, 3.0, 24)))
         tails = max(_student(e, nu, s) for nu in TAILS for s in SCALES)
@@ -144,6 +147,46 @@ class Outliers(Effect):
             weights,
             size,
         )
+
+
+def _beside_neighbours(regression: Regression) -> Array:
+    r"""Residuals less what both neighbours tell of them, in robust standard deviations.
+
+    .. math:: e_k - \frac{\rho}{1 + \rho^2}(e_{k-1} + e_{k+1})
+
+    is what a correlation leaves of one reading. Whitened residuals show a wild reading twice,
+    and what lasts over many readings as large as it is. White noise stays as it is.
+    """
+    rho = regression.whiten.rho
+    if rho == 0.0:
+        return standardised(regression)
+    left = regression.left - regression.whiten.run_part(regression.left)
+    left = left * regression.root_weights
+    e = _interpolated(left, rho, regression.bounds)
+    spread = 1.4826 * float(np.median(np.abs(e)))
+    # Its neighbours are not wild where a reading that stands out alone makes them so.
+    wild = np.abs(e) > WILD * spread
+    alone = np.flatnonzero(wild)
+    alone = alone[_isolated(regression, alone)]
+    known = left.copy()
+    known[alone] -= e[alone]
+    return np.asarray(
+        np.where(np.isin(np.arange(e.size), alone), e, _interpolated(known, rho, regression.bounds))
+        / max(spread, 1e-300)
+    )
+
+
+def _interpolated(left: Array, rho: float, bounds: list[tuple[int, int]]) -> Array:
+    """What is left of every reading beside its neighbours in the run."""
+    out = left.copy()
+    share = rho / (1.0 + rho**2)
+    for start, stop in bounds:
+        run = left[start:stop]
+        if run.size > 2:
+            out[start + 1 : stop - 1] -= share * (run[:-2] + run[2:])
+            out[start] -= rho * run[1]
+            out[stop - 1] -= rho * run[-2]
+    return out
 
 
 def _isolated(regression: Regression, rows: NDArray[np.int64]) -> NDArray[np.bool_]:

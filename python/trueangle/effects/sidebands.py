@@ -30,6 +30,10 @@ __all__ = ["Sidebands"]
 RESOLVED = 0.75
 
 
+#: Share of the larger line below which the other of a pair is none: a modulation makes both.
+ONE_LINE = 0.1
+
+
 @dataclass(frozen=True)
 class Sidebands(Effect):
     """Lines beside a gear order: its amplitude or phase is modulated once or twice a turn.
@@ -83,7 +87,12 @@ class Sidebands(Effect):
                     shapes += [{"carrier": m, "offset": k, "form": f} for f in ("AM", "PM")]
                 shapes.append({"carrier": m, "offset": k, "form": "free"})
         log_grid = float(np.log(max(len(shapes), 1)))
-        return best_shape(cls, regression, shapes, [log_grid] * len(shapes))
+        while shapes:
+            best = best_shape(cls, regression, shapes, [log_grid] * len(shapes))
+            if best is None or not _is_one_line(best):
+                return best
+            shapes.remove(best.shape)
+        return None
 
     @classmethod
     def columns(cls, signals: Signals, around: Surroundings, shape: dict[str, Any]) -> Array:
@@ -144,3 +153,11 @@ class Sidebands(Effect):
 
     def to_lines(self) -> Sequence[tuple[str, float]]:
         return tuple(("output", self.carrier + offset) for offset in self.offsets)
+
+
+def _is_one_line(extension: Extension) -> bool:
+    """A free pair of which only one line is there: that is a line, no modulation."""
+    if extension.shape["form"] != "free":
+        return False
+    sizes = np.hypot(extension.coefficients[0::2], extension.coefficients[1::2])
+    return bool(sizes.min() < ONE_LINE * sizes.max())

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -39,6 +39,19 @@ class Regression(LeastSquares):
         x = x - self.q @ (self.q.T @ x)
         after = np.einsum("ij,ij->j", x, x)
         return x, after > EXCITED * np.maximum(before, 1e-300)
+
+    def beside(self, columns: Array) -> Self:
+        """The same regression with ``columns`` fitted too, for scores of others beside them."""
+        x, excited = self.projected(columns)
+        u, s, _ = np.linalg.svd(x[:, excited], full_matrices=False)
+        u = u[:, s > EXCITED * s.max(initial=0.0)]
+        other = object.__new__(type(self))
+        other.__dict__.update(self.__dict__)
+        other.memory = {}
+        other.q = np.hstack([self.q, u])
+        other.r = self.r - u @ (u.T @ self.r)
+        other.rss = max(float(other.r @ other.r), 1e-300)
+        return other
 
     def gain(self, columns: Array) -> tuple[float, Array]:
         """Deviance that ``columns`` save together, and their coefficients."""

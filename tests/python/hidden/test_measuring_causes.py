@@ -80,10 +80,7 @@ def test_without_a_current_it_is_not_told():
     assert "current_coupling" in judge(pose(Case((), 1.0, 3))).blind
 
 
-TWICE = pytest.mark.xfail(reason="structure without a name takes a part of the lines")
-
-
-@pytest.mark.parametrize("ratio", [80.0, pytest.param(120.0, marks=TWICE)])
+@pytest.mark.parametrize("ratio", [80.0, 120.0])
 def test_a_wrong_ratio_moves_all_lines_together(ratio):
     lines = (
         Harmonic("output", 1, 12.0, 30.0),

@@ -57,7 +57,6 @@ def test_an_aliased_simulation_is_not_refuted_on_the_grid() -> None:
     assert "alias" in reasons(report)
 
 
-@pytest.mark.xfail(reason="sidebands and missing orders of as much evidence change places")
 def test_an_aliased_simulation_is_refuted_off_the_grid() -> None:
     free = pose(Case((), 1.0, 1))
     report, _ = diagnose(free, folded(free.joint).simulation(free.habit.sigma))

@@ -28,6 +28,8 @@ class Evidence:
         unexplained; the others describe the noise.
     rms : float
         Of the structure that it shows, in units of the residual.
+    at : float or None
+        Frequency (per s, or per turn) of the line that it shows, where it shows one.
     """
 
     test: str
@@ -36,6 +38,7 @@ class Evidence:
     says: str
     decides: bool = True
     rms: float = 0.0
+    at: float | None = None
 
     def to_json(self) -> dict[str, Any]:
         """The entry of ``unexplained.evidence``."""

@@ -176,7 +176,8 @@ def time_test(left: Leftover) -> Evidence | None:
         found.p,
         f"a line of {found.peak:.5g} {unit}{detail}, about {found.amplitude:.2g} arcsec, its "
         "phase new in every run",
-        rms=found.amplitude / np.sqrt(2.0),
+        rms=float(found.amplitude / np.sqrt(2.0)),
+        at=found.peak,
     )
 
 
@@ -191,7 +192,8 @@ def order_test(left: Leftover, top: float) -> Evidence | None:
         found.p,
         f"a line of order {found.peak:.5g}, about {found.amplitude:.2g} arcsec, comes back at the "
         "same place within runs and not between them",
-        rms=found.amplitude / np.sqrt(2.0),
+        rms=float(found.amplitude / np.sqrt(2.0)),
+        at=found.peak,
     )
 
 
