@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, ClassVar
 
 import numpy as np
@@ -28,6 +28,10 @@ __all__ = ["VaryingLine", "VaryingLineTerm"]
 #: Lines at most, and the price of a broad cause: one of so many beside every narrow one.
 MOST_LINES = 2
 BROAD = 8.0
+
+#: Turns from which on whole orders are told apart; periods that a line needs over less, and
+#: periods by which orders must differ there.
+WHOLE_TURN, RESOLVED, UNRESOLVED = 0.9, 1.0, 0.5
 
 
 @dataclass(frozen=True)
@@ -79,7 +83,7 @@ class VaryingLine(Effect):
         signals, around = regression.signals, regression.around
         if sum(term.cause == cls.kind for term in regression.terms) >= MOST_LINES:
             return None
-        orders = regression.lines.orders[regression.lines.plausible]
+        orders = _resolved(regression)
         shapes: list[dict[str, Any]] = []
         for follows in ("speed", "velocity", "torque"):
             scale = _scale(signals, follows)
@@ -92,7 +96,13 @@ class VaryingLine(Effect):
                 and not (follows == "torque" and (m == 1.0 or is_gear_order(around, float(m))))
             ]
         log_grid = float(np.log(BROAD * max(len(shapes), 1)))
-        return best_shape(cls, regression, shapes, [log_grid] * len(shapes))
+        best = best_shape(cls, regression, shapes, [log_grid] * len(shapes))
+        if best is None:
+            return None
+        # What varies is told by what it leaves of the line as it is, which comes first.
+        steady = regression.beside(line_columns(signals.theta, best.shape["order"]))
+        beyond = steady.gain(best.columns)[0]
+        return replace(best, deviance=min(best.deviance, beyond))
 
     @classmethod
     def columns(cls, signals: Signals, around: Surroundings, shape: dict[str, Any]) -> Array:
@@ -159,6 +169,24 @@ class VaryingLineTerm(Term):
     def forms(self) -> tuple[Form, ...]:
         (signal,) = self.needs
         return (forms.Scaled(signal, lines=self.lines, absolute=self.follows == "speed"),)
+
+
+def _resolved(regression: Regression) -> Array:
+    """Orders that are lines over the travel, without those hardly told from a fast shaft's own.
+
+    Over less of a period a line times the speed is the speed itself.
+    """
+    lines = regression.lines
+    travel = float(regression.signals.run_turns().max())
+    orders = lines.orders[lines.plausible]
+    if travel >= WHOLE_TURN:
+        return np.asarray(orders)
+    joint = regression.around.joint
+    names = [joint.name_order(float(m)) for m in orders]
+    own = np.array([m for m, n in zip(orders, names, strict=True) if n and n[0] != "output"])
+    near = np.abs(orders[:, None] - own[None, :]) * travel < UNRESOLVED
+    kept = (orders * travel > RESOLVED) & (np.isin(orders, own) | ~near.any(axis=1))
+    return np.asarray(orders[kept])
 
 
 def _scale(signals: Signals, follows: str) -> Array | None:
