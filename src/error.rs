@@ -2,6 +2,8 @@
 
 use thiserror::Error;
 
+use crate::terms::Signal;
+
 /// A precondition that did not hold: which argument, what was got, what is wanted.
 #[derive(Clone, Debug, Error, PartialEq)]
 pub enum Error {
@@ -140,12 +142,13 @@ pub enum Error {
 
     /// A term of the correction lacks a signal.
     #[error(
-        "the model's term '{term}' needs {signal}, which was not given: pass {signal}=, in a log the column {}",
-        crate::terms::Signal::column(signal)
+        "the model's term '{term}' needs {name}, which was not given: pass {name}=, in a log the column {column}",
+        name = signal.name(),
+        column = signal.column()
     )]
     MissingSignal {
-        /// The keyword of the signal.
-        signal: &'static str,
+        /// Which.
+        signal: Signal,
         /// What the term is called.
         term: String,
     },

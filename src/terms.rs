@@ -1,5 +1,5 @@
 //! What a corrector needs beyond harmonics: errors that follow travel, velocity,
-//! temperature and torque.
+//! temperature, torque and current.
 //!
 //! With `phi(t) = theta(t - delay)` the angle the encoder saw,
 //! `indicated = phi + series(phi) + sum of terms(phi, signals)`, and
@@ -14,4 +14,4 @@ mod travel;
 pub use corrector::Corrector;
 pub use form::{Form, Line, Term};
 pub use prepared::Terms;
-pub use signals::{Columns, Signal, Signals};
+pub use signals::{BySignal, Columns, Signal, Signals};

@@ -116,12 +116,7 @@ proptest! {
         let mut theta = start;
         for (step, velocity, temperature, torque) in steps {
             theta += step;
-            let signals = Signals {
-                velocity: directed.then_some(velocity),
-                temperature: Some(temperature),
-                torque: Some(torque),
-                direction: directed.then_some(step),
-            };
+            let signals = Signals::default().with(Signal::Velocity, directed.then_some(velocity)).with(Signal::Temperature, temperature).with(Signal::Torque, torque).with(Signal::Direction, directed.then_some(step));
             let error = forward.error(theta, &signals).unwrap();
             let found = back.correct(theta + error, &signals).unwrap();
             prop_assert!((found - theta).abs() <= SOLVED, "{found} {theta}");
@@ -146,12 +141,7 @@ proptest! {
             ],
         ] {
             let velocity: Vec<f64> = angles.iter().map(|x| 3.0 * x).collect();
-            let columns = Columns {
-                velocity: Some(&velocity),
-                temperature: Some(&[35.0]),
-                torque: Some(&[-4.0]),
-                direction: None,
-            };
+            let columns = Columns::default().with(Signal::Velocity, &velocity[..]).with(Signal::Temperature, &[35.0][..]).with(Signal::Torque, &[-4.0][..]);
             let mut batch = vec![0.0; angles.len()];
             let pairs = Batch::apart(&angles, &mut batch).unwrap();
             corrector(&terms).run(Quantity::Correction, pairs, &columns, None, None).unwrap();
@@ -166,23 +156,18 @@ proptest! {
 #[test]
 fn a_missing_signal_is_named() {
     let mut corrector = corrector(&every_term());
-    let signals = Signals {
-        temperature: Some(20.0),
-        velocity: Some(1.0),
-        ..Signals::default()
-    };
+    let signals = Signals::default()
+        .with(Signal::Temperature, 20.0)
+        .with(Signal::Velocity, 1.0);
     assert_eq!(
         corrector.correct(1.0, &signals),
         Err(Error::MissingSignal {
-            signal: "torque",
+            signal: Signal::Torque,
             term: "scaled".to_owned()
         })
     );
     let mut out = [0.0];
-    let columns = Columns {
-        velocity: Some(&[1.0]),
-        ..Columns::default()
-    };
+    let columns = Columns::default().with(Signal::Velocity, &[1.0][..]);
     let batch = Batch::in_place(&mut out);
     let failure = corrector.run(Quantity::Correction, batch, &columns, None, None);
     assert!(
@@ -196,12 +181,10 @@ fn a_missing_signal_is_named() {
 #[test]
 fn columns_of_another_length_are_refused() {
     let mut out = [0.0; 3];
-    let columns = Columns {
-        torque: Some(&[1.0, 2.0]),
-        velocity: Some(&[1.0]),
-        temperature: Some(&[1.0]),
-        ..Columns::default()
-    };
+    let columns = Columns::default()
+        .with(Signal::Torque, &[1.0, 2.0][..])
+        .with(Signal::Velocity, &[1.0][..])
+        .with(Signal::Temperature, &[1.0][..]);
     let failure = corrector(&every_term())
         .run(
             Quantity::Correction,
@@ -228,10 +211,7 @@ fn resetting_forgets_the_past() {
         half_width: 1.0,
         lines: vec![],
     })]);
-    let forward = Signals {
-        direction: Some(1.0),
-        ..Signals::default()
-    };
+    let forward = Signals::default().with(Signal::Direction, 1.0);
     let unknown = Signals::default();
     let first = corrector.correct(10.0, &unknown).unwrap();
     let moving = corrector.correct(10.0, &forward).unwrap();
@@ -287,10 +267,7 @@ fn a_damped_filter_has_the_gain_of_its_equation() {
         damping: Some(damping),
     });
     let mut joint = Corrector::new(Arc::new(Terms::new(evaluator, &[filter]).unwrap()));
-    let signals = Signals {
-        velocity: Some(speed),
-        ..Signals::default()
-    };
+    let signals = Signals::default().with(Signal::Velocity, speed);
     let w = order * speed / PERIOD / frequency;
     let size = (1.0 - w * w).hypot(2.0 * damping * w).recip();
     let lag = (2.0 * damping * w).atan2(1.0 - w * w);

@@ -1,9 +1,10 @@
 from collections.abc import Sequence
-from typing import Any, Literal, final, overload
+from typing import Any, Literal, Unpack, final, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from .signals import GivenSignals
 from .step import Step
 
 __version__: str
@@ -125,6 +126,7 @@ class Corrector:
         temperature: float | None = None,
         torque: float | None = None,
         direction: float | None = None,
+        current: float | None = None,
     ) -> float: ...
     def store(self) -> list[float]: ...
     def restore(self, numbers: Sequence[float]) -> None: ...
@@ -134,25 +136,19 @@ class Corrector:
         indicated: ArrayLike,
         out: NDArray[Any] | None = None,
         *,
-        velocity: ArrayLike | None = None,
-        temperature: ArrayLike | None = None,
-        torque: ArrayLike | None = None,
-        direction: ArrayLike | None = None,
         threads: int | None = None,
         path: _Path | None = None,
         stretch: tuple[float, float, bool] | None = None,
+        **signals: Unpack[GivenSignals[ArrayLike]],
     ) -> tuple[_Corrected, int]: ...
     def error(
         self,
         theta: ArrayLike,
         out: NDArray[Any] | None = None,
         *,
-        velocity: ArrayLike | None = None,
-        temperature: ArrayLike | None = None,
-        torque: ArrayLike | None = None,
-        direction: ArrayLike | None = None,
         threads: int | None = None,
         path: _Path | None = None,
+        **signals: Unpack[GivenSignals[ArrayLike]],
     ) -> _Corrected: ...
 
 @final

@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from os import PathLike
-from typing import TYPE_CHECKING, Any, Literal, TypeAlias, overload
+from typing import TYPE_CHECKING, Any, Literal, TypeAlias, Unpack, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -17,6 +17,7 @@ from .correction.term import Term
 from .errors import ArgumentError, NotInvertibleError
 from .records import FitRecord, Provenance
 from .shafts import Shaft
+from .signals import AT_RUN_TIME, GivenSignals, check_names
 from .spanguard import SpanGuard
 from .step import Step
 
@@ -173,12 +174,9 @@ class HarmonicModel:
         theta: float,
         out: None = None,
         *,
-        direction: float | None = None,
-        velocity: float | None = None,
-        temperature: float | None = None,
-        torque: float | None = None,
         threads: int | None = None,
         path: Path | None = None,
+        **signals: Unpack[GivenSignals[float]],
     ) -> float: ...
     @overload
     def error(
@@ -186,24 +184,18 @@ class HarmonicModel:
         theta: ArrayLike,
         out: NDArray[Any] | None = None,
         *,
-        direction: ArrayLike | None = None,
-        velocity: ArrayLike | None = None,
-        temperature: ArrayLike | None = None,
-        torque: ArrayLike | None = None,
         threads: int | None = None,
         path: Path | None = None,
+        **signals: Unpack[GivenSignals[ArrayLike]],
     ) -> NDArray[Any]: ...
     def error(
         self,
         theta: ArrayLike,
         out: NDArray[Any] | None = None,
         *,
-        direction: ArrayLike | None = None,
-        velocity: ArrayLike | None = None,
-        temperature: ArrayLike | None = None,
-        torque: ArrayLike | None = None,
         threads: int | None = None,
         path: Path | None = None,
+        **signals: Unpack[GivenSignals[ArrayLike]],
     ) -> float | NDArray[Any]:
         """Error of the joint at angle ``theta``, in the unit of ``period``.
 
@@ -214,14 +206,14 @@ class HarmonicModel:
             float32, integers (counts) and everything else float64.
         out : ndarray, optional
             Where to put the result, of the result's shape and type; may be ``theta``.
-        direction, velocity, temperature, torque : float or array_like, optional
-            Signals at the samples, broadcast: sign of travel (0 keeps the last one),
-            angle units per second, degrees Celsius, newton metres. `signals` names those
-            the model needs; others are ignored.
         threads : int, optional
             At most so many; by default all allowed to the process for large arrays.
         path : {"table", "cubics", "exact", "direct", "counts"}, optional
             Forces a way of evaluation, of a model without terms ("cubics": float32 only).
+        direction, velocity, temperature, torque, current : float or array_like, optional
+            Signals at the samples, broadcast: sign of travel (0 keeps the last one),
+            angle units per second, degrees Celsius, newton metres, amperes. `signals` names
+            those the model needs; others are ignored.
 
         Returns
         -------
@@ -247,17 +239,10 @@ class HarmonicModel:
         precision, within 2.4e-7 of the sum of amplitudes and the constant at any angle;
         ``path="table"`` computes it in double precision and rounds once.
         """
+        if signals:
+            check_names(signals)
         if self.terms:
-            return self._core_corrector().error(
-                theta,
-                out,
-                direction=direction,
-                velocity=velocity,
-                temperature=temperature,
-                torque=torque,
-                threads=threads,
-                path=path,
-            )
+            return self._core_corrector().error(theta, out, threads=threads, path=path, **signals)
         return self._series.error(theta, out, threads, path)
 
     @overload
@@ -266,12 +251,9 @@ class HarmonicModel:
         indicated: float,
         out: None = None,
         *,
-        direction: float | None = None,
-        velocity: float | None = None,
-        temperature: float | None = None,
-        torque: float | None = None,
         threads: int | None = None,
         path: Path | None = None,
+        **signals: Unpack[GivenSignals[float]],
     ) -> float: ...
     @overload
     def correct(
@@ -279,24 +261,18 @@ class HarmonicModel:
         indicated: ArrayLike,
         out: NDArray[Any] | None = None,
         *,
-        direction: ArrayLike | None = None,
-        velocity: ArrayLike | None = None,
-        temperature: ArrayLike | None = None,
-        torque: ArrayLike | None = None,
         threads: int | None = None,
         path: Path | None = None,
+        **signals: Unpack[GivenSignals[ArrayLike]],
     ) -> NDArray[Any]: ...
     def correct(
         self,
         indicated: ArrayLike,
         out: NDArray[Any] | None = None,
         *,
-        direction: ArrayLike | None = None,
-        velocity: ArrayLike | None = None,
-        temperature: ArrayLike | None = None,
-        torque: ArrayLike | None = None,
         threads: int | None = None,
         path: Path | None = None,
+        **signals: Unpack[GivenSignals[ArrayLike]],
     ) -> float | NDArray[Any]:
         """True angle behind an indicated one: ``indicated - error(true angle)``.
 
@@ -312,18 +288,12 @@ class HarmonicModel:
             Once per model, when it was fitted on part of a turn only and a corrected
             angle lies outside that part.
         """
+        if signals:
+            check_names(signals)
         stretch = self._warn.stretch
         if self.terms:
             corrected, outside = self._core_corrector().correct(
-                indicated,
-                out,
-                direction=direction,
-                velocity=velocity,
-                temperature=temperature,
-                torque=torque,
-                threads=threads,
-                path=path,
-                stretch=stretch,
+                indicated, out, threads=threads, path=path, stretch=stretch, **signals
             )
         elif stretch is None:
             return self._series.correct(indicated, out, threads, path)
@@ -349,7 +319,7 @@ class HarmonicModel:
         The cheapest call there is: a bound method of the compiled core, no allocation
         but the result, the same number as `correct`. It does not warn about the span.
 
-        With terms it is ``step(indicated, velocity=, temperature=, torque=, direction=)``
+        With terms it is ``step(indicated, velocity=, temperature=, torque=, direction=, current=)``
         and keeps the state of travel; `corrector` gives the same step and a ``reset``. Signals
         that the model does not need are ignored, as by `correct`. A step can be pickled.
 
@@ -434,7 +404,7 @@ class HarmonicModel:
         Where "direction" is among them, a velocity will do as well.
         """
         needed = {name for term in self.terms for name in term.needs}
-        return tuple(name for name in _SIGNALS if name in needed)
+        return tuple(name for name in AT_RUN_TIME if name in needed)
 
     @property
     def uses_signals(self) -> tuple[str, ...]:
@@ -442,7 +412,7 @@ class HarmonicModel:
         used = set(self.signals)
         if self.follows_travel:
             used |= {"direction", "velocity"}
-        return tuple(name for name in _SIGNALS if name in used)
+        return tuple(name for name in AT_RUN_TIME if name in used)
 
     @property
     def follows_travel(self) -> bool:
@@ -516,8 +486,6 @@ class HarmonicModel:
     def __reduce__(self) -> tuple[Any, ...]:
         return _rebuild, ({entry.name: getattr(self, entry.name) for entry in fields(self)},)
 
-
-_SIGNALS = ("direction", "velocity", "temperature", "torque")
 
 #: What a condition number may be below 1 by rounding.
 _ROUNDING = 1e-6

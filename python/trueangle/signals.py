@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import difflib
 import re
-from collections.abc import Mapping
-from typing import NamedTuple, TypeAlias
+from collections.abc import Iterable, Mapping
+from typing import Generic, NamedTuple, TypeAlias, TypedDict, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -17,10 +17,13 @@ from numpy.typing import ArrayLike, NDArray
 from .errors import ArgumentError
 
 __all__ = [
+    "AT_RUN_TIME",
     "FIELDS",
     "SIGNALS",
+    "GivenSignals",
     "Signal",
     "Signals",
+    "check_names",
     "column",
     "find_signal",
     "signal_columns",
@@ -28,6 +31,51 @@ __all__ = [
 
 #: Values by the name of the signal; one per reading, or one for all.
 Signals: TypeAlias = Mapping[str, ArrayLike]
+
+
+T = TypeVar("T")
+
+
+class GivenSignals(TypedDict, Generic[T], total=False):
+    """Keyword arguments of corrections: the signals a joint's control loop can have.
+
+    Attributes
+    ----------
+    direction
+        Sign of travel; 0 keeps the last one.
+    velocity
+        Angle units per second.
+    temperature
+        Degrees Celsius.
+    torque
+        Newton metres at the output.
+    current
+        Amperes of the motor.
+    """
+
+    direction: T | None
+    velocity: T | None
+    temperature: T | None
+    torque: T | None
+    current: T | None
+
+
+#: Names of the signals that a correction may take.
+AT_RUN_TIME: tuple[str, ...] = tuple(GivenSignals.__annotations__)
+
+
+def check_names(given: Iterable[str]) -> None:
+    """Refuse keyword arguments that no correction takes, as Python does.
+
+    Raises
+    ------
+    TypeError
+    """
+    for name in given:
+        if name not in AT_RUN_TIME:
+            near = difflib.get_close_matches(name, AT_RUN_TIME, 1)
+            hint = f"did you mean {near[0]}?" if near else f"signals are {', '.join(AT_RUN_TIME)}"
+            raise TypeError(f"got an unexpected keyword argument {name!r}; {hint}")
 
 
 class Signal(NamedTuple):

@@ -18,5 +18,6 @@ class Step(Protocol):
         temperature: float | None = None,
         torque: float | None = None,
         direction: float | None = None,
+        current: float | None = None,
     ) -> float:
         """The true angle of an indicated one."""

@@ -3,9 +3,10 @@
 use std::sync::Arc;
 
 use numpy::{PyArrayDescrMethods, PyArrayDyn, PyUntypedArray, PyUntypedArrayMethods};
+use pyo3::exceptions::PyTypeError;
 use pyo3::intern;
 use pyo3::prelude::*;
-use pyo3::types::PyTuple;
+use pyo3::types::{PyDict, PyTuple};
 
 use super::array::{Angles, as_array, data, numpy_module};
 use super::door::{self, Computation, Computed};
@@ -62,7 +63,7 @@ impl PyCorrector {
         self.restore(py, numbers)
     }
 
-    #[pyo3(signature = (indicated, /, velocity=None, temperature=None, torque=None, direction=None))]
+    #[pyo3(signature = (indicated, /, velocity=None, temperature=None, torque=None, direction=None, current=None))]
     fn step(
         &mut self,
         indicated: &Bound<'_, PyAny>,
@@ -70,20 +71,25 @@ impl PyCorrector {
         temperature: Given<'_, '_>,
         torque: Given<'_, '_>,
         direction: Given<'_, '_>,
+        current: Given<'_, '_>,
     ) -> PyResult<f64> {
         let py = indicated.py();
         let angle = single(indicated, "the angle of a step")?;
         let terms = self.inner.terms();
-        let value = |signal: Signal, given: Given<'_, '_>| match given {
-            Some(given) if terms.takes(signal) => single(given, signal.name()).map(Some),
-            _ => Ok(None),
-        };
-        let signals = Signals {
-            direction: value(Signal::Direction, direction)?,
-            velocity: value(Signal::Velocity, velocity)?,
-            temperature: value(Signal::Temperature, temperature)?,
-            torque: value(Signal::Torque, torque)?,
-        };
+        let mut signals = Signals::default();
+        for (signal, given) in [
+            (Signal::Direction, direction),
+            (Signal::Velocity, velocity),
+            (Signal::Temperature, temperature),
+            (Signal::Torque, torque),
+            (Signal::Current, current),
+        ] {
+            if let Some(given) = given
+                && terms.takes(signal)
+            {
+                signals = signals.with(signal, single(given, signal.name())?);
+            }
+        }
         Ok(attached(py, || self.inner.correct(angle, &signals))??)
     }
 
@@ -104,38 +110,30 @@ impl PyCorrector {
     }
 
     /// True angles, and how many of them lie outside a stretch.
-    #[pyo3(signature = (indicated, out=None, *, velocity=None, temperature=None, torque=None, direction=None, threads=None, path=None, stretch=None))]
+    #[pyo3(signature = (indicated, out=None, *, threads=None, path=None, stretch=None, **signals))]
     fn correct<'py>(
         &mut self,
         indicated: &Bound<'py, PyAny>,
         out: Option<&Bound<'py, PyAny>>,
-        velocity: Given<'_, 'py>,
-        temperature: Given<'_, 'py>,
-        torque: Given<'_, 'py>,
-        direction: Given<'_, 'py>,
         threads: Asked<'py>,
         path: Option<&str>,
         stretch: Option<(f64, f64, bool)>,
+        signals: Option<&Bound<'py, PyDict>>,
     ) -> PyResult<Computed<'py>> {
-        let signals = [direction, velocity, temperature, torque];
         let quantity = Quantity::Correction;
         self.compute(quantity, indicated, out, signals, threads, path, stretch)
     }
 
     /// Errors; of nothing else, so none lies outside anything.
-    #[pyo3(signature = (theta, out=None, *, velocity=None, temperature=None, torque=None, direction=None, threads=None, path=None))]
+    #[pyo3(signature = (theta, out=None, *, threads=None, path=None, **signals))]
     fn error<'py>(
         &mut self,
         theta: &Bound<'py, PyAny>,
         out: Option<&Bound<'py, PyAny>>,
-        velocity: Given<'_, 'py>,
-        temperature: Given<'_, 'py>,
-        torque: Given<'_, 'py>,
-        direction: Given<'_, 'py>,
         threads: Asked<'py>,
         path: Option<&str>,
+        signals: Option<&Bound<'py, PyDict>>,
     ) -> PyResult<Bound<'py, PyAny>> {
-        let signals = [direction, velocity, temperature, torque];
         let quantity = Quantity::Error;
         Ok(self
             .compute(quantity, theta, out, signals, threads, path, None)?
@@ -175,7 +173,7 @@ impl PyCorrector {
         quantity: Quantity,
         x: &Bound<'py, PyAny>,
         out: Option<&Bound<'py, PyAny>>,
-        given: [Given<'_, 'py>; 4],
+        given: Option<&Bound<'py, PyDict>>,
         asked: Asked<'py>,
         path: Option<&str>,
         stretch: Option<(f64, f64, bool)>,
@@ -186,38 +184,30 @@ impl PyCorrector {
             return Err(argument_error(py, problem.to_owned()));
         }
         let terms = self.inner.terms();
-        let mut signals = [const { None }; 4];
-        for ((signal, given), place) in Signal::ALL.into_iter().zip(given).zip(&mut signals) {
-            if let Some(given) = given
-                && terms.takes(signal)
-            {
-                *place = Some(as_signal(given, signal.name())?);
-            }
-        }
+        let mut signals = match given {
+            Some(given) => taken(given, terms)?,
+            None => Vec::new(),
+        };
         let period = terms.evaluator().series().period().value();
         let stretch = door::stretch(period, stretch);
-        let alone = signals.iter().flatten().all(|signal| signal.len() == 1);
+        let alone = signals.iter().all(|(_, values)| values.len() == 1);
         let angles = if out.is_none() && is_number(x) && alone {
             None
         } else {
             Some(broadcast(x, &mut signals)?)
         };
-        let slice = |signal: &'_ Option<Bound<'py, PyUntypedArray>>| {
-            signal.as_ref().map(|signal| {
+        let columns = signals
+            .iter()
+            .fold(Columns::default(), |columns, (signal, values)| {
                 // SAFETY: a contiguous array of doubles that is kept while the slice is used.
-                unsafe { std::slice::from_raw_parts(data::<f64>(signal), signal.len()) }
-            })
-        };
-        let [direction, velocity, temperature, torque] = &signals;
+                let values =
+                    unsafe { std::slice::from_raw_parts(data::<f64>(values), values.len()) };
+                columns.with(*signal, values)
+            });
         let samples = angles.as_ref().map_or(1, |angles| angles.plain.len());
         let mut wish = Wish {
             quantity,
-            columns: Columns {
-                direction: slice(direction),
-                velocity: slice(velocity),
-                temperature: slice(temperature),
-                torque: slice(torque),
-            },
+            columns,
             threads: threads(py, asked.as_ref(), samples)?,
             stretch,
             corrector: &mut self.inner,
@@ -225,11 +215,32 @@ impl PyCorrector {
         match &angles {
             None => door::number(x, &mut wish),
             Some(angles) => {
-                let beside: Vec<_> = signals.iter().flatten().collect();
+                let beside: Vec<_> = signals.iter().map(|(_, values)| values).collect();
                 door::array(angles, out, &beside, &mut wish)
             }
         }
     }
+}
+
+/// A signal and its values.
+type Taken<'py> = (Signal, Bound<'py, PyUntypedArray>);
+
+/// Those of the given signals that the terms take.
+fn taken<'py>(given: &Bound<'py, PyDict>, terms: &Terms) -> PyResult<Vec<Taken<'py>>> {
+    let mut taken = Vec::with_capacity(given.len());
+    for (name, values) in given {
+        let name: String = name.extract()?;
+        let signal = Signal::named(&name).ok_or_else(|| {
+            let known = Signal::ALL.map(Signal::name).join(", ");
+            PyTypeError::new_err(format!(
+                "got an unexpected keyword argument '{name}'; signals are {known}"
+            ))
+        })?;
+        if !values.is_none() && terms.takes(signal) {
+            taken.push((signal, as_signal(&values, signal.name())?));
+        }
+    }
+    Ok(taken)
 }
 
 /// A signal as doubles in the order they were taken; one value stays one.
@@ -261,34 +272,29 @@ fn in_order<'py>(array: &Bound<'py, PyUntypedArray>) -> PyResult<Bound<'py, PyUn
 }
 
 /// Angles and signals of one shape.
-fn broadcast<'py>(
-    x: &Bound<'py, PyAny>,
-    signals: &mut [Option<Bound<'py, PyUntypedArray>>; 4],
-) -> PyResult<Angles<'py>> {
+fn broadcast<'py>(x: &Bound<'py, PyAny>, signals: &mut [Taken<'py>]) -> PyResult<Angles<'py>> {
     let py = x.py();
     let (given, labels) = match x.cast_exact::<PyUntypedArray>() {
         Ok(array) => (array.clone(), None),
         Err(_) => as_array(x, "angles")?,
     };
-    let fits = |signal: &Bound<'py, PyUntypedArray>| {
-        signal.shape() == given.shape() || (signal.len() == 1 && signal.ndim() == 0)
+    let fits = |(_, values): &Taken<'py>| {
+        values.shape() == given.shape() || (values.len() == 1 && values.ndim() == 0)
     };
-    if signals.iter().flatten().all(fits) {
+    if signals.iter().all(fits) {
         return Angles::of_array(given, labels, true);
     }
     let numpy = numpy_module(py)?;
     let shapes: Vec<_> = std::iter::once(&given)
-        .chain(signals.iter().flatten())
+        .chain(signals.iter().map(|(_, values)| values))
         .map(|array| PyTuple::new(py, array.shape()))
         .collect::<PyResult<_>>()?;
     let shape = numpy
         .call_method1(intern!(py, "broadcast_shapes"), PyTuple::new(py, &shapes)?)
         .map_err(|_| {
-            let others: Vec<_> = Signal::ALL
+            let others: Vec<_> = signals
                 .iter()
-                .zip(signals.iter())
-                .filter_map(|(name, signal)| Some((name.name(), signal.as_ref()?)))
-                .map(|(name, signal)| format!("{name} {:?}", signal.shape()))
+                .map(|(signal, values)| format!("{} {:?}", signal.name(), values.shape()))
                 .collect();
             let (own, others) = (given.shape(), others.join(", "));
             let problem = format!(
@@ -300,9 +306,9 @@ fn broadcast<'py>(
         let spread = numpy.call_method1(intern!(py, "broadcast_to"), (array, &shape))?;
         Ok(spread.cast_into()?)
     };
-    for signal in signals.iter_mut().flatten() {
-        if signal.len() != 1 {
-            *signal = in_order(&spread(signal)?)?;
+    for (_, values) in signals.iter_mut() {
+        if values.len() != 1 {
+            *values = in_order(&spread(values)?)?;
         }
     }
     let wide = spread(&given)?;

@@ -11,6 +11,7 @@ use super::number::single;
 use super::release::detached;
 use super::series::PySeries;
 use crate::compensator::Compensator;
+use crate::terms::Signal;
 
 /// Correction of one sample at a time.
 #[pyclass(name = "Compensator", module = "trueangle._core", frozen)]
@@ -62,7 +63,7 @@ struct Definition(ffi::PyMethodDef);
 unsafe impl Sync for Definition {}
 
 const DOCUMENTATION: &CStr = c"step(indicated, /, velocity=None, temperature=None, torque=None, \
-direction=None)\n--\n\nThe true angle of an indicated one. Signals are taken, as by every \
+direction=None, current=None)\n--\n\nThe true angle of an indicated one. Signals are taken, as by every \
 model, and not needed.";
 
 static STEP: Definition = Definition(ffi::PyMethodDef {
@@ -124,9 +125,11 @@ fn check_arguments(
     given: ffi::Py_ssize_t,
     keywords: *mut ffi::PyObject,
 ) -> PyResult<()> {
-    const SIGNALS: [&str; 4] = ["velocity", "temperature", "torque", "direction"];
-    if !(1..=1 + SIGNALS.len() as isize).contains(&given) {
-        let problem = format!("step takes an angle and up to four signals, got {given} arguments");
+    if !(1..=1 + Signal::COUNT as isize).contains(&given) {
+        let problem = format!(
+            "step takes an angle and up to {} signals, got {given} arguments",
+            Signal::COUNT
+        );
         return Err(PyTypeError::new_err(problem));
     }
     if keywords.is_null() {
@@ -134,7 +137,7 @@ fn check_arguments(
     }
     // SAFETY: a tuple of names, as the calling convention has it.
     let names: Vec<String> = unsafe { Bound::from_borrowed_ptr(py, keywords) }.extract()?;
-    match names.iter().find(|name| !SIGNALS.contains(&name.as_str())) {
+    match names.iter().find(|name| Signal::named(name).is_none()) {
         Some(name) => {
             let problem = format!("step got an unexpected keyword argument '{name}'");
             Err(PyTypeError::new_err(problem))

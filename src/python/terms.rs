@@ -75,8 +75,7 @@ fn form(object: &Bound<'_, PyAny>) -> PyResult<Form> {
 
 fn signal(object: &Bound<'_, PyAny>) -> PyResult<Signal> {
     let name: String = object.getattr("signal")?.extract()?;
-    let found = Signal::ALL.into_iter().find(|signal| signal.name() == name);
-    found.ok_or_else(|| {
+    Signal::named(&name).ok_or_else(|| {
         let problem = format!("a correction knows no signal {name:?}");
         argument_error(object.py(), problem)
     })

@@ -4,7 +4,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use super::prepared::Terms;
-use super::signals::{Columns, Signals};
+use super::signals::{Columns, Signal, Signals};
 use super::travel::{Heading, Travel};
 use crate::error::Error;
 use crate::kernel::{Batch, InstructionSet, Quantity, Real, Sample, Shared, Stretch};
@@ -86,7 +86,7 @@ impl Corrector {
     ) -> Result<usize, Error> {
         let len = batch.len();
         columns.check(len)?;
-        self.terms.check(|signal| columns.of(signal).is_some())?;
+        self.terms.check(|signal| columns.get(signal).is_some())?;
         let outside = AtomicUsize::new(0);
         let shared = Shared::new(batch);
         let size = self.part_size();
@@ -199,7 +199,7 @@ impl Corrector {
         }
         let constant = terms.evaluator.series().constant();
         travel.align(indicated - constant, terms.period());
-        if let Some(signal) = signals.direction.or(signals.velocity) {
+        if let Some(signal) = travel_of(signals) {
             let heading = travel.heading(signal);
             let x = find(travel, heading);
             if x.is_nan() || signal.is_nan() {
@@ -248,7 +248,7 @@ impl Corrector {
             travel.align(x, terms.period());
             let way = x - travel.farthest;
             let moved = if way.is_nan() { 0.0 } else { way };
-            let signal = signals.direction.or(signals.velocity).unwrap_or(moved);
+            let signal = travel_of(signals).unwrap_or(moved);
             if signal.is_nan() {
                 return f64::NAN;
             }
@@ -259,6 +259,12 @@ impl Corrector {
         }
         error - delayed
     }
+}
+
+/// The signal whose sign is the direction of travel.
+fn travel_of(signals: &Signals) -> Option<f64> {
+    let velocity = signals.get(Signal::Velocity);
+    signals.get(Signal::Direction).or(velocity)
 }
 
 /// Before the first motion.

@@ -129,7 +129,7 @@ impl Terms {
     }
 
     pub(super) fn delayed(&self, signals: &Signals) -> f64 {
-        match signals.velocity {
+        match signals.get(Signal::Velocity) {
             Some(velocity) if self.delay != 0.0 => velocity * self.delay,
             _ => 0.0,
         }
@@ -140,7 +140,7 @@ impl Terms {
             let implied = signal == Signal::Direction && given(Signal::Velocity);
             if !implied && !given(signal) {
                 return Err(Error::MissingSignal {
-                    signal: signal.name(),
+                    signal,
                     term: term.clone(),
                 });
             }

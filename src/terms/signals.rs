@@ -13,15 +13,21 @@ pub enum Signal {
     Temperature,
     /// Newton metres at the output.
     Torque,
+    /// Amperes of the motor.
+    Current,
 }
 
 impl Signal {
-    /// All of them, in the order of [`Signals`].
-    pub const ALL: [Self; 4] = [
+    /// How many there are.
+    pub const COUNT: usize = 5;
+
+    /// All of them, in the order of [`BySignal`].
+    pub const ALL: [Self; Self::COUNT] = [
         Self::Direction,
         Self::Velocity,
         Self::Temperature,
         Self::Torque,
+        Self::Current,
     ];
 
     /// The keyword argument of this signal.
@@ -31,63 +37,63 @@ impl Signal {
             Self::Velocity => "velocity",
             Self::Temperature => "temperature",
             Self::Torque => "torque",
+            Self::Current => "current",
         }
     }
 
-    /// The column of a log that holds the signal called `name`.
-    pub fn column(name: &str) -> &'static str {
-        match name {
-            "velocity" => "velocity_deg_s",
-            "temperature" => "temperature_C",
-            "torque" => "torque_Nm",
-            _ => "direction or velocity_deg_s",
+    /// The signal of a keyword argument.
+    pub fn named(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|signal| signal.name() == name)
+    }
+
+    /// The column of a log that holds this signal.
+    pub fn column(self) -> &'static str {
+        match self {
+            Self::Direction => "direction or velocity_deg_s",
+            Self::Velocity => "velocity_deg_s",
+            Self::Temperature => "temperature_C",
+            Self::Torque => "torque_Nm",
+            Self::Current => "current_A",
         }
     }
 }
 
-/// Signals of one sample; `None` is not given.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct Signals {
-    /// Direction of travel.
-    pub direction: Option<f64>,
-    /// Angle units per second.
-    pub velocity: Option<f64>,
-    /// Degrees Celsius.
-    pub temperature: Option<f64>,
-    /// Newton metres.
-    pub torque: Option<f64>,
-}
+/// A value for each signal that is given.
+#[derive(Clone, Copy, Debug)]
+pub struct BySignal<T>([Option<T>; Signal::COUNT]);
 
-impl Signals {
-    /// The value of one signal.
-    pub fn get(&self, signal: Signal) -> Option<f64> {
-        match signal {
-            Signal::Direction => self.direction,
-            Signal::Velocity => self.velocity,
-            Signal::Temperature => self.temperature,
-            Signal::Torque => self.torque,
-        }
-    }
-}
+/// Signals of one sample.
+pub type Signals = BySignal<f64>;
 
 /// Signals of many samples: one value per sample, or one for all.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct Columns<'a> {
-    /// Direction of travel.
-    pub direction: Option<&'a [f64]>,
-    /// Angle units per second.
-    pub velocity: Option<&'a [f64]>,
-    /// Degrees Celsius.
-    pub temperature: Option<&'a [f64]>,
-    /// Newton metres.
-    pub torque: Option<&'a [f64]>,
+pub type Columns<'a> = BySignal<&'a [f64]>;
+
+impl<T> Default for BySignal<T> {
+    fn default() -> Self {
+        Self([const { None }; Signal::COUNT])
+    }
+}
+
+impl<T: Copy> BySignal<T> {
+    /// The value of one signal.
+    #[inline]
+    pub fn get(&self, signal: Signal) -> Option<T> {
+        self.0[signal as usize]
+    }
+
+    /// The same with one signal given, or not given.
+    #[must_use]
+    pub fn with(mut self, signal: Signal, value: impl Into<Option<T>>) -> Self {
+        self.0[signal as usize] = value.into();
+        self
+    }
 }
 
 impl Columns<'_> {
     /// Refuses columns that are neither of length `len` nor 1.
     pub fn check(&self, len: usize) -> Result<(), Error> {
         for signal in Signal::ALL {
-            match self.of(signal) {
+            match self.get(signal) {
                 Some(values) if values.len() != len && values.len() != 1 => {
                     return Err(Error::Length {
                         what: signal.name(),
@@ -102,28 +108,12 @@ impl Columns<'_> {
         Ok(())
     }
 
-    /// The column of one signal.
-    pub fn of(&self, signal: Signal) -> Option<&[f64]> {
-        match signal {
-            Signal::Direction => self.direction,
-            Signal::Velocity => self.velocity,
-            Signal::Temperature => self.temperature,
-            Signal::Torque => self.torque,
-        }
-    }
-
     /// Signals of sample `i`.
     pub fn at(&self, i: usize) -> Signals {
-        let one = |column: Option<&[f64]>| match column {
+        BySignal(self.0.map(|column| match column {
             Some([all]) => Some(*all),
             Some(values) => Some(values[i]),
             None => None,
-        };
-        Signals {
-            direction: one(self.direction),
-            velocity: one(self.velocity),
-            temperature: one(self.temperature),
-            torque: one(self.torque),
-        }
+        }))
     }
 }

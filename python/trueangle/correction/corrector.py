@@ -3,22 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Unpack
 
 from numpy.typing import ArrayLike, NDArray
 
-from .. import _core
+from ..signals import GivenSignals, check_names
 from .velocity import Velocity
 
 if TYPE_CHECKING:
     from ..model import HarmonicModel, Step
 
-__all__ = ["SIGNALS", "Corrector", "evaluate"]
-
-#: Signals in the order of the core's arguments.
-SIGNALS = ("velocity", "temperature", "torque", "direction")
-
-Given = dict[str, ArrayLike | None]
+__all__ = ["Corrector"]
 
 
 class Corrector:
@@ -57,7 +52,7 @@ class Corrector:
 
     @property
     def step(self) -> Step:
-        """``step(indicated, velocity=, temperature=, torque=, direction=) -> corrected``.
+        """``step(indicated, velocity=, temperature=, torque=, direction=, current=) -> corrected``.
 
         One sample, in the state of this corrector: a bound method of the compiled core
         without allocation but the result. A signal the model needs and does not get is a
@@ -95,12 +90,9 @@ class Corrector:
         indicated: ArrayLike,
         out: NDArray[Any] | None = None,
         *,
-        direction: ArrayLike | None = None,
-        velocity: ArrayLike | None = None,
-        temperature: ArrayLike | None = None,
-        torque: ArrayLike | None = None,
         time: ArrayLike | None = None,
         threads: int | None = None,
+        **signals: Unpack[GivenSignals[ArrayLike]],
     ) -> float | NDArray[Any]:
         """True angles behind the next indicated ones; see `HarmonicModel.correct`.
 
@@ -109,14 +101,14 @@ class Corrector:
         indicated : float or array_like
             In the order taken (C order); steps below half a turn.
         out : ndarray, optional
-        direction, velocity, temperature, torque : float or array_like, optional
-            Signals, broadcast against ``indicated``. Those that the model does not use
-            are ignored.
         time : array_like, optional
             Seconds of every sample: in place of a velocity that is not given, backward
             differences of the indicated angle. At equal times the last velocity holds; the
             very first sample takes that of the second.
         threads : int, optional
+        direction, velocity, temperature, torque, current : float or array_like, optional
+            Signals, broadcast against ``indicated``. Those that the model does not use
+            are ignored.
 
         Returns
         -------
@@ -131,34 +123,17 @@ class Corrector:
         ArgumentError
             Shapes that do not fit.
         """
-        if velocity is None and time is not None and "velocity" in self._model.uses_signals:
-            velocity = self._velocity(indicated, time)
-        given: Given = {
-            "velocity": velocity,
-            "temperature": temperature,
-            "torque": torque,
-            "direction": direction,
-        }
-        return evaluate(self._model, self._core, "correct", indicated, out, given, threads)
+        check_names(signals)
+        if (
+            time is not None
+            and signals.get("velocity") is None
+            and "velocity" in self._model.uses_signals
+        ):
+            signals["velocity"] = self._velocity(indicated, time)
+        return self._core.correct(indicated, out, threads=threads, **signals)[0]
 
 
 def _rebuild(model: HarmonicModel, state: tuple[float, ...]) -> Corrector:
     corrector = model.corrector()
     corrector.state = state
     return corrector
-
-
-def evaluate(
-    model: HarmonicModel,
-    core: _core.Corrector,
-    quantity: str,
-    angle: ArrayLike,
-    out: NDArray[Any] | None,
-    given: Given,
-    threads: int | None = None,
-) -> float | NDArray[Any]:
-    """``quantity`` ("error" or "correct") of samples by ``core`` and its state."""
-    signals: dict[str, Any] = dict(given)
-    if quantity == "error":
-        return core.error(angle, out, **signals, threads=threads)
-    return core.correct(angle, out, **signals, threads=threads)[0]

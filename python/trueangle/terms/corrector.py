@@ -1,5 +1,6 @@
 """The corrector, under the name it had before: see `trueangle.correction.corrector`."""
 
-from ..correction.corrector import SIGNALS, Corrector, evaluate
+from ..correction.corrector import Corrector
+from ..signals import AT_RUN_TIME as SIGNALS
 
-__all__ = ["SIGNALS", "Corrector", "evaluate"]
+__all__ = ["SIGNALS", "Corrector"]
