@@ -80,6 +80,7 @@ fn every_term() -> Vec<Term> {
         },
         scaled(Signal::Temperature, 20.0, false, 1e-3, 1e-3, lines),
         scaled(Signal::Torque, 0.0, false, 3e-3, 0.0, vec![]),
+        scaled(Signal::Current, 0.0, false, 2e-3, 0.0, vec![]),
         Form::Spring {
             signal: Signal::Torque,
             linear: 1e-3,
@@ -116,7 +117,8 @@ proptest! {
         let mut theta = start;
         for (step, velocity, temperature, torque) in steps {
             theta += step;
-            let signals = Signals::default().with(Signal::Velocity, directed.then_some(velocity)).with(Signal::Temperature, temperature).with(Signal::Torque, torque).with(Signal::Direction, directed.then_some(step));
+            let signals = Signals::default().with(Signal::Velocity, directed.then_some(velocity)).with(Signal::Temperature, temperature).with(Signal::Torque, torque)
+                .with(Signal::Current, -0.4 * torque).with(Signal::Direction, directed.then_some(step));
             let error = forward.error(theta, &signals).unwrap();
             let found = back.correct(theta + error, &signals).unwrap();
             prop_assert!((found - theta).abs() <= SOLVED, "{found} {theta}");
@@ -141,7 +143,8 @@ proptest! {
             ],
         ] {
             let velocity: Vec<f64> = angles.iter().map(|x| 3.0 * x).collect();
-            let columns = Columns::default().with(Signal::Velocity, &velocity[..]).with(Signal::Temperature, &[35.0][..]).with(Signal::Torque, &[-4.0][..]);
+            let columns = Columns::default().with(Signal::Velocity, &velocity[..]).with(Signal::Temperature, &[35.0][..]).with(Signal::Torque, &[-4.0][..])
+                .with(Signal::Current, &[0.7][..]);
             let mut batch = vec![0.0; angles.len()];
             let pairs = Batch::apart(&angles, &mut batch).unwrap();
             corrector(&terms).run(Quantity::Correction, pairs, &columns, None, None).unwrap();

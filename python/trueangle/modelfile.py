@@ -62,8 +62,8 @@ _MOST_SENTENCES = 1000
 _STEEP_LINE_ORDERS = 3e5
 #: Signals (velocity in turns per second) at which any model must correct.
 _NORMAL = (
-    {"velocity": 0.01, "temperature": 20.0, "torque": 1.0, "direction": 1.0},
-    {"velocity": -0.01, "temperature": 40.0, "torque": -1.0, "direction": -1.0},
+    {"velocity": 0.01, "temperature": 20.0, "torque": 1.0, "current": 1.0, "direction": 1.0},
+    {"velocity": -0.01, "temperature": 40.0, "torque": -1.0, "current": -1.0, "direction": -1.0},
 )
 _SHAFT_KEYS = ("name", "cycles_per_turn", "orders", "cosine", "sine")
 

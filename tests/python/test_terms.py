@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 import trueangle as ta
 from trueangle import errors
-from trueangle.terms import TERMS, ChannelSkew, DirectionalPattern, VaryingLine
+from trueangle.terms import TERMS, ChannelSkew, CurrentCoupling, DirectionalPattern, VaryingLine
 
 numbers = st.floats(-1e-3, 1e-3)
 lines = st.lists(st.tuples(st.floats(0.5, 500.0), numbers, numbers), max_size=3).map(
@@ -37,6 +37,7 @@ def any_terms(draw):
         ta.StiffeningCompliance(
             draw(numbers), draw(numbers), draw(numbers), draw(st.floats(0.0, 9.0)), draw(numbers)
         ),
+        CurrentCoupling(draw(numbers), **draw(lines)),
         ta.LoadDependentGearError(
             **draw(lines), torque=draw(st.sampled_from(["signed", "absolute"]))
         ),

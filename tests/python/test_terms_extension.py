@@ -56,6 +56,7 @@ TABLES = {
         "knee_Nm": 3.0,
         "gravity_deg": 30.0,
     },
+    "current_coupling": {"arcsec_per_A": 3.0, "lines_per_A": [[100.0, 2.0, 30.0]]},
     "load_dependent_gear_error": {"lines_per_Nm": [[100.0, 0.4, 20.0]], "torque": "absolute"},
     "local_defect": {
         "place_deg": 90.0, "width_deg": 8.0, "height_arcsec": 12.0, "shaft": "motor"
@@ -73,7 +74,14 @@ def simulation(*effects, sigma=0.0):
 
 def designs(start, samples=600):
     """Both directions within each run, three speeds, loads and temperatures."""
-    levels = [(5, 0, 20), (40, 6, 32), (15, -6, 20), (40, 0, 32), (5, 6, 26), (15, -6, 26)]
+    levels = [
+        (5, 0, 20, 1.0),
+        (40, 6, 32, -0.5),
+        (15, -6, 20, -1.0),
+        (40, 0, 32, 0.5),
+        (5, 6, 26, 0.0),
+        (15, -6, 26, 2.0),
+    ]
     return [
         RunDesign(
             label=f"{start}-{k}",
@@ -86,8 +94,9 @@ def designs(start, samples=600):
             reversals=(0.35, 0.7),
             torque_Nm=load,
             temperature_C=warm,
+            current_A=current,
         )
-        for k, (speed, load, warm) in enumerate(levels)
+        for k, (speed, load, warm, current) in enumerate(levels)
     ]
 
 
@@ -114,6 +123,7 @@ def signals_of(run, unit=1.0):
         "velocity": run.speed * unit,
         "temperature": run.temperature,
         "torque": run.torque,
+        "current": run.signal("current"),
     }
 
 

@@ -8,6 +8,10 @@ import pytest
 
 import trueangle as ta
 from trueangle.cli import main
+from trueangle.terms import CurrentCoupling
+
+
+SIGNALS = ("velocity_deg_s", "temperature_C", "torque_Nm", "current_A")
 
 
 @pytest.fixture
@@ -19,24 +23,30 @@ def joint():
         ta.Latency(2e-3),
         ta.ThermalDrift(1e-5),
         ta.TorsionalCompliance(3e-5),
+        CurrentCoupling(4e-5, orders=[2], cosine=[1e-5], sine=[0.0]),
     ]
     return ta.HarmonicModel([shaft], period=2.0 * math.pi, terms=terms)
 
 
-def written_log(path, joint, rows=40_000, columns=("velocity_deg_s", "temperature_C", "torque_Nm")):
+def written_log(path, joint, rows=40_000, columns=SIGNALS):
     """A log of many blocks that ends in another direction than it begins, in degrees."""
     t = np.arange(rows) * 1e-3
     theta = 200.0 * np.sin(0.4 * t)
     speed = 80.0 * np.cos(0.4 * t)
-    warm, load = 20.0 + 0.3 * t, 5.0 * np.sin(t)
+    warm, load, current = 20.0 + 0.3 * t, 5.0 * np.sin(t), 2.0 * np.cos(3.0 * t)
     error = joint.error(
-        np.radians(theta), velocity=np.radians(speed), temperature=warm, torque=load
+        np.radians(theta),
+        velocity=np.radians(speed),
+        temperature=warm,
+        torque=load,
+        current=current,
     )
     every = {
         "time_s": t,
         "velocity_deg_s": speed,
         "temperature_C": warm,
         "torque_Nm": load,
+        "current_A": current,
         "indicated_deg": theta + np.degrees(error),
     }
     names = [name for name in every if name in ("indicated_deg", *columns)]
@@ -68,7 +78,7 @@ def test_signals_come_from_their_columns_and_travel_crosses_blocks(tmp_path, joi
 
 
 def test_time_stamps_stand_in_for_the_velocity(tmp_path, joint):
-    columns = ("time_s", "temperature_C", "torque_Nm")
+    columns = ("time_s", "temperature_C", "torque_Nm", "current_A")
     theta = written_log(tmp_path / "log.csv", joint, columns=columns)
     status, out = run(joint, tmp_path)
     assert status == 0
@@ -88,10 +98,11 @@ def test_time_stamps_stand_in_for_the_velocity(tmp_path, joint):
         ("velocity_deg_s", "velocity_deg_s or time_s: the model's term 'latency'"),
         ("temperature_C", "temperature_C: the model's term 'thermal_drift'"),
         ("torque_Nm", "torque_Nm: the model's term 'torsional_compliance'"),
+        ("current_A", "current_A: the model's term 'current_coupling'"),
     ],
 )
 def test_a_missing_column_is_named(tmp_path, joint, capsys, missing, said):
-    columns = {"velocity_deg_s", "temperature_C", "torque_Nm"} - {missing}
+    columns = {*SIGNALS} - {missing}
     written_log(tmp_path / "log.csv", joint, rows=5, columns=columns)
     status, out = run(joint, tmp_path)
     assert status == 1

@@ -97,6 +97,7 @@ def without_terms(
             velocity=velocity,
             temperature=run.temperature,
             torque=run.torque,
+            current=run.signal("current"),
         )
         terms = error + late - plain.error(seen)
         cleaned.append(replace(run, reference=seen, indicated=run.indicated - terms))

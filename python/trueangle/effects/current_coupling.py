@@ -8,6 +8,9 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from ..correction import forms
+from ..correction.forms import Form
+from ..correction.term import Term, from_arcsec, line_values
 from ..joint.pattern import Surroundings, line_sum
 from ..joint.signals import Signals
 from ..regression.estimate import Parameters, quantity
@@ -20,7 +23,7 @@ from .search import Array, Fitted, known_orders
 from .thermal_drift import ThermalDrift
 from .torsional_compliance import TorsionalCompliance
 
-__all__ = ["CurrentCoupling"]
+__all__ = ["CurrentCoupling", "CurrentCouplingTerm"]
 
 
 @dataclass(frozen=True)
@@ -55,10 +58,6 @@ class CurrentCoupling(FactorEffect):
     )
     acts_on_runs: ClassVar[bool] = True
     changes_lines: ClassVar[bool] = True
-    not_at_run_time: ClassVar[str] = (
-        "a corrector is given no current: shield the sensor or move it from the windings"
-    )
-
     def signal(self, signals: Signals, around: Surroundings, rng: np.random.Generator) -> Array:
         if signals.current is None:
             return np.zeros(len(signals))
@@ -113,3 +112,36 @@ class CurrentCoupling(FactorEffect):
                 "are the same regressor",
                 TorsionalCompliance,
             )
+
+    def to_terms(self, period: float, shafts: Mapping[str, float]) -> tuple[Term, ...]:
+        lines = line_values(self.lines_per_A, period)
+        return (CurrentCouplingTerm(from_arcsec(self.arcsec_per_A, period), **lines),)
+
+
+@dataclass(frozen=True, repr=False)
+class CurrentCouplingTerm(Term):
+    r"""An error in proportion to the motor's current.
+
+    .. math:: \varepsilon = i\,\Big(a_0 + \sum_m A_m \cos m\varphi + B_m \sin m\varphi\Big)
+
+    Parameters
+    ----------
+    per_A : float
+        :math:`a_0`, angle per ampere.
+    orders, cosine, sine : sequence of float
+        Output orders (positive) and coefficients per ampere.
+    """
+
+    per_A: float = 0.0
+    orders: tuple[float, ...] = ()
+    cosine: tuple[float, ...] = ()
+    sine: tuple[float, ...] = ()
+
+    kind: ClassVar[str] = "current_coupling"
+    signals: ClassVar[tuple[str, ...]] = ("current",)
+
+    def check(self) -> None:
+        self._check_lines()
+
+    def forms(self) -> tuple[Form, ...]:
+        return (forms.Scaled("current", self.per_A, self.lines),)

@@ -1,4 +1,4 @@
-r"""Terms of the correction beyond harmonics: what follows travel, speed, heat and load.
+r"""Terms of the correction beyond harmonics: what follows travel, speed, heat, load and current.
 
 A `HarmonicModel` with ``terms`` corrects, with :math:`\varphi = \theta - v\tau`,
 
@@ -16,6 +16,7 @@ from ..correction.term import TERMS, Term
 from ..effects import EFFECTS
 from ..effects.backlash import BacklashTerm as Backlash
 from ..effects.channel_skew import ChannelSkewTerm as ChannelSkew
+from ..effects.current_coupling import CurrentCouplingTerm as CurrentCoupling
 from ..effects.direction_dependent_pattern import DirectionalPatternTerm as DirectionalPattern
 from ..effects.filter_lag import FilterLagTerm as FilterLag
 from ..effects.latency import LatencyTerm as Latency
@@ -31,6 +32,7 @@ __all__ = [
     "TERMS",
     "Backlash",
     "ChannelSkew",
+    "CurrentCoupling",
     "DirectionalPattern",
     "FilterLag",
     "Latency",
