@@ -10,7 +10,6 @@ import trueangle as ta
 from trueangle.cli import main
 from trueangle.terms import CurrentCoupling
 
-
 SIGNALS = ("velocity_deg_s", "temperature_C", "torque_Nm", "current_A")
 
 

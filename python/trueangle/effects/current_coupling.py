@@ -58,6 +58,7 @@ class CurrentCoupling(FactorEffect):
     )
     acts_on_runs: ClassVar[bool] = True
     changes_lines: ClassVar[bool] = True
+
     def signal(self, signals: Signals, around: Surroundings, rng: np.random.Generator) -> Array:
         if signals.current is None:
             return np.zeros(len(signals))
