@@ -2,6 +2,7 @@
 
 import importlib
 import re
+import sys
 
 import pytest
 
@@ -68,12 +69,17 @@ def resolved(path):
 
 def documented():
     """Everything that the reference lists, members that are named included."""
-    text = (ROOT / "docs" / "reference.md").read_text("utf-8")
+    sys.path.insert(0, str(ROOT / "docs"))
+    try:
+        from reference_pages import BLOCK, entries
+    finally:
+        sys.path.pop(0)
     paths = []
-    for match in re.finditer(r"^\.\. auto\w+:: (\S+)\n((?:   :.*\n)*)", text, re.MULTILINE):
-        paths.append(match[1])
-        members = re.search(r":members: (\S.*)", match[2])
-        paths += [f"{match[1]}.{name.strip()}" for name in members[1].split(",")] if members else []
+    for page in sorted((ROOT / "docs" / "reference").glob("*.md")):
+        for block in BLOCK.findall(page.read_text("utf-8")):
+            for name, members in entries(block):
+                paths.append(name)
+                paths += [f"{name}.{member.strip()}" for member in members.split(",") if member]
     assert len(paths) > 50
     return paths
 
