@@ -19,7 +19,14 @@ from .runs import CalibrationRun, Source
 from .signals import FIELDS
 from .suggestions import did_you_mean
 
-__all__ = ["Readings", "RunColumns", "read_columns", "read_readings", "read_runs"]
+__all__ = [
+    "Readings",
+    "RunColumns",
+    "read_columns",
+    "read_readings",
+    "read_runs",
+    "runs_of_readings",
+]
 
 #: Unit, label and rows of every run.
 Groups: TypeAlias = list[tuple[str | None, str | None, NDArray[np.intp]]]
@@ -79,7 +86,7 @@ def read_runs(
     paths = [path] if isinstance(path, (str, PathLike)) else list(path)
 
     def read(file: Path) -> list[CalibrationRun]:
-        return _runs(_columns(readings_of(file, wanted, topic), indicated, reference))
+        return runs_of_readings(readings_of(file, wanted, topic), indicated, reference)
 
     runs = [run for entry in paths for run in named(Path(entry), read)]
     units = {run.period: run for run in runs}
@@ -186,8 +193,12 @@ def _entries(table: Readings, counts: float | None) -> RunColumns:
     return RunColumns(table, _PERIOD, reference, indicated, {}, groups, [left_out], table.source)
 
 
-def _runs(found: RunColumns) -> list[CalibrationRun]:
-    table, signals = found.table, found.signals
+def runs_of_readings(
+    table: Readings, counts_per_turn: float | None, counts_per_turn_reference: float | None
+) -> list[CalibrationRun]:
+    """Runs of the rows of a table; raises as `read_runs`."""
+    found = _columns(table, counts_per_turn, counts_per_turn_reference)
+    signals = found.signals
     used = {c.name for role, c in table.roles.items() if c.is_asked or role in _USED}
     others = {name: values for name, values in table.columns.items() if name not in used}
     runs = []

@@ -11,11 +11,13 @@ from ..files import MODEL, SIMULATION
 from ..pace import STYLES, ending_early
 from .durations import seconds
 from .paths import Input, Output
-from .signal_options import add_signals
+from .signal_options import add_signals, reading, signals_by_joint
 
 if TYPE_CHECKING:
     from ..diagnosis import Diagnosis
 
+#: `trueangle.joining.simulated.BY`, not imported for a help text.
+BY = ("time", "angle")
 HELP = "name the physical causes that a simulation of the joint lacks"
 EXAMPLE = "trueangle diagnose runs.csv --simulation joint.toml --extend better.toml"
 
@@ -24,7 +26,20 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command's arguments."""
     add = parser.add_argument
     add("runs", nargs="+", type=Input, metavar="RUNS", help="calibration runs (CSV or Parquet)")
-    add("--simulation", required=True, type=Input, metavar="FILE", help="simulation file (TOML)")
+    add("--simulation", type=Input, metavar="FILE", help="simulation file (TOML)")
+    add(
+        "--simulated",
+        type=Input,
+        metavar="LOG",
+        help="what another simulator (MuJoCo, Isaac, Gazebo, Simulink ...) says of the same "
+        "motion: its true angle as reference, its encoder as indicated; the simulation and its "
+        "extension stand on top of it. --signal simulated.ROLE=NAME[:UNIT] names its columns",
+    )
+    add(
+        "--simulated-by",
+        choices=BY,
+        help="what joins the log to the readings (default: time where the motions are the same)",
+    )
     add(
         "--extend",
         type=Output.of(SIMULATION),
@@ -57,6 +72,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Print the diagnosis."""
     from ..diagnosis import diagnose
+    from ..joining import minus_simulated
     from ..modelfile import load_model
     from ..simulation import load_simulation
     from .run_lists import read_checked
@@ -66,10 +82,26 @@ def run(args: argparse.Namespace) -> int:
             "--model FILE (the model to extend) and --corrected-model FILE (the one to write) "
             "belong together"
         )
-    simulation = load_simulation(args.simulation)
+    if args.simulation is None and args.simulated is None:
+        raise ArgumentError("give --simulation FILE, or --simulated LOG, or both")
+    if args.simulated is not None and args.model is not None:
+        raise ArgumentError(
+            "--model with --simulated: no correction model can hold what is known as a log only; "
+            "leave --model out"
+        )
+    simulation = None if args.simulation is None else load_simulation(args.simulation)
+    own = [entry for entry in args.signal or () if entry[0] == "simulated"]
+    args.signal = [entry for entry in args.signal or () if entry[0] != "simulated"]
     runs = read_checked(args)
+    simulated = None
+    if args.simulated is not None:
+        columns = (signals_by_joint(own, single=False) or {}).get("simulated")
+        given = {**reading(args), "signals": columns}
+        simulated = minus_simulated(runs, args.simulated, by=args.simulated_by, **given)
     with ending_early() as interruption:
-        result = diagnose(runs, simulation, within=args.within, progress=args.progress)
+        result = diagnose(
+            runs, simulation, simulated=simulated, within=args.within, progress=args.progress
+        )
     if interruption.happened:
         print(result.to_json() if args.json else result.summary())
         raise KeyboardInterrupt(_unwritten(args, result.complete))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +16,7 @@ from ..effects.blindness import Blindness
 from ..effects.scatter import NEW_SCATTER, ScatterFinding
 from ..effects.wrong_gear_ratio import WrongGearRatio
 from ..errors import ArgumentError
+from ..joining import MeasuredMinusSimulated, minus_simulated
 from ..joint.signals import Signals, join_runs
 from ..pace import Pace, pace, paced
 from ..regression.estimate import quantity
@@ -51,8 +53,9 @@ FOR_CHOICE, FOR_FINDINGS = 0.6, 0.9
 
 def diagnose(
     runs: CalibrationRun | Iterable[CalibrationRun],
-    sim: Simulation,
+    sim: Simulation | None = None,
     *,
+    simulated: Any = None,
     gain: bool = True,
     within: float | None = None,
     progress: str = "none",
@@ -76,7 +79,11 @@ def diagnose(
     ----------
     runs : CalibrationRun or iterable of CalibrationRun
         Time, velocity, torque, temperature and mount where known.
-    sim : Simulation
+    sim : Simulation, optional
+        What is believed; may be left out where there is a log.
+    simulated : path, table, runs or MeasuredMinusSimulated, optional
+        What any other simulator says of the same motion (`trueangle.joining.minus_simulated`):
+        it is taken off the readings, and ``sim`` and its extension stand on top of it.
     gain : bool
         Measure the gain on held-out runs (about half of the time).
     within : float, optional
@@ -94,7 +101,8 @@ def diagnose(
     Raises
     ------
     ArgumentError
-        No run, or too few readings; a time that is not above zero.
+        No run, too few readings, neither a simulation nor a log, or a time that is not above
+        zero.
 
     Notes
     -----
@@ -113,12 +121,25 @@ def diagnose(
     >>> diagnose(runs, sim).findings[0].cause
     'backlash'
     """
+    measured = as_runs(runs)
+    log = None
+    if simulated is not None:
+        is_joined = isinstance(simulated, MeasuredMinusSimulated)
+        log = simulated if is_joined else minus_simulated(measured, simulated)
+    elif sim is None:
+        raise ArgumentError("nothing is believed: give a simulation, or a log as simulated=")
     with paced(within, progress):
-        return _diagnosis(as_runs(runs), sim, gain)
+        return _diagnosis(measured, log, Simulation() if sim is None else sim, gain)
 
 
-def _diagnosis(found: list[CalibrationRun], sim: Simulation, gain: bool) -> Diagnosis:
+def _diagnosis(
+    measured: list[CalibrationRun],
+    log: MeasuredMinusSimulated | None,
+    sim: Simulation,
+    gain: bool,
+) -> Diagnosis:
     at = pace()
+    found = measured if log is None else log.runs
     every = join_runs(found)
     if len(every) < LEAST_READINGS:
         raise ArgumentError(
@@ -177,9 +198,10 @@ def _diagnosis(found: list[CalibrationRun], sim: Simulation, gain: bool) -> Diag
         rest,
         before,
         beliefs,
-        faults_of(records_of(found)),
+        faults_of(records_of(measured)),
         [_incomplete(at, gain)] if at.cut else [],
         not at.cut,
+        log,
     )
 
 

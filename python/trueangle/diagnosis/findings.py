@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 from ..checks import DataFault
 from ..effects import EFFECTS, Effect
 from ..effects.blindness import Blindness
+from ..joining import MeasuredMinusSimulated
 from ..regression.estimate import Parameters
 from ..simulation.simulation import Simulation
 from .beliefs import Belief
@@ -129,6 +130,8 @@ class Diagnosis:
         What else must be known of the account.
     complete : bool
         False where it was ended early: by the time given, or by Ctrl-C.
+    simulated : MeasuredMinusSimulated or None
+        The log of another simulator that the simulation stands on.
     """
 
     discrepancy: Discrepancy
@@ -147,6 +150,7 @@ class Diagnosis:
     data_faults: list[DataFault] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
     complete: bool = True
+    simulated: MeasuredMinusSimulated | None = None
 
     @property
     def is_enough(self) -> bool:
@@ -194,6 +198,7 @@ class Diagnosis:
             "notes": self.notes,
             "not_identifiable": [spot.to_json() for spot in self.not_identifiable],
             "extended_simulation": extended_simulation,
+            **({} if self.simulated is None else {"simulated": self.simulated.to_json()}),
         }
 
     def _unexplained(self) -> dict[str, Any]:

@@ -23,6 +23,7 @@ def render(diagnosis: Diagnosis) -> str:
     d = diagnosis.discrepancy
     lines = [
         *headline(diagnosis),
+        *_wrapped(diagnosis.simulated.summary() if diagnosis.simulated else "", 0),
         f"Measured minus simulated: rms {d.rms:.2f} arcsec, peak-to-peak "
         f"{d.peak_to_peak:.2f}, max abs {d.max_abs:.2f} ({diagnosis.readings} readings).",
         f"Noise of one reading: {diagnosis.noise:.2f} arcsec"
