@@ -1,0 +1,125 @@
+"""A transformer of scikit-learn: indicated angles in, true angles out."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from .errors import MissingExtraError, NoModelError
+from .fitting.fit import fit
+from .model import HarmonicModel
+from .runs import CalibrationRun
+
+try:
+    from sklearn.base import BaseEstimator, OneToOneFeatureMixin, TransformerMixin
+    from sklearn.utils.validation import check_is_fitted, validate_data
+except ImportError:
+    raise MissingExtraError(
+        "the transformer needs scikit-learn: pip install 'trueangle[sklearn]'"
+    ) from None
+
+__all__ = ["AngleCorrector"]
+
+
+class AngleCorrector(OneToOneFeatureMixin, TransformerMixin, BaseEstimator):  # type: ignore[misc]
+    r"""Correct columns of indicated angles by models of their errors.
+
+    .. math:: \theta = r - \varepsilon(\theta), \qquad
+              \varepsilon(\theta) = C_0 + \sum_k A_k \cos k\theta + B_k \sin k\theta
+
+    Every column is one encoder's reading of the same true angle, which is ``y`` of `fit`. Rows may
+    come in any order, as folds and shuffles leave them: nothing here follows time or direction.
+
+    Parameters
+    ----------
+    orders : iterable of int or "auto"
+        Of the output shaft; by default selected by evidence (`trueangle.fit`).
+    period : float
+        One turn in the unit of all angles: ``2*pi`` (default), 360 ...
+    gear_ratio : float, optional
+        Makes gear orders candidates.
+
+    Attributes
+    ----------
+    models_ : list of HarmonicModel or None
+        For each column; None where the readings support no order: such a column is left as it is.
+    n_features_in_, feature_names_in_
+        As scikit-learn has them.
+
+    Raises
+    ------
+    MissingExtraError
+        On import: scikit-learn is not installed.
+    ArgumentError
+        In `fit`: a column that does not follow ``y`` at all (another unit or sign); and whatever
+        else `trueangle.fit` refuses.
+
+    Notes
+    -----
+    ``set_output(transform="pandas")`` and the like, pipelines, clones and searches over parameters
+    work as of any transformer. The checks of scikit-learn pass, but for those whose targets are no
+    angle that the columns follow. The cost is that of `trueangle.fit` and `HarmonicModel.correct`.
+
+    Examples
+    --------
+    >>> theta = np.linspace(0.0, 360.0, 200, endpoint=False)
+    >>> read = theta + 0.5 * np.sin(np.radians(theta))
+    >>> corrector = AngleCorrector(orders=[1], period=360.0).fit(read[:, None], theta)
+    >>> float(np.abs(corrector.transform(read[:, None])[:, 0] - theta).max()) < 1e-9
+    True
+    """
+
+    def __init__(
+        self,
+        orders: Iterable[int] | str = "auto",
+        *,
+        period: float = 2.0 * math.pi,
+        gear_ratio: float | None = None,
+    ) -> None:
+        self.orders = orders
+        self.period = period
+        self.gear_ratio = gear_ratio
+
+    def fit(self, X: ArrayLike, y: ArrayLike) -> AngleCorrector:
+        """Fit a model to every column.
+
+        Parameters
+        ----------
+        X : array_like, shape (n, encoders)
+            Indicated angles.
+        y : array_like, shape (n,)
+            The true angle.
+        """
+        indicated, true = validate_data(self, X, y, dtype=np.float64, y_numeric=True)
+        by_angle = np.argsort(np.mod(true, self.period), kind="stable")
+        reference = np.mod(true[by_angle], self.period)
+        orders = self.orders if isinstance(self.orders, str) else list(self.orders)
+        self.models_: list[HarmonicModel | None] = []
+        for column in indicated.T:
+            run = CalibrationRun(reference, column[by_angle], self.period)
+            try:
+                found = fit(run, orders, gear_ratio=self.gear_ratio, argument="reference")
+            except NoModelError:
+                self.models_.append(None)
+            else:
+                self.models_.append(found.model)
+        return self
+
+    def transform(self, X: ArrayLike) -> NDArray[np.float64]:
+        """Corrected angles, of the shape of ``X``."""
+        check_is_fitted(self)
+        indicated = validate_data(self, X, dtype=np.float64, reset=False)
+        corrected: NDArray[np.float64] = indicated.copy()
+        for j, model in enumerate(self.models_):
+            if model is not None:
+                corrected[:, j] = model.correct(indicated[:, j])
+        return corrected
+
+    def __sklearn_tags__(self) -> Any:
+        tags = super().__sklearn_tags__()
+        tags.target_tags.required = True
+        return tags
