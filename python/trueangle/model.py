@@ -11,15 +11,16 @@ from typing import TYPE_CHECKING, Any, Literal, TypeAlias, Unpack, overload
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from . import _core
-from .angles import arcsec, check_period, unit_name
+from . import _core, modelsummary
+from .angles import check_period
 from .correction.term import Term
-from .errors import ArgumentError, NotInvertibleError
+from .errors import ArgumentError
 from .records import FitRecord, Provenance
 from .shafts import Shaft
 from .signals import AT_RUN_TIME, GivenSignals, check_names
 from .spanguard import SpanGuard
 from .step import Step
+from .validity import ROUNDING, check_fit, check_invertible, check_number, checked_covariance
 
 if TYPE_CHECKING:
     from .correction.corrector import Corrector
@@ -29,12 +30,6 @@ __all__ = ["Argument", "HarmonicModel", "Step", "check_invertible"]
 Argument: TypeAlias = Literal["reference", "indicated"]
 Path: TypeAlias = Literal["table", "cubics", "exact", "direct", "counts"]
 Array: TypeAlias = NDArray[np.float64]
-
-#: Ends of a span are within so many turns.
-_MOST_TURNS = 1e9
-
-#: Lines that a summary lists before it says how many more there are.
-_LISTED = 40
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -104,26 +99,13 @@ class HarmonicModel:
         if self.argument == "reference":
             check_invertible(series.slope_bound)
         if self.covariance is not None:
-            put(self, "covariance", self._checked_covariance(self.covariance))
+            put(self, "covariance", checked_covariance(self.covariance, len(self.orders)))
         if self.condition_number is not None:
-            _check_number("condition_number", self.condition_number, 1.0 - _ROUNDING, math.inf)
+            check_number("condition_number", self.condition_number, 1.0 - ROUNDING, math.inf)
         if self.fit is not None:
-            self._check_fit(self.fit)
+            check_fit(self.fit, self.period)
         if self.terms:
             self._check_terms()
-
-    def _check_fit(self, fit: FitRecord) -> None:
-        far = _MOST_TURNS * self.period
-        for what, value in zip(("start", "stop"), fit.span, strict=True):
-            _check_number(f"fit.span's {what}", value, -far, far)
-        if fit.span[0] > fit.span[1]:
-            raise ArgumentError(f"fit.span must not stop before it starts, got {fit.span!r}")
-        if fit.residual is not None:
-            _check_number("fit.residual", fit.residual, 0.0, far)
-        for what in ("samples", "runs", "ridge", "offset_spread"):
-            _check_number(f"fit.{what}", getattr(fit, what), 0.0, math.inf)
-        for i, offset in enumerate(fit.offsets):
-            _check_number(f"fit.offsets[{i}]", offset, -far, far)
 
     def _check_terms(self) -> None:
         for i, term in enumerate(self.terms):
@@ -154,17 +136,6 @@ class HarmonicModel:
             [list(shaft.sine) for shaft in self.shafts],
             self.argument,
         )
-
-    def _checked_covariance(self, covariance: ArrayLike) -> Array:
-        matrix = np.array(covariance, dtype=np.float64)
-        size = 1 + 2 * sum(len(shaft.orders) for shaft in self.shafts)
-        if matrix.shape != (size, size) or not np.isfinite(matrix).all():
-            raise ArgumentError(
-                f"covariance must be {size} x {size} finite numbers "
-                f"(constant, then A and B of every order), got shape {matrix.shape}"
-            )
-        matrix.flags.writeable = False
-        return matrix
 
     # -- evaluation ---------------------------------------------------------------
 
@@ -337,40 +308,11 @@ class HarmonicModel:
     # -- description --------------------------------------------------------------
 
     def __repr__(self) -> str:
-        lines = sum(len(shaft.orders) for shaft in self.shafts)
-        parts = [
-            f"{lines} {'order' if lines == 1 else 'orders'}"
-            + (f" of {_listed([shaft.name for shaft in self.shafts])}" if self.shafts else ""),
-            f"period {self.period:g}",
-            f"argument {self.argument}",
-        ]
-        if self.terms:
-            parts.append(f"with {_listed([term.kind for term in self.terms])}")
-        return f"<HarmonicModel: {', '.join(parts)}>"
+        return modelsummary.one_line(self)
 
     def summary(self) -> str:
         """The harmonics by shaft and order, in arcseconds, and what is known of the fit."""
-        unit = unit_name(self.period)
-        lines = [
-            repr(self)[1:-1],
-            f"constant {self.constant:.6g} {unit}, {arcsec(self.constant, self.period):.6g} arcsec",
-            f"{'shaft':16s} {'order':>10s} {'amplitude, arcsec':>18s} {'phase, deg':>11s}",
-        ]
-        rows = [
-            f"{shaft.name:16.16s} {k:10d} {arcsec(c, self.period):18.4f} {math.degrees(p):11.2f}"
-            for shaft in self.shafts
-            for k, c, p in zip(shaft.orders, shaft.amplitudes, shaft.phases, strict=True)
-        ]
-        lines += rows[:_LISTED]
-        if len(rows) > _LISTED:
-            lines.append(f"... and {len(rows) - _LISTED} more")
-        if self.fit is not None:
-            start, stop = self.fit.span
-            lines.append(
-                f"fitted to {self.fit.samples} readings of {self.fit.runs} runs "
-                f"between {start:.6g} and {stop:.6g} {unit}"
-            )
-        return "\n".join(lines)
+        return modelsummary.summary(self)
 
     def _repr_html_(self) -> str:
         from html import escape
@@ -485,33 +427,6 @@ class HarmonicModel:
 
     def __reduce__(self) -> tuple[Any, ...]:
         return _rebuild, ({entry.name: getattr(self, entry.name) for entry in fields(self)},)
-
-
-#: What a condition number may be below 1 by rounding.
-_ROUNDING = 1e-6
-
-
-def _check_number(what: str, value: object, least: float, most: float) -> None:
-    number = isinstance(value, (int, float, np.integer, np.floating))
-    if not (number and math.isfinite(value) and least <= value <= most):  # type: ignore[arg-type,operator]
-        bounds = f"at least {least:g}" if math.isinf(most) else f"from {least:g} to {most:g}"
-        raise ArgumentError(f"{what} must be a finite number, {bounds}, got {value!r}")
-
-
-def _listed(names: list[str], most: int = 4) -> str:
-    more = f" and {len(names) - most} more" if len(names) > most else ""
-    return ", ".join(name[:24] for name in names[:most]) + more
-
-
-def check_invertible(slope: float) -> None:
-    """Raise `NotInvertibleError` when ``|d error / d angle|`` may reach 1."""
-    if slope >= 1.0:
-        raise NotInvertibleError(
-            f"|error'| may reach {slope:.3g}: from 1 on an indicated angle stands for several "
-            "true angles and cannot be corrected; use fewer or lower orders, or "
-            "argument='indicated'",
-            slope,
-        )
 
 
 def _rebuild(values: dict[str, Any]) -> HarmonicModel:

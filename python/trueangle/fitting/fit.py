@@ -7,10 +7,11 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from ..errors import ArgumentError, NoModelError, UnlikeRunsWarning
-from ..model import Argument, check_invertible
+from ..model import Argument
 from ..runs import CalibrationRun, as_runs
 from ..shafts import resolve_orders
 from ..units import check_follows
+from ..validity import check_invertible
 from .argument import ARGUMENTS, AnyArgument, Choice, choose_argument
 from .breakdown import breakdown_sentence
 from .likeness import unlike_runs, unlike_sentence
