@@ -53,7 +53,7 @@ def figures(folder: Path) -> None:
         "held-out": plots.before_after(fit.model, runs[6:]),
         "direction": plots.residuals(fit, "direction"),
         "simulated": plots.measured_and_simulated(runs, sim),
-        "left": plots.error_left(diagnosis, runs, sim),
+        "left": plots.error_left(diagnosis),
         "gains": plots.gains(diagnosis),
         "positions": plots.plan_positions(plan),
         "factors": plots.plan_factors(plan),

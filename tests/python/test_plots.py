@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -13,6 +14,7 @@ from trueangle.errors import ArgumentError, MissingExtraError, RankError
 from trueangle.fitting.phases import run_phases
 from trueangle.planning import plan_mounts, plan_tilts
 from trueangle.plots import curves, palette
+from trueangle.plots.orderaxis import OrderAxis
 from trueangle.simulation import Harmonic, Joint, RunDesign, Simulation
 
 matplotlib = pytest.importorskip("matplotlib")
@@ -112,6 +114,7 @@ def test_spectrum_of_a_fit_shows_amplitudes_in_order(fit: ta.FitResult) -> None:
     bars = [patch.get_height() for patch in ax.patches]
     np.testing.assert_allclose(bars, 3600.0 * fit.amplitudes[np.argsort(fit.orders)])
     assert [t.get_text() for t in ax.get_xticklabels()] == ["1", "2", "100"]
+    assert ax.get_yscale() == "log"
 
 
 def test_phases_of_systematic_orders_stay_together(fit: ta.FitResult) -> None:
@@ -208,10 +211,56 @@ def test_given_axes_are_drawn_on_and_returned(fit: ta.FitResult) -> None:
         fit.plot("pie")
 
 
-def test_colours_are_okabe_ito() -> None:
-    okabe_ito = {"#E69F00", "#56B4E9", "#009E73", "#F0E442", "#0072B2", "#D55E00", "#CC79A7"}
-    assert set(palette.RUNS) <= okabe_ito
-    assert len(set(palette.RUNS)) == len(palette.RUNS)
+#: Least contrast of a mark with its paper (WCAG 1.4.11), and the papers: white, black.
+CONTRAST = 3.0
+PAPERS = (1.0, 0.0)
+
+#: Linear RGB as who lacks red or green receptors sees it (Viénot, Brettel, Mollon 1999).
+BLINDNESS = {
+    "protanopia": [[0.11238, 0.88762, 0.0], [0.11238, 0.88762, 0.0], [0.00401, -0.00401, 1.0]],
+    "deuteranopia": [[0.29275, 0.70725, 0.0], [0.29275, 0.70725, 0.0], [-0.02234, 0.02234, 1.0]],
+}
+
+
+def linear(colour: str) -> np.ndarray:
+    c = np.array(matplotlib.colors.to_rgb(colour))
+    return np.where(c <= 0.04045, c / 12.92, ((c + 0.055) / 1.055) ** 2.4)
+
+
+def luminance(colour: str) -> float:
+    return float(linear(colour) @ [0.2126, 0.7152, 0.0722])
+
+
+@pytest.mark.parametrize("colour", sorted({*palette.RUNS, palette.BEFORE, palette.AFTER,
+                                           palette.WARNING, palette.MUTED}))  # fmt: skip
+def test_colours_stand_out_of_white_and_of_black_paper(colour: str) -> None:
+    for paper in PAPERS:
+        high, low = sorted((luminance(colour), paper), reverse=True)
+        assert (high + 0.05) / (low + 0.05) >= CONTRAST
+
+
+@pytest.mark.parametrize("kind", [None, *BLINDNESS])
+def test_runs_next_to_each_other_are_told_apart(kind: str | None) -> None:
+    """By colour as the colour-blind see it, and by a marker of their own for grey print."""
+    assert len(set(palette.RUNS)) == len(set(palette.MARKERS)) == len(palette.RUNS)
+    seen = [linear(colour) for colour in palette.RUNS]
+    if kind is not None:
+        seen = [np.array(BLINDNESS[kind]) @ colour for colour in seen]
+    for one, other in pairwise(seen):
+        assert np.abs(one - other).max() > 0.1
+
+
+def test_before_and_after_differ_in_grey() -> None:
+    assert luminance(palette.BEFORE) > 1.5 * luminance(palette.AFTER)
+
+
+def test_ink_follows_the_paper() -> None:
+    from matplotlib import pyplot
+
+    with pyplot.style.context("dark_background"):
+        _, dark = pyplot.subplots()
+    _, light = pyplot.subplots()
+    assert (palette.ink(dark), palette.ink(light)) == ("#FFFFFF", "#000000")
 
 
 def test_missing_matplotlib_is_named(fit: ta.FitResult, monkeypatch) -> None:
@@ -281,18 +330,19 @@ def diagnosed():
 def test_diagnosis_pictures(diagnosed) -> None:
     diagnosis, runs, sim = diagnosed
     gains = diagnosis.plot()
-    left = plots.error_left(diagnosis, runs, sim)
+    left = plots.error_left(diagnosis)
     compared = plots.measured_and_simulated(runs, sim)
     for ax in (gains, left, compared):
         nothing_clipped(ax)
     gain = diagnosis.findings[0].gain
     assert gains.patches[0].get_width() == pytest.approx(100.0 * gain.reducible_share)
-    before, after = (patch.get_width() for patch in left.patches)
-    assert before == pytest.approx(diagnosis.discrepancy.rms, rel=1e-9)
+    # With all causes, then without this one: the numbers of its gain.
+    after, before = (patch.get_width() for patch in left.patches)
+    assert (before, after) == (gain.before[0], gain.after[0])
     # Backlash of 6 and noise of 2 arcsec before, the noise after.
     assert before == pytest.approx(np.hypot(6.0, 2.0), rel=0.1)
     assert after == pytest.approx(2.0, rel=0.1)
-    assert legend_texts(compared) == ["measured", "simulated", "difference"]
+    assert legend_texts(compared) == ["measured", "simulated", "difference, moved down"]
 
 
 def test_diagnosis_without_findings_has_no_gain_to_draw(diagnosed) -> None:
@@ -301,3 +351,68 @@ def test_diagnosis_without_findings_has_no_gain_to_draw(diagnosed) -> None:
     assert nothing.findings == []
     with pytest.raises(ArgumentError, match="no finding"):
         nothing.plot()
+
+
+def pictures(fit, runs, diagnosed, selection):
+    diagnosis, simulated_runs, sim = diagnosed
+    plan = plan_mounts(100, 36, 2)
+    return {
+        "errors": lambda ax=None: plots.error_curves(fit, ax),
+        "spectrum": lambda ax=None: plots.amplitude_spectrum(fit, ax),
+        "selection": lambda ax=None: selection.plot(ax),
+        "held out": lambda ax=None: plots.before_after(fit.model, runs[3:], ax),
+        "residuals": lambda ax=None: plots.residuals(fit, ax=ax),
+        "simulated": lambda ax=None: plots.measured_and_simulated(simulated_runs, sim, ax),
+        "left": lambda ax=None: plots.error_left(diagnosis, ax),
+        "gains": lambda ax=None: plots.gains(diagnosis, ax),
+        "positions": lambda ax=None: plots.plan_positions(plan, ax),
+        "factors": lambda ax=None: plots.plan_factors(plan, ax),
+        "phases": lambda ax=None: plots.phases_over_runs(fit, ax),
+    }
+
+
+def test_every_picture_says_what_is_seen(fit, runs, diagnosed, selection) -> None:
+    for name, draw in pictures(fit, runs, diagnosed, selection).items():
+        text = plots.text_alternative(draw())
+        assert text.endswith("."), name
+        assert any(letter.isdigit() for letter in text), f"{name}: {text}"
+
+
+def test_legends_cover_no_neighbour(fit, runs, diagnosed, selection) -> None:
+    """Six pictures in one figure, a fit of many runs among them."""
+    from matplotlib import pyplot
+
+    many = [ta.CalibrationRun(r.reference, r.indicated, 360.0) for r in runs for _ in range(3)]
+    drawn = pictures(ta.fit(many, [1], loss="linear"), runs, diagnosed, selection)
+    figure, axes = pyplot.subplots(2, 3, figsize=(13.0, 7.0), layout="constrained")
+    names = ["errors", "selection", "held out", "residuals", "simulated", "spectrum"]
+    for ax, name in zip(axes.flat, names, strict=True):
+        drawn[name](ax)
+    figure.canvas.draw()
+    for ax in axes.flat:
+        box = ax.get_legend().get_window_extent()
+        for other in axes.flat:
+            if other is not ax:
+                assert not box.overlaps(other.get_tightbbox())
+        assert box.y1 <= ax.get_window_extent().y1 + 1.0
+
+
+def test_the_axis_of_orders_is_broken_between_the_groups(selection) -> None:
+    ax = selection.plot()
+    axis = OrderAxis.of([float(row.order) for row in selection.table])
+    assert len(axis.groups) >= 3
+    place = axis.places([1, 2, 17, 100, 101])
+    assert place[1] - place[0] == pytest.approx((place[2] - place[0]) / 16)
+    assert place[3] > place[2]
+    # Bars use the width: the last group ends near the right border.
+    last = max(patch.get_x() + patch.get_width() for patch in ax.patches)
+    low, high = ax.get_xlim()
+    assert (last - low) / (high - low) > 0.9
+    assert sum(line.get_label() == "_break" for line in ax.lines) == 2 * (len(axis.groups) - 1)
+
+
+def test_ticks_of_orders_do_not_overlap(selection) -> None:
+    ax = selection.plot()
+    ax.figure.canvas.draw()
+    boxes = [label.get_window_extent() for label in ax.get_xticklabels() if label.get_text()]
+    assert all(a.x1 < b.x0 for a, b in pairwise(boxes))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import json
 
+from .error_units import add_errors_in, errors_in
 from .paths import Input
 
 HELP = "difference of two models per order and over the turn"
@@ -26,6 +27,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="B",
         help="model file: the new calibration; B less A is printed",
     )
+    add_errors_in(parser)
     add("--json", action="store_true", help="print the result as JSON")
 
 
@@ -34,5 +36,8 @@ def run(args: argparse.Namespace) -> int:
     from ..export import compare
 
     result = compare(args.first, args.second)
-    print(json.dumps(result.as_json(), allow_nan=False) if args.json else result.summary())
+    if args.json:
+        print(json.dumps(result.as_json(), allow_nan=False))
+    else:
+        print(result.summary(errors_in(args)))
     return 0

@@ -8,6 +8,8 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 from ..errors import ArgumentError, TrueAngleError
+from ..errorunits import ErrorsIn, error_unit
+from .error_units import add_errors_in, errors_in
 from .paths import Input, ModelInput
 from .signal_options import add_signals, signals_by_joint
 from .terminal import own_interrupts
@@ -75,6 +77,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         default="auto",
         help="on stderr (default: text on a terminal; one JSON object a line with --json)",
     )
+    add_errors_in(parser)
     add("--json", action="store_true", help="print the result as JSON")
 
 
@@ -110,7 +113,7 @@ def run(args: argparse.Namespace) -> int:
         output_topic=args.output_topic,
         scheduler=args.scheduler,
         progress=progress,
-        report=(lambda log: None) if args.json else _print,
+        report=(lambda log: None) if args.json else (lambda log: _print(log, errors_in(args))),
     )
     if args.json:
         print(json.dumps(result.as_json()))
@@ -143,7 +146,7 @@ def _columns(entries: Sequence[str] | None, single: bool) -> Any:
     return by_joint(entries, "--column")
 
 
-def _print(log: LogReport) -> None:
+def _print(log: LogReport, asked: ErrorsIn) -> None:
     if not log.is_done:
         return  # told at the end, on stderr
     result = log.result
@@ -155,9 +158,11 @@ def _print(log: LogReport) -> None:
         f"{result['rows_per_second']:,.0f} rows/s -> {log.output}"
     )
     for joint in result["joints"]:
+        rms, largest = joint["rms_correction_arcsec"], joint["max_abs_correction_arcsec"]
+        unit = error_unit(asked, largest)
         text = (
-            f"  {joint['corrected']}: correction {joint['rms_correction_arcsec']:.2f} arcsec rms, "
-            f"{joint['max_abs_correction_arcsec']:.2f} max abs"
+            f"  {joint['corrected']}: correction {unit.text(rms)} rms, "
+            f"{unit.number(largest)} max abs"
         )
         if joint["missing"]:
             text += f", {joint['missing']} missing kept"

@@ -10,6 +10,7 @@ from ..errors import ArgumentError
 from ..files import MODEL, SIMULATION
 from ..pace import STYLES, ending_early
 from .durations import seconds
+from .error_units import add_errors_in, errors_in
 from .paths import Input, Output
 from .signal_options import add_signals, reading, signals_by_joint
 
@@ -66,6 +67,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         default="auto",
         help="on stderr after one second (default: text on a terminal, nothing elsewhere)",
     )
+    add_errors_in(parser)
     add("--json", action="store_true", help="print the diagnosis as JSON")
 
 
@@ -103,7 +105,7 @@ def run(args: argparse.Namespace) -> int:
             runs, simulation, simulated=simulated, within=args.within, progress=args.progress
         )
     if interruption.happened:
-        print(result.to_json() if args.json else result.summary())
+        print(result.to_json() if args.json else result.summary(errors_in(args)))
         raise KeyboardInterrupt(_unwritten(args, result.complete))
     if args.extend:
         result.extended.save(args.extend)
@@ -112,7 +114,7 @@ def run(args: argparse.Namespace) -> int:
     if args.json:
         print(result.to_json(args.extend))
     else:
-        print(result.summary())
+        print(result.summary(errors_in(args)))
         if args.extend:
             print(f"\nExtended simulation: {args.extend}")
         if args.corrected_model:

@@ -6,6 +6,7 @@ import argparse
 import json
 from typing import TYPE_CHECKING
 
+from .error_units import add_errors_in, errors_in
 from .paths import Input, Output
 
 if TYPE_CHECKING:
@@ -30,6 +31,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="take the smallest table that differs from the model by at most this",
     )
     add_target_options(parser)
+    add_errors_in(parser)
     add("--json", action="store_true", help="print the result as JSON")
 
 
@@ -88,5 +90,5 @@ def run(args: argparse.Namespace) -> int:
         for note in made.notes:
             print(f"trueangle: note: {note}", file=sys.stderr)
     else:
-        print(made.summary())
+        print(made.summary(errors_in(args)))
     return 0

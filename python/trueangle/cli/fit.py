@@ -6,6 +6,7 @@ import argparse
 import json
 
 from ..files import MODEL
+from .error_units import add_errors_in, errors_in
 from .fit_json import fit_as_json
 from .onepass import add_one_pass, saved, wants_one_pass
 from .order_lists import declared_shafts, orders_by_shaft, parse_orders
@@ -57,6 +58,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         action="store_true",
         help="keep the sha256 of the files in the model, also of a fit in one pass",
     )
+    add_errors_in(parser)
     parser.add_argument("--json", action="store_true", help="print the result as JSON")
 
 
@@ -142,6 +144,6 @@ def run(args: argparse.Namespace) -> int:
     if args.json:
         print(json.dumps({"model": args.output, **fit_as_json(result)}))
     else:
-        print(result.summary())
+        print(result.summary(errors_in(args)))
         print(f"\nsaved {args.output}")
     return 0

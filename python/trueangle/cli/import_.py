@@ -5,7 +5,9 @@ from __future__ import annotations
 import argparse
 import json
 
+from ..errorunits import error_unit
 from ..files import MODEL
+from .error_units import add_errors_in, errors_in
 from .export import add_target_options, target_options
 from .paths import Input, Output
 
@@ -35,6 +37,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="model file to write",
     )
     add_target_options(parser)
+    add_errors_in(parser)
     add("--json", action="store_true", help="print what the table corrects as JSON")
 
 
@@ -65,9 +68,11 @@ def run(args: argparse.Namespace) -> int:
     print(
         f"{args.output}: {len(rows)} orders, zero {model.constant / model.period * 360.0:.6g} deg"
     )
+    largest = max((row["amplitude_arcsec"] for row in rows), default=0.0)
+    shown = error_unit(errors_in(args), largest, model.period)
     for row in sorted(rows, key=lambda row: -row["amplitude_arcsec"])[:_SHOWN]:
         print(
-            f"  order {row['order']:g}: {row['amplitude_arcsec']:.4g} arcsec at "
+            f"  order {row['order']:g}: {shown.text(row['amplitude_arcsec'])} at "
             f"{row['phase_deg']:.1f} deg"
         )
     return 0

@@ -7,6 +7,7 @@ import json
 from typing import Any
 
 from ..files import RUNS
+from .error_units import add_errors_in, errors_in
 from .paths import Input, Output
 from .signal_options import add_signals, signals_by_joint
 
@@ -43,6 +44,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "(default: five times its typical step)",
     )
     add_signals(parser)
+    add_errors_in(parser)
     add("--json", action="store_true", help="print the result as JSON")
 
 
@@ -65,7 +67,7 @@ def run(args: argparse.Namespace) -> int:
     if args.json:
         print(json.dumps({"output": args.output, **found.as_json()}, allow_nan=False))
     else:
-        print(found.summary())
+        print(found.summary(errors_in(args)))
         print(f"\nsaved {args.output}")
     return 0
 

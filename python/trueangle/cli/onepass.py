@@ -7,7 +7,10 @@ import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ..angles import arcsec
 from ..errors import ArgumentError
+from ..errorunits import error_unit
+from .error_units import errors_in
 from .fit_json import fit_as_json
 from .order_lists import declared_shafts
 from .signal_options import reading
@@ -107,7 +110,7 @@ def saved(args: argparse.Namespace, orders: Any) -> int:
     if args.json:
         print(json.dumps({"model": args.output, **fit_as_json(found)}))
     else:
-        print(found.summary())
+        print(found.summary(errors_in(args)))
         print(f"\nsaved {args.output}")
     return 0
 
@@ -124,12 +127,15 @@ def printed_orders(args: argparse.Namespace) -> int:
         renamed = {"samples": result["readings"], "noise_arcsec": result["residual_arcsec"]}
         print(json.dumps(renamed | {"runs": result["runs"], "orders": result["evidence"]}))
         return 0
-    print(f"{found.rows} readings, residual {result['residual_arcsec']:.2f} arcsec")
+    period = found.model.period
+    residual = arcsec(found.residual_std, period)
+    sizes = [residual, *(arcsec(row.amplitude, period) for row in found.table)]
+    unit = error_unit(errors_in(args), max(sizes), period)
+    print(f"{found.rows} readings, residual {unit.text(residual)}")
     for row in found.table:
-        arcsec = 1_296_000.0 / found.model.period
+        size, std = unit.pair(arcsec(row.amplitude, period), arcsec(row.std, period))
         print(
-            f"  {row.shaft:<15} {row.order:5d}  {arcsec * row.amplitude:10.3f} +- "
-            f"{arcsec * row.std:.3f} arcsec, {row.phase_deg:6.2f} deg  "
-            + ("retained" if row.retained else row.reason)
+            f"  {row.shaft:<15} {row.order:5d}  {size:>10} +- {std:>7} {unit.name}, "
+            f"{row.phase_deg:6.2f} deg  " + ("retained" if row.retained else row.reason)
         )
     return 0

@@ -7,6 +7,7 @@ import json
 import math
 from typing import TYPE_CHECKING
 
+from .error_units import add_errors_in, errors_in
 from .fit import add_argument_choice, add_covariance, add_joint, add_nuisance
 from .onepass import add_one_pass, printed_orders, wants_one_pass
 from .order_lists import declared_shafts, parse_orders
@@ -37,6 +38,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_nuisance(parser)
     add("--run", action="append", metavar="LABEL", help="use this run only (may be repeated)")
     add_one_pass(parser)
+    add_errors_in(parser)
     add("--json", action="store_true", help="print the table as JSON")
 
 
@@ -62,7 +64,10 @@ def run(args: argparse.Namespace) -> int:
         shafts=declared_shafts(args.shaft),
         reference_orders=reference,
     )
-    print(json.dumps(as_json(selection), indent=2) if args.json else selection.summary())
+    if args.json:
+        print(json.dumps(as_json(selection), indent=2))
+    else:
+        print(selection.summary(errors_in(args)))
     return 0
 
 

@@ -7,6 +7,7 @@ import json
 import sys
 
 from ..errors import ArgumentError
+from .error_units import add_errors_in, errors_in
 from .order_lists import parse_orders
 from .paths import Input, Output
 from .signal_options import add_signals, reading
@@ -58,6 +59,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="where the heads stand, degrees, if their readings share one zero",
     )
     add_signals(parser)
+    add_errors_in(parser)
     add("--json", action="store_true", help="print the result as JSON")
 
 
@@ -87,7 +89,7 @@ def run(args: argparse.Namespace) -> int:
     if args.json:
         print(json.dumps({"model": args.output, **result.as_json()}, allow_nan=False))
     else:
-        print(result.summary())
+        print(result.summary(errors_in(args)))
         print(f"\nsaved {args.output}")
     return 0
 

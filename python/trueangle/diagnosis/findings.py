@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 from ..checks import DataFault
 from ..effects import EFFECTS, Effect
 from ..effects.blindness import Blindness
+from ..errorunits import ErrorsIn
 from ..joining import MeasuredMinusSimulated
 from ..regression.estimate import Parameters
 from ..simulation.simulation import Simulation
@@ -224,8 +225,15 @@ class Diagnosis:
 
         return gains(self, ax)
 
-    def summary(self) -> str:
-        """A readable account (`trueangle.diagnosis.summary.render`)."""
+    def summary(self, errors_in: ErrorsIn = "auto") -> str:
+        """A readable account (`trueangle.diagnosis.summary.render`).
+
+        Parameters
+        ----------
+        errors_in : {"auto", "arcsec", "deg", "mrad", "count"} or float
+            Unit of the errors; by itself arcsec, or degrees where one reaches a degree. A
+            number is the counts of a turn.
+        """
         from .summary import render
 
-        return render(self)
+        return render(self, errors_in)

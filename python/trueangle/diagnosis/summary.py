@@ -6,6 +6,7 @@ import textwrap
 from typing import TYPE_CHECKING, Any
 
 from ..effects.blindness import Blindness
+from ..errorunits import ErrorsIn, ErrorUnit, error_unit
 from ..regression.estimate import Quantity
 from .beliefs import Belief
 from .levels import LevelGain
@@ -18,15 +19,21 @@ __all__ = ["headline", "render"]
 WIDTH = 88
 
 
-def render(diagnosis: Diagnosis) -> str:
+#: Numbers that are no errors, which `ErrorUnit.pair` rounds as well.
+_PLAIN = ErrorUnit("", 1.0)
+
+
+def render(diagnosis: Diagnosis, errors_in: ErrorsIn = "auto") -> str:
     """The account of a diagnosis: what is wrong, why, the evidence, the gain, what is open."""
     d = diagnosis.discrepancy
+    unit = error_unit(errors_in, d.max_abs)
+    n = unit.number
     lines = [
-        *headline(diagnosis),
+        *headline(diagnosis, unit),
         *_wrapped(diagnosis.simulated.summary() if diagnosis.simulated else "", 0),
-        f"Measured minus simulated: rms {d.rms:.2f} arcsec, peak-to-peak "
-        f"{d.peak_to_peak:.2f}, max abs {d.max_abs:.2f} ({diagnosis.readings} readings).",
-        f"Noise of one reading: {diagnosis.noise:.2f} arcsec"
+        f"Measured minus simulated: rms {unit.text(d.rms)}, peak-to-peak "
+        f"{n(d.peak_to_peak)}, max abs {n(d.max_abs)} ({diagnosis.readings} readings).",
+        f"Noise of one reading: {unit.text(diagnosis.noise)}"
         + (
             f", correlated by {diagnosis.correlation:.2f} from one to the next."
             if diagnosis.correlation
@@ -39,20 +46,20 @@ def render(diagnosis: Diagnosis) -> str:
     if diagnosis.readings_used < diagnosis.readings:
         lines.append(f"{diagnosis.readings_used} of the readings, spread evenly, were used.")
     for k, finding in enumerate(diagnosis.findings, 1):
-        lines += ["", *_finding(k, finding)]
+        lines += ["", *_finding(k, finding, unit)]
     wrong = [belief for belief in diagnosis.beliefs if belief.verdict != "confirmed"]
     if wrong:
         lines += ["", "What the simulation claims and the readings do not show:"]
         for belief in wrong:
-            lines += _wrapped(f"- {_belief(belief)}", 2)
+            lines += _wrapped(f"- {_belief(belief, unit)}", 2)
     g = diagnosis.gain
-    lines += [
-        "",
-        f"All together: rms {g['rms_before_arcsec']:.2f} -> {g['rms_after_arcsec']:.2f} arcsec, "
-        f"peak-to-peak {g['peak_to_peak_before_arcsec']:.2f} -> "
-        f"{g['peak_to_peak_after_arcsec']:.2f}, max abs {g['max_abs_before_arcsec']:.2f} -> "
-        f"{g['max_abs_after_arcsec']:.2f} (in the readings that were fitted).",
-    ]
+    together = (
+        f"All together: rms {n(g['rms_before_arcsec'])} -> {unit.text(g['rms_after_arcsec'])}, "
+        f"peak-to-peak {n(g['peak_to_peak_before_arcsec'])} -> "
+        f"{n(g['peak_to_peak_after_arcsec'])}, max abs {n(g['max_abs_before_arcsec'])} -> "
+        f"{n(g['max_abs_after_arcsec'])} (in the readings that were fitted)."
+    )
+    lines += ["", *_wrapped(together, 2)]
     if diagnosis.not_identifiable:
         lines += ["", "What these readings cannot tell:"]
         for spot in sorted(diagnosis.not_identifiable, key=lambda spot: not spot.supported):
@@ -62,12 +69,12 @@ def render(diagnosis: Diagnosis) -> str:
             lines += _wrapped(f"- {head}: {spot.because}. To tell: {spot.measure}.", 2)
             for cause, parameters in spot.estimates.items():
                 known = {name: q for name, q in parameters.items() if q.value is not None}
-                shown = ", ".join(f"{name} {_quantity(q)}" for name, q in known.items())
+                shown = ", ".join(" ".join(_named(name, q, unit)) for name, q in known.items())
                 lines += _wrapped(f"If {cause}: {shown}.", 6, first=4)
     return "\n".join(lines)
 
 
-def headline(diagnosis: Diagnosis) -> list[str]:
+def headline(diagnosis: Diagnosis, unit: ErrorUnit) -> list[str]:
     """What a reader must know first: faults, what is not understood, what is seen or wrong."""
     lines: list[str] = []
     for note in diagnosis.notes:
@@ -77,7 +84,7 @@ def headline(diagnosis: Diagnosis) -> list[str]:
     rest = diagnosis.unexplained
     if rest is not None and rest.found:
         lines += _wrapped(
-            f"NOT UNDERSTOOD: at least {rest.rms:.2f} arcsec rms ({100.0 * rest.share:.0f} % of "
+            f"NOT UNDERSTOOD: at least {unit.text(rest.rms)} rms ({100.0 * rest.share:.0f} % of "
             "the variance that is left) is no noise and has no name.",
             2,
         )
@@ -95,39 +102,41 @@ def headline(diagnosis: Diagnosis) -> list[str]:
         lines += _wrapped(f"Wrong in the simulation: {told}.", 2)
     for spot in diagnosis.not_identifiable:
         if spot.supported:
-            lines += _wrapped(f"Seen, and not told apart: {_seen(spot)}.", 2)
+            lines += _wrapped(f"Seen, and not told apart: {_seen(spot, unit)}.", 2)
     if not lines:
         lines = ["Nothing beyond the simulation: no test of the readings fires."]
     return [*lines, ""]
 
 
-def _seen(spot: Blindness) -> str:
+def _seen(spot: Blindness, unit: ErrorUnit) -> str:
     """Causes of which one is seen, each with the size that it would have."""
     sizes = []
     for cause in spot.causes:
         first = next(
             (
-                f" {name} {_quantity(q)}"
+                " ".join(_named(name, q, unit))
                 for name, q in spot.estimates.get(cause, {}).items()
                 if isinstance(q.value, float)
             ),
             "",
         )
-        sizes.append(f"{cause}{' (' + first.strip() + ')' if first else ''}")
+        sizes.append(f"{cause}{f' ({first})' if first else ''}")
     return " or ".join(sizes)
 
 
-def _belief(belief: Belief) -> str:
+def _belief(belief: Belief, unit: ErrorUnit) -> str:
     measured, believed, std = belief.measured, belief.believed, belief.std
     text = f"{belief.what}: {belief.verdict.replace('_', ' ')}; "
     parts = [
-        f"{name.replace('_', ' ')} {measured[name]:.4g} +- {std[name]:.2g}, believed {value:.4g}"
+        f"{shown.replace('_', ' ')} {' +- '.join(of.pair(measured[name], std[name]))}, "
+        f"believed {of.number(value)}"
         for name, value in believed.items()
+        for shown, of in [_unit_of(name, unit)]
     ]
     text += "; ".join(parts)
     gain = belief.gain
     if gain is not None:
-        text += f"; held out, rms {gain.before[0]:.2f} -> {gain.after[0]:.2f} arcsec"
+        text += f"; held out, rms {unit.number(gain.before[0])} -> {unit.text(gain.after[0])}"
     return text
 
 
@@ -135,14 +144,15 @@ def _chance(p: float) -> str:
     return "below 1e-12" if p < 1e-12 else f"{p:.1g}"
 
 
-def _finding(number: int, finding: Finding) -> list[str]:
+def _finding(number: int, finding: Finding, unit: ErrorUnit) -> list[str]:
+    n = unit.number
     lines = [f"{number}. {finding.cause}"]
     if not finding.confirmed:
         lines[0] += f" (NOT CONFIRMED: {finding.reason})"
         lines = _wrapped(lines[0], 3)
     lines += _wrapped(finding.sentence, 3, first=3)
     for name, entry in finding.parameters.items():
-        lines += _wrapped(f"{name}: {_quantity(entry)}", 7, first=5)
+        lines += _wrapped(": ".join(_named(name, entry, unit)), 7, first=5)
     text = f"Evidence: BIC better by {finding.evidence['bic_gain']:.1f}"
     if finding.rivals:
         text += "; in its place " + ", ".join(
@@ -152,9 +162,9 @@ def _finding(number: int, finding: Finding) -> list[str]:
     gain = finding.gain
     if gain is not None:
         text = (
-            f"Gain on held-out data, {gain.holdout}: rms {gain.before[0]:.2f} -> "
-            f"{gain.after[0]:.2f} arcsec, peak-to-peak {gain.before[1]:.2f} -> "
-            f"{gain.after[1]:.2f}, max abs {gain.before[2]:.2f} -> {gain.after[2]:.2f}"
+            f"Gain on held-out data, {gain.holdout}: rms {n(gain.before[0])} -> "
+            f"{unit.text(gain.after[0])}, peak-to-peak {n(gain.before[1])} -> "
+            f"{n(gain.after[1])}, max abs {n(gain.before[2])} -> {n(gain.after[2])}"
         )
         if gain.reducible_share is not None and gain.interval is not None:
             text += (
@@ -167,38 +177,50 @@ def _finding(number: int, finding: Finding) -> list[str]:
             text += f"; {gain.note}"
         lines += _wrapped(text + ".", 5, first=3)
         if gain.by_level is not None:
-            lines += _wrapped(_by_level(gain.by_level), 5, first=3)
+            lines += _wrapped(_by_level(gain.by_level, unit), 5, first=3)
     return lines
 
 
-def _by_level(gain: LevelGain) -> str:
+def _by_level(gain: LevelGain, unit: ErrorUnit) -> str:
     levels = ", ".join(f"{value:.4g}" for value in gain.held_out or gain.levels)
     if gain.reducible_share is None or gain.interval is None:
         return f"Gain by {gain.factor} ({levels} {gain.unit}): {gain.note}."
     return (
         f"Gain with each {gain.factor} left out in turn ({levels} {gain.unit}): rms "
-        f"{gain.rms_before:.2f} -> {gain.rms_after:.2f} arcsec; reducible share "
+        f"{unit.number(gain.rms_before or 0.0)} -> {unit.text(gain.rms_after or 0.0)}; "
+        "reducible share "
         f"{gain.reducible_share:.2f} ({gain.interval[0]:.2f} to {gain.interval[1]:.2f}); "
         f"{gain.note}."
     )
 
 
-def _quantity(entry: Quantity) -> str:
+def _unit_of(name: str, unit: ErrorUnit) -> tuple[str, ErrorUnit]:
+    """What a parameter is called in ``unit``, and the unit that it is shown in."""
+    stem = name.removesuffix("_arcsec")
+    return (name, _PLAIN) if stem == name else (f"{stem}_{unit.name}", unit)
+
+
+def _named(name: str, entry: Quantity, unit: ErrorUnit) -> tuple[str, str]:
+    """Name and value of a parameter, an error in ``unit``."""
+    shown, of = _unit_of(name, unit)
     value, std = entry.value, entry.std
     if isinstance(value, list):
-        shown = ", ".join(_number(item) for item in value[:12])
+        text = ", ".join(_number(item, of) for item in value[:12])
         if len(value) > 12:
-            shown += f" and {len(value) - 12} more"
+            text += f" and {len(value) - 12} more"
         if isinstance(std, list):
-            shown += " +- " + ", ".join(_number(item) for item in std[:12])
-        return shown
-    if isinstance(std, float):
-        return f"{_number(value)} +- {_number(std)}"
-    return _number(value)
+            text += " +- " + ", ".join(_number(item, of) for item in std[:12])
+        return shown, text
+    if isinstance(std, float) and isinstance(value, int | float):
+        pair = of.pair(float(value), std)
+        return shown, " +- ".join(pair) if pair[1] != "-" else pair[0]
+    return shown, _number(value, of)
 
 
-def _number(value: Any) -> str:
-    return f"{value:.4g}" if isinstance(value, float) else str(value)
+def _number(value: Any, of: ErrorUnit) -> str:
+    if isinstance(value, float) and not (of is _PLAIN and value.is_integer()):
+        return of.number(value)
+    return f"{value:.0f}" if isinstance(value, float) else str(value)
 
 
 def _wrapped(text: str, indent: int, first: int = 0) -> list[str]:

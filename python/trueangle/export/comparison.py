@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from ..angles import ARCSEC_PER_TURN
 from ..errors import ArgumentError
+from ..errorunits import ErrorsIn, error_unit
 from ..model import HarmonicModel
 from ..modelfile import load_model
 from .pattern import Pattern
@@ -60,20 +61,25 @@ class Comparison:
         """All of it."""
         return dict(vars(self))
 
-    def summary(self) -> str:
-        """The numbers as lines of text."""
+    def summary(self, errors_in: ErrorsIn = "auto") -> str:
+        """The numbers as lines of text.
+
+        Parameters
+        ----------
+        errors_in : {"auto", "arcsec", "deg", "mrad", "count"} or float
+            Unit of the errors; by itself arcsec, or degrees where one reaches a degree. A
+            number is the counts of a turn.
+        """
+        unit = error_unit(errors_in, self.max_abs_arcsec)
         lines = [
-            f"difference: {self.rms_arcsec:.4g} arcsec rms, {self.max_abs_arcsec:.4g} max abs, "
-            f"zero {self.zero_deg:.6g} deg"
-            + ("" if self.std_arcsec is None else f"; known to {self.std_arcsec:.3g} arcsec"),
-            "  order  amplitude/arcsec  phase/deg  std/arcsec",
+            f"difference: {unit.text(self.rms_arcsec)} rms, {unit.number(self.max_abs_arcsec)} "
+            f"max abs, zero {self.zero_deg:.6g} deg"
+            + ("" if self.std_arcsec is None else f"; known to {unit.text(self.std_arcsec)}"),
+            f"  order  {f'amplitude/{unit.name}':>16}  phase/deg  {f'std/{unit.name}':>10}",
         ]
         for row in self.orders:
-            std = "-" if row["std_arcsec"] is None else f"{row['std_arcsec']:.3g}"
-            lines.append(
-                f"{row['order']:7g}  {row['amplitude_arcsec']:16.4g}  {row['phase_deg']:9.1f}  "
-                f"{std:>10}"
-            )
+            size, std = unit.pair(row["amplitude_arcsec"] or 0.0, row["std_arcsec"])
+            lines.append(f"{row['order']:7g}  {size:>16}  {row['phase_deg']:9.1f}  {std:>10}")
         lines += [f"not compared: {kind}" for kind in self.differ_in]
         return "\n".join(lines)
 

@@ -13,6 +13,7 @@ from typing import Any
 from .._core import __version__
 from ..angles import ARCSEC_PER_TURN
 from ..errors import ArgumentError, TrueAngleError
+from ..errorunits import ErrorsIn, error_unit
 from ..files import check_output, read_whole, written_atomically
 from ..model import HarmonicModel
 from ..modelfile import load_model, model_text
@@ -86,20 +87,28 @@ class Exported:
         """Everything but the text."""
         return {key: value for key, value in vars(self).items() if key != "text"}
 
-    def summary(self) -> str:
-        """What a person wants to know, in some lines."""
+    def summary(self, errors_in: ErrorsIn = "auto") -> str:
+        """What a person wants to know, in some lines.
+
+        Parameters
+        ----------
+        errors_in : {"auto", "arcsec", "deg", "mrad", "count"} or float
+            Unit of the errors; by itself arcsec, or degrees where one reaches a degree. A
+            number is the counts of a turn.
+        """
+        unit = error_unit(errors_in, self.max_difference_arcsec)
         where = f"{self.output}: " if self.output else ""
         lines = [
             f"{where}{self.entries} entries for {self.target}, {self.bytes} bytes; "
             f"{self.sign}, looked up at the {self.argument} angle",
-            f"differs from the model by at most {self.max_difference_arcsec:.4g} arcsec, "
-            f"{self.rms_difference_arcsec:.3g} rms ({self.proof}); "
-            f"the number format alone leaves {self.floor_arcsec:.2g} rms",
+            f"differs from the model by at most {unit.text(self.max_difference_arcsec)}, "
+            f"{unit.number(self.rms_difference_arcsec)} rms ({self.proof}); "
+            f"the number format alone leaves {unit.number(self.floor_arcsec)} rms",
         ]
         worst = max(self.lost, key=lambda row: row["arcsec"], default=None)
         if worst is not None:
             lines.append(
-                f"of the orders, {worst['order']:g} loses most: {worst['arcsec']:.3g} arcsec"
+                f"of the orders, {worst['order']:g} loses most: {unit.text(worst['arcsec'])}"
             )
         return "\n".join([*lines, *(f"note: {note}" for note in self.notes)])
 

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..errorunits import ErrorsIn
 from ..model import HarmonicModel
 from ..runs import CalibrationRun
 from .coefficients import Coefficients
@@ -194,11 +195,18 @@ class FitResult(Coefficients):
 
         return fit_plot(self, kind, ax, **options)
 
-    def summary(self) -> str:
-        """The result as text: coefficients with uncertainties, quality, notes."""
+    def summary(self, errors_in: ErrorsIn = "auto") -> str:
+        """The result as text: coefficients with uncertainties, quality, notes.
+
+        Parameters
+        ----------
+        errors_in : {"auto", "arcsec", "deg", "mrad", "count"} or float
+            Unit of the errors; by itself arcsec, or degrees where one reaches a degree. A
+            number is the counts of a turn.
+        """
         from .summary import fit_summary
 
-        return fit_summary(self)
+        return fit_summary(self, errors_in)
 
     def __repr__(self) -> str:
         return (

@@ -1,4 +1,4 @@
-"""Results as text. Errors are printed in arcsec, angles of phases in degrees."""
+"""Results as text: errors in one unit, phases in degrees, to the digits that are known."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ import numpy as np
 
 from ..angles import arcsec, unit_name
 from ..distributions import student_quantile
+from ..errorunits import ErrorsIn, ErrorUnit, error_unit
 
 if TYPE_CHECKING:
     from .result import FitResult
@@ -16,17 +17,18 @@ if TYPE_CHECKING:
 __all__ = ["fit_summary"]
 
 
-def fit_summary(fit: FitResult) -> str:
+def fit_summary(fit: FitResult, errors_in: ErrorsIn = "auto") -> str:
     """See `FitResult.summary`."""
     model = fit.model
     period = model.period
     readings = sum(len(run) for run in fit.runs)
     unit = unit_name(period)
+    shown = _unit(fit, errors_in)
     head = [
         ("readings", f"{readings} in {len(fit.runs)} run{'s' if len(fit.runs) > 1 else ''}"),
         ("argument", f"{model.argument} angle"),
-        ("zero", f"{model.constant:.6g} {unit}" + _spread(fit)),
-        ("residual", f"{arcsec(fit.residual_std, period):.2f} arcsec standard deviation, ")
+        ("zero", f"{model.constant:.6g} {unit}" + _spread(fit, shown)),
+        ("residual", f"{_residual(fit, shown)} standard deviation, ")
         if math.isfinite(fit.residual_variance)
         else ("residual", "none left: as many unknowns as readings, "),
         ("solved by", f"{fit.method}, condition number {fit.condition_number:.3g}"),
@@ -37,18 +39,33 @@ def fit_summary(fit: FitResult) -> str:
         head.append(("intervals", _intervals(fit)))
     lines = ["Harmonic model of the angle error (error = indicated - reference)", ""]
     lines += [f"  {label:<10} {text}" for label, text in head]
-    lines += ["", *_table(fit)]
+    lines += ["", *_table(fit, shown)]
     if fit.notes:
         lines += ["", *(f"  [{i}] {note}" for i, note in enumerate(fit.notes, 1))]
     return "\n".join(lines)
 
 
-def _spread(fit: FitResult) -> str:
+def _unit(fit: FitResult, errors_in: ErrorsIn) -> ErrorUnit:
+    """One unit for the amplitudes and the residual."""
+    period = fit.model.period
+    sizes = [float(c) for c in fit.model.amplitudes] + [float(fit.residual_std)]
+    largest = max((size for size in sizes if math.isfinite(size)), default=0.0)
+    return error_unit(errors_in, arcsec(largest, period), period)
+
+
+def _residual(fit: FitResult, shown: ErrorUnit) -> str:
+    """The residual to the digits that its degrees of freedom leave, with its unit."""
+    size = arcsec(fit.residual_std, fit.model.period)
+    std = size / math.sqrt(2.0 * max(1.0, fit.degrees_of_freedom))
+    return f"{shown.number(size, std)} {shown.name}"
+
+
+def _spread(fit: FitResult, shown: ErrorUnit) -> str:
     if len(fit.runs) < 2:
         return ""
     return (
         f", circular mean of {len(fit.runs)} runs that differ by "
-        f"{arcsec(fit.offset_spread, fit.model.period):.2f} arcsec (standard deviation)"
+        f"{shown.text(arcsec(fit.offset_spread, fit.model.period))} (standard deviation)"
     )
 
 
@@ -68,21 +85,30 @@ _KINDS = {
 }
 
 
-def _table(fit: FitResult) -> list[str]:
+#: Phases are angles as well.
+_DEGREES = error_unit("deg")
+
+
+def _table(fit: FitResult, shown: ErrorUnit) -> list[str]:
     model = fit.model
     with_std = model.covariance is not None
     amplitude_std = fit.amplitude_std if with_std else np.full(model.amplitudes.size, np.nan)
     phase_std = fit.phase_std if with_std else np.full(model.amplitudes.size, np.nan)
     width = max([5, *(len(shaft.name) for shaft in model.shafts)])
     lines = [f"  {'shaft':<{width}}  order   amplitude     +-     phase     +-"]
-    lines += [f"  {'':<{width}}            arcsec  arcsec       deg    deg"]
+    lines += [f"  {'':<{width}}      {shown.name:>10} {shown.name:>7}       deg    deg"]
     rows = ((shaft, i) for shaft in model.shafts for i in range(len(shaft.orders)))
     for n, (shaft, i) in enumerate(rows):
+        size, spread = shown.pair(
+            arcsec(float(model.amplitudes[n]), model.period),
+            arcsec(float(amplitude_std[n]), model.period),
+        )
+        phase, phase_std_text = _DEGREES.pair(
+            3600.0 * (math.degrees(model.phases[n]) % 360.0),
+            3600.0 * min(math.degrees(phase_std[n]), 180.0),
+        )
         lines.append(
             f"  {shaft.name:<{width}}  {shaft.orders[i]:5d}  "
-            f"{arcsec(model.amplitudes[n], model.period):10.3f} "
-            f"{arcsec(amplitude_std[n], model.period):7.3f}  "
-            f"{math.degrees(model.phases[n]) % 360.0:8.2f} "
-            f"{min(math.degrees(phase_std[n]), 180.0):6.2f}"
+            f"{size:>10} {spread:>7}  {phase:>8} {phase_std_text:>6}"
         )
     return lines

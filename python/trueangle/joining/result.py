@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from os import PathLike
 from typing import Any, NamedTuple
 
+from ..errorunits import ErrorsIn, error_unit
 from ..runs import CalibrationRun
 
 __all__ = ["Gap", "Joined"]
@@ -69,19 +70,27 @@ class Joined:
             "notes": list(self.notes),
         }
 
-    def summary(self) -> str:
-        """The result as text."""
+    def summary(self, errors_in: ErrorsIn = "auto") -> str:
+        """The result as text.
+
+        Parameters
+        ----------
+        errors_in : {"auto", "arcsec", "deg", "mrad", "count"} or float
+            Unit of the errors; by itself arcsec, or degrees where one reaches a degree. A
+            number is the counts of a turn.
+        """
 
         def told(value: float, std: float | None, unit: str) -> str:
             return f"{value:.9g} {unit}" + ("" if std is None else f" +- {std:.2g}")
 
+        unit = error_unit(errors_in, self.std_arcsec)
         found = self.as_json()
         lines = [
             f"{found['readings']} readings joined in {found['runs']} run(s), "
             f"{self.left_out} without a reference left out",
             f"  offset    {told(self.offset_s, self.offset_std_s, 's')}",
             f"  rate      {told(self.rate_ppm, self.rate_std_ppm, 'ppm')}",
-            f"  joining   adds {self.std_arcsec:.3g} arcsec standard deviation",
+            f"  joining   adds {unit.text(self.std_arcsec)} standard deviation",
             f"  gaps      {len(self.gaps)}",
         ]
         if self.on_change:

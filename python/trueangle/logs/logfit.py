@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from html import escape
 
 from ..angles import arcsec
+from ..errorunits import ErrorsIn, error_unit
 from ..fitting.coefficients import Coefficients
 from ..fitting.uncertainty import Uncertainty
 from ..model import HarmonicModel
@@ -107,27 +108,38 @@ class LogFit(Coefficients):
     def _repr_html_(self) -> str:
         return f"<pre>{escape(self.summary())}</pre>"
 
-    def summary(self) -> str:
-        """The result as text."""
+    def summary(self, errors_in: ErrorsIn = "auto") -> str:
+        """The result as text.
+
+        Parameters
+        ----------
+        errors_in : {"auto", "arcsec", "deg", "mrad", "count"} or float
+            Unit of the errors; by itself arcsec, or degrees where one reaches a degree. A
+            number is the counts of a turn.
+        """
         period = self.model.period
         residual = arcsec(math.sqrt(self.fit.residual_variance), period)
+        sizes = [residual, *(arcsec(float(c), period) for c in self.model.amplitudes)]
+        unit = error_unit(errors_in, max(filter(math.isfinite, sizes), default=0.0), period)
         lines = [
             "Harmonic model of the angle error (error = indicated - reference), one pass",
             "",
             f"  readings   {self.rows} in {len(self.moments.runs)} runs, {self.missing} missing",
-            f"  residual   {residual:.2f} arcsec standard deviation",
+            f"  residual   {unit.text(residual)} standard deviation",
             f"  solved by  {self.fit.method}, condition number {self.fit.condition_number:.3g}",
             "",
             "  shaft           order   amplitude     +-     phase",
-            "                             arcsec  arcsec       deg",
+            f"                         {unit.name:>10} {unit.name:>7}       deg",
         ]
         std = self.amplitude_std
         rows = [(shaft, i) for shaft in self.model.shafts for i in range(len(shaft.orders))]
         for n, (shaft, i) in enumerate(rows):
-            spread = arcsec(float(std[n]), period)
+            size, spread = unit.pair(
+                arcsec(float(shaft.amplitudes[i]), period), arcsec(float(std[n]), period)
+            )
             lines.append(
                 f"  {shaft.name:<15} {shaft.orders[i]:5d}  "
-                f"{arcsec(float(shaft.amplitudes[i]), period):10.3f} {spread:7.3f}  "
+                f"{size:>10} {spread:>7}  "
                 f"{math.degrees(float(shaft.phases[i])) % 360.0:8.2f}"
             )
         lines += ["", *(f"  [{i}] {note}" for i, note in enumerate(self.notes, 1))]

@@ -9,6 +9,7 @@ from html import escape
 from typing import TYPE_CHECKING
 
 from ..aliasing import Positions
+from ..errorunits import ErrorsIn
 from ..explanations import Explanation
 from ..model import Argument
 from .repeats import Noise
@@ -193,11 +194,18 @@ class OrderSelection:
 
         return amplitude_spectrum(self, ax)
 
-    def summary(self) -> str:
-        """The table and its notes as text, amplitudes in arcsec."""
+    def summary(self, errors_in: ErrorsIn = "auto") -> str:
+        """The table and its notes as text.
+
+        Parameters
+        ----------
+        errors_in : {"auto", "arcsec", "deg", "mrad", "count"} or float
+            Unit of the errors; by itself arcsec, or degrees where one reaches a degree. A
+            number is the counts of a turn.
+        """
         from .summary import summarise
 
-        return summarise(self)
+        return summarise(self, errors_in)
 
     def __str__(self) -> str:
         return self.summary()

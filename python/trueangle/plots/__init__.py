@@ -1,14 +1,15 @@
 """Pictures of runs, fits, order selections, diagnoses and plans.
 
 One file a picture. Every function draws into ``ax`` (a new one when not given) and
-returns it; errors are in arcsec, angles in degrees. Needs ``pip install trueangle[plot]``;
-matplotlib is imported at the first picture.
+returns it; `text_alternative` says in a sentence what it shows. Errors are in arcsec, angles
+in degrees. Needs ``pip install trueangle[plot]``; matplotlib is imported at the first picture.
 """
 
 from __future__ import annotations
 
 from .amplitudespectrum import amplitude_spectrum
 from .beforeafter import before_after
+from .canvas import text_alternative
 from .errorcurves import error_curves
 from .errorleft import error_left
 from .gains import gains
@@ -30,4 +31,5 @@ __all__ = [
     "plan_factors",
     "plan_positions",
     "residuals",
+    "text_alternative",
 ]

@@ -9,11 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..angles import ARCSEC_PER_TURN
+from ..errorunits import significant
 from ..orders.selection import FALSE_ALARM
 from ..orders.table import OrderRow, OrderSelection
 from . import palette
-from .canvas import legend, new_axes
+from .canvas import described, grid, legend, new_axes
 from .curves import CONFIDENCE
+from .orderaxis import OrderAxis
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -25,8 +27,10 @@ __all__ = ["amplitude_spectrum", "likely_aliases", "thresholds"]
 
 Array = NDArray[np.float64]
 
-#: Up to so many orders each has a place of its own on the axis.
-_MOST_NAMED = 40
+#: Orders told in words.
+_TOLD = 6
+#: Least amplitude of the logarithmic axis, as part of the smallest that has to be seen.
+_FLOOR = 0.2
 #: Aliases and explanations written at a bar; the table has them all.
 _MOST_ALIASES = 3
 #: Bars that get their aliases written, the largest first.
@@ -35,6 +39,8 @@ _MOST_ANNOTATED = 12
 
 def amplitude_spectrum(result: OrderSelection | FitResult, ax: Axes | None = None) -> Axes:
     """Amplitude against order: of all candidates of a selection, or of a fit's orders.
+
+    The axis of orders is broken where none was looked at; that of amplitudes is logarithmic.
 
     Retained orders are filled, others hollow. The dashed steps are the amplitude that an
     order needs to be significant; aliases that the positions cannot tell from a retained
@@ -57,54 +63,57 @@ def amplitude_spectrum(result: OrderSelection | FitResult, ax: Axes | None = Non
 
 
 def _of_fit(fit: FitResult, ax: Axes | None) -> Axes:
-    ax = new_axes(ax)
     factor = ARCSEC_PER_TURN / fit.model.period
     ranks = np.argsort(fit.orders)
-    place = _places(ax, [float(fit.orders[i]) for i in ranks])
+    orders = [float(fit.orders[i]) for i in ranks]
     amplitude = factor * fit.amplitudes[ranks]
     std = None
     if fit.model.covariance is not None:
         std = CONFIDENCE * factor * fit.amplitude_std[ranks]
+    ax = new_axes(ax)
+    axis = OrderAxis.of(orders)
     ax.bar(
-        place,
+        axis.places(orders),
         amplitude,
-        width=_width(place),
+        width=axis.width(orders),
         color=palette.AFTER,
-        yerr=std,
-        ecolor=palette.MODEL,
+        yerr=None if std is None else [np.minimum(std, 0.999 * amplitude), std],
+        ecolor=palette.ink(ax),
         capsize=2.0,
         error_kw={"linewidth": 0.8},
         label="fitted amplitude, 95 % interval",
     )
-    return _finish(ax)
+    described(ax, f"Amplitude of {len(orders)} fitted orders: {_largest(orders, amplitude)}.")
+    return _finish(ax, axis, amplitude)
 
 
 def _of_selection(selection: OrderSelection, ax: Axes | None) -> Axes:
-    ax = new_axes(ax)
     factor = ARCSEC_PER_TURN / selection.period
     rows = selection.table
-    place = _places(ax, [float(row.order) for row in rows])
-    width = _width(place)
+    orders = [float(row.order) for row in rows]
+    axis = OrderAxis.of(orders)
+    ax = new_axes(ax)
+    place, width = axis.places(orders), axis.width(orders)
     amplitude = np.array([factor * row.amplitude for row in rows])
     kept = np.array([row.retained for row in rows], dtype=bool)
+    limit = factor * thresholds(selection)
     if kept.any():
-        ax.bar(place[kept], amplitude[kept], width, color=palette.AFTER, label="retained")
+        ax.bar(place[kept], amplitude[kept], width[kept], color=palette.AFTER, label="retained")
     if not kept.all():
         ax.bar(
             place[~kept],
             amplitude[~kept],
-            width,
+            width[~kept],
             facecolor="none",
             edgecolor=palette.MUTED,
             linewidth=0.9,
             label="not retained",
         )
-    limit = factor * thresholds(selection)
     if np.isfinite(limit).any():
         ax.hlines(
             limit,
-            place - 0.5 * width,
-            place + 0.5 * width,
+            place - 0.6 * width,
+            place + 0.6 * width,
             color=palette.WARNING,
             linewidth=1.6,
             label="needed to be significant",
@@ -125,9 +134,19 @@ def _of_selection(selection: OrderSelection, ax: Axes | None) -> Axes:
             fontsize="x-small",
             color=palette.WARNING,
         )
-    if tall:
-        ax.set_ylim(0.0, 1.35 * float(np.nanmax(amplitude)))
-    return _finish(ax)
+    names = [order for order, keep in zip(orders, kept, strict=True) if keep]
+    told = _largest(names, amplitude[kept]) if names else "none"
+    described(ax, f"Amplitude of {len(rows)} candidate orders. Retained: {told}.")
+    shown = np.concatenate([amplitude[kept], limit[np.isfinite(limit)]])
+    return _finish(ax, axis, shown if shown.size else amplitude, room=1.0 if tall else 0.0)
+
+
+def _largest(orders: list[float], amplitude: Array) -> str:
+    """The largest orders with their amplitudes, and how many more there are."""
+    ranks = np.argsort(-amplitude)
+    told = [f"{orders[i]:g} ({significant(float(amplitude[i]), 3)} arcsec)" for i in ranks[:_TOLD]]
+    more = f" and {len(orders) - _TOLD} smaller ones" if len(orders) > _TOLD else ""
+    return ", ".join(told) + more
 
 
 def thresholds(selection: OrderSelection) -> Array:
@@ -151,23 +170,16 @@ def likely_aliases(row: OrderRow) -> tuple[float, ...]:
     return known or row.aliases
 
 
-def _places(ax: Axes, orders: list[float]) -> Array:
-    """Where the bars stand: evenly, each with its name, while there are few."""
-    if len(orders) > _MOST_NAMED:
-        return np.asarray(orders, dtype=np.float64)
-    place = np.arange(len(orders), dtype=np.float64)
-    ax.set_xticks(place, [f"{m:g}" for m in orders], rotation=90 if len(orders) > 20 else 0)
-    return place
-
-
-def _width(place: Array) -> float:
-    return 0.75 * float(np.diff(place).min(initial=1.0))
-
-
-def _finish(ax: Axes) -> Axes:
+def _finish(ax: Axes, axis: OrderAxis, sizes: Array, room: float = 0.0) -> Axes:
+    """Axes and legend; ``sizes`` have to be seen, ``room`` decades above them stay free."""
+    seen = sizes[np.isfinite(sizes) & (sizes > 0.0)]
+    low = _FLOOR * float(seen.min(initial=1.0)) if seen.size else 0.1
+    high = float(seen.max(initial=low)) if seen.size else 1.0
+    ax.set_yscale("log")
+    ax.set_ylim(low, 1.5 * high * 10.0**room)
+    axis.draw(ax)
     ax.set_xlabel("order / cycles per output turn")
     ax.set_ylabel("amplitude / arcsec")
-    ax.grid(True, axis="y", color="#00000018", linewidth=0.8)
-    ax.set_axisbelow(True)
+    grid(ax, "y")
     legend(ax)
     return ax

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..runs import CalibrationRun, as_runs
 from . import palette
-from .canvas import legend, new_axes, turn_axis
+from .canvas import described, legend, new_axes, turn_axis
 from .curves import held_out_points, seen_span, thinned
 
 if TYPE_CHECKING:
@@ -43,6 +43,7 @@ def before_after(
     """
     pairs = held_out_points(model, as_runs(runs))
     ax = new_axes(ax)
+    told: list[str] = []
     for points, colour, name, marker in (
         ([b for b, _ in pairs], palette.BEFORE, "before", "s"),
         ([a for _, a in pairs], palette.AFTER, "after", "o"),
@@ -61,9 +62,10 @@ def before_after(
                 color=colour,
                 label=None if i else f"{name}: rms {rms:.2f}, peak-to-peak {ptp:.2f} arcsec",
             )
+        told.append(f"{name} correction rms {rms:.2f}, peak-to-peak {ptp:.2f} arcsec")
     ax.axhline(0.0, color=palette.MUTED, linewidth=0.8, zorder=0)
     turn_axis(ax, *seen_span(model))
     ax.set_xlabel("reference angle / deg")
     ax.set_ylabel("error of held-out runs / arcsec")
     legend(ax)
-    return ax
+    return described(ax, f"Error of {len(pairs)} held-out runs: {'; '.join(told)}.")

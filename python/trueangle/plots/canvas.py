@@ -2,17 +2,27 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 from ..errors import MissingExtraError
+from .palette import ink
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.legend import Legend
 
-__all__ = ["legend", "new_axes", "turn_axis"]
+__all__ = ["described", "grid", "legend", "new_axes", "text_alternative", "turn_axis"]
 
 #: Entries of a legend beyond which it stands beside the picture, not inside.
 _MANY: int = 5
+
+#: Entries side by side of a legend that has to stay inside, and the height of a row of them
+#: as part of the axes'.
+_COLUMNS: int = 4
+_ROW: float = 0.09
+
+#: What stays faint in a legend as well.
+_BAND: str = "95 % band"
 
 
 def new_axes(ax: Axes | None, *, polar: bool = False, height: float = 4.0) -> Axes:
@@ -38,6 +48,12 @@ def new_axes(ax: Axes | None, *, polar: bool = False, height: float = 4.0) -> Ax
     return made
 
 
+def grid(ax: Axes, axis: Literal["both", "x", "y"] = "both") -> None:
+    """Faint lines behind what is drawn."""
+    ax.grid(True, axis=axis, color=ink(ax) + "18", linewidth=0.8)
+    ax.set_axisbelow(True)
+
+
 def turn_axis(ax: Axes, low: float = 0.0, high: float = 360.0) -> None:
     """Angle axis in degrees, with whole parts of a turn as ticks."""
     from matplotlib.ticker import MultipleLocator
@@ -48,34 +64,88 @@ def turn_axis(ax: Axes, low: float = 0.0, high: float = 360.0) -> None:
         if span / step <= 9.0:
             ax.xaxis.set_major_locator(MultipleLocator(step))
             break
-    ax.grid(True, color="#00000018", linewidth=0.8)
+    grid(ax)
+
+
+def described(ax: Axes, text: str) -> Axes:
+    """The axes with a text for who does not see them: see `text_alternative`."""
+    ax.set_label(text)
+    return ax
+
+
+def text_alternative(ax: Axes) -> str:
+    """What a picture of this package shows, in a sentence, for an ``alt`` attribute.
+
+    Parameters
+    ----------
+    ax : matplotlib Axes
+        As a function of `trueangle.plots` returned it.
+
+    Examples
+    --------
+    >>> import trueangle as ta
+    >>> plan = ta.plan_mounts(100, positions=36, mounts=2)
+    >>> text_alternative(ta.plots.plan_positions(plan))
+    'Mounts of a plan of 36 positions: +0, +2.14 deg.'
+    """
+    return str(ax.get_label())
 
 
 def legend(ax: Axes, title: str | None = None) -> None:
-    """The legend: inside while short, beside the picture when long."""
-    handles, _ = ax.get_legend_handles_labels()
+    """The legend: inside while short, else beside the picture; inside where it has neighbours."""
+    handles, names = ax.get_legend_handles_labels()
     if not handles:
         return
-    if len(handles) <= _MANY:
-        # Room above the data, so that no entry covers a reading.
-        low, high = ax.get_ylim()
-        if ax.name != "polar":
-            ax.set_ylim(low, high + 0.2 * (high - low))
-        ax.legend(
-            title=title,
-            loc="upper center",
-            ncols=len(handles),
-            frameon=False,
-            fontsize="small",
-            markerscale=2.0,
-        )
-    else:
-        columns = 1 + (len(handles) - 1) // 18
-        ax.legend(
+    shared = len(ax.get_figure(root=True).axes) > 1  # type: ignore[union-attr]
+    if len(handles) > _MANY and not shared:
+        made = ax.legend(
             title=title,
             loc="center left",
             bbox_to_anchor=(1.01, 0.5),
             frameon=False,
-            ncols=columns,
+            ncols=1 + (len(handles) - 1) // 18,
             fontsize="small",
+            markerscale=2.0,
         )
+        _opaque(made)
+        return
+    columns = _columns(ax, names) if shared else len(handles)
+    rows = -(-len(handles) // columns)
+    # Room above the data, so that no entry covers a reading.
+    if ax.name != "polar":
+        _room_above(ax, 0.11 + _ROW * rows)
+    made = ax.legend(
+        title=title,
+        loc="upper center",
+        ncols=columns,
+        frameon=False,
+        fontsize="small" if rows == 1 else "x-small",
+        markerscale=2.0,
+        columnspacing=1.0,
+        handletextpad=0.4,
+        borderaxespad=0.2,
+    )
+    _opaque(made)
+
+
+def _opaque(made: Legend) -> None:
+    """A single mark of a cloud of faint points has to be seen."""
+    for handle in made.legend_handles:
+        if handle is not None and handle.get_label() != _BAND:
+            handle.set_alpha(1.0)
+
+
+def _columns(ax: Axes, names: list[str]) -> int:
+    """Entries that fit side by side, by the width of the longest."""
+    figure = ax.get_figure(root=True)
+    inches = ax.get_position().width * figure.get_figwidth()  # type: ignore[union-attr]
+    longest = max(map(len, names))
+    return max(1, min(_COLUMNS, len(names), int(inches / (0.3 + 0.065 * longest))))
+
+
+def _room_above(ax: Axes, share: float) -> None:
+    low, high = ax.get_ylim()
+    if ax.get_yscale() == "log":
+        ax.set_ylim(low, high * (high / low) ** share)
+    else:
+        ax.set_ylim(low, high + share * (high - low))

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from . import palette
-from .canvas import new_axes, turn_axis
+from .canvas import described, new_axes, turn_axis
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -43,7 +43,7 @@ def certified_errors(positions: Sequence[Mapping[str, float]], ax: Axes | None =
         marker="o",
         markersize=3.0,
         color=palette.AFTER,
-        ecolor=palette.MODEL,
+        ecolor=palette.ink(ax),
         elinewidth=0.9,
         capsize=2.0,
     )
@@ -51,4 +51,9 @@ def certified_errors(positions: Sequence[Mapping[str, float]], ax: Axes | None =
     turn_axis(ax, float(angle.min()) - margin, float(angle.max()) + margin)
     ax.set_xlabel("position / deg")
     ax.set_ylabel("error / arcsec")
-    return ax
+    return described(
+        ax,
+        f"Error at {len(positions)} positions with expanded uncertainty, from "
+        f"{float(error.min()):.2f} to {float(error.max()):.2f} arcsec, U at most "
+        f"{float(expanded.max()):.2f}.",
+    )

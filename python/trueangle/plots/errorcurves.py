@@ -4,8 +4,11 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+import numpy as np
+
+from ..errorunits import significant
 from . import palette
-from .canvas import legend, new_axes, turn_axis
+from .canvas import described, legend, new_axes, turn_axis
 from .curves import CONFIDENCE, error_points, model_curve, seen_span, thinned
 
 if TYPE_CHECKING:
@@ -60,7 +63,7 @@ def error_curves(fit: FitResult, ax: Axes | None = None) -> Axes:
     ax.plot(
         curve.angle,
         curve.error,
-        color=palette.MUTED if dense else palette.MODEL,
+        color=palette.MUTED if dense else palette.ink(ax),
         linewidth=0.5 if dense else 1.2,
         zorder=1.0 if dense else 3.0,
         label="model",
@@ -71,7 +74,7 @@ def error_curves(fit: FitResult, ax: Axes | None = None) -> Axes:
             curve.angle,
             curve.error - half,
             curve.error + half,
-            color=palette.MODEL,
+            color=palette.ink(ax),
             alpha=0.2,
             linewidth=0.0,
             zorder=0.5,
@@ -81,4 +84,9 @@ def error_curves(fit: FitResult, ax: Axes | None = None) -> Axes:
     ax.set_xlabel("reference angle / deg")
     ax.set_ylabel("error, zero of the run removed / arcsec")
     legend(ax)
-    return ax
+    size = significant(float(np.ptp(curve.error)), 3)
+    return described(
+        ax,
+        f"Error of {len(fit.runs)} runs over the angle and the fitted model, which spans {size} "
+        f"arcsec peak-to-peak in {len(fit.orders)} orders.",
+    )

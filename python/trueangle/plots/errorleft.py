@@ -1,55 +1,54 @@
-"""What is left of the disagreement after each cause of a diagnosis is added."""
+"""What a diagnosis leaves of held-out readings, with all its causes and without each."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
-from ..runs import CalibrationRun, as_runs
+from ..errors import ArgumentError
 from . import palette
-from .canvas import new_axes
-from .simulatedcurves import left_after_causes
+from .canvas import described, new_axes
+from .simulatedcurves import left_without
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
     from ..diagnosis import Diagnosis
-    from ..simulation import Simulation
 
 __all__ = ["error_left"]
 
 
-def error_left(
-    diagnosis: Diagnosis,
-    runs: CalibrationRun | Iterable[CalibrationRun],
-    sim: Simulation,
-    ax: Axes | None = None,
-) -> Axes:
-    """Rms of measured less simulated error as each finding joins, down to the noise.
+def error_left(diagnosis: Diagnosis, ax: Axes | None = None) -> Axes:
+    """Rms left of held-out readings: with all causes in place, and with each one left out.
+
+    The numbers are those of the findings' gains, so that they cannot say otherwise.
 
     Parameters
     ----------
     diagnosis : Diagnosis
-        Of ``runs`` against ``sim``.
-    runs : CalibrationRun or iterable of them
-    sim : Simulation
     ax : matplotlib Axes, optional
 
     Returns
     -------
     matplotlib Axes
+
+    Raises
+    ------
+    ArgumentError
+        No finding has a gain that carries over to new runs.
     """
-    steps = left_after_causes(diagnosis, as_runs(runs), sim)
+    steps = left_without(diagnosis)
+    if not steps:
+        raise ArgumentError("no finding of this diagnosis has a gain that carries over to new runs")
     ax = new_axes(ax, height=1.4 + 0.4 * len(steps))
     place = list(range(len(steps)))
     bars = ax.barh(
         place,
         [rms for _, rms in steps],
         height=0.6,
-        color=[palette.BEFORE] + [palette.AFTER] * (len(steps) - 1),
+        color=[palette.AFTER] + [palette.BEFORE] * (len(steps) - 1),
     )
     ax.bar_label(bars, fmt="%.2f", padding=3, fontsize="small")
-    ax.axvline(diagnosis.noise, color=palette.MODEL, linestyle="--", linewidth=1.0)
+    ax.axvline(diagnosis.noise, color=palette.ink(ax), linestyle="--", linewidth=1.0)
     ax.annotate(
         f"noise {diagnosis.noise:.2f}",
         (diagnosis.noise, 1.0),
@@ -62,5 +61,6 @@ def error_left(
     ax.set_yticks(place, [name for name, _ in steps])
     ax.invert_yaxis()
     ax.margins(x=0.12)
-    ax.set_xlabel("rms of measured less simulated error / arcsec")
-    return ax
+    ax.set_xlabel("rms of what is left of held-out readings / arcsec")
+    told = ", ".join(f"{name} {rms:.2f} arcsec" for name, rms in steps)
+    return described(ax, f"Rms left of held-out readings: {told}; noise {diagnosis.noise:.2f}.")

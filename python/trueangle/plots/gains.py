@@ -8,7 +8,7 @@ import numpy as np
 
 from ..errors import ArgumentError
 from . import palette
-from .canvas import new_axes
+from .canvas import described, new_axes
 from .simulatedcurves import gain_bars
 
 if TYPE_CHECKING:
@@ -48,10 +48,11 @@ def gains(diagnosis: Diagnosis, ax: Axes | None = None) -> Axes:
     below = share - [min(bar.low, bar.share) for bar in bars]
     above = np.array([max(bar.high, bar.share) for bar in bars]) - share
     ax.barh(place, share, height=0.6, color=palette.AFTER)
-    ax.errorbar(share, place, xerr=[below, above], fmt="none", ecolor=palette.MODEL, capsize=4.0)
+    ax.errorbar(share, place, xerr=[below, above], fmt="none", ecolor=palette.ink(ax), capsize=4.0)
     ax.axvline(100.0, color=palette.MUTED, linestyle="--", linewidth=1.0)
     ax.set_yticks(place, [bar.cause for bar in bars])
     ax.invert_yaxis()
     ax.set_xlim(min(0.0, float((share - below).min())), max(105.0, float((share + above).max())))
     ax.set_xlabel("share of the reducible error taken away on held-out runs / %")
-    return ax
+    told = ", ".join(f"{b.cause} {b.share:.0f} % ({b.low:.0f} to {b.high:.0f})" for b in bars)
+    return described(ax, f"Share of the reducible error that each cause takes away: {told}.")

@@ -1,26 +1,42 @@
-"""Colours that colour-blind readers can tell apart (Okabe and Ito), and what they mean."""
+"""Colours that survive colour blindness, grey print and dark pages, and what they mean.
+
+Six hues of Okabe and Ito, the two light ones darkened or exchanged, so that each stands out
+of white and of black paper by 3 to 1. What must be told apart in grey has a marker of its own.
+"""
 
 from __future__ import annotations
 
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
-__all__ = ["AFTER", "BEFORE", "MARKERS", "MODEL", "MUTED", "RUNS", "WARNING", "run_colour"]
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
-#: Models and what stays after correction.
-MODEL: Final = "#000000"
+__all__ = ["AFTER", "BEFORE", "MARKERS", "MUTED", "RUNS", "WARNING", "ink", "run_colour"]
+
+#: What stays after correction.
 AFTER: Final = "#0072B2"
-#: What was there before.
-BEFORE: Final = "#E69F00"
-#: What is not retained, grids, noise.
+#: What was there before: lighter than `AFTER` in grey.
+BEFORE: Final = "#D07C00"
+#: What is not retained, noise.
 MUTED: Final = "#8C8C8C"
 #: Thresholds and aliases.
 WARNING: Final = "#D55E00"
 #: Runs, in turn.
-RUNS: Final = ("#0072B2", "#E69F00", "#009E73", "#CC79A7", "#56B4E9", "#D55E00")
+RUNS: Final = ("#0072B2", "#C77800", "#009E73", "#CC79A7", "#7A68C8", "#D55E00")
 #: With the colours they make runs distinct beyond the first six.
 MARKERS: Final = ("o", "s", "^", "D", "v", "P")
+
+#: Mean of red, green and blue below which paper is dark.
+_DARK: Final = 0.5
 
 
 def run_colour(number: int) -> str:
     """Colour of run ``number`` (from 0)."""
     return RUNS[number % len(RUNS)]
+
+
+def ink(ax: Axes) -> str:
+    """Black, or white on dark axes: models, limits and grids."""
+    from matplotlib.colors import to_rgb
+
+    return "#FFFFFF" if sum(to_rgb(ax.get_facecolor())) < 3.0 * _DARK else "#000000"

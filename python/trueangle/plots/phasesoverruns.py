@@ -8,7 +8,7 @@ import numpy as np
 
 from ..fitting.phases import run_phases
 from . import palette
-from .canvas import new_axes
+from .canvas import described, grid, new_axes
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -67,7 +67,18 @@ def phases_over_runs(fit: FitResult, ax: Axes | None = None, most: int = _MOST_O
     polar.set_rlabel_position(112.5)
     polar.set_xticks(np.radians(np.arange(0, 360, 45)))
     polar.set_xlabel("angle: phase / deg; radius: amplitude / arcsec")
-    polar.grid(True, color="#00000020", linewidth=0.8)
-    polar.legend(loc="center left", bbox_to_anchor=(1.08, 0.5), frameon=False, fontsize="small")
+    grid(polar)
+    if len(polar.get_figure(root=True).axes) > 1:
+        # Below, where no neighbour of a row of axes stands.
+        polar.legend(
+            loc="upper center",
+            bbox_to_anchor=(0.5, -0.16),
+            ncols=3,
+            frameon=False,
+            fontsize="x-small",
+        )
+    else:
+        polar.legend(loc="center left", bbox_to_anchor=(1.08, 0.5), frameon=False, fontsize="small")
     drawn: Axes = polar
-    return drawn
+    told = ", ".join(f"order {p.order:g}" for p in sorted(found, key=lambda p: p.order))
+    return described(drawn, f"Phase and amplitude of {told} in every run, on polar axes.")

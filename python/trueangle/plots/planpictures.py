@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from . import palette
-from .canvas import new_axes
+from .canvas import described, grid, new_axes
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -55,8 +55,11 @@ def plan_positions(plan: CalibrationPlan, ax: Axes | None = None) -> Axes:
         [f"{what} {i + 1}: {offset:+.4g}°" for i, offset in enumerate(plan.mount_offsets_deg)],
     )
     ax.set_xlabel(f"output angle / deg (first three of {plan.positions} positions)")
-    ax.grid(True, axis="x", color="#00000018", linewidth=0.8)
-    return ax
+    grid(ax, "x")
+    offsets = ", ".join(f"{offset:+.4g}" for offset in plan.mount_offsets_deg)
+    return described(
+        ax, f"{what.capitalize()}s of a plan of {plan.positions} positions: {offsets} deg."
+    )
 
 
 def plan_factors(plan: CalibrationPlan, ax: Axes | None = None) -> Axes:
@@ -89,10 +92,13 @@ def plan_factors(plan: CalibrationPlan, ax: Axes | None = None) -> Axes:
             fontsize="small",
             color=palette.WARNING,
         )
-    ax.axhline(1.0, color=palette.MODEL, linewidth=1.0, linestyle="--")
+    ax.axhline(1.0, color=palette.ink(ax), linewidth=1.0, linestyle="--")
     ax.set_xticks(place, [f"{m:g}" for m in orders], rotation=90 if len(orders) > 20 else 0)
     ax.set_xlabel("order / cycles per output turn")
     ax.set_ylabel("noise factor (1 = ideal)")
-    ax.grid(True, axis="y", color="#00000018", linewidth=0.8)
-    ax.set_axisbelow(True)
-    return ax
+    grid(ax, "y")
+    blind = [f"{orders[i]:g}" for i in place[~seen]]
+    told = f"worst {float(factors[seen].max(initial=0.0)):.3g}" + (
+        f"; not seen: {', '.join(blind)}" if blind else ""
+    )
+    return described(ax, f"Noise factor of {len(orders)} wanted orders: {told}.")

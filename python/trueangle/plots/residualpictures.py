@@ -6,8 +6,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..errorunits import significant
 from . import palette
-from .canvas import legend, new_axes, turn_axis
+from .canvas import described, grid, legend, new_axes, turn_axis
 from .curves import SIGNALS, Points, residual_points, seen_span, thinned
 
 if TYPE_CHECKING:
@@ -63,13 +64,18 @@ def residuals(fit: FitResult, against: str = "angle", ax: Axes | None = None) ->
             )
         _medians(ax, points)
     ax.axhline(0.0, color=palette.MUTED, linewidth=0.8, zorder=0)
-    ax.grid(True, color="#00000018", linewidth=0.8)
+    grid(ax)
     if against == "angle":
         turn_axis(ax, *seen_span(fit.model))
     ax.set_xlabel(SIGNALS[against])
     ax.set_ylabel("residual / arcsec")
     legend(ax)
-    return ax
+    rest = np.concatenate([part.y for part in points])
+    return described(
+        ax,
+        f"What the model leaves of {rest.size} readings against {against}: "
+        f"{significant(float(rest.std()), 3)} arcsec standard deviation.",
+    )
 
 
 def _medians(ax: Axes, points: list[Points]) -> None:
@@ -84,7 +90,7 @@ def _medians(ax: Axes, points: list[Points]) -> None:
     ax.plot(
         [float(x[index == b].mean()) for b in filled],
         [float(np.median(y[index == b])) for b in filled],
-        color=palette.MODEL,
+        color=palette.ink(ax),
         linewidth=1.4,
         marker=".",
         label="median",

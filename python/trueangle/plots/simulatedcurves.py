@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from ..diagnosis import Diagnosis
     from ..simulation import Simulation
 
-__all__ = ["GainBar", "gain_bars", "left_after_causes", "simulated_points"]
+__all__ = ["GainBar", "gain_bars", "left_without", "simulated_points"]
 
 
 @dataclass(frozen=True)
@@ -49,24 +49,20 @@ def simulated_points(
     return found
 
 
-def left_after_causes(
-    diagnosis: Diagnosis, runs: Sequence[CalibrationRun], sim: Simulation
-) -> list[tuple[str, float]]:
-    """Rms of measured less simulated error: as it is, then with each finding added.
+def left_without(diagnosis: Diagnosis) -> list[tuple[str, float]]:
+    """Rms of held-out readings with all findings in place, and with each of them left out.
 
-    The extended simulations are run as they are, nothing is fitted again; errors drawn
-    anew in each run (a slipped zero) stay.
+    From the gains of the findings that carry over to new runs; empty where none does.
     """
-    steps, effects = [("simulation as it is", sim)], []
-    for finding in diagnosis.findings:
-        if finding.confirmed:
-            effects += finding.effects
-        steps.append((f"+ {finding.cause.replace('_', ' ')}", sim.with_effects(effects)))
-    found = []
-    for name, extended in steps:
-        left = np.concatenate([m.y - s.y for m, s in simulated_points(runs, extended)])
-        found.append((name, float(np.std(left))))
-    return found
+    known = [
+        (finding.cause.replace("_", " "), finding.gain)
+        for finding in diagnosis.findings
+        if finding.gain is not None and finding.gain.reducible_share is not None
+    ]
+    if not known:
+        return []
+    together = ("with all causes", known[0][1].after[0])
+    return [together, *((f"without {name}", gain.before[0]) for name, gain in known)]
 
 
 def gain_bars(diagnosis: Diagnosis) -> list[GainBar]:

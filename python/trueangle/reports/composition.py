@@ -17,7 +17,6 @@ from ..files import CERTIFICATE, PDF, REPORT, check_output, written_atomically
 from ..fitting.heldout import HeldOut, hold_out
 from ..model import HarmonicModel
 from ..plots.curves import Points, degrees, error_points, label_of
-from ..plots.simulatedcurves import left_after_causes
 from ..provenance import provenance
 from ..runs import CalibrationRun, as_runs
 from . import diagnosisfigures, figures
@@ -243,10 +242,9 @@ def report(
     }
     drawn = _figures(found, fit, selection, held)
     if simulation is not None and diagnosis is not None:
-        left = left_after_causes(diagnosis, found, simulation)
-        content["diagnosis"] = diagnosed(diagnosis, left)
+        content["diagnosis"] = diagnosed(diagnosis)
         content["extended"] = _extended(fit, diagnosis, found, simulation)
-        drawn |= diagnosisfigures.figures_of(diagnosis, found, simulation, left)
+        drawn |= diagnosisfigures.figures_of(diagnosis, found, simulation)
     content["unknowns"] = unknowns(found, selection, content["diagnosis"])
     made = Report(heading, content, drawn)
     if path is not None:

@@ -25,8 +25,8 @@ _UNITS: Final = {
 }
 
 
-def diagnosed(diagnosis: Diagnosis, left: list[tuple[str, float]]) -> dict[str, Any]:
-    """`Diagnosis.to_dict` with the sentences of its findings and what each of them leaves.
+def diagnosed(diagnosis: Diagnosis) -> dict[str, Any]:
+    """`Diagnosis.to_dict` with the sentences of its findings.
 
     Parameters are listed; a value that is no single number is given as ``text``.
     """
@@ -35,9 +35,8 @@ def diagnosed(diagnosis: Diagnosis, left: list[tuple[str, float]]) -> dict[str, 
     content["nothing"] = diagnosis.is_enough and not any(
         spot.supported for spot in diagnosis.not_identifiable
     )
-    for finding, (_, rms) in zip(content["findings"], left[1:], strict=True):
+    for finding in content["findings"]:
         finding["sentence"] = finding.pop("physics")
-        finding["rms_left_arcsec"] = rms
         finding["parameters"] = [
             _parameter(i, *entry) for i, entry in enumerate(finding["parameters"].items())
         ]

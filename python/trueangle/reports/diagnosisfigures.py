@@ -9,7 +9,7 @@ import numpy as np
 
 from ..plots import curves
 from ..plots.curves import Points
-from ..plots.simulatedcurves import gain_bars, simulated_points
+from ..plots.simulatedcurves import gain_bars, left_without, simulated_points
 from .charts import Chart, Figure, figure
 from .figures import run_dots, turn
 
@@ -28,13 +28,13 @@ def figures_of(
     diagnosis: Diagnosis,
     runs: Sequence[CalibrationRun],
     sim: Simulation,
-    left: Sequence[tuple[str, float]],
 ) -> dict[str, Figure]:
-    """Measured against simulated; what is left after each cause, and gains, of several causes.
+    """Measured against simulated; what is left without each cause, and gains, of several causes.
 
     A chart of one bar says less than the sentence beside it: it is left out.
     """
     found = {"measured-simulated": _compared(runs, sim)}
+    left = left_without(diagnosis)
     if len(left) > 2:
         found["error-left"] = _left(diagnosis, left)
     if len(gain_bars(diagnosis)) > 1:
@@ -86,17 +86,17 @@ def _left(diagnosis: Diagnosis, left: Sequence[tuple[str, float]]) -> Figure:
     names = [name for name, _ in left]
     sizes = np.array([rms for _, rms in left])
     chart = Chart(
-        "rms of the difference / arcsec",
+        "rms left of held-out readings / arcsec",
         "",
         x_range=(0.0, 1.08 * float(max(sizes.max(), diagnosis.noise))),
         categories=names,
         height_rem=7.0 + 2.0 * len(names),
     )
-    chart.bars(names[:1], sizes[:1], colour="before", hover="@y: @x{0.00} arcsec rms")
-    chart.bars(names[1:], sizes[1:], colour="after", hover="@y: @x{0.00} arcsec rms")
+    chart.bars(names[:1], sizes[:1], colour="after", hover="@y: @x{0.00} arcsec rms")
+    chart.bars(names[1:], sizes[1:], colour="before", hover="@y: @x{0.00} arcsec rms")
     chart.upright(diagnosis.noise, label=f"noise of one reading, {diagnosis.noise:.2f} arcsec")
     alt = (
-        "Rms of measured less simulated error as each cause joins the simulation: "
+        "Rms left of held-out readings with all causes in place and without each: "
         + ", ".join(f"{name} {rms:.2f} arcsec" for name, rms in left)
         + f". Noise of one reading {diagnosis.noise:.2f} arcsec."
     )

@@ -2,30 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from itertools import pairwise
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..angles import ARCSEC_PER_TURN
 from ..plots.amplitudespectrum import likely_aliases, thresholds
 from ..plots.curves import CONFIDENCE
+from ..plots.orderaxis import order_groups
 from .charts import Chart, Figure, figure
 
 if TYPE_CHECKING:
     from ..fitting.result import FitResult
     from ..orders.select import OrderSelection
 
-__all__ = ["order_groups", "spectrum"]
+__all__ = ["spectrum"]
 
-Array = NDArray[np.float64]
-
-#: Orders between which nothing was looked at over so many orders stand in charts of their own.
-_BREAK: Final = 12.0
-#: Groups side by side at most; more would leave no width for each.
-_MOST_GROUPS: Final = 6
 #: Orders written at their lines, the largest first.
 _MOST_NAMED: Final = 8
 #: Least amplitude of the logarithmic axis, as part of the smallest threshold or amplitude kept.
@@ -52,21 +44,6 @@ def spectrum(fit: FitResult | None, selection: OrderSelection | None) -> Figure:
     )  # fmt: skip
     alt = f"Amplitude in arcsec of {len(rows)} {what}. Retained: {names}."
     return figure(alt, charts, "joined")
-
-
-def order_groups(orders: Sequence[float]) -> list[tuple[float, float]]:
-    """First and last order of every group; groups are broken at the widest gaps.
-
-    Examples
-    --------
-    >>> order_groups([1, 2, 5, 100, 101, 202])
-    [(1.0, 5.0), (100.0, 101.0), (202.0, 202.0)]
-    """
-    ascending = np.unique(np.asarray(orders, dtype=np.float64))
-    gaps = np.diff(ascending)
-    wide = [int(i) for i in np.argsort(-gaps) if gaps[i] > _BREAK][: _MOST_GROUPS - 1]
-    edges = [0, *sorted(i + 1 for i in wide), ascending.size]
-    return [(float(ascending[a]), float(ascending[b - 1])) for a, b in pairwise(edges)]
 
 
 def _group(

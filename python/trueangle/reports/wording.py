@@ -9,7 +9,7 @@ __all__ = ["FIGURE_TITLES", "cause_name", "joined", "residual_signals", "verdict
 FIGURE_TITLES: Final = {
     "errors": "Measured error of every run, and the model",
     "measured-simulated": "Measured error and what the simulation expects",
-    "error-left": "Error left after each cause is added",
+    "error-left": "What is left of held-out runs without each cause",
     "gains": "Gain of each cause on held-out runs",
     "spectrum": "Size of every order",
     "phases": "Phase and size of every order, run by run",

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..angles import ARCSEC_PER_TURN
+from ..errorunits import ErrorsIn
 from ..model import HarmonicModel
 
 __all__ = ["Blind", "HeldOut", "OrderEstimate", "SelfCalibration"]
@@ -155,11 +156,18 @@ class SelfCalibration:
             "notes": list(self.notes),
         }
 
-    def summary(self) -> str:
-        """The result as text."""
+    def summary(self, errors_in: ErrorsIn = "auto") -> str:
+        """The result as text.
+
+        Parameters
+        ----------
+        errors_in : {"auto", "arcsec", "deg", "mrad", "count"} or float
+            Unit of the errors; by itself arcsec, or degrees where one reaches a degree. A
+            number is the counts of a turn.
+        """
         from .summary import summary
 
-        return summary(self)
+        return summary(self, errors_in)
 
 
 def estimates(

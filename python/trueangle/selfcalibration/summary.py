@@ -6,6 +6,8 @@ import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
+from ..errorunits import ErrorsIn, ErrorUnit, error_unit
+
 if TYPE_CHECKING:
     from .result import OrderEstimate, SelfCalibration
 
@@ -17,16 +19,19 @@ def listed(orders: Sequence[float]) -> str:
     return f"orders {ranges(orders)}" if any(orders) else "zero"
 
 
-def summary(result: SelfCalibration) -> str:
+def summary(result: SelfCalibration, errors_in: ErrorsIn = "auto") -> str:
     """Numbers, what they are numbers of, what is blind, tests, notes."""
+    sizes = [result.noise_arcsec, *(o.amplitude for o in (*result.orders, *result.sums))]
+    period = result.model.period
+    unit = error_unit(errors_in, max(filter(math.isfinite, sizes), default=0.0), period)
     lines = [
         f"calibrated without a reference ({result.method}): {result.readings} readings, "
-        f"{result.turns:.1f} turns, noise {result.noise_arcsec:.3g} arcsec",
+        f"{result.turns:.1f} turns, noise {unit.text(result.noise_arcsec)}",
     ]
     if result.orders:
-        lines += ["", *_table(result.orders)]
+        lines += ["", *_table(result.orders, unit)]
     if result.sums:
-        lines += ["", "not the encoder's alone:", *_table(result.sums)]
+        lines += ["", "not the encoder's alone:", *_table(result.sums, unit)]
     lines += ["", "blind to"]
     for blind in result.blind:
         lines.append(f"  {listed(blind.orders)}: {blind.because}")
@@ -36,22 +41,23 @@ def summary(result: SelfCalibration) -> str:
         for test in result.held_out.values():
             agree = "agree" if test.p > 0.001 else "DISAGREE"
             lines.append(
-                f"  {test.fitted_on} predict {test.judged_on}: {test.rms_before:.4g} -> "
-                f"{test.rms_after:.4g} arcsec rms, they {agree} (p = {test.p:.2g})"
+                f"  {test.fitted_on} predict {test.judged_on}: {unit.number(test.rms_before)} -> "
+                f"{unit.number(test.rms_after)} {unit.name} rms, they {agree} (p = {test.p:.2g})"
             )
     lines += [f"note: {note}" for note in result.notes]
     return "\n".join(lines)
 
 
-def _table(orders: tuple[OrderEstimate, ...]) -> list[str]:
+def _table(orders: tuple[OrderEstimate, ...], unit: ErrorUnit) -> list[str]:
     names = {o.of for o in orders} != {"the encoder"}
     lines = [
-        "   order  amplitude/arcsec     std  phase/deg  retained  factor"
+        f"   order  {f'amplitude/{unit.name}':>16}     std  phase/deg  retained  factor"
         + ("  of" if names else "")
     ]
     for o in orders:
+        size, std = unit.pair(o.amplitude, o.std)
         lines.append(
-            f"{o.order:8g} {o.amplitude:17.3f} {o.std:7.3f} {o.phase_deg:10.2f} {o.retained:9.3f} "
+            f"{o.order:8g} {size:>17} {std:>7} {o.phase_deg:10.2f} {o.retained:9.3f} "
             f"{o.std_factor:7.2f}" + (f"  {o.of}" if names else "")
         )
     return lines
