@@ -1,4 +1,4 @@
-"""Shafts and bearings that a joint declares beside its gear: worms, belts, gear trains."""
+"""What a joint declares beside its gear: further shafts, bearings, reading heads."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from ..errors import ArgumentError
 
-__all__ = ["Bearing", "DeclaredShaft"]
+__all__ = ["Bearing", "DeclaredShaft", "Head"]
 
 #: Names that belong to the output and its gear.
 _TAKEN = ("output", "motor", "wave_generator")
@@ -101,3 +101,26 @@ class Bearing:
         yield "outer race", 0.5 * n * (1.0 - x)
         yield "inner race", 0.5 * n * (1.0 + x)
         yield "ball", 0.5 * (1.0 - x * x) / x
+
+
+@dataclass(frozen=True)
+class Head:
+    """One of several reading heads on the joint's disc.
+
+    Parameters
+    ----------
+    angle_deg : float
+        Where it stands. It reads ``theta + angle`` with the disc's error there; a head at 0
+        is the joint's own.
+
+    Examples
+    --------
+    >>> Head(119.2).angle_deg
+    119.2
+    """
+
+    angle_deg: float
+
+    def __post_init__(self) -> None:
+        if not abs(self.angle_deg) <= 360.0:
+            raise ArgumentError(f"angle_deg must be within one turn, got {self.angle_deg!r}")

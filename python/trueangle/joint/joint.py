@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from ..errors import ArgumentError
-from .declared import Bearing, DeclaredShaft
+from .declared import Bearing, DeclaredShaft, Head
 from .shafts import FIXED_MEMBERS, shaft_cycles
 
 __all__ = ["Joint"]
@@ -14,6 +14,9 @@ ENCODER_SIDES = ("motor", "output")
 
 #: Multiples of a declared shaft that are expected of it.
 DECLARED_ORDERS = (1, 2, 3, 4)
+
+#: Heads on one disc, at most: columns ``head1`` to ``head99``.
+MOST_HEADS = 99
 
 #: Share of its order by which slip moves a bearing's line.
 SLIP = 0.02
@@ -36,6 +39,8 @@ class Joint:
     declared : tuple of DeclaredShaft
         Further shafts: a worm, a belt, the wheels of a gear train.
     bearings : tuple of Bearing
+    heads : tuple of Head
+        Reading heads on the disc, each with a column of its own; none for the one usual.
 
     Examples
     --------
@@ -49,6 +54,7 @@ class Joint:
     pole_pairs: int = 1
     declared: tuple[DeclaredShaft, ...] = ()
     bearings: tuple[Bearing, ...] = ()
+    heads: tuple[Head, ...] = ()
 
     def __post_init__(self) -> None:
         if not 0.0 < self.gear_ratio < float("inf"):
@@ -66,6 +72,8 @@ class Joint:
         names = [shaft.name for shaft in self.declared]
         if len(set(names)) < len(names):
             raise ArgumentError(f"shafts are declared twice: {', '.join(names)}")
+        if len(self.heads) > MOST_HEADS:
+            raise ArgumentError(f"at most {MOST_HEADS} heads, got {len(self.heads)}")
         for bearing in self.bearings:
             self.output_order(bearing.shaft, 1.0)
 

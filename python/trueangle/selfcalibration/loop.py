@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Final
 
 from ..errors import ArgumentError
-from .result import Blind
+from .result import Blind, OrderEstimate
 
-__all__ = ["LOOPS", "check_loop", "followed_orders"]
+__all__ = ["LOOPS", "check_loop", "followed_orders", "followed_share", "widened"]
 
 LOOPS: Final = ("open", "closed", "unknown")
 
@@ -70,3 +71,27 @@ def followed_orders(
         f"bandwidth of {bandwidth:g} Hz, where it follows more than a tenth of them",
         f"coast down with the drive off, drive open loop, or turn faster than {fast:.3g} turns/s",
     )
+
+
+def followed_share(hertz: float, loop: str, bandwidth: float | None) -> float:
+    """The most that a loop follows above its bandwidth, if it rolls off by first order only.
+
+    Examples
+    --------
+    >>> followed_share(6.0, "closed", 1.2)
+    0.2
+    """
+    if loop != "closed" or bandwidth is None:
+        return 0.0
+    return min(1.0, bandwidth / hertz)
+
+
+def widened(estimate: OrderEstimate, share: float) -> OrderEstimate:
+    """The estimate where any part of it up to ``share`` may be the loop's doing.
+
+    In any phase: the standard deviation of a disc of that radius, along one direction.
+    """
+    if share == 0.0 or estimate.std == 0.0:
+        return estimate
+    std = math.hypot(estimate.std, 0.5 * share * estimate.amplitude)
+    return replace(estimate, std=std, std_factor=estimate.std_factor * std / estimate.std)

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from ..errors import NoModelError
 from .choice import choose_orders, highest_order
 from .colour import noise_beside
-from .loop import followed_orders
+from .loop import followed_orders, followed_share, widened
 from .modelling import made_model
 from .recording import Recording
 from .result import ARCSEC, Blind, OrderEstimate, SelfCalibration, estimates
@@ -103,6 +103,13 @@ def spin_down(
     given, sums, blind = _sorted_out(
         table, readings, loop, bandwidth, separable, ripple, with_current
     )
+    if loop == "closed" and bandwidth is not None and given and not with_current:
+        first = given[0].order
+        share = followed_share(first * float(np.quantile(readings.speed, 0.02)), loop, bandwidth)
+        notes.append(
+            f"a loop that rolls off slowly (first order) still follows {share:.0%} of order "
+            f"{first:g} and less of those above: the standard errors allow for it"
+        )
     notes += _notes(fit, readings, colour, chosen, given, sums, separable, ripple)
     tests = held_out(fit, [o.order for o in given or sums or table], float(colour.max()))
     notes += _test_notes(tests, rippling)
@@ -156,10 +163,7 @@ def _add_current(readings: Readings, loop: str) -> bool:
         current = stretch.recording.current
         if current is None:
             return False
-        i = current[stretch.rows] - current[stretch.rows].mean()
-        dt = np.diff(stretch.time, prepend=stretch.time[0])
-        speed = np.cumsum(i * dt)
-        parts.append(np.cumsum((speed - speed.mean()) * dt))
+        parts.append(_twice_integrated(stretch.time, current[stretch.rows]))
     extra = np.concatenate(parts)
     size = float(np.sqrt(np.mean(extra**2)))
     if size == 0.0:
@@ -167,6 +171,17 @@ def _add_current(readings: Readings, loop: str) -> bool:
     readings.extra = extra[None, :] / size
     readings.extra_names = (_CURRENT,)
     return True
+
+
+def _twice_integrated(time: Array, values: Array) -> Array:
+    """Place of a mass under a force that is linear between its readings, less a line."""
+    force = values - values.mean()
+    dt = np.diff(time)
+    gained = 0.5 * dt * (force[:-1] + force[1:])
+    speed = np.concatenate([[0.0], np.cumsum(gained)])
+    speed -= speed.mean()
+    moved = dt * speed[:-1] + dt * dt * (2.0 * force[:-1] + force[1:]) / 6.0
+    return np.concatenate([[0.0], np.cumsum(moved)])
 
 
 def _sorted_out(
@@ -217,7 +232,8 @@ def _sorted_out(
             may_ripple.append(o)
             sums.append(_renamed(o, f"{ENCODER} or the speed ripple"))
         else:
-            given.append(o)
+            share = 0.0 if with_current else followed_share(o.order * slowest, loop, bandwidth)
+            given.append(widened(o, share))
     if may_ripple:
         low, high = np.quantile(readings.speed, [0.05, 0.95])
         blind.append(

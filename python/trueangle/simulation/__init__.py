@@ -26,6 +26,7 @@ from ..effects import (
     TorsionalCompliance,
     ZeroSlip,
 )
+from ..joint.declared import Head
 from ..joint.joint import Joint
 from ..joint.pattern import Harmonic, Pattern
 from ..joint.signals import Signals, join_runs
@@ -41,6 +42,7 @@ __all__ = [
     "Effect",
     "FilterLag",
     "Harmonic",
+    "Head",
     "HeteroscedasticNoise",
     "Joint",
     "Latency",

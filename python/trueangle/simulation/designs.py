@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import itertools
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import ArgumentError
+from ..joint.pattern import Pattern
 from ..runs import CalibrationRun
+from .rotor import Motion, turned
 
 __all__ = ["MAX_SAMPLES", "SPACINGS", "RunDesign"]
 
@@ -19,7 +22,10 @@ MAX_SAMPLES = 20_000_000
 #: Turns and degrees, at most: beyond, an angle has no digits left for an arcsec.
 _MOST_TURNS = 1e6
 
-SPACINGS = ("uniform", "jittered", "random")
+SPACINGS = ("uniform", "jittered", "random", "clock")
+
+#: A run without lines: nothing for a loop to follow.
+_NO_LINES = Pattern(np.zeros(0), np.zeros(0), np.zeros(0))
 
 
 @dataclass(frozen=True)
@@ -37,8 +43,9 @@ class RunDesign:
         The shaft coasts to this speed with viscous friction: linearly in travel,
         exponentially in time.
     samples : int
-    spacing : {"jittered", "uniform", "random"}
-        Equal steps, equal steps each moved at random within its own, or random angles.
+    spacing : {"jittered", "uniform", "random", "clock"}
+        Equal steps, equal steps each moved at random within its own, random angles, or
+        equal steps of time, as a logger reads.
     start_deg : float
     turns : float
         Whole travel, summed over the stretches between reversals.
@@ -57,6 +64,20 @@ class RunDesign:
         Constant current of the motor; no column where not given.
     shift_deg : float, optional
         How far one of two encoders was turned for this run; no column where not given.
+        The reference is that encoder then, and reads with the lines of ``reference_error``.
+    loop_bandwidth_hz : float, optional
+        The speed is held by a loop closed on the encoder under test
+        (`trueangle.simulation.rotor`).
+    cogging_deg_s2, cogging_order, cogging_phase_deg : float
+        Acceleration ``c sin(m theta + phase)`` of the shaft by cogging.
+    imbalance_deg_s2, imbalance_phase_deg : float
+        Acceleration ``u sin(theta + phase)`` by imbalance.
+    friction_deg_s2, friction_memory_s : float
+        Standard deviation and memory of a friction that wanders.
+    deg_s2_per_A : float, optional
+        Acceleration per ampere; the current that the loop asks for joins ``current_A``.
+    motor_sigma_arcsec : float, optional
+        The motor's own angle is recorded too, not reduced, with this noise.
     """
 
     label: str | None = None
@@ -76,6 +97,16 @@ class RunDesign:
     current_A: float | None = None
     shift_deg: float | None = None
     speed_end_deg_s: float | None = None
+    loop_bandwidth_hz: float | None = None
+    cogging_deg_s2: float = 0.0
+    cogging_order: float = 1.0
+    cogging_phase_deg: float = 0.0
+    imbalance_deg_s2: float = 0.0
+    imbalance_phase_deg: float = 0.0
+    friction_deg_s2: float = 0.0
+    friction_memory_s: float = 2.0
+    deg_s2_per_A: float | None = None
+    motor_sigma_arcsec: float | None = None
 
     def __post_init__(self) -> None:
         def refuse(name: str, wanted: str) -> ArgumentError:
@@ -101,6 +132,38 @@ class RunDesign:
         edges = (0.0, *self.reversals, 1.0)
         if any(b <= a for a, b in itertools.pairwise(edges)):
             raise refuse("reversals", "ascending shares of the travel between 0 and 1")
+        self._check_rotor(refuse)
+
+    def _check_rotor(self, refuse: Callable[[str, str], ArgumentError]) -> None:
+        """What moves the shaft beside the speed asked for needs one, in one direction."""
+        for name in ("loop_bandwidth_hz", "cogging_order", "friction_memory_s", "deg_s2_per_A"):
+            value = getattr(self, name)
+            if value is not None and not 0.0 < value < math.inf:
+                raise refuse(name, "positive")
+        for name in ("cogging_deg_s2", "imbalance_deg_s2", "friction_deg_s2"):
+            if not 0.0 <= getattr(self, name) < math.inf:
+                raise refuse(name, "positive, or 0 for none")
+        if self.motor_sigma_arcsec is not None and not 0.0 <= self.motor_sigma_arcsec < math.inf:
+            raise refuse("motor_sigma_arcsec", "positive, or 0 for none")
+        if self.deg_s2_per_A is not None and self.loop_bandwidth_hz is None:
+            raise refuse("deg_s2_per_A", "given with loop_bandwidth_hz, whose current it is")
+        if self.is_moved and (self.reversals or self.speed_deg_s == 0.0):
+            raise ArgumentError(
+                "cogging, imbalance, friction and loops need a speed_deg_s and no reversals"
+            )
+
+    @property
+    def is_moved(self) -> bool:
+        """Something moves the shaft beside the speed asked for."""
+        pushes = (self.cogging_deg_s2, self.imbalance_deg_s2, self.friction_deg_s2)
+        return self.loop_bandwidth_hz is not None or any(pushes)
+
+    @property
+    def decay_per_s(self) -> float:
+        """Share of its speed that a coasting shaft loses in a second; 0 at constant speed."""
+        if self.speed_end_deg_s is None:
+            return 0.0
+        return (self.speed_deg_s - self.speed_end_deg_s) / (360.0 * self.turns)
 
     def path(self, rng: np.random.Generator) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Travel and unwrapped angle of every reading, degrees, in the order taken."""
@@ -110,42 +173,64 @@ class RunDesign:
             share = (np.arange(n) + rng.random(n)) / n
         elif self.spacing == "random":
             share = np.sort(rng.random(n))
+        elif self.spacing == "clock" and self.decay_per_s != 0.0:
+            assert self.speed_end_deg_s is not None
+            lost = 1.0 - self.speed_end_deg_s / self.speed_deg_s
+            share = -np.expm1(share * math.log1p(-lost)) / lost
         knots = np.array([0.0, *self.reversals, 1.0])
         signs = self.direction * (-1.0) ** np.arange(knots.size - 1)
         angles = np.concatenate([[0.0], np.cumsum(signs * np.diff(knots))])
         travel = 360.0 * self.turns
         return travel * share, self.start_deg + travel * np.interp(share, knots, angles)
 
-    def measure(self, rng: np.random.Generator, label: str) -> CalibrationRun:
-        """The run with an ideal joint: indicated equals reference; degrees."""
+    def measure(
+        self, rng: np.random.Generator, label: str, pattern: Pattern = _NO_LINES
+    ) -> CalibrationRun:
+        """The run with an ideal joint: indicated equals reference; degrees.
+
+        ``pattern`` is what a loop that is closed on the encoder follows.
+        """
         travel, angle = self.path(rng)
         n = self.samples
         knots = np.array([0.0, *self.reversals]) * (360.0 * self.turns)
         stretch = np.searchsorted(knots, travel, side="right") - 1
         signs = self.direction * (-1.0) ** stretch
-        at_rest = self.speed_deg_s == 0.0
         speed = np.full(n, self.speed_deg_s)
-        time = np.arange(n, dtype=np.float64) if at_rest else travel / self.speed_deg_s
-        end = self.speed_end_deg_s
-        if end is not None and end != self.speed_deg_s:
-            loss = (self.speed_deg_s - end) / (360.0 * self.turns)
-            speed = self.speed_deg_s - loss * travel
-            time = -np.log(speed / self.speed_deg_s) / loss
+        if self.speed_deg_s == 0.0:
+            time = np.arange(n, dtype=np.float64)
+        elif self.decay_per_s == 0.0:
+            time = travel / self.speed_deg_s
+        else:
+            speed = self.speed_deg_s - self.decay_per_s * travel
+            time = -np.log(speed / self.speed_deg_s) / self.decay_per_s
+        motion = Motion(angle, np.asarray(signs * speed), np.zeros(n))
+        if self.is_moved:
+            motion = turned(self, time, pattern, rng)
         temperature = np.full(n, self.temperature_C)
         if self.temperature_end_C is not None:
             share = travel / (360.0 * self.turns)
             temperature += (self.temperature_end_C - self.temperature_C) * share
-        constant = {"current": self.current_A, "shift": self.shift_deg}
-        moment = self.gravity_Nm * np.sin(np.radians(angle - self.gravity_deg))
+        moment = self.gravity_Nm * np.sin(np.radians(motion.angle - self.gravity_deg))
         return CalibrationRun(
-            angle,
-            angle,
+            motion.angle,
+            motion.angle,
             period=360.0,
             time=time,
             temperature=temperature,
             torque=self.torque_Nm + moment,
-            mount=np.full(n, self.mount_deg),
+            # A reference that is an encoder turned for this run has turned on its mount.
+            mount=np.full(n, self.mount_deg + (self.shift_deg or 0.0)),
             label=self.label or label,
-            velocity=np.asarray(signs * speed, dtype=np.float64),
-            signals={name: value for name, value in constant.items() if value is not None},
+            velocity=motion.speed,
+            signals=self._signals(motion),
         )
+
+    def _signals(self, motion: Motion) -> dict[str, NDArray[np.float64]]:
+        """Current and shift, where the run has them."""
+        found = {}
+        if self.current_A is not None or self.deg_s2_per_A is not None:
+            driven = motion.driven / (self.deg_s2_per_A or math.inf)
+            found["current"] = (self.current_A or 0.0) + driven
+        if self.shift_deg is not None:
+            found["shift"] = np.full(self.samples, self.shift_deg)
+        return found

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ..effects import Effect
+from ..effects import Effect, ReferenceLines
 from ..errors import ArgumentError
 from ..joint.joint import Joint
 from ..joint.pattern import Harmonic, Pattern, Surroundings
@@ -120,7 +120,8 @@ def simulate(
     Returns
     -------
     list of CalibrationRun
-        In degrees, with time, velocity, torque, temperature and mount.
+        In degrees, with time, velocity, torque, temperature and mount; with the signals
+        that joint and runs have beside: ``head1`` ..., ``motor``, ``shift``, ``current``.
 
     Raises
     ------
@@ -139,19 +140,64 @@ def simulate(
     designs = tuple(sim.runs if runs is None else runs)
     if not designs:
         raise ArgumentError("the simulation designs no run: add a [[run]] table or pass runs=")
-    ideal = [design.measure(rng, str(j + 1)) for j, design in enumerate(designs)]
-    signals = join_runs(ideal)
     around = sim.surroundings
+    ideal = [design.measure(rng, str(j + 1), around.pattern) for j, design in enumerate(designs)]
+    signals = join_runs(ideal)
     error = around.pattern.value(signals.theta)
     spread = np.full(len(signals), sim.sigma_arcsec)
+    reference = np.zeros(len(signals))
+    turned = np.repeat([d.shift_deg is not None for d in designs], [len(run) for run in ideal])
     for effect in sim.effects:
-        error = error + effect.signal(signals, around, rng)
+        found = effect.signal(signals, around, rng)
+        error = error + found
+        if isinstance(effect, ReferenceLines):
+            reference = reference + np.where(turned, found, 0.0)
         factor = effect.noise_factor(signals, around)
         if factor is not None:
             spread = spread * factor
     error = (error + spread * rng.standard_normal(len(signals))) / ARCSEC_PER_DEG
-    cuts = np.cumsum([len(run) for run in ideal])[:-1]
-    return [
-        replace(run, indicated=run.reference + part)
-        for run, part in zip(ideal, np.split(error, cuts), strict=True)
-    ]
+    # Where the reference is an encoder turned for the run, its error is in its own readings.
+    reference /= ARCSEC_PER_DEG
+    theta = np.concatenate([run.reference for run in ideal])
+    own = theta + (error - reference)
+    beside = _beside(sim, designs, signals, own, spread, rng)
+    runs_made = []
+    for run, (a, b) in zip(ideal, signals.run_bounds(), strict=True):
+        read = {name: values[a:b] for name, values in beside.items()}
+        runs_made.append(
+            replace(
+                run,
+                reference=run.reference - reference[a:b],
+                indicated=own[a:b],
+                signals={**run.signals, **{k: v for k, v in read.items() if not np.isnan(v).any()}},
+            )
+        )
+    return runs_made
+
+
+def _beside(
+    sim: Simulation,
+    designs: tuple[RunDesign, ...],
+    signals: Signals,
+    own: Array,
+    spread: Array,
+    rng: np.random.Generator,
+) -> dict[str, Array]:
+    """What heads and the motor's own encoder read, degrees; not a number where not recorded.
+
+    ``own`` is what the joint's own head reads. A further head sees lines and effects where
+    it stands, random effects by their mean.
+    """
+    found = {}
+    for i, head in enumerate(sim.joint.heads, 1):
+        if head.angle_deg % 360.0 == 0.0:
+            found[f"head{i}"] = own + head.angle_deg
+            continue
+        there = replace(signals, theta=signals.theta + np.radians(head.angle_deg))
+        noise = spread * rng.standard_normal(len(signals))
+        found[f"head{i}"] = there.degrees + (sim.predict(there) + noise) / ARCSEC_PER_DEG
+    sigma = [np.nan if d.motor_sigma_arcsec is None else d.motor_sigma_arcsec for d in designs]
+    if not np.isnan(sigma).all():
+        noise = np.array(sigma)[signals.run] * rng.standard_normal(len(signals))
+        found["motor"] = signals.degrees * sim.joint.gear_ratio + noise / ARCSEC_PER_DEG
+    return found

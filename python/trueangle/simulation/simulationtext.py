@@ -12,7 +12,7 @@ from ..decoding import finite, read_text, shown
 from ..effects import EFFECTS, Effect
 from ..errors import ArgumentError, FileError
 from ..files import SIMULATION, SIMULATION_BYTES, written_atomically
-from ..joint.declared import Bearing, DeclaredShaft
+from ..joint.declared import Bearing, DeclaredShaft, Head
 from ..joint.joint import Joint
 from ..joint.pattern import Harmonic
 from .designs import MAX_SAMPLES, RunDesign
@@ -22,8 +22,15 @@ if TYPE_CHECKING:
 
 __all__ = ["Decoded", "decoded", "dumps", "guarded", "to_table", "write"]
 
-_TABLES = ("joint", "shaft", "bearing", "harmonic", "effect", "noise", "run")
+_TABLES = ("joint", "shaft", "bearing", "head", "harmonic", "effect", "noise", "run")
 _JOINT_KEYS = ("gear_ratio", "fixed_member", "encoder_side", "pole_pairs")
+
+#: Tables of what a joint declares: field of `Joint`, name of the table, what each makes.
+_DECLARED: tuple[tuple[str, str, Any], ...] = (
+    ("declared", "shaft", DeclaredShaft),
+    ("bearings", "bearing", Bearing),
+    ("heads", "head", Head),
+)
 
 #: Lines, effects, runs, or numbers of one list, at most.
 MAX_TABLES = 10_000
@@ -93,7 +100,7 @@ def _decoded(path: str | Path, document: Mapping[str, Any]) -> Decoded:
 
 
 def _joint(path: str | Path, document: Mapping[str, Any]) -> Joint:
-    """The gear, with the further shafts and the bearings that the file declares."""
+    """The gear, with the further shafts, bearings and heads that the file declares."""
     table = _table(path, document, "joint")
     for name in table:
         if name not in _JOINT_KEYS:
@@ -101,18 +108,17 @@ def _joint(path: str | Path, document: Mapping[str, Any]) -> Joint:
                 path, f"[joint]: unknown key {shown(name)}; it has {', '.join(_JOINT_KEYS)}"
             )
     gear = _build(path, "[joint]", Joint, _geared(table))
-    declared = tuple(
-        _build(path, f"[[shaft]] number {k}", DeclaredShaft, entry)
-        for k, entry in enumerate(_tables(path, document, "shaft"), 1)
-    )
-    bearings = tuple(
-        _build(path, f"[[bearing]] number {k}", Bearing, entry)
-        for k, entry in enumerate(_tables(path, document, "bearing"), 1)
-    )
-    if not declared and not bearings:
+    further: dict[str, Any] = {
+        field: tuple(
+            _build(path, f"[[{name}]] number {k}", kind, entry)
+            for k, entry in enumerate(_tables(path, document, name), 1)
+        )
+        for field, name, kind in _DECLARED
+    }
+    if not any(further.values()):
         return gear
-    where = "[[shaft]] and [[bearing]]"
-    return guarded(path, where, lambda: replace(gear, declared=declared, bearings=bearings))
+    where = ", ".join(f"[[{name}]]" for field, name, _ in _DECLARED if further[field])
+    return guarded(path, where, lambda: replace(gear, **further))
 
 
 def _geared(joint: Mapping[str, Any]) -> Mapping[str, Any]:
@@ -221,8 +227,10 @@ def to_table(sim: Simulation | Decoded) -> dict[str, Any]:
         runs.append({k: v for k, v in values.items() if v is not None and v != plain[k]})
     return {
         "joint": {name: getattr(sim.joint, name) for name in _JOINT_KEYS},
-        "shaft": [_given(shaft) for shaft in sim.joint.declared],
-        "bearing": [_given(bearing) for bearing in sim.joint.bearings],
+        **{
+            name: [_given(entry) for entry in getattr(sim.joint, field)]
+            for field, name, _ in _DECLARED
+        },
         "harmonic": [_given(line) for line in sim.harmonics],
         "effect": [effect.to_table() for effect in sim.effects],
         "noise": {"sigma_arcsec": sim.sigma_arcsec},

@@ -1,0 +1,169 @@
+r"""The shaft as an inertia: what moves it beside the speed that a run asks for.
+
+.. math:: \ddot\theta = -\gamma\dot\theta + c \sin(m\theta + \varphi) + u \sin(\theta + \psi)
+          + f(t) + a
+
+with viscous friction :math:`\gamma` (none at constant speed), cogging, imbalance and a friction
+that wanders, all as accelerations, and :math:`a` what a velocity loop asks of the motor. The
+loop is closed on the encoder under test: with what the encoder reads, r, and its speed,
+
+.. math:: a = \omega_b (\dot r_0 - \dot r) + \tfrac14 \omega_b^2 (r_0 - r),
+          \quad T(s) = \frac{\omega_b s + \omega_b^2/4}{(s + \omega_b/2)^2},
+
+so that the shaft moves by :math:`-T\varepsilon` and the log shows :math:`(1 - T)\varepsilon`.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Final, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..angles import ARCSEC_PER_TURN
+from ..errors import ArgumentError
+from ..joint.pattern import Pattern
+
+if TYPE_CHECKING:
+    from .designs import RunDesign
+
+__all__ = ["Motion", "turned"]
+
+Array = NDArray[np.float64]
+
+ARCSEC_PER_RAD: Final = ARCSEC_PER_TURN / (2.0 * math.pi)
+
+#: Radians that the fastest term turns by in one step of the integration, at most: Runge and
+#: Kutta's rule of fourth order is then right to some 1e-6 of what the term moves.
+_STEP: Final = 0.1
+
+
+class Motion(NamedTuple):
+    """Angle (deg), speed (deg/s) and acceleration by the motor (deg/s^2) at every reading."""
+
+    angle: Array
+    speed: Array
+    driven: Array
+
+
+def turned(design: RunDesign, time: Array, pattern: Pattern, rng: np.random.Generator) -> Motion:
+    """Where the shaft is at ``time``, integrated from the start of the run.
+
+    Parameters
+    ----------
+    design : RunDesign
+    time : ndarray
+        Seconds, ascending from the start of the run.
+    pattern : Pattern
+        Lines that the loop sees; other effects and noise do not move the shaft.
+    rng : numpy.random.Generator
+        Of the friction that wanders.
+
+    Raises
+    ------
+    ArgumentError
+        The shaft runs away.
+    """
+    start = math.radians(design.speed_deg_s) * design.direction
+    rate = design.decay_per_s
+    place = math.radians(design.start_deg)
+    cogging, order = math.radians(design.cogging_deg_s2), design.cogging_order
+    phase = math.radians(design.cogging_phase_deg)
+    imbalance = math.radians(design.imbalance_deg_s2)
+    low = math.radians(design.imbalance_phase_deg)
+    band = 2.0 * math.pi * (design.loop_bandwidth_hz or 0.0)
+    viscous = 0.0 if band else rate  # a loop gives what friction takes
+    lines = (
+        [
+            (m, complex(a, -b) / ARCSEC_PER_RAD)
+            for m, a, b in zip(
+                pattern.orders.tolist(),
+                pattern.cosine.tolist(),
+                pattern.sine.tolist(),
+                strict=True,
+            )
+        ]
+        if band
+        else []
+    )
+
+    def seen(x: float) -> tuple[float, float]:
+        """The pattern at ``x`` and its slope."""
+        value = slope = 0.0
+        for m, line in lines:
+            term = line * complex(math.cos(m * x), math.sin(m * x))
+            value += term.real
+            slope -= m * term.imag
+        return value, slope
+
+    zero = seen(place)[0]
+
+    def loop(t: float, x: float, v: float) -> float:
+        value, slope = seen(x)
+        wanted = start * math.exp(-rate * t)
+        way = start * t if rate == 0.0 else start * -math.expm1(-rate * t) / rate
+        reading = x + value - zero - place
+        lag = band * (wanted - v * (1.0 + slope)) + 0.25 * band * band * (way - reading)
+        return lag - rate * wanted
+
+    def pushed(x: float, v: float) -> float:
+        a = -viscous * v
+        if cogging:
+            a += cogging * math.sin(order * x + phase)
+        if imbalance:
+            a += imbalance * math.sin(x + low)
+        return a
+
+    fastest = max([order if cogging else 1.0, *(m for m, _ in lines)])
+    longest = _STEP / max(fastest * abs(start) * max(1.0, math.exp(-rate * time[-1])), band, 1e-12)
+    friction = np.radians(_wander(design, time, rng)).tolist()
+    n = time.size
+    angle, speed, driven = np.empty(n), np.empty(n), np.zeros(n)
+    x, v, before = place, start, 0.0
+    for i, now in enumerate(time.tolist()):
+        f = friction[i]
+        steps = max(1, math.ceil((now - before) / longest))
+        h = (now - before) / steps
+        for j in range(steps if h > 0.0 else 0):
+            t = before + j * h
+            a1 = f + pushed(x, v)
+            x2, v2 = x + 0.5 * h * v, v + 0.5 * h * a1
+            if band:
+                a1 += loop(t, x, v)
+                v2 = v + 0.5 * h * a1
+                a2 = f + pushed(x2, v2) + loop(t + 0.5 * h, x2, v2)
+                x3, v3 = x + 0.5 * h * v2, v + 0.5 * h * a2
+                a3 = f + pushed(x3, v3) + loop(t + 0.5 * h, x3, v3)
+                x4, v4 = x + h * v3, v + h * a3
+                a4 = f + pushed(x4, v4) + loop(t + h, x4, v4)
+            else:
+                a2 = f + pushed(x2, v2)
+                x3, v3 = x + 0.5 * h * v2, v + 0.5 * h * a2
+                a3 = f + pushed(x3, v3)
+                x4, v4 = x + h * v3, v + h * a3
+                a4 = f + pushed(x4, v4)
+            x += h / 6.0 * (v + 2.0 * v2 + 2.0 * v3 + v4)
+            v += h / 6.0 * (a1 + 2.0 * a2 + 2.0 * a3 + a4)
+        if not abs(v) < 1e9:
+            raise ArgumentError("the shaft runs away: cogging, imbalance or loop are too strong")
+        angle[i], speed[i] = x, v
+        if band:
+            driven[i] = loop(now, x, v)
+        before = now
+    return Motion(np.degrees(angle), np.degrees(speed), np.degrees(driven))
+
+
+def _wander(design: RunDesign, time: Array, rng: np.random.Generator) -> Array:
+    """A friction's acceleration at every reading, that forgets itself in ``friction_memory_s``."""
+    size = design.friction_deg_s2
+    if size == 0.0:
+        return np.zeros(time.size)
+    keep = np.exp(-np.diff(time, prepend=time[0]) / design.friction_memory_s)
+    shocks = rng.standard_normal(time.size) * size
+    found, state = np.empty(time.size), float(shocks[0])
+    fresh = np.sqrt(1.0 - keep**2) * shocks
+    for i, (k, new) in enumerate(zip(keep.tolist(), fresh.tolist(), strict=True)):
+        state = k * state + (new if i else 0.0)
+        found[i] = state
+    return found
