@@ -78,8 +78,8 @@ def followed_share(hertz: float, loop: str, bandwidth: float | None) -> float:
 
     Examples
     --------
-    >>> followed_share(6.0, "closed", 1.2)
-    0.2
+    >>> followed_share(6.0, "closed", 1.5)
+    0.25
     """
     if loop != "closed" or bandwidth is None:
         return 0.0
