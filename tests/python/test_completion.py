@@ -5,6 +5,7 @@ import pty
 import select
 import shutil
 import subprocess
+import sys
 import time
 
 import pytest
@@ -134,3 +135,30 @@ def test_help_is_grouped(command):
     for action in parser._actions:
         if "--output" in action.option_strings or "--json" in action.option_strings:
             assert action in groups["output"]._group_actions
+
+
+def test_a_command_that_is_called_alone_has_its_arguments():
+    """The others are there by name; what they can be asked takes long to import."""
+    parser = build_parser(["fit", "runs.csv"])
+    assert list(parser.commands) == list(COMMANDS)
+    assert "--orders" in parser.commands["fit"]._option_string_actions
+    assert "--method" not in parser.commands["selfcal"]._option_string_actions
+    assert parser.format_help() == build_parser().format_help()
+
+
+@pytest.mark.parametrize("command", [["--help"], ["fit", "runs.csv"]])
+def test_small_work_starts_without_what_it_does_not_need(command, tmp_path):
+    """No package is imported that takes longer to start than such a command runs."""
+    rows = "".join(f"{x},{x + 0.1 * (x % 7)}\n" for x in range(0, 360, 10))
+    (tmp_path / "runs.csv").write_text("reference_deg,indicated_deg\n" + rows)
+    script = (
+        "import sys\nfrom trueangle.cli import main\n"
+        "try:\n    main(sys.argv[1:])\nexcept SystemExit:\n    pass\n"
+        "heavy = {'pyarrow', 'pandas', 'trueangle.effects', 'trueangle.export'}\n"
+        "print(sorted(heavy & {*sys.modules}), file=sys.stderr)"
+    )
+    words = [sys.executable, "-c", script, *command]
+    if command[0] == "fit":
+        words += ["-o", "model.json"]
+    done = subprocess.run(words, cwd=tmp_path, capture_output=True, text=True, check=True)
+    assert done.stderr.splitlines()[-1] == "[]", done.stderr

@@ -92,10 +92,10 @@ def test_products_under_a_noise_need_no_mapped_columns(space, noise):
     x, y = rng.standard_normal((space.n, 6)), rng.standard_normal((space.n, 2))
     assert x.T @ whiten.transposed(y) == pytest.approx(whiten(x).T @ y, rel=ROUNDING, abs=ROUNDING)
     blocks = Blocks([x[:, :2], x[:, 2:3], x[:, 3:5], x[:, 5:]])
-    for (where, width, _, _), grams in zip(blocks.groups, blocks.grams(whiten), strict=True):
-        for k, gram in zip(where, grams, strict=True):
+    for where, products in blocks.groups:
+        for k, gram in zip(where, products.under(whiten), strict=True):
             start = (0, 2, 3, 5)[k]
-            mapped = whiten(x[:, start : start + width])
+            mapped = whiten(x[:, start : start + products.width])
             assert gram == pytest.approx(mapped.T @ mapped, rel=ROUNDING, abs=ROUNDING)
 
 
@@ -160,7 +160,7 @@ def test_gains_are_those_of_least_squares(space):
 
 def test_run_effects_have_the_likelihood_of_the_dense_covariance(space):
     z = np.column_stack([np.ones(space.n), space.signals.clock / 10.0])
-    ratio, deviance = best_ratio(space.factor, space.r, space.as_deviances, z)
+    ratio, deviance = best_ratio(space.whiten, space.q, space.r, space.as_deviances, z)
 
     def minus_two_log_likelihood(ratio):
         v = dense_covariance(space, 0.0, [RunEffect(z, ratio)], np.ones(space.n))
@@ -175,6 +175,24 @@ def test_run_effects_have_the_likelihood_of_the_dense_covariance(space):
     trials = ratio * np.geomspace(0.1, 10.0, 9)
     # The grid of ratios is a factor of 1.8 wide: the maximum is flat.
     assert deviance > max(none - minus_two_log_likelihood(t) for t in trials) - 0.05
+
+
+def test_scores_beside_further_columns_are_those_with_them_fitted(space):
+    rng = np.random.default_rng(8)
+    known, others = rng.standard_normal((space.n, 2)), rng.standard_normal((space.n, 4))
+    space.line_gains()  # what it keeps for itself must not be kept for the other
+    beside = space.beside(known)
+    pair = np.hstack([known, others[:, :1]])
+    whole = space.gain(pair)[0] - space.gain(known)[0]
+    assert beside.gain(others[:, :1])[0] == pytest.approx(whole, rel=1e-7)
+    singly = [beside.gain(others[:, [k]])[0] for k in range(4)]
+    blocks = Blocks([others[:, [k]] for k in range(4)])
+    assert beside.block_gains(blocks) == pytest.approx(singly, rel=1e-7)
+    # A run effect of the columns themselves finds nothing left of them.
+    space.r = space.r + 100.0 * space.projected(known[:, :1])[0][:, 0]
+    effect = space.beside(known).propose_run_effect("drift_within_run", {}, known[:, :1])
+    assert space.propose_run_effect("drift_within_run", {}, known[:, :1]).deviance > 0.0
+    assert effect.deviance < 10.0
 
 
 @pytest.mark.parametrize("width", [2, 20])
@@ -194,7 +212,7 @@ def test_squares_saved_at_every_ratio_are_those_of_a_ridge(space, width):
         seen.extend(saved)
         return 2.0 * saved
 
-    ratio, deviance = best_ratio(space.factor, left, deviances, z)
+    ratio, deviance = best_ratio(space.whiten, space.q, left, deviances, z)
     moment = own.T @ left
     saved = moment @ np.linalg.solve(np.eye(own.shape[1]) / ratio + beside.T @ own, moment)
     assert min(abs(s / saved - 1.0) for s in seen) < 1e-7

@@ -9,7 +9,7 @@ import os
 import sys
 import traceback
 import warnings
-from collections.abc import Sequence
+from collections.abc import Container, Sequence
 from keyword import iskeyword
 from typing import Protocol
 
@@ -55,8 +55,12 @@ class Command(Protocol):
         """Do the work; the result is the exit status."""
 
 
-def build_parser() -> Parser:
-    """Parser of the whole command line."""
+def build_parser(words: Container[str] = COMMANDS) -> Parser:
+    """Parser of the command line, with the arguments of the commands among ``words``.
+
+    What a command can be asked is known to modules that take long to import (its targets,
+    its methods): of a command that is not called only the name and the line of help are.
+    """
     parser = Parser(
         prog="trueangle",
         description="Fit, diagnose and correct the angle error of encoders and robot joints.",
@@ -72,12 +76,14 @@ def build_parser() -> Parser:
             epilog=f"example:\n  {command.EXAMPLE}",
             formatter_class=argparse.RawDescriptionHelpFormatter,
         )
+        parser.commands[name] = subparser
+        if name not in words:
+            continue
         command.add_arguments(subparser)
         subparser.add_argument(
             "--debug", action="store_true", help="print the traceback of an error too"
         )
         subparser.set_defaults(handler=command.run)
-        parser.commands[name] = subparser
     return parser
 
 
@@ -91,7 +97,8 @@ def main(argv: Sequence[str] | None = None) -> int:
         interrupted; 141 who read standard output has gone, as a shell says it.
     """
     with plain_streams():
-        args = build_parser().parse_args(argv)
+        words = list(sys.argv[1:] if argv is None else argv)
+        args = build_parser(words).parse_args(words)
         before, warnings.showwarning = warnings.showwarning, _print_warning
         try:
             check_paths(args)

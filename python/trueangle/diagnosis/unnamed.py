@@ -105,7 +105,7 @@ class UnnamedPattern(Effect):
         if not known:
             return None
         orders = regression.lines.orders
-        wave = regression.lines.values.view(np.float32)
+        wave = regression.lines.values
         trials: list[tuple[float, dict[str, Any]]] = []
         r = (regression.left - regression.whiten.run_part(regression.left)) * (~regression.outlying)
         for name, (mean, spread) in known.items():

@@ -59,8 +59,8 @@ def best_shape(
     )
     more = np.zeros(len(shapes)) if extra is None else np.asarray(extra)
     penalty = more * regression.log_n + 2.0 * np.asarray(log_grids)
-    for where, width, _, _ in blocks.groups:
-        penalty[where] += width * regression.log_n
+    for where, products in blocks.groups:
+        penalty[where] += products.width * regression.log_n
     k = int(np.argmax(regression.block_gains(blocks) - penalty))
     columns = effect.columns(signals, around, shapes[k])
     parameters = columns.shape[1] + int(more[k])

@@ -6,24 +6,26 @@ everything without pyarrow, through the standard library.
 
 from __future__ import annotations
 
+import functools
 import importlib.util
 import zlib
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from pathlib import Path
-from typing import IO, TypeAlias
+from typing import IO, TYPE_CHECKING, TypeAlias
 
 from .csvheader import LONGEST_LINE, Header
 from .csvrows import BLOCK, QuotedBlock, quoted_blocks, too_long
 from .format import TEXTS, Addition, Batch, Choose, Contents, Watch
 
-if importlib.util.find_spec("pyarrow") is not None:
-    from .csvblocks import PlainBlock, plain_block
-else:
-    plain_block = None  # type: ignore[assignment]
+if TYPE_CHECKING:
+    from .csvblocks import PlainBlock
 
 __all__ = ["columns", "contents", "copy", "line_of", "read"]
 
 _Block: TypeAlias = "QuotedBlock | PlainBlock"
+
+#: Bytes of a file that the standard library reads in less time than pyarrow takes to start.
+SMALL = 1 << 17
 
 
 def columns(path: Path, topic: str | None = None) -> list[str]:
@@ -49,7 +51,9 @@ def read(
     numbers = [name for name in names if name not in texts]
     with path.open("rb") as file:
         header = Header(path, file)
-        for block in _blocks(file, header):
+        # The length of a pipe is told as 0.
+        small = 0 < path.stat().st_size <= SMALL
+        for block in _blocks(file, header, small):
             found: Batch = dict(block.numbers(numbers, labels, strict))
             yield found | {name: block.labels(name) for name in labels}
 
@@ -114,9 +118,20 @@ def _used(channels: Sequence[Addition]) -> list[str]:
     return list(dict.fromkeys(names))
 
 
-def _blocks(file: IO[bytes], header: Header) -> Iterator[_Block]:
-    """The rest of the file in blocks of whole rows."""
+@functools.cache
+def _plain_block() -> Callable[[bytes, Header, int], PlainBlock | None] | None:
+    """What makes blocks of lines without quotes; None where pyarrow is not installed."""
+    if importlib.util.find_spec("pyarrow") is None:
+        return None
+    from .csvblocks import plain_block
+
+    return plain_block
+
+
+def _blocks(file: IO[bytes], header: Header, small: bool = False) -> Iterator[_Block]:
+    """The rest of the file in blocks of whole rows, of a ``small`` one as csv cuts them."""
     line, held = header.line, b""
+    plain_block = None if small else _plain_block()
     while data := held + file.read(BLOCK):
         if plain_block is None or b'"' in data:
             # A quoted cell may hold line breaks: from here on rows are cut by csv.

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .whitening import Whitener
 
-__all__ = ["Blocks", "block_gram"]
+__all__ = ["Blocks", "Products"]
 
 Array = NDArray[np.float64]
 
@@ -25,63 +26,74 @@ class Blocks:
 
     def __init__(self, blocks: Sequence[Array]) -> None:
         self.count = len(blocks)
-        #: For every width: the places of its blocks, their columns, their products.
-        self.groups: list[tuple[NDArray[np.int64], int, Array, Array]] = []
+        #: The places of the blocks of every width, and their columns.
+        self.groups: list[tuple[NDArray[np.int64], Products]] = []
         widths = np.array([block.shape[1] for block in blocks])
         for width in np.unique(widths):
             where = np.flatnonzero(widths == width)
             columns = np.hstack([blocks[int(k)] for k in where])
-            self.groups.append((where, int(width), columns, block_gram(columns, int(width))))
+            self.groups.append((where, Products(columns, int(width))))
+
+
+class Products:
+    r"""Products of the columns within blocks of one width, under any noise.
+
+    With X a block and M the map that makes the noise white, :math:`X^T M^T M X`. Correlated
+    noise asks for the products of neighbouring readings as well: these are kept, so that
+    another correlation costs no pass over the readings.
+
+    Parameters
+    ----------
+    columns : ndarray, shape (n, blocks * width)
+    width : int
+    """
+
+    def __init__(self, columns: NDArray[Any], width: int) -> None:
+        self.columns = columns
+        self.width = width
+        self._plain: Array | None = None
         self._weights: Array | None = None
-        self._lagged: list[tuple[Array, Array, Array]] = []
+        self._lagged: tuple[Array, Array, Array] | None = None
 
-    def grams(self, whiten: Whitener) -> list[Array]:
-        """Products of the columns within each block under a noise, group by group.
-
-        Correlated noise asks for the products of neighbours as well, which are kept.
-        """
+    def under(self, whiten: Whitener) -> Array:
+        """Products within each block, shape (blocks, width, width)."""
         if whiten.is_identity:
-            return [gram for *_, gram in self.groups]
-        if whiten.weights is not self._weights or not self._lagged:
-            self._weights = whiten.weights
-            self._lagged = [_lagged(columns, width, whiten) for _, width, columns, _ in self.groups]
-        rho = whiten.rho
-        found = [same + rho**2 * inner - rho * cross for same, inner, cross in self._lagged]
+            if self._plain is None:
+                self._plain = _gram(self.columns, self.width)
+            return self._plain
+        if self._lagged is None or self._weights is not whiten.weights:
+            self._weights, self._lagged = whiten.weights, self._neighbours(whiten)
+        same, inner, cross = self._lagged
+        found = same + whiten.rho**2 * inner - whiten.rho * cross
         if whiten.effects:
             w, c = whiten.taken()
-            for (_, width, columns, _), gram in zip(self.groups, found, strict=True):
-                for (start, stop), share in zip(whiten.bounds, c, strict=True):
-                    part = np.sqrt(share)[:, None] * (w[start:stop].T @ columns[start:stop])
-                    gram -= block_gram(part, width)
+            w = w.astype(self.columns.dtype, copy=False)
+            for (start, stop), share in zip(whiten.bounds, c, strict=True):
+                part = w[start:stop].T @ self.columns[start:stop]
+                found -= _gram(np.sqrt(share)[:, None] * part, self.width)
         return found
 
+    def _neighbours(self, whiten: Whitener) -> tuple[Array, Array, Array]:
+        """Products at one reading, at those that end no run, and with the reading before."""
+        columns, width = self.columns, self.width
+        if whiten.root_weights is not None:
+            columns = columns * whiten.root_weights.astype(columns.dtype)[:, None]
+        same = _gram(columns, width)
+        inner, cross = same.copy(), np.zeros_like(same)
+        for start, stop in whiten.bounds:
+            inner -= _gram(columns[[start, stop - 1]], width)
+            cross += _gram(columns[start : stop - 1], width, columns[start + 1 : stop])
+        return same, inner, cross + np.swapaxes(cross, 1, 2)
 
-def _lagged(columns: Array, width: int, whiten: Whitener) -> tuple[Array, Array, Array]:
-    """Products at one reading, of those that are no ends of runs, and with the one before."""
-    if whiten.root_weights is not None:
-        columns = columns * whiten.root_weights[:, None]
-    same = block_gram(columns, width)
-    inner, cross = same.copy(), np.zeros_like(same)
-    for start, stop in whiten.bounds:
-        inner -= block_gram(columns[[start, stop - 1]], width)
-        cross += block_gram(columns[start : stop - 1], width, columns[start + 1 : stop])
-    return same, inner, cross + np.swapaxes(cross, 1, 2)
 
-
-def block_gram(columns: Array, width: int, others: Array | None = None) -> Array:
-    """Products of the columns within each block, shape (blocks, width, width).
-
-    With ``others``, those of the columns with others of the same shape.
-    """
+def _gram(columns: NDArray[Any], width: int, others: NDArray[Any] | None = None) -> Array:
+    """Products of columns, or of them with others, within each block."""
     cut = columns.reshape(len(columns), -1, width)
     gram = np.empty((cut.shape[1], width, width))
-    if others is not None:
-        beside = others.reshape(len(columns), -1, width)
-        for i in range(width):
-            for j in range(width):
-                gram[:, i, j] = np.einsum("nb,nb->b", cut[:, :, i], beside[:, :, j])
-        return gram
+    beside = cut if others is None else others.reshape(len(columns), -1, width)
     for i in range(width):
-        for j in range(i, width):
-            gram[:, i, j] = gram[:, j, i] = np.einsum("nb,nb->b", cut[:, :, i], cut[:, :, j])
+        for j in range(0 if others is not None else i, width):
+            gram[:, i, j] = np.einsum("nb,nb->b", cut[:, :, i], beside[:, :, j])
+            if others is None:
+                gram[:, j, i] = gram[:, i, j]
     return gram

@@ -156,13 +156,20 @@ class LeastSquares:
         factor = Factor.of(blocks, self.bounds, rho, effects, self.weights, self._factors)
         # White and correlated noise take turns: the last two are kept.
         self._factors = (factor, *(f for f in self._factors if f.whiten is not factor.whiten))[:2]
-        self.factor, self.whiten = factor, factor.whiten
-        self.q, self.back = factor.q, factor.back
+        self.whiten, self.q, self.back = factor.whiten, factor.q, factor.back
         y = self.whiten(target)
         inner = self.q.T @ y
         self.r = y - self.q @ inner
         self.rss = max(float(self.r @ self.r), 1e-300)
         self.coefficients = self.back @ inner
+        self._seen: tuple[Array, Array] | None = None
+
+    @property
+    def seen(self) -> tuple[Array, Array]:
+        """The fitted columns and the residual as columns that are not whitened see them."""
+        if self._seen is None:
+            self._seen = self.whiten.transposed(self.q), self.whiten.transposed(self.r)
+        return self._seen
 
     @property
     def unscaled_covariance(self) -> Array:
@@ -174,8 +181,9 @@ class LeastSquares:
     ) -> RunEffect:
         others = [effect for j, effect in enumerate(effects) if j != k]
         self._project(target, rho, others)
-        ratio, _ = best_ratio(self.factor, self.r, self.as_deviances, effects[k].columns)
-        return RunEffect(effects[k].columns, max(ratio, 1e-9))
+        columns = effects[k].columns
+        ratio, _ = best_ratio(self.whiten, self.q, self.r, self.as_deviances, columns)
+        return RunEffect(columns, max(ratio, 1e-9))
 
     def _pattern(self) -> Pattern:
         """The believed pattern with the missing orders found so far.

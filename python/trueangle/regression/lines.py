@@ -8,10 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..joint.joint import Joint
+from .batch import Products
 
 __all__ = ["LineBasis", "plausible_orders"]
-
-Array = NDArray[np.float64]
 
 #: Orders searched at least, and at most: bounds memory and the penalty of the search.
 LEAST_ORDERS, MOST_ORDERS = 128, 1024
@@ -24,7 +23,7 @@ LOW_ORDERS = 24
 
 
 class LineBasis:
-    """``exp(i m theta)`` for every order m searched, in single precision.
+    """Cosine and sine of ``m theta`` for every order m searched, in single precision.
 
     Whole output orders up to four turns of the fastest shaft and a bit, and the lowest
     multiples of every shaft.
@@ -37,7 +36,7 @@ class LineBasis:
     """
 
     def __init__(
-        self, theta: NDArray[np.float64], joint: Joint, values: NDArray[np.complex64] | None = None
+        self, theta: NDArray[np.float64], joint: Joint, values: NDArray[np.float32] | None = None
     ) -> None:
         self.theta = theta
         self.joint = joint
@@ -55,11 +54,11 @@ class LineBasis:
         expected = plausible_orders(joint)
         self.plausible = np.array([any(abs(m - p) < 1e-9 for p in expected) for m in self.orders])
         self._values = values
-        self._products: tuple[Array, Array, Array] | None = None
+        self._products: Products | None = None
 
     @property
-    def values(self) -> NDArray[np.complex64]:
-        """The basis, shape (n, k); computed at first use by repeated rotation."""
+    def values(self) -> NDArray[np.float32]:
+        """Cosine and sine of every order side by side, shape (n, 2 k); made at first use."""
         if self._values is None:
             step = np.exp(1j * self.theta)
             out = np.empty((self.theta.size, self.orders.size), dtype=np.complex64)
@@ -69,21 +68,15 @@ class LineBasis:
                 out[:, k] = turn
             for k in range(self._whole, self.orders.size):
                 out[:, k] = np.exp(1j * self.orders[k] * self.theta)
-            self._values = out
+            self._values = out.view(np.float32)
         return self._values
 
-    def products(self, whitened: NDArray[np.complex64] | None = None) -> tuple[Array, Array, Array]:
-        """Sums of cos^2, sin^2 and cos sin of every order, of the basis or of it whitened."""
-        if whitened is None and self._products is not None:
-            return self._products
-        e = self.values if whitened is None else whitened
-        parts = e.view(np.float32)
-        squares = np.einsum("ij,ij->j", parts, parts).astype(np.float64)
-        mixed = np.einsum("ij,ij->j", e.real, e.imag).astype(np.float64)
-        found = squares[0::2], squares[1::2], mixed
-        if whitened is None:
-            self._products = found
-        return found
+    @property
+    def products(self) -> Products:
+        """Sums of cos^2, sin^2 and cos sin of every order under any noise."""
+        if self._products is None:
+            self._products = Products(self.values, 2)
+        return self._products
 
     def take(self, rows: NDArray[np.bool_]) -> LineBasis:
         """The basis of some of the readings."""

@@ -7,8 +7,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from .factor import Factor
-from .whitening import principal
+from .whitening import Whitener, principal
 
 __all__ = ["best_ratio"]
 
@@ -27,7 +26,11 @@ FEW_COLUMNS = 40
 
 
 def best_ratio(
-    factor: Factor, left: Array, deviances: Callable[[Array], Array], columns: Array
+    whiten: Whitener,
+    q: Array,
+    left: Array,
+    deviances: Callable[[Array], Array],
+    columns: Array,
 ) -> tuple[float, float]:
     r"""Best ratio of variances of a run effect beside what is fitted, and what it saves.
 
@@ -40,8 +43,9 @@ def best_ratio(
 
     Parameters
     ----------
-    factor : Factor
-        What is fitted.
+    whiten : Whitener
+    q : ndarray, shape (n, p)
+        What is fitted, whitened and orthonormal.
     left : ndarray, shape (n,)
         What it leaves of the whitened readings.
     deviances : callable
@@ -54,9 +58,9 @@ def best_ratio(
     float, float
         The ratio, 0 where none saves anything, and the deviance saved.
     """
-    bounds = factor.whiten.bounds
-    values, turned = principal(factor.whiten(columns), bounds)
-    stacked = np.column_stack([factor.q, left])
+    bounds = whiten.bounds
+    values, turned = principal(whiten(columns), bounds)
+    stacked = np.column_stack([q, left])
     moment = np.array([turned[a:b].T @ stacked[a:b] for a, b in bounds])
     kept = values > COUNTS * values.max(initial=1e-300)
     power = values[kept]

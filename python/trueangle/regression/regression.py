@@ -51,15 +51,23 @@ class Regression(LeastSquares):
         other.q = np.hstack([self.q, u])
         other.r = self.r - u @ (u.T @ self.r)
         other.rss = max(float(other.r @ other.r), 1e-300)
+        other._seen = None
         return other
+
+    def _beside(self, columns: Array) -> tuple[Array, Array, Array, Array]:
+        """Whitened columns, their powers before and after projection, their known shares."""
+        x = self.whiten(columns)
+        before = np.einsum("ij,ij->j", x, x)
+        known = self.q.T @ x
+        return x, before, before - np.einsum("ij,ij->j", known, known), known
 
     def gain(self, columns: Array) -> tuple[float, Array]:
         """Deviance that ``columns`` save together, and their coefficients."""
-        x, excited = self.projected(columns)
+        x, before, after, known = self._beside(columns)
         coefficients = np.zeros(columns.shape[1])
-        if not excited.all():
+        if not (after > EXCITED * np.maximum(before, 1e-300)).all():
             return 0.0, coefficients
-        gram = x.T @ x
+        gram = x.T @ x - known.T @ known
         scale = np.sqrt(np.diag(gram))
         values, vectors = np.linalg.eigh(gram / np.outer(scale, scale))
         if values[0] < EXCITED * values[-1]:
@@ -76,18 +84,18 @@ class Regression(LeastSquares):
 
     def gains(self, columns: Array) -> Array:
         """Deviance that each column saves alone."""
-        x, excited = self.projected(columns)
-        power = np.einsum("ij,ij->j", x, x)
-        saved = (x.T @ self.r) ** 2 / np.maximum(power, 1e-300)
-        return np.where(excited, self.as_deviances(saved), 0.0)
+        x, before, after, _ = self._beside(columns)
+        excited = after > EXCITED * np.maximum(before, 1e-300)
+        saved = (x.T @ self.r) ** 2 / np.where(excited, after, 1.0)
+        return np.where(excited, self.as_deviances(np.where(excited, saved, 0.0)), 0.0)
 
     def block_gains(self, blocks: Blocks) -> Array:
         """Deviance that each block of columns saves alone, as `gain` of each."""
         found = np.zeros(blocks.count)
-        q, r = self.whiten.transposed(self.q), self.whiten.transposed(self.r)
-        for (where, width, columns, _), before in zip(
-            blocks.groups, blocks.grams(self.whiten), strict=True
-        ):
+        q, r = self.seen
+        for where, products in blocks.groups:
+            columns, width = products.columns, products.width
+            before = products.under(self.whiten)
             known = (q.T @ columns).reshape(q.shape[1], -1, width)
             moment = (r @ columns).reshape(-1, width)
             after = before - np.einsum("kbi,kbj->bij", known, known)
@@ -116,18 +124,19 @@ class Regression(LeastSquares):
 
     def fixed_gains(self, columns: Array) -> Array:
         """Deviance that each column saves with the coefficient 1."""
-        x, excited = self.projected(columns)
-        saved = 2.0 * (x.T @ self.r) - np.einsum("ij,ij->j", x, x)
+        x, before, after, _ = self._beside(columns)
+        excited = after > EXCITED * np.maximum(before, 1e-300)
+        saved = 2.0 * (x.T @ self.r) - after
         return np.where(excited, self.as_deviances(saved), 0.0)
 
     def line_gains(self) -> Array:
         """Deviance that a line of each order of `lines` saves (two coefficients)."""
-        whitened = None if self.whiten.is_identity else self.whiten(self.lines.values)
-        cosines, sines, mixed = self.lines.products(whitened)
-        # Cosines and sines side by side, real.
-        e = (self.lines.values if whitened is None else whitened).view(np.float32)
-        known = (self.q.astype(np.float32).T @ e).astype(np.float64)
-        moment = (self.r.astype(np.float32) @ e).astype(np.float64)
+        before = self.lines.products.under(self.whiten)
+        cosines, sines, mixed = before[:, 0, 0], before[:, 1, 1], before[:, 0, 1]
+        # Cosines and sines side by side.
+        q, r = (columns.astype(np.float32) for columns in self.seen)
+        known = (q.T @ self.lines.values).astype(np.float64)
+        moment = (r @ self.lines.values).astype(np.float64)
         aa = cosines - (known[:, 0::2] ** 2).sum(axis=0)
         bb = sines - (known[:, 1::2] ** 2).sum(axis=0)
         ab = mixed - (known[:, 0::2] * known[:, 1::2]).sum(axis=0)
@@ -172,7 +181,7 @@ class Regression(LeastSquares):
         self, cause: str, shape: dict[str, Any], columns: Array, log_grid: float = 0.0
     ) -> Extension:
         """Extension of a run effect with its evidence in this regression."""
-        ratio, deviance = best_ratio(self.factor, self.r, self.as_deviances, columns)
+        ratio, deviance = best_ratio(self.whiten, self.q, self.r, self.as_deviances, columns)
         return Extension(
             cause,
             shape,

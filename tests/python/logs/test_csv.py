@@ -11,15 +11,16 @@ from trueangle.formats import csvfile as csvlog
 
 from .conftest import made_angles
 
-WAYS = ["standard library"] + (["pyarrow"] if csvlog.plain_block else [])
+WAYS = ["standard library"] + (["pyarrow"] if csvlog._plain_block() else [])
 
 
 @pytest.fixture(params=WAYS)
 def way(request, monkeypatch):
     if request.param == "standard library":
-        monkeypatch.setattr(csvlog, "plain_block", None)
+        monkeypatch.setattr(csvlog, "_plain_block", lambda: None)
     # Small blocks put borders everywhere, also inside lines.
     monkeypatch.setattr(csvlog, "BLOCK", 701)
+    monkeypatch.setattr(csvlog, "SMALL", 0)
     monkeypatch.setattr("trueangle.formats.csvrows.BLOCK", 701)
     return request.param
 

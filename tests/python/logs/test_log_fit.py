@@ -127,7 +127,8 @@ def test_a_damaged_log_ends_the_fit(folder, monkeypatch, threads):
 @pytest.mark.parametrize("arrow", [True, False])
 def test_csv_with_runs_equals_parquet(tmp_path, monkeypatch, arrow):
     if not arrow:
-        monkeypatch.setattr("trueangle.formats.csvfile.plain_block", None)
+        monkeypatch.setattr("trueangle.formats.csvfile._plain_block", lambda: None)
+    monkeypatch.setattr("trueangle.formats.csvfile.SMALL", 0)
     monkeypatch.setattr("trueangle.formats.csvrows.BLOCK", 1 << 16)
     monkeypatch.setattr("trueangle.formats.csvfile.BLOCK", 1 << 16)
     reference, indicated = readings(9000, 1, 0.0)

@@ -211,9 +211,24 @@ def _boxcar(x: Array, width: int) -> Array:
     if width <= 1:
         return x
     total = np.concatenate([[0.0], np.cumsum(x)])
-    k = np.arange(x.size)
-    low, high = np.maximum(k - width // 2, 0), np.minimum(k + width - width // 2, x.size)
-    return np.asarray((total[high] - total[low]) / (high - low))
+    before, after = width // 2, width - width // 2
+    out = np.empty_like(x)
+    inner = slice(before, max(x.size - after + 1, before))
+    out[inner] = (total[width:] - total[:-width]) / width
+    for k in (*range(min(before, x.size)), *range(max(x.size - after + 1, before), x.size)):
+        low, high = max(k - before, 0), min(k + after, x.size)
+        out[k] = (total[high] - total[low]) / (high - low)
+    return out
+
+
+def _medians(values: Array, cuts: NDArray[np.int64]) -> Array:
+    """Medians of the stretches between cuts."""
+    sizes = np.diff(cuts)
+    place = cuts[:-1, None] + np.arange(sizes.max(initial=1))
+    inside = place < cuts[1:, None]
+    rows = np.sort(np.where(inside, values[np.minimum(place, values.size - 1)], np.inf), axis=1)
+    k = np.arange(sizes.size)
+    return np.asarray(0.5 * (rows[k, (sizes - 1) // 2] + rows[k, sizes // 2]))
 
 
 def _level(power: Array, over: float) -> tuple[Array, Array]:
@@ -227,9 +242,7 @@ def _level(power: Array, over: float) -> tuple[Array, Array]:
         edges.append(edges[-1] + min(width, max(edges[-1] * 0.5, 4.0 * over)))
     cuts = np.unique(np.minimum(np.array(edges), power.size).astype(np.int64))
     middle = 0.5 * (cuts[:-1] + cuts[1:] - 1)
-    level = np.array(
-        [np.median(power[a:b]) / np.log(2.0) for a, b in itertools.pairwise(cuts.tolist())]
-    )
+    level = _medians(power, cuts) / np.log(2.0)
     log_level = np.log(np.maximum(level, 1e-12 * max(float(level.max()), 1e-300)))
     # Short blocks at the low end are uncertain: neighbours share what they know.
     if log_level.size >= 3:
