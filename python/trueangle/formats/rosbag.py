@@ -2,22 +2,25 @@
 
 from __future__ import annotations
 
+import struct
 import zlib
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections import defaultdict
+from collections.abc import Collection, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import replace
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from rosbags.rosbag1 import Reader as Reader1
-from rosbags.rosbag2 import Reader as Reader2
 from rosbags.typesys import Stores, get_typestore
 
 from ..errors import FileError
 from .damage import damage_told
 from .format import TEXTS, Addition, Batch, Choose, Contents, Watch, note
+from .jointstates import Block
+from .mcapchunks import BagReader
 from .rosbagwriter import opened_writer
 
 __all__ = ["columns", "contents", "copy", "read"]
@@ -29,6 +32,7 @@ _FIELDS = {"velocity_rad_s": "velocity", "torque_Nm": "effort"}
 _TIME = "time_s"
 #: Messages corrected together.
 _BLOCK = 4096
+_TIMES = struct.Struct("<q")
 
 
 def columns(path: Path, topic: str | None = None) -> list[str]:
@@ -49,14 +53,10 @@ def read(
     """Positions and signals in batches; see `format.FormatModule`."""
     with _opened(path) as bag:
         connections = bag.topic(topic)
-        block: list[Any] = []
-        for _connection, _stamp, data in bag.reader.messages(connections):
-            block.append(bag.decoded(data))
-            if len(block) == _BLOCK:
-                yield {name: _values(block, name) for name in names}
-                block = []
-        if block:
-            yield {name: _values(block, name) for name in names}
+        joints = bag.joints(connections)
+        for block in _blocks(bag.reader.messages(connections)):
+            states = Block([data for _connection, _stamp, data in block], bag.is_ros1)
+            yield {name: _values(states, name, joints) for name in names}
 
 
 def copy(
@@ -83,6 +83,7 @@ def copy(
                 source, f"topic {output} is there already: corrected before, or --output-topic"
             )
         total = max(bag.reader.message_count, 1)
+        joints = bag.joints(connections)
         digest = _Digest()
         done = 0
         with opened_writer(bag, target, note(channels)) as writer:
@@ -91,15 +92,16 @@ def copy(
                 c.id: copies[c.id] if output == name else writer.add(c, output) for c in connections
             }
             for block in _blocks(bag.reader.messages()):
-                states = [(i, bag.decoded(m[2])) for i, m in enumerate(block) if m[0].id in outputs]
-                made = dict(_corrected(states, channels))
+                places = [i for i, message in enumerate(block) if message[0].id in outputs]
+                states = Block([block[i][2] for i in places], bag.is_ros1)
+                made = dict(zip(places, _corrected(states, channels, joints), strict=True))
                 for i, (connection, time, data) in enumerate(block):
                     replaced = i in made and output == name
                     if not replaced:
                         writer.write(copies[connection.id], time, data)
                         digest.update(connection.topic, time, data)
                     if i in made:
-                        data = bag.encoded(made[i])
+                        data = made[i]
                         writer.write(outputs[connection.id], time, data)
                         digest.update(output, time, data)
                 done += len(block)
@@ -117,7 +119,7 @@ def contents(path: Path, topic: str | None = None) -> Contents:
 
 
 class Bag:
-    """An open bag and how its joint states are decoded.
+    """An open bag and where its joint states are.
 
     Only the JointState type is needed: its wire format is the same in all releases of ROS 1
     and in all of ROS 2, and other types are copied as they are.
@@ -145,26 +147,17 @@ class Bag:
             raise FileError(self.path, f"{problem}: name one with --topic; there are {listed}")
         return [c for c in states if c.topic == name]
 
+    def joints(self, connections: Sequence[Any]) -> list[str]:
+        """Joints of the first messages."""
+        messages = islice(self.reader.messages(connections), _BLOCK)
+        block = Block([data for _connection, _time, data in messages], self.is_ros1)
+        return block.joints
+
     def columns(self, connections: Sequence[Any]) -> list[str]:
         """Joints of the first messages, with their signals."""
-        joints: dict[str, None] = {}
-        for i, (_connection, _time, data) in enumerate(self.reader.messages(connections)):
-            joints |= dict.fromkeys(self.decoded(data).name)
-            if i == _BLOCK:
-                break
+        joints = self.joints(connections)
         fields = (f"{joint}/{field}" for joint in joints for field in _FIELDS)
         return [*joints, *fields, *([] if _TIME in joints else [_TIME])]
-
-    def decoded(self, data: bytes) -> Any:
-        """A JointState message."""
-        if self.is_ros1:
-            return self.types.deserialize_ros1(data, _JOINT_STATE)
-        return self.types.deserialize_cdr(data, _JOINT_STATE)
-
-    def encoded(self, message: Any) -> bytes:
-        """The bytes of a JointState message."""
-        serialize = self.types.serialize_ros1 if self.is_ros1 else self.types.serialize_cdr
-        return bytes(serialize(message, _JOINT_STATE))
 
 
 @contextmanager
@@ -172,7 +165,7 @@ def _opened(path: Path) -> Iterator[Bag]:
     """The bag, its errors told with its name."""
     with (
         damage_told(path, "a bag"),
-        Reader1(path) if path.suffix == ".bag" else Reader2(path) as bag,
+        Reader1(path) if path.suffix == ".bag" else BagReader(path) as bag,
     ):
         yield Bag(path, bag)
 
@@ -182,13 +175,23 @@ class _Digest:
 
     def __init__(self) -> None:
         self._sums: dict[str, tuple[int, int]] = {}
+        self._waiting: defaultdict[str, list[bytes]] = defaultdict(list)
 
     def update(self, topic: str, time: int, data: bytes) -> None:
+        waiting = self._waiting[topic]
+        waiting += (_TIMES.pack(time), data)
+        if len(waiting) >= 2 * _BLOCK:
+            self._sum(topic)
+
+    def _sum(self, topic: str) -> None:
+        """Add up what waits: one call for many messages."""
+        waiting = self._waiting.pop(topic)
         count, check = self._sums.get(topic, (0, 0))
-        check = zlib.crc32(data, zlib.crc32(time.to_bytes(8, "little", signed=True), check))
-        self._sums[topic] = (count + 1, check)
+        self._sums[topic] = (count + len(waiting) // 2, zlib.crc32(b"".join(waiting), check))
 
     def contents(self) -> Contents:
+        for topic in list(self._waiting):
+            self._sum(topic)
         return Contents(
             sum(count for count, _check in self._sums.values()),
             {topic: f"{count}:{check:08x}" for topic, (count, check) in self._sums.items()},
@@ -206,41 +209,23 @@ def _blocks(messages: Iterator[Any]) -> Iterator[list[Any]]:
         yield block
 
 
-def _values(messages: Sequence[Any], name: str) -> NDArray[np.float64]:
+def _values(states: Block, name: str, joints: Collection[str]) -> NDArray[np.float64]:
     """A joint's positions, or its velocity or effort; NaN in messages without it."""
-    if name == _TIME and not any(_TIME in message.name for message in messages[:1]):
-        stamps = (message.header.stamp for message in messages)
-        return np.array([stamp.sec + 1e-9 * stamp.nanosec for stamp in stamps])
+    if name == _TIME and _TIME not in joints:
+        return states.times()
     joint, slash, field = name.rpartition("/")
-    if not slash or field not in _FIELDS:
-        joint, attribute = name, "position"
-    else:
-        attribute = _FIELDS[field]
-    values = np.full(len(messages), np.nan)
-    for i, message in enumerate(messages):
-        given = getattr(message, attribute)
-        if joint in message.name and len(given) == len(message.name):
-            values[i] = given[message.name.index(joint)]
-    return values
+    if slash and field in _FIELDS:
+        return states.values(joint, _FIELDS[field])
+    return states.values(name, "position")
 
 
-def _corrected(
-    states: Sequence[tuple[int, Any]], channels: Sequence[Addition]
-) -> Iterator[tuple[int, Any]]:
+def _corrected(states: Block, channels: Sequence[Addition], joints: Collection[str]) -> list[bytes]:
     """The messages with the positions of the joints replaced by corrected ones."""
-    messages = [message for _place, message in states]
-    if not messages:
-        return
-    results: list[Mapping[str, Any]] = []
+    if not len(states):
+        return []
+    positions = {}
     for channel in channels:
-        signals = {s: _values(messages, column) for s, column in channel.signals.items()}
-        joint = channel.column
-        results.append(
-            {"joint": joint, "values": channel.correct(_values(messages, joint), signals)}
-        )
-    for i, (place, message) in enumerate(states):
-        position = np.array(message.position)
-        for result in results:
-            if result["joint"] in message.name and len(position) == len(message.name):
-                position[message.name.index(result["joint"])] = result["values"][i]
-        yield place, replace(message, position=position)
+        signals = {s: _values(states, column, joints) for s, column in channel.signals.items()}
+        indicated = _values(states, channel.column, joints)
+        positions[channel.column] = channel.correct(indicated, signals)
+    return states.with_positions(positions)

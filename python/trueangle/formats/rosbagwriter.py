@@ -11,10 +11,12 @@ from typing import TYPE_CHECKING, Any
 from rosbags.interfaces import MessageDefinitionFormat
 from rosbags.rosbag1 import Writer as Writer1
 from rosbags.rosbag1.reader import decompressors
-from rosbags.rosbag2 import StoragePlugin, Writer
+from rosbags.rosbag2 import StoragePlugin
 from rosbags.rosbag2.enums import CompressionFormat, CompressionMode
 
 from ..errors import FileError
+from .mcapchunks import BagWriter as Writer
+from .mcapchunks import ChunkReader
 
 if TYPE_CHECKING:
     from .rosbag import Bag
@@ -31,7 +33,7 @@ class BagWriter:
         self._bag = bag
         self._writer = writer
         self._note = note
-        self.write = writer.write
+        self.write = getattr(writer, "write_message", writer.write)
 
     def add(self, connection: Any, topic: str) -> Any:
         """A connection like one that was read, perhaps of another topic.
@@ -83,7 +85,7 @@ def opened_writer(bag: Bag, target: Path, note: str) -> Iterator[BagWriter]:
     folder = target.with_name(f"{target.name}.bag") if single else target
     storage = bag.reader.storage
     parts = [storage] if single else storage.storages
-    mcap = type(parts[0]).__name__ == "McapReader" if parts else False
+    mcap = bool(parts) and isinstance(parts[0], ChunkReader)
     writer = Writer(
         folder, version=9, storage_plugin=StoragePlugin.MCAP if mcap else StoragePlugin.SQLITE3
     )

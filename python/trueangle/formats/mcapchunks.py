@@ -1,0 +1,194 @@
+"""Chunks of MCAP files, read and written with one step of Python a message.
+
+rosbags reads and writes them field by field, which takes ten times as long; files and their
+index, which are small, stay with it. Format: https://mcap.dev/spec (version 0).
+"""
+
+from __future__ import annotations
+
+import struct
+from collections import defaultdict
+from collections.abc import Callable, Collection, Iterator
+from io import BytesIO
+from itertools import chain, pairwise
+from operator import itemgetter
+from typing import Any, ClassVar, cast
+
+from rosbags.rosbag2 import CompressionMode, Reader, StoragePlugin, Writer
+from rosbags.rosbag2.reader import DirectoryReader
+from rosbags.rosbag2.storage_mcap import McapReader, McapWriter, PendingChunk, decompress
+
+__all__ = ["BagReader", "BagWriter", "ChunkReader", "ChunkWriter"]
+
+_MESSAGE, _CHUNK, _MESSAGE_INDEX = 0x05, 0x06, 0x07
+#: Start of a chunk without messages.
+_NEVER = (1 << 63) - 1
+#: Record: kind and length; of a message also channel, number, times of logging and publishing.
+_RECORD = struct.Struct("<BQ")
+_HEAD = struct.Struct("<BQHIQQ")
+#: What of these the length of a message counts.
+_COUNTED = _HEAD.size - _RECORD.size
+#: Of a chunk: kind and length; times, size and checksum of what is compressed in it.
+_CHUNK_HEAD = struct.Struct("<BQQQQI")
+#: Bytes from which on a chunk is closed, as rosbags has it.
+_FULL = 1 << 20
+
+_by_time = itemgetter(1)
+
+
+class ChunkReader(McapReader):  # type: ignore[misc]
+    """The MCAP storage of rosbags, with whole chunks of messages taken apart at once."""
+
+    def messages(
+        self, connections: Collection[Any], start: int | None = None, stop: int | None = None
+    ) -> Iterator[tuple[Any, int, bytes]]:
+        """Connection, time and data of every message, in the order of time.
+
+        Raises
+        ------
+        ValueError
+            A chunk whose records do not fill it.
+        """
+        if start is not None or stop is not None or not self._is_in_order():
+            yield from super().messages(connections, start, stop)
+            return
+        wanted = {connection.id: connection for connection in connections}
+        for chunk in self.chunks:
+            if not any(chunk.channel_count.get(number) for number in wanted):
+                continue
+            self.bio.seek(chunk.chunk_start_offset)
+            *_times, size, check = _CHUNK_HEAD.unpack(self.bio.read(_CHUNK_HEAD.size))
+            self.bio.seek(4 + len(chunk.compression) + 8, 1)
+            packed = self.bio.read(chunk.compressed_size)
+            data = decompress(packed, chunk.compression, size, check)
+            yield from sorted(_messages(data, wanted), key=_by_time)
+
+    def _is_in_order(self) -> bool:
+        """Every chunk ends before the next one starts (there are files without any)."""
+        chunks = self.chunks
+        return bool(chunks) and all(
+            a.message_end_time <= b.message_start_time for a, b in pairwise(chunks)
+        )
+
+
+def _messages(data: bytes, wanted: dict[int, Any]) -> Iterator[tuple[Any, int, bytes]]:
+    """Messages of wanted channels as they stand in a chunk."""
+    place, end = 0, len(data)
+    head_of, record_of = _HEAD.unpack_from, _RECORD.unpack_from
+    last_head = end - _HEAD.size
+    while place < end:
+        if place <= last_head and data[place] == _MESSAGE:
+            _kind, length, channel, _number, time, _published = head_of(data, place)
+            after = place + _RECORD.size + length
+            if length < _COUNTED or after > end:
+                raise ValueError("a message reaches beyond its chunk")
+            if channel in wanted:
+                yield wanted[channel], time, data[place + _HEAD.size : after]
+        else:
+            if place + _RECORD.size > end:
+                raise ValueError("a record reaches beyond its chunk")
+            after = place + _RECORD.size + record_of(data, place)[1]
+            if after > end or data[place] == _MESSAGE:
+                raise ValueError("a record reaches beyond its chunk")
+        place = after
+
+
+class _Directory(DirectoryReader):  # type: ignore[misc]
+    STORAGE_PLUGINS: ClassVar[Any] = {**DirectoryReader.STORAGE_PLUGINS, "mcap": ChunkReader}
+
+
+class BagReader(Reader):  # type: ignore[misc]
+    """The reader of rosbags for bags of ROS 2, with `ChunkReader`."""
+
+    STORAGE_PLUGINS: ClassVar[Any] = {
+        **Reader.STORAGE_PLUGINS,
+        "dir": _Directory,
+        ".mcap": ChunkReader,
+    }
+
+
+class ChunkWriter(McapWriter):  # type: ignore[misc]
+    """The MCAP storage of rosbags, with messages written in one step."""
+
+    chunk: Any
+    message_start_time: int
+    message_end_time: int
+
+    def write(self, connection: Any, timestamp: int, data: bytes | memoryview) -> None:
+        """Write one message."""
+        chunk, number = self.chunk, connection.id
+        if timestamp < chunk.message_start_time:
+            chunk.message_start_time = timestamp
+        if timestamp > chunk.message_end_time:
+            chunk.message_end_time = timestamp
+        place = chunk.bio.tell()
+        chunk.msgs[number].append((timestamp, place))
+        size = len(data)
+        head = _HEAD.pack(_MESSAGE, _COUNTED + size, number, 0, timestamp, timestamp)
+        chunk.bio.write(head)
+        chunk.bio.write(data)
+        if place + size > _FULL:
+            self.close_chunk()
+
+    def close_chunk(self) -> None:
+        """Write the messages that wait, and where they stand."""
+        chunk = self.chunk
+        if not chunk.bio.tell():
+            return
+        self.message_start_time = min(self.message_start_time, chunk.message_start_time)
+        self.message_end_time = max(self.message_end_time, chunk.message_end_time)
+        data = chunk.bio.getvalue()
+        packed = self.compressor(data)
+        span = chunk.message_start_time, chunk.message_end_time
+        body = (
+            struct.pack("<QQQI", *span, len(data), 0),
+            _text(self.compression),
+            struct.pack("<Q", len(packed)),
+        )
+        start = self.bio.tell()
+        self.bio.write(_RECORD.pack(_CHUNK, sum(map(len, body)) + len(packed)))
+        self.bio.writelines([*body, packed])
+        end = self.bio.tell()
+        places = []
+        for number, entries in chunk.msgs.items():
+            self.channel_stats[number] += len(entries)
+            places.append(struct.pack("<HQ", number, self.bio.tell()))
+            index = struct.pack(f"<{2 * len(entries)}Q", *chain.from_iterable(entries))
+            self.bio.write(_RECORD.pack(_MESSAGE_INDEX, 6 + len(index)))
+            self.bio.write(struct.pack("<HI", number, len(index)) + index)
+        told = BytesIO()
+        told.write(struct.pack("<QQQQI", *span, start, end - start, 10 * len(places)))
+        told.write(b"".join(places) + struct.pack("<Q", self.bio.tell() - end))
+        told.write(_text(self.compression) + struct.pack("<QQ", len(packed), len(data)))
+        self.chunks.append(told)
+        self.chunk = PendingChunk(_NEVER, 0, BytesIO(), defaultdict(list))
+
+
+def _text(text: str) -> bytes:
+    return struct.pack("<I", len(text)) + text.encode()
+
+
+class BagWriter(Writer):  # type: ignore[misc]
+    """The writer of rosbags for bags of ROS 2, with `ChunkWriter`."""
+
+    STORAGE_PLUGINS: ClassVar[Any] = {
+        **Writer.STORAGE_PLUGINS,
+        StoragePlugin.MCAP: ChunkWriter,
+    }
+
+    @property
+    def write_message(self) -> Callable[[Any, int, bytes], None]:
+        """The shortest way to write one: connection, time, data."""
+        is_plain = self.compression_mode != CompressionMode.MESSAGE
+        if is_plain and isinstance(self.storage, ChunkWriter):
+            return cast("Callable[[Any, int, bytes], None]", self.storage.write)
+        return cast("Callable[[Any, int, bytes], None]", self.write)
+
+    def close(self) -> None:
+        """Count what was written by the short way, and close."""
+        if isinstance(self.storage, ChunkWriter):
+            self.storage.close_chunk()
+            self.counts = dict(self.storage.channel_stats)
+            self.min_timestamp = self.storage.message_start_time
+            self.max_timestamp = self.storage.message_end_time
+        super().close()
