@@ -15,6 +15,7 @@ from ..validity import check_invertible
 from .argument import ARGUMENTS, AnyArgument, Choice, choose_argument
 from .breakdown import breakdown_sentence
 from .likeness import unlike_runs, unlike_sentence
+from .newrun import check_new_run
 from .nuisance import asked_nuisance, likely_orders, take_out, take_out_beside
 from .problem import Problem
 from .result import FitResult
@@ -109,7 +110,8 @@ def fit(
     RankError
         The readings cannot tell the orders apart; names those at fault.
     NoModelError
-        Orders were to be selected and the data support none; says why.
+        Orders were to be selected and the data support none, or such that do not hold from run
+        to run, so that a further run would be made worse; says why.
     ArgumentError
         Runs in different units, an indicated angle that does not follow the reference
         (wrong unit or sign), unknown shafts, and the like.
@@ -162,6 +164,7 @@ def fit(
         )
     if selection is not None:
         choice = Choice(selection.argument)
+        check_new_run(found, wanted, choice.argument)
     else:
         choice = choose_argument(found, argument, wanted)
     problem = Problem(found, wanted, choice.argument, method, threads)
