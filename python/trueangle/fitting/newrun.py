@@ -1,4 +1,4 @@
-"""Would a run that took no part gain by a correction? Orders that hold in some runs only do harm."""
+"""Would a run that took no part gain by a correction? Orders of some runs only do harm."""
 
 from __future__ import annotations
 
@@ -35,7 +35,8 @@ def check_new_run(
 
     With :math:`g_r` the decrease of the mean square of run r by what the others say, it asks for
 
-    .. math:: \bar g > 2\sqrt{\max(0, \operatorname{var} g - \overline{4\sigma_r^2 c^T G_r c/n_r^2})}
+    .. math:: \bar g > 2\sqrt{\max(0,\;
+              \operatorname{var} g - \overline{4\sigma_r^2 c^T G_r c/n_r^2})}
 
     the scatter between runs beyond that of the noise.
 
