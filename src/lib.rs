@@ -14,6 +14,7 @@ pub mod direct;
 pub mod interrupt;
 pub mod memory;
 pub mod once;
+pub mod reserve;
 pub mod threads;
 
 pub mod simd;

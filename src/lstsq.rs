@@ -12,7 +12,7 @@ use std::borrow::Cow;
 
 use nalgebra::DMatrix;
 
-use blocked::cholesky;
+use blocked::{cholesky, triangle};
 pub use system::{Estimate, Pivot, System};
 
 /// The upper triangle `R` of rows; the last column is the right-hand side.
@@ -61,7 +61,7 @@ impl Triangle {
         let mut rows = DMatrix::zeros(top + below.nrows(), columns);
         rows.rows_mut(0, top).copy_from(&self.factor);
         rows.rows_mut(top, below.nrows()).copy_from(below);
-        self.factor = rows.qr().unpack_r();
+        self.factor = triangle(rows);
     }
 
     /// The triangle of rows whose Gram matrix is given, lower half column by column: the

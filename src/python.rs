@@ -20,6 +20,10 @@ mod threads;
 
 use pyo3::prelude::*;
 
+/// Of the extension alone: who links the crate chooses for themselves.
+#[global_allocator]
+static ALLOCATOR: crate::reserve::Reserve = crate::reserve::Reserve;
+
 /// The compiled core of trueangle.
 #[pymodule(gil_used = false)]
 mod _core {
@@ -52,6 +56,7 @@ mod _core {
     #[pymodule_init]
     fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
         module.add("__version__", env!("CARGO_PKG_VERSION"))?;
+        crate::reserve::fill();
         crate::threads::prepare();
         // The stub lists the names; a second list would have to be kept in step with it.
         module.delattr("__all__")

@@ -147,9 +147,21 @@ fn f32_takes_the_cubics_unless_it_cannot() {
     );
     let error = cubics.run(Quantity::Error, route, None, batch).unwrap_err();
     assert!(error.to_string().contains("float32"), "{error}");
-    // Too many segments. Values that no f32 holds are refused with the series.
-    for (size, orders) in [(1.0, &[3000])] {
-        let other = evaluator(TAU, size, 0.0, orders);
+    // Values that no f32 holds are refused with the series.
+    let beyond = Shaft {
+        cycles: 1.0,
+        orders: vec![1],
+        cosine: vec![1e35],
+        sine: vec![0.0],
+    };
+    let refused = HarmonicSeries::new(TAU, 0.0, vec![beyond]).unwrap_err();
+    assert!(
+        refused.to_string().contains("the size of cosine[0]"),
+        "{refused}"
+    );
+    // Too many segments.
+    {
+        let other = evaluator(TAU, 1.0, 0.0, &[3000]);
         let route = other.route::<f32, f32>(Quantity::Error, 1);
         assert_eq!(route.path, Path::Table);
         let x = hard_angles(TAU, 64);

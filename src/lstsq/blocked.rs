@@ -1,10 +1,73 @@
-//! Cholesky factor and triangular inverse by halves: products of matrices do the work.
+//! Factors and the triangular inverse by halves and panels: products of matrices do the work,
+//! and between two of them it may be called off.
 
-use nalgebra::{DMatrixView, DMatrixViewMut};
+use nalgebra::{DMatrix, DMatrixView, DMatrixViewMut};
+
+use crate::interrupt;
 
 /// Size up to which a factorisation is done column by column; larger ones are halved, so
 /// that nearly all of the work is in matrix products.
 const UNBLOCKED: usize = 48;
+
+/// Columns that are reflected together, where there are more than `WHOLE`.
+const PANEL: usize = 64;
+const WHOLE: usize = 256;
+
+/// Columns of a product between two points where the work may stop: 0.1 s of the largest.
+const COLUMNS: usize = 32;
+
+/// `out += factor a b`, a few columns at a time where it takes long.
+fn add_product(
+    mut out: DMatrixViewMut<f64>,
+    factor: f64,
+    a: DMatrixView<f64>,
+    b: DMatrixView<f64>,
+) {
+    let n = out.ncols();
+    if n <= WHOLE {
+        out.gemm(factor, &a, &b, 1.0);
+        return;
+    }
+    for start in (0..n).step_by(COLUMNS) {
+        interrupt::point();
+        let width = COLUMNS.min(n - start);
+        out.columns_mut(start, width)
+            .gemm(factor, &a, &b.columns(start, width), 1.0);
+    }
+}
+
+/// `a b`.
+pub fn product(a: DMatrixView<f64>, b: DMatrixView<f64>) -> DMatrix<f64> {
+    let mut out = DMatrix::zeros(a.nrows(), b.ncols());
+    add_product(out.as_view_mut(), 1.0, a, b);
+    out
+}
+
+/// The upper triangle of the QR factorisation of rows, its diagonal not negative.
+pub fn triangle(mut rows: DMatrix<f64>) -> DMatrix<f64> {
+    let (height, columns) = rows.shape();
+    if columns <= WHOLE {
+        return rows.qr().unpack_r();
+    }
+    let last = height.min(columns);
+    for start in (0..last).step_by(PANEL) {
+        interrupt::point();
+        let width = PANEL.min(last - start);
+        let panel = rows.view((start, start), (height - start, width));
+        let panel = panel.into_owned().qr();
+        let next = start + width;
+        for from in (next..columns).step_by(PANEL) {
+            interrupt::point();
+            let some = PANEL.min(columns - from);
+            panel.q_tr_mul(&mut rows.view_mut((start, from), (height - start, some)));
+        }
+        let mut own = rows.view_mut((start, start), (height - start, width));
+        own.fill(0.0);
+        let upper = panel.unpack_r();
+        own.rows_mut(0, upper.nrows()).copy_from(&upper);
+    }
+    rows.resize_vertically(last, 0.0)
+}
 
 /// Lower Cholesky factor in place of the lower half; None when not positive definite to
 /// working precision.
@@ -39,7 +102,12 @@ fn factor(mut a: DMatrixViewMut<f64>, least: f64) -> Option<()> {
     let mut below = a.view((half, 0), (n - half, half)).into_owned();
     divide_by_transpose(below.as_view_mut(), upper_left.as_view());
     let mut rest = a.view_mut((half, half), (n - half, n - half));
-    rest.gemm(-1.0, &below, &below.transpose(), 1.0);
+    add_product(
+        rest.as_view_mut(),
+        -1.0,
+        below.as_view(),
+        below.transpose().as_view(),
+    );
     a.view_mut((half, 0), (n - half, half)).copy_from(&below);
     factor(a.view_mut((half, half), (n - half, n - half)), least)
 }
@@ -62,7 +130,8 @@ fn divide_by_transpose(mut b: DMatrixViewMut<f64>, l: DMatrixView<f64>) {
     let (mut left, mut right) = b.columns_range_pair_mut(..half, half..);
     divide_by_transpose(left.as_view_mut(), l.view((0, 0), (half, half)));
     let below = l.view((half, 0), (n - half, half));
-    right.gemm(-1.0, &left, &below.transpose(), 1.0);
+    let below = below.transpose();
+    add_product(right.as_view_mut(), -1.0, left.as_view(), below.as_view());
     divide_by_transpose(right, l.view((half, half), (n - half, n - half)));
 }
 
@@ -83,10 +152,13 @@ pub fn invert_upper(mut r: DMatrixViewMut<f64>) {
     let half = n / 2;
     invert_upper(r.view_mut((0, 0), (half, half)));
     invert_upper(r.view_mut((half, half), (n - half, n - half)));
-    let product = r.view((0, 0), (half, half)) * r.view((0, half), (half, n - half));
-    let product = product * r.view((half, half), (n - half, n - half));
-    r.view_mut((0, half), (half, n - half))
-        .copy_from(&(-product));
+    let rest = n - half;
+    let across = product(
+        r.view((0, 0), (half, half)),
+        r.view((0, half), (half, rest)),
+    );
+    let across = product(across.as_view(), r.view((half, half), (rest, rest)));
+    r.view_mut((0, half), (half, rest)).copy_from(&(-across));
 }
 
 /// `U U'` of an upper triangle.
@@ -105,8 +177,9 @@ pub fn times_transpose(u: DMatrixView<f64>, mut out: DMatrixViewMut<f64>) {
         out.view_mut((0, 0), (half, half)),
     );
     let mut first = out.view_mut((0, 0), (half, half));
-    first.gemm(1.0, &corner, &corner.transpose(), 1.0);
-    let aside = corner * last.transpose();
+    let turned = corner.transpose();
+    add_product(first.as_view_mut(), 1.0, corner, turned.as_view());
+    let aside = product(corner, last.transpose().as_view());
     out.view_mut((0, half), (half, rest)).copy_from(&aside);
     out.view_mut((half, 0), (rest, half))
         .copy_from(&aside.transpose());
@@ -148,6 +221,26 @@ mod tests {
         let mut square = DMatrix::zeros(n, n);
         times_transpose(u.as_view(), square.as_view_mut());
         assert!((square - &u * u.transpose()).amax() < ROUNDING);
+    }
+
+    #[test]
+    fn panels_give_the_triangle_of_the_whole() {
+        for (height, columns) in [(700, WHOLE + 41), (WHOLE + 3, WHOLE + 200)] {
+            let rows = DMatrix::from_fn(height, columns, |i, j| {
+                ((3 * i + 7 * j) as f64).sin() + f64::from(u8::from(i == j))
+            });
+            let found = triangle(rows.clone());
+            let whole = rows.qr().unpack_r();
+            assert_eq!(found.shape(), whole.shape());
+            assert!((found - &whole).amax() < ROUNDING * whole.amax());
+        }
+    }
+
+    #[test]
+    fn large_products_are_those_of_small_ones() {
+        let a = DMatrix::from_fn(90, 70, |i, j| ((i + 5 * j) as f64).cos());
+        let b = DMatrix::from_fn(70, 2 * WHOLE + 5, |i, j| ((2 * i + j) as f64).sin());
+        assert!((product(a.as_view(), b.as_view()) - &a * &b).amax() < ROUNDING);
     }
 
     #[test]

@@ -3,7 +3,7 @@
 use nalgebra::{DMatrix, DMatrixView, DVector};
 
 use super::Triangle;
-use super::blocked::{invert_upper, times_transpose};
+use super::blocked::{invert_upper, product, times_transpose};
 
 /// Above this size the condition number is estimated by power iteration (a few per
 /// cent low at most) instead of all singular values, whose cost grows fastest.
@@ -82,7 +82,7 @@ impl Spread {
                 times_transpose(inverse.as_view(), covariance.as_view_mut());
                 covariance
             }
-            Self::Root(root) => root.tr_mul(root),
+            Self::Root(root) => product(root.transpose().as_view(), root.as_view()),
         }
     }
 }
@@ -112,9 +112,9 @@ impl System {
             let mut inverse = factor.view((0, 0), (n, n)).into_owned();
             invert_upper(inverse.as_view_mut());
             let plain = square.view((0, 0), (n, n));
-            let share = plain * &inverse;
+            let share = product(plain, inverse.as_view());
             let misfit = (plain * &coefficients - square.view((0, n), (n, 1))).norm_squared();
-            let spread = Spread::Root(&share * inverse.transpose());
+            let spread = Spread::Root(product(share.as_view(), inverse.transpose().as_view()));
             (
                 coefficients,
                 spread,

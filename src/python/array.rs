@@ -85,6 +85,17 @@ impl Kind {
 /// Most dimensions of an array of numpy.
 const MOST_DIMENSIONS: usize = 64;
 
+/// A shape as Python writes it.
+pub fn shown(shape: &[usize]) -> String {
+    match shape {
+        [one] => format!("({one},)"),
+        _ => {
+            let sizes: Vec<_> = shape.iter().map(ToString::to_string).collect();
+            format!("({})", sizes.join(", "))
+        }
+    }
+}
+
 /// A new array whose elements are to be written before they are seen, or `MemoryError`.
 pub fn empty<'py, T: Element>(
     py: Python<'py>,
@@ -279,9 +290,9 @@ impl<'py> Angles<'py> {
             return Err(argument_error(
                 py,
                 format!(
-                    "out must have the shape of the angles {:?}, got {:?}",
-                    self.given.shape(),
-                    out.shape()
+                    "out must have the shape of the angles {}, got {}",
+                    shown(self.given.shape()),
+                    shown(out.shape())
                 ),
             ));
         }

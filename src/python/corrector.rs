@@ -8,7 +8,7 @@ use pyo3::intern;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyTuple};
 
-use super::array::{Angles, as_array, data, numpy_module};
+use super::array::{Angles, as_array, data, numpy_module, shown};
 use super::door::{self, Computation, Computed};
 use super::failure::{argument_error, kind_error};
 use super::number::{is_number, single};
@@ -294,11 +294,11 @@ fn broadcast<'py>(x: &Bound<'py, PyAny>, signals: &mut [Taken<'py>]) -> PyResult
         .map_err(|_| {
             let others: Vec<_> = signals
                 .iter()
-                .map(|(signal, values)| format!("{} {:?}", signal.name(), values.shape()))
+                .map(|(signal, values)| format!("{} {}", signal.name(), shown(values.shape())))
                 .collect();
-            let (own, others) = (given.shape(), others.join(", "));
+            let (own, others) = (shown(given.shape()), others.join(", "));
             let problem = format!(
-                "signals must have the shape of the angles {own:?} or one value, got {others}"
+                "signals must have the shape of the angles {own} or one value, got {others}"
             );
             argument_error(py, problem)
         })?;

@@ -5,21 +5,27 @@ use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::{Arc, Mutex, PoisonError};
 
+use pyo3::exceptions::PyMemoryError;
 use pyo3::prelude::*;
 
 use super::failure::defect;
-use crate::interrupt;
+use crate::{interrupt, reserve};
 
 /// Work that takes no time worth releasing the interpreter for.
 pub fn attached<T>(py: Python<'_>, work: impl FnOnce() -> T) -> PyResult<T> {
+    reserve::fill();
     catch_unwind(AssertUnwindSafe(work)).map_err(|payload| panicked(py, payload))
 }
 
 /// Work without the interpreter, which Ctrl-C ends.
 pub fn detached<T: Send>(py: Python<'_>, work: impl FnOnce() -> T + Send) -> PyResult<T> {
+    reserve::fill();
     let raised = Arc::new(Mutex::new(None));
     let seen = Arc::clone(&raised);
     let check = move || {
+        if reserve::is_empty() {
+            return true;
+        }
         Python::attach(|py| match py.check_signals() {
             Ok(()) => false,
             Err(error) => {
@@ -33,9 +39,9 @@ pub fn detached<T: Send>(py: Python<'_>, work: impl FnOnce() -> T + Send) -> PyR
         Ok(Ok(value)) => Ok(value),
         Ok(Err(interrupt::Interrupted)) => {
             let mut raised = raised.lock().unwrap_or_else(PoisonError::into_inner);
-            Err(raised
-                .take()
-                .unwrap_or_else(|| defect(py, "interrupted by nobody")))
+            Err(raised.take().unwrap_or_else(|| {
+                PyMemoryError::new_err("memory ran short while this was computed")
+            }))
         }
         Err(payload) => Err(panicked(py, payload)),
     }

@@ -1,0 +1,84 @@
+"""The list of planted faults: one TOML file a room, one table a fault."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+FOLDER = Path(__file__).parent / "faults"
+
+#: What a table of the list may hold.
+KEYS = {"name", "file", "old", "new", "tests", "sample", "survives"}
+
+
+@dataclass(frozen=True)
+class Fault:
+    """One text replaced by another, and the tests that must notice.
+
+    ``tests`` are arguments of pytest, or of ``cargo test`` where they begin with ``cargo``.
+    ``survives`` is the reason why no test can or need notice.
+    """
+
+    name: str
+    file: str
+    old: str
+    new: str
+    tests: tuple[str, ...]
+    sample: bool = False
+    survives: str = ""
+
+    @property
+    def of_core(self) -> bool:
+        """Whether the core must be built anew."""
+        return self.file.startswith("src/")
+
+    def problems(self, root: Path) -> list[str]:
+        """Why it cannot be planted: nothing where it can."""
+        path = root / self.file
+        if not path.is_file():
+            return [f"there is no {self.file}"]
+        count = path.read_text(encoding="utf-8").count(self.old)
+        found = [] if count == 1 else [f"{self.file} holds its text {count} times: {self.old!r}"]
+        if self.old == self.new:
+            found.append("it changes nothing")
+        for test in self.tests:
+            file = test.split("::")[0]
+            if file.startswith("tests/") and not (root / file).exists():
+                found.append(f"there is no {file}")
+        return found if self.tests else [*found, "it names no test"]
+
+    def plant(self, root: Path) -> str:
+        """Put the fault into the copy at ``root``; what stood there before."""
+        path = root / self.file
+        before = path.read_text(encoding="utf-8")
+        path.write_text(before.replace(self.old, self.new), encoding="utf-8")
+        return before
+
+
+def read_faults(root: Path) -> list[Fault]:
+    """Every fault of the list, by file and name."""
+    found: list[Fault] = []
+    for file in sorted(FOLDER.glob("*.toml")):
+        for table in tomllib.loads(file.read_text(encoding="utf-8"))["fault"]:
+            unknown = table.keys() - KEYS
+            assert not unknown, f"{file.name}: {table.get('name')}: no such keys: {unknown}"
+            tests = table.pop("tests")
+            found.append(Fault(tests=tuple([tests] if isinstance(tests, str) else tests), **table))
+    names = [fault.name for fault in found]
+    assert len(names) == len(set(names)), sorted(n for n in set(names) if names.count(n) > 1)
+    return found
+
+
+def chosen(
+    faults: Sequence[Fault], sample: bool, parts: Sequence[str] | None, core: str
+) -> list[Fault]:
+    """The faults asked for."""
+    return [
+        fault
+        for fault in faults
+        if (fault.sample or not sample)
+        and (core == "all" or fault.of_core == (core == "only"))
+        and (not parts or any(part in fault.name or part in fault.file for part in parts))
+    ]

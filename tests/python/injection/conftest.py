@@ -1,0 +1,83 @@
+"""A desk with runs, a model, a simulation and logs, and the commands that are tried there."""
+
+import shutil
+import sys
+
+import numpy as np
+import pytest
+
+import trueangle as ta
+
+from .shim import Driver, compiled
+
+SIMULATION = """\
+[joint]
+gear_ratio = 50.0
+[noise]
+sigma_arcsec = 2.0
+[[run]]
+samples = 60
+[[run]]
+samples = 60
+direction = -1
+"""
+
+#: Commands and what they write; `correct` writes a folder and its manifest.
+COMMANDS = {
+    "fit": (["fit", "r.csv", "--orders", "1", "-o", "x.json"], "x.json"),
+    "simulate": (["simulate", "b.toml", "-o", "x.csv"], "x.csv"),
+    "correct": (["correct", "logs", "-m", "m.json", "-o", "out"], "out"),
+    "correct one": (["correct", "logs/a.csv", "-m", "m.json", "-o", "x.csv"], "x.csv"),
+    "report": (["report", "r.csv", "--orders", "1", "-o", "x.html"], "x.html"),
+}
+
+
+def commands():
+    """Names of the commands whose libraries are there."""
+    from importlib.util import find_spec
+
+    return [name for name in COMMANDS if name != "report" or find_spec("bokeh")]
+
+
+def furnish(folder):
+    """Put the inputs of all commands into an empty folder."""
+    (folder / "logs").mkdir(parents=True)
+    rng = np.random.default_rng(5)
+    theta = np.arange(0.0, 360.0, 4.0)
+    error = 0.1 * np.sin(np.radians(theta)) + 1e-3 * rng.normal(size=theta.size)
+    rows = [f"{t!r},{t + e!r}" for t, e in zip(theta.tolist(), error.tolist(), strict=True)]
+    (folder / "r.csv").write_text("\n".join(["reference_deg,indicated_deg", *rows]) + "\n")
+    (folder / "b.toml").write_text(SIMULATION)
+    for name in ("a.csv", "b.csv"):
+        angles = rng.uniform(0.0, 360.0, 50)
+        lines = [f"{x:.9f}" for x in angles]
+        (folder / "logs" / name).write_text("\n".join(["indicated_deg", *lines]) + "\n")
+    shaft = ta.Shaft("output", 1, [1, 2], [0.1, 0.0], [0.4, -0.05])
+    ta.HarmonicModel([shaft], constant=0.2, period=360.0).save(folder / "m.json")
+
+
+def tree(folder):
+    """Every file below a folder, hidden ones too, with its bytes."""
+    files = (path for path in sorted(folder.rglob("*")) if path.is_file())
+    return {str(path.relative_to(folder)): path.read_bytes() for path in files}
+
+
+@pytest.fixture
+def desk(tmp_path):
+    folder = tmp_path / "desk"
+    furnish(folder)
+    return folder
+
+
+@pytest.fixture(scope="session")
+def driver(tmp_path_factory):
+    """The process whose calls of the system can be made to fail."""
+    compiler = shutil.which("cc") or shutil.which("gcc")
+    if not sys.platform.startswith("linux") or compiler is None:
+        pytest.skip("calls of the system are made to fail on Linux with a C compiler")
+    folder = tmp_path_factory.mktemp("driver")
+    furnish(folder / "desk")
+    library = compiled(folder, compiler)
+    running = Driver(library, folder / "desk", [COMMANDS[name][0] for name in commands()])
+    yield running
+    running.close()
