@@ -2,7 +2,7 @@
 # PYTHON is the interpreter of an environment that has `pip install '.[test,lint]'`.
 PYTHON ?= .venv/bin/python
 
-.PHONY: check format lint types stub rust python docs bench develop aarch64 fuzz nightly exam
+.PHONY: check format lint types stub rust python docs bench develop aarch64 fuzz mutants nightly exam
 
 check: lint types stub rust python docs
 
@@ -51,7 +51,10 @@ docs:               ## documentation, warnings are errors
 fuzz:               ## 20 000 damaged files for every loader; some hours, so apart from `check`
 	$(PYTHON) tests/fuzz --cases 20000
 
-nightly: aarch64 fuzz ## what takes hours: the exam at full size, fuzzing, the emulated aarch64
+mutants:            ## planted faults: each must be noticed by its tests; an hour or two
+	$(PYTHON) tests/mutants
+
+nightly: aarch64 fuzz mutants ## what takes hours: the exam at full size, fuzzing, faults, aarch64
 	TRUEANGLE_NIGHTLY=1 $(PYTHON) -m pytest
 
 bench:              ## benchmarks against a reference, in one run

@@ -46,7 +46,8 @@ class Copy:
         for file in FILES:
             shutil.copy(root / file, folder / file)
         core = find_spec("trueangle._core")
-        assert core is not None and core.origin is not None, "build the core first: make develop"
+        assert core is not None, "build the core first: make develop"
+        assert core.origin is not None
         self.core = folder / "python" / "trueangle" / Path(core.origin).name
         self.kept = folder / "core"
         shutil.copy(core.origin, self.kept)

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+import re
+import sys
 from pathlib import Path
 
 import pytest
@@ -24,3 +26,34 @@ def data_dir() -> Path:
     if not folder.is_dir():
         pytest.skip(f"no measured data at {folder}")
     return folder
+
+
+def expected_skips(platform: str) -> re.Pattern[str]:
+    """Reasons of `skips.txt` for this system."""
+    found = []
+    for line in (Path(__file__).parent / "skips.txt").read_text(encoding="utf-8").splitlines():
+        system, colon, reason = line.partition(": ")
+        if not line or line.startswith("#"):
+            continue
+        if not colon or system not in ("darwin", "win32", "linux"):
+            found.append(line)
+        elif system == platform:
+            found.append(reason)
+    return re.compile("|".join(f"(?:{reason})" for reason in found))
+
+
+def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
+    """Where nothing may be skipped silently (TRUEANGLE_CI=1), tell what was."""
+    if os.environ.get("TRUEANGLE_CI") != "1":
+        return
+    expected = expected_skips(sys.platform)
+    unexpected = [
+        report.longrepr
+        for report in terminalreporter.getreports("skipped")
+        if isinstance(report.longrepr, tuple) and not expected.search(report.longrepr[2])
+    ]
+    if unexpected:
+        terminalreporter.section("skips that are on no list (tests/python/skips.txt)")
+        for file, line, reason in unexpected:
+            terminalreporter.line(f"{file}:{line}: {reason}", red=True)
+        terminalreporter._session.exitstatus = pytest.ExitCode.TESTS_FAILED

@@ -286,6 +286,9 @@ def test_a_fork_while_another_thread_builds_tables_goes_on():
         "fast.correct(x)",
         "backlash.correct(x)",
         "ta._core.fit([(x, x, None)], 360.0, [1.0, 0.1234567], [list(range(1, 60)), [3]])",
+        # One large solution, by QR and by the normal equations.
+        "ta._core.fit([(few, few, None)], 360.0, [1.0], [list(range(1, 2500))], method='qr')",
+        "ta._core.fit([(few, few, None)], 360.0, [1.0], [list(range(1, 2500))], method='moments')",
     ],
 )
 def test_long_work_ends_with_ctrl_c(work):
@@ -302,6 +305,7 @@ def test_long_work_ends_with_ctrl_c(work):
         terms = [ta.Backlash(0.01), ta.LocalDefect(1.0, 2.0, 0.01)]
         backlash = ta.HarmonicModel([narrow], period=360.0, terms=terms)
         x = np.linspace(0.0, 360.0, 20_000_000)
+        few = np.linspace(0.0, 360.0, 9000, endpoint=False)
         pressed = []
 
         def press():

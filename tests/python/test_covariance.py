@@ -175,3 +175,66 @@ def test_the_command_takes_a_covariance(tmp_path, capsys):
     assert wide > 1.5 * narrow
     low, high = found["auto"]["orders"][0]["interval_arcsec"]
     assert low < found["auto"]["orders"][0]["amplitude_arcsec"] < high
+
+
+def test_many_coefficients_have_the_covariance_of_the_scatter_of_their_scores():
+    """Beyond 256 coefficients the adjustment is one factor: CR1, by its definition."""
+    rng = np.random.default_rng(6)
+    size, count = 260, 12
+    parts = [rng.normal(size=(400, size)) for _ in range(count)]
+    left = [rng.normal(size=400) for _ in range(count)]
+    found = robust_covariance([Cluster(p.T @ p, p.T @ e) for p, e in zip(parts, left, strict=True)])
+    bread = np.linalg.inv(sum(p.T @ p for p in parts))
+    scores = np.array([p.T @ e for p, e in zip(parts, left, strict=True)])
+    expected = bread @ (scores.T @ scores) @ bread * count / (count - 1.0)
+    np.testing.assert_allclose(found.covariance, expected, rtol=1e-9, atol=1e-18)
+    np.testing.assert_array_equal(found.freedom, count - 1.0)
+
+
+def test_the_scatter_between_runs_has_its_degrees_of_freedom():
+    """White residuals: chi-squared about its mean, and each run's own coefficients by lstsq."""
+    from trueangle.fitting.clusters import scatter_statistic
+
+    rng = np.random.default_rng(7)
+    total = []
+    for _ in range(200):
+        parts = [rng.normal(size=(40, 3)) for _ in range(5)]
+        x = np.vstack(parts)
+        y = rng.normal(size=len(x))
+        e = y - x @ np.linalg.lstsq(x, y, rcond=None)[0]
+        left = np.split(e, 5)
+        clusters = [Cluster(p.T @ p, p.T @ r) for p, r in zip(parts, left, strict=True)]
+        statistic, freedom = scatter_statistic(clusters, 1.0)
+        assert freedom == 5 * 3 - 3
+        total.append(statistic)
+    # The mean of 200 chi-squared of 12 degrees of freedom: standard error 0.35.
+    assert np.mean(total) == pytest.approx(12.0, abs=1.4)
+
+
+def test_the_constant_is_no_surer_than_the_coefficients():
+    """How the zeros scatter tells nothing of it: its error widens as theirs do."""
+    runs = some_runs(3, "sweeps", 0.9)
+    white, cluster = (ta.fit(runs, [1, 2, 5], covariance=kind) for kind in ("white", "cluster"))
+    wider = np.sqrt(np.diag(cluster.covariance) / np.diag(white.covariance))
+    assert wider[0] == pytest.approx(max(1.0, np.median(wider[1:])), rel=1e-9)
+    assert wider[0] > 1.5
+
+
+def test_a_penalty_widens_the_errors_by_what_it_may_have_taken():
+    """Its bias as a covariance, by its definition on the rows of the design."""
+    rng = np.random.default_rng(9)
+    x = np.sort(rng.uniform(0.0, 100.0, 300))
+    error = sum(c * np.sin(np.radians(k * x + p)) for k, c, p in LINES[:2])
+    run = ta.CalibrationRun(x, x + error + 0.02 * rng.normal(size=300), 360.0)
+    found = ta.fit(run, orders=[1, 2, 5], covariance="white", ridge=1e-4, loss="linear")
+    angle = np.radians(np.outer(x, [1, 2, 5]))
+    rows = np.stack([np.cos(angle), np.sin(angle)], axis=2).reshape(300, 6)
+    rows = rows - rows.mean(axis=0)
+    penalty = 1e-4 * 300
+    taken = penalty * np.linalg.inv(rows.T @ rows + penalty * np.eye(6))
+    shaft = found.model.shafts[0]
+    size = np.mean(np.square([*shaft.cosine, *shaft.sine]))
+    plain = np.asarray(found.fitted.solution.covariance)[1:, 1:]
+    added = found.uncertainty.covariance[1:, 1:] - plain
+    np.testing.assert_allclose(added, size * (taken @ taken), rtol=1e-6, atol=1e-12)
+    assert np.max(np.diag(added) / np.diag(plain)) > 0.1

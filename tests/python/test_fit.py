@@ -293,3 +293,38 @@ def test_runs_are_held_out_with_the_gear_that_was_declared(member, cycles):
     gain = hold_out(result)
     assert all(run.model is not None and run.model.orders == (line,) for run in gain.runs)
     assert gain.reduction > 0.8
+
+
+def test_amplitudes_and_phases_take_the_covariance_of_both_coefficients():
+    """An arc, where cosine and sine correlate: by the gradient, sign and all."""
+    rng = np.random.default_rng(12)
+    theta = np.sort(rng.uniform(20.0, 230.0, 4000))
+    result = fitted(
+        theta,
+        theta
+        + 0.3 * np.sin(np.radians(theta + 50.0))
+        + 0.1 * np.sin(np.radians(2.0 * theta + 200.0))
+        + 0.01 * rng.normal(size=theta.size),
+        orders=[1, 2],
+        ridge=0.0,
+        covariance="white",
+    )
+    cov, shaft = result.covariance, result.model.shafts[0]
+    for k in range(2):
+        a, b = shaft.cosine[k], shaft.sine[k]
+        pair = cov[1 + 2 * k : 3 + 2 * k, 1 + 2 * k : 3 + 2 * k]
+        assert abs(pair[0, 1]) > 0.3 * math.sqrt(pair[0, 0] * pair[1, 1])
+        step, size = 1e-7, math.hypot(a, b)
+        gradient = [
+            (math.hypot(a + step, b) - math.hypot(a - step, b)) / (2 * step),
+            (math.hypot(a, b + step) - math.hypot(a, b - step)) / (2 * step),
+        ]
+        turn = [
+            (math.atan2(a + step, b) - math.atan2(a - step, b)) / (2 * step),
+            (math.atan2(a, b + step) - math.atan2(a, b - step)) / (2 * step),
+        ]
+        assert size > 10 * math.sqrt(pair.trace())
+        expected = math.sqrt(np.array(gradient) @ pair @ gradient)
+        assert result.amplitude_std[k] == pytest.approx(expected, rel=1e-4)
+        expected = math.sqrt(np.array(turn) @ pair @ turn)
+        assert result.phase_std[k] == pytest.approx(expected, rel=1e-4)

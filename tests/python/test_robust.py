@@ -84,3 +84,63 @@ def test_spikes_are_found_without_a_model():
     )
     clean, _ = contaminated(16, 0.0)
     assert without_spikes(clean) is clean
+
+
+@pytest.mark.parametrize("loss", ["huber", "tukey"])
+def test_given_weights_multiply_those_of_a_robust_loss(loss):
+    """Readings given four times count as one of weight 4, whatever the loss."""
+    run, _ = contaminated(17, 0.05)
+    often = np.arange(len(run)) % 3 == 0
+    # These have a larger amplitude, so that their weight shows.
+    indicated = run.indicated + 0.01 * often * np.sin(np.radians(3 * run.reference))
+    rows = np.concatenate([np.arange(len(run)), np.tile(np.flatnonzero(often), 3)])
+    weights = np.where(often, 4.0, 1.0)
+    a, b, plain = (
+        ta.fit(ta.CalibrationRun(x, y, 360.0, weights=w), orders=[3], loss=loss)
+        for x, y, w in (
+            (run.reference[rows], indicated[rows], None),
+            (run.reference, indicated, weights),
+            (run.reference, indicated, None),
+        )
+    )
+    # The scale is a median of other readings: alike to a few hundredths of the noise.
+    assert a.amplitudes[0] == pytest.approx(b.amplitudes[0], abs=0.05 * SIGMA)
+    assert b.amplitudes[0] - plain.amplitudes[0] > 0.2 * SIGMA
+
+
+def test_given_weights_stay_where_readings_are_set_aside():
+    run, hit = contaminated(18, 0.03)
+    weights = np.random.default_rng(1).uniform(0.2, 5.0, len(run))
+    told = ta.CalibrationRun(run.reference, run.indicated, 360.0, weights=weights)
+    found = ta.fit(told, orders=range(1, 6))
+    assert [row for _, row in found.wild] == hit.tolist()
+    expected = weights.copy()
+    expected[hit] = 0.0
+    np.testing.assert_array_equal(found.weights[0], expected)
+    np.testing.assert_array_equal(
+        without_spikes(told).weights, np.where(without_spikes(run).weights == 0.0, 0.0, weights)
+    )
+
+
+def test_readings_that_do_not_count_are_never_called_wild():
+    run, hit = contaminated(19, 0.03)
+    weights = np.ones(len(run))
+    weights[hit[::2]] = 0.0
+    told = ta.CalibrationRun(run.reference, run.indicated, 360.0, weights=weights)
+    found = ta.fit(told, orders=range(1, 6))
+    assert [row for _, row in found.wild] == hit[1::2].tolist()
+    assert found.model.fit.wild == hit[1::2].size
+
+
+def test_the_robust_scale_is_the_standard_deviation_of_normal_readings():
+    from trueangle.fitting.robust import HUBER, robust_scale
+
+    rng = np.random.default_rng(20)
+    # Of 4096 readings the median of the absolute values is known to 1.8 %.
+    assert robust_scale(3.0 * rng.normal(size=4096)) == pytest.approx(3.0, rel=0.06)
+    # 95 % of the efficiency of least squares, by the definition of the constant.
+    x = np.linspace(-8.0, 8.0, 160_001)
+    density = np.exp(-0.5 * x**2) / np.sqrt(2.0 * np.pi) * (x[1] - x[0])
+    psi = np.clip(x, -HUBER, HUBER)
+    inside = density[np.abs(x) < HUBER].sum()
+    assert inside**2 / (density @ psi**2) == pytest.approx(0.95, abs=1e-3)

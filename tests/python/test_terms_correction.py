@@ -395,7 +395,10 @@ def test_shapes_types_and_out_are_those_of_a_model_without_terms():
     ("call", "said"),
     [
         (lambda m: m.correct([1.0, 2.0], temperature=[1.0, 2.0, 3.0]), r"temperature \(3,\)"),
-        (lambda m: m.correct([1.0, 2.0], out=np.empty(3), temperature=1.0), r"shape of the angles \(2,\), got \(3,\)"),
+        (
+            lambda m: m.correct([1.0, 2.0], out=np.empty(3), temperature=1.0),
+            r"shape of the angles \(2,\), got \(3,\)",
+        ),
         (lambda m: m.correct([1.0], out=np.empty(1, np.float32), temperature=1.0), "float64"),
         (lambda m: m.correct(["a"], temperature=1.0), "angles must be real numbers"),
         (lambda m: m.correct([1.0], temperature=["a"]), "temperature must be real numbers"),

@@ -40,7 +40,7 @@ def expected(driver, tmp_path_factory):
 
 
 def same(name, content, whole):
-    """Whether a file that is there is the whole one: reports and models note when they were made."""
+    """Whether a file is the whole one: reports and models note when they were made."""
     if name.endswith(("jsonl", ".json", ".html")):
         return abs(len(content) - len(whole)) < 200 and content.rstrip()[-6:] == whole.rstrip()[-6:]
     return content == whole
@@ -72,7 +72,9 @@ def test_the_nth_call_fails(command, failure, driver, expected, tmp_path):
         else:
             failed += 1
             assert answer.status == 1, (n, answer)
-            lines = [line for line in answer.told.splitlines() if line.startswith("trueangle: error")]
+            lines = [
+                line for line in answer.told.splitlines() if line.startswith("trueangle: error")
+            ]
             assert len(lines) == 1, (n, answer.told)
             assert "Traceback" not in answer.told
             assert "defect of trueangle" not in answer.told, (n, answer.told)

@@ -7,7 +7,7 @@ import pytest
 
 import trueangle as ta
 from trueangle.cli import main
-from trueangle.terms import Backlash
+from trueangle.terms import Backlash, ThermalDrift
 
 from .conftest import made_angles, made_model
 
@@ -172,3 +172,56 @@ def test_a_log_after_a_damaged_one_begins_its_own_travel(logs, tmp_path):
     assert statuses(report) == ["done", "failed", "done", "done"]
     ta.correct_logs(logs / "2.csv", model, tmp_path / "alone.csv")
     assert (tmp_path / "out" / "2.csv").read_bytes() == (tmp_path / "alone.csv").read_bytes()
+
+
+def test_a_changed_output_is_made_anew(logs, tmp_path):
+    """Someone's hand in an output: it is not what the manifest tells of."""
+    out = tmp_path / "out"
+    ta.correct_logs(logs, made_model(), out)
+    before = outputs(out)
+    (out / "1.csv").write_text("something else\n")
+    report = ta.correct_logs(logs, made_model(), out)
+    assert [log.status == "done" for log in report.logs] == [False, True, False, False]
+    assert outputs(out) == before
+
+
+#: Terms of a model, and what its joint is told to read: the request before, and another.
+READ = {
+    "column of a signal": (
+        [ThermalDrift(zero_per_K=0.001)],
+        {"temperature": "temperature_C"},
+        {"temperature": "other_deg"},
+    ),
+    "unit of a joint": (
+        [],
+        {"indicated": ("indicated_deg", "deg")},
+        {"indicated": ("indicated_deg", "rad")},
+    ),
+}
+
+
+@pytest.mark.parametrize("what", READ)
+def test_what_a_joint_reads_belongs_to_the_request(what, logs, tmp_path):
+    terms, first, second = READ[what]
+    shafts, out = made_model().shafts, tmp_path / "out"
+    model = ta.HarmonicModel(shafts, constant=0.2, period=360.0, terms=terms)
+    assert statuses(ta.correct_logs(logs, model, out, signals=first)) == ["done"] * FILES
+    assert statuses(ta.correct_logs(logs, model, out, signals=first)) == ["done before"] * FILES
+    before = outputs(out)
+    assert statuses(ta.correct_logs(logs, model, out, signals=second)) == ["done"] * FILES
+    assert outputs(out) != before
+
+
+def test_single_precision_stays_where_turns_are_counted(angles, tmp_path):
+    pa = pytest.importorskip("pyarrow")
+    pq = pytest.importorskip("pyarrow.parquet")
+
+    single = np.concatenate(angles).astype(np.float32)
+    pq.write_table(pa.table({"indicated_deg": single}), tmp_path / "a.parquet")
+    ta.correct_logs(tmp_path / "a.parquet", turning(), tmp_path / "b.parquet")
+    found = pq.read_table(tmp_path / "b.parquet")["corrected_deg"]
+    assert found.type == pa.float32()
+    unwrapped = np.unwrap(single.astype(float), period=360.0)
+    whole = turning().correct(unwrapped) - (unwrapped - single)
+    # Ten turns in single precision: its rounding at 3600.
+    np.testing.assert_allclose(found.to_numpy(), whole, atol=4e-4)

@@ -310,3 +310,19 @@ def test_a_signal_without_a_column_is_a_usage_error(logs, model_file, tmp_path, 
     assert left.value.code == 2
     assert "ROLE=NAME" in capsys.readouterr().err
     assert tree(tmp_path) == before
+
+
+def test_a_log_that_grows_meanwhile_is_not_taken(logs, model, tmp_path, monkeypatch):
+    from trueangle.formats import parquet as parquetlog
+
+    real, path = parquetlog.contents, logs / "log0.parquet"
+
+    def growing(aside, topic=None):
+        with path.open("ab") as file:
+            file.write(b"more")
+        return real(aside, topic)
+
+    monkeypatch.setattr(parquetlog, "contents", growing)
+    report = ta.correct_logs(path, model, tmp_path / "b.parquet")
+    assert "changed while it was read" in str(report.logs[0].error)
+    assert not (tmp_path / "b.parquet").exists()
