@@ -16,7 +16,8 @@ WORK = {
     "fit": "s = ta._core.fit([(x, x + np.sin(x), None)], 360.0, [1.0], [list(range(1, 30))])\n"
     "print(s.cosine, s.residual_variance)",
     "qr": "y = np.ascontiguousarray(x[::10])\n"
-    "s = ta._core.fit([(y, y + np.sin(y), None)], 360.0, [1.0], [list(range(1, 20))], method='qr')\nprint(s.cosine, s.residual_variance)",
+    "s = ta._core.fit([(y, y + np.sin(y), None)], 360.0, [1.0], "
+    "[list(range(1, 20))], method='qr')\nprint(s.cosine, s.residual_variance)",
     "moments": "m = ta.Moments(range(1, 20), period=360.0)\nm.update(x, np.sin(x))\n"
     "m.merge(m.copy())\nprint(m.count, m.solve().cosine.tolist())",
 }

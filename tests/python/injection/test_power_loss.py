@@ -7,7 +7,7 @@ import pytest
 
 from trueangle.cli import main
 
-from .conftest import COMMANDS, commands, furnish, tree
+from .conftest import COMMANDS, commands, tree
 from .disk import Disk, laid_out
 
 pytestmark = pytest.mark.skipif(
