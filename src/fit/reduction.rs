@@ -114,10 +114,10 @@ pub fn reduce(
             }
         }
     }
+    inspect()?;
     if matches!(asked, Some(Method::Moments | Method::Qr | Method::Counts)) {
         return Err(Error::Method);
     }
-    inspect()?;
     let system = rows(design, runs, centres);
     Ok(Reduced::new(system, Method::Plain))
 }

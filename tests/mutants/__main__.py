@@ -40,6 +40,11 @@ def main() -> int:
         return 1 if wrong or not faults else 0
     with tempfile.TemporaryDirectory(prefix="mutants-") as folder:
         copy = Copy(ROOT, Path(args.copy or folder), args.seconds)
+        of_core = [fault for fault in faults if fault.of_core]
+        told = copy.build(of_core) if of_core else ""
+        if told:
+            print(f"the core with its faults was not built:\n{told}")
+            return 1
         if not args.trust and not unplanted(copy, faults):
             return 1
         return planted(copy, faults)
@@ -62,9 +67,10 @@ def unplanted(copy: Copy, faults: list[Fault]) -> bool:
 def planted(copy: Copy, faults: list[Fault]) -> int:
     """Plant one fault after the other; the exit status."""
     counts: Counter[str] = Counter()
+    numbers = {fault.name: k for k, fault in enumerate(f for f in faults if f.of_core)}
     for fault in faults:
         start = time.monotonic()
-        verdict = copy.tried(fault)
+        verdict = copy.tried(fault, numbers.get(fault.name, -1))
         outcome = verdict.outcome
         if fault.survives:
             outcome = "excused" if outcome == "survived" else "killed though excused"

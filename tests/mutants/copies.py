@@ -1,4 +1,9 @@
-"""A copy of the project to plant faults in, and the tests that run there."""
+"""A copy of the project to plant faults in, and the tests that run there.
+
+A fault of the package is one text replaced by another while its tests run. The faults of the
+core are all built into one core, each behind a question that the environment answers: a build
+for each would take a day.
+"""
 
 from __future__ import annotations
 
@@ -8,6 +13,7 @@ import signal
 import subprocess
 import sys
 import sysconfig
+from collections.abc import Mapping, Sequence
 from importlib.util import find_spec
 from pathlib import Path
 from typing import NamedTuple
@@ -22,8 +28,23 @@ FILES += ("CITATION.cff", "CONTRIBUTING.md", "SECURITY.md", "Makefile")
 #: Exit status of pytest where tests failed; others mean that none could run.
 FAILED = 1
 
-#: Of the core for tests of the package: built in half a minute, without the long link.
+#: What the core with all faults is built with: without the long link.
 QUICK = {"CARGO_PROFILE_RELEASE_LTO": "off", "CARGO_PROFILE_RELEASE_CODEGEN_UNITS": "16"}
+#: Seconds for that on a busy machine.
+BUILD = 3600.0
+
+#: Which fault of the core is switched on, by its number.
+CHOSEN = "TRUEANGLE_PLANTED"
+QUESTION = f"""\
+//! Which of the planted faults is switched on.
+
+/// Whether it is this one.
+#[inline(never)]
+pub fn is(number: usize) -> bool {{
+    static CHOSEN: std::sync::OnceLock<Option<usize>> = std::sync::OnceLock::new();
+    *CHOSEN.get_or_init(|| std::env::var("{CHOSEN}").ok()?.parse().ok()) == Some(number)
+}}
+"""
 
 
 class Verdict(NamedTuple):
@@ -49,64 +70,53 @@ class Copy:
         assert core is not None, "build the core first: make develop"
         assert core.origin is not None
         self.core = folder / "python" / "trueangle" / Path(core.origin).name
-        self.kept = folder / "core"
-        shutil.copy(core.origin, self.kept)
         shutil.copy(core.origin, self.core)
 
-    def tried(self, fault: Fault) -> Verdict:
+    def tried(self, fault: Fault, number: int) -> Verdict:
         """What the tests of a fault say with it planted."""
+        if fault.of_core:
+            return self.run(fault.tests, {CHOSEN: str(number)})
         before = fault.plant(self.folder)
-        path = self.folder / fault.file
         try:
-            if fault.of_core and not fault.tests[0].startswith("cargo"):
-                told = self._build()
-                if told:
-                    return Verdict("broken", told=told)
             return self.run(fault.tests)
         finally:
-            path.write_text(before, encoding="utf-8")
-            if fault.of_core:
-                shutil.copy(self.kept, self.core)
+            (self.folder / fault.file).write_text(before, encoding="utf-8")
 
-    def run(self, tests: tuple[str, ...]) -> Verdict:
-        """Run some tests in the copy."""
-        if tests[0].startswith("cargo"):
-            return self._cargo(tests)
-        command = [sys.executable, "-m", "pytest", "-x", "-q", "-p", "no:cacheprovider", *tests]
-        status, told = self._done(command, self._environment())
-        if status is None:
-            return Verdict("killed", "(time is up)")
-        if status == FAILED:
-            lines = [line for line in told.splitlines() if line.startswith(("FAILED", "ERROR"))]
-            return Verdict("killed", lines[0].split(" - ")[0] if lines else "", told[-1500:])
-        if status == 0 and " passed" in told:
-            return Verdict("survived", told=told[-300:])
-        return Verdict("broken", told=told[-1500:])
-
-    def _cargo(self, tests: tuple[str, ...]) -> Verdict:
-        command = ["cargo", "test", "--locked", "-q", *tests[0].split()[1:]]
-        status, told = self._done([*command, "--no-run"], self._environment())
-        if status != 0:
-            return Verdict("broken", told=told[-1500:])
-        status, told = self._done(command, self._environment())
-        if status is None:
-            return Verdict("killed", "(time is up)")
-        lines = [line for line in told.splitlines() if line.startswith("    ")]
-        said = lines[-1].strip() if status and lines else ""
-        return Verdict("killed" if status else "survived", said, told[-1500:])
-
-    def _build(self) -> str:
-        """Build the core of the copy for Python; what went wrong."""
+    def build(self, faults: Sequence[Fault]) -> str:
+        """A core with all these faults, none of them switched on; what went wrong."""
+        for number, fault in enumerate(faults):
+            path = self.folder / fault.file
+            text = path.read_text(encoding="utf-8")
+            either = f"(if crate::planted::is({number}) {{ {fault.new} }} else {{ {fault.old} }})"
+            path.write_text(text.replace(fault.old, either), encoding="utf-8")
+        (self.folder / "src" / "planted.rs").write_text(QUESTION, encoding="utf-8")
+        root = self.folder / "src" / "lib.rs"
+        root.write_text(root.read_text(encoding="utf-8") + "pub mod planted;\n", encoding="utf-8")
         command = ["cargo", "build", "--release", "--locked", "-q", "--features", "python", "--lib"]
-        status, told = self._done(command, self._environment() | QUICK)
+        status, told = self._done(command, self._environment() | QUICK, BUILD)
         if status != 0:
-            return told[-1500:] or "the core was not built in time"
+            return told[-3000:] or "the core was not built in time"
         ending = {"win32": "dll", "darwin": "dylib"}.get(sys.platform, "so")
         prefix = "" if sys.platform == "win32" else "lib"
         built = self.folder / "target" / "release" / f"{prefix}trueangle.{ending}"
         self.core.unlink()
         shutil.copy(built, self.core)
         return ""
+
+    def run(self, tests: tuple[str, ...], more: Mapping[str, str] | None = None) -> Verdict:
+        """Run some tests in the copy."""
+        command = [sys.executable, "-m", "pytest", "-x", "-q", "-p", "no:cacheprovider", *tests]
+        status, told = self._done(command, self._environment() | dict(more or {}), self.seconds)
+        if status is None:
+            return Verdict("killed", "(time is up)")
+        if status == FAILED:
+            lines = [line for line in told.splitlines() if line.startswith(("FAILED", "ERROR"))]
+            return Verdict("killed", lines[0].split(" - ")[0] if lines else "", told[-1500:])
+        if status < 0:
+            return Verdict("killed", f"(signal {-status})")
+        if status == 0 and " passed" in told:
+            return Verdict("survived", told=told[-300:])
+        return Verdict("broken", told=told[-1500:])
 
     def _environment(self) -> dict[str, str]:
         data = os.environ.get("TRUEANGLE_DATA", str(self.root.parent / "shared" / "data"))
@@ -120,7 +130,9 @@ class Copy:
         }
         return {k: v for k, v in os.environ.items() if k != "CARGO_TARGET_DIR"} | more
 
-    def _done(self, command: list[str], environment: dict[str, str]) -> tuple[int | None, str]:
+    def _done(
+        self, command: list[str], environment: dict[str, str], seconds: float
+    ) -> tuple[int | None, str]:
         """Exit status (None: time was up, everything it started is killed) and output."""
         process = subprocess.Popen(
             command,
@@ -133,7 +145,7 @@ class Copy:
             start_new_session=True,
         )
         try:
-            told, _ = process.communicate(timeout=self.seconds)
+            told, _ = process.communicate(timeout=seconds)
         except subprocess.TimeoutExpired:
             os.killpg(process.pid, signal.SIGKILL)
             process.communicate()

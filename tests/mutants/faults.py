@@ -17,7 +17,7 @@ KEYS = {"name", "file", "old", "new", "tests", "sample", "survives"}
 class Fault:
     """One text replaced by another, and the tests that must notice.
 
-    ``tests`` are arguments of pytest, or of ``cargo test`` where they begin with ``cargo``.
+    ``tests`` are arguments of pytest. Texts of the core are expressions, see `copies`.
     ``survives`` is the reason why no test can or need notice.
     """
 

@@ -124,7 +124,7 @@ class Sidebands(Effect):
         if shape["form"] == "PM":
             a, b = b, -a
         # (a cos x + b sin x) cos y and sin y in cosines and sines of x - y and x + y.
-        map_ = 0.5 * np.array([[a, -b], [b, a], [a, b], [b, -a]])
+        map_ = 0.5 * np.array([[a, b], [b, -a], [a, -b], [b, a]])
         return map_ @ coefficients, map_ @ covariance @ map_.T
 
     @classmethod
