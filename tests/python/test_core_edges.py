@@ -29,9 +29,7 @@ def test_the_largest_residual_is_found_wherever_it_is(size):
         assert largest == pytest.approx(abs(wild[at] - x[at] - series().error(x[at])), abs=ROUNDING)
         weights = np.ones(size)
         weights[at] = 0.0
-        sample, largest = _core.scan_residuals(
-            series(), (x, wild, weights), "reference", 0.0, 1, 1
-        )
+        sample, largest = _core.scan_residuals(series(), (x, wild, weights), "reference", 0.0, 1, 1)
         assert largest < 0.01
         assert len(sample) == size - 1
 
@@ -132,9 +130,7 @@ def test_standing_still_keeps_the_direction():
     pattern = 0.05 * np.sin(np.radians(theta))
     np.testing.assert_allclose(found - pattern, [0.0, -0.5, -0.5, -0.5], atol=ROUNDING)
     moved = play().error(np.array([20.0, 10.0, 10.0, 10.0]))
-    np.testing.assert_allclose(
-        moved[1:] - 0.05 * np.sin(np.radians(10.0)), -0.5, atol=ROUNDING
-    )
+    np.testing.assert_allclose(moved[1:] - 0.05 * np.sin(np.radians(10.0)), -0.5, atol=ROUNDING)
 
 
 def spring():

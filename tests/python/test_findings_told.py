@@ -1,4 +1,4 @@
-"""What a finding tells is what was fitted: its effects give the fitted columns back, to the sign."""
+"""What a finding tells is what was fitted: its effects give the fitted columns back."""
 
 import numpy as np
 import pytest
