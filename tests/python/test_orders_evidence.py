@@ -1,0 +1,118 @@
+"""Noise of orders and its degrees of freedom, bounded from both sides on white noise."""
+
+import math
+
+import numpy as np
+import pytest
+
+import trueangle as ta
+from trueangle.orders.evidence import (
+    choose_forward,
+    examine_orders,
+    fit_subset,
+    log_tail,
+    neighbour_scatter,
+    pooled_scatter,
+    run_scatter,
+)
+from trueangle.orders.harmonicsums import Readings, harmonic_sums
+
+SIGMA = 0.3
+
+
+def noise_units(seed, units=3, size=60, line=None):
+    """White noise; ``line``: order of a line of another phase in every unit."""
+    rng = np.random.default_rng(seed)
+    found = []
+    for k in range(units):
+        turns = rng.uniform(0.0, 2.0, size)
+        error = SIGMA * rng.normal(size=size) + 5.0 * k
+        if line is not None:
+            error = error + 3.0 * np.sin(2.0 * np.pi * (line * turns + k / units))
+        found.append(Readings(turns, error, np.ones(size), str(k)))
+    return found
+
+
+def test_scatter_between_units_is_the_noise():
+    """2 (R - 1) degrees of freedom each: the mean of 60 sets of 12 orders is known to 2 %."""
+    found = []
+    for seed in range(60):
+        sums = harmonic_sums(noise_units(seed), tuple(range(1, 13)))
+        found.append(run_scatter(sums, [], range(12)))
+    assert np.mean(found) == pytest.approx(SIGMA**2, rel=0.08)
+
+
+def test_the_orders_beside_one_tell_the_noise():
+    """The median of twelve: its mean is known to 3 %, and lies 4 % above by its skewness."""
+    found = [
+        np.mean(neighbour_scatter(harmonic_sums(noise_units(s, 1, 400), tuple(range(1, 60))), []))
+        for s in range(40)
+    ]
+    assert np.mean(found) == pytest.approx(1.04 * SIGMA**2, rel=0.1)
+
+
+def test_pooled_noise_leaves_out_what_disagrees_and_counts_the_rest():
+    rng = np.random.default_rng(4)
+    scatter = SIGMA**2 * rng.chisquare(4, 40) / 4.0
+    variance, freedom = pooled_scatter(scatter, 3)
+    assert variance == pytest.approx(scatter.mean(), rel=1e-12)
+    assert freedom == 40 * 4
+    loud = np.append(scatter, 1000.0 * SIGMA**2)
+    variance, freedom = pooled_scatter(loud, 3)
+    assert variance == pytest.approx(scatter.mean(), rel=1e-12)
+    assert freedom == 40 * 4
+    assert pooled_scatter(scatter[:4], 3) is None
+
+
+def test_an_order_that_differs_between_units_has_its_own_noise_and_freedom():
+    units = noise_units(5, line=3)
+    sums = harmonic_sums(units, (1, 2, 3, 4))
+    scatter = run_scatter(sums, [], range(4))
+    noise = (SIGMA**2, 200.0)
+    test = examine_orders(sums, [], [0, 2], noise, np.array([SIGMA**2, scatter[2]]))
+    _, _, left = fit_subset(sums, [])
+    gains = [left - fit_subset(sums, [k])[2] for k in (0, 2)]
+    assert scatter[2] > 50.0 * SIGMA**2
+    # Order 3 against its own scatter with 2 (R - 1) degrees of freedom, order 1 against all.
+    assert test.statistic == pytest.approx([gains[0] / SIGMA**2, gains[1] / scatter[2]])
+    expected = [log_tail(gains[0] / SIGMA**2, 200.0), log_tail(gains[1] / scatter[2], 4.0)]
+    assert test.log_p == pytest.approx([float(x) for x in expected])
+    inverse = fit_subset(sums, [2])[1]
+    assert test.variance[1] == pytest.approx(scatter[2] * np.trace(inverse) / 2.0)
+
+
+def test_few_readings_choose_no_order_of_noise_more_often_than_asked():
+    """Nine readings, noise from their own residual: 1 % for each of two orders."""
+    chosen = 0
+    for seed in range(400):
+        rng = np.random.default_rng(seed)
+        unit = Readings(rng.uniform(0.0, 1.0, 9), rng.normal(size=9), np.ones(9), "")
+        sums = harmonic_sums([unit], (1, 2))
+        chosen += bool(choose_forward(sums, np.full(2, math.log(0.01)), 8, None))
+    # 8 of 400 are expected; 24 would be five standard deviations more.
+    assert 0 <= chosen <= 24
+    # And a line of six times the noise is taken.
+    rng = np.random.default_rng(1)
+    turns = np.arange(9) / 9.0
+    unit = Readings(turns, 6.0 * np.sin(2 * np.pi * turns) + 0.3 * rng.normal(size=9),
+                    np.ones(9), "")  # fmt: skip
+    sums = harmonic_sums([unit], (1, 2))
+    assert choose_forward(sums, np.full(2, math.log(0.01)), 8, None) == [0]
+
+
+def test_errors_of_the_papers_amplitudes_are_those_of_the_mean_of_its_runs():
+    """Three runs of 36 positions and one that verifies: sigma sqrt(2/36) / sqrt(3)."""
+    theta = np.arange(36) * 10.0
+    found = []
+    for seed in range(60):
+        rng = np.random.default_rng(seed)
+        error = 0.1 * np.sin(np.radians(2.0 * theta))
+        runs = [
+            ta.CalibrationRun(theta, theta + error + 0.01 * rng.normal(size=36), 360.0)
+            for _ in range(4)
+        ]
+        table = ta.select_orders(runs, candidates=range(1, 10), method="paper").table
+        found.append([row.standard_error**2 for row in table])
+    expected = 0.01 * math.sqrt(2.0 / 36.0) / math.sqrt(3.0)
+    # 540 variances of four degrees of freedom: known to 3 %.
+    assert math.sqrt(np.mean(found)) == pytest.approx(expected, rel=0.06)
