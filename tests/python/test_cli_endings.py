@@ -102,12 +102,15 @@ def test_debug_shows_where_bad_input_was_found(desk, capsys):
     assert told.endswith("trueangle: error: missing.csv: No such file or directory\n")
 
 
-def test_warnings_are_shown_as_before_after_a_command(desk):
+def test_warnings_are_shown_as_before_after_a_command(desk, monkeypatch):
     import warnings
 
-    before = warnings.showwarning
+    def mine(*_args, **_more):
+        pass
+
+    monkeypatch.setattr(warnings, "showwarning", mine)
     main(["orders", "missing.csv"])
-    assert warnings.showwarning is before
+    assert warnings.showwarning is mine
 
 
 # -- usage
@@ -343,7 +346,8 @@ def test_a_missing_folder_is_told_before_the_work(desk, capsys, monkeypatch):
     assert capsys.readouterr().err == "trueangle: error: nowhere: No such folder\n"
 
 
-def test_standard_output_that_is_full_is_told(desk):
+@pytest.mark.parametrize("unbuffered", ["", "1"])
+def test_standard_output_that_is_full_is_told(unbuffered, desk):
     if not os.path.exists("/dev/full"):
         pytest.skip("no /dev/full here")
     with open("/dev/full", "w") as full:
@@ -352,6 +356,7 @@ def test_standard_output_that_is_full_is_told(desk):
             capture_output=False,
             stdout=full,
             stderr=subprocess.PIPE,
+            env=os.environ | {"PYTHONUNBUFFERED": unbuffered},
         )
     assert done.returncode == 1
     assert done.stderr == "trueangle: error: standard output: No space left on device\n"

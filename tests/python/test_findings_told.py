@@ -9,6 +9,7 @@ from trueangle.effects import EFFECTS, Sidebands
 from trueangle.effects.search import line_parameters
 from trueangle.joint.signals import join_runs
 from trueangle.regression.regression import Regression
+from trueangle.regression.whitening import LagCorrelation
 from trueangle.simulation import Harmonic, Joint, RunDesign, Simulation
 
 JOINT = Joint(50.0, "circular_spline", "motor")
@@ -131,6 +132,24 @@ def test_errors_of_a_line_follow_from_the_covariance_of_its_coefficients():
     assert turn == pytest.approx(((turns + 180.0) % 360.0 - 180.0).std(), rel=0.01)
 
 
+def test_a_spring_under_gravity_has_no_moment_where_the_load_hangs(signals):
+    """By its formula: the moment of a load is its torque times the sine of the angle."""
+    effect = EFFECTS["stiffening_compliance"](2.0, 0.5, gravity_deg=40.0)
+    rng = np.random.default_rng(0)
+    moment = signals.torque * np.sin(signals.theta - np.radians(40.0))
+    found = effect.signal(signals, SIM.surroundings, rng)
+    np.testing.assert_allclose(found, 2.0 * moment + 0.5 * moment**3, atol=1e-9)
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_the_references_error_turns_with_its_mount(sign, signals):
+    effect = EFFECTS["reference_error"]((3.0,), (2.0,), (50.0,), sign)
+    found = effect.signal(signals, SIM.surroundings, np.random.default_rng(0))
+    angle = 3.0 * (signals.theta + sign * signals.mount) + np.radians(50.0)
+    np.testing.assert_allclose(found, 2.0 * np.sin(angle), atol=1e-9)
+    assert np.unique(signals.mount).size == 3
+
+
 # -- how much evidence a cause must bring ----------------------------------------------
 
 
@@ -164,6 +183,33 @@ def test_the_price_of_an_account_is_that_of_its_parameters_and_causes(signals):
     assert one.bic == pytest.approx(one.deviance + extension.log_n, rel=1e-12)
     assert selection.total_penalty(one) == pytest.approx(one.bic + 6.0, rel=1e-12)
     assert selection.total_penalty(regression) == pytest.approx(regression.deviance, rel=1e-12)
+
+
+def test_the_deviance_is_that_of_the_normal_likelihood(signals):
+    """-2 ln of it up to a constant of the readings, by lstsq: n ln(RSS / n)."""
+    few = signals.take(np.arange(200))
+    noise = np.random.default_rng(12).normal(size=200)
+    regression = Regression(few, noise, SIM.surroundings, rho=0.0)
+    left = float(np.linalg.lstsq(regression.base, noise, rcond=None)[1][0])
+    assert not regression.outlying.any()
+    assert regression.deviance == pytest.approx(200 * np.log(left / 200), rel=1e-9)
+    # What a column saves is the difference of the two fits.
+    column = few.direction[:, None]
+    saved = regression.gain(column)[0]
+    both = np.hstack([regression.base, column])
+    less = float(np.linalg.lstsq(both, noise, rcond=None)[1][0])
+    assert saved == pytest.approx(200 * np.log(left / less), rel=1e-6)
+
+
+def test_white_noise_is_called_white_and_correlated_noise_is_not():
+    clock, bounds = np.tile(np.arange(300.0), 4), [(300 * k, 300 * (k + 1)) for k in range(4)]
+    correlation, rng = LagCorrelation(clock, bounds), np.random.default_rng(13)
+    white = [correlation(rng.normal(size=1200)) for _ in range(40)]
+    assert white == [0.0] * 40
+    noise = rng.normal(size=1200)
+    for i in range(1, 1200):
+        noise[i] = 0.5 * noise[i - 1] + np.sqrt(0.75) * noise[i]
+    assert correlation(noise) == pytest.approx(0.5, abs=0.12)
 
 
 # -- degrees of freedom ----------------------------------------------------------------
