@@ -39,6 +39,9 @@ POSITION_TOLERANCE: Final = 1.0 / 36_000.0
 #: three usual ones.
 _MISSING: Final = 20.0 / 360.0
 
+#: Readings that a turn takes at least, in steps below half of it.
+_LEAST_OF_A_TURN: Final = 3
+
 #: Most shifted uniform grids that a union of mounts is searched for.
 _MOST_GRIDS: Final = 24
 
@@ -196,11 +199,15 @@ def closure_errors(
     """
     found = []
     for run in as_runs(runs):
+        if len(run) < _LEAST_OF_A_TURN:
+            continue
         width = run.period * POSITION_TOLERANCE if tolerance is None else tolerance
-        travel = run.unwrapped_reference[-1] - run.unwrapped_reference[0]
+        reference = run.unwrapped_reference
+        travel = reference[-1] - reference[0]
         turns = round(float(travel / run.period))
         if turns and abs(travel - turns * run.period) <= width:
-            found.append(float(run.centred_error[-1] - run.centred_error[0]))
+            error = run.centred_error
+            found.append(float(error[-1] - error[0]))
     return np.array(found, dtype=np.float64)
 
 

@@ -13,6 +13,7 @@ from trueangle.orders.evidence import (
     log_tail,
 )
 from trueangle.orders.harmonicsums import Readings, harmonic_sums
+from trueangle.orders.zerogroups import units_of
 
 # Normal equations of a few hundred readings, relative to their size.
 ROUNDING = 1e-10
@@ -140,3 +141,18 @@ def test_tail_of_the_f_distribution():
     for t, dof in ((3.0, 5.0), (15.0, 140.0), (40.0, 1000.0)):
         assert log_tail(t, dof) == pytest.approx(stats.f.logsf(t / 2, 2, dof))
     assert log_tail(15.0, np.inf) == pytest.approx(stats.chi2.logsf(15.0, 2))
+
+
+@pytest.mark.parametrize("sizes", [[2, 1, 7, 40], [2000, 3000]])
+def test_units_have_the_errors_of_their_runs(sizes):
+    """Many short runs are taken together, long ones one by one."""
+    rng = np.random.default_rng(len(sizes))
+    runs = []
+    for k, n in enumerate(sizes):
+        reference = rng.uniform(-720.0, 720.0, n)
+        indicated = reference + 178.0 + 3.0 * rng.standard_normal(n) + 360.0 * (k % 2)
+        runs.append(ta.CalibrationRun(reference, indicated, period=360.0))
+    units, places = units_of(runs, whole=True)
+    assert np.array_equal(places, np.arange(sum(sizes)))
+    for unit, run in zip(units, runs, strict=True):
+        np.testing.assert_allclose(unit.error, run.centred_error, rtol=1e-12, atol=1e-12)

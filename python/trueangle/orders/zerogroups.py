@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Iterator, Sequence
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..aliasing import Positions
+from ..angles import wrap
 from ..fitting.travel import over_turns
 from ..runs import CalibrationRun
 from .harmonicsums import Readings
@@ -18,6 +20,9 @@ __all__ = ["angle_blocks", "units_of"]
 #: Folds of a single run: whole blocks of neighbouring positions, dealt in turn.
 _FOLDS: Final = 6
 _BLOCKS: Final = 24
+
+#: Readings a run up to which the call of a function costs more than what it computes.
+_SHORT: Final = 1000
 
 
 def units_of(
@@ -29,11 +34,11 @@ def units_of(
     runs. Angles are taken over turns unless ``whole`` (all orders are whole).
     """
     units, places, start = [], [], 0
-    for number, run in enumerate(runs):
+    for number, (run, error) in enumerate(zip(runs, _centred(runs), strict=True)):
         label = run.label or str(number + 1)
         angle = (run if whole else over_turns(run)).reference
         weights = np.ones(len(run)) if run.weights is None else run.weights
-        everything = Readings(angle / run.period, run.centred_error, weights, label)
+        everything = Readings(angle / run.period, error, weights, label)
         place = np.arange(start, start + len(run))
         if run.mount is not None and np.unique(run.mount).size > 1:
             for mount in np.unique(run.mount):
@@ -45,6 +50,21 @@ def units_of(
             places.append(place)
         start += len(run)
     return units, np.concatenate(places)
+
+
+def _centred(runs: Sequence[CalibrationRun]) -> Iterator[NDArray[np.float64]]:
+    """Error of every run unfolded around its zero; of many short runs all at once."""
+    sizes = np.array([len(run) for run in runs])
+    if sizes.mean() > _SHORT or len({run.period for run in runs}) > 1:
+        yield from (run.centred_error for run in runs)
+        return
+    period = runs[0].period
+    error = np.concatenate([run.indicated for run in runs])
+    error -= np.concatenate([run.reference for run in runs])
+    ends = np.cumsum(sizes)
+    vectors = np.add.reduceat(np.exp(error * (2j * math.pi / period)), ends - sizes)
+    zero = np.repeat(wrap(np.angle(vectors) * (period / (2.0 * math.pi)), period), sizes)
+    yield from np.split(zero + wrap(error - zero, period), ends[:-1])
 
 
 def angle_blocks(unit: Readings, positions: Positions) -> list[Readings]:
