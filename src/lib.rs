@@ -25,11 +25,13 @@ pub mod compensator;
 pub mod terms;
 
 pub mod band;
+pub mod banded;
 pub mod design;
 pub mod fit;
 pub mod lstsq;
 pub mod moments;
 pub mod rank;
+pub mod waves;
 
 #[cfg(feature = "python")]
 mod python;

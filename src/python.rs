@@ -10,6 +10,7 @@ mod door;
 mod failure;
 mod fit;
 mod moments;
+mod motion;
 mod number;
 mod release;
 mod series;
@@ -46,6 +47,9 @@ mod _core {
 
     #[pymodule_export]
     use super::moments::{PyMoments, fit_moments};
+
+    #[pymodule_export]
+    use super::motion::{PyBanded, harmonic_rows, harmonic_sum};
 
     #[pymodule_export]
     use super::table::{table_correction, table_source};

@@ -152,6 +152,14 @@ class Corrector:
     ) -> _Corrected: ...
 
 @final
+class Banded:
+    @staticmethod
+    def factor(bands: NDArray[np.float64]) -> Banded | None: ...
+    @property
+    def log_determinant(self) -> float: ...
+    def solve(self, right: NDArray[np.float64]) -> None: ...
+
+@final
 class Solution:
     @property
     def offsets(self) -> _Array: ...
@@ -193,6 +201,21 @@ def band(
     orders: Sequence[Sequence[int]],
     covariance: _Array,
 ) -> _Array: ...
+def harmonic_rows(
+    theta: NDArray[np.float64],
+    orders: Sequence[int],
+    out: NDArray[np.float64],
+    factor: NDArray[np.float64] | None = None,
+    lead: NDArray[np.float64] | None = None,
+) -> None: ...
+def harmonic_sum(
+    theta: NDArray[np.float64],
+    orders: Sequence[int],
+    coefficients: NDArray[np.float64],
+    out: NDArray[np.float64],
+    factor: NDArray[np.float64] | None = None,
+    lead: NDArray[np.float64] | None = None,
+) -> None: ...
 def resultant(
     indicated: NDArray[np.float64], reference: NDArray[np.float64], period: float
 ) -> float: ...

@@ -8,6 +8,7 @@ import math
 from typing import TYPE_CHECKING, Any
 
 from ..errors import ArgumentError
+from .paths import Input
 
 if TYPE_CHECKING:
     from ..planning.selfplan import SelfPlan
@@ -27,9 +28,15 @@ def add_self_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="METHOD",
         help=f"plan a calibration without a reference: {', '.join(SELF_METHODS)}",
     )
-    add("--count", type=int, default=3, metavar="N", help="heads or shifts (default: %(default)s)")
+    add(
+        "--simulation",
+        type=Input,
+        metavar="FILE",
+        help="simulation file whose heads, shifts, coast and noise are planned with",
+    )
+    add("--count", type=int, metavar="N", help="heads or shifts (default: 3)")
     add("--angles", metavar="0,90,180", help="angles of heads or shifts that are there")
-    add("--speed-ratio", type=float, default=5.0, metavar="R", help="start over end speed (5)")
+    add("--speed-ratio", type=float, metavar="R", help="start over end speed (5)")
     add("--start-speed", type=float, metavar="F", help="turns per second at the start")
     add("--rate", type=float, metavar="HZ", help="readings per second")
 
@@ -38,18 +45,24 @@ def run_self(args: argparse.Namespace, orders: tuple[float, ...] | None) -> int:
     """Print the plan."""
     from ..planning.selfplan import plan_self
 
-    plan = plan_self(
-        args.self_method,
-        orders,
-        count=args.count,
-        angles=None if args.angles is None else _angles(args.angles),
-        speed_ratio=args.speed_ratio,
-        start_speed=args.start_speed,
-        rate=args.rate,
-        gear_ratio=args.gear_ratio,
-        noise=args.noise_arcsec,
-        standard_error=args.std_arcsec,
-    )
+    told = {
+        "orders": orders,
+        "count": args.count,
+        "angles": None if args.angles is None else _angles(args.angles),
+        "speed_ratio": args.speed_ratio,
+        "start_speed": args.start_speed,
+        "rate": args.rate,
+        "gear_ratio": args.gear_ratio,
+        "noise": args.noise_arcsec,
+        "standard_error": args.std_arcsec,
+    }
+    given = {name: value for name, value in told.items() if value is not None}
+    if args.simulation is not None:
+        from ..planning.selfdesigns import designed
+        from ..simulation import load_simulation
+
+        given = designed(load_simulation(args.simulation), args.self_method) | given
+    plan = plan_self(args.self_method, **given)
     print(json.dumps(as_json(plan), indent=2, allow_nan=False) if args.json else render(plan))
     return 0
 

@@ -9,8 +9,10 @@ from numpy.typing import NDArray
 
 from ..distributions import chi_squared_quantile
 from .colour import spectrum_at
+from .pattern import ENCODER, pattern_series
 from .projected import pairs
-from .steady import ENCODER, Readings, SteadyFit, fit_steady, pattern_series
+from .readings import Readings
+from .steady import SteadyFit, fit_steady
 
 __all__ = ["HIGHEST", "choose_orders", "highest_order"]
 

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..distributions import chi_squared_tail
+from .projected import harmonic_rows
 
 __all__ = ["noise_beside", "spectrum_at"]
 
@@ -23,17 +24,29 @@ _CHANCE: Final = 1e-3
 #: Readings that are looked at: enough to see 10 %.
 _MOST: Final = 200_000
 
+_CHUNK: Final = 4096
+
 
 def spectrum_at(theta: Array, values: Array, orders: Array) -> Array:
     r""":math:`2\,|\sum_i e_i \exp(-ik\theta_i)|^2 / \sum e^2`: 2 on average in white noise."""
     total = float(values @ values)
     if total == 0.0:
         return np.zeros(orders.size)
-    power = np.zeros(orders.size)
-    for i, k in enumerate(orders):
-        angle = k * theta
-        power[i] = (values @ np.cos(angle)) ** 2 + (values @ np.sin(angle)) ** 2
-    return np.asarray(power * (2.0 / total))
+    # Harmonics of the whole part of an order times those of the rest, which few share.
+    whole = np.unique(np.floor(orders))
+    rests, which = np.unique(np.round(orders - np.floor(orders), 9), return_inverse=True)
+    place = np.searchsorted(whole, np.floor(orders))
+    found = np.zeros((2 * whole.size, 2 * rests.size))
+    for a in range(0, theta.size, _CHUNK):
+        x, e = theta[a : a + _CHUNK], values[a : a + _CHUNK]
+        beside = rests[:, None] * x
+        both = np.concatenate([e * np.cos(beside), e * np.sin(beside)])
+        found += harmonic_rows(x, whole) @ both.T
+    cosine, sine = found[0::2], found[1::2]
+    n = rests.size
+    real = cosine[place, which] - sine[place, which + n]
+    imaginary = sine[place, which] + cosine[place, which + n]
+    return np.asarray((real**2 + imaginary**2) * (2.0 / total))
 
 
 def noise_beside(theta: Array, residuals: Array, orders: Sequence[float], turns: float) -> Array:
@@ -46,8 +59,10 @@ def noise_beside(theta: Array, residuals: Array, orders: Sequence[float], turns:
         return factors
     part = slice(0, _MOST)
     x, e = theta[part], residuals[part]
-    for i, order in enumerate(orders):
-        beside = spectrum_at(x, e, np.array([order + d for d in _BESIDE if order + d > 0.3]))
+    near = np.add.outer(np.asarray(orders, dtype=np.float64), _BESIDE)
+    power = spectrum_at(x, e, near.ravel()).reshape(near.shape)
+    for i, there in enumerate(near > 0.3):
+        beside = power[i, there]
         mean = float(beside.mean()) / 2.0
         if chi_squared_tail(float(beside.sum()), 2.0 * beside.size) < _CHANCE:
             factors[i] = max(mean, 1.0)

@@ -14,7 +14,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any, Final, NamedTuple
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 from ..distributions import f_tail
 from ..errors import ArgumentError, NoModelError
 from .dense import DenseFit, Rows, fit_dense
+from .gearlines import SLIP, Channels, Line, channels_of, lines_of, motion, slope_ratio, varied
 from .modelling import made_model
 from .projected import Column, pairs
 from .recording import Recording
@@ -32,17 +33,11 @@ __all__ = ["dual"]
 
 Array = NDArray[np.float64]
 
-#: Orders of each shaft that are tried by default.
-_HIGHEST: Final = 8
-
 #: An order of which less is left beside line, direction and the others is not told.
 _LEAST: Final = 0.02
 
 #: An estimated ratio within so many standard errors of a whole number is taken for it.
 _WHOLE: Final = 4.0
-
-#: Turns by which two orders must part over the travel to be two numbers.
-_SLIP: Final = 0.05
 
 #: Output turns from which its low orders stand apart from the ratio.
 _WHOLE_TURNS: Final = 1.5
@@ -50,35 +45,7 @@ _WHOLE_TURNS: Final = 1.5
 #: Fits in which the ratio settles beside the patterns.
 _RATIOS: Final = 3
 
-#: Speed is a regressor of its own where it varies by this share of the highest.
-_VARIED: Final = 0.2
-
 _CHUNK: Final = 8192
-
-
-class _Line(NamedTuple):
-    """One order of the output, with every shaft that has it."""
-
-    order: float
-    output: int  # order of the output, 0 for none
-    motor: int  # order of the motor, 0 for none
-
-    @property
-    def of(self) -> str:
-        if self.output and self.motor:
-            return (
-                f"output {self.output} + motor {self.motor} "
-                "(output encoder, motor encoder or gear: one number)"
-            )
-        if self.output:
-            return f"output {self.output} (output encoder or gear)"
-        return f"motor {self.motor} (motor encoder or gear)"
-
-
-class _Channels(NamedTuple):
-    motor: list[Array]
-    output: list[Array]
-    time: list[Array | None]
 
 
 def dual(
@@ -91,12 +58,12 @@ def dual(
     """Sums at every order with their names; see `trueangle.selfcal`."""
     if gear_ratio is not None and not (math.isfinite(gear_ratio) and gear_ratio != 0.0):
         raise ArgumentError(f"gear_ratio must be motor turns per output turn, got {gear_ratio!r}")
-    channels = _channels(recordings)
+    channels = channels_of(recordings)
     estimated = gear_ratio is None
-    ratio = _ratio(channels) if gear_ratio is None else float(gear_ratio)
+    ratio = slope_ratio(channels) if gear_ratio is None else float(gear_ratio)
     turns = sum(float(np.ptp(m)) for m in channels.motor) / abs(ratio) / (2.0 * math.pi)
     for _ in range(_RATIOS if estimated else 1):
-        lines = _lines(orders, ratio, turns)
+        lines = lines_of(orders, ratio, turns)
         if turns < _WHOLE_TURNS:  # the output's own orders would pass for a slope
             lines = [line for line in lines if line.motor]
         fit = _fit(channels, ratio, lines)
@@ -107,9 +74,9 @@ def dual(
             ratio = measured
     whole = round(abs(ratio))
     doubt = abs(ratio) * slope_std
-    if estimated and whole and doubt * turns < _SLIP and abs(abs(ratio) - whole) < _WHOLE * doubt:
+    if estimated and whole and doubt * turns < SLIP and abs(abs(ratio) - whole) < _WHOLE * doubt:
         ratio = math.copysign(float(whole), ratio)
-    lines = _lines(orders, ratio, turns)
+    lines = lines_of(orders, ratio, turns)
     fit = _fit(channels, ratio, lines)
     retained = fit.projected.retained()
     lost = [
@@ -166,65 +133,15 @@ def dual(
     )
 
 
-def _at_output(o: OrderEstimate, line: _Line, channels: _Channels, ratio: float) -> OrderEstimate:
+def _at_output(o: OrderEstimate, line: Line, channels: Channels, ratio: float) -> OrderEstimate:
     """A motor's order as a function of the output's reading in the first run."""
     zero = float(np.median(channels.output[0] - channels.motor[0] / ratio))
     turned = complex(o.cosine, o.sine) * np.exp(1j * line.order * zero)
     return replace(o, cosine=turned.real, sine=turned.imag)
 
 
-def _channels(recordings: Sequence[Recording]) -> _Channels:
-    motor, output, time = [], [], []
-    for r in recordings:
-        reading = r.indicated if r.indicated is not None else r.reference
-        if r.motor is None or reading is None:
-            raise NoModelError(
-                f"{r.named}: both readings are needed, motor_deg (not reduced) and indicated_deg "
-                "(the output encoder)"
-            )
-        motor.append(_unwrapped(r.motor))
-        output.append(_unwrapped(reading))
-        time.append(r.time)
-    return _Channels(motor, output, time)
-
-
-def _unwrapped(angle: Array) -> Array:
-    if float(np.ptp(angle)) > 1.02 * 2.0 * math.pi:
-        return angle
-    return np.asarray(np.unwrap(angle, period=2.0 * math.pi))
-
-
-def _ratio(channels: _Channels) -> float:
-    """Motor turns per output turn, by the slope of one reading over the other."""
-    top = bottom = 0.0
-    for m, o in zip(channels.motor, channels.output, strict=True):
-        dm, do = m - m.mean(), o - o.mean()
-        top += float(dm @ dm)
-        bottom += float(dm @ do)
-    if bottom == 0.0:
-        raise NoModelError(
-            "the output does not move with the motor: give --gear-ratio, or record motion"
-        )
-    return top / bottom
-
-
-def _lines(orders: str | Sequence[float], ratio: float, turns: float) -> list[_Line]:
-    """Orders of both shafts; those that the travel cannot tell apart stand once."""
-    size = abs(ratio)
-    numbers = range(1, _HIGHEST + 1) if isinstance(orders, str) else [int(k) for k in orders]
-    lines = {float(k): _Line(float(k), k, 0) for k in numbers}
-    for j in range(1, _HIGHEST + 1):
-        order = j * size
-        near = round(order)
-        if near >= 1 and abs(order - near) * turns < _SLIP:
-            lines[float(near)] = _Line(float(near), near, j)
-        else:
-            lines[order] = _Line(order, 0, j)
-    return [lines[k] for k in sorted(lines)]
-
-
 def _fit(
-    channels: _Channels, ratio: float, lines: Sequence[_Line], half: int | None = None
+    channels: Channels, ratio: float, lines: Sequence[Line], half: int | None = None
 ) -> DenseFit:
     columns: list[Column] = [c for line in lines for c in pairs(line.of, [line.order])]
     parts = _parts(channels, ratio, lines, half)
@@ -232,16 +149,16 @@ def _fit(
 
 
 def _parts(
-    channels: _Channels, ratio: float, lines: Sequence[_Line], half: int | None = None
+    channels: Channels, ratio: float, lines: Sequence[Line], half: int | None = None
 ) -> list[Rows]:
     """Nuisances: ratio, direction, velocity where time is known, a zero per run."""
     runs = len(channels.motor)
-    reversing, timed = _varied(channels, ratio)
+    reversing, timed = varied(channels, ratio)
     parts = []
     for j, (m, o, t) in enumerate(zip(*channels, strict=True)):
         theta = m / ratio
         centre = float(np.mean(theta))
-        way, speed = _motion(theta, t)
+        way, speed = motion(theta, t)
         # By whole turns the output's zero is any; its patterns count from its own reading.
         zero = float((o - theta)[0])
         target = o - theta - zero
@@ -271,43 +188,7 @@ def _parts(
     return parts
 
 
-def _varied(channels: _Channels, ratio: float) -> tuple[bool, bool]:
-    """Whether both directions were travelled, and at speeds that differ.
-
-    At one speed the column would hold nothing but the motor's own error, differentiated.
-    """
-    motions = [_motion(m / ratio, t) for m, t in zip(channels.motor, channels.time, strict=True)]
-    ways = np.unique(np.concatenate([np.unique(way) for way, _ in motions]))
-    speed = np.abs(np.concatenate([v for _, v in motions]))
-    known = all(t is not None for t in channels.time)
-    varied = known and float(speed.std()) > _VARIED * float(np.quantile(speed, 0.99))
-    return bool({-1.0, 1.0} <= set(ways.tolist())), bool(varied)
-
-
-def _motion(theta: Array, time: Array | None) -> tuple[Array, Array]:
-    """Direction of travel (-1, 1) and speed of the output in radians per second."""
-    step = np.diff(theta, prepend=theta[0])
-    width = 5
-    smooth = np.convolve(step, np.ones(width) / width, "same")
-    sign = np.sign(smooth)
-    moving = np.flatnonzero(sign)
-    if moving.size == 0:
-        return np.zeros(theta.size), np.zeros(theta.size)
-    last = np.maximum.accumulate(np.where(sign != 0.0, np.arange(sign.size), moving[0]))
-    way = sign[last]
-    if time is None:
-        return np.asarray(way), np.zeros(theta.size)
-    spread = max(1, min(10, theta.size // 10))
-    speed = np.zeros(theta.size)
-    dt = time[2 * spread :] - time[: -2 * spread]
-    speed[spread:-spread] = (theta[2 * spread :] - theta[: -2 * spread]) / np.where(
-        dt > 0.0, dt, np.inf
-    )
-    speed[:spread], speed[-spread:] = speed[spread], speed[-spread - 1]
-    return np.asarray(way), speed
-
-
-def _significant(fit: DenseFit, lines: Sequence[_Line], among: Sequence[_Line]) -> list[_Line]:
+def _significant(fit: DenseFit, lines: Sequence[Line], among: Sequence[Line]) -> list[Line]:
     from ..distributions import chi_squared_quantile
 
     limit = chi_squared_quantile(1.0 - 0.01 / max(len(lines), 1), 2.0)
@@ -323,7 +204,7 @@ def _significant(fit: DenseFit, lines: Sequence[_Line], among: Sequence[_Line]) 
 
 
 def _blind(
-    kept: Sequence[_Line], lost: Sequence[_Line], ratio: float, channels: _Channels
+    kept: Sequence[Line], lost: Sequence[Line], ratio: float, channels: Channels
 ) -> list[Blind]:
     blind = [
         Blind(
@@ -363,9 +244,9 @@ def _blind(
 
 
 def _beside(
-    fit: DenseFit, ratio: float, measured: float, std: float, channels: _Channels
+    fit: DenseFit, ratio: float, measured: float, std: float, channels: Channels
 ) -> dict[str, Any]:
-    reversing, timed = _varied(channels, ratio)
+    reversing, timed = varied(channels, ratio)
     found: dict[str, Any] = {
         "gear_ratio": ratio,
         "gear_ratio_measured": measured,
@@ -386,7 +267,7 @@ def _notes(
     measured: float,
     std: float,
     estimated: bool,
-    channels: _Channels,
+    channels: Channels,
 ) -> list[str]:
     notes = []
     if estimated:
@@ -399,7 +280,7 @@ def _notes(
         )
     if fit.correlated:
         notes.append("neighbouring residuals agree: standard errors are taken from blocks")
-    if not _varied(channels, ratio)[0]:
+    if not varied(channels, ratio)[0]:
         notes.append("one direction of travel only: reversal error is not seen")
     notes.append(
         "the model takes what is seen for the output's: it makes the output agree with the motor"
@@ -407,7 +288,7 @@ def _notes(
     return notes
 
 
-def _held_out(channels: _Channels, ratio: float, lines: Sequence[_Line]) -> dict[str, HeldOut]:
+def _held_out(channels: Channels, ratio: float, lines: Sequence[Line]) -> dict[str, HeldOut]:
     """First half of every run against the second."""
     if min(o.size for o in channels.output) < 200:
         return {}

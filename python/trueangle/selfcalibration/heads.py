@@ -20,11 +20,11 @@ from ..angles import wrap
 from ..errors import ArgumentError, NoModelError
 from .dense import DenseFit, Rows, fit_dense
 from .modelling import made_model
+from .pattern import ENCODER, pattern_model
 from .projected import harmonic_rows, names_in_words, pairs
 from .recording import Recording
 from .result import ARCSEC, Blind, HeldOut, OrderEstimate, SelfCalibration, estimates
 from .significance import chosen_orders
-from .steady import ENCODER, pattern_model
 from .summary import listed
 from .verification import judged
 

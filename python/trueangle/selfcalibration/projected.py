@@ -10,7 +10,17 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["NOT_SEEN", "Column", "Projected", "harmonic_rows", "names_in_words"]
+from .. import _core
+
+__all__ = [
+    "NOT_SEEN",
+    "Column",
+    "Projected",
+    "harmonic_rows",
+    "harmonic_sum",
+    "names_in_words",
+    "pairs",
+]
 
 Array = NDArray[np.float64]
 
@@ -40,19 +50,37 @@ def pairs(source: str, orders: Iterable[float]) -> list[Column]:
     return [Column(source, float(k), part) for k in orders for part in ("cos", "sin")]
 
 
-def harmonic_rows(theta: Array, orders: Sequence[float], out: Array | None = None) -> Array:
-    """``cos k theta, sin k theta`` of each order in turn, shape (2 orders, n).
+def harmonic_rows(
+    theta: Array,
+    orders: Sequence[float],
+    out: Array | None = None,
+    *,
+    factor: Array | None = None,
+    lead: Array | None = None,
+) -> Array:
+    r"""``cos k theta, sin k theta`` of each whole order in turn, shape (2 orders, n).
 
     Neighbouring orders are made by one complex product each: within ``k`` roundings.
+    With ``lead`` the phase ``lead / k`` is added, with ``factor`` each reading is scaled.
     """
     rows = np.empty((2 * len(orders), theta.size)) if out is None else out
-    unit = np.exp(1j * theta)
-    power, reached = np.ones_like(unit), 0.0
-    for i, k in enumerate(orders):
-        power = power * unit if k == reached + 1.0 else np.exp(1j * (k * theta))
-        reached = k
-        rows[2 * i], rows[2 * i + 1] = power.real, power.imag
+    _core.harmonic_rows(theta, [int(k) for k in orders], rows, factor, lead)
     return rows
+
+
+def harmonic_sum(
+    theta: Array,
+    orders: Sequence[float],
+    coefficients: Array,
+    *,
+    factor: Array | None = None,
+    lead: Array | None = None,
+) -> Array:
+    """``coefficients @ harmonic_rows(...)`` without the rows."""
+    out = np.empty(theta.size)
+    whole = [int(k) for k in orders]
+    _core.harmonic_sum(theta, whole, np.ascontiguousarray(coefficients), out, factor, lead)
+    return out
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any, Final
 
 import numpy as np
@@ -21,13 +20,14 @@ from numpy.typing import NDArray
 from ..angles import wrap
 from ..distributions import f_tail
 from ..errors import NoModelError
+from .clampings import Clampings, clampings_of
 from .dense import DenseFit, Rows, fit_dense
 from .modelling import made_model
+from .pattern import ENCODER, pattern_model
 from .projected import Column, harmonic_rows, pairs
 from .recording import Recording
 from .result import ARCSEC, Blind, HeldOut, SelfCalibration, estimates
 from .significance import chosen_orders
-from .steady import ENCODER, pattern_model
 from .summary import listed, ranges
 
 __all__ = ["shifts"]
@@ -43,26 +43,8 @@ _ROUNDS: Final = 8
 #: Share of an order that is left beside the other pattern, below which it is refused.
 _LEAST: Final = 1e-3
 
-#: Shifts that differ by less (radians) are one shift.
-_APART: Final = math.radians(0.5)
-
-#: Readings of a polygon stand within this share of the pitch of its facets.
-_ON_FACET: Final = 0.1
-_MOST_FACETS: Final = 720
-
 #: Orders of a coupling that changes with the clamping.
 _COUPLING: Final = (1.0, 2.0)
-
-
-@dataclass(frozen=True)
-class _Design:
-    """Readings of all mounts, radians: joint, other scale, shift of each run."""
-
-    joint: list[Array]
-    other: list[Array]
-    shift: Array
-    facets: int  # 0 for an encoder
-    notes: tuple[str, ...]
 
 
 def shifts(
@@ -72,7 +54,7 @@ def shifts(
     period: float = 360.0,
 ) -> SelfCalibration:
     """Both patterns from readings at several shifts; see `trueangle.selfcal`."""
-    design = _design(recordings)
+    design = clampings_of(recordings)
     if isinstance(orders, str):
         highest = design.facets // 2 if design.facets else _HIGHEST
         wanted = tuple(float(k) for k in range(1, highest + 1))
@@ -153,86 +135,14 @@ def shifts(
     )
 
 
-def _design(recordings: Sequence[Recording]) -> _Design:
-    first = recordings[0]
-    for r in recordings:
-        if r.indicated is None or r.reference is None:
-            raise NoModelError(
-                f"{r.named}: two readings are needed, indicated_deg and reference_deg (the other "
-                "encoder, or the polygon's nominal angles)"
-            )
-    if len(recordings) < 2:
-        raise NoModelError(
-            f"{first.named}: one clamping shows the sum of both patterns only; record at least two "
-            "(three are better), each as a run of its own with its shift_deg"
-        )
-    joint = [np.asarray(r.indicated) for r in recordings]
-    other = [np.asarray(r.reference) for r in recordings]
-    told = [r.shift if r.shift is not None else r.mount for r in recordings]
-    gap = np.array(
-        [float(np.angle(np.exp(1j * (b - a)).mean())) for a, b in zip(joint, other, strict=True)]
-    )
-    gap = np.asarray(wrap(gap - gap[0]))
-    notes: list[str] = []
-    if any(t is None for t in told):
-        shift = gap
-        if np.abs(wrap(gap)).max() < _APART:
-            raise NoModelError(
-                f"{first.named}: all clampings are at one angle, which shows the sum of both "
-                "patterns only; turn one of the two between runs and record by how much (shift_deg)"
-            )
-        notes.append("the shifts are estimated from the mean differences of the two readings")
-        return _Design(joint, other, shift, _facets(other), tuple(notes))
-    given = np.array([float(np.angle(np.exp(1j * np.asarray(t)).mean())) for t in told])
-    given = np.asarray(wrap(given - given[0]))
-    if np.abs(given).max() < _APART and np.abs(gap).max() < _APART:
-        raise NoModelError(
-            f"{first.named}: all clampings have one shift, which shows the sum of both patterns "
-            "only; turn one of the two between runs"
-        )
-    follows = min(float(np.abs(wrap(gap - s * given)).max()) for s in (1.0, -1.0))
-    still = float(np.abs(gap).max())
-    if still < follows:
-        # Both readings were set to one zero at every clamping: the place on the other scale
-        # is its reading and the shift.
-        raw = np.array([float(np.asarray(t).mean()) for t in told])
-        other = [b + s for b, s in zip(other, raw, strict=True)]
-        shift = given
-    else:
-        shift = gap
-        if follows > math.radians(2.0):
-            notes.append(
-                f"the readings' differences are off shift_deg by up to "
-                f"{math.degrees(follows):.3g} deg: the differences are taken"
-            )
-    return _Design(joint, other, shift, _facets(other), tuple(notes))
-
-
-def _facets(other: Sequence[Array]) -> int:
-    """Facets of a polygon: readings that stand at a few equal steps of the turn; else 0."""
-    places = np.mod(np.concatenate(list(other)), 2.0 * math.pi)
-    offset = float(np.angle(np.exp(1j * places[:1]).mean()))
-    x = np.mod(places - offset, 2.0 * math.pi) / (2.0 * math.pi)
-    steps = np.unique(np.round(x * 36_000.0) % 36_000)
-    if steps.size > min(_MOST_FACETS, x.size // 2):
-        return 0
-    for n in range(max(2, steps.size), _MOST_FACETS + 1):
-        if (
-            float(np.abs(x * n - np.round(x * n)).max()) < _ON_FACET
-            and np.unique(np.round(x * n) % n).size >= 0.8 * n
-        ):
-            return n
-    return 0
-
-
-def _columns(design: _Design, orders: Sequence[float]) -> list[Column]:
+def _columns(design: Clampings, orders: Sequence[float]) -> list[Column]:
     columns = pairs(ENCODER, orders)
     if design.facets:
         return columns + [Column(f"facet {i}", 0.0, "") for i in range(design.facets)]
     return columns + pairs(OTHER, orders)
 
 
-def _fit(design: _Design, orders: Sequence[float], runs: Sequence[int] | None = None) -> DenseFit:
+def _fit(design: Clampings, orders: Sequence[float], runs: Sequence[int] | None = None) -> DenseFit:
     """Fixed point over the places on both scales."""
     runs = range(len(design.joint)) if runs is None else runs
     columns = _columns(design, orders)
@@ -258,7 +168,7 @@ def _fit(design: _Design, orders: Sequence[float], runs: Sequence[int] | None = 
 
 
 def _rows(
-    design: _Design,
+    design: Clampings,
     j: int,
     i: int,
     runs: int,
@@ -305,7 +215,9 @@ def _lost(fit: DenseFit, orders: Sequence[float]) -> tuple[float, ...]:
     return tuple(lost)
 
 
-def _beside(design: _Design, fit: DenseFit, lost: Sequence[float], limit: float) -> dict[str, Any]:
+def _beside(
+    design: Clampings, fit: DenseFit, lost: Sequence[float], limit: float
+) -> dict[str, Any]:
     found: dict[str, Any] = {"shifts_deg": [math.degrees(s) % 360.0 for s in design.shift]}
     noise = math.sqrt(fit.projected.variance)
     found["coupling_arcsec"] = math.sqrt(fit.random_variance) * noise * ARCSEC
@@ -339,7 +251,7 @@ def _beside(design: _Design, fit: DenseFit, lost: Sequence[float], limit: float)
     return found
 
 
-def _notes(design: _Design, fit: DenseFit) -> list[str]:
+def _notes(design: Clampings, fit: DenseFit) -> list[str]:
     notes = []
     if design.facets:
         notes.append(f"the other is a polygon of {design.facets} facets, each with its own error")
@@ -359,7 +271,7 @@ def _notes(design: _Design, fit: DenseFit) -> list[str]:
     return notes
 
 
-def _held_out(design: _Design, orders: Sequence[float], whole: DenseFit) -> dict[str, HeldOut]:
+def _held_out(design: Clampings, orders: Sequence[float], whole: DenseFit) -> dict[str, HeldOut]:
     """Each clamping predicted by the others."""
     runs = len(design.joint)
     if runs < 3:

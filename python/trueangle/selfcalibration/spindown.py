@@ -19,10 +19,12 @@ from .choice import choose_orders, highest_order
 from .colour import noise_beside
 from .loop import followed_orders, followed_share, widened
 from .modelling import made_model
+from .pattern import ENCODER, pattern_series
+from .readings import Readings
 from .recording import Recording
 from .result import ARCSEC, Blind, OrderEstimate, SelfCalibration, estimates
 from .ripple import LARGEST_COST, averaged_over_ripple, cost_of_ripple
-from .steady import ENCODER, Readings, SteadyFit, fit_steady, pattern_series
+from .steady import SteadyFit, fit_steady
 from .stretches import cut_stretches
 from .summary import listed, ranges
 from .verification import held_out

@@ -103,7 +103,8 @@ def ripple_lead(stretch: Stretch, speed: Array) -> Array:
     law = float(spread @ spread)
     damping = max(0.0, -float(spread @ rate) / law) if law > 0.0 else 0.0
     lead = (damping * omega - 3.0 * rate) / omega**2
-    return np.asarray(stretch.direction * np.interp(stretch.time, t, lead))
+    # One value for some neighbours, so that their sines are taken once.
+    return np.repeat(stretch.direction * lead, step)[: speed.size]
 
 
 def cut_stretches(recordings: Iterable[Recording]) -> list[Stretch]:

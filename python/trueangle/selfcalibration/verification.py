@@ -10,8 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..distributions import chi_squared_tail
+from .readings import Readings
 from .result import ARCSEC, HeldOut
-from .steady import Readings, SteadyFit, fit_steady
+from .steady import SteadyFit, fit_steady
 
 __all__ = ["held_out", "judged"]
 
@@ -102,6 +103,7 @@ def _compare(
         start=fit,
         groups=groups,
         thorough=False,
+        like=fit.motion,
     )
     m = 2 * len(fit.orders)
     rows = np.array(

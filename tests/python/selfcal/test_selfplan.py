@@ -56,3 +56,62 @@ def test_wrong_wishes_are_refused():
         plan_self("spin-down", speed_ratio=0.9)
     with pytest.raises(ArgumentError, match="two angles"):
         plan_self("heads", count=1)
+
+
+FILE = """
+[joint]
+gear_ratio = 7.3
+
+[[harmonic]]
+shaft = "output"
+order = 3
+amplitude_arcsec = 40.0
+
+[[head]]
+angle_deg = 0.0
+[[head]]
+angle_deg = 120.0
+[[head]]
+angle_deg = 240.0
+
+[noise]
+sigma_arcsec = 20.0
+
+[[run]]
+speed_deg_s = 3600.0
+speed_end_deg_s = 720.0
+turns = 99.4186
+samples = 20000
+shift_deg = 10.0
+[[run]]
+shift_deg = 50.0
+"""
+
+
+def test_a_plan_speaks_of_what_a_simulation_designs(tmp_path, capsys):
+    path = tmp_path / "joint.toml"
+    path.write_text(FILE)
+
+    def told(method, *options):
+        arguments = ["plan", "--self", method, "--simulation", str(path), "--json", *options]
+        assert cli.main(arguments) == 0
+        return json.loads(capsys.readouterr().out)
+
+    heads = told("heads")
+    assert heads["orders"] == [3.0]
+    assert heads["given"]["blind_orders"] == [3.0]
+    coast = told("spin-down", "--std-arcsec", "0.3")
+    assert coast["speed_ratio"] == pytest.approx(5.0)
+    # 20 000 readings in 20 s, coasting from 10 turns a second.
+    assert coast["readings"] / coast["seconds"] == pytest.approx(1000.0, rel=1e-3)
+    by_hand = plan_self(
+        "spin-down", [3.0], start_speed=10.0, rate=1000.0, noise=20.0, standard_error=0.3
+    )
+    assert coast["readings"] == pytest.approx(by_hand.readings, rel=1e-3)
+    assert told("shifts")["given"]["angles_deg"] == [10.0, 50.0]
+    assert told("shifts", "--angles", "0,90")["given"]["angles_deg"] == [0.0, 90.0]
+    assert told("dual")["noise_factors"] == {"3": 1.0}
+    path.write_text("[[run]]\nsamples = 10\n")
+    for method, words in (("spin-down", "speed_end_deg_s"), ("heads", "head"), ("dual", "gear")):
+        assert cli.main(["plan", "--self", method, "--simulation", str(path)]) == 1
+        assert words in capsys.readouterr().err

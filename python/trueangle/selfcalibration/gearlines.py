@@ -1,0 +1,147 @@
+"""The two readings of a geared joint, and the orders that both shafts give the output."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Final, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import NoModelError
+from .recording import Recording
+
+__all__ = ["SLIP", "Channels", "Line", "channels_of", "lines_of", "motion", "slope_ratio", "varied"]
+
+Array = NDArray[np.float64]
+
+#: Orders of each shaft that are tried by default.
+_HIGHEST: Final = 8
+
+#: Turns by which two orders must part over the travel to be two numbers.
+SLIP: Final = 0.05
+
+#: Speed is a regressor of its own where it varies by this share of the highest.
+_VARIED: Final = 0.2
+
+
+class Line(NamedTuple):
+    """One order of the output, with every shaft that has it."""
+
+    order: float
+    output: int  # order of the output, 0 for none
+    motor: int  # order of the motor, 0 for none
+
+    @property
+    def of(self) -> str:
+        """What its number is a number of."""
+        if self.output and self.motor:
+            return (
+                f"output {self.output} + motor {self.motor} "
+                "(output encoder, motor encoder or gear: one number)"
+            )
+        if self.output:
+            return f"output {self.output} (output encoder or gear)"
+        return f"motor {self.motor} (motor encoder or gear)"
+
+
+class Channels(NamedTuple):
+    """Both readings of every run, unwrapped, in radians; its time where recorded."""
+
+    motor: list[Array]
+    output: list[Array]
+    time: list[Array | None]
+
+
+def channels_of(recordings: Sequence[Recording]) -> Channels:
+    """The readings of the runs.
+
+    Raises
+    ------
+    NoModelError
+        A run without one of the two.
+    """
+    motor, output, time = [], [], []
+    for r in recordings:
+        reading = r.indicated if r.indicated is not None else r.reference
+        if r.motor is None or reading is None:
+            raise NoModelError(
+                f"{r.named}: both readings are needed, motor_deg (not reduced) and indicated_deg "
+                "(the output encoder)"
+            )
+        motor.append(_unwrapped(r.motor))
+        output.append(_unwrapped(reading))
+        time.append(r.time)
+    return Channels(motor, output, time)
+
+
+def _unwrapped(angle: Array) -> Array:
+    if float(np.ptp(angle)) > 1.02 * 2.0 * math.pi:
+        return angle
+    return np.asarray(np.unwrap(angle, period=2.0 * math.pi))
+
+
+def slope_ratio(channels: Channels) -> float:
+    """Motor turns per output turn, by the slope of one reading over the other."""
+    top = bottom = 0.0
+    for m, o in zip(channels.motor, channels.output, strict=True):
+        dm, do = m - m.mean(), o - o.mean()
+        top += float(dm @ dm)
+        bottom += float(dm @ do)
+    if bottom == 0.0:
+        raise NoModelError(
+            "the output does not move with the motor: give --gear-ratio, or record motion"
+        )
+    return top / bottom
+
+
+def lines_of(orders: str | Sequence[float], ratio: float, turns: float) -> list[Line]:
+    """Orders of both shafts; those that the travel cannot tell apart stand once."""
+    size = abs(ratio)
+    numbers = range(1, _HIGHEST + 1) if isinstance(orders, str) else [int(k) for k in orders]
+    lines = {float(k): Line(float(k), k, 0) for k in numbers}
+    for j in range(1, _HIGHEST + 1):
+        order = j * size
+        near = round(order)
+        if near >= 1 and abs(order - near) * turns < SLIP:
+            lines[float(near)] = Line(float(near), near, j)
+        else:
+            lines[order] = Line(order, 0, j)
+    return [lines[k] for k in sorted(lines)]
+
+
+def varied(channels: Channels, ratio: float) -> tuple[bool, bool]:
+    """Whether both directions were travelled, and at speeds that differ.
+
+    At one speed the column would hold nothing but the motor's own error, differentiated.
+    """
+    motions = [motion(m / ratio, t) for m, t in zip(channels.motor, channels.time, strict=True)]
+    ways = np.unique(np.concatenate([np.unique(way) for way, _ in motions]))
+    speed = np.abs(np.concatenate([v for _, v in motions]))
+    known = all(t is not None for t in channels.time)
+    varied = known and float(speed.std()) > _VARIED * float(np.quantile(speed, 0.99))
+    return bool({-1.0, 1.0} <= set(ways.tolist())), bool(varied)
+
+
+def motion(theta: Array, time: Array | None) -> tuple[Array, Array]:
+    """Direction of travel (-1, 1) and speed of the output in radians per second."""
+    step = np.diff(theta, prepend=theta[0])
+    width = 5
+    smooth = np.convolve(step, np.ones(width) / width, "same")
+    sign = np.sign(smooth)
+    moving = np.flatnonzero(sign)
+    if moving.size == 0:
+        return np.zeros(theta.size), np.zeros(theta.size)
+    last = np.maximum.accumulate(np.where(sign != 0.0, np.arange(sign.size), moving[0]))
+    way = sign[last]
+    if time is None:
+        return np.asarray(way), np.zeros(theta.size)
+    spread = max(1, min(10, theta.size // 10))
+    speed = np.zeros(theta.size)
+    dt = time[2 * spread :] - time[: -2 * spread]
+    speed[spread:-spread] = (theta[2 * spread :] - theta[: -2 * spread]) / np.where(
+        dt > 0.0, dt, np.inf
+    )
+    speed[:spread], speed[-spread:] = speed[spread], speed[-spread - 1]
+    return np.asarray(way), speed
