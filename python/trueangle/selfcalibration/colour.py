@@ -41,7 +41,7 @@ def spectrum_at(theta: Array, values: Array, orders: Array) -> Array:
         x, e = theta[a : a + _CHUNK], values[a : a + _CHUNK]
         beside = rests[:, None] * x
         both = np.concatenate([e * np.cos(beside), e * np.sin(beside)])
-        found += harmonic_rows(x, whole) @ both.T
+        found += harmonic_rows(x, whole.tolist()) @ both.T
     cosine, sine = found[0::2], found[1::2]
     n = rests.size
     real = cosine[place, which] - sine[place, which + n]

@@ -170,7 +170,16 @@ def fit_steady(
             knots, spline, unknowns, valid, last, like, near=fit
         )
         like = fit
-        if moved < _STILL or (stride > 1 and moved < 0.5):
+        if moved < _STILL or (stride > 1 and _settled(fit, orders)):
             break
     left = work.residuals(knots, spline, unknowns)
     return SteadyFit(orders, ripple, unknowns, fit, readings, left, valid)
+
+
+def _settled(fit: MotionFit, orders: Sequence[float]) -> bool:
+    r"""Whether a further step would be small: it is of second order, :math:`k\,\delta^2`."""
+    step = float(np.linalg.norm(fit.unknowns[: 2 * len(orders)]))
+    std = np.sqrt(np.maximum(np.diagonal(fit.projected.covariance), 0.0))
+    return bool(
+        max(orders, default=0.0) * step**2 < _STILL * std[: 2 * len(orders)].min(initial=1.0)
+    )

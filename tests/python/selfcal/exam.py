@@ -69,7 +69,7 @@ def many(seeds, make, lines=LINES, orders=None, **options):
     """Errors of calibrations of ``make(rng)``; an order that is not given fails the row."""
     want = coefficients(lines)
     errors, stds = [], []
-    for seed in seeds:
+    for number, seed in enumerate(seeds, 1):
         found = ta.selfcal(
             make(np.random.default_rng(seed)), orders=orders or list(lines), **options
         )
@@ -77,6 +77,8 @@ def many(seeds, make, lines=LINES, orders=None, **options):
         assert len(given) == len(lines), (seed, [o.order for o in found.orders])
         errors.append([v for o in given for v in (o.cosine, o.sine)] - want)
         stds.append([o.std for o in given for _ in (0, 1)])
+        if number % 100 == 0 and number < len(seeds):
+            print(f"  {number} seeds: {Errors(np.array(errors), np.array(stds))}", flush=True)
     return Errors(np.array(errors), np.array(stds))
 
 
