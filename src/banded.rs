@@ -141,10 +141,12 @@ mod tests {
         let mut expected = 0.0;
         for k in 0..n {
             expected += full[k][k].ln();
-            for i in k + 1..n {
-                let factor = full[i][k] / full[k][k];
-                for j in k..n {
-                    full[i][j] -= factor * full[k][j];
+            let (above, below) = full.split_at_mut(k + 1);
+            let pivot = &above[k];
+            for row in below {
+                let factor = row[k] / pivot[k];
+                for (x, y) in row.iter_mut().zip(pivot) {
+                    *x -= factor * y;
                 }
             }
         }

@@ -3,6 +3,10 @@
 //! A row may be scaled reading by reading and turned by `lead / k`, the phase by which the
 //! answer of order `k` runs ahead. Readings of one lead share its sines.
 
+// Kernels index arrays instead of chaining closures: a closure is compiled for the
+// baseline processor and would call every vector instruction as a function.
+#![allow(clippy::needless_range_loop)]
+
 use crate::check::same_length;
 use crate::error::Error;
 use crate::simd::{InstructionSet, Kernel, Lanes, dispatch};
@@ -146,7 +150,7 @@ fn lead_on(cosine: &mut [f64], sine: &mut [f64], lead: &[f64], order: u32) {
 }
 
 /// A part of the scales or leads.
-fn part<'a>(values: Option<&'a [f64]>, start: usize, len: usize) -> Option<&'a [f64]> {
+fn part(values: Option<&[f64]>, start: usize, len: usize) -> Option<&[f64]> {
     values.map(|values| &values[start..start + len])
 }
 

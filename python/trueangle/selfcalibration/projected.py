@@ -64,7 +64,8 @@ def harmonic_rows(
     With ``lead`` the phase ``lead / k`` is added, with ``factor`` each reading is scaled.
     """
     rows = np.empty((2 * len(orders), theta.size)) if out is None else out
-    _core.harmonic_rows(theta, [int(k) for k in orders], rows, factor, lead)
+    whole = [int(k) for k in orders]
+    _core.harmonic_rows(np.ascontiguousarray(theta), whole, rows, factor, lead)
     return rows
 
 
