@@ -134,6 +134,11 @@ def test_what_to_record_is_said(tmp_path):
     once = {name: values[:100] for name, values in log.items()}
     with pytest.raises(NoModelError, match="record at least 10 turns"):
         ta.selfcal(once, loop="open")
+    few = {name: values[::60] for name, values in log.items()}
+    few["indicated_rad"] = few["indicated_rad"] * 0.0 + 0.1 * np.arange(few["time_s"].size)
+    with pytest.raises(NoModelError, match="only 167 readings in motion; record at least 10 turns"):
+        ta.selfcal({name: np.mod(v, 2.0 * np.pi) if "rad" in name else v
+                    for name, v in few.items()}, loop="open")  # fmt: skip
     fast = {name: values[::60] for name, values in log.items()}
     with pytest.raises(NoModelError, match="turn slower"):
         ta.selfcal(fast, loop="open")
