@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 import trueangle as ta
-from trueangle.orders import harmonicsums
+from trueangle.aliasing import distinct_positions
+from trueangle.orders import harmonicsums, repeats
 from trueangle.orders.evidence import (
     choose_forward,
     examine_orders,
@@ -156,3 +157,24 @@ def test_units_have_the_errors_of_their_runs(sizes):
     assert np.array_equal(places, np.arange(sum(sizes)))
     for unit, run in zip(units, runs, strict=True):
         np.testing.assert_allclose(unit.error, run.centred_error, rtol=1e-12, atol=1e-12)
+
+
+def test_noise_of_repeats_is_that_of_least_squares(monkeypatch):
+    """A mean for each position and unit, however the pairs that occur are found."""
+    rng = np.random.default_rng(9)
+    turns = [rng.integers(0, 12, 60) / 12.0, rng.integers(0, 12, 40) / 12.0, np.array([0.31, 0.31])]
+    units = [Readings(t, rng.standard_normal(t.size), np.ones(t.size), "") for t in turns]
+    runs = [ta.CalibrationRun(360.0 * t, 360.0 * t, period=360.0) for t in turns]
+    positions = distinct_positions(runs)
+    unit = np.repeat(np.arange(3), [t.size for t in turns])
+    y = np.concatenate([u.error for u in units])
+    design = np.zeros((y.size, len(positions) + 3))
+    design[np.arange(y.size), positions.index] = 1.0
+    design[np.arange(y.size), len(positions) + unit] = 1.0
+    left = y - design @ np.linalg.lstsq(design, y)[0]
+    freedom = y.size - np.linalg.matrix_rank(design)
+    for room in (repeats._ROOM, 0):
+        monkeypatch.setattr(repeats, "_ROOM", room)
+        noise = repeats.pure_error(units, positions)
+        assert noise.degrees_of_freedom == freedom
+        assert noise.variance == pytest.approx(left @ left / freedom, rel=1e-6)

@@ -18,6 +18,9 @@ __all__ = ["Noise", "pure_error"]
 #: Sweeps of alternating means (positions, zeros); whole grids need one.
 _SWEEPS: Final = 20
 
+#: Possible pairs of unit and position for each reading up to which they are counted.
+_ROOM: Final = 8
+
 
 @dataclass(frozen=True)
 class Noise:
@@ -55,7 +58,7 @@ def pure_error(units: Sequence[Readings], positions: Positions) -> Noise | None:
     w = np.concatenate([u.weights for u in units])
     unit = np.repeat(np.arange(len(units)), [u.turns.size for u in units])
     place = positions.index
-    pairs = np.unique(unit * len(positions) + place)
+    pairs = _met(unit * len(positions) + place, len(units) * len(positions))
     dof = y.size - len(positions) - len(units) + _components(pairs, len(units), len(positions))
     if dof < 1:
         return None
@@ -69,6 +72,13 @@ def pure_error(units: Sequence[Readings], positions: Positions) -> Noise | None:
         if float(np.abs(mean).max()) <= 1e-9 * (float(np.abs(y).max()) or 1.0):
             break
     return Noise(float(np.dot(w, e * e)) / dof, int(dof), "repeats")
+
+
+def _met(pairs: NDArray[np.int64], possible: int) -> NDArray[np.int64]:
+    """The pairs that occur, in their order; counted where there is room for each possible one."""
+    if possible > _ROOM * pairs.size:
+        return np.unique(pairs)
+    return np.flatnonzero(np.bincount(pairs, minlength=possible))
 
 
 def _components(pairs: NDArray[np.int64], units: int, positions: int) -> int:
