@@ -1,6 +1,7 @@
 """Covariances that hold: intervals under white and correlated noise, bounded from both sides."""
 
 import json
+import re
 
 import numpy as np
 import pytest
@@ -87,6 +88,9 @@ def test_stretches_of_one_long_run_hold_where_the_correlation_dies_out():
         hit.append((low < TRUE) & (high > TRUE))
     assert LOW - 0.02 <= np.mean(hit) <= HIGH
     assert any("cannot be known from one run" in note for note in found.notes)
+    # Of the two signs the nearer one is told: neighbours, of which 0.6 is remembered.
+    (told,) = [note for note in found.notes if "white noise" in note]
+    assert re.search(r"neighbours in time correlate by 0\.(5[5-9]|6[0-4])", told), told
 
 
 def test_few_readings_say_that_they_cannot_tell():
