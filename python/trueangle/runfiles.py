@@ -136,7 +136,7 @@ def read_columns(
 
 def _columns(table: Readings, counts: float | None, reference_counts: float | None) -> RunColumns:
     asked = {role for role, column in table.roles.items() if column.is_asked}
-    filled = len(next(iter(table.columns.values()))) > 0
+    filled = any(len(column) for column in table.columns.values())
     # A log of an angle called indicated_deg is no table.
     if len(table.columns) == 1 and filled and table.roles.keys() <= asked & {"indicated"}:
         return _entries(table, counts)

@@ -67,3 +67,12 @@ def test_what_is_none_or_would_run_code_is_refused(tmp_path):
     path.write_bytes(path.read_bytes()[:-40])
     with pytest.raises(FileError, match="damaged"):
         ta.read_runs(path)
+
+
+def test_an_archive_without_columns_is_refused(tmp_path):
+    np.savez(tmp_path / "empty.npz", picture=np.eye(3))
+    with pytest.raises(FileError, match="no column reference_deg"):
+        ta.read_runs(tmp_path / "empty.npz")
+    np.savez(tmp_path / "nothing.npz")
+    with pytest.raises(FileError):
+        ta.read_runs(tmp_path / "nothing.npz")
