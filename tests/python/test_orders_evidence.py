@@ -116,3 +116,42 @@ def test_errors_of_the_papers_amplitudes_are_those_of_the_mean_of_its_runs():
     expected = 0.01 * math.sqrt(2.0 / 36.0) / math.sqrt(3.0)
     # 540 variances of four degrees of freedom: known to 3 %.
     assert math.sqrt(np.mean(found)) == pytest.approx(expected, rel=0.06)
+
+
+def paper(phases, last=0.1):
+    """Runs of order 5 with these phases, and one that verifies, of another amplitude."""
+    theta = np.arange(36) * 10.0
+    runs = []
+    for phase, size in [*((p, 0.1) for p in phases), (phases[0], last)]:
+        error = size * np.sin(np.radians(5.0 * theta + phase))
+        runs.append(ta.CalibrationRun(theta, theta + error, 360.0))
+    return ta.select_orders(runs, candidates=range(1, 10), method="paper")
+
+
+def test_the_papers_run_that_verifies_is_not_fitted():
+    found = paper([10.0, 10.0, 10.0], last=0.7)
+    (row,) = [row for row in found.table if row.order == 5]
+    assert row.amplitude == pytest.approx(0.1, rel=1e-9)
+
+
+@pytest.mark.parametrize(("spread", "kept"), [(50.0, True), (80.0, False), (140.0, False)])
+def test_an_order_of_the_paper_repeats_its_phase_within_60_degrees(spread, kept):
+    found = paper([350.0, 350.0 + 0.5 * spread, 350.0 + spread])
+    assert (5 in found.orders) == kept
+
+
+@pytest.mark.parametrize(("size", "told"), [(1.0, True), (0.002, False)])
+def test_aliases_are_told_where_zeros_that_moved_decide(size, told):
+    """Grids of 36 positions 0.3 deg apart: order 28 is turned against 8 by 11 deg."""
+    from trueangle.aliasing import distinct_positions
+    from trueangle.orders.lookalikes import find_lookalikes
+
+    rng = np.random.default_rng(2)
+    runs, units = [], []
+    for shift in (0.0, 0.3):
+        theta = np.arange(36) * 10.0 + shift
+        error = size * np.sin(np.radians(8.0 * theta)) + 0.01 * rng.normal(size=36)
+        runs.append(ta.CalibrationRun(theta, theta + error, 360.0))
+        units.append(Readings(theta / 360.0, error - error.mean(), np.ones(36), ""))
+    (alike,) = find_lookalikes(units, distinct_positions(runs), [8.0], 0.01**2, 40)
+    assert (28 not in alike) == told
