@@ -225,3 +225,21 @@ def test_single_precision_stays_where_turns_are_counted(angles, tmp_path):
     whole = turning().correct(unwrapped) - (unwrapped - single)
     # Ten turns in single precision: its rounding at 3600.
     np.testing.assert_allclose(found.to_numpy(), whole, atol=4e-4)
+
+
+def test_every_setting_that_changes_the_output_belongs_to_the_request():
+    from dataclasses import replace
+
+    from trueangle.logs.joints import Joint, LogSettings
+
+    plain = LogSettings((Joint(made_model()),), "deg", 4096.0, "/joints", "/corrected", 2)
+    changes = {
+        "unit": "rad",
+        "counts_per_turn": 8192.0,
+        "topic": "/other",
+        "output_topic": "/other",
+        "joints": (Joint(made_model(), unit="rad"),),
+    }
+    digests = {plain.digest, *(replace(plain, **{k: v}).digest for k, v in changes.items())}
+    assert len(digests) == 1 + len(changes)
+    assert replace(plain, threads=1).digest == plain.digest
