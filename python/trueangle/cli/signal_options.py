@@ -38,7 +38,11 @@ def add_signals(parser: argparse.ArgumentParser, counts: bool = True) -> None:
         metavar="N",
         help="of a reference in counts",
     )
-    add("--topic", metavar="NAME", help="JointState topic of a ROS bag (default: the only one)")
+    add(
+        "--topic",
+        metavar="NAME",
+        help="JointState topic of a ROS bag (default: the only one); join takes two, A,B",
+    )
 
 
 class _Entry(tuple[str | None, str, str, str | None]):

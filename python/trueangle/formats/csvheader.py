@@ -167,7 +167,7 @@ class Header:
                     if i != before[-1]:
                         continue
                 cells = self._cells(text)
-                if abs(len(cells) - width) > 1:
+                if abs(len(cells) - width) > 1 or self._is_talk(cells, lines[begin]):
                     continue
                 if self._units_of(text, width) is None:
                     return self._scope(lines, before, width, i), begin
@@ -179,6 +179,11 @@ class Header:
         if len(plain) == 1 and number(lines[first].text.strip(), ",") is not None:
             return -1, first
         return first, self._after_units(lines, first)
+
+    def _is_talk(self, cells: list[str], reading: _Line) -> bool:
+        """One cell above several that are filled: words of a firmware, no names."""
+        below = self._cells(reading.text)
+        return len(cells) == 1 and len(below) > 1 and bool(below[-1])
 
     def _scope(self, lines: list[_Line], before: list[int], width: int, last: int) -> int:
         """The line of names in a preamble of TwinCAT's exports, else ``last``."""

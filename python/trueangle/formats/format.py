@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib
 import json
+import re
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -135,8 +136,8 @@ class FormatModule(Protocol):
 class Format:
     """A format: how its files are told, its module and the extra that it needs.
 
-    ``magics`` are first bytes of its files; ``unit`` is that of all angles of formats that
-    define it.
+    ``magics`` are first bytes of its files, ``pattern`` matches them; ``unit`` is that of all
+    angles of formats that define it.
     """
 
     name: str
@@ -145,6 +146,7 @@ class Format:
     extra: str | None = None
     unit: str | None = None
     magics: tuple[bytes, ...] = ()
+    pattern: re.Pattern[bytes] | None = None
 
     @cached_property
     def module(self) -> FormatModule:

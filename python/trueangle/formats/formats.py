@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 from ..errors import FileError
 from .format import Format
 
 __all__ = ["FORMATS", "find_format", "format_of_content", "known_format"]
+
+#: A process variable and a date, as camonitor begins a line.
+_CAMONITOR = re.compile(rb"\S+\s+\d{4}-\d\d-\d\d \d\d:\d\d:\d\d")
 
 FORMATS = (
     Format("Parquet", (".parquet", ".pq"), "parquet", "arrow", magics=(b"PAR1",)),
@@ -33,6 +37,7 @@ FORMATS = (
     Format("MDF4", (".mf4", ".mdf"), "mdf", "mdf", magics=(b"MDF     ", b"UnFinMF ")),
     Format("numpy array", (".npy",), "npy", magics=(b"\x93NUMPY",)),
     Format("numpy archive", (".npz",), "npz", magics=(b"PK\x03\x04",)),
+    Format("EPICS log", (".camonitor",), "camonitor", pattern=_CAMONITOR),
     Format("CSV", (".csv", ".tsv", ".txt"), "csvfile"),
 )
 
@@ -77,6 +82,6 @@ def format_of_content(path: Path) -> Format:
     if not path.is_dir():
         head = _head(path)
         for entry in FORMATS:
-            if head.startswith(entry.magics):
+            if head.startswith(entry.magics) or (entry.pattern and entry.pattern.match(head)):
                 return entry
     return known_format(path) or FORMATS[-1]

@@ -61,7 +61,7 @@ def join(
         typical step).
     counts_per_turn, counts_per_turn_reference, signals, topic
         As in `trueangle.read_runs`; ``signals={"a": {...}, "b": {...}}`` names columns of
-        one log only.
+        one log only, ``topic="/joints,/laser"`` the topics of A and of B.
 
     Returns
     -------
@@ -161,13 +161,18 @@ def _assigned(
     """The log that holds the indicated angle, and the one that holds the reference."""
     shared = dict(signals or {})
     own = [dict(shared.pop(name, None) or {}) for name in ("a", "b")]
-    tables = [read_readings(path, given, topic) for path, given in zip(paths, own, strict=True)]
+    named = (topic or "").split(",")
+    topics = [named[0] or None, named[-1] or None]
+    tables = [
+        read_readings(path, given, name)
+        for path, given, name in zip(paths, own, topics, strict=True)
+    ]
     used: set[str] = set()
     for i, table in enumerate(tables):
         fitting = {role: wanted for role, wanted in shared.items() if _has(table, wanted)}
         used |= fitting.keys()
         if fitting:
-            tables[i] = read_readings(paths[i], {**fitting, **own[i]}, topic)
+            tables[i] = read_readings(paths[i], {**fitting, **own[i]}, topics[i])
     for role in shared.keys() - used:  # says what was meant
         matching(tables[0].path, list(tables[0].columns), _name(shared[role]))
     for one, other in (tables, tables[::-1]):

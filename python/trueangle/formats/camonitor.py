@@ -1,0 +1,98 @@
+"""EPICS logs as ``camonitor`` prints them: a process variable, its time stamp and its value a line.
+
+A row is one line: the time, the value of the variable that changed, and nothing of the others.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Collection, Iterator, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from ..errors import FileError
+from .format import TEXTS, Batch, Choose, Contents, Watch
+
+__all__ = ["LINE", "columns", "contents", "copy", "read"]
+
+#: Name, date, time, value; what follows (alarms) is of no concern.
+LINE = re.compile(rb"(\S+)\s+(\d{4}-\d\d-\d\d)\s(\d\d:\d\d:\d\d(?:\.\d{1,9})?)\s+(\S+)")
+_TIME = "time_s"
+#: Lines taken together.
+_BLOCK = 1 << 16
+#: Longest line that is read.
+_LONGEST = 1 << 16
+#: Times count from here: a later start keeps more digits of a second.
+_EPOCH = np.datetime64("2000-01-01T00:00:00", "ns")
+
+
+def columns(path: Path, topic: str | None = None) -> list[str]:
+    """The time and the process variables, in the order in which they come."""
+    names: dict[str, None] = {}
+    for name, _stamp, _value in _lines(path):
+        names.setdefault(name)
+    return [_TIME, *names]
+
+
+def read(
+    path: Path,
+    names: Sequence[str],
+    topic: str | None = None,
+    stretch: None = None,
+    *,
+    texts: Collection[str] = TEXTS,
+    strict: bool = False,
+) -> Iterator[Batch]:
+    """Columns in batches, NaN where another variable changed; see `format.FormatModule`."""
+    lines = _lines(path)
+    while block := [line for _, line in zip(range(_BLOCK), lines, strict=False)]:
+        found, stamps, values = zip(*block, strict=True)
+        number = np.array(values)
+        name_of = np.array(found, dtype=object)
+        times = (np.array(stamps, dtype="datetime64[ns]") - _EPOCH) / np.timedelta64(1, "s")
+        yield {
+            name: times if name == _TIME else np.where(name_of == name, number, np.nan)
+            for name in names
+        }
+
+
+def copy(
+    source: Path,
+    target: Path,
+    choose: Choose,
+    watch: Watch,
+    topic: str | None = None,
+    output_topic: str | None = None,
+) -> Contents:
+    """Refused: a line has no room for another column."""
+    raise FileError(
+        source,
+        "a log of camonitor has no room for corrected angles; make a table of it first "
+        "(trueangle join), or correct the runs that it was joined to",
+    )
+
+
+def contents(path: Path, topic: str | None = None) -> Contents:
+    """Readings; nothing is ever added to be summed up."""
+    return Contents(sum(1 for _ in _lines(path)), {})
+
+
+def _lines(path: Path) -> Iterator[tuple[str, str, float]]:
+    """Variable, time stamp and value of every reading; blank lines and those of a lost one pass."""
+    with path.open("rb") as file:
+        number = 0
+        while line := file.readline(_LONGEST):
+            number += 1
+            if not line.strip() or line.startswith(b"#") or b"***" in line:
+                continue
+            found = LINE.match(line)
+            try:
+                name, date, clock, text = (part.decode() for part in found.groups())  # type: ignore[union-attr]
+                value, stamp = float(text), f"{date}T{clock}"
+                np.datetime64(stamp)
+            except (AttributeError, ValueError):
+                got = line.decode("utf-8", "replace").strip()[:60]
+                problem = f"a variable, date, time and number are needed, got {got!r}"
+                raise FileError(path, problem, line=number) from None
+            yield name, stamp, value
