@@ -107,7 +107,7 @@ def test_epics(together, tmp_path):
     assert abs(np.median(np.abs(off)) - 0.0125 * 9.0) < NOISE
 
 
-def test_epics_that_is_damaged_or_to_be_corrected(tmp_path):
+def test_epics_that_is_damaged_or_to_be_corrected(tmp_path, capsys):
     path = tmp_path / "log.txt"
     good = next(monitored("PV", np.zeros(1), np.zeros(1)))[1]
     for bad, told in ((" 0.00000", " open"), ("23:59:30", "25:61:30"), (" 2024-", " 2024")):
@@ -116,8 +116,11 @@ def test_epics_that_is_damaged_or_to_be_corrected(tmp_path):
             list(camonitor.read(path, ["PV"]))
     path.write_text(good * 3)
     model = ta.HarmonicModel([ta.Shaft("output", 1, [1], [0.1], [0.0])], period=360.0)
-    with pytest.raises(FileError, match="trueangle join"):
-        ta.correct_logs(path, model, tmp_path / "out.txt", column="PV", unit="deg")
+    model.save(tmp_path / "model.json")
+    command = ["correct", str(path), "-m", str(tmp_path / "model.json"), "--column", "PV"]
+    assert main([*command, "--unit", "deg", "-o", str(tmp_path / "out.txt")]) == 1
+    printed = capsys.readouterr()
+    assert "no room for corrected angles" in printed.out + printed.err
     assert not (tmp_path / "out.txt").exists()
 
 
