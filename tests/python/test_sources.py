@@ -114,6 +114,7 @@ def test_epics_that_is_damaged_or_to_be_corrected(tmp_path, capsys):
         path.write_text(good + good.replace(bad, told))
         with pytest.raises(FileError, match=r"log.txt, line 2: a variable, date, time and number"):
             list(camonitor.read(path, ["PV"]))
+    path = tmp_path / "log.camonitor"
     path.write_text(good * 3)
     model = ta.HarmonicModel([ta.Shaft("output", 1, [1], [0.1], [0.0])], period=360.0)
     model.save(tmp_path / "model.json")
