@@ -31,6 +31,8 @@ if TYPE_CHECKING:
     from .orders.select import OrderSelection as OrderSelection
     from .orders.select import select_orders as select_orders
     from .planning.plan import plan_mounts as plan_mounts
+    from .rehearsal import Rehearsal as Rehearsal
+    from .rehearsal.rehearse import rehearse as rehearse
     from .reports import report as report
     from .runfiles import read_runs as read_runs
     from .runs import CalibrationRun as CalibrationRun
@@ -75,6 +77,8 @@ _PUBLIC = {
     "load_model": "modelfile",
     "Moments": "moments",
     "read_runs": "runfiles",
+    "Rehearsal": "rehearsal",
+    "rehearse": "rehearsal",
     "report": "reports",
     "selfcal": "selfcalibration",
     "Simulation": "simulation",

@@ -109,15 +109,20 @@ class Pace:
         finally:
             self._share = before
 
-    def at(self, stage: str, done: int, total: int, then: float = 0.0) -> None:
-        """``done`` of ``total`` are done of a stage; seconds that follow it, where known."""
+    def at(
+        self, stage: str, done: int, total: int, then: float = 0.0, bound: str = "at least"
+    ) -> None:
+        """``done`` of ``total`` are done of a stage; seconds that follow it, where known.
+
+        ``bound`` says what the time left is where none was given.
+        """
         now = self._clock()
         if stage != self._stage or done == 0:
             self._stage, self._entered = stage, now
         if self._style == "none" or now - self._shown < _INTERVAL:
             return
         self._shown = now
-        left, least = self._left(now, done, total, then)
+        left, open_end = self._left(now, done, total, then)
         if self._style == "json":
             state = {"stage": stage, "done": done, "total": total}
             times = {"seconds": now - self._begun, "seconds_left": left}
@@ -125,7 +130,7 @@ class Pace:
             return
         text = f"{stage}: {done} of {total}"
         if left is not None:
-            text += f", {'at least ' if least else ''}{_clock_text(left)} left"
+            text += f", {f'{bound} ' if open_end else ''}{_clock_text(left)} left"
         self._write("\r" + text.ljust(self._width))
         self._width = max(self._width, len(text))
 

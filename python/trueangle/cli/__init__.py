@@ -32,6 +32,7 @@ COMMANDS: tuple[str, ...] = (
     "plan",
     "simulate",
     "diagnose",
+    "rehearse",
     "report",
     "export",
     "import",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Self
 
 import numpy as np
 
@@ -43,6 +43,8 @@ class ArgumentShift(Effect):
     coefficient: float = -1.0
 
     kind: ClassVar[str] = "argument_error"
+    size_name: ClassVar[str] = "coefficient"
+    size_most: ClassVar[float] = 1.0
     sentence: ClassVar[str] = (
         "The pattern was taken as a function of one angle and belongs to the other (indicated "
         "against true): it differs by the product of the pattern and its slope."
@@ -58,6 +60,14 @@ class ArgumentShift(Effect):
         pattern = around.pattern
         change = pattern.indicated_value(signals.theta) - pattern.value(signals.theta)
         return np.asarray(-self.coefficient * change)
+
+    @classmethod
+    def drawn(
+        cls, size: float, signals: Signals, around: Surroundings, rng: np.random.Generator
+    ) -> Self | None:
+        if around.pattern.orders.size == 0:
+            return None
+        return cls(-1.0)  # the argument is one angle or the other: it has no other size
 
     @classmethod
     def propose(cls, regression: Regression) -> Extension | None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Self
 
 import numpy as np
 
@@ -19,6 +19,7 @@ from ..regression.estimate import Parameters, quantity
 from ..regression.extension import Extension
 from ..regression.regression import Regression
 from .blindness import OWN_POWER, Blindness, share_left
+from .drawing import phase
 from .effect import Effect
 from .filter_lag import FilterLag
 from .latency import UNTIMED, Latency
@@ -54,6 +55,7 @@ class ChannelSkew(Effect):
     phase_deg: float = 0.0
 
     kind: ClassVar[str] = "channel_skew"
+    size_name: ClassVar[str] = "delay_s"
     sentence: ClassVar[str] = (
         "The two channels of a sine and cosine sensor are read one after the other: a constant "
         "and twice the sensor's order, both in proportion to speed."
@@ -73,6 +75,15 @@ class ChannelSkew(Effect):
         line = np.sin(self.order * signals.theta + np.radians(self.phase_deg))
         half = 0.5 * self.delay_s * ARCSEC_PER_DEG * 360.0 * signals.turns_per_s
         return np.asarray(half * (1.0 + line))
+
+    @classmethod
+    def drawn(
+        cls, size: float, signals: Signals, around: Surroundings, rng: np.random.Generator
+    ) -> Self | None:
+        joint = around.joint
+        side = "motor" if joint.encoder_side == "motor" and "motor" in joint.shafts else "output"
+        order = joint.output_order(side, 2.0 * joint.pole_pairs)
+        return cls(size, order, phase(rng))
 
     @classmethod
     def propose(cls, regression: Regression) -> Extension | None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Self
 
 import numpy as np
 
@@ -19,6 +19,7 @@ from ..regression.extension import Extension
 from ..regression.regression import Regression
 from .backlash import ONE_WAY, Backlash, goes_both_ways
 from .blindness import Blindness
+from .drawing import phase
 from .effect import Effect
 from .latency import Latency
 from .presliding_hysteresis import PreslidingHysteresis
@@ -55,6 +56,7 @@ class DirectionalPattern(Effect):
     phases_deg: tuple[float, ...]
 
     kind: ClassVar[str] = "direction_dependent_pattern"
+    size_name: ClassVar[str] = "amplitudes_arcsec"
     sentence: ClassVar[str] = (
         "Play or friction differs from place to place (an eccentric or worn gear): the curves "
         "forward and backward have different shapes."
@@ -79,6 +81,13 @@ class DirectionalPattern(Effect):
 
     def signal(self, signals: Signals, around: Surroundings, rng: np.random.Generator) -> Array:
         return np.asarray(signals.direction * line_sum(signals.theta, self.lines))
+
+    @classmethod
+    def drawn(
+        cls, size: float, signals: Signals, around: Surroundings, rng: np.random.Generator
+    ) -> Self | None:
+        order = float(rng.integers(1, 5))
+        return cls((order,), (size,), (phase(rng),))
 
     @classmethod
     def propose(cls, regression: Regression) -> Extension | None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import ClassVar
+from typing import ClassVar, Self
 
 import numpy as np
 
@@ -73,6 +73,7 @@ class DriftWithinRun(Effect):
     wander_arcsec: float = 0.0
 
     kind: ClassVar[str] = "drift_within_run"
+    size_name: ClassVar[str] = "wander_arcsec"
     sentence: ClassVar[str] = (
         "The set-up settles, warms up or creeps while a run lasts: the error follows the clock "
         "and not the angle, differently in every run."
@@ -101,6 +102,12 @@ class DriftWithinRun(Effect):
             span = np.sqrt(max(float(clock[-1] - clock[0]), 1e-300))
             out[start:stop] += self.wander_arcsec * walk / span
         return out
+
+    @classmethod
+    def drawn(
+        cls, size: float, signals: Signals, around: Surroundings, rng: np.random.Generator
+    ) -> Self | None:
+        return cls(wander_arcsec=size)
 
     @classmethod
     def propose(cls, regression: Regression) -> Extension | None:

@@ -78,6 +78,12 @@ class Effect:
         A cause of the scatter that gives the readings weights.
     not_at_run_time : str
         Why no corrector can take it off while the joint runs; empty where one can.
+    size_name : str
+        The parameter that says how large it is, for a rehearsal; the first where not given.
+    size_grows : bool
+        It shows the more the larger that is; False where the less.
+    size_most : float
+        The largest size that has a meaning.
     """
 
     kind: ClassVar[str]
@@ -97,6 +103,9 @@ class Effect:
     is_doubted: ClassVar[bool] = True
     weighs: ClassVar[bool] = False
     not_at_run_time: ClassVar[str] = ""
+    size_name: ClassVar[str] = ""
+    size_grows: ClassVar[bool] = True
+    size_most: ClassVar[float] = math.inf
 
     def __init_subclass__(cls, **options: Any) -> None:
         super().__init_subclass__(**options)
@@ -118,6 +127,19 @@ class Effect:
     def noise_factor(self, signals: Signals, around: Surroundings) -> Array | None:
         """Factor on the standard deviation of the noise, or None."""
         return None
+
+    # -- rehearse ------------------------------------------------------------------
+
+    @classmethod
+    def drawn(
+        cls, size: float, signals: Signals, around: Surroundings, rng: np.random.Generator
+    ) -> Self | None:
+        """One of this size with all else drawn at random, to be hidden in readings of ``signals``.
+
+        None where these runs of this joint cannot have it. Here the first parameter is the size,
+        and there is nothing else to draw.
+        """
+        return cls(size)  # type: ignore[call-arg]
 
     # -- diagnose ------------------------------------------------------------------
 

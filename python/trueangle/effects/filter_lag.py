@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -76,6 +76,8 @@ class FilterLag(Effect):
     damping: float | None = None
 
     kind: ClassVar[str] = "filter_lag"
+    size_name: ClassVar[str] = "cutoff_hz"
+    size_grows: ClassVar[bool] = False
     sentence: ClassVar[str] = (
         "A filter or tracking loop in the encoder follows the ramp but smooths the pattern: "
         "fast lines shrink and trail in proportion to speed."
@@ -98,6 +100,12 @@ class FilterLag(Effect):
             signals.theta, signals.turns_per_s, lambda f: low_pass(f, self.cutoff_hz, self.damping)
         )
         return np.asarray(seen - pattern.value(signals.theta))
+
+    @classmethod
+    def drawn(
+        cls, size: float, signals: Signals, around: Surroundings, rng: np.random.Generator
+    ) -> Self | None:
+        return None if around.pattern.orders.size == 0 else cls(size)
 
     @classmethod
     def propose(cls, regression: Regression) -> Extension | None:

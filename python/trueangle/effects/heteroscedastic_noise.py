@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import ClassVar, Self
 
 import numpy as np
 
@@ -50,6 +50,8 @@ class HeteroscedasticNoise(Effect):
     per_Nm: float = 0.0
 
     kind: ClassVar[str] = "heteroscedastic_noise"
+    size_name: ClassVar[str] = "cosine"
+    size_most: ClassVar[float] = 6.0
     sentence: ClassVar[str] = (
         "Readings scatter more at some angles, speeds or loads (friction zones, weak field, "
         "edge of the autocollimator's range)."
@@ -71,6 +73,13 @@ class HeteroscedasticNoise(Effect):
         if signals.torque is not None:
             log_variance += self.per_Nm * np.abs(signals.torque)
         return np.asarray(np.exp(0.5 * log_variance))
+
+    @classmethod
+    def drawn(
+        cls, size: float, signals: Signals, around: Surroundings, rng: np.random.Generator
+    ) -> Self | None:
+        angle = float(rng.uniform(0.0, 2.0 * np.pi))
+        return cls(size * float(np.cos(angle)), size * float(np.sin(angle)))
 
     @classmethod
     def find_scatter(cls, regression: Regression) -> ScatterFinding | None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Self
 
 import numpy as np
 
@@ -22,6 +22,7 @@ from .blindness import (
     Blindness,
     share_left,
 )
+from .drawing import carrier_order, free_line, phase
 from .effect import Effect
 from .factor import FactorEffect
 from .missing_order import MissingOrder
@@ -54,6 +55,7 @@ class LoadDependentGearError(FactorEffect):
     torque: str = "signed"
 
     kind: ClassVar[str] = "load_dependent_gear_error"
+    size_name: ClassVar[str] = "lines_per_Nm"
     sentence: ClassVar[str] = (
         "Load presses the teeth of the gear into each other: its lines (motor and wave "
         "generator orders) grow with torque."
@@ -72,6 +74,15 @@ class LoadDependentGearError(FactorEffect):
         if self.torque == "absolute":
             torque = np.abs(torque)
         return np.asarray(torque * line_sum(signals.theta, self.lines_per_Nm))
+
+    @classmethod
+    def drawn(
+        cls, size: float, signals: Signals, around: Surroundings, rng: np.random.Generator
+    ) -> Self | None:
+        order = carrier_order(around, rng)
+        if order is None:
+            _, _, order = free_line(around, rng)
+        return cls(((order, size, phase(rng)),))
 
     @classmethod
     def scale(cls, signals: Signals, kind: str) -> Array | None:

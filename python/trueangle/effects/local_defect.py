@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +24,7 @@ from .argument_error import ArgumentShift
 from .blindness import (
     Blindness,
 )
+from .drawing import visited_place
 from .effect import Effect
 from .missing_order import MissingOrder
 from .search import (
@@ -78,6 +79,7 @@ class LocalDefect(Effect):
     shaft: str = "output"
 
     kind: ClassVar[str] = "local_defect"
+    size_name: ClassVar[str] = "height_arcsec"
     sentence: ClassVar[str] = (
         "A damaged tooth, pole or graduation line: a bump at one place of one shaft, the same "
         "in every pass."
@@ -102,6 +104,12 @@ class LocalDefect(Effect):
         away = np.degrees(phase) - place_deg
         away -= 360.0 * np.round(away / 360.0)
         return np.asarray(np.exp(-0.5 * (away / width_deg) ** 2))
+
+    @classmethod
+    def drawn(
+        cls, size: float, signals: Signals, around: Surroundings, rng: np.random.Generator
+    ) -> Self | None:
+        return cls(visited_place(signals, rng), float(rng.uniform(3.0, 8.0)), size)
 
     @classmethod
     def propose(cls, regression: Regression) -> Extension | None:

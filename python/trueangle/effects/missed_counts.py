@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Self
 
 import numpy as np
 
@@ -47,6 +47,7 @@ class MissedCounts(Effect):
     row: int
 
     kind: ClassVar[str] = "missed_counts"
+    size_name: ClassVar[str] = "step_arcsec"
     sentence: ClassVar[str] = (
         "Counts or whole periods were lost at one moment: from there to the end of the run "
         "every reading is off by the same step."
@@ -62,6 +63,15 @@ class MissedCounts(Effect):
     def signal(self, signals: Signals, around: Surroundings, rng: np.random.Generator) -> Array:
         after = (signals.run == self.run) & (signals.row >= self.row)
         return np.asarray(self.step_arcsec * after)
+
+    @classmethod
+    def drawn(
+        cls, size: float, signals: Signals, around: Surroundings, rng: np.random.Generator
+    ) -> Self | None:
+        bounds = signals.run_bounds()
+        run = int(rng.integers(len(bounds)))
+        start, stop = bounds[run]
+        return cls(size, run, int((stop - start) * rng.uniform(0.2, 0.8)))
 
     @classmethod
     def propose(cls, regression: Regression) -> Extension | None:

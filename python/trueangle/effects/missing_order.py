@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Self
 
 import numpy as np
 
@@ -17,6 +17,7 @@ from ..regression.regression import Regression
 from .blindness import (
     Blindness,
 )
+from .drawing import free_line, phase
 from .effect import Effect
 from .scale_error import ScaleError
 from .search import (
@@ -55,6 +56,7 @@ class MissingOrder(Effect):
     phase_deg: float = 0.0
 
     kind: ClassVar[str] = "missing_order"
+    size_name: ClassVar[str] = "amplitude_arcsec"
     sentence: ClassVar[str] = "A periodic error of one shaft that the simulation does not have."
     measure: ClassVar[str] = FREE_ANGLES
     confused_with: ClassVar[Mapping[type[Effect], str]] = {
@@ -68,6 +70,13 @@ class MissingOrder(Effect):
     def signal(self, signals: Signals, around: Surroundings, rng: np.random.Generator) -> Array:
         order = around.joint.output_order(self.shaft, self.order)
         return line_sum(signals.theta, ((order, self.amplitude_arcsec, self.phase_deg),))
+
+    @classmethod
+    def drawn(
+        cls, size: float, signals: Signals, around: Surroundings, rng: np.random.Generator
+    ) -> Self | None:
+        shaft, order, _ = free_line(around, rng)
+        return cls(shaft, order, size, phase(rng))
 
     @classmethod
     def propose(cls, regression: Regression) -> Extension | None:

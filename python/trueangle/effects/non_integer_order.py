@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import ClassVar, Self
 
 import numpy as np
 
@@ -67,6 +67,7 @@ class NonIntegerOrder(Effect):
     amplitude_arcsec: float
 
     kind: ClassVar[str] = "non_integer_order"
+    size_name: ClassVar[str] = "amplitude_arcsec"
     sentence: ClassVar[str] = (
         "A bearing's cage or balls roll with slip: a line at an order that is not whole, with "
         "another phase in every run."
@@ -85,6 +86,12 @@ class NonIntegerOrder(Effect):
     def signal(self, signals: Signals, around: Surroundings, rng: np.random.Generator) -> Array:
         phase = rng.uniform(0.0, 2.0 * np.pi, signals.runs)[signals.run]
         return np.asarray(self.amplitude_arcsec * np.sin(self.order * signals.theta + phase))
+
+    @classmethod
+    def drawn(
+        cls, size: float, signals: Signals, around: Surroundings, rng: np.random.Generator
+    ) -> Self | None:
+        return cls(float(rng.integers(5, 40)) + float(rng.uniform(0.3, 0.7)), size)
 
     @classmethod
     def propose(cls, regression: Regression) -> Extension | None:

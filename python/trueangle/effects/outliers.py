@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from math import lgamma
-from typing import ClassVar
+from typing import ClassVar, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -73,6 +73,7 @@ class Outliers(Effect):
     size_arcsec: float
 
     kind: ClassVar[str] = "outliers"
+    size_name: ClassVar[str] = "size_arcsec"
     sentence: ClassVar[str] = (
         "Single readings are far off (bit flips, glitches, mistaken entries) and their neighbours "
         "are not."
@@ -88,6 +89,12 @@ class Outliers(Effect):
     def signal(self, signals: Signals, around: Surroundings, rng: np.random.Generator) -> Array:
         far_off = rng.random(len(signals)) < self.fraction
         return np.asarray(far_off * self.size_arcsec * rng.standard_normal(len(signals)))
+
+    @classmethod
+    def drawn(
+        cls, size: float, signals: Signals, around: Surroundings, rng: np.random.Generator
+    ) -> Self | None:
+        return cls(float(rng.uniform(0.01, 0.03)), size)
 
     @classmethod
     def find_scatter(cls, regression: Regression) -> ScatterFinding | None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Self
 
 import numpy as np
 
@@ -76,6 +76,7 @@ class PreslidingHysteresis(Effect):
     start_state: float = 0.0
 
     kind: ClassVar[str] = "presliding_hysteresis"
+    size_name: ClassVar[str] = "amplitude_arcsec"
     sentence: ClassVar[str] = (
         "Friction winds up the elastic parts after each reversal: the error moves from one "
         "branch to the other over a transition length and remembers where it turned."
@@ -92,6 +93,12 @@ class PreslidingHysteresis(Effect):
 
     def signal(self, signals: Signals, around: Surroundings, rng: np.random.Generator) -> Array:
         return self.amplitude_arcsec * signals.presliding(self.length_deg, self.start_state)
+
+    @classmethod
+    def drawn(
+        cls, size: float, signals: Signals, around: Surroundings, rng: np.random.Generator
+    ) -> Self | None:
+        return cls(size, float(rng.uniform(2.0, 6.0)))
 
     @classmethod
     def propose(cls, regression: Regression) -> Extension | None:

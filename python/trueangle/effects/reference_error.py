@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Self
 
 import numpy as np
 
@@ -17,6 +17,7 @@ from ..regression.regression import Regression
 from .blindness import (
     Blindness,
 )
+from .drawing import phase
 from .effect import Effect
 from .missing_order import MissingOrder
 from .search import (
@@ -52,6 +53,7 @@ class ReferenceLines(Effect):
     mount_sign: float = 1.0
 
     kind: ClassVar[str] = "reference_error"
+    size_name: ClassVar[str] = "amplitudes_arcsec"
     sentence: ClassVar[str] = (
         "The reference (polygon, table, encoder) has an error of its own or sits off centre: it "
         "turns with the reference's mount and is not the joint's."
@@ -83,6 +85,13 @@ class ReferenceLines(Effect):
         if signals.mount is None:
             return signals.theta
         return np.asarray(signals.theta + mount_sign * signals.mount)
+
+    @classmethod
+    def drawn(
+        cls, size: float, signals: Signals, around: Surroundings, rng: np.random.Generator
+    ) -> Self | None:
+        order = float(rng.integers(1, 5))
+        return cls((order,), (size,), (phase(rng),))
 
     @classmethod
     def propose(cls, regression: Regression) -> Extension | None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Self
 
 import numpy as np
 
@@ -14,6 +14,7 @@ from ..joint.signals import Signals
 from ..regression.estimate import Parameters, quantity
 from ..regression.extension import Extension
 from ..regression.regression import Regression
+from .drawing import carrier_order, phase
 from .effect import Effect
 from .missing_order import FREE_ANGLES, MissingOrder
 from .search import (
@@ -52,6 +53,7 @@ class Sidebands(Effect):
     phases_deg: tuple[float, ...]
 
     kind: ClassVar[str] = "sidebands"
+    size_name: ClassVar[str] = "amplitudes_arcsec"
     sentence: ClassVar[str] = (
         "Eccentricity or tilt at the output changes the depth of mesh as it turns: a gear line "
         "is modulated and has neighbours one or two orders away."
@@ -67,6 +69,15 @@ class Sidebands(Effect):
     def signal(self, signals: Signals, around: Surroundings, rng: np.random.Generator) -> Array:
         lines = zip(self.offsets, self.amplitudes_arcsec, self.phases_deg, strict=True)
         return line_sum(signals.theta, tuple((self.carrier + o, a, p) for o, a, p in lines))
+
+    @classmethod
+    def drawn(
+        cls, size: float, signals: Signals, around: Surroundings, rng: np.random.Generator
+    ) -> Self | None:
+        carrier = carrier_order(around, rng)
+        if carrier is None:
+            return None
+        return cls(carrier, (-1.0, 1.0), (size, size), (phase(rng), phase(rng)))
 
     @classmethod
     def propose(cls, regression: Regression) -> Extension | None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Self
 
 import numpy as np
 
@@ -21,6 +21,7 @@ from .blindness import (
     Blindness,
     share_left,
 )
+from .drawing import largest
 from .effect import Effect
 from .search import (
     Array,
@@ -60,6 +61,7 @@ class StiffeningCompliance(Effect):
     gravity_deg: float | None = None
 
     kind: ClassVar[str] = "stiffening_compliance"
+    size_name: ClassVar[str] = "arcsec_per_Nm3"
     sentence: ClassVar[str] = (
         "The gear stiffens under torque, as K1 and K2 of its catalogue say: the wind-up grows "
         "less than in proportion, which under gravity leaves orders 1 and 3."
@@ -94,6 +96,13 @@ class StiffeningCompliance(Effect):
     def beyond(torque: Array, knee: float) -> Array:
         """Torque beyond a knee, with its sign."""
         return np.asarray(np.sign(torque) * np.maximum(np.abs(torque) - knee, 0.0))
+
+    @classmethod
+    def drawn(
+        cls, size: float, signals: Signals, around: Surroundings, rng: np.random.Generator
+    ) -> Self | None:
+        # What is taken off at the largest load is a quarter of the linear part there.
+        return cls(4.0 * size * largest(signals.torque) ** 2, -size)
 
     @classmethod
     def propose(cls, regression: Regression) -> Extension | None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import ClassVar, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +15,7 @@ from ..regression.estimate import Parameters, quantity
 from ..regression.extension import Extension
 from ..regression.regression import Regression
 from .blindness import Blindness
+from .drawing import reading_rate
 from .drift_within_run import DriftWithinRun
 from .effect import ALWAYS, Effect
 from .missing_order import MissingOrder
@@ -65,6 +66,7 @@ class TimePeriodic(Effect):
     amplitude_arcsec: float
 
     kind: ClassVar[str] = "time_periodic"
+    size_name: ClassVar[str] = "amplitude_arcsec"
     sentence: ClassVar[str] = (
         "Mains, a converter's clock, vibration or the alias of one of them: a line of fixed "
         "frequency in time, at every speed and at rest, with another phase in every run."
@@ -85,6 +87,14 @@ class TimePeriodic(Effect):
         phase = rng.uniform(0.0, 2.0 * np.pi, signals.runs)[signals.run]
         turn = 2.0 * np.pi * self.frequency_hz * signals.clock
         return np.asarray(self.amplitude_arcsec * np.sin(turn + phase))
+
+    @classmethod
+    def drawn(
+        cls, size: float, signals: Signals, around: Surroundings, rng: np.random.Generator
+    ) -> Self | None:
+        if signals.time is None:
+            return None
+        return cls(float(rng.uniform(0.1, 0.4)) * reading_rate(signals), size)
 
     @classmethod
     def propose(cls, regression: Regression) -> Extension | None:

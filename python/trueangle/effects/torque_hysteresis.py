@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Self
 
 import numpy as np
 
@@ -54,6 +54,7 @@ class TorqueHysteresis(Effect):
     span_Nm: float
 
     kind: ClassVar[str] = "torque_hysteresis"
+    size_name: ClassVar[str] = "half_width_arcsec"
     sentence: ClassVar[str] = (
         "Friction between teeth holds back the wind-up: at one torque the gear stands at two "
         "angles, one while the load grows and one while it falls."
@@ -76,6 +77,13 @@ class TorqueHysteresis(Effect):
 
     def signal(self, signals: Signals, around: Surroundings, rng: np.random.Generator) -> Array:
         return self.half_width_arcsec * self.loop(signals, self.span_Nm)
+
+    @classmethod
+    def drawn(
+        cls, size: float, signals: Signals, around: Surroundings, rng: np.random.Generator
+    ) -> Self | None:
+        span = 0.0 if signals.torque is None else float(np.ptp(signals.torque))
+        return cls(size, float(rng.uniform(0.1, 0.3)) * span) if span > 0.0 else None
 
     @classmethod
     def propose(cls, regression: Regression) -> Extension | None:

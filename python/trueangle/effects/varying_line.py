@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Self
 
 import numpy as np
 
@@ -18,6 +18,7 @@ from ..regression.extension import Extension
 from ..regression.regression import Regression
 from .blindness import Blindness
 from .channel_skew import ChannelSkew, sensor_order
+from .drawing import carrier_order, free_line, phase
 from .effect import ALWAYS, Effect
 from .filter_lag import FilterLag
 from .load_dependent_gear_error import LoadDependentGearError
@@ -55,6 +56,7 @@ class VaryingLine(Effect):
     phase_deg: float = 0.0
 
     kind: ClassVar[str] = "varying_line"
+    size_name: ClassVar[str] = "amplitude_arcsec"
     sentence: ClassVar[str] = (
         "A line of a shaft grows, shrinks or turns with speed or load, in a form that no "
         "narrower cause has."
@@ -77,6 +79,15 @@ class VaryingLine(Effect):
         return scale * line_sum(
             signals.theta, ((self.order, self.amplitude_arcsec, self.phase_deg),)
         )
+
+    @classmethod
+    def drawn(
+        cls, size: float, signals: Signals, around: Surroundings, rng: np.random.Generator
+    ) -> Self | None:
+        order = carrier_order(around, rng)
+        if order is None:
+            _, _, order = free_line(around, rng)
+        return cls(order, "speed", size, phase(rng))
 
     @classmethod
     def propose(cls, regression: Regression) -> Extension | None:

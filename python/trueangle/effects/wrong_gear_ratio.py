@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Self
 
 import numpy as np
 
@@ -15,6 +15,7 @@ from ..joint.signals import Signals
 from ..regression.estimate import Parameters, quantity
 from ..regression.extension import Extension
 from ..regression.regression import Regression
+from .drawing import carrier_order
 from .effect import Effect
 from .missing_order import MissingOrder
 from .search import Array, Fitted
@@ -46,6 +47,8 @@ class WrongGearRatio(Effect):
     gear_ratio: float
 
     kind: ClassVar[str] = "wrong_gear_ratio"
+    size_name: ClassVar[str] = "gear_ratio_departure"
+    size_most: ClassVar[float] = 1.0
     sentence: ClassVar[str] = (
         "The simulation counts with another gear ratio than the joint has: all lines of the "
         "motor and the wave generator stand at other orders, together."
@@ -65,6 +68,15 @@ class WrongGearRatio(Effect):
         orders = _moved(around.joint, around.pattern, self.gear_ratio)
         pattern = Pattern(np.array(orders), around.pattern.cosine, around.pattern.sine)
         return pattern.value(signals.theta) - around.pattern.value(signals.theta)
+
+    @classmethod
+    def drawn(
+        cls, size: float, signals: Signals, around: Surroundings, rng: np.random.Generator
+    ) -> Self | None:
+        ratio = around.joint.gear_ratio
+        if ratio == 1.0 or carrier_order(around, rng) is None:
+            return None
+        return cls(ratio + size * float(rng.choice([-1.0, 1.0])))
 
     @classmethod
     def propose(cls, regression: Regression) -> Extension | None:

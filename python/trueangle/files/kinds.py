@@ -13,6 +13,7 @@ __all__ = [
     "MODEL",
     "PAGE",
     "PDF",
+    "PICTURE",
     "REPORT",
     "RUNS",
     "SIMULATION",
@@ -129,6 +130,8 @@ SIMULATION: Final = Kind("a simulation (TOML)", (".toml",))
 RUNS: Final = Kind("a table of runs (CSV)", (".csv",))
 PAGE: Final = Kind("a report (HTML)", (".html", ".htm"))
 PDF: Final = Kind("a report (PDF)", (".pdf",))
+#: What a picture is written as, by the ending.
+PICTURE: Final = Kind("a picture (PNG, SVG or PDF)", (".png", ".svg", ".pdf"))
 CERTIFICATE: Final = Kind("a certificate (PDF)", (".pdf",))
 #: What `Report.save` writes, by the ending.
 REPORT: Final = Kind("a report (HTML or PDF)", (*PAGE.endings, *PDF.endings))

@@ -1,8 +1,9 @@
 """Pictures of runs, fits, order selections, diagnoses and plans.
 
 One file a picture. Every function draws into ``ax`` (a new one when not given) and
-returns it; `text_alternative` says in a sentence what it shows. Errors are in arcsec, angles
-in degrees. Needs ``pip install trueangle[plot]``; matplotlib is imported at the first picture.
+returns it, but `detection`, which makes a figure; `text_alternative` says in a sentence what
+it shows. Errors are in arcsec, angles in degrees. Needs ``pip install trueangle[plot]``;
+matplotlib is imported at the first picture.
 """
 
 from __future__ import annotations
@@ -10,6 +11,7 @@ from __future__ import annotations
 from .amplitudespectrum import amplitude_spectrum
 from .beforeafter import before_after
 from .canvas import text_alternative
+from .detection import detection
 from .errorcurves import error_curves
 from .errorleft import error_left
 from .gains import gains
@@ -22,6 +24,7 @@ from .residualpictures import residuals
 __all__ = [
     "amplitude_spectrum",
     "before_after",
+    "detection",
     "error_curves",
     "error_left",
     "fit_plot",

@@ -9,9 +9,18 @@ from .palette import ink
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
     from matplotlib.legend import Legend
 
-__all__ = ["described", "grid", "legend", "new_axes", "text_alternative", "turn_axis"]
+__all__ = [
+    "described",
+    "grid",
+    "legend",
+    "new_axes",
+    "new_figure",
+    "text_alternative",
+    "turn_axis",
+]
 
 #: Entries of a legend beyond which it stands beside the picture, not inside.
 _MANY: int = 5
@@ -35,11 +44,9 @@ def new_axes(ax: Axes | None, *, polar: bool = False, height: float = 4.0) -> Ax
     """
     if ax is not None:
         return ax
-    try:
-        from matplotlib import pyplot
-    except ImportError:
-        raise MissingExtraError("pictures need matplotlib: pip install 'trueangle[plot]'") from None
+    pyplot = _pyplot()
     kind: dict[str, Any] = {"projection": "polar"} if polar else {}
+    made: Axes
     _, made = pyplot.subplots(
         figsize=(5.0 if polar else 7.5, 5.0 if polar else height),
         layout="constrained",
@@ -52,6 +59,28 @@ def grid(ax: Axes, axis: Literal["both", "x", "y"] = "both") -> None:
     """Faint lines behind what is drawn."""
     ax.grid(True, axis=axis, color=ink(ax) + "18", linewidth=0.8)
     ax.set_axisbelow(True)
+
+
+def new_figure(rows: int, columns: int, width: float, height: float) -> tuple[Figure, list[Axes]]:
+    """A new figure with axes in rows and columns, listed row by row.
+
+    Raises
+    ------
+    MissingExtraError
+        matplotlib is not installed.
+    """
+    figure, made = _pyplot().subplots(
+        rows, columns, figsize=(width, height), layout="constrained", squeeze=False, sharey=True
+    )
+    return figure, list(made.ravel())
+
+
+def _pyplot() -> Any:
+    try:
+        from matplotlib import pyplot
+    except ImportError:
+        raise MissingExtraError("pictures need matplotlib: pip install 'trueangle[plot]'") from None
+    return pyplot
 
 
 def turn_axis(ax: Axes, low: float = 0.0, high: float = 360.0) -> None:

@@ -1,0 +1,88 @@
+"""``trueangle rehearse``: which causes planned runs would show, and from which size on."""
+
+from __future__ import annotations
+
+import argparse
+import io
+from pathlib import Path
+from typing import TYPE_CHECKING, TextIO, cast
+
+from ..files import PICTURE, written_atomically
+from ..pace import STYLES, ending_early
+from .durations import seconds
+from .paths import Input, Output
+
+if TYPE_CHECKING:
+    from ..rehearsal import Rehearsal
+
+HELP = "say from which size on a diagnosis of planned runs would name each cause"
+EXAMPLE = "trueangle rehearse joint.toml --within 5min --plot detection.png"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the command's arguments."""
+    add = parser.add_argument
+    add(
+        "simulation",
+        type=Input,
+        metavar="SIMULATION",
+        help="simulation file (TOML) with the joint, its noise and the planned runs",
+    )
+    add(
+        "--causes",
+        type=lambda text: [name.strip() for name in text.split(",") if name.strip()],
+        metavar="A,B",
+        help="causes to hide (default: all)",
+    )
+    add("--seeds", type=int, default=20, metavar="N", help="trials of a cause at most (default 20)")
+    add("--seed", type=int, default=0, metavar="N", help="of the random numbers (default 0)")
+    add(
+        "--within",
+        type=seconds,
+        metavar="TIME",
+        help="give what was found in that time, as 60s, 5min or seconds",
+    )
+    add("--workers", type=int, metavar="N", help="processes side by side (default: every core)")
+    add("--plot", type=Output.of(PICTURE), metavar="FILE", help="write the picture as well")
+    add(
+        "--progress",
+        choices=STYLES,
+        default="auto",
+        help="on stderr after one second (default: text on a terminal, nothing elsewhere)",
+    )
+    add("--json", action="store_true", help="print the result as JSON")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Print the rehearsal."""
+    from ..rehearsal import rehearse
+    from ..simulation import load_simulation
+
+    sim = load_simulation(args.simulation)
+    with ending_early() as interruption:
+        result = rehearse(
+            sim,
+            causes=args.causes,
+            seeds=args.seeds,
+            seed=args.seed,
+            within=args.within,
+            workers=args.workers,
+            progress=args.progress,
+        )
+    if args.plot and not interruption.happened:
+        _draw(result, args.plot)
+    print(result.to_json() if args.json else result.summary())
+    if interruption.happened:
+        told = "the account so far is incomplete"
+        raise KeyboardInterrupt(told + (f", and {args.plot} not written" if args.plot else ""))
+    return 0
+
+
+def _draw(result: Rehearsal, path: str) -> None:
+    """Write the picture, in the format that its ending says (PNG where it says none)."""
+    ending = Path(path).suffix.lower()
+    kind = ending[1:] if ending in PICTURE.endings else "png"
+    drawn = io.BytesIO()
+    result.plot().savefig(drawn, format=kind)
+    with written_atomically(path, kind=PICTURE) as file:
+        cast(TextIO, file).buffer.write(drawn.getvalue())

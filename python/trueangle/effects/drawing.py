@@ -1,0 +1,54 @@
+"""What effects drawn for a rehearsal have in common: lines, places and speeds of these runs."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..joint.pattern import Surroundings
+from ..joint.signals import Signals
+
+__all__ = ["carrier_order", "free_line", "largest", "phase", "reading_rate", "visited_place"]
+
+#: Low orders of the output that are drawn beside those of its gear.
+LOW_ORDERS = tuple(("output", k) for k in range(1, 9))
+
+
+def phase(rng: np.random.Generator) -> float:
+    """A phase in degrees."""
+    return float(rng.uniform(0.0, 360.0))
+
+
+def free_line(around: Surroundings, rng: np.random.Generator) -> tuple[str, float, float]:
+    """A line that the simulation does not have: shaft, order, order of the output."""
+    joint, known = around.joint, around.pattern.orders
+    lines = [(s, float(k), float(joint.output_order(s, k))) for s, k in joint.gear_orders()]
+    lines += [(s, float(k), float(joint.output_order(s, k))) for s, k in LOW_ORDERS]
+    free = [line for line in lines if not np.any(np.isclose(known, line[2], rtol=1e-6))]
+    return free[int(rng.integers(len(free)))]
+
+
+def carrier_order(around: Surroundings, rng: np.random.Generator) -> float | None:
+    """A line of the simulation that the gear leaves; None where it has none."""
+    joint = around.joint
+    geared = {round(float(joint.output_order(s, k)), 6) for s, k in joint.gear_orders()}
+    found = [float(m) for m in around.pattern.orders if round(float(m), 6) in geared]
+    return found[int(rng.integers(len(found)))] if found else None
+
+
+def visited_place(signals: Signals, rng: np.random.Generator) -> float:
+    """A place that the runs pass, degrees of the output."""
+    return float(np.mod(signals.degrees[int(rng.integers(len(signals)))], 360.0))
+
+
+def reading_rate(signals: Signals) -> float:
+    """Readings a second in the slowest of the runs."""
+    steps = [
+        float(np.median(np.diff(signals.clock[a:b]))) for a, b in signals.run_bounds() if b > a + 1
+    ]
+    return 1.0 / max(max(steps, default=1.0), 1e-12)
+
+
+def largest(values: NDArray[np.float64] | None) -> float:
+    """Largest absolute value of a channel; 0 where it was not recorded."""
+    return 0.0 if values is None else float(np.abs(values).max(initial=0.0))

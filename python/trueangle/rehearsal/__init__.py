@@ -1,0 +1,8 @@
+"""Rehearsal: which causes a diagnosis of planned runs would name, and from what size on."""
+
+from __future__ import annotations
+
+from .rehearse import rehearse
+from .result import Rehearsal, RehearsedCause
+
+__all__ = ["Rehearsal", "RehearsedCause", "rehearse"]

@@ -1,0 +1,142 @@
+"""One trial: an effect hidden in simulated readings, and what a diagnosis of them says."""
+
+from __future__ import annotations
+
+import zlib
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..diagnosis import Diagnosis, diagnose
+from ..effects import EFFECTS, Effect
+from ..errors import TrueAngleError
+from ..joint.pattern import Surroundings
+from ..joint.signals import Signals, join_runs
+from ..simulation.simulation import Simulation, simulate
+
+__all__ = [
+    "ENDED",
+    "FAILED",
+    "NAMED",
+    "Outcome",
+    "Trial",
+    "asked",
+    "drawn_effect",
+    "measured_signals",
+    "rng_of",
+]
+
+#: What a diagnosis may say of a hidden cause: it is confirmed; it is listed and not confirmed; it
+#: is one of several that are not told apart; another cause stands in its place; something is
+#: unexplained; nothing is seen. A diagnosis that failed is a defect; one that was ended no answer.
+NAMED, LISTED, UNTOLD, OTHER, UNEXPLAINED, NOTHING = (
+    "named",
+    "not_confirmed",
+    "not_told_apart",
+    "taken_for_another",
+    "unexplained",
+    "nothing",
+)
+FAILED, ENDED = "failed", "ended"
+
+
+@dataclass(frozen=True)
+class Trial:
+    """What is hidden: a cause, its size, and the number of its draw.
+
+    Attributes
+    ----------
+    cause : str
+    step : int
+        The size, in steps of the search.
+    size : float
+    number : int
+        Of the trial among those of its cause.
+    """
+
+    cause: str
+    step: int
+    size: float
+    number: int
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What a diagnosis said of a hidden cause.
+
+    Attributes
+    ----------
+    verdict : str
+    instead : tuple of str
+        Causes that were named in its place, or that it was not told from.
+    beside : tuple of str
+        Causes that were named though they were not there, beside the true one.
+    failure : str
+        Why the diagnosis failed.
+    """
+
+    verdict: str
+    instead: tuple[str, ...] = ()
+    beside: tuple[str, ...] = ()
+    failure: str = ""
+
+    @property
+    def is_named(self) -> bool:
+        """The cause was named and confirmed."""
+        return self.verdict == NAMED
+
+
+def rng_of(seed: int, cause: str, number: int) -> np.random.Generator:
+    """Random numbers of a trial: the same whoever asks for it, and when."""
+    return np.random.default_rng([seed, zlib.crc32(cause.encode()), number])
+
+
+def measured_signals(sim: Simulation) -> Signals:
+    """Signals at the readings of the simulation's own runs."""
+    return join_runs(simulate(replace(sim, effects=()), 0))
+
+
+def drawn_effect(
+    cause: str, size: float, signals: Signals, around: Surroundings, rng: np.random.Generator
+) -> Effect | None:
+    """An effect of this cause and size; None where these runs cannot have it."""
+    return EFFECTS[cause].drawn(size, signals, around, rng)
+
+
+def asked(sim: Simulation, signals: Signals, trial: Trial, seed: int) -> Outcome:
+    """Hide the effect of a trial in readings of the simulation, diagnose them, and compare."""
+    rng = rng_of(seed, trial.cause, trial.number)
+    effect = drawn_effect(trial.cause, trial.size, signals, sim.surroundings, rng)
+    if effect is None:
+        return Outcome(NOTHING)
+    runs = simulate(sim.with_effects([effect]), rng)
+    try:
+        result = diagnose(runs, sim)
+    except TrueAngleError:
+        raise
+    except Exception as failure:  # told with the result: hours of other trials are not lost
+        return Outcome(FAILED, failure=f"{type(failure).__name__}: {failure}")
+    return judged(result, trial.cause) if result.complete else Outcome(ENDED)
+
+
+def judged(result: Diagnosis, cause: str) -> Outcome:
+    """What a diagnosis says where ``cause`` alone is hidden."""
+    confirmed = [finding.cause for finding in result.findings if finding.confirmed]
+    refuted = [belief.what for belief in result.beliefs if belief.verdict != "confirmed"]
+    others = tuple(dict.fromkeys(c for c in confirmed if c != cause))
+    if cause in confirmed or cause in refuted:
+        return Outcome(NAMED, beside=others)
+    if any(finding.cause == cause for finding in result.findings):
+        return Outcome(LISTED, others)
+    seen = [spot for spot in result.not_identifiable if spot.supported]
+    for spot in seen:
+        if cause in spot.causes:
+            return Outcome(UNTOLD, tuple(c for c in spot.causes if c != cause))
+    others += tuple(c for spot in seen for c in spot.causes if c not in others)
+    # A refuted line or effect of the simulation is another name for what is hidden.
+    others += tuple(w for w in refuted if w in EFFECTS)
+    if others or refuted:
+        return Outcome(OTHER, others)
+    if result.unexplained is not None and result.unexplained.found:
+        return Outcome(UNEXPLAINED)
+    return Outcome(NOTHING)

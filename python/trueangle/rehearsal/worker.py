@@ -1,0 +1,40 @@
+"""A process that asks trials: ``python -m trueangle.rehearsal.worker``, pickles in and out."""
+
+from __future__ import annotations
+
+import contextlib
+import pickle
+import signal
+import sys
+from typing import Any, BinaryIO
+
+from .trial import asked, measured_signals
+
+__all__ = ["serve"]
+
+
+def serve(source: BinaryIO, target: BinaryIO) -> None:
+    """Answer every trial that comes until there are no more."""
+    sim, seed = pickle.load(source)
+    signals = measured_signals(sim)
+    while True:
+        try:
+            trial = pickle.load(source)
+        except EOFError:
+            return
+        answer: Any
+        try:
+            answer = asked(sim, signals, trial, seed)
+        except Exception as failure:  # told by the one who asked
+            answer = failure
+        pickle.dump(answer, target)
+        target.flush()
+
+
+if __name__ == "__main__":
+    # Ctrl-C is for the one who asked: it ends its workers.
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    with contextlib.suppress(BrokenPipeError, EOFError):
+        answers = sys.stdout.buffer
+        sys.stdout = sys.stderr
+        serve(sys.stdin.buffer, answers)
