@@ -111,11 +111,19 @@ def judged_beliefs(
     are not judged; the latter become entries of what cannot be told.
     """
     lines, harmonics = _lines(regression, sim, spots, with_gain)
-    effects = []
+    effects: list[Belief] = []
+    refuted: list[tuple[int, tuple[Array, Array]]] = []
     for old, new in zip(sim.effects, believed.effects, strict=True):
         belief = _effect(regression, sim, old, new)
         if belief is not None:
+            if belief.verdict != "confirmed":
+                errors = [e.expected(regression.signals, sim.surroundings) for e in (old, new)]
+                refuted.append((len(effects), (errors[0], errors[1])))
             effects.append(belief)
+    if with_gain and refuted:
+        gains = measure_belief_gains(regression, [], [change for _, change in refuted])
+        for (k, _), gain in zip(refuted, gains, strict=True):
+            effects[k] = replace(effects[k], gain=gain)
     kept = tuple(
         new
         for new in believed.effects

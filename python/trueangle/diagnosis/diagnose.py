@@ -33,6 +33,7 @@ from .named import findings_of, reconsidered, scatter_doubt, scatter_finding
 from .remainder import leftover_of, unexplained_after
 from .selection import NEW_CAUSE, misfit, select, total_penalty
 from .unnamed import is_named
+from .wrongplace import moved
 
 __all__ = ["MOST_READINGS", "diagnose"]
 
@@ -178,6 +179,7 @@ def _diagnosis(
     extended = corrected.with_effects(
         effect for finding in findings if finding.confirmed for effect in finding.effects
     )
+    beliefs, findings = moved(beliefs, findings, sim)
     residual = error - stated.predict(every)
     before = goodness_of_fit(
         leftover_of(signals, residual if rows is None else residual[rows]),
@@ -220,7 +222,8 @@ def _believed_account(
     """The account, and the simulation with the effects it claims as the readings show them."""
     account = _account(signals, error, sim)
     believed = sim
-    for _ in range(len(sim.effects)):
+    # Twice each: what one was taken for is only known once the others are right.
+    for _ in range(2 * len(sim.effects)):
         other = None if pace().over else corrected_effects(account.chosen, believed, sim)
         if other is None:
             break

@@ -128,34 +128,43 @@ def measure_gain(
 
 
 def measure_belief_gains(
-    regression: Regression, columns: Sequence[slice], seed: int = 0
+    regression: Regression,
+    columns: Sequence[slice],
+    changes: Sequence[tuple[Array, Array]] = (),
+    seed: int = 0,
 ) -> list[Gain]:
-    """Gain of measured lines in place of believed ones, by leaving out runs.
+    """Gain of measured lines and effects in place of believed ones, by leaving out runs.
 
-    ``columns`` are those of the lines among the regressors of the simulation's own pattern.
+    ``columns`` are those of the lines among the regressors of the simulation's own pattern;
+    ``changes`` are the errors of effects as believed and as measured, at every reading. The
+    strength of an effect is measured again in the other runs.
     """
     rng = np.random.default_rng(seed)
     unit, what = _units(regression)
     folds = rng.permutation(int(unit.max()) + 1) % min(FOLDS, int(unit.max()) + 1)
     own_zero = any(effect_of(term.cause).draws_zeros for term in regression.terms)
-    left = np.zeros((len(columns) + 1, regression.n))
+    count = len(columns) + len(changes)
+    before, after = np.zeros((count, regression.n)), np.zeros((count, regression.n))
     for fold in range(int(folds.max()) + 1):
         test = folds[unit] == fold
         fitted = part(regression, ~test).with_terms(rebuilt(t, ~test) for t in regression.terms)
-        left[0, test] = residual_at(
+        left = residual_at(
             fitted, regression.signals.take(test), regression.residual[test], own_zero
         )
+        after[:, test] = before[:, test] = left
         for k, where in enumerate(columns):
-            change = regression.base[test, where] @ fitted.coefficients[where]
-            left[k + 1, test] = left[0, test] + change
+            before[k, test] += regression.base[test, where] @ fitted.coefficients[where]
+        for k, (old, new) in enumerate(changes, len(columns)):
+            own = old - old.mean()
+            before[k, test] += (new - old - (new - old).mean())[test]
+            after[k, test] -= fitted.gain(own[~test, None])[1][0] * own[test]
     clean = ~regression.outlying
     gains = []
-    for k in range(len(columns)):
-        before, after = left[k + 1][clean], left[0][clean]
-        share, interval = reducible_share(before, after, unit[clean], regression.variance, rng)
+    for was, is_now in zip(before[:, clean], after[:, clean], strict=True):
+        share, interval = reducible_share(was, is_now, unit[clean], regression.variance, rng)
         holdout = f"{what} ({int(folds.max()) + 1} parts)"
         gains.append(
-            Gain(holdout, numbers(before), numbers(after), share, interval, None, _note(share))
+            Gain(holdout, numbers(was), numbers(is_now), share, interval, None, _note(share))
         )
     return gains
 
