@@ -82,7 +82,9 @@ def status_of(
 
 def _is_seen_without_a_name(regression: Regression | None, group: Sequence[int]) -> bool:
     """Without it the surest of what is left is a line in time at its frequency."""
-    if regression is None or not group or not is_line_in_time(regression.terms[group[0]]):
+    if regression is None or not group or regression.signals.runs < 2:
+        return False
+    if not is_line_in_time(regression.terms[group[0]]):
         return False
     left = remainder_of(regression, without=group)
     line = time_test(left)
