@@ -13,7 +13,7 @@ from ..effects.local_defect import LocalDefect
 from ..effects.missing_order import MissingOrder
 from ..effects.zero_slip import ZeroSlip
 from ..pace import pace
-from ..regression.regression import Extension, Regression
+from ..regression.regression import BEYOND_SHOWN, Extension, Regression
 from .goodness import estimate_noise
 from .remainder import remainder_of
 from .unnamed import UNNAMED, effect_of, is_named
@@ -155,6 +155,10 @@ def _by_other_paths(regression: Regression, direct: Regression) -> Regression:
     if declared is not regression:
         starts.append(declared)
     paths = [_pruned(_forward(_forward(s, specific), list(EFFECTS))) for s in starts]
+    if declared is not regression:
+        # Beside the declared lines what wanders is a wander, not what else bends as slowly.
+        flexible = [cause for cause, effect in EFFECTS.items() if is_flexible(effect)]
+        paths.append(_pruned(_forward(_forward(declared, flexible), list(EFFECTS))))
     return _made_specific(min([direct, *paths], key=total_penalty))
 
 
@@ -223,7 +227,9 @@ def _left_by_forms(deviance: float, readings: int) -> float:
 
 def _penalty(terms: Sequence[Extension], left: float) -> float:
     """Of causes beyond that of their parameters; their forms may leave ``left``."""
-    causes = len(finding_groups(terms))
+    # A line of a declared shaft is expected, and stands where it was said to stand.
+    declared = sum(term.cause == MissingOrder.kind and not term.log_grid for term in terms)
+    causes = len(finding_groups(terms)) - declared
     # A cause that contains another one spends a second form on the same error.
     forms = causes + len({term.cause for term in terms if effect_of(term.cause).contains})
     return NEW_CAUSE * causes + left * max(forms - 1, 0)
@@ -308,9 +314,12 @@ def _forward(regression: Regression, causes: Sequence[str]) -> Regression:
 def _pruned(regression: Regression) -> Regression:
     """Without the terms that the others have made superfluous."""
     while regression.terms and not pace().over:
-        least = min(range(len(regression.terms)), key=lambda k: _net_loss(regression, k))
+        # Terms larger than all that the readings show only take each other off again.
+        beyond = [k for k in range(len(regression.terms)) if _is_beyond_shown(regression, k)]
+        asked = beyond or range(len(regression.terms))
+        least = min(asked, key=lambda k: _net_loss(regression, k))
         without = cause_terms(regression, [least])
-        if total_penalty(without) > total_penalty(regression):
+        if not beyond and total_penalty(without) > total_penalty(regression):
             break
         regression = without
     regression = _plainest(regression)
@@ -318,6 +327,17 @@ def _pruned(regression: Regression) -> Regression:
         replace(term, deviance=_lost(regression, k)) for k, term in enumerate(regression.terms)
     ]
     return regression.with_terms(terms)
+
+
+def _is_beyond_shown(regression: Regression, k: int) -> bool:
+    """The term is larger than the readings show at all."""
+    term, coefficients = regression.fitted()[k]
+    if term.run_effect is None:
+        size = float(np.std(term.columns @ coefficients))
+    else:
+        power = float(np.mean(np.sum(term.run_effect.columns**2, axis=1)))
+        size = float(np.sqrt(max(term.run_effect.ratio, 0.0) * power * regression.variance))
+    return size > BEYOND_SHOWN * float(np.std(regression.residual))
 
 
 def _plainest(regression: Regression) -> Regression:

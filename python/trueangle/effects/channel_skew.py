@@ -92,7 +92,7 @@ class ChannelSkew(Effect):
         signals, around = regression.signals, regression.around
         pair = cls.columns(signals, around, {})
         free, coefficients = regression.gain(pair)
-        if regression.hopeless(free, 2):
+        if regression.hopeless(free, 2) or _is_part_of_a_line(regression):
             return None
         # The constant part is as large as the line: which of the two signs, the data say.
         phase = float(np.arctan2(*coefficients))
@@ -141,8 +141,7 @@ class ChannelSkew(Effect):
         if signals.velocity is None:
             yield cls.blind(UNTIMED)
             return
-        line = line_columns(signals.theta, sensor_order(regression.belief.joint))
-        if share_left(regression, signals.velocity[:, None] * line, line) < OWN_POWER:
+        if _is_part_of_a_line(regression):
             yield cls.blind("one speed in one direction (or at rest): it is part of a line")
 
     def to_terms(self, period: float, shafts: Mapping[str, float]) -> tuple[Term, ...]:
@@ -184,6 +183,14 @@ class ChannelSkewTerm(Term):
         half, phase = 0.5 * self.delay_s, math.radians(self.phase_deg)
         line = (self.order, half * math.sin(phase), half * math.cos(phase))
         return (forms.Scaled("velocity", half, (line,)),)
+
+
+def _is_part_of_a_line(regression: Regression) -> bool:
+    """The line times the velocity is not told from the line."""
+    signals = regression.signals
+    assert signals.velocity is not None
+    line = line_columns(signals.theta, sensor_order(regression.belief.joint))
+    return bool(share_left(regression, signals.velocity[:, None] * line, line) < OWN_POWER)
 
 
 def sensor_order(joint: Joint) -> float:

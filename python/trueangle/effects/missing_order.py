@@ -34,6 +34,9 @@ FREE_ANGLES = (
     "off the grid (plan with 'trueangle plan'; about 2.14 deg for 36 positions)"
 )
 
+#: Periods over the travel below which there is no line.
+HALF = 0.5
+
 #: Orders closer than this share of one over the turns covered, that explain at least this
 #: much of what the best one does, are hardly told apart.
 UNRESOLVED, ALIKE = 0.5, 0.9
@@ -84,6 +87,8 @@ class MissingOrder(Effect):
         lines = regression.lines
         expected = int(lines.plausible.sum())
         penalties = 2.0 * np.log(np.where(lines.plausible, 2 * expected, 2 * gains.size))
+        # Less than half a period is a bend, and anything slow bends.
+        gains = np.where(lines.orders * regression.signals.run_turns().max() < HALF, 0.0, gains)
         best = int(np.argmax(gains - penalties))
         if gains[best] <= 0.0:
             return None

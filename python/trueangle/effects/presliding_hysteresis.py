@@ -103,7 +103,8 @@ class PreslidingHysteresis(Effect):
     @classmethod
     def propose(cls, regression: Regression) -> Extension | None:
         signals = regression.signals
-        if np.ptp(signals.direction) == 0.0 and not signals.travel.any():
+        # What builds up from the start of runs that all go one way may be anything slow.
+        if not goes_both_ways(signals):
             return None
         best: tuple[float, float, float] | None = None
         for start in (0.0, 1.0):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any, Self
 
 import numpy as np
@@ -14,7 +15,7 @@ from .leastsquares import ROUNDING, LeastSquares
 from .ratio import best_ratio
 from .whitening import RunEffect
 
-__all__ = ["ROUNDING", "Extension", "Regression"]
+__all__ = ["BEYOND_SHOWN", "ROUNDING", "Extension", "Regression"]
 
 Array = NDArray[np.float64]
 
@@ -49,6 +50,7 @@ class Regression(LeastSquares):
         other.__dict__.update(self.__dict__)
         other.memory = {}
         other.q = np.hstack([self.q, u])
+        other.factor = replace(self.factor, q=other.q)  # of which scores ask for q alone
         other.r = self.r - u @ (u.T @ self.r)
         other.rss = max(float(other.r @ other.r), 1e-300)
         other._seen = None
