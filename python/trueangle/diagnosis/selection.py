@@ -168,7 +168,9 @@ def _with_lines_for_bumps(regression: Regression) -> Regression:
     One after the other each line saves less than a bump that imitates all of them at once.
     """
     plain = [term for term in regression.terms if term.cause != LocalDefect.kind]
-    if len(plain) == len(regression.terms):
+    travel = regression.signals.run_turns().max()
+    # Over a part of a turn other paths take lines first (`_by_other_paths`).
+    if len(plain) == len(regression.terms) or travel < LocalDefect.flexible_below:
         return regression
     lines = _forward(regression.with_terms(plain), [MissingOrder.kind])
     if len(lines.terms) < len(plain) + 2:
