@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 from typing import Any, Self
 
 import numpy as np
@@ -50,7 +49,6 @@ class Regression(LeastSquares):
         other.__dict__.update(self.__dict__)
         other.memory = {}
         other.q = np.hstack([self.q, u])
-        other.factor = replace(self.factor, q=other.q)  # of which scores ask for q alone
         other.r = self.r - u @ (u.T @ self.r)
         other.rss = max(float(other.r @ other.r), 1e-300)
         other._seen = None
