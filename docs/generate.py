@@ -6,6 +6,7 @@ import os
 import platform
 import subprocess
 import sys
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -26,6 +27,18 @@ from trueangle.reports.demo import demo_simulation
 
 __all__ = ["everything"]
 
+ROOT = Path(__file__).resolve().parents[1]
+
+#: Scripts of the gallery: what they show, and how they are called for it.
+EXAMPLES = {
+    "control_loop.py": (
+        "A loop with a wrong and with a corrected encoder",
+        "--seconds 1.5",
+    ),
+    "spin_down.py": ("From a coasting shaft to a corrected loop, without a reference", ""),
+    "long_log.py": ("A log corrected in blocks", "--rows 2e5"),
+}
+
 #: Size of the batches that are timed.
 SAMPLES = 200_000
 
@@ -35,6 +48,7 @@ def everything(folder: Path) -> None:
     folder.mkdir(exist_ok=True)
     figures(folder)
     (folder / "performance.md").write_text(performance(), encoding="utf-8")
+    (folder / "gallery.md").write_text(gallery(), encoding="utf-8")
     (folder / "causes.md").write_text(causes_page(), encoding="utf-8")
     (folder / "commands.md").write_text(commands(), encoding="utf-8")
 
@@ -62,6 +76,10 @@ def figures(folder: Path) -> None:
     for name, ax in drawn.items():
         ax.figure.savefig(folder / f"{name}.svg")
         mpl.pyplot.close(ax.figure)
+    for number, draw in paper_figures().items():
+        drawn_figure = draw()
+        drawn_figure.savefig(folder / f"paper{number}.svg")
+        mpl.pyplot.close(drawn_figure)
     told = story()
     told.savefig(folder / "story.svg")
     mpl.pyplot.close(told)
@@ -140,3 +158,25 @@ def commands() -> str:
     return "\n".join(
         f"## {name}\n\n```text\n{parsers[name].format_help()}```\n" for name in COMMANDS
     )
+
+
+def paper_figures() -> dict[int, Callable[[], mpl.figure.Figure]]:
+    """The paper's figures beside what they hide, as the example draws them."""
+    sys.path.insert(0, str(ROOT / "examples" / "paper"))
+    import figures
+
+    return figures.FIGURES
+
+
+def gallery() -> str:
+    """Every example script with what it printed when this page was made."""
+    parts = []
+    for name, (what, arguments) in EXAMPLES.items():
+        script = ROOT / "examples" / name
+        command = [sys.executable, str(script), *arguments.split()]
+        done = subprocess.run(command, capture_output=True, text=True, check=True)
+        parts.append(
+            f"## {what}\n\n```text\n$ python examples/{name} {arguments}\n{done.stdout}```\n\n"
+            f":::{{dropdown}} examples/{name}\n```python\n{script.read_text('utf-8')}```\n:::\n"
+        )
+    return "\n".join(parts)

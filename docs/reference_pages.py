@@ -50,7 +50,7 @@ def expanded(text: str) -> str:
 def _block(block: str) -> str:
     found = list(entries(block))
     lines = ["```{eval-rst}", ".. autosummary::", "   :nosignatures:", ""]
-    lines += [f"   {name}" for name, _ in found if callable(imported(name))]
+    lines += [f"   ~{name}" for name, _ in found if callable(imported(name))]
     for name, members in found:
         lines += ["", *_directive(name, members)]
     return "\n".join([*lines, "```"])

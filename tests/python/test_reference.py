@@ -55,7 +55,7 @@ def test_a_page_begins_with_its_summary():
     text = reference_pages.expanded("```{reference}\ntrueangle.fit\ntrueangle.Shaft: order\n```\n")
     summary, details = text.split(".. autofunction:: trueangle.fit")
     assert "autosummary" in summary
-    assert "   trueangle.Shaft\n" in summary
+    assert "   ~trueangle.Shaft\n" in summary
     assert ".. autoclass:: trueangle.Shaft\n   :members: order\n" in details
 
 

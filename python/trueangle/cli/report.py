@@ -7,6 +7,7 @@ import json
 
 from ..errors import ArgumentError
 from ..files import PDF, REPORT
+from ..pace import STYLES, paced
 from .fit import add_joint
 from .order_lists import orders_by_shaft
 from .paths import Input, Output
@@ -56,6 +57,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="FILE",
         help="print it to a PDF too, by an installed browser",
     )
+    add(
+        "--progress",
+        choices=STYLES,
+        default="auto",
+        help="on stderr after one second (default: text on a terminal, nothing elsewhere)",
+    )
     add("--json", action="store_true", help="print the report's numbers as JSON")
 
 
@@ -72,18 +79,19 @@ def run(args: argparse.Namespace) -> int:
         from ..simulation import load_simulation
 
         simulation = load_simulation(args.simulation)
-    made = report(
-        runs,
-        args.output,
-        simulation=simulation,
-        orders=orders_by_shaft(args.orders),
-        gear_ratio=args.gear_ratio,
-        fixed_member=args.fixed_member,
-        title=args.title,
-        certificate=args.certificate,
-        positions=args.positions,
-        model=args.model,
-    )
+    with paced(style=args.progress):
+        made = report(
+            runs,
+            args.output,
+            simulation=simulation,
+            orders=orders_by_shaft(args.orders),
+            gear_ratio=args.gear_ratio,
+            fixed_member=args.fixed_member,
+            title=args.title,
+            certificate=args.certificate,
+            positions=args.positions,
+            model=args.model,
+        )
     if args.pdf is not None:
         made.save_pdf(args.pdf)
     if args.json:

@@ -26,8 +26,8 @@ _BREAK: Final = 12.0
 _MOST_GROUPS: Final = 6
 #: Width of a group of one order, and the gap between two, in the unit of `_width`.
 _LEAST, _GAP = 2.5, 1.0
-#: Ticks of the whole axis; groups share them by their widths.
-_TICKS: Final = 24
+#: Inches that a tick needs, and each digit at it.
+_TICK_INCHES, _DIGIT_INCHES = 0.12, 0.09
 
 
 def order_groups(orders: Sequence[float]) -> list[tuple[float, float]]:
@@ -92,13 +92,15 @@ class OrderAxis:
     def draw(self, ax: Axes) -> None:
         """Ticks at whole orders, and marks where the axis is broken."""
         ticks: list[float] = []
-        share = _TICKS / sum(self._spans())
+        figure = ax.get_figure(root=True)
+        inches = ax.get_position().width * figure.get_figwidth()  # type: ignore[union-attr]
+        share = inches / sum(self._spans())
         for (low, high), span in zip(self.groups, self._spans(), strict=True):
-            # Longer names need more room.
-            most = max(2, round(2.0 * share * span / len(f"{high:g}"))) if high > low else 1
+            room = _TICK_INCHES + _DIGIT_INCHES * len(f"{high:g}")
+            most = max(2, int(share * span / room)) if high > low else 1
             ticks += _whole_ticks(low, high, most)
         ax.set_xticks(self.places(ticks), [f"{m:g}" for m in ticks])
-        if len(ticks) > _TICKS or max(ticks, default=0.0) >= 100.0:
+        if max(ticks, default=0.0) >= 100.0:
             ax.tick_params(axis="x", labelsize="small")
         ends = self.places([high for _, high in self.groups])
         ax.set_xlim(self.starts[0] - 0.8, float(ends[-1]) + 0.8)

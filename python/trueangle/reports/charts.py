@@ -19,6 +19,12 @@ __all__ = ["Chart", "Figure", "figure", "run_colour", "run_marker", "swatch"]
 
 Array = NDArray[np.float64]
 
+#: Part of a chart's width at either border from which texts are turned inwards.
+_EDGE: Final = 0.3
+
+#: Decades of a logarithmic axis up to which it has ticks within them.
+_FEW_DECADES: Final = 4
+
 #: A figure of the report: its alternative text and the charts that it consists of.
 Figure = dict[str, Any]
 
@@ -103,6 +109,10 @@ class Chart:
         self._figure = plotting.figure(
             sizing_mode="stretch_both",
             toolbar_location=None,
+            # The page's paper shows through; a border once drawn would stay at the edges.
+            border_fill_color=None,
+            border_line_color=None,
+            background_fill_color=None,
             # The last number of the axis reaches beyond it.
             min_border_right=14,
             tools=[],
@@ -111,6 +121,8 @@ class Chart:
             y_axis_label=y,
             **ranges,
         )
+        if log_y and y_range is not None:
+            self._log_axis(*y_range)
         if joined:
             self._figure.yaxis.visible = False
         zoom = models.BoxZoomTool()
@@ -220,21 +232,24 @@ class Chart:
         self._figure.add_layout(span)
         self._legend[label] = ("fore", "╍")
 
-    def labels(self, x: Array, y: Array, texts: Sequence[str]) -> None:
-        """Texts above points."""
+    def labels(self, x: Array, y: Array, texts: Sequence[str], inside: tuple[float, float]) -> None:
+        """Texts above points, turned inwards from the borders ``inside`` of the chart."""
+        low, high = inside
+        place = (np.asarray(x, dtype=np.float64) - low) / (high - low)
+        sides = ["left" if p < _EDGE else "right" if p > 1.0 - _EDGE else "center" for p in place]
         source = self._models.ColumnDataSource(
-            {"x": _short(x), "y": _short(y), "text": list(texts)}
+            {"x": _short(x), "y": _short(y), "text": list(texts), "side": sides}
         )
         drawn = self._figure.text(
-            "x", "y", "text", source=source, text_align="center", text_baseline="bottom",
+            "x", "y", "text", source=source, text_align="side", text_baseline="bottom",
             y_offset=-7, text_font_size="11px",
         )  # fmt: skip
         self._add(drawn, "fore", "", None, "")
 
-    def angle_axis(self, low: float, high: float) -> None:
-        """Ticks at whole parts of a turn."""
-        for step in (1.0, 5.0, 15.0, 30.0, 45.0, 90.0, 360.0, 1800.0):
-            if (high - low) / step <= 9.0:
+    def angle_axis(self, low: float, high: float, most: float = 9.0) -> None:
+        """Ticks at whole parts of a turn, about ``most`` of them."""
+        for step in (0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 15.0, 30.0, 45.0, 90.0, 360.0, 1800.0):
+            if (high - low) / step <= most:
                 first = np.ceil(low / step)
                 ticks = step * np.arange(first, np.floor(high / step) + 1.0)
                 self._figure.xaxis.ticker = self._models.FixedTicker(ticks=ticks.tolist())
@@ -247,6 +262,15 @@ class Chart:
         )
         ticks = np.arange(step * np.ceil(low / step), high + 1e-9, step)
         self._figure.xaxis.ticker = self._models.FixedTicker(ticks=ticks.tolist())
+
+    def _log_axis(self, low: float, high: float) -> None:
+        """Ticks at 1, 2 and 5 of every decade while these are few, else at decades alone."""
+        decades = np.arange(np.floor(np.log10(low)), np.ceil(np.log10(high)) + 1.0)
+        marks = (1.0, 2.0, 5.0) if decades.size <= _FEW_DECADES else (1.0,)
+        ticks = [m * 10.0**d for d in decades for m in marks if low <= m * 10.0**d <= high]
+        ticker = self._models.FixedTicker(ticks=ticks)
+        self._figure.yaxis.ticker = self._figure.ygrid.ticker = ticker
+        self._figure.yaxis.formatter = self._models.BasicTickFormatter(use_scientific=False)
 
     def drawn(self) -> dict[str, Any]:
         """The chart as plain values, ready for JSON."""

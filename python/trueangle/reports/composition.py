@@ -15,7 +15,9 @@ from ..diagnosis.heldout import hold_out_extended
 from ..errors import ArgumentError, NoModelError, TrueAngleError
 from ..files import CERTIFICATE, PDF, REPORT, check_output, written_atomically
 from ..fitting.heldout import HeldOut, hold_out
+from ..joint.joint import Joint
 from ..model import HarmonicModel
+from ..pace import pace
 from ..plots.curves import Points, degrees, error_points, label_of
 from ..provenance import provenance
 from ..runs import CalibrationRun, as_runs
@@ -23,6 +25,7 @@ from . import diagnosisfigures, figures
 from .diagnosed import diagnosed
 from .gained import extended_model, gained
 from .givenmodel import given_model
+from .linenames import LineNames, line_names
 from .measured import measured
 from .modelled import modelled, selected
 from .phases import phases
@@ -41,6 +44,9 @@ __all__ = ["Report", "report"]
 Orders: TypeAlias = Iterable[float] | Mapping[str, Iterable[float]] | str | None
 
 FORMAT, VERSION = "trueangle-report", 1
+
+#: Steps of the work, for its progress.
+_STAGES = 4
 
 
 @dataclass(frozen=True, eq=False)
@@ -221,8 +227,13 @@ def report(
         return certified
     if positions is not None:
         raise ArgumentError("positions are those of a certificate: give certificate too")
+    at = pace()
+    at.at("fitting", 0, _STAGES)
     fit, selection, why_not = _fitted(found, orders, gear_ratio, fixed_member)
+    at.at("holding runs out", 1, _STAGES)
     held, why_no_gain = _held_out(fit)
+    at.at("diagnosing", 2, _STAGES)
+    name = line_names(_joint(simulation, gear_ratio, fixed_member))
     diagnosis = None if simulation is None else diagnose(found, simulation)
     heading = title or _title(found)
     content: dict[str, Any] = {
@@ -230,8 +241,8 @@ def report(
         "version": VERSION,
         "title": heading,
         "measured": measured(found),
-        "selection": None if selection is None else selected(selection),
-        "model": None if fit is None else modelled(fit),
+        "selection": None if selection is None else selected(selection, name),
+        "model": None if fit is None else modelled(fit, name),
         "why_no_model": why_not,
         "given_model": None if model is None else given_model(model, found),
         "gain": None if held is None else gained(held),
@@ -240,7 +251,8 @@ def report(
         "extended": None,
         "provenance": provenance(found, None if simulation is None else simulation.source),
     }
-    drawn = _figures(found, fit, selection, held)
+    at.at("drawing", 3, _STAGES)
+    drawn = _figures(found, fit, selection, held, name)
     if simulation is not None and diagnosis is not None:
         content["diagnosis"] = diagnosed(diagnosis)
         content["extended"] = _extended(fit, diagnosis, found, simulation)
@@ -250,6 +262,15 @@ def report(
     if path is not None:
         made.save(path)
     return made
+
+
+def _joint(
+    simulation: Simulation | None, gear_ratio: float | None, fixed_member: str
+) -> Joint | None:
+    """What is known of the shafts."""
+    if simulation is not None:
+        return simulation.joint
+    return None if gear_ratio is None else Joint(gear_ratio, fixed_member, "motor")
 
 
 def _title(runs: list[CalibrationRun]) -> str:
@@ -303,16 +324,17 @@ def _figures(
     fit: FitResult | None,
     selection: OrderSelection | None,
     held: HeldOut | None,
+    name: LineNames,
 ) -> dict[str, dict[str, Any]]:
     """Every figure that this report has."""
     points = error_points(fit) if fit is not None else [_plain(r, i) for i, r in enumerate(runs)]
     made = {"errors": figures.errors_of_runs(fit, runs, points)}
     if fit is not None or selection is not None:
-        made["spectrum"] = spectrum(fit, selection)
+        made["spectrum"] = spectrum(fit, selection, name)
     if held is not None:
         made["before-after"] = figures.before_after(held, runs)
     if fit is not None:
-        multiples = phases(fit)
+        multiples = phases(fit, name)
         if multiples is not None:
             made["phases"] = multiples
         for signal in figures.signals_present(fit):

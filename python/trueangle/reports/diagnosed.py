@@ -25,6 +25,10 @@ _UNITS: Final = {
 }
 
 
+#: Digits of a number without an uncertainty.
+_PLAIN_DIGITS: Final = 4
+
+
 def diagnosed(diagnosis: Diagnosis) -> dict[str, Any]:
     """`Diagnosis.to_dict` with the sentences of its findings.
 
@@ -61,7 +65,7 @@ def _parameter(index: int, name: str, entry: dict[str, Any]) -> dict[str, Any]:
         "unit": _UNITS.get(unit, ""),
         "value": value if number else None,
         "std": std if known else None,
-        "digits": _digits(std, 2) if known else _digits(value, 4) if number else 0,
+        "digits": _digits(std, 2) if known else _digits(value, _PLAIN_DIGITS) if number else 0,
         "text": "" if number else _text(value),
     }
 
@@ -70,6 +74,8 @@ def _digits(value: float, significant: int) -> int:
     """Digits after the point that show so many significant ones of ``value``."""
     if value == 0.0 or not math.isfinite(value):
         return significant
+    if significant == _PLAIN_DIGITS and float(value).is_integer():
+        return 0  # an order
     return min(max(significant - 1 - math.floor(math.log10(abs(value))), 0), 12)
 
 

@@ -49,7 +49,7 @@ def _compared(runs: Sequence[CalibrationRun], sim: Simulation) -> Figure:
     both = Chart("", "error / arcsec", x_range=(low, high), height_rem=16.0)
     apart = Chart(
         "reference angle / deg",
-        "measured less simulated / arcsec",
+        "difference / arcsec",
         x_range=(low, high),
         height_rem=16.0,
     )
@@ -77,7 +77,7 @@ def _compared(runs: Sequence[CalibrationRun], sim: Simulation) -> Figure:
         run_dots(apart, number, rest, len(runs))
     alt = (
         f"Measured error of {len(runs)} runs and the error that the simulation expects at the same "
-        "readings, and below it their difference, in arcsec over one turn."
+        "readings, and below it the measured less the simulated one, in arcsec over one turn."
     )
     return figure(alt, [both, apart], "stacked")
 

@@ -32,6 +32,8 @@ _DENSE: Final = 40.0
 #: Places of an envelope, and periods of the stretch that is shown beside it.
 _PLACES: Final = 180
 _PERIODS: Final = 4.0
+#: Ticks of that narrow chart.
+_STRETCH_TICKS: Final = 4.0
 
 
 def run_dots(
@@ -124,6 +126,7 @@ def _stretch(fit: FitResult, everything: list[Points], y: str) -> Chart:
         x_range=(start, start + width),
         title=f"A stretch of {width:.3g}°: {_PERIODS:g} periods of order {strong:g}",
     )
+    chart.angle_axis(start, start + width, _STRETCH_TICKS)
     whole = curves.model_curve(fit.model, (start, start + width))
     _draw_model(chart, whole, "model there")
     for i, points in enumerate(everything):

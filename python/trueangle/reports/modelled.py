@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from ..angles import ARCSEC_PER_TURN
+from .linenames import LineNames
 
 if TYPE_CHECKING:
     from ..fitting.result import FitResult
@@ -20,7 +21,7 @@ _NOTABLE: Final = 0.3
 _MOST_CORRELATIONS: Final = 5
 
 
-def modelled(fit: FitResult) -> dict[str, Any]:
+def modelled(fit: FitResult, name: LineNames) -> dict[str, Any]:
     """Coefficients with standard errors, and the quality of the fit, in arcsec and deg."""
     model = fit.model
     factor = ARCSEC_PER_TURN / model.period
@@ -31,6 +32,7 @@ def modelled(fit: FitResult) -> dict[str, Any]:
     for n, (shaft, i) in enumerate(rows):
         coefficients.append(
             {
+                "line": name(shaft.orders[i] * shaft.cycles_per_turn),
                 "shaft": shaft.name,
                 "order": shaft.orders[i],
                 "output_order": shaft.orders[i] * shaft.cycles_per_turn,
@@ -54,15 +56,15 @@ def modelled(fit: FitResult) -> dict[str, Any]:
         "offset_spread_arcsec": factor * fit.offset_spread,
         "wild_readings": len(fit.wild),
         "ridge": fit.ridge,
-        "correlations": _correlations(fit) if known else [],
+        "correlations": _correlations(fit, name) if known else [],
         "notes": list(fit.notes),
     }
 
 
-def _correlations(fit: FitResult) -> list[dict[str, Any]]:
+def _correlations(fit: FitResult, name: LineNames) -> list[dict[str, Any]]:
     """The strongest correlations between two coefficients."""
     names = [
-        f"{part} of {shaft.name} order {order}"
+        f"{part} of {name(order * shaft.cycles_per_turn)}"
         for shaft in fit.model.shafts
         for order in shaft.orders
         for part in ("A", "B")
@@ -80,7 +82,7 @@ def _correlations(fit: FitResult) -> list[dict[str, Any]]:
     ]
 
 
-def selected(selection: OrderSelection) -> dict[str, Any]:
+def selected(selection: OrderSelection, name: LineNames) -> dict[str, Any]:
     """Every candidate order and the evidence for or against it."""
     factor = ARCSEC_PER_TURN / selection.period
     before, after = selection.holdout_rms
@@ -96,6 +98,7 @@ def selected(selection: OrderSelection) -> dict[str, Any]:
         "notes": list(selection.notes),
         "table": [
             {
+                "line": name(float(row.order)),
                 "order": float(row.order),
                 "retained": row.retained,
                 "verdict": row.verdict,

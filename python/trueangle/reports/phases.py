@@ -9,6 +9,7 @@ import numpy as np
 from ..errors import RankError
 from ..fitting.phases import Phases, run_phases
 from .charts import Chart, Figure, figure, run_colour, run_marker
+from .linenames import LineNames
 
 if TYPE_CHECKING:
     from ..fitting.result import FitResult
@@ -21,7 +22,7 @@ _MOST: Final = 12
 _LEAST: Final = 15.0
 
 
-def phases(fit: FitResult) -> Figure | None:
+def phases(fit: FitResult, name: LineNames) -> Figure | None:
     """Phase of every order in every run; None where no run holds them, or there is one."""
     try:
         found = sorted(run_phases(fit), key=lambda p: -float(p.amplitude.mean()))[:_MOST]
@@ -30,7 +31,10 @@ def phases(fit: FitResult) -> Figure | None:
     if not found or len(found[0].labels) < 2:
         return None
     numbers = {(run.label or str(i + 1)): i for i, run in enumerate(fit.runs)}
-    charts = [_of_order(order, numbers) for order in sorted(found, key=lambda p: p.order)]
+    charts = [
+        _of_order(order, numbers, name(order.order))
+        for order in sorted(found, key=lambda p: p.order)
+    ]
     alt = (
         f"Phases of {len(charts)} orders, a chart for each, one dot per run. Dots of one order "
         "on a level line are a systematic error."
@@ -38,7 +42,7 @@ def phases(fit: FitResult) -> Figure | None:
     return figure(alt, charts, "multiples")
 
 
-def _of_order(order: Phases, numbers: dict[str, int]) -> Chart:
+def _of_order(order: Phases, numbers: dict[str, int], name: str) -> Chart:
     mean = np.angle(np.mean(order.amplitude * np.exp(1j * order.phase)))
     around = np.angle(np.exp(1j * (order.phase - mean)))
     degrees = np.degrees(mean + around)
@@ -51,7 +55,7 @@ def _of_order(order: Phases, numbers: dict[str, int]) -> Chart:
         "phase / deg",
         x_range=(0.3, len(order.labels) + 0.7),
         y_range=(middle - half, middle + half),
-        title=f"Order {order.order:g}: {_size(float(order.amplitude.mean()))} arcsec",
+        title=f"{name.capitalize()}: {_size(float(order.amplitude.mean()))} arcsec",
         height_rem=11.0,
     )
     chart.whole_axis(1.0, float(len(order.labels)), 7)

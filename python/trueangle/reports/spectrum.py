@@ -11,6 +11,7 @@ from ..plots.amplitudespectrum import likely_aliases, thresholds
 from ..plots.curves import CONFIDENCE
 from ..plots.orderaxis import order_groups
 from .charts import Chart, Figure, figure
+from .linenames import LineNames
 
 if TYPE_CHECKING:
     from ..fitting.result import FitResult
@@ -24,9 +25,9 @@ _MOST_NAMED: Final = 8
 _FLOOR: Final = 0.2
 
 
-def spectrum(fit: FitResult | None, selection: OrderSelection | None) -> Figure:
+def spectrum(fit: FitResult | None, selection: OrderSelection | None, name: LineNames) -> Figure:
     """Amplitude of every order: candidates of a selection, or the orders of a fit."""
-    rows = _of_fit(fit) if selection is None else _of_selection(selection)
+    rows = _of_fit(fit, name) if selection is None else _of_selection(selection, name)
     kept = [row for row in rows if row["kept"]]
     seen = [row["limit"] for row in rows if row["limit"] > 0.0]
     seen += [row["amplitude"] for row in (kept or rows) if row["amplitude"] > 0.0]
@@ -105,6 +106,7 @@ def _group(
         np.array([row["order"] for row in written]),
         np.array([row["amplitude"] for row in written]),
         [row["name"] for row in written],
+        (low - margin, high + margin),
     )
     return chart
 
@@ -125,11 +127,15 @@ def _apart(named: list[dict[str, Any]], low: float, high: float) -> list[dict[st
     return taken
 
 
-def _of_fit(fit: FitResult | None) -> list[dict[str, Any]]:
+def _short(order: float, name: LineNames) -> str:
+    """The name at a line: orders of the output have none but their number."""
+    return name(order).removeprefix("output ")
+
+
+def _of_fit(fit: FitResult | None, name: LineNames) -> list[dict[str, Any]]:
     assert fit is not None
     factor = ARCSEC_PER_TURN / fit.model.period
     known = fit.model.covariance is not None
-    names = [(shaft.name.replace("_", " "), k) for shaft in fit.model.shafts for k in shaft.orders]
     rows = [
         {
             "order": float(order),
@@ -137,20 +143,20 @@ def _of_fit(fit: FitResult | None) -> list[dict[str, Any]]:
             "half": CONFIDENCE * factor * float(fit.amplitude_std[i]) if known else 0.0,
             "limit": 0.0,
             "kept": True,
-            "told": "" if names[i][0] == "output" else f"({names[i][0]} {names[i][1]})",
-            "name": f"{order:g}" if names[i][0] == "output" else f"{names[i][0]} {names[i][1]}",
+            "told": f"({name(float(order))})",
+            "name": _short(float(order), name),
         }
         for i, order in enumerate(fit.orders)
     ]
     return sorted(rows, key=lambda row: row["order"])
 
 
-def _of_selection(selection: OrderSelection) -> list[dict[str, Any]]:
+def _of_selection(selection: OrderSelection, name: LineNames) -> list[dict[str, Any]]:
     factor = ARCSEC_PER_TURN / selection.period
     limits = np.nan_to_num(factor * thresholds(selection))
     found = []
     for row, limit in zip(selection.table, limits, strict=True):
-        told = [row.verdict]
+        told = [name(float(row.order)), row.verdict]
         if row.aliases:
             told.append("looks like order " + ", ".join(f"{m:g}" for m in likely_aliases(row)[:4]))
         told += [str(e) for e in row.explanations[:3]]
@@ -162,7 +168,7 @@ def _of_selection(selection: OrderSelection) -> list[dict[str, Any]]:
                 "limit": float(limit),
                 "kept": row.retained,
                 "told": "(" + "; ".join(told) + ")",
-                "name": f"{row.order:g}",
+                "name": _short(float(row.order), name),
             }
         )
     return found

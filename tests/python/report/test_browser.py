@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -27,6 +28,10 @@ X_RANGE = f"""(id) => {{ const r = ({CHARTS})(id)[0].model.x_range; return [r.st
 CONTRAST = 3.0
 #: Largest report, in bytes.
 LARGEST = 1_000_000
+#: Processor time in seconds until the page can be used, and trials of which the best counts.
+SOON, TRIALS = 1.0, 3
+#: Two threads that share a core take up to twice the time for each: so where all are in use.
+SHARED = 2.0
 
 WIDTHS = {"desktop": 1200, "phone": 390}
 
@@ -57,7 +62,7 @@ class Page:
         self.page.on("pageerror", lambda e: self.complaints.append(str(e)))
         self.page.on("request", lambda r: self.requests.append(r.url))
         self.page.goto(file.as_uri())
-        self.page.wait_for_selector("html[data-ready]", timeout=30_000)
+        self.page.wait_for_selector("html[data-drawn]", timeout=60_000)
 
     def visible_points(self, figure: str) -> int:
         """Points of the figure's dots that are shown."""
@@ -108,16 +113,55 @@ def test_figures_are_drawn(page: Page) -> None:
 
 def test_report_is_small_and_soon_there(browser, file: Path) -> None:
     assert file.stat().st_size < LARGEST
-    opened = Page(browser, file, 1200)
-    # Everything that the page's own thread does until it is ready, loading included.
-    busy = opened.page.context.new_cdp_session(opened.page)
-    busy.send("Performance.enable")
-    opened.page.reload()
-    opened.page.wait_for_selector("html[data-ready]", timeout=30_000)
-    metrics = {m["name"]: m["value"] for m in busy.send("Performance.getMetrics")["metrics"]}
-    print(f"script {metrics['ScriptDuration']:.2f} s, all tasks {metrics['TaskDuration']:.2f} s")
-    assert metrics["ScriptDuration"] > 0.0
-    opened.page.close()
+    processes = browser.new_browser_cdp_session()
+
+    def spent() -> dict[int, float]:
+        found = processes.send("SystemInfo.getProcessInfo")["processInfo"]
+        return {p["id"]: p["cpuTime"] for p in found if p["type"] == "renderer"}
+
+    used = []
+    for _ in range(TRIALS):
+        page = browser.new_page(viewport={"width": 1200, "height": 900})
+        page.goto("about:blank")
+        before = spent()
+        page.goto(file.as_uri())
+        page.wait_for_selector("html[data-ready]", timeout=60_000)
+        # Of the page's own process; the browser keeps others in reserve.
+        used.append(max(now - before.get(which, 0.0) for which, now in spent().items()))
+        page.close()
+    print(f"processor time until interactive: {sorted(used)} s")
+    # The least of some trials: what others do on the machine only adds to it.
+    busy = os.getloadavg()[0] > 0.5 * (os.cpu_count() or 1)
+    assert min(used) < SOON * (SHARED if busy else 1.0)
+
+
+def test_texts_within_charts_do_not_overlap(browser, file: Path) -> None:
+    """Ticks, names of axes and of lines: on paper charts are vectors, and their texts boxes."""
+    page = browser.new_page(viewport={"width": 1200, "height": 900})
+    page.goto(file.as_uri() + "#print")
+    page.wait_for_selector("html[data-drawn]", timeout=60_000)
+    found = page.evaluate(
+        """() => { const inside = (root) => [...root.querySelectorAll("*")].flatMap((e) =>
+            [e, ...(e.shadowRoot ? inside(e.shadowRoot) : [])]);
+          const clashes = []; let texts = 0;
+          for (const canvas of document.querySelectorAll(".canvas")) {
+            const boxes = inside(canvas).filter((e) => e.tagName === "text")
+              .map((e) => [e.textContent, e.getBoundingClientRect()])
+              .filter(([text, r]) => text.trim() && r.width && r.height);
+            texts += boxes.length;
+            // A layer that was painted again holds the same text at the same place.
+            const same = ([a, p], [b, q]) => a === b && Math.abs(p.left - q.left) < 1
+              && Math.abs(p.top - q.top) < 1;
+            for (const [i, one] of boxes.entries()) for (const other of boxes.slice(i + 1)) {
+              const [[a, p], [b, q]] = [one, other];
+              if (!same(one, other) && Math.min(p.right, q.right) - Math.max(p.left, q.left) > 1
+                  && Math.min(p.bottom, q.bottom) - Math.max(p.top, q.top) > 3)
+                clashes.push(`${canvas.closest(".plot").id}: ${a} / ${b}`); } }
+          return [texts, clashes]; }"""
+    )
+    page.close()
+    assert found[0] > 50
+    assert found[1] == []
 
 
 def test_texts_of_a_chart_do_not_overlap(page: Page) -> None:
@@ -136,6 +180,24 @@ def test_texts_of_a_chart_do_not_overlap(page: Page) -> None:
           return found; }"""
     )
     assert clashes == []
+
+
+def test_what_is_wider_than_the_page_can_be_reached(browser, file: Path) -> None:
+    opened = Page(browser, file, WIDTHS["phone"])
+    opened.page.evaluate("document.querySelectorAll('details').forEach((d) => { d.open = true; })")
+    opened.page.evaluate("dispatchEvent(new Event('resize'))")
+    lost = opened.page.evaluate(
+        """() => [...document.querySelectorAll("body *")].filter((e) => {
+          const r = e.getBoundingClientRect();
+          if (!r.width || !r.height || r.right <= innerWidth + 1 || r.left < 0) return false;
+          const frame = e.closest(".scroll, pre");
+          if (!frame || frame.getBoundingClientRect().right > innerWidth + 1) return true;
+          return frame.matches(".scroll")
+            && getComputedStyle(frame.querySelector(".hint")).display === "none"; })
+          .map((e) => e.outerHTML.slice(0, 80))"""
+    )
+    opened.page.close()
+    assert lost == []
 
 
 def test_wide_tables_say_that_they_scroll(page: Page) -> None:

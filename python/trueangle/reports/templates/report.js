@@ -34,7 +34,7 @@
       }
       if (run !== null) model.visible = shown(run);
       if (model.type === "Figure")
-        set(model, { background_fill_color: null, border_fill_color: null, outline_line_color: line });
+        set(model, { background_fill_color: null, border_fill_color: null, outline_line_color: line, border_line_color: null });
       else if (/Axis$/.test(model.type))
         set(model, { axis_label_text_color: fore, major_label_text_color: fore, axis_line_color: line,
           major_tick_line_color: line, minor_tick_line_color: null, axis_label_text_font_style: "normal",
@@ -70,18 +70,25 @@
     drawn.set(plot, await Promise.all(figure.charts.map((c, i) => chart(c, places[i]))));
   }
 
+  /* Every figure is drawn once: those in sight at first, the others as time or sight allows. */
+  const begun = new Map();
+  const once = (plot) => begun.get(plot) || begun.set(plot, draw(plot)).get(plot);
+  const inSight = (plot) => paper || plot.getBoundingClientRect().top < innerHeight;
+  const idle = () => new Promise((go) => (window.requestIdleCallback || setTimeout)(go));
+
   function repaint() {
     root.dataset.theme = theme();
     for (const charts of drawn.values()) charts.forEach(paint);
   }
 
-  const resetAll = (plot) => drawn.get(plot).forEach(({ figure }) => {
+  const resetAll = (plot) => (drawn.get(plot) || []).forEach(({ figure }) => {
     for (const range of [figure.x_range, figure.y_range]) range.reset();
   });
 
   /* Zoom (factor < 1), move or reset the angle axis by keys. */
   function key(event) {
     const plot = event.currentTarget;
+    if (!drawn.has(plot)) return;
     const range = drawn.get(plot)[0].figure.x_range;
     const low = range.start, high = range.end, width = high - low, middle = (low + high) / 2;
     const move = { ArrowLeft: -0.1, ArrowRight: 0.1 }[event.key];
@@ -120,7 +127,7 @@
     if (paper) document.querySelectorAll("details").forEach((d) => { d.open = true; });
     if (paper) document.body.style.width = "680px";
     await load();
-    await Promise.all(plots.map(draw));
+    await Promise.all(plots.filter(inSight).map(once));
     for (const plot of plots) {
       plot.addEventListener("keydown", key);
       plot.addEventListener("dblclick", () => resetAll(plot));
@@ -134,12 +141,23 @@
     const signal = document.getElementById("signal");
     if (signal) signal.addEventListener("change", () => {
       const plot = document.getElementById("figure-residual");
-      plot.dataset.figure = signal.value;
-      draw(plot);
+      once(plot).then(() => { plot.dataset.figure = signal.value; draw(plot); });
     });
     addEventListener("beforeprint", () => { root.dataset.theme = "light"; });
     addEventListener("afterprint", repaint);
     root.dataset.ready = "true";
+    await drawTheRest();
+    root.dataset.drawn = "true";
+  }
+
+  async function drawTheRest() {
+    const coming = new IntersectionObserver((seen) => seen.filter((s) => s.isIntersecting)
+      .forEach((s) => { coming.unobserve(s.target); once(s.target); }), { rootMargin: "600px" });
+    plots.forEach((plot) => coming.observe(plot));
+    for (const plot of plots) {
+      await idle();
+      await once(plot);
+    }
   }
 
   start().catch((error) => {
