@@ -152,6 +152,7 @@ def figure7() -> Figure:
     for ax, found, colour in ((shown, OF_GROUPS, AFTER), (hidden, of_gear, BEFORE)):
         around = np.angle(found / found.mean(axis=0), deg=True)
         ax.bar(ORDERS, np.ptp(around, axis=0), color=colour)
+        ax.set_xticks(ORDERS[::4])
         ax.set_xlabel("order / cycles per output turn")
         ax.set_ylabel("range of the phase / deg")
     return figure

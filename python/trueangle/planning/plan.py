@@ -87,7 +87,7 @@ def wanted_orders(
     fixed_member: str = "circular_spline",
     highest: int = HIGHEST_LOW_ORDER,
 ) -> tuple[float, ...]:
-    """Orders ``1 .. highest`` and the known orders of the gear.
+    """Orders 1 to ``highest`` and the known orders of the gear.
 
     Examples
     --------
