@@ -26,6 +26,12 @@ pub struct Period {
 }
 
 impl Period {
+    /// One turn of angles in radians.
+    pub const RADIANS: Self = Self {
+        high: TAU,
+        low: TAU_LOW,
+    };
+
     /// One turn of `value` units: `TAU`, 360, 1, or the counts per turn.
     pub fn new(value: f64) -> Result<Self, Error> {
         if !PERIODS.contains(&value) {

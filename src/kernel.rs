@@ -11,6 +11,7 @@ mod evaluator;
 mod exact;
 mod expansion;
 mod inverse;
+pub mod lines;
 mod route;
 mod segments;
 mod sincos;

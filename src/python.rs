@@ -9,6 +9,7 @@ mod corrector;
 mod door;
 mod failure;
 mod fit;
+mod lines;
 mod moments;
 mod motion;
 mod number;
@@ -44,6 +45,9 @@ mod _core {
 
     #[pymodule_export]
     use super::fit::{Solution, band, fit, scan_residuals, triangle};
+
+    #[pymodule_export]
+    use super::lines::{line_columns, line_sum, unit_sums};
 
     #[pymodule_export]
     use super::moments::{PyMoments, fit_moments};

@@ -243,6 +243,28 @@ def residuals(
     period: float,
     fitted: NDArray[np.float64],
 ) -> None: ...
+@overload
+def line_columns(
+    theta: NDArray[np.float64], orders: NDArray[np.float64], single: Literal[False] = False
+) -> NDArray[np.float64]: ...
+@overload
+def line_columns(
+    theta: NDArray[np.float64], orders: NDArray[np.float64], single: Literal[True]
+) -> NDArray[np.float32]: ...
+def line_sum(
+    theta: NDArray[np.float64],
+    orders: NDArray[np.float64],
+    cosine: NDArray[np.float64],
+    sine: NDArray[np.float64],
+) -> NDArray[np.float64]: ...
+def unit_sums(
+    theta: NDArray[np.float64],
+    values: NDArray[np.float64],
+    starts: Sequence[int],
+    first: float,
+    step: float,
+    count: int,
+) -> NDArray[np.float64]: ...
 def covered_span(
     angles: Sequence[NDArray[np.float64]], period: float
 ) -> tuple[float, float, bool]: ...

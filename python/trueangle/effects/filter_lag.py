@@ -11,6 +11,7 @@ from typing import Any, ClassVar, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from .. import _core
 from ..correction import forms
 from ..correction.forms import Form
 from ..correction.term import Term
@@ -295,7 +296,8 @@ def low_pass(frequency: Array, cutoff: float, damping: float | None) -> NDArray[
 def _waves(pattern: Pattern, theta: Array) -> NDArray[np.complex128]:
     """Complex lines of a pattern, shape (n, k): their real parts add up to it."""
     amplitudes = pattern.cosine - 1j * pattern.sine
-    return np.asarray(amplitudes * np.exp(1j * theta[:, None] * pattern.orders))
+    waves = _core.line_columns(np.ascontiguousarray(theta), np.ascontiguousarray(pattern.orders))
+    return np.asarray(amplitudes * waves.view(np.complex128))
 
 
 def _slopes(

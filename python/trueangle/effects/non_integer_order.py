@@ -8,6 +8,7 @@ from typing import ClassVar, Self
 
 import numpy as np
 
+from .. import _core
 from ..joint.pattern import Surroundings, line_columns
 from ..joint.signals import Signals
 from ..regression.estimate import Parameters, quantity
@@ -173,13 +174,8 @@ class NonIntegerOrder(Effect):
         orders = low + step * np.arange(count, dtype=np.float64)
         e = regression.left - regression.whiten.run_part(regression.left)
         e = np.where(regression.outlying, 0.0, e)
-        turn = np.exp(-1j * step * theta).astype(np.complex64)
-        wave = (e * np.exp(-1j * orders[0] * theta)).astype(np.complex64)
-        power = np.empty((count, starts.size))
-        for k in range(count):
-            sums = np.add.reduceat(wave, starts)
-            power[k] = sums.real**2 + sums.imag**2
-            wave *= turn
+        sums = _core.unit_sums(theta, e[None, :], starts.tolist(), low, step, count)
+        power = sums[:, :, 0] ** 2 + sums[:, :, 1] ** 2
         # P: sum of the two squared normalised coefficients per run, 2 on average.
         p = 2.0 * power / (sizes * regression.variance)
         best = np.zeros(count)

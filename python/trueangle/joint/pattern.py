@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from .. import _core
 from ..errors import ArgumentError
 from .joint import Joint
 
@@ -19,6 +20,7 @@ __all__ = [
     "Surroundings",
     "line_columns",
     "line_sum",
+    "lines_columns",
 ]
 
 Array = NDArray[np.float64]
@@ -103,12 +105,9 @@ class Pattern:
         )
 
     def _sum(self, theta: Array, cosine: Array, sine: Array) -> Array:
-        out = np.zeros_like(theta)
-        for order, a, b in zip(self.orders, cosine, sine, strict=True):
-            x = order * theta
-            out += a * np.cos(x)
-            out += b * np.sin(x)
-        return out
+        parts = (np.ravel(theta), self.orders, cosine, sine)
+        total = _core.line_sum(*(np.ascontiguousarray(part, dtype=np.float64) for part in parts))
+        return total.reshape(np.shape(theta))
 
     def value(self, theta: Array) -> Array:
         """p(theta), arcsec."""
@@ -167,9 +166,17 @@ def line_columns(theta: Array, order: float) -> Array:
     One that vanishes at every reading (the sine of order 18 on 36 positions) is exactly 0:
     its rounding is no regressor.
     """
-    x = order * theta
-    columns = np.column_stack([np.cos(x), np.sin(x)])
-    columns[:, np.abs(columns).max(axis=0, initial=0.0) < _VANISHES * max(1.0, order)] = 0.0
+    return lines_columns(theta, np.array([order], dtype=np.float64))
+
+
+def lines_columns(theta: Array, orders: Array) -> Array:
+    """`line_columns` of many orders side by side, shape (n, 2 k)."""
+    columns = _core.line_columns(np.ascontiguousarray(theta), orders)
+    limit = _VANISHES * np.repeat(np.maximum(orders, 1.0), 2)
+    # Sums of squares are quick to tell where it is not so.
+    small = np.flatnonzero(np.einsum("ij,ij->j", columns, columns) < limit**2 * max(len(theta), 1))
+    for k in small[np.abs(columns[:, small]).max(axis=0, initial=0.0) < limit[small]]:
+        columns[:, k] = 0.0
     return columns
 
 

@@ -7,6 +7,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from .. import _core
 from ..joint.joint import Joint
 from .batch import Products
 
@@ -50,7 +51,6 @@ class LineBasis:
         }
         further = sorted(multiples - whole)
         self.orders = np.array([*sorted(whole), *further], dtype=np.float64)
-        self._whole = top
         expected = plausible_orders(joint)
         self.plausible = np.array([any(abs(m - p) < 1e-9 for p in expected) for m in self.orders])
         self._values = values
@@ -60,15 +60,7 @@ class LineBasis:
     def values(self) -> NDArray[np.float32]:
         """Cosine and sine of every order side by side, shape (n, 2 k); made at first use."""
         if self._values is None:
-            step = np.exp(1j * self.theta)
-            out = np.empty((self.theta.size, self.orders.size), dtype=np.complex64)
-            turn = np.ones_like(step)
-            for k in range(self._whole):
-                turn *= step
-                out[:, k] = turn
-            for k in range(self._whole, self.orders.size):
-                out[:, k] = np.exp(1j * self.orders[k] * self.theta)
-            self._values = out.view(np.float32)
+            self._values = _core.line_columns(self.theta, self.orders, True)
         return self._values
 
     @property

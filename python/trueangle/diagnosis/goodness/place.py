@@ -24,6 +24,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ... import _core
 from ...distributions import incomplete_gamma_tail, student_tail
 from .evidence import Evidence, largest_of
 from .leftover import Leftover
@@ -69,7 +70,7 @@ def place_tests(left: Leftover, top: float = LEAST_ORDERS) -> list[Evidence]:
     -------
     list of Evidence
         ``place``, ``place x direction`` where both were measured, and place by speed,
-        torque, temperature where these change, each also by direction. About 20 ns per
+        torque, temperature where these change, each also by direction. About 1 ns per
         reading, order and modulator.
     """
     units = left.units()
@@ -119,13 +120,9 @@ def _sums(
     values: Array, theta: Array, step: float, count: int, starts: NDArray[np.int64]
 ) -> Complex:
     """Sums over units of ``values exp(-i m theta)``, m = step ... count step."""
-    turn = np.exp(-1j * step * theta)[:, None]
-    wave = values.astype(np.complex128)
-    out = np.empty((count, starts.size, values.shape[1]), dtype=np.complex128)
-    for k in range(count):
-        wave *= turn
-        out[k] = np.add.reduceat(wave, starts, axis=0)
-    return out
+    columns = np.ascontiguousarray(values.T)
+    sums = _core.unit_sums(theta, columns, starts.tolist(), step, step, count)
+    return sums.view(np.complex128)
 
 
 def _level(power: Array, half: int) -> Array:

@@ -1,0 +1,85 @@
+//! Lines of any order: columns, sums, sums over units of readings.
+
+use numpy::{PyArray1, PyReadonlyArray1, PyReadonlyArray2, PyUntypedArray};
+use pyo3::prelude::*;
+
+use super::array::{data, empty};
+use super::failure::argument_error;
+use super::release::detached;
+use crate::kernel::lines::{self, Ladder};
+
+/// Cosines and sines of orders times angles, shape (n, 2 orders); in single precision where
+/// that is enough.
+#[pyfunction]
+#[pyo3(signature = (theta, orders, single = false))]
+pub fn line_columns<'py>(
+    py: Python<'py>,
+    theta: PyReadonlyArray1<'py, f64>,
+    orders: PyReadonlyArray1<'py, f64>,
+    single: bool,
+) -> PyResult<Bound<'py, PyUntypedArray>> {
+    let (theta, orders) = (theta.as_slice()?, orders.as_slice()?);
+    let shape = [theta.len(), 2 * orders.len()];
+    let size = shape[0] * shape[1];
+    // SAFETY: of both, a fresh contiguous array of this type and size.
+    if single {
+        let array = empty::<f32>(py, &shape, false)?;
+        let out = unsafe { std::slice::from_raw_parts_mut(data::<f32>(&array), size) };
+        detached(py, || lines::columns(theta, orders, out))??;
+        return Ok(array);
+    }
+    let array = empty::<f64>(py, &shape, false)?;
+    let out = unsafe { std::slice::from_raw_parts_mut(data::<f64>(&array), size) };
+    detached(py, || lines::columns(theta, orders, out))??;
+    Ok(array)
+}
+
+/// Sum of lines at every angle.
+#[pyfunction]
+pub fn line_sum<'py>(
+    py: Python<'py>,
+    theta: PyReadonlyArray1<'py, f64>,
+    orders: PyReadonlyArray1<'py, f64>,
+    cosine: PyReadonlyArray1<'py, f64>,
+    sine: PyReadonlyArray1<'py, f64>,
+) -> PyResult<Bound<'py, PyArray1<f64>>> {
+    let (theta, orders) = (theta.as_slice()?, orders.as_slice()?);
+    let (cosine, sine) = (cosine.as_slice()?, sine.as_slice()?);
+    let array = empty::<f64>(py, &[theta.len()], false)?;
+    // SAFETY: a fresh contiguous array of this type and size.
+    let out = unsafe { std::slice::from_raw_parts_mut(data::<f64>(&array), theta.len()) };
+    detached(py, || lines::sum(theta, orders, cosine, sine, out))??;
+    Ok(array.into_any().cast_into()?)
+}
+
+/// Sums of values times `exp(-i order angle)` over units, real and imaginary parts, shape
+/// (count, units, 2 columns), for orders `first`, `first + step` ...
+#[pyfunction]
+pub fn unit_sums<'py>(
+    py: Python<'py>,
+    theta: PyReadonlyArray1<'py, f64>,
+    values: PyReadonlyArray2<'py, f64>,
+    starts: Vec<usize>,
+    first: f64,
+    step: f64,
+    count: usize,
+) -> PyResult<Bound<'py, PyUntypedArray>> {
+    let theta = theta.as_slice()?;
+    let columns = values.as_array().nrows();
+    let values = values.as_slice()?;
+    if values.len() != columns * theta.len() {
+        let got = values.len() / columns.max(1);
+        return Err(argument_error(
+            py,
+            format!("values must have {} readings a row, got {got}", theta.len()),
+        ));
+    }
+    let shape = [count, starts.len(), 2 * columns];
+    let array = empty::<f64>(py, &shape, false)?;
+    let size = shape.iter().product();
+    // SAFETY: a fresh contiguous array of this type and size.
+    let out = unsafe { std::slice::from_raw_parts_mut(data::<f64>(&array), size) };
+    let orders = Ladder { first, step, count };
+    detached(py, || lines::unit_sums(theta, values, &starts, orders, out))??;
+    Ok(array)
+}
