@@ -48,3 +48,27 @@ def test_parts_counted_by_themselves_join_to_the_whole():
         state = TurnSpan(360.0, float(part[0]), *alone.state).after(state)
     assert state == whole.state
     assert TurnSpan(360.0, None, None, 0).after(state) == state  # nothing but NaN
+
+
+def test_a_batch_of_nothing_but_gaps_stays_in_its_turn():
+    counter = TurnCounter(360.0)
+    counter.count(np.array([350.0, 10.0, 120.0, 240.0, 350.0, 10.0]))
+    turns = counter.state.turns
+    assert turns == 2
+    assert counter.count(np.array([np.nan, np.nan])).tolist() == [2, 2]
+    assert counter.state.turns == turns
+
+
+@pytest.mark.parametrize("cut", range(1, 8))
+def test_parts_join_across_a_wrap_at_their_border(cut):
+    """A wrap at every step: wherever the parts are cut, one lies between them."""
+    angles = np.array([100.0, 340.0, 220.0, 100.0, 340.0, 220.0, 100.0, 340.0])
+    whole = TurnCounter(360.0)
+    whole.count(angles)
+    assert whole.state.turns == -3
+    state = TurnState()
+    for part in (angles[:cut], angles[cut:]):
+        alone = TurnCounter(360.0)
+        alone.count(part)
+        state = TurnSpan(360.0, float(part[0]), *alone.state).after(state)
+    assert state == whole.state
