@@ -82,7 +82,7 @@ def diagnose(
         Time, velocity, torque, temperature and mount where known.
     sim : Simulation, optional
         What is believed; may be left out where there is a log.
-    simulated : path, table, runs or MeasuredMinusSimulated, optional
+    simulated : path, table, iterable of CalibrationRun or MeasuredMinusSimulated, optional
         What any other simulator says of the same motion (`trueangle.joining.minus_simulated`):
         it is taken off the readings, and ``sim`` and its extension stand on top of it.
     gain : bool

@@ -112,7 +112,7 @@ def minus_simulated(
     Parameters
     ----------
     runs : CalibrationRun or iterable of CalibrationRun
-    simulated : path, table or runs
+    simulated : path, table or iterable of CalibrationRun
         The log, as `trueangle.runtables.runs_of` takes it: ``reference`` is the simulator's
         true output angle, ``indicated`` what the simulated encoder (or command) says. One run
         for all measured runs, or runs of the same labels.
