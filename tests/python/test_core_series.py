@@ -180,7 +180,7 @@ def test_other_numbers(dtype):
         "text",
         None,
         1j,
-        object(),
+        pytest.param(object(), id="object"),
         [[1.0], [1.0, 2.0]],
         np.array([True]),
         np.array(["1"]),
