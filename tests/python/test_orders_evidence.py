@@ -11,11 +11,9 @@ from trueangle.orders.evidence import (
     examine_orders,
     fit_subset,
     log_tail,
-    neighbour_scatter,
-    pooled_scatter,
-    run_scatter,
 )
 from trueangle.orders.harmonicsums import Readings, harmonic_sums
+from trueangle.orders.scatter import neighbour_scatter, pooled_scatter, run_scatter
 
 SIGMA = 0.3
 

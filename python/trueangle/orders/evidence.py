@@ -19,15 +19,15 @@ from numpy.typing import NDArray
 from .harmonicsums import HarmonicSums
 
 __all__ = [
+    "COLLINEAR",
+    "OVERDISPERSED",
     "OrderTest",
     "choose_forward",
     "examine_orders",
     "fit_subset",
     "held_out_gains",
+    "log_chi2_tail",
     "log_tail",
-    "neighbour_scatter",
-    "pooled_scatter",
-    "run_scatter",
 ]
 
 Array = NDArray[np.float64]
@@ -35,7 +35,7 @@ Index = NDArray[np.intp]
 
 #: A candidate whose columns keep less than this of their energy beside those already
 #: chosen is an alias of them.
-_COLLINEAR: Final = 1e-8
+COLLINEAR: Final = 1e-8
 
 #: Columns that keep this part of their length beside all others are inverted directly.
 _REGULAR: Final = 1e-4
@@ -43,17 +43,24 @@ _REGULAR: Final = 1e-4
 #: Least degrees of freedom that a residual must keep.
 _LEAST_DOF: Final = 3
 
-#: Orders next to one that tell the noise there.
-NEIGHBOURS: Final = 12
 
 #: Scatter between runs counts as an order's own where chance makes it rarer than this.
-_OVERDISPERSED: Final = 1e-3
+OVERDISPERSED: Final = 1e-3
 
 
 def log_tail(statistic: Array | float, dof: float) -> Array:
     """Logarithm of the probability that noise alone reaches ``statistic``."""
     t = np.maximum(np.asarray(statistic, dtype=np.float64), 0.0)
     return np.asarray(-0.5 * t if math.isinf(dof) else -0.5 * dof * np.log1p(t / dof))
+
+
+def log_chi2_tail(x: Array, dof: int) -> Array:
+    """Log of the upper tail of chi-square with an even number of degrees of freedom."""
+    half = 0.5 * np.asarray(x, dtype=np.float64)[..., None]
+    i = np.arange(dof // 2)
+    terms = i * np.log(np.maximum(half, 1e-300)) - np.array([math.lgamma(j + 1.0) for j in i])
+    top = terms.max(axis=-1, keepdims=True)
+    return np.asarray(-half[..., 0] + top[..., 0] + np.log(np.exp(terms - top).sum(axis=-1)))
 
 
 def _pairs(matrix: Array, n: int) -> tuple[Array, Array, Array]:
@@ -107,8 +114,8 @@ def choose_forward(
             break
         aa, ab, bb = _pairs(gram, n)
         det = aa * bb - ab * ab
-        alive &= det > (_COLLINEAR * energy) ** 2
-        alive &= np.minimum(aa, bb) > _COLLINEAR * energy
+        alive &= det > (COLLINEAR * energy) ** 2
+        alive &= np.minimum(aa, bb) > COLLINEAR * energy
         safe = np.where(alive, det, 1.0)
         a, b = rhs[:n], rhs[n:]
         gain = np.where(alive, (bb * a * a - 2.0 * ab * a * b + aa * b * b) / safe, 0.0)
@@ -165,43 +172,6 @@ def _inverse(gram: Array) -> Array:
     return np.asarray(inverse / np.outer(scale, scale))
 
 
-def run_scatter(sums: HarmonicSums, chosen: Sequence[int], orders: Sequence[int]) -> Array:
-    r"""Variance of one reading as each order's coefficients vary between the units.
-
-    .. math:: s_k^2 = \frac{1}{2(R-1)} \sum_r h_{rk}^T H_{rk}^{-1} h_{rk}
-
-    with the scores ``h = X' W (y - model)`` of each unit about their common fit: the
-    noise at that order, whatever its colour, including what really changes from run to
-    run. Infinite with one unit.
-    """
-    index = np.asarray(orders, dtype=np.intp)
-    if sums.units < 2 or index.size == 0:
-        return np.full(index.size, math.inf)
-    coefficients, _, _ = fit_subset(sums, chosen)
-    n = index.size
-    both = np.concatenate([index, np.asarray(chosen, dtype=np.intp)])
-    parts = []
-    for unit in range(sums.units):
-        gram = sums.gram(unit, both)
-        mine = np.concatenate([np.arange(n), np.arange(n) + both.size])
-        theirs = np.concatenate([np.arange(n, both.size), np.arange(n, both.size) + both.size])
-        score = sums.rhs(unit, index) - gram[np.ix_(mine, theirs)] @ coefficients
-        i = np.arange(n)
-        blocks = np.empty((n, 2, 2))
-        blocks[:, 0, 0] = gram[i, i]
-        blocks[:, 1, 1] = gram[i + both.size, i + both.size]
-        blocks[:, 0, 1] = blocks[:, 1, 0] = gram[i, i + both.size]
-        blocks += 1e-9 * np.trace(blocks, axis1=1, axis2=2)[:, None, None] * np.eye(2)
-        parts.append((blocks, np.stack([score[:n], score[n:]], axis=1)))
-    together = np.sum([blocks for blocks, _ in parts], axis=0)
-    common = np.linalg.solve(together, np.sum([s for _, s in parts], axis=0)[..., None])
-    quadratic = np.zeros(n)
-    for blocks, score in parts:
-        own = score - (blocks @ common)[..., 0]
-        quadratic += np.einsum("ki,ki->k", own, np.linalg.solve(blocks, own[..., None])[..., 0])
-    return np.asarray(quadratic / (2.0 * (sums.units - 1)))
-
-
 @dataclass(frozen=True, eq=False)
 class OrderTest:
     """Statistics of orders beside the chosen ones (or among them).
@@ -215,71 +185,6 @@ class OrderTest:
     variance: Array
     statistic: Array
     log_p: Array
-
-
-def neighbour_scatter(sums: HarmonicSums, chosen: Sequence[int]) -> Array | None:
-    r"""Variance of one reading as the orders next to each say it, for noise that has a colour.
-
-    .. math:: s_k^2 = \mathrm{median}_{j \sim k}\{T_j\} / (2 \ln 2)
-
-    with the reduction ``T`` of the sum of squares by each of the `NEIGHBOURS` nearest orders
-    that are not chosen: two squares of normal numbers each, the noise at about that order. None
-    where there are too few of them.
-    """
-    taken = set(chosen)
-    others = np.array([i for i in range(sums.orders.size) if i not in taken], dtype=np.intp)
-    if others.size < 2 * NEIGHBOURS:
-        return None
-    total, rhs, _ = sums.total()
-    coefficients, inverse, _ = fit_subset(sums, chosen)
-    base = sums.columns(chosen)
-    n = sums.orders.size
-    cosine, sine = others, others + n
-    to_cosine, to_sine = total[np.ix_(base, cosine)], total[np.ix_(base, sine)]
-    by_cosine, by_sine = inverse @ to_cosine, inverse @ to_sine
-    aa = total[cosine, cosine] - np.einsum("bk,bk->k", to_cosine, by_cosine)
-    bb = total[sine, sine] - np.einsum("bk,bk->k", to_sine, by_sine)
-    ab = total[cosine, sine] - np.einsum("bk,bk->k", to_cosine, by_sine)
-    a = rhs[cosine] - to_cosine.T @ coefficients
-    b = rhs[sine] - to_sine.T @ coefficients
-    det = aa * bb - ab * ab
-    seen = det > (_COLLINEAR * (total[cosine, cosine] + total[sine, sine])) ** 2
-    others, gain = others[seen], (bb * a * a - 2.0 * ab * a * b + aa * b * b)[seen] / det[seen]
-    if others.size < 2 * NEIGHBOURS:
-        return None
-    places = sums.orders[others]
-    found = np.empty(n)
-    half = NEIGHBOURS // 2
-    for k in range(n):
-        low = int(np.searchsorted(places, sums.orders[k]))
-        first = min(max(0, low - half), others.size - NEIGHBOURS - 1)
-        window = np.arange(first, first + NEIGHBOURS + 1)
-        window = window[others[window] != k][:NEIGHBOURS]
-        found[k] = np.median(gain[window])
-    return np.asarray(np.maximum(found, 0.0) / (2.0 * math.log(2.0)))
-
-
-def pooled_scatter(scatter: Array, units: int) -> tuple[float, float] | None:
-    """Noise common to most orders: mean of their scatter, the overdispersed left out."""
-    finite = scatter[np.isfinite(scatter)]
-    each = 2 * (units - 1)
-    if finite.size * each < 20:
-        return None
-    # Median of chi-square over its mean (Wilson and Hilferty).
-    middle = float(np.median(finite)) / (1.0 - 2.0 / (9.0 * each)) ** 3
-    usual = finite[_log_chi2_tail(finite / middle * each, each) > math.log(_OVERDISPERSED)]
-    if usual.size * each < 20:
-        return None
-    return float(usual.mean()), float(usual.size * each)
-
-
-def _log_chi2_tail(x: Array, dof: int) -> Array:
-    """Log of the upper tail of chi-square with an even number of degrees of freedom."""
-    half = 0.5 * np.asarray(x, dtype=np.float64)[..., None]
-    i = np.arange(dof // 2)
-    terms = i * np.log(np.maximum(half, 1e-300)) - np.array([math.lgamma(j + 1.0) for j in i])
-    top = terms.max(axis=-1, keepdims=True)
-    return np.asarray(-half[..., 0] + top[..., 0] + np.log(np.exp(terms - top).sum(axis=-1)))
 
 
 def examine_orders(
@@ -303,7 +208,7 @@ def examine_orders(
     if scatter is not None:
         each = 2 * (sums.units - 1) if freedom is None else freedom
         ratio = np.maximum(scatter, 0.0) / noise[0] * each
-        own = np.isfinite(scatter) & (_log_chi2_tail(ratio, each) < math.log(_OVERDISPERSED))
+        own = np.isfinite(scatter) & (log_chi2_tail(ratio, each) < math.log(OVERDISPERSED))
         np.copyto(level, scatter, where=own)
         dof[own] = each
     position = {k: i for i, k in enumerate(chosen)}
@@ -330,7 +235,7 @@ def examine_orders(
             pair = [j, j + len(outside)]
             block = blocks[np.ix_(pair, pair)]
             scale = float(np.trace(total[np.ix_(other[pair], other[pair])]))
-            if np.linalg.eigvalsh(block)[0] <= _COLLINEAR * scale:
+            if np.linalg.eigvalsh(block)[0] <= COLLINEAR * scale:
                 cosine[i] = sine[i] = variance[i] = math.nan
                 statistic[i], log_p[i] = 0.0, 0.0
                 continue
@@ -391,7 +296,7 @@ def held_out_gains(
         )
         step = np.einsum(
             "kij,kj->ki",
-            np.linalg.pinv(blocks, rcond=_COLLINEAR, hermitian=True),
+            np.linalg.pinv(blocks, rcond=COLLINEAR, hermitian=True),
             score[other] - np.einsum("bki,b->ki", flat, fitted),
         )
         move = np.einsum("bki,ki->bk", slope, step)

@@ -14,19 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..fitting.uncertainty import CovarianceKind
-from .evidence import (
-    NEIGHBOURS,
-    OrderTest,
-    choose_forward,
-    examine_orders,
-    fit_subset,
-    held_out_gains,
-    neighbour_scatter,
-    pooled_scatter,
-    run_scatter,
-)
+from .evidence import OrderTest, choose_forward, examine_orders, fit_subset, held_out_gains
 from .harmonicsums import HarmonicSums
 from .repeats import Noise
+from .scatter import NEIGHBOURS, neighbour_scatter, pooled_scatter, run_scatter
 from .steepness import greatest_slope
 
 __all__ = ["FALSE_ALARM", "NEGLIGIBLE_NOISE", "NEGLIGIBLE_SHARE", "STEEPEST", "EvidenceSearch"]
