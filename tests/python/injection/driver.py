@@ -81,7 +81,9 @@ def child(job: dict[str, Any], shim: ctypes.CDLL, told: str) -> int:
     sys.stderr.flush()
     shim.shim_stop()
     counts = {name: shim.shim_count(k) for k, name in enumerate(KINDS)}
-    Path(told + ".counts").write_text(json.dumps(counts))
+    # In one step: a kill may come just here.
+    Path(told + ".new").write_text(json.dumps(counts))
+    os.replace(told + ".new", told + ".counts")
     return status
 
 
@@ -96,6 +98,7 @@ def main() -> None:
         job = json.loads(line)
         counts = Path(job["told"] + ".counts")
         counts.unlink(missing_ok=True)
+        Path(job["told"]).write_text("")
         pid = os.fork()
         if pid == 0:
             status = 3
