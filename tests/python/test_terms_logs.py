@@ -171,3 +171,17 @@ def test_travel_crosses_files_on_a_cluster(recording, tmp_path):
         report = ta.correct_logs(folder, model, tmp_path / "out", scheduler=found.scheduler_address)
     assert report.is_done
     np.testing.assert_array_equal(parts(tmp_path / "out"), whole)
+
+
+def test_a_velocity_without_a_unit_has_that_of_the_angle():
+    """A log in radians whose speeds are named without a unit: radians per second."""
+    from trueangle.columns import Column
+    from trueangle.logs.joints import _with_unit
+
+    speed = Column("velocity", "v", None)
+    for unit in ("deg", "rad", "turn"):
+        assert _with_unit(speed, unit).unit == f"{unit}/s"
+    told = Column("velocity", "v", "rad/s")
+    assert _with_unit(told, "deg") is told
+    torque = Column("torque", "t", None)
+    assert _with_unit(torque, "rad") is torque
