@@ -39,7 +39,7 @@ aarch64:            ## tests of the core on an emulated aarch64; apart from `che
 	cargo test --locked --target aarch64-unknown-linux-gnu --tests
 
 python:             ## tests of the package
-	$(PYTHON) -m pytest
+	$(PYTHON) -m pytest -n auto --dist worksteal
 
 exam:               ## the diagnosis' own exam at full size: an hour or more, figures asserted
 	TRUEANGLE_NIGHTLY=1 TRUEANGLE_EXAM_SEEDS=20 $(PYTHON) -m pytest -s \
