@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 
 import pytest
 
@@ -25,8 +24,6 @@ def test_the_notebook_runs(monkeypatch):
     pytest.importorskip("ipykernel")
     pytest.importorskip("matplotlib")
     monkeypatch.setenv("JUPYTER_PLATFORM_DIRS", "1")
-    path = [str(ROOT / "python"), *filter(None, [os.environ.get("PYTHONPATH")])]
-    monkeypatch.setenv("PYTHONPATH", os.pathsep.join(path))
     notebook = nbformat.read(NOTEBOOK, as_version=4)
     run = nbclient.NotebookClient(
         notebook, timeout=300, resources={"metadata": {"path": str(FOLDER)}}
