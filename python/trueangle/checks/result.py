@@ -102,9 +102,9 @@ class Check:
             f"{e.readings} readings in {e.runs} run{'s' * (e.runs != 1)}, {e.span_deg:.4g} deg of "
             f"places, {e.turns:.4g} turns at most.",
             f"Indicated per reference: {ratio} ({self.suggests}).",
-            f"Directions: {_levels(e.directions)}; speeds: {_levels(e.speeds)} deg/s; loads: "
-            f"{_levels(e.loads)} Nm;",
-            f"temperatures: {_levels(e.temperatures)} C; mounts: {_levels(e.mounts)} deg.",
+            f"Directions: {_levels(e.directions)}; speeds: {_levels(e.speeds, 'deg/s')}; "
+            f"loads: {_levels(e.loads, 'Nm')};",
+            f"temperatures: {_levels(e.temperatures, 'C')}; mounts: {_levels(e.mounts, 'deg')}.",
             "",
         ]
         lines += _wrapped(f"Can be known: {'; '.join(self.can)}.", 2)
@@ -117,8 +117,10 @@ class Check:
         return "\n".join(lines)
 
 
-def _levels(values: tuple[float, ...] | tuple[int, ...]) -> str:
-    return ", ".join(f"{value:g}" for value in values) or "not recorded"
+def _levels(values: tuple[float, ...] | tuple[int, ...], unit: str = "") -> str:
+    if not values:
+        return "not recorded"
+    return f"{', '.join(f'{value:g}' for value in values)} {unit}".rstrip()
 
 
 def _wrapped(text: str, indent: int, first: int = 0) -> list[str]:
