@@ -15,6 +15,7 @@ from scipy.io import loadmat, savemat
 from ..errors import FileError
 from .damage import damage_told
 from .format import TEXTS, Batch, Choose, Contents, Watch, note, row_labels
+from .matlabelements import check_elements
 
 __all__ = ["columns", "contents", "copy", "read", "together"]
 
@@ -116,6 +117,7 @@ def _sum(values: NDArray[Any]) -> str:
 
 def _vectors(path: Path) -> dict[str, NDArray[Any]]:
     with damage_told(path, "a MATLAB file", "; save it again, with -v7 or -v7.3"):
+        check_elements(path.read_bytes())
         variables = loadmat(path, struct_as_record=True, squeeze_me=False, chars_as_strings=True)
     found: dict[str, NDArray[Any]] = {}
     for name, value in variables.items():
