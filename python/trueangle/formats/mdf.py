@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Collection, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -118,7 +119,7 @@ def _opened(path: Path, **options: Any) -> Iterator[MDF]:
     with path.open("rb") as file:
         if file.read(8) not in _MAGIC:
             raise FileError(path, "is not MDF4")
-    with damage_told(path, "MDF4"):
+    with damage_told(path, "MDF4"), _told_once():
         try:
             with MDF(path, **options) as mdf:
                 if mdf.version < "4":
@@ -128,6 +129,21 @@ def _opened(path: Path, **options: Any) -> Iterator[MDF]:
         except Exception as cause:
             _close_half_built(cause)
             raise
+
+
+@contextmanager
+def _told_once() -> Iterator[None]:
+    """Without what the library prints of damage beside the error that it raises."""
+
+    def nothing(record: logging.LogRecord) -> bool:
+        return False
+
+    logger = logging.getLogger("asammdf")
+    logger.addFilter(nothing)
+    try:
+        yield
+    finally:
+        logger.removeFilter(nothing)
 
 
 def _check_sizes(path: Path, mdf: MDF) -> None:

@@ -1,5 +1,7 @@
 """MDF4 logs: corrected channels in groups of their own, all else kept."""
 
+import logging
+
 import numpy as np
 import pytest
 
@@ -102,3 +104,24 @@ def test_bad_files_are_refused_with_their_name(tmp_path, model):
         with pytest.raises(ta.errors.FileError, match=message):
             raise report.logs[0].error
         assert not (tmp_path / "out.mf4").exists()
+
+
+def test_damage_is_told_once(tmp_path, model):
+    """The library prints lines of its own before it raises."""
+    source = made_file(tmp_path / "damaged.mf4", made_angles(10))
+    data = source.read_bytes()
+    assert b"##CG" in data
+    source.write_bytes(data.replace(b"##CG", b"##XX"))
+    told = []
+    handler = logging.Handler()
+    handler.emit = told.append
+    logger = logging.getLogger("asammdf")
+    logger.addHandler(handler)
+    try:
+        report = ta.correct_logs(source, model, tmp_path / "out.mf4")
+        assert "damaged" in str(report.logs[0].error)
+        assert not told
+        logger.error("heard again afterwards")
+        assert len(told) == 1
+    finally:
+        logger.removeHandler(handler)
