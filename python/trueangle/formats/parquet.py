@@ -246,6 +246,8 @@ def _options(file: pq.ParquetFile, channels: Sequence[Addition]) -> dict[str, An
     }
     if meta.num_row_groups == 0:
         return options
+    # A codec that is none ends the process where it is asked for, and raises where it is used.
+    next(file.iter_batches(batch_size=1, row_groups=[0]), None)
     chunks = [meta.row_group(0).column(i) for i in range(meta.num_columns)]
     codecs = {chunk.path_in_schema: chunk.compression for chunk in chunks}
     angle = channels[0].column
