@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .errors import ArgumentError
+from .quantiles import median
 from .runs import CalibrationRun, as_runs
 
 __all__ = [
@@ -81,7 +82,7 @@ class Positions:
         """Part of the turn that is covered: 1, or less where an arc was not travelled."""
         gaps = np.diff(self.turns, append=self.turns[0] + 1.0)
         largest = float(gaps.max())
-        return 1.0 if largest <= max(_MISSING, 3.0 * float(np.median(gaps))) else 1.0 - largest
+        return 1.0 if largest <= max(_MISSING, 3.0 * float(median(gaps))) else 1.0 - largest
 
     def of_rows(self, rows: NDArray[np.intp]) -> Positions:
         """The same positions for the readings in another order, or for some of them."""

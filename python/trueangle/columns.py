@@ -6,7 +6,6 @@ of `trueangle.signals.SIGNALS`.
 
 from __future__ import annotations
 
-import difflib
 import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
@@ -129,6 +128,8 @@ def role_kind(role: str) -> str:
         return find_signal(role).kind
     except ArgumentError:
         known = ["reference", "indicated", *SIGNALS, *_LABELS, "head1"]
+        import difflib
+
         near = difflib.get_close_matches(role, known, 1)
         hint = f"did you mean {near[0]}?" if near else f"roles are {', '.join(known)}"
         raise ArgumentError(f"no column has the role {role!r}; {hint}") from None
@@ -215,6 +216,8 @@ def matching(path: object, header: Sequence[str], name: str) -> str:
                 path, f"several columns may be meant ({', '.join(found)})", line=1, column=name
             )
     by_plain = {plain(column): column for plain in (_plain, _bare) for column in header}
+    import difflib
+
     near = difflib.get_close_matches(_plain(name), by_plain, 1)
     hint = f"did you mean {by_plain[near[0]]!r}? " if near else ""
     raise FileError(path, f"no such column; {hint}{listed(header)}", line=1, column=name)

@@ -9,7 +9,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from functools import lru_cache
-from statistics import NormalDist
 from typing import Final
 
 from .errors import ArgumentError
@@ -42,8 +41,6 @@ _TINY: Final = 1e-300
 #: Degrees of freedom beyond which Student's distribution is the normal one to rounding.
 _NORMAL_BEYOND: Final = 1e12
 
-_NORMAL: Final = NormalDist()
-
 
 def normal_tail(x: float) -> float:
     r"""Probability :math:`P(Z > x)` of the standard normal distribution.
@@ -58,7 +55,9 @@ def normal_tail(x: float) -> float:
 
 def normal_quantile(p: float) -> float:
     r"""The x with :math:`P(Z \le x) = p`; p inside (0, 1), relative accuracy 1e-15."""
-    return _NORMAL.inv_cdf(_probability(p))
+    from statistics import NormalDist  # loads decimal and random: only where it is asked
+
+    return NormalDist().inv_cdf(_probability(p))
 
 
 def student_tail(t: float, degrees_of_freedom: float) -> float:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import re
 import stat
-import tempfile
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from os import PathLike
@@ -109,6 +108,8 @@ def named(path: Path, read: Callable[[Path], T]) -> T:
 
 @contextmanager
 def _spooled(path: Path) -> Iterator[Path]:
+    import tempfile  # pipes only
+
     data = read_whole(path, RUNS_BYTES, "a table of runs")
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder, os.path.basename(path) or "runs")

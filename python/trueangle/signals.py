@@ -6,7 +6,6 @@ option ``--signal`` follow it.
 
 from __future__ import annotations
 
-import difflib
 import re
 from collections.abc import Iterable, Mapping
 from typing import Generic, NamedTuple, TypeAlias, TypedDict, TypeVar
@@ -73,6 +72,8 @@ def check_names(given: Iterable[str]) -> None:
     """
     for name in given:
         if name not in AT_RUN_TIME:
+            import difflib
+
             near = difflib.get_close_matches(name, AT_RUN_TIME, 1)
             hint = f"did you mean {near[0]}?" if near else f"signals are {', '.join(AT_RUN_TIME)}"
             raise TypeError(f"got an unexpected keyword argument {name!r}; {hint}")
@@ -139,6 +140,8 @@ def find_signal(name: str) -> Signal:
         return SIGNALS[name]
     except KeyError:
         known = [*SIGNALS, "head1", "head2"]
+        import difflib
+
         near = difflib.get_close_matches(name, known, 1)
         hint = f"did you mean {near[0]}?" if near else f"signals are {', '.join(known)}"
         raise ArgumentError(f"no signal is called {name!r}; {hint}") from None

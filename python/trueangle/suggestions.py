@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Iterable
 
 __all__ = ["did_you_mean"]
@@ -18,6 +17,8 @@ def did_you_mean(got: str, known: Iterable[str]) -> str:
     >>> did_you_mean("elbow", ["output", "motor"])
     ''
     """
+    import difflib  # needed only where something is wrong
+
     words = {word.lower(): word for word in reversed(list(known))}
     near = difflib.get_close_matches(got.lower(), words, n=1, cutoff=0.7)
     return f"; did you mean {words[near[0]]}?" if near else ""

@@ -10,6 +10,7 @@ from . import _core
 from .checks.angles import AGREES, ratio_of, suggestion
 from .checks.record import records_of
 from .errors import ArgumentError
+from .quantiles import quantile
 from .runs import CalibrationRun
 
 __all__ = ["check_follows"]
@@ -83,7 +84,7 @@ def _ratio(run: CalibrationRun) -> float | None:
     if ratio is None or ratio == 0.0:
         return None
     reference, indicated = record.unwrapped
-    fast = float(np.quantile(np.abs(np.diff(indicated)), 0.9)) > _FAST
+    fast = float(quantile(np.abs(np.diff(indicated)), 0.9)) > _FAST
     agree = _core.resultant(indicated / ratio, reference, 360.0) > _REMEDIED
     return ratio if agree and not fast else None
 

@@ -5,11 +5,11 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Iterator
-from fractions import Fraction
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..quantiles import median, quantile
 from .fault import DataFault
 from .record import Record
 
@@ -51,7 +51,7 @@ BLOCKS = 8
 def ratio_of(records: list[Record]) -> float | None:
     """Indicated per reference travel: the median slope of the runs; None without travel."""
     slopes = [slope for record in records if (slope := _slope(record)) is not None]
-    return float(np.median(slopes)) if slopes else None
+    return float(median(slopes)) if slopes else None
 
 
 def suggestion(ratio: float | None) -> str:
@@ -70,6 +70,8 @@ def suggestion(ratio: float | None) -> str:
         return "the indicated angle is reduced to the output"
     if abs(ratio + 1.0) < AGREES:
         return "the indicated angle counts the other way"
+    from fractions import Fraction  # loads decimal: for joints that are wrong only
+
     size = abs(ratio)
     sign = ", counted the other way" if ratio < 0.0 else ""
     for text, factor in UNITS.items():
@@ -94,7 +96,7 @@ def wrong_ratio(records: list[Record]) -> Iterator[DataFault]:
         turned.setdefault(kind, []).append((record.label, slope))
     for kind, found in turned.items():
         labels = [label for label, _ in found]
-        value = float(np.median([slope for _, slope in found]))
+        value = float(median([slope for _, slope in found]))
         which = "all runs" if len(found) == len(records) else f"run {', '.join(labels[:4])}"
         if kind == "wrong_sign":
             yield DataFault.of(
@@ -135,7 +137,7 @@ def mixed_units(records: list[Record]) -> Iterator[DataFault]:
             labels,
             (),
             f"run {', '.join(labels[:4])} looks like radians among degrees: its angles "
-            f"cover {float(np.median(travel[small])):.3g} where other runs cover {whole:.4g}",
+            f"cover {float(median(travel[small])):.3g} where other runs cover {whole:.4g}",
             "multiply its angles by 180/pi",
         )
     for k, record in enumerate(records):
@@ -148,11 +150,9 @@ def _parts_in_other_units(record: Record) -> Iterator[DataFault]:
         return
     steps = np.abs(np.diff(record.reference))
     edges = np.linspace(0, len(record), BLOCKS + 1).astype(int)
-    typical = np.array(
-        [np.median(steps[a : max(b - 1, a + 1)]) for a, b in itertools.pairwise(edges)]
-    )
+    typical = np.array([median(steps[a : max(b - 1, a + 1)]) for a, b in itertools.pairwise(edges)])
     top = np.array([np.abs(record.reference[a:b]).max() for a, b in itertools.pairwise(edges)])
-    large = float(np.median(typical[typical > 0.3 * typical.max()])) if typical.max() > 0 else 0.0
+    large = float(median(typical[typical > 0.3 * typical.max()])) if typical.max() > 0 else 0.0
     if large == 0.0 or top.max() < 30.0:
         return
     other = (top <= top.max() * np.pi / 180.0 * (1.0 + UNIT_SPREAD)) & (
@@ -180,8 +180,8 @@ def wrapped(records: list[Record]) -> Iterator[DataFault]:
         ahead = indicated - 360.0 * np.round(indicated / 360.0)
         slip = reference - ahead
         slip -= 360.0 * np.round(slip / 360.0)
-        spread = 1.4826 * float(np.median(np.abs(slip - np.median(slip))))
-        typical = float(np.median(np.abs(ahead)))
+        spread = 1.4826 * float(median(np.abs(slip - median(slip))))
+        typical = float(median(np.abs(ahead)))
         jumps = np.flatnonzero(np.abs(slip) > max(20.0 * spread, 10.0 * typical, 20.0))
         if jumps.size == 0:
             continue
@@ -193,7 +193,7 @@ def wrapped(records: list[Record]) -> Iterator[DataFault]:
         at_ends = (ends - low < near) & (high - tops < near)
         if not at_ends.all():
             continue
-        period = float(np.median(tops - ends)) + typical
+        period = float(median(tops - ends)) + typical
         yield DataFault.of(
             "wrapped_reference",
             [record.label],
@@ -213,18 +213,18 @@ def swapped(records: list[Record]) -> Iterator[DataFault]:
         reference, indicated = record.unwrapped
         own, other = (_roughness(x, record.time) for x in (reference, indicated))
         steps = np.abs(np.diff(indicated))
-        typical = float(np.median(steps))
+        typical = float(median(steps))
         least = EXACT * typical
         # Readings taken at even counts of the joint say nothing of its noise.
         even = float(np.mean(np.abs(steps - typical) <= EVEN * typical)) > 0.5
         if own > least and not even:
             ratios.append(own / max(other, least, 1e-300))
-    if ratios and float(np.median(ratios)) > NOISIER:
+    if ratios and float(median(ratios)) > NOISIER:
         yield DataFault.of(
             "swapped_channels",
             [record.label for record in records],
             (),
-            f"the reference scatters {min(float(np.median(ratios)), 1e6):.3g} times as much as "
+            f"the reference scatters {min(float(median(ratios)), 1e6):.3g} times as much as "
             "the joint that it is to judge: the two columns may be swapped",
             "exchange the columns, or go on where the reference really is the noisier one",
         )
@@ -237,7 +237,7 @@ def _roughness(x: Array, time: Array | None) -> float:
     whole = before + after
     even = whole > 0.0
     line = (x[:-2] * after + x[2:] * before)[even] / whole[even]
-    return float(np.median(np.abs(x[1:-1][even] - line))) if even.any() else 0.0
+    return float(median(np.abs(x[1:-1][even] - line))) if even.any() else 0.0
 
 
 def _slope(record: Record) -> float | None:
@@ -246,7 +246,7 @@ def _slope(record: Record) -> float | None:
     if len(record) < 4 or np.ptp(reference) < LEAST_TRAVEL:
         return None
     steps = np.abs(np.diff(reference))
-    if float(np.quantile(steps, 0.9)) > 90.0:
+    if float(quantile(steps, 0.9)) > 90.0:
         return None  # too coarse to say which way it went
     x = reference - reference.mean()
     return float(x @ (indicated - indicated.mean()) / (x @ x))

@@ -4,17 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from os import PathLike
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from ..errors import ArgumentError
 from ..runs import CalibrationRun
 from .angles import mixed_units, ratio_of, suggestion, swapped, wrapped, wrong_ratio
-from .extent import extent_of, verdicts
 from .fault import DataFault
-from .files import read_records
 from .record import Record, records_of
-from .result import Check
 from .rows import duplicate_rows, duplicate_runs, stuck_readings, unsorted_time
+
+if TYPE_CHECKING:
+    from .result import Check
 
 __all__ = ["check", "faults_of"]
 
@@ -83,6 +83,9 @@ def check(
         "signals": signals,
         "topic": topic,
     }
+    from .extent import extent_of, verdicts
+    from .result import Check
+
     records = _records(data, given)
     if not records:
         raise ArgumentError("no data: give at least one file or run")
@@ -111,6 +114,8 @@ def faults_of(records: list[Record]) -> list[DataFault]:
 
 
 def _records(data: object, given: Mapping[str, Any]) -> list[Record]:
+    from .files import read_records
+
     if isinstance(data, CalibrationRun):
         return records_of([data])
     if isinstance(data, (str, PathLike)):

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ..quantiles import median, quantile
 from .record import Record
 
 __all__ = ["Extent", "extent_of", "verdicts"]
@@ -60,7 +61,7 @@ def extent_of(records: list[Record]) -> Extent:
         travels.append(float(np.ptp(reference)) / 360.0)
         steps = np.diff(reference)
         moving = (
-            steps[np.abs(steps) > 0.25 * float(np.quantile(np.abs(steps), 0.9, axis=0))]
+            steps[np.abs(steps) > 0.25 * float(quantile(np.abs(steps), 0.9, axis=0))]
             if (steps.size)
             else steps
         )
@@ -68,7 +69,7 @@ def extent_of(records: list[Record]) -> Extent:
             if np.mean(np.sign(moving) == sign) > 0.05 if moving.size else False:
                 directions.add(sign)
         if record.velocity is not None:
-            speeds.append(float(np.median(np.abs(record.velocity))))
+            speeds.append(float(median(np.abs(record.velocity))))
         elif record.time is not None and np.ptp(record.time) > 0.0:
             speeds.append(float(np.abs(steps).sum() / np.ptp(record.time)))
     return Extent(
@@ -160,4 +161,4 @@ def _span(places: Array) -> float:
     gaps = np.diff(np.append(ordered, ordered[0] + 360.0))
     widest = float(gaps.max())
     # Evenly spaced places leave no gap but their step.
-    return 360.0 if widest < 3.0 * float(np.median(gaps[gaps > 0.0])) else 360.0 - widest
+    return 360.0 if widest < 3.0 * float(median(gaps[gaps > 0.0])) else 360.0 - widest

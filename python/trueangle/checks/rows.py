@@ -8,6 +8,7 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
+from ..quantiles import median, quantile
 from .fault import DataFault
 from .record import Record
 
@@ -103,9 +104,9 @@ def _stuck(record: Record, name: str, own: Array, other: Array) -> Iterator[Data
         return
     steps = np.abs(np.diff(own))
     moved = steps[steps > 0.0]
-    count = float(np.quantile(moved, 0.01))  # the lattice, or less than it
+    count = float(quantile(moved, 0.01))  # the lattice, or less than it
     slip = np.diff(own - other)
-    noise = 1.4826 * float(np.median(np.abs(slip - np.median(slip))))
+    noise = 1.4826 * float(median(np.abs(slip - median(slip))))
     still = np.concatenate([[False], steps == 0.0])
     edges = np.flatnonzero(np.diff(np.concatenate([[0], still.astype(np.int8), [0]])))
     low, high = float(own.min()), float(own.max())

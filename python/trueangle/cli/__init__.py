@@ -9,7 +9,7 @@ import os
 import sys
 import traceback
 import warnings
-from collections.abc import Container, Sequence
+from collections.abc import Container, Iterable, Sequence
 from keyword import iskeyword
 from typing import Protocol
 
@@ -56,8 +56,8 @@ class Command(Protocol):
         """Do the work; the result is the exit status."""
 
 
-def build_parser(words: Container[str] = COMMANDS) -> Parser:
-    """Parser of the command line, with the arguments of the commands among ``words``.
+def build_parser(words: Container[str] = COMMANDS, commands: Iterable[str] = COMMANDS) -> Parser:
+    """Parser of ``commands``, with the arguments of those among ``words``.
 
     What a command can be asked is known to modules that take long to import (its targets,
     its methods): of a command that is not called only the name and the line of help are.
@@ -67,8 +67,10 @@ def build_parser(words: Container[str] = COMMANDS) -> Parser:
         description="Fit, diagnose and correct the angle error of encoders and robot joints.",
     )
     parser.add_argument("--version", action="version", version=f"trueangle {__version__}")
-    subparsers = parser.add_subparsers(dest="command", metavar="COMMAND", required=True)
-    for name in COMMANDS:
+    subparsers = parser.add_subparsers(
+        dest="command", metavar="COMMAND", required=True, prog=parser.prog
+    )
+    for name in commands:
         command: Command = importlib.import_module(f".{name}{'_' * iskeyword(name)}", __name__)
         subparser = subparsers.add_parser(
             name,
@@ -99,7 +101,9 @@ def main(argv: Sequence[str] | None = None) -> int:
     """
     with plain_streams():
         words = list(sys.argv[1:] if argv is None else argv)
-        args = build_parser(words).parse_args(words)
+        # The others are looked at only where their names are to be told.
+        called = words[:1] if words[:1] and words[0] in COMMANDS else COMMANDS
+        args = build_parser(words, called).parse_args(words)
         before, warnings.showwarning = warnings.showwarning, _print_warning
         try:
             check_paths(args)

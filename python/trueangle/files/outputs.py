@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import errno
 import os
-import secrets
 import stat
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
@@ -181,7 +180,7 @@ def sync(path: str | PathLike[str]) -> None:
 def _created_beside(target: Path) -> tuple[int, str]:
     """A new file in the folder of ``target`` with the permissions that open() would give."""
     while True:
-        beside = target.with_name(f".{target.name[:LONGEST]}.{secrets.token_hex(4)}{PARTIAL}")
+        beside = target.with_name(f".{target.name[:LONGEST]}.{os.urandom(4).hex()}{PARTIAL}")
         flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_CLOEXEC", 0)
         try:
             return os.open(beside, flags | getattr(os, "O_BINARY", 0), 0o666), str(beside)

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from .. import _core
 from ..angles import circular_mean
+from ..quantiles import median
 from .problem import Fitted, Problem
 
 __all__ = ["RunSums", "far_runs", "unlike_runs", "unlike_sentence"]
@@ -75,7 +76,7 @@ def far_runs(runs: Sequence[RunSums]) -> list[tuple[int, float]]:
     alone = [_solved(run.gram, run.moment) for run in runs]
     # Most runs decide where each can speak: one that is unlike moves the mean of all.
     if len(runs) > 2 and all(clear for _, _, clear in alone):
-        common = np.median([solution for solution, _, _ in alone], axis=0)
+        common = median([solution for solution, _, _ in alone], axis=0)
     else:
         grams = np.sum([run.gram for run in runs], axis=0)
         common, _, _ = _solved(grams, np.sum([run.moment for run in runs], axis=0))

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property
-from html import escape
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -216,4 +215,6 @@ class FitResult(Coefficients):
         )
 
     def _repr_html_(self) -> str:
+        from html import escape
+
         return f"<pre>{escape(self.summary())}</pre>"

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import ArgumentError
+from ..quantiles import median, quantile
 from ..runs import CalibrationRun
 from .problem import Fitted, Problem
 
@@ -174,10 +175,10 @@ def without_spikes(run: CalibrationRun) -> CalibrationRun:
     around = np.concatenate([error[order[-half:]], error[order], error[order[:half]]])
     windows = np.lib.stride_tricks.sliding_window_view(around, _NEIGHBOURS)
     deviation = np.empty_like(error)
-    deviation[order] = error[order] - np.median(windows, axis=1)
+    deviation[order] = error[order] - median(windows, axis=1)
     distance = np.abs(deviation)
     # Readings in counts: most deviations may be exactly 0, the rest one count.
-    wild = distance > WILD * max(robust_scale(deviation), float(np.quantile(distance, 0.8)))
+    wild = distance > WILD * max(robust_scale(deviation), float(quantile(distance, 0.8)))
     if not wild.any() or wild.mean() > WILD_SHARE:
         return run
     return replace(run, weights=np.where(wild, 0.0, _given(run.weights, wild.size)))

@@ -13,6 +13,7 @@ from .. import _core
 from ..angles import circular_mean, wrap
 from ..distributions import chi_squared_tail
 from ..errors import ArgumentError
+from ..quantiles import median
 from .clusters import Cluster, robust_covariance, scatter_statistic
 from .problem import Fitted, Problem
 
@@ -243,10 +244,10 @@ def _with_constant(white: Array, covariance: Array, freedom: Array) -> tuple[Arr
     How the zeros of the runs scatter tells nothing of it, for each may be another.
     """
     ratio = np.sqrt(np.diag(covariance) / np.diag(white)[1:])
-    scale = np.concatenate([[max(1.0, float(np.median(ratio)))], ratio])
+    scale = np.concatenate([[max(1.0, float(median(ratio)))], ratio])
     full = white * np.outer(scale, scale)
     full[1:, 1:] = covariance
-    return full, np.concatenate([[float(np.median(freedom))], freedom])
+    return full, np.concatenate([[float(median(freedom))], freedom])
 
 
 def _weight(weights: Array | None, size: int) -> float:

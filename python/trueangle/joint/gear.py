@@ -12,15 +12,20 @@ from .shafts import FIXED_MEMBERS
 
 __all__ = [
     "COMMON_RATIOS",
+    "HIGHEST_LOW_ORDER",
     "Explanation",
     "explain_as_harmonic",
     "explain_by_shafts",
     "explain_order",
     "gear_orders",
+    "wanted_orders",
 ]
 
 #: Gear ratios of common strain wave gears, tried where none is declared.
 COMMON_RATIOS: Final = (30, 50, 80, 100, 120, 160)
+
+#: Low orders wanted by default: what 36 positions can hold beside the constant.
+HIGHEST_LOW_ORDER: Final = 17
 
 
 @dataclass(frozen=True)
@@ -112,6 +117,24 @@ def gear_orders(gear_ratio: float, fixed_member: str = "circular_spline") -> dic
         _whole(3 * i): f"three times per motor turn: waveform {motor}, or wave generator",
         _whole(4 * i): f"four times per motor turn: interpolation error {motor}, or wave generator",
     }
+
+
+def wanted_orders(
+    gear_ratio: float | None,
+    fixed_member: str = "circular_spline",
+    highest: int = HIGHEST_LOW_ORDER,
+) -> tuple[float, ...]:
+    """Orders 1 to ``highest`` and the known orders of the gear.
+
+    Examples
+    --------
+    >>> wanted_orders(100)[-8:]
+    (17, 100, 101, 200, 201, 202, 300, 400)
+    """
+    low = [float(k) for k in range(1, highest + 1)]
+    gear = [] if gear_ratio is None else [float(m) for m in gear_orders(gear_ratio, fixed_member)]
+    both = sorted({*low, *gear})
+    return tuple(int(m) if m.is_integer() else m for m in both)
 
 
 def explain_order(

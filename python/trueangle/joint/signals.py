@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..angles import ARCSEC_PER_TURN
+from ..quantiles import median
 from ..runs import CalibrationRun
 from .grid import lattice_step
 
@@ -238,7 +239,7 @@ def _travel(run: CalibrationRun) -> tuple[Array, Array, Index, Array, Array]:
 def _dead_zone_direction(angle: Array) -> Array:
     """Direction of travel that ignores steps back below three typical steps."""
     steps = np.abs(np.diff(angle))
-    zone = 3.0 * float(np.median(steps[steps > 0.0])) if steps.any() else 0.0
+    zone = 3.0 * float(median(steps[steps > 0.0])) if steps.any() else 0.0
     direction = np.zeros(angle.size)
     extreme, sign, since = angle[0], 0.0, 0
     for k, x in enumerate(angle.tolist()):

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from ..aliasing import POSITION_TOLERANCE, Positions, distinct_positions, position_coherence
 from ..errors import ArgumentError
 from ..explanations import COMMON_RATIOS, gear_orders
-from ..planning.plan import HIGHEST_LOW_ORDER
+from ..joint.gear import HIGHEST_LOW_ORDER
 from ..runs import CalibrationRun
 
 __all__ = ["Candidates", "choose_candidates", "effective_positions"]

@@ -152,24 +152,25 @@ def fit_subset(sums: HarmonicSums, chosen: Sequence[int]) -> tuple[Array, Array,
     columns = sums.columns(chosen)
     if columns.size == 0:
         return np.zeros(0), np.zeros((0, 0)), squares
-    inverse = _inverse(gram[np.ix_(columns, columns)])
+    inverse = _inverse(gram[columns[:, None], columns])
     coefficients = inverse @ rhs[columns]
     return coefficients, inverse, max(0.0, squares - float(rhs[columns] @ coefficients))
 
 
 def _inverse(gram: Array) -> Array:
     """Inverse of a normal matrix; directions that the readings do not see get zero."""
-    scale = np.sqrt(np.maximum(np.diag(gram), 1e-300))
-    unit = gram / np.outer(scale, scale)
+    scale = np.sqrt(np.maximum(gram.diagonal(), 1e-300))
+    scales = scale[:, None] * scale
+    unit = gram / scales
     try:
-        if float(np.diag(np.linalg.cholesky(unit)).min(initial=1.0)) > _REGULAR:
-            return np.asarray(np.linalg.inv(unit) / np.outer(scale, scale))
+        if float(np.linalg.cholesky(unit).diagonal().min(initial=1.0)) > _REGULAR:
+            return np.asarray(np.linalg.inv(unit) / scales)
     except np.linalg.LinAlgError:
         pass
     values, vectors = np.linalg.eigh(unit)
     keep = values > 1e-12 * values[-1]
     inverse = (vectors[:, keep] / values[keep]) @ vectors[:, keep].T
-    return np.asarray(inverse / np.outer(scale, scale))
+    return np.asarray(inverse / scales)
 
 
 @dataclass(frozen=True, eq=False)

@@ -25,11 +25,13 @@ Array = NDArray[np.float64]
 #: Powers of e^{ix} between two fresh evaluations: keeps rounding near 1e-15 * 64.
 _RESEED: Final = 64
 
-#: From so many readings on the core's piecewise moments are faster than this file's loop.
-_LARGE: Final = 4096
+#: From so many readings on the core's piecewise moments are faster than this file's powers.
+_LARGE: Final = 1024
 
 #: Readings handled at once: the working set stays in the cache.
 _CHUNK: Final = 1 << 15
+#: The same where `_RESEED` powers of each are kept.
+_BLOCK: Final = 512
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,7 +105,7 @@ class HarmonicSums:
         """``X' W X`` of a unit about its means, for the orders at ``index``."""
         columns = self.columns(index)
         if self._grams is not None:
-            return np.asarray(self._grams[unit][np.ix_(columns, columns)])
+            return np.asarray(self._grams[unit][columns[:, None], columns])
         assert self._spectra is not None
         whole = self.orders[np.asarray(index, dtype=np.intp)].astype(np.int64)
         spectrum = self._spectra[unit]
@@ -117,7 +119,7 @@ class HarmonicSums:
             ]
         )
         mean = self._means[unit, columns]
-        return np.asarray(gram - self.weight[unit] * np.outer(mean, mean))
+        return np.asarray(gram - (self.weight[unit] * mean)[:, None] * mean)
 
     def total(self) -> tuple[Array, Array, float]:
         """Sums of all units: ``X' W X``, ``X' W y`` and the sum of squares."""
@@ -222,25 +224,26 @@ def _spectra(
         sums.update(unit.turns, error / scale, unit.weights)
         weights, values, _, _, about = sums.spectrum()
         return weights, scale * (values + about * weights[: values.size])
-    weights = np.zeros(2 * highest + 1, dtype=np.complex128)
-    values = np.zeros(highest + 1, dtype=np.complex128)
-    for start in range(0, unit.turns.size, _CHUNK):
-        part = slice(start, start + _CHUNK)
+    count = 2 * highest + 1
+    found = np.zeros((count, 2), dtype=np.complex128)
+    for start in range(0, unit.turns.size, _BLOCK):
+        part = slice(start, start + _BLOCK)
         turns = unit.turns[part] - np.floor(unit.turns[part])
-        step = np.exp(2j * math.pi * turns)
         w = unit.weights[part]
-        wy = w * (unit.error[part] - centre)
-        for m in range(2 * highest + 1):
-            if m % _RESEED == 0:
-                # The product m * t loses what lies before the point: take it off first.
-                phase = m * turns
-                power = np.exp(2j * math.pi * (phase - np.round(phase)))
-            else:
-                power *= step
-            weights[m] += w @ power
-            if m <= highest:
-                values[m] += wy @ power
-    return weights, values
+        both = np.stack([w, w * (unit.error[part] - centre)], axis=1) + 0j
+        step = np.exp(2j * math.pi * turns)
+        for first in range(0, count, _RESEED):
+            powers = np.empty((min(_RESEED, count - first), turns.size), dtype=np.complex128)
+            # The product m * t loses what lies before the point: take it off first.
+            phase = first * turns
+            powers[0] = np.exp(2j * math.pi * (phase - np.round(phase)))
+            filled, stride = 1, step
+            while filled < len(powers):
+                more = powers[filled : 2 * filled]
+                np.multiply(powers[: len(more)], stride, out=more)
+                filled, stride = 2 * filled, stride * stride
+            found[first : first + len(powers)] += powers @ both
+    return found[:, 0], found[: highest + 1, 1]
 
 
 def _from_columns(

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from ..aliasing import Positions
 from ..errors import ArgumentError
+from ..quantiles import median
 from ..runs import CalibrationRun
 from .candidates import Candidates
 from .evidence import log_tail
@@ -118,7 +119,7 @@ def select_by_paper(
     if free < len(training) * 3:
         # A run of 36 positions holds 35 unknowns: only the scatter of runs tells noise.
         per_run = float(np.mean([u.weights.sum() for u in training]))
-        variance = 0.5 * per_run * float(np.median(scatter)) * len(training)
+        variance = 0.5 * per_run * float(median(scatter)) * len(training)
         noise = Noise(variance, dof * len(orders), "repeats")
     retained = [orders[n] for n in np.flatnonzero(kept)]
     alike = find_lookalikes(units, placed, retained, noise.variance, candidates.highest_alias)

@@ -91,5 +91,5 @@ def _components(pairs: NDArray[np.int64], units: int, positions: int) -> int:
         new = label.copy()
         np.minimum.at(new, unit, lowest[place])
         if (new == label).all():
-            return int(np.unique(label).size)
+            return len(set(label.tolist()))
         label = new

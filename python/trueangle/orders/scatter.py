@@ -9,6 +9,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from ..quantiles import median
 from .evidence import COLLINEAR, OVERDISPERSED, fit_subset, log_chi2_tail
 from .harmonicsums import HarmonicSums
 
@@ -95,7 +96,7 @@ def neighbour_scatter(sums: HarmonicSums, chosen: Sequence[int]) -> Array | None
         first = min(max(0, low - half), others.size - NEIGHBOURS - 1)
         window = np.arange(first, first + NEIGHBOURS + 1)
         window = window[others[window] != k][:NEIGHBOURS]
-        found[k] = np.median(gain[window])
+        found[k] = median(gain[window])
     return np.asarray(np.maximum(found, 0.0) / (2.0 * math.log(2.0)))
 
 
@@ -106,7 +107,7 @@ def pooled_scatter(scatter: Array, units: int) -> tuple[float, float] | None:
     if finite.size * each < 20:
         return None
     # Median of chi-square over its mean (Wilson and Hilferty).
-    middle = float(np.median(finite)) / (1.0 - 2.0 / (9.0 * each)) ** 3
+    middle = float(median(finite)) / (1.0 - 2.0 / (9.0 * each)) ** 3
     usual = finite[log_chi2_tail(finite / middle * each, each) > math.log(OVERDISPERSED)]
     if usual.size * each < 20:
         return None

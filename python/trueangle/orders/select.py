@@ -17,7 +17,6 @@ from ..fitting.travel import over_turns
 from ..fitting.uncertainty import CovarianceKind, check_covariance
 from ..runs import CalibrationRun, as_runs
 from .candidates import choose_candidates
-from .paper import select_by_paper
 from .selection import FALSE_ALARM, EvidenceSelection
 from .table import OrderRow, OrderSelection
 
@@ -140,6 +139,8 @@ def select_orders(
         shafts,
     )
     if method == "paper":
+        from .paper import select_by_paper
+
         selection = select_by_paper(kept, positions, chosen)
     else:
         selection = EvidenceSelection(kept, positions, chosen, covariance).result()

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from html import escape
 from typing import TYPE_CHECKING
 
 from ..aliasing import Positions
@@ -219,4 +218,6 @@ class OrderSelection:
         )
 
     def _repr_html_(self) -> str:
+        from html import escape
+
         return f"<pre>{escape(self.summary())}</pre>"

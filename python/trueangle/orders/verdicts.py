@@ -11,9 +11,13 @@ import numpy as np
 
 from ..aliasing import Positions, closure_errors, distinct_positions, energy_near_nyquist, fold
 from ..angles import arcsec
-from ..joint.gear import explain_as_harmonic, explain_by_shafts, explain_order
-from ..planning.noisefactors import mount_noise_factors
-from ..planning.plan import HIGHEST_LOW_ORDER, plan_mounts, wanted_orders
+from ..joint.gear import (
+    HIGHEST_LOW_ORDER,
+    explain_as_harmonic,
+    explain_by_shafts,
+    explain_order,
+    wanted_orders,
+)
 from ..runs import CalibrationRun, as_runs
 from .candidates import Candidates, choose_candidates
 from .table import OrderRow, OrderSelection
@@ -109,6 +113,8 @@ def _measure(positions: Positions, ratio: float | None, member: str) -> str:
 @lru_cache(maxsize=32)
 def _separating_offset(divisions: int, ratio: float | None, member: str) -> float | None:
     """Offset of a second mount that serves the declared gear, or ratio 100."""
+    from ..planning.plan import plan_mounts
+
     try:
         plan = plan_mounts(ratio or 100.0, divisions, 2, fixed_member=member)
     except ValueError:
@@ -213,6 +219,8 @@ def _between(positions: Positions, candidates: Candidates) -> bool:
         return True
     if candidates.gear_ratio is None or not candidates.whole:
         return False
+    from ..planning.noisefactors import mount_noise_factors
+
     low = min(HIGHEST_LOW_ORDER, grid.highest_order)
     orders = wanted_orders(candidates.gear_ratio, candidates.fixed_member, low)
     offsets = 360.0 * np.asarray(grid.offsets)

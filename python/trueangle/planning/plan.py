@@ -8,13 +8,12 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import Final
 
 import numpy as np
 
 from ..aliasing import fold
 from ..errors import ArgumentError, NoModelError
-from ..explanations import gear_orders
+from ..joint.gear import HIGHEST_LOW_ORDER, wanted_orders
 from .mountsearch import offset_tolerance, search_offsets, search_shifts
 from .noisefactors import mount_noise_factors, noise_factors
 
@@ -27,9 +26,6 @@ __all__ = [
     "readings_needed",
     "wanted_orders",
 ]
-
-#: Low orders wanted by default: what 36 positions can hold beside the constant.
-HIGHEST_LOW_ORDER: Final = 17
 
 
 @dataclass(frozen=True)
@@ -80,24 +76,6 @@ class CalibrationPlan:
     def invisible_orders(self) -> tuple[float, ...]:
         """Wanted orders that fold onto the constant: every zero absorbs them."""
         return tuple(m for m, f in self.noise_factors.items() if not math.isfinite(f))
-
-
-def wanted_orders(
-    gear_ratio: float | None,
-    fixed_member: str = "circular_spline",
-    highest: int = HIGHEST_LOW_ORDER,
-) -> tuple[float, ...]:
-    """Orders 1 to ``highest`` and the known orders of the gear.
-
-    Examples
-    --------
-    >>> wanted_orders(100)[-8:]
-    (17, 100, 101, 200, 201, 202, 300, 400)
-    """
-    low = [float(k) for k in range(1, highest + 1)]
-    gear = [] if gear_ratio is None else [float(m) for m in gear_orders(gear_ratio, fixed_member)]
-    both = sorted({*low, *gear})
-    return tuple(int(m) if m.is_integer() else m for m in both)
 
 
 def readings_needed(noise: float, standard_error: float, factor: float = 1.0) -> int:

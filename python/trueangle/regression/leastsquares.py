@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from ..joint.pattern import Pattern, Surroundings, line_columns
 from ..joint.signals import Signals
+from ..quantiles import median
 from .extension import Extension, penalty_of_parameter
 from .factor import Factor
 from .lines import LineBasis
@@ -119,7 +120,7 @@ class LeastSquares:
             left = self.residual - design @ self.coefficients
             left -= self.whiten.run_part(left)
             scale = self.root_weights * left
-            spread = 1.4826 * float(np.median(np.abs(scale - np.median(scale))))
+            spread = 1.4826 * float(median(np.abs(scale - median(scale))))
             limit = CLIP * max(spread, 1e-12) / self.root_weights
             outlying = np.abs(left) > limit
             if self.fixed_rho is None:
