@@ -43,7 +43,9 @@ def doubts_about(
     cause = extension.cause
     if EFFECTS[cause].is_doubted:
         for spot in spots:
-            if cause in spot.causes:
+            if spot.hides(cause) and not (
+                spot.common and EFFECTS[cause].told(extension, regression)
+            ):
                 return spot
     doubts = (effect.doubt(extension, regression, spots) for effect in EFFECTS.values())
     found = [doubt for doubt in doubts if doubt is not None]

@@ -46,6 +46,9 @@ def findings_of(
         doubt = doubts_about(regression.terms[group[0]], regression, spots)
         if doubt is None:
             named.append(group)
+            # What sets it apart from the common form was seen after all.
+            cause = regression.terms[group[0]].cause
+            spots = [spot for spot in spots if not (spot.common and spot.hides(cause))]
             continue
         evidence = sum(regression.terms[k].bic_gain for k in group)
         spots = [spot for spot in spots if spot != doubt]

@@ -53,6 +53,9 @@ class Blindness:
     factor : str
         What in the design of the runs is at fault: "grid", "mount", "torque", "velocity",
         "temperature", "direction", "run", "time".
+    common : str
+        The cause whose form is what all of them share, where there is one: naming it claims
+        no more than is seen.
     """
 
     causes: tuple[str, ...]
@@ -62,6 +65,11 @@ class Blindness:
     evidence: float | None = None
     estimates: dict[str, Parameters] = field(default_factory=dict)
     factor: str = "run"
+    common: str = ""
+
+    def hides(self, cause: str) -> bool:
+        """Whether naming this cause would be a guess."""
+        return cause in self.causes and cause != self.common
 
     def to_json(self) -> dict[str, Any]:
         """The entry of ``not_identifiable``."""

@@ -184,20 +184,34 @@ class Effect:
         return None
 
     @classmethod
+    def told(cls, extension: Extension, regression: Regression) -> bool:
+        """Whether the readings show what the design alone does not promise to tell.
+
+        Asked of a blind spot whose causes have a common form (`Blindness.common`).
+        """
+        return False
+
+    @classmethod
     def blind(
-        cls, because: str, *others: type[Effect], first: bool = True, factor: str | None = None
+        cls,
+        because: str,
+        *others: type[Effect],
+        first: bool = True,
+        factor: str | None = None,
+        common: type[Effect] | None = None,
     ) -> Blindness:
         """Blind spot of this effect, or of it and ``others`` which it is taken for.
 
         ``first=False`` names the others before it; ``factor`` is what in the design is at
-        fault, where that is not the effect's own.
+        fault, where that is not the effect's own; ``common`` has the form that all share.
         """
         effects = (cls, *others) if first else (*others, cls)
         measure = cls.measure
         if others:
             measure = telling_apart(effects[0], effects[1]) or effects[0].measure
         causes = tuple(effect.kind for effect in effects)
-        return Blindness(causes, because, measure, factor=factor or cls.factor)
+        shared = "" if common is None else common.kind
+        return Blindness(causes, because, measure, factor=factor or cls.factor, common=shared)
 
     # -- correct -------------------------------------------------------------------
 

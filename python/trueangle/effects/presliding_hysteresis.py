@@ -45,6 +45,10 @@ _AFTER_REVERSAL = (
 #: nature.
 OWN_OF_TRANSITION = 1e-3
 
+#: By how much a transition's BIC must beat that of two branches alone to be seen in readings
+#: whose design does not promise to show one: "very strong" on the scale of Kass and Raftery.
+TOLD = 10.0
+
 #: Elements of a Maxwell-slip model at most, and the ratio of lengths that keeps them apart.
 MOST_ELEMENTS = 3
 APART = 2.5
@@ -234,7 +238,16 @@ class PreslidingHysteresis(Effect):
                 "no reversal inside a run is followed closely: a wound-up spring and play give "
                 "the same two branches",
                 Backlash,
+                common=Backlash,
             )
+
+    @classmethod
+    def told(cls, extension: Extension, regression: Regression) -> bool:
+        """Whether the transition itself stands out, as after a start from a relaxed joint."""
+        others = [t for t in regression.terms if t.cause not in (cls.kind, Backlash.kind)]
+        rest = regression.with_terms(others, regression.whiten.rho)
+        play = Backlash.propose(rest)
+        return play is None or rest.bic - play.bic_gain - regression.bic > TOLD
 
     def to_terms(self, period: float, shafts: Mapping[str, float]) -> tuple[Term, ...]:
         amplitude = from_arcsec(self.amplitude_arcsec, period)

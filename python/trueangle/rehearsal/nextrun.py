@@ -59,7 +59,7 @@ def blind_causes(sim: Simulation) -> dict[str, Blindness]:
     found: dict[str, Blindness] = {}
     for spot in blind_spots(Regression(signals, noise, sim.surroundings)):
         for cause in spot.causes:
-            if EFFECTS[cause].is_doubted:
+            if EFFECTS[cause].is_doubted and spot.hides(cause):
                 found.setdefault(cause, spot)
     return found
 
