@@ -222,23 +222,3 @@ def test_the_constant_is_no_surer_than_the_coefficients():
     wider = np.sqrt(np.diag(cluster.covariance) / np.diag(white.covariance))
     assert wider[0] == pytest.approx(max(1.0, np.median(wider[1:])), rel=1e-9)
     assert wider[0] > 1.5
-
-
-def test_a_penalty_widens_the_errors_by_what_it_may_have_taken():
-    """Its bias as a covariance, by its definition on the rows of the design."""
-    rng = np.random.default_rng(9)
-    x = np.sort(rng.uniform(0.0, 100.0, 300))
-    error = sum(c * np.sin(np.radians(k * x + p)) for k, c, p in LINES[:2])
-    run = ta.CalibrationRun(x, x + error + 0.02 * rng.normal(size=300), 360.0)
-    found = ta.fit(run, orders=[1, 2, 5], covariance="white", ridge=1e-4, loss="linear")
-    angle = np.radians(np.outer(x, [1, 2, 5]))
-    rows = np.stack([np.cos(angle), np.sin(angle)], axis=2).reshape(300, 6)
-    rows = rows - rows.mean(axis=0)
-    penalty = 1e-4 * 300
-    taken = penalty * np.linalg.inv(rows.T @ rows + penalty * np.eye(6))
-    shaft = found.model.shafts[0]
-    size = np.mean(np.square([*shaft.cosine, *shaft.sine]))
-    plain = np.asarray(found.fitted.solution.covariance)[1:, 1:]
-    added = found.uncertainty.covariance[1:, 1:] - plain
-    np.testing.assert_allclose(added, size * (taken @ taken), rtol=1e-6, atol=1e-12)
-    assert np.max(np.diag(added) / np.diag(plain)) > 0.1

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import trueangle as ta
-from trueangle.errors import OutsideSpanWarning, UnlikeRunsWarning
+from trueangle.errors import OutsideSpanWarning, RankError, UnlikeRunsWarning
 from trueangle.orders import unitgroups
 from trueangle.orders.harmonicsums import Readings, harmonic_sums
 
@@ -236,3 +236,13 @@ def test_a_sine_that_is_zero_at_every_facet_is_not_fitted(seed, tmp_path):
     amplitudes = found.parameters["amplitudes"].value
     assert 18.0 in found.parameters["orders"].value
     assert max(amplitudes) < 2.0 * facets.std()
+
+
+def test_coefficients_beyond_any_series_are_told_as_orders_that_cancel():
+    """Eleven orders on 100 degrees, and readings that alternate: 1e13 degrees of an order."""
+    x = np.linspace(10.0, 110.0, 200)
+    run = ta.CalibrationRun(x, x + 80.0 * np.cos(np.pi * np.arange(200) / 8.0), 360.0)
+    with pytest.raises(RankError, match="give a ridge, or measure over more travel") as refused:
+        ta.fit(run, orders=range(1, 12), loss="linear")
+    assert "orders 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11 of output" in str(refused.value)
+    assert refused.value.orders[0] == (0, 1)

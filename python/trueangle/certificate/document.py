@@ -162,8 +162,8 @@ def certify(
 
 
 def _degrees_of_freedom(fit: FitResult) -> float:
-    """Of the fit's covariance: the fewest of any coefficient, so that no U is too narrow."""
-    return float(fit.freedom.min())
+    """Of the fit's noise: the fewest of any coefficient, so that no U is too narrow."""
+    return fit.uncertainty.fewest
 
 
 def _budget(budget: Budget, angle_deg: float) -> dict[str, Any]:

@@ -29,6 +29,7 @@ def fit_as_json(found: FitResult | LogFit) -> dict[str, object]:
         "ridge": getattr(found, "ridge", 0.0),
         "offset_spread_arcsec": arcsec(found.offset_spread, period),
         "covariance": found.uncertainty.kind,
+        "intervals_hold": ["noise", "ridge"] if getattr(found, "ridge", 0.0) > 0.0 else ["noise"],
         "wild": [list(place) for place in getattr(found, "wild", ())],
         "orders": [
             {

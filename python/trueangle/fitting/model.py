@@ -53,7 +53,9 @@ def fit_notes(fit: FitResult) -> Iterable[str]:
         where = "arc" if fit.problem.is_periodic else "travel"
         yield (
             f"On this {where} the orders nearly cancel: a ridge of {fit.ridge:.1e} keeps the "
-            "amplitudes small; single coefficients have no meaning of their own."
+            "amplitudes small; single coefficients have no meaning of their own. Standard errors "
+            "and intervals hold what the ridge may have taken from the pattern, for patterns "
+            "of the sizes that the readings show, on average over the travel."
         )
     if weighted.weights is not None and weighted.wild:
         yield f"{weighted.wild} wild reading{'s' if weighted.wild > 1 else ''} set aside."

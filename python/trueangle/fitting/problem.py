@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from .. import _core
 from ..angles import circular_mean
-from ..errors import ArgumentError
+from ..errors import ArgumentError, RankError
 from ..model import Argument
 from ..runs import CalibrationRun
 from ..shafts import ShaftOrders
@@ -59,13 +59,31 @@ class Fitted:
         self.shafts, self.period = tuple(shafts), period
         #: Zero of every run; NaN for a run without any weight.
         self.offsets = offsets
-        self.series = _core.Series(
-            period,
-            solution.constant,
-            [shaft.cycles_per_turn for shaft in shafts],
-            [list(shaft.orders) for shaft in shafts],
-            solution.cosine,
-            solution.sine,
+        try:
+            self.series = _core.Series(
+                period,
+                solution.constant,
+                [shaft.cycles_per_turn for shaft in shafts],
+                [list(shaft.orders) for shaft in shafts],
+                solution.cosine,
+                solution.sine,
+            )
+        except ArgumentError:
+            # Orders that all but cancel: coefficients beyond what any series may have.
+            raise RankError(
+                f"the angles read cover too little of a turn to determine {self._named()} "
+                f"(condition number {solution.condition_number:.3g}); fit fewer orders, give a "
+                "ridge, or measure over more travel",
+                [(i, order) for i, shaft in enumerate(shafts) for order in shaft.orders],
+            ) from None
+
+    def _named(self) -> str:
+        """The orders, of every shaft that has some."""
+        return ", ".join(
+            f"{'orders' if len(shaft.orders) > 1 else 'order'} "
+            f"{', '.join(f'{order:g}' for order in shaft.orders)} of {shaft.name}"
+            for shaft in self.shafts
+            if shaft.orders
         )
 
     def __reduce__(self) -> tuple[Any, ...]:

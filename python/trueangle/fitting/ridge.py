@@ -13,7 +13,7 @@ from ..angles import circular_mean, wrap
 from ..runs import CalibrationRun
 from .problem import Problem
 
-__all__ = ["choose_ridge"]
+__all__ = ["REACH", "choose_ridge", "error_range"]
 
 Array = NDArray[np.float64]
 
@@ -29,7 +29,7 @@ _STRETCHES = 4
 
 #: The amplitudes may add up to so many times the range of the measured error. On a full
 #: turn the sum of amplitudes of a smooth error is about half its range.
-_REACH = 3.0
+REACH = 3.0
 
 #: Readings whose angles and errors are looked at for the ends of blocks and the range.
 _LOOKED_AT = 65_536
@@ -80,7 +80,7 @@ def choose_ridge(problem: Problem, weights: Sequence[Array | None]) -> float:
     best = int(np.argmin(scores))
     amplitudes = _solutions(folds, own_zeros)[1:]
     sums = np.hypot(amplitudes[::2], amplitudes[1::2]).sum(axis=0)
-    reach = _REACH * _error_range(problem, weights)
+    reach = REACH * error_range(problem, weights)
     tame = np.flatnonzero(sums[best:] <= reach)
     return float(_PENALTIES[best + tame[0]] if tame.size else _PENALTIES[-1])
 
@@ -169,7 +169,7 @@ def _held_out(solutions: Array, held: _Fold, own_zeros: bool) -> Array:
     return np.asarray(np.einsum("ij,ij->j", unexplained, unexplained) / held.weight)
 
 
-def _error_range(problem: Problem, weights: Sequence[Array | None]) -> float:
+def error_range(problem: Problem, weights: Sequence[Array | None]) -> float:
     """Peak-to-peak of the measured errors that count, each run around its own zero."""
     stride = max(1, sum(len(run) for run in problem.runs) // _LOOKED_AT)
     parts = []

@@ -75,7 +75,8 @@ def _intervals(fit: FitResult) -> str:
     least, most = float(found.freedom.min()), float(found.freedom.max())
     near, far = (student_quantile(0.975, v) for v in (most, least))
     times = f"{far:.3g}" if far < near + 0.05 else f"{near:.3g} to {far:.3g}"
-    return f"95 % within {times} standard errors, {_KINDS[found.kind]}"
+    held = " and what the ridge may have taken" if fit.ridge > 0.0 else ""
+    return f"95 % within {times} standard errors, {_KINDS[found.kind]}{held}"
 
 
 _KINDS = {

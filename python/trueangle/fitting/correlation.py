@@ -1,0 +1,110 @@
+"""Whether residuals correlate in time or scatter between runs, and how long they remember."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..angles import wrap
+from ..distributions import chi_squared_tail
+from .clusters import scatter_statistic
+from .clustersums import clusters_of, runs_together
+from .problem import Fitted, Problem
+
+__all__ = ["FEWEST_RUNS", "FEWEST_STRETCHES", "SCATTER", "correlation_found", "memory_of"]
+
+Array = NDArray[np.float64]
+
+#: Runs from which whole runs are the clusters.
+FEWEST_RUNS: Final = 3
+
+#: Readings in a row whose correlation is looked at.
+_LOOKED_AT: Final = 65_536
+
+#: Correlation counts from so many of its standard errors; white noise shows it once in 1000.
+_FOUND: Final = 3.1
+#: Chance of the scatter between runs from which it is not that of white noise.
+SCATTER: Final = 1e-3
+
+#: Readings in a row that are averaged when slow correlation is looked for.
+_STRETCHES: Final = (8, 64)
+
+#: A stretch of readings stands for itself when it is so many times as long as their memory.
+_LONG: Final = 8.0
+#: Stretches of a run, most and fewest.
+_MOST_STRETCHES: Final = 64
+FEWEST_STRETCHES: Final = 8
+
+
+def _in_time(
+    problem: Problem, fitted: Fitted, weights: Sequence[Array | None], used: Sequence[int]
+) -> list[Array]:
+    """Weighted residuals of the first readings of every run, in the order they were taken."""
+    most = max(64, _LOOKED_AT // len(used))
+    found = []
+    for i in used:
+        run, weight = problem.runs[i], weights[i]
+        offset = fitted.offsets[i] - fitted.solution.constant
+        rest = run.indicated[:most] - run.reference[:most] - offset
+        rest = wrap(rest - fitted.predict(problem.angles[i][:most]), problem.period)
+        found.append(rest if weight is None else rest * np.sqrt(weight[:most]))
+    return found
+
+
+def correlation_found(
+    problem: Problem, fitted: Fitted, weights: Sequence[Array | None], used: Sequence[int]
+) -> str:
+    """What speaks against white noise, in words; empty where nothing does."""
+    solution = fitted.solution
+    if not (solution.residual_variance > 0.0 and solution.degrees_of_freedom > problem.unknowns):
+        return ""
+    parts = _in_time(problem, fitted, weights, used)
+    count = sum(part.size for part in parts)
+    power = sum(float(part @ part) for part in parts)
+    pairs = count - len(parts)
+    if power <= 0.0 or pairs < 20:
+        return ""
+    near = sum(float(part[1:] @ part[:-1]) for part in parts) / power
+    # Low orders that were taken out leave white noise a little anticorrelated.
+    if near + (problem.unknowns + 1.0) / count > _FOUND / math.sqrt(pairs):
+        return f"neighbours in time correlate by {near:.2f}"
+    for length in _STRETCHES:
+        blocks = [part[: part.size // length * length].reshape(-1, length) for part in parts]
+        means = np.concatenate([block.mean(axis=1) for block in blocks])
+        if means.size < 20:
+            break
+        ratio = length * float((means**2).mean()) * count / power
+        if ratio - 1.0 > _FOUND * math.sqrt(2.0 / means.size):
+            return (
+                f"means of {length} neighbours in time scatter {math.sqrt(ratio):.2g} times as much"
+            )
+    if len(used) >= FEWEST_RUNS:
+        clusters = runs_together([clusters_of(problem, fitted, weights, i, 1)[0] for i in used])
+        statistic, freedom = scatter_statistic(clusters, solution.residual_variance)
+        if chi_squared_tail(statistic, freedom) < SCATTER:
+            times = math.sqrt(statistic / freedom)
+            return f"coefficients scatter {times:.2g} times as much between runs"
+    return ""
+
+
+def memory_of(
+    problem: Problem, fitted: Fitted, weights: Sequence[Array | None], used: Sequence[int]
+) -> tuple[float, list[int]]:
+    """Readings that the residuals remember, and stretches to cut each run into."""
+    parts = _in_time(problem, fitted, weights, used)
+    power = sum(float(part @ part) for part in parts)
+    memory, lag = 1.0, 1
+    limit = 2.0 / math.sqrt(sum(part.size for part in parts))
+    while power > 0.0 and lag < max(part.size for part in parts) // 4:
+        near = sum(float(part[lag:] @ part[:-lag]) for part in parts if part.size > lag) / power
+        if near < limit:
+            break
+        memory += 2.0 * near
+        lag += 1
+    long = max(1, math.ceil(_LONG * memory))
+    sizes = [len(problem.runs[i]) for i in used]
+    return memory, [max(2, min(_MOST_STRETCHES, size // long)) for size in sizes]
