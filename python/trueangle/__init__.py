@@ -34,6 +34,7 @@ if TYPE_CHECKING:
     from .rehearsal import Rehearsal as Rehearsal
     from .rehearsal.rehearse import rehearse as rehearse
     from .reports import report as report
+    from .runcsv import write_runs as write_runs
     from .runfiles import read_runs as read_runs
     from .runs import CalibrationRun as CalibrationRun
     from .selfcalibration import SelfCalibration as SelfCalibration
@@ -85,6 +86,7 @@ _PUBLIC = {
     "diagnose": "diagnosis",
     "load_simulation": "simulation",
     "simulate": "simulation",
+    "write_runs": "runcsv",
     **dict.fromkeys(
         (
             "Backlash",

@@ -68,4 +68,4 @@ def test_what_a_corrected_effect_gains_is_measured_on_other_runs():
     assert wrong.gain.before[0] == pytest.approx((3.0**2 + SIGMA**2) ** 0.5, rel=0.05)
     assert wrong.gain.after[0] == pytest.approx(SIGMA, rel=0.05)
     assert wrong.gain.interval[0] > 0.9
-    assert wrong.to_json()["gain"]["reducible_share"] > 0.9
+    assert wrong.to_dict()["gain"]["reducible_share"] > 0.9

@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 
 import trueangle as ta
+from trueangle import write_runs
 from trueangle.cli import main
 from trueangle.errors import ArgumentError
 from trueangle.simulation import (
@@ -43,7 +44,6 @@ from trueangle.simulation import (
     ZeroSlip,
     simulate,
 )
-from trueangle.simulation.runtable import write_runs
 
 NIGHTLY = os.environ.get("TRUEANGLE_NIGHTLY") == "1"
 

@@ -15,12 +15,12 @@ import numpy as np
 import pytest
 
 import trueangle as ta
+from trueangle import write_runs
 from trueangle.cli import main
 from trueangle.cli.durations import seconds
 from trueangle.errors import ArgumentError
 from trueangle.pace import Pace, ending_early, entered, pace, paced
 from trueangle.simulation import Backlash, Harmonic, Latency, RunDesign, Simulation, simulate
-from trueangle.simulation.runtable import write_runs
 
 #: Seconds by which a diagnosis may take longer than it was given: what is in hand is ended (one
 #: search), and what is left is tested. Generous, as the machine that runs this may be busy.

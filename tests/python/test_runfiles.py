@@ -107,7 +107,7 @@ def test_parquet_reads_like_csv(tmp_path):
 
 
 def test_signals_go_there_and_back(tmp_path):
-    from trueangle.simulation.runtable import write_runs
+    from trueangle import write_runs
 
     text = (
         "unit,run,reference_turn,indicated_turn,current_A,shift_deg,motor_rad,head1_turn\n"

@@ -62,7 +62,7 @@ class DataFault:
     def __str__(self) -> str:
         return f"{self.fault}: {self.says}; {self.mend}"
 
-    def to_json(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, Any]:
         """The entry of ``data_faults``."""
         return {
             "fault": self.fault,

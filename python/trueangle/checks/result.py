@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import json
 import textwrap
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+from ..plainresult import PlainResult
 from .extent import Extent
 from .fault import DataFault
 
@@ -17,7 +17,7 @@ WIDTH = 88
 
 
 @dataclass(frozen=True)
-class Check:
+class Check(PlainResult):
     """Whether data are fit to be used, before any model.
 
     Attributes
@@ -54,7 +54,7 @@ class Check:
         """What ``trueangle check --json`` prints."""
         e = self.extent
         return {
-            "data_faults": [fault.to_json() for fault in self.data_faults],
+            "data_faults": [fault.to_dict() for fault in self.data_faults],
             "usable": self.usable,
             "ratio": self.ratio,
             "ratio_suggests": self.suggests,
@@ -74,10 +74,6 @@ class Check:
             "can": [*self.can],
             "cannot": [*self.cannot],
         }
-
-    def to_json(self) -> str:
-        """`to_dict` as JSON text."""
-        return json.dumps(self.to_dict(), indent=2, allow_nan=False)
 
     def summary(self) -> str:
         """The check as readable text: faults first."""

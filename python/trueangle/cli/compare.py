@@ -37,7 +37,7 @@ def run(args: argparse.Namespace) -> int:
 
     result = compare(args.first, args.second)
     if args.json:
-        print(json.dumps(result.as_json(), allow_nan=False))
+        print(json.dumps(result.to_dict(), allow_nan=False))
     else:
         print(result.summary(errors_in(args)))
     return 0

@@ -116,7 +116,7 @@ def run(args: argparse.Namespace) -> int:
         report=(lambda log: None) if args.json else (lambda log: _print(log, errors_in(args))),
     )
     if args.json:
-        print(json.dumps(result.as_json()))
+        print(json.dumps(result.to_dict()))
     return _status(result)
 
 

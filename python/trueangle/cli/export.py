@@ -86,7 +86,7 @@ def run(args: argparse.Namespace) -> int:
         args.model, args.to, args.output, max_arcsec=args.max_arcsec, **target_options(args)
     )
     if args.json:
-        print(json.dumps(made.as_json(), allow_nan=False))
+        print(json.dumps(made.to_dict(), allow_nan=False))
         for note in made.notes:
             print(f"trueangle: note: {note}", file=sys.stderr)
     else:

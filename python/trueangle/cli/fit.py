@@ -7,7 +7,6 @@ import json
 
 from ..files import MODEL
 from .error_units import add_errors_in, errors_in
-from .fit_json import fit_as_json
 from .onepass import add_one_pass, saved, wants_one_pass
 from .order_lists import declared_shafts, orders_by_shaft, parse_orders
 from .paths import Input, Output
@@ -142,7 +141,7 @@ def run(args: argparse.Namespace) -> int:
     )
     result.model.save(args.output)
     if args.json:
-        print(json.dumps({"model": args.output, **fit_as_json(result)}))
+        print(json.dumps({"model": args.output, **result.to_dict()}))
     else:
         print(result.summary(errors_in(args)))
         print(f"\nsaved {args.output}")

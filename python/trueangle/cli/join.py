@@ -65,7 +65,7 @@ def run(args: argparse.Namespace) -> int:
     )
     found.save(args.output)
     if args.json:
-        print(json.dumps({"output": args.output, **found.as_json()}, allow_nan=False))
+        print(json.dumps({"output": args.output, **found.to_dict()}, allow_nan=False))
     else:
         print(found.summary(errors_in(args)))
         print(f"\nsaved {args.output}")

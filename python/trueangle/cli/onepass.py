@@ -11,7 +11,6 @@ from ..angles import arcsec
 from ..errors import ArgumentError
 from ..errorunits import error_unit
 from .error_units import errors_in
-from .fit_json import fit_as_json
 from .order_lists import declared_shafts
 from .signal_options import reading
 from .terminal import own_interrupts
@@ -108,7 +107,7 @@ def saved(args: argparse.Namespace, orders: Any) -> int:
     found = fit_in_one_pass(args, orders)
     found.model.save(args.output)
     if args.json:
-        print(json.dumps({"model": args.output, **fit_as_json(found)}))
+        print(json.dumps({"model": args.output, **found.to_dict()}))
     else:
         print(found.summary(errors_in(args)))
         print(f"\nsaved {args.output}")
@@ -122,7 +121,7 @@ def printed_orders(args: argparse.Namespace) -> int:
             "--orders, --method and --reference-orders do not go with logs in one pass"
         )
     found = fit_in_one_pass(args, None)
-    result = fit_as_json(found)
+    result = found.to_dict()
     if args.json:
         renamed = {"samples": result["readings"], "noise_arcsec": result["residual_arcsec"]}
         print(json.dumps(renamed | {"runs": result["runs"], "orders": result["evidence"]}))

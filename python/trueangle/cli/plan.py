@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import json
 import math
 from typing import TYPE_CHECKING
 
@@ -75,25 +74,8 @@ def run(args: argparse.Namespace) -> int:
         else:
             mounts = 2 if args.mounts is None else args.mounts
             plan = planning.plan_mounts(args.gear_ratio, positions, mounts, **common)
-    print(json.dumps(as_json(plan), indent=2) if args.json else render(plan))
+    print(plan.to_json() if args.json else render(plan))
     return 0
-
-
-def as_json(plan: CalibrationPlan) -> dict[str, object]:
-    """The plan as plain values; an infinite factor becomes null."""
-    return {
-        "kind": plan.kind,
-        "positions": plan.positions,
-        "mount_offsets_deg": list(plan.mount_offsets_deg),
-        "facet_shifts": list(plan.facet_shifts),
-        "facet_noise_factor": _finite(plan.facet_noise_factor),
-        "worst_noise_factor": _finite(plan.worst_noise_factor),
-        "noise_factors": {f"{m:g}": _finite(f) for m, f in plan.noise_factors.items()},
-        "invisible_orders": list(plan.invisible_orders),
-        "tolerance_deg": plan.tolerance_deg,
-        "readings": plan.readings,
-        "notes": list(plan.notes),
-    }
 
 
 def render(plan: CalibrationPlan) -> str:

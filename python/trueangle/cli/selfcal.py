@@ -87,7 +87,7 @@ def run(args: argparse.Namespace) -> int:
             file=sys.stderr,
         )
     if args.json:
-        print(json.dumps({"model": args.output, **result.as_json()}, allow_nan=False))
+        print(json.dumps({"model": args.output, **result.to_dict()}, allow_nan=False))
     else:
         print(result.summary(errors_in(args)))
         print(f"\nsaved {args.output}")

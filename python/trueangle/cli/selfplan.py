@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import json
 import math
 from typing import TYPE_CHECKING, Any
 
@@ -63,7 +62,7 @@ def run_self(args: argparse.Namespace, orders: tuple[float, ...] | None) -> int:
 
         given = designed(load_simulation(args.simulation), args.self_method) | given
     plan = plan_self(args.self_method, **given)
-    print(json.dumps(as_json(plan), indent=2, allow_nan=False) if args.json else render(plan))
+    print(plan.to_json() if args.json else render(plan))
     return 0
 
 
@@ -75,36 +74,6 @@ def _angles(text: str) -> list[float]:
     if len(found) < 2 or not all(map(math.isfinite, found)):
         raise ArgumentError(f"--angles: two angles or more in degrees, such as 0,90, got {text!r}")
     return found
-
-
-def as_json(plan: SelfPlan) -> dict[str, Any]:
-    """The plan as plain values; an infinite factor becomes null."""
-    return {
-        "method": plan.method,
-        "orders": list(plan.orders),
-        "noise_factors": _plain(plan.noise_factors),
-        "worst_noise_factor": _plain(plan.worst_noise_factor),
-        "blind_orders": list(plan.blind_orders),
-        "angles_deg": list(plan.angles_deg),
-        "given": _plain(plan.given),
-        "speed_ratio": plan.speed_ratio,
-        "speed_ratio_factors": _plain(plan.speed_ratio_factors),
-        "turns": plan.turns,
-        "readings": plan.readings,
-        "seconds": plan.seconds,
-        "knots_per_turn": plan.knots_per_turn,
-        "notes": list(plan.notes),
-    }
-
-
-def _plain(value: Any) -> Any:
-    if isinstance(value, dict):
-        return {
-            (f"{k:g}" if isinstance(k, float) else k): _plain(entry) for k, entry in value.items()
-        }
-    if isinstance(value, list):
-        return [_plain(entry) for entry in value]
-    return value if not isinstance(value, float) or math.isfinite(value) else None
 
 
 def render(plan: SelfPlan) -> str:

@@ -35,8 +35,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Write the runs."""
+    from ..runcsv import write_runs
     from ..simulation import load_simulation, simulate
-    from ..simulation.runtable import write_runs
 
     if args.seed < 0:
         from ..errors import ArgumentError

@@ -61,7 +61,7 @@ class Belief:
     std: dict[str, float]
     gain: Any = None
 
-    def to_json(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, Any]:
         """The entry of ``beliefs``."""
         return {
             "what": self.what,
@@ -69,7 +69,7 @@ class Belief:
             "believed": self.believed,
             "measured": self.measured,
             "std": self.std,
-            "gain": None if self.gain is None else self.gain.to_json(),
+            "gain": None if self.gain is None else self.gain.to_dict(),
         }
 
 

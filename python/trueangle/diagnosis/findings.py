@@ -12,6 +12,7 @@ from ..effects import EFFECTS, Effect
 from ..effects.blindness import Blindness
 from ..errorunits import ErrorsIn
 from ..joining import MeasuredMinusSimulated
+from ..plainresult import PlainResult
 from ..regression.estimate import Parameters
 from ..simulation.simulation import Simulation
 from .beliefs import Belief
@@ -79,15 +80,15 @@ class Finding:
         """The physics in one sentence."""
         return EFFECTS[self.cause].sentence
 
-    def to_json(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, Any]:
         """The entry of ``findings``."""
         return {
             "cause": self.cause,
             "status": self.status,
             "status_reason": self.reason,
-            "parameters": {name: q.to_json() for name, q in self.parameters.items()},
+            "parameters": {name: q.to_dict() for name, q in self.parameters.items()},
             "evidence": self.evidence,
-            "gain": None if self.gain is None else self.gain.to_json(),
+            "gain": None if self.gain is None else self.gain.to_dict(),
             "rivals": [{"cause": cause, "bic_gap": gap} for cause, gap in self.rivals],
             "physics": self.sentence,
             "correctable": self.cause not in EFFECTS or not EFFECTS[self.cause].not_at_run_time,
@@ -95,7 +96,7 @@ class Finding:
 
 
 @dataclass(frozen=True)
-class Diagnosis:
+class Diagnosis(PlainResult):
     """What `trueangle.diagnose` found.
 
     Attributes
@@ -191,15 +192,15 @@ class Diagnosis:
             "readings": self.readings,
             "readings_used": self.readings_used,
             "unexplained": self._unexplained(),
-            "findings": [finding.to_json() for finding in self.findings],
-            "beliefs": [belief.to_json() for belief in self.beliefs],
-            "data_faults": [fault.to_json() for fault in self.data_faults],
+            "findings": [finding.to_dict() for finding in self.findings],
+            "beliefs": [belief.to_dict() for belief in self.beliefs],
+            "data_faults": [fault.to_dict() for fault in self.data_faults],
             "gain": self.gain,
             "complete": self.complete,
             "notes": self.notes,
-            "not_identifiable": [spot.to_json() for spot in self.not_identifiable],
+            "not_identifiable": [spot.to_dict() for spot in self.not_identifiable],
             "extended_simulation": extended_simulation,
-            **({} if self.simulated is None else {"simulated": self.simulated.to_json()}),
+            **({} if self.simulated is None else {"simulated": self.simulated.to_dict()}),
         }
 
     def _unexplained(self) -> dict[str, Any]:
@@ -207,8 +208,8 @@ class Diagnosis:
             return {"found": False, "rms_arcsec": 0.0, "share": 0.0, "evidence": [], "before": None}
         before = self.unexplained_before
         return {
-            **self.unexplained.to_json(),
-            "before": None if before is None else before.to_json(),
+            **self.unexplained.to_dict(),
+            "before": None if before is None else before.to_dict(),
         }
 
     def to_json(self, extended_simulation: str | None = None) -> str:

@@ -59,7 +59,7 @@ class Gain:
     note: str
     by_level: LevelGain | None = None
 
-    def to_json(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, Any]:
         """The ``gain`` object of a finding."""
         found: dict[str, Any] = {"holdout": self.holdout}
         for when, values in (("before", self.before), ("after", self.after)):
@@ -69,7 +69,7 @@ class Gain:
         found["reducible_share_interval"] = None if self.interval is None else [*self.interval]
         found["control_share"] = self.control_share
         found["note"] = self.note
-        found["by_level"] = None if self.by_level is None else self.by_level.to_json()
+        found["by_level"] = None if self.by_level is None else self.by_level.to_dict()
         return found
 
 

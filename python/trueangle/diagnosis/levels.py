@@ -75,7 +75,7 @@ class LevelGain:
     interval: tuple[float, float] | None = None
     note: str = ""
 
-    def to_json(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, Any]:
         """The ``by_level`` object of a gain."""
         return {
             "factor": self.factor,

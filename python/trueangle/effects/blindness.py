@@ -71,7 +71,7 @@ class Blindness:
         """Whether naming this cause would be a guess."""
         return cause in self.causes and cause != self.common
 
-    def to_json(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, Any]:
         """The entry of ``not_identifiable``."""
         return {
             "causes": list(self.causes),
@@ -80,7 +80,7 @@ class Blindness:
             "supported": self.supported,
             "bic_gain": self.evidence,
             "estimates": {
-                cause: {name: q.to_json() for name, q in parameters.items()}
+                cause: {name: q.to_dict() for name, q in parameters.items()}
                 for cause, parameters in self.estimates.items()
             },
         }

@@ -15,6 +15,7 @@ from ..errors import ArgumentError
 from ..errorunits import ErrorsIn, error_unit
 from ..model import HarmonicModel
 from ..modelfile import load_model
+from ..plainresult import PlainResult
 from .pattern import Pattern
 
 __all__ = ["Comparison", "compare"]
@@ -27,7 +28,7 @@ _MOST_POINTS = 1 << 22
 
 
 @dataclass(frozen=True)
-class Comparison:
+class Comparison(PlainResult):
     """Second model less first, in what they correct.
 
     Attributes
@@ -57,7 +58,7 @@ class Comparison:
     argument: str
     differ_in: list[str]
 
-    def as_json(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, Any]:
         """All of it."""
         return dict(vars(self))
 

@@ -17,6 +17,7 @@ from ..errorunits import ErrorsIn, error_unit
 from ..files import check_output, read_whole, written_atomically
 from ..model import HarmonicModel
 from ..modelfile import load_model, model_text
+from ..plainresult import PlainResult
 from .pattern import Pattern
 from .proof import Proof, lost_orders, prove
 from .target import Header, Made, Target
@@ -32,7 +33,7 @@ _ROUGH_BITS = 14
 
 
 @dataclass(frozen=True)
-class Exported:
+class Exported(PlainResult):
     """A table made of a model, and how far it is from it.
 
     Attributes
@@ -83,7 +84,7 @@ class Exported:
     text: str = field(repr=False)
     output: str | None = None
 
-    def as_json(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, Any]:
         """Everything but the text."""
         return {key: value for key, value in vars(self).items() if key != "text"}
 

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from ..distributions import student_quantile
 from ..errors import ArgumentError
 from ..model import HarmonicModel
+from ..plainresult import PlainResult
 
 if TYPE_CHECKING:
     from .uncertainty import Uncertainty
@@ -20,7 +21,7 @@ __all__ = ["Coefficients"]
 Array = NDArray[np.float64]
 
 
-class Coefficients:
+class Coefficients(PlainResult):
     """Coefficients with their uncertainty: what fits of runs and of logs have in common."""
 
     if TYPE_CHECKING:

@@ -194,6 +194,12 @@ class FitResult(Coefficients):
 
         return fit_plot(self, kind, ax, **options)
 
+    def to_dict(self) -> dict[str, Any]:
+        """The object that ``trueangle fit --json`` prints beside the model."""
+        from .plain import plain_fit
+
+        return plain_fit(self)
+
     def summary(self, errors_in: ErrorsIn = "auto") -> str:
         """The result as text: coefficients with uncertainties, quality, notes.
 

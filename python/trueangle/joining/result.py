@@ -7,6 +7,7 @@ from os import PathLike
 from typing import Any, NamedTuple
 
 from ..errorunits import ErrorsIn, error_unit
+from ..plainresult import PlainResult
 from ..runs import CalibrationRun
 
 __all__ = ["Gap", "Joined"]
@@ -21,7 +22,7 @@ class Gap(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Joined:
+class Joined(PlainResult):
     """Two logs as calibration runs.
 
     Attributes
@@ -54,7 +55,7 @@ class Joined:
     on_change: tuple[str, ...]
     notes: tuple[str, ...]
 
-    def as_json(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, Any]:
         """Plain values."""
         return {
             "readings": sum(len(run) for run in self.runs),
@@ -84,7 +85,7 @@ class Joined:
             return f"{value:.9g} {unit}" + ("" if std is None else f" +- {std:.2g}")
 
         unit = error_unit(errors_in, self.std_arcsec)
-        found = self.as_json()
+        found = self.to_dict()
         lines = [
             f"{found['readings']} readings joined in {found['runs']} run(s), "
             f"{self.left_out} without a reference left out",
@@ -100,6 +101,6 @@ class Joined:
 
     def save(self, path: str | PathLike[str]) -> int:
         """Write the runs as CSV, complete or not at all; the number of readings."""
-        from ..simulation.runtable import write_runs
+        from ..runcsv import write_runs
 
         return write_runs(self.runs, str(path))

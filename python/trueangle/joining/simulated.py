@@ -64,7 +64,7 @@ class MeasuredMinusSimulated:
     std_arcsec: float
     notes: tuple[str, ...]
 
-    def to_json(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, Any]:
         """Plain values."""
         return {
             "source": self.source,

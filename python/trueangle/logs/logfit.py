@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from html import escape
+from typing import Any
 
 from ..angles import arcsec
 from ..errorunits import ErrorsIn, error_unit
@@ -107,6 +108,12 @@ class LogFit(Coefficients):
 
     def _repr_html_(self) -> str:
         return f"<pre>{escape(self.summary())}</pre>"
+
+    def to_dict(self) -> dict[str, Any]:
+        """The object that ``trueangle fit --json`` prints beside the model."""
+        from ..fitting.plain import plain_fit
+
+        return plain_fit(self)
 
     def summary(self, errors_in: ErrorsIn = "auto") -> str:
         """The result as text.

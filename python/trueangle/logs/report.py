@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from ..plainresult import PlainResult
 from .joints import LogSettings
 from .manifest import Manifest
 from .sources import Place
@@ -41,7 +42,7 @@ class LogReport:
         """True when the output is complete and verified."""
         return self.status.startswith("done")
 
-    def as_json(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, Any]:
         """Plain values."""
         known = {key: value for key, value in self.result.items() if key != "after"}
         error = {} if self.error is None else {"error": str(self.error)}
@@ -55,7 +56,7 @@ class LogReport:
 
 
 @dataclass
-class BatchReport:
+class BatchReport(PlainResult):
     """What became of all logs, in the order they were given."""
 
     logs: list[LogReport]
@@ -67,11 +68,11 @@ class BatchReport:
         """True when every log is."""
         return all(log.is_done for log in self.logs)
 
-    def as_json(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, Any]:
         """Plain values."""
         done = [log for log in self.logs if log.status == "done"]
         return {
-            "files": [log.as_json() for log in self.logs],
+            "files": [log.to_dict() for log in self.logs],
             "rows": sum(log.result["rows"] for log in done),
             "seconds": self.seconds,
             "complete": self.is_done,

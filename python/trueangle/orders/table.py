@@ -5,12 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from ..aliasing import Positions
 from ..errorunits import ErrorsIn
 from ..explanations import Explanation
 from ..model import Argument
+from ..plainresult import PlainResult
 from .repeats import Noise
 
 if TYPE_CHECKING:
@@ -93,7 +94,7 @@ class OrderRow:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class OrderSelection:
+class OrderSelection(PlainResult):
     """Orders that the data support, and the evidence for and against each candidate.
 
     Attributes
@@ -186,6 +187,12 @@ class OrderSelection:
     def note(self) -> str:
         """The notes in one line, for a model's record."""
         return ". ".join(note[:1].upper() + note[1:] for note in self.notes)
+
+    def to_dict(self) -> dict[str, Any]:
+        """The object that ``trueangle orders --json`` prints."""
+        from .plain import plain_selection
+
+        return plain_selection(self)
 
     def plot(self, ax: Axes | None = None) -> Axes:
         """Amplitude of every candidate with its threshold (needs ``trueangle[plot]``)."""

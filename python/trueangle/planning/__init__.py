@@ -9,12 +9,15 @@ from .plan import (
     readings_needed,
     wanted_orders,
 )
+from .selfplan import SelfPlan, plan_self
 
 __all__ = [
     "HIGHEST_LOW_ORDER",
     "CalibrationPlan",
+    "SelfPlan",
     "plan_encoder",
     "plan_mounts",
+    "plan_self",
     "plan_tilts",
     "readings_needed",
     "wanted_orders",

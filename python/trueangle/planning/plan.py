@@ -8,12 +8,14 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from ..aliasing import fold
 from ..errors import ArgumentError, NoModelError
 from ..joint.gear import HIGHEST_LOW_ORDER, wanted_orders
+from ..plainresult import PlainResult
 from .mountsearch import offset_tolerance, search_offsets, search_shifts
 from .noisefactors import mount_noise_factors, noise_factors
 
@@ -29,7 +31,7 @@ __all__ = [
 
 
 @dataclass(frozen=True)
-class CalibrationPlan:
+class CalibrationPlan(PlainResult):
     """Where to read, and how well each order will be known.
 
     Attributes
@@ -76,6 +78,12 @@ class CalibrationPlan:
     def invisible_orders(self) -> tuple[float, ...]:
         """Wanted orders that fold onto the constant: every zero absorbs them."""
         return tuple(m for m, f in self.noise_factors.items() if not math.isfinite(f))
+
+    def to_dict(self) -> dict[str, Any]:
+        """The object that ``trueangle plan --json`` prints."""
+        from .plain import plain_plan
+
+        return plain_plan(self)
 
 
 def readings_needed(noise: float, standard_error: float, factor: float = 1.0) -> int:

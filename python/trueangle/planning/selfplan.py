@@ -5,12 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import ArgumentError
+from ..plainresult import PlainResult
 from .plan import readings_needed
 
 __all__ = ["SELF_METHODS", "SelfPlan", "angle_factors", "best_angles", "plan_self", "speed_factor"]
@@ -34,7 +35,7 @@ _SWEEPS: Final = 6
 
 
 @dataclass(frozen=True)
-class SelfPlan:
+class SelfPlan(PlainResult):
     """What to record, and how well each order will be known.
 
     Attributes
@@ -81,6 +82,12 @@ class SelfPlan:
     def blind_orders(self) -> tuple[float, ...]:
         """Wanted orders that are not seen."""
         return tuple(k for k, f in self.noise_factors.items() if not math.isfinite(f))
+
+    def to_dict(self) -> dict[str, Any]:
+        """The object that ``trueangle plan --self METHOD --json`` prints."""
+        from .plain import plain_self_plan
+
+        return plain_self_plan(self)
 
 
 def angle_factors(angles_deg: ArrayLike, orders: Sequence[float]) -> Array:

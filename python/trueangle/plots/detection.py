@@ -59,7 +59,7 @@ def detection(rehearsal: Rehearsal) -> Figure:
 
 def _draw(ax: Axes, cause: RehearsedCause) -> None:
     size = np.array([*cause.tried])
-    entries = cause.to_json()["tried"]
+    entries = cause.to_dict()["tried"]
     share = np.array([entry["named"] / entry["trials"] for entry in entries])
     ends = np.array([entry["interval"] for entry in entries]).T
     spread = np.abs(ends - share)

@@ -24,7 +24,7 @@ class Quantity:
     value: Any
     std: Any = None
 
-    def to_json(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, Any]:
         """``{"value": .., "std": ..}``."""
         return {"value": self.value, "std": self.std}
 

@@ -42,7 +42,7 @@ class NextRun:
     changes: tuple[str, ...]
     opens: tuple[str, ...]
 
-    def to_json(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, Any]:
         """The object ``next_run``; ``run`` as a ``[[run]]`` table of a simulation file."""
         table = {
             f.name: list(v) if isinstance(v := getattr(self.design, f.name), tuple) else v

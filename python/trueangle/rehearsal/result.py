@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import json
 from collections import Counter
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
+from ..plainresult import PlainResult
 from .detection import Chance, binomial_interval
 from .nextrun import NextRun
 from .visibility import Range
@@ -73,7 +73,7 @@ class RehearsedCause:
         """It was named once at least."""
         return any(named for named, _ in self.tried.values())
 
-    def to_json(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, Any]:
         """The entry of ``causes``."""
         return {
             "cause": self.cause,
@@ -145,7 +145,7 @@ def rehearsed(
 
 
 @dataclass(frozen=True)
-class Rehearsal:
+class Rehearsal(PlainResult):
     """What `trueangle.rehearse` found.
 
     Attributes
@@ -186,8 +186,8 @@ class Rehearsal:
     def to_dict(self) -> dict[str, Any]:
         """The object that ``trueangle rehearse --json`` prints."""
         return {
-            "causes": [cause.to_json() for cause in self.causes],
-            "next_run": None if self.next_run is None else self.next_run.to_json(),
+            "causes": [cause.to_dict() for cause in self.causes],
+            "next_run": None if self.next_run is None else self.next_run.to_dict(),
             "readings": self.readings,
             "runs": self.runs,
             "noise_arcsec": self.noise,
@@ -197,10 +197,6 @@ class Rehearsal:
             "complete": self.complete,
             "notes": self.notes,
         }
-
-    def to_json(self) -> str:
-        """`to_dict` as JSON text."""
-        return json.dumps(self.to_dict(), indent=2, allow_nan=False)
 
     def summary(self) -> str:
         """A readable account (`trueangle.rehearsal.summary.render`)."""

@@ -117,7 +117,7 @@ def _next(rehearsal: Rehearsal) -> list[str]:
         if all(cause.ever_named for cause in rehearsal.causes):
             return []
         return ["No single further run was found that opens another cause."]
-    table = ", ".join(f"{name} = {_toml(value)}" for name, value in run.to_json()["run"].items())
+    table = ", ".join(f"{name} = {_toml(value)}" for name, value in run.to_dict()["run"].items())
     return [
         *_wrapped(f"One further run, {'; '.join(run.changes)}, opens {', '.join(run.opens)}:", 2),
         *_wrapped(f"[[run]] {table}", 4, 2),

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from ..angles import ARCSEC_PER_TURN
 from ..errorunits import ErrorsIn
 from ..model import HarmonicModel
+from ..plainresult import PlainResult
 
 __all__ = ["Blind", "HeldOut", "OrderEstimate", "SelfCalibration"]
 
@@ -48,7 +49,7 @@ class OrderEstimate:
         """``phi = atan2(A, B)`` in degrees from 0: the term is ``C sin(k x + phi)``."""
         return math.degrees(math.atan2(self.cosine, self.sine)) % 360.0
 
-    def as_json(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, Any]:
         """Plain values."""
         return {
             "order": int(self.order) if float(self.order).is_integer() else self.order,
@@ -69,7 +70,7 @@ class Blind:
     because: str
     measure: str
 
-    def as_json(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, Any]:
         """Plain values."""
         return {
             "orders": [int(k) if float(k).is_integer() else k for k in self.orders],
@@ -90,7 +91,7 @@ class HeldOut:
     p: float
     """Probability of so great a difference between the two patterns by noise alone."""
 
-    def as_json(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, Any]:
         """Plain values."""
         return {
             "fitted_on": self.fitted_on,
@@ -103,7 +104,7 @@ class HeldOut:
 
 
 @dataclass(frozen=True)
-class SelfCalibration:
+class SelfCalibration(PlainResult):
     """Result of `trueangle.selfcal`.
 
     Attributes
@@ -140,15 +141,15 @@ class SelfCalibration:
     turns: float
     beside: Mapping[str, Any] = field(default_factory=dict)
 
-    def as_json(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, Any]:
         """The result as plain values, angles in arcsec."""
         return {
             "method": self.method,
             "calibrated_without_reference": True,
-            "orders": [o.as_json() for o in self.orders],
-            "sums": [o.as_json() for o in self.sums],
-            "blind": [b.as_json() for b in self.blind],
-            "held_out": {name: test.as_json() for name, test in self.held_out.items()},
+            "orders": [o.to_dict() for o in self.orders],
+            "sums": [o.to_dict() for o in self.sums],
+            "blind": [b.to_dict() for b in self.blind],
+            "held_out": {name: test.to_dict() for name, test in self.held_out.items()},
             "noise_arcsec": self.noise_arcsec,
             "readings": self.readings,
             "turns": self.turns,

@@ -247,7 +247,7 @@ def _beside(
         limit,
         OTHER,
     )
-    found["other"] = [o.as_json() for o in table]
+    found["other"] = [o.to_dict() for o in table]
     return found
 
 

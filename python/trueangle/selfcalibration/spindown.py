@@ -98,7 +98,7 @@ def spin_down(
             "the speed ripple",
         )
         beside["ripple"] = [
-            {**entry.as_json(), "probability": float(p)}
+            {**entry.to_dict(), "probability": float(p)}
             for entry, p in zip(found, probable, strict=True)
         ]
         beside["ripple_at_turns_per_s"] = readings.mean_speed

@@ -242,7 +242,7 @@ def test_the_default_table_is_as_fine_as_the_model_is_known(model):
 
 def test_json_carries_every_figure(model, tmp_path):
     made = ta.export_model(model, "c", tmp_path / "a.h", entries=128, bits=16)
-    found = made.as_json()
+    found = made.to_dict()
     assert {
         "target", "sign", "argument", "entries", "bytes", "max_difference_arcsec",
         "rms_difference_arcsec", "floor_arcsec", "lost", "proven",

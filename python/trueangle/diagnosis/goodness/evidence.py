@@ -40,7 +40,7 @@ class Evidence:
     rms: float = 0.0
     at: float | None = None
 
-    def to_json(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, Any]:
         """The entry of ``unexplained.evidence``."""
         return {
             "test": self.test,

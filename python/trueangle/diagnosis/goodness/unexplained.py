@@ -51,13 +51,13 @@ class Unexplained:
         deciding = sum(item.decides for item in self.evidence)
         return [item for item in self.evidence if item.decides and item.p * deciding < LEVEL]
 
-    def to_json(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, Any]:
         """The ``unexplained`` object of a diagnosis."""
         return {
             "found": self.found,
             "rms_arcsec": self.rms,
             "share": self.share,
-            "evidence": [item.to_json() for item in self.evidence],
+            "evidence": [item.to_dict() for item in self.evidence],
         }
 
 

@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from ..angles import arcsec
+from ..plainresult import finite
 
 if TYPE_CHECKING:
-    from ..fitting.result import FitResult
-    from ..logs.fitting import LogFit
+    from ..logs.logfit import LogFit
+    from .result import FitResult
 
-__all__ = ["evidence_as_json", "fit_as_json"]
+__all__ = ["plain_fit"]
 
 
-def fit_as_json(found: FitResult | LogFit) -> dict[str, object]:
+def plain_fit(found: FitResult | LogFit) -> dict[str, Any]:
     """The fit with the same names whatever way it took; angles in arcsec."""
     period = found.model.period
     record = found.model.fit
@@ -22,8 +23,8 @@ def fit_as_json(found: FitResult | LogFit) -> dict[str, object]:
         "readings": found.readings,
         "missing": getattr(found, "missing", 0),
         "runs": 0 if record is None else record.runs,
-        "residual_arcsec": _finite(arcsec(found.residual_std, period)),
-        "condition_number": _finite(found.condition_number),
+        "residual_arcsec": finite(arcsec(found.residual_std, period)),
+        "condition_number": finite(found.condition_number),
         "method": found.method,
         "argument": found.model.argument,
         "ridge": getattr(found, "ridge", 0.0),
@@ -43,12 +44,12 @@ def fit_as_json(found: FitResult | LogFit) -> dict[str, object]:
                 (shaft.name, order) for shaft in found.model.shafts for order in shaft.orders
             )
         ],
-        "evidence": evidence_as_json(found),
+        "evidence": _evidence(found),
         "notes": list(found.notes),
     }
 
 
-def evidence_as_json(found: FitResult | LogFit) -> list[dict[str, object]]:
+def _evidence(found: FitResult | LogFit) -> list[dict[str, Any]]:
     """The evidence for every order that was looked at; empty where the orders were given."""
     scale = arcsec(1.0, found.model.period)
     selection = getattr(found, "selection", None)
@@ -61,26 +62,22 @@ def evidence_as_json(found: FitResult | LogFit) -> list[dict[str, object]]:
             "shaft": shaft,
             "order": order,
             "retained": row.retained,
-            "amplitude_arcsec": _finite(scale * row.amplitude),
-            "std_arcsec": _finite(scale * std),
-            "phase_deg": _finite(row.phase_deg % 360.0),
-            "holdout_gain": _finite(gain),
+            "amplitude_arcsec": finite(scale * row.amplitude),
+            "std_arcsec": finite(scale * std),
+            "phase_deg": finite(row.phase_deg % 360.0),
+            "holdout_gain": finite(gain),
             "reason": row.reason,
         }
         for shaft, order, row, std, gain in rows
     ]
 
 
-def _spread(found: FitResult | LogFit, n: int) -> dict[str, object]:
+def _spread(found: FitResult | LogFit, n: int) -> dict[str, Any]:
     """Standard error and 95 % interval of one amplitude; null where nothing tells them."""
     if found.model.covariance is None:
         return {"std_arcsec": None, "interval_arcsec": None}
     period = found.model.period
     return {
-        "std_arcsec": _finite(arcsec(float(found.amplitude_std[n]), period)),
+        "std_arcsec": finite(arcsec(float(found.amplitude_std[n]), period)),
         "interval_arcsec": [arcsec(v, period) for v in found.amplitude_interval()[n].tolist()],
     }
-
-
-def _finite(value: float) -> float | None:
-    return value if math.isfinite(value) else None

@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ..files import RUNS, written_atomically
-from ..runs import CalibrationRun, as_runs
-from ..signals import find_signal
+from .files import RUNS, written_atomically
+from .runs import CalibrationRun, as_runs
+from .signals import find_signal
 
 __all__ = ["write_runs"]
 
@@ -26,10 +26,30 @@ def write_runs(runs: CalibrationRun | Iterable[CalibrationRun], path: str | Path
     `trueangle.signals.SIGNALS` that every run has, such as time_s and current_A; ``unit``
     where a run has one.
 
+    Parameters
+    ----------
+    runs : CalibrationRun or iterable of CalibrationRun
+    path : str or path
+        A CSV file; another ending is refused.
+
     Returns
     -------
     int
         Number of readings written.
+
+    Raises
+    ------
+    ArgumentError, FileError
+        No runs; a file that cannot be written, which then is as it was.
+
+    Examples
+    --------
+    >>> import tempfile, trueangle as ta
+    >>> path = tempfile.mkdtemp() + "/runs.csv"
+    >>> ta.write_runs(ta.CalibrationRun([0.0, 90.0], [0.1, 90.2], period=360.0), path)
+    2
+    >>> ta.read_runs(path)[0].indicated
+    array([ 0.1, 90.2])
     """
     found = as_runs(runs)
     scale = 360.0 / found[0].period
