@@ -7,6 +7,7 @@ all that it prints, so that its numbers can be compared.
 from __future__ import annotations
 
 import math
+import re
 from dataclasses import dataclass
 from typing import Final, TypeAlias
 
@@ -26,6 +27,9 @@ LARGE: Final = 3600.0
 #: Digits of an uncertainty (GUM 7.2.6), and of a number that has none.
 _UNCERTAIN_DIGITS: Final = 2
 _DIGITS: Final = 4
+
+#: A size in a sentence.
+_SIZE: Final = re.compile(r"(-?\d+(?:\.\d+)?(?:e[+-]?\d+)?) arcsec\b")
 
 #: Decimals are kept this far; beyond it a double has none.
 _MOST_DECIMALS: Final = 12
@@ -64,6 +68,34 @@ class ErrorUnit:
         """The number, its standard deviation where there is one, and the unit."""
         value, spread = self.pair(arcsec, std)
         return f"{value} {self.name}" if spread == "-" else f"{value} +- {spread} {self.name}"
+
+    def decimals(self, arcsec: float, digits: int = _UNCERTAIN_DIGITS) -> int:
+        """Decimals that show so many digits of an error; none where it is zero or unknown.
+
+        Examples
+        --------
+        >>> error_unit("deg").decimals(36.0), error_unit("arcsec").decimals(36.0)
+        (3, 0)
+        """
+        value = arcsec * self.per_arcsec
+        return _decimals(value, digits) if value and math.isfinite(value) else 0
+
+    def spoken(self, sentence: str) -> str:
+        """A sentence with its sizes, written in arcsec, in this unit and to as many digits.
+
+        Examples
+        --------
+        >>> error_unit("deg").spoken("strongest at order 4, about 26000 arcsec")
+        'strongest at order 4, about 7.2 deg'
+        """
+        if self.name == "arcsec":
+            return sentence
+        return _SIZE.sub(lambda found: f"{self._converted(found[1])} {self.name}", sentence)
+
+    def _converted(self, number: str) -> str:
+        written = number.partition("e")[0].replace(".", "").lstrip("-0").rstrip("0")
+        digits = max(len(written), _UNCERTAIN_DIGITS)
+        return significant(float(number) * self.per_arcsec, digits)
 
 
 def error_unit(

@@ -8,6 +8,7 @@ import json
 from ..errors import ArgumentError
 from ..files import PDF, REPORT
 from ..pace import STYLES, paced
+from .error_units import add_errors_in, errors_in
 from .fit import add_joint
 from .order_lists import orders_by_shaft
 from .paths import Input, Output
@@ -51,6 +52,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "the laboratory and the type B uncertainties",
     )
     add("--positions", type=int, metavar="N", help="nominal positions of a certificate (36)")
+    add_errors_in(parser)
     add(
         "--pdf",
         type=Output.of(PDF),
@@ -91,6 +93,7 @@ def run(args: argparse.Namespace) -> int:
             certificate=args.certificate,
             positions=args.positions,
             model=args.model,
+            errors_in=errors_in(args),
         )
     if args.pdf is not None:
         made.save_pdf(args.pdf)

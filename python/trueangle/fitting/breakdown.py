@@ -30,7 +30,8 @@ def breakdown_sentence(problem: Problem, weighted: Weighted) -> str:
     rest = problem.residuals(weighted.fitted)
     scale, near = robust_scale(np.concatenate(rest)), _between_neighbours(problem, rest)
     if weighted.weights is None:
-        if scale <= _BENT * near:
+        # Most neighbours are equal where a joint rests or a grid is coarse: they tell nothing.
+        if near == 0.0 or scale <= _BENT * near:
             return ""
         return (
             f"the residuals are {scale / near:.2g} times what neighbours in angle differ by: the "

@@ -13,6 +13,7 @@ from ..certificate import Certificate, Identity, certify
 from ..diagnosis import diagnose
 from ..diagnosis.heldout import hold_out_extended
 from ..errors import ArgumentError, NoModelError, TrueAngleError
+from ..errorunits import ErrorsIn
 from ..files import CERTIFICATE, PDF, REPORT, check_output, written_atomically
 from ..fitting.heldout import HeldOut, hold_out
 from ..joint.joint import Joint
@@ -29,6 +30,7 @@ from .linenames import LineNames, line_names
 from .measured import measured
 from .modelled import modelled, selected
 from .phases import phases
+from .scale import Scale, scale_of
 from .spectrum import spectrum
 from .unknowns import unknowns
 
@@ -128,6 +130,7 @@ def report(
     certificate: None = None,
     positions: None = None,
     model: HarmonicModel | str | PathLike[str] | None = None,
+    errors_in: ErrorsIn = "auto",
 ) -> Report: ...
 
 
@@ -158,6 +161,7 @@ def report(
     certificate: Identity | str | PathLike[str] | None = None,
     positions: int | None = None,
     model: HarmonicModel | str | PathLike[str] | None = None,
+    errors_in: ErrorsIn = "auto",
 ) -> Report | Certificate:
     """Fit, select orders, hold out, diagnose and put it all on one page; or certify.
 
@@ -183,6 +187,10 @@ def report(
         A model that is there already, such as one calibrated without a reference: the
         report says in its first lines how it was made, what it is blind to, and what it
         leaves of these runs.
+    errors_in : str or float
+        Unit of every error on the page: ``"arcsec"``, ``"deg"``, ``"mrad"``, ``"count"``, or
+        the counts of a turn; ``"auto"`` is arcsec, or degrees where an error reaches a
+        degree. The content stays in arcsec.
 
     Returns
     -------
@@ -214,6 +222,8 @@ def report(
     if certificate is not None:
         if title is not None:
             raise ArgumentError("a certificate has no title of its own: its identity names it")
+        if errors_in != "auto":
+            raise ArgumentError("errors_in is for reports: a certificate states arcsec")
         certified = certify(
             found,
             certificate,
@@ -227,6 +237,8 @@ def report(
         return certified
     if positions is not None:
         raise ArgumentError("positions are those of a certificate: give certificate too")
+    sizes = measured(found)
+    scale = scale_of(errors_in, sizes["error"]["max_abs_arcsec"], found)
     at = pace()
     at.at("fitting", 0, _STAGES)
     fit, selection, why_not = _fitted(found, orders, gear_ratio, fixed_member)
@@ -240,7 +252,8 @@ def report(
         "format": FORMAT,
         "version": VERSION,
         "title": heading,
-        "measured": measured(found),
+        "errors_in": scale.to_dict(),
+        "measured": sizes,
         "selection": None if selection is None else selected(selection, name),
         "model": None if fit is None else modelled(fit, name),
         "why_no_model": why_not,
@@ -252,11 +265,11 @@ def report(
         "provenance": provenance(found, None if simulation is None else simulation.source),
     }
     at.at("drawing", 3, _STAGES)
-    drawn = _figures(found, fit, selection, held, name)
+    drawn = _figures(found, fit, selection, held, name, scale)
     if simulation is not None and diagnosis is not None:
         content["diagnosis"] = diagnosed(diagnosis)
         content["extended"] = _extended(fit, diagnosis, found, simulation)
-        drawn |= diagnosisfigures.figures_of(diagnosis, found, simulation)
+        drawn |= diagnosisfigures.figures_of(diagnosis, found, simulation, scale)
     content["unknowns"] = unknowns(found, selection, content["diagnosis"])
     made = Report(heading, content, drawn)
     if path is not None:
@@ -325,20 +338,21 @@ def _figures(
     selection: OrderSelection | None,
     held: HeldOut | None,
     name: LineNames,
+    scale: Scale,
 ) -> dict[str, dict[str, Any]]:
     """Every figure that this report has."""
     points = error_points(fit) if fit is not None else [_plain(r, i) for i, r in enumerate(runs)]
-    made = {"errors": figures.errors_of_runs(fit, runs, points)}
+    made = {"errors": figures.errors_of_runs(fit, runs, points, scale)}
     if fit is not None or selection is not None:
-        made["spectrum"] = spectrum(fit, selection, name)
+        made["spectrum"] = spectrum(fit, selection, name, scale)
     if held is not None:
-        made["before-after"] = figures.before_after(held, runs)
+        made["before-after"] = figures.before_after(held, runs, scale)
     if fit is not None:
-        multiples = phases(fit, name)
+        multiples = phases(fit, name, scale)
         if multiples is not None:
             made["phases"] = multiples
         for signal in figures.signals_present(fit):
-            made[f"residual-{signal}"] = figures.residuals(fit, signal)
+            made[f"residual-{signal}"] = figures.residuals(fit, signal, scale)
     return made
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import TYPE_CHECKING, Any, Final
 
 if TYPE_CHECKING:
@@ -23,10 +22,6 @@ _UNITS: Final = {
     "hz": "Hz",
     "s": "s",
 }
-
-
-#: Digits of a number without an uncertainty.
-_PLAIN_DIGITS: Final = 4
 
 
 def diagnosed(diagnosis: Diagnosis) -> dict[str, Any]:
@@ -58,25 +53,22 @@ def _parameter(index: int, name: str, entry: dict[str, Any]) -> dict[str, Any]:
     value, std = entry["value"], entry["std"]
     number = isinstance(value, int | float) and not isinstance(value, bool)
     unit = next((u for u in _UNITS if name.endswith(f"_{u}")), "")
-    known = number and isinstance(std, int | float)
     return {
         "index": index,
         "name": name.removesuffix(f"_{unit}").replace("_", " "),
         "unit": _UNITS.get(unit, ""),
         "value": value if number else None,
-        "std": std if known else None,
-        "digits": _digits(std, 2) if known else _digits(value, _PLAIN_DIGITS) if number else 0,
+        "std": std if number and isinstance(std, int | float) else None,
+        "values": _numbers(value),
         "text": "" if number else _text(value),
     }
 
 
-def _digits(value: float, significant: int) -> int:
-    """Digits after the point that show so many significant ones of ``value``."""
-    if value == 0.0 or not math.isfinite(value):
-        return significant
-    if significant == _PLAIN_DIGITS and float(value).is_integer():
-        return 0  # an order
-    return min(max(significant - 1 - math.floor(math.log10(abs(value))), 0), 12)
+def _numbers(value: Any) -> list[float] | None:
+    """A list of numbers, which the page writes in its own unit."""
+    if isinstance(value, list) and value and all(isinstance(v, float) for v in value):
+        return value
+    return None
 
 
 def _text(value: Any) -> str:

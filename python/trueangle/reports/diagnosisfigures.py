@@ -12,6 +12,7 @@ from ..plots.curves import Points
 from ..plots.simulatedcurves import gain_bars, left_without, simulated_points
 from .charts import Chart, Figure, figure
 from .figures import run_dots, turn
+from .scale import Scale
 
 if TYPE_CHECKING:
     from ..diagnosis import Diagnosis
@@ -28,28 +29,29 @@ def figures_of(
     diagnosis: Diagnosis,
     runs: Sequence[CalibrationRun],
     sim: Simulation,
+    scale: Scale,
 ) -> dict[str, Figure]:
     """Measured against simulated; what is left without each cause, and gains, of several causes.
 
     A chart of one bar says less than the sentence beside it: it is left out.
     """
-    found = {"measured-simulated": _compared(runs, sim)}
+    found = {"measured-simulated": _compared(runs, sim, scale)}
     left = left_without(diagnosis)
     if len(left) > 2:
-        found["error-left"] = _left(diagnosis, left)
+        found["error-left"] = _left(diagnosis, left, scale)
     if len(gain_bars(diagnosis)) > 1:
         found["gains"] = _gains(diagnosis)
     return found
 
 
-def _compared(runs: Sequence[CalibrationRun], sim: Simulation) -> Figure:
+def _compared(runs: Sequence[CalibrationRun], sim: Simulation, scale: Scale) -> Figure:
     """Both in one chart, the difference below: neither hides another."""
     pairs = simulated_points(runs, sim)
     low, high = turn(None)
-    both = Chart("", "error / arcsec", x_range=(low, high), height_rem=16.0)
+    both = Chart("", f"error / {scale.name}", x_range=(low, high), height_rem=16.0)
     apart = Chart(
         "reference angle / deg",
-        "difference / arcsec",
+        f"difference / {scale.name}",
         x_range=(low, high),
         height_rem=16.0,
     )
@@ -61,7 +63,7 @@ def _compared(runs: Sequence[CalibrationRun], sim: Simulation) -> Figure:
             ("measured", measured, "circle", True),
             ("simulated", simulated, "circle", False),
         ):
-            part = curves.thinned(points, most)
+            part = curves.thinned(scale.points(points), most)
             both.dots(
                 part.x,
                 part.y,
@@ -71,34 +73,37 @@ def _compared(runs: Sequence[CalibrationRun], sim: Simulation) -> Figure:
                 size=5.0 if hollow else 2.0,
                 hollow=hollow,
                 run=number,
-                hover=f"run {measured.label}, {name}: @y{{0.00}} arcsec at @x{{0.00}}°",
+                hover=f"run {measured.label}, {name}: {scale.read} at @x{{0.00}}°",
             )
-        rest = Points(measured.label, measured.x, measured.y - simulated.y)
-        run_dots(apart, number, rest, len(runs))
+        rest = scale.points(Points(measured.label, measured.x, measured.y - simulated.y))
+        run_dots(apart, number, rest, len(runs), scale)
     alt = (
         f"Measured error of {len(runs)} runs and the error that the simulation expects at the same "
-        "readings, and below it the measured less the simulated one, in arcsec over one turn."
+        f"readings, and below it the measured less the simulated one, in {scale.name} over a turn."
     )
     return figure(alt, [both, apart], "stacked")
 
 
-def _left(diagnosis: Diagnosis, left: Sequence[tuple[str, float]]) -> Figure:
+def _left(diagnosis: Diagnosis, left: Sequence[tuple[str, float]], scale: Scale) -> Figure:
     names = [name for name, _ in left]
-    sizes = np.array([rms for _, rms in left])
+    sizes = scale.of(np.array([rms for _, rms in left]))
+    noise = scale.of(np.array([diagnosis.noise]))[0]
+    hover = f"@y: @x{{{scale.finest}}} {scale.name} rms"
     chart = Chart(
-        "rms left of held-out readings / arcsec",
+        f"rms left of held-out readings / {scale.name}",
         "",
-        x_range=(0.0, 1.08 * float(max(sizes.max(), diagnosis.noise))),
+        x_range=(0.0, 1.08 * float(max(sizes.max(), noise))),
         categories=names,
         height_rem=7.0 + 2.0 * len(names),
     )
-    chart.bars(names[:1], sizes[:1], colour="after", hover="@y: @x{0.00} arcsec rms")
-    chart.bars(names[1:], sizes[1:], colour="before", hover="@y: @x{0.00} arcsec rms")
-    chart.upright(diagnosis.noise, label=f"noise of one reading, {diagnosis.noise:.2f} arcsec")
+    chart.bars(names[:1], sizes[:1], colour="after", hover=hover)
+    chart.bars(names[1:], sizes[1:], colour="before", hover=hover)
+    told = scale.unit.text(diagnosis.noise)
+    chart.upright(noise, label=f"noise of one reading, {told}")
     alt = (
         "Rms left of held-out readings with all causes in place and without each: "
-        + ", ".join(f"{name} {rms:.2f} arcsec" for name, rms in left)
-        + f". Noise of one reading {diagnosis.noise:.2f} arcsec."
+        + ", ".join(f"{name} {scale.unit.text(rms)}" for name, rms in left)
+        + f". Noise of one reading {told}."
     )
     return figure(alt, [chart])
 

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from ..plots import curves
 from ..plots.curves import CONFIDENCE, Curve, Points
 from .charts import Chart, Figure, figure, run_colour, run_marker
+from .scale import Scale
 
 if TYPE_CHECKING:
     from ..fitting.heldout import HeldOut
@@ -37,9 +38,10 @@ _STRETCH_TICKS: Final = 4.0
 
 
 def run_dots(
-    chart: Chart, number: int, points: Points, runs: int, *, size: float = 4.0, zoomed: bool = False
-) -> None:
-    """Readings of one run."""
+    chart: Chart, number: int, points: Points, runs: int, scale: Scale,
+    *, size: float = 4.0, zoomed: bool = False,
+) -> None:  # fmt: skip
+    """Readings of one run, in the unit of the page or another signal's."""
     part = points if zoomed else curves.thinned(points, max(50, _MOST_POINTS // runs))
     chart.dots(
         part.x,
@@ -50,7 +52,7 @@ def run_dots(
         run=number,
         # The table of runs has their symbols; a long legend would leave no picture.
         label=f"run {points.label}" if runs <= _MOST_IN_LEGEND and not zoomed else "",
-        hover=f"run {points.label}: @y{{0.00}} arcsec at @x{{0.00}}°",
+        hover=f"run {points.label}: {scale.read} at @x{{0.00}}°",
     )
 
 
@@ -60,7 +62,7 @@ def turn(model: HarmonicModel | None) -> tuple[float, float]:
 
 
 def errors_of_runs(
-    fit: FitResult | None, runs: Sequence[CalibrationRun], everything: list[Points]
+    fit: FitResult | None, runs: Sequence[CalibrationRun], measured: list[Points], scale: Scale
 ) -> Figure:
     """Measured error of every run with the model and its band.
 
@@ -68,24 +70,25 @@ def errors_of_runs(
     curve, and a stretch of a few periods beside it shows the curve itself.
     """
     low, high = turn(None if fit is None else fit.model)
-    y = "error less the run's zero / arcsec"
+    everything = [scale.points(points) for points in measured]
+    y = f"error less the run's zero / {scale.name}"
     dense = fit is not None and max(fit.orders, default=0.0) > _DENSE
     main = Chart("reference angle / deg", y, x_range=(low, high), grow=2.0)
     main.angle_axis(low, high)
     charts = [main]
     if fit is not None:
-        curve = curves.model_curve(fit.model)
+        curve = scale.curve(curves.model_curve(fit.model))
         if dense:
             places, least, most = _envelope(curve)
             main.band(places, least, most, colour="model", label="envelope of the model")
         else:
             _draw_model(main, curve)
     for i, points in enumerate(everything):
-        run_dots(main, i, points, len(runs))
+        run_dots(main, i, points, len(runs), scale)
     if fit is not None and dense:
-        charts.append(_stretch(fit, everything, y))
+        charts.append(_stretch(fit, everything, y, scale))
     what = "the fitted model with its 95 % band" if fit is not None else "no model"
-    alt = f"Measured error in arcsec over one turn for {len(runs)} run(s), with {what}"
+    alt = f"Measured error in {scale.name} over one turn for {len(runs)} run(s), with {what}"
     alt += "; a short stretch is shown larger beside it." if dense else "."
     return figure(alt, charts)
 
@@ -110,7 +113,7 @@ def _envelope(curve: Curve) -> tuple[Array, Array, Array]:
     )
 
 
-def _stretch(fit: FitResult, everything: list[Points], y: str) -> Chart:
+def _stretch(fit: FitResult, everything: list[Points], y: str, scale: Scale) -> Chart:
     """A few periods of the strongest gear order, as large as they are."""
     strong = max(
         (pair for pair in zip(fit.amplitudes, fit.orders, strict=True) if pair[1] > _DENSE),
@@ -127,20 +130,21 @@ def _stretch(fit: FitResult, everything: list[Points], y: str) -> Chart:
         title=f"A stretch of {width:.3g}°: {_PERIODS:g} periods of order {strong:g}",
     )
     chart.angle_axis(start, start + width, _STRETCH_TICKS)
-    whole = curves.model_curve(fit.model, (start, start + width))
+    whole = scale.curve(curves.model_curve(fit.model, (start, start + width)))
     _draw_model(chart, whole, "model there")
     for i, points in enumerate(everything):
         inside = (points.x >= start) & (points.x <= start + width)
         part = Points(points.label, points.x[inside], points.y[inside])
-        run_dots(chart, i, part, len(everything), size=6.0, zoomed=True)
+        run_dots(chart, i, part, len(everything), scale, size=6.0, zoomed=True)
     return chart
 
 
-def before_after(held: HeldOut, runs: Sequence[CalibrationRun]) -> Figure:
+def before_after(held: HeldOut, runs: Sequence[CalibrationRun], scale: Scale) -> Figure:
     """Error of every held-out run before and after correction."""
     model = next((run.model for run in held.runs if run.model is not None), None)
     low, high = turn(model)
-    chart = Chart("reference angle / deg", "error of held-out runs / arcsec", x_range=(low, high))
+    y = f"error of held-out runs / {scale.name}"
+    chart = Chart("reference angle / deg", y, x_range=(low, high))
     chart.angle_axis(low, high)
     most = max(50, _MOST_POINTS // (2 * len(held.runs)))
     for name, marker in (("before", "square"), ("after", "circle")):
@@ -148,7 +152,7 @@ def before_after(held: HeldOut, runs: Sequence[CalibrationRun]) -> Figure:
             first = 0.0 if run.model is None else curves.seen_span(run.model)[0]
             points = Points(run.label, curves.degrees(run.run, first), getattr(run, name))
             index = next(i for i, known in enumerate(runs) if known is run.run)
-            part = curves.thinned(points, most)
+            part = curves.thinned(scale.points(points), most)
             chart.dots(
                 part.x,
                 part.y,
@@ -156,7 +160,7 @@ def before_after(held: HeldOut, runs: Sequence[CalibrationRun]) -> Figure:
                 marker=marker,
                 run=index,
                 label=name,
-                hover=f"run {run.label}, {name}: @y{{0.00}} arcsec at @x{{0.00}}°",
+                hover=f"run {run.label}, {name}: {scale.read} at @x{{0.00}}°",
             )
     alt = (
         f"Error of {len(held.runs)} runs over one turn before and after correction by a model "
@@ -180,12 +184,12 @@ def _signal(run: CalibrationRun, name: str) -> Array | None:
     return value
 
 
-def residuals(fit: FitResult, against: str) -> Figure:
+def residuals(fit: FitResult, against: str, scale: Scale) -> Figure:
     """What the model leaves, against one signal."""
-    points = curves.residual_points(fit, against)
+    points = [scale.points(part) for part in curves.residual_points(fit, against)]
     by_label = {(run.label or str(i + 1)): i for i, run in enumerate(fit.runs)}
     x_range = {"angle": turn(fit.model), "direction": (-1.5, 1.5)}.get(against)
-    chart = Chart(curves.SIGNALS[against], "residual / arcsec", x_range=x_range)
+    chart = Chart(curves.SIGNALS[against], f"residual / {scale.name}", x_range=x_range)
     if against == "angle":
         chart.angle_axis(*turn(fit.model))
     if against == "direction":
@@ -193,8 +197,8 @@ def residuals(fit: FitResult, against: str) -> Figure:
     for part in points:
         number = by_label[part.label]
         drawn = _beside(part, number, len(points)) if against == "direction" else part
-        run_dots(chart, number, drawn, len(points))
-    alt = f"Residual of the fitted model in arcsec against {against}, {len(points)} run(s)."
+        run_dots(chart, number, drawn, len(points), scale)
+    alt = f"Residual of the fitted model in {scale.name} against {against}, {len(points)} run(s)."
     return figure(alt, [chart])
 
 

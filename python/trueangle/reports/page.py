@@ -11,14 +11,12 @@ from typing import TYPE_CHECKING, Any
 
 from ..errors import MissingExtraError
 from . import charts, wording
+from .numbers import Numbers
 
 if TYPE_CHECKING:
     from .composition import Report
 
-__all__ = ["formatted", "lookup", "render"]
-
-#: Stands where there is no number.
-NONE = "\u2013"
+__all__ = ["render"]
 
 _TEMPLATES = Path(__file__).parent / "templates"
 
@@ -32,14 +30,7 @@ def render(report: Report) -> str:
         raise MissingExtraError(
             "reports need bokeh and jinja2: pip install 'trueangle[report]'"
         ) from None
-    content = report.content
-
-    def number(path: str, digits: int = 2, unit: str = "") -> Any:
-        """A value of the content as text, marked with where it stands."""
-        text = formatted(lookup(content, path), digits)
-        mark = Markup('<span class="n" data-path="{}" data-digits="{}">{}</span>')
-        return mark.format(path, digits, text) + (f"\u00a0{unit}" if unit and text != NONE else "")
-
+    numbers = Numbers(report.content)
     environment = Environment(
         loader=FileSystemLoader(_TEMPLATES),
         autoescape=True,
@@ -47,7 +38,8 @@ def render(report: Report) -> str:
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    environment.globals |= {"n": number, "wording": wording, "swatch": charts.swatch}
+    environment.globals |= {"show": numbers, "wording": wording, "swatch": charts.swatch}
+    content = report.content
     return environment.get_template("report.html.j2").render(
         c=content,
         figures=report.figures,
@@ -57,33 +49,6 @@ def render(report: Report) -> str:
         script=Markup((_TEMPLATES / "report.js").read_text("utf-8")),
         library=Markup(_library()),
     )
-
-
-def lookup(content: Any, path: str) -> Any:
-    """The value at ``path``: keys and list indices joined by dots.
-
-    Examples
-    --------
-    >>> lookup({"runs": [{"readings": 36}]}, "runs.0.readings")
-    36
-    """
-    for key in path.split("."):
-        content = content[int(key)] if isinstance(content, list) else content[key]
-    return content
-
-
-def formatted(value: float | None, digits: int) -> str:
-    r"""A number as the page shows it; a dash for none.
-
-    Examples
-    --------
-    >>> formatted(-0.004, 2), formatted(None, 2)
-    ('0.00', '\u2013')
-    """
-    if value is None:
-        return NONE
-    text = f"{value:.{digits}f}"
-    return text.lstrip("-") if float(text) == 0.0 else text
 
 
 def _embedded(value: Any) -> str:

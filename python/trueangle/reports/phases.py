@@ -7,9 +7,11 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from ..errors import RankError
+from ..errorunits import significant
 from ..fitting.phases import Phases, run_phases
 from .charts import Chart, Figure, figure, run_colour, run_marker
 from .linenames import LineNames
+from .scale import Scale
 
 if TYPE_CHECKING:
     from ..fitting.result import FitResult
@@ -22,7 +24,7 @@ _MOST: Final = 12
 _LEAST: Final = 15.0
 
 
-def phases(fit: FitResult, name: LineNames) -> Figure | None:
+def phases(fit: FitResult, name: LineNames, scale: Scale) -> Figure | None:
     """Phase of every order in every run; None where no run holds them, or there is one."""
     try:
         found = sorted(run_phases(fit), key=lambda p: -float(p.amplitude.mean()))[:_MOST]
@@ -32,7 +34,7 @@ def phases(fit: FitResult, name: LineNames) -> Figure | None:
         return None
     numbers = {(run.label or str(i + 1)): i for i, run in enumerate(fit.runs)}
     charts = [
-        _of_order(order, numbers, name(order.order))
+        _of_order(order, numbers, name(order.order), scale)
         for order in sorted(found, key=lambda p: p.order)
     ]
     alt = (
@@ -42,7 +44,7 @@ def phases(fit: FitResult, name: LineNames) -> Figure | None:
     return figure(alt, charts, "multiples")
 
 
-def _of_order(order: Phases, numbers: dict[str, int], name: str) -> Chart:
+def _of_order(order: Phases, numbers: dict[str, int], name: str, scale: Scale) -> Chart:
     mean = np.angle(np.mean(order.amplitude * np.exp(1j * order.phase)))
     around = np.angle(np.exp(1j * (order.phase - mean)))
     degrees = np.degrees(mean + around)
@@ -50,12 +52,13 @@ def _of_order(order: Phases, numbers: dict[str, int], name: str) -> Chart:
     if middle < 0.0:
         degrees, middle = degrees + 360.0, middle + 360.0
     half = min(max(1.3 * float(np.abs(np.degrees(around)).max()), _LEAST), 190.0)
+    size = significant(scale.factor * float(order.amplitude.mean()), 3)
     chart = Chart(
         "run",
         "phase / deg",
         x_range=(0.3, len(order.labels) + 0.7),
         y_range=(middle - half, middle + half),
-        title=f"{name.capitalize()}: {_size(float(order.amplitude.mean()))} arcsec",
+        title=f"{name.capitalize()}: {size} {scale.name}",
         height_rem=11.0,
     )
     chart.whole_axis(1.0, float(len(order.labels)), 7)
@@ -68,17 +71,6 @@ def _of_order(order: Phases, numbers: dict[str, int], name: str) -> Chart:
             marker=run_marker(number),
             run=number,
             size=8.0,
-            hover=f"run {label}: {order.amplitude[place]:.2f} arcsec at @y{{0.0}}°",
+            hover=f"run {label}: {scale.unit.text(float(order.amplitude[place]))} at @y{{0.0}}°",
         )
     return chart
-
-
-def _size(value: float) -> str:
-    """Three digits, without an exponent.
-
-    Examples
-    --------
-    >>> _size(1510.2), _size(57.31), _size(0.0312)
-    ('1510', '57.3', '0.0312')
-    """
-    return f"{value:.0f}" if value >= 100.0 else f"{value:.3g}"

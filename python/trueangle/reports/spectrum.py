@@ -12,6 +12,7 @@ from ..plots.curves import CONFIDENCE
 from ..plots.orderaxis import order_groups
 from .charts import Chart, Figure, figure
 from .linenames import LineNames
+from .scale import Scale
 
 if TYPE_CHECKING:
     from ..fitting.result import FitResult
@@ -25,9 +26,13 @@ _MOST_NAMED: Final = 8
 _FLOOR: Final = 0.2
 
 
-def spectrum(fit: FitResult | None, selection: OrderSelection | None, name: LineNames) -> Figure:
+def spectrum(
+    fit: FitResult | None, selection: OrderSelection | None, name: LineNames, scale: Scale
+) -> Figure:
     """Amplitude of every order: candidates of a selection, or the orders of a fit."""
     rows = _of_fit(fit, name) if selection is None else _of_selection(selection, name)
+    for row in rows:
+        row |= {size: scale.factor * row[size] for size in ("amplitude", "half", "limit")}
     kept = [row for row in rows if row["kept"]]
     seen = [row["limit"] for row in rows if row["limit"] > 0.0]
     seen += [row["amplitude"] for row in (kept or rows) if row["amplitude"] > 0.0]
@@ -38,12 +43,12 @@ def spectrum(fit: FitResult | None, selection: OrderSelection | None, name: Line
     for group in order_groups([row["order"] for row in rows]):
         inside = [row for row in rows if group[0] <= row["order"] <= group[1]]
         here = [row for row in named if row in inside]
-        charts.append(_group(inside, group, (floor, top), here, joined=bool(charts)))
+        charts.append(_group(inside, group, (floor, top), here, scale, joined=bool(charts)))
     names = ", ".join(f"{row['order']:g}" for row in kept) or "none"
     what = "fitted orders with 95 % intervals" if selection is None else (
         "candidate orders with the threshold of significance"
     )  # fmt: skip
-    alt = f"Amplitude in arcsec of {len(rows)} {what}. Retained: {names}."
+    alt = f"Amplitude in {scale.name} of {len(rows)} {what}. Retained: {names}."
     return figure(alt, charts, "joined")
 
 
@@ -52,6 +57,7 @@ def _group(
     group: tuple[float, float],
     y_range: tuple[float, float],
     named: list[dict[str, Any]],
+    scale: Scale,
     joined: bool,
 ) -> Chart:
     low, high = group
@@ -59,7 +65,7 @@ def _group(
     margin = max(0.06 * width, 1.0)
     chart = Chart(
         "order" if joined else "order / cycles per output turn",
-        "amplitude / arcsec",
+        f"amplitude / {scale.name}",
         x_range=(low - margin, high + margin),
         y_range=y_range,
         log_y=True,
@@ -75,7 +81,7 @@ def _group(
         x = np.array([row["order"] for row in some])
         size = np.maximum([row["amplitude"] for row in some], y_range[0])
         told = {"order": [f"{row['order']:g}" for row in some], "told": [r["told"] for r in some]}
-        hover = "order @order: @y{0.00} arcsec @told"
+        hover = f"order @order: {scale.read} @told"
         chart.stems(x, y_range[0], size, colour=colour, label=_once(label, joined))
         chart.dots(x, size, colour=colour, size=7.0, hover=hover, columns=told, hollow=not kept)
     limited = [row for row in rows if row["limit"] > 0.0]

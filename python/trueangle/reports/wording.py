@@ -4,7 +4,15 @@ from __future__ import annotations
 
 from typing import Any, Final
 
-__all__ = ["FIGURE_TITLES", "cause_name", "joined", "residual_signals", "verdict"]
+__all__ = [
+    "FIGURE_TITLES",
+    "cause_name",
+    "gain_paths",
+    "joined",
+    "paths",
+    "residual_signals",
+    "verdict",
+]
 
 FIGURE_TITLES: Final = {
     "errors": "Measured error of every run, and the model",
@@ -58,3 +66,20 @@ def joined(items: list[Any]) -> str:
 def residual_signals(figures: dict[str, Any]) -> list[str]:
     """Signals that the residual is drawn against."""
     return [name.removeprefix("residual-") for name in figures if name.startswith("residual-")]
+
+
+def paths(pattern: str, entries: list[Any]) -> list[str]:
+    """Where the same number of every entry stands in the content.
+
+    Examples
+    --------
+    >>> paths("runs.{}.rms", ["a", "b"])
+    ['runs.0.rms', 'runs.1.rms']
+    """
+    return [pattern.format(i) for i in range(len(entries))]
+
+
+def gain_paths(findings: list[dict[str, Any]]) -> list[str]:
+    """Where what is left after each finding stands."""
+    every = enumerate(findings)
+    return [f"diagnosis.findings.{i}.gain.rms_after_arcsec" for i, f in every if f["gain"]]

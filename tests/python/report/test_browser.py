@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from trueangle.reports.page import formatted, lookup
+from trueangle.reports.numbers import formatted, lookup
 from trueangle.reports.pdf import find_browser
 
 playwright = pytest.importorskip("playwright.sync_api")
@@ -239,11 +239,13 @@ def test_tables_equal_the_json(page: Page, made) -> None:
     assert result == made.content
     shown = page.page.evaluate(
         """[...document.querySelectorAll("td .n, .card .n, p .n")]
-           .map((e) => [e.dataset.path, Number(e.dataset.digits), e.textContent])"""
+           .map((e) => [e.dataset, e.textContent]).map(([data, text]) =>
+             [data.path, Number(data.per), Number(data.digits), text])"""
     )
     assert len(shown) > 150
-    for path, digits, text in shown:
-        assert text == formatted(lookup(result, path), digits), path
+    for path, per, digits, text in shown:
+        value = lookup(result, path)
+        assert text == formatted(None if value is None else value * per, digits), path
 
 
 def test_box_of_a_run_hides_it_in_every_figure(page: Page) -> None:

@@ -14,7 +14,7 @@ import trueangle as ta
 from trueangle.cli import main
 from trueangle.errors import ArgumentError, MissingExtraError
 from trueangle.fitting.heldout import hold_out
-from trueangle.reports.page import formatted, lookup
+from trueangle.reports.numbers import formatted, lookup
 from trueangle.reports.pdf import find_browser, print_pdf
 
 from .conftest import ORDERS
@@ -99,16 +99,22 @@ def drawn_columns(chart: dict) -> list[dict]:
     return [m for m in models(chart) if m["name"] == "ColumnDataSource"]
 
 
-def page_numbers(page: str) -> list[tuple[str, int, str]]:
-    found = re.findall(r'<span class="n" data-path="([^"]+)" data-digits="(\d+)">([^<]*)<', page)
-    return [(path, int(digits), html.unescape(text)) for path, digits, text in found]
+def page_numbers(page: str) -> list[tuple[str, float, int, str]]:
+    mark = r'<span class="n" data-path="([^"]+)" data-per="([^"]+)" data-digits="(\d+)">([^<]*)<'
+    found = re.findall(mark, page)
+    return [(path, float(per), int(d), html.unescape(text)) for path, per, d, text in found]
+
+
+def written(content: dict, path: str, per: float, digits: int) -> str:
+    value = lookup(content, path)
+    return formatted(None if value is None else value * per, digits)
 
 
 def test_every_number_of_the_page_is_the_content(made) -> None:
     numbers = page_numbers(made.html)
     assert len(numbers) > 150
-    for path, digits, text in numbers:
-        assert text == formatted(lookup(made.content, path), digits), path
+    for path, per, digits, text in numbers:
+        assert text == written(made.content, path, per, digits), path
 
 
 def test_no_number_stands_on_the_page_without_its_path(made) -> None:
@@ -222,9 +228,9 @@ def test_diagnosis_is_on_the_page(demo, runs) -> None:
 
 def test_numbers_of_the_diagnosis_are_the_content(demo) -> None:
     numbers = page_numbers(demo.html)
-    assert any(path.startswith("diagnosis.findings.0.gain") for path, _, _ in numbers)
-    for path, digits, text in numbers:
-        assert text == formatted(lookup(demo.content, path), digits), path
+    assert any(path.startswith("diagnosis.findings.0.gain") for path, *_ in numbers)
+    for path, per, digits, text in numbers:
+        assert text == written(demo.content, path, per, digits), path
 
 
 def test_extended_simulation_can_be_read_back(demo, tmp_path) -> None:

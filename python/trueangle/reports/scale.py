@@ -1,0 +1,99 @@
+"""The unit of a page's errors, and how they are read off its figures."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errorunits import ErrorsIn, ErrorUnit, error_unit
+from ..plots.curves import Curve, Points
+from ..runs import CalibrationRun
+
+__all__ = ["Scale", "scale_of"]
+
+#: Part of the largest error that hovering over a point still shows.
+_FINEST: Final = 1e-4
+
+
+@dataclass(frozen=True)
+class Scale:
+    """One unit for every error of a page; results are in arcsec, what is drawn in it.
+
+    Attributes
+    ----------
+    unit : ErrorUnit
+    largest : float
+        Largest absolute error of the page, arcsec.
+    turn : float or None
+        Counts of a turn where the unit is a count.
+    """
+
+    unit: ErrorUnit
+    largest: float
+    turn: float | None = None
+
+    @property
+    def name(self) -> str:
+        """The unit's name."""
+        return self.unit.name
+
+    @property
+    def factor(self) -> float:
+        """How many of the unit one second of arc is."""
+        return self.unit.per_arcsec
+
+    @property
+    def finest(self) -> str:
+        """Format of a number that is read off a figure, as Bokeh writes it."""
+        decimals = self.unit.decimals(_FINEST * self.largest, 1)
+        return f"0.{'0' * decimals}" if decimals else "0"
+
+    @property
+    def read(self) -> str:
+        """An error that is read off a figure by hovering, with its unit."""
+        return f"@y{{{self.finest}}} {self.name}"
+
+    @property
+    def defined(self) -> str:
+        """What the unit is, for those who do not know it."""
+        return {
+            "arcsec": "in seconds of arc (1 arcsec = 1/3600 degree)",
+            "deg": "in degrees",
+            "mrad": "in thousandths of a radian (1 mrad = 0.0573 degree)",
+            "count": f"in counts of {self.turn:g} to a turn" if self.turn else "in counts",
+        }[self.name]
+
+    def of(self, arcsec: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Errors in the unit."""
+        return arcsec * self.factor
+
+    def points(self, points: Points) -> Points:
+        """Readings of a run in the unit."""
+        return Points(points.label, points.x, self.of(points.y))
+
+    def curve(self, curve: Curve) -> Curve:
+        """A model in the unit."""
+        std = None if curve.std is None else self.of(curve.std)
+        return Curve(curve.angle, self.of(curve.error), std)
+
+    def to_dict(self) -> dict[str, Any]:
+        """For the content: the unit of the page, beside numbers that stay in arcsec."""
+        return {"unit": self.name, "per_arcsec": self.factor, "defined": self.defined}
+
+
+def scale_of(asked: ErrorsIn, largest: float, runs: Sequence[CalibrationRun]) -> Scale:
+    """The scale asked for; counts are those of the runs where no number says otherwise.
+
+    Raises
+    ------
+    ArgumentError
+        Another word; counts where nothing says how many a turn has.
+    """
+    period = runs[0].period
+    unit = error_unit(asked, largest, period)
+    turn = None if unit.name != "count" else period if isinstance(asked, str) else float(asked)
+    return Scale(unit, largest, turn)
