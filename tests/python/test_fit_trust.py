@@ -119,6 +119,14 @@ def test_a_robust_fit_beyond_its_breakdown_says_so(loss, kind, seed):
     assert not warned(within)
 
 
+def test_readings_of_a_joint_at_rest_are_fitted():
+    """Most neighbours are equal: how they differ is no measure of the noise."""
+    x = np.repeat(np.arange(0.0, 360.0, 5.0), 20)
+    error = 0.1 * np.sin(np.radians(x)) + np.where(np.mod(x, 50.0) < 10.0, 1.0, 0.0)
+    found = ta.fit(ta.CalibrationRun(x, x + error, 360.0), [1])
+    assert np.isfinite(found.residual_std)
+
+
 def test_a_block_of_outliers_cannot_hide_behind_the_scale_it_makes():
     found = ta.fit(block(1, 0.05, "constant"), range(1, 6))
     assert found.amplitudes[2] == pytest.approx(0.1, abs=0.005)

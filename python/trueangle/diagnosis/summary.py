@@ -196,6 +196,8 @@ def _by_level(gain: LevelGain, unit: ErrorUnit) -> str:
 
 def _unit_of(name: str, unit: ErrorUnit) -> tuple[str, ErrorUnit]:
     """What a parameter is called in ``unit``, and the unit that it is shown in."""
+    # The amplitudes of several lines, whose name says no unit.
+    name = "amplitudes_arcsec" if name == "amplitudes" else name
     stem = name.removesuffix("_arcsec")
     return (name, _PLAIN) if stem == name else (f"{stem}_{unit.name}", unit)
 

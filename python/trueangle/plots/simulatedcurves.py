@@ -11,6 +11,7 @@ import numpy as np
 from ..angles import ARCSEC_PER_TURN, circular_mean, wrap
 from ..runs import CalibrationRun
 from .curves import Points, degrees, label_of
+from .findingnames import finding_names
 
 if TYPE_CHECKING:
     from ..diagnosis import Diagnosis
@@ -55,8 +56,8 @@ def left_without(diagnosis: Diagnosis) -> list[tuple[str, float]]:
     From the gains of the findings that carry over to new runs; empty where none does.
     """
     known = [
-        (finding.cause.replace("_", " "), finding.gain)
-        for finding in diagnosis.findings
+        (name, finding.gain)
+        for name, finding in zip(finding_names(diagnosis), diagnosis.findings, strict=True)
         if finding.gain is not None and finding.gain.reducible_share is not None
     ]
     if not known:
@@ -69,12 +70,12 @@ def gain_bars(diagnosis: Diagnosis) -> list[GainBar]:
     """Findings whose gain carries over to new runs."""
     return [
         GainBar(
-            finding.cause.replace("_", " "),
+            name,
             100.0 * gain.reducible_share,
             100.0 * gain.interval[0],
             100.0 * gain.interval[1],
         )
-        for finding in diagnosis.findings
+        for name, finding in zip(finding_names(diagnosis), diagnosis.findings, strict=True)
         if (gain := finding.gain) is not None
         and gain.reducible_share is not None
         and gain.interval is not None

@@ -28,7 +28,7 @@ _FEW_DECADES: Final = 4
 #: A figure of the report: its alternative text and the charts that it consists of.
 Figure = dict[str, Any]
 
-#: Colours of runs in the style sheet, and markers that tell more runs apart.
+#: Colours of runs in the style sheet, and markers: every run of the first 36 has a pair of its own.
 _COLOURS: Final = 6
 _MARKERS: Final = ("circle", "square", "triangle", "diamond", "inverted_triangle", "cross")
 _GLYPHS: Final = ("●", "■", "▲", "◆", "▼", "✚")
@@ -40,13 +40,17 @@ def run_colour(number: int) -> str:
 
 
 def run_marker(number: int) -> str:
-    """Marker of a run; with the colours it tells the first six apart."""
-    return _MARKERS[number % len(_MARKERS)]
+    """Marker of a run; another one with the same colour every six runs."""
+    return _MARKERS[_shape(number)]
 
 
 def swatch(number: int) -> tuple[str, str]:
     """Colour and symbol of a run, for the table of runs."""
-    return f"var(--{run_colour(number)})", _GLYPHS[number % len(_GLYPHS)]
+    return f"var(--{run_colour(number)})", _GLYPHS[_shape(number)]
+
+
+def _shape(number: int) -> int:
+    return (number + number // _COLOURS) % len(_MARKERS)
 
 
 def figure(alt: str, charts: Sequence[Chart], arrangement: str = "row") -> Figure:
@@ -64,7 +68,7 @@ class Chart:
         Titles of the axes, with units.
     x_range, y_range : (float, float), optional
         By default what the data cover.
-    log_y : bool
+    log_x, log_y : bool
     categories : list of str, optional
         The y axis lists these, from the top down, instead of numbers.
     title : str
@@ -84,6 +88,7 @@ class Chart:
         *,
         x_range: tuple[float, float] | None = None,
         y_range: tuple[float, float] | None = None,
+        log_x: bool = False,
         log_y: bool = False,
         categories: Sequence[str] | None = None,
         title: str = "",
@@ -99,6 +104,8 @@ class Chart:
             ) from None
         self._models = models
         self.title, self.grow, self.height_rem = title, grow, height_rem
+        #: What the x axis shows, where it was given.
+        self.x_range = x_range or (0.0, 0.0)
         ranges: dict[str, Any] = {}
         if x_range is not None:
             ranges["x_range"] = x_range
@@ -116,13 +123,16 @@ class Chart:
             # The last number of the axis reaches beyond it.
             min_border_right=14,
             tools=[],
+            x_axis_type="log" if log_x else "auto",
             y_axis_type="log" if log_y else "auto",
             x_axis_label=x,
             y_axis_label=y,
             **ranges,
         )
+        if log_x and x_range is not None:
+            self._log_axis(self._figure.xaxis, self._figure.xgrid, *x_range)
         if log_y and y_range is not None:
-            self._log_axis(*y_range)
+            self._log_axis(self._figure.yaxis, self._figure.ygrid, *y_range)
         if joined:
             self._figure.yaxis.visible = False
         zoom = models.BoxZoomTool()
@@ -225,6 +235,19 @@ class Chart:
             )
             self._add(error, "fore", "", None, "")
 
+    def level_stems(
+        self, names: Sequence[str], low: float, values: Array, *, colour: str, hover: str = ""
+    ) -> None:
+        """Level lines of the categories from ``low`` to a dot at their value."""
+        data = {"y": list(names), "x": _short(values), "low": _short(np.full(len(names), low))}
+        source = self._models.ColumnDataSource(data)
+        line = self._figure.segment(
+            x0="low", x1="x", y0="y", y1="y", source=source, line_width=3.0, line_cap="butt"
+        )
+        self._add(line, colour, "", None, "")
+        dot = self._figure.scatter("x", "y", source=source, size=11.0, line_alpha=0.0)
+        self._add(dot, colour, "", None, hover)
+
     def upright(self, x: float, *, label: str) -> None:
         """A dashed line over the whole height."""
         span = _span(x)
@@ -248,7 +271,7 @@ class Chart:
 
     def angle_axis(self, low: float, high: float, most: float = 9.0) -> None:
         """Ticks at whole parts of a turn, about ``most`` of them."""
-        for step in (0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 15.0, 30.0, 45.0, 90.0, 360.0, 1800.0):
+        for step in (0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 15.0, 30.0, 45.0, 90.0, 360.0, 1800.0):
             if (high - low) / step <= most:
                 first = np.ceil(low / step)
                 ticks = step * np.arange(first, np.floor(high / step) + 1.0)
@@ -263,14 +286,14 @@ class Chart:
         ticks = np.arange(step * np.ceil(low / step), high + 1e-9, step)
         self._figure.xaxis.ticker = self._models.FixedTicker(ticks=ticks.tolist())
 
-    def _log_axis(self, low: float, high: float) -> None:
+    def _log_axis(self, axis: Any, grid: Any, low: float, high: float) -> None:
         """Ticks at 1, 2 and 5 of every decade while these are few, else at decades alone."""
         decades = np.arange(np.floor(np.log10(low)), np.ceil(np.log10(high)) + 1.0)
         marks = (1.0, 2.0, 5.0) if decades.size <= _FEW_DECADES else (1.0,)
         ticks = [m * 10.0**d for d in decades for m in marks if low <= m * 10.0**d <= high]
         ticker = self._models.FixedTicker(ticks=ticks)
-        self._figure.yaxis.ticker = self._figure.ygrid.ticker = ticker
-        self._figure.yaxis.formatter = self._models.BasicTickFormatter(use_scientific=False)
+        axis.ticker = grid.ticker = ticker
+        axis.formatter = self._models.BasicTickFormatter(use_scientific=False)
 
     def drawn(self) -> dict[str, Any]:
         """The chart as plain values, ready for JSON."""

@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING, Any, TypeAlias, overload
 
 from ..angles import ARCSEC_PER_TURN, wrap
 from ..certificate import Certificate, Identity, certify
+from ..checks.check import faults_of
+from ..checks.record import records_of
 from ..diagnosis import diagnose
 from ..diagnosis.heldout import hold_out_extended
 from ..errors import ArgumentError, NoModelError, TrueAngleError
@@ -254,6 +256,7 @@ def report(
         "title": heading,
         "errors_in": scale.to_dict(),
         "measured": sizes,
+        "data_faults": [fault.to_json() for fault in faults_of(records_of(found))],
         "selection": None if selection is None else selected(selection, name),
         "model": None if fit is None else modelled(fit, name),
         "why_no_model": why_not,

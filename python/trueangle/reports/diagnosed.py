@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, Final
 
+from ..plots.findingnames import finding_names
+
 if TYPE_CHECKING:
     from ..diagnosis import Diagnosis
 
@@ -24,6 +26,10 @@ _UNITS: Final = {
 }
 
 
+#: Parameters that the name of a finding says already.
+_NAMED: Final = ("shaft", "order", "carrier")
+
+
 def diagnosed(diagnosis: Diagnosis) -> dict[str, Any]:
     """`Diagnosis.to_dict` with the sentences of its findings.
 
@@ -34,11 +40,16 @@ def diagnosed(diagnosis: Diagnosis) -> dict[str, Any]:
     content["nothing"] = diagnosis.is_enough and not any(
         spot.supported for spot in diagnosis.not_identifiable
     )
-    for finding in content["findings"]:
+    for name, finding in zip(finding_names(diagnosis), content["findings"], strict=True):
+        finding["name"] = name
         finding["sentence"] = finding.pop("physics")
         finding["parameters"] = [
-            _parameter(i, *entry) for i, entry in enumerate(finding["parameters"].items())
+            _parameter(i, parameter, entry, named=":" in name)
+            for i, (parameter, entry) in enumerate(finding["parameters"].items())
         ]
+        finding["sized"] = any(
+            q["std"] is not None and q["unit"].startswith("arcsec") for q in finding["parameters"]
+        )
         gain = finding["gain"]
         if gain is not None:
             share, interval = gain["reducible_share"], gain["reducible_share_interval"]
@@ -49,17 +60,21 @@ def diagnosed(diagnosis: Diagnosis) -> dict[str, Any]:
     return content
 
 
-def _parameter(index: int, name: str, entry: dict[str, Any]) -> dict[str, Any]:
+def _parameter(index: int, name: str, entry: dict[str, Any], named: bool) -> dict[str, Any]:
     value, std = entry["value"], entry["std"]
     number = isinstance(value, int | float) and not isinstance(value, bool)
     unit = next((u for u in _UNITS if name.endswith(f"_{u}")), "")
+    # The amplitudes of several lines, whose name says no unit.
+    unit = "arcsec" if name == "amplitudes" else unit
     return {
         "index": index,
         "name": name.removesuffix(f"_{unit}").replace("_", " "),
+        "in_name": named and name in _NAMED,
         "unit": _UNITS.get(unit, ""),
         "value": value if number else None,
         "std": std if number and isinstance(std, int | float) else None,
-        "values": _numbers(value),
+        "numbers": _numbers(value),
+        "stds": _numbers(std),
         "text": "" if number else _text(value),
     }
 

@@ -6,12 +6,13 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..plots import curves
 from ..plots.curves import Points
 from ..plots.simulatedcurves import gain_bars, left_without, simulated_points
 from .charts import Chart, Figure, figure
-from .figures import run_dots, turn
+from .figures import dot_size, run_dots, stretch_chart, strong_gear_order, within
 from .scale import Scale
 
 if TYPE_CHECKING:
@@ -21,6 +22,10 @@ if TYPE_CHECKING:
 
 __all__ = ["figures_of"]
 
+Array = NDArray[np.float64]
+
+#: Part of a turn in degrees from which on the axis shows a whole one.
+_MOST_OF_A_TURN = 300.0
 #: Readings drawn of what is measured and of what is simulated.
 _MOST_POINTS = 3_000
 
@@ -35,7 +40,7 @@ def figures_of(
 
     A chart of one bar says less than the sentence beside it: it is left out.
     """
-    found = {"measured-simulated": _compared(runs, sim, scale)}
+    found = {"measured-simulated": _compared(runs, sim, diagnosis.extended, scale)}
     left = left_without(diagnosis)
     if len(left) > 2:
         found["error-left"] = _left(diagnosis, left, scale)
@@ -44,60 +49,82 @@ def figures_of(
     return found
 
 
-def _compared(runs: Sequence[CalibrationRun], sim: Simulation, scale: Scale) -> Figure:
-    """Both in one chart, the difference below: neither hides another."""
-    pairs = simulated_points(runs, sim)
-    low, high = turn(None)
-    both = Chart("", f"error / {scale.name}", x_range=(low, high), height_rem=16.0)
+def _compared(
+    runs: Sequence[CalibrationRun], sim: Simulation, known: Simulation, scale: Scale
+) -> Figure:
+    """Both in one chart, the difference below: neither hides another.
+
+    Gear orders fill the chart of a turn: a stretch of a few periods beside it shows both.
+    """
+    pairs = [tuple(map(scale.points, pair)) for pair in simulated_points(runs, sim)]
+    low, high = _span([measured.x for measured, _ in pairs])
+    y = f"error / {scale.name}"
+    both = Chart("", y, x_range=(low, high), height_rem=16.0, grow=2.0)
     apart = Chart(
         "reference angle / deg",
         f"difference / {scale.name}",
         x_range=(low, high),
         height_rem=16.0,
+        grow=3.0,
     )
     for chart in (both, apart):
         chart.angle_axis(low, high)
+    lines = known.harmonics
+    orders = [known.joint.output_order(line.shaft, line.order) for line in lines]
+    strong = strong_gear_order(orders, [line.amplitude_arcsec for line in lines], high - low)
+    charts = [both]
+    if strong is not None:
+        charts.append(stretch_chart(strong, low, high, y, height_rem=16.0))
+    size = dot_size(sum(len(run) for run in runs))
     most = max(50, _MOST_POINTS // len(runs))
     for number, (measured, simulated) in enumerate(pairs):
-        for name, points, marker, hollow in (
-            ("measured", measured, "circle", True),
-            ("simulated", simulated, "circle", False),
-        ):
-            part = curves.thinned(scale.points(points), most)
-            both.dots(
-                part.x,
-                part.y,
-                colour="before" if name == "measured" else "model",
-                label=name,
-                marker=marker,
-                size=5.0 if hollow else 2.0,
-                hollow=hollow,
-                run=number,
-                hover=f"run {measured.label}, {name}: {scale.read} at @x{{0.00}}°",
-            )
-        rest = scale.points(Points(measured.label, measured.x, measured.y - simulated.y))
-        run_dots(apart, number, rest, len(runs), scale)
+        for chart in charts:
+            stretch = chart is not both
+            for name, points in (("measured", measured), ("simulated", simulated)):
+                shown = within(points, *chart.x_range) if stretch else curves.thinned(points, most)
+                hollow = name == "measured"
+                chart.dots(
+                    shown.x,
+                    shown.y,
+                    colour="before" if hollow else "model",
+                    label="" if stretch else name,
+                    size=1.5 * size if hollow else 0.6 * size,
+                    hollow=hollow,
+                    run=number,
+                    hover=f"run {measured.label}, {name}: {scale.read} at @x{{0.00}}°",
+                )
+        rest = Points(measured.label, measured.x, measured.y - simulated.y)
+        run_dots(apart, number, rest, len(runs), scale, size=size)
     alt = (
         f"Measured error of {len(runs)} runs and the error that the simulation expects at the same "
         f"readings, and below it the measured less the simulated one, in {scale.name} over a turn."
     )
-    return figure(alt, [both, apart], "stacked")
+    return figure(alt, [*charts, apart], "stacked" if strong is None else "above")
+
+
+def _span(angles: Sequence[Array]) -> tuple[float, float]:
+    """A turn, or the part of it that was travelled."""
+    low, high = min(float(x.min()) for x in angles), max(float(x.max()) for x in angles)
+    return (0.0, 360.0) if high - low > _MOST_OF_A_TURN else (low, high)
 
 
 def _left(diagnosis: Diagnosis, left: Sequence[tuple[str, float]], scale: Scale) -> Figure:
+    """On a logarithmic axis: one cause may leave a hundred times what another does."""
     names = [name for name, _ in left]
     sizes = scale.of(np.array([rms for _, rms in left]))
-    noise = scale.of(np.array([diagnosis.noise]))[0]
-    hover = f"@y: @x{{{scale.finest}}} {scale.name} rms"
+    noise = float(scale.of(np.array([diagnosis.noise]))[0])
+    low, high = 0.6 * min(float(sizes.min()), noise), 1.5 * max(float(sizes.max()), noise)
     chart = Chart(
-        f"rms left of held-out readings / {scale.name}",
+        f"rms left / {scale.name}",
         "",
-        x_range=(0.0, 1.08 * float(max(sizes.max(), noise))),
+        x_range=(low, high),
+        log_x=True,
         categories=names,
         height_rem=7.0 + 2.0 * len(names),
     )
-    chart.bars(names[:1], sizes[:1], colour="after", hover=hover)
-    chart.bars(names[1:], sizes[1:], colour="before", hover=hover)
+    hover = f"@y: @x{{{scale.finest}}} {scale.name} rms"
+    chart.level_stems(names[:1], low, sizes[:1], colour="after", hover=hover)
+    chart.level_stems(names[1:], low, sizes[1:], colour="before", hover=hover)
     told = scale.unit.text(diagnosis.noise)
     chart.upright(noise, label=f"noise of one reading, {told}")
     alt = (
@@ -110,12 +137,12 @@ def _left(diagnosis: Diagnosis, left: Sequence[tuple[str, float]], scale: Scale)
 
 def _gains(diagnosis: Diagnosis) -> Figure:
     bars = gain_bars(diagnosis)
-    names = [f"{i}. {bar.cause}" for i, bar in enumerate(bars, start=1)]
+    names = [bar.cause for bar in bars]
     share = np.array([bar.share for bar in bars])
     low = np.array([min(bar.low, bar.share) for bar in bars])
     high = np.array([max(bar.high, bar.share) for bar in bars])
     chart = Chart(
-        "share of the reducible error taken away / %",
+        "share taken away / %",
         "",
         x_range=(min(0.0, 1.05 * float(low.min())), max(100.0, 1.05 * float(high.max()))),
         categories=names,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import pairwise
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,8 +28,14 @@ Array = NDArray[np.float64]
 _MOST_POINTS: Final = 4_000
 #: Runs named in the legends; the table of runs has the symbols of all.
 _MOST_IN_LEGEND: Final = 4
-#: Orders from which on a curve fills the picture: it is drawn as an envelope.
+#: Size of the dots, and of those of few readings, which would be lost.
+_DOT, _LARGE_DOT = 4.0, 6.0
+#: Readings of all runs up to which dots are large.
+_FEW: Final = 600
+#: Periods from which on a curve fills the picture: it is drawn as an envelope ...
 _DENSE: Final = 40.0
+#: ... where such orders make this part of the amplitudes; smaller ones are ripple on a line.
+_NOTABLE: Final = 0.1
 #: Places of an envelope, and periods of the stretch that is shown beside it.
 _PLACES: Final = 180
 _PERIODS: Final = 4.0
@@ -39,7 +45,7 @@ _STRETCH_TICKS: Final = 4.0
 
 def run_dots(
     chart: Chart, number: int, points: Points, runs: int, scale: Scale,
-    *, size: float = 4.0, zoomed: bool = False,
+    *, size: float = _DOT, zoomed: bool = False,
 ) -> None:  # fmt: skip
     """Readings of one run, in the unit of the page or another signal's."""
     part = points if zoomed else curves.thinned(points, max(50, _MOST_POINTS // runs))
@@ -54,6 +60,11 @@ def run_dots(
         label=f"run {points.label}" if runs <= _MOST_IN_LEGEND and not zoomed else "",
         hover=f"run {points.label}: {scale.read} at @x{{0.00}}°",
     )
+
+
+def dot_size(readings: int) -> float:
+    """Size of the dots of so many readings."""
+    return _LARGE_DOT if readings <= _FEW else _DOT
 
 
 def turn(model: HarmonicModel | None) -> tuple[float, float]:
@@ -72,24 +83,25 @@ def errors_of_runs(
     low, high = turn(None if fit is None else fit.model)
     everything = [scale.points(points) for points in measured]
     y = f"error less the run's zero / {scale.name}"
-    dense = fit is not None and max(fit.orders, default=0.0) > _DENSE
+    strong = None if fit is None else strong_gear_order(fit.orders, fit.amplitudes, high - low)
     main = Chart("reference angle / deg", y, x_range=(low, high), grow=2.0)
     main.angle_axis(low, high)
     charts = [main]
     if fit is not None:
         curve = scale.curve(curves.model_curve(fit.model))
-        if dense:
+        if strong is not None:
             places, least, most = _envelope(curve)
             main.band(places, least, most, colour="model", label="envelope of the model")
         else:
             _draw_model(main, curve)
+    size = dot_size(sum(len(run) for run in runs))
     for i, points in enumerate(everything):
-        run_dots(main, i, points, len(runs), scale)
-    if fit is not None and dense:
-        charts.append(_stretch(fit, everything, y, scale))
+        run_dots(main, i, points, len(runs), scale, size=size)
+    if fit is not None and strong is not None:
+        charts.append(_stretch(fit, strong, everything, y, scale))
     what = "the fitted model with its 95 % band" if fit is not None else "no model"
     alt = f"Measured error in {scale.name} over one turn for {len(runs)} run(s), with {what}"
-    alt += "; a short stretch is shown larger beside it." if dense else "."
+    alt += "; a short stretch is shown larger beside it." if strong else "."
     return figure(alt, charts)
 
 
@@ -113,30 +125,41 @@ def _envelope(curve: Curve) -> tuple[Array, Array, Array]:
     )
 
 
-def _stretch(fit: FitResult, everything: list[Points], y: str, scale: Scale) -> Chart:
-    """A few periods of the strongest gear order, as large as they are."""
-    strong = max(
-        (pair for pair in zip(fit.amplitudes, fit.orders, strict=True) if pair[1] > _DENSE),
-        default=(0.0, _DENSE),
-    )[1]
-    low, high = turn(fit.model)
-    width = min(_PERIODS * 360.0 / float(strong), high - low)
-    # In the middle of the travel: both ends may be thin.
+def strong_gear_order(
+    orders: Sequence[float], amplitudes: Sequence[float] | Array, span: float
+) -> float | None:
+    """The strongest order whose periods fill a picture of ``span`` degrees; None without one."""
+    pairs = list(zip(amplitudes, orders, strict=True))
+    fine = [(a, m) for a, m in pairs if m * span / 360.0 > _DENSE]
+    part = sum(a for a, _ in fine) / (sum(a for a, _ in pairs) or 1.0)
+    return float(max(fine)[1]) if part > _NOTABLE else None
+
+
+def stretch_chart(order: float, low: float, high: float, y: str, **given: Any) -> Chart:
+    """An empty chart of a few periods of an order, in the middle: both ends may be thin."""
+    width = min(_PERIODS * 360.0 / order, high - low)
     start = 0.5 * (low + high) - 0.5 * width
-    chart = Chart(
-        "reference angle / deg",
-        y,
-        x_range=(start, start + width),
-        title=f"A stretch of {width:.3g}°: {_PERIODS:g} periods of order {strong:g}",
-    )
+    title = f"A stretch of {width:.3g}°: {_PERIODS:g} periods of order {order:g}"
+    chart = Chart("reference angle / deg", y, x_range=(start, start + width), title=title, **given)
     chart.angle_axis(start, start + width, _STRETCH_TICKS)
-    whole = scale.curve(curves.model_curve(fit.model, (start, start + width)))
-    _draw_model(chart, whole, "model there")
+    return chart
+
+
+def _stretch(fit: FitResult, order: float, everything: list[Points], y: str, scale: Scale) -> Chart:
+    """A few periods of the strongest gear order, as large as they are."""
+    chart = stretch_chart(order, *turn(fit.model), y)
+    start, end = chart.x_range
+    _draw_model(chart, scale.curve(curves.model_curve(fit.model, (start, end))), "model there")
     for i, points in enumerate(everything):
-        inside = (points.x >= start) & (points.x <= start + width)
-        part = Points(points.label, points.x[inside], points.y[inside])
+        part = within(points, start, end)
         run_dots(chart, i, part, len(everything), scale, size=6.0, zoomed=True)
     return chart
+
+
+def within(points: Points, low: float, high: float) -> Points:
+    """The readings between two angles."""
+    inside = (points.x >= low) & (points.x <= high)
+    return Points(points.label, points.x[inside], points.y[inside])
 
 
 def before_after(held: HeldOut, runs: Sequence[CalibrationRun], scale: Scale) -> Figure:
@@ -147,6 +170,7 @@ def before_after(held: HeldOut, runs: Sequence[CalibrationRun], scale: Scale) ->
     chart = Chart("reference angle / deg", y, x_range=(low, high))
     chart.angle_axis(low, high)
     most = max(50, _MOST_POINTS // (2 * len(held.runs)))
+    size = dot_size(sum(len(run) for run in runs))
     for name, marker in (("before", "square"), ("after", "circle")):
         for run in held.runs:
             first = 0.0 if run.model is None else curves.seen_span(run.model)[0]
@@ -158,6 +182,7 @@ def before_after(held: HeldOut, runs: Sequence[CalibrationRun], scale: Scale) ->
                 part.y,
                 colour=name,
                 marker=marker,
+                size=size,
                 run=index,
                 label=name,
                 hover=f"run {run.label}, {name}: {scale.read} at @x{{0.00}}°",
@@ -194,10 +219,11 @@ def residuals(fit: FitResult, against: str, scale: Scale) -> Figure:
         chart.angle_axis(*turn(fit.model))
     if against == "direction":
         chart.whole_axis(-1.0, 1.0, 3)
+    size = dot_size(sum(part.y.size for part in points))
     for part in points:
         number = by_label[part.label]
         drawn = _beside(part, number, len(points)) if against == "direction" else part
-        run_dots(chart, number, drawn, len(points), scale)
+        run_dots(chart, number, drawn, len(points), scale, size=size)
     alt = f"Residual of the fitted model in {scale.name} against {against}, {len(points)} run(s)."
     return figure(alt, [chart])
 

@@ -98,10 +98,18 @@ class Numbers:
         known = [abs(v) for v in values if v]
         return self.unit.decimals(min(known), _LEAST_DIGITS) if known else 0
 
-    def listed(self, values: Sequence[float], error: bool = True) -> str:
-        """Several numbers of one parameter."""
+    def listed(
+        self, values: Sequence[float], stds: Sequence[float] | None, of: int, error: bool = True
+    ) -> str:
+        """Several numbers of one parameter (``of`` 0) or their standard deviations (1)."""
         unit = self.unit if error else _PLAIN
-        return "; ".join(unit.number(value) for value in values)
+        known = [None] * len(values) if stds is None else stds
+        pairs = (
+            (f"{v:g}", "-") if not error and float(v).is_integer() else unit.pair(v, std)
+            for v, std in zip(values, known, strict=True)
+        )
+        shown = [pair[of] for pair in pairs]
+        return NONE if set(shown) == {"-"} else "; ".join(shown)
 
     def named(self, unit: str) -> str:
         """A unit of the content as the page names it: arcsec/Nm becomes deg/Nm."""

@@ -20,6 +20,8 @@ if TYPE_CHECKING:
 
 __all__ = ["spectrum"]
 
+#: Half a letter of a name as part of a chart's width, and what parts names above each other.
+_LETTER, _HIGHER = 0.012, 2.0
 #: Orders written at their lines, the largest first.
 _MOST_NAMED: Final = 8
 #: Least amplitude of the logarithmic axis, as part of the smallest threshold or amplitude kept.
@@ -126,9 +128,14 @@ def _apart(named: list[dict[str, Any]], low: float, high: float) -> list[dict[st
     """Lines whose texts do not run into each other, the largest first."""
     taken: list[dict[str, Any]] = []
     for row in named:
-        near = [t for t in taken if abs(t["order"] - row["order"]) < 0.12 * (high - low)]
-        if all(max(t["amplitude"], row["amplitude"]) > 2.5 * min(t["amplitude"], row["amplitude"])
-               for t in near):  # fmt: skip
+        near = [
+            t
+            for t in taken
+            if abs(t["order"] - row["order"])
+            < _LETTER * (len(t["name"]) + len(row["name"])) * (high - low)
+        ]
+        if all(max(t["amplitude"], row["amplitude"]) > _HIGHER * min(t["amplitude"],
+               row["amplitude"]) for t in near):  # fmt: skip
             taken.append(row)
     return taken
 

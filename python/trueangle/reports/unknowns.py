@@ -113,19 +113,27 @@ def _folded(selection: OrderSelection | None) -> list[dict[str, str]]:
     """Retained orders that these positions cannot tell from others."""
     if selection is None:
         return []
+    folded = [row for row in selection.table if row.retained and row.aliases]
+    if not folded:
+        return []
+    told = [
+        f"order {row.order:g} is really "
+        + " or ".join(f"{m:g}" for m in likely_aliases(row)[:_MOST_ALIASES])
+        for row in sorted(folded, key=lambda row: -row.amplitude)
+    ]
+    more = f", and {len(told) - _MOST_FOLDED} more orders alike" if len(told) > _MOST_FOLDED else ""
     return [
         _entry(
-            f"whether order {row.order:g} is really order "
-            + ", ".join(f"{m:g}" for m in likely_aliases(row)[:_MOST_ALIASES]),
+            f"whether {', '.join(told[:_MOST_FOLDED])}{more}",
             "at these positions they are one and the same column of numbers",
             "repeat a run with the positions shifted as the command trueangle plan proposes",
         )
-        for row in selection.table
-        if row.retained and row.aliases
     ]
 
 
+#: Aliases told of an order, and orders told of.
 _MOST_ALIASES: Final = 3
+_MOST_FOLDED: Final = 4
 
 
 def _entry(what: str, because: str, measure: str) -> dict[str, str]:

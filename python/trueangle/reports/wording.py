@@ -4,13 +4,17 @@ from __future__ import annotations
 
 from typing import Any, Final
 
+from ..errorunits import ErrorUnit
+
 __all__ = [
     "FIGURE_TITLES",
     "cause_name",
+    "conditions",
     "gain_paths",
     "joined",
     "paths",
     "residual_signals",
+    "sentence",
     "verdict",
 ]
 
@@ -18,11 +22,22 @@ FIGURE_TITLES: Final = {
     "errors": "Measured error of every run, and the model",
     "measured-simulated": "Measured error and what the simulation expects",
     "error-left": "What is left of held-out runs without each cause",
-    "gains": "Gain of each cause on held-out runs",
+    "gains": "Share of the reducible error that each cause takes away on held-out runs",
     "spectrum": "Size of every order",
     "phases": "Phase and size of every order, run by run",
     "before-after": "Held-out runs before and after correction",
 }
+
+#: Conditions of a run: where they stand, their name and unit.
+_CONDITIONS: Final = (
+    ("speed_deg_s", "speed", "deg/s"),
+    ("temperature_C", "temperature", "°C"),
+    ("torque_Nm", "torque", "Nm"),
+    ("mount_deg", "mount", "deg"),
+)
+#: Digits of the largest of a column.
+_CONDITION_DIGITS: Final = 3
+_PLAIN: Final = ErrorUnit("", 1.0)
 
 #: Reduction, in percent, from which a correction is worth having.
 _WORTH: Final = 1.0
@@ -38,6 +53,18 @@ def verdict(content: dict[str, Any]) -> str:
     low = gain["reduction_low_percent"]
     low = gain["reduction_percent"] if low is None else low
     return "gain" if low >= _WORTH else "no-gain"
+
+
+def sentence(text: str) -> str:
+    """A remark as a sentence.
+
+    Examples
+    --------
+    >>> sentence("verified at 36 positions")
+    'Verified at 36 positions.'
+    """
+    text = text.strip()
+    return f"{text[:1].upper()}{text[1:]}{'' if text.endswith(('.', '!', '?')) else '.'}"
 
 
 def cause_name(cause: str) -> str:
@@ -66,6 +93,17 @@ def joined(items: list[Any]) -> str:
 def residual_signals(figures: dict[str, Any]) -> list[str]:
     """Signals that the residual is drawn against."""
     return [name.removeprefix("residual-") for name in figures if name.startswith("residual-")]
+
+
+def conditions(runs: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """Columns of the conditions that any run has, each with the decimals it needs."""
+    known = []
+    for key, name, unit in _CONDITIONS:
+        values = [abs(run[key]) for run in runs if run[key] is not None]
+        if values:
+            digits = _PLAIN.decimals(max(values), _CONDITION_DIGITS)
+            known.append({"key": key, "name": name, "unit": unit, "digits": digits})
+    return known
 
 
 def paths(pattern: str, entries: list[Any]) -> list[str]:

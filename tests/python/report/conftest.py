@@ -8,7 +8,9 @@ import pytest
 
 import trueangle as ta
 from trueangle.effects import Backlash
+from trueangle.joint.declared import DeclaredShaft
 from trueangle.reports.demo import demo_simulation
+from trueangle.simulation import Harmonic, Joint, RunDesign
 
 ORDERS = {"output": [1], "motor": [1, 2], "wave_generator": [2]}
 
@@ -16,6 +18,25 @@ ORDERS = {"output": [1], "motor": [1, 2], "wave_generator": [2]}
 @pytest.fixture(scope="session")
 def runs() -> list[ta.CalibrationRun]:
     return ta.simulate(replace(demo_simulation(), effects=(Backlash(8.0),)), seed=0)
+
+
+@pytest.fixture(scope="session")
+def large():
+    """One run over a part of a turn, degrees of error, several causes of one kind."""
+    pytest.importorskip("jinja2")
+    pytest.importorskip("bokeh")
+    believed = ta.Simulation(
+        Joint(declared=(DeclaredShaft("stepper", cycles_per_turn=50.0),)),
+        sigma_arcsec=60.0,
+        runs=(RunDesign(label="one", samples=1200, speed_deg_s=9.0, turns=0.95),),
+    )
+    lines = (
+        Harmonic("output", 4, 25_000.0, 30.0),
+        Harmonic("stepper", 2, 400.0, 70.0),
+        Harmonic("stepper", 1, 900.0, 200.0),
+    )
+    runs = ta.simulate(replace(believed, harmonics=lines), seed=7)
+    return ta.report(runs, simulation=believed, title="Degrees")
 
 
 @pytest.fixture(scope="session")

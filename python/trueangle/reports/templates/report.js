@@ -23,7 +23,7 @@
 
   /* Colours of the theme, and what boxes hide. */
   function paint({ models }) {
-    const fore = colour("fore"), grid = colour("grid"), line = colour("line");
+    const back = paper ? null : colour("back"), fore = colour("fore"), grid = colour("grid"), line = colour("line");
     for (const model of models) {
       const name = tagged(model, "colour");
       const run = tagged(model, "run");
@@ -34,7 +34,8 @@
       }
       if (run !== null) model.visible = shown(run);
       if (model.type === "Figure")
-        set(model, { background_fill_color: null, border_fill_color: null, outline_line_color: line, border_line_color: null });
+        // A border that is not filled keeps what was painted there before the layout was known.
+        set(model, { background_fill_color: back, border_fill_color: back, outline_line_color: line, border_line_color: null });
       else if (/Axis$/.test(model.type))
         set(model, { axis_label_text_color: fore, major_label_text_color: fore, axis_line_color: line,
           major_tick_line_color: line, minor_tick_line_color: null, axis_label_text_font_style: "normal",
@@ -56,6 +57,8 @@
     const views = await Bokeh.embed.embed_item(item, place);
     const view = Array.isArray(views) ? views[0] : [...views][0];
     const figure = view.model;
+    // On a phone charts that go on with the axis of another stand below it.
+    if (innerWidth < 640 && !paper) for (const axis of figure.left) axis.visible = true;
     const made = { models: [...figure.references()], figure };
     // A finger that moves over a chart scrolls the page.
     if (matchMedia("(pointer: coarse)").matches) figure.toolbar.active_drag = null;
