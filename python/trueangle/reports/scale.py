@@ -16,7 +16,7 @@ from ..runs import CalibrationRun
 __all__ = ["Scale", "scale_of"]
 
 #: Part of the largest error that hovering over a point still shows.
-_FINEST: Final = 1e-4
+_FINEST: Final = 3e-4
 
 
 @dataclass(frozen=True)
