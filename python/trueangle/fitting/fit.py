@@ -14,6 +14,7 @@ from ..units import check_follows
 from ..validity import check_invertible
 from .argument import ARGUMENTS, AnyArgument, Choice, choose_argument
 from .breakdown import breakdown_sentence
+from .laterstretch import check_later_stretch
 from .likeness import unlike_runs, unlike_sentence
 from .newrun import check_new_run
 from .nuisance import asked_nuisance, likely_orders, take_out, take_out_beside
@@ -111,7 +112,7 @@ def fit(
         The readings cannot tell the orders apart; names those at fault.
     NoModelError
         Orders were to be selected and the data support none, or such that do not hold from run
-        to run, so that a further run would be made worse; says why.
+        to run or from stretch to stretch, so that a further one would be made worse; says why.
     ArgumentError
         Runs in different units, an indicated angle that does not follow the reference
         (wrong unit or sign), unknown shafts, and the like.
@@ -176,6 +177,8 @@ def fit(
         ) or weighted.fitted.solution.condition_number < CONDITION
         ridge = 0.0 if tame else choose_ridge(problem, weighted.weights or problem.base)
     fitted = weighted.fitted
+    if selection is not None:
+        check_later_stretch(problem, weighted.weights or problem.base)
     if ridge > 0.0:
         fitted = problem.solve(weighted.weights or problem.base, ridge)
     if problem.argument == "reference":

@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..distributions import student_quantile
 from ..errors import NoModelError
 from ..runs import CalibrationRun
 from ..shafts import ShaftOrders
 
-__all__ = ["check_new_run", "gains_of_runs"]
+__all__ = ["RunGains", "check_new_run", "gains_of_runs"]
 
 Array = NDArray[np.float64]
 
@@ -26,6 +27,31 @@ _RIDGE: Final = 1e-6
 #: Standard deviations between runs by which the mean gain must exceed nothing: of forty further
 #: runs one may lose then. Runs of one joint have ten and more, those of unlike joints below 1.6.
 _SURE: Final = 2.0
+#: Orders in which runs may be unlike beside those wanted, and the part of what each shows that
+#: they must share to count as alike. Of unlike runs some order agrees by chance: ...
+_SHOWN: Final = tuple(range(1, 13))
+_ALIKE: Final = 0.5
+#: ... in so many of them the gain must be beyond it, at this level all together.
+_SEARCHED: Final = 100
+_CHANCE: Final = 0.05
+
+
+class RunGains(NamedTuple):
+    """What a fit to the other runs does to each.
+
+    Attributes
+    ----------
+    gains : ndarray
+        Decrease of every run's mean square.
+    noise : float
+        Variance of the gains by the noise of the readings.
+    shown : float
+        Mean square that low orders and those wanted explain of each run by itself.
+    """
+
+    gains: Array
+    noise: float
+    shown: float
 
 
 def check_new_run(
@@ -38,7 +64,9 @@ def check_new_run(
     .. math:: \bar g > 2\sqrt{\max(0,\;
               \operatorname{var} g - \overline{4\sigma_r^2 c^T G_r c/n_r^2})}
 
-    the scatter between runs beyond that of the noise.
+    the scatter between runs beyond that of the noise. Where the runs share less than half of what
+    each shows by itself, the mean gain must also exceed what chance makes of the order that
+    agrees best among a hundred (Student's t, 5 %).
 
     Raises
     ------
@@ -49,23 +77,32 @@ def check_new_run(
     found = gains_of_runs(runs, orders, argument)
     if found is None:
         return
-    gains, noise = found
-    beyond = max(0.0, float(gains.var(ddof=1)) - noise)
-    if float(gains.mean()) > _SURE * np.sqrt(beyond):
-        return
-    worse = int(np.count_nonzero(gains < 0.0))
+    gains, noise, shown = found
+    mean, scatter = float(gains.mean()), float(gains.std(ddof=1))
     listed = ", ".join(f"{order:g}" for order in orders[:6]) + (" ..." if orders[6:] else "")
-    raise NoModelError(
-        f"no correction can be given: what the other runs say of order {listed} would make the "
-        f"error of {worse} of {len(runs)} runs larger, and that of the rest unevenly smaller; they "
-        "seem to be of unlike joints: fit each alone (--run), or declare the orders (--orders)"
+    mend = (
+        "they seem to be of unlike joints: fit each alone (--run), or declare the orders (--orders)"
     )
+    if mean <= _SURE * np.sqrt(max(0.0, scatter**2 - noise)):
+        worse = int(np.count_nonzero(gains < 0.0))
+        raise NoModelError(
+            f"no correction can be given: what the other runs say of order {listed} would make the "
+            f"error of {worse} of {len(runs)} runs larger, and that of the rest unevenly smaller; "
+            f"{mend}"
+        )
+    bound = student_quantile(1.0 - _CHANCE / _SEARCHED, len(runs) - 1) / np.sqrt(len(runs))
+    if mean < _ALIKE * shown and mean <= bound * scatter:
+        raise NoModelError(
+            f"no correction can be given: of what the runs show they share {100 * mean / shown:.2g}"
+            f" % (order {listed}), no more than {len(runs)} runs that share nothing may by chance; "
+            f"{mend}"
+        )
 
 
 def gains_of_runs(
     runs: Sequence[CalibrationRun], orders: Sequence[float], argument: str
-) -> tuple[Array, float] | None:
-    """Decrease of every run's mean square by a fit to the others, and its variance by noise.
+) -> RunGains | None:
+    """Decrease of every run's mean square by a fit to the others, and what noise makes of it.
 
     None where a run alone, or too few readings, cannot say.
     """
@@ -75,10 +112,12 @@ def gains_of_runs(
     if len(runs) < 2 or share * total < _PER_COLUMN * columns * len(runs):
         return None
     rng = np.random.default_rng(0)
-    grams, moments, energies, sizes = [], [], [], []
+    every = np.array([*orders, *(k for k in _SHOWN if k not in orders)])
+    wanted = np.repeat([np.arange(every.size) < len(orders)], 2, axis=0).ravel()
+    grams, moments, lefts, shown, sizes = [], [], [], [], []
     for run in runs:
         keep = slice(None) if share == 1.0 else np.flatnonzero(rng.random(len(run)) < share)
-        x = (2.0 * np.pi / run.period * getattr(run, argument))[keep, None] * np.asarray(orders)
+        x = (2.0 * np.pi / run.period * getattr(run, argument))[keep, None] * every
         if len(x) < 2:
             return None
         weight = np.ones(len(x)) if run.weights is None else run.weights[keep]
@@ -87,19 +126,22 @@ def gains_of_runs(
         root = np.sqrt(weight / weight.mean())[:, None]
         design = root * _about(np.hstack([np.cos(x), np.sin(x)]), weight)
         error = root[:, 0] * _about(run.centred_error[keep, None], weight)[:, 0]
-        grams.append(design.T @ design)
-        moments.append(design.T @ error)
-        energies.append(float(error @ error))
+        gram, moment, energy = design.T @ design, design.T @ error, float(error @ error)
+        grams.append(gram[np.ix_(wanted, wanted)])
+        moments.append(moment[wanted])
+        lefts.append(max(0.0, energy - float(_solved(grams[-1], moments[-1]) @ moments[-1])))
         sizes.append(len(x))
+        by_chance = 2.0 * every.size / max(len(x), 1)
+        alone = float(_solved(gram, moment) @ moment)
+        shown.append(max(0.0, alone - by_chance * max(0.0, energy - alone)) / len(x))
     gains, noise = np.empty(len(runs)), 0.0
     gram, moment = sum(grams), sum(moments)
     for i, (own, mine) in enumerate(zip(grams, moments, strict=True)):
         others = _solved(gram - own, moment - mine)
         power = float(others @ own @ others)
         gains[i] = (2.0 * float(others @ mine) - power) / sizes[i]
-        left = max(0.0, energies[i] - float(_solved(own, mine) @ mine)) / sizes[i]
-        noise += 4.0 * left * power / sizes[i] ** 2 / len(runs)
-    return gains, noise
+        noise += 4.0 * lefts[i] * power / sizes[i] ** 3 / len(runs)
+    return RunGains(gains, noise, float(np.mean(shown)))
 
 
 def _about(columns: Array, weight: Array) -> Array:

@@ -19,6 +19,9 @@ FOLDS: Final = 3
 _GAIN: Final = 0.01
 #: ... and this share of it must be left beside the pattern: else the design cannot tell them.
 _TOLD: Final = 0.02
+#: ... and no order's standard error may grow by more than this factor beside it: else what the
+#: nuisance takes away is the pattern.
+_GROWN: Final = 5.0
 #: Of nuisances that leave nearly the same the simplest is taken.
 _ALIKE: Final = 0.02
 
@@ -102,7 +105,8 @@ def choose(rows: Rows, forced: list[str]) -> tuple[list[str], list[tuple[str, fl
         best = min(alike, key=lambda name: rows.groups[name].shape[1])
         kind = best.rstrip("0123456789")
         barred.add(kind)
-        if _told(rows, chosen, best) < _TOLD:
+        grown = max(inflation(rows, [*chosen, best]), default=1.0)
+        if _told(rows, chosen, best) < _TOLD or grown > _GROWN:
             unseparated.append(kind)
             continue
         shares.append((kind, float(before.sum() - good[best].sum()) / total))
