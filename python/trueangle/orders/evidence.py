@@ -125,7 +125,8 @@ def choose_forward(
                 continue
         else:
             if noise is None:
-                left = np.maximum(rest - gain, 1e-300)
+                # Of collinear columns rounding makes a gain beyond all there is.
+                left = np.maximum(rest - gain, 1e-200)
                 score = log_tail(gain * dof / left, dof) - log_limits
             else:
                 score = log_tail(gain / noise[0], noise[1]) - log_limits
