@@ -256,7 +256,7 @@ def report(
         "title": heading,
         "errors_in": scale.to_dict(),
         "measured": sizes,
-        "data_faults": [fault.to_json() for fault in faults_of(records_of(found))],
+        "data_faults": [fault.to_dict() for fault in faults_of(records_of(found))],
         "selection": None if selection is None else selected(selection, name),
         "model": None if fit is None else modelled(fit, name),
         "why_no_model": why_not,
