@@ -102,7 +102,6 @@ def test_numpy_haptic_joint(haptic) -> None:
     assert amplitudes == pytest.approx([0.036, 0.043, 0.024], abs=0.003)
 
 
-@pytest.mark.xfail(reason="the delay comes out at -0.56 ms, beyond 0.1 ms of the one by hand")
 def test_haptic_joint_has_a_reversal_error_a_delay_and_motor_lines(haptic, tmp_path) -> None:
     time, indicated, output, speed, ratio = (
         column[::EVERY] if isinstance(column, np.ndarray) else column for column in haptic

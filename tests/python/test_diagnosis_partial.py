@@ -185,9 +185,13 @@ def test_a_law_that_does_not_reach_another_level_gains_nothing_there():
         )
         for run in simulate(sim, 4)
     ]  # fmt: skip
-    found = {f.cause: f.gain for f in ta.diagnose(runs, sim).findings}
+    result = ta.diagnose(runs, sim)
+    found = {f.cause: f.gain for f in result.findings}
+    # What its form leaves is no play: there is none. It is left, and said to be.
+    assert set(found) == {"latency"}
+    assert result.unexplained.found
     gain = found["latency"]
-    assert gain.reducible_share > 0.9
+    assert gain.reducible_share > 0.8
     assert gain.by_level.reducible_share < gain.reducible_share - 0.3
 
 

@@ -20,7 +20,7 @@ from ..simulation.simulation import Simulation
 from .beliefs import LEVEL, Belief, judge_line, verdict_of_factor
 from .gain import measure_belief_gains
 from .identifiability import doubts_about
-from .selection import NEW_CAUSE
+from .penalty import NEW_CAUSE
 from .unnamed import effect_of
 
 __all__ = ["corrected_effects", "judged_beliefs", "scaled"]
@@ -171,7 +171,7 @@ def _lines(
             continue  # modulation takes from its carrier what it gives to the sidebands
         where = slice(1 + 2 * k, 3 + 2 * k)
         change = regression.coefficients[where]
-        spread = regression.robust(where)
+        spread = regression.robust(np.arange(where.start, where.stop))
         shaft, number = joint.name_order(float(order)) or ("output", float(order))
         what = f"{shaft} order {number:g}"
         belief = judge_line(what, (pattern.cosine[k], pattern.sine[k]), change, spread)

@@ -14,8 +14,9 @@ from ..joint.pattern import line_columns
 from ..regression.regression import Regression
 from .gain import Gain
 from .goodness.periodogram import order_test, time_test
+from .penalty import NEW_CAUSE, cause_terms
 from .remainder import remainder_of
-from .selection import NEW_CAUSE, cause_terms, is_flexible
+from .selection import is_flexible
 from .unnamed import is_line_in_time, is_line_of, is_named, modulator, modulators
 
 __all__ = ["CONFIRMED", "NOT_CONFIRMED", "status_of"]

@@ -30,8 +30,9 @@ from .gearratio import Ratio, aligned, find_ratio
 from .goodness import goodness_of_fit
 from .identifiability import blind_spots
 from .named import findings_of, reconsidered, scatter_doubt, scatter_finding
+from .penalty import NEW_CAUSE, misfit, total_penalty
 from .remainder import leftover_of, unexplained_after
-from .selection import NEW_CAUSE, misfit, select, total_penalty
+from .selection import select
 from .unnamed import is_named
 from .wrongplace import moved
 

@@ -13,9 +13,11 @@ from ..regression.estimate import Parameters
 from ..regression.regression import Regression
 from .confirmation import CONFIRMED, NOT_CONFIRMED, status_of
 from .findings import Finding
+from .forms import with_form_errors
 from .gain import Gain, measure_gain
 from .identifiability import doubts_about
-from .selection import cause_terms, extensions, finding_groups, is_flexible, propose
+from .penalty import cause_terms, finding_groups
+from .selection import extensions, is_flexible, propose
 from .unnamed import is_named
 
 __all__ = ["findings_of", "reconsidered", "scatter_doubt", "scatter_finding"]
@@ -58,12 +60,13 @@ def findings_of(
     if with_gain and named:
         gains = measure_gain(regression, named) or gains
     fitted = regression.fitted()
+    widened = with_form_errors(regression)
     findings: list[Finding] = []
     doubtful: list[int] = []
     for group, gain in zip(named, gains, strict=True):
-        terms = [(*fitted[k], regression.robust_covariance(k)) for k in group]
+        terms = [(*fitted[k], widened.robust_covariance(k)) for k in group]
         cause = terms[0][0].cause
-        parameters, effects = EFFECTS[cause].report(regression, terms)
+        parameters, effects = EFFECTS[cause].report(widened, terms)
         rivals = _rivals(regression, group) if len(findings) < RIVALLED and not pace().over else []
         weight = {
             "bic_gain": float(sum(t.bic_gain for t, _, _ in terms)),

@@ -14,30 +14,29 @@ from ..effects.missing_order import MissingOrder
 from ..effects.zero_slip import ZeroSlip
 from ..pace import pace
 from ..regression.regression import BEYOND_SHOWN, Extension, Regression
+from .forms import beside_bends, share_beside, told_from_forms
 from .goodness import estimate_noise
+from .penalty import (
+    NEW_CAUSE,
+    cause_terms,
+    finding_groups,
+    left_by_forms,
+    lost,
+    misfit,
+    net_loss,
+    penalty_of,
+    total_penalty,
+)
 from .remainder import remainder_of
 from .unnamed import UNNAMED, effect_of, is_named
 
 __all__ = [
-    "NEW_CAUSE",
-    "cause_terms",
     "extensions",
-    "finding_groups",
     "is_flexible",
-    "misfit",
     "on_runs",
     "propose",
     "select",
-    "total_penalty",
 ]
-
-#: Evidence (in units of BIC) that a new cause must bring beyond its penalty: 6 is what
-#: Kass and Raftery call strong, odds of 20 to 1.
-NEW_CAUSE = 6.0
-
-#: Share of the energy explained so far that a further cause, or a form of its own for one,
-#: must bring as well: a form known to 3 % leaves 0.1 % of its energy, and no cause.
-FORM = 1e-3
 
 #: Time that what is said of chosen causes takes (gain, rivals), in shares of that of the choice.
 AFTER_CHOICE = 0.7
@@ -120,7 +119,7 @@ def _priced_with_noise(regression: Regression) -> Regression:
         noise = estimate_noise(remainder_of(rest))
         if noise.correlation > 0.0:
             tried.append(_pruned(rest.with_terms(plain, noise.correlation)))
-    return min(tried, key=total_penalty)
+    return _without_misfits(min(tried, key=total_penalty))
 
 
 def _by_other_paths(regression: Regression, direct: Regression) -> Regression:
@@ -207,55 +206,6 @@ def _made_specific(regression: Regression) -> Regression:
     return regression
 
 
-def total_penalty(regression: Regression) -> float:
-    """BIC with the penalty of every cause: lower is better."""
-    return regression.bic + _penalty(regression.terms, misfit(regression))
-
-
-def misfit(regression: Regression) -> float:
-    """Deviance that the causes found may leave because their forms are not exact."""
-    return _left_by_forms(regression.start - regression.deviance, regression.n)
-
-
-def _left_by_forms(deviance: float, readings: int) -> float:
-    r"""Deviance of a share of the energy that a deviance stands for.
-
-    n readings of noise 1 with an error of energy n E give a deviance of
-    :math:`n\ln(1 + E)`; `FORM` of that energy one of :math:`n\ln(1 + \mathrm{FORM}\,E)`.
-    """
-    energy = np.expm1(min(max(deviance, 0.0) / readings, 500.0))
-    return float(readings * np.log1p(FORM * energy))
-
-
-def _penalty(terms: Sequence[Extension], left: float) -> float:
-    """Of causes beyond that of their parameters; their forms may leave ``left``."""
-    # A line of a declared shaft is expected, and stands where it was said to stand.
-    declared = sum(term.cause == MissingOrder.kind and not term.log_grid for term in terms)
-    causes = len(finding_groups(terms)) - declared
-    # A cause that contains another one spends a second form on the same error.
-    forms = causes + len({term.cause for term in terms if effect_of(term.cause).contains})
-    return NEW_CAUSE * causes + left * max(forms - 1, 0)
-
-
-def finding_groups(terms: Sequence[Extension]) -> list[list[int]]:
-    """Indices of the terms that make one finding together, in the order found."""
-    groups: list[list[int]] = []
-    place: dict[str, int] = {}
-    for k, term in enumerate(terms):
-        if effect_of(term.cause).is_separate or term.cause not in place:
-            place[term.cause] = len(groups)
-            groups.append([k])
-        else:
-            groups[place[term.cause]].append(k)
-    return groups
-
-
-def cause_terms(regression: Regression, group: Sequence[int], settled: bool = False) -> Regression:
-    """Without the terms ``group``; ``settled`` keeps the correlation of the noise."""
-    terms = [t for k, t in enumerate(regression.terms) if k not in group]
-    return regression.with_terms(terms, regression.whiten.rho if settled else None)
-
-
 def propose(effect: type[Effect], regression: Regression) -> Extension | None:
     """What a cause proposes; nothing where a wider one that contains it is chosen already."""
     if any(effect in effect_of(term.cause).contains for term in regression.terms):
@@ -297,19 +247,61 @@ def extensions(
 
 def _forward(regression: Regression, causes: Sequence[str]) -> Regression:
     while len(regression.terms) < MOST_TERMS and not regression.is_explained:
-        best: tuple[float, Regression, Extension] | None = None
+        scored = []
         for extension, start, gain in extensions(regression, causes):
             left = misfit(start)
             explained = start.start - start.deviance + extension.deviance
-            after = _penalty([*start.terms, extension], _left_by_forms(explained, regression.n))
-            score = gain - (after - _penalty(start.terms, left))
-            if score > 0.0 and (best is None or score > best[0] + 1e-6):
-                best = (score, start, extension)
+            after = penalty_of([*start.terms, extension], left_by_forms(explained, regression.n))
+            score = gain - (after - penalty_of(start.terms, left))
+            if score > 0.0:
+                scored.append((score, start, extension))
+        best = _best_told_from_forms(scored)
         # A step that was not finished chose among some only: it chose nothing.
         if best is None or pace().over:
             return regression
-        _, start, extension = best
+        start, extension = best
         regression = start.with_terms([*start.terms, extension])
+    return regression
+
+
+def _best_told_from_forms(
+    scored: list[tuple[float, Regression, Extension]],
+) -> tuple[Regression, Extension] | None:
+    """The best extension once what bends of the causes found explain as well is taken off.
+
+    That only lowers a score: those that stay behind the best one found need not be asked.
+    """
+    best: tuple[float, Regression, Extension] | None = None
+    for score, start, extension in sorted(scored, key=lambda item: -item[0]):
+        if best is not None and score <= best[0] + 1e-6:
+            break
+        told = told_from_forms(start, extension)
+        score -= extension.deviance - told.deviance
+        if score > 0.0 and (best is None or score > best[0] + 1e-6):
+            best = score, start, extension
+    return None if best is None else best[1:]
+
+
+def _without_misfits(regression: Regression) -> Regression:
+    """Without causes that bends of the others explain as well, the weakest first.
+
+    They may have been chosen when the others were not known, or not in their form.
+    """
+    while not pace().over:
+        groups = finding_groups(regression.terms)
+        if len(groups) < 2:
+            return regression
+        told = []
+        for group in groups:
+            rest = cause_terms(regression, group, settled=True)
+            beside = beside_bends(rest, {regression.terms[group[0]].cause})
+            if beside is not rest:
+                saved = lost(regression, group)
+                share = share_beside(rest, beside, [regression.terms[k] for k in group])
+                told.append((net_loss(regression, group) - (1.0 - share) * saved, group))
+        if not told or min(told)[0] > 0.0:
+            return regression
+        regression = _pruned(cause_terms(regression, min(told)[1]))
     return regression
 
 
@@ -317,16 +309,15 @@ def _pruned(regression: Regression) -> Regression:
     """Without the terms that the others have made superfluous."""
     while regression.terms and not pace().over:
         # Terms larger than all that the readings show only take each other off again.
-        beyond = [k for k in range(len(regression.terms)) if _is_beyond_shown(regression, k)]
-        asked = beyond or range(len(regression.terms))
-        least = min(asked, key=lambda k: _net_loss(regression, k))
-        without = cause_terms(regression, [least])
+        beyond = [[k] for k in range(len(regression.terms)) if _is_beyond_shown(regression, k)]
+        least = min(beyond or _droppable(regression), key=lambda g: net_loss(regression, g))
+        without = cause_terms(regression, least)
         if not beyond and total_penalty(without) > total_penalty(regression):
             break
         regression = without
     regression = _plainest(regression)
     terms = [
-        replace(term, deviance=_lost(regression, k)) for k, term in enumerate(regression.terms)
+        replace(term, deviance=lost(regression, [k])) for k, term in enumerate(regression.terms)
     ]
     return regression.with_terms(terms)
 
@@ -355,21 +346,10 @@ def _plainest(regression: Regression) -> Regression:
     return regression
 
 
-def _net_loss(regression: Regression, k: int) -> float:
-    """Deviance that dropping term ``k`` would cost, less the penalty it would save."""
-    term = regression.terms[k]
-    alone = any(group == [k] for group in finding_groups(regression.terms))
-    penalty = term.parameters * term.log_n + 2.0 * term.log_grid
-    return _lost(regression, k) - penalty - (NEW_CAUSE if alone else 0.0)
+def _droppable(regression: Regression) -> list[list[int]]:
+    """What may be dropped at once: a term, or all of a cause.
 
-
-def _lost(regression: Regression, k: int) -> float:
-    """Deviance that term ``k`` saves beside all the others (Wald, or by fitting without)."""
-    term = regression.terms[k]
-    if term.run_effect is not None:
-        return cause_terms(regression, [k]).deviance - regression.deviance
-    _, coefficients = regression.fitted()[k]
-    spread = regression.covariance(k) / regression.variance
-    return regression.n * float(
-        np.log1p(coefficients @ np.linalg.pinv(spread) @ coefficients / regression.rss)
-    )
+    Each element of a cause may be worth its own parameters, and the cause not its form.
+    """
+    whole = [group for group in finding_groups(regression.terms) if len(group) > 1]
+    return [[k] for k in range(len(regression.terms))] + whole

@@ -36,8 +36,11 @@ from .zero_slip import ZeroSlip
 
 __all__ = ["DriftWithinRun"]
 
-#: Half periods over one run that make up a wander.
-WANDER_TERMS = 24
+#: Half periods over one run that make up a wander: at first, and at most.
+WANDER_TERMS, MOST_TERMS = 24, 96
+
+#: Power of the last of them, in variances of one reading, from which on more are needed.
+SEEN = 0.5
 
 #: Time constant of settling, in shares of the run.
 SETTLING = 0.4
@@ -114,7 +117,7 @@ class DriftWithinRun(Effect):
         if regression.has(cls.kind):
             return None
         extensions = [cls._proposal(regression, form) for form in FORMS]
-        best = max(extensions, key=lambda p: p.bic_gain)
+        best = cls._finer(regression, max(extensions, key=lambda p: p.bic_gain))
         if best.bic_gain <= 0.0:
             return best
         # An error that comes back at the same place on the next pass in that direction is
@@ -125,23 +128,39 @@ class DriftWithinRun(Effect):
         if regression.signals.runs > 1 and not regression.has(ZeroSlip.kind):
             zero = beyond.propose_run_effect(ZeroSlip.kind, {}, np.ones((regression.n, 1)))
             beyond = beyond.with_terms([*beyond.terms, zero])
-        deviance = cls._proposal(beyond, best.shape["form"]).deviance
+        deviance = cls._proposal(beyond, **best.shape).deviance
         return replace(best, deviance=min(best.deviance, deviance))
 
     @classmethod
-    def _proposal(cls, regression: Regression, form: str) -> Extension:
-        columns = regression.remembered(form, None, partial(cls._shapes, regression, form))
+    def _finer(cls, regression: Regression, best: Extension) -> Extension:
+        """With as many half periods as are above the noise: where they end, an edge is left."""
+        while True:
+            effect, terms = best.run_effect, int(best.shape["terms"])
+            assert effect is not None
+            power = float(effect.columns[:, -1] @ effect.columns[:, -1]) / regression.signals.runs
+            if terms >= MOST_TERMS or effect.columns.shape[1] < 2 or effect.ratio * power < SEEN:
+                return best
+            finer = cls._proposal(regression, best.shape["form"], 2 * terms)
+            if finer.deviance <= best.deviance:
+                return best
+            best = finer
+
+    @classmethod
+    def _proposal(cls, regression: Regression, form: str, terms: int = WANDER_TERMS) -> Extension:
+        build = partial(cls._shapes, regression, form, terms)
+        columns = regression.remembered(f"{form} {terms}", None, build)
         log_grid = float(np.log(UNLIKE_FORMS))
-        return regression.propose_run_effect(cls.kind, {"form": form}, columns, log_grid)
+        shape = {"form": form, "terms": terms}
+        return regression.propose_run_effect(cls.kind, shape, columns, log_grid)
 
     @staticmethod
-    def _shapes(regression: Regression, form: str) -> Array:
+    def _shapes(regression: Regression, form: str, terms: int) -> Array:
         """Columns of a drift, scaled so that it ends at variance 1 or about that."""
         u = np.zeros(regression.n)
         for start, stop in regression.bounds:
             clock = regression.signals.clock[start:stop]
             u[start:stop] = (clock - clock[0]) / max(float(clock[-1] - clock[0]), 1e-300)
-        k = np.arange(1, WANDER_TERMS + 1)
+        k = np.arange(1, terms + 1)
         if form == "ramp":
             return u[:, None]
         if form == "centred ramp":

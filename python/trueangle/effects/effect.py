@@ -16,6 +16,7 @@ from ..joint.signals import Signals
 from ..regression.estimate import Parameters
 from ..regression.extension import Extension
 from ..regression.regression import Regression
+from .bends import bent
 from .blindness import Blindness
 from .parameters import checked, plain
 from .scatter import ScatterFinding
@@ -157,6 +158,15 @@ class Effect:
     def columns(cls, signals: Signals, around: Surroundings, shape: dict[str, Any]) -> Array:
         """Regressors of ``shape`` at other readings, shape (n, p); none of a random effect."""
         return np.zeros((len(signals), 0))
+
+    @classmethod
+    def bends(cls, signals: Signals, terms: Sequence[tuple[Extension, Array]]) -> Array:
+        """Columns by which the error of this cause's ``terms`` may depart from its form.
+
+        By its factor (`trueangle.effects.bends`); of one that has an exact form none.
+        """
+        signal = sum((t.columns @ c for t, c in terms if c.size), np.zeros(len(signals)))
+        return bent(signals, cls.factor, np.asarray(signal))
 
     @classmethod
     def report(

@@ -21,6 +21,7 @@ from .backlash import (
     Backlash,
     goes_both_ways,
 )
+from .bends import transitions
 from .blindness import (
     Blindness,
     share_left,
@@ -164,11 +165,18 @@ class PreslidingHysteresis(Effect):
         return signals.presliding(shape["length_deg"], shape["start_state"])[:, None]
 
     @classmethod
+    def bends(cls, signals: Signals, terms: Sequence[tuple[Extension, Array]]) -> Array:
+        size = sum(float(np.sum(coefficients)) for _, coefficients in terms)
+        signal = np.sum([term.columns @ coefficients for term, coefficients in terms], axis=0)
+        # Other lengths, and the same amplitude far from the reversal.
+        return np.asarray(size * transitions(signals) - signal[:, None])
+
+    @classmethod
     def report(
         cls, regression: Regression, terms: Sequence[Fitted]
     ) -> tuple[Parameters, list[Effect]]:
         total = sum(float(c[0]) for _, c, _ in terms)
-        std = float(np.sqrt(sum(v[0, 0] for _, _, v in terms)))
+        std = float(np.sqrt(regression.sum_variance([t for t, _, _ in terms])))
         weights = np.array([abs(float(c[0])) for _, c, _ in terms])
         lengths = np.array([t.shape["length_deg"] for t, _, _ in terms])
         length = float(weights @ lengths / weights.sum())

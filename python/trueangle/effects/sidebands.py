@@ -117,6 +117,17 @@ class Sidebands(Effect):
         line = a * np.cos(x) + b * np.sin(x)
         return np.asarray(line[:, None] * line_columns(theta, k))
 
+    @classmethod
+    def bends(cls, signals: Signals, terms: Sequence[tuple[Extension, Array]]) -> Array:
+        """Modulation that is deep, or no sine, has further pairs and changes the carrier."""
+        columns = []
+        for term, _ in terms:
+            carrier, k = term.shape["carrier"], term.shape["offset"]
+            for order in carrier + k * np.array([-3.0, -2.0, 0.0, 2.0, 3.0]):
+                if order > 0.0:
+                    columns.append(line_columns(signals.theta, float(order)))
+        return np.hstack(columns)
+
     @staticmethod
     def _carrier(around: Surroundings, carrier: float) -> tuple[float, float]:
         pattern = around.pattern

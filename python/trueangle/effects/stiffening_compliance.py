@@ -16,6 +16,7 @@ from ..joint.signals import Signals
 from ..regression.estimate import Parameters, quantity
 from ..regression.extension import Extension
 from ..regression.regression import Regression
+from .bends import beyond
 from .blindness import (
     OWN_POWER,
     Blindness,
@@ -148,6 +149,16 @@ class StiffeningCompliance(Effect):
         else:
             second = StiffeningCompliance.beyond(moment, shape["knee_Nm"])
         return np.column_stack([moment, second])
+
+    @classmethod
+    def bends(cls, signals: Signals, terms: Sequence[tuple[Extension, Array]]) -> Array:
+        columns = [super().bends(signals, terms)]
+        for term, _ in terms:
+            moment = cls.moment(signals, term.shape["gravity_deg"])
+            top = float(np.abs(moment).max())
+            knees = [cls.beyond(moment, share * top) for share in KNEES]
+            columns.append(beyond(np.column_stack([*knees, moment**3]), term.columns))
+        return np.hstack(columns)
 
     @classmethod
     def report(

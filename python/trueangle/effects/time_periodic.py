@@ -253,7 +253,8 @@ def _wandering(frequencies: Array, p: Array) -> tuple[NDArray[np.int64], float, 
             band = p[low:high]
             cells = (high - low) / OVERSAMPLING
             deviance = float(band.max(axis=0).sum())
-            log_grid = float(np.log(2.0 * bands) + p.shape[1] * np.log(cells))
+            # A band of so many cells has one point more at which its power is of its own.
+            log_grid = float(np.log(2.0 * bands) + p.shape[1] * np.log(cells + 1.0))
             if deviance - 2.0 * log_grid > best[1] - 2.0 * best[2]:
                 best = (low + band.argmax(axis=0), deviance, log_grid)
         middle *= 1.0 + WANDER

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from typing import Any, Self
 
@@ -75,6 +75,8 @@ class LeastSquares:
             [np.ones(self.n), *(line_columns(signals.theta, m) for m in around.pattern.orders)]
         )
         self.terms: list[Extension] = []
+        #: Covariance of all coefficients by what the forms of the terms leave, where known.
+        self.form_errors: Array | None = None
         self.correlation = LagCorrelation(signals.clock, self.bounds)
         self._factors: tuple[Factor, ...] = ()
         #: What causes proposed beside given terms; shared by regressions of the same readings.
@@ -90,6 +92,7 @@ class LeastSquares:
         other = object.__new__(type(self))
         other.__dict__.update(self.__dict__)
         other.terms = list(terms)
+        other.form_errors = None
         if rho is not None:
             other.fixed_rho = rho
         other.update()
@@ -212,36 +215,46 @@ class LeastSquares:
             start = stop
         return found
 
+    def place(self, k: int) -> NDArray[np.int64]:
+        """Columns of term ``k`` among those of the design."""
+        start = self.base.shape[1] + sum(t.columns.shape[1] for t in self.terms[:k])
+        return np.arange(start, start + self.terms[k].columns.shape[1])
+
     def covariance(self, k: int) -> Array:
         """Covariance of the coefficients of term ``k``."""
-        start = self.base.shape[1] + sum(t.columns.shape[1] for t in self.terms[:k])
-        stop = start + self.terms[k].columns.shape[1]
-        return np.asarray(self.unscaled_covariance[start:stop, start:stop] * self.variance)
+        where = self.place(k)
+        return np.asarray(self.unscaled_covariance[np.ix_(where, where)] * self.variance)
 
     def robust_covariance(self, k: int) -> Array:
         """Covariance of the coefficients of term ``k``, widened by what its form leaves."""
-        start = self.base.shape[1] + sum(t.columns.shape[1] for t in self.terms[:k])
-        return self.robust(slice(start, start + self.terms[k].columns.shape[1]))
+        return self.robust(self.place(k))
 
-    def robust(self, where: slice) -> Array:
+    def sum_variance(self, terms: Sequence[Extension]) -> float:
+        """Variance of the sum of all coefficients of some of the terms, widened alike."""
+        places = [self.place(k) for k, term in enumerate(self.terms) if term in terms]
+        return float(self.robust(np.concatenate(places)).sum())
+
+    def robust(self, where: NDArray[np.int64]) -> Array:
         r"""Covariance of some coefficients, at least as wide as runs disagree on them.
 
         .. math:: V_s = \frac{R}{R - 1}\sum_j s_j s_j^T, \quad s_j = X^+_j r_j
 
         with the residuals r of run j: no form is exact, and what it leaves is alike within a
         run. Coefficients whose variance is larger by this than by the noise alone are
-        widened to it; from `ENOUGH_RUNS` runs on.
+        widened to it; from `ENOUGH_RUNS` runs on. `form_errors`, where known, come on top.
         """
-        plain = self.unscaled_covariance[where, where] * self.variance
+        among = np.ix_(where, where)
+        plain = np.asarray(self.unscaled_covariance[among] * self.variance)
+        beyond = 0.0 if self.form_errors is None else self.form_errors[among]
         runs = len(self.bounds)
         if runs < ENOUGH_RUNS or not plain.size:
-            return np.asarray(plain)
+            return np.asarray(plain + beyond)
         scores = np.array(
             [self.back[where] @ (self.q[a:b].T @ self.r[a:b]) for a, b in self.bounds]
         )
         between = (scores**2).sum(axis=0) * runs / (runs - 1.0)
         wider = np.sqrt(np.maximum(between / np.maximum(np.diag(plain), 1e-300), 1.0))
-        return np.asarray(plain * np.outer(wider, wider))
+        return np.asarray(plain * np.outer(wider, wider) + beyond)
 
     @property
     def variance(self) -> float:

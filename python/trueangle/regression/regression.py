@@ -40,17 +40,29 @@ class Regression(LeastSquares):
         after = np.einsum("ij,ij->j", x, x)
         return x, after > EXCITED * np.maximum(before, 1e-300)
 
-    def beside(self, columns: Array) -> Self:
-        """The same regression with ``columns`` fitted too, for scores of others beside them."""
+    def beside(self, columns: Array, spread: float = np.inf) -> Self:
+        r"""The same regression with ``columns`` fitted too, for scores of others beside them.
+
+        With a finite ``spread`` their coefficients are drawn from a normal distribution of that
+        standard deviation about zero: a column that the readings tell worse than that is fitted
+        in part. Scores stay those of generalised least squares: with the covariance
+        :math:`I + U S^2 U^T` of columns and noise, :math:`U S^2/(1 + S^2) U^T` is taken out.
+        """
         x, excited = self.projected(columns)
         u, s, _ = np.linalg.svd(x[:, excited], full_matrices=False)
-        u = u[:, s > EXCITED * s.max(initial=0.0)]
+        kept = s > EXCITED * s.max(initial=0.0)
+        u, s = u[:, kept], s[kept]
+        share = np.ones_like(s)
+        if np.isfinite(spread):
+            power = (s * spread) ** 2 / self.variance
+            share = power / (1.0 + power)
         other = object.__new__(type(self))
         other.__dict__.update(self.__dict__)
         other.memory = {}
-        other.q = np.hstack([self.q, u])
-        other.r = self.r - u @ (u.T @ self.r)
-        other.rss = max(float(other.r @ other.r), 1e-300)
+        other.q = np.hstack([self.q, u * np.sqrt(share)])
+        moment = u.T @ self.r
+        other.r = self.r - u @ (share * moment)
+        other.rss = max(float(self.r @ other.r), 1e-300)
         other._seen = None
         return other
 

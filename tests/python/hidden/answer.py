@@ -6,6 +6,7 @@ import json
 import math
 import tempfile
 import time
+from collections.abc import Iterable
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -13,6 +14,7 @@ from typing import Any
 import trueangle as ta
 
 from .case import Case, Question, pose
+from .source import Source
 
 #: Standard errors within which a parameter counts as found.
 STANDARD_ERRORS = 3.0
@@ -95,12 +97,7 @@ def judge(question: Question) -> Answer:
     """Diagnose and compare with the truth."""
     report, seconds = diagnose(question)
     findings = report["findings"]
-    scores: dict[str, float] = {}
-    for source in question.sources:
-        for finding in findings:
-            if finding["cause"] == source.cause:
-                scores |= _scores(source.cause, source.parameters(), finding["parameters"])
-                break
+    scores = scored(question.sources, findings)
     blind = report["not_identifiable"]
     return Answer(
         case=question.case,
@@ -112,6 +109,17 @@ def judge(question: Question) -> Answer:
         visible=question.visible(),
         seconds=seconds,
     )
+
+
+def scored(sources: Iterable[Source], findings: list[dict[str, Any]]) -> dict[str, float]:
+    """Distance of every shared parameter from the truth, in stated standard errors."""
+    scores: dict[str, float] = {}
+    for source in sources:
+        for finding in findings:
+            if finding["cause"] == source.cause:
+                scores |= _scores(source.cause, source.parameters(), finding["parameters"])
+                break
+    return scores
 
 
 def _scores(cause: str, truth: dict[str, float], found: dict[str, Any]) -> dict[str, float]:

@@ -15,6 +15,7 @@ from collections import defaultdict
 from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 
+from ..answer import STANDARD_ERRORS
 from .questions import JUDGES, Case, Verdict, ask, cases
 
 
@@ -42,6 +43,10 @@ def table(verdicts: list[Verdict]) -> str:
         lines.append(
             f"{group:9s} {kind:45s} {right:4d}/{len(found):<4d} {100 * right / len(found):5.1f} %"
         )
+        scores = [score for v in found for score in v.scores.values()]
+        if scores:
+            near = sum(abs(score) <= STANDARD_ERRORS for score in scores)
+            lines[-1] += f"   parameters within {STANDARD_ERRORS:g} se {near}/{len(scores)}"
     return "\n".join(lines)
 
 

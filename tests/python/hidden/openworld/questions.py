@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import zlib
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 
 from trueangle import CalibrationRun
 
-from ..answer import diagnose
+from ..answer import STANDARD_ERRORS, diagnose, scored
 from ..case import Case as HiddenCase
 from ..case import Question
 from ..causes import CAUSES, draw
@@ -20,6 +20,8 @@ from ..joint import Joint, Line, random_joint
 from ..measurement import ARCSEC, Habit, measure, random_habit
 from ..reversal import Backlash
 from ..source import Source
+from .inexact import INEXACT
+from .inexact import draw as draw_inexact
 from .structures import SHAPES, structure
 
 #: Noise of the exam beyond what the logger of the hidden exam knows, and bits of rounding.
@@ -71,7 +73,7 @@ SIGMAS = 8.0
 class Case:
     """One question: a group, what is hidden, how strongly, and a seed."""
 
-    group: str  # "outside", "nothing", "belief", "several", "high"
+    group: str  # "outside", "nothing", "belief", "several", "high", "inexact"
     kind: str
     scale: float = 1.0
     seed: int = 0
@@ -94,12 +96,14 @@ class Verdict:
     unexplained: bool
     evidence: str
     seconds: float
+    scores: dict[str, float] = field(default_factory=dict)
 
     def __str__(self) -> str:
         return (
             f"{'ok  ' if self.right else 'FAIL'} {self.case}: {list(self.confirmed)}"
             f"{' listed ' + str(list(self.listed)) if self.listed else ''} "
-            f"{'unexplained: ' + self.evidence if self.unexplained else ''} {self.seconds:.1f} s"
+            f"{'unexplained: ' + self.evidence if self.unexplained else ''} "
+            f"{', '.join(f'{n} {s:+.1f} se' for n, s in self.scores.items())} {self.seconds:.1f} s"
         )
 
 
@@ -113,7 +117,12 @@ def ask(case: Case) -> Verdict:
     unexplained = report.get("unexplained") or {"found": False, "evidence": []}
     firing = unexplained["evidence"][0]["says"] if unexplained["found"] else ""
     right = JUDGES[case.group](case, report, confirmed, bool(unexplained["found"]), truth)
-    return Verdict(case, right, confirmed, listed, bool(unexplained["found"]), firing, seconds)
+    scores = scored(question.sources, found)
+    if case.group == "inexact":
+        right = right and all(abs(score) <= STANDARD_ERRORS for score in scores.values())
+    return Verdict(
+        case, right, confirmed, listed, bool(unexplained["found"]), firing, seconds, scores
+    )
 
 
 def _question(
@@ -232,12 +241,21 @@ def high(case: Case) -> Posed:
     return _question(case, joint, habit, (hidden,), rng), frozenset({case.kind}), None
 
 
+def inexact(case: Case) -> Posed:
+    """One effect whose form is off by a few percent, with a parameter that is known."""
+    rng = case.rng()
+    joint, habit = random_joint(rng), random_habit(rng)
+    hidden = replace(draw_inexact(case.kind, rng), size=INEXACT[case.kind] * habit.sigma)
+    return _question(case, joint, habit, (hidden,), rng), frozenset({hidden.cause}), None
+
+
 POSERS: dict[str, Callable[[Case], Posed]] = {
     "outside": outside,
     "nothing": nothing,
     "belief": belief,
     "several": several,
     "high": high,
+    "inexact": inexact,
 }
 
 
@@ -281,12 +299,20 @@ def _no_companion(
     return set(confirmed) == set(names)
 
 
+def _named(
+    case: Case, report: Any, confirmed: tuple[str, ...], unexplained: bool, names: Any
+) -> bool:
+    """The cause is named first; its parameters are judged apart."""
+    return bool(report["findings"]) and report["findings"][0]["cause"] in names
+
+
 JUDGES = {
     "outside": _outside_right,
     "nothing": _nothing_right,
     "belief": _belief_right,
     "several": _all_and_only,
     "high": _no_companion,
+    "inexact": _named,
 }
 
 
@@ -298,5 +324,6 @@ def cases(group: str, seeds: range, scale: float = 1.0) -> list[Case]:
         "belief": [*BELIEFS],
         "several": ["+".join(s) for s in SEVERAL],
         "high": [*HIGH],
+        "inexact": [*INEXACT],
     }[group]
     return [Case(group, kind, scale, seed) for kind in kinds for seed in seeds]

@@ -1,0 +1,116 @@
+"""What a cause is worth beside what the forms of the larger ones leave: none is exact."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from copy import copy
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..regression.extension import Extension
+from ..regression.regression import Regression
+from .unnamed import effect_of, is_named
+
+__all__ = ["FORM", "beside_bends", "share_beside", "told_from_forms", "with_form_errors"]
+
+Array = NDArray[np.float64]
+
+#: Share of a cause's energy that its form may leave: one known to 3 %.
+FORM = 1e-3
+
+#: Sizes of bends that are tried, in units of those expected; deviance from which on they show.
+SIZES = np.geomspace(0.03, 10.0, 26).tolist()
+SHOWN = 6.0
+
+#: Share of the strongest combination of bends from which another one counts.
+DISTINCT = 1e-6
+
+#: Share of the noise below which what a form leaves does not matter.
+SLIGHT = 0.01
+
+
+def bends(regression: Regression, exempt: Collection[str] = ()) -> Array:
+    """Columns by which the causes found may bend, each with the size that is expected of it.
+
+    Of causes ``exempt`` none: a further element of a cause is no companion of it.
+    """
+    causes: dict[str, list[tuple[Extension, Array]]] = {}
+    for term, coefficients in regression.fitted():
+        if coefficients.size and is_named(term) and term.cause not in exempt:
+            causes.setdefault(term.cause, []).append((term, coefficients))
+    columns = [np.zeros((regression.n, 0))]
+    for cause, terms in causes.items():
+        size = float(np.std(sum(t.columns @ c for t, c in terms)))
+        found = effect_of(cause).bends(regression.signals, terms)
+        spread = np.std(found, axis=0)
+        kept = spread > 1e-9 * size
+        if np.sqrt(FORM) * size > SLIGHT * np.sqrt(regression.variance):
+            columns.append(found[:, kept] * (np.sqrt(FORM) * size / spread[kept]))
+    return np.hstack(columns)
+
+
+def beside_bends(regression: Regression, exempt: Collection[str] = ()) -> Regression:
+    """The regression beside `bends`, for scores of what else there may be; itself without any."""
+    columns = bends(regression, exempt)
+    return regression.beside(columns, 1.0) if columns.shape[1] else regression
+
+
+def told_from_forms(regression: Regression, extension: Extension) -> Extension:
+    """The extension with the evidence that it has beside bends of the other causes."""
+    beside = beside_bends(regression, {extension.cause})
+    if beside is regression:
+        return extension
+    share = share_beside(regression, beside, [extension])
+    return replace(extension, deviance=extension.deviance * share)
+
+
+def share_beside(
+    regression: Regression, beside: Regression, extensions: Sequence[Extension]
+) -> float:
+    """Share of the deviance of ``extensions`` together that is left beside the bends."""
+    saved = []
+    effects = [e.run_effect.columns for e in extensions if e.run_effect is not None]
+    for each in (regression, beside):
+        if effects:
+            saved.append(each.propose_run_effect("", {}, effects[0]).deviance)
+        else:
+            saved.append(each.gain(np.hstack([e.columns for e in extensions]))[0])
+    return min(saved[1] / saved[0], 1.0) if saved[0] > 0.0 else 1.0
+
+
+def with_form_errors(regression: Regression) -> Regression:
+    r"""The regression with the errors that the forms make in its coefficients.
+
+    Bends B with coefficients :math:`\xi \sim N(0, \kappa^2)` shift what is fitted without
+    them by :math:`X^+ B\xi`. :math:`\kappa` is the one that makes the residual most likely (0
+    where it is hardly better than none), and :math:`\xi` has its mean and covariance given
+    the residual.
+    """
+    columns = regression.whiten(bends(regression))
+    known = regression.q.T @ columns
+    rest = columns - regression.q @ known
+    count = columns.shape[1]
+    if not count:
+        return regression
+    _, s, vt = np.linalg.svd(rest, full_matrices=False)
+    kept = s > DISTINCT * s[0]
+    s, vt = s[kept], vt[kept]
+    moment = vt @ (rest.T @ regression.r) / s
+    variance = regression.variance
+
+    def deviance(kappa: float) -> float:
+        wider = 1.0 + (kappa * s) ** 2 / variance
+        return float(np.sum(moment**2 / variance * (1.0 - 1.0 / wider) - np.log(wider)))
+
+    kappa = max(SIZES, key=deviance)
+    if deviance(kappa) < SHOWN:
+        return regression
+    wider = variance + (kappa * s) ** 2
+    mean = vt.T @ (kappa**2 * s * moment / wider)
+    spread = kappa**2 * (np.eye(count) - (vt.T * ((kappa * s) ** 2 / wider)) @ vt)
+    shifts = regression.back @ known
+    other = copy(regression)
+    other.form_errors = np.asarray(shifts @ (np.outer(mean, mean) + spread) @ shifts.T)
+    return other

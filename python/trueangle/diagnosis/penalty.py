@@ -1,0 +1,98 @@
+"""What a cause must bring, and what is lost without one."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ..effects.missing_order import MissingOrder
+from ..regression.regression import Extension, Regression
+from .forms import FORM
+from .unnamed import effect_of
+
+__all__ = [
+    "NEW_CAUSE",
+    "cause_terms",
+    "finding_groups",
+    "left_by_forms",
+    "lost",
+    "misfit",
+    "net_loss",
+    "penalty_of",
+    "total_penalty",
+]
+
+#: Evidence (in units of BIC) that a new cause must bring beyond its penalty: 6 is what
+#: Kass and Raftery call strong, odds of 20 to 1.
+NEW_CAUSE = 6.0
+
+
+def total_penalty(regression: Regression) -> float:
+    """BIC with the penalty of every cause: lower is better."""
+    return regression.bic + penalty_of(regression.terms, misfit(regression))
+
+
+def misfit(regression: Regression) -> float:
+    """Deviance that the causes found may leave because their forms are not exact."""
+    return left_by_forms(regression.start - regression.deviance, regression.n)
+
+
+def left_by_forms(deviance: float, readings: int) -> float:
+    r"""Deviance of a share of the energy that a deviance stands for.
+
+    n readings of noise 1 with an error of energy n E give a deviance of
+    :math:`n\ln(1 + E)`; `FORM` of that energy one of :math:`n\ln(1 + \mathrm{FORM}\,E)`.
+    """
+    energy = np.expm1(min(max(deviance, 0.0) / readings, 500.0))
+    return float(readings * np.log1p(FORM * energy))
+
+
+def penalty_of(terms: Sequence[Extension], left: float) -> float:
+    """Of causes beyond that of their parameters; their forms may leave ``left``."""
+    # A line of a declared shaft is expected, and stands where it was said to stand.
+    declared = sum(term.cause == MissingOrder.kind and not term.log_grid for term in terms)
+    causes = len(finding_groups(terms)) - declared
+    # A cause that contains another one spends a second form on the same error.
+    forms = causes + len({term.cause for term in terms if effect_of(term.cause).contains})
+    return NEW_CAUSE * causes + left * max(forms - 1, 0)
+
+
+def finding_groups(terms: Sequence[Extension]) -> list[list[int]]:
+    """Indices of the terms that make one finding together, in the order found."""
+    groups: list[list[int]] = []
+    place: dict[str, int] = {}
+    for k, term in enumerate(terms):
+        if effect_of(term.cause).is_separate or term.cause not in place:
+            place[term.cause] = len(groups)
+            groups.append([k])
+        else:
+            groups[place[term.cause]].append(k)
+    return groups
+
+
+def cause_terms(regression: Regression, group: Sequence[int], settled: bool = False) -> Regression:
+    """Without the terms ``group``; ``settled`` keeps the correlation of the noise."""
+    terms = [t for k, t in enumerate(regression.terms) if k not in group]
+    return regression.with_terms(terms, regression.whiten.rho if settled else None)
+
+
+def net_loss(regression: Regression, group: Sequence[int]) -> float:
+    """Deviance that dropping the terms ``group`` would cost, less the penalties it would save."""
+    terms = regression.terms
+    left = misfit(regression)
+    kept = [term for k, term in enumerate(terms) if k not in group]
+    own = sum(terms[k].parameters * terms[k].log_n + 2.0 * terms[k].log_grid for k in group)
+    return lost(regression, group) - own - (penalty_of(terms, left) - penalty_of(kept, left))
+
+
+def lost(regression: Regression, group: Sequence[int]) -> float:
+    """Deviance that the terms ``group`` save beside all the others (Wald, or without them)."""
+    if any(regression.terms[k].run_effect is not None for k in group):
+        return cause_terms(regression, group).deviance - regression.deviance
+    columns = np.concatenate([regression.place(k) for k in group])
+    coefficients = regression.coefficients[columns]
+    spread = regression.unscaled_covariance[np.ix_(columns, columns)]
+    return regression.n * float(
+        np.log1p(coefficients @ np.linalg.pinv(spread) @ coefficients / regression.rss)
+    )

@@ -1,0 +1,74 @@
+"""How the form of a cause may bend: no real effect follows its textbook law exactly."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..joint.signals import Signals
+
+__all__ = ["bent", "beyond", "transitions"]
+
+Array = NDArray[np.float64]
+
+#: Lengths (degrees) of the transitions by which an error of reversal may be softened.
+LENGTHS = (0.1, 0.5, 2.0, 8.0, 30.0)
+
+#: Share of a run over which an error may lag behind what it follows.
+LAG = 0.03
+
+
+def bent(signals: Signals, factor: str, signal: Array) -> Array:
+    r"""Columns by which an error ``signal`` may depart from its law in a factor x.
+
+    .. math:: s\,x,\quad s\,|x|,\quad s\,x^2,\quad
+              \langle s\rangle_\text{late} - s,\quad |s|\,\mathrm{sign}(\dot s)
+
+    curvature, saturation, lag and a loop; for an error of reversal transitions of other
+    lengths. None where the factor was not recorded or bends nothing.
+
+    Parameters
+    ----------
+    signals : Signals
+    factor : {"direction", "velocity", "temperature", "torque"}
+    signal : ndarray, shape (n,)
+
+    Returns
+    -------
+    ndarray, shape (n, k)
+    """
+    if factor == "direction":
+        soft = (signal * signals.direction)[:, None] * transitions(signals)
+        return np.asarray(soft - signal[:, None])
+    x = getattr(signals, factor) if factor in ("velocity", "temperature", "torque") else None
+    if x is None or not np.ptp(x) > 0.0:
+        return np.zeros((len(signals), 0))
+    x = x - x.mean() if factor == "temperature" else x
+    x = x / float(np.abs(x).max())
+    late = _late(signals, signal)
+    loop = np.abs(signal) * np.sign(signal - late)
+    curved = signal[:, None] * np.column_stack([x, np.abs(x), x**2, np.abs(x) ** 3])
+    # What has a part along the error itself is that much more of it, and no bend.
+    return np.column_stack([beyond(curved, signal[:, None]), late - signal, loop])
+
+
+def transitions(signals: Signals) -> Array:
+    """States of springs of several lengths, relaxed and run in at the start of a run."""
+    return np.column_stack([signals.presliding(x, start) for start in (0.0, 1.0) for x in LENGTHS])
+
+
+def beyond(columns: Array, own: Array) -> Array:
+    """What ``columns`` have beside the columns ``own``."""
+    return np.asarray(columns - own @ np.linalg.lstsq(own, columns, rcond=None)[0])
+
+
+def _late(signals: Signals, values: Array) -> Array:
+    """``values`` behind a lag of a share of each run."""
+    late = np.empty_like(values)
+    for start, stop in signals.run_bounds():
+        keep = float(np.exp(-1.0 / max(LAG * (stop - start), 1e-3)))
+        state = float(values[start])
+        for i, value in enumerate(values[start:stop].tolist(), start):
+            state = value + (state - value) * keep
+            late[i] = state
+    return late
