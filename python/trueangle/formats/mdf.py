@@ -17,6 +17,7 @@ from ..errors import FileError
 from .checksum import Checksum
 from .damage import damage_told
 from .format import TEXTS, Addition, Batch, Choose, Contents, Watch, note
+from .mdfblocks import check_chains
 
 __all__ = ["columns", "contents", "copy", "read"]
 
@@ -26,6 +27,10 @@ _MOST_COMPRESSED = 2000
 _BLOCK = 1 << 19
 #: Acquisition name of the groups of corrected channels.
 _GROUP = "trueangle"
+#: Types of channels that have no place in a record: virtual master and data.
+_VIRTUAL = (3, 6)
+#: Channels of values of any length stand elsewhere in the file.
+_ELSEWHERE = 1
 #: First bytes of a file, also of one that was not finished.
 _MAGIC = (b"MDF     ", b"UnFinMF ")
 #: Compression argument of asammdf by the type of data block found.
@@ -119,6 +124,7 @@ def _opened(path: Path, **options: Any) -> Iterator[MDF]:
     with path.open("rb") as file:
         if file.read(8) not in _MAGIC:
             raise FileError(path, "is not MDF4")
+    check_chains(path)
     with damage_told(path, "MDF4"), _told_once():
         try:
             with MDF(path, **options) as mdf:
@@ -154,6 +160,16 @@ def _check_sizes(path: Path, mdf: MDF) -> None:
         said = int(group.channel_group.cycles_nr) * max(int(record), 1)
         if said > _MOST_COMPRESSED * size:
             raise FileError(path, f"is damaged: of {size} bytes it says to hold {said}")
+        for channel in group.channels:
+            if channel.channel_type not in _VIRTUAL:
+                bits = 8 * int(channel.byte_offset) + int(channel.bit_offset) + channel.bit_count
+                if bits > 8 * int(group.channel_group.samples_byte_nr):
+                    raise FileError(
+                        path,
+                        "is damaged: the channel ends behind its record of "
+                        f"{group.channel_group.samples_byte_nr} bytes",
+                        column=channel.name,
+                    )
 
 
 def _close_half_built(error: Exception) -> None:
@@ -201,6 +217,9 @@ def _cycles(mdf: MDF, group: int) -> int:
 def _part(path: Path, mdf: MDF, place: tuple[int, int], start: int) -> Signal:
     """Readings from row ``start``; those marked invalid become NaN and stay marked."""
     group, index = place
+    channel = mdf.groups[group].channels[index]
+    if channel.channel_type == _ELSEWHERE or mdf.groups[group].channel_dependencies[index]:
+        raise FileError(path, "numbers are needed, one to a record", column=channel.name)
     part = mdf.get(
         group=group,
         index=index,

@@ -93,3 +93,71 @@ def test_whole_logs_are_read(tmp_path, model):
     assert report.logs[0].error is None
     with pa.memory_map(str(tmp_path / "out.arrow")) as source:
         assert pa.ipc.open_file(source).read_all().column("a").equals(table.column("a"))
+
+
+def _mdf(path):
+    asammdf = pytest.importorskip("asammdf")
+    times = np.arange(ROWS) / 1e3
+    with asammdf.MDF(version="4.11") as mdf:
+        mdf.append([asammdf.Signal(made_angles(ROWS), times, name="indicated_deg")])
+        mdf.save(path, overwrite=True)
+    return path.read_bytes()
+
+
+def _leading_to(data, block, link, target):
+    """The file with one link of a block changed."""
+    place = block + 24 + 8 * link
+    return data[:place] + int(target).to_bytes(8, "little") + data[place + 8 :]
+
+
+CORRECTED = """
+    import pathlib, resource, sys, trueangle as ta
+    resource.setrlimit(resource.RLIMIT_CPU, (60, 60))
+    model, out = ta.load_model(sys.argv[1]), pathlib.Path(sys.argv[2])
+    for path in sys.argv[3:]:
+        error = ta.correct_logs(path, model, out).logs[0].error
+        print(type(error).__name__, error, out.exists())
+"""
+
+#: A block, one of its links, the kind of block it is made to lead to, and what is said of it.
+CIRCLES = (
+    (b"##DG", 0, b"##DG", "leads back to that at"),
+    (b"##CG", 0, b"##CG", "leads back to that at"),
+    (b"##CN", 0, b"##CN", "leads back to that at"),
+    (b"##FH", 0, b"##FH", "leads back to that at"),
+    (b"##HD", 0, b"##HD", "where no DG block stands"),
+    (b"##DG", 1, b"##DG", "where no CG block stands"),
+)
+
+
+def test_blocks_of_mdf_that_lead_in_a_circle_are_refused(tmp_path, model_file):
+    """The library would follow them for ever."""
+    data = _mdf(tmp_path / "whole.mf4")
+    paths = []
+    for number, (kind, link, to, _) in enumerate(CIRCLES):
+        paths.append(tmp_path / f"log{number}.mf4")
+        paths[-1].write_bytes(_leading_to(data, data.index(kind), link, data.index(to)))
+    told = in_a_process(CORRECTED, model_file, tmp_path / "out.mf4", *paths).splitlines()
+    assert len(told) == len(CIRCLES)
+    for line, path, (_, _, _, says) in zip(told, paths, CIRCLES, strict=True):
+        assert line.startswith("FileError")
+        assert path.name in line
+        assert says in line
+        assert line.endswith("False")
+
+
+def test_a_channel_of_mdf_behind_its_record_is_refused(tmp_path, model_file):
+    """The library would read memory that is not the file's, or end the process."""
+    path = tmp_path / "log.mf4"
+    data = _mdf(path)
+    for block in range(len(data)):
+        if data[block : block + 4] == b"##CN":
+            place = block + 24 + 8 * int.from_bytes(data[block + 16 : block + 24], "little") + 4
+            offset = int.from_bytes(data[place : place + 4], "little")
+            if offset == 8:  # behind the time: the channel of the angle
+                data = data[:place] + (4_653_072).to_bytes(4, "little") + data[place + 4 :]
+    path.write_bytes(data)
+    told = in_a_process(CORRECTED, model_file, tmp_path / "out.mf4", path)
+    assert told.startswith("FileError")
+    assert "column 'indicated_deg'" in told
+    assert "ends behind its record of 16 bytes" in told
