@@ -46,6 +46,16 @@ def test_shafts_of_nearly_one_speed_do_not_cancel(turns):
     assert any("nearly cancel" in note for note in asked.notes)
 
 
+def test_a_gear_that_one_turn_of_a_grid_does_not_tell_is_left_out():
+    """Positions every 5 degrees of one turn, and a motor of ratio 1.001."""
+    found = ta.fit(
+        run_of(np.arange(72) * 5.0, [(1, 0.1, 0.0)], 2), gear_ratio=1.001, fixed_member="none"
+    )
+    assert [s.name for s in found.model.shafts] == ["output"]
+    assert found.amplitudes[0] == pytest.approx(0.1, abs=0.01)
+    assert any("1.001 from 1" in note for note in found.notes)
+
+
 def test_a_gear_that_is_told_over_the_travel_is_looked_for():
     x = np.linspace(0.0, 7200.0, 4000)
     run = run_of(x, [(1, 0.1, 30.0), (1.94, 0.05, 200.0)], seed=2)

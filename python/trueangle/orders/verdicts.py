@@ -223,6 +223,8 @@ def _between(positions: Positions, candidates: Candidates) -> bool:
 
     low = min(HIGHEST_LOW_ORDER, grid.highest_order)
     orders = wanted_orders(candidates.gear_ratio, candidates.fixed_member, low)
+    if any(m % 1.0 for m in orders):  # the candidates left those of the gear out
+        return False
     offsets = 360.0 * np.asarray(grid.offsets)
     worst = float(mount_noise_factors(grid.divisions, offsets, orders).max())
     return worst <= _TELLING_FACTOR
