@@ -137,6 +137,14 @@ def test_readings_of_a_joint_at_rest_are_fitted():
     assert np.isfinite(found.residual_std)
 
 
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("loss", ["huber", "tukey"])
+def test_a_block_that_few_orders_cannot_follow_is_told_too(loss, seed):
+    """One order: it cannot bend towards the block, whose readings widen the scale instead."""
+    assert warned(ta.fit(block(seed, 0.22, "constant"), [3], loss=loss))
+    assert not warned(ta.fit(block(seed, 0.0, "constant"), [3], loss=loss))
+
+
 def test_a_block_of_outliers_cannot_hide_behind_the_scale_it_makes():
     found = ta.fit(block(1, 0.05, "constant"), range(1, 6))
     assert found.amplitudes[2] == pytest.approx(0.1, abs=0.005)

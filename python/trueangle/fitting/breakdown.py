@@ -24,26 +24,27 @@ _BENT: Final = 3.0
 
 def breakdown_sentence(problem: Problem, weighted: Weighted) -> str:
     """What to tell of a robust fit at the end of its powers; empty where it is not."""
-    share = weighted.far
-    if share <= MANY:
+    share, robust = weighted.far, weighted.weights is not None
+    if share <= MANY and not robust:
         return ""
     rest = problem.residuals(weighted.fitted)
     scale, near = robust_scale(np.concatenate(rest)), _between_neighbours(problem, rest)
-    if weighted.weights is None:
-        # Most neighbours are equal where a joint rests or a grid is coarse: they tell nothing.
-        if near == 0.0 or scale <= _BENT * near:
-            return ""
+    bent = scale > _BENT * near
+    if robust and share > (MANY if bent else _MOST):
         return (
-            f"the residuals are {scale / near:.2g} times what neighbours in angle differ by: the "
-            "model lacks an effect, or wrong readings stand together; look at the residuals"
+            f"{100.0 * share:.0f} % of the readings lie beyond {FAR:g} robust standard deviations "
+            "(0.7 % of normal ones do): more than a robust fit holds out against, where they stand "
+            "together; the coefficients may be off by far more than their errors. Look at the "
+            "residuals, and give the readings that are wrong weight 0"
         )
-    if share <= _MOST and scale <= _BENT * near:
+    # Most neighbours are equal where a joint rests or a grid is coarse: they tell nothing.
+    if not bent or near == 0.0:
         return ""
+    # A block of readings that the few orders cannot follow widens the scale it is judged by.
+    many = ", more than a robust fit holds out against" if robust else ""
     return (
-        f"{100.0 * share:.0f} % of the readings lie beyond {FAR:g} robust standard deviations "
-        "(0.7 % of normal ones do): more than a robust fit holds out against, where they stand "
-        "together; the coefficients may be off by far more than their errors. Look at the "
-        "residuals, and give the readings that are wrong weight 0"
+        f"the residuals are {scale / near:.2g} times what neighbours in angle differ by: the "
+        f"model lacks an effect, or wrong readings stand together{many}; look at the residuals"
     )
 
 
