@@ -48,7 +48,8 @@ copybutton_exclude = ".linenos, .gp, .go"
 
 
 def _with_reference(app, name, source):
-    source[0] = reference_pages.expanded(source[0])
+    # The line that ends a doctest of the sources would stand as an empty one.
+    source[0] = reference_pages.expanded(source[0]).replace("\n\n```\n", "\n```\n")
 
 
 def setup(app):

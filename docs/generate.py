@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import os
 import platform
+import re
 import subprocess
 import sys
+import tempfile
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -21,7 +23,7 @@ import trueangle as ta
 from trueangle import plots
 from trueangle.cli import COMMANDS, build_parser
 from trueangle.diagnosis import diagnose
-from trueangle.effects import Backlash
+from trueangle.effects import Backlash, Latency
 from trueangle.planning import plan_mounts
 from trueangle.reports.demo import demo_simulation
 
@@ -54,17 +56,20 @@ def everything(folder: Path) -> None:
 
 
 def figures(folder: Path) -> None:
-    """One picture for each part of the method, all of the same simulated joint."""
+    """One picture for each part of the method, and the tutorial's own of its own joint."""
     sim = demo_simulation()
-    runs = ta.simulate(replace(sim, effects=(Backlash(8.0),)), seed=0)
+    # Two causes: a chart of one bar says nothing.
+    runs = ta.simulate(replace(sim, effects=(Backlash(8.0), Latency(4e-4))), seed=4)
     fit = ta.fit(runs[:6], gear_ratio=100.0)
+    taught = tutorial_runs()
+    learnt = ta.fit(taught[:2], orders=[1, 100], gear_ratio=100)
     diagnosis = diagnose(runs, sim)
     plan = plan_mounts(100, positions=36, mounts=2)
     drawn = {
         "errors": plots.error_curves(fit),
         "spectrum": plots.amplitude_spectrum(fit),
-        "phases": plots.phases_over_runs(fit),
-        "held-out": plots.before_after(fit.model, runs[6:]),
+        "phases": plots.phases_over_runs(learnt),
+        "held-out": plots.before_after(learnt.model, taught[2:]),
         "direction": plots.residuals(fit, "direction"),
         "simulated": plots.measured_and_simulated(runs, sim),
         "left": plots.error_left(diagnosis),
@@ -83,6 +88,17 @@ def figures(folder: Path) -> None:
     told = story()
     told.savefig(folder / "story.svg")
     mpl.pyplot.close(told)
+
+
+def tutorial_runs() -> list[ta.CalibrationRun]:
+    """The runs of the joint that the tutorial describes."""
+    text = (ROOT / "docs" / "tutorial.md").read_text(encoding="utf-8")
+    described = re.search(r"```toml\n(.*?)```", text, re.S)
+    assert described
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder, "joint.toml")
+        file.write_text(described[1], encoding="utf-8")
+        return ta.simulate(ta.load_simulation(file), seed=0)
 
 
 def story() -> mpl.figure.Figure:
@@ -116,7 +132,7 @@ def story() -> mpl.figure.Figure:
         f"2. corrected from these: {rest.std():.0f} arcsec\nthere, {between:.0f} between"
     )
     rest = truth - left(planned.model, everywhere)
-    axes[2].plot(everywhere, rest, color="#0072B2", linewidth=0.4)
+    axes[2].plot(everywhere, rest, color="#0072B2", linewidth=1.2)
     axes[2].set_title(f"3. from two mounts as planned:\n{rest.std():.1f} arcsec everywhere")
     for ax in axes:
         ax.set_xticks([0, 90, 180, 270, 360])

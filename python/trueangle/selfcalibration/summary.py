@@ -39,9 +39,10 @@ def summary(result: SelfCalibration, errors_in: ErrorsIn = "auto") -> str:
     if result.held_out:
         lines += ["", "held out"]
         for test in result.held_out.values():
+            verb = "predict" if test.fitted_on.endswith("s") else "predicts"
             agree = "agree" if test.p > 0.001 else "DISAGREE"
             lines.append(
-                f"  {test.fitted_on} predict {test.judged_on}: {unit.number(test.rms_before)} -> "
+                f"  {test.fitted_on} {verb} {test.judged_on}: {unit.number(test.rms_before)} -> "
                 f"{unit.number(test.rms_after)} {unit.name} rms, they {agree} (p = {test.p:.2g})"
             )
     lines += [f"note: {note}" for note in result.notes]

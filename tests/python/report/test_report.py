@@ -58,6 +58,14 @@ def test_held_out_run_does_not_enter_its_own_model(runs) -> None:
         assert run.model.amplitudes == pytest.approx(ta.fit(others, [1]).amplitudes, rel=TINY)
 
 
+def test_faults_of_the_data_are_told_first(runs) -> None:
+    twice = ta.CalibrationRun(runs[0].reference, runs[0].indicated, 360.0, label="again")
+    made = ta.report([runs[0], twice, runs[1]], orders=[1])
+    (fault,) = [f for f in made.content["data_faults"] if f["fault"] == "duplicate_runs"]
+    first = made.html.split("Words used here")[0]
+    assert fault["says"][1:] in html.unescape(first)
+
+
 def test_one_run_has_no_gain_and_says_so(runs) -> None:
     made = ta.report(runs[:1], orders=[1])
     assert made.content["gain"] is None
