@@ -8,6 +8,7 @@ from ..errorunits import ErrorUnit
 
 __all__ = [
     "FIGURE_TITLES",
+    "by_kind",
     "cause_name",
     "conditions",
     "gain_paths",
@@ -104,6 +105,22 @@ def conditions(runs: list[dict[str, Any]]) -> list[dict[str, Any]]:
             digits = _PLAIN.decimals(max(values), _CONDITION_DIGITS)
             known.append({"key": key, "name": name, "unit": unit, "digits": digits})
     return known
+
+
+def by_kind(faults: list[dict[str, Any]]) -> list[tuple[dict[str, Any], list[str]]]:
+    """The first fault of every kind, with the runs that have it too.
+
+    Examples
+    --------
+    >>> a, b = {"fault": "x", "runs": ["1"]}, {"fault": "x", "runs": ["2", "3"]}
+    >>> by_kind([a, b])
+    [({'fault': 'x', 'runs': ['1']}, ['2', '3'])]
+    """
+    found: dict[str, tuple[dict[str, Any], list[str]]] = {}
+    for fault in faults:
+        _, others = found.setdefault(fault["fault"], (fault, []))
+        others += [run for run in fault["runs"] if run not in found[fault["fault"]][0]["runs"]]
+    return list(found.values())
 
 
 def paths(pattern: str, entries: list[Any]) -> list[str]:

@@ -48,6 +48,16 @@
   const box = (run) => document.querySelector(`.run-toggle[data-run="${run}"]`);
   const shown = (run) => !box(run) || box(run).checked;
 
+  /* Numbers of an axis that would run into each other on a narrow screen: every second, third ... */
+  function thin(figure, width) {
+    const room = Math.max(width - 70, 60);
+    for (const axis of figure.below) {
+      const ticks = axis.ticker.ticks;
+      const every = ticks ? Math.ceil((ticks.length * 32) / room) : 1;
+      if (every > 1) axis.ticker = axis.ticker.clone({ ticks: ticks.filter((_, i) => i % every === 0) });
+    }
+  }
+
   async function chart(specification, place) {
     const item = structuredClone(specification.document);
     const attributes = item.doc.roots[0].attributes;
@@ -57,8 +67,12 @@
     const views = await Bokeh.embed.embed_item(item, place);
     const view = Array.isArray(views) ? views[0] : [...views][0];
     const figure = view.model;
+    if (!paper) thin(figure, place.clientWidth);
     // On a phone charts that go on with the axis of another stand below it.
-    if (innerWidth < 640 && !paper) for (const axis of figure.left) axis.visible = true;
+    if (innerWidth < 640 && !paper) {
+      for (const axis of figure.left) axis.visible = true;
+      for (const r of figure.renderers) if (r.glyph && r.glyph.type === "Text") r.glyph.text_font_size = "9px";
+    }
     const made = { models: [...figure.references()], figure };
     // A finger that moves over a chart scrolls the page.
     if (matchMedia("(pointer: coarse)").matches) figure.toolbar.active_drag = null;
