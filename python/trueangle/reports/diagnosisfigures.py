@@ -110,7 +110,8 @@ def _span(angles: Sequence[Array]) -> tuple[float, float]:
 
 def _left(diagnosis: Diagnosis, left: Sequence[tuple[str, float]], scale: Scale) -> Figure:
     """On a logarithmic axis: one cause may leave a hundred times what another does."""
-    names = [name for name, _ in left]
+    # The title says "without each cause".
+    names = [name.removeprefix("without ") for name, _ in left]
     sizes = scale.of(np.array([rms for _, rms in left]))
     noise = float(scale.of(np.array([diagnosis.noise]))[0])
     low, high = 0.6 * min(float(sizes.min()), noise), 1.5 * max(float(sizes.max()), noise)

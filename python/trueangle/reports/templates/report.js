@@ -50,7 +50,8 @@
 
   /* Numbers of an axis that would run into each other on a narrow screen: every second, third ... */
   function thin(figure, width) {
-    const room = Math.max(width - 70, 60);
+    const names = figure.y_range.factors || [];
+    const room = Math.max(width - Math.max(70, ...names.map((name) => 6.5 * name.length)), 40);
     for (const axis of figure.below) {
       const ticks = axis.ticker.ticks;
       const every = ticks ? Math.ceil((ticks.length * 32) / room) : 1;
