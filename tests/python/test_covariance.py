@@ -222,3 +222,25 @@ def test_the_constant_is_no_surer_than_the_coefficients():
     wider = np.sqrt(np.diag(cluster.covariance) / np.diag(white.covariance))
     assert wider[0] == pytest.approx(max(1.0, np.median(wider[1:])), rel=1e-9)
     assert wider[0] > 1.5
+
+
+@pytest.mark.parametrize("memory", [0.9, 0.97])
+def test_a_run_too_short_for_its_memory_gets_no_small_errors_by_chance(memory):
+    """Two stretches scatter as they like: no error far below the others, no pinched band."""
+    hit, least = [], []
+    for seed in range(SETS):
+        rng = np.random.default_rng([2, seed])
+        x = np.linspace(0.0, 720.0, 300)
+        error = sum(c * np.sin(np.radians(k * x + p)) for k, c, p in LINES)
+        run = ta.CalibrationRun(x, x + error + SIGMA * correlated(rng, memory, x.size), 360.0)
+        found = ta.fit(run, orders=[1, 2, 5])
+        assert any("too short for their memory" in note for note in found.notes)
+        low, high = found.interval()[1:].T
+        hit.append((low < TRUE) & (high > TRUE))
+        band = found.model.band(np.linspace(0.0, 360.0, 181))
+        least.append(band.min() / band.max())
+    print(f"memory {memory}: {100 * np.mean(hit):.1f} %")
+    # How long noise remembers is known roughly here, and taken rather too long than too short.
+    assert 0.92 <= np.mean(hit) <= 1.0
+    assert np.mean(hit) < 0.9995
+    assert min(least) > 0.9

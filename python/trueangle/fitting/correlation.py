@@ -107,4 +107,21 @@ def memory_of(
         lag += 1
     long = max(1, math.ceil(_LONG * memory))
     sizes = [len(problem.runs[i]) for i in used]
-    return memory, [max(2, min(_MOST_STRETCHES, size // long)) for size in sizes]
+    stretches = [max(2, min(_MOST_STRETCHES, size // long)) for size in sizes]
+    if min(stretches) < FEWEST_STRETCHES:
+        memory = max(memory, _of_neighbours(parts, power, problem.unknowns + len(used)))
+    return memory, stretches
+
+
+def _of_neighbours(parts: list[Array], power: float, unknowns: int) -> float:
+    """Memory of noise that forgets by the same share from reading to reading.
+
+    The correlation of neighbours in few residuals is too low by what the fit took from them,
+    and that of readings further apart is lost in it.
+    """
+    if power <= 0.0:
+        return 1.0
+    count = sum(part.size for part in parts)
+    near = sum(float(part[1:] @ part[:-1]) for part in parts) / power
+    near = max(near + (1.0 + near) * unknowns / count, 0.0)
+    return min((1.0 + near) / (1.0 - near), float(count)) if near < 1.0 else float(count)

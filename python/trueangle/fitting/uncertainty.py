@@ -139,6 +139,9 @@ def _noise(
         note = said + _between(len(clusters), len(used))
     else:
         memory, stretches = memory_of(problem, fitted, weights, used)
+        if min(stretches) < FEWEST_STRETCHES:
+            count = sum(len(problem.runs[i]) for i in used)
+            return _thinned(white, count / memory, problem.unknowns + len(used), memory, said)
         clusters = [
             cluster
             for i, count in zip(used, stretches, strict=True)
@@ -150,14 +153,31 @@ def _noise(
             f"{'one run' if len(used) == 1 else f'{len(used)} runs'}: measure "
             f"{_ENOUGH_RUNS} runs and more"
         )
-        if min(stretches) < FEWEST_STRETCHES:
-            note += "; the runs are too short for their memory, and the covariance is not known"
     try:
         total = sum(weight_of(w, len(problem.runs[i])) for i, w in enumerate(weights) if i in used)
         robust = robust_covariance(clusters, penalty * total)
     except np.linalg.LinAlgError:
         return Uncertainty("white", white, freedom, _CANCEL)
     return Uncertainty(kind, *_with_constant(white, *robust), note)
+
+
+def _thinned(
+    white: Array, independent: float, unknowns: int, memory: float, said: str
+) -> Uncertainty:
+    """As if one reading in so many as the noise remembers were there, and independent.
+
+    The scatter of a few stretches has fewer directions than there are coefficients: its
+    standard errors may come out as small as they like.
+    """
+    note = (
+        f"{said}standard errors as if one in {memory:.0f} readings, so many as the residuals "
+        "remember, stood for itself. The runs are too short for their memory, and the covariance "
+        f"is not known: measure {_ENOUGH_RUNS} runs and more"
+    )
+    # Of so many independent readings the fit takes its unknowns, and the residuals are smaller.
+    left = max(independent - unknowns, 1.0)
+    wider = memory * max(independent / left, 1.0)
+    return Uncertainty("hac", white * wider, np.full(len(white), left), note)
 
 
 def _bias(
