@@ -48,13 +48,16 @@ def check_follows(run: CalibrationRun) -> None:
     if reference.size < 4 or _core.resultant(indicated, reference, run.period) >= _FOLLOWS:
         return
     ratio = _ratio(run)
-    # By the travel where readings are dense enough to follow it; else, and where steps of
-    # more than half a turn hide it, by what would make the differences agree.
+    # By the travel where readings are dense enough to follow it; else, where steps of more
+    # than half a turn hide it, by what would make the differences agree.
     found = (
         text
         for text, factor in _remedies(run.period).items()
-        if (ratio is not None and abs(factor * ratio - 1.0) < _NEAR)
-        or _core.resultant(factor * indicated, reference, run.period) > _REMEDIED
+        if (
+            abs(factor * ratio - 1.0) < _NEAR
+            if ratio is not None
+            else _core.resultant(factor * indicated, reference, run.period) > _REMEDIED
+        )
     )
     remedy = next(found, None) or _moves(ratio)
     named = f" of run {run.label}" if run.label else ""

@@ -3,6 +3,7 @@
 import copy
 import math
 import pickle
+import re
 
 import numpy as np
 import pytest
@@ -203,6 +204,18 @@ def test_wrong_units_and_signs_are_named(factor, remedy):
     theta, error = readings(1)
     with pytest.raises(errors.ArgumentError, match=remedy):
         fitted(theta, factor * (theta + error))
+
+
+@pytest.mark.parametrize("ratio", [7.3, 5.9, 6.6, 0.17])
+def test_a_ratio_near_that_of_two_units_is_told_as_a_ratio(ratio):
+    """Divided by 2 pi it agrees within a sixth of a turn, and is no unit all the same."""
+    theta, error = readings(1)
+    order = np.argsort(theta)
+    with pytest.raises(errors.ArgumentError, match="looks like") as refused:
+        fitted(theta[order], ratio * (theta + error)[order])
+    (told,) = re.findall(r"it moves ([0-9.]+) times", str(refused.value))
+    assert float(told) == pytest.approx(ratio, rel=0.01)
+    assert "radians" not in str(refused.value)
 
 
 @pytest.mark.parametrize(
