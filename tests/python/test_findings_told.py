@@ -1,11 +1,13 @@
 """What a finding tells is what was fitted: its effects give the fitted columns back."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 import trueangle as ta
 from trueangle.diagnosis import selection
-from trueangle.effects import EFFECTS, Sidebands
+from trueangle.effects import EFFECTS, Quantisation, Sidebands
 from trueangle.effects.search import line_parameters
 from trueangle.joint.signals import join_runs
 from trueangle.regression.regression import Regression
@@ -245,3 +247,23 @@ def test_errors_widen_by_how_far_runs_disagree(signals):
     assert one.whiten.is_identity
     assert wider > 2.0 * plain
     assert float(one.robust_covariance(0)[0, 0]) == pytest.approx(wider, rel=1e-6)
+
+
+def test_noise_beyond_the_stated_is_never_nothing():
+    runs = [replace(run, reversals=()) for run in SIM.runs]
+    truth = replace(SIM, sigma_arcsec=1.5, runs=tuple(runs))
+    said = ta.diagnose(ta.simulate(truth, 21), replace(truth, sigma_arcsec=1.0)).summary()
+    assert "Nothing beyond" not in said
+    assert said.startswith("No pattern beyond the simulation, but its noise is another:")
+    assert "where the simulation states 1" in said
+    same = ta.diagnose(ta.simulate(truth, 22), truth).summary()
+    assert same.startswith("Nothing beyond the simulation")
+
+
+def test_a_lattice_is_found_whatever_the_noise():
+    truth = SIM.with_effects([Quantisation(6.0)])
+    result = ta.diagnose(ta.simulate(truth, 23), SIM)
+    (finding,) = result.findings
+    assert (finding.cause, finding.status) == ("quantisation", "confirmed")
+    assert finding.parameters["step_arcsec"].value == pytest.approx(6.0)
+    assert "where the simulation states 1" in result.summary()[:300]

@@ -10,6 +10,7 @@ import pytest
 
 import trueangle as ta
 from trueangle.cli import main
+from trueangle.effects import Quantisation
 from trueangle.errors import ArgumentError, FileError
 from trueangle.simulation import (
     EFFECTS,
@@ -17,6 +18,7 @@ from trueangle.simulation import (
     Backlash,
     FilterLag,
     Harmonic,
+    Head,
     Joint,
     Latency,
     LocalDefect,
@@ -313,3 +315,22 @@ def test_values_that_no_joint_has_are_refused_with_their_place(case, tmp_path):
     with pytest.raises(FileError, match=message) as caught:
         ta.load_simulation(path)
     assert str(caught.value).startswith(str(path))
+
+
+#: Arcsec that a whole turn in degrees keeps of a lattice: 360 deg in 53 bits are 2e-10 arcsec.
+LATTICE = 1e-6
+
+
+def test_a_reading_is_rounded_with_its_noise():
+    step, sigma = 7.0, 3.0
+    runs = (RunDesign(samples=4000, spacing="random"),)
+    joint = Joint(heads=(Head(0.0), Head(180.0)))
+    sim = Simulation(joint, (), (Quantisation(step),), sigma, runs)
+    (run,) = ta.simulate(sim, 3)
+    for reading in (run.indicated, run.signals["head1"], run.signals["head2"]):
+        counts = reading * 3600.0 / step
+        assert np.abs(counts - np.round(counts)).max() < LATTICE
+    # Sheppard: the variances add where the noise is a good part of the step; 4 standard errors.
+    expected = math.hypot(sigma, step / math.sqrt(12.0))
+    found = float(np.std((run.indicated - run.reference) * 3600.0))
+    assert abs(found / expected - 1.0) < 4.0 / math.sqrt(2.0 * 4000)

@@ -9,6 +9,8 @@ from ..effects.blindness import Blindness
 from ..errorunits import ErrorsIn, ErrorUnit, error_unit
 from ..regression.estimate import Quantity
 from .beliefs import Belief
+from .goodness.evidence import Evidence
+from .goodness.scatter import AGAINST_STATED
 from .levels import LevelGain
 
 if TYPE_CHECKING:
@@ -18,6 +20,9 @@ __all__ = ["headline", "render"]
 
 WIDTH = 88
 
+
+#: Share by which the noise must differ from what the simulation states to be told first.
+MATERIAL = 0.1
 
 #: Numbers that are no errors, which `ErrorUnit.pair` rounds as well.
 _PLAIN = ErrorUnit("", 1.0)
@@ -103,9 +108,24 @@ def headline(diagnosis: Diagnosis, unit: ErrorUnit) -> list[str]:
     for spot in diagnosis.not_identifiable:
         if spot.supported:
             lines += _wrapped(f"Seen, and not told apart: {_seen(spot, unit)}.", 2)
-    if not lines:
+    noise = [] if rest is None else rest.noise_firing
+    stated = [item for item in noise if item.test == AGAINST_STATED and _is_material(item)]
+    if lines:
+        for item in stated:
+            lines += _wrapped(f"{item.says[0].upper()}{item.says[1:]}.", 2)
+    elif stated or any(item.test != AGAINST_STATED for item in noise):
+        lines = ["No pattern beyond the simulation, but its noise is another:"]
+        for item in noise:
+            if item in stated or item.test != AGAINST_STATED:
+                lines += _wrapped(f"- {item.says} (p {_chance(item.p)})", 4, 2)
+    else:
         lines = ["Nothing beyond the simulation: no test of the readings fires."]
     return [*lines, ""]
+
+
+def _is_material(item: Evidence) -> bool:
+    """Whether the noise differs from the stated one by what anybody would act on."""
+    return abs(item.statistic - 1.0) > MATERIAL
 
 
 def _seen(spot: Blindness, unit: ErrorUnit) -> str:

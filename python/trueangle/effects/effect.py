@@ -129,6 +129,10 @@ class Effect:
         """Factor on the standard deviation of the noise, or None."""
         return None
 
+    def written(self, degrees: Array) -> Array:
+        """What is recorded of readings in degrees, all errors and the noise included."""
+        return degrees
+
     # -- rehearse ------------------------------------------------------------------
 
     @classmethod

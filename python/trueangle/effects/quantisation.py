@@ -19,13 +19,15 @@ from .search import Array
 
 __all__ = ["Quantisation"]
 
+ARCSEC_PER_DEG = 3600.0
+
 #: Share of the noise's variance from which on the rounding of the readings is its cause.
 LEAST_SHARE = 0.2
 
 
 @dataclass(frozen=True)
 class Quantisation(Effect):
-    r"""The reading is rounded to whole steps: noise of :math:`q/\sqrt{12}`.
+    r"""The reading, its noise included, is rounded to whole steps: :math:`q/\sqrt{12}`.
 
     Parameters
     ----------
@@ -49,9 +51,12 @@ class Quantisation(Effect):
     not_at_run_time: ClassVar[str] = "what was rounded away is not in the reading"
 
     def signal(self, signals: Signals, around: Surroundings, rng: np.random.Generator) -> Array:
-        pattern = around.pattern.value(signals.theta)
-        exact = signals.theta * (180.0 * 3600.0 / np.pi) + pattern
-        return np.asarray(np.round(exact / self.step_arcsec) * self.step_arcsec - exact)
+        # Rounding follows the noise (`written`): beside enough of it its mean is zero.
+        return np.zeros(len(signals))
+
+    def written(self, degrees: Array) -> Array:
+        step = self.step_arcsec / ARCSEC_PER_DEG
+        return np.asarray(np.round(degrees / step) * step)
 
     @classmethod
     def find_scatter(cls, regression: Regression) -> ScatterFinding | None:

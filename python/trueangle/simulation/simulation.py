@@ -160,6 +160,7 @@ def simulate(
     reference /= ARCSEC_PER_DEG
     theta = np.concatenate([run.reference for run in ideal])
     own = theta + (error - reference)
+    recorded = _written(sim, own)
     beside = _beside(sim, designs, signals, own, spread, rng)
     runs_made = []
     for run, (a, b) in zip(ideal, signals.run_bounds(), strict=True):
@@ -168,11 +169,18 @@ def simulate(
             replace(
                 run,
                 reference=run.reference - reference[a:b],
-                indicated=own[a:b],
+                indicated=recorded[a:b],
                 signals={**run.signals, **{k: v for k, v in read.items() if not np.isnan(v).any()}},
             )
         )
     return runs_made
+
+
+def _written(sim: Simulation, degrees: Array) -> Array:
+    """What is recorded of readings: rounded, where an effect says so."""
+    for effect in sim.effects:
+        degrees = effect.written(degrees)
+    return degrees
 
 
 def _beside(
@@ -191,11 +199,12 @@ def _beside(
     found = {}
     for i, head in enumerate(sim.joint.heads, 1):
         if head.angle_deg % 360.0 == 0.0:
-            found[f"head{i}"] = own + head.angle_deg
+            found[f"head{i}"] = _written(sim, own + head.angle_deg)
             continue
         there = replace(signals, theta=signals.theta + np.radians(head.angle_deg))
         noise = spread * rng.standard_normal(len(signals))
-        found[f"head{i}"] = there.degrees + (sim.predict(there) + noise) / ARCSEC_PER_DEG
+        read = there.degrees + (sim.predict(there) + noise) / ARCSEC_PER_DEG
+        found[f"head{i}"] = _written(sim, read)
     sigma = [np.nan if d.motor_sigma_arcsec is None else d.motor_sigma_arcsec for d in designs]
     if not np.isnan(sigma).all():
         noise = np.array(sigma)[signals.run] * rng.standard_normal(len(signals))

@@ -10,9 +10,12 @@ from .evidence import Evidence
 from .leftover import Leftover
 from .noise import Noise
 
-__all__ = ["repeats", "scatter_tests", "whitened"]
+__all__ = ["AGAINST_STATED", "repeats", "scatter_tests", "whitened"]
 
 Array = NDArray[np.float64]
+
+#: Name of the test of the noise against the sigma of the simulation.
+AGAINST_STATED = "noise against the simulation's"
 
 #: Degrees within which two readings were taken at the same place.
 SAME_PLACE = 1e-3
@@ -163,7 +166,7 @@ def _against_stated(e: Array, noise: Noise, stated: float) -> Evidence:
     spread = np.sqrt((kurtosis - 1.0) * (1.0 + rho**2) / (1.0 - rho**2) / max(noise.freedom, 1.0))
     z = 2.0 * float(np.log(ratio)) / float(spread) if ratio > 0.0 else -np.inf
     return Evidence(
-        "noise against the simulation's",
+        AGAINST_STATED,
         ratio,
         2.0 * normal_tail(abs(z)),
         f"the noise of one reading is {noise.sigma:.3g} arcsec where the simulation states "

@@ -51,6 +51,12 @@ class Unexplained:
         deciding = sum(item.decides for item in self.evidence)
         return [item for item in self.evidence if item.decides and item.p * deciding < LEVEL]
 
+    @property
+    def noise_firing(self) -> list[Evidence]:
+        """The tests that describe the noise and fire; they decide nothing."""
+        describing = [item for item in self.evidence if not item.decides]
+        return [item for item in describing if item.p * len(describing) < LEVEL]
+
     def to_dict(self) -> dict[str, Any]:
         """The ``unexplained`` object of a diagnosis."""
         return {
