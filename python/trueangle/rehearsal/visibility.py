@@ -105,6 +105,11 @@ def _deviance(
     column = effect.signal(regression.signals, around, rng)
     x, excited = regression.projected(column[:, None])
     found = float(x[:, 0] @ x[:, 0]) / sim.sigma_arcsec**2 if excited[0] else 0.0
+    # Where nothing is changed in the writing, the difference is exactly zero.
+    noise = sim.sigma_arcsec * rng.standard_normal(regression.n)
+    reading = regression.signals.degrees + noise / 3600.0
+    rounded = (effect.written(reading) - reading) * 3600.0
+    found += float(rounded @ rounded) / sim.sigma_arcsec**2
     factor = effect.noise_factor(regression.signals, around)
     if factor is not None:
         # Half of the variance of the logarithm of the variance, for every reading.
