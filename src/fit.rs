@@ -5,6 +5,7 @@
 
 mod check;
 mod counts;
+mod folds;
 mod reduction;
 mod residuals;
 
@@ -20,6 +21,7 @@ use crate::{rank, threads};
 
 pub use crate::readings::{Argument, Run};
 use counts::Counts;
+pub use folds::Fold;
 use reduction::Reduced;
 pub use residuals::{Scan, scan};
 
@@ -57,6 +59,10 @@ pub struct Solution {
     pub method: Method,
     system: System,
     condition_number: Option<f64>,
+    scatter: f64,
+    design: Design,
+    centres: Vec<f64>,
+    count: usize,
     estimate: Estimate,
     /// Derivative of the constant by every zero.
     shares: Vec<f64>,
@@ -73,6 +79,24 @@ impl Solution {
     pub fn condition_number(&self) -> f64 {
         let made = || self.system.condition_number();
         self.condition_number.unwrap_or_else(made)
+    }
+
+    /// The same readings under penalties on the squared coefficients: nothing is read again.
+    pub fn penalised(&self, ridge: &[f64]) -> Result<Self, Error> {
+        check::penalties(&self.design, ridge)?;
+        let reduced = Reduced {
+            system: self.system.clone(),
+            condition_number: self.condition_number,
+            method: self.method,
+            scatter: self.scatter,
+        };
+        conclude(
+            &self.design,
+            reduced,
+            &self.centres,
+            self.count,
+            Some(ridge),
+        )
     }
 
     /// Covariance of `[constant, A, B, ...]`, row by row; NaN without degrees of freedom.
@@ -185,6 +209,24 @@ pub fn triangle(
     Ok(found.to_rows())
 }
 
+/// The same of every stretch of the argument that ends at one of `ends`, and of the rest.
+pub fn folds(
+    design: &Design,
+    run: &Run,
+    argument: Argument,
+    ends: &[f64],
+    zero: f64,
+    threads: usize,
+) -> Result<Vec<Fold>, Error> {
+    check::lengths(run)?;
+    let readings = run.readings(argument);
+    let found = folds::folds(design, &readings, ends, zero, threads);
+    if !found.iter().all(|fold| fold.triangle.is_finite()) {
+        check::angles(std::slice::from_ref(run))?;
+    }
+    Ok(found)
+}
+
 /// Solves the reduced system and puts centres and variances back.
 fn conclude(
     design: &Design,
@@ -234,6 +276,10 @@ fn conclude(
         method,
         system,
         condition_number,
+        scatter,
+        design: design.clone(),
+        centres: centres.to_vec(),
+        count,
         estimate,
         shares,
     })

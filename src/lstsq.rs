@@ -113,6 +113,11 @@ impl Triangle {
         self.square().transpose().as_slice().to_vec()
     }
 
+    /// Whether every number of it is finite.
+    pub fn is_finite(&self) -> bool {
+        self.factor.iter().all(|value| value.is_finite())
+    }
+
     /// The columns of the design part.
     pub fn design_columns(&self) -> Vec<Vec<f64>> {
         let square = self.square();

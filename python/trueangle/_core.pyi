@@ -183,6 +183,7 @@ class Solution:
     def condition_number(self) -> float: ...
     @property
     def method(self) -> Literal["plain", "moments", "qr", "counts"]: ...
+    def penalised(self, ridge: Sequence[float]) -> Solution: ...
 
 def fit(
     runs: Sequence[tuple[_Array, _Array, _Array | None]],
@@ -228,6 +229,16 @@ def triangle(
     zero: float,
     threads: int | None = None,
 ) -> NDArray[np.float64]: ...
+def folds(
+    run: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64] | None],
+    period: float,
+    cycles: Sequence[float],
+    orders: Sequence[Sequence[int]],
+    argument: str,
+    ends: Sequence[float],
+    zero: float,
+    threads: int | None = None,
+) -> list[tuple[NDArray[np.float64], float]]: ...
 def scan_residuals(
     series: Series,
     run: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64] | None],

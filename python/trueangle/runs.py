@@ -226,7 +226,9 @@ def as_runs(runs: CalibrationRun | Iterable[CalibrationRun]) -> list[Calibration
     ArgumentError
         No run at all, something else than runs, or runs in different units.
     """
-    found = [runs] if isinstance(runs, CalibrationRun) else list(runs)
+    if isinstance(runs, CalibrationRun):
+        return [runs]
+    found = list(runs)
     if not found:
         raise ArgumentError("runs is empty: at least one CalibrationRun is needed")
     for i, run in enumerate(found):

@@ -8,14 +8,19 @@ use crate::readings::{Argument, Run};
 /// Lengths, weights, and that every run has a reading that counts.
 pub fn shapes(design: &Design, runs: &[Run], ridge: Option<&[f64]>) -> Result<(), Error> {
     if let Some(ridge) = ridge {
-        same_length("ridge", ridge.len(), "coefficients", design.columns())?;
-        not_negative("ridge", ridge)?;
+        penalties(design, ridge)?;
     }
     runs.iter().try_for_each(lengths)?;
     let weights = |run: &Run| run.weights.map_or(Ok(()), |w| not_negative("weights", w));
     runs.iter().try_for_each(weights)?;
     let counts = |run: &Run| run.readings(Argument::Reference).count();
     have_readings(design, runs.iter().map(counts))
+}
+
+/// That there is one penalty for each coefficient, and none is negative.
+pub fn penalties(design: &Design, ridge: &[f64]) -> Result<(), Error> {
+    same_length("ridge", ridge.len(), "coefficients", design.columns())?;
+    not_negative("ridge", ridge)
 }
 
 /// That the columns of a run are equally long.

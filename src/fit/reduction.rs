@@ -17,7 +17,7 @@ const BLOCK_ROWS: usize = 512;
 const READINGS_PER_SEGMENT: usize = 8;
 
 /// Factors of segments want some readings more than their twelve unknowns.
-const READINGS_PER_FACTOR: usize = 32;
+pub const READINGS_PER_FACTOR: usize = 32;
 
 /// Segments beyond which moments would take more memory than they are worth.
 const MOST_SEGMENTS: usize = 1 << 16;

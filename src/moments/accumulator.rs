@@ -56,6 +56,11 @@ pub fn segments(highest: u32) -> usize {
     needed.max(FEWEST_SEGMENTS).next_multiple_of(2)
 }
 
+/// Bytes of the tables of an accumulator for orders up to `highest`.
+pub fn table_bytes(highest: u32) -> usize {
+    3 * size_of::<Segment>() * segments(highest)
+}
+
 impl Accumulator {
     /// No readings yet; errors are wrapped around `centre`.
     pub fn new(period: Period, cycles: f64, highest: u32, centre: f64) -> Self {
@@ -87,6 +92,16 @@ impl Accumulator {
             });
         }
         memory::room(TABLES * size_of::<Segment>() * segments(highest) + 2 * PART_BYTES)
+    }
+
+    /// Segments of its circle.
+    pub fn segments(&self) -> usize {
+        self.total.len()
+    }
+
+    /// Where on its circle readings lie.
+    pub fn frame(&self) -> Frame {
+        Frame::new(self.base, self.total.len())
     }
 
     /// Turns of the base shaft per turn.

@@ -90,6 +90,13 @@ impl Solution {
         self.inner.condition_number()
     }
 
+    /// The same readings under penalties on the squared coefficients, without another look.
+    fn penalised(&self, py: Python<'_>, ridge: Vec<f64>) -> PyResult<Self> {
+        let inner = detached(py, || self.inner.penalised(&ridge))??;
+        let sizes = self.sizes.clone();
+        Ok(Self { inner, sizes })
+    }
+
     #[getter]
     fn method(&self) -> &'static str {
         match self.inner.method {
@@ -176,6 +183,34 @@ pub fn triangle<'py>(
         core::triangle(&design, &run, argument, zero, threads)
     })??;
     square(py, &rows, size)
+}
+
+/// The same of every stretch of the argument that ends at one of `ends`, with its weight.
+#[pyfunction]
+#[pyo3(signature = (run, period, cycles, orders, argument, ends, zero, threads=None))]
+#[allow(clippy::too_many_arguments)] // one Python call, its arguments by name
+pub fn folds<'py>(
+    py: Python<'py>,
+    run: Readings<'py>,
+    period: f64,
+    cycles: Vec<f64>,
+    orders: &Bound<'_, PyAny>,
+    argument: &str,
+    ends: Vec<f64>,
+    zero: f64,
+    threads: Asked<'_>,
+) -> PyResult<Vec<(Bound<'py, PyArray2<f64>>, f64)>> {
+    let argument = argument_named(py, argument)?;
+    let design = design(period, cycles, orders)?;
+    let size = design.columns() + 2;
+    let run = slices(&run)?;
+    let threads = threads::count(py, threads.as_ref(), run.reference.len())?;
+    design.room()?;
+    let found = detached(py, || {
+        core::folds(&design, &run, argument, &ends, zero, threads)
+    })??;
+    let fold = |fold: core::Fold| Ok((square(py, &fold.triangle.to_rows(), size)?, fold.weight));
+    found.into_iter().map(fold).collect()
 }
 
 /// Standard deviations of a fitted series at some angles, from its covariance.

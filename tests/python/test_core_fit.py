@@ -352,3 +352,72 @@ def test_bad_arguments():
     ]:
         with pytest.raises(ValueError, match=message):
             _core.fit([(good, good, None)], tau, [1.0], [[1]], **keywords)
+
+
+FOLDED = 1e-13  # relative to the largest sum of products: rounding of sums of so many readings
+
+
+@pytest.mark.parametrize("weighted", [False, True])
+@pytest.mark.parametrize("argument", ["reference", "indicated"])
+@pytest.mark.parametrize("count", [300, 60_000])
+def test_folds_are_the_readings_between_their_ends(count, argument, weighted):
+    seed = int(np.random.SeedSequence().entropy % 2**32)
+    print(f"seed {seed}")
+    rng = np.random.default_rng(seed)
+    period, orders, zero = 360.0, [[1, 2, 7]], 12.0
+    reference = rng.uniform(-50.0, 700.0, count)  # more than one turn, in no order
+    indicated = reference + zero + np.sin(np.radians(reference)) + rng.normal(0.0, 0.1, count)
+    weights = rng.uniform(0.5, 2.0, count) * (rng.random(count) > 0.1) if weighted else None
+    angle = reference if argument == "reference" else indicated
+    # Of two ends nearly nothing lies between, and nothing beyond the last.
+    ends = [0.0, 150.0, 150.01, 400.0, 2000.0]
+    run = (reference, indicated, weights)
+    found = _core.folds(run, period, [1.0], orders, argument, ends, zero)
+    assert len(found) == len(ends) + 1
+    place = np.searchsorted(ends, angle, side="left")
+    design = np.column_stack(
+        [np.ones(count), design_matrix(angle, period, [1.0], orders), indicated - reference - zero]
+    )
+    given = np.ones(count) if weights is None else weights
+    for fold, (triangle, weight) in enumerate(found):
+        rows, w = design[place == fold], given[place == fold]
+        wanted = rows.T @ (w[:, None] * rows)
+        assert weight == pytest.approx(w.sum(), rel=FOLDED)
+        assert np.abs(triangle.T @ triangle - wanted).max() <= FOLDED * count
+        assert np.array_equal(triangle, np.triu(triangle))
+
+
+def test_folds_name_the_reading_that_is_not_finite():
+    angle = np.linspace(0.0, 300.0, 50)
+    angle[7] = np.nan
+    with pytest.raises(ValueError, match=r"indicated\[7\]"):
+        _core.folds(
+            (np.linspace(0.0, 300.0, 50), angle, None),
+            360.0,
+            [1.0],
+            [[1]],
+            "reference",
+            [90.0],
+            0.0,
+        )
+
+
+def test_a_penalty_needs_no_second_look_at_the_readings():
+    seed = int(np.random.SeedSequence().entropy % 2**32)
+    print(f"seed {seed}")
+    rng = np.random.default_rng(seed)
+    runs = []
+    for count in (400, 90):
+        theta = rng.uniform(0.0, 200.0, count)
+        error = np.cos(np.radians(theta)) + rng.normal(0.0, 0.1, count)
+        runs.append((theta, theta + error, rng.uniform(0.5, 2.0, count)))
+    ridge = [3.0, 0.5, 2.0, 0.1]
+    plain = _core.fit(runs, 360.0, [1.0], [[1, 2]])
+    again = plain.penalised(ridge)
+    wanted = _core.fit(runs, 360.0, [1.0], [[1, 2]], ridge=ridge)
+    for name in ("offsets", "offset_std", "constant", "cosine", "sine", "covariance"):
+        assert np.array_equal(getattr(again, name), getattr(wanted, name)), name
+    assert again.residual_variance == wanted.residual_variance
+    assert again.degrees_of_freedom == wanted.degrees_of_freedom != plain.degrees_of_freedom
+    with pytest.raises(ValueError, match="ridge"):
+        plain.penalised([1.0])

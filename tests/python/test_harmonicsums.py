@@ -178,3 +178,25 @@ def test_noise_of_repeats_is_that_of_least_squares(monkeypatch):
         noise = repeats.pure_error(units, positions)
         assert noise.degrees_of_freedom == freedom
         assert noise.variance == pytest.approx(left @ left / freedom, rel=1e-6)
+
+
+@pytest.mark.parametrize("orders", [[1, 2, 5, 9], [1.0, 2.5, 7.3]])
+def test_parts_of_the_normal_matrix_are_parts_of_it(orders):
+    seed = int(np.random.SeedSequence().entropy % 2**32)
+    print(f"seed {seed}")
+    rng = np.random.default_rng(seed)
+    units = [
+        Readings(rng.uniform(0.0, 1.0, n), rng.normal(size=n), rng.uniform(0.5, 2.0, n), "")
+        for n in (50, 700)
+    ]
+    sums = harmonic_sums(units, orders)
+    size = len(orders)
+    everything = range(size)
+    for unit, own in enumerate(sums.blocks()):
+        whole = sums.gram(unit, everything)
+        part = sums.gram(unit, [2, 0], [1])
+        assert np.array_equal(part, whole[np.ix_(sums.columns([2, 0]), sums.columns([1]))])
+        for k in everything:
+            assert np.allclose(
+                own[k], whole[np.ix_([k, k + size], [k, k + size])], rtol=1e-13, atol=0
+            )

@@ -180,7 +180,7 @@ def fit(
     if selection is not None:
         check_later_stretch(problem, weighted.weights or problem.base)
     if ridge > 0.0:
-        fitted = problem.solve(weighted.weights or problem.base, ridge)
+        fitted = problem.penalised(fitted, weighted.weights or problem.base, ridge)
     if problem.argument == "reference":
         check_invertible(fitted.series.slope_bound)
     joint = (gear_ratio, fixed_member)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from functools import cached_property
 from typing import Any, Literal, NamedTuple, cast
 
 import numpy as np
@@ -133,16 +132,15 @@ class Problem:
         self.threads = threads
         self.period = runs[0].period
         self.base: list[Array | None] = [run.weights for run in runs]
+        #: The argument of every run.
+        self.angles: list[Array] = [getattr(run, argument) for run in self.runs]
+        #: Cycles per turn of every shaft, and its orders, as the core takes them.
+        self.design = ([s.cycles_per_turn for s in shafts], [list(s.orders) for s in shafts])
 
     @property
     def unknowns(self) -> int:
         """Two per order; the zeros of the runs are not counted."""
         return 2 * sum(len(shaft.orders) for shaft in self.shafts)
-
-    @cached_property
-    def angles(self) -> list[Array]:
-        """The argument of every run."""
-        return [getattr(run, self.argument) for run in self.runs]
 
     def solve(self, weights: Sequence[Array | None], penalty: float = 0.0) -> Fitted:
         """Least squares under ``weights``, with an optional Tikhonov penalty.
@@ -157,23 +155,36 @@ class Problem:
         ]
         if not rows:
             raise ArgumentError("every reading has weight 0: nothing is left to fit")
-        ridge: list[float] | None = None
-        if penalty > 0.0:
-            total = sum(x.size if w is None else float(w.sum()) for x, _, w in rows)
-            ridge = [penalty * total] * self.unknowns
+        ridge = self._penalties(weights, penalty) if penalty > 0.0 else None
         solution = _core.fit(
             rows,
             self.period,
-            [shaft.cycles_per_turn for shaft in self.shafts],
-            [list(shaft.orders) for shaft in self.shafts],
+            *self.design,
             self.argument,
             self.method,
             ridge,
             self.threads,
         )
-        offsets = np.full(len(self.runs), np.nan)
-        offsets[used] = solution.offsets
+        offsets = solution.offsets
+        if len(rows) < len(self.runs):
+            offsets = np.full(len(self.runs), np.nan)
+            offsets[used] = solution.offsets
         return Fitted(solution, offsets, self.shafts, self.period)
+
+    def penalised(self, fitted: Fitted, weights: Sequence[Array | None], penalty: float) -> Fitted:
+        """What `solve` gives for the readings of ``fitted`` with a penalty, from its sums alone."""
+        solution = fitted.solution.penalised(self._penalties(weights, penalty))
+        offsets = fitted.offsets.copy()
+        offsets[~np.isnan(offsets)] = solution.offsets
+        return Fitted(solution, offsets, self.shafts, self.period)
+
+    def _penalties(self, weights: Sequence[Array | None], penalty: float) -> list[float]:
+        """Of every coefficient, for one relative to the sum of weights."""
+        total = sum(
+            len(run) if weight is None else float(weight.sum())
+            for run, weight in zip(self.runs, weights, strict=True)
+        )
+        return [penalty * total] * self.unknowns
 
     def residuals(self, fitted: Fitted) -> list[Array]:
         """Measured less fitted error of every run, each around its own zero."""

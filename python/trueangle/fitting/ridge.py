@@ -86,40 +86,20 @@ def choose_ridge(problem: Problem, weights: Sequence[Array | None]) -> float:
 
 
 def _folds(problem: Problem, weights: Sequence[Array | None]) -> list[_Fold]:
-    if len(problem.runs) > 1:
-        parts = [
-            (run.reference, run.indicated, weight, _zero(run))
-            for run, weight in zip(problem.runs, weights, strict=True)
-        ]
-    else:
-        (run,), (weight,) = problem.runs, weights
-        zero = _zero(run)
-        count = _BLOCKS if problem.is_periodic else _STRETCHES
-        block = _blocks(problem.angles[0], count)
-        order = np.argsort(block, kind="stable")
-        pieces = np.split(order, np.cumsum(np.bincount(block, minlength=count))[:-1])
-        parts = [
-            (run.reference[i], run.indicated[i], None if weight is None else weight[i], zero)
-            for i in pieces
-            if i.size
-        ]
-    cycles = [shaft.cycles_per_turn for shaft in problem.shafts]
-    orders = [list(shaft.orders) for shaft in problem.shafts]
-    return [
-        _Fold(
-            _core.triangle(
-                (reference, indicated, weight),
-                problem.period,
-                cycles,
-                orders,
-                problem.argument,
-                zero,
-                problem.threads,
-            ),
-            float(reference.size if weight is None else weight.sum()),
+    several = len(problem.runs) > 1
+    found: list[tuple[Array, float]] = []
+    for run, weight, angles in zip(problem.runs, weights, problem.angles, strict=True):
+        ends = [] if several else _ends(angles, _BLOCKS if problem.is_periodic else _STRETCHES)
+        found += _core.folds(
+            (run.reference, run.indicated, weight),
+            problem.period,
+            *problem.design,
+            problem.argument,
+            ends,
+            _zero(run),
+            problem.threads,
         )
-        for reference, indicated, weight, zero in parts
-    ]
+    return [_Fold(triangle, weight) for triangle, weight in found]
 
 
 def _zero(run: CalibrationRun) -> float:
@@ -128,14 +108,11 @@ def _zero(run: CalibrationRun) -> float:
     return circular_mean(run.indicated[::stride] - run.reference[::stride], run.period)
 
 
-def _blocks(angles: Array, count: int) -> NDArray[np.uint8]:
-    """Which of so many equal parts of the readings, by their angles, each belongs to."""
+def _ends(angles: Array, count: int) -> list[float]:
+    """Where so many parts of the readings, equal in number, end on the travel."""
     looked_at = angles[:: max(1, angles.size // _LOOKED_AT)]
-    ends = np.quantile(looked_at, np.arange(1, count) / count)
-    block = np.zeros(angles.size, dtype=np.uint8)
-    for end in ends:
-        block += angles > end
-    return block
+    ends: list[float] = np.quantile(looked_at, np.arange(1, count) / count).tolist()
+    return ends
 
 
 def _solutions(folds: Sequence[_Fold], own_zeros: bool) -> Array:

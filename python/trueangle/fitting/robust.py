@@ -79,7 +79,8 @@ def robust_scale(residuals: Array) -> float:
     stride = max(1, residuals.size // SAMPLE)
     sample = np.abs(residuals[::stride])
     middle = sample.size // 2
-    return MAD_TO_SIGMA * float(np.partition(sample, middle)[middle])
+    sample.partition(middle)
+    return MAD_TO_SIGMA * float(sample[middle])
 
 
 def weigh(problem: Problem, loss: Loss, floor: float) -> Weighted:

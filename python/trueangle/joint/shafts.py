@@ -134,6 +134,8 @@ def resolve_orders(
 
 
 def _order(order: object, shaft: str) -> int:
+    if type(order) is int and 1 <= order < 2**31:
+        return order
     try:
         whole = int(order)  # type: ignore[call-overload]
         if whole == order and 1 <= whole < 2**31:

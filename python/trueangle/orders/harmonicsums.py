@@ -86,6 +86,7 @@ class HarmonicSums:
         self._spectra = spectra
         self._means = means
         self._total: Array | None = None
+        self._blocks: Array | None = None
 
     @property
     def units(self) -> int:
@@ -101,15 +102,22 @@ class HarmonicSums:
         """``X' W y`` of a unit about its means, for the orders at ``index``."""
         return np.asarray(self._rhs[unit, self.columns(index)])
 
-    def gram(self, unit: int, index: Sequence[int] | NDArray[np.intp]) -> Array:
-        """``X' W X`` of a unit about its means, for the orders at ``index``."""
-        columns = self.columns(index)
+    def gram(
+        self,
+        unit: int,
+        index: Sequence[int] | NDArray[np.intp],
+        others: Sequence[int] | NDArray[np.intp] | None = None,
+    ) -> Array:
+        """``X' W X`` of a unit about its means, for the orders at ``index`` and ``others``."""
+        others = index if others is None else others
+        rows, columns = self.columns(index), self.columns(others)
         if self._grams is not None:
-            return np.asarray(self._grams[unit][columns[:, None], columns])
+            return np.asarray(self._grams[unit][rows[:, None], columns])
         assert self._spectra is not None
-        whole = self.orders[np.asarray(index, dtype=np.intp)].astype(np.int64)
+        mine = self.orders[rows[: rows.size // 2]].astype(np.int64)
+        theirs = self.orders[columns[: columns.size // 2]].astype(np.int64)
         spectrum = self._spectra[unit]
-        down, up = whole[:, None] - whole[None, :], whole[:, None] + whole[None, :]
+        down, up = mine[:, None] - theirs, mine[:, None] + theirs
         minus, plus = spectrum[np.abs(down)], spectrum[up]
         sine = np.sign(down) * minus.imag
         gram = 0.5 * np.block(
@@ -118,8 +126,30 @@ class HarmonicSums:
                 [plus.imag + sine, minus.real - plus.real],
             ]
         )
-        mean = self._means[unit, columns]
-        return np.asarray(gram - (self.weight[unit] * mean)[:, None] * mean)
+        means = self._means[unit]
+        return np.asarray(gram - (self.weight[unit] * means[rows])[:, None] * means[columns])
+
+    def blocks(self) -> Array:
+        """``X' W X`` of every unit for each order by itself, shape (units, orders, 2, 2)."""
+        if self._blocks is None:
+            self._blocks = np.stack([self._own(unit) for unit in range(self.units)])
+        return self._blocks
+
+    def _own(self, unit: int) -> Array:
+        size = self.orders.size
+        if self._grams is not None:
+            pairs = np.stack([np.arange(size), np.arange(size) + size], axis=1)
+            return np.asarray(self._grams[unit][pairs[:, :, None], pairs[:, None, :]])
+        assert self._spectra is not None
+        whole, twice = (
+            self._spectra[unit, 0].real,
+            self._spectra[unit, 2 * self.orders.astype(np.int64)],
+        )
+        own = np.empty((size, 2, 2))
+        own[:, 0, 0], own[:, 1, 1] = whole + twice.real, whole - twice.real
+        own[:, 0, 1] = own[:, 1, 0] = twice.imag
+        mean = self._means[unit].reshape(2, size).T
+        return np.asarray(0.5 * own - self.weight[unit] * mean[:, :, None] * mean[:, None, :])
 
     def total(self) -> tuple[Array, Array, float]:
         """Sums of all units: ``X' W X``, ``X' W y`` and the sum of squares."""

@@ -35,19 +35,12 @@ def run_scatter(sums: HarmonicSums, chosen: Sequence[int], orders: Sequence[int]
         return np.full(index.size, math.inf)
     coefficients, _, _ = fit_subset(sums, chosen)
     n = index.size
-    both = np.concatenate([index, np.asarray(chosen, dtype=np.intp)])
     parts = []
-    for unit in range(sums.units):
-        gram = sums.gram(unit, both)
-        mine = np.concatenate([np.arange(n), np.arange(n) + both.size])
-        theirs = np.concatenate([np.arange(n, both.size), np.arange(n, both.size) + both.size])
-        score = sums.rhs(unit, index) - gram[np.ix_(mine, theirs)] @ coefficients
-        i = np.arange(n)
-        blocks = np.empty((n, 2, 2))
-        blocks[:, 0, 0] = gram[i, i]
-        blocks[:, 1, 1] = gram[i + both.size, i + both.size]
-        blocks[:, 0, 1] = blocks[:, 1, 0] = gram[i, i + both.size]
-        blocks += 1e-9 * np.trace(blocks, axis1=1, axis2=2)[:, None, None] * np.eye(2)
+    # What one order has in common with itself does not depend on those chosen.
+    own = sums.blocks()[:, index]
+    own = own + 1e-9 * np.trace(own, axis1=2, axis2=3)[..., None, None] * np.eye(2)
+    for unit, blocks in enumerate(own):
+        score = sums.rhs(unit, index) - sums.gram(unit, index, chosen) @ coefficients
         parts.append((blocks, np.stack([score[:n], score[n:]], axis=1)))
     together = np.sum([blocks for blocks, _ in parts], axis=0)
     common = np.linalg.solve(together, np.sum([s for _, s in parts], axis=0)[..., None])

@@ -157,15 +157,16 @@ class Chart:
         hollow: bool = False,
     ) -> None:
         """Dots; ``hover`` is a line of text with ``@{column}`` in it."""
-        drawn = self._figure.scatter(
-            "x",
-            "y",
-            source=self._source(x, y, columns),
+        # A figure's own `scatter` makes glyphs for states that never come, at four times the price.
+        glyph = self._models.Scatter(
+            x="x",
+            y="y",
             size=size,
             marker=marker,
             fill_alpha=0.0 if hollow else 1.0,
             line_alpha=1.0 if hollow or marker == "cross" else 0.0,
         )
+        drawn = self._figure.add_glyph(self._source(x, y, columns), glyph)
         sign = "○" if hollow else _GLYPHS[_MARKERS.index(marker)]
         self._add(drawn, colour, label, run, hover, sign)
 
