@@ -79,7 +79,24 @@ def nothing_clipped(ax) -> None:
         assert frame.y0 - 1 <= box.y0 < box.y1 <= frame.y1 + 1, text.get_text()
 
 
-def test_error_curves_show_readings_model_and_band(fit: ta.FitResult) -> None:
+def test_gear_orders_are_drawn_as_an_envelope(fit: ta.FitResult) -> None:
+    ax = plots.error_curves(fit)
+    check_labels(ax)
+    assert legend_texts(ax) == ["run r0", "run r1", "run r2", "envelope of the model"]
+    (band,) = ax.collections
+    drawn = band.get_paths()[0].vertices[:, 1]
+    curve = curves.model_curve(fit.model)
+    assert drawn.max() == pytest.approx(curve.error.max())
+    assert drawn.min() == pytest.approx(curve.error.min())
+    angle, least, most = curves.envelope(curve)
+    near = np.abs(curve.angle[:, None] - angle).argmin(axis=1)
+    # Places that lie between two parts may belong to either.
+    inside = (curve.error >= least[near]) & (curve.error <= most[near])
+    assert inside.mean() > 0.95
+
+
+def test_error_curves_show_readings_model_and_band(runs: list[ta.CalibrationRun]) -> None:
+    fit = ta.fit(runs[:3], [1, 2])
     ax = plots.error_curves(fit)
     check_labels(ax)
     nothing_clipped(ax)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
@@ -23,6 +24,7 @@ __all__ = [
     "SIGNALS",
     "Curve",
     "Points",
+    "envelope",
     "error_points",
     "held_out_points",
     "model_curve",
@@ -38,6 +40,9 @@ CONFIDENCE: Final = 1.96
 
 #: Points of a curve for each cycle of its highest order, and the least and most of them.
 _PER_CYCLE, _FEWEST, _MOST_SAMPLES = 12, 721, 12001
+
+#: Places of an envelope.
+_PLACES: Final = 180
 
 #: What residuals can be drawn against: axis label by name.
 SIGNALS: Final = {
@@ -108,6 +113,22 @@ def model_curve(model: HarmonicModel, span: tuple[float, float] | None = None) -
     error = factor * (np.asarray(model.error(theta)) - model.constant)
     std = None if model.covariance is None else factor * model.band(theta)
     return Curve(angle, error, std)
+
+
+def envelope(curve: Curve) -> tuple[Array, Array, Array]:
+    """Least and greatest value of a curve, at places of which each holds several periods.
+
+    Returns
+    -------
+    angle, least, greatest : ndarray
+    """
+    edges = np.linspace(0, curve.angle.size, _PLACES + 1).astype(int)
+    parts = [slice(a, b) for a, b in pairwise(edges) if b > a]
+    return (
+        np.array([curve.angle[p].mean() for p in parts]),
+        np.array([curve.error[p].min() for p in parts]),
+        np.array([curve.error[p].max() for p in parts]),
+    )
 
 
 def seen_span(model: HarmonicModel) -> tuple[float, float]:

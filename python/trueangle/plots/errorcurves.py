@@ -9,7 +9,7 @@ import numpy as np
 from ..errorunits import significant
 from . import palette
 from .canvas import described, legend, new_axes, turn_axis
-from .curves import CONFIDENCE, error_points, model_curve, seen_span, thinned
+from .curves import CONFIDENCE, envelope, error_points, model_curve, seen_span, thinned
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -60,15 +60,18 @@ def error_curves(fit: FitResult, ax: Axes | None = None) -> Axes:
     curve = model_curve(fit.model)
     # A gear's orders fill the picture: the readings stay on top of them.
     dense = max(fit.orders, default=0.0) > _DENSE
-    ax.plot(
-        curve.angle,
-        curve.error,
-        color=palette.MUTED if dense else palette.ink(ax),
-        linewidth=0.5 if dense else 1.2,
-        zorder=1.0 if dense else 3.0,
-        label="model",
-    )
-    if curve.std is not None:
+    if dense:
+        ax.fill_between(
+            *envelope(curve),
+            color=palette.MUTED,
+            alpha=0.35,
+            linewidth=0.0,
+            zorder=0.5,
+            label="envelope of the model",
+        )
+    else:
+        ax.plot(curve.angle, curve.error, color=palette.ink(ax), zorder=3.0, label="model")
+    if curve.std is not None and not dense:
         half = CONFIDENCE * curve.std
         ax.fill_between(
             curve.angle,

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from itertools import pairwise
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -36,8 +35,7 @@ _FEW: Final = 600
 _DENSE: Final = 40.0
 #: ... where such orders make this part of the amplitudes; smaller ones are ripple on a line.
 _NOTABLE: Final = 0.1
-#: Places of an envelope, and periods of the stretch that is shown beside it.
-_PLACES: Final = 180
+#: Periods of the stretch that is shown beside an envelope.
 _PERIODS: Final = 4.0
 #: Ticks of that narrow chart.
 _STRETCH_TICKS: Final = 4.0
@@ -90,7 +88,7 @@ def errors_of_runs(
     if fit is not None:
         curve = scale.curve(curves.model_curve(fit.model))
         if strong is not None:
-            places, least, most = _envelope(curve)
+            places, least, most = curves.envelope(curve)
             main.band(places, least, most, colour="model", label="envelope of the model")
         else:
             _draw_model(main, curve)
@@ -112,17 +110,6 @@ def _draw_model(chart: Chart, curve: Curve, label: str = "model") -> None:
             curve.angle, curve.error - half, curve.error + half, colour="model", label="95 % band"
         )
     chart.line(curve.angle, curve.error, colour="model", label=label)
-
-
-def _envelope(curve: Curve) -> tuple[Array, Array, Array]:
-    """Least and greatest value of a curve at each of some places."""
-    edges = np.linspace(0, curve.angle.size, _PLACES + 1).astype(int)
-    parts = [slice(a, b) for a, b in pairwise(edges) if b > a]
-    return (
-        np.array([curve.angle[p].mean() for p in parts]),
-        np.array([curve.error[p].min() for p in parts]),
-        np.array([curve.error[p].max() for p in parts]),
-    )
 
 
 def strong_gear_order(
