@@ -12,17 +12,20 @@ import pytest
 from trueangle.reports.numbers import formatted, lookup
 from trueangle.reports.pdf import find_browser
 
+from .scripts import (
+    CHARTS,
+    CONTRASTS,
+    NUMBERS_APART,
+    OUT_OF_REACH,
+    TEXTS_AROUND,
+    TEXTS_WITHIN,
+    VISIBLE_POINTS,
+    X_RANGE,
+)
+
 playwright = pytest.importorskip("playwright.sync_api")
 BROWSER = find_browser()
 pytestmark = pytest.mark.skipif(BROWSER is None, reason="no Chromium installed: .ci/browser")
-
-#: Views of the charts below an element; Bokeh keeps them by the id of their model.
-CHARTS = """(id) => [...Bokeh.index].filter((view) => view.model.type === "Figure" &&
-  document.getElementById(id).contains(view.el.getRootNode().host || view.el))"""
-VISIBLE_POINTS = f"""(id) => ({CHARTS})(id).flatMap((view) => view.model.renderers)
-  .filter((r) => r.visible && r.glyph && r.glyph.type === "Scatter")
-  .reduce((n, r) => n + r.data_source.get_length(), 0)"""
-X_RANGE = f"""(id) => {{ const r = ({CHARTS})(id)[0].model.x_range; return [r.start, r.end]; }}"""
 
 #: Least contrast of a point or line with the page (WCAG 1.4.11).
 CONTRAST = 3.0
@@ -140,25 +143,7 @@ def test_texts_within_charts_do_not_overlap(browser, file: Path) -> None:
     page = browser.new_page(viewport={"width": 1200, "height": 900})
     page.goto(file.as_uri() + "#print")
     page.wait_for_selector("html[data-drawn]", timeout=60_000)
-    found = page.evaluate(
-        """() => { const inside = (root) => [...root.querySelectorAll("*")].flatMap((e) =>
-            [e, ...(e.shadowRoot ? inside(e.shadowRoot) : [])]);
-          const clashes = []; let texts = 0;
-          for (const canvas of document.querySelectorAll(".canvas")) {
-            const boxes = inside(canvas).filter((e) => e.tagName === "text")
-              .map((e) => [e.textContent, e.getBoundingClientRect()])
-              .filter(([text, r]) => text.trim() && r.width && r.height);
-            texts += boxes.length;
-            // A layer that was painted again holds the same text at the same place.
-            const same = ([a, p], [b, q]) => a === b && Math.abs(p.left - q.left) < 1
-              && Math.abs(p.top - q.top) < 1;
-            for (const [i, one] of boxes.entries()) for (const other of boxes.slice(i + 1)) {
-              const [[a, p], [b, q]] = [one, other];
-              if (!same(one, other) && Math.min(p.right, q.right) - Math.max(p.left, q.left) > 1
-                  && Math.min(p.bottom, q.bottom) - Math.max(p.top, q.top) > 3)
-                clashes.push(`${canvas.closest(".plot").id}: ${a} / ${b}`); } }
-          return [texts, clashes]; }"""
-    )
+    found = page.evaluate(TEXTS_WITHIN)
     page.close()
     assert found[0] > 50
     assert found[1] == []
@@ -166,19 +151,7 @@ def test_texts_within_charts_do_not_overlap(browser, file: Path) -> None:
 
 def test_texts_of_a_chart_do_not_overlap(page: Page) -> None:
     """Titles, legends and captions of figures; ticks and axes are Bokeh's own to place."""
-    clashes = page.page.evaluate(
-        """() => { const found = [];
-          for (const figure of document.querySelectorAll("figure")) {
-            const texts = [...figure.querySelectorAll(
-              "figcaption, .chart-title, .legend > span, .note, .canvas")]
-              .map((e) => [e, e.getBoundingClientRect()]).filter(([, r]) => r.width && r.height);
-            for (const [i, [a, p]] of texts.entries()) for (const [b, q] of texts.slice(i + 1)) {
-              const over = Math.min(p.right, q.right) - Math.max(p.left, q.left) > 1
-                && Math.min(p.bottom, q.bottom) - Math.max(p.top, q.top) > 1;
-              if (over && !a.contains(b) && !b.contains(a))
-                found.push([a.outerHTML.slice(0, 60), b.outerHTML.slice(0, 60)]); } }
-          return found; }"""
-    )
+    clashes = page.page.evaluate(TEXTS_AROUND)
     assert clashes == []
 
 
@@ -186,18 +159,32 @@ def test_what_is_wider_than_the_page_can_be_reached(browser, file: Path) -> None
     opened = Page(browser, file, WIDTHS["phone"])
     opened.page.evaluate("document.querySelectorAll('details').forEach((d) => { d.open = true; })")
     opened.page.evaluate("dispatchEvent(new Event('resize'))")
-    lost = opened.page.evaluate(
-        """() => [...document.querySelectorAll("body *")].filter((e) => {
-          const r = e.getBoundingClientRect();
-          if (!r.width || !r.height || r.right <= innerWidth + 1 || r.left < 0) return false;
-          const frame = e.closest(".scroll, pre");
-          if (!frame || frame.getBoundingClientRect().right > innerWidth + 1) return true;
-          return frame.matches(".scroll")
-            && getComputedStyle(frame.querySelector(".hint")).display === "none"; })
-          .map((e) => e.outerHTML.slice(0, 80))"""
-    )
+    lost = opened.page.evaluate(OUT_OF_REACH)
     opened.page.close()
     assert lost == []
+
+
+def test_a_page_of_degrees_keeps_its_texts_apart(browser, large, tmp_path: Path) -> None:
+    """One run, several causes of one kind, a part of a turn: other figures than the page above."""
+    path = tmp_path / "large.html"
+    large.save(path)
+    paper = browser.new_page(viewport={"width": 1200, "height": 900})
+    paper.goto(path.as_uri() + "#print")
+    paper.wait_for_selector("html[data-drawn]", timeout=60_000)
+    texts, clashes = paper.evaluate(TEXTS_WITHIN)
+    paper.close()
+    assert texts > 50
+    assert clashes == []
+    for scheme in ("light", "dark"):
+        phone = Page(browser, path, WIDTHS["phone"], scheme)
+        assert phone.complaints == []
+        assert phone.page.evaluate(TEXTS_AROUND) == []
+        assert phone.page.evaluate(OUT_OF_REACH) == []
+        axes, near = phone.page.evaluate(NUMBERS_APART)
+        assert axes >= 5
+        assert near == []
+        assert min(phone.page.evaluate(CONTRASTS).values()) >= CONTRAST
+        phone.page.close()
 
 
 def test_wide_tables_say_that_they_scroll(page: Page) -> None:
@@ -213,22 +200,7 @@ def test_wide_tables_say_that_they_scroll(page: Page) -> None:
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 def test_points_are_seen_in_both_themes(browser, file: Path, scheme: str) -> None:
     opened = Page(browser, file, 1200, scheme)
-    ratios = opened.page.evaluate(
-        """() => {
-          const light = (hex) => { const v = [1, 3, 5]
-            .map((i) => parseInt(hex.slice(i, i + 2), 16) / 255)
-            .map((x) => x <= 0.03928 ? x / 12.92 : ((x + 0.055) / 1.055) ** 2.4);
-            return 0.2126 * v[0] + 0.7152 * v[1] + 0.0722 * v[2]; };
-          const root = getComputedStyle(document.documentElement);
-          const back = light(root.getPropertyValue("--back").trim());
-          const found = {};
-          for (const view of Bokeh.index) for (const r of view.model.renderers || []) {
-            const shade = r.glyph && r.glyph.line_color && r.glyph.line_color.value;
-            if (!shade) continue;
-            const l = light(shade);
-            found[shade] = (Math.max(l, back) + 0.05) / (Math.min(l, back) + 0.05); }
-          return found; }"""
-    )
+    ratios = opened.page.evaluate(CONTRASTS)
     assert len(ratios) >= 5
     assert min(ratios.values()) >= CONTRAST, ratios
     opened.page.close()
