@@ -56,6 +56,20 @@ def diagnosed(diagnosis: Diagnosis) -> dict[str, Any]:
             gain["reducible_percent"] = None if share is None else 100.0 * share
             low, high = (None, None) if interval is None else (100.0 * x for x in interval)
             gain["reducible_low_percent"], gain["reducible_high_percent"] = low, high
+    for spot in content["not_identifiable"]:
+        # What each cause in doubt would amount to, as findings are listed.
+        spot["options"] = [
+            {
+                "name": cause.replace("_", " "),
+                "parameters": [
+                    _parameter(i, parameter, entry, named=False)
+                    for i, (parameter, entry) in enumerate(
+                        spot.get("estimates", {}).get(cause, {}).items()
+                    )
+                ],
+            }
+            for cause in spot["causes"]
+        ]
     content["extended"] = _toml(diagnosis)
     return content
 
