@@ -1,6 +1,8 @@
 """Every allocation of the core fails once: a result as ever or a MemoryError, never an abort."""
 
 import hashlib
+import subprocess
+import sys
 
 import pytest
 
@@ -42,6 +44,25 @@ def test_the_nth_allocation_fails(what, driver, desk):
             assert found.told == whole.told, n
         gentle += 1
     assert gentle >= 20
+
+
+#: Leaves so many addresses beyond those in use, before the work; status 12 for a MemoryError.
+TIGHT = """
+pages = int(open("/proc/self/statm").read().split()[0]) * resource.getpagesize()
+resource.setrlimit(resource.RLIMIT_AS, (pages + {extra}, resource.RLIM_INFINITY))
+try:
+    exec({work!r})
+except MemoryError:
+    sys.exit(12)
+"""
+
+
+@pytest.mark.parametrize("extra", [0, 1 << 18, 5 << 20])
+@pytest.mark.parametrize("what", WORK)
+def test_a_process_that_gets_no_more_memory_goes_on_or_says_so(what, extra):
+    code = "import resource, sys\n" + START + TIGHT.format(extra=extra, work=WORK[what])
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert done.returncode in (0, 12), (done.returncode, done.stderr[-500:])
 
 
 def test_a_thread_that_does_not_start_is_done_without(driver, desk):
