@@ -85,3 +85,20 @@ def test_a_plan(own: bool, capsys: pytest.CaptureFixture[str]) -> None:
         )
         plan = plan_mounts(100.0, 36, 3)
     assert json.loads(plan.to_json()) == said
+
+
+def test_phases_count_from_0_to_360_everywhere(
+    folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    table, back = folder / "phases.csv", folder / "back.json"
+    base = ta.load_model(folder / "model.json")
+    shafts = (ta.Shaft("output", 1.0, (1, 2, 3), (3e-3, -3e-3, -3e-3), (-4e-3, -4e-3, 4e-3)),)
+    model = ta.HarmonicModel(shafts, period=base.period, constant=0.0)
+    ta.export_model(model, "csv", table)
+    said = printed(capsys, "import", table, "--from", "csv", "-o", back, "--json")
+    compared = ta.compare(base, model).to_dict()
+    for row in [*said["orders"], *compared["orders"]]:  # type: ignore[misc]
+        assert 0.0 <= row["phase_deg"] < 360.0
+    phases = {row["order"]: row["phase_deg"] for row in said["orders"]}  # type: ignore[attr-defined]
+    for order, phase in zip((1.0, 2.0, 3.0), (143.130, 216.870, 323.130), strict=True):
+        assert phases[order] == pytest.approx(phase, abs=0.1)

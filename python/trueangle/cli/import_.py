@@ -51,7 +51,7 @@ def run(args: argparse.Namespace) -> int:
     model = import_model(args.file, args.source, args.output, **target_options(args))
     unit = ARCSEC_PER_TURN / model.period
     rows = [
-        {"order": order, "amplitude_arcsec": c * unit, "phase_deg": math.degrees(phase)}
+        {"order": order, "amplitude_arcsec": c * unit, "phase_deg": math.degrees(phase) % 360.0}
         for order, c, phase in zip(model.orders, model.amplitudes, model.phases, strict=True)
     ]
     if args.json:

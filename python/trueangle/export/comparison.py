@@ -148,7 +148,7 @@ def compare(
             {
                 "order": order,
                 "amplitude_arcsec": abs(z) * ARCSEC_PER_TURN,
-                "phase_deg": math.degrees(math.atan2(z.real, z.imag)),
+                "phase_deg": math.degrees(math.atan2(z.real, z.imag)) % 360.0,
                 "std_arcsec": _std(first, second, order),
             }
         )
