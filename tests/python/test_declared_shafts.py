@@ -117,3 +117,5 @@ def test_the_worm_of_a_telescope_comes_before_its_wander(data_dir: Path) -> None
     assert first.parameters["output_order"].value == 144.0
     # About 9 arcsec by a spline and two orders; the wander beside it takes a part.
     assert 6.0 < first.parameters["amplitude_arcsec"].value < 11.0
+    # One direction: its ramp is also one in angle, but it wanders beside a ramp.
+    assert "drift_within_run" in {finding.cause for finding in found.findings}

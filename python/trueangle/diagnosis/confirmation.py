@@ -46,21 +46,26 @@ def status_of(
     gain: Gain | None,
     regression: Regression | None,
     group: Sequence[int],
-    unexplained: bool,
+    unexplained: float,
 ) -> tuple[str, str]:
     """Status of a finding and the reason where it is not confirmed.
 
     A cause that transfers is confirmed by a gain on held-out data whose interval excludes
     zero. One that every run draws anew has none: it must explain the noise of the runs one
     by one. Whatever takes up what is left (`is_flexible`, causes of the scatter) is not
-    confirmed while something is unexplained, but for a line in time that a test which needs
-    no name sees at the same frequency.
+    confirmed while something is ``unexplained`` (arcsec rms; 0 where nothing is), but for a line
+    in time that a test which needs no name sees at the same frequency. Nor is a cause that is
+    smaller than what is unexplained: it may be a part of that.
     """
     effect = EFFECTS[cause]
     takes_up = is_flexible(effect) or _of_scatter(cause)
     if unexplained and takes_up and not _is_seen_without_a_name(regression, group):
         return NOT_CONFIRMED, ("something is unexplained, and this cause takes up whatever is left")
     if unexplained and regression is not None and group:
+        if not takes_up and _size(regression, group) < unexplained:
+            return NOT_CONFIRMED, (
+                f"{unexplained:.2g} arcsec rms are unexplained, of which this may be a part"
+            )
         follows = _follows(regression, group)
         if follows:
             return NOT_CONFIRMED, f"something is unexplained, and this follows the {follows}"
@@ -79,6 +84,13 @@ def status_of(
             return CONFIRMED, ""
         return NOT_CONFIRMED, "it explains the noise of some runs only"
     return CONFIRMED, ""
+
+
+def _size(regression: Regression, group: Sequence[int]) -> float:
+    """Standard deviation of the error that a finding explains."""
+    fitted = regression.fitted()
+    columns = [term.columns @ c for term, c in (fitted[k] for k in group) if c.size]
+    return float(np.std(np.sum(columns, axis=0))) if columns else np.inf
 
 
 def _is_seen_without_a_name(regression: Regression | None, group: Sequence[int]) -> bool:

@@ -30,7 +30,7 @@ from .gearratio import Ratio, aligned, find_ratio
 from .goodness import goodness_of_fit
 from .identifiability import blind_spots
 from .named import findings_of, reconsidered, scatter_doubt, scatter_finding
-from .penalty import NEW_CAUSE, misfit, total_penalty
+from .penalty import NEW_CAUSE, misfit_of_scatter, total_penalty
 from .remainder import leftover_of, unexplained_after
 from .selection import select
 from .unnamed import is_named
@@ -161,19 +161,19 @@ def _diagnosis(
     start, chosen = account.start, account.chosen
     rest = unexplained_after(chosen, sim.sigma_arcsec or None)
     with at.part(FOR_FINDINGS):
-        findings, spots, doubtful = findings_of(chosen, account.spots, gain, rest.found)
+        findings, spots, doubtful = findings_of(chosen, account.spots, gain, rest.size)
     if doubtful and not rest.found and not at.cut:
         # What is not confirmed explains nothing.
         rest = unexplained_after(chosen, sim.sigma_arcsec or None, without=doubtful)
         if rest.found:
-            findings = reconsidered(chosen, findings)
+            findings = reconsidered(chosen, findings, rest.size)
     beliefs, corrected = judged_beliefs(chosen, sim, believed, spots, gain)
     in_doubt = any(spot.supported for spot in spots)
     for item in account.scatter:
         if in_doubt and item.size < OUTLYING_ANYWAY:
             spots.append(scatter_doubt(item))
         else:
-            findings.append(scatter_finding(item, rest.found))
+            findings.append(scatter_finding(item, rest.size))
     if ratio is not None:
         findings.append(_ratio_finding(ratio))
     findings.sort(key=lambda finding: (not finding.confirmed, -finding.evidence["bic_gain"]))
@@ -266,7 +266,7 @@ def _account(signals: Signals, error: Array, sim: Simulation) -> _Account:
     if pace().over:
         return _Account(start, chosen, scatter, spots)  # what is left is no scatter yet
     uneven = next(iter(_scatter(chosen, weighs=True)), None)
-    if uneven is not None and uneven.bic_gain > NEW_SCATTER + misfit(chosen):
+    if uneven is not None and uneven.bic_gain > NEW_SCATTER + misfit_of_scatter(start, chosen):
         scatter.append(uneven)
         start = Regression(signals, residual, sim.surroundings, uneven.weights, start.lines)
         chosen = select(start, chosen.terms)

@@ -44,7 +44,7 @@ def doubts_about(
     if EFFECTS[cause].is_doubted:
         for spot in spots:
             if spot.hides(cause) and not (
-                spot.common and EFFECTS[cause].told(extension, regression)
+                (spot.common or spot.is_open) and EFFECTS[cause].told(extension, regression)
             ):
                 return spot
     doubts = (effect.doubt(extension, regression, spots) for effect in EFFECTS.values())

@@ -33,11 +33,12 @@ NOT_HELD_OUT = "the account was ended before its gain on the readings held out w
 
 
 def findings_of(
-    regression: Regression, spots: list[Blindness], with_gain: bool, unexplained: bool
+    regression: Regression, spots: list[Blindness], with_gain: bool, unexplained: float
 ) -> tuple[list[Finding], list[Blindness], list[int]]:
     """Findings of the chosen terms; those in doubt become entries of what is not told.
 
-    Also the indices of the terms of findings that are not confirmed.
+    ``unexplained`` are arcsec rms. Also given are the indices of the terms of findings that are
+    not confirmed.
     """
     spots = list(spots)
     groups = finding_groups(regression.terms)
@@ -95,12 +96,16 @@ def findings_of(
     return findings, spots, doubtful
 
 
-def reconsidered(regression: Regression, findings: Sequence[Finding]) -> list[Finding]:
+def reconsidered(
+    regression: Regression, findings: Sequence[Finding], unexplained: float
+) -> list[Finding]:
     """Findings once it is known that something is unexplained."""
     found = []
     for finding in findings:
         if finding.confirmed and finding.group:
-            status, reason = status_of(finding.cause, finding.gain, regression, finding.group, True)
+            status, reason = status_of(
+                finding.cause, finding.gain, regression, finding.group, unexplained
+            )
             finding = replace(finding, status=status, reason=reason)
         found.append(finding)
     return found
@@ -138,7 +143,7 @@ def _rivals(regression: Regression, group: Sequence[int]) -> list[tuple[str, flo
     return [(name, float(gap)) for name, gap in gaps[:RIVALS]]
 
 
-def scatter_finding(item: ScatterFinding, unexplained: bool) -> Finding:
+def scatter_finding(item: ScatterFinding, unexplained: float) -> Finding:
     """Finding of a cause of the scatter."""
     evidence = {"bic_gain": item.bic_gain}
     status, reason = status_of(item.cause, None, None, (), unexplained)

@@ -18,6 +18,7 @@ __all__ = [
     "left_by_forms",
     "lost",
     "misfit",
+    "misfit_of_scatter",
     "net_loss",
     "penalty_of",
     "total_penalty",
@@ -36,6 +37,16 @@ def total_penalty(regression: Regression) -> float:
 def misfit(regression: Regression) -> float:
     """Deviance that the causes found may leave because their forms are not exact."""
     return left_by_forms(regression.start - regression.deviance, regression.n)
+
+
+def misfit_of_scatter(start: Regression, chosen: Regression) -> float:
+    """As `misfit`, by how much smaller the readings' scatter has become.
+
+    Correlated noise takes up a part of what is not yet explained, and hides it from a likelihood.
+    """
+    left = chosen.left - chosen.whiten.run_part(chosen.left)
+    ratio = float(np.var(start.left)) / max(float(np.var(left)), 1e-300)
+    return left_by_forms(chosen.n * float(np.log(max(ratio, 1.0))), chosen.n)
 
 
 def left_by_forms(deviance: float, readings: int) -> float:

@@ -56,6 +56,9 @@ class Blindness:
     common : str
         The cause whose form is what all of them share, where there is one: naming it claims
         no more than is seen.
+    is_open : bool
+        The readings may show what the design does not promise to (`Effect.told`), and then leave
+        the others in doubt.
     """
 
     causes: tuple[str, ...]
@@ -66,6 +69,7 @@ class Blindness:
     estimates: dict[str, Parameters] = field(default_factory=dict)
     factor: str = "run"
     common: str = ""
+    is_open: bool = False
 
     def hides(self, cause: str) -> bool:
         """Whether naming this cause would be a guess."""

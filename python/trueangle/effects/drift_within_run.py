@@ -42,6 +42,10 @@ WANDER_TERMS, MOST_TERMS = 24, 96
 #: Power of the last of them, in variances of one reading, from which on more are needed.
 SEEN = 0.5
 
+#: Evidence of a wander beside a ramp from which on it is more than one: "very strong" on the scale
+#: of Kass and Raftery.
+TOLD = 10.0
+
 #: Time constant of settling, in shares of the run.
 SETTLING = 0.4
 
@@ -133,17 +137,27 @@ class DriftWithinRun(Effect):
 
     @classmethod
     def _finer(cls, regression: Regression, best: Extension) -> Extension:
-        """With as many half periods as are above the noise: where they end, an edge is left."""
-        while True:
-            effect, terms = best.run_effect, int(best.shape["terms"])
-            assert effect is not None
-            power = float(effect.columns[:, -1] @ effect.columns[:, -1]) / regression.signals.runs
-            if terms >= MOST_TERMS or effect.columns.shape[1] < 2 or effect.ratio * power < SEEN:
-                return best
-            finer = cls._proposal(regression, best.shape["form"], 2 * terms)
-            if finer.deviance <= best.deviance:
-                return best
-            best = finer
+        """With as many half periods as are above the noise: where they end, an edge is left.
+
+        Asked under white noise, as correlated noise stands for what is finer; of one run under
+        the noise found, for there a wander that is taken too fine takes the lines of the place.
+        """
+        form, terms = best.shape["form"], int(best.shape["terms"])
+        waves = "ramp" not in form and form != "settling"
+        if best.bic_gain <= 0.0 or not waves:
+            return best
+        one = regression.signals.runs < 2
+        white = regression if one else regression.with_terms(regression.terms, 0.0)
+        at = cls._proposal(white, form, terms)
+        while terms < MOST_TERMS:
+            assert at.run_effect is not None
+            last = at.run_effect.columns[:, -1]
+            power = at.run_effect.ratio * float(last @ last) / regression.signals.runs
+            finer = cls._proposal(white, form, 2 * terms) if power > SEEN else at
+            if finer.deviance <= at.deviance:
+                break
+            at, terms = finer, 2 * terms
+        return best if terms == best.shape["terms"] else cls._proposal(regression, form, terms)
 
     @classmethod
     def _proposal(cls, regression: Regression, form: str, terms: int = WANDER_TERMS) -> Extension:
@@ -207,7 +221,19 @@ class DriftWithinRun(Effect):
         left = share_left(regression, signals.theta[:, None], clock[:, None])
         if left < OWN_OF_VELOCITY and np.ptp(signals.direction) == 0.0:
             because = "one direction: a ramp in angle is a ramp in time"
-            yield cls.blind(because, ScaleError, first=False)
+            yield replace(cls.blind(because, ScaleError, first=False), is_open=True)
+
+    @classmethod
+    def told(cls, extension: Extension, regression: Regression) -> bool:
+        """Whether it wanders: beside a ramp in angle, which a ramp in time is, too."""
+        assert extension.run_effect is not None
+        others = [term for term in regression.terms if term.cause != cls.kind]
+        rest = regression.with_terms(others, regression.whiten.rho)
+        ramp = ScaleError.propose(rest)
+        if ramp is not None:
+            rest = rest.with_terms([*others, ramp], regression.whiten.rho)
+        columns = extension.run_effect.columns
+        return rest.propose_run_effect(cls.kind, extension.shape, columns).bic_gain > TOLD
 
     @classmethod
     def doubt(

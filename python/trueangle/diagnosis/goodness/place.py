@@ -46,6 +46,9 @@ BANDS = (4, 8, 16, 32, 64, 128)
 #: Share of the sum of sizes below which a sum of products is the rounding of nothing.
 ROUNDED = 1e-9
 
+#: Share of a modulator's power from which on it changes within runs.
+MOVES = 1e-3
+
 #: Spread of a factor, in shares of its size, from which on it counts as changing.
 CHANGES = 0.05
 
@@ -190,7 +193,9 @@ def _alike(g: Array, left: Leftover, units: list[tuple[int, int]]) -> tuple[floa
     """Chance of the modulator itself, at no place in particular, by the scatter of units; size."""
     # Within runs, or between them where it does not change within any.
     inside = left.centred(left.bounds)
-    moves = sum(float(np.ptp(g[a:b]) > 0.0) for a, b in units) > 0.5 * len(units)
+    # What scatters about a level that a run keeps is the noise of its sensor: no change.
+    within = sum(float(np.sum((g[a:b] - g[a:b].mean()) ** 2)) for a, b in left.bounds)
+    moves = within > MOVES * float(np.sum((g - g.mean()) ** 2))
     e = inside if moves else left.residual - left.residual.mean()
     sums = np.array([float(g[a:b] @ e[a:b]) for a, b in units])
     power = float(sums @ sums)

@@ -20,6 +20,9 @@ __all__ = ["LEVEL", "Unexplained", "goodness_of_fit"]
 #: Chance with which noise alone may be called unexplained, all deciding tests together.
 LEVEL = 0.01
 
+#: Arcsec that something is at least.
+SMALLEST = 1e-9
+
 
 @dataclass(frozen=True)
 class Unexplained:
@@ -56,6 +59,11 @@ class Unexplained:
         """The tests that describe the noise and fire; they decide nothing."""
         describing = [item for item in self.evidence if not item.decides]
         return [item for item in describing if item.p * len(describing) < LEVEL]
+
+    @property
+    def size(self) -> float:
+        """`rms` where something is found, which is above zero; else 0."""
+        return max(self.rms, SMALLEST) if self.found else 0.0
 
     def to_dict(self) -> dict[str, Any]:
         """The ``unexplained`` object of a diagnosis."""
