@@ -142,3 +142,19 @@ def test_a_wander_that_reaches_far_leaves_no_line_where_its_waves_end() -> None:
     assert not {"time_periodic", "non_integer_order", "varying_line"} & {
         finding.cause for finding in found if finding.confirmed
     }
+
+
+@pytest.mark.parametrize("height", [3.0, 12.0, 40.0])
+def test_a_tall_bump_is_as_wide_as_a_low_one(height: float) -> None:
+    """Its top must not be clipped as wild readings are: then it would look wide."""
+    rng = np.random.default_rng([46, int(height)])
+    runs = []
+    for run in loaded_runs(rng, softness=0.0, readings=900):
+        away = (run.reference - 130.0 + 180.0) % 360.0 - 180.0
+        bump = height * np.exp(-0.5 * (away / 1.3) ** 2)
+        indicated = run.indicated + bump / 3600.0
+        runs.append(ta.CalibrationRun(run.reference, indicated, 360.0, time=run.time))
+    found = ta.diagnose(runs, Simulation(sigma_arcsec=1.0), gain=False).findings
+    (width,) = [f.parameters["width_deg"] for f in found if f.cause == "local_defect"]
+    assert abs(width.value - 1.3) < 3.0 * width.std
+    assert width.std < 0.5 / height

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from copy import copy
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any, ClassVar, Self
@@ -49,6 +50,11 @@ PEAKS = 2
 
 #: Steps by which place and width are made exact.
 NEWTON_STEPS = 4
+
+#: Times that a bump whose top was clipped is refined, and its height from which on a reading
+#: is one of its own.
+UNCLIPPED = 3
+ON_BUMP = 0.1
 
 #: Readings' worth of power that a bump must rest on.
 LEAST_READINGS = 4.0
@@ -123,6 +129,7 @@ class LocalDefect(Effect):
                 shape = {"shaft": shaft, "place_deg": place, "width_deg": width}
                 if not regression.hopeless(score / regression.variance, 3, log_grid):
                     shape = cls._refined(regression, shaft, place, width)
+                    shape = cls._unclipped(regression, shape)
                 columns = cls.columns(regression.signals, regression.around, shape)
                 power = columns[:, 0] ** 2
                 # One or two readings are outliers, not a place of the joint.
@@ -191,6 +198,25 @@ class LocalDefect(Effect):
                 break
             place, width, value = place + step[0], min(width + step[1], WIDEST), following
         return {"shaft": shaft, "place_deg": float(place % 360.0), "width_deg": float(width)}
+
+    @classmethod
+    def _unclipped(cls, regression: Regression, shape: dict[str, Any]) -> dict[str, Any]:
+        """Refined again with a tall bump in the model: its top was taken for wild readings.
+
+        Clipped at so many standard deviations it has a flat top, and looks wide.
+        """
+        for _ in range(UNCLIPPED):
+            columns = cls.columns(regression.signals, regression.around, shape)
+            if not regression.outlying[columns[:, 0] > ON_BUMP].any():
+                return shape
+            bump = regression.propose(cls.kind, shape, columns)
+            full = regression.with_terms([*regression.terms, bump], regression.whiten.rho)
+            seen = copy(regression)
+            y = regression.whiten(full.target)
+            seen.r = y - regression.q @ (regression.q.T @ y)
+            seen.rss = float(seen.r @ seen.r)
+            shape = cls._refined(seen, shape["shaft"], shape["place_deg"], shape["width_deg"])
+        return shape
 
     @classmethod
     def _tangents(cls, regression: Regression, shape: dict[str, Any], height: float) -> Array:
