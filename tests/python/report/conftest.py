@@ -27,13 +27,13 @@ def large():
     pytest.importorskip("bokeh")
     believed = ta.Simulation(
         Joint(declared=(DeclaredShaft("stepper", cycles_per_turn=50.0),)),
-        sigma_arcsec=60.0,
+        sigma_arcsec=10.0,
         runs=(RunDesign(label="one", samples=1200, speed_deg_s=9.0, turns=0.95),),
     )
     lines = (
         Harmonic("output", 4, 25_000.0, 30.0),
         Harmonic("stepper", 2, 400.0, 70.0),
-        Harmonic("stepper", 1, 900.0, 200.0),
+        Harmonic("stepper", 1, 3_000.0, 200.0),
     )
     runs = ta.simulate(replace(believed, harmonics=lines), seed=7)
     return ta.report(runs, simulation=believed, title="Degrees")
