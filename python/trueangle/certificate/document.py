@@ -63,6 +63,7 @@ def certify(
     orders: Iterable[float] | Mapping[str, Iterable[float]] | str | None = None,
     gear_ratio: float | None = None,
     fixed_member: str = "circular_spline",
+    shafts: Mapping[str, float] | None = None,
     positions: int | None = None,
     fit: FitResult | None = None,
 ) -> Certificate:
@@ -80,7 +81,7 @@ def certify(
     runs : CalibrationRun or iterable of them
     identity : Identity or path
         Who, what and where, and the type B contributions (`load_identity`).
-    orders, gear_ratio, fixed_member
+    orders, gear_ratio, fixed_member, shafts
         As for `trueangle.fit`.
     positions : int, optional
         Nominal positions to a turn; by default those that were read where they are at most
@@ -114,7 +115,12 @@ def certify(
     if fit is None:
         from ..fitting.fit import fit as fit_runs
 
-        fit = fit_runs(found, orders, gear_ratio=gear_ratio, fixed_member=fixed_member)
+        gear: dict[str, Any] = {
+            "gear_ratio": gear_ratio,
+            "fixed_member": fixed_member,
+            "shafts": shafts,
+        }
+        fit = fit_runs(found, orders, **gear)
     if fit.model.covariance is None or not math.isfinite(fit.residual_std):
         raise ArgumentError(
             "as many unknowns as readings leave nothing to take an uncertainty from: "

@@ -126,10 +126,10 @@ def run(args: argparse.Namespace) -> int:
     from .run_lists import read_selected
 
     if wants_one_pass(args):
-        return saved(args, orders_by_shaft(args.orders))
+        return saved(args, orders_by_shaft(args.orders, declared_shafts(args.shaft)))
     result = fit(
         read_selected(args),
-        orders=orders_by_shaft(args.orders),
+        orders=orders_by_shaft(args.orders, declared_shafts(args.shaft)),
         gear_ratio=args.gear_ratio,
         fixed_member=args.fixed_member,
         argument=args.argument,

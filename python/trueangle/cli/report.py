@@ -10,7 +10,7 @@ from ..files import PDF, REPORT
 from ..pace import STYLES, paced
 from .error_units import add_errors_in, errors_in
 from .fit import add_joint
-from .order_lists import orders_by_shaft
+from .order_lists import declared_shafts, orders_by_shaft
 from .paths import Input, Output
 
 HELP = "write a report on calibration runs: one HTML page, or a PDF"
@@ -81,14 +81,16 @@ def run(args: argparse.Namespace) -> int:
         from ..simulation import load_simulation
 
         simulation = load_simulation(args.simulation)
+    known = declared_shafts(args.shaft) if simulation is None else simulation.joint.shafts
     with paced(style=args.progress):
         made = report(
             runs,
             args.output,
             simulation=simulation,
-            orders=orders_by_shaft(args.orders),
+            orders=orders_by_shaft(args.orders, known),
             gear_ratio=args.gear_ratio,
             fixed_member=args.fixed_member,
+            shafts=declared_shafts(args.shaft),
             title=args.title,
             certificate=args.certificate,
             positions=args.positions,

@@ -13,12 +13,10 @@ from ..certificate import Certificate, Identity, certify
 from ..checks.check import faults_of
 from ..checks.record import records_of
 from ..diagnosis import diagnose
-from ..diagnosis.heldout import hold_out_extended
-from ..errors import ArgumentError, NoModelError, TrueAngleError
+from ..errors import ArgumentError
 from ..errorunits import ErrorsIn
 from ..files import CERTIFICATE, PDF, REPORT, check_output, written_atomically
-from ..fitting.heldout import HeldOut, hold_out
-from ..joint.joint import Joint
+from ..fitting.heldout import HeldOut
 from ..model import HarmonicModel
 from ..pace import pace
 from ..plots.curves import Points, degrees, error_points, label_of
@@ -26,7 +24,8 @@ from ..provenance import provenance
 from ..runs import CalibrationRun, as_runs
 from . import diagnosisfigures, figures
 from .diagnosed import diagnosed
-from .gained import extended_model, gained
+from .fitted import extended, fitted, gear_of, held_out, joint_of
+from .gained import gained
 from .givenmodel import given_model
 from .linenames import LineNames, line_names
 from .measured import measured
@@ -37,7 +36,6 @@ from .spectrum import spectrum
 from .unknowns import unknowns
 
 if TYPE_CHECKING:
-    from ..diagnosis import Diagnosis
     from ..fitting.result import FitResult
     from ..orders.select import OrderSelection
     from ..simulation import Simulation
@@ -128,6 +126,7 @@ def report(
     orders: Orders = None,
     gear_ratio: float | None = None,
     fixed_member: str = "circular_spline",
+    shafts: Mapping[str, float] | None = None,
     title: str | None = None,
     certificate: None = None,
     positions: None = None,
@@ -145,6 +144,7 @@ def report(
     orders: Orders = None,
     gear_ratio: float | None = None,
     fixed_member: str = "circular_spline",
+    shafts: Mapping[str, float] | None = None,
     title: None = None,
     certificate: Identity | str | PathLike[str],
     positions: int | None = None,
@@ -159,6 +159,7 @@ def report(
     orders: Orders = None,
     gear_ratio: float | None = None,
     fixed_member: str = "circular_spline",
+    shafts: Mapping[str, float] | None = None,
     title: str | None = None,
     certificate: Identity | str | PathLike[str] | None = None,
     positions: int | None = None,
@@ -177,8 +178,8 @@ def report(
         Gives the gear ratio too.
     orders : optional
         As for `trueangle.fit`; by default selected by evidence.
-    gear_ratio, fixed_member
-        As for `trueangle.fit`.
+    gear_ratio, fixed_member, shafts
+        As for `trueangle.fit`; a simulation states them itself.
     title : str, optional
     certificate : Identity or path, optional
         An identity file: what is made, returned and written to ``path`` (PDF) is then a
@@ -215,12 +216,10 @@ def report(
     if path is not None:  # before the work
         kind = REPORT if certificate is None else CERTIFICATE
         check_output(path, kind, hashes=[run.source.sha256 for run in found if run.source])
-    if simulation is not None:
-        if gear_ratio is not None:
-            raise ArgumentError("give gear_ratio or a simulation (which states it), not both")
-        if "motor" in simulation.joint.shafts:
-            gear_ratio = simulation.joint.gear_ratio
-            fixed_member = simulation.joint.fixed_member
+    if simulation is not None and (gear_ratio is not None or shafts):
+        what = "shafts" if shafts else "gear_ratio"
+        raise ArgumentError(f"give {what} or a simulation (which states them), not both")
+    joint = joint_of(simulation, gear_ratio, fixed_member, shafts)
     if certificate is not None:
         if title is not None:
             raise ArgumentError("a certificate has no title of its own: its identity names it")
@@ -230,9 +229,8 @@ def report(
             found,
             certificate,
             orders=orders,
-            gear_ratio=gear_ratio,
-            fixed_member=fixed_member,
             positions=positions,
+            **gear_of(joint),
         )
         if path is not None:
             certified.save(path)
@@ -243,11 +241,11 @@ def report(
     scale = scale_of(errors_in, sizes["error"]["max_abs_arcsec"], found)
     at = pace()
     at.at("fitting", 0, _STAGES)
-    fit, selection, why_not = _fitted(found, orders, gear_ratio, fixed_member)
+    fit, selection, why_not = fitted(found, orders, joint)
     at.at("holding runs out", 1, _STAGES)
-    held, why_no_gain = _held_out(fit)
+    held, why_no_gain = held_out(fit)
     at.at("diagnosing", 2, _STAGES)
-    name = line_names(_joint(simulation, gear_ratio, fixed_member))
+    name = line_names(joint)
     diagnosis = None if simulation is None else diagnose(found, simulation)
     heading = title or _title(found)
     content: dict[str, Any] = {
@@ -271,7 +269,7 @@ def report(
     drawn = _figures(found, fit, selection, held, name, scale)
     if simulation is not None and diagnosis is not None:
         content["diagnosis"] = diagnosed(diagnosis)
-        content["extended"] = _extended(fit, diagnosis, found, simulation)
+        content["extended"] = extended(fit, diagnosis, found, simulation)
         drawn |= diagnosisfigures.figures_of(diagnosis, found, simulation, scale)
     content["unknowns"] = unknowns(found, selection, content["diagnosis"])
     made = Report(heading, content, drawn)
@@ -280,59 +278,9 @@ def report(
     return made
 
 
-def _joint(
-    simulation: Simulation | None, gear_ratio: float | None, fixed_member: str
-) -> Joint | None:
-    """What is known of the shafts."""
-    if simulation is not None:
-        return simulation.joint
-    return None if gear_ratio is None else Joint(gear_ratio, fixed_member, "motor")
-
-
 def _title(runs: list[CalibrationRun]) -> str:
     files = sorted({run.source.file for run in runs if run.source is not None})
     return f"Angle error of {', '.join(files)}" if files else "Angle error of a joint"
-
-
-def _fitted(
-    runs: list[CalibrationRun], orders: Any, gear_ratio: float | None, fixed_member: str
-) -> tuple[FitResult | None, OrderSelection | None, str]:
-    """The fit; or the selection and the reason why there is none."""
-    from ..fitting.fit import fit as fit_runs
-
-    try:
-        fit = fit_runs(runs, orders, gear_ratio=gear_ratio, fixed_member=fixed_member)
-    except NoModelError as reason:
-        from ..orders.select import select_orders
-
-        selection = select_orders(runs, gear_ratio=gear_ratio, fixed_member=fixed_member)
-        return None, selection, str(reason)
-    return fit, fit.selection, ""
-
-
-def _held_out(fit: FitResult | None) -> tuple[HeldOut | None, str]:
-    if fit is None:
-        return None, "There is no model to hold against other runs."
-    try:
-        return hold_out(fit), ""
-    except TrueAngleError as reason:
-        return None, f"{str(reason)[0].upper()}{str(reason)[1:]}."
-
-
-def _extended(
-    fit: FitResult | None,
-    diagnosis: Diagnosis,
-    runs: list[CalibrationRun],
-    sim: Simulation,
-) -> dict[str, Any] | None:
-    """The correction with the causes found as its terms; None where there are none."""
-    if fit is None or not diagnosis.findings:
-        return None
-    try:
-        model = diagnosis.correction(fit.model, runs)
-        return extended_model(model, hold_out_extended(fit, sim)) if model.terms else None
-    except TrueAngleError:
-        return None
 
 
 def _figures(

@@ -176,6 +176,23 @@ def test_command_writes_the_page(runs, tmp_path, capsys) -> None:
     assert content["provenance"]["inputs"][0]["sha256"] in page.read_text()
 
 
+def test_shafts_are_declared_and_named(tmp_path, capsys) -> None:
+    theta = np.sort(np.random.default_rng(5).uniform(0.0, 360.0, 400))
+    rows = ["run,reference_deg,indicated_deg"]
+    for run in range(3):
+        error = 0.01 * np.sin(np.radians(50.0 * theta + 20.0))
+        rows += [f"{run},{a!r},{b!r}" for a, b in zip(theta.tolist(), (theta + error).tolist(),
+                                                     strict=True)]  # fmt: skip
+    file, page = tmp_path / "joint.csv", tmp_path / "report.html"
+    file.write_text("\n".join(rows) + "\n")
+    arguments = ["report", str(file), "-o", str(page), "--shaft", "stepper=50", "--json"]
+    assert main([*arguments, "--orders", "stepper:1"]) == 0
+    (row,) = json.loads(capsys.readouterr().out)["model"]["coefficients"]
+    assert (row["line"], row["output_order"]) == ("stepper 1", 50.0)
+    with pytest.raises(ArgumentError, match="give shafts or a simulation"):
+        ta.report(ta.read_runs(file), simulation=ta.Simulation(), shafts={"worm": 3.0})
+
+
 def test_bad_file_leaves_no_page(tmp_path, capsys) -> None:
     bad = tmp_path / "bad.csv"
     bad.write_text("reference_deg\n1\n")

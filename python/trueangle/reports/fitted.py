@@ -1,0 +1,91 @@
+"""What a report rests on: the fit, what it gains on held-out runs, its extension."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+from ..diagnosis.heldout import hold_out_extended
+from ..errors import NoModelError, TrueAngleError
+from ..fitting.heldout import HeldOut, hold_out
+from ..joint.declared import DeclaredShaft
+from ..joint.joint import Joint
+from ..runs import CalibrationRun
+from .gained import extended_model
+
+if TYPE_CHECKING:
+    from ..diagnosis import Diagnosis
+    from ..fitting.result import FitResult
+    from ..orders.select import OrderSelection
+    from ..simulation import Simulation
+
+__all__ = ["extended", "fitted", "gear_of", "held_out", "joint_of"]
+
+
+def joint_of(
+    simulation: Simulation | None,
+    gear_ratio: float | None,
+    fixed_member: str,
+    shafts: Mapping[str, float] | None,
+) -> Joint | None:
+    """What is known of the shafts."""
+    if simulation is not None:
+        return simulation.joint
+    if gear_ratio is None and not shafts:
+        return None
+    declared = tuple(DeclaredShaft(name, cycles) for name, cycles in (shafts or {}).items())
+    if gear_ratio is None:
+        return Joint(declared=declared)
+    return Joint(gear_ratio, fixed_member, "motor", declared=declared)
+
+
+def gear_of(joint: Joint | None) -> dict[str, Any]:
+    """The joint as `trueangle.fit` takes it."""
+    if joint is None:
+        return {}
+    gear: dict[str, Any] = {"shafts": {s.name: s.cycles for s in joint.declared} or None}
+    if "motor" in joint.shafts:
+        gear |= {"gear_ratio": joint.gear_ratio, "fixed_member": joint.fixed_member}
+    return gear
+
+
+def fitted(
+    runs: list[CalibrationRun], orders: Any, joint: Joint | None
+) -> tuple[FitResult | None, OrderSelection | None, str]:
+    """The fit; or the selection and the reason why there is none."""
+    from ..fitting.fit import fit as fit_runs
+
+    try:
+        fit = fit_runs(runs, orders, **gear_of(joint))
+    except NoModelError as reason:
+        from ..orders.select import select_orders
+
+        selection = select_orders(runs, **gear_of(joint))
+        return None, selection, str(reason)
+    return fit, fit.selection, ""
+
+
+def held_out(fit: FitResult | None) -> tuple[HeldOut | None, str]:
+    """What the fit gains on runs left out of it; or the reason why that is not known."""
+    if fit is None:
+        return None, "There is no model to hold against other runs."
+    try:
+        return hold_out(fit), ""
+    except TrueAngleError as reason:
+        return None, f"{str(reason)[0].upper()}{str(reason)[1:]}."
+
+
+def extended(
+    fit: FitResult | None,
+    diagnosis: Diagnosis,
+    runs: list[CalibrationRun],
+    sim: Simulation,
+) -> dict[str, Any] | None:
+    """The correction with the causes found as its terms; None where there are none."""
+    if fit is None or not diagnosis.findings:
+        return None
+    try:
+        model = diagnosis.correction(fit.model, runs)
+        return extended_model(model, hold_out_extended(fit, sim)) if model.terms else None
+    except TrueAngleError:
+        return None
