@@ -365,8 +365,13 @@ class HarmonicModel:
     def partial_span(self) -> tuple[float, float] | None:
         """The stretch the model was fitted on when that was not the whole turn.
 
-        First and last angle, whole turns kept, where the error does not repeat after a turn.
+        First and last angle, whole turns kept, where the error does not repeat after a turn: of
+        a term that holds over its own travel only (`Term.travel`), else of the fit.
         """
+        travels = [term.travel for term in self.terms if term.travel is not None]
+        if travels and self._series.is_periodic:
+            starts, stops = zip(*travels, strict=True)
+            return max(starts), min(stops)
         if self.fit is None:
             return None
         start, stop = self.fit.span

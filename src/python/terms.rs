@@ -64,6 +64,11 @@ fn form(object: &Bound<'_, PyAny>) -> PyResult<Form> {
             height: number("height")?,
             cycles: number("cycles")?,
         },
+        "Ramp" => Form::Ramp {
+            slope: number("slope")?,
+            start: number("start")?,
+            stop: number("stop")?,
+        },
         other => {
             return Err(argument_error(
                 object.py(),

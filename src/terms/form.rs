@@ -92,6 +92,15 @@ pub enum Form {
         /// Turns of the shaft per output turn.
         cycles: f64,
     },
+    /// `slope (x - middle)` from `start` to `stop`, and beyond them what it is there.
+    Ramp {
+        /// Error per angle.
+        slope: f64,
+        /// Where it begins, over the turns.
+        start: f64,
+        /// Where it ends.
+        stop: f64,
+    },
 }
 
 impl Form {
@@ -105,7 +114,7 @@ impl Form {
                 let swing: f64 = lines.iter().map(|line| line.cosine.hypot(line.sine)).sum();
                 (half_width - swing < 0.0).then_some(Signal::Direction)
             }
-            Self::Friction { .. } | Self::Bump { .. } => None,
+            Self::Friction { .. } | Self::Bump { .. } | Self::Ramp { .. } => None,
             Self::Lag { .. } | Self::Filter { .. } => Some(Signal::Velocity),
             Self::Scaled { signal, .. } | Self::Spring { signal, .. } => Some(*signal),
         }
@@ -140,6 +149,11 @@ pub(super) enum Smooth {
         width: f64,
         height: f64,
         cycles: f64,
+    },
+    Ramp {
+        slope: f64,
+        start: f64,
+        stop: f64,
     },
 }
 
@@ -190,6 +204,7 @@ impl Smooth {
                 height,
                 cycles,
             }),
+            Form::Ramp { slope, start, stop } => Some(Self::Ramp { slope, start, stop }),
         })
     }
 
@@ -200,7 +215,7 @@ impl Smooth {
                 relative, lines, ..
             } => *relative != 0.0 || lines.is_some(),
             Self::Spring { gravity, .. } => gravity.is_some(),
-            Self::Filter { .. } | Self::Bump { .. } => true,
+            Self::Filter { .. } | Self::Bump { .. } | Self::Ramp { .. } => true,
         }
     }
 
@@ -271,6 +286,11 @@ impl Smooth {
                 let away = period.wrap((turn + low) * period.value() - place) / width;
                 let sum = height * (-0.5 * away * away).exp();
                 (sum, -sum * away * cycles / width)
+            }
+            &Self::Ramp { slope, start, stop } => {
+                let sum = slope * (x.max(start).min(stop) - 0.5 * (start + stop));
+                let rises = start <= x && x <= stop;
+                (sum, if rises { slope } else { 0.0 })
             }
         }
     }

@@ -53,6 +53,7 @@ impl Terms {
             needs: Vec::new(),
         };
         let mut places: Vec<Line> = Vec::new();
+        let mut ramps = 0.0;
         for Term { name, form } in terms {
             match form {
                 Form::Play { half_width, lines } => {
@@ -73,6 +74,7 @@ impl Terms {
                     ready.has_travel = true;
                 }
                 Form::Lag { delay } => ready.delay += delay,
+                Form::Ramp { slope, .. } => ramps += slope.abs(),
                 _ => {}
             }
             ready.smooth.extend(Smooth::new(form, period)?);
@@ -96,7 +98,7 @@ impl Terms {
                 .map_or(0.0, HarmonicSeries::slope_bound);
         let bound = ready.evaluator.slope_bound();
         ready.steepness = bound / (1.0 - bound).max(f64::MIN_POSITIVE);
-        let slope = steepest + bound;
+        let slope = steepest + bound + ramps;
         if ready.evaluator.argument() == Argument::Reference && slope >= 1.0 {
             return Err(Error::NotInvertible { slope });
         }

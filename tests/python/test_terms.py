@@ -10,7 +10,14 @@ from hypothesis import strategies as st
 
 import trueangle as ta
 from trueangle import errors
-from trueangle.terms import TERMS, ChannelSkew, CurrentCoupling, DirectionalPattern, VaryingLine
+from trueangle.terms import (
+    TERMS,
+    ChannelSkew,
+    CurrentCoupling,
+    DirectionalPattern,
+    ScaleError,
+    VaryingLine,
+)
 
 numbers = st.floats(-1e-3, 1e-3)
 lines = st.lists(st.tuples(st.floats(0.5, 500.0), numbers, numbers), max_size=3).map(
@@ -43,6 +50,9 @@ def any_terms(draw):
         ),
         ta.LocalDefect(
             draw(numbers), draw(st.floats(1.0, 9.0)), draw(numbers), draw(st.floats(0.1, 200.0))
+        ),
+        ScaleError(
+            draw(st.floats(-0.3, 0.3)), draw(st.floats(-9.0, 0.0)), draw(st.floats(1.0, 9.0))
         ),
     )
 
@@ -109,6 +119,8 @@ def test_files_with_impossible_terms_are_refused(tmp_path, term, said):
         (lambda: ta.PreslidingHysteresis(1.0, 0.0), "length must be positive"),
         (lambda: ta.PreslidingHysteresis(1.0, 1.0, 1.5), "start must be from 0 to 1"),
         (lambda: ta.LocalDefect(0.0, 0.0, 1.0), "width must be positive"),
+        (lambda: ScaleError(0.1, 3.0, 3.0), r"stop must be beyond start \(3.0\)"),
+        (lambda: ScaleError(1.0, 0.0, 3.0), "relative_error must be between -1 and 1"),
         (lambda: ta.LocalDefect(0.0, 1.0, 1.0, -1.0), "cycles_per_turn must be positive"),
         (lambda: ta.StiffeningCompliance(knee_Nm=-1.0), "knee_Nm must be 0 or more"),
         (lambda: ta.LoadDependentGearError([0.0], [1.0], [1.0]), "orders must be positive"),

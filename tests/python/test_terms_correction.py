@@ -10,6 +10,7 @@ from scipy.integrate import solve_ivp
 
 import trueangle as ta
 from trueangle import errors
+from trueangle.terms import ScaleError
 
 # The contract: theta + error(theta) = indicated is solved to below 1e-12 of a turn.
 SOLVED = 1e-12
@@ -45,6 +46,7 @@ def every_term(period=360.0):
         ta.StiffeningCompliance(1e-3 * unit, 2e-6 * unit, -2e-4 * unit, 3.0, 30.0 * unit),
         ta.LoadDependentGearError([100.5], [1e-5 * unit], [2e-5 * unit], "absolute"),
         ta.LocalDefect(100.0 * unit, 8.0 * unit, 0.01 * unit, 3.0),
+        ScaleError(2e-4, -90.0 * unit, 250.0 * unit),
     )
 
 
@@ -252,6 +254,7 @@ def test_thermal_and_load_terms_against_their_formulas():
         * np.cos(100 * x),
         ta.LocalDefect(100.0, 8.0, 0.01, 3.0): 0.01
         * np.exp(-0.5 * ((np.mod(3.0 * theta - 100.0 + 180.0, 360.0) - 180.0) / 8.0) ** 2),
+        ScaleError(2e-4, -90.0, 250.0): 2e-4 * (np.clip(theta, -90.0, 250.0) - 80.0),
     }
     for term, expected in cases.items():
         model = plain.replace(terms=[term])
@@ -313,7 +316,7 @@ def test_readings_that_are_not_finite_leave_the_state_alone():
 
 
 def test_angles_within_one_turn_are_as_good_as_unwrapped_ones():
-    terms = [t for t in every_term() if t.kind != "load_dependent_gear_error"]
+    terms = [t for t in every_term() if t.is_periodic and t.kind != "load_dependent_gear_error"]
     model = joint(terms=terms)
     theta, signals = motion(np.random.default_rng(5))
     corrected = model.correct(theta, **signals)

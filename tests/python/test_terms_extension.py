@@ -61,6 +61,7 @@ TABLES = {
     "local_defect": {
         "place_deg": 90.0, "width_deg": 8.0, "height_arcsec": 12.0, "shaft": "motor"
     },
+    "scale_error": {"relative_error": 5e-5, "start_deg": -2000.0, "stop_deg": 2000.0},
 }  # fmt: skip
 
 
@@ -330,3 +331,61 @@ def test_a_sideband_of_broken_order_gets_a_shaft_of_its_own():
     model = ta.fit(train, {"motor": [1]}, gear_ratio=50.5).model
     extended = extend_model(model, train, truth)
     assert rms_arcsec(extended, train) < 1e-6 < 1.0 < rms_arcsec(model, train)
+
+
+# Readings are jittered: one may lie a little beyond those of the other runs.
+@pytest.mark.filterwarnings("ignore::trueangle.errors.OutsideSpanWarning")
+def test_a_wrong_scale_goes_from_the_finding_into_the_corrected_model(tmp_path, capsys):
+    """Turns there and back: found, corrected, stepped, stored; not carried by a table."""
+    relative, start = 2e-5, -100.0
+    runs = [
+        RunDesign(
+            label=f"r{k}", samples=720, spacing="jittered", start_deg=start, turns=6.0,
+            reversals=(0.35, 0.7), speed_deg_s=20.0 + 10.0 * k,
+        )
+        for k in range(4)
+    ]  # fmt: skip
+    truth = Simulation(JOINT, LINES, (EFFECTS["scale_error"](relative),), 1.0, tuple(runs))
+    believed = Simulation(JOINT, LINES, (), 1.0, tuple(runs))
+    measured = ta.simulate(truth, seed=77)
+    result = ta.diagnose(measured, believed)
+    (found,) = [f for f in result.findings if f.cause == "scale_error"]
+    assert found.parameters["relative_error"].value == pytest.approx(relative, rel=0.02)
+    assert found.to_dict()["correctable"]
+    orders = {"output": [1], "motor": [1, 2]}
+    before = ta.fit(measured, orders, gear_ratio=50, nuisance="ramp").model
+    assert before.partial_span is None
+    after = result.correction(before, measured)
+    (term,) = after.terms
+    after.save(tmp_path / "m.json")
+    assert term.kind == "scale_error"
+    assert not after.is_periodic
+    travel = [run.unwrapped_reference for run in measured]
+    assert term.start == pytest.approx(min(x.min() for x in travel))
+    assert term.stop == pytest.approx(max(x.max() for x in travel))
+    assert after.partial_span == (term.start, term.stop)
+    held = ta.simulate(truth, seed=78)
+    # Noise of 1 arcsec; the ramp alone has some 750 deg * 2e-5 / sqrt(12), 15 arcsec.
+    assert spread_arcsec(after, held) < 1.1 < 5.0 < spread_arcsec(before, held)
+    with pytest.warns(errors.OutsideSpanWarning):
+        beyond = ta.load_model(tmp_path / "m.json").correct(term.stop + 3.0 * 2 * math.pi)
+    plain = after.replace(terms=()).correct(term.stop + 3.0 * 2 * math.pi)
+    # Beyond the travel the ramp is held at its end.
+    assert plain - beyond == pytest.approx(0.5 * relative * (term.stop - term.start), rel=0.03)
+    run = held[0]
+    steps = np.array([after.corrector().step(x) for x in run.indicated])
+    np.testing.assert_allclose(steps, after.correct(run.indicated), rtol=0, atol=1e-12)
+    assert ta.load_model(tmp_path / "m.json") == after
+    told = ta.export_model(after, "c", tmp_path / "m.h")
+    assert "scale_error" in told.summary()
+    # A ramp believed without a travel is corrected over that of the runs.
+    (believed_term,) = extend_model(before, measured, truth).terms
+    assert (believed_term.start, believed_term.stop) == pytest.approx((term.start, term.stop))
+    with pytest.raises(errors.ArgumentError, match="give start_deg and stop_deg"):
+        terms_from_effects([{"kind": "scale_error", "relative_error": 1e-5}], 360.0)
+
+
+def spread_arcsec(model, runs):
+    """rms of what is left, each run about its own zero."""
+    parts = [model.correct(run.indicated) - run.reference for run in runs]
+    return float(np.sqrt(np.mean(np.concatenate([p - p.mean() for p in parts]) ** 2))) / ARCSEC

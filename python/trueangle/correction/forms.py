@@ -9,7 +9,18 @@ from __future__ import annotations
 
 from typing import NamedTuple, TypeAlias
 
-__all__ = ["Bump", "Filter", "Form", "Friction", "Lag", "Lines", "Play", "Scaled", "Spring"]
+__all__ = [
+    "Bump",
+    "Filter",
+    "Form",
+    "Friction",
+    "Lag",
+    "Lines",
+    "Play",
+    "Ramp",
+    "Scaled",
+    "Spring",
+]
 
 Lines: TypeAlias = tuple[tuple[float, float, float], ...]
 
@@ -80,4 +91,12 @@ class Bump(NamedTuple):
     cycles: float = 1.0
 
 
-Form: TypeAlias = Play | Friction | Lag | Filter | Scaled | Spring | Bump
+class Ramp(NamedTuple):
+    """``slope * (x - middle)`` from ``start`` to ``stop``, and beyond them what it is there."""
+
+    slope: float
+    start: float
+    stop: float
+
+
+Form: TypeAlias = Play | Friction | Lag | Filter | Scaled | Spring | Bump | Ramp

@@ -87,6 +87,11 @@ class Term:
         """True when the term repeats after one output turn."""
         return all(order == int(order) for order in getattr(self, "orders", ()))
 
+    @property
+    def travel(self) -> tuple[float, float] | None:
+        """Stretch, over the turns, outside of which the term is held; None where it has none."""
+        return None
+
     def check(self) -> None:
         """Raise where parameters are out of range; they are finite numbers by then."""
 

@@ -131,7 +131,10 @@ def extend_model(
     """
     found = as_runs(runs)
     cycles, orders = _shafts(model, simulation)
-    terms = terms_from_effects(simulation.effects, model.period, simulation.joint.shafts)
+    travel = [360.0 / run.period * run.unwrapped_reference for run in found]
+    span = min(float(x.min()) for x in travel), max(float(x.max()) for x in travel)
+    effects = [effect.over(*span) for effect in simulation.effects]
+    terms = terms_from_effects(effects, model.period, simulation.joint.shafts)
     extended = model.replace(terms=terms)
     for _ in range(_ROUNDS):
         fitted = fit(

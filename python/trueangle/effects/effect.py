@@ -244,6 +244,10 @@ class Effect:
             "reason (not_at_run_time)"
         )
 
+    def over(self, start_deg: float, stop_deg: float) -> Self:
+        """The effect over this travel, where it is corrected over a stated one and states none."""
+        return self
+
     def to_lines(self) -> Sequence[tuple[str, float]]:
         """(shaft, order) of the lines that a correction has to take up."""
         return ()

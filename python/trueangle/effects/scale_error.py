@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Any, ClassVar
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, ClassVar, Self
 
 import numpy as np
 
+from ..correction import forms
+from ..correction.forms import Form
+from ..correction.term import Term
+from ..errors import ArgumentError
 from ..joint.pattern import ARCSEC_PER_RAD, Surroundings
 from ..joint.signals import Signals
 from ..regression.estimate import Parameters, quantity
@@ -19,7 +23,7 @@ from .search import (
     Fitted,
 )
 
-__all__ = ["ScaleError"]
+__all__ = ["ScaleError", "ScaleErrorTerm"]
 
 
 @dataclass(frozen=True)
@@ -30,9 +34,13 @@ class ScaleError(Effect):
     ----------
     relative_error : float
         s, such as 1e-5 for a ratio of 100.001 taken as 100.
+    start_deg, stop_deg : float, optional
+        Travel over which it was measured: what a correction needs to know.
     """
 
     relative_error: float
+    start_deg: float | None = None
+    stop_deg: float | None = None
 
     kind: ClassVar[str] = "scale_error"
     sentence: ClassVar[str] = (
@@ -41,9 +49,6 @@ class ScaleError(Effect):
     )
     measure: ClassVar[str] = "turn several turns in both directions"
     acts_on_runs: ClassVar[bool] = True
-    not_at_run_time: ClassVar[str] = (
-        "the ratio that turns counts into angles is wrong: put it right there"
-    )
 
     def signal(self, signals: Signals, around: Surroundings, rng: np.random.Generator) -> Array:
         return self.relative_error * ARCSEC_PER_RAD * signals.theta
@@ -78,4 +83,63 @@ class ScaleError(Effect):
     ) -> tuple[Parameters, list[Effect]]:
         _, (scale,), covariance = terms[0]
         std = float(np.sqrt(covariance[0, 0]))
-        return {"relative_error": quantity(scale, std)}, [ScaleError(float(scale))]
+        travel = np.degrees(regression.signals.theta)
+        found = ScaleError(float(scale), float(travel.min()), float(travel.max()))
+        return {"relative_error": quantity(scale, std)}, [found]
+
+    def over(self, start_deg: float, stop_deg: float) -> Self:
+        if self.start_deg is not None and self.stop_deg is not None:
+            return self
+        return replace(self, start_deg=start_deg, stop_deg=stop_deg)
+
+    def to_terms(self, period: float, shafts: Mapping[str, float]) -> tuple[Term, ...]:
+        if self.start_deg is None or self.stop_deg is None:
+            raise ArgumentError(
+                f"effect '{self.kind}' is corrected over a stated travel only: give start_deg and "
+                "stop_deg, or put the ratio right that turns counts into angles"
+            )
+        degree = period / 360.0
+        return (
+            ScaleErrorTerm(self.relative_error, self.start_deg * degree, self.stop_deg * degree),
+        )
+
+
+@dataclass(frozen=True, repr=False)
+class ScaleErrorTerm(Term):
+    r"""A wrong ratio, over the travel on which it was measured.
+
+    .. math:: \varepsilon = s\,[\min(\max(\varphi, a), b) - (a + b)/2]
+
+    with :math:`\varphi` over the turns, not modulo one. Beyond the travel it keeps the value of
+    its end: where the ratio is wrong there too, put it right where counts are turned into angles.
+
+    Parameters
+    ----------
+    relative_error : float
+        s, below 1 in size.
+    start, stop : float
+        a < b.
+    """
+
+    relative_error: float
+    start: float
+    stop: float
+
+    kind: ClassVar[str] = "scale_error"
+
+    @property
+    def is_periodic(self) -> bool:
+        return False
+
+    @property
+    def travel(self) -> tuple[float, float]:
+        return self.start, self.stop
+
+    def check(self) -> None:
+        if not -1.0 < self.relative_error < 1.0:
+            raise self._out_of_range("relative_error", "between -1 and 1")
+        if self.stop <= self.start:
+            raise self._out_of_range("stop", f"beyond start ({self.start!r})")
+
+    def forms(self) -> tuple[Form, ...]:
+        return (forms.Ramp(self.relative_error, self.start, self.stop),)

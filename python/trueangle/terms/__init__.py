@@ -23,6 +23,7 @@ from ..effects.latency import LatencyTerm as Latency
 from ..effects.load_dependent_gear_error import LoadDependentGearErrorTerm as LoadDependentGearError
 from ..effects.local_defect import LocalDefectTerm as LocalDefect
 from ..effects.presliding_hysteresis import PreslidingHysteresisTerm as PreslidingHysteresis
+from ..effects.scale_error import ScaleErrorTerm as ScaleError
 from ..effects.stiffening_compliance import StiffeningComplianceTerm as StiffeningCompliance
 from ..effects.thermal_drift import ThermalDriftTerm as ThermalDrift
 from ..effects.torsional_compliance import TorsionalComplianceTerm as TorsionalCompliance
@@ -39,6 +40,7 @@ __all__ = [
     "LoadDependentGearError",
     "LocalDefect",
     "PreslidingHysteresis",
+    "ScaleError",
     "StiffeningCompliance",
     "Term",
     "ThermalDrift",
