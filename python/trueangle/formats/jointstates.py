@@ -124,7 +124,7 @@ class Block:
 
     Parameters
     ----------
-    messages : sequence of bytes
+    messages : sequence of bytes, or array of them, one a row
     is_ros1 : bool
         Of ROS 1; else CDR of ROS 2.
 
@@ -134,7 +134,7 @@ class Block:
         A message is cut short or in another encoding.
     """
 
-    def __init__(self, messages: Sequence[bytes], is_ros1: bool) -> None:
+    def __init__(self, messages: Sequence[bytes] | NDArray[np.uint8], is_ros1: bool) -> None:
         self._messages = messages
         self._parts = list(_alike(messages, is_ros1))
 
@@ -168,7 +168,25 @@ class Block:
 
     def with_positions(self, positions: Mapping[str, NDArray[np.float64]]) -> list[bytes]:
         """The messages with other positions of some joints, where they have one."""
-        made = list(self._messages)
+        made = [bytes(message) for message in self._messages]
+        for part, data in self._changed(positions):
+            text, size = data.tobytes(), data.shape[1]
+            for i, row in enumerate(part.rows.tolist()):
+                made[row] = text[i * size : (i + 1) * size]
+        return made
+
+    def rows_with_positions(
+        self, positions: Mapping[str, NDArray[np.float64]]
+    ) -> NDArray[np.uint8]:
+        """The same as an array, one message a row; of messages that were given as one."""
+        made = np.array(self._messages, dtype=np.uint8)
+        for part, data in self._changed(positions):
+            made[part.rows] = data
+        return made
+
+    def _changed(
+        self, positions: Mapping[str, NDArray[np.float64]]
+    ) -> Iterator[tuple[_Alike, NDArray[np.uint8]]]:
         for part in self._parts:
             names, (place, count) = part.layout.names, part.layout.fields["position"]
             if count != len(names):
@@ -178,22 +196,32 @@ class Block:
                 at = place + 8 * names.index(joint)
                 values = positions[joint][part.rows].astype(f"{part.layout.order}f8")
                 data[:, at : at + 8] = values.view(np.uint8).reshape(-1, 8)
-            text, size = data.tobytes(), data.shape[1]
-            for i, row in enumerate(part.rows.tolist()):
-                made[row] = text[i * size : (i + 1) * size]
-        return made
+            yield part, data
 
 
-def _alike(messages: Sequence[bytes], is_ros1: bool) -> Iterator[_Alike]:
+def _alike(messages: Sequence[bytes] | NDArray[np.uint8], is_ros1: bool) -> Iterator[_Alike]:
     """The messages by their layouts."""
-    sizes = np.fromiter(map(len, messages), dtype=np.intp, count=len(messages))
-    for size in np.unique(sizes).tolist():
-        rows = np.flatnonzero(sizes == size)
-        text = b"".join([messages[row] for row in rows.tolist()])
-        data = np.frombuffer(text, dtype=np.uint8).reshape(rows.size, size)
+    for rows, data in _by_size(messages):
         while rows.size:
             layout = _layout(data[0].tobytes(), is_ros1)
             fixed = ~layout.free
             same = (data[:, fixed] == data[0, fixed]).all(axis=1)
+            if same.all():
+                yield _Alike(layout, rows, data)
+                break
             yield _Alike(layout, rows[same], data[same])
             rows, data = rows[~same], data[~same]
+
+
+def _by_size(
+    messages: Sequence[bytes] | NDArray[np.uint8],
+) -> Iterator[tuple[NDArray[np.intp], NDArray[np.uint8]]]:
+    """Places and bytes of the messages of each length, one a row."""
+    if isinstance(messages, np.ndarray):
+        yield np.arange(len(messages)), messages
+        return
+    sizes = np.fromiter(map(len, messages), dtype=np.intp, count=len(messages))
+    for size in np.unique(sizes).tolist():
+        rows = np.flatnonzero(sizes == size)
+        text = b"".join([messages[row] for row in rows.tolist()])
+        yield rows, np.frombuffer(text, dtype=np.uint8).reshape(rows.size, size)

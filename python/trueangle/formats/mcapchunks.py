@@ -8,15 +8,18 @@ from __future__ import annotations
 
 import struct
 from collections import defaultdict
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Callable, Collection, Iterator, Sequence
 from io import BytesIO
 from itertools import chain, pairwise
 from operator import itemgetter
 from typing import Any, ClassVar, cast
 
+import numpy as np
 from rosbags.rosbag2 import CompressionMode, Reader, StoragePlugin, Writer
 from rosbags.rosbag2.reader import DirectoryReader
 from rosbags.rosbag2.storage_mcap import McapReader, McapWriter, PendingChunk, decompress
+
+from .mcaprows import Rows, interleaved
 
 __all__ = ["BagReader", "BagWriter", "ChunkReader", "ChunkWriter"]
 
@@ -39,9 +42,14 @@ _by_time = itemgetter(1)
 class ChunkReader(McapReader):  # type: ignore[misc]
     """The MCAP storage of rosbags, with whole chunks of messages taken apart at once."""
 
+    #: Whether messages that are alike may come as `Rows`, and their first time before them.
+    by_rows = False
+    #: Whether the order of messages of unlike topics is of no account.
+    by_topic = False
+
     def messages(
         self, connections: Collection[Any], start: int | None = None, stop: int | None = None
-    ) -> Iterator[tuple[Any, int, bytes]]:
+    ) -> Iterator[tuple[Any, int, bytes | Rows]]:
         """Connection, time and data of every message, in the order of time.
 
         Raises
@@ -61,7 +69,14 @@ class ChunkReader(McapReader):  # type: ignore[misc]
             self.bio.seek(4 + len(chunk.compression) + 8, 1)
             packed = self.bio.read(chunk.compressed_size)
             data = decompress(packed, chunk.compression, size, check)
-            yield from sorted(_messages(data, wanted), key=_by_time)
+            mixed = self.by_topic or len(wanted) == 1
+            alike = Rows.of_chunk(data, mixed) if self.by_rows else None
+            if alike is None:
+                yield from sorted(_messages(data, wanted), key=_by_time)
+                continue
+            for rows in alike:
+                if rows.channel in wanted:
+                    yield wanted[rows.channel], int(rows.times[0]), rows
 
     def _is_in_order(self) -> bool:
         """Every chunk ends before the next one starts (there are files without any)."""
@@ -130,6 +145,30 @@ class ChunkWriter(McapWriter):  # type: ignore[misc]
         if place + size > _FULL:
             self.close_chunk()
 
+    def write_rows(self, parts: Sequence[tuple[Any, Rows]]) -> None:
+        """Write rows of several connections, row by row: as `write` would, one by one."""
+        rows = interleaved([(connection.id, rows) for connection, rows in parts])
+        width, size = rows.records.shape[1], rows.messages.shape[1]
+        done, turn = 0, len(parts)
+        while done < len(rows):
+            chunk = self.chunk
+            place = chunk.bio.tell()
+            most = max(0, (_FULL - size - place) // width + 1) + 1
+            part = Rows(rows.records[done : done + most])
+            times = part.times
+            chunk.message_start_time = min(chunk.message_start_time, int(times[0]))
+            chunk.message_end_time = max(chunk.message_end_time, int(times[-1]))
+            places = place + width * np.arange(len(part))
+            for i, (connection, _) in enumerate(parts):
+                mine = slice((i - done) % turn, None, turn)
+                entries = zip(times[mine].tolist(), places[mine].tolist(), strict=True)
+                if some := list(entries):
+                    chunk.msgs[connection.id].extend(some)
+            chunk.bio.write(part.records.data)
+            done += len(part)
+            if len(part) == most:
+                self.close_chunk()
+
     def close_chunk(self) -> None:
         """Write the messages that wait, and where they stand."""
         chunk = self.chunk
@@ -183,6 +222,10 @@ class BagWriter(Writer):  # type: ignore[misc]
         if is_plain and isinstance(self.storage, ChunkWriter):
             return cast("Callable[[Any, int, bytes], None]", self.storage.write)
         return cast("Callable[[Any, int, bytes], None]", self.write)
+
+    def write_rows(self, parts: Sequence[tuple[Any, Rows]]) -> None:
+        """Write rows of several connections, row by row."""
+        self.storage.write_rows(parts)
 
     def close(self) -> None:
         """Count what was written by the short way, and close."""

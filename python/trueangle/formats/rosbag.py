@@ -7,9 +7,8 @@ import zlib
 from collections import defaultdict
 from collections.abc import Collection, Iterator, Sequence
 from contextlib import contextmanager
-from itertools import islice
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,7 +19,8 @@ from ..errors import FileError
 from .damage import damage_told
 from .format import TEXTS, Addition, Batch, Choose, Contents, Watch, note
 from .jointstates import Block
-from .mcapchunks import BagReader
+from .mcapchunks import BagReader, ChunkReader
+from .mcaprows import Rows
 from .rosbagwriter import opened_writer
 
 __all__ = ["columns", "contents", "copy", "read"]
@@ -54,8 +54,8 @@ def read(
     with _opened(path) as bag:
         connections = bag.topic(topic)
         joints = bag.joints(connections)
-        for block in _blocks(bag.reader.messages(connections)):
-            states = Block([data for _connection, _stamp, data in block], bag.is_ros1)
+        for block in bag.blocks(connections):
+            states = bag.states(block)
             yield {name: _values(states, name, joints) for name in names}
 
 
@@ -91,17 +91,33 @@ def copy(
             outputs = {
                 c.id: copies[c.id] if output == name else writer.add(c, output) for c in connections
             }
-            for block in _blocks(bag.reader.messages()):
+            for block in bag.blocks():
+                if isinstance(block, Alike):
+                    connection, rows = block
+                    parts = [(copies[connection.id], connection.topic, rows)]
+                    if connection.id in outputs:
+                        states = bag.states(block)
+                        positions = _corrected(states, channels, joints)
+                        made = rows.with_messages(states.rows_with_positions(positions))
+                        parts = parts[: 1 if output != name else 0]
+                        parts.append((outputs[connection.id], output, made))
+                    writer.write_rows([(target, some) for target, _topic, some in parts])
+                    for _target, topic, some in parts:
+                        digest.update_rows(topic, some)
+                    done += len(rows)
+                    watch(len(rows) if connection.id in outputs else 0, done / total)
+                    continue
                 places = [i for i, message in enumerate(block) if message[0].id in outputs]
                 states = Block([block[i][2] for i in places], bag.is_ros1)
-                made = dict(zip(places, _corrected(states, channels, joints), strict=True))
+                positions = _corrected(states, channels, joints)
+                changed = dict(zip(places, states.with_positions(positions), strict=True))
                 for i, (connection, time, data) in enumerate(block):
-                    replaced = i in made and output == name
+                    replaced = i in changed and output == name
                     if not replaced:
                         writer.write(copies[connection.id], time, data)
                         digest.update(connection.topic, time, data)
-                    if i in made:
-                        data = made[i]
+                    if i in changed:
+                        data = changed[i]
                         writer.write(outputs[connection.id], time, data)
                         digest.update(output, time, data)
                 done += len(block)
@@ -113,9 +129,22 @@ def contents(path: Path, topic: str | None = None) -> Contents:
     """Messages of all topics, and a checksum of the messages and times of each."""
     digest = _Digest()
     with _opened(path) as bag:
-        for connection, time, data in bag.reader.messages():
-            digest.update(connection.topic, time, data)
+        for storage in bag.chunked:
+            storage.by_topic = True
+        for block in bag.blocks():
+            if isinstance(block, Alike):
+                digest.update_rows(block.connection.topic, block.rows)
+                continue
+            for connection, time, data in block:
+                digest.update(connection.topic, time, data)
     return digest.contents()
+
+
+class Alike(NamedTuple):
+    """Messages of a connection that are alike in length."""
+
+    connection: Any
+    rows: Rows
 
 
 class Bag:
@@ -130,6 +159,9 @@ class Bag:
         self.reader = reader
         self.is_ros1 = isinstance(reader, Reader1)
         self.types = get_typestore(Stores.ROS1_NOETIC if self.is_ros1 else Stores.LATEST)
+        self.chunked = [] if self.is_ros1 else list(_chunked(reader))
+        for storage in self.chunked:
+            storage.by_rows = True
 
     def topic(self, name: str | None) -> list[Any]:
         """Connections of the JointState topic ``name``, or of the only one."""
@@ -149,9 +181,32 @@ class Bag:
 
     def joints(self, connections: Sequence[Any]) -> list[str]:
         """Joints of the first messages."""
-        messages = islice(self.reader.messages(connections), _BLOCK)
-        block = Block([data for _connection, _time, data in messages], self.is_ros1)
-        return block.joints
+        first = next(iter(self.blocks(connections)), None)
+        return [] if first is None else self.states(first).joints
+
+    def blocks(self, connections: Sequence[Any] = ()) -> Iterator[list[Any] | Alike]:
+        """Messages of these connections, or of all: some thousands, or `Rows` that are alike."""
+        block: list[Any] = []
+        for message in self.reader.messages(connections):
+            rows = message[2]
+            if isinstance(rows, Rows):
+                if block:
+                    yield block
+                    block = []
+                yield Alike(message[0], rows)
+                continue
+            block.append(message)
+            if len(block) == _BLOCK:
+                yield block
+                block = []
+        if block:
+            yield block
+
+    def states(self, block: list[Any] | Alike) -> Block:
+        """Joint states of a block."""
+        if isinstance(block, Alike):
+            return Block(block.rows.messages, self.is_ros1)
+        return Block([data for _connection, _time, data in block], self.is_ros1)
 
     def columns(self, connections: Sequence[Any]) -> list[str]:
         """Joints of the first messages, with their signals."""
@@ -183,6 +238,13 @@ class _Digest:
         if len(waiting) >= 2 * _BLOCK:
             self._sum(topic)
 
+    def update_rows(self, topic: str, rows: Rows) -> None:
+        """Add messages that are alike."""
+        if topic in self._waiting:
+            self._sum(topic)
+        count, check = self._sums.get(topic, (0, 0))
+        self._sums[topic] = count + len(rows), rows.checksum(check)
+
     def _sum(self, topic: str) -> None:
         """Add up what waits: one call for many messages."""
         waiting = self._waiting.pop(topic)
@@ -198,15 +260,12 @@ class _Digest:
         )
 
 
-def _blocks(messages: Iterator[Any]) -> Iterator[list[Any]]:
-    block: list[Any] = []
-    for message in messages:
-        block.append(message)
-        if len(block) == _BLOCK:
-            yield block
-            block = []
-    if block:
-        yield block
+def _chunked(reader: Any) -> Iterator[ChunkReader]:
+    """The MCAP files of a reader of ROS 2, unless each message is compressed by itself."""
+    storage = reader.storage
+    if reader.compression_mode != "message":
+        parts = getattr(storage, "storages", [storage])
+        yield from (part for part in parts if isinstance(part, ChunkReader))
 
 
 def _values(states: Block, name: str, joints: Collection[str]) -> NDArray[np.float64]:
@@ -219,13 +278,13 @@ def _values(states: Block, name: str, joints: Collection[str]) -> NDArray[np.flo
     return states.values(name, "position")
 
 
-def _corrected(states: Block, channels: Sequence[Addition], joints: Collection[str]) -> list[bytes]:
-    """The messages with the positions of the joints replaced by corrected ones."""
-    if not len(states):
-        return []
+def _corrected(
+    states: Block, channels: Sequence[Addition], joints: Collection[str]
+) -> dict[str, NDArray[np.float64]]:
+    """Corrected positions of the joints."""
     positions = {}
-    for channel in channels:
+    for channel in channels if len(states) else ():
         signals = {s: _values(states, column, joints) for s, column in channel.signals.items()}
         indicated = _values(states, channel.column, joints)
         positions[channel.column] = channel.correct(indicated, signals)
-    return states.with_positions(positions)
+    return positions

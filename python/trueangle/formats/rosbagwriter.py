@@ -34,6 +34,8 @@ class BagWriter:
         self._writer = writer
         self._note = note
         self.write = getattr(writer, "write_message", writer.write)
+        #: Of bags of ROS 2 in MCAP files, from which alone rows are read.
+        self.write_rows: Any = getattr(writer, "write_rows", None)
 
     def add(self, connection: Any, topic: str) -> Any:
         """A connection like one that was read, perhaps of another topic.
