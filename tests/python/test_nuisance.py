@@ -118,6 +118,37 @@ def test_lines_of_the_reference_are_fitted_and_not_in_the_model():
         assert any("lines of the reference" in note for note in found.notes)
 
 
+@pytest.mark.parametrize("mounted", ["anew", "once"])
+def test_a_reference_that_is_mounted_anew_has_its_phase_in_every_run(mounted):
+    """A stepper as the reference: its zero, and so the phase of its lines, is new in every run."""
+    rng = np.random.default_rng(41)
+    runs, turned = [], []
+    for r in range(5):
+        zero = rng.uniform(0.0, 7.2) if mounted == "anew" else 3.0
+        x = np.sort(rng.uniform(0.0, 360.0, 2000))
+        lines = 0.03 * np.sin(np.radians(50 * (x + zero))) + 0.01 * np.sin(np.radians(100 * x))
+        e = sum(c * np.sin(np.radians(k * x + p)) for k, c, p in LINES) + lines
+        runs.append(ta.CalibrationRun(x, x + e + SIGMA * rng.normal(size=2000) + r, 360.0))
+        turned.append(50 * zero)
+    for orders in (None, [1, 3]):
+        found = ta.fit(runs, orders, argument="reference", reference_orders=[50, 100])
+        assert found.orders == (1, 3)
+        assert found.residual_std == pytest.approx(SIGMA, rel=0.05)
+        assert found.amplitudes == pytest.approx([0.05, 0.02], abs=6 * SIGMA / np.sqrt(5000))
+        assert ("turned" in found.nuisance.kinds) == (mounted == "anew")
+    if mounted == "anew":
+        (order, amplitude, phases), _ = found.nuisance.turned
+        assert (order, amplitude) == (50.0, pytest.approx(0.03, rel=0.02))
+        off = np.degrees(phases) - turned
+        assert np.abs(ta.wrap(off, 360.0)).max() < 6.0 * np.degrees(SIGMA / 0.03 / np.sqrt(1000))
+        (told,) = (note for note in found.notes if "zero is new in each" in note)
+        assert "not in the model" in told
+        assert "order 50: 108 arcsec" in told
+    chosen = ta.select_orders(runs, argument="reference", reference_orders=[50, 100])
+    assert chosen.orders == (1, 3)
+    assert any("zero is new in each" in n for n in chosen.notes) == (mounted == "anew")
+
+
 def test_standard_errors_grow_beside_a_nuisance():
     """An arc travelled once at one speed: a drift takes much of what order 1 says."""
     x = np.linspace(0.0, 340.0, 400)

@@ -104,7 +104,8 @@ def add_nuisance(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--reference-orders",
         metavar="50,100",
-        help="orders that the reference itself makes: fitted beside the pattern, not retained",
+        help="orders that the reference itself makes: fitted beside the pattern, not retained; "
+        "with a phase of their own in every run where it was mounted anew",
     )
 
 

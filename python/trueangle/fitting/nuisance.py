@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from ..errors import ArgumentError
 from ..runs import CalibrationRun
 from ..shafts import ShaftOrders, shaft_cycles
-from .nuisancechoice import FOLDS, Rows, choose, inflation, solved, stiffest
+from .nuisancechoice import FOLDS, Rows, choose, inflation, solved, stiffest, turns
 
 __all__ = ["KINDS", "Nuisance", "asked_nuisance", "likely_orders", "take_out", "take_out_beside"]
 
@@ -40,7 +40,7 @@ _STRETCHES: Final = 13
 _LOOKED_AT: Final = 24_000
 
 
-#: Runs of which each may drift by itself.
+#: Runs of which each may drift by itself, or have lines of the reference of its own.
 _MOST_DRIFTING: Final = 24
 
 #: Orders of each shaft that nuisances are looked for beside.
@@ -62,6 +62,11 @@ class Nuisance:
         Of the velocity: error per velocity, seconds; negative where the reading lags.
     intervals : int
         Of the spline in time; 0 without drift.
+    reference : tuple of (order, A, B)
+        Lines that the reference makes, the same in every run.
+    turned : tuple of (order, amplitude, phases)
+        The same where the reference was mounted anew for every run: one amplitude, and a phase
+        in every run, radians.
     shares : mapping of str to float
         Part of the held-out sum of squares that each kind took away.
     unseparated : tuple of str
@@ -76,6 +81,7 @@ class Nuisance:
     delay: float = 0.0
     intervals: int = 0
     reference: tuple[tuple[float, float, float], ...] = ()
+    turned: tuple[tuple[float, float, tuple[float, ...]], ...] = ()
     shares: tuple[tuple[str, float], ...] = ()
     unseparated: tuple[str, ...] = ()
     inflation: tuple[float, ...] = ()
@@ -102,6 +108,8 @@ class Nuisance:
             "drift": f"a drift in time (cubic spline of {self.intervals} "
             f"interval{'s' if self.intervals > 1 else ''} in every run)",
             "reference": f"{len(self.reference)} lines of the reference",
+            "turned": "lines of the reference with a phase of their own in every run, because its "
+            f"zero is new in each ({', '.join(self._told(period))})",
         }
         shares = dict(self.shares)
         for kind in self.kinds:
@@ -113,6 +121,10 @@ class Nuisance:
                 "tell it from the pattern: run trueangle diagnose, or measure in both directions, "
                 "at several speeds and over more turns"
             )
+
+    def _told(self, period: float) -> Iterable[str]:
+        for order, amplitude, _ in self.turned:
+            yield f"order {order:g}: {1_296_000.0 * amplitude / period:.3g} arcsec"
 
 
 def asked_nuisance(asked: str | Iterable[str]) -> tuple[str, ...] | None:
@@ -173,7 +185,7 @@ def take_out(
     stride = max(1, sum(map(len, runs)) // _LOOKED_AT)
     orders = [k * s.cycles_per_turn for s in shafts for k in s.orders]
     rows = _columns(runs, orders, argument, stride, kinds, reference_orders)
-    forced = ["reference"] if reference_orders else []
+    forced = [_lines_of_reference(rows)] if reference_orders else []
     shares: list[tuple[str, float]] = []
     unseparated: list[str] = []
     if kinds is None:
@@ -199,7 +211,10 @@ def take_out(
             (float(k), *found["reference"][2 * i : 2 * i + 2].tolist())
             for i, k in enumerate(reference_orders)
         )
-        if reference_orders
+        if "reference" in found
+        else (),
+        turned=_one_amplitude(found["turned"], reference_orders, len(runs))
+        if "turned" in found
         else (),
         shares=tuple(shares),
         unseparated=tuple(unseparated),
@@ -207,6 +222,28 @@ def take_out(
     )
     drifts = next((found[n] for n in chosen if n.startswith("drift")), None)
     return [_without(run, i, nuisance, drifts) for i, run in enumerate(runs)], nuisance
+
+
+def _lines_of_reference(rows: Rows) -> str:
+    """Whether the lines of the reference are the same in every run, or are new in each.
+
+    The other group leaves the rows.
+    """
+    name = "turned" if "turned" in rows.groups and turns(rows) else "reference"
+    rows.groups.pop("reference" if name == "turned" else "turned", None)
+    return name
+
+
+def _one_amplitude(
+    found: Array, orders: Sequence[float], runs: int
+) -> tuple[tuple[float, float, tuple[float, ...]], ...]:
+    """``(order, amplitude, phases)`` of ``A, B`` of every run: the mean amplitude for all."""
+    a, b = np.moveaxis(found.reshape(runs, len(orders), 2), 2, 0)
+    phases, sizes = np.arctan2(a, b), np.hypot(a, b).mean(axis=0)
+    return tuple(
+        (float(order), float(sizes[i]), tuple(phases[:, i].tolist()))
+        for i, order in enumerate(orders)
+    )
 
 
 def take_out_beside(
@@ -248,6 +285,9 @@ def _without(
     for order, a, b in nuisance.reference:
         x = 2.0 * np.pi * order / run.period * run.reference
         error += a * np.cos(x) + b * np.sin(x)
+    for order, amplitude, phases in nuisance.turned:
+        x = 2.0 * np.pi * order / run.period * run.reference
+        error += amplitude * np.sin(x + phases[index])
     if drifts is not None and run.time is not None:
         width = nuisance.intervals + 2
         mine = drifts[index * width : (index + 1) * width]
@@ -280,14 +320,15 @@ def _columns(
             mine["velocity"] = np.asarray(speeds[i])[take, None]
         if reference_orders:
             lines = (2.0 * np.pi / run.period * run.reference)[take, None] * reference_orders
-            mine["reference"] = np.stack([np.cos(lines), np.sin(lines)], 2).reshape(len(x), -1)
+            both = np.stack([np.cos(lines), np.sin(lines)], 2).reshape(len(x), -1)
+            mine["reference"] = both
+            if 1 < len(runs) <= _MOST_DRIFTING:
+                mine["turned"] = _of_run(both, i, len(runs))
         if "drift" in wanted and timed and len(runs) <= _MOST_DRIFTING:
             assert run.time is not None
             for count in _INTERVALS:
                 own = _spline(run.time[take], run.time, count)
-                full = np.zeros((len(x), len(runs) * own.shape[1]))
-                full[:, i * own.shape[1] : (i + 1) * own.shape[1]] = own
-                mine[f"drift{count}"] = full
+                mine[f"drift{count}"] = _of_run(own, i, len(runs))
         used = weight[take]
         for name, columns in mine.items():
             parts.setdefault(name, []).append(_about(columns, used))
@@ -307,6 +348,13 @@ def _about(columns: Array, weight: Array) -> Array:
     """Columns about their weighted mean, by the roots of the weights."""
     mean = (weight @ columns) / weight.sum()
     return np.asarray(np.sqrt(weight)[:, None] * (columns - mean))
+
+
+def _of_run(own: Array, index: int, runs: int) -> Array:
+    """Columns that each run has for itself: those of this run, zeros for the others."""
+    full = np.zeros((len(own), runs * own.shape[1]))
+    full[:, index * own.shape[1] : (index + 1) * own.shape[1]] = own
+    return full
 
 
 def _spline(time: Array, whole: Array, intervals: int) -> Array:

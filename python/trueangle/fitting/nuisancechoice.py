@@ -8,7 +8,7 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["FOLDS", "Rows", "choose", "inflation", "solved", "stiffest"]
+__all__ = ["FOLDS", "Rows", "choose", "inflation", "solved", "stiffest", "turns"]
 
 Array = NDArray[np.float64]
 
@@ -112,6 +112,13 @@ def choose(rows: Rows, forced: list[str]) -> tuple[list[str], list[tuple[str, fl
         shares.append((kind, float(before.sum() - good[best].sum()) / total))
         chosen.append(best)
         before = good[best]
+
+
+def turns(rows: Rows) -> bool:
+    """Whether lines of the reference in every run for itself lower the held-out error."""
+    before, after = _held_out(rows, ["reference"]), _held_out(rows, ["turned"])
+    lower = np.count_nonzero(after < before) > FOLDS // 2
+    return bool(lower and after.sum() < (1.0 - _GAIN) * before.sum())
 
 
 def stiffest(rows: Rows, chosen: Sequence[str]) -> str:

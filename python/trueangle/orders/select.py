@@ -82,7 +82,8 @@ def select_orders(
         What is taken out of the readings first, as in `trueangle.fit`.
     reference_orders : iterable of float, optional
         Orders that the reference itself is known to make (50 and 100 for a stepper motor
-        of 200 steps). They and their side bands are fitted, named and not retained.
+        of 200 steps). They and their side bands are fitted, named and not retained. Where their
+        phases are new in every run (the reference was mounted anew) they are taken out first.
     tolerance : float, optional
         Positions closer than this are one, default 0.01 degree; unit of the runs.
 
@@ -120,11 +121,15 @@ def select_orders(
     if not kept:
         raise ArgumentError("all readings have weight 0: nothing is left to select orders from")
     said: tuple[str, ...] = ()
-    if (kinds := asked_nuisance(nuisance)) != ():
+    kinds, lines = asked_nuisance(nuisance), tuple(map(float, reference_orders))
+    if kinds != () or (lines and len(kept) > 1):
         likely = likely_orders(kept, gear_ratio, fixed_member, shafts)
         angle = "indicated" if argument == "indicated" else "reference"
-        kept, taken = take_out(kept, kinds, likely, angle)
-        said = tuple(taken.sentences(kept[0].period))
+        cleaned, taken = take_out(kept, kinds, likely, angle, lines if len(kept) > 1 else ())
+        if lines and not taken.turned:
+            # Lines that are the same in every run stay, to be fitted and named.
+            cleaned, taken = take_out(kept, kinds, likely, angle)
+        kept, said = cleaned, tuple(taken.sentences(kept[0].period))
     choice = choose_argument(kept, argument)
     if choice.argument == "indicated":
         kept = [at_indicated(run) for run in kept]
