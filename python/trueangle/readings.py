@@ -129,6 +129,9 @@ def readings_of(path: Path, wanted: Mapping[str, Any], topic: str | None) -> Rea
     others = [name for name in header if name not in needed][:_KEPT]
     together = getattr(kind.module, "together", None)
     if together is not None:  # formats whose columns need not be equally long
+        if not needed and len(header) > 1:  # which belong together nobody said
+            empty = dict.fromkeys(header, np.empty(0))
+            return Readings(path, kind, roles, empty, Source(path.name, sha256_of(path)))
         others = together(path, needed, others)
     labels = {column.name for column in roles.values() if column.role in ("run", "unit")}
     numeric = _numeric(kind, path, others, topic)

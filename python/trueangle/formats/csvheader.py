@@ -90,6 +90,7 @@ class Header:
         if first < 0:
             cells = [f"column{i + 1}" for i in range(len(cells))]
         self.names = self._named(cells, lines[first + 1 : data] if first >= 0 else [])
+        self._refuse_blanks(lines[data : data + 1])
         self.trailing = self._trailing(lines[data : data + 1])
         file.seek(sum(len(line) for line in self.head))
 
@@ -113,6 +114,19 @@ class Header:
             text = self.delimiter.join(["", *(added if i == self.place else [""] * len(added))])
             head[i] = body + text.encode(self.encoding, "replace") + ending
         return b"".join(head)
+
+    def _refuse_blanks(self, reading: list[_Line]) -> None:
+        """Of one cell in which several numbers stand apart by blanks."""
+        for line in reading:
+            words = line.text.split()
+            numbers = [number(word, ".") for word in words]
+            if len(self.names) == 1 < len(words) and None not in numbers:
+                raise FileError(
+                    self.path,
+                    "its columns stand apart by blanks alone: separate them by commas, semicolons "
+                    "or tabs",
+                    line=line.place,
+                )
 
     def _is_units(self, raw: bytes) -> bool:
         return self._units_of(raw.decode(self.encoding, "replace"), len(self.names)) is not None

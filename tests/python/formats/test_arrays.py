@@ -88,3 +88,19 @@ def test_what_is_damaged_is_told_with_its_name(name, tmp_path):
     path.write_bytes(heads[name] + b"\x01" * 200)
     with pytest.raises(FileError, match=rf"{name}: is damaged or not"):
         ta.read_runs(path)
+
+
+@pytest.mark.parametrize("ending", [".mat", ".h5"])
+def test_a_file_of_unnamed_arrays_says_what_is_in_it(ending, tmp_path):
+    path = tmp_path / f"rig{ending}"
+    angle = np.arange(40.0)
+    if ending == ".mat":
+        scipy_io = pytest.importorskip("scipy.io")
+        scipy_io.savemat(path, {"rig": {"ref": angle, "enc": angle + 0.1}, "other": np.arange(3.0)})
+    else:
+        with pytest.importorskip("h5py").File(path, "w") as file:
+            file["rig/ref"], file["rig/enc"] = angle, angle + 0.1
+    with pytest.raises(FileError, match=r"no column reference_deg .*rig/enc"):
+        ta.check(path)
+    with pytest.raises(FileError, match=r"no column reference_deg .*rig/enc"):
+        ta.read_runs(path)

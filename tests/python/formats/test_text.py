@@ -217,3 +217,16 @@ def test_bytes_that_are_no_text_are_refused_wherever_they_stand(way, column, tmp
     name = "run" if column == 0 else "note"
     with pytest.raises(FileError, match=rf"late\.csv, line 2502, column '{name}'.*UTF-8"):
         ta.read_runs(path)
+
+
+@pytest.mark.parametrize(
+    ("names", "line"),
+    # Without names the first line is taken for them.
+    [("   time_s   reference_deg   indicated_deg\n", 2), ("# rig 7\n", 3), ("", 2)],
+)
+def test_columns_that_stand_apart_by_blanks_are_told(names, line, tmp_path):
+    rows = "".join(f"{t:10.3f}{x:12.4f}{y:12.4f}\n" for t, x, y in [(0, 1, 2), (0.1, 3, 4)])
+    (tmp_path / "rig.dat").write_text(names + rows)
+    with pytest.raises(FileError, match=r"by blanks alone: separate them by commas") as found:
+        ta.read_runs(tmp_path / "rig.dat")
+    assert found.value.line == line
