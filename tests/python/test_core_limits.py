@@ -135,6 +135,28 @@ def test_asking_for_other_numbers_of_threads_leaves_one_pool():
     assert more <= cores
 
 
+@pytest.mark.skipif(os.cpu_count() == 1, reason="one processor")
+def test_a_large_batch_is_shared_by_threads_and_a_small_one_is_not():
+    found = in_child(
+        """
+        import os
+        import numpy as np
+        import trueangle as ta
+        shaft = ta.Shaft("output", 1, [1, 20], [0.1, 0.0], [0.0, 0.1])
+        model = ta.HarmonicModel([shaft], period=360.0)
+        counts = []
+        for size in (1, 100, 4_000_000):
+            model.correct(np.linspace(0.0, 360.0, size), threads=2)
+            counts.append(len(os.listdir("/proc/self/task")))
+        print(*counts)
+        """
+    )
+    assert found.returncode == 0, found.stderr
+    one, small, large = (int(word) for word in found.stdout.split())
+    assert small == one
+    assert large > one
+
+
 # -- numbers that no model may have ----------------------------------------------------
 
 

@@ -125,7 +125,7 @@ def _failed(error: BaseException, debug: bool) -> int:
     if debug:
         traceback.print_exception(error)
     if isinstance(error, KeyboardInterrupt):
-        told = _one_line(error)
+        told = str(error)
         _say("interrupted" + (f": {told}" if told else ""))
         return 130
     if isinstance(error, OSError) and error.filename == STANDARD_OUTPUT:
@@ -133,17 +133,17 @@ def _failed(error: BaseException, debug: bool) -> int:
         if isinstance(error, BrokenPipeError):
             return 141
     if isinstance(error, TrueAngleError):
-        _say(f"error: {_one_line(error)}")
+        _say(f"error: {error}")
     elif isinstance(error, OSError):
         _say(f"error: {_system(error)}")
     elif isinstance(error, MemoryError):
         _say(
-            f"error: out of memory ({_one_line(error) or 'no more is given'}); take fewer "
+            f"error: out of memory ({str(error) or 'no more is given'}); take fewer "
             "readings at a time, or --one-pass where the command has it"
         )
     else:
         _say(
-            f"error: unexpected {type(error).__name__}: {_one_line(error)}; this is a defect of "
+            f"error: unexpected {type(error).__name__}: {error}; this is a defect of "
             "trueangle: please report this line and what --debug prints"
         )
     return 1
@@ -152,18 +152,15 @@ def _failed(error: BaseException, debug: bool) -> int:
 def _system(error: OSError) -> str:
     """What the system refused, and of which file."""
     if error.filename is None:
-        return _one_line(error)
+        return str(error)
     name = error.filename
     shown = os.fsdecode(name) if isinstance(name, (str, bytes, os.PathLike)) else str(name)
     hint = "; name /dev/stdin to read a pipe" if shown == "-" else ""
     return f"{shown}: {error.strerror or error}{hint}"
 
 
-def _one_line(error: BaseException) -> str:
-    return " ".join(str(error).split())
-
-
 def _say(text: str) -> None:
+    """Tell it in one line, whatever lines it came in."""
     if sys.stderr is not None:
         with contextlib.suppress(OSError):  # a closed terminal
             print(f"trueangle: {' '.join(text.split())}", file=sys.stderr, flush=True)

@@ -67,8 +67,9 @@ class Manifest:
     def done(self, source: Path, target: Path, settings: str) -> Mapping[str, Any] | None:
         """What was recorded when ``source`` was corrected to ``target``, if that still holds."""
         entry = self._entries.get(self._name(target))
-        if entry is None or entry["settings"] != settings or not target.exists():
+        if entry is None or entry["settings"] != settings:
             return None
+        # A file that is lost has the stamp of nothing, which no output has.
         if tuple(entry["output_stamp"]) != stamp(target):
             return None
         if target != source and tuple(entry["log_stamp"]) != stamp(source):

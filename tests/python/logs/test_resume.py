@@ -227,6 +227,17 @@ def test_single_precision_stays_where_turns_are_counted(angles, tmp_path):
     np.testing.assert_allclose(found.to_numpy(), whole, atol=4e-4)
 
 
+@pytest.mark.parametrize("dtype", [np.float32, np.float64, np.int32])
+def test_corrected_readings_have_the_precision_of_the_column(dtype):
+    """Where turns are counted too: a format that takes what it is given must get it right."""
+    from trueangle.logs.joints import Joint, LogSettings
+
+    (channel,) = LogSettings((Joint(turning()),)).channels("log", ["indicated_deg"])
+    assert channel.counts_turns
+    found = channel.correct(np.array([350, 5, 20], dtype=dtype))
+    assert found.dtype == (np.float32 if dtype is np.float32 else np.float64)
+
+
 def test_every_setting_that_changes_the_output_belongs_to_the_request():
     from dataclasses import replace
 
