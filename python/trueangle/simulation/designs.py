@@ -202,7 +202,7 @@ class RunDesign:
             time = travel / self.speed_deg_s
         else:
             speed = self.speed_deg_s - self.decay_per_s * travel
-            time = -np.log(speed / self.speed_deg_s) / self.decay_per_s
+            time = np.log(self.speed_deg_s / speed) / self.decay_per_s
         motion = Motion(angle, np.asarray(signs * speed), np.zeros(n))
         if self.is_moved:
             motion = turned(self, time, pattern, rng)
