@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
+from ..errorunits import ErrorUnit
 from ..plots.amplitudespectrum import likely_aliases
 from ..runs import CalibrationRun
 
@@ -48,12 +49,20 @@ def _estimates(entry: dict[str, Any]) -> list[str]:
     return [
         f"if {cause.replace('_', ' ')}: "
         + ", ".join(
-            f"{name.replace('_', ' ')} {q['value']:.4g} +- {q['std']:.3g}"
+            _estimate(name, q["value"], q["std"])
             for name, q in parameters.items()
             if isinstance(q["value"], float) and isinstance(q["std"], float)
         )
         for cause, parameters in entry.get("estimates", {}).items()
     ]
+
+
+def _estimate(name: str, value: float, std: float) -> str:
+    """Sizes with their unit behind each number, as `ErrorUnit.spoken` finds them."""
+    stem = name.removesuffix("_arcsec")
+    unit = "" if stem == name and name != "amplitudes" else " arcsec"
+    shown, spread = ErrorUnit("", 1.0).pair(value, std)
+    return f"{stem.replace('_', ' ')} {shown}{unit} +- {spread}{unit}"
 
 
 def _held(runs: Sequence[CalibrationRun]) -> list[dict[str, str]]:
