@@ -68,6 +68,11 @@ def measured_and_simulated(
             )
     ax.axhline(down, color=palette.MUTED, linewidth=0.8, zorder=0)
     turn_axis(ax)
+    # Numbers of the axis belong to the two above; below them stands the difference's zero.
+    top = max(float(points.y.max()) for pair in pairs for points in pair)
+    ticks = [float(tick) for tick in ax.get_yticks() if lowest <= tick <= top]
+    texts = [f"{tick:g}".replace("-", "\N{MINUS SIGN}") for tick in ticks]
+    ax.set_yticks([down, *ticks], ["0", *texts])
     ax.set_xlabel("reference angle / deg")
     ax.set_ylabel("error / arcsec")
     legend(ax)

@@ -70,7 +70,7 @@ class Report:
 
     @cached_property
     def html(self) -> str:
-        """The page: one file that needs no network.
+        """One file that needs no network.
 
         Raises
         ------
