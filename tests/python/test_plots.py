@@ -11,6 +11,7 @@ import pytest
 import trueangle as ta
 from trueangle import plots, simulation
 from trueangle.errors import ArgumentError, MissingExtraError, RankError
+from trueangle.errorunits import significant
 from trueangle.fitting.phases import run_phases
 from trueangle.planning import plan_mounts, plan_tilts
 from trueangle.plots import curves, palette
@@ -159,7 +160,10 @@ def test_before_after_states_rms_and_peak_to_peak(fit: ta.FitResult, runs) -> No
     left = 3600.0 * (fit.model.correct(runs[3].indicated) - runs[3].reference)
     left -= left.mean()
     rms, ptp = np.sqrt(np.mean(left**2)), np.ptp(left)
-    assert legend_texts(ax)[1] == f"after: rms {rms:.2f}, peak-to-peak {ptp:.2f} arcsec"
+    assert (
+        legend_texts(ax)[1]
+        == f"after: rms {significant(rms)}, peak-to-peak {significant(ptp)} arcsec"
+    )
     assert rms < 2.5
 
 

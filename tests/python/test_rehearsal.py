@@ -124,6 +124,12 @@ def test_the_picture_shows_every_cause_that_was_hidden(seen):
     figure = seen.plot()
     assert [ax.get_title() for ax in figure.axes] == ["backlash"]
     assert figure.axes[0].get_xlabel() == "half_width_arcsec"
+    figure.canvas.draw()
+    for ax in figure.axes:
+        boxes = [t.get_window_extent() for t in ax.get_xticklabels() if t.get_text()]
+        assert boxes
+        boxes.sort(key=lambda box: box.x0)
+        assert all(a.x1 < b.x0 for a, b in zip(boxes, boxes[1:], strict=False))
     told = ta.plots.text_alternative(figure.axes[0])
     assert told.startswith("Share of trials in which backlash was named by half_width_arcsec: 50 %")
     pyplot.close(figure)

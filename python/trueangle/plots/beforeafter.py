@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..errorunits import significant
 from ..runs import CalibrationRun, as_runs
 from . import palette
 from .canvas import described, legend, new_axes, turn_axis
@@ -60,9 +61,13 @@ def before_after(
                 alpha=0.8 if y.size < 2000 else 0.4,
                 markeredgewidth=0.0,
                 color=colour,
-                label=None if i else f"{name}: rms {rms:.2f}, peak-to-peak {ptp:.2f} arcsec",
+                label=None
+                if i
+                else f"{name}: rms {significant(rms)}, peak-to-peak {significant(ptp)} arcsec",
             )
-        told.append(f"{name} correction rms {rms:.2f}, peak-to-peak {ptp:.2f} arcsec")
+        told.append(
+            f"{name} correction rms {significant(rms)}, peak-to-peak {significant(ptp)} arcsec"
+        )
     ax.axhline(0.0, color=palette.MUTED, linewidth=0.8, zorder=0)
     turn_axis(ax, *seen_span(model))
     ax.set_xlabel("reference angle / deg")

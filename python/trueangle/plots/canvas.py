@@ -30,9 +30,6 @@ _MANY: int = 5
 _COLUMNS: int = 4
 _ROW: float = 0.09
 
-#: What stays faint in a legend as well.
-_BAND: str = "95 % band"
-
 
 def new_axes(ax: Axes | None, *, polar: bool = False, height: float = 4.0) -> Axes:
     """``ax`` itself, or the axes of a new figure.
@@ -158,9 +155,11 @@ def legend(ax: Axes, title: str | None = None) -> None:
 
 
 def _opaque(made: Legend) -> None:
-    """A single mark of a cloud of faint points has to be seen."""
+    """A single mark of a cloud of faint points has to be seen; areas stay as faint as they are."""
+    from matplotlib.patches import Patch
+
     for handle in made.legend_handles:
-        if handle is not None and handle.get_label() != _BAND:
+        if handle is not None and not isinstance(handle, Patch):
             handle.set_alpha(1.0)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -20,6 +21,8 @@ __all__ = ["detection"]
 
 #: Small pictures side by side.
 COLUMNS = 4
+#: Numbers at a size axis.
+_TICKS = 4
 
 
 def detection(rehearsal: Rehearsal) -> Figure:
@@ -57,6 +60,19 @@ def detection(rehearsal: Rehearsal) -> Figure:
     return figure
 
 
+def _size_ticks(ax: Axes) -> None:
+    """At most `_TICKS` plain numbers: those of matplotlib run into each other here."""
+    low, high = sorted(ax.get_xlim())
+    decades = range(math.floor(math.log10(low)), math.ceil(math.log10(high)) + 1)
+    for marks in ((1.0, 2.0, 5.0), (1.0, 3.0), (1.0,)):
+        ticks = [m * 10.0**d for d in decades for m in marks if low <= m * 10.0**d <= high]
+        if len(ticks) <= _TICKS:
+            break
+    ticks = ticks[:: -(-len(ticks) // _TICKS)] if ticks else [math.sqrt(low * high)]
+    ax.set_xticks(ticks, [f"{tick:.3g}" for tick in ticks])
+    ax.minorticks_off()
+
+
 def _draw(ax: Axes, cause: RehearsedCause) -> None:
     size = np.array([*cause.tried])
     entries = cause.to_dict()["tried"]
@@ -77,6 +93,7 @@ def _draw(ax: Axes, cause: RehearsedCause) -> None:
         ax.set_xlim(size[0] / 2.0, size[0] * 2.0)
     if not cause.grows:
         ax.invert_xaxis()
+    _size_ticks(ax)
     ax.set_ylim(-0.05, 1.05)
     ax.set_title(cause.cause, fontsize="small")
     ax.set_xlabel(cause.size_name, fontsize="small")

@@ -50,7 +50,7 @@ def error_curves(fit: FitResult, ax: Axes | None = None) -> Axes:
             part.x,
             part.y,
             linestyle="none",
-            marker=palette.MARKERS[number % len(palette.MARKERS)],
+            marker=palette.run_marker(number),
             markersize=2.0 if part.x.size > 500 else 3.5,
             alpha=0.35 if part.x.size > 500 else 0.75,
             markeredgewidth=0.0,

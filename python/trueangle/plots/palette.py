@@ -35,6 +35,11 @@ def run_colour(number: int) -> str:
     return RUNS[number % len(RUNS)]
 
 
+def run_marker(number: int) -> str:
+    """Marker of run ``number``: with the colours another pair for each of the first 36."""
+    return MARKERS[(number + number // len(RUNS)) % len(MARKERS)]
+
+
 def ink(ax: Axes) -> str:
     """Black, or white on dark axes: models, limits and grids."""
     from matplotlib.colors import to_rgb

@@ -47,7 +47,7 @@ def phases_over_runs(fit: FitResult, ax: Axes | None = None, most: int = _MOST_O
     polar: Any = new_axes(ax, polar=True)
     for i, order in enumerate(sorted(found, key=lambda p: p.order)):
         colour = palette.run_colour(i)
-        marker = palette.MARKERS[(i // len(palette.RUNS) + i) % len(palette.MARKERS)]
+        marker = palette.run_marker(i)
         polar.plot(
             order.phase,
             order.amplitude,

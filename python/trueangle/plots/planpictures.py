@@ -43,7 +43,7 @@ def plan_positions(plan: CalibrationPlan, ax: Axes | None = None) -> Axes:
             np.full(place.size, -float(number)),
             xerr=plan.tolerance_deg if math.isfinite(plan.tolerance_deg) else None,
             linestyle="none",
-            marker=palette.MARKERS[number % len(palette.MARKERS)],
+            marker=palette.run_marker(number),
             color=palette.run_colour(number),
             capsize=3.0,
         )

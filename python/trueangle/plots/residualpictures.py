@@ -55,7 +55,7 @@ def residuals(fit: FitResult, against: str = "angle", ax: Axes | None = None) ->
                 part.x,
                 part.y,
                 linestyle="none",
-                marker=palette.MARKERS[number % len(palette.MARKERS)],
+                marker=palette.run_marker(number),
                 markersize=3.5 if part.x.size < 500 else 2.0,
                 alpha=0.75 if part.x.size < 500 else 0.35,
                 markeredgewidth=0.0,
