@@ -5,6 +5,7 @@ Designs are tiny, as every trial is a diagnosis; the search itself is held again
 
 from __future__ import annotations
 
+import itertools
 import json
 import os
 import secrets
@@ -129,7 +130,7 @@ def test_the_picture_shows_every_cause_that_was_hidden(seen):
         boxes = [t.get_window_extent() for t in ax.get_xticklabels() if t.get_text()]
         assert boxes
         boxes.sort(key=lambda box: box.x0)
-        assert all(a.x1 < b.x0 for a, b in zip(boxes, boxes[1:], strict=False))
+        assert all(a.x1 < b.x0 for a, b in itertools.pairwise(boxes))
     told = ta.plots.text_alternative(figure.axes[0])
     assert told.startswith("Share of trials in which backlash was named by half_width_arcsec: 50 %")
     pyplot.close(figure)
