@@ -27,7 +27,8 @@ _DENSE = 40.0
 def error_curves(fit: FitResult, ax: Axes | None = None) -> Axes:
     """Measured error of every run, the fitted model and its 95 % band.
 
-    Every run is shown less its own zero, the model without its constant.
+    Every run is shown less its own zero, the model without its constant; gear orders, which
+    would fill the picture, as the envelope of the model.
 
     Parameters
     ----------
