@@ -33,6 +33,8 @@ def spectrum(
 ) -> Figure:
     """Amplitude of every order: candidates of a selection, or the orders of a fit."""
     rows = _of_fit(fit, name) if selection is None else _of_selection(selection, name)
+    # Orders that the travel does not tell apart have no size.
+    rows = [row for row in rows if np.isfinite(row["amplitude"])]
     for row in rows:
         row |= {size: scale.factor * row[size] for size in ("amplitude", "half", "limit")}
     kept = [row for row in rows if row["kept"]]
@@ -166,7 +168,7 @@ def _of_fit(fit: FitResult | None, name: LineNames) -> list[dict[str, Any]]:
 
 def _of_selection(selection: OrderSelection, name: LineNames) -> list[dict[str, Any]]:
     factor = ARCSEC_PER_TURN / selection.period
-    limits = np.nan_to_num(factor * thresholds(selection))
+    limits = np.nan_to_num(factor * thresholds(selection), posinf=0.0)
     found = []
     for row, limit in zip(selection.table, limits, strict=True):
         told = [name(float(row.order)), row.verdict]
