@@ -50,6 +50,7 @@ def everything(folder: Path) -> None:
     folder.mkdir(exist_ok=True)
     figures(folder)
     (folder / "performance.md").write_text(performance(), encoding="utf-8")
+    (folder / "scaling.md").write_text(scaling(folder / "scaling.svg"), encoding="utf-8")
     (folder / "gallery.md").write_text(gallery(), encoding="utf-8")
     (folder / "causes.md").write_text(causes_page(), encoding="utf-8")
     (folder / "commands.md").write_text(commands(), encoding="utf-8")
@@ -165,6 +166,14 @@ def performance() -> str:
     done = subprocess.run(command, capture_output=True, text=True, check=True)
     head = f"Nanoseconds per sample, measured by this build ({platform.machine()}):"
     return f"{head}\n\n```text\n{done.stdout}```\n"
+
+
+def scaling(picture: Path) -> str:
+    """The text of ``trueangle bench --scaling`` of this build, and its picture."""
+    command = [sys.executable, "-m", "trueangle", "bench", "--scaling", "--plot", str(picture)]
+    command += ["--largest", "1e6", "--rounds", "2"]
+    done = subprocess.run(command, capture_output=True, text=True, check=True)
+    return f"```text\n{done.stdout}```\n"
 
 
 def commands() -> str:

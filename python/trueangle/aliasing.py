@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .errors import ArgumentError
+from .powersums import power_sums
 from .quantiles import median
 from .runs import CalibrationRun, as_runs
 
@@ -94,11 +95,8 @@ class Positions:
             cells = (self.turns * _CELLS).astype(np.int64) % _CELLS
             counts = np.bincount(cells, minlength=_CELLS)
             return np.asarray(np.abs(np.fft.rfft(counts))[: highest + 1] / len(self))
-        orders = np.arange(highest + 1)
-        # One block of orders after the other keeps the matrix small.
-        blocks = np.array_split(orders, 1 + orders.size * len(self) // _BLOCK)
-        means = [np.exp(2j * math.pi * np.outer(m, self.turns)).mean(axis=1) for m in blocks]
-        return np.asarray(np.abs(np.concatenate(means)))
+        sums = power_sums(self.turns, np.ones((len(self), 1)), highest + 1)
+        return np.asarray(np.abs(sums[:, 0]) / len(self))
 
     @property
     def highest_order(self) -> int:

@@ -7,8 +7,9 @@ import json
 import numpy as np
 import pytest
 
-from trueangle.bench import evaluation, latency
+from trueangle.bench import compiled, evaluation, latency, scaling
 from trueangle.bench.evaluationpeers import peers
+from trueangle.bench.interleaved import Timing
 from trueangle.cli import main
 
 #: The least accurate peer draws chords over 65536 places: h^2/8 times the curvature of
@@ -55,3 +56,70 @@ def test_latency_counts_every_call():
     assert list(quantiles.values()) == sorted(quantiles.values())
     lines = latency.histogram(found).splitlines()
     assert sum(int(line.split()[2]) for line in lines) == 200
+
+
+@pytest.mark.parametrize("arguments", [[], ["--json"]])
+def test_scaling(arguments, tmp_path, capsys):
+    picture = tmp_path / "scaling.svg"
+    if not arguments:
+        pytest.importorskip("matplotlib")
+        arguments = ["--plot", str(picture)]
+    words = ["bench", "--scaling", "--largest", "1e4", "--rounds", "1", *arguments]
+    assert main(words) == 0
+    out = capsys.readouterr().out
+    if "--json" in arguments:
+        found = json.loads(out)
+        sizes = {m["readings"] for m in found["measured"]}
+        assert sizes == {1000, 10_000}
+        assert {m["orders"] for m in found["measured"]} == {1, 4, 16, 17, 64}
+        assert {(c["work"], c["threads"]) for c in found["costs"]} == {
+            (work, n) for work in ("correct", "fit") for n in (1, 2)
+        }
+    else:
+        assert "model of cost" in out
+        assert picture.stat().st_size > 1000
+
+
+@pytest.mark.parametrize("words", [["--largest", "10"], ["--workers", "2,no"], ["--workers", "0"]])
+def test_scaling_refuses_nonsense(words, capsys):
+    assert main(["bench", "--scaling", *words]) == 1
+    assert "--largest" in capsys.readouterr().err
+
+
+def test_the_model_of_cost_is_found():
+    def taken(n, factor=1.0):
+        return Timing(*[factor * (2e-6 + 3e-9 * n)] * 3)
+
+    exact = [scaling.Measured("fit", n, 17, 1, taken(n)) for n in (10**3, 10**5, 10**7)]
+    off = [m._replace(threads=2) for m in exact]
+    off[1] = off[1]._replace(timing=taken(10**5, 1.1))
+    one, two = scaling.costs(exact + off)
+    assert one.call == pytest.approx(2e-6, rel=1e-9)
+    assert one.reading == pytest.approx(3e-9, rel=1e-9)
+    assert one.spread < 1e-9 < two.spread < 0.11
+    assert one.seconds(1e12) == pytest.approx(3000.0, rel=1e-6)
+    # A call that comes out below nothing is none.
+    (bare,) = scaling.costs(
+        [m._replace(timing=Timing(*[1e-18 * m.readings**2] * 3)) for m in exact]
+    )
+    assert bare.call == 0.0
+
+
+def test_workers_share_logs():
+    pytest.importorskip("distributed")
+    pytest.importorskip("pyarrow")
+    (found,) = scaling.by_workers([1], 80_000)
+    assert (found.work, found.readings, found.threads) == ("fit of logs", 80_000, 1)
+    assert found.timing.median > 0.0
+
+
+def test_loops_in_c_take_any_number_of_angles():
+    if not compiled.is_available():
+        pytest.skip("no gcc")
+    model = evaluation.harmonics(range(1, 6))
+    for size in (0, 1, 511, 512, 1300):
+        theta = np.linspace(-3.0, 9.0, size)
+        for name in ("per_order", "horner"):
+            found = compiled.compiled(name)(model)(theta)
+            assert np.abs(found - model.error(theta)).max(initial=0.0) < 1e-17
+    assert np.array([5e-324])[0] * 1.0 > 0.0, "numbers below 2e-308 are taken for 0"

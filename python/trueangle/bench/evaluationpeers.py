@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from .. import reference
 from ..model import HarmonicModel
+from .compiled import compiled, is_available
 
 __all__ = ["peers"]
 
@@ -135,6 +136,32 @@ def _polars(model: HarmonicModel) -> _Evaluate:
     return evaluate
 
 
+def _ducc0(model: HarmonicModel) -> _Evaluate:
+    ducc0 = importlib.import_module("ducc0")
+    amplitudes = _coefficients(model)
+    modes = np.concatenate([np.zeros(amplitudes.size - 1), amplitudes])
+
+    def evaluate(theta: _Array) -> _Array:
+        found = ducc0.nufft.u2nu(
+            grid=modes, coord=theta[:, None], forward=False, epsilon=1e-14, nthreads=0,
+            periodicity=2.0 * np.pi, fft_order=False,
+        )  # fmt: skip
+        return np.asarray(found.real)
+
+    return evaluate
+
+
+def _duckdb(model: HarmonicModel) -> _Evaluate:
+    connection = importlib.import_module("duckdb").connect()
+    query = f"select {_terms(model)} as y from t"
+
+    def evaluate(theta: _Array) -> _Array:
+        t = {"x": theta}  # found by its name in the query
+        return np.asarray(connection.execute(query).fetchnumpy()["y"]) if t else theta
+
+    return evaluate
+
+
 #: Ways by name: the package that has to be installed and the function that prepares it.
 _PEERS: dict[str, tuple[str, Callable[[HarmonicModel], _Evaluate]]] = {
     "numpy per order (reference)": ("numpy", _numpy_reference),
@@ -145,7 +172,9 @@ _PEERS: dict[str, tuple[str, Callable[[HarmonicModel], _Evaluate]]] = {
     "numba Clenshaw, all threads": ("numba", _numba),
     "jax Horner": ("jax", _jax),
     "finufft type 2, eps 1e-14": ("finufft", _finufft),
+    "ducc0 type 2, eps 1e-14": ("ducc0", _ducc0),
     "polars": ("polars", _polars),
+    "duckdb": ("duckdb", _duckdb),
 }
 
 
@@ -157,4 +186,12 @@ def peers(model: HarmonicModel) -> tuple[dict[str, _Evaluate], list[str]]:
             missing.append(name)
         else:
             ways[name] = prepare(model)
+    for name, function in (
+        ("C -Ofast, libmvec, per order", "per_order"),
+        ("C -Ofast, libmvec, Horner", "horner"),
+    ):
+        if is_available():
+            ways[name] = compiled(function)(model)
+        else:
+            missing.append(name)
     return ways, missing

@@ -4,6 +4,10 @@ from __future__ import annotations
 
 import argparse
 import json
+from typing import Any
+
+from ..files import PICTURE
+from .paths import Output
 
 HELP = "measure evaluation, correction and fits here, beside copies and other libraries"
 EXAMPLE = "trueangle bench --json"
@@ -13,11 +17,36 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command's arguments."""
     parser.add_argument("--samples", type=int, default=1_000_000, help="size of the large batches")
     parser.add_argument("--rounds", type=int, default=5, help="rounds of each measurement")
+    parser.add_argument(
+        "--scaling",
+        action="store_true",
+        help="how time grows with readings, orders and threads, beside a model of cost",
+    )
+    parser.add_argument(
+        "--largest",
+        type=float,
+        default=1e7,
+        metavar="N",
+        help="with --scaling: most readings (24 bytes of memory each), 1e7 by default",
+    )
+    parser.add_argument(
+        "--workers",
+        metavar="1,2,4",
+        help="with --scaling: fit logs of N readings with so many Dask workers here, too",
+    )
+    parser.add_argument(
+        "--plot",
+        type=Output.of(PICTURE),
+        metavar="FILE",
+        help="with --scaling: draw it (needs trueangle[plot])",
+    )
     parser.add_argument("--json", action="store_true", help="print the medians as JSON")
 
 
 def run(args: argparse.Namespace) -> int:
     """Measure and print."""
+    if args.scaling:
+        return _scaling(args)
     from ..bench import evaluation, fit, fitpeers
     from ..errors import ArgumentError
 
@@ -59,3 +88,76 @@ def run(args: argparse.Namespace) -> int:
     for name in missing:
         print(f"  {name:38s} not installed")
     return 0
+
+
+def _scaling(args: argparse.Namespace) -> int:
+    """Measure how time grows, print and draw it."""
+    from ..bench import scaling
+    from ..errors import ArgumentError
+
+    try:
+        workers = [int(count) for count in args.workers.split(",")] if args.workers else []
+    except ValueError:
+        workers = [0]
+    if not 1e3 <= args.largest <= 1e10 or args.rounds < 1 or any(w < 1 for w in workers):
+        raise ArgumentError(
+            "--largest must lie between 1e3 and 1e10, --rounds and --workers must be whole numbers "
+            f"from 1, got {args.largest:g}, {args.rounds} and {args.workers}"
+        )
+    size = int(args.largest)
+    grown = scaling.by_readings(size, args.rounds)
+    # Orders far fewer than readings: the moments take these, and they tell all orders.
+    some = min(size, scaling.READINGS)
+    orders = scaling.by_orders(args.rounds, some // 64, some)
+    shared = scaling.by_workers(workers, size) if workers else []
+    costs = scaling.costs(grown)
+    if args.plot is not None:
+        _draw(args.plot, grown, costs)
+    if args.json:
+        print(json.dumps(_scaling_values([*grown, *orders, *shared], costs), indent=2))
+        return 0
+    print(
+        f"{'work':14}{'readings':>12}{'orders':>8}{'threads':>8}{'seconds':>12}{'ns/reading':>12}"
+    )
+    for point in [*grown, *orders, *shared]:
+        median = point.timing.median
+        print(
+            f"{point.work:14}{point.readings:12d}{point.orders:8d}{point.threads:8d}"
+            f"{median:12.4g}{1e9 * median / point.readings:12.3g}"
+        )
+    print(f"\nmodel of cost, {scaling.ORDERS} orders: seconds = call + readings x each")
+    for cost in costs:
+        print(
+            f"  {cost.work}, {cost.threads} thread{'s' * (cost.threads > 1)}: "
+            f"{1e6 * cost.call:.3g} us + {1e9 * cost.reading:.3g} ns a reading (within "
+            f"{100.0 * cost.spread:.0f} %); 1e12 readings: {cost.seconds(1e12) / 3600.0:.3g} h"
+        )
+    return 0
+
+
+def _scaling_values(points: list[Any], costs: list[Any]) -> dict[str, Any]:
+    """All of it as plain values."""
+    return {
+        "measured": [
+            {**point._asdict(), "timing": point.timing.median, "least": point.timing.least}
+            for point in points
+        ],
+        "costs": [cost._asdict() for cost in costs],
+    }
+
+
+def _draw(path: str, points: list[Any], costs: list[Any]) -> None:
+    from ..plots.costcurves import cost_curves
+
+    measured: dict[str, list[tuple[float, float]]] = {}
+    for point in points:
+        label = _label(point.work, point.threads)
+        measured.setdefault(label, []).append((point.readings, point.timing.median))
+    models = {_label(cost.work, cost.threads): (cost.call, cost.reading) for cost in costs}
+    picture = cost_curves(measured, models).get_figure(root=True)
+    assert picture is not None
+    picture.savefig(path)
+
+
+def _label(work: str, threads: int) -> str:
+    return f"{work}, {threads} thread{'s' * (threads > 1)}"

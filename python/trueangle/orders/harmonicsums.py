@@ -16,22 +16,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .. import _core
+from ..powersums import power_sums
 from .unitgroups import MOST_UNITS, columns_summed, dealt
 
 __all__ = ["HarmonicSums", "Readings", "harmonic_sums"]
 
 Array = NDArray[np.float64]
 
-#: Powers of e^{ix} between two fresh evaluations: keeps rounding near 1e-15 * 64.
-_RESEED: Final = 64
-
 #: From so many readings on the core's piecewise moments are faster than this file's powers.
 _LARGE: Final = 1024
 
 #: Readings handled at once: the working set stays in the cache.
 _CHUNK: Final = 1 << 15
-#: The same where `_RESEED` powers of each are kept.
-_BLOCK: Final = 512
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,20 +110,27 @@ class HarmonicSums:
         if self._grams is not None:
             return np.asarray(self._grams[unit][rows[:, None], columns])
         assert self._spectra is not None
-        mine = self.orders[rows[: rows.size // 2]].astype(np.int64)
-        theirs = self.orders[columns[: columns.size // 2]].astype(np.int64)
-        spectrum = self._spectra[unit]
-        down, up = mine[:, None] - theirs, mine[:, None] + theirs
-        minus, plus = spectrum[np.abs(down)], spectrum[up]
+        mine, theirs = (
+            self.orders[rows[: rows.size // 2]],
+            self.orders[columns[: columns.size // 2]],
+        )
+        gram = self._whole(self._spectra[unit], mine, theirs)
+        means = self._means[unit]
+        return np.asarray(gram - (self.weight[unit] * means[rows])[:, None] * means[columns])
+
+    @staticmethod
+    def _whole(spectrum: NDArray[np.complex128], mine: Array, theirs: Array) -> Array:
+        """``X' W X`` of whole orders about no mean, by the spectrum of the positions."""
+        rows, columns = mine.astype(np.int64)[:, None], theirs.astype(np.int64)
+        down = rows - columns
+        minus, plus = spectrum[np.abs(down)], spectrum[rows + columns]
         sine = np.sign(down) * minus.imag
-        gram = 0.5 * np.block(
+        return 0.5 * np.block(
             [
                 [plus.real + minus.real, plus.imag - sine],
                 [plus.imag + sine, minus.real - plus.real],
             ]
         )
-        means = self._means[unit]
-        return np.asarray(gram - (self.weight[unit] * means[rows])[:, None] * means[columns])
 
     def blocks(self) -> Array:
         """``X' W X`` of every unit for each order by itself, shape (units, orders, 2, 2)."""
@@ -155,10 +158,13 @@ class HarmonicSums:
         """Sums of all units: ``X' W X``, ``X' W y`` and the sum of squares."""
         if self._total is None:
             everything = np.arange(self.orders.size)
-            total = self.gram(0, everything)
-            for unit in range(1, self.units):
-                total = total + self.gram(unit, everything)
-            self._total = total
+            if self._spectra is None:
+                grams = [self.gram(unit, everything) for unit in range(self.units)]
+                self._total = np.sum(grams, axis=0)
+            else:
+                means = self._means
+                whole = self._whole(self._spectra.sum(axis=0), self.orders, self.orders)
+                self._total = whole - means.T @ (self.weight[:, None] * means)
         return self._total, self._rhs.sum(axis=0), float(self.squares.sum())
 
 
@@ -254,25 +260,8 @@ def _spectra(
         sums.update(unit.turns, error / scale, unit.weights)
         weights, values, _, _, about = sums.spectrum()
         return weights, scale * (values + about * weights[: values.size])
-    count = 2 * highest + 1
-    found = np.zeros((count, 2), dtype=np.complex128)
-    for start in range(0, unit.turns.size, _BLOCK):
-        part = slice(start, start + _BLOCK)
-        turns = unit.turns[part] - np.floor(unit.turns[part])
-        w = unit.weights[part]
-        both = np.stack([w, w * (unit.error[part] - centre)], axis=1) + 0j
-        step = np.exp(2j * math.pi * turns)
-        for first in range(0, count, _RESEED):
-            powers = np.empty((min(_RESEED, count - first), turns.size), dtype=np.complex128)
-            # The product m * t loses what lies before the point: take it off first.
-            phase = first * turns
-            powers[0] = np.exp(2j * math.pi * (phase - np.round(phase)))
-            filled, stride = 1, step
-            while filled < len(powers):
-                more = powers[filled : 2 * filled]
-                np.multiply(powers[: len(more)], stride, out=more)
-                filled, stride = 2 * filled, stride * stride
-            found[first : first + len(powers)] += powers @ both
+    both = np.stack([unit.weights, unit.weights * (unit.error - centre)], axis=1)
+    found = power_sums(unit.turns, both, 2 * highest + 1)
     return found[:, 0], found[: highest + 1, 1]
 
 

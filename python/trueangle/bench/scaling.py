@@ -1,0 +1,156 @@
+"""How the time of a correction and of a fit grows: with readings, orders, threads and workers."""
+
+from __future__ import annotations
+
+import math
+import tempfile
+import time
+from collections.abc import Callable, Sequence
+from functools import partial
+from pathlib import Path
+from typing import Final, NamedTuple, TypeAlias
+
+import numpy as np
+
+from ..errors import MissingExtraError
+from ..fitting.fit import fit
+from ..runs import CalibrationRun
+from .evaluation import harmonics
+from .fit import Case, readings
+from .interleaved import Timing, interleave
+
+__all__ = ["Cost", "Measured", "by_orders", "by_readings", "by_workers", "costs"]
+
+_Ways: TypeAlias = dict[tuple[str, int], Callable[[], object]]
+
+#: Orders where readings are counted, and readings where orders are.
+ORDERS: Final = 17
+READINGS: Final = 1_000_000
+
+#: Numbers of orders looked at.
+_STEPS: Final = (1, 4, 16, 64, 256, 1024)
+
+#: Readings from which on three rounds are enough.
+_MANY: Final = 30_000_000
+
+
+class Measured(NamedTuple):
+    """What a piece of work took."""
+
+    work: str
+    readings: int
+    orders: int
+    threads: int
+    timing: Timing
+
+
+class Cost(NamedTuple):
+    r"""The model of cost :math:`t(n) = t_0 + n\,t_1` of one work with so many threads, in seconds.
+
+    ``spread`` is the largest relative departure of what was measured from it.
+    """
+
+    work: str
+    threads: int
+    call: float
+    reading: float
+    spread: float
+
+    def seconds(self, readings: float) -> float:
+        """What so many readings take."""
+        return self.call + self.reading * readings
+
+
+def by_readings(largest: int, rounds: int = 5, threads: Sequence[int] = (1, 2)) -> list[Measured]:
+    """Corrections and fits of 10^3 readings and more, a decade apart, `ORDERS` orders."""
+    theta, error = readings(Case(largest, ORDERS))
+    indicated, out = theta + error, np.empty_like(theta)
+    model = harmonics(range(1, ORDERS + 1))
+    found = []
+    for size in (10**k for k in range(3, round(math.log10(largest)) + 1)):
+        run = CalibrationRun(theta[:size], indicated[:size], period=2.0 * math.pi)
+        ways: _Ways = {}
+        for n in threads:
+            ways["correct", n] = partial(model.correct, indicated[:size], out=out[:size], threads=n)
+            ways["fit", n] = partial(fit, run, orders=range(1, ORDERS + 1), threads=n)
+        found += _measured(ways, size, ORDERS, 3 if size >= _MANY else rounds)
+    return found
+
+
+def by_orders(rounds: int = 5, most: int = 1024, size: int = READINGS) -> list[Measured]:
+    """Corrections and fits of `READINGS` readings with ever more orders, one thread."""
+    theta, error = readings(Case(size, 1))
+    indicated, out = theta + error, np.empty_like(theta)
+    run = CalibrationRun(theta, indicated, period=2.0 * math.pi)
+    found = []
+    for orders in (k for k in _STEPS if k <= most):
+        wanted = range(1, orders + 1)
+        ways: _Ways = {
+            ("correct", 1): partial(harmonics(wanted).correct, indicated, out=out, threads=1),
+            ("fit", 1): partial(fit, run, orders=wanted, threads=1),
+        }
+        found += _measured(ways, size, orders, rounds)
+    return found
+
+
+def by_workers(workers: Sequence[int], size: int, files: int = 8) -> list[Measured]:
+    """Fits of logs (Parquet) shared by the workers of a Dask cluster on this machine.
+
+    Raises
+    ------
+    MissingExtraError
+        Dask's scheduler or pyarrow is not installed.
+    """
+    try:
+        import distributed
+        import pyarrow as pa
+        import pyarrow.parquet as pq
+    except ImportError:
+        raise MissingExtraError(
+            "workers need Dask and Parquet: pip install 'trueangle[dask,parquet]'"
+        ) from None
+    from ..logs.fitting import fit_logs
+
+    found = []
+    with tempfile.TemporaryDirectory() as folder:
+        paths = [Path(folder, f"{k}.parquet") for k in range(files)]
+        theta, error = readings(Case(size // files, ORDERS))
+        columns = {"reference_rad": theta, "indicated_rad": theta + error}
+        for path in paths:
+            pq.write_table(pa.table(columns), path)
+        for count in workers:
+            with distributed.LocalCluster(
+                n_workers=count, threads_per_worker=1, processes=True, dashboard_address=":0"
+            ) as cluster:
+                work = partial(
+                    fit_logs, paths, range(1, ORDERS + 1),
+                    scheduler=cluster.scheduler_address, progress="none",
+                )  # fmt: skip
+                work()  # imports of the workers
+                start = time.perf_counter()
+                work()
+                taken = time.perf_counter() - start
+            timing = Timing(taken, taken, taken)
+            found.append(Measured("fit of logs", files * theta.size, ORDERS, count, timing))
+    return found
+
+
+def costs(measured: Sequence[Measured]) -> list[Cost]:
+    """The model of cost of each work and number of threads, by relative least squares."""
+    found = []
+    for work, threads in dict.fromkeys((m.work, m.threads) for m in measured):
+        own = [m for m in measured if (m.work, m.threads) == (work, threads)]
+        size = np.array([m.readings for m in own], dtype=np.float64)
+        taken = np.array([m.timing.median for m in own])
+        rows = np.stack([1.0 / taken, size / taken], axis=1)
+        call, reading = np.linalg.lstsq(rows, np.ones(len(own)), rcond=None)[0].tolist()
+        if call < 0.0:  # nothing but readings
+            call, reading = 0.0, float(rows[:, 1].sum() / (rows[:, 1] @ rows[:, 1]))
+        spread = float(np.abs((call + reading * size) / taken - 1.0).max())
+        found.append(Cost(work, threads, call, reading, spread))
+    return found
+
+
+def _measured(ways: _Ways, size: int, orders: int, rounds: int) -> list[Measured]:
+    timings = interleave({f"{work} {n}": way for (work, n), way in ways.items()}, rounds)
+    return [Measured(work, size, orders, n, timings[f"{work} {n}"]) for work, n in ways]
