@@ -39,6 +39,8 @@ RIGS = (
         contributions=(Contribution("reference", 0.5, "B", "triangular"),)),
     Rig("part of a turn", 200.0, 80, 4, (1, 2), 4.0,
         contributions=(Contribution("reference", 1.0, "B", "normal", 8.0),)),
+    Rig("a third of a turn, with a ridge", 120.0, 60, 3, (1, 2, 3, 4), 2.0,
+        contributions=(Contribution("reference", 0.5),)),
 )  # fmt: skip
 
 
