@@ -6,6 +6,7 @@ import pytest
 import trueangle as ta
 from trueangle.errors import NoModelError
 from trueangle.fitting.laterstretch import gains_of_stretches
+from trueangle.fitting.newrun import gains_of_runs
 from trueangle.fitting.problem import Problem
 from trueangle.shafts import resolve_orders
 
@@ -94,8 +95,27 @@ def test_orders_on_which_unlike_joints_agree_by_chance_are_refused(count):
         )
         size = 0.05 * (1.0 + 0.3 * i)
         runs.append(run_of(x, own + size * np.sin(np.radians(4 * x)), seed=i))
+    found = gains_of_runs(runs, [4.0], "reference")
+    assert found.shared < 0.5 * found.shown
     with pytest.raises(NoModelError, match=r"share nothing may by chance|unlike joints|no order"):
         ta.fit(runs, argument="reference")
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_runs_of_one_joint_whose_lines_vary_are_not_unlike(seed):
+    """By a fifth from run to run: few orders are sure of three runs, but not by chance."""
+    rng = np.random.default_rng([SEED, seed])
+    phases, sizes = rng.uniform(0.0, 6.28, 4), 0.1 * rng.uniform(0.2, 1.0, 4)
+    runs = []
+    for i in range(3):
+        x = np.sort(rng.uniform(0.0, 360.0, 300))
+        lines = zip((1, 2, 4, 6), phases, sizes, strict=True)
+        error = sum(
+            c / k * (1.0 + 0.2 * rng.normal()) * np.sin(np.radians(k * x) + p) for k, p, c in lines
+        )
+        runs.append(run_of(x, error, noise=0.005, seed=i))
+    found = gains_of_runs(runs, [1.0, 2.0, 4.0, 6.0], "reference")
+    assert found.shared > 0.5 * found.shown
 
 
 @pytest.mark.filterwarnings("ignore::trueangle.errors.UnlikeRunsWarning")

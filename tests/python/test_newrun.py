@@ -23,7 +23,7 @@ def joint(phase, amplitude=0.1, label=None, seed=0, n=400):
 
 def test_gains_are_those_of_refits():
     runs = [joint(0.1 * i, label=str(i), seed=i) for i in range(4)]
-    gains, noise, _ = gains_of_runs(runs, [2.0], "reference")
+    gains, noise, *_ = gains_of_runs(runs, [2.0], "reference")
     for i, run in enumerate(runs):
         others = [other for j, other in enumerate(runs) if j != i]
         model = ta.fit(others, [2], argument="reference", loss="linear").model

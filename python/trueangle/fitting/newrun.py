@@ -47,11 +47,14 @@ class RunGains(NamedTuple):
         Variance of the gains by the noise of the readings.
     shown : float
         Mean square that low orders and those wanted explain of each run by itself.
+    shared : float
+        Of that, what the other runs say of all these orders explains.
     """
 
     gains: Array
     noise: float
     shown: float
+    shared: float
 
 
 def check_new_run(
@@ -65,8 +68,8 @@ def check_new_run(
               \operatorname{var} g - \overline{4\sigma_r^2 c^T G_r c/n_r^2})}
 
     the scatter between runs beyond that of the noise. Where the runs share less than half of what
-    each shows by itself, the mean gain must also exceed what chance makes of the order that
-    agrees best among a hundred (Student's t, 5 %).
+    each shows by itself in low orders, the mean gain must also exceed what chance makes of the
+    order that agrees best among a hundred (Student's t, 5 %).
 
     Raises
     ------
@@ -77,7 +80,7 @@ def check_new_run(
     found = gains_of_runs(runs, orders, argument)
     if found is None:
         return
-    gains, noise, shown = found
+    gains, noise, shown, shared = found
     mean, scatter = float(gains.mean()), float(gains.std(ddof=1))
     listed = ", ".join(f"{order:g}" for order in orders[:6]) + (" ..." if orders[6:] else "")
     mend = (
@@ -91,7 +94,7 @@ def check_new_run(
             f"{mend}"
         )
     bound = student_quantile(1.0 - _CHANCE / _SEARCHED, len(runs) - 1) / np.sqrt(len(runs))
-    if mean < _ALIKE * shown and mean <= bound * scatter:
+    if max(mean, shared) < _ALIKE * shown and mean <= bound * scatter:
         raise NoModelError(
             f"no correction can be given: of what the runs show they share {100 * mean / shown:.2g}"
             f" % (order {listed}), no more than {len(runs)} runs that share nothing may by chance; "
@@ -115,6 +118,7 @@ def gains_of_runs(
     every = np.array([*orders, *(k for k in _SHOWN if k not in orders)])
     wanted = np.repeat([np.arange(every.size) < len(orders)], 2, axis=0).ravel()
     grams, moments, lefts, shown, sizes = [], [], [], [], []
+    wholes: list[tuple[Array, Array]] = []
     for run in runs:
         keep = slice(None) if share == 1.0 else np.flatnonzero(rng.random(len(run)) < share)
         x = (2.0 * np.pi / run.period * getattr(run, argument))[keep, None] * every
@@ -131,6 +135,7 @@ def gains_of_runs(
         moments.append(moment[wanted])
         lefts.append(max(0.0, energy - float(_solved(grams[-1], moments[-1]) @ moments[-1])))
         sizes.append(len(x))
+        wholes.append((gram, moment))
         by_chance = 2.0 * every.size / max(len(x), 1)
         alone = float(_solved(gram, moment) @ moment)
         shown.append(max(0.0, alone - by_chance * max(0.0, energy - alone)) / len(x))
@@ -141,7 +146,12 @@ def gains_of_runs(
         power = float(others @ own @ others)
         gains[i] = (2.0 * float(others @ mine) - power) / sizes[i]
         noise += 4.0 * lefts[i] * power / sizes[i] ** 3 / len(runs)
-    return RunGains(gains, noise, float(np.mean(shown)))
+    gram, moment = sum(whole for whole, _ in wholes), sum(whole for _, whole in wholes)
+    shared = 0.0
+    for (own, mine), size in zip(wholes, sizes, strict=True):
+        others = _solved(gram - own, moment - mine)
+        shared += float(2.0 * others @ mine - others @ own @ others) / size / len(runs)
+    return RunGains(gains, noise, float(np.mean(shown)), shared)
 
 
 def _about(columns: Array, weight: Array) -> Array:
