@@ -11,6 +11,7 @@ __all__ = [
     "by_kind",
     "cause_name",
     "conditions",
+    "figure_title",
     "gain_paths",
     "joined",
     "paths",
@@ -42,6 +43,18 @@ _PLAIN: Final = ErrorUnit("", 1.0)
 
 #: Reduction, in percent, from which a correction is worth having.
 _WORTH: Final = 1.0
+
+
+def figure_title(name: str, modelled: bool) -> str:
+    """What stands above a figure.
+
+    Examples
+    --------
+    >>> figure_title("errors", modelled=False)
+    'Measured error of every run'
+    """
+    title = FIGURE_TITLES[name]
+    return title if modelled else title.removesuffix(", and the model")
 
 
 def verdict(content: dict[str, Any]) -> str:

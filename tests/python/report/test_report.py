@@ -295,7 +295,8 @@ def test_runs_that_support_no_order_get_a_report_that_says_so() -> None:
     made = ta.report(runs)
     assert made.content["model"] is None
     assert made.content["why_no_model"]
-    assert "No correction." in made.html
+    assert "No correction.</strong> No order" in made.html
+    assert "and the model" not in made.html
     assert "spectrum" in made.figures
 
 
