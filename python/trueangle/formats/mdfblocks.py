@@ -73,7 +73,9 @@ def _leads(path: Path, file: BinaryIO, block: int, size: int) -> list[int]:
     file.seek(block)
     kind, length, count = struct.unpack("<4s4xQQ", file.read(_HEAD).ljust(_HEAD, b"\0"))
     leads = _LEADS.get(kind, {})
-    count = min(count, max(length - _HEAD, 0) // 8, (size - block) // 8) if leads else 0
+    # The library reads the links of most kinds where they must stand, whatever number is said.
+    said = min(count, max(length - _HEAD, 0) // 8, (size - block) // 8)
+    count = max(said, max(leads) + 1) if leads and kind != b"##CC" else said if leads else 0
     data = file.read(8 * count)
     links = struct.unpack(f"<{len(data) // 8}Q", data[: len(data) // 8 * 8])
     found = []

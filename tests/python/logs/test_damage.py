@@ -135,8 +135,12 @@ def test_blocks_of_mdf_that_lead_in_a_circle_are_refused(tmp_path, model_file):
     data = _mdf(tmp_path / "whole.mf4")
     paths = []
     for number, (kind, link, to, _) in enumerate(CIRCLES):
+        block = data.index(kind)
+        circle = _leading_to(data, block, link, data.index(to))
+        if number == 0:  # the library does not look at how many links a block says to have
+            circle = circle[: block + 16] + bytes(8) + circle[block + 24 :]
         paths.append(tmp_path / f"log{number}.mf4")
-        paths[-1].write_bytes(_leading_to(data, data.index(kind), link, data.index(to)))
+        paths[-1].write_bytes(circle)
     told = in_a_process(CORRECTED, model_file, tmp_path / "out.mf4", *paths).splitlines()
     assert len(told) == len(CIRCLES)
     for line, path, (_, _, _, says) in zip(told, paths, CIRCLES, strict=True):
