@@ -166,7 +166,7 @@ def test_travel_crosses_files_on_a_cluster(recording, tmp_path):
     distributed = pytest.importorskip("distributed")
     model, folder, whole = recording
     with distributed.LocalCluster(
-        n_workers=2, threads_per_worker=1, dashboard_address=None, silence_logs=50
+        n_workers=2, threads_per_worker=1, dashboard_address=":0", silence_logs=50
     ) as found:
         report = ta.correct_logs(folder, model, tmp_path / "out", scheduler=found.scheduler_address)
     assert report.is_done
