@@ -149,8 +149,9 @@ def _opened(path: Path, **options: Any) -> Iterator[pq.ParquetFile]:
 def _whole(path: Path) -> Iterator[tuple[pq.ParquetFile, Iterator[pa.Table]]]:
     """The file with its own schema, and all of its rows."""
     with _opened(path) as file:
-        schema, footer = file.schema_arrow, file.metadata
-        rows = _rows_at_once(footer, schema)
+        schema = file.schema_arrow
+        rows = _rows_at_once(file, schema)
+        footer = file.metadata
         with _opened(path, metadata=footer, read_dictionary=_texts(schema)) as reader:
             yield file, _tables(reader, schema, rows)
 
@@ -194,7 +195,7 @@ def _cuts(batch: pa.RecordBatch, schema: pa.Schema) -> Iterator[tuple[int, int]]
         start = stop
 
 
-def _rows_at_once(footer: pq.FileMetaData, schema: pa.Schema) -> int:
+def _rows_at_once(file: pq.ParquetFile, schema: pa.Schema) -> int:
     """Rows of which the columns of fixed width, decoded, take a bounded size.
 
     Other columns (lists, long texts without a dictionary) are as wide as their file says,
@@ -206,24 +207,33 @@ def _rows_at_once(footer: pq.FileMetaData, schema: pa.Schema) -> int:
             width += max(int(field.type.bit_width) // 8, 1)
         except ValueError:
             width += 8
-            encoded = _encoded(footer, field.name)
-            width += encoded // max(footer.num_rows, 1)
+            encoded = _encoded(file, field.name)
+            width += encoded // max(file.metadata.num_rows, 1)
             nested = pa.types.is_nested(field.type)
             if encoded > _BYTES or nested:
                 rows = min(rows, _FEW if encoded > _BYTES else 1024)
     return max(min(rows, _BYTES // width), 1)
 
 
-def _encoded(footer: pq.FileMetaData, name: str) -> int:
+def _encoded(file: pq.ParquetFile, name: str) -> int:
     """Bytes of a column as it is encoded, without the compression."""
-    total = 0
-    for group in range(footer.num_row_groups):
-        meta = footer.row_group(group)
-        for i in range(meta.num_columns):
-            column = meta.column(i)
-            if column.path_in_schema.partition(".")[0] == name:
-                total += int(column.total_uncompressed_size)
-    return total
+    groups = range(file.metadata.num_row_groups)
+    return sum(int(c.total_uncompressed_size) for g in groups for c in _chunks(file, g, name))
+
+
+def _chunks(
+    file: pq.ParquetFile, group: int, name: str | None = None
+) -> list[pq.ColumnChunkMetaData]:
+    """What the footer says of a row group's columns, or of one, whose first row is read before.
+
+    Damage there (a codec that is none, statistics of another length) ends the process where
+    it is asked for, and raises where it is read.
+    """
+    columns = None if name is None else [name]
+    next(file.iter_batches(1, row_groups=[group], columns=columns, use_threads=False), None)
+    tops = [file.schema.column(i).path.partition(".")[0] for i in range(len(file.schema))]
+    meta = file.metadata.row_group(group)
+    return [meta.column(i) for i, top in enumerate(tops) if name in (None, top)]
 
 
 def _texts(schema: pa.Schema) -> list[str]:
@@ -246,9 +256,7 @@ def _options(file: pq.ParquetFile, channels: Sequence[Addition]) -> dict[str, An
     }
     if meta.num_row_groups == 0:
         return options
-    # A codec that is none ends the process where it is asked for, and raises where it is used.
-    next(file.iter_batches(batch_size=1, row_groups=[0]), None)
-    chunks = [meta.row_group(0).column(i) for i in range(meta.num_columns)]
+    chunks = _chunks(file, 0)
     codecs = {chunk.path_in_schema: chunk.compression for chunk in chunks}
     angle = channels[0].column
     codecs |= {name: codecs.get(angle, chunks[0].compression) for name in added}

@@ -82,6 +82,30 @@ def test_codecs_that_are_none_are_refused(tmp_path, model_file):
     assert any("codec" in line for line in told)
 
 
+def test_no_byte_of_a_footer_ends_the_process(tmp_path, model_file):
+    """Each larger by one: sizes, codecs, lengths of statistics of numbers and texts."""
+    path = tmp_path / "log.parquet"
+    texts = [None if i % 7 == 0 else f"s{i % 5}" for i in range(ROWS)]
+    pq.write_table(pa.table({"indicated_deg": made_angles(ROWS), "state": texts}), path)
+    told = in_a_process(
+        """
+        import sys, pathlib, trueangle as ta
+        path, out = pathlib.Path(sys.argv[1]), pathlib.Path(sys.argv[3])
+        model, data = ta.load_model(sys.argv[2]), path.read_bytes()
+        footer = len(data) - 8 - int.from_bytes(data[-8:-4], "little")
+        for place in range(footer, len(data) - 8):
+            path.write_bytes(data[:place] + bytes([(data[place] + 1) % 256]) + data[place + 1 :])
+            error = ta.correct_logs(path, model, out).logs[0].error
+            print(type(error).__name__)
+            out.unlink(missing_ok=True)
+        """,
+        path,
+        model_file,
+        tmp_path / "out.parquet",
+    ).splitlines()
+    assert set(told) == {"FileError", "NoneType"}
+
+
 def test_whole_logs_are_read(tmp_path, model):
     """The checks refuse nothing that is whole: texts, dictionaries, nulls."""
     texts = pa.array([None if i % 7 == 0 else f"s{i % 5}" for i in range(ROWS)])
