@@ -40,7 +40,7 @@ def power_sums(
     --------
     >>> import numpy as np
     >>> sums = power_sums(np.arange(4) / 4.0, np.ones((4, 1)), 5)[:, 0]
-    >>> np.round(sums.real + 0.0, 12).tolist()
+    >>> (np.round(sums.real, 12) + 0.0).tolist()
     [4.0, 0.0, 0.0, 0.0, 4.0]
     """
     found = np.zeros((count, columns.shape[1]), dtype=np.complex128)
