@@ -267,3 +267,22 @@ def test_a_lattice_is_found_whatever_the_noise():
     assert (finding.cause, finding.status) == ("quantisation", "confirmed")
     assert finding.parameters["step_arcsec"].value == pytest.approx(6.0)
     assert "where the simulation states 1" in result.summary()[:300]
+
+
+@pytest.mark.parametrize("seed", [31, 32, 33])
+def test_a_reading_that_no_tail_reaches_is_wild(seed: int) -> None:
+    """Student's t of 3 degrees of freedom, whose tails hide a few wild readings otherwise."""
+    print(f"seed {seed}")
+    rng = np.random.default_rng(seed)
+    runs = []
+    for k in range(4):
+        theta = np.sort(rng.uniform(0.0, 360.0, 300))
+        error = rng.standard_t(3.0, theta.size) / 3600.0
+        runs.append(ta.CalibrationRun(theta, theta + error, 360.0, label=str(k)))
+    heavy = ta.diagnose(runs, Simulation())
+    assert "outliers" not in [finding.cause for finding in heavy.findings]
+    indicated = runs[2].indicated.copy()
+    indicated[117] += 0.1
+    runs[2] = replace(runs[2], indicated=indicated)
+    (wild,) = [f for f in ta.diagnose(runs, Simulation()).findings if f.cause == "outliers"]
+    assert wild.parameters["rows"].value == [["2", 117]]

@@ -57,6 +57,14 @@ SCALES = np.linspace(0.85, 1.1, 11)
 BEYOND_TAILS = 2.0
 
 
+#: Ratio of the largest of readings with a tail :math:`x^{-nu}` to the next that is passed by a
+#: chance of :math:`8^{-nu}`: 0.2 % for nu = 3, 3e-5 for nu = 5. Such a reading is of another kind.
+APART = 8.0
+
+#: Share of the readings that may stand apart so.
+MOST_APART = 0.01
+
+
 @dataclass(frozen=True)
 class Outliers(Effect):
     """Isolated outliers: a share of the readings gets a normal error of its own.
@@ -109,12 +117,18 @@ class Outliers(Effect):
         value -= 0.5 * n * np.log(2.0 * np.pi)
         gain = 2.0 * (value - normal) - 2.0 * regression.log_n
         beyond = 2.0 * (value - tails) - regression.log_n
-        if gain <= 0.0 or beyond <= BEYOND_TAILS:
+        if gain <= 0.0:
             return None
-        x = e / scale
-        wide = share / size * np.exp(-0.5 * (x / size) ** 2)
-        chance = wide / (wide + (1.0 - share) * np.exp(-0.5 * x**2))
-        rows = np.flatnonzero(chance > 0.5)
+        if beyond > BEYOND_TAILS:
+            x = e / scale
+            wide = share / size * np.exp(-0.5 * (x / size) ** 2)
+            chance = wide / (wide + (1.0 - share) * np.exp(-0.5 * x**2))
+            rows = np.flatnonzero(chance > 0.5)
+        else:
+            rows = _apart(e)
+            if rows.size == 0:
+                return None
+            share, size = rows.size / n, float(np.sqrt(np.mean(e[rows] ** 2))) / scale
         alone = rows[_isolated(regression, rows)]
         stretches = 1 + np.count_nonzero(np.diff(rows) > 1)
         bursts = 0
@@ -154,6 +168,14 @@ class Outliers(Effect):
             weights,
             size,
         )
+
+
+def _apart(e: Array) -> NDArray[np.int64]:
+    """Rows of the few readings that no tail reaches: far above the largest of all others."""
+    order = np.argsort(-np.abs(e))
+    sizes = np.abs(e)[order][: 2 + int(MOST_APART * e.size)]
+    gaps = np.flatnonzero(sizes[:-1] > APART * sizes[1:])
+    return np.sort(order[: gaps[-1] + 1]) if gaps.size else order[:0]
 
 
 def _beside_neighbours(regression: Regression) -> Array:

@@ -47,7 +47,9 @@ def test_the_nth_allocation_fails(what, driver, desk):
 
 
 #: Leaves so many addresses beyond those in use, before the work; status 12 for a MemoryError.
+#: Done once before, so that Python has imported what it needs: its own imports end otherwise.
 TIGHT = """
+exec({work!r})
 pages = int(open("/proc/self/statm").read().split()[0]) * resource.getpagesize()
 resource.setrlimit(resource.RLIMIT_AS, (pages + {extra}, resource.RLIM_INFINITY))
 try:
