@@ -229,6 +229,8 @@ def test_the_variance_is_that_of_the_residual_degrees_of_freedom(signals):
     assert one.variance == pytest.approx(float(left[0]) / (40 - rank), rel=1e-9)
     inverse = np.linalg.pinv(design.T @ design)[-12:, -12:]
     np.testing.assert_allclose(one.covariance(0), one.variance * inverse, rtol=1e-7)
+    # One run does not disagree with itself: nothing to widen by.
+    np.testing.assert_allclose(one.robust_covariance(0), one.variance * inverse, rtol=1e-7)
 
 
 def test_errors_widen_by_how_far_runs_disagree(signals):
