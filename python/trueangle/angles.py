@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from .errors import ArgumentError
 
 __all__ = [
+    "ARCSEC_PER_DEG",
     "ARCSEC_PER_TURN",
     "UNIT_PERIODS",
     "arcsec",
@@ -20,7 +21,8 @@ __all__ = [
     "wrap",
 ]
 
-ARCSEC_PER_TURN: Final = 1_296_000.0
+ARCSEC_PER_DEG: Final = 3600.0
+ARCSEC_PER_TURN: Final = 360.0 * ARCSEC_PER_DEG
 
 #: Units by the suffix of a column name. Counts have no fixed period.
 UNIT_PERIODS: Final = {"deg": 360.0, "rad": 2.0 * math.pi, "turn": 1.0}

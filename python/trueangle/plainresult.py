@@ -25,4 +25,4 @@ class PlainResult:
 
 def finite(value: float) -> float | None:
     """A number that JSON can hold, else None."""
-    return value if math.isfinite(value) else None
+    return float(value) if math.isfinite(value) else None

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 from ..angles import ARCSEC_PER_TURN
 from ..errors import ArgumentError
+from ..plainresult import finite
 from ..provenance import provenance
 from ..runs import CalibrationRun, as_runs
 from .budget import LEVEL, Budget, Contribution
@@ -149,7 +150,7 @@ def certify(
                 "angle_deg": float(angle),
                 "error_arcsec": float(error),
                 "standard_arcsec": budget.standard,
-                "degrees_of_freedom": _finite(budget.degrees_of_freedom),
+                "degrees_of_freedom": finite(budget.degrees_of_freedom),
                 "coverage_factor": budget.coverage_factor,
                 "expanded_arcsec": budget.expanded,
             }
@@ -183,13 +184,13 @@ def _budget(budget: Budget, angle_deg: float) -> dict[str, Any]:
                 "distribution": item.distribution,
                 "standard_arcsec": item.standard,
                 "sensitivity": item.sensitivity,
-                "degrees_of_freedom": _finite(item.degrees_of_freedom),
+                "degrees_of_freedom": finite(item.degrees_of_freedom),
                 "share_percent": 100.0 * budget.share(item),
             }
             for item in budget.contributions
         ],
         "standard_arcsec": budget.standard,
-        "degrees_of_freedom": _finite(budget.degrees_of_freedom),
+        "degrees_of_freedom": finite(budget.degrees_of_freedom),
         "coverage_factor": budget.coverage_factor,
         "expanded_arcsec": budget.expanded,
     }
@@ -241,7 +242,3 @@ def _aliases(fit: FitResult) -> list[dict[str, Any]]:
         for row in fit.selection.table
         if row.retained and row.aliases
     ]
-
-
-def _finite(value: float) -> float | None:
-    return value if math.isfinite(value) else None

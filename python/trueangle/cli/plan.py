@@ -115,7 +115,3 @@ def render(plan: CalibrationPlan) -> str:
 def _table(factors: dict[float, float]) -> list[str]:
     entries = [f"{m:>5g} {f:5.2f}" for m, f in factors.items()]
     return ["  " + "  ".join(entries[i : i + 6]) for i in range(0, len(entries), 6)]
-
-
-def _finite(value: float) -> float | None:
-    return value if math.isfinite(value) else None

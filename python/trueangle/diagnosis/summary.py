@@ -108,24 +108,23 @@ def headline(diagnosis: Diagnosis, unit: ErrorUnit) -> list[str]:
     for spot in diagnosis.not_identifiable:
         if spot.supported:
             lines += _wrapped(f"Seen, and not told apart: {_seen(spot, unit)}.", 2)
-    noise = [] if rest is None else rest.noise_firing
-    stated = [item for item in noise if item.test == AGAINST_STATED and _is_material(item)]
+    noise = [] if rest is None else [item for item in rest.noise_firing if _is_material(item)]
     if lines:
-        for item in stated:
-            lines += _wrapped(f"{item.says[0].upper()}{item.says[1:]}.", 2)
-    elif stated or any(item.test != AGAINST_STATED for item in noise):
+        for item in noise:
+            if item.test == AGAINST_STATED:
+                lines += _wrapped(f"{item.says[0].upper()}{item.says[1:]}.", 2)
+    elif noise:
         lines = ["No pattern beyond the simulation, but its noise is another:"]
         for item in noise:
-            if item in stated or item.test != AGAINST_STATED:
-                lines += _wrapped(f"- {item.says} (p {_chance(item.p)})", 4, 2)
+            lines += _wrapped(f"- {item.says} (p {_chance(item.p)})", 4, 2)
     else:
         lines = ["Nothing beyond the simulation: no test of the readings fires."]
     return [*lines, ""]
 
 
 def _is_material(item: Evidence) -> bool:
-    """Whether the noise differs from the stated one by what anybody would act on."""
-    return abs(item.statistic - 1.0) > MATERIAL
+    """Whether what a test says of the noise is more than a few percent of the stated one."""
+    return item.test != AGAINST_STATED or abs(item.statistic - 1.0) > MATERIAL
 
 
 def _seen(spot: Blindness, unit: ErrorUnit) -> str:

@@ -9,6 +9,7 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
+from ..angles import ARCSEC_PER_DEG
 from ..correction import forms
 from ..correction.forms import Form
 from ..correction.term import Term
@@ -29,7 +30,6 @@ from .search import Array, Fitted, line_parameters
 __all__ = ["ChannelSkew", "ChannelSkewTerm"]
 
 #: Arcsec in a degree.
-ARCSEC_PER_DEG = 3600.0
 
 
 @dataclass(frozen=True)

@@ -8,6 +8,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from ..angles import ARCSEC_PER_DEG
 from ..correction import forms
 from ..correction.forms import Form
 from ..correction.term import Term
@@ -32,8 +33,6 @@ from .search import (
 __all__ = ["Latency", "LatencyTerm"]
 
 #: Arcsec in a degree.
-ARCSEC_PER_DEG = 3600.0
-
 TWO_SPEEDS = (
     "move in both directions at two speeds at least a factor of 3 apart, or read at rest as well"
 )

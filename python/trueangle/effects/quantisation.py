@@ -8,6 +8,7 @@ from typing import ClassVar
 
 import numpy as np
 
+from ..angles import ARCSEC_PER_DEG
 from ..joint.pattern import Surroundings
 from ..joint.signals import Signals
 from ..regression.estimate import quantity
@@ -18,8 +19,6 @@ from .scatter import ScatterFinding
 from .search import Array
 
 __all__ = ["Quantisation"]
-
-ARCSEC_PER_DEG = 3600.0
 
 #: Share of the noise's variance from which on the rounding of the readings is its cause.
 LEAST_SHARE = 0.2

@@ -8,6 +8,7 @@ from typing import ClassVar
 
 import numpy as np
 
+from ..angles import ARCSEC_PER_DEG
 from ..joint.pattern import Surroundings
 from ..joint.signals import Signals
 from ..regression.estimate import quantity
@@ -20,8 +21,6 @@ from .search import Array
 __all__ = ["TimestampJitter"]
 
 #: Arcsec in a degree.
-ARCSEC_PER_DEG = 3600.0
-
 #: Scoring steps, and the least variance in robust ones of the whole.
 STEPS = 25
 FLOOR = 1e-4

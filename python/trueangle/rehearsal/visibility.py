@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ..angles import ARCSEC_PER_DEG
 from ..effects import EFFECTS, Effect
 from ..joint.signals import Signals
 from ..regression.regression import Regression
@@ -107,8 +108,8 @@ def _deviance(
     found = float(x[:, 0] @ x[:, 0]) / sim.sigma_arcsec**2 if excited[0] else 0.0
     # Where nothing is changed in the writing, the difference is exactly zero.
     noise = sim.sigma_arcsec * rng.standard_normal(regression.n)
-    reading = regression.signals.degrees + noise / 3600.0
-    rounded = (effect.written(reading) - reading) * 3600.0
+    reading = regression.signals.degrees + noise / ARCSEC_PER_DEG
+    rounded = (effect.written(reading) - reading) * ARCSEC_PER_DEG
     found += float(rounded @ rounded) / sim.sigma_arcsec**2
     factor = effect.noise_factor(regression.signals, around)
     if factor is not None:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from ..angles import ARCSEC_PER_TURN
+from ..plainresult import finite
 from .linenames import LineNames
 
 if TYPE_CHECKING:
@@ -50,9 +51,9 @@ def modelled(fit: FitResult, name: LineNames) -> dict[str, Any]:
         "argument": model.argument,
         "constant_deg": model.constant * 360.0 / model.period,
         "coefficients": coefficients,
-        "residual_std_arcsec": _finite(factor * fit.residual_std),
+        "residual_std_arcsec": finite(factor * fit.residual_std),
         "degrees_of_freedom": float(fit.degrees_of_freedom),
-        "condition_number": _finite(fit.condition_number),
+        "condition_number": finite(fit.condition_number),
         "offset_spread_arcsec": factor * fit.offset_spread,
         "wild_readings": len(fit.wild),
         "ridge": fit.ridge,
@@ -90,9 +91,9 @@ def selected(selection: OrderSelection, name: LineNames) -> dict[str, Any]:
         "orders": [float(m) for m in selection.orders],
         "reason": selection.reason,
         "holdout": selection.holdout,
-        "holdout_rms_before_arcsec": _finite(factor * before),
-        "holdout_rms_after_arcsec": _finite(factor * after),
-        "noise_arcsec": _finite(factor * selection.noise.standard_deviation),
+        "holdout_rms_before_arcsec": finite(factor * before),
+        "holdout_rms_after_arcsec": finite(factor * after),
+        "noise_arcsec": finite(factor * selection.noise.standard_deviation),
         "noise_source": selection.noise.source,
         "gear_ratio": selection.gear_ratio,
         "notes": list(selection.notes),
@@ -102,11 +103,11 @@ def selected(selection: OrderSelection, name: LineNames) -> dict[str, Any]:
                 "order": float(row.order),
                 "retained": row.retained,
                 "verdict": row.verdict,
-                "amplitude_arcsec": _finite(factor * row.amplitude),
-                "std_arcsec": _finite(factor * row.standard_error),
-                "phase_deg": _finite(row.phase_deg % 360.0),
-                "phase_spread_deg": _finite(row.phase_spread_deg),
-                "holdout_gain_percent": _finite(100.0 * row.holdout_gain),
+                "amplitude_arcsec": finite(factor * row.amplitude),
+                "std_arcsec": finite(factor * row.standard_error),
+                "phase_deg": finite(row.phase_deg % 360.0),
+                "phase_spread_deg": finite(row.phase_spread_deg),
+                "holdout_gain_percent": finite(100.0 * row.holdout_gain),
                 "aliases": [float(m) for m in row.aliases],
                 "explanations": [str(e) for e in row.explanations],
                 "reason": row.reason,
@@ -118,7 +119,3 @@ def selected(selection: OrderSelection, name: LineNames) -> dict[str, Any]:
 
 def _degrees(radians: float) -> float:
     return min(math.degrees(radians), 180.0) if math.isfinite(radians) else 180.0
-
-
-def _finite(value: float) -> float | None:
-    return float(value) if math.isfinite(value) else None

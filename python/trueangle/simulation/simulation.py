@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from ..angles import ARCSEC_PER_DEG
 from ..effects import Effect, ReferenceLines
 from ..errors import ArgumentError
 from ..joint.joint import Joint
@@ -20,8 +21,6 @@ from .designs import RunDesign
 __all__ = ["Simulation", "simulate"]
 
 Array = NDArray[np.float64]
-
-ARCSEC_PER_DEG = 3600.0
 
 
 @dataclass(frozen=True)
