@@ -24,7 +24,8 @@ def provenance(runs: Sequence[CalibrationRun], simulation: str | None) -> dict[s
         if run.source is not None:
             inputs.setdefault(run.source.file, run.source.sha256)
     if simulation is not None and Path(simulation).is_file():
-        inputs[simulation] = hashlib.sha256(Path(simulation).read_bytes()).hexdigest()
+        # As of runs: the name; where somebody keeps the file is nobody else's business.
+        inputs[Path(simulation).name] = hashlib.sha256(Path(simulation).read_bytes()).hexdigest()
     return {
         "inputs": [{"file": file, "sha256": digest} for file, digest in inputs.items()],
         "written": datetime.now(UTC).isoformat(timespec="seconds"),

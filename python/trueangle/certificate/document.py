@@ -9,8 +9,11 @@ from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
+import numpy as np
+
 from ..angles import ARCSEC_PER_TURN
 from ..errors import ArgumentError
+from ..errorunits import ErrorsIn, error_unit
 from ..plainresult import finite
 from ..provenance import provenance
 from ..runs import CalibrationRun, as_runs
@@ -35,6 +38,7 @@ class Certificate:
     ----------
     content : dict
         Every number and word of it, plain values: `save` adds nothing but the layout.
+        Errors are in arcsec; ``errors_in`` says which unit the pages show.
         ``positions`` holds ``angle_deg, error_arcsec, standard_arcsec,
         degrees_of_freedom, coverage_factor, expanded_arcsec`` of every position.
     """
@@ -67,6 +71,7 @@ def certify(
     shafts: Mapping[str, float] | None = None,
     positions: int | None = None,
     fit: FitResult | None = None,
+    errors_in: ErrorsIn = "auto",
 ) -> Certificate:
     r"""Value and expanded uncertainty of the error at every nominal position.
 
@@ -89,6 +94,10 @@ def certify(
         36, else 36.
     fit : FitResult, optional
         A fit of ``runs`` that is there already.
+    errors_in : str or float
+        Unit of every value and uncertainty of the pages: ``"arcsec"``, ``"deg"``,
+        ``"mrad"``, ``"count"``, or the counts of a turn; ``"auto"`` is arcsec, or degrees
+        where an error reaches a degree. The content stays in arcsec.
 
     Returns
     -------
@@ -128,6 +137,7 @@ def certify(
             "read more positions, or fit fewer orders"
         )
     values = values_at(fit, nominal_positions(fit, positions))
+    unit = error_unit(errors_in, float(np.abs(values.error_arcsec).max()), fit.model.period)
     shared = [item for item in (left_at_places(fit), reversal(fit)) if item is not None]
     shared += list(who.contributions)
     freedom = _degrees_of_freedom(fit)
@@ -143,6 +153,7 @@ def certify(
         "identity": {name: getattr(who, name) for name in ENTRIES},
         "temperature_C": who.temperature_C,
         "not_stated": list(who.not_stated),
+        "errors_in": {"unit": unit.name, "per_arcsec": unit.per_arcsec},
         "level_percent": 100.0 * LEVEL,
         "argument": fit.model.argument,
         "positions": [

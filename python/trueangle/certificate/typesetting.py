@@ -10,6 +10,7 @@ from os import PathLike
 from pathlib import Path
 from typing import Any, Final
 
+from ..angles import ARCSEC_PER_TURN
 from ..errors import MissingExtraError
 from ..files import CERTIFICATE, check_output, publish
 
@@ -59,7 +60,11 @@ def _picture(content: dict[str, Any]) -> bytes:
     """Value and U at every position as SVG."""
     from ..plots.certified import certified_errors
 
-    figure = certified_errors(content["positions"]).get_figure(root=True)
+    shown = content["errors_in"]
+    counts = shown["per_arcsec"] * ARCSEC_PER_TURN
+    figure = certified_errors(
+        content["positions"], errors_in=counts if shown["unit"] == "count" else shown["unit"]
+    ).get_figure(root=True)
     assert figure is not None
     buffer = io.BytesIO()
     figure.savefig(buffer, format="svg")

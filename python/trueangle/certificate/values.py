@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from ..aliasing import distinct_positions
 from ..angles import ARCSEC_PER_TURN
 from ..errors import ArgumentError
+from ..plots.curves import seen_span
 from ..reference import design_matrix
 from .budget import Contribution
 from .propagation import propagated
@@ -78,7 +79,7 @@ def nominal_positions(fit: FitResult, count: int | None = None) -> Array:
         read = distinct_positions(fit.runs)
         if 2 <= len(read) <= POSITIONS:
             return read.turns * 360.0
-    low, high = _seen(fit)
+    low, high = seen_span(fit.model)
     pitch = 360.0 / (count or POSITIONS)
     first = int(np.ceil(low / pitch - 1e-9))
     last = (
@@ -169,14 +170,6 @@ def reversal(fit: FitResult) -> Contribution | None:
     error = float(np.std(halves, ddof=1) / np.sqrt(count)) if count > 2 else float(np.max(errors))
     standard = abs(half) if abs(half) > _SEEN * error else 0.0
     return Contribution("reversal error, half of it", standard, "A", "two-point", max(count - 1, 1))
-
-
-def _seen(fit: FitResult) -> tuple[float, float]:
-    """The stretch that was travelled, in degrees."""
-    if fit.model.partial_span is None:
-        return 0.0, 360.0
-    low, high = (x * (360.0 / fit.model.period) for x in fit.model.partial_span)
-    return low, high
 
 
 def _by_place(

@@ -194,11 +194,11 @@ class OrderSelection(PlainResult):
 
         return plain_selection(self)
 
-    def plot(self, ax: Axes | None = None) -> Axes:
+    def plot(self, ax: Axes | None = None, errors_in: ErrorsIn = "auto") -> Axes:
         """Amplitude of every candidate with its threshold (needs ``trueangle[plot]``)."""
         from ..plots import amplitude_spectrum
 
-        return amplitude_spectrum(self, ax)
+        return amplitude_spectrum(self, ax, errors_in)
 
     def summary(self, errors_in: ErrorsIn = "auto") -> str:
         """The table and its notes as text.

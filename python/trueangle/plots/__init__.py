@@ -2,7 +2,8 @@
 
 One file a picture. Every function draws into ``ax`` (a new one when not given) and
 returns it, but `detection`, which makes a figure; `text_alternative` says in a sentence what
-it shows. Errors are in arcsec, angles in degrees. Needs ``pip install trueangle[plot]``;
+it shows. Angles are in degrees, errors in arcsec, or in degrees where one reaches a
+degree (``errors_in=`` asks for another unit). Needs ``pip install trueangle[plot]``;
 matplotlib is imported at the first picture.
 """
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..angles import ARCSEC_PER_TURN
-from ..errorunits import significant
+from ..errorunits import ErrorsIn, ErrorUnit, error_unit, significant
 from ..orders.selection import FALSE_ALARM
 from ..orders.table import OrderRow, OrderSelection
 from . import palette
@@ -37,7 +37,9 @@ _MOST_ALIASES = 3
 _MOST_ANNOTATED = 12
 
 
-def amplitude_spectrum(result: OrderSelection | FitResult, ax: Axes | None = None) -> Axes:
+def amplitude_spectrum(
+    result: OrderSelection | FitResult, ax: Axes | None = None, errors_in: ErrorsIn = "auto"
+) -> Axes:
     """Amplitude against order: of all candidates of a selection, or of a fit's orders.
 
     The axis of orders is broken where none was looked at; that of amplitudes is logarithmic.
@@ -51,19 +53,30 @@ def amplitude_spectrum(result: OrderSelection | FitResult, ax: Axes | None = Non
     result : OrderSelection or FitResult
         A fit that selected its orders shows that selection.
     ax : matplotlib Axes, optional
+    errors_in : str or float
+        Unit of the errors, as for summaries: ``"auto"`` is arcsec, or degrees where one
+        reaches a degree.
 
     Returns
     -------
     matplotlib Axes
     """
     if isinstance(result, OrderSelection):
-        return _of_selection(result, ax)
-    selection = result.selection
-    return _of_fit(result, ax) if selection is None else _of_selection(selection, ax)
+        return _of_selection(result, ax, errors_in)
+    if result.selection is None:
+        return _of_fit(result, ax, errors_in)
+    return _of_selection(result.selection, ax, errors_in)
 
 
-def _of_fit(fit: FitResult, ax: Axes | None) -> Axes:
-    factor = ARCSEC_PER_TURN / fit.model.period
+def _unit(asked: ErrorsIn, amplitudes: Array, period: float) -> tuple[ErrorUnit, float]:
+    """The unit for amplitudes of that period, and how many of it one of theirs is."""
+    arcsec = ARCSEC_PER_TURN / period
+    unit = error_unit(asked, arcsec * float(np.max(amplitudes, initial=0.0)), period)
+    return unit, arcsec * unit.per_arcsec
+
+
+def _of_fit(fit: FitResult, ax: Axes | None, errors_in: ErrorsIn) -> Axes:
+    unit, factor = _unit(errors_in, fit.amplitudes, fit.model.period)
     ranks = np.argsort(fit.orders)
     orders = [float(fit.orders[i]) for i in ranks]
     amplitude = factor * fit.amplitudes[ranks]
@@ -83,18 +96,19 @@ def _of_fit(fit: FitResult, ax: Axes | None) -> Axes:
         error_kw={"linewidth": 0.8},
         label="fitted amplitude, 95 % interval",
     )
-    described(ax, f"Amplitude of {len(orders)} fitted orders: {_largest(orders, amplitude)}.")
-    return _finish(ax, axis, amplitude)
+    described(ax, f"Amplitude of {len(orders)} fitted orders: {_largest(orders, amplitude, unit)}.")
+    return _finish(ax, axis, amplitude, unit)
 
 
-def _of_selection(selection: OrderSelection, ax: Axes | None) -> Axes:
-    factor = ARCSEC_PER_TURN / selection.period
+def _of_selection(selection: OrderSelection, ax: Axes | None, errors_in: ErrorsIn) -> Axes:
     rows = selection.table
+    sizes = np.array([row.amplitude for row in rows])
+    unit, factor = _unit(errors_in, sizes, selection.period)
     orders = [float(row.order) for row in rows]
     axis = OrderAxis.of(orders)
     ax = new_axes(ax)
     place, width = axis.places(orders), axis.width(orders)
-    amplitude = np.array([factor * row.amplitude for row in rows])
+    amplitude = factor * sizes
     kept = np.array([row.retained for row in rows], dtype=bool)
     limit = factor * thresholds(selection)
     if kept.any():
@@ -135,16 +149,18 @@ def _of_selection(selection: OrderSelection, ax: Axes | None) -> Axes:
             color=palette.WARNING,
         )
     names = [order for order, keep in zip(orders, kept, strict=True) if keep]
-    told = _largest(names, amplitude[kept]) if names else "none"
+    told = _largest(names, amplitude[kept], unit) if names else "none"
     described(ax, f"Amplitude of {len(rows)} candidate orders. Retained: {told}.")
     shown = np.concatenate([amplitude[kept], limit[np.isfinite(limit)]])
-    return _finish(ax, axis, shown if shown.size else amplitude, room=1.0 if tall else 0.0)
+    return _finish(ax, axis, shown if shown.size else amplitude, unit, 1.0 if tall else 0.0)
 
 
-def _largest(orders: list[float], amplitude: Array) -> str:
+def _largest(orders: list[float], amplitude: Array, unit: ErrorUnit) -> str:
     """The largest orders with their amplitudes, and how many more there are."""
     ranks = np.argsort(-amplitude)
-    told = [f"{orders[i]:g} ({significant(float(amplitude[i]), 3)} arcsec)" for i in ranks[:_TOLD]]
+    told = [
+        f"{orders[i]:g} ({significant(float(amplitude[i]), 3)} {unit.name})" for i in ranks[:_TOLD]
+    ]
     more = f" and {len(orders) - _TOLD} smaller ones" if len(orders) > _TOLD else ""
     return ", ".join(told) + more
 
@@ -170,7 +186,7 @@ def likely_aliases(row: OrderRow) -> tuple[float, ...]:
     return known or row.aliases
 
 
-def _finish(ax: Axes, axis: OrderAxis, sizes: Array, room: float = 0.0) -> Axes:
+def _finish(ax: Axes, axis: OrderAxis, sizes: Array, unit: ErrorUnit, room: float = 0.0) -> Axes:
     """Axes and legend; ``sizes`` have to be seen, ``room`` decades above them stay free."""
     seen = sizes[np.isfinite(sizes) & (sizes > 0.0)]
     low = _FLOOR * float(seen.min(initial=1.0)) if seen.size else 0.1
@@ -179,7 +195,7 @@ def _finish(ax: Axes, axis: OrderAxis, sizes: Array, room: float = 0.0) -> Axes:
     ax.set_ylim(low, 1.5 * high * 10.0**room)
     axis.draw(ax)
     ax.set_xlabel("order / cycles per output turn")
-    ax.set_ylabel("amplitude / arcsec")
+    ax.set_ylabel(f"amplitude / {unit.name}")
     grid(ax, "y")
     legend(ax)
     return ax

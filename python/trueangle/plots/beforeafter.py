@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..errorunits import significant
+from ..errorunits import ErrorsIn, error_unit, significant
 from ..runs import CalibrationRun, as_runs
 from . import palette
 from .canvas import described, legend, new_axes, turn_axis
-from .curves import held_out_points, seen_span, thinned
+from .curves import greatest, held_out_points, seen_span, thinned
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -24,12 +24,15 @@ _MOST = 8000
 
 
 def before_after(
-    model: HarmonicModel, runs: CalibrationRun | Iterable[CalibrationRun], ax: Axes | None = None
+    model: HarmonicModel,
+    runs: CalibrationRun | Iterable[CalibrationRun],
+    ax: Axes | None = None,
+    errors_in: ErrorsIn = "auto",
 ) -> Axes:
     """Error of held-out ``runs`` before and after correction by ``model``.
 
     Every run keeps its own zero: the mean of what is left is taken off. The legend gives
-    root mean square and peak-to-peak of both in arcsec.
+    root mean square and peak-to-peak of both.
 
     Parameters
     ----------
@@ -37,17 +40,21 @@ def before_after(
     runs : CalibrationRun or iterable of them
         That took no part in the fit; runs that did make the picture too good.
     ax : matplotlib Axes, optional
+    errors_in : str or float
+        Unit of the errors, as for summaries: ``"auto"`` is arcsec, or degrees where one
+        reaches a degree.
 
     Returns
     -------
     matplotlib Axes
     """
     pairs = held_out_points(model, as_runs(runs))
+    unit = error_unit(errors_in, greatest(p for pair in pairs for p in pair), model.period)
     ax = new_axes(ax)
     told: list[str] = []
     for points, colour, name, marker in (
-        ([b for b, _ in pairs], palette.BEFORE, "before", "s"),
-        ([a for _, a in pairs], palette.AFTER, "after", "o"),
+        ([b.scaled(unit.per_arcsec) for b, _ in pairs], palette.BEFORE, "before", "s"),
+        ([a.scaled(unit.per_arcsec) for _, a in pairs], palette.AFTER, "after", "o"),
     ):
         y = np.concatenate([p.y for p in points])
         rms, ptp = float(np.sqrt(np.mean(y * y))), float(np.ptp(y))
@@ -63,14 +70,14 @@ def before_after(
                 color=colour,
                 label=None
                 if i
-                else f"{name}: rms {significant(rms)}, peak-to-peak {significant(ptp)} arcsec",
+                else f"{name}: rms {significant(rms)}, peak-to-peak {significant(ptp)} {unit.name}",
             )
         told.append(
-            f"{name} correction rms {significant(rms)}, peak-to-peak {significant(ptp)} arcsec"
+            f"{name} correction rms {significant(rms)}, peak-to-peak {significant(ptp)} {unit.name}"
         )
     ax.axhline(0.0, color=palette.MUTED, linewidth=0.8, zorder=0)
     turn_axis(ax, *seen_span(model))
     ax.set_xlabel("reference angle / deg")
-    ax.set_ylabel("error of held-out runs / arcsec")
+    ax.set_ylabel(f"error of held-out runs / {unit.name}")
     legend(ax)
     return described(ax, f"Error of {len(pairs)} held-out runs: {'; '.join(told)}.")

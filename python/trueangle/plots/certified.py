@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..errorunits import ErrorsIn, error_unit, significant
 from . import palette
 from .canvas import described, new_axes, turn_axis
 
@@ -16,7 +17,11 @@ if TYPE_CHECKING:
 __all__ = ["certified_errors"]
 
 
-def certified_errors(positions: Sequence[Mapping[str, float]], ax: Axes | None = None) -> Axes:
+def certified_errors(
+    positions: Sequence[Mapping[str, float]],
+    ax: Axes | None = None,
+    errors_in: ErrorsIn = "auto",
+) -> Axes:
     """Error at every nominal position with bars of its expanded uncertainty.
 
     Parameters
@@ -24,6 +29,9 @@ def certified_errors(positions: Sequence[Mapping[str, float]], ax: Axes | None =
     positions : sequence of mappings
         ``angle_deg, error_arcsec, expanded_arcsec``, as a certificate's content has them.
     ax : matplotlib Axes, optional
+    errors_in : str or float
+        Unit of the errors, as for summaries: ``"auto"`` is arcsec, or degrees where one
+        reaches a degree.
 
     Returns
     -------
@@ -34,6 +42,8 @@ def certified_errors(positions: Sequence[Mapping[str, float]], ax: Axes | None =
         np.array([row[name] for row in positions])
         for name in ("angle_deg", "error_arcsec", "expanded_arcsec")
     )
+    unit = error_unit(errors_in, float(np.abs(error).max()))
+    error, expanded = unit.per_arcsec * error, unit.per_arcsec * expanded
     ax.axhline(0.0, color=palette.MUTED, linewidth=0.8)
     ax.errorbar(
         angle,
@@ -50,10 +60,10 @@ def certified_errors(positions: Sequence[Mapping[str, float]], ax: Axes | None =
     margin = 0.02 * max(float(np.ptp(angle)), 1.0)
     turn_axis(ax, float(angle.min()) - margin, float(angle.max()) + margin)
     ax.set_xlabel("position / deg")
-    ax.set_ylabel("error / arcsec")
+    ax.set_ylabel(f"error / {unit.name}")
     return described(
         ax,
         f"Error at {len(positions)} positions with expanded uncertainty, from "
-        f"{float(error.min()):.2f} to {float(error.max()):.2f} arcsec, U at most "
-        f"{float(expanded.max()):.2f}.",
+        f"{significant(float(error.min()))} to {significant(float(error.max()))} {unit.name}, "
+        f"U at most {significant(float(expanded.max()), 2)} {unit.name}.",
     )

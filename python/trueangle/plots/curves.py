@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import TYPE_CHECKING, Final
@@ -26,6 +26,7 @@ __all__ = [
     "Points",
     "envelope",
     "error_points",
+    "greatest",
     "held_out_points",
     "model_curve",
     "residual_points",
@@ -63,6 +64,10 @@ class Points:
     x: Array
     y: Array
 
+    def scaled(self, factor: float) -> Points:
+        """The readings with their errors in another unit."""
+        return Points(self.label, self.x, factor * self.y)
+
 
 @dataclass(frozen=True)
 class Curve:
@@ -71,6 +76,16 @@ class Curve:
     angle: Array
     error: Array
     std: Array | None
+
+    def scaled(self, factor: float) -> Curve:
+        """The model with its errors in another unit."""
+        std = None if self.std is None else factor * self.std
+        return Curve(self.angle, factor * self.error, std)
+
+
+def greatest(parts: Iterable[Points]) -> float:
+    """Largest absolute error of some readings, arcsec: what a unit is chosen by."""
+    return max((float(np.abs(part.y).max(initial=0.0)) for part in parts), default=0.0)
 
 
 def thinned(points: Points, most: int) -> Points:

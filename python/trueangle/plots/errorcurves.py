@@ -6,10 +6,18 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..errorunits import significant
+from ..errorunits import ErrorsIn, error_unit, significant
 from . import palette
 from .canvas import described, legend, new_axes, turn_axis
-from .curves import CONFIDENCE, envelope, error_points, model_curve, seen_span, thinned
+from .curves import (
+    CONFIDENCE,
+    envelope,
+    error_points,
+    greatest,
+    model_curve,
+    seen_span,
+    thinned,
+)
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -24,7 +32,7 @@ _MOST = 4000
 _DENSE = 40.0
 
 
-def error_curves(fit: FitResult, ax: Axes | None = None) -> Axes:
+def error_curves(fit: FitResult, ax: Axes | None = None, errors_in: ErrorsIn = "auto") -> Axes:
     """Measured error of every run, the fitted model and its 95 % band.
 
     Every run is shown less its own zero, the model without its constant; gear orders, which
@@ -34,6 +42,9 @@ def error_curves(fit: FitResult, ax: Axes | None = None) -> Axes:
     ----------
     fit : FitResult
     ax : matplotlib Axes, optional
+    errors_in : str or float
+        Unit of the errors, as for summaries: ``"auto"`` is arcsec, or degrees where one
+        reaches a degree.
 
     Returns
     -------
@@ -44,9 +55,11 @@ def error_curves(fit: FitResult, ax: Axes | None = None) -> Axes:
     MissingExtraError
         matplotlib is not installed.
     """
+    measured = error_points(fit)
+    unit = error_unit(errors_in, greatest(measured), fit.model.period)
     ax = new_axes(ax)
-    for number, points in enumerate(error_points(fit)):
-        part = thinned(points, _MOST)
+    for number, points in enumerate(measured):
+        part = thinned(points, _MOST).scaled(unit.per_arcsec)
         ax.plot(
             part.x,
             part.y,
@@ -58,7 +71,7 @@ def error_curves(fit: FitResult, ax: Axes | None = None) -> Axes:
             color=palette.run_colour(number),
             label=f"run {part.label}",
         )
-    curve = model_curve(fit.model)
+    curve = model_curve(fit.model).scaled(unit.per_arcsec)
     # A gear's orders fill the picture: the readings stay on top of them.
     dense = max(fit.orders, default=0.0) > _DENSE
     if dense:
@@ -86,11 +99,11 @@ def error_curves(fit: FitResult, ax: Axes | None = None) -> Axes:
         )
     turn_axis(ax, *seen_span(fit.model))
     ax.set_xlabel("reference angle / deg")
-    ax.set_ylabel("error, zero of the run removed / arcsec")
+    ax.set_ylabel(f"error, zero of the run removed / {unit.name}")
     legend(ax)
     size = significant(float(np.ptp(curve.error)), 3)
     return described(
         ax,
         f"Error of {len(fit.runs)} runs over the angle and the fitted model, which spans {size} "
-        f"arcsec peak-to-peak in {len(fit.orders)} orders.",
+        f"{unit.name} peak-to-peak in {len(fit.orders)} orders.",
     )

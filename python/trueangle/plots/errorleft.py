@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from ..errors import ArgumentError
+from ..errorunits import ErrorsIn, error_unit
 from . import palette
 from .canvas import described, new_axes
 from .simulatedcurves import left_without
@@ -17,7 +18,7 @@ if TYPE_CHECKING:
 __all__ = ["error_left"]
 
 
-def error_left(diagnosis: Diagnosis, ax: Axes | None = None) -> Axes:
+def error_left(diagnosis: Diagnosis, ax: Axes | None = None, errors_in: ErrorsIn = "auto") -> Axes:
     """Rms left of held-out readings: with all causes in place, and with each one left out.
 
     The numbers are those of the findings' gains, so that they cannot say otherwise.
@@ -26,6 +27,9 @@ def error_left(diagnosis: Diagnosis, ax: Axes | None = None) -> Axes:
     ----------
     diagnosis : Diagnosis
     ax : matplotlib Axes, optional
+    errors_in : str or float
+        Unit of the errors, as for summaries: ``"auto"`` is arcsec, or degrees where one
+        reaches a degree.
 
     Returns
     -------
@@ -39,19 +43,21 @@ def error_left(diagnosis: Diagnosis, ax: Axes | None = None) -> Axes:
     steps = left_without(diagnosis)
     if not steps:
         raise ArgumentError("no finding of this diagnosis has a gain that carries over to new runs")
+    unit = error_unit(errors_in, max(diagnosis.noise, *(rms for _, rms in steps)))
+    noise = unit.per_arcsec * diagnosis.noise
     ax = new_axes(ax, height=1.4 + 0.4 * len(steps))
     place = list(range(len(steps)))
     bars = ax.barh(
         place,
-        [rms for _, rms in steps],
+        [unit.per_arcsec * rms for _, rms in steps],
         height=0.6,
         color=[palette.AFTER] + [palette.BEFORE] * (len(steps) - 1),
     )
-    ax.bar_label(bars, fmt="%.2f", padding=3, fontsize="small")
-    ax.axvline(diagnosis.noise, color=palette.ink(ax), linestyle="--", linewidth=1.0)
+    ax.bar_label(bars, [unit.number(rms) for _, rms in steps], padding=3, fontsize="small")
+    ax.axvline(noise, color=palette.ink(ax), linestyle="--", linewidth=1.0)
     ax.annotate(
-        f"noise {diagnosis.noise:.2f}",
-        (diagnosis.noise, 1.0),
+        f"noise {unit.number(diagnosis.noise)}",
+        (noise, 1.0),
         xycoords=("data", "axes fraction"),
         xytext=(0, 3),
         textcoords="offset points",
@@ -61,6 +67,7 @@ def error_left(diagnosis: Diagnosis, ax: Axes | None = None) -> Axes:
     ax.set_yticks(place, [name for name, _ in steps])
     ax.invert_yaxis()
     ax.margins(x=0.12)
-    ax.set_xlabel("rms of what is left of held-out readings / arcsec")
-    told = ", ".join(f"{name} {rms:.2f} arcsec" for name, rms in steps)
-    return described(ax, f"Rms left of held-out readings: {told}; noise {diagnosis.noise:.2f}.")
+    ax.set_xlabel(f"rms of what is left of held-out readings / {unit.name}")
+    told = ", ".join(f"{name} {unit.text(rms)}" for name, rms in steps)
+    noise_told = unit.text(diagnosis.noise)
+    return described(ax, f"Rms left of held-out readings: {told}; noise {noise_told}.")

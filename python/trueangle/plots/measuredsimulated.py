@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..errorunits import significant
+from ..errorunits import ErrorsIn, error_unit, significant
 from ..runs import CalibrationRun, as_runs
 from . import palette
 from .canvas import described, legend, new_axes, turn_axis
-from .curves import thinned
+from .curves import greatest, thinned
 from .simulatedcurves import simulated_points
 
 if TYPE_CHECKING:
@@ -25,7 +25,10 @@ _MOST = 6000
 
 
 def measured_and_simulated(
-    runs: CalibrationRun | Iterable[CalibrationRun], sim: Simulation, ax: Axes | None = None
+    runs: CalibrationRun | Iterable[CalibrationRun],
+    sim: Simulation,
+    ax: Axes | None = None,
+    errors_in: ErrorsIn = "auto",
 ) -> Axes:
     """Measured error, the simulated one at the same readings, and their difference.
 
@@ -34,6 +37,9 @@ def measured_and_simulated(
     runs : CalibrationRun or iterable of them
     sim : Simulation
     ax : matplotlib Axes, optional
+    errors_in : str or float
+        Unit of the errors, as for summaries: ``"auto"`` is arcsec, or degrees where one
+        reaches a degree.
 
     Returns
     -------
@@ -41,7 +47,10 @@ def measured_and_simulated(
     """
     found = as_runs(runs)
     ax = new_axes(ax)
-    pairs = simulated_points(found, sim)
+    expected = simulated_points(found, sim)
+    largest = greatest(points for pair in expected for points in pair)
+    unit = error_unit(errors_in, largest, found[0].period)
+    pairs = [(m.scaled(unit.per_arcsec), s.scaled(unit.per_arcsec)) for m, s in expected]
     # The difference stands below the two, on a line of its own: nothing hides another.
     rest = np.concatenate([m.y - s.y for m, s in pairs])
     lowest = min(float(points.y.min()) for pair in pairs for points in pair)
@@ -74,10 +83,10 @@ def measured_and_simulated(
     texts = [f"{tick:g}".replace("-", "\N{MINUS SIGN}") for tick in ticks]
     ax.set_yticks([down, *ticks], ["0", *texts])
     ax.set_xlabel("reference angle / deg")
-    ax.set_ylabel("error / arcsec")
+    ax.set_ylabel(f"error / {unit.name}")
     legend(ax)
     return described(
         ax,
         f"Measured and simulated error of {len(found)} runs over the angle; they differ by "
-        f"{significant(float(rest.std()), 3)} arcsec rms.",
+        f"{significant(float(rest.std()), 3)} {unit.name} rms.",
     )

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..errorunits import ErrorsIn, error_unit
 from ..fitting.phases import run_phases
 from . import palette
 from .canvas import described, grid, new_axes
@@ -21,8 +22,13 @@ __all__ = ["phases_over_runs"]
 _MOST_ORDERS = 12
 
 
-def phases_over_runs(fit: FitResult, ax: Axes | None = None, most: int = _MOST_ORDERS) -> Axes:
-    """Phase (angle) and amplitude (radius, arcsec) of every order in every run.
+def phases_over_runs(
+    fit: FitResult,
+    ax: Axes | None = None,
+    most: int = _MOST_ORDERS,
+    errors_in: ErrorsIn = "auto",
+) -> Axes:
+    """Phase (angle) and amplitude (radius) of every order in every run.
 
     A point is one run fitted by itself with the fit's orders; points of one order that
     stay together are a systematic error, points spread around the turn are none.
@@ -33,6 +39,9 @@ def phases_over_runs(fit: FitResult, ax: Axes | None = None, most: int = _MOST_O
     ax : matplotlib PolarAxes, optional
     most : int
         Draw only so many orders, the largest.
+    errors_in : str or float
+        Unit of the errors, as for summaries: ``"auto"`` is arcsec, or degrees where one
+        reaches a degree.
 
     Returns
     -------
@@ -44,13 +53,15 @@ def phases_over_runs(fit: FitResult, ax: Axes | None = None, most: int = _MOST_O
         No run holds the orders by itself.
     """
     found = sorted(run_phases(fit), key=lambda p: -float(p.amplitude.mean()))[:most]
+    top = max((float(p.amplitude.max()) for p in found), default=1.0)
+    unit = error_unit(errors_in, top, fit.model.period)
     polar: Any = new_axes(ax, polar=True)
     for i, order in enumerate(sorted(found, key=lambda p: p.order)):
         colour = palette.run_colour(i)
         marker = palette.run_marker(i)
         polar.plot(
             order.phase,
-            order.amplitude,
+            unit.per_arcsec * order.amplitude,
             linestyle="none",
             marker=marker,
             markersize=5.0,
@@ -60,13 +71,14 @@ def phases_over_runs(fit: FitResult, ax: Axes | None = None, most: int = _MOST_O
         )
         # From the middle of the cluster to the centre: which phase it stands for.
         mean = np.mean(order.amplitude * np.exp(1j * order.phase))
-        polar.plot([0.0, np.angle(mean)], [0.0, abs(mean)], color=colour, linewidth=0.8)
+        polar.plot(
+            [0.0, np.angle(mean)], [0.0, unit.per_arcsec * abs(mean)], color=colour, linewidth=0.8
+        )
     polar.set_rmin(0.0)
-    top = max((float(p.amplitude.max()) for p in found), default=1.0)
-    polar.set_rmax(1.1 * top)
+    polar.set_rmax(1.1 * unit.per_arcsec * top)
     polar.set_rlabel_position(112.5)
     polar.set_xticks(np.radians(np.arange(0, 360, 45)))
-    polar.set_xlabel("angle: phase / deg; radius: amplitude / arcsec")
+    polar.set_xlabel(f"angle: phase / deg; radius: amplitude / {unit.name}")
     grid(polar)
     if len(polar.get_figure(root=True).axes) > 1:
         # Below, where no neighbour of a row of axes stands.

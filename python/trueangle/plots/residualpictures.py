@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..errorunits import significant
+from ..errorunits import ErrorsIn, error_unit, significant
 from . import palette
 from .canvas import described, grid, legend, new_axes, turn_axis
-from .curves import SIGNALS, Points, residual_points, seen_span, thinned
+from .curves import SIGNALS, Points, greatest, residual_points, seen_span, thinned
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -23,7 +23,12 @@ _MOST = 4000
 _BINS, _ENOUGH = 36, 360
 
 
-def residuals(fit: FitResult, against: str = "angle", ax: Axes | None = None) -> Axes:
+def residuals(
+    fit: FitResult,
+    against: str = "angle",
+    ax: Axes | None = None,
+    errors_in: ErrorsIn = "auto",
+) -> Axes:
     """What the model leaves of every reading, against a signal that it may depend on.
 
     The black line joins medians of bins: anything but a flat line at zero is an error
@@ -34,6 +39,9 @@ def residuals(fit: FitResult, against: str = "angle", ax: Axes | None = None) ->
     fit : FitResult
     against : {"angle", "time", "speed", "temperature", "direction", "torque"}
     ax : matplotlib Axes, optional
+    errors_in : str or float
+        Unit of the errors, as for summaries: ``"auto"`` is arcsec, or degrees where one
+        reaches a degree.
 
     Returns
     -------
@@ -44,7 +52,9 @@ def residuals(fit: FitResult, against: str = "angle", ax: Axes | None = None) ->
     ArgumentError
         An unknown signal, or one that no run has.
     """
-    points = residual_points(fit, against)
+    found = residual_points(fit, against)
+    unit = error_unit(errors_in, greatest(found), fit.model.period)
+    points = [part.scaled(unit.per_arcsec) for part in found]
     ax = new_axes(ax, height=3.4)
     if against == "direction":
         _boxes(ax, points)
@@ -68,13 +78,13 @@ def residuals(fit: FitResult, against: str = "angle", ax: Axes | None = None) ->
     if against == "angle":
         turn_axis(ax, *seen_span(fit.model))
     ax.set_xlabel(SIGNALS[against])
-    ax.set_ylabel("residual / arcsec")
+    ax.set_ylabel(f"residual / {unit.name}")
     legend(ax)
     rest = np.concatenate([part.y for part in points])
     return described(
         ax,
         f"What the model leaves of {rest.size} readings against {against}: "
-        f"{significant(float(rest.std()), 3)} arcsec standard deviation.",
+        f"{significant(float(rest.std()), 3)} {unit.name} standard deviation.",
     )
 
 

@@ -148,6 +148,7 @@ def report(
     title: None = None,
     certificate: Identity | str | PathLike[str],
     positions: int | None = None,
+    errors_in: ErrorsIn = "auto",
 ) -> Certificate: ...
 
 
@@ -191,9 +192,9 @@ def report(
         report says in its first lines how it was made, what it is blind to, and what it
         leaves of these runs.
     errors_in : str or float
-        Unit of every error on the page: ``"arcsec"``, ``"deg"``, ``"mrad"``, ``"count"``, or
-        the counts of a turn; ``"auto"`` is arcsec, or degrees where an error reaches a
-        degree. The content stays in arcsec.
+        Unit of every error on the page or in the certificate: ``"arcsec"``, ``"deg"``,
+        ``"mrad"``, ``"count"``, or the counts of a turn; ``"auto"`` is arcsec, or degrees
+        where an error reaches a degree. The content stays in arcsec.
 
     Returns
     -------
@@ -223,13 +224,12 @@ def report(
     if certificate is not None:
         if title is not None:
             raise ArgumentError("a certificate has no title of its own: its identity names it")
-        if errors_in != "auto":
-            raise ArgumentError("errors_in is for reports: a certificate states arcsec")
         certified = certify(
             found,
             certificate,
             orders=orders,
             positions=positions,
+            errors_in=errors_in,
             **gear_of(joint),
         )
         if path is not None:

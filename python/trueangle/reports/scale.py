@@ -73,12 +73,11 @@ class Scale:
 
     def points(self, points: Points) -> Points:
         """Readings of a run in the unit."""
-        return Points(points.label, points.x, self.of(points.y))
+        return points.scaled(self.factor)
 
     def curve(self, curve: Curve) -> Curve:
         """A model in the unit."""
-        std = None if curve.std is None else self.of(curve.std)
-        return Curve(curve.angle, self.of(curve.error), std)
+        return curve.scaled(self.factor)
 
     def to_dict(self) -> dict[str, Any]:
         """For the content: the unit of the page, beside numbers that stay in arcsec."""
