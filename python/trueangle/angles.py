@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-from typing import Final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .errors import ArgumentError
+from .turns import ARCSEC_PER_DEG, ARCSEC_PER_TURN, UNIT_PERIODS
 
 __all__ = [
     "ARCSEC_PER_DEG",
@@ -20,12 +20,6 @@ __all__ = [
     "unit_name",
     "wrap",
 ]
-
-ARCSEC_PER_DEG: Final = 3600.0
-ARCSEC_PER_TURN: Final = 360.0 * ARCSEC_PER_DEG
-
-#: Units by the suffix of a column name. Counts have no fixed period.
-UNIT_PERIODS: Final = {"deg": 360.0, "rad": 2.0 * math.pi, "turn": 1.0}
 
 
 def check_period(period: float) -> float:

@@ -8,11 +8,10 @@ from __future__ import annotations
 
 import math
 import re
-from dataclasses import dataclass
-from typing import Final, TypeAlias
+from typing import Final, NamedTuple, TypeAlias
 
-from .angles import ARCSEC_PER_TURN, UNIT_PERIODS
 from .errors import ArgumentError
+from .turns import ARCSEC_PER_TURN, UNIT_PERIODS
 
 __all__ = ["ERROR_UNITS", "ErrorUnit", "ErrorsIn", "error_unit", "significant"]
 
@@ -35,8 +34,7 @@ _SIZE: Final = re.compile(r"(-?\d+(?:\.\d+)?(?:e[+-]?\d+)?) arcsec\b")
 _MOST_DECIMALS: Final = 12
 
 
-@dataclass(frozen=True)
-class ErrorUnit:
+class ErrorUnit(NamedTuple):
     """A unit, and how many of it one second of arc is.
 
     Examples

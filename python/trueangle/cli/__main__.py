@@ -1,7 +1,5 @@
 """``python -m trueangle.cli``."""
 
-import sys
+from . import process
 
-from . import main
-
-sys.exit(main())
+process()

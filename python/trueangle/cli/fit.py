@@ -63,7 +63,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def add_joint(parser: argparse.ArgumentParser) -> None:
     """Options that tell what joint the readings are of; shared by several commands."""
-    from ..shafts import FIXED_MEMBERS
+    from ..joint.members import FIXED_MEMBERS
 
     parser.add_argument("--gear-ratio", type=float, metavar="R", help="motor turns per output turn")
     parser.add_argument(

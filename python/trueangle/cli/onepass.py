@@ -7,7 +7,6 @@ import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ..angles import arcsec
 from ..errors import ArgumentError
 from ..errorunits import error_unit
 from .error_units import errors_in
@@ -120,6 +119,8 @@ def printed_orders(args: argparse.Namespace) -> int:
         raise ArgumentError(
             "--orders, --method and --reference-orders do not go with logs in one pass"
         )
+    from ..angles import arcsec
+
     found = fit_in_one_pass(args, None)
     result = found.to_dict()
     if args.json:

@@ -6,7 +6,6 @@ import argparse
 from collections.abc import Sequence
 from typing import Any
 
-from ..columns import role_kind, wanted_unit
 from ..errors import ArgumentError
 
 __all__ = ["ROLES", "add_signals", "reading", "signal_argument", "signals_by_joint"]
@@ -59,6 +58,8 @@ def signal_argument(text: str) -> _Entry:
     >>> signal_argument("arm.torque=tau"), signal_argument("reference=IOC:m1.RBV")
     (('arm', 'torque', 'tau', None), (None, 'reference', 'IOC:m1.RBV', None))
     """
+    from ..columns import role_kind, wanted_unit  # takes numpy, which a help does without
+
     left, equals, name = text.partition("=")
     joint, _, role = left.rpartition(".")
     if not equals or not name or not role:

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import hashlib
 import io
 import os
-import select
 import stat
 from os import PathLike
 from typing import Final
@@ -121,6 +119,8 @@ def _wait_for(file: io.FileIO) -> io.FileIO:
     A signal between Python's last look for signals and the system call of ``read`` only leaves
     a mark that nobody looks at until bytes come. Short waits look at it ten times a second.
     """
+    import select  # pipes only
+
     if hasattr(select, "poll"):  # Windows waits for sockets only
         poll = select.poll()
         poll.register(file, select.POLLIN)
@@ -131,6 +131,8 @@ def _wait_for(file: io.FileIO) -> io.FileIO:
 
 def sha256_of(path: str | PathLike[str]) -> str:
     """Hexadecimal sha256 of a regular file, in constant memory."""
+    import hashlib  # brings OpenSSL with it
+
     with open(path, "rb") as file:
         return hashlib.file_digest(file, "sha256").hexdigest()
 

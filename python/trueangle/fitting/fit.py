@@ -14,13 +14,8 @@ from ..units import check_follows
 from ..validity import check_invertible
 from .argument import ARGUMENTS, AnyArgument, Choice, choose_argument
 from .breakdown import breakdown_sentence
-from .laterstretch import check_later_stretch
-from .likeness import unlike_runs, unlike_sentence
-from .newrun import check_new_run
-from .nuisance import asked_nuisance, likely_orders, take_out, take_out_beside
 from .problem import Problem
 from .result import FitResult
-from .ridge import choose_ridge
 from .robust import Loss, weigh, without_spikes
 from .travel import CONDITION, travelled_span
 from .uncertainty import CovarianceKind, check_covariance
@@ -143,10 +138,12 @@ def fit(
     for run in found:
         check_follows(run)
     selection = None
-    beside = _Beside(asked_nuisance(nuisance), tuple(map(float, reference_orders)))
+    beside = _beside(nuisance, reference_orders)
     given = found
     if orders is None or isinstance(orders, str):
         if beside.wanted:
+            from .nuisance import likely_orders, take_out
+
             likely = likely_orders(found, gear_ratio, fixed_member, shafts)
             found, _ = take_out(given, beside.kinds, likely, _angle(argument), beside.reference)
         sought = {
@@ -161,13 +158,18 @@ def fit(
     wanted = resolve_orders(orders, gear_ratio, fixed_member, shafts)
     taken = None
     if beside.wanted:
+        from .nuisance import likely_orders, take_out_beside
+
         likely = likely_orders(given, gear_ratio, fixed_member, shafts)
         found, taken = take_out_beside(
             given, beside.kinds, wanted, likely, _angle(argument), beside.reference
         )
     if selection is not None:
         choice = Choice(selection.argument)
-        check_new_run(found, wanted, choice.argument)
+        if len(found) > 1:
+            from .newrun import check_new_run
+
+            check_new_run(found, wanted, choice.argument)
     else:
         choice = choose_argument(found, argument, wanted)
     problem = Problem(found, wanted, choice.argument, method, threads)
@@ -177,9 +179,15 @@ def fit(
         tame = (
             span.full and problem.is_periodic
         ) or weighted.fitted.solution.condition_number < CONDITION
-        ridge = 0.0 if tame else choose_ridge(problem, weighted.weights or problem.base)
+        ridge = 0.0
+        if not tame:
+            from .ridge import choose_ridge
+
+            ridge = choose_ridge(problem, weighted.weights or problem.base)
     fitted = weighted.fitted
     if selection is not None:
+        from .laterstretch import check_later_stretch
+
         check_later_stretch(problem, weighted.weights or problem.base)
     if ridge > 0.0:
         fitted = problem.penalised(fitted, weighted.weights or problem.base, ridge)
@@ -189,11 +197,14 @@ def fit(
     remarks = list(filter(None, (choice.note, breakdown_sentence(problem, weighted))))
     if taken is not None:
         remarks += taken.sentences(problem.period)
-    unlike = unlike_runs(problem, fitted)
-    if unlike:
-        labels = [found[i].label or str(i + 1) for i in unlike]
-        remarks.append(unlike_sentence(labels, len(found)))
-        warnings.warn(remarks[-1], UnlikeRunsWarning, stacklevel=2)
+    if len(found) > 1:
+        from .likeness import unlike_runs, unlike_sentence
+
+        unlike = unlike_runs(problem, fitted)
+        if unlike:
+            labels = [found[i].label or str(i + 1) for i in unlike]
+            remarks.append(unlike_sentence(labels, len(found)))
+            warnings.warn(remarks[-1], UnlikeRunsWarning, stacklevel=2)
     return FitResult(
         problem,
         fitted,
@@ -219,6 +230,15 @@ class _Beside(NamedTuple):
     def wanted(self) -> bool:
         """Whether anything is fitted beside the pattern."""
         return self.kinds != () or bool(self.reference)
+
+
+def _beside(nuisance: str | Iterable[str], reference_orders: Iterable[float]) -> _Beside:
+    lines = tuple(map(float, reference_orders))
+    if nuisance == "none":
+        return _Beside((), lines)
+    from .nuisance import asked_nuisance
+
+    return _Beside(asked_nuisance(nuisance), lines)
 
 
 def _angle(argument: AnyArgument) -> Argument:

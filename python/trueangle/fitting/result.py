@@ -15,7 +15,6 @@ from ..model import HarmonicModel
 from ..runs import CalibrationRun
 from .coefficients import Coefficients
 from .model import build_model, fit_notes
-from .nuisance import Nuisance
 from .problem import Fitted, Problem
 from .robust import Weighted
 from .travel import Span
@@ -25,6 +24,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
     from ..orders.select import OrderSelection
+    from .nuisance import Nuisance
 
 __all__ = ["FitResult"]
 

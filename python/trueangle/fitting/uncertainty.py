@@ -23,7 +23,6 @@ from .correlation import (
 )
 from .penalty import bias_covariance, pattern_variances
 from .problem import Fitted, Problem
-from .ridge import REACH, error_range
 
 __all__ = [
     "COVARIANCES",
@@ -184,6 +183,8 @@ def _bias(
     problem: Problem, fitted: Fitted, weights: Sequence[Array | None], penalty: float
 ) -> Array:
     """What a penalty may have taken from the coefficients, as a covariance (see `penalty`)."""
+    from .ridge import REACH, error_range
+
     used = [i for i in range(len(problem.runs)) if not np.isnan(fitted.offsets[i])]
     parts = [sums_of(problem, weights, i, 1)[0] for i in used]
     means = [part[0] / part[0, 0] for part in parts]

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from ..errors import ArgumentError
-from .shafts import FIXED_MEMBERS
+from .members import FIXED_MEMBERS
 
 __all__ = [
     "COMMON_RATIOS",

@@ -6,7 +6,8 @@ from dataclasses import dataclass
 
 from ..errors import ArgumentError
 from .declared import Bearing, DeclaredShaft, Head
-from .shafts import FIXED_MEMBERS, shaft_cycles
+from .members import FIXED_MEMBERS
+from .shafts import shaft_cycles
 
 __all__ = ["Joint"]
 

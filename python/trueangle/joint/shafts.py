@@ -10,12 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import ArgumentError
+from .members import FIXED_MEMBERS
 
 __all__ = ["FIXED_MEMBERS", "Shaft", "ShaftOrders", "resolve_orders", "shaft_cycles"]
 
 Array: TypeAlias = NDArray[np.float64]
-
-FIXED_MEMBERS = ("circular_spline", "flexspline", "none")
 
 #: Turns of the wave generator against the output member, less those of the motor.
 _WAVE_GENERATOR = {"circular_spline": 1.0, "flexspline": -1.0, "none": 0.0}

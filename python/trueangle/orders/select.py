@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 from ..aliasing import distinct_positions
 from ..errors import ArgumentError
 from ..fitting.argument import AnyArgument, at_indicated, choose_argument
-from ..fitting.nuisance import asked_nuisance, likely_orders, take_out
 from ..fitting.travel import over_turns
 from ..fitting.uncertainty import CovarianceKind, check_covariance
 from ..runs import CalibrationRun, as_runs
@@ -121,8 +120,15 @@ def select_orders(
     if not kept:
         raise ArgumentError("all readings have weight 0: nothing is left to select orders from")
     said: tuple[str, ...] = ()
-    kinds, lines = asked_nuisance(nuisance), tuple(map(float, reference_orders))
+    lines = tuple(map(float, reference_orders))
+    kinds: tuple[str, ...] | None = ()
+    if nuisance != "none":
+        from ..fitting.nuisance import asked_nuisance
+
+        kinds = asked_nuisance(nuisance)
     if kinds != () or (lines and len(kept) > 1):
+        from ..fitting.nuisance import likely_orders, take_out
+
         likely = likely_orders(kept, gear_ratio, fixed_member, shafts)
         angle = "indicated" if argument == "indicated" else "reference"
         cleaned, taken = take_out(kept, kinds, likely, angle, lines if len(kept) > 1 else ())

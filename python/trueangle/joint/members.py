@@ -1,0 +1,9 @@
+"""Which member of a strain wave gear stands still."""
+
+from __future__ import annotations
+
+from typing import Final
+
+__all__ = ["FIXED_MEMBERS"]
+
+FIXED_MEMBERS: Final = ("circular_spline", "flexspline", "none")
