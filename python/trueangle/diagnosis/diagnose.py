@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -12,36 +11,28 @@ from numpy.typing import NDArray
 from ..checks.check import faults_of
 from ..checks.record import records_of
 from ..effects import EFFECTS
-from ..effects.blindness import Blindness
-from ..effects.scatter import NEW_SCATTER, ScatterFinding
 from ..effects.wrong_gear_ratio import WrongGearRatio
 from ..errors import ArgumentError
 from ..joining import MeasuredMinusSimulated, minus_simulated
-from ..joint.signals import Signals, join_runs
+from ..joint.signals import join_runs
 from ..pace import Pace, pace, paced
 from ..regression.estimate import quantity
 from ..regression.regression import Regression
 from ..runs import CalibrationRun, as_runs
 from ..simulation.simulation import Simulation
-from .believed import corrected_effects, judged_beliefs
+from .account import account_of
+from .believed import judged_beliefs
 from .discrepancy import compare, unfolded_error
 from .findings import Diagnosis, Finding
-from .gearratio import Ratio, aligned, find_ratio
+from .gearedlines import Ratio
 from .goodness import goodness_of_fit
-from .identifiability import blind_spots
 from .named import findings_of, reconsidered, scatter_doubt, scatter_finding
-from .penalty import NEW_CAUSE, misfit_of_scatter, total_penalty
 from .remainder import leftover_of, unexplained_after
-from .selection import select
-from .unnamed import is_named
 from .wrongplace import moved
 
-__all__ = ["MOST_READINGS", "diagnose"]
+__all__ = ["diagnose"]
 
 Array = NDArray[np.float64]
-
-#: Readings used at most: beyond, one of every so many in a row is drawn at random.
-MOST_READINGS = 40_000
 
 #: Fewest readings that can support a cause.
 LEAST_READINGS = 20
@@ -137,7 +128,7 @@ def diagnose(
 def _diagnosis(
     measured: list[CalibrationRun],
     log: MeasuredMinusSimulated | None,
-    sim: Simulation,
+    stated: Simulation,
     gain: bool,
 ) -> Diagnosis:
     at = pace()
@@ -148,34 +139,28 @@ def _diagnosis(
             f"{len(every)} readings cannot support a diagnosis: give at least {LEAST_READINGS}"
         )
     error = unfolded_error(found)
-    stated = sim
-    ratio = find_ratio(sim, every, error)
-    if ratio is not None:
-        sim = ratio.simulation
-        every = aligned(sim, every, error)
-    rows = _subsample(len(every))
-    signals = every if rows is None else every.take(rows)
-    part = error if rows is None else error[rows]
     with at.part(FOR_CHOICE):
-        account, believed = _believed_account(signals, part, sim)
-    start, chosen = account.start, account.chosen
+        account = account_of(every, error, stated)
+    seen = account.seen
+    sim, every, signals, rows = seen.sim, seen.every, seen.signals, seen.rows
+    start, chosen = account.choice.start, account.choice.chosen
     rest = unexplained_after(chosen, sim.sigma_arcsec or None)
     with at.part(FOR_FINDINGS):
-        findings, spots, doubtful = findings_of(chosen, account.spots, gain, rest.size)
+        findings, spots, doubtful = findings_of(chosen, account.choice.spots, gain, rest.size)
     if doubtful and not rest.found and not at.cut:
         # What is not confirmed explains nothing.
         rest = unexplained_after(chosen, sim.sigma_arcsec or None, without=doubtful)
         if rest.found:
             findings = reconsidered(chosen, findings, rest.size)
-    beliefs, corrected = judged_beliefs(chosen, sim, believed, spots, gain)
+    beliefs, corrected = judged_beliefs(chosen, sim, account.believed, spots, gain)
     in_doubt = any(spot.supported for spot in spots)
-    for item in account.scatter:
+    for item in account.choice.scatter:
         if in_doubt and item.size < OUTLYING_ANYWAY:
             spots.append(scatter_doubt(item))
         else:
             findings.append(scatter_finding(item, rest.size))
-    if ratio is not None:
-        findings.append(_ratio_finding(ratio))
+    if seen.ratio is not None:
+        findings.append(_ratio_finding(seen.ratio))
     findings.sort(key=lambda finding: (not finding.confirmed, -finding.evidence["bic_gain"]))
     extended = corrected.with_effects(
         effect for finding in findings if finding.confirmed for effect in finding.effects
@@ -217,24 +202,6 @@ def _incomplete(at: Pace, gain: bool) -> str:
     return f"INCOMPLETE: {why} while {at.cut}; {means}"
 
 
-def _believed_account(
-    signals: Signals, error: Array, sim: Simulation
-) -> tuple[_Account, Simulation]:
-    """The account, and the simulation with the effects it claims as the readings show them."""
-    account = _account(signals, error, sim)
-    believed = sim
-    # Twice each: what one was taken for is only known once the others are right.
-    for _ in range(2 * len(sim.effects)):
-        other = None if pace().over else corrected_effects(account.chosen, believed, sim)
-        if other is None:
-            break
-        tried = _account(signals, error, other)
-        if total_penalty(tried.chosen) >= total_penalty(account.chosen):
-            break
-        account, believed = tried, other
-    return account, believed
-
-
 def _ratio_finding(ratio: Ratio) -> Finding:
     """All lines of the geared shafts at another ratio, as one cause."""
     parameters = {
@@ -246,46 +213,6 @@ def _ratio_finding(ratio: Ratio) -> Finding:
     return Finding(WrongGearRatio.kind, parameters, {"bic_gain": min(z * z, 1e12)}, None, [])
 
 
-@dataclass(frozen=True)
-class _Account:
-    """What was chosen for readings against a simulation."""
-
-    start: Regression
-    chosen: Regression
-    scatter: list[ScatterFinding]
-    spots: list[Blindness]
-
-
-def _account(signals: Signals, error: Array, sim: Simulation) -> _Account:
-    """Choose the causes by which readings differ from a simulation."""
-    residual = error - sim.predict(signals)
-    start = Regression(signals, residual, sim.surroundings)
-    spots = blind_spots(start)
-    chosen = select(start)
-    scatter: list[ScatterFinding] = []
-    if pace().over:
-        return _Account(start, chosen, scatter, spots)  # what is left is no scatter yet
-    uneven = next(iter(_scatter(chosen, weighs=True)), None)
-    if uneven is not None and uneven.bic_gain > NEW_SCATTER + misfit_of_scatter(start, chosen):
-        scatter.append(uneven)
-        start = Regression(signals, residual, sim.surroundings, uneven.weights, start.lines)
-        chosen = select(start, chosen.terms)
-    if not all(map(is_named, chosen.terms)) and not unexplained_after(chosen).found:
-        chosen = select(start, unnamed=False)
-    scatter += [i for i in _scatter(chosen, weighs=False) if i.bic_gain > NEW_CAUSE]
-    return _Account(start, chosen, scatter, spots)
-
-
-def _scatter(regression: Regression, weighs: bool) -> list[ScatterFinding]:
-    """Causes of the scatter, of those that weigh readings or not, strongest first."""
-    found = [
-        item
-        for effect in EFFECTS.values()
-        if effect.weighs == weighs and (item := effect.find_scatter(regression)) is not None
-    ]
-    return sorted(found, key=lambda item: -item.bic_gain)
-
-
 def _structure(start: Regression) -> dict[str, float]:
     """Share of the variance that each cause would explain alone, largest first."""
     alone = {
@@ -294,15 +221,6 @@ def _structure(start: Regression) -> dict[str, float]:
         if (extension := start.memory.get((cause,))) is not None and extension.bic_gain > 0.0
     }
     return dict(sorted(alone.items(), key=lambda item: -item[1]))
-
-
-def _subsample(n: int) -> NDArray[np.int64] | None:
-    """One reading of every so many in a row, at random within each; None where all fit."""
-    if n <= MOST_READINGS:
-        return None
-    edges = np.linspace(0, n, MOST_READINGS + 1).astype(np.int64)
-    rng = np.random.default_rng(0)
-    return edges[:-1] + (rng.random(MOST_READINGS) * np.diff(edges)).astype(np.int64)
 
 
 def _overall(before: Regression, after: Regression) -> dict[str, float]:

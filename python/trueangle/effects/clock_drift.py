@@ -88,6 +88,7 @@ class ClockDrift(Effect):
         ramps = (signals.theta[:, None], signals.velocity[:, None], signals.clock[:, None])
         if share_left(regression, column, *ramps) < OWN_OF_VELOCITY:
             yield cls.blind(
-                "one speed in one direction: a ramp in time times speed is a ramp in angle",
+                "each run has one speed and at most one reversal: a ramp in time times speed is "
+                "a ramp in angle",
                 ScaleError,
             )

@@ -1,0 +1,198 @@
+"""Account of readings: the causes chosen, against the simulation or nearly it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..effects import EFFECTS
+from ..effects.blindness import Blindness
+from ..effects.scatter import NEW_SCATTER, ScatterFinding
+from ..joint.signals import Signals
+from ..pace import pace
+from ..regression.regression import Regression
+from ..simulation.simulation import Simulation
+from .believed import corrected_effects
+from .gearedlines import Ratio
+from .gearratio import aligned, find_ratio, near_ratio
+from .identifiability import blind_spots
+from .penalty import NEW_CAUSE, misfit_of_scatter, total_penalty
+from .remainder import unexplained_after
+from .selection import select
+from .unnamed import is_named
+
+__all__ = ["MOST_READINGS", "Account", "account_of"]
+
+Array = NDArray[np.float64]
+
+#: Readings used at most: beyond, one of every so many in a row is drawn at random.
+MOST_READINGS = 40_000
+
+
+@dataclass(frozen=True)
+class Choice:
+    """What was chosen for readings against a simulation.
+
+    Attributes
+    ----------
+    start, chosen : Regression
+    scatter : list of ScatterFinding
+    spots : list of Blindness
+    """
+
+    start: Regression
+    chosen: Regression
+    scatter: list[ScatterFinding]
+    spots: list[Blindness]
+
+
+@dataclass(frozen=True)
+class Seen:
+    """Readings as they are held against a simulation.
+
+    Attributes
+    ----------
+    sim : Simulation
+        As stated, but with the ratio of the readings.
+    ratio : Ratio or None
+        A gear ratio that is not the stated one.
+    every, signals : Signals
+        All readings, and those that are used.
+    error : ndarray
+        Of those that are used, arcsec.
+    rows : ndarray or None
+        Places of the latter among the former; None where all are used.
+    """
+
+    sim: Simulation
+    ratio: Ratio | None
+    every: Signals
+    signals: Signals
+    error: Array
+    rows: NDArray[np.int64] | None
+
+    @classmethod
+    def of(cls, every: Signals, error: Array, sim: Simulation, ratio: Ratio | None) -> Seen:
+        """With another ratio, or as the simulation states it."""
+        if ratio is not None:
+            sim = ratio.simulation
+            every = aligned(sim, every, error)
+        rows = _subsample(len(every))
+        if rows is None:
+            return cls(sim, ratio, every, every, error, None)
+        return cls(sim, ratio, every, every.take(rows), error[rows], rows)
+
+
+@dataclass(frozen=True)
+class Account:
+    """What was chosen, and what it was chosen against.
+
+    Attributes
+    ----------
+    seen : Seen
+    choice : Choice
+    believed : Simulation
+        The simulation with the effects it claims as the readings show them.
+    """
+
+    seen: Seen
+    choice: Choice
+    believed: Simulation
+
+
+def account_of(every: Signals, error: Array, sim: Simulation) -> Account:
+    """Choose the causes by which readings differ from a simulation.
+
+    Parameters
+    ----------
+    every : Signals
+    error : ndarray
+        Measured error, arcsec.
+    sim : Simulation
+
+    Returns
+    -------
+    Account
+        The better one where the ratio may be another one.
+    """
+    ratio = find_ratio(sim, every, error)
+    account = _believed(Seen.of(every, error, sim, ratio))
+    near = None if ratio else near_ratio(sim, every, error)
+    if near is None or pace().over:
+        return account
+    seen = Seen.of(every, error, sim, near)
+    chosen = account.choice.chosen
+    if not _helps(seen, chosen):
+        return account
+    other = _believed(seen)
+    better = total_penalty(other.choice.chosen) < total_penalty(chosen) - NEW_CAUSE
+    return other if better else account
+
+
+def _helps(seen: Seen, chosen: Regression) -> bool:
+    """Whether another ratio helps, alone or beside what was chosen; a whole account is slower."""
+    start = _start(seen, seen.sim)
+    hopes = (start, start.with_terms(chosen.terms))
+    return min(map(total_penalty, hopes)) < total_penalty(chosen)
+
+
+def _believed(seen: Seen) -> Account:
+    """The account, and the simulation with the effects it claims as the readings show them."""
+    choice, believed = _chosen(seen, seen.sim), seen.sim
+    # Twice each: what one was taken for is only known once the others are right.
+    for _ in range(2 * len(seen.sim.effects)):
+        other = None if pace().over else corrected_effects(choice.chosen, believed, seen.sim)
+        if other is None:
+            break
+        tried = _chosen(seen, other)
+        if total_penalty(tried.chosen) >= total_penalty(choice.chosen):
+            break
+        choice, believed = tried, other
+    return Account(seen, choice, believed)
+
+
+def _start(seen: Seen, sim: Simulation) -> Regression:
+    """The readings against a simulation, without any cause."""
+    return Regression(seen.signals, seen.error - sim.predict(seen.signals), sim.surroundings)
+
+
+def _chosen(seen: Seen, sim: Simulation) -> Choice:
+    """Choose the causes by which readings differ from a simulation."""
+    start = _start(seen, sim)
+    spots = blind_spots(start)
+    chosen = select(start)
+    scatter: list[ScatterFinding] = []
+    if pace().over:
+        return Choice(start, chosen, scatter, spots)  # what is left is no scatter yet
+    uneven = next(iter(_scatter(chosen, weighs=True)), None)
+    if uneven is not None and uneven.bic_gain > NEW_SCATTER + misfit_of_scatter(start, chosen):
+        scatter.append(uneven)
+        start = Regression(
+            seen.signals, start.residual, sim.surroundings, uneven.weights, start.lines
+        )
+        chosen = select(start, chosen.terms)
+    if not all(map(is_named, chosen.terms)) and not unexplained_after(chosen).found:
+        chosen = select(start, unnamed=False)
+    scatter += [i for i in _scatter(chosen, weighs=False) if i.bic_gain > NEW_CAUSE]
+    return Choice(start, chosen, scatter, spots)
+
+
+def _scatter(regression: Regression, weighs: bool) -> list[ScatterFinding]:
+    """Causes of the scatter, of those that weigh readings or not, strongest first."""
+    found = [
+        item
+        for effect in EFFECTS.values()
+        if effect.weighs == weighs and (item := effect.find_scatter(regression)) is not None
+    ]
+    return sorted(found, key=lambda item: -item.bic_gain)
+
+
+def _subsample(n: int) -> NDArray[np.int64] | None:
+    """One reading of every so many in a row, at random within each; None where all fit."""
+    if n <= MOST_READINGS:
+        return None
+    edges = np.linspace(0, n, MOST_READINGS + 1).astype(np.int64)
+    rng = np.random.default_rng(0)
+    return edges[:-1] + (rng.random(MOST_READINGS) * np.diff(edges)).astype(np.int64)
