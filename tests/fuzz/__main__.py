@@ -1,18 +1,21 @@
-"""Fuzzing of every loader: ``python tests/fuzz --cases 20000 --seed 7 [--loader model]``.
+"""Fuzzing of every loader: ``python tests/fuzz --cases 1000000 --seed 7 [--loader model]``.
 
 Each case is one damaged file, made from the seed and its number alone. It must end within
 five seconds of the processor and 1 GiB beyond what was in use, either accepted or refused by a
-`TrueAngleError`. What does not is printed with the command that repeats it.
+`TrueAngleError`. What does not is printed with the command that repeats it. Stopped before
+its end (Ctrl-C, or SIGTERM), it says how many cases each loader has reached.
 """
 
 from __future__ import annotations
 
 import argparse
 import contextlib
+import gc
 import os
 import random
 import resource
 import shutil
+import signal
 import subprocess
 import sys
 import tempfile
@@ -20,7 +23,9 @@ import time
 import traceback
 import warnings
 import zlib
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
+from types import FrameType
 
 #: Of the processor, for a case; and of the clock, after which it counts as hanging.
 SECONDS = 5.0
@@ -28,6 +33,12 @@ HANGS = 60.0
 BYTES = 1 << 30
 #: Exit status of a child whose own cases cannot be made.
 BROKEN = 3
+#: Where cases are written: a file system in memory where there is one, for outputs are synced.
+MEMORY = "/dev/shm" if os.access("/dev/shm", os.W_OK) else None
+
+#: Children at work, and whether they are to end.
+running: set[subprocess.Popen[bytes]] = set()
+stopped = False
 
 
 def main() -> int:
@@ -36,6 +47,7 @@ def main() -> int:
     parser.add_argument("--cases", type=int, default=20_000, help="of each loader")
     parser.add_argument("--seed", type=int, help="default: drawn and printed")
     parser.add_argument("--loader", action="append", help="this one only (may be repeated)")
+    parser.add_argument("--jobs", type=int, default=1, help="loaders at a time")
     parser.add_argument("--first", type=int, default=0, help="number of the first case")
     parser.add_argument("--keep", metavar="FOLDER", help="where files that fail are copied to")
     parser.add_argument("--child", metavar="STATE", help=argparse.SUPPRESS)
@@ -48,36 +60,57 @@ def main() -> int:
 
     names = args.loader or list(loaders())
     print(f"seed {args.seed}, {args.cases} cases of each of {', '.join(names)}", flush=True)
-    failures = 0
-    for name in names:
-        failures += parent(name, args)
-    return 1 if failures else 0
+    signal.signal(signal.SIGTERM, stop)
+    signal.signal(signal.SIGINT, stop)
+    with ThreadPoolExecutor(args.jobs) as pool:
+        failures = sum(pool.map(lambda name: parent(name, args), names))
+    return 1 if failures or stopped else 0
+
+
+def stop(number: int, frame: FrameType | None) -> None:
+    """End the children; their parents tell how far they came."""
+    global stopped
+    stopped = True
+    for process in list(running):
+        process.kill()
 
 
 def parent(name: str, args: argparse.Namespace) -> int:
     """Cases of one loader, going on behind one that took its process with it."""
     first, last, failures, start = args.first, args.first + args.cases, 0, time.monotonic()
-    with tempfile.TemporaryDirectory() as folder:
+    reached = first
+    with tempfile.TemporaryDirectory(dir=MEMORY) as folder:
         state = Path(folder, "state")
-        while first < last:
-            state.write_text(str(first))
+        while first < last and not stopped:
+            state.write_text(f"{first} 0")
             command = [sys.executable, str(Path(__file__).parent), "--loader", name]
             command += ["--seed", str(args.seed), "--first", str(first)]
             command += ["--cases", str(last - first), "--child", str(state)]
             command += ["--keep", args.keep] if args.keep else []
-            done = subprocess.run(command, check=False)
+            # A session of its own: Ctrl-C is for the parent, which ends it.
+            with subprocess.Popen(command, start_new_session=True) as process:
+                running.add(process)
+                if stopped:
+                    process.kill()
+                status = process.wait()
+                running.discard(process)
             reached, told = (int(x) for x in state.read_text().split()[:2])
             failures += told
-            if done.returncode == 0:
+            if status == 0:
+                reached = last
                 break
-            if done.returncode == BROKEN:
+            if status == BROKEN:
                 return failures + 1
+            if stopped:
+                break
             failures += 1
-            how = f"more than {HANGS:g} s" if done.returncode == 1 else f"died ({done.returncode})"
+            how = f"more than {HANGS:g} s" if status == -signal.SIGALRM else f"died ({status})"
             print(f"{name}: case {reached} {how}: {_again(name, args.seed, reached)}", flush=True)
-            first = reached + 1
+            first = reached = reached + 1
     seconds = time.monotonic() - start
-    print(f"{name}: {args.cases} cases, {failures} failed, {seconds:.0f} s", flush=True)
+    if stopped or reached > args.first:
+        cases = reached - args.first
+        print(f"{name}: {cases} cases, {failures} failed, {seconds:.0f} s", flush=True)
     return failures
 
 
@@ -93,7 +126,8 @@ def child(name: str, seed: int, first: int, cases: int, state: str, keep: str | 
     from trueangle.errors import TrueAngleError
 
     loader = loaders()[name]
-    with tempfile.TemporaryDirectory() as folder:  # makes the seeds before memory is bounded
+    here = Path(state).parent
+    with tempfile.TemporaryDirectory(dir=here) as folder:  # seeds, before memory is bounded
         try:
             loader.make(Path(folder), random.Random(0))
         except Exception:
@@ -105,13 +139,16 @@ def child(name: str, seed: int, first: int, cases: int, state: str, keep: str | 
     resource.setrlimit(
         resource.RLIMIT_AS, (pages * resource.getpagesize() + BYTES, resource.RLIM_INFINITY)
     )
-    with tempfile.TemporaryDirectory() as folder:
+    # A timer of the system costs a call; the thread of faulthandler's own, a thread for each case.
+    faulthandler.register(signal.SIGALRM, chain=True)
+    gc.freeze()
+    with tempfile.TemporaryDirectory(dir=here) as folder:
         handle = os.open(state, os.O_WRONLY | os.O_TRUNC)
         for case in range(first, first + cases):
             os.pwrite(handle, f"{case:12d} {failures:8d}".encode(), 0)
             rng = random.Random(zlib.crc32(f"{name} {seed} {case}".encode()))
             path = loader.make(Path(folder), rng)
-            faulthandler.dump_traceback_later(HANGS, exit=True)
+            signal.setitimer(signal.ITIMER_REAL, HANGS)
             begun = time.process_time()
             try:
                 with contextlib.suppress(TrueAngleError):
@@ -125,7 +162,7 @@ def child(name: str, seed: int, first: int, cases: int, state: str, keep: str | 
                 if keep:
                     shutil.copy(path, Path(keep, f"{name}-{case}{path.suffix}"))
             finally:
-                faulthandler.cancel_dump_traceback_later()
+                signal.setitimer(signal.ITIMER_REAL, 0.0)
         os.close(handle)
     return 0
 

@@ -316,20 +316,33 @@ def _make_hdf5(folder: Path, rng: random.Random) -> Path:
 
 def _make_npz(folder: Path, rng: random.Random) -> Path:
     path = folder / "log.npz"
-    columns = {name: np.array(values) for name, values in _columns().items()}
-    name = rng.choice(list(columns))
-    columns[name] = rng.choice((columns[name], columns[name][:5], columns[name][:, None]))
-    rng.choice((np.savez, np.savez_compressed))(path, **columns)
+    wanted = rng.choice(list(_columns())), rng.randrange(3), rng.random() < 0.5
+
+    def made(folder: Path) -> bytes:
+        name, shape, compressed = wanted
+        columns = {name: np.array(values) for name, values in _columns().items()}
+        columns[name] = (columns[name], columns[name][:5], columns[name][:, None])[shape]
+        (np.savez_compressed if compressed else np.savez)(path, **columns)
+        return path.read_bytes()
+
+    path.write_bytes(_seeds(f"npz {wanted}", made, folder))
     return _damaged(path, rng)
 
 
 def _make_npy(folder: Path, rng: random.Random) -> Path:
     path = folder / "log.npy"
-    columns = {k: np.array(v) for k, v in _columns().items() if k != rng.choice(("run", "note"))}
-    table = np.empty(_ROWS, dtype=[(name, values.dtype) for name, values in columns.items()])
-    for name, values in columns.items():
-        table[name] = values
-    np.save(path, rng.choice((table, columns["indicated_deg"], np.eye(4))))
+    wanted = rng.choice(("run", "note")), rng.randrange(3)
+
+    def made(folder: Path) -> bytes:
+        without, kind = wanted
+        columns = {k: np.array(v) for k, v in _columns().items() if k != without}
+        table = np.empty(_ROWS, dtype=[(name, values.dtype) for name, values in columns.items()])
+        for name, values in columns.items():
+            table[name] = values
+        np.save(path, (table, columns["indicated_deg"], np.eye(4))[kind])
+        return path.read_bytes()
+
+    path.write_bytes(_seeds(f"npy {wanted}", made, folder))
     return _damaged(path, rng)
 
 
@@ -337,9 +350,16 @@ def _make_matlab(folder: Path, rng: random.Random) -> Path:
     from scipy.io import savemat
 
     path = folder / "log.mat"
-    columns = {name: np.array(values) for name, values in _columns().items()}
-    nested = {"rig": columns, "indicated_deg": columns["indicated_deg"]}
-    savemat(path, rng.choice((columns, nested)), do_compression=rng.random() < 0.5)
+    wanted = rng.random() < 0.5, rng.random() < 0.5
+
+    def made(folder: Path) -> bytes:
+        inside, compressed = wanted
+        columns = {name: np.array(values) for name, values in _columns().items()}
+        nested = {"rig": columns, "indicated_deg": columns["indicated_deg"]}
+        savemat(path, nested if inside else columns, do_compression=compressed)
+        return path.read_bytes()
+
+    path.write_bytes(_seeds(f"matlab {wanted}", made, folder))
     return _damaged(path, rng)
 
 
