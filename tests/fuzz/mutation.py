@@ -115,9 +115,8 @@ def mutated_document(document: Any, rng: random.Random) -> Any:
         elif action < 0.7:
             del holder[key]
         elif isinstance(holder, dict):
-            holder[rng.choice(("period", "orders", "x", "kind", str(key) + "s"))] = rng.choice(
-                NASTY
-            )
+            name = rng.choice(("period", "orders", "x", "kind", str(key) + "s"))
+            holder[name] = copy.deepcopy(rng.choice(NASTY))
         else:
             holder.insert(key, copy.deepcopy(rng.choice((holder[key], *NASTY))))
     return made

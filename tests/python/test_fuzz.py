@@ -11,6 +11,7 @@ FUZZ = Path(__file__).resolve().parents[1] / "fuzz"
 sys.path.insert(0, str(FUZZ))
 
 from loaders import loaders  # noqa: E402
+from mutation import NASTY, mutated_document  # noqa: E402
 
 #: Damaged files of each loader.
 CASES = 40
@@ -26,3 +27,15 @@ def test_damaged_files_are_read_or_refused(name):
         [*command, "--seed", str(seed)], capture_output=True, text=True, check=False
     )
     assert done.returncode == 0, done.stdout + done.stderr
+
+
+def test_a_case_leaves_nothing_behind_for_the_next():
+    """Each is made from its number alone: what the damage is made of stays as it was."""
+    before = repr(NASTY)
+    rng = random.Random(7)
+    made = {"a": [1, {"b": 2.0}]}
+    for _ in range(3000):
+        made = mutated_document(made, rng)
+        if not isinstance(made, dict) or len(repr(made)) > 2000:
+            made = {"a": [1, {"b": 2.0}]}
+    assert repr(NASTY) == before
