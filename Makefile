@@ -2,7 +2,12 @@
 # PYTHON is the interpreter of an environment that has `pip install '.[test,lint]'`.
 PYTHON ?= .venv/bin/python
 
-.PHONY: check format lint types stub rust python docs bench develop aarch64 fuzz mutants nightly exam
+.PHONY: check format lint types stub rust python docs bench develop aarch64 fuzz mutants sample
+.PHONY: nightly exam pythons readings
+
+# Damaged files for each loader, and loaders at a time: `make fuzz CASES=1000000 JOBS=2`.
+CASES ?= 20000
+JOBS ?= 1
 
 check: lint types stub rust python docs
 
@@ -16,7 +21,7 @@ format:             ## rewrite the code in the project's style
 
 lint:               ## style and lints, warnings are errors
 	cargo fmt --check
-	cargo clippy --all-targets --locked -- -D warnings
+	cargo clippy --lib --locked -- -D warnings
 	cargo clippy --all-targets --locked --features python -- -D warnings
 	RUSTDOCFLAGS="-D warnings" cargo doc --no-deps --locked
 	$(PYTHON) -m ruff check .
@@ -48,14 +53,24 @@ exam:               ## the diagnosis' own exam at full size: an hour or more, fi
 docs:               ## documentation, warnings are errors
 	$(PYTHON) -m sphinx -W --keep-going -q docs docs/_build/html
 
-fuzz:               ## 20 000 damaged files for every loader; some hours, so apart from `check`
-	$(PYTHON) tests/fuzz --cases 20000
+fuzz:               ## CASES damaged files for every loader; Ctrl-C tells how far each has come
+	$(PYTHON) tests/fuzz --cases $(CASES) --jobs $(JOBS)
+
+sample:             ## some of the planted faults; minutes
+	$(PYTHON) tests/mutants --sample
 
 mutants:            ## planted faults: each must be noticed by its tests; an hour or two
 	$(PYTHON) tests/mutants
 
-nightly: aarch64 fuzz mutants ## what takes hours: the exam at full size, fuzzing, faults, aarch64
-	TRUEANGLE_NIGHTLY=1 $(PYTHON) -m pytest
+pythons:            ## the wheel tried on every Python that is to be had here
+	$(PYTHON) -m pip wheel --quiet --no-deps --wheel-dir target/tried .
+	$(PYTHON) .ci/pythons target/tried/*.whl
+
+readings:           ## time and memory up to 10^8 readings, beside the model of cost
+	$(PYTHON) -m trueangle bench --scaling --largest 1e8
+
+nightly: aarch64 pythons readings fuzz mutants exam ## what takes hours, one after the other
+	TRUEANGLE_NIGHTLY=1 TRUEANGLE_KILLS=200 $(PYTHON) -m pytest -n auto --dist worksteal
 
 bench:              ## benchmarks against a reference, in one run
 	cargo bench

@@ -12,7 +12,7 @@ def test_every_promise_names_tests_that_exist() -> None:
     rows = [line for line in page.splitlines() if line.startswith("| ")][2:]
     assert len(rows) >= 12
     for row in rows:
-        named = re.findall(r"`(tests/[^`]+)`", row)
+        named = re.findall(r"`((?:tests|\.ci)/[^`]+)`", row)
         assert named, row
         for path in named:
             assert (ROOT / path).exists(), path
