@@ -3,7 +3,7 @@
 PYTHON ?= .venv/bin/python
 
 .PHONY: check format lint types stub rust python docs bench develop aarch64 fuzz mutants sample
-.PHONY: nightly exam pythons readings
+.PHONY: nightly exam asan kills pythons readings
 
 # Damaged files for each loader, and loaders at a time: `make fuzz CASES=1000000 JOBS=2`.
 CASES ?= 20000
@@ -28,6 +28,7 @@ lint:               ## style and lints, warnings are errors
 	$(PYTHON) -m ruff format --check .
 	$(PYTHON) .ci/arrows
 	$(PYTHON) -m check_jsonschema --builtin-schema vendor.github-workflows .github/workflows/*.yml
+	$(dir $(PYTHON))zizmor --offline --quiet .github/workflows
 
 types:              ## types of the whole package
 	$(PYTHON) -m mypy
@@ -69,8 +70,15 @@ pythons:            ## the wheel tried on every Python that is to be had here
 readings:           ## time and memory up to 10^8 readings, beside the model of cost
 	$(PYTHON) -m trueangle bench --scaling --largest 1e8
 
-nightly: aarch64 pythons readings fuzz mutants exam ## what takes hours, one after the other
-	TRUEANGLE_NIGHTLY=1 TRUEANGLE_KILLS=200 $(PYTHON) -m pytest -n auto --dist worksteal
+kills:              ## 40 kills of each of five commands at random moments; logs of any size
+	TRUEANGLE_KILLS=40 $(PYTHON) -m pytest -q tests/python/injection tests/python/logs
+
+asan:               ## tests of the core under AddressSanitizer, by the compiler's unstable flag
+	RUSTC_BOOTSTRAP=1 RUSTFLAGS="-Zsanitizer=address" CARGO_TARGET_DIR=target/asan \
+	cargo test --locked --tests --target $$(rustc -vV | sed -n 's/^host: //p')
+
+NIGHTLY = aarch64 asan pythons readings kills fuzz mutants exam
+nightly: $(NIGHTLY) ## what takes hours; each has a job of its own in .github/workflows/nightly.yml
 
 bench:              ## benchmarks against a reference, in one run
 	cargo bench

@@ -87,8 +87,8 @@ def parent(name: str, args: argparse.Namespace) -> int:
             command += ["--seed", str(args.seed), "--first", str(first)]
             command += ["--cases", str(last - first), "--child", str(state)]
             command += ["--keep", args.keep] if args.keep else []
-            # A session of its own: Ctrl-C is for the parent, which ends it.
-            with subprocess.Popen(command, start_new_session=True) as process:
+            # A group of its own: Ctrl-C is for the parent, which ends it.
+            with subprocess.Popen(command, process_group=0) as process:
                 running.add(process)
                 if stopped:
                     process.kill()

@@ -18,6 +18,17 @@ def test_every_promise_names_tests_that_exist() -> None:
             assert (ROOT / path).exists(), path
 
 
+def test_every_part_of_the_night_has_a_job() -> None:
+    makefile = (ROOT / "Makefile").read_text(encoding="utf-8")
+    workflow = (ROOT / ".github" / "workflows" / "nightly.yml").read_text(encoding="utf-8")
+    parts = re.findall(r"^NIGHTLY = (.*)$", makefile, re.MULTILINE)[0].split()
+    jobs = re.findall(r"^ +part: \[(.*)\]$", workflow, re.MULTILINE)[0].split(", ")
+    assert len(parts) >= 8
+    assert sorted(parts) == sorted(jobs)
+    for part in parts:
+        assert re.search(rf"^{part}:.*##", makefile, re.MULTILINE), part
+
+
 def test_the_version_is_one_everywhere() -> None:
     import tomllib
 

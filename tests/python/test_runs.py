@@ -2,6 +2,7 @@
 
 import math
 import pickle
+from fractions import Fraction
 
 import numpy as np
 import pytest
@@ -11,6 +12,22 @@ from trueangle.errors import ArgumentError
 from trueangle.runs import as_runs
 
 THETA = np.arange(0.0, 360.0, 10.0)
+
+
+@pytest.mark.parametrize("period", [1.0, 360.0, 2.0 * math.pi])
+def test_wrapped_angles_differ_by_whole_turns_and_lie_in_one(period):
+    """Against exact fractions; at half a turn, which is kept, and one bit beside it."""
+    half = 0.5 * period
+    beside = [np.nextafter(half, 0.0), half, np.nextafter(half, period)]
+    rng = np.random.default_rng(11)
+    angles = np.concatenate([beside, np.negative(beside), rng.uniform(-9.0, 9.0, 500) * period])
+    for angle, wrapped in zip(angles.tolist(), ta.wrap(angles, period).tolist(), strict=True):
+        assert -half < wrapped <= half
+        turns = (Fraction(angle) - Fraction(wrapped)) / Fraction(period)
+        # One rounding of the turns taken off, one of the difference.
+        assert abs(turns - round(turns)) <= 2 * abs(angle / period) * 2.0**-53 + 2.0**-53
+    kept = beside[:2]
+    assert ta.wrap(kept, period).tolist() == kept
 
 
 @pytest.mark.parametrize(

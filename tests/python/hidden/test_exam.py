@@ -72,7 +72,8 @@ def test_parameters_of_hidden_causes_are_within_their_standard_errors() -> None:
 
 
 def test_a_weak_cause_is_named() -> None:
-    found = exam.answers(exam.singles(CAUSES, [0.3], [FIXED]))
+    """Every second cause; `make exam` asks all, twenty seeds each."""
+    found = exam.answers(exam.singles(list(CAUSES)[::2], [0.3], [FIXED]))
     print(told(found))
     assert share([a.right_first for a in found]) >= NAMED_FIRST[0.3], told(found)
 
@@ -84,7 +85,7 @@ def test_noise_alone_has_no_cause(noise: str) -> None:
 
 
 def test_two_causes_are_both_named() -> None:
-    found = exam.answers(pairs.cases(1.0, [FIXED])[::2])
+    found = exam.answers(pairs.cases(1.0, [FIXED])[::3])
     assert share([a.exact for a in found]) >= BOTH_NAMED - 1.0 / len(found), told(found)
 
 

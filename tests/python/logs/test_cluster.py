@@ -4,6 +4,7 @@ import os
 import signal
 import threading
 import time
+from contextlib import nullcontext
 
 import numpy as np
 import pytest
@@ -54,11 +55,18 @@ def cluster(workers):
     )
 
 
+@pytest.fixture(scope="module")
+def two():
+    """A cluster that no test takes a worker from."""
+    with cluster(2) as found:
+        yield found
+
+
 @pytest.mark.parametrize("workers", [1, 2, 4])
-def test_any_number_of_workers_gives_the_bytes_of_one_process(workers, logs, alone, tmp_path):
+def test_any_number_of_workers_gives_the_bytes_of_one_process(workers, two, logs, alone, tmp_path):
     # A model that counts turns: every log must know where the one before stopped.
     model = made_model(ratio=50.5)
-    with cluster(workers) as found:
+    with nullcontext(two) if workers == 2 else cluster(workers) as found:
         address = found.scheduler_address
         report = ta.correct_logs(logs, model, tmp_path / "out", scheduler=address)
         fit = ta.fit_logs(logs, [1, 2, 3], scheduler=address)
@@ -96,19 +104,18 @@ def test_a_lost_worker_changes_nothing(logs, alone, tmp_path):
     assert tree(out) == alone
 
 
-def test_a_damaged_log_fails_alone_and_the_rest_resumes(logs, tmp_path):
+def test_a_damaged_log_fails_alone_and_the_rest_resumes(two, logs, tmp_path):
     folder = tmp_path / "logs"
     folder.mkdir()
     for i in range(3):
         data = (logs / f"{i}.parquet").read_bytes()
         (folder / f"{i}.parquet").write_bytes(data[:-100] if i == 1 else data)
-    with cluster(2) as found:
-        address = found.scheduler_address
-        report = ta.correct_logs(folder, made_model(), tmp_path / "out", scheduler=address)
-        assert [log.status for log in report.logs] == ["done", "failed", "done"]
-        assert "1.parquet" in str(report.logs[1].error)
-        (folder / "1.parquet").write_bytes((logs / "1.parquet").read_bytes())
-        report = ta.correct_logs(folder, made_model(), tmp_path / "out", scheduler=address)
+    address = two.scheduler_address
+    report = ta.correct_logs(folder, made_model(), tmp_path / "out", scheduler=address)
+    assert [log.status for log in report.logs] == ["done", "failed", "done"]
+    assert "1.parquet" in str(report.logs[1].error)
+    (folder / "1.parquet").write_bytes((logs / "1.parquet").read_bytes())
+    report = ta.correct_logs(folder, made_model(), tmp_path / "out", scheduler=address)
     assert [log.status for log in report.logs] == ["done before", "done", "done before"]
 
 
