@@ -32,6 +32,7 @@ __all__ = [
     "residual_points",
     "seen_span",
     "thinned",
+    "travelled",
 ]
 
 Array = NDArray[np.float64]
@@ -41,6 +42,9 @@ CONFIDENCE: Final = 1.96
 
 #: Points of a curve for each cycle of its highest order, and the least and most of them.
 _PER_CYCLE, _FEWEST, _MOST_SAMPLES = 12, 721, 12001
+
+#: Degrees without a reading that make a travel partial, where no model says what was seen.
+_WIDE_GAP: Final = 90.0
 
 #: Places of an envelope.
 _PLACES: Final = 180
@@ -139,10 +143,13 @@ def envelope(curve: Curve) -> tuple[Array, Array, Array]:
     """
     edges = np.linspace(0, curve.angle.size, _PLACES + 1).astype(int)
     parts = [slice(a, b) for a, b in pairwise(edges) if b > a]
+    # With its neighbours: a place of hardly a period would have ragged edges.
+    wide = [slice(parts[max(i - 1, 0)].start, parts[min(i + 1, len(parts) - 1)].stop)
+            for i in range(len(parts))]  # fmt: skip
     return (
         np.array([curve.angle[p].mean() for p in parts]),
-        np.array([curve.error[p].min() for p in parts]),
-        np.array([curve.error[p].max() for p in parts]),
+        np.array([curve.error[p].min() for p in wide]),
+        np.array([curve.error[p].max() for p in wide]),
     )
 
 
@@ -153,7 +160,22 @@ def seen_span(model: HarmonicModel) -> tuple[float, float]:
     low, high = (360.0 / model.period * x for x in model.partial_span)
     if high - low >= 360.0:  # several turns of an error that does not repeat
         return 0.0, 360.0
-    # An arc across zero reads better as -90 to 90 than as 270 to 450.
+    return _about_zero(low, high)
+
+
+def travelled(runs: Sequence[CalibrationRun]) -> tuple[float, float]:
+    """The stretch of the turn that runs hold readings of, in degrees; a turn without a wide gap."""
+    angle = np.sort(np.concatenate([degrees(run) for run in runs]))
+    gaps = np.diff(np.append(angle, angle[0] + 360.0))
+    widest = int(np.argmax(gaps))
+    if gaps[widest] < _WIDE_GAP:
+        return 0.0, 360.0
+    low, high = float(angle[(widest + 1) % angle.size]), float(angle[widest])
+    return _about_zero(low, high if high >= low else high + 360.0)
+
+
+def _about_zero(low: float, high: float) -> tuple[float, float]:
+    """An arc across zero reads better as -90 to 90 than as 270 to 450."""
     turns = 360.0 * np.floor((0.5 * (low + high) + 180.0) / 360.0) if high > 360.0 else 0.0
     return low - turns, high - turns
 

@@ -19,7 +19,7 @@ from ..files import CERTIFICATE, PDF, REPORT, check_output, written_atomically
 from ..fitting.heldout import HeldOut
 from ..model import HarmonicModel
 from ..pace import pace
-from ..plots.curves import Points, degrees, error_points, label_of
+from ..plots.curves import Points, degrees, error_points, label_of, travelled
 from ..provenance import provenance
 from ..runs import CalibrationRun, as_runs
 from . import diagnosisfigures, figures
@@ -292,7 +292,7 @@ def _figures(
     scale: Scale,
 ) -> dict[str, dict[str, Any]]:
     """Every figure that this report has."""
-    points = error_points(fit) if fit is not None else [_plain(r, i) for i, r in enumerate(runs)]
+    points = error_points(fit) if fit is not None else _plain(runs)
     made = {"errors": figures.errors_of_runs(fit, runs, points, scale)}
     if fit is not None or selection is not None:
         made["spectrum"] = spectrum(fit, selection, name, scale)
@@ -307,6 +307,12 @@ def _figures(
     return made
 
 
-def _plain(run: CalibrationRun, number: int) -> Points:
-    error = wrap(run.indicated - run.reference - run.zero, run.period)
-    return Points(label_of(run, number), degrees(run), (ARCSEC_PER_TURN / run.period) * error)
+def _plain(runs: list[CalibrationRun]) -> list[Points]:
+    """Readings where there is no model, on the turn that begins where the travel does."""
+    low, _ = travelled(runs)
+    found = []
+    for number, run in enumerate(runs):
+        error = wrap(run.indicated - run.reference - run.zero, run.period)
+        error *= ARCSEC_PER_TURN / run.period
+        found.append(Points(label_of(run, number), degrees(run, low), error))
+    return found

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, Final
 
 from ..plots.findingnames import finding_names
+from .numbers import shortened
 
 if TYPE_CHECKING:
     from ..diagnosis import Diagnosis
@@ -101,6 +102,9 @@ def _numbers(value: Any) -> list[float] | None:
 
 
 def _text(value: Any) -> str:
+    if isinstance(value, list) and any(isinstance(item, list | tuple) for item in value):
+        # What belongs together, a run and a row of it, stands on one line.
+        return "\n".join(shortened([" row ".join(map(_text, item)) for item in value]))
     if isinstance(value, list):
         return "; ".join(_text(item) for item in value)
     return f"{value:.4g}" if isinstance(value, float) else str(value)

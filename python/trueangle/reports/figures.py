@@ -78,7 +78,7 @@ def errors_of_runs(
     A model with gear orders would be a black surface: it is drawn as the envelope of its
     curve, and a stretch of a few periods beside it shows the curve itself.
     """
-    low, high = turn(None if fit is None else fit.model)
+    low, high = curves.travelled(runs) if fit is None else turn(fit.model)
     everything = [scale.points(points) for points in measured]
     y = f"error less the run's zero / {scale.name}"
     strong = None if fit is None else strong_gear_order(fit.orders, fit.amplitudes, high - low)

@@ -8,13 +8,16 @@ from typing import Any, Final
 
 from ..errorunits import ErrorUnit
 
-__all__ = ["NONE", "Numbers", "formatted", "lookup"]
+__all__ = ["NONE", "Numbers", "formatted", "lookup", "shortened"]
 
 #: Stands where there is no number.
 NONE: Final = "\u2013"
 
 #: Digits of an error that stands alone, and of the smallest of a column of them.
 _DIGITS, _LEAST_DIGITS = 4, 3
+
+#: Lines of a list in a cell at most; of a longer one so many are shown.
+_MOST_LINES, _SHOWN_LINES = 12, 6
 
 #: What a number that is no error is rounded by.
 _PLAIN: Final = ErrorUnit("", 1.0)
@@ -45,6 +48,19 @@ def formatted(value: float | None, digits: int) -> str:
         return NONE
     text = f"{value:.{digits}f}"
     return text.lstrip("-") if float(text) == 0.0 else text
+
+
+def shortened(lines: Sequence[str]) -> list[str]:
+    """A list as a cell of a table shows it; a page is no place for hundreds of them.
+
+    Examples
+    --------
+    >>> shortened([str(n) for n in range(100)])[-2:]
+    ['5', 'and 94 more']
+    """
+    if len(lines) <= _MOST_LINES:
+        return list(lines)
+    return [*lines[:_SHOWN_LINES], f"and {len(lines) - _SHOWN_LINES} more"]
 
 
 class Numbers:
@@ -101,7 +117,7 @@ class Numbers:
     def listed(
         self, values: Sequence[float], stds: Sequence[float] | None, of: int, error: bool = True
     ) -> str:
-        """Several numbers of one parameter (``of`` 0) or their standard deviations (1)."""
+        """Numbers of one parameter (``of`` 0) or their standard deviations (1), one a line."""
         unit = self.unit if error else _PLAIN
         known = [None] * len(values) if stds is None else stds
         pairs = (
@@ -109,7 +125,7 @@ class Numbers:
             for v, std in zip(values, known, strict=True)
         )
         shown = [pair[of] for pair in pairs]
-        return NONE if set(shown) == {"-"} else "; ".join(shown)
+        return NONE if set(shown) == {"-"} else "\n".join(shortened(shown))
 
     def named(self, unit: str) -> str:
         """A unit of the content as the page names it: arcsec/Nm becomes deg/Nm."""

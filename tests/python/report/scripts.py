@@ -82,3 +82,13 @@ NUMBERS_APART = """() => { const found = []; let axes = 0;
         const room = 3 * (at[i][0].length + at[i - 1][0].length);
         if (at[i][1] - at[i - 1][1] < room) found.push(`${at[i - 1][0]} ${at[i][0]}`); } } }
   return [axes, found]; }"""
+
+#: Cards whose numbers stick out, four of them side by side and one with two long numbers.
+CARDS_BURST = """() => { const cards = document.querySelector(".cards");
+  while (cards.children.length < 4) cards.append(cards.children[0].cloneNode(true));
+  const big = cards.children[1].querySelector(".big");
+  big.className = "big pair"; big.textContent = "0.3967 \u2192 0.0810";
+  return [...cards.children].filter((card) => { const range = document.createRange();
+    range.selectNodeContents(card);
+    return range.getBoundingClientRect().right > card.getBoundingClientRect().right; })
+    .map((card) => card.textContent); }"""

@@ -13,6 +13,7 @@ from trueangle.reports.numbers import formatted, lookup
 from trueangle.reports.pdf import find_browser
 
 from .scripts import (
+    CARDS_BURST,
     CHARTS,
     CONTRASTS,
     NUMBERS_APART,
@@ -198,6 +199,13 @@ def test_wide_tables_say_that_they_scroll(page: Page) -> None:
              && innerWidth < 640).map((e) => e.getAttribute("aria-label"))"""
     )
     assert silent == []
+
+
+@pytest.mark.parametrize("width", [NARROW, 390, 700, 1280])
+def test_numbers_stay_inside_their_cards(browser, file: Path, width: int) -> None:
+    opened = Page(browser, file, width)
+    assert opened.page.evaluate(CARDS_BURST) == []
+    opened.page.close()
 
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])
