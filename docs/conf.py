@@ -42,7 +42,9 @@ napoleon_use_ivar = True
 napoleon_use_rtype = False
 html_math_renderer = "drawn"
 html_static_path = ["static"]
-html_css_files = ["formulas.css"]
+html_css_files = ["pages.css"]
+html_js_files = ["pages.js"]
+html_extra_path = ["_generated/pages"]
 # Copied is what is typed: neither prompts nor output.
 copybutton_exclude = ".linenos, .gp, .go"
 

@@ -21,6 +21,8 @@ from causes import causes_page
 
 import trueangle as ta
 from trueangle import plots
+from trueangle.certificate import certify
+from trueangle.certificate.typesetting import pictures
 from trueangle.cli import COMMANDS, build_parser
 from trueangle.diagnosis import diagnose
 from trueangle.effects import Backlash, Latency
@@ -54,6 +56,7 @@ def everything(folder: Path) -> None:
     (folder / "gallery.md").write_text(gallery(), encoding="utf-8")
     (folder / "causes.md").write_text(causes_page(), encoding="utf-8")
     (folder / "commands.md").write_text(commands(), encoding="utf-8")
+    pages(folder / "pages")
 
 
 def figures(folder: Path) -> None:
@@ -86,9 +89,10 @@ def figures(folder: Path) -> None:
         drawn_figure = draw()
         drawn_figure.savefig(folder / f"paper{number}.svg")
         mpl.pyplot.close(drawn_figure)
-    told = story()
-    told.savefig(folder / "story.svg")
-    mpl.pyplot.close(told)
+    for name, shape in {"story": (1, 3), "story-narrow": (3, 1)}.items():
+        told = story(*shape)
+        told.savefig(folder / f"{name}.svg")
+        mpl.pyplot.close(told)
 
 
 def tutorial_runs() -> list[ta.CalibrationRun]:
@@ -102,7 +106,7 @@ def tutorial_runs() -> list[ta.CalibrationRun]:
         return ta.simulate(ta.load_simulation(file), seed=0)
 
 
-def story() -> mpl.figure.Figure:
+def story(rows: int, columns: int) -> mpl.figure.Figure:
     """The error of a joint, what a correction from 36 positions leaves, and what it hid."""
     joint = replace(demo_simulation(), sigma_arcsec=1.0)
 
@@ -121,7 +125,10 @@ def story() -> mpl.figure.Figure:
         return 3600.0 * ta.wrap(model.error(angles) - model.constant, 360.0)
 
     truth = joint.pattern.value(np.radians(everywhere))
-    figure, axes = mpl.pyplot.subplots(1, 3, figsize=(10.0, 3.0), sharey=True, layout="constrained")
+    size = (10.0, 3.0) if rows == 1 else (4.2, 7.4)
+    figure, axes = mpl.pyplot.subplots(
+        rows, columns, figsize=size, sharex=True, sharey=True, layout="constrained"
+    )
     axes[0].plot(everywhere, truth, color="#B8C4CE", linewidth=0.4)
     axes[0].plot(positions, joint.pattern.value(np.radians(positions)), ".", color="#B06A00")
     axes[0].set_title("1. the error,\nand 36 positions of it")
@@ -137,10 +144,12 @@ def story() -> mpl.figure.Figure:
     axes[2].set_title(f"3. from two mounts as planned:\n{rest.std():.1f} arcsec everywhere")
     for ax in axes:
         ax.set_xticks([0, 90, 180, 270, 360])
-        ax.set_xlabel("output angle / deg")
         ax.title.set_fontsize("medium")
         ax.grid(True, color="#00000018")
-    axes[0].set_ylabel("error / arcsec")
+    for ax in axes if rows == 1 else axes[-1:]:
+        ax.set_xlabel("output angle / deg")
+    for ax in axes[:1] if rows == 1 else axes:
+        ax.set_ylabel("error / arcsec")
     return figure
 
 
@@ -158,6 +167,24 @@ def folded() -> mpl.axes.Axes:
     ax.set_ylim(-1.2, 1.6)
     ax.legend(loc="upper center", ncols=3, frameon=False)
     return ax
+
+
+def pages(folder: Path) -> None:
+    """What users get: the demonstration's report, and the certificate of the how-to."""
+    folder.mkdir(exist_ok=True)
+    command = [sys.executable, "-m", "trueangle", "demo", "--report", str(folder / "report.html")]
+    subprocess.run(command, capture_output=True, check=True)
+    text = (ROOT / "docs" / "howto" / "certificate.md").read_text(encoding="utf-8")
+    identity = re.search(r"```toml\n(.*?)```", text, re.S)
+    assert identity
+    with tempfile.TemporaryDirectory() as made:
+        ta.write_runs(tutorial_runs(), Path(made, "joint.csv"))
+        file = Path(made, "identity.toml")
+        file.write_text(identity[1], encoding="utf-8")
+        read = ta.read_runs(Path(made, "joint.csv"))
+        content = certify(read, file, gear_ratio=100.0).content
+    for number, page in enumerate(pictures(content), start=1):
+        (folder / f"certificate{number}.png").write_bytes(page)
 
 
 def performance() -> str:

@@ -14,7 +14,7 @@ from ..angles import ARCSEC_PER_TURN
 from ..errors import MissingExtraError
 from ..files import CERTIFICATE, check_output, publish
 
-__all__ = ["write_pdf"]
+__all__ = ["pictures", "typeset", "write_pdf"]
 
 _TEMPLATE: Final = Path(__file__).parent / "certificate.typ"
 
@@ -33,6 +33,16 @@ def write_pdf(content: dict[str, Any], path: str | PathLike[str]) -> None:
 
 def typeset(content: dict[str, Any]) -> bytes:
     """The certificate as a PDF/A-2b document."""
+    return bytes(_compiled(content, format="pdf", pdf_standards="a-2b"))
+
+
+def pictures(content: dict[str, Any], dots_per_inch: float = 110.0) -> list[bytes]:
+    """Its pages as PNG, to be shown where a PDF cannot be."""
+    made = _compiled(content, format="png", ppi=dots_per_inch)
+    return made if isinstance(made, list) else [made]
+
+
+def _compiled(content: dict[str, Any], **how: Any) -> Any:
     try:
         import typst
     except ImportError:
@@ -46,14 +56,9 @@ def typeset(content: dict[str, Any]) -> bytes:
         (place / "certificate.typ").write_bytes(_TEMPLATE.read_bytes())
         (place / "content.json").write_text(json.dumps(content, allow_nan=False), "utf-8")
         (place / "errors.svg").write_bytes(picture)
-        made = typst.compile(
-            os.fspath(place / "certificate.typ"),
-            root=folder,
-            ignore_system_fonts=True,
-            format="pdf",
-            pdf_standards="a-2b",
+        return typst.compile(
+            os.fspath(place / "certificate.typ"), root=folder, ignore_system_fonts=True, **how
         )
-    return bytes(made)
 
 
 def _picture(content: dict[str, Any]) -> bytes:
