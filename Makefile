@@ -8,6 +8,8 @@ PYTHON ?= .venv/bin/python
 # Damaged files for each loader, and loaders at a time: `make fuzz CASES=1000000 JOBS=2`.
 CASES ?= 20000
 JOBS ?= 1
+# `SAMPLE=--trust` where the tests have just passed.
+SAMPLE ?=
 
 check: lint types stub rust python docs
 
@@ -58,7 +60,7 @@ fuzz:               ## CASES damaged files for every loader; Ctrl-C tells how fa
 	$(PYTHON) tests/fuzz --cases $(CASES) --jobs $(JOBS)
 
 sample:             ## some of the planted faults; minutes
-	$(PYTHON) tests/mutants --sample
+	$(PYTHON) tests/mutants --sample $(SAMPLE)
 
 mutants:            ## planted faults: each must be noticed by its tests; an hour or two
 	$(PYTHON) tests/mutants

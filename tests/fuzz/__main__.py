@@ -56,9 +56,11 @@ def main() -> int:
         args.seed = random.SystemRandom().randrange(2**32)
     if args.child:
         return child(args.loader[0], args.seed, args.first, args.cases, args.child, args.keep)
-    from loaders import loaders
+    names = args.loader
+    if not names:
+        from loaders import loaders
 
-    names = args.loader or list(loaders())
+        names = list(loaders())
     print(f"seed {args.seed}, {args.cases} cases of each of {', '.join(names)}", flush=True)
     signal.signal(signal.SIGTERM, stop)
     signal.signal(signal.SIGINT, stop)
