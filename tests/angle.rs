@@ -31,6 +31,31 @@ fn half_a_turn_belongs_to_the_upper_end() {
     }
 }
 
+/// Ten thousand half turns, each with the doubles beside it: where reductions are cut.
+#[test]
+fn every_half_turn_and_what_lies_beside_it() {
+    for period in [TAU, 360.0, 1.0, 65536.0] {
+        let turn = Period::new(period).unwrap();
+        for k in -5000..=5000 {
+            let cut = f64::from(k) * 0.5 * period;
+            for x in [cut.next_down(), cut, cut.next_up()] {
+                let wrapped = turn.wrap(x);
+                assert!(
+                    -period / 2.0 < wrapped && wrapped <= period / 2.0,
+                    "{x} of {period}"
+                );
+                let turns = (x - wrapped) / period;
+                assert!((turns - turns.round()).abs() < 1e-12, "{x} of {period}");
+                let (phase, low) = turn.phase(x, 3.0);
+                assert!(
+                    phase.abs() <= 0.5 + PHASE && low.abs() <= PHASE,
+                    "{x} of {period}"
+                );
+            }
+        }
+    }
+}
+
 #[test]
 fn the_double_nearest_to_two_pi_stands_for_two_pi_itself() {
     // sin(1e6 rad) = -0.34999350217129295211765248678077146906140660532871 (mpmath, 50 digits)

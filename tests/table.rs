@@ -62,3 +62,36 @@ fn floats_are_radians() {
         0.5
     );
 }
+
+/// Every segment of every size: its first reading meets its knot, its last stays inside.
+#[test]
+fn no_reading_of_any_size_leaves_its_segment() {
+    for bits in 1..=12u32 {
+        let count = 1u32 << bits;
+        // Any knots will do; these differ from each other and change sign.
+        let knot = |i: u32| (i.wrapping_mul(2_654_435_761) >> 12) as i32 - (1 << 19);
+        let wide: Vec<i32> = (0..=count).map(knot).collect();
+        let short: Vec<i16> = wide.iter().map(|&y| (y >> 5) as i16).collect();
+        let float: Vec<f32> = wide.iter().map(|&y| y as f32).collect();
+        let flat: Vec<[i32; 2]> = wide.iter().map(|&y| [y, 0]).collect();
+        for i in 0..count {
+            let (first, last) = (i << (32 - bits), (i << (32 - bits)) + (u32::MAX >> bits));
+            let (here, next) = (wide[i as usize], wide[i as usize + 1]);
+            let inside = here.min(next)..=here.max(next);
+            assert_eq!(linear_i32(&wide, bits, first), here, "{bits} bits, {i}");
+            assert_eq!(cubic_i32(&flat, bits, first), here, "{bits} bits, {i}");
+            assert_eq!(linear_f32(&float, bits, first), here as f32);
+            assert_eq!(
+                linear_i16(&short, bits, 0, first),
+                i32::from(short[i as usize])
+            );
+            assert!(
+                inside.contains(&linear_i32(&wide, bits, last)),
+                "{bits} bits, {i}"
+            );
+            // Three products of a cubic are rounded, each by half a unit at most.
+            let off = cubic_i32(&flat, bits, last) - next;
+            assert!(off.abs() <= 2, "{bits} bits, {i}: {off}");
+        }
+    }
+}
