@@ -17,6 +17,7 @@ __all__ = [
     "OutsideSpanWarning",
     "RankError",
     "TrueAngleError",
+    "UnitWarning",
     "UnlikeRunsWarning",
 ]
 
@@ -127,6 +128,10 @@ class EmptyCellsWarning(UserWarning):
 
 class OutsideSpanWarning(UserWarning):
     """Angles outside the span the model was fitted on were corrected."""
+
+
+class UnitWarning(UserWarning):
+    """Angles that look like degrees were given without ``period=360``."""
 
 
 class UnlikeRunsWarning(UserWarning):

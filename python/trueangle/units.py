@@ -3,17 +3,23 @@
 from __future__ import annotations
 
 import math
+import warnings
+from typing import TypeAlias
 
 import numpy as np
+from numpy.typing import NDArray
 
 from . import _core
+from .angles import wrap
 from .checks.angles import AGREES, ratio_of, suggestion
 from .checks.record import records_of
-from .errors import ArgumentError
+from .errors import ArgumentError, UnitWarning
 from .quantiles import quantile
 from .runs import CalibrationRun
 
 __all__ = ["check_follows"]
+
+Array: TypeAlias = NDArray[np.float64]
 
 #: Readings looked at; a mistake of unit shows in any few.
 _SAMPLE = 1000
@@ -31,6 +37,12 @@ _NEAR = 0.01
 #: Step of the indicated angle (degrees) that may be a turn more or less.
 _FAST = 120.0
 
+#: Radians beyond which a reference may as well be degrees: ten turns.
+_MANY = 20.0 * math.pi
+
+#: Highest order, and the share of the error's power left by it, by which degrees are told.
+_HIGHEST, _LEFT = 3, 0.25
+
 _TURNS = {"degrees": 360.0, "radians": 2.0 * math.pi, "turns": 1.0}
 
 
@@ -41,11 +53,20 @@ def check_follows(run: CalibrationRun) -> None:
     ------
     ArgumentError
         Says what the indicated angle looks like instead: another unit, the other sign.
+
+    Warns
+    -----
+    UnitWarning
+        Angles whose error repeats with 360, and not with 2 pi.
     """
     stride = max(1, len(run) // _SAMPLE)
     reference = np.ascontiguousarray(run.reference[::stride])
     indicated = np.ascontiguousarray(run.indicated[::stride])
-    if reference.size < 4 or _core.resultant(indicated, reference, run.period) >= _FOLLOWS:
+    if reference.size < 4:
+        return
+    if run.period == _TURNS["radians"] and reference.max() > _MANY:
+        _warn_of_degrees(run, reference, indicated)
+    if _core.resultant(indicated, reference, run.period) >= _FOLLOWS:
         return
     ratio = _ratio(run)
     # By the travel where readings are dense enough to follow it; else, where steps of more
@@ -65,6 +86,30 @@ def check_follows(run: CalibrationRun) -> None:
         f"the indicated angle{named} does not follow the reference "
         f"(their differences are spread over the whole turn): {remedy}"
     )
+
+
+def _warn_of_degrees(run: CalibrationRun, reference: Array, indicated: Array) -> None:
+    """Warn where low orders of 360 explain the error, and those of 2 pi do not.
+
+    A motor of some sixty turns to one of its output shows much the same: no error then.
+    """
+    left = {}
+    for period in (_TURNS["radians"], _TURNS["degrees"]):
+        error = wrap(indicated - reference, period)
+        angle = np.outer(reference, np.arange(1, _HIGHEST + 1)) * (2.0 * math.pi / period)
+        lines = np.column_stack([np.ones(angle.shape[0]), np.cos(angle), np.sin(angle)])
+        if angle.shape[0] <= 2 * lines.shape[1]:
+            return
+        rest = error - lines @ np.linalg.lstsq(lines, error, rcond=None)[0]
+        left[period] = float(rest @ rest)
+    if left[_TURNS["degrees"]] < _LEFT * left[_TURNS["radians"]]:
+        named = f" of run {run.label}" if run.label else ""
+        warnings.warn(
+            f"the reference{named} goes to {float(reference.max()):.6g}, and its error repeats "
+            "with 360: if these are degrees, give period=360 (the default is 2*pi, radians)",
+            UnitWarning,
+            stacklevel=3,
+        )
 
 
 def _remedies(period: float) -> dict[str, float]:
