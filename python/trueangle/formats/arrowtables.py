@@ -23,6 +23,7 @@ __all__ = [
     "corrected_schema",
     "labels",
     "numbers",
+    "values_of",
 ]
 
 #: Key of the schema's metadata under which the provenance is kept.
@@ -51,7 +52,25 @@ def numbers(path: object, name: str, column: pa.Array | pa.ChunkedArray) -> NDAr
         column = column.cast(pa.float64())
     elif not (pa.types.is_integer(kind) or pa.types.is_floating(kind)):
         raise FileError(path, f"numbers are needed, the column holds {kind}", column=name)
-    values: NDArray[Any] = column.to_numpy(zero_copy_only=False)
+    return values_of(column)
+
+
+def values_of(column: pa.Array) -> NDArray[Any]:
+    """Whole numbers or floats as `pyarrow.Array.to_numpy` gives them, nulls as NaN.
+
+    That method imports pandas where it is installed, which takes longer than a million numbers.
+    """
+    kind, data = column.type, column.buffers()[1]
+    letter = "f" if pa.types.is_floating(kind) else "iu"[pa.types.is_unsigned_integer(kind)]
+    dtype = np.dtype(f"{letter}{kind.bit_width // 8}")
+    if data is None:  # nothing, or nulls alone
+        values: NDArray[Any] = np.zeros(len(column), dtype)
+    else:
+        values = np.frombuffer(data, dtype, len(column), column.offset * dtype.itemsize)
+    if column.null_count:
+        missing = column.is_null().cast(pa.uint8()).buffers()[1]
+        values = values.astype(dtype if letter == "f" else np.float64)
+        values[np.frombuffer(missing, np.bool_, len(column))] = np.nan
     return values
 
 
@@ -201,7 +220,10 @@ def labels(column: pa.Array | pa.ChunkedArray) -> Labels:
     if not pa.types.is_dictionary(column.type):
         column = column.dictionary_encode()
     names = column.dictionary.to_pylist()
-    codes = column.indices.fill_null(len(names)).to_numpy(zero_copy_only=False).astype(np.intp)
+    codes = values_of(column.indices)
+    if column.indices.null_count:
+        codes = np.where(np.isnan(codes), len(names), codes)
+    codes = codes.astype(np.intp)
     if codes.size and not 0 <= int(codes.min()) <= int(codes.max()) <= len(names):
         raise pa.ArrowInvalid("indices beyond their dictionary")
     return Labels(codes, [*names, None])

@@ -11,7 +11,7 @@ import pyarrow.compute as pc
 import pyarrow.csv
 from numpy.typing import NDArray
 
-from .arrowtables import labels
+from .arrowtables import labels, numbers
 from .csvheader import Header
 from .csvrows import QuotedBlock
 from .format import Labels
@@ -88,7 +88,7 @@ class PlainBlock:
             # The standard library reads a little more (+1.5) and says what is wrong where.
             self._quoted = QuotedBlock.whole(self.data, self.header, self.line)
             return self._quoted.numbers(names, texts, strict)
-        return {name: self._table[name].to_numpy() for name in names}
+        return {name: numbers(self.header.path, name, self._table[name]) for name in names}
 
     def labels(self, name: str) -> Labels:
         """A column of texts after `numbers`; see `QuotedBlock.labels`."""
