@@ -7,6 +7,7 @@ HERE = Path(__file__).parent
 sys.path.insert(0, str(HERE))
 
 
+import docstrings  # noqa: E402
 import formulas  # noqa: E402
 import generate  # noqa: E402
 import reference_pages  # noqa: E402
@@ -57,4 +58,5 @@ def _with_reference(app, name, source):
 def setup(app):
     """Expand the reference and draw the formulas."""
     app.connect("source-read", _with_reference)
+    docstrings.connect(app)
     app.add_html_math_renderer("drawn", *formulas.RENDERERS)

@@ -100,3 +100,21 @@ def test_what_moves_otherwise_is_told_by_its_measured_ratio(case, wraps):
         reference, indicated = reference % period, indicated % period
     with pytest.raises(ArgumentError, match=said):
         ta.fit(ta.CalibrationRun(reference, indicated, period=period), orders=[1])
+
+
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        (["--outptu", "m.json"], "unrecognized arguments: --outptu; did you mean --output?"),
+        (["--outptu=m.json"], "--outptu; did you mean --output?"),
+        (["--order", "1"], "required: -o/--output"),  # a beginning of --orders
+        (["--gear-ratoi", "-5"], "--gear-ratoi; did you mean --gear-ratio?"),
+        (["--gear-ratio", "5"], "required: -o/--output"),
+        (["--xyzzy", "5"], "required: -o/--output"),
+    ],
+)
+def test_a_mistyped_option_is_told_before_one_that_is_missing(words, says, capsys):
+    with pytest.raises(SystemExit) as ended:
+        main(["fit", "r.csv", *words])
+    assert ended.value.code == 2
+    assert says in capsys.readouterr().err.splitlines()[-1]

@@ -1,5 +1,7 @@
 """Every block of the documentation runs and shows what it says."""
 
+import sys
+
 import pytest
 
 from conftest import ROOT
@@ -19,3 +21,15 @@ def test_every_block_runs(page, tmp_path):
 
 def test_there_are_pages():
     assert len(PAGES) >= 10
+
+
+def test_attributes_that_share_a_line_are_listed_each():
+    sys.path.insert(0, str(ROOT / "docs"))
+    from docstrings import one_attribute_each
+
+    lines = ["Attributes", "----------", "a, b,", "c : int", "    Three.", "d : str", ""]
+    lines += ["Examples", "--------", ">>> x, y"]
+    assert one_attribute_each(lines) == [
+        *("Attributes", "----------", "a : int", "    Three.", "b : int", "    Three."),
+        *("c : int", "    Three.", "d : str", "", "Examples", "--------", ">>> x, y"),
+    ]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import re
+import sys
 from collections.abc import Sequence
 from typing import Any, Final, NoReturn
 
@@ -11,6 +12,10 @@ from ..suggestions import did_you_mean
 from .paths import Input
 
 __all__ = ["GROUPS", "Parser"]
+
+#: What argparse says of arguments that are not there, and what looks like an option.
+_MISSING: Final = "the following arguments are required"
+_OPTION: Final = re.compile(r"-{1,2}[A-Za-z]")
 
 _CHOICE = re.compile(r"invalid choice: '(?P<got>.*)' \(choose from (?P<known>.*)\)")
 
@@ -37,6 +42,7 @@ class Parser(argparse.ArgumentParser):
 
     def __init__(self, *args: Any, **kwargs: Any) -> None:
         self._headed: dict[str, argparse._ArgumentGroup] = {}
+        self._words: list[str] = []
         super().__init__(*args, **kwargs)
         #: Parsers of the commands, by name; those of a command have none.
         self.commands: dict[str, Parser] = {}
@@ -64,8 +70,32 @@ class Parser(argparse.ArgumentParser):
             chosen.error(f"unrecognized arguments: {' '.join(unknown)}{guess}")
         return parsed
 
+    def parse_known_args(  # type: ignore[override]
+        self, args: Sequence[str] | None = None, namespace: argparse.Namespace | None = None
+    ) -> tuple[argparse.Namespace, list[str]]:
+        """As `argparse.ArgumentParser.parse_known_args`, with the words at hand for `error`."""
+        self._words = list(sys.argv[1:] if args is None else args)
+        return super().parse_known_args(args, namespace)
+
+    def _mistyped(self) -> str:
+        """The first word that no option has, with the one that was meant; empty without one."""
+        known = self._option_string_actions
+        for word in self._words:
+            name = word.partition("=")[0]
+            if name == "--":
+                break
+            if not _OPTION.match(name) or any(option.startswith(name) for option in known):
+                continue
+            # A short option may hold its value: -ojoint.json.
+            guess = did_you_mean(name, known)
+            if guess and name[:2] not in known:
+                return f"unrecognized arguments: {name}{guess}"
+        return ""
+
     def error(self, message: str) -> NoReturn:
         """Print usage and ``message`` with a suggestion, exit with status 2."""
+        if message.startswith(_MISSING):  # perhaps because it was mistyped
+            message = self._mistyped() or message
         found = _CHOICE.search(message)
         if found is not None:
             known = re.findall(r"[\w-]+", found["known"])

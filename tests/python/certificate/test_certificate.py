@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 import trueangle as ta
-from trueangle.certificate import Contribution, Identity, certify, load_identity
+from trueangle.certificate import Budget, Contribution, Identity, certify, load_identity
 from trueangle.errors import ArgumentError, FileError
 
 from .joints import RIGS, Rig, covered
@@ -47,6 +47,31 @@ def test_u_covers_what_it_says(rig: Rig) -> None:
     inside = np.array([covered(rig, 5000 + k) for k in range(JOINTS)])
     print(f"{rig.name}: seeds 5000 to {5000 + JOINTS - 1}, {100.0 * inside.mean():.2f} %")
     assert SHARE[0] <= inside.mean() <= SHARE[1]
+
+
+#: Draws of a value and its budget, and the share of them known to 0.03 %.
+DRAWS = 500_000
+#: What the rule itself covers where Student's distribution of eight degrees of freedom meets a
+#: normal one: as wide as the normal one, half of it, next to nothing of it.
+RULE = {0.862: 0.9459, 0.5: 0.9500, 0.01: 0.9545}
+
+
+@pytest.mark.parametrize("fitted", RULE)
+def test_what_the_rule_of_welch_and_satterthwaite_covers(fitted: float) -> None:
+    """At the ends of a partial travel fit and reference weigh alike: less than 95.45 % by rule."""
+    rng = np.random.default_rng(20261122)
+    freedom = 312
+    scatter = fitted * np.sqrt(rng.chisquare(freedom, DRAWS) / freedom)
+    error = fitted * rng.standard_normal(DRAWS) + rng.standard_t(8.0, DRAWS)
+    # U depends on the scatter smoothly: a table of it is enough.
+    known = np.linspace(scatter.min(), scatter.max(), 400)
+    expanded = [
+        Budget((Contribution("fit", u, "A", "t", freedom),
+                Contribution("reference", 1.0, degrees_of_freedom=8.0))).expanded
+        for u in known.tolist()
+    ]  # fmt: skip
+    share = np.mean(np.abs(error) <= np.interp(scatter, known, expanded))
+    assert share == pytest.approx(RULE[fitted], abs=0.0012)
 
 
 def _runs(noise: float = 1.0, extra: float = 0.0, play: float = 0.0, seed: int = 3) -> list:
