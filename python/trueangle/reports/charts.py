@@ -25,6 +25,9 @@ _EDGE: Final = 0.3
 #: Decades of a logarithmic axis up to which it has ticks within them.
 _FEW_DECADES: Final = 4
 
+#: Bits of a drawn number's mantissa: 1.5e-5 of it.
+_KEPT_BITS: Final = 15
+
 #: A figure of the report: its alternative text and the charts that it consists of.
 Figure = dict[str, Any]
 
@@ -358,5 +361,14 @@ def _grouped(hover: Sequence[tuple[str, Any]]) -> list[tuple[str, list[Any]]]:
 
 
 def _short(values: Array) -> NDArray[np.float32]:
-    """For drawing only, half the bytes: numbers on the page come from the content."""
-    return np.asarray(values, dtype=np.float32)
+    """For drawing only, half the bytes: numbers on the page come from the content.
+
+    Rounded to `_KEPT_BITS` of the mantissa, 0.005 of 360 deg: what no screen shows would be
+    a fifth of the figures' bytes, for noise cannot be packed.
+    """
+    dropped = 23 - _KEPT_BITS
+    bits = np.asarray(values, dtype=np.float32).view(np.uint32)
+    # A carry into the exponent is the next power of two, as it has to be; infinity stays.
+    finite = (bits & 0x7F800000) != 0x7F800000
+    rounded = np.where(finite, bits + np.uint32(1 << (dropped - 1)), bits)
+    return np.asarray(rounded & np.uint32(0xFFFFFFFF << dropped & 0xFFFFFFFF)).view(np.float32)

@@ -172,6 +172,7 @@ def test_a_page_of_degrees_keeps_its_texts_apart(browser, large, tmp_path: Path)
     """One run, several causes of one kind, a part of a turn: other figures than the page above."""
     path = tmp_path / "large.html"
     large.save(path)
+    assert path.stat().st_size < LARGEST
     paper = browser.new_page(viewport={"width": 1200, "height": 900})
     paper.goto(path.as_uri() + "#print")
     paper.wait_for_selector("html[data-drawn]", timeout=60_000)

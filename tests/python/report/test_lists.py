@@ -1,4 +1,4 @@
-"""What a page does with lists, and with a travel that no model describes."""
+"""What a page does with lists and arrays, and with a travel that no model describes."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ import pytest
 
 import trueangle as ta
 from trueangle.plots.curves import travelled
+from trueangle.reports.charts import _short
 from trueangle.reports.diagnosed import _parameter
 
 
@@ -47,3 +48,18 @@ def _models(chart):
     from .test_report import models
 
     return models(chart)
+
+
+def test_drawn_numbers_are_near_and_short() -> None:
+    """Noise cannot be packed: what no screen shows is left out of it."""
+    rng = np.random.default_rng(20261122)
+    values = np.concatenate([rng.normal(0.0, 10.0 ** rng.uniform(-6, 6, 4000)), [0.0, 360.0, -1.0]])
+    drawn = _short(values)
+    np.testing.assert_allclose(drawn, values, rtol=2.0**-15)
+    assert np.abs(drawn / np.where(values == 0.0, 1.0, values) - 1.0)[:-3].max() > 2.0**-18
+    assert not np.any(drawn.view(np.uint32) & 0xFF)
+    assert drawn[-3:].tolist() == [0.0, 360.0, -1.0]
+    # One bit below a power of two carries into it; what is not finite stays.
+    assert _short(np.array([np.nextafter(np.float32(2.0), 0.0)])).tolist() == [2.0]
+    assert np.isnan(_short(np.array([np.nan]))).all()
+    assert np.isinf(_short(np.array([np.inf, -np.inf]))).all()
