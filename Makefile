@@ -66,6 +66,7 @@ mutants:            ## planted faults: each must be noticed by its tests; an hou
 	$(PYTHON) tests/mutants
 
 pythons:            ## the wheel tried on every Python that is to be had here
+	rm -rf target/tried
 	$(PYTHON) -m pip wheel --quiet --no-deps --wheel-dir target/tried .
 	$(PYTHON) .ci/pythons target/tried/*.whl
 

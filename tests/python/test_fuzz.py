@@ -1,6 +1,7 @@
 """A short fuzz of every loader; `make fuzz` is the long one."""
 
 import random
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -39,3 +40,17 @@ def test_a_case_leaves_nothing_behind_for_the_next():
         if not isinstance(made, dict) or len(repr(made)) > 2000:
             made = {"a": [1, {"b": 2.0}]}
     assert repr(NASTY) == before
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="memory is bounded by RLIMIT_AS")
+def test_a_long_fuzz_that_is_stopped_says_how_far_it_came():
+    command = [sys.executable, "-u", str(FUZZ), "--loader", "simulation", "--cases", "1000000"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as fuzz:
+        assert fuzz.stdout is not None
+        assert fuzz.stdout.readline().startswith("seed ")
+        with pytest.raises(subprocess.TimeoutExpired):
+            fuzz.wait(timeout=2.0)
+        fuzz.terminate()
+        told = fuzz.stdout.read()
+    assert re.fullmatch(r"simulation: \d+ cases, 0 failed, \d+ s\n", told), told
+    assert fuzz.returncode == 1
