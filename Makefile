@@ -77,6 +77,7 @@ kills:              ## 40 kills of each of five commands at random moments; logs
 	TRUEANGLE_KILLS=40 $(PYTHON) -m pytest -q tests/python/injection tests/python/logs
 
 asan:               ## tests of the core under AddressSanitizer, by the compiler's unstable flag
+	ASAN_OPTIONS=allocator_may_return_null=1 \
 	RUSTC_BOOTSTRAP=1 RUSTFLAGS="-Zsanitizer=address" CARGO_TARGET_DIR=target/asan \
 	cargo test --locked --tests --target $$(rustc -vV | sed -n 's/^host: //p')
 
