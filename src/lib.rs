@@ -31,6 +31,7 @@ pub mod fit;
 pub mod lstsq;
 pub mod moments;
 pub mod rank;
+pub mod spectrum;
 pub mod waves;
 
 #[cfg(feature = "python")]

@@ -15,6 +15,7 @@ mod motion;
 mod number;
 mod release;
 mod series;
+mod spectrum;
 mod step;
 mod table;
 mod terms;
@@ -54,6 +55,9 @@ mod _core {
 
     #[pymodule_export]
     use super::motion::{PyBanded, harmonic_rows, harmonic_sum};
+
+    #[pymodule_export]
+    use super::spectrum::add_relative_power;
 
     #[pymodule_export]
     use super::table::{table_correction, table_source};

@@ -276,6 +276,12 @@ def unit_sums(
     step: float,
     count: int,
 ) -> NDArray[np.float64]: ...
+def add_relative_power(
+    power: NDArray[np.float64],
+    cuts: NDArray[np.int64],
+    boxes: Sequence[tuple[int, float]],
+    totals: NDArray[np.float64],
+) -> None: ...
 def covered_span(
     angles: Sequence[NDArray[np.float64]], period: float
 ) -> tuple[float, float, bool]: ...

@@ -17,6 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ... import _core
 from ...distributions import f_tail
 from .evidence import Evidence, largest_of
 from .leftover import Leftover
@@ -129,15 +130,15 @@ def periodogram(
         place = ((axis[a:b] - axis[a:b].min()) / cell + 0.5).astype(np.int64)
         e = values[a:b] - values[a:b].mean()
         spectrum = np.fft.rfft(np.bincount(place, weights=e, minlength=size)[:size])
-        power = np.abs(spectrum) ** 2
-        raw += 4.0 * power / (b - a) ** 2 / len(kept)
-        level, cells = _level(power, over * longest / span)
-        relative = power / level
+        power = spectrum.real**2
+        power += spectrum.imag**2
+        raw += power * (4.0 / ((b - a) ** 2 * len(kept)))
+        cuts, cells = _blocks(power.size, over * longest / span)
         known += cells
-        for k, width in enumerate(WIDTHS):
-            held = max(1.0, width * span / longest)
-            freedom[k] += held
-            total[k] += held * _boxcar(relative, int(width * over + 0.5) if width > 1 else 1)
+        held = [max(1.0, width * span / longest) for width in WIDTHS]
+        freedom += held
+        boxes = [int(width * over + 0.5) if width > 1 else 1 for width in WIDTHS]
+        _core.add_relative_power(power, cuts, list(zip(boxes, held, strict=True)), total)
     best: tuple[float, int, int] | None = None
     # Rounded down to a few values, each of which is one test of a maximum.
     blocks = 2.0 ** (np.floor(2.0 * np.log2(np.maximum(known[first:last], 1.0))) / 2.0)
@@ -206,52 +207,19 @@ def _sampling(axis: Array, bounds: list[tuple[int, int]]) -> tuple[bool, float]:
     return even, 1.0 / middle if even else float(np.max(rates))
 
 
-def _boxcar(x: Array, width: int) -> Array:
-    """Running mean of ``width`` bins about each."""
-    if width <= 1:
-        return x
-    total = np.concatenate([[0.0], np.cumsum(x)])
-    before, after = width // 2, width - width // 2
-    out = np.empty_like(x)
-    inner = slice(before, max(x.size - after + 1, before))
-    out[inner] = (total[width:] - total[:-width]) / width
-    for k in (*range(min(before, x.size)), *range(max(x.size - after + 1, before), x.size)):
-        low, high = max(k - before, 0), min(k + after, x.size)
-        out[k] = (total[high] - total[low]) / (high - low)
-    return out
-
-
-def _medians(values: Array, cuts: NDArray[np.int64]) -> Array:
-    """Medians of the stretches between cuts."""
-    sizes = np.diff(cuts)
-    place = cuts[:-1, None] + np.arange(sizes.max(initial=1))
-    inside = place < cuts[1:, None]
-    rows = np.sort(np.where(inside, values[np.minimum(place, values.size - 1)], np.inf), axis=1)
-    k = np.arange(sizes.size)
-    return np.asarray(0.5 * (rows[k, (sizes - 1) // 2] + rows[k, sizes // 2]))
-
-
-def _level(power: Array, over: float) -> tuple[Array, Array]:
-    """Level of a spectrum by the medians of blocks, which lines do not raise, and its cells.
+def _blocks(size: int, over: float) -> tuple[NDArray[np.int64], Array]:
+    """Edges of the blocks whose medians are a spectrum's level, and the cells that it is worth.
 
     Blocks are as wide as a third of their frequency at most, so that slopes stay slopes.
     """
     width = max(2.0 * LEVEL_CELLS * over, 8.0)
     edges = [1.0]
-    while edges[-1] < power.size:
+    while edges[-1] < size:
         edges.append(edges[-1] + min(width, max(edges[-1] * 0.5, 4.0 * over)))
-    cuts = np.unique(np.minimum(np.array(edges), power.size).astype(np.int64))
-    middle = 0.5 * (cuts[:-1] + cuts[1:] - 1)
-    level = _medians(power, cuts) / np.log(2.0)
-    log_level = np.log(np.maximum(level, 1e-12 * max(float(level.max()), 1e-300)))
+    cuts = np.unique(np.minimum(np.array(edges), size).astype(np.int64))
     # Short blocks at the low end are uncertain: neighbours share what they know.
-    if log_level.size >= 3:
-        padded = np.concatenate([log_level[:1], log_level, log_level[-1:]])
-        log_level = 0.25 * padded[:-2] + 0.5 * padded[1:-1] + 0.25 * padded[2:]
-    k = np.arange(power.size)
     cells = np.repeat(SHARED * np.diff(cuts) / over, np.diff(cuts))
-    cells = np.concatenate([cells[:1], cells, np.repeat(cells[-1:], power.size)])[: power.size]
-    return np.asarray(np.exp(np.interp(k, middle, log_level))), cells
+    return cuts, np.concatenate([cells[:1], cells])
 
 
 def _likeliest(total: Array, freedom: float, cells: Array) -> tuple[float, int]:
