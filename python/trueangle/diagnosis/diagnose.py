@@ -168,7 +168,7 @@ def _diagnosis(
     beliefs, findings = moved(beliefs, findings, sim)
     residual = error - stated.predict(every)
     before = goodness_of_fit(
-        leftover_of(signals, residual if rows is None else residual[rows]),
+        leftover_of(signals, residual if rows is None else residual[rows], start.lines),
         float(start.lines.orders.max()),
         sim.sigma_arcsec or None,
     )

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..joint.signals import Signals
+from ..regression.lines import LineBasis
 from ..regression.regression import Regression
 from ..regression.whitening import Whitener
 from .goodness import Leftover, Unexplained, goodness_of_fit
@@ -18,7 +19,7 @@ __all__ = ["leftover_of", "remainder_of", "unexplained_after"]
 Array = NDArray[np.float64]
 
 
-def leftover_of(signals: Signals, residual: Array) -> Leftover:
+def leftover_of(signals: Signals, residual: Array, lines: LineBasis) -> Leftover:
     """Residuals with the signals of their readings; speed, load and temperature as factors."""
     factors: dict[str, Array] = {}
     if signals.velocity is not None:
@@ -35,6 +36,7 @@ def leftover_of(signals: Signals, residual: Array) -> Leftover:
         signals.clock,
         signals.time is not None,
         factors,
+        lines.once("left over", None, dict),
     )
 
 
@@ -59,7 +61,7 @@ def remainder_of(regression: Regression, without: Collection[int] = ()) -> Lefto
     kept = left[~regression.outlying]
     if regression.outlying.any() and kept.size:
         left = np.clip(left, float(kept.min()), float(kept.max()))
-    return leftover_of(regression.signals, left * regression.root_weights)
+    return leftover_of(regression.signals, left * regression.root_weights, regression.lines)
 
 
 def unexplained_after(

@@ -101,7 +101,7 @@ class UnnamedPattern(Effect):
     def propose(cls, regression: Regression) -> Extension | None:
         """The modulator and orders with the most evidence."""
         signals = regression.signals
-        known = regression.remembered("modulators", None, lambda: modulators(signals))
+        known = regression.lines.once("modulators", None, lambda: modulators(signals))
         if not known:
             return None
         orders = regression.lines.orders

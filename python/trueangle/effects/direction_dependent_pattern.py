@@ -67,6 +67,7 @@ class DirectionalPattern(Effect):
         Latency: "two speeds at least a factor of 3 apart: play does not grow with speed",
         PreslidingHysteresis: "reversals at several places, and both directions over whole turns",
     }
+    of_motion: ClassVar[bool] = True
     measure: ClassVar[str] = "pass every position in both directions, within each run"
     located: ClassVar[bool] = True
 

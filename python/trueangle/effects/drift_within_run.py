@@ -162,7 +162,7 @@ class DriftWithinRun(Effect):
     @classmethod
     def _proposal(cls, regression: Regression, form: str, terms: int = WANDER_TERMS) -> Extension:
         build = partial(cls._shapes, regression, form, terms)
-        columns = regression.remembered(f"{form} {terms}", None, build)
+        columns = regression.lines.once(f"{form} {terms}", None, build)
         log_grid = float(np.log(UNLIKE_FORMS))
         shape = {"form": form, "terms": terms}
         return regression.propose_run_effect(cls.kind, shape, columns, log_grid)

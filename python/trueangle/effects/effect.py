@@ -77,6 +77,8 @@ class Effect:
         A blind spot that names it is reason enough not to name it.
     weighs : bool
         A cause of the scatter that gives the readings weights.
+    of_motion : bool
+        Its columns follow from the shape and the motion alone, whatever the pattern.
     not_at_run_time : str
         Why no corrector can take it off while the joint runs; empty where one can.
     size_name : str
@@ -103,6 +105,7 @@ class Effect:
     changes_lines: ClassVar[bool] = False
     is_doubted: ClassVar[bool] = True
     weighs: ClassVar[bool] = False
+    of_motion: ClassVar[bool] = False
     not_at_run_time: ClassVar[str] = ""
     size_name: ClassVar[str] = ""
     size_grows: ClassVar[bool] = True

@@ -62,6 +62,7 @@ class LoadDependentGearError(FactorEffect):
     )
     needs: ClassVar[tuple[str, ...]] = ("torque",)
     factor: ClassVar[str] = "torque"
+    of_motion: ClassVar[bool] = True
     measure: ClassVar[str] = "repeat the runs at a second load, densely enough for the gear's lines"
     confused_with: ClassVar[Mapping[type[Effect], str]] = {
         ThermalDrift: "change load and temperature independently",

@@ -113,7 +113,7 @@ class PreslidingHysteresis(Effect):
             return None
         best: tuple[float, float, float] | None = None
         for start in (0.0, 1.0):
-            columns = regression.remembered(
+            columns = regression.lines.once(
                 f"presliding {start}",
                 None,
                 lambda start=start: np.column_stack(  # type: ignore[misc]

@@ -60,6 +60,7 @@ class ReferenceLines(Effect):
     )
     needs: ClassVar[tuple[str, ...]] = ("mount",)
     factor: ClassVar[str] = "mount"
+    of_motion: ClassVar[bool] = True
     measure: ClassVar[str] = (
         "turn the reference on its mount by unlike angles (0, 130, 250 deg) and repeat"
     )

@@ -52,7 +52,8 @@ def best_shape(
     if not shapes:
         return None
     signals, around = regression.signals, regression.around
-    blocks: Blocks = regression.remembered(
+    remembered = regression.lines.once if effect.of_motion else regression.remembered
+    blocks: Blocks = remembered(
         effect.kind,
         repr(shapes),
         lambda: Blocks([effect.columns(signals, around, shape) for shape in shapes]),

@@ -69,6 +69,7 @@ class StiffeningCompliance(Effect):
     )
     needs: ClassVar[tuple[str, ...]] = ("torque",)
     factor: ClassVar[str] = "torque"
+    of_motion: ClassVar[bool] = True
     measure: ClassVar[str] = "repeat the runs at three or more loads of both signs"
     confused_with: ClassVar[Mapping[type[Effect], str]] = {
         TorsionalCompliance: "three loads or more, of both signs",

@@ -5,8 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar, Self
+from weakref import WeakKeyDictionary
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..joint.pattern import Surroundings, line_columns
 from ..joint.signals import Signals
@@ -92,7 +94,7 @@ class TorqueHysteresis(Effect):
         if torque is None or not torque.any() or len(present) >= MOST_ELEMENTS:
             return None
         spans = SPANS * float(np.abs(torque).max())
-        loops = regression.remembered(
+        loops = regression.lines.once(
             cls.kind,
             None,
             lambda: np.column_stack([cls.loop(regression.signals, float(s)) for s in spans]),
@@ -163,19 +165,71 @@ class TorqueHysteresis(Effect):
     @staticmethod
     def loop(signals: Signals, span_Nm: float) -> Array:
         """State z in [-1, 1] of the loop, 0 at the start of every run."""
-        state = np.zeros(len(signals))
+        history = _HISTORIES.get(signals)
+        if history is None:
+            history = _HISTORIES[signals] = _History.of(signals)
+        return history.state(span_Nm)
+
+
+@dataclass(frozen=True, eq=False)
+class _History:
+    """Branches of the torque between its turns, one after the other.
+
+    Attributes
+    ----------
+    sign : ndarray, shape (branches,)
+        Sign of change of the torque; 0 before the first turn.
+    opens : ndarray of bool
+        The branch is the first of its run.
+    last : ndarray of int
+        Last reading of every branch.
+    branch : ndarray of int, shape (n,)
+    gone : ndarray, shape (n,)
+        Change of the torque since the branch began.
+    """
+
+    sign: Array
+    opens: NDArray[np.bool_]
+    last: NDArray[np.int64]
+    branch: NDArray[np.int64]
+    gone: Array
+
+    @classmethod
+    def of(cls, signals: Signals) -> Self:
         torque = torque_of(signals)
         zone = TURNED * float(np.abs(torque).max(initial=0.0))
-        for start, stop in signals.run_bounds():
-            sign, since = _branches(torque[start:stop], zone)
-            begun = 0.0
-            cuts = np.flatnonzero(np.diff(since) != 0.0) + 1
-            for a, b in zip([0, *cuts], [*cuts, stop - start], strict=True):
-                gone = np.abs(torque[start + a : start + b] - since[a]) / span_Nm
-                branch = sign[a] - (sign[a] - begun) * np.exp(-np.minimum(gone, 700.0))
-                state[start + a : start + b] = branch if sign[a] else begun
-                begun = float(state[start + b - 1])
-        return state
+        bounds = signals.run_bounds()
+        parts = [_branches(torque[start:stop], zone) for start, stop in bounds]
+        sign, since = (np.concatenate(side) for side in zip(*parts, strict=True))
+        begins = np.zeros(torque.size, dtype=bool)
+        begins[1:] = np.diff(since) != 0.0
+        starts = np.array([start for start, _ in bounds])
+        begins[starts] = True
+        first = np.flatnonzero(begins)
+        return cls(
+            sign[first],
+            np.isin(first, starts),
+            np.append(first[1:], torque.size) - 1,
+            np.cumsum(begins) - 1,
+            np.abs(torque - since),
+        )
+
+    def state(self, span_Nm: float) -> Array:
+        """State of the loop at every reading."""
+        keeps = np.exp(-np.minimum(self.gone / span_Nm, 700.0))
+        keeps[self.sign[self.branch] == 0.0] = 1.0
+        begun = np.zeros(self.sign.size)
+        state = 0.0
+        ends = keeps[self.last].tolist()
+        rows = zip(self.sign.tolist(), self.opens.tolist(), ends, strict=True)
+        for k, (sign, opens, keep) in enumerate(rows):
+            begun[k] = state = 0.0 if opens else state
+            state = sign - (sign - state) * keep
+        return np.asarray(self.sign[self.branch] - (self.sign - begun)[self.branch] * keeps)
+
+
+#: Branches of the torque of signals that somebody still holds: loops of every span share them.
+_HISTORIES: WeakKeyDictionary[Signals, _History] = WeakKeyDictionary()
 
 
 def _branches(torque: Array, zone: float) -> tuple[Array, Array]:

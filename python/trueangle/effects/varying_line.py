@@ -67,6 +67,7 @@ class VaryingLine(Effect):
         ChannelSkew: "angles dense enough for twice the sensor's order",
         LoadDependentGearError: "three loads of both signs",
     }
+    of_motion: ClassVar[bool] = True
     measure: ClassVar[str] = "three speeds and three loads, at free angles"
     flexible_below: ClassVar[float] = ALWAYS
     changes_lines: ClassVar[bool] = True

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -55,6 +57,8 @@ class LineBasis:
         self.plausible = np.array([any(abs(m - p) < 1e-9 for p in expected) for m in self.orders])
         self._values = values
         self._products: Products | None = None
+        #: What else follows from the motion alone, by name: see `once`.
+        self.kept: dict[str, tuple[object, Any]] = {}
 
     @property
     def values(self) -> NDArray[np.float32]:
@@ -70,12 +74,23 @@ class LineBasis:
             self._products = Products(self.values, 2)
         return self._products
 
+    def once(self, name: str, key: object, build: Callable[[], Any]) -> Any:
+        """What ``build`` makes of the motion for ``key``; of every name the last one is kept.
+
+        Shared by all regressions of the same readings, whatever they are held against.
+        """
+        kept = self.kept.get(name)
+        if kept is None or kept[0] != key:
+            kept = self.kept[name] = (key, build())
+        return kept[1]
+
     def take(self, rows: NDArray[np.bool_]) -> LineBasis:
         """The basis of some of the readings."""
         part = object.__new__(LineBasis)
         part.__dict__.update(self.__dict__)
         part.theta = self.theta[rows]
         part._products = None
+        part.kept = {}
         part._values = None if self._values is None else self._values[rows]
         return part
 

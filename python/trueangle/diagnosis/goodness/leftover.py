@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,6 +42,8 @@ class Leftover:
         ``clock`` holds seconds.
     factors : mapping of str to ndarray
         Further channels whose product with place may matter: speed, torque, temperature.
+    kept : dict
+        What tests made of the motion alone; other residuals of the same readings may share it.
     """
 
     residual: Array
@@ -50,6 +53,7 @@ class Leftover:
     clock: Array
     timed: bool = True
     factors: Mapping[str, Array] = field(default_factory=dict)
+    kept: dict[str, Any] = field(default_factory=dict)
 
     def __len__(self) -> int:
         return int(self.residual.size)

@@ -91,10 +91,12 @@ def estimate_noise(left: Leftover, orders: int | None = None) -> Noise:
     spread = 1.4826 * float(np.median(np.abs(e - np.median(e))))
     # Wild readings would hide a correlation; what is slow keeps its size.
     e = _without_spikes(e, max(spread, 1e-300))
-    x = _pattern(left, stop, len(bounds), orders)
-    x, e = _centred(x, bounds), _centred(e[:, None], bounds)[:, 0]
+    columns = left.kept.get("pattern")
+    if columns is None or columns.orders != orders:
+        pattern = _centred(_pattern(left, stop, len(bounds), orders), bounds)
+        columns = left.kept["pattern"] = _Columns(pattern, bounds, orders)
     means = len(bounds)
-    sums = _Sums(x, e, bounds)
+    sums = _Sums(columns, _centred(e[:, None], bounds)[:, 0])
     trials = np.array(TRIALS)
     values = np.array([sums.deviance(r, means) for r in trials])
     k = int(np.argmin(values))
@@ -163,6 +165,23 @@ def _centred(x: Array, bounds: list[tuple[int, int]]) -> Array:
     return out
 
 
+class _Columns:
+    """The flexible pattern with its products: of readings, of inner ones, of neighbours."""
+
+    def __init__(self, pattern: Array, bounds: list[tuple[int, int]], orders: int | None) -> None:
+        self.orders = orders
+        self.x = x = _independent(pattern)
+        self.runs = len(bounds)
+        first = np.array([a for a, _ in bounds])
+        last = np.array([b - 1 for _, b in bounds])
+        self.ends = np.concatenate([first, last])
+        self.closing = last[:-1]
+        self.same = x.T @ x
+        self.inner = self.same - x[self.ends].T @ x[self.ends]
+        cross = x[1:].T @ x[:-1] - x[self.closing + 1].T @ x[self.closing]
+        self.cross = cross + cross.T
+
+
 class _Sums:
     """Products from which RSS and determinant follow for every correlation.
 
@@ -170,20 +189,20 @@ class _Sums:
     is not quite the best estimate of the run's zero, by an amount that ends matter for only.
     """
 
-    def __init__(self, x: Array, e: Array, bounds: list[tuple[int, int]]) -> None:
-        z = np.column_stack([_independent(x), e])
-        first = np.array([a for a, _ in bounds])
-        last = np.array([b - 1 for _, b in bounds])
-        self.runs = len(bounds)
-        self.n = z.shape[0]
-        self.same = z.T @ z
-        inner = np.ones(self.n, dtype=bool)
-        inner[first] = inner[last] = False
-        self.inner = z[inner].T @ z[inner]
-        follows = np.ones(self.n - 1, dtype=bool)
-        follows[last[:-1]] = False
-        cross = z[1:][follows].T @ z[:-1][follows]
-        self.cross = cross + cross.T
+    def __init__(self, columns: _Columns, e: Array) -> None:
+        x, ends, closing = columns.x, columns.ends, columns.closing
+        self.runs, self.n = columns.runs, e.size
+        inner = e.copy()
+        inner[ends] = 0.0
+        # What stands beside a reading in its run.
+        beside = np.zeros_like(e)
+        beside[1:] = e[:-1]
+        beside[:-1] += e[1:]
+        beside[closing] -= e[closing + 1]
+        beside[closing + 1] -= e[closing]
+        self.same = _bordered(columns.same, x, e, e)
+        self.inner = _bordered(columns.inner, x, inner, e)
+        self.cross = _bordered(columns.cross, x, beside, e)
 
     def products(self, rho: float) -> Array:
         """Products z' V^-1 z times the variance of one innovation."""
@@ -211,6 +230,15 @@ class _Sums:
         zero = (1.0 - rho) * (per_run * (1.0 - rho) + 2.0 * rho)
         determinant += means * float(np.log(max(zero, 1e-300)))
         return float(freedom * np.log(rss) - self.runs * np.log1p(-(rho**2)) + determinant)
+
+
+def _bordered(gram: Array, x: Array, mapped: Array, e: Array) -> Array:
+    """Products of columns with one more column beside them, as the noise ``mapped`` it."""
+    whole = np.empty((gram.shape[0] + 1, gram.shape[1] + 1))
+    whole[:-1, :-1] = gram
+    whole[-1, :-1] = whole[:-1, -1] = mapped @ x
+    whole[-1, -1] = mapped @ e
+    return whole
 
 
 def _independent(x: Array) -> Array:
