@@ -10,6 +10,7 @@ from trueangle.joint.grid import UniformGrid, uniform_grid
 from trueangle.regression.batch import Blocks
 from trueangle.regression.factor import Factor
 from trueangle.regression.ratio import best_ratio
+from trueangle.regression.runcolumns import RunColumns
 from trueangle.regression.regression import Regression
 from trueangle.regression.whitening import LagCorrelation, RunEffect, Whitener
 from trueangle.simulation import Harmonic, Joint, RunDesign, Simulation, join_runs, simulate
@@ -160,7 +161,7 @@ def test_gains_are_those_of_least_squares(space):
 
 def test_run_effects_have_the_likelihood_of_the_dense_covariance(space):
     z = np.column_stack([np.ones(space.n), space.signals.clock / 10.0])
-    ratio, deviance = best_ratio(space.whiten, space.q, space.r, space.as_deviances, z)
+    ratio, deviance = space.ratio_of(RunColumns(z, space.bounds))
 
     def minus_two_log_likelihood(ratio):
         v = dense_covariance(space, 0.0, [RunEffect(z, ratio)], np.ones(space.n))
@@ -212,7 +213,9 @@ def test_squares_saved_at_every_ratio_are_those_of_a_ridge(space, width):
         seen.extend(saved)
         return 2.0 * saved
 
-    ratio, deviance = best_ratio(space.whiten, space.q, left, deviances, z)
+    columns = RunColumns(z, space.bounds)
+    moments = columns.moments(np.column_stack([space.q, left]))
+    ratio, deviance = best_ratio(columns.grams(space.whiten), moments, deviances)
     moment = own.T @ left
     saved = moment @ np.linalg.solve(np.eye(own.shape[1]) / ratio + beside.T @ own, moment)
     assert min(abs(s / saved - 1.0) for s in seen) < 1e-7

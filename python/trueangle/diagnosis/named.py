@@ -17,7 +17,7 @@ from .forms import with_form_errors
 from .gain import Gain, measure_gain
 from .identifiability import doubts_about
 from .penalty import cause_terms, finding_groups
-from .selection import extensions, is_flexible, propose
+from .selection import Candidate, extensions, is_flexible, propose
 from .unnamed import is_named
 
 __all__ = ["findings_of", "reconsidered", "scatter_doubt", "scatter_finding"]
@@ -138,8 +138,16 @@ def _rivals(regression: Regression, group: Sequence[int]) -> list[tuple[str, flo
     rest = cause_terms(regression, group)
     own = rest.bic - regression.bic
     others = [name for name in EFFECTS if name != cause]
-    gaps = [(p.cause, own - gain) for p, _, gain in extensions(rest, others) if p.deviance > 0.0]
-    gaps.sort(key=lambda item: item[1])
+
+    def gaps_of(candidates: Sequence[Candidate]) -> list[tuple[str, float]]:
+        found = [(p.cause, own - gain) for p, _, gain in candidates if p.deviance > 0.0]
+        return sorted(found, key=lambda item: item[1])
+
+    def least(candidates: Sequence[Candidate]) -> float:
+        gaps = gaps_of(candidates)
+        return own - gaps[RIVALS - 1][1] if len(gaps) >= RIVALS else 0.0
+
+    gaps = gaps_of(extensions(rest, others, least))
     return [(name, float(gap)) for name, gap in gaps[:RIVALS]]
 
 

@@ -100,7 +100,9 @@ def net_loss(regression: Regression, group: Sequence[int]) -> float:
 def lost(regression: Regression, group: Sequence[int]) -> float:
     """Deviance that the terms ``group`` save beside all the others (Wald, or without them)."""
     if any(regression.terms[k].run_effect is not None for k in group):
-        return cause_terms(regression, group).deviance - regression.deviance
+        return regression.asked(
+            ("lost", *group), lambda: cause_terms(regression, group).deviance - regression.deviance
+        )
     columns = np.concatenate([regression.place(k) for k in group])
     coefficients = regression.coefficients[columns]
     spread = regression.unscaled_covariance[np.ix_(columns, columns)]

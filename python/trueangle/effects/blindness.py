@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..regression.estimate import Parameters
+from ..regression.factor import orthonormal_basis
 from ..regression.regression import Regression
 
 __all__ = [
@@ -92,9 +93,7 @@ class Blindness:
 
 def share_left(regression: Regression, columns: Array, *others: Array) -> float:
     """Largest share of power that columns keep beside the simulation's lines and others."""
-    known = np.hstack([regression.base, *others])
-    u, s, _ = np.linalg.svd(known / np.linalg.norm(known, axis=0).clip(1e-300), False)
-    q = u[:, s > 1e-7 * s[0]]
+    q = orthonormal_basis(np.hstack([regression.base, *others]))
     rest = columns - q @ (q.T @ columns)
     before = np.einsum("ij,ij->j", columns, columns)
     after = np.einsum("ij,ij->j", rest, rest)

@@ -4,16 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from typing import ClassVar, Self
 
 import numpy as np
 
+from .. import _core
 from ..joint.pattern import Surroundings
 from ..joint.signals import Signals
 from ..regression.estimate import Parameters, quantity
 from ..regression.extension import Extension
 from ..regression.regression import Regression
+from ..regression.runcolumns import RunColumns
 from ..regression.whitening import wander_basis
 from .backlash import Backlash
 from .blindness import (
@@ -121,8 +122,11 @@ class DriftWithinRun(Effect):
         if regression.has(cls.kind):
             return None
         extensions = [cls._proposal(regression, form) for form in FORMS]
-        best = cls._finer(regression, max(extensions, key=lambda p: p.bic_gain))
-        if best.bic_gain <= 0.0:
+        best = max(extensions, key=lambda p: p.bic_gain)
+        if regression.beaten(best.deviance, 1, best.log_grid):
+            return best
+        best = cls._finer(regression, best)
+        if best.bic_gain <= regression.least:
             return best
         # An error that comes back at the same place on the next pass in that direction is
         # no wander in time, nor is a new zero.
@@ -161,8 +165,11 @@ class DriftWithinRun(Effect):
 
     @classmethod
     def _proposal(cls, regression: Regression, form: str, terms: int = WANDER_TERMS) -> Extension:
-        build = partial(cls._shapes, regression, form, terms)
-        columns = regression.lines.once(f"{form} {terms}", None, build)
+        columns = regression.lines.once(
+            f"{form} {terms}",
+            None,
+            lambda: RunColumns(cls._shapes(regression, form, terms), regression.bounds),
+        )
         log_grid = float(np.log(UNLIKE_FORMS))
         shape = {"form": form, "terms": terms}
         return regression.propose_run_effect(cls.kind, shape, columns, log_grid)
@@ -182,9 +189,9 @@ class DriftWithinRun(Effect):
         if form == "settling":
             return (1.0 - np.exp(-u / SETTLING))[:, None]
         if form == "walk":
-            sines = np.sin(np.pi * np.outer(u, k - 0.5))
-            return np.asarray(np.sqrt(2.0) * sines / (np.pi * (k - 0.5)))
-        cosines = np.cos(np.pi * np.outer(u, k))
+            sines = _core.line_columns(np.pi * u, k - 0.5)[:, 1::2]
+            return np.asarray(sines * (np.sqrt(2.0) / (np.pi * (k - 0.5))))
+        cosines = _core.line_columns(np.pi * u, k.astype(np.float64))[:, 0::2]
         if form == "centred walk":
             return np.asarray(np.sqrt(2.0) * cosines / (np.pi * k))
         if form == "flicker":

@@ -127,7 +127,10 @@ class LocalDefect(Effect):
         for shaft, cycles in joint.shafts.items():
             for score, place, width in cls._search(regression, cycles, e):
                 shape = {"shaft": shaft, "place_deg": place, "width_deg": width}
-                if not regression.hopeless(score / regression.variance, 3, log_grid):
+                if not (
+                    regression.hopeless(score / regression.variance, 3, log_grid)
+                    or cls._is_beaten(regression, shape, log_grid)
+                ):
                     shape = cls._refined(regression, shaft, place, width)
                     shape = cls._unclipped(regression, shape)
                 columns = cls.columns(regression.signals, regression.around, shape)
@@ -139,6 +142,14 @@ class LocalDefect(Effect):
                 if best is None or extension.deviance > best.deviance:
                     best = extension
         return best
+
+    @classmethod
+    def _is_beaten(cls, regression: Regression, shape: dict[str, Any], log_grid: float) -> bool:
+        """Something else explains more than a bump of that place and width can be refined to."""
+        if regression.least <= 0.0:
+            return False
+        columns = cls.columns(regression.signals, regression.around, shape)
+        return regression.beaten(float(regression.gains(columns)[0]), 3, log_grid)
 
     @staticmethod
     def _search(

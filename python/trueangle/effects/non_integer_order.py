@@ -105,12 +105,17 @@ class NonIntegerOrder(Effect):
         step = orders[1] - orders[0]
         penalty = cls._log_grid(regression, orders)
         net = power - 2.0 * penalty
+        top = int(np.argmax(net))
+        if regression.beaten(float(power[top]), 1, float(penalty[top])):
+            return None
         peaks = np.flatnonzero((net[1:-1] >= net[:-2]) & (net[1:-1] >= net[2:])) + 1
         for k in peaks[np.argsort(net[peaks])[::-1][:PEAKS]]:
             extension = cls._at(regression, float(orders[k]), float(penalty[k]))
             if best is None or extension.bic_gain > best.bic_gain:
                 best = extension
         if best is None or best.bic_gain < 0.0:
+            return best
+        if regression.beaten(best.deviance, 1, best.log_grid):
             return best
         middle, log_grid = best.shape["order"], best.log_grid
         order, _ = golden_maximum(

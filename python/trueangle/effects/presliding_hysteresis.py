@@ -130,11 +130,13 @@ class PreslidingHysteresis(Effect):
         if gain <= 0.0 or len(present) >= MOST_ELEMENTS:
             return None
         step = np.log(LENGTHS[1] / LENGTHS[0])
-        log_length, _ = golden_maximum(
-            lambda x: float(regression.gains(signals.presliding(np.exp(x), start)[:, None])[0]),
-            np.log(length) - step,
-            np.log(length) + step,
-        )
+        log_length = float(np.log(length))
+        if not regression.beaten(gain, 2, float(np.log(2.0))):
+            log_length, _ = golden_maximum(
+                lambda x: float(regression.gains(signals.presliding(np.exp(x), start)[:, None])[0]),
+                log_length - step,
+                log_length + step,
+            )
         shape = {"length_deg": float(np.exp(log_length)), "start_state": start}
         columns = cls.columns(signals, regression.around, shape)
         extension = regression.propose(cls.kind, shape, columns, parameters=2, log_grid=np.log(2.0))

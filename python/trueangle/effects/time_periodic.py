@@ -104,6 +104,9 @@ class TimePeriodic(Effect):
         if found is None:
             return None
         frequencies, p, sizes = found
+        # No frequency of its own in every run can bring more.
+        if regression.beaten(float(p.max(axis=0).sum()), 1, np.log(frequencies.size)):
+            return None
         tried = [_fixed(frequencies, p, sizes), _wandering(frequencies, p)]
         best: Extension | None = None
         for place, deviance, log_grid in tried:

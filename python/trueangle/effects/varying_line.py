@@ -111,6 +111,8 @@ class VaryingLine(Effect):
         best = best_shape(cls, regression, shapes, [log_grid] * len(shapes))
         if best is None:
             return None
+        if best.bic_gain < regression.least:
+            return best
         # What varies is told by what it leaves of the line as it is, which comes first.
         steady = regression.beside(line_columns(signals.theta, best.shape["order"]))
         beyond = steady.gain(best.columns)[0]

@@ -79,18 +79,19 @@ class Products:
         if whiten.root_weights is not None:
             columns = columns * whiten.root_weights.astype(columns.dtype)[:, None]
         same = _gram(columns, width)
-        inner, cross = same.copy(), np.zeros_like(same)
-        for start, stop in whiten.bounds:
-            inner -= _gram(columns[[start, stop - 1]], width)
-            cross += _gram(columns[start : stop - 1], width, columns[start + 1 : stop])
+        first, stop = np.array(whiten.bounds).T
+        inner = same - _gram(columns[first], width) - _gram(columns[stop - 1], width)
+        cross = _gram(columns[:-1], width, columns[1:])
+        # Runs are no neighbours.
+        cross -= _gram(columns[first[1:] - 1], width, columns[first[1:]])
         return same, inner, cross + np.swapaxes(cross, 1, 2)
 
 
 def _gram(columns: NDArray[Any], width: int, others: NDArray[Any] | None = None) -> Array:
     """Products of columns, or of them with others, within each block."""
-    cut = columns.reshape(len(columns), -1, width)
+    cut = columns.reshape(len(columns), columns.shape[1] // width, width)
     gram = np.empty((cut.shape[1], width, width))
-    beside = cut if others is None else others.reshape(len(columns), -1, width)
+    beside = cut if others is None else others.reshape(cut.shape)
     for i in range(width):
         for j in range(0 if others is not None else i, width):
             gram[:, i, j] = np.einsum("nb,nb->b", cut[:, :, i], beside[:, :, j])

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from .whitening import RunEffect, Whitener
 
-__all__ = ["Factor"]
+__all__ = ["Factor", "orthonormal_basis"]
 
 Array = NDArray[np.float64]
 
@@ -76,7 +76,8 @@ class Factor:
 
     @classmethod
     def _fresh(cls, blocks: tuple[Array, ...], whiten: Whitener) -> Factor:
-        x = whiten(np.hstack(blocks))
+        x = np.hstack(blocks) if len(blocks) > 1 else blocks[0]
+        x = whiten(x)
         made = _orthonormal(x)
         if made is not None:
             q, scaled, lengths = made
@@ -119,6 +120,15 @@ class Factor:
         lengths = np.concatenate([self.lengths, lengths])
         back = whole / lengths[:, None]
         return Factor(self.whiten, blocks, np.hstack([self.q, q]), back, whole, lengths)
+
+
+def orthonormal_basis(x: Array) -> Array:
+    """Columns of length 1 at right angles that span the same."""
+    made = _orthonormal(x)
+    if made is not None:
+        return made[0]
+    u, s, _ = np.linalg.svd(x / np.linalg.norm(x, axis=0).clip(1e-300), full_matrices=False)
+    return np.asarray(u[:, s > DISTINCT * s[0]])
 
 
 def _orthonormal(x: Array) -> tuple[Array, Array, Array] | None:

@@ -17,6 +17,7 @@ from .factor import Factor
 from .lines import LineBasis
 from .ratio import best_ratio
 from .repeats import repeated_part
+from .runcolumns import RunColumns
 from .whitening import LagCorrelation, RunEffect
 
 __all__ = ["ROUNDING", "LeastSquares"]
@@ -81,6 +82,10 @@ class LeastSquares:
         self._factors: tuple[Factor, ...] = ()
         #: What causes proposed beside given terms; shared by regressions of the same readings.
         self.memory: dict[Any, Any] = {}
+        #: Evidence below which no candidate matters at the moment (`Regression.beaten`).
+        self.least = 0.0
+        #: Answers given, with the residual that they were given for.
+        self._asked: tuple[Array, dict[object, float]] | None = None
         self.update()
         #: `deviance` without any term.
         self.start = self.deviance
@@ -93,9 +98,20 @@ class LeastSquares:
         other.__dict__.update(self.__dict__)
         other.terms = list(terms)
         other.form_errors = None
+        other.least, other._asked = 0.0, None
         if rho is not None:
             other.fixed_rho = rho
         other.update()
+        return other
+
+    def with_evidence(self, terms: Iterable[Extension]) -> Self:
+        """The same terms told otherwise: with another deviance, say."""
+        terms = list(terms)
+        if sum(term.run_effect is not None for term in terms) > 1:
+            return self.with_terms(terms)  # ratios of variance settle among each other
+        other = object.__new__(type(self))
+        other.__dict__.update(self.__dict__)
+        other.terms, other._asked = terms, None
         return other
 
     def without_repeats(self, by_direction: bool = False) -> Self:
@@ -168,12 +184,17 @@ class LeastSquares:
         self.coefficients = self.back @ inner
         self._seen: tuple[Array, Array] | None = None
 
+    def _all_seen(self) -> Array:
+        """`seen`, the residual as the last column."""
+        if self._seen is None or self._seen[0] is not self.r:
+            self._seen = self.r, self.whiten.transposed(np.column_stack([self.q, self.r]))
+        return self._seen[1]
+
     @property
     def seen(self) -> tuple[Array, Array]:
         """The fitted columns and the residual as columns that are not whitened see them."""
-        if self._seen is None:
-            self._seen = self.whiten.transposed(self.q), self.whiten.transposed(self.r)
-        return self._seen
+        seen = self._all_seen()
+        return seen[:, :-1], seen[:, -1]
 
     @property
     def unscaled_covariance(self) -> Array:
@@ -186,8 +207,13 @@ class LeastSquares:
         others = [effect for j, effect in enumerate(effects) if j != k]
         self._project(target, rho, others)
         columns = effects[k].columns
-        ratio, _ = best_ratio(self.whiten, self.q, self.r, self.as_deviances, columns)
+        ratio, _ = self.ratio_of(RunColumns(columns, self.bounds))
         return RunEffect(columns, max(ratio, 1e-9))
+
+    def ratio_of(self, columns: RunColumns) -> tuple[float, float]:
+        """Best ratio of variances of a run effect beside what is fitted, and what it saves."""
+        moments = columns.moments(self._all_seen())
+        return best_ratio(columns.grams(self.whiten), moments, self.as_deviances)
 
     def _pattern(self) -> Pattern:
         """The believed pattern with the missing orders found so far.

@@ -56,6 +56,8 @@ class LineBasis:
         expected = plausible_orders(joint)
         self.plausible = np.array([any(abs(m - p) < 1e-9 for p in expected) for m in self.orders])
         self._values = values
+        #: Those of more readings and the rows of these, until they are asked for.
+        self._source: tuple[NDArray[np.float32], NDArray[np.bool_]] | None = None
         self._products: Products | None = None
         #: What else follows from the motion alone, by name: see `once`.
         self.kept: dict[str, tuple[object, Any]] = {}
@@ -63,6 +65,9 @@ class LineBasis:
     @property
     def values(self) -> NDArray[np.float32]:
         """Cosine and sine of every order side by side, shape (n, 2 k); made at first use."""
+        if self._values is None and self._source is not None:
+            whole, rows = self._source
+            self._values, self._source = whole[rows], None
         if self._values is None:
             self._values = _core.line_columns(self.theta, self.orders, True)
         return self._values
@@ -91,7 +96,8 @@ class LineBasis:
         part.theta = self.theta[rows]
         part._products = None
         part.kept = {}
-        part._values = None if self._values is None else self._values[rows]
+        part._values = None
+        part._source = None if self._values is None else (self._values, rows)
         return part
 
 

@@ -7,8 +7,6 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from .whitening import Whitener, principal
-
 __all__ = ["best_ratio"]
 
 Array = NDArray[np.float64]
@@ -26,11 +24,7 @@ FEW_COLUMNS = 40
 
 
 def best_ratio(
-    whiten: Whitener,
-    q: Array,
-    left: Array,
-    deviances: Callable[[Array], Array],
-    columns: Array,
+    grams: Array, moments: Array, deviances: Callable[[Array], Array]
 ) -> tuple[float, float]:
     r"""Best ratio of variances of a run effect beside what is fitted, and what it saves.
 
@@ -43,25 +37,21 @@ def best_ratio(
 
     Parameters
     ----------
-    whiten : Whitener
-    q : ndarray, shape (n, p)
-        What is fitted, whitened and orthonormal.
-    left : ndarray, shape (n,)
-        What it leaves of the whitened readings.
+    grams : ndarray, shape (runs, k, k)
+        Products of the run effect's columns in every run, whitened.
+    moments : ndarray, shape (runs, k, p + 1)
+        Their products with what is fitted, whitened and orthonormal, and with what that leaves.
     deviances : callable
         Deviance that so many squares saved are worth.
-    columns : ndarray, shape (n, k)
-        Shapes of the run effect.
 
     Returns
     -------
     float, float
         The ratio, 0 where none saves anything, and the deviance saved.
     """
-    bounds = whiten.bounds
-    values, turned = principal(whiten(columns), bounds)
-    stacked = np.column_stack([q, left])
-    moment = np.array([turned[a:b].T @ stacked[a:b] for a, b in bounds])
+    values, vectors = np.linalg.eigh(grams)
+    values = np.maximum(values, 0.0)
+    moment = np.swapaxes(vectors, 1, 2) @ moments
     kept = values > COUNTS * values.max(initial=1e-300)
     power = values[kept]
     b = (moment / np.sqrt(np.where(kept, values, 1.0))[:, :, None])[kept]

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from .batch import Blocks
 from .extension import Extension
 from .leastsquares import ROUNDING, LeastSquares
-from .ratio import best_ratio
+from .runcolumns import RunColumns
 from .whitening import RunEffect
 
 __all__ = ["BEYOND_SHOWN", "ROUNDING", "Extension", "Regression"]
@@ -134,6 +134,15 @@ class Regression(LeastSquares):
             kept = self.memory["kept", name] = (key, build())
         return kept[1]
 
+    def asked(self, key: object, build: Callable[[], float]) -> float:
+        """What ``build`` makes of this regression and its terms, made once."""
+        if self._asked is None or self._asked[0] is not self.r:
+            self._asked = self.r, {}
+        answers = self._asked[1]
+        if key not in answers:
+            answers[key] = build()
+        return answers[key]
+
     def fixed_gains(self, columns: Array) -> Array:
         """Deviance that each column saves with the coefficient 1."""
         x, before, after, _ = self._beside(columns)
@@ -190,10 +199,16 @@ class Regression(LeastSquares):
         )
 
     def propose_run_effect(
-        self, cause: str, shape: dict[str, Any], columns: Array, log_grid: float = 0.0
+        self,
+        cause: str,
+        shape: dict[str, Any],
+        columns: Array | RunColumns,
+        log_grid: float = 0.0,
     ) -> Extension:
         """Extension of a run effect with its evidence in this regression."""
-        ratio, deviance = best_ratio(self.whiten, self.q, self.r, self.as_deviances, columns)
+        if not isinstance(columns, RunColumns):
+            columns = RunColumns(columns, self.bounds)
+        ratio, deviance = self.ratio_of(columns)
         return Extension(
             cause,
             shape,
@@ -202,9 +217,13 @@ class Regression(LeastSquares):
             log_grid,
             deviance,
             self.log_runs,
-            RunEffect(columns, ratio),
+            RunEffect(columns.columns, ratio),
         )
 
     def hopeless(self, deviance: float, parameters: int, log_grid: float = 0.0) -> bool:
-        """A coarse search this far below its penalty gains nothing by refining."""
-        return 1.5 * deviance + 10.0 < parameters * self.log_n + 2.0 * log_grid
+        """A coarse search this far below its penalty, or below `least`, need not be refined."""
+        return 1.5 * deviance + 10.0 < parameters * self.log_n + 2.0 * log_grid + self.least
+
+    def beaten(self, deviance: float, parameters: int, log_grid: float = 0.0) -> bool:
+        """As `hopeless`, of causes that are refined as long as nothing else explains more."""
+        return self.least > 0.0 and self.hopeless(deviance, parameters, log_grid)

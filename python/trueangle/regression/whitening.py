@@ -128,6 +128,7 @@ class Whitener:
         self._first = [start for start, _ in bounds]
         self._rotations: list[tuple[Array, Array]] = []
         self._log_determinants: list[float] = []
+        self._shares: tuple[Array, Array] | None = None
         self.log_determinant: float = -len(bounds) * float(np.log1p(-(rho**2)))
         if weights is not None:
             self.log_determinant -= float(np.log(weights).sum())
@@ -249,9 +250,15 @@ class Whitener:
         if chosen is not None:
             widths = [effect.columns.shape[1] for effect in self.effects]
             kept = np.repeat(np.asarray(chosen, dtype=np.float64), widths)
-        stacked = np.hstack([np.sqrt(effect.ratio) * effect.columns for effect in self.effects])
-        for start, stop in self.bounds:
+        if self._shares is None:
+            scaled = [np.sqrt(effect.ratio) * effect.columns for effect in self.effects]
+            stacked = scaled[0] if len(scaled) == 1 else np.hstack(scaled)
+            grams = np.array([stacked[a:b].T @ stacked[a:b] for a, b in self.bounds])
+            # I plus what is positive: well conditioned where it matters.
+            self._shares = stacked, np.linalg.inv(np.eye(stacked.shape[1]) + grams)
+        stacked, shares = self._shares
+        for (start, stop), share in zip(self.bounds, shares, strict=True):
             a = stacked[start:stop]
-            inner = np.linalg.solve(np.eye(a.shape[1]) + a.T @ a, a.T @ residual[start:stop])
-            part[start:stop] = (a if kept is None else a * kept) @ inner
+            inner = share @ (a.T @ residual[start:stop])
+            np.matmul(a, inner if kept is None else kept * inner, out=part[start:stop])
         return part
