@@ -10,8 +10,8 @@ from trueangle.joint.grid import UniformGrid, uniform_grid
 from trueangle.regression.batch import Blocks
 from trueangle.regression.factor import Factor
 from trueangle.regression.ratio import best_ratio
-from trueangle.regression.runcolumns import RunColumns
 from trueangle.regression.regression import Regression
+from trueangle.regression.runcolumns import RunColumns
 from trueangle.regression.whitening import LagCorrelation, RunEffect, Whitener
 from trueangle.simulation import Harmonic, Joint, RunDesign, Simulation, join_runs, simulate
 

@@ -11,13 +11,14 @@ from ..effects.scatter import ScatterFinding
 from ..pace import pace
 from ..regression.estimate import Parameters
 from ..regression.regression import Regression
+from .candidates import Candidate, extensions, propose
 from .confirmation import CONFIRMED, NOT_CONFIRMED, status_of
 from .findings import Finding
 from .forms import with_form_errors
 from .gain import Gain, measure_gain
 from .identifiability import doubts_about
 from .penalty import cause_terms, finding_groups
-from .selection import Candidate, extensions, is_flexible, propose
+from .selection import is_flexible
 from .unnamed import is_named
 
 __all__ = ["findings_of", "reconsidered", "scatter_doubt", "scatter_finding"]

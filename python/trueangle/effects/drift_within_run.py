@@ -181,7 +181,7 @@ class DriftWithinRun(Effect):
         for start, stop in regression.bounds:
             clock = regression.signals.clock[start:stop]
             u[start:stop] = (clock - clock[0]) / max(float(clock[-1] - clock[0]), 1e-300)
-        k = np.arange(1, terms + 1)
+        k = np.arange(1, terms + 1, dtype=np.float64)
         if form == "ramp":
             return u[:, None]
         if form == "centred ramp":
@@ -191,7 +191,7 @@ class DriftWithinRun(Effect):
         if form == "walk":
             sines = _core.line_columns(np.pi * u, k - 0.5)[:, 1::2]
             return np.asarray(sines * (np.sqrt(2.0) / (np.pi * (k - 0.5))))
-        cosines = _core.line_columns(np.pi * u, k.astype(np.float64))[:, 0::2]
+        cosines = _core.line_columns(np.pi * u, k)[:, 0::2]
         if form == "centred walk":
             return np.asarray(np.sqrt(2.0) * cosines / (np.pi * k))
         if form == "flicker":
