@@ -53,8 +53,14 @@ def bends(regression: Regression, exempt: Collection[str] = ()) -> Array:
 
 def beside_bends(regression: Regression, exempt: Collection[str] = ()) -> Regression:
     """The regression beside `bends`, for scores of what else there may be; itself without any."""
-    columns = bends(regression, exempt)
-    return regression.beside(columns, 1.0) if columns.shape[1] else regression
+
+    def build() -> Regression:
+        columns = bends(regression, exempt)
+        return regression.beside(columns, 1.0) if columns.shape[1] else regression
+
+    present = {term.cause for term in regression.terms}
+    made: Regression = regression.asked(("bends", *sorted(present & set(exempt))), build)
+    return made
 
 
 def told_from_forms(regression: Regression, extension: Extension) -> Extension:

@@ -100,9 +100,10 @@ def net_loss(regression: Regression, group: Sequence[int]) -> float:
 def lost(regression: Regression, group: Sequence[int]) -> float:
     """Deviance that the terms ``group`` save beside all the others (Wald, or without them)."""
     if any(regression.terms[k].run_effect is not None for k in group):
-        return regression.asked(
-            ("lost", *group), lambda: cause_terms(regression, group).deviance - regression.deviance
+        without: float = regression.asked(
+            ("lost", *group), lambda: cause_terms(regression, group).deviance
         )
+        return without - regression.deviance
     columns = np.concatenate([regression.place(k) for k in group])
     coefficients = regression.coefficients[columns]
     spread = regression.unscaled_covariance[np.ix_(columns, columns)]

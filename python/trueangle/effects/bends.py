@@ -17,6 +17,9 @@ LENGTHS = (0.1, 0.5, 2.0, 8.0, 30.0)
 #: Share of a run over which an error may lag behind what it follows.
 LAG = 0.03
 
+#: Share from which on what is left of an earlier reading is rounding.
+FORGOTTEN = 1e-18
+
 
 def bent(signals: Signals, factor: str, signal: Array) -> Array:
     r"""Columns by which an error ``signal`` may depart from its law in a factor x.
@@ -67,8 +70,12 @@ def _late(signals: Signals, values: Array) -> Array:
     late = np.empty_like(values)
     for start, stop in signals.run_bounds():
         keep = float(np.exp(-1.0 / max(LAG * (stop - start), 1e-3)))
-        state = float(values[start])
-        for i, value in enumerate(values[start:stop].tolist(), start):
-            state = value + (state - value) * keep
-            late[i] = state
+        state = (1.0 - keep) * values[start:stop]
+        state[0] = values[start]
+        # What each reading still holds of those before: of 1, of 3, of 7 ... of them.
+        back = 1
+        while back < stop - start and keep > FORGOTTEN:
+            state[back:] += keep * state[:-back]
+            back, keep = 2 * back, keep * keep
+        late[start:stop] = state
     return late

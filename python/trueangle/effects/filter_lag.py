@@ -351,8 +351,12 @@ def _lagged(
 ) -> Array:
     """Change of the pattern by a low-pass of first or second order."""
     w = frequency / cutoff_hz
+    square = w * w
+    # Real parts alone: of -jw/(1 + jw), and of (w^2 - 2j zeta w)/(1 - w^2 + 2j zeta w).
     if damping is None:
-        change = -1j * w / (1.0 + 1j * w)
+        change = (waves.imag * w - waves.real * square) / (1.0 + square)
     else:
-        change = (w**2 - 2j * damping * w) / (1.0 - w**2 + 2j * damping * w)
-    return np.asarray((waves * change).real.sum(axis=1))
+        w *= 2.0 * damping
+        lead = waves.real * square * (1.0 - square - 4.0 * damping**2) + waves.imag * w
+        change = lead / ((1.0 - square) ** 2 + w * w)
+    return np.asarray(change.sum(axis=1))

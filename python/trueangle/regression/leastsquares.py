@@ -85,7 +85,7 @@ class LeastSquares:
         #: Evidence below which no candidate matters at the moment (`Regression.beaten`).
         self.least = 0.0
         #: Answers given, with the residual that they were given for.
-        self._asked: tuple[Array, dict[object, float]] | None = None
+        self._asked: tuple[Array, dict[object, Any]] | None = None
         self.update()
         #: `deviance` without any term.
         self.start = self.deviance

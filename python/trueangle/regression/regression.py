@@ -134,7 +134,7 @@ class Regression(LeastSquares):
             kept = self.memory["kept", name] = (key, build())
         return kept[1]
 
-    def asked(self, key: object, build: Callable[[], float]) -> float:
+    def asked(self, key: object, build: Callable[[], Any]) -> Any:
         """What ``build`` makes of this regression and its terms, made once."""
         if self._asked is None or self._asked[0] is not self.r:
             self._asked = self.r, {}
