@@ -200,6 +200,12 @@ def _made_specific(regression: Regression) -> Regression:
 
 
 def _forward(regression: Regression, causes: Sequence[str]) -> Regression:
+    """With the best cause after the other, as long as one is worth it."""
+    found: Regression = regression.asked(("forward", *causes), lambda: _grown(regression, causes))
+    return found
+
+
+def _grown(regression: Regression, causes: Sequence[str]) -> Regression:
     while len(regression.terms) < MOST_TERMS and not regression.is_explained:
         scores = Scores()
         best = scores.best(extensions(regression, causes, scores.least))

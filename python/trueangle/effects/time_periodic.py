@@ -9,6 +9,7 @@ from typing import ClassVar, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from .. import _core
 from ..joint.pattern import Surroundings, line_columns
 from ..joint.signals import Signals
 from ..regression.estimate import Parameters, quantity
@@ -269,18 +270,18 @@ def _refined(regression: Regression, frequencies: list[float], step: float) -> l
     e = regression.left - regression.whiten.run_part(regression.left)
     e = np.where(regression.outlying, 0.0, e)
 
-    def power(f: float, runs: Sequence[tuple[int, int]]) -> float:
-        turn = -2j * np.pi * f
-        return sum(
-            float(np.abs(e[a:b] @ np.exp(turn * regression.signals.clock[a:b])) ** 2)
-            for a, b in runs
-        )
+    turn = 2.0 * np.pi * regression.signals.clock
+
+    def power(f: float, start: int, stop: int, starts: list[int]) -> float:
+        sums = _core.unit_sums(turn[start:stop], e[None, start:stop], starts, f, 1.0, 1)
+        return float((sums**2).sum())
 
     if len({*frequencies}) == 1:
         f = frequencies[0]
-        found, _ = golden_maximum(lambda x: power(x, regression.bounds), f - step, f + step, 12)
+        starts = [start for start, _ in regression.bounds]
+        found, _ = golden_maximum(lambda x: power(x, 0, e.size, starts), f - step, f + step, 12)
         return [float(found)] * len(frequencies)
     return [
-        float(golden_maximum(lambda x, r=run: power(x, [r]), f - step, f + step, 10)[0])  # type: ignore[misc]
+        float(golden_maximum(lambda x, r=run: power(x, *r, [0]), f - step, f + step, 10)[0])  # type: ignore[misc]
         for f, run in zip(frequencies, regression.bounds, strict=True)
     ]

@@ -123,7 +123,7 @@ class LeastSquares:
         other = object.__new__(type(self))
         other.__dict__.update(self.__dict__)
         other.residual = self.residual - repeated
-        other.memory = {}
+        other.memory, other._asked = {}, None
         other.update()
         other.start = self.start + other.deviance - self.deviance
         return other

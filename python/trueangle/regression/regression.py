@@ -58,7 +58,7 @@ class Regression(LeastSquares):
             share = power / (1.0 + power)
         other = object.__new__(type(self))
         other.__dict__.update(self.__dict__)
-        other.memory = {}
+        other.memory, other._asked = {}, None
         other.q = np.hstack([self.q, u * np.sqrt(share)])
         moment = u.T @ self.r
         other.r = self.r - u @ (share * moment)
@@ -135,13 +135,15 @@ class Regression(LeastSquares):
         return kept[1]
 
     def asked(self, key: object, build: Callable[[], Any]) -> Any:
-        """What ``build`` makes of this regression and its terms, made once."""
+        """What ``build`` makes of this regression and its terms, made once; itself perhaps."""
         if self._asked is None or self._asked[0] is not self.r:
             self._asked = self.r, {}
         answers = self._asked[1]
         if key not in answers:
-            answers[key] = build()
-        return answers[key]
+            made = build()
+            # Not itself: who holds itself is not let go of.
+            answers[key] = None if made is self else made
+        return self if answers[key] is None else answers[key]
 
     def fixed_gains(self, columns: Array) -> Array:
         """Deviance that each column saves with the coefficient 1."""
