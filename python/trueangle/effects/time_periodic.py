@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import ClassVar, Self
 
 import numpy as np
@@ -279,9 +280,13 @@ def _refined(regression: Regression, frequencies: list[float], step: float) -> l
     if len({*frequencies}) == 1:
         f = frequencies[0]
         starts = [start for start, _ in regression.bounds]
-        found, _ = golden_maximum(lambda x: power(x, 0, e.size, starts), f - step, f + step, 12)
-        return [float(found)] * len(frequencies)
+        of_all = partial(power, start=0, stop=e.size, starts=starts)
+        return [float(golden_maximum(of_all, f - step, f + step, 12)[0])] * len(frequencies)
     return [
-        float(golden_maximum(lambda x, r=run: power(x, *r, [0]), f - step, f + step, 10)[0])  # type: ignore[misc]
-        for f, run in zip(frequencies, regression.bounds, strict=True)
+        float(
+            golden_maximum(
+                partial(power, start=start, stop=stop, starts=[0]), f - step, f + step, 10
+            )[0]
+        )
+        for f, (start, stop) in zip(frequencies, regression.bounds, strict=True)
     ]
