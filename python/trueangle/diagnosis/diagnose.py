@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..blas import one_blas_thread
 from ..checks.check import faults_of
 from ..checks.record import records_of
 from ..effects import EFFECTS
@@ -101,8 +102,8 @@ def diagnose(
     -----
     Up to 40 000 readings are used; of more, one of every so many in a row is drawn at
     random (seed 0), which keeps the angles free of a grid. About 1 to 3 s for 10 000
-    readings. Source: Frisch-Waugh projection; Schwarz (1978) and Kass and Wasserman
-    (1995) for the penalty; Koenker
+    readings, on one processor: numpy's own threads are stopped meanwhile.
+    Source: Frisch-Waugh projection; Schwarz (1978) and Kass and Wasserman (1995) for the penalty; Koenker
     (1981) for the variance.
 
     Examples
@@ -121,7 +122,7 @@ def diagnose(
         log = simulated if is_joined else minus_simulated(measured, simulated)
     elif sim is None:
         raise ArgumentError("nothing is believed: give a simulation, or a log as simulated=")
-    with paced(within, progress):
+    with paced(within, progress), one_blas_thread():
         return _diagnosis(measured, log, Simulation() if sim is None else sim, gain)
 
 

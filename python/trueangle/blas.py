@@ -1,0 +1,80 @@
+"""Threads of numpy's linear algebra: none beside the caller's where products are many and small."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+
+__all__ = ["one_blas_thread"]
+
+#: Names by which builds of OpenBLAS ask for and set their threads.
+NAMES = tuple(
+    (f"{before}openblas_get_num_threads{after}", f"{before}openblas_set_num_threads{after}")
+    for before in ("scipy_", "")
+    for after in ("64_", "")
+)
+
+_lock = threading.Lock()
+_inside = 0
+_before = 1
+
+
+@contextmanager
+def one_blas_thread() -> Iterator[None]:
+    """Let the OpenBLAS that came with numpy work without threads of its own for a while.
+
+    They wait for each other in a loop, which costs a second processor and more time than they
+    save where products take some microseconds. Given back at the end of the last of several
+    that overlap; holds for the whole process. Nothing is done where numpy brought no OpenBLAS.
+
+    Examples
+    --------
+    >>> with one_blas_thread():
+    ...     product = np.ones((3, 3)) @ np.ones((3, 3))
+    >>> float(product[0, 0])
+    3.0
+    """
+    global _inside, _before
+    found = blas_threads()
+    if found is None:
+        yield
+        return
+    count, change = found
+    with _lock:
+        if _inside == 0:
+            _before = count()
+            change(1)
+        _inside += 1
+    try:
+        yield
+    finally:
+        with _lock:
+            _inside -= 1
+            if _inside == 0:
+                change(_before)
+
+
+@cache
+def blas_threads() -> tuple[Callable[[], int], Callable[[int], None]] | None:
+    """How to ask for and to set the threads of numpy's own OpenBLAS; None without one."""
+    package = Path(np.__file__).parent
+    folders = (package.parent / "numpy.libs", package / ".dylibs")
+    paths = [path for folder in folders for path in sorted(folder.glob("*openblas*"))]
+    if not paths:
+        return None
+    import ctypes
+
+    for path in paths:
+        try:
+            library = ctypes.CDLL(str(path))
+        except OSError:
+            continue
+        for asks, sets in NAMES:
+            if hasattr(library, asks) and hasattr(library, sets):
+                return getattr(library, asks), getattr(library, sets)
+    return None
