@@ -115,8 +115,11 @@ def with_form_errors(regression: Regression) -> Regression:
         return regression
     wider = variance + (kappa * s) ** 2
     mean = vt.T @ (kappa**2 * s * moment / wider)
-    spread = kappa**2 * (np.eye(count) - (vt.T * ((kappa * s) ** 2 / wider)) @ vt)
-    shifts = regression.back @ known
+    # The mean, what the residual tells of the bends, and what it does not: roots, whose products
+    # are no variances below zero.
+    told = vt.T * (kappa * np.sqrt(variance / wider))
+    untold = kappa * (np.eye(count) - vt.T @ vt)
+    roots = regression.back @ known @ np.column_stack([mean, told, untold])
     other = copy(regression)
-    other.form_errors = np.asarray(shifts @ (np.outer(mean, mean) + spread) @ shifts.T)
+    other.form_errors = np.asarray(roots @ roots.T)
     return other
