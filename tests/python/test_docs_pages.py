@@ -18,7 +18,7 @@ BODY = """<article><div class="table-wrapper docutils container" style="overflow
 <div class="highlight"><pre style="overflow:auto">{code}</pre></div>
 <figure><img class="picture" src="data:image/svg+xml,%3Csvg xmlns='http://www.w3.org/2000/svg'
  width='700' height='300'/%3E"><figcaption>A caption of one sentence.</figcaption></figure>
-<img class="wide"><img class="narrow"></article>"""
+<img class="wide"><img class="narrow"></article><a class="skip-to-content">Skip</a>"""
 HINT = """(selector) => getComputedStyle(document.querySelector(selector), "::before").content"""
 
 
@@ -61,4 +61,20 @@ def test_one_of_two_forms_of_a_picture_is_seen(width: int, seen: str) -> None:
                .filter((e) => getComputedStyle(e).display !== "none").map((e) => e.className)"""
         )
         assert shown == [seen]
+        browser.close()
+
+
+def test_paper_has_the_wide_form_and_nothing_floating() -> None:
+    """Sheets are narrow, and what is fixed on a screen would cover words on each of them."""
+    with playwright.sync_playwright() as driver:
+        browser, page = opened(driver, 700, True)
+        page.emulate_media(media="print")
+        seen = page.evaluate(
+            """[...document.querySelectorAll("img.wide, img.narrow, .skip-to-content")]
+               .filter((e) => getComputedStyle(e).display !== "none").map((e) => e.className)"""
+        )
+        assert seen == ["wide"]
+        for what in (".table-wrapper", "figure"):
+            hint = f"getComputedStyle(document.querySelector('{what}'), '::before').display"
+            assert page.evaluate(hint) == "none"
         browser.close()

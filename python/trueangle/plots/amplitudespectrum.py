@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -33,8 +34,9 @@ _TOLD = 6
 _FLOOR = 0.2
 #: Aliases and explanations written at a bar; the table has them all.
 _MOST_ALIASES = 3
-#: Bars that get their aliases written, the largest first.
+#: Bars that get their aliases written, the largest first, and inches that each needs.
 _MOST_ANNOTATED = 12
+_LABEL_INCHES = 0.17
 
 
 def amplitude_spectrum(
@@ -132,7 +134,8 @@ def _of_selection(selection: OrderSelection, ax: Axes | None, errors_in: ErrorsI
             linewidth=1.6,
             label="needed to be significant",
         )
-    tall = [i for i in np.argsort(-amplitude) if kept[i] and rows[i].aliases][:_MOST_ANNOTATED]
+    told = [i for i in np.argsort(-amplitude) if kept[i] and rows[i].aliases]
+    tall = _apart(told, place, axis.room(ax, _LABEL_INCHES))[:_MOST_ANNOTATED]
     for i in tall:
         likely = likely_aliases(rows[i])
         aliases = [f"{m:g}" for m in likely[:_MOST_ALIASES]]
@@ -153,6 +156,15 @@ def _of_selection(selection: OrderSelection, ax: Axes | None, errors_in: ErrorsI
     described(ax, f"Amplitude of {len(rows)} candidate orders. Retained: {told}.")
     shown = np.concatenate([amplitude[kept], limit[np.isfinite(limit)]])
     return _finish(ax, axis, shown if shown.size else amplitude, unit, 1.0 if tall else 0.0)
+
+
+def _apart(ranked: Sequence[np.intp], place: Array, room: float) -> list[np.intp]:
+    """Of bars, the most important first, those that have room beside the ones before."""
+    kept: list[np.intp] = []
+    for i in ranked:
+        if all(abs(place[i] - place[k]) >= room for k in kept):
+            kept.append(i)
+    return kept
 
 
 def _largest(orders: list[float], amplitude: Array, unit: ErrorUnit) -> str:

@@ -31,6 +31,7 @@ __all__ = [
     "model_curve",
     "residual_points",
     "seen_span",
+    "strong_gear_order",
     "thinned",
     "travelled",
 ]
@@ -45,6 +46,11 @@ _PER_CYCLE, _FEWEST, _MOST_SAMPLES = 12, 721, 12001
 
 #: Degrees without a reading that make a travel partial, where no model says what was seen.
 _WIDE_GAP: Final = 90.0
+
+#: Periods from which on a curve fills the picture: it is drawn as an envelope ...
+_DENSE: Final = 40.0
+#: ... where such orders make this part of the amplitudes; smaller ones are ripple on a line.
+_NOTABLE: Final = 0.1
 
 #: Places of an envelope.
 _PLACES: Final = 180
@@ -132,6 +138,16 @@ def model_curve(model: HarmonicModel, span: tuple[float, float] | None = None) -
     error = factor * (np.asarray(model.error(theta)) - model.constant)
     std = None if model.covariance is None else factor * model.band(theta)
     return Curve(angle, error, std)
+
+
+def strong_gear_order(
+    orders: Sequence[float], amplitudes: Sequence[float] | Array, span: float
+) -> float | None:
+    """The strongest order whose periods fill a picture of ``span`` degrees; None without one."""
+    pairs = list(zip(amplitudes, orders, strict=True))
+    fine = [(a, m) for a, m in pairs if m * span / 360.0 > _DENSE]
+    part = sum(a for a, _ in fine) / (sum(a for a, _ in pairs) or 1.0)
+    return float(max(fine)[1]) if part > _NOTABLE else None
 
 
 def envelope(curve: Curve) -> tuple[Array, Array, Array]:

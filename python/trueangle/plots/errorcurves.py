@@ -16,6 +16,7 @@ from .curves import (
     greatest,
     model_curve,
     seen_span,
+    strong_gear_order,
     thinned,
 )
 
@@ -28,8 +29,6 @@ __all__ = ["error_curves"]
 
 #: Points drawn per run; a picture is no wider.
 _MOST = 4000
-#: Orders beyond which the model fills the picture.
-_DENSE = 40.0
 
 
 def error_curves(fit: FitResult, ax: Axes | None = None, errors_in: ErrorsIn = "auto") -> Axes:
@@ -73,7 +72,8 @@ def error_curves(fit: FitResult, ax: Axes | None = None, errors_in: ErrorsIn = "
         )
     curve = model_curve(fit.model).scaled(unit.per_arcsec)
     # A gear's orders fill the picture: the readings stay on top of them.
-    dense = max(fit.orders, default=0.0) > _DENSE
+    low, high = seen_span(fit.model)
+    dense = strong_gear_order(fit.orders, fit.amplitudes, high - low) is not None
     if dense:
         ax.fill_between(
             *envelope(curve),
@@ -97,7 +97,7 @@ def error_curves(fit: FitResult, ax: Axes | None = None, errors_in: ErrorsIn = "
             zorder=0.5,
             label="95 % band",
         )
-    turn_axis(ax, *seen_span(fit.model))
+    turn_axis(ax, low, high)
     ax.set_xlabel("reference angle / deg")
     ax.set_ylabel(f"error, zero of the run removed / {unit.name}")
     legend(ax)

@@ -89,12 +89,16 @@ class OrderAxis:
         least = float(np.diff(place).min(initial=0.5))
         return np.full(place.size, 0.75 * min(least, 0.5))
 
+    def room(self, ax: Axes, inches: float) -> float:
+        """Places that so many inches take on these axes."""
+        figure = ax.get_figure(root=True)
+        wide = ax.get_position().width * figure.get_figwidth()  # type: ignore[union-attr]
+        return inches * sum(self._spans()) / wide
+
     def draw(self, ax: Axes) -> None:
         """Ticks at whole orders, and marks where the axis is broken."""
         ticks: list[float] = []
-        figure = ax.get_figure(root=True)
-        inches = ax.get_position().width * figure.get_figwidth()  # type: ignore[union-attr]
-        share = inches / sum(self._spans())
+        share = 1.0 / self.room(ax, 1.0)
         for (low, high), span in zip(self.groups, self._spans(), strict=True):
             room = _TICK_INCHES + _DIGIT_INCHES * len(f"{high:g}")
             most = max(2, int(share * span / room)) if high > low else 1

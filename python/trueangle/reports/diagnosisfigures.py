@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..plots import curves
-from ..plots.curves import Points
+from ..plots.curves import Points, strong_gear_order
 from ..plots.simulatedcurves import gain_bars, left_without, simulated_points
 from .charts import Chart, Figure, figure
-from .figures import dot_size, run_dots, stretch_chart, strong_gear_order, within
+from .figures import dot_size, run_dots, stretch_chart, within
 from .scale import Scale
 
 if TYPE_CHECKING:

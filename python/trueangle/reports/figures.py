@@ -31,10 +31,6 @@ _MOST_IN_LEGEND: Final = 4
 _DOT, _LARGE_DOT = 4.0, 6.0
 #: Readings of all runs up to which dots are large.
 _FEW: Final = 600
-#: Periods from which on a curve fills the picture: it is drawn as an envelope ...
-_DENSE: Final = 40.0
-#: ... where such orders make this part of the amplitudes; smaller ones are ripple on a line.
-_NOTABLE: Final = 0.1
 #: Periods of the stretch that is shown beside an envelope.
 _PERIODS: Final = 4.0
 #: Ticks of that narrow chart.
@@ -81,7 +77,9 @@ def errors_of_runs(
     low, high = curves.travelled(runs) if fit is None else turn(fit.model)
     everything = [scale.points(points) for points in measured]
     y = f"error less the run's zero / {scale.name}"
-    strong = None if fit is None else strong_gear_order(fit.orders, fit.amplitudes, high - low)
+    strong = (
+        None if fit is None else curves.strong_gear_order(fit.orders, fit.amplitudes, high - low)
+    )
     main = Chart("reference angle / deg", y, x_range=(low, high), grow=2.0)
     main.angle_axis(low, high)
     charts = [main]
@@ -110,16 +108,6 @@ def _draw_model(chart: Chart, curve: Curve, label: str = "model") -> None:
             curve.angle, curve.error - half, curve.error + half, colour="model", label="95 % band"
         )
     chart.line(curve.angle, curve.error, colour="model", label=label)
-
-
-def strong_gear_order(
-    orders: Sequence[float], amplitudes: Sequence[float] | Array, span: float
-) -> float | None:
-    """The strongest order whose periods fill a picture of ``span`` degrees; None without one."""
-    pairs = list(zip(amplitudes, orders, strict=True))
-    fine = [(a, m) for a, m in pairs if m * span / 360.0 > _DENSE]
-    part = sum(a for a, _ in fine) / (sum(a for a, _ in pairs) or 1.0)
-    return float(max(fine)[1]) if part > _NOTABLE else None
 
 
 def stretch_chart(order: float, low: float, high: float, y: str, **given: Any) -> Chart:

@@ -1,0 +1,47 @@
+"""Texts of pictures stand apart, and an envelope is drawn where a model fills its picture."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import trueangle as ta
+from trueangle import plots
+
+matplotlib = pytest.importorskip("matplotlib")
+matplotlib.use("Agg")
+
+
+@pytest.fixture(scope="module")
+def stepper() -> list[ta.CalibrationRun]:
+    """Steps of a motor: order 4 of degrees, and many small ones that few positions confuse."""
+    theta = np.arange(0.0, 360.0, 3.6)
+    rng = np.random.default_rng(20261122)
+    angle = np.radians(theta)
+    error = 7.4 * np.sin(4.0 * angle)
+    for order in (1, 2, 3, 5, 6, 8, 12, 16, 20, 41, 43, 44, 46, 47):
+        error += rng.uniform(0.02, 0.2) * np.sin(order * angle + rng.uniform(0.0, 6.0))
+    return [
+        ta.CalibrationRun(theta, theta + error + rng.normal(0.0, 1e-3, theta.size), 360.0)
+        for _ in range(4)
+    ]
+
+
+def test_aliases_of_neighbours_do_not_stand_on_each_other(stepper) -> None:
+    ax = ta.select_orders(stepper).plot()
+    ax.figure.canvas.draw()
+    boxes = [text.get_window_extent() for text in ax.texts]
+    assert len(boxes) >= 4
+    for number, one in enumerate(boxes):
+        assert not any(one.overlaps(other) for other in boxes[number + 1 :])
+    matplotlib.pyplot.close(ax.figure)
+
+
+def test_small_orders_of_a_gear_do_not_widen_the_model_to_a_ribbon(stepper) -> None:
+    """Where low orders are steep, an envelope is as wide as they rise within its places."""
+    fit = ta.fit(stepper, [1, 2, 3, 4, 5, 6, 8, 12, 16, 20, 41, 43])
+    ax = plots.error_curves(fit)
+    names = [text.get_text() for text in ax.get_legend().get_texts()]
+    assert "model" in names
+    assert "envelope of the model" not in names
+    matplotlib.pyplot.close(ax.figure)
