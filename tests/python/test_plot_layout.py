@@ -15,11 +15,11 @@ matplotlib.use("Agg")
 @pytest.fixture(scope="module")
 def stepper() -> list[ta.CalibrationRun]:
     """Steps of a motor: order 4 of degrees, and many small ones that few positions confuse."""
-    theta = np.arange(0.0, 360.0, 3.6)
+    theta = np.arange(0.0, 360.0, 1.8)
     rng = np.random.default_rng(20261122)
     angle = np.radians(theta)
     error = 7.4 * np.sin(4.0 * angle)
-    for order in (1, 2, 3, 5, 6, 8, 12, 16, 20, 41, 43, 44, 46, 47):
+    for order in (1, 2, 3, 5, 6, 8, 12, 16, 20, 41, 43, 44, 45, 46):
         error += rng.uniform(0.02, 0.2) * np.sin(order * angle + rng.uniform(0.0, 6.0))
     return [
         ta.CalibrationRun(theta, theta + error + rng.normal(0.0, 1e-3, theta.size), 360.0)

@@ -309,7 +309,7 @@ def test_paper_hides_controls(page: Page) -> None:
     assert page.page.locator("#figure-errors").is_visible()
     # Notes are smaller than the text that they stand below, as on a screen.
     text, *notes = page.page.evaluate(
-        """["#measured ~ p", ".note", ".words dd", ".card span:not(.big)"].map((s) =>
+        """["#measured ~ p", ".note", ".words dd", ".card > span:not(.big)"].map((s) =>
              parseFloat(getComputedStyle(document.querySelector(s)).fontSize))"""
     )
     assert max(notes) <= text
