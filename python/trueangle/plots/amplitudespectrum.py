@@ -134,8 +134,8 @@ def _of_selection(selection: OrderSelection, ax: Axes | None, errors_in: ErrorsI
             linewidth=1.6,
             label="needed to be significant",
         )
-    told = [i for i in np.argsort(-amplitude) if kept[i] and rows[i].aliases]
-    tall = _apart(told, place, axis.room(ax, _LABEL_INCHES))[:_MOST_ANNOTATED]
+    confused = [i for i in np.argsort(-amplitude) if kept[i] and rows[i].aliases]
+    tall = _apart(confused, place, axis.room(ax, _LABEL_INCHES))[:_MOST_ANNOTATED]
     for i in tall:
         likely = likely_aliases(rows[i])
         aliases = [f"{m:g}" for m in likely[:_MOST_ALIASES]]
