@@ -9,7 +9,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from ..angles import wrap
+from .. import _core
 from ..distributions import chi_squared_tail
 from .clusters import scatter_statistic
 from .clustersums import clusters_of, runs_together
@@ -49,8 +49,8 @@ def _in_time(
     for i in used:
         run, weight = problem.runs[i], weights[i]
         offset = fitted.offsets[i] - fitted.solution.constant
-        rest = run.indicated[:most] - run.reference[:most] - offset
-        rest = wrap(rest - fitted.predict(problem.angles[i][:most]), problem.period)
+        rest = fitted.predict(problem.angles[i][:most])
+        _core.residuals(run.indicated[:most], run.reference[:most], offset, problem.period, rest)
         found.append(rest if weight is None else rest * np.sqrt(weight[:most]))
     return found
 
