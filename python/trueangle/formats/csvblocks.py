@@ -18,18 +18,23 @@ from .format import Labels
 
 __all__ = ["PlainBlock", "plain_block"]
 
-_NEWLINE = 10
+_NEWLINE, _NOTE, _END = b"\n#E"
 
 
 def plain_block(data: bytes, header: Header, line: int) -> PlainBlock | None:
     """The block, or None for text that needs the standard library: blank lines, notes."""
-    if header.trailing or data.startswith((b"#", b"EOF")) or b"\n#" in data or b"\nEOF" in data:
+    if header.trailing:
         return None
-    ends = np.flatnonzero(np.frombuffer(data, dtype=np.uint8) == _NEWLINE)
+    signs = np.frombuffer(data, dtype=np.uint8)
+    ends = np.flatnonzero(signs == _NEWLINE)
     width = len(header.ending)
     starts = np.concatenate([[0], ends + 1])
     if starts[-1] == len(data):
         starts = starts[:-1]
+    # The first sign of every line, not a search through all of the text.
+    first = signs[starts]
+    if (first == _NOTE).any() or ((first == _END).any() and _has_end(data)):
+        return None
     lengths = np.diff(starts, append=len(data))
     returns = data.count(b"\r")
     if (width == 1 and returns) or (width == 2 and not returns == ends.size == data.count(b"\r\n")):
@@ -37,6 +42,10 @@ def plain_block(data: bytes, header: Header, line: int) -> PlainBlock | None:
     if lengths.size and lengths.min() <= width:
         return None
     return PlainBlock(data, header, line, starts)
+
+
+def _has_end(data: bytes) -> bool:
+    return data.startswith(b"EOF") or b"\nEOF" in data
 
 
 class PlainBlock:

@@ -144,5 +144,6 @@ def _blocks(file: IO[bytes], header: Header, small: bool = False) -> Iterator[_B
         if len(held) > LONGEST_LINE:
             raise too_long(header, line)
         if data:
-            yield plain_block(data, header, line) or QuotedBlock.whole(data, header, line)
-            line += data.count(b"\n")
+            block = plain_block(data, header, line)
+            yield block or QuotedBlock.whole(data, header, line)
+            line += block.rows if block else data.count(b"\n")
