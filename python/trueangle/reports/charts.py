@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import MissingExtraError
+from .dotcopies import hover_copy, renderer_copy
 
 __all__ = ["Chart", "Figure", "figure", "run_colour", "run_marker", "swatch"]
 
@@ -144,6 +145,8 @@ class Chart:
         #: Legend, set as text of the page: label -> colour and sign.
         self._legend: dict[str, tuple[str, str]] = {}
         self._hover: list[Any] = []
+        #: Dots, each with the number of renderers below it and its line of text.
+        self._dots: list[tuple[int, dict[str, Any], str]] = []
 
     def dots(
         self,
@@ -160,18 +163,12 @@ class Chart:
         hollow: bool = False,
     ) -> None:
         """Dots; ``hover`` is a line of text with ``@{column}`` in it."""
-        # A figure's own `scatter` makes glyphs for states that never come, at four times the price.
-        glyph = self._models.Scatter(
-            x="x",
-            y="y",
-            size=size,
-            marker=marker,
-            fill_alpha=0.0 if hollow else 1.0,
-            line_alpha=1.0 if hollow or marker == "cross" else 0.0,
-        )
-        drawn = self._figure.add_glyph(self._source(x, y, columns), glyph)
-        sign = "○" if hollow else _GLYPHS[_MARKERS.index(marker)]
-        self._add(drawn, colour, label, run, hover, sign)
+        data = {"x": _short(x), "y": _short(y)} | {k: list(v) for k, v in (columns or {}).items()}
+        drawn = renderer_copy(marker, size, hollow, data, _tags(colour, run))
+        self._dots.append((len(self._figure.renderers), drawn, hover))
+        if label:
+            sign = "○" if hollow else _GLYPHS[_MARKERS.index(marker)]
+            self._legend.setdefault(label, (colour, sign))
 
     def line(
         self, x: Array, y: Array, *, colour: str, label: str = "", width: float = 1.5,
@@ -310,6 +307,11 @@ class Chart:
             )
         document = Document(title="")
         document.add_root(self._figure)
+        written = document.to_json(deferred=False)
+        root: dict[str, Any] = written["roots"][0]  # type: ignore[assignment]
+        # What is referred to, as renderers are by tools, must stand before that.
+        root["attributes"] = {"renderers": [], **root["attributes"]}
+        self._add_dots(root["attributes"])
         return {
             "title": self.title,
             "grow": self.grow,
@@ -322,28 +324,36 @@ class Chart:
             "document": {
                 "target_id": None,
                 "root_id": self._figure.id,
-                "doc": document.to_json(deferred=False),
+                "doc": written,
                 "version": __version__,
             },
         }
 
-    def _source(
-        self, x: Array, y: Array, columns: Mapping[str, Sequence[Any]] | None = None
-    ) -> Any:
-        return self._models.ColumnDataSource(
-            {"x": _short(x), "y": _short(y)} | {k: list(v) for k, v in (columns or {}).items()}
-        )
+    def _add_dots(self, written: dict[str, Any]) -> None:
+        """Put the dots among the renderers of the written figure, each above what it was above."""
+        renderers = written["renderers"]
+        for place, drawn, _ in reversed(self._dots):
+            renderers.insert(place, drawn)
+        for text, shown in _grouped([(text, drawn) for _, drawn, text in self._dots if text]):
+            written["toolbar"]["attributes"]["tools"].append(hover_copy(text, shown))
+
+    def _source(self, x: Array, y: Array) -> Any:
+        return self._models.ColumnDataSource({"x": _short(x), "y": _short(y)})
 
     def _add(
         self, drawn: Any, colour: str, label: str, run: int | None, hover: str, sign: str = ""
     ) -> None:
-        drawn.tags = [f"colour:{colour}"] + ([f"run:{run}"] if run is not None else [])
+        drawn.tags = _tags(colour, run)
         # Selections and hovering change nothing: one glyph is enough.
         drawn.nonselection_glyph = drawn.muted_glyph = None
         if label:
             self._legend.setdefault(label, (colour, sign))
         if hover:
             self._hover.append((hover, drawn))
+
+
+def _tags(colour: str, run: int | None) -> list[str]:
+    return [f"colour:{colour}"] + ([f"run:{run}"] if run is not None else [])
 
 
 def _span(x: float) -> Any:

@@ -9,10 +9,8 @@ from os import PathLike
 from typing import TYPE_CHECKING, Any, TypeAlias, overload
 
 from ..angles import ARCSEC_PER_TURN, wrap
-from ..certificate import Certificate, Identity, certify
 from ..checks.check import faults_of
 from ..checks.record import records_of
-from ..diagnosis import diagnose
 from ..errors import ArgumentError
 from ..errorunits import ErrorsIn
 from ..files import CERTIFICATE, PDF, REPORT, check_output, written_atomically
@@ -36,6 +34,7 @@ from .spectrum import spectrum
 from .unknowns import unknowns
 
 if TYPE_CHECKING:
+    from ..certificate import Certificate, Identity
     from ..fitting.result import FitResult
     from ..orders.select import OrderSelection
     from ..simulation import Simulation
@@ -224,6 +223,8 @@ def report(
     if certificate is not None:
         if title is not None:
             raise ArgumentError("a certificate has no title of its own: its identity names it")
+        from ..certificate import certify
+
         certified = certify(
             found,
             certificate,
@@ -246,7 +247,11 @@ def report(
     held, why_no_gain = held_out(fit)
     at.at("diagnosing", 2, _STAGES)
     name = line_names(joint)
-    diagnosis = None if simulation is None else diagnose(found, simulation)
+    diagnosis = None
+    if simulation is not None:
+        from ..diagnosis import diagnose
+
+        diagnosis = diagnose(found, simulation)
     heading = title or _title(found)
     content: dict[str, Any] = {
         "format": FORMAT,

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
-from ..diagnosis.heldout import hold_out_extended
 from ..errors import NoModelError, TrueAngleError
 from ..fitting.heldout import HeldOut, hold_out
 from ..joint.declared import DeclaredShaft
@@ -84,6 +83,8 @@ def extended(
     """The correction with the causes found as its terms; None where there are none."""
     if fit is None or not diagnosis.findings:
         return None
+    from ..diagnosis.heldout import hold_out_extended
+
     try:
         model = diagnosis.correction(fit.model, runs)
         return extended_model(model, hold_out_extended(fit, sim)) if model.terms else None

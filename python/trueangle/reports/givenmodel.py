@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 
 from ..angles import ARCSEC_PER_TURN, circular_mean, wrap
 from ..model import HarmonicModel
-from ..modelfile import load_model
 from ..runs import CalibrationRun
 
 __all__ = ["given_model"]
@@ -25,6 +24,8 @@ def given_model(
     Every run keeps a zero of its own. Models that need signals are described only.
     """
     if not isinstance(model, HarmonicModel):
+        from ..modelfile import load_model
+
         model = load_model(model)
     record = model.fit
     content: dict[str, Any] = {
