@@ -142,7 +142,9 @@ class FilterLag(Effect):
             return regression.fixed_gains(columns)
 
         grids: dict[float | None, Array] = {None: grid(None)}
-        if not regression.hopeless(float(grids[None].max()), 1, REFINED_FROM):
+        coarse = float(grids[None].max())
+        unlikely = regression.hopeless(coarse, 1, REFINED_FROM)
+        if not (unlikely or regression.beaten(coarse, 1, REFINED_FROM)):
             grids |= {damping: grid(damping) for damping in DAMPING}
         step = float(np.log(CUTOFFS[1] / CUTOFFS[0]))
         best: Extension | None = None

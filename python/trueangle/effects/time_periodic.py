@@ -112,7 +112,8 @@ class TimePeriodic(Effect):
         tried = [_fixed(frequencies, p, sizes), _wandering(frequencies, p)]
         best: Extension | None = None
         for place, deviance, log_grid in tried:
-            if regression.hopeless(deviance, 1, log_grid):
+            unlikely = regression.hopeless(deviance, 1, log_grid)
+            if unlikely or regression.beaten(deviance, 1, log_grid):
                 continue
             shape = {"frequency_hz": frequencies[place].tolist()}
             step = frequencies[1] - frequencies[0]

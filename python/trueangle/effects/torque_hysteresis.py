@@ -105,7 +105,8 @@ class TorqueHysteresis(Effect):
         if gains[k] <= 0.0:
             return None
         span = float(spans[k])
-        if not regression.hopeless(float(gains[k]), 2):
+        gain = float(gains[k])
+        if not (regression.hopeless(gain, 2) or regression.beaten(gain, 2)):
             step = float(np.log(SPANS[1] / SPANS[0]))
             log_span, _ = golden_maximum(
                 lambda x: float(
