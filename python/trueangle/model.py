@@ -13,7 +13,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from . import _core, modelsummary
 from .angles import check_period
-from .correction.term import Term
 from .errors import ArgumentError
 from .records import FitRecord, Provenance
 from .shafts import Shaft
@@ -24,6 +23,7 @@ from .validity import ROUNDING, check_fit, check_invertible, check_number, check
 
 if TYPE_CHECKING:
     from .correction.corrector import Corrector
+    from .correction.term import Term
 
 __all__ = ["Argument", "HarmonicModel", "Step", "check_invertible"]
 
@@ -108,6 +108,8 @@ class HarmonicModel:
             self._check_terms()
 
     def _check_terms(self) -> None:
+        from .correction.term import Term  # most models have none
+
         for i, term in enumerate(self.terms):
             if not isinstance(term, Term):
                 raise ArgumentError(

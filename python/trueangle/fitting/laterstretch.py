@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 from ..errors import NoModelError, TrueAngleError
 from ..runs import CalibrationRun
 from .problem import Problem
-from .ridge import choose_ridge
 from .travel import CONDITION, travelled_span
 
 __all__ = ["check_later_stretch", "gains_of_stretches"]
@@ -111,5 +110,7 @@ def _left(problem: Problem, kept: NDArray[np.intp], held: NDArray[np.intp]) -> A
     fitted = part.solve(part.base)
     span = travelled_span(part.angles, part.period, part.is_periodic)
     if not span.full and fitted.solution.condition_number >= CONDITION:
+        from .ridge import choose_ridge
+
         fitted = part.solve(part.base, choose_ridge(part, part.base))
     return np.asarray(run.centred_error[held] - fitted.predict(problem.angles[0][held]))
