@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from trueangle.diagnosis.discrepancy import noise_from_repeats
+from trueangle.effects.bends import LAG, _late
 from trueangle.joint.grid import UniformGrid, uniform_grid
 from trueangle.regression.batch import Blocks
 from trueangle.regression.factor import Factor
@@ -98,6 +99,14 @@ def test_products_under_a_noise_need_no_mapped_columns(space, noise):
             start = (0, 2, 3, 5)[k]
             mapped = whiten(x[:, start : start + products.width])
             assert gram == pytest.approx(mapped.T @ mapped, rel=ROUNDING, abs=ROUNDING)
+    drawn = RunColumns(x, space.bounds)
+    grams, moments = drawn.grams(whiten), drawn.moments(whiten.transposed(whiten(y)))
+    mapped, seen = whiten(x), whiten(y)
+    for k, (a, b) in enumerate(space.bounds):
+        slow = mapped[a:b].T @ mapped[a:b]
+        assert grams[k] == pytest.approx(slow, rel=ROUNDING, abs=ROUNDING)
+        slow = mapped[a:b].T @ seen[a:b]
+        assert moments[k] == pytest.approx(slow, rel=ROUNDING, abs=ROUNDING)
 
 
 def test_gains_of_blocks_are_those_of_each(space, noise):
@@ -255,3 +264,14 @@ def test_repeats_give_the_noise_without_a_model():
     error = np.concatenate([run.error for run in runs]) * 3600.0
     # 19 * 36 degrees of freedom: 2.7 % standard error.
     assert noise_from_repeats(join_runs(runs), error) == pytest.approx(2.0, rel=0.11)
+
+
+def test_what_lags_is_the_recursion_reading_by_reading(space):
+    values = np.cumsum(np.random.default_rng(11).standard_normal(space.n))
+    late = _late(space.signals, values)
+    for start, stop in space.bounds:
+        keep = np.exp(-1.0 / (LAG * (stop - start)))
+        state = values[start]
+        for k in range(start, stop):
+            state = values[k] + (state - values[k]) * keep
+            assert late[k] == pytest.approx(state, rel=ROUNDING, abs=ROUNDING)
