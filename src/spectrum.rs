@@ -106,7 +106,9 @@ mod tests {
         power[200] = 50.0 * fall(200);
         let cuts: Vec<usize> = (0..=20).map(|k| 20 * k).collect();
         divide_by_level(&mut power, &cuts);
-        for (k, x) in power.iter().enumerate().take(380).skip(20) {
+        // The outermost block shares its level with itself: up to the middle of the next one
+        // the level is not straight.
+        for (k, x) in power.iter().enumerate().take(370).skip(30) {
             let expected = if k == 200 { 50.0 * LN_2 } else { LN_2 };
             assert!((x / expected - 1.0).abs() < 0.01, "{k}: {x}");
         }
