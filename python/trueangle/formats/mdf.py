@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from asammdf import MDF, Signal
 from asammdf.blocks.mdf_v4 import MDF4
+from asammdf.blocks.utils import DataBlockInfo
 from numpy.typing import NDArray
 
 from ..errors import FileError
@@ -25,10 +26,14 @@ __all__ = ["columns", "contents", "copy", "read"]
 _MOST_COMPRESSED = 2000
 #: Readings taken together.
 _BLOCK = 1 << 19
+#: Bytes of a data block read at once: asammdf reads a block whole for each part of it.
+_PIECE = 1 << 22
 #: Acquisition name of the groups of corrected channels.
 _GROUP = "trueangle"
 #: Types of channels that have no place in a record: virtual master and data.
 _VIRTUAL = (3, 6)
+#: Flag of a channel whose readings may be marked invalid.
+_HAS_MARKS = 2
 #: Channels of values of any length stand elsewhere in the file.
 _ELSEWHERE = 1
 #: First bytes of a file, also of one that was not finished.
@@ -54,9 +59,9 @@ def read(
 ) -> Iterator[Batch]:
     """Channels ``names`` in batches; see `format.FormatModule`."""
     with _opened(path) as mdf:
-        group = _common_group(path, mdf, names)
-        for start in range(0, _cycles(mdf, group), _BLOCK):
-            yield {name: _part(path, mdf, _place(mdf, name), start).samples for name in names}
+        _common_group(path, mdf, names)
+        for parts in _parts(path, mdf, [_place(mdf, name) for name in names]):
+            yield {name: part.samples for name, part in zip(names, parts, strict=True)}
 
 
 def copy(
@@ -84,16 +89,13 @@ def copy(
         sums = _kept(source, mdf)
         compression = _compression(mdf)
         done, total = 0, max(sum(rows), 1)
-        for channel, count in zip(channels, rows, strict=True):
+        for channel in channels:
             check = Checksum()
-            place = _place(mdf, channel.column)
             made: int | None = None
-            for start in range(0, max(count, 1), _BLOCK):
-                part = _part(source, mdf, place, start)
-                signals = {
-                    signal: _part(source, mdf, _place(mdf, name), start).samples
-                    for signal, name in channel.signals.items()
-                }
+            names = [channel.column, *channel.signals.values()]
+            for part, *beside in _parts(source, mdf, [_place(mdf, name) for name in names]):
+                values = (other.samples for other in beside)
+                signals = dict(zip(channel.signals, values, strict=True))
                 corrected = channel.correct(part.samples, signals)
                 check.update(corrected)
                 made = _put(mdf, made, part, corrected, channel)
@@ -131,6 +133,7 @@ def _opened(path: Path, **options: Any) -> Iterator[MDF]:
                 if mdf.version < "4":
                     raise FileError(path, f"is MDF {mdf.version}; convert it to MDF 4")
                 _check_sizes(path, mdf)
+                _take_in_pieces(mdf)
                 yield mdf
         except Exception as cause:
             _close_half_built(cause)
@@ -170,6 +173,27 @@ def _check_sizes(path: Path, mdf: MDF) -> None:
                         f"{group.channel_group.samples_byte_nr} bytes",
                         column=channel.name,
                     )
+
+
+def _take_in_pieces(mdf: MDF) -> None:
+    """Let large data blocks that are not compressed count as many small ones in a row."""
+    for group in mdf.groups:
+        if group.sorted:
+            blocks = group.data_blocks
+            group.data_blocks = [piece for block in blocks for piece in _pieces(block)]
+
+
+def _pieces(block: DataBlockInfo) -> list[DataBlockInfo]:
+    size = block.original_size or 0
+    # What is compressed, has marks beside it or is cut short is taken as it is.
+    whole = block.block_type or block.invalidation_block or block.block_limit is not None
+    if whole or size <= _PIECE:
+        return [block]
+    return [
+        DataBlockInfo(block.address + at, 0, length, length, block.param, location=block.location)
+        for at in range(0, size, _PIECE)
+        for length in (min(_PIECE, size - at),)
+    ]
 
 
 def _close_half_built(error: Exception) -> None:
@@ -214,23 +238,35 @@ def _cycles(mdf: MDF, group: int) -> int:
     return int(mdf.groups[group].channel_group.cycles_nr)
 
 
-def _part(path: Path, mdf: MDF, place: tuple[int, int], start: int) -> Signal:
-    """Readings from row ``start``; those marked invalid become NaN and stay marked."""
+def _parts(path: Path, mdf: MDF, places: Sequence[tuple[int, int]]) -> Iterator[list[Signal]]:
+    """Readings of channels of one group, part by part, the records read once.
+
+    Without records there is one part without readings.
+    """
+    group = mdf.groups[places[0][0]]
+    for _, index in places:
+        channel = group.channels[index]
+        if channel.channel_type == _ELSEWHERE or group.channel_dependencies[index]:
+            raise FileError(path, "numbers are needed, one to a record", column=channel.name)
+    head = group.channel_group
+    record = int(head.samples_byte_nr) + int(head.invalidation_bytes_nr)
+    # Its own reading of a stretch of records goes through all of them.
+    mdf.configure(read_fragment_size=_BLOCK * max(record, 1))
+    for records in mdf._mdf._load_data(group):
+        yield [_part(path, mdf, place, records) for place in places]
+
+
+def _part(path: Path, mdf: MDF, place: tuple[int, int], records: Any) -> Signal:
+    """Readings of some records; those marked invalid become NaN and stay marked."""
     group, index = place
-    channel = mdf.groups[group].channels[index]
-    if channel.channel_type == _ELSEWHERE or mdf.groups[group].channel_dependencies[index]:
-        raise FileError(path, "numbers are needed, one to a record", column=channel.name)
-    part = mdf.get(
-        group=group,
-        index=index,
-        record_offset=start,
-        record_count=_BLOCK,
-        ignore_invalidation_bits=True,
-    )
+    part = mdf.get(group=group, index=index, data=records, ignore_invalidation_bits=True)
     if part.samples.dtype.kind not in "fiu":
         raise FileError(
             path, f"numbers are needed, the channel holds {part.samples.dtype}", column=part.name
         )
+    if part.invalidation_bits is None and mdf.groups[group].channels[index].flags & _HAS_MARKS:
+        # Of records without a mark none are given, which a group that has them cannot be told.
+        part.invalidation_bits = np.zeros(part.samples.size, dtype=bool)
     if part.invalidation_bits is not None and part.invalidation_bits.any():
         kind = np.float32 if part.samples.dtype == np.float32 else np.float64
         part.samples = np.where(part.invalidation_bits, np.nan, part.samples).astype(kind)
@@ -270,8 +306,8 @@ def _kept(path: Path, mdf: MDF) -> dict[str, str]:
             if i == _master(mdf, index):
                 continue
             check = Checksum()
-            for start in range(0, _cycles(mdf, index), _BLOCK):
-                check.update(_part(path, mdf, (index, i), start).samples)
+            for (part,) in _parts(path, mdf, [(index, i)]):
+                check.update(part.samples)
             found[channel.name] = check.text()
     return found
 

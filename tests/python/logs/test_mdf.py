@@ -10,6 +10,7 @@ import trueangle as ta
 from .conftest import made_angles, made_model, unwrapped_truth
 
 asammdf = pytest.importorskip("asammdf")
+mdf = pytest.importorskip("trueangle.formats.mdf")
 
 ROWS = 5000
 
@@ -125,3 +126,50 @@ def test_damage_is_told_once(tmp_path, model):
         assert len(told) == 1
     finally:
         logger.removeHandler(handler)
+
+
+@pytest.mark.parametrize("marked", [[], [0], [3000], [ROWS - 1]])
+def test_marks_of_any_part_are_kept(marked, tmp_path, model):
+    source = made_file(tmp_path / "a.mf4", made_angles(ROWS), invalid=marked)
+    report = ta.correct_logs(source, model, tmp_path / "b.mf4")
+    assert report.logs[0].error is None
+    samples, _, marks, _ = read(tmp_path / "b.mf4", "corrected_deg")
+    assert np.flatnonzero(np.isnan(samples)).tolist() == marked
+    assert ([] if marks is None else np.flatnonzero(marks).tolist()) == marked
+
+
+@pytest.mark.parametrize("compression", [0, 2])
+def test_records_are_gone_through_once(compression, tmp_path, monkeypatch):
+    """Parts asked for by their place would each go through all records: 22 s for 2e7, not 1."""
+    angles = made_angles(ROWS)
+    path = made_file(tmp_path / "a.mf4", angles, compression)
+    seen = []
+    load = asammdf.blocks.mdf_v4.MDF4._load_data
+    monkeypatch.setattr(
+        "asammdf.blocks.mdf_v4.MDF4._load_data",
+        lambda self, *args, **more: seen.append(1) or load(self, *args, **more),
+    )
+    monkeypatch.setattr(
+        "asammdf.blocks.mdf_v4.get_channel_raw_bytes_complete",
+        lambda *args: pytest.fail("all records are read for a part of them"),
+    )
+    parts = list(mdf.read(path, ["indicated_deg", "counter"]))
+    assert len(seen) == 1
+    assert len(parts) == -(-ROWS // 777)
+    assert np.array_equal(np.concatenate([part["indicated_deg"] for part in parts]), angles)
+    counted = np.concatenate([part["counter"] for part in parts])
+    assert np.array_equal(counted, np.arange(ROWS))
+
+
+def test_a_large_block_is_taken_in_pieces(monkeypatch, tmp_path):
+    monkeypatch.setattr("trueangle.formats.mdf._PIECE", 1000)
+    angles = made_angles(ROWS)
+    path = made_file(tmp_path / "a.mf4", angles)
+    with mdf._opened(path) as opened:
+        blocks = list(opened.groups[0].get_data_blocks())
+        at = [block.address for block in blocks]
+        sizes = [block.original_size for block in blocks]
+    assert max(sizes) == 1000
+    assert np.array_equal(np.diff(at), sizes[:-1])
+    parts = list(mdf.read(path, ["indicated_deg"]))
+    assert np.array_equal(np.concatenate([part["indicated_deg"] for part in parts]), angles)
