@@ -41,6 +41,9 @@ Array = NDArray[np.float64]
 #: Half width of a 95 % band in standard deviations.
 CONFIDENCE: Final = 1.96
 
+#: Multiples of the golden section modulo one are evenly spread, however many there are.
+_GOLDEN = 0.5 * (5.0**0.5 - 1.0)
+
 #: Points of a curve for each cycle of its highest order, and the least and most of them.
 _PER_CYCLE, _FEWEST, _MOST_SAMPLES = 12, 721, 12001
 
@@ -98,10 +101,13 @@ def greatest(parts: Iterable[Points]) -> float:
     return max((float(np.abs(part.y).max(initial=0.0)) for part in parts), default=0.0)
 
 
-def thinned(points: Points, most: int) -> Points:
-    """At most ``most`` of the points, evenly taken."""
+def thinned(points: Points, most: int, number: int = 0) -> Points:
+    """At most ``most`` points, evenly taken; each of runs that are alike begins elsewhere."""
     stride = -(-points.x.size // most)
-    return points if stride <= 1 else Points(points.label, points.x[::stride], points.y[::stride])
+    if stride <= 1:
+        return points
+    first = int(stride * (number * _GOLDEN % 1.0))
+    return Points(points.label, points.x[first::stride], points.y[first::stride])
 
 
 def label_of(run: CalibrationRun, number: int) -> str:

@@ -12,7 +12,7 @@ from ..plots import curves
 from ..plots.curves import Points, strong_gear_order
 from ..plots.simulatedcurves import gain_bars, left_without, simulated_points
 from .charts import Chart, Figure, figure
-from .figures import dot_size, run_dots, stretch_chart, within
+from .figures import dot_size, dots_of_run, run_dots, stretch_chart, within
 from .scale import Scale
 
 if TYPE_CHECKING:
@@ -76,12 +76,16 @@ def _compared(
     if strong is not None:
         charts.append(stretch_chart(strong, low, high, y, height_rem=16.0))
     size = dot_size(sum(len(run) for run in runs))
-    most = max(50, _MOST_POINTS // len(runs))
+    most = dots_of_run(len(runs), _MOST_POINTS)
     for number, (measured, simulated) in enumerate(pairs):
         for chart in charts:
             stretch = chart is not both
             for name, points in (("measured", measured), ("simulated", simulated)):
-                shown = within(points, *chart.x_range) if stretch else curves.thinned(points, most)
+                shown = (
+                    within(points, *chart.x_range)
+                    if stretch
+                    else curves.thinned(points, most, number)
+                )
                 hollow = name == "measured"
                 chart.dots(
                     shown.x,

@@ -25,6 +25,10 @@ Array = NDArray[np.float64]
 
 #: Readings drawn in one chart at most: more do not show, and make the page heavy and slow.
 _MOST_POINTS: Final = 4_000
+#: Runs up to which as many are drawn; of more, whose tables are long, fewer: a page weighs 1 MB.
+_MOST_RUNS: Final = 12
+#: Readings drawn of each run at least.
+_FEWEST: Final = 6
 #: Runs named in the legends; the table of runs has the symbols of all.
 _MOST_IN_LEGEND: Final = 4
 #: Size of the dots, and of those of few readings, which would be lost.
@@ -42,7 +46,7 @@ def run_dots(
     *, size: float = _DOT, zoomed: bool = False,
 ) -> None:  # fmt: skip
     """Readings of one run, in the unit of the page or another signal's."""
-    part = points if zoomed else curves.thinned(points, max(50, _MOST_POINTS // runs))
+    part = points if zoomed else curves.thinned(points, dots_of_run(runs), number)
     chart.dots(
         part.x,
         part.y,
@@ -54,6 +58,11 @@ def run_dots(
         label=f"run {points.label}" if runs <= _MOST_IN_LEGEND and not zoomed else "",
         hover=f"run {points.label}: {scale.read} at @x{{0.00}}°",
     )
+
+
+def dots_of_run(runs: int, most: int = _MOST_POINTS) -> int:
+    """Readings drawn of each of so many runs, of ``most`` in all where runs are few."""
+    return max(_FEWEST, int(most * min(1.0, _MOST_RUNS / runs) / runs))
 
 
 def dot_size(readings: int) -> float:
@@ -144,14 +153,14 @@ def before_after(held: HeldOut, runs: Sequence[CalibrationRun], scale: Scale) ->
     y = f"error of held-out runs / {scale.name}"
     chart = Chart("reference angle / deg", y, x_range=(low, high))
     chart.angle_axis(low, high)
-    most = max(50, _MOST_POINTS // (2 * len(held.runs)))
+    most = dots_of_run(len(held.runs), _MOST_POINTS // 2)
     size = dot_size(sum(len(run) for run in runs))
     for name, marker in (("before", "square"), ("after", "circle")):
         for run in held.runs:
             first = 0.0 if run.model is None else curves.seen_span(run.model)[0]
             points = Points(run.label, curves.degrees(run.run, first), getattr(run, name))
             index = next(i for i, known in enumerate(runs) if known is run.run)
-            part = curves.thinned(scale.points(points), most)
+            part = curves.thinned(scale.points(points), most, index)
             chart.dots(
                 part.x,
                 part.y,

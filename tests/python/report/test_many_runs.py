@@ -1,0 +1,41 @@
+"""Reports of very many runs: pages stay small, and pictures show them all."""
+
+import numpy as np
+
+import trueangle as ta
+from trueangle.plots.curves import Points, thinned
+from trueangle.reports.figures import dots_of_run
+
+#: Bytes of a page at most.
+LARGEST = 1_000_000
+
+
+def test_few_runs_are_drawn_whole_and_many_in_part():
+    assert dots_of_run(1) == 4000
+    assert dots_of_run(12) == 333
+    totals = [runs * dots_of_run(runs) for runs in (12, 24, 48, 79)]
+    assert totals == sorted(totals, reverse=True)
+    assert totals[-1] > 400
+
+
+def test_runs_that_are_alike_are_not_drawn_at_the_same_places():
+    angle = np.arange(0.0, 360.0, 0.36)
+    places = [thinned(Points("", angle, angle), 6, number).x for number in range(79)]
+    assert all(5 <= x.size <= 6 for x in places)
+    drawn = np.sort(np.concatenate(places))
+    # Evenly spread: no gap as wide as a hundredth of a turn.
+    assert np.diff(np.concatenate([drawn, [drawn[0] + 360.0]])).max() < 3.6
+
+
+def test_a_page_of_eighty_runs_is_small(tmp_path):
+    seed = 79
+    rng = np.random.default_rng(seed)
+    print(f"seed {seed}")
+    angle = np.arange(0.0, 360.0, 0.9)
+    runs = []
+    for k in range(80):
+        phase = np.radians(angle + rng.uniform(0.0, 0.5))
+        error = 0.4 * np.sin(phase) + 0.1 * np.cos(4.0 * phase) + rng.normal(0.0, 0.06, 400)
+        runs.append(ta.CalibrationRun(angle, angle + error, period=360.0, label=f"run {k}"))
+    ta.report(runs, tmp_path / "page.html")
+    assert (tmp_path / "page.html").stat().st_size < LARGEST
