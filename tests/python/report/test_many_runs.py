@@ -36,6 +36,7 @@ def test_a_page_of_eighty_runs_is_small(tmp_path):
     for k in range(80):
         phase = np.radians(angle + rng.uniform(0.0, 0.5))
         error = 0.4 * np.sin(phase) + 0.1 * np.cos(4.0 * phase) + rng.normal(0.0, 0.06, 400)
-        runs.append(ta.CalibrationRun(angle, angle + error, period=360.0, label=f"run {k}"))
+        time = angle / 300.0 + 1e-4 * rng.random(400)
+        runs.append(ta.CalibrationRun(angle, angle + error, 360.0, time, label=f"run {k}"))
     ta.report(runs, tmp_path / "page.html")
     assert (tmp_path / "page.html").stat().st_size < LARGEST
