@@ -13,7 +13,7 @@ from typing import Final, NamedTuple, TypeAlias
 from .errors import ArgumentError
 from .turns import ARCSEC_PER_TURN, UNIT_PERIODS
 
-__all__ = ["ERROR_UNITS", "ErrorUnit", "ErrorsIn", "error_unit", "significant"]
+__all__ = ["ERROR_UNITS", "ErrorUnit", "ErrorsIn", "brief", "error_unit", "significant"]
 
 #: What may be asked for by name; a number is the counts of a turn.
 ERROR_UNITS: Final = ("auto", "arcsec", "deg", "mrad", "count")
@@ -150,6 +150,17 @@ def significant(value: float, digits: int = _DIGITS) -> str:
     if not math.isfinite(value):
         return "-"
     return _fixed(value, _decimals(value, digits)) if value else "0"
+
+
+def brief(value: float) -> str:
+    """``value`` with two significant digits, or all before the point: for sentences.
+
+    Examples
+    --------
+    >>> brief(0.301), brief(7.25), brief(103.6)
+    ('0.3', '7.2', '104')
+    """
+    return f"{value:.2g}" if abs(value) < 99.5 else f"{value:.0f}"
 
 
 def _decimals(value: float, digits: int) -> int:

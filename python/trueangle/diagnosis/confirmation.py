@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from ..effects import EFFECTS
 from ..effects.local_defect import LocalDefect
 from ..effects.non_integer_order import NonIntegerOrder
+from ..errorunits import brief
 from ..joint.pattern import line_columns
 from ..regression.regression import Regression
 from .gain import Gain
@@ -64,7 +65,7 @@ def status_of(
     if unexplained and regression is not None and group:
         if not takes_up and _size(regression, group) < unexplained:
             return NOT_CONFIRMED, (
-                f"{unexplained:.2g} arcsec rms are unexplained, of which this may be a part"
+                f"{brief(unexplained)} arcsec rms are unexplained, of which this may be a part"
             )
         follows = _follows(regression, group)
         if follows:

@@ -8,6 +8,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from ..errorunits import brief
 from .problem import Problem
 from .robust import FAR, MANY, Weighted, robust_scale
 
@@ -43,7 +44,7 @@ def breakdown_sentence(problem: Problem, weighted: Weighted) -> str:
     # A block of readings that the few orders cannot follow widens the scale it is judged by.
     many = ", more than a robust fit holds out against" if robust else ""
     return (
-        f"the residuals are {scale / near:.2g} times what neighbours in angle differ by: the "
+        f"the residuals are {brief(scale / near)} times what neighbours in angle differ by: the "
         f"model lacks an effect, or wrong readings stand together{many}; look at the residuals"
     )
 

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from ..distributions import student_quantile
 from ..errors import NoModelError
+from ..errorunits import brief
 from ..runs import CalibrationRun
 from ..shafts import ShaftOrders
 
@@ -96,8 +97,9 @@ def check_new_run(
     bound = student_quantile(1.0 - _CHANCE / _SEARCHED, len(runs) - 1) / np.sqrt(len(runs))
     if max(mean, shared) < _ALIKE * shown and mean <= bound * scatter:
         raise NoModelError(
-            f"no correction can be given: of what the runs show they share {100 * mean / shown:.2g}"
-            f" % (order {listed}), no more than {len(runs)} runs that share nothing may by chance; "
+            "no correction can be given: of what the runs show they share "
+            f"{brief(100 * mean / shown)} % (order {listed}), no more than {len(runs)} runs that "
+            "share nothing may by chance; "
             f"{mend}"
         )
 

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from ..distributions import chi_squared_tail
 from ..errors import ArgumentError
+from ..errorunits import brief
 from ..quantiles import median
 from .clusters import Cluster, robust_covariance, scatter_statistic
 from .clustersums import clusters_of, runs_together, sums_of, weight_of
@@ -253,7 +254,7 @@ def uncertainty_of_sums(
         if not variance > 0.0 or chi_squared_tail(statistic, dof) >= SCATTER:
             return plain
         said = _said(
-            f"coefficients scatter {math.sqrt(statistic / dof):.2g} times as much between runs"
+            f"coefficients scatter {brief(math.sqrt(statistic / dof))} times as much between runs"
         )
     together = runs_together(list(clusters))
     try:

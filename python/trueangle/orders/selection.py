@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..aliasing import Positions
+from ..errorunits import brief
 from ..fitting.uncertainty import CovarianceKind
 from ..runs import CalibrationRun
 from .candidates import Candidates
@@ -157,7 +158,7 @@ class EvidenceSelection(EvidenceSearch):
         chance = 100.0 * 10.0**best.log10_false_alarm
         return (
             f"{beside} does not stand out of the noise "
-            f"(noise alone does as well in {chance:.2g} % of such searches)"
+            f"(noise alone does as well in {brief(chance)} % of such searches)"
         )
 
     def _held_out_rms(self, model: float) -> tuple[float, float]:

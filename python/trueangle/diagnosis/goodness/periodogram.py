@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from ... import _core
 from ...distributions import f_tail
+from ...errorunits import brief
 from .evidence import Evidence, largest_of
 from .leftover import Leftover
 
@@ -175,7 +176,7 @@ def time_test(left: Leftover) -> Evidence | None:
         "time periodogram",
         found.statistic,
         found.p,
-        f"a line of {found.peak:.5g} {unit}{detail}, about {found.amplitude:.2g} arcsec, its "
+        f"a line of {found.peak:.5g} {unit}{detail}, about {brief(found.amplitude)} arcsec, its "
         "phase new in every run",
         rms=float(found.amplitude / np.sqrt(2.0)),
         at=found.peak,
@@ -191,8 +192,8 @@ def order_test(left: Leftover, top: float) -> Evidence | None:
         "place within runs",
         found.statistic,
         found.p,
-        f"a line of order {found.peak:.5g}, about {found.amplitude:.2g} arcsec, comes back at the "
-        "same place within runs and not between them",
+        f"a line of order {found.peak:.5g}, about {brief(found.amplitude)} arcsec, comes back at "
+        "the same place within runs and not between them",
         rms=float(found.amplitude / np.sqrt(2.0)),
         at=found.peak,
     )

@@ -26,6 +26,7 @@ from numpy.typing import NDArray
 
 from ... import _core
 from ...distributions import incomplete_gamma_tail, student_tail
+from ...errorunits import brief
 from .evidence import Evidence, largest_of
 from .leftover import Leftover
 
@@ -179,11 +180,11 @@ def _judged(
         detail = f"strongest in the orders up to {band * step:.4g}"
         rms = float(np.sqrt(power[: int(band)].sum()))
     elif band < 0.0:
-        detail = f"by about {abs(size):.2g} arcsec at every place"
+        detail = f"by about {brief(abs(size))} arcsec at every place"
         rms = abs(size) * float(np.sqrt(whole / len(left)))
     else:
         amplitude = float(np.sqrt(2.0 * power[k]))
-        detail = f"strongest at order {(k + 1) * step:.4g}, about {amplitude:.2g} arcsec"
+        detail = f"strongest at order {(k + 1) * step:.4g}, about {brief(amplitude)} arcsec"
         rms = float(np.sqrt(power[np.exp(-logs) * count < 0.01].sum()))
     says = f"what is left {modulator.what}: {detail}"
     return Evidence(modulator.name, statistic, p, says, rms=rms)

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...distributions import f_tail
+from ...errorunits import brief
 from .evidence import Evidence
 from .leftover import Leftover
 from .noise import Noise
@@ -70,6 +71,6 @@ def run_test(left: Leftover, noise: Noise) -> Evidence | None:
         "zeros of the runs",
         statistic,
         p,
-        f"the runs differ in their zeros by {spread:.2g} arcsec beyond what the noise explains",
+        f"the runs differ in their zeros by {brief(spread)} arcsec beyond what the noise explains",
         rms=spread,
     )
