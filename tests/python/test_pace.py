@@ -201,14 +201,13 @@ def test_ctrl_c_asks_first_and_ends_then():
     assert signal.getsignal(signal.SIGINT) is before
 
 
-@pytest.fixture(scope="module")
-def files(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("pace")
+def made(folder, samples):
+    """Readings of four runs, and what is believed of them."""
     many = BELIEVED.with_effects([])
     dense = Simulation(
         sigma_arcsec=1.0,
         runs=tuple(
-            RunDesign(label=str(k), samples=3000, speed_deg_s=5.0 * k, reversals=(0.5,))
+            RunDesign(label=str(k), samples=samples, speed_deg_s=5.0 * k, reversals=(0.5,))
             for k in range(1, 5)
         ),
     )
@@ -219,7 +218,14 @@ def files(tmp_path_factory):
     return folder
 
 
-def test_ctrl_c_gives_the_account_so_far(files):
+@pytest.fixture(scope="module")
+def files(tmp_path_factory):
+    return made(tmp_path_factory.mktemp("pace"), 3000)
+
+
+def test_ctrl_c_gives_the_account_so_far(tmp_path):
+    # As many readings as a diagnosis uses: it must last well beyond the first word at one second.
+    files = made(tmp_path, 10_000)
     arguments = ["diagnose", "r.csv", "--simulation", "believed.toml", "--extend", "out.toml"]
     process = subprocess.Popen(
         [sys.executable, "-m", "trueangle", *arguments, "--progress", "json", "--json"],
