@@ -81,11 +81,14 @@ def check_follows(run: CalibrationRun) -> None:
         )
     )
     remedy = next(found, None) or _moves(ratio)
-    named = f" of run {run.label}" if run.label else ""
     raise ArgumentError(
-        f"the indicated angle{named} does not follow the reference "
+        f"the indicated angle{_of(run)} does not follow the reference "
         f"(their differences are spread over the whole turn): {remedy}"
     )
+
+
+def _of(run: CalibrationRun) -> str:
+    return f" of run {run.label}" if run.label else ""
 
 
 def _warn_of_degrees(run: CalibrationRun, reference: Array, indicated: Array) -> None:
@@ -103,9 +106,8 @@ def _warn_of_degrees(run: CalibrationRun, reference: Array, indicated: Array) ->
         rest = error - lines @ np.linalg.lstsq(lines, error, rcond=None)[0]
         left[period] = float(rest @ rest)
     if left[_TURNS["degrees"]] < _LEFT * left[_TURNS["radians"]]:
-        named = f" of run {run.label}" if run.label else ""
         warnings.warn(
-            f"the reference{named} goes to {float(reference.max()):.6g}, and its error repeats "
+            f"the reference{_of(run)} goes to {float(reference.max()):.6g}, and its error repeats "
             "with 360: if these are degrees, give period=360 (the default is 2*pi, radians)",
             UnitWarning,
             stacklevel=3,

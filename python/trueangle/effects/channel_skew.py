@@ -29,8 +29,6 @@ from .search import Array, Fitted, line_parameters
 
 __all__ = ["ChannelSkew", "ChannelSkewTerm"]
 
-#: Arcsec in a degree.
-
 
 @dataclass(frozen=True)
 class ChannelSkew(Effect):

@@ -32,7 +32,6 @@ from .search import (
 
 __all__ = ["Latency", "LatencyTerm"]
 
-#: Arcsec in a degree.
 TWO_SPEEDS = (
     "move in both directions at two speeds at least a factor of 3 apart, or read at rest as well"
 )

@@ -20,7 +20,6 @@ from .search import Array
 
 __all__ = ["TimestampJitter"]
 
-#: Arcsec in a degree.
 #: Scoring steps, and the least variance in robust ones of the whole.
 STEPS = 25
 FLOOR = 1e-4
