@@ -15,7 +15,7 @@ from ..pace import pace
 from ..regression.regression import Regression
 from ..simulation.simulation import Simulation
 from .believed import corrected_effects
-from .gearedlines import Ratio
+from .gearedlines import GearedLines, Ratio
 from .gearratio import aligned, find_ratio, near_ratio
 from .identifiability import blind_spots
 from .penalty import NEW_CAUSE, misfit_of_scatter, total_penalty
@@ -23,7 +23,7 @@ from .remainder import unexplained_after
 from .selection import select
 from .unnamed import is_named
 
-__all__ = ["MOST_READINGS", "Account", "account_of"]
+__all__ = ["Account", "account_of"]
 
 Array = NDArray[np.float64]
 
@@ -117,9 +117,10 @@ def account_of(every: Signals, error: Array, sim: Simulation) -> Account:
     Account
         The better one where the ratio may be another one.
     """
-    ratio = find_ratio(sim, every, error)
+    geared = GearedLines.of(sim, every, error)
+    ratio = None if geared is None else find_ratio(geared)
     account = _believed(Seen.of(every, error, sim, ratio))
-    near = None if ratio else near_ratio(sim, every, error)
+    near = None if geared is None or ratio else near_ratio(geared)
     if near is None or pace().over:
         return account
     seen = Seen.of(every, error, sim, near)

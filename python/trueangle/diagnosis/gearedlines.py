@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -156,7 +157,7 @@ class GearedLines:
         """
         cycles = np.array([float(line.order) for line in self.lines])
         lines = np.hstack([line_columns(self.theta, order) for order in self.orders(ratio)])
-        beside, error = self._centred(lines), self._centred(self.y)
+        beside, error = self._centred(lines), self._error
         angle = self.theta if common else self._centred(self.theta)
         product = power = left = 0.0
         freedom = self.y.size - len(self.bounds)
@@ -205,7 +206,7 @@ class GearedLines:
     def left(self, ratio: float, common: bool) -> float:
         """Sum of squares left beside the lines: one phase for all runs, or one for each."""
         columns = np.hstack([line_columns(self.theta, m) for m in sorted(set(self.orders(ratio)))])
-        known, error = self._centred(columns), self._centred(self.y)
+        known, error = self._centred(columns), self._error
         left = 0.0
         for start, stop in self._parts(common):
             x, y = known[start:stop], error[start:stop]
@@ -229,6 +230,10 @@ class GearedLines:
 
     def _parts(self, common: bool) -> tuple[tuple[int, int], ...]:
         return ((0, self.y.size),) if common else self.bounds
+
+    @cached_property
+    def _error(self) -> Array:
+        return self._centred(self.y)
 
     def _centred(self, values: Array) -> Array:
         """Values less their mean in each run."""

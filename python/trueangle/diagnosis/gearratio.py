@@ -40,25 +40,12 @@ MOST_TURNS = 64
 ANOTHER_TURN = 9.0
 
 
-def find_ratio(sim: Simulation, signals: Signals, error: Array) -> Ratio | None:
+def find_ratio(geared: GearedLines) -> Ratio | None:
     """The gear ratio at which the believed lines are, where they are not at the believed one.
 
-    Parameters
-    ----------
-    sim : Simulation
-    signals : Signals
-    error : ndarray
-        Measured error, arcsec.
-
-    Returns
-    -------
-    Ratio or None
-        None where the believed lines are where they should be, or nowhere.
+    None where the believed lines are where they should be, or nowhere.
     """
-    geared = GearedLines.of(sim, signals, error)
-    if geared is None:
-        return None
-    believed = sim.joint.gear_ratio
+    believed = geared.sim.joint.gear_ratio
     if geared.share(believed) > MISSING:
         return None
     trials = np.arange(believed * (1.0 - REACH), believed * (1.0 + REACH), geared.step)
@@ -67,25 +54,12 @@ def find_ratio(sim: Simulation, signals: Signals, error: Array) -> Ratio | None:
     return found if found.found >= FOUND else None
 
 
-def near_ratio(sim: Simulation, signals: Signals, error: Array) -> Ratio | None:
+def near_ratio(geared: GearedLines) -> Ratio | None:
     """A ratio near the believed one at which the geared lines stay in step, to be tried.
 
-    Parameters
-    ----------
-    sim : Simulation
-    signals : Signals
-    error : ndarray
-        Measured error, arcsec.
-
-    Returns
-    -------
-    Ratio or None
-        None where they stay in step at the believed ratio, or are not there.
+    None where they stay in step at the believed ratio, or are not there.
     """
-    geared = GearedLines.of(sim, signals, error)
-    if geared is None:
-        return None
-    believed = sim.joint.gear_ratio
+    believed = geared.sim.joint.gear_ratio
     apart, together = (abs(geared.out_of_step(common)) > OUT_OF_STEP for common in (False, True))
     if not apart and not together:
         return None

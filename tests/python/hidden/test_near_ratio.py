@@ -7,6 +7,7 @@ import pytest
 
 import trueangle as ta
 from trueangle.diagnosis.discrepancy import unfolded_error
+from trueangle.diagnosis.gearedlines import GearedLines
 from trueangle.diagnosis.gearratio import near_ratio
 from trueangle.joint.signals import join_runs
 from trueangle.simulation import Harmonic, Joint, RunDesign, Simulation
@@ -44,6 +45,11 @@ def joint_pair(rng, ratio, departure, turns, runs, samples, reversals):
     return Simulation(true, lines, (), 1.5, design), believed
 
 
+def seen(believed, measured):
+    """The lines that are believed, in what was measured."""
+    return GearedLines.of(believed, join_runs(measured), unfolded_error(measured))
+
+
 @pytest.mark.parametrize(
     ("ratio", "departure", "reversals"),
     [(100.0, 0.03, ()), (50.0, -0.02, (0.5, 0.8)), (26.85, 0.05, (0.5, 0.8))],
@@ -74,7 +80,7 @@ def test_the_standard_error_of_a_near_ratio_is_honest():
         runs, samples = int(rng.integers(2, 8)), int(rng.integers(200, 800))
         true, believed = joint_pair(rng, ratio, departure, turns, runs, samples, back)
         measured = ta.simulate(true, k)
-        found = near_ratio(believed, join_runs(measured), unfolded_error(measured))
+        found = near_ratio(seen(believed, measured))
         if found is not None:
             pulls.append((found.gear_ratio - ratio - departure) / found.std)
     assert len(pulls) > JOINTS * 5 / 6
@@ -87,7 +93,7 @@ def test_the_right_ratio_is_not_tried():
     for k in range(20):
         true, believed = joint_pair(rng, 100.0, 0.0, float(rng.uniform(0.5, 3.0)), 4, 400, (0.5,))
         measured = ta.simulate(true, k)
-        assert near_ratio(believed, join_runs(measured), unfolded_error(measured)) is None
+        assert near_ratio(seen(believed, measured)) is None
 
 
 @pytest.mark.parametrize("turns", [0, 1])
