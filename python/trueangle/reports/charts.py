@@ -13,8 +13,8 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import MissingExtraError
-from .dotcopies import hover_copy, renderer_copy
+from .bokehmodels import Model, columns, field, model, reference, value
+from .chartaxes import ChartAxis
 
 __all__ = ["Chart", "Figure", "figure", "run_colour", "run_marker", "swatch"]
 
@@ -22,9 +22,6 @@ Array = NDArray[np.float64]
 
 #: Part of a chart's width at either border from which texts are turned inwards.
 _EDGE: Final = 0.3
-
-#: Decades of a logarithmic axis up to which it has ticks within them.
-_FEW_DECADES: Final = 4
 
 #: Bits of a drawn number's mantissa: 1.5e-5 of it.
 _KEPT_BITS: Final = 15
@@ -100,53 +97,17 @@ class Chart:
         height_rem: float = 22.0,
         joined: bool = False,
     ) -> None:
-        try:
-            from bokeh import models, plotting
-        except ImportError:
-            raise MissingExtraError(
-                "reports need bokeh and jinja2: pip install 'trueangle[report]'"
-            ) from None
-        self._models = models
         self.title, self.grow, self.height_rem = title, grow, height_rem
         #: What the x axis shows, where it was given.
         self.x_range = x_range or (0.0, 0.0)
-        ranges: dict[str, Any] = {}
-        if x_range is not None:
-            ranges["x_range"] = x_range
-        if y_range is not None:
-            ranges["y_range"] = y_range
-        if categories is not None:
-            ranges["y_range"] = models.FactorRange(factors=list(reversed(list(categories))))
-        self._figure = plotting.figure(
-            sizing_mode="stretch_both",
-            toolbar_location=None,
-            # The page's paper shows through; a border once drawn would stay at the edges.
-            border_fill_color=None,
-            border_line_color=None,
-            background_fill_color=None,
-            # The last number of the axis reaches beyond it.
-            min_border_right=14,
-            tools=[],
-            x_axis_type="log" if log_x else "auto",
-            y_axis_type="log" if log_y else "auto",
-            x_axis_label=x,
-            y_axis_label=y,
-            **ranges,
-        )
-        if log_x and x_range is not None:
-            self._log_axis(self._figure.xaxis, self._figure.xgrid, *x_range)
-        if log_y and y_range is not None:
-            self._log_axis(self._figure.yaxis, self._figure.ygrid, *y_range)
-        if joined:
-            self._figure.yaxis.visible = False
-        zoom = models.BoxZoomTool()
-        self._figure.add_tools(zoom, models.PanTool(), models.ResetTool())
-        self._figure.toolbar.active_drag = zoom
+        self._across = ChartAxis(x, x_range, log_x)
+        self._up = ChartAxis(y, y_range, log_y, categories, visible=not joined)
+        self._renderers: list[Model] = []
+        self._spans: list[Model] = []
         #: Legend, set as text of the page: label -> colour and sign.
         self._legend: dict[str, tuple[str, str]] = {}
-        self._hover: list[Any] = []
-        #: Dots, each with the number of renderers below it and its line of text.
-        self._dots: list[tuple[int, dict[str, Any], str]] = []
+        #: Renderers by the line of text that is shown over them.
+        self._hover: dict[str, list[Model]] = {}
 
     def dots(
         self,
@@ -159,26 +120,22 @@ class Chart:
         marker: str = "circle",
         size: float = 4.0,
         hover: str = "",
-        columns: Mapping[str, Sequence[Any]] | None = None,
+        more: Mapping[str, Sequence[Any]] | None = None,
         hollow: bool = False,
     ) -> None:
-        """Dots; ``hover`` is a line of text with ``@{column}`` in it."""
-        data = {"x": _short(x), "y": _short(y)} | {k: list(v) for k, v in (columns or {}).items()}
-        drawn = renderer_copy(marker, size, hollow, data, _tags(colour, run))
-        self._dots.append((len(self._figure.renderers), drawn, hover))
-        if label:
-            sign = "○" if hollow else _GLYPHS[_MARKERS.index(marker)]
-            self._legend.setdefault(label, (colour, sign))
+        """Dots; ``hover`` is a line of text with ``@{column}`` of ``more`` columns in it."""
+        data = {"x": _short(x), "y": _short(y), **(more or {})}
+        sign = "○" if hollow else _GLYPHS[_MARKERS.index(marker)]
+        self._add(_marks(marker, size, hollow), columns(data), colour, label, run, hover, sign)
 
     def line(
         self, x: Array, y: Array, *, colour: str, label: str = "", width: float = 1.5,
         dash: str = "solid", run: int | None = None, hover: str = "",
     ) -> None:  # fmt: skip
         """A line through the points."""
-        drawn = self._figure.line(
-            "x", "y", source=self._source(x, y), line_width=width, line_dash=dash
-        )
-        self._add(drawn, colour, label, run, hover, "━" if dash == "solid" else "╍")
+        glyph = model("Line", x=field("x"), y=field("y"), line_width=width, line_dash=dash)
+        sign = "━" if dash == "solid" else "╍"
+        self._add(glyph, _points(x, y), colour, label, run, hover, sign)
 
     def band(
         self,
@@ -191,69 +148,59 @@ class Chart:
         alpha: float = 0.25,
     ) -> None:
         """The area between two curves."""
-        source = self._models.ColumnDataSource(
-            {"x": _short(x), "low": _short(low), "y": _short(high)}
-        )
-        drawn = self._figure.varea("x", "low", "y", source=source, fill_alpha=0.25)
-        self._add(drawn, colour, label, None, "", "▒")
+        glyph = model("VArea", x=field("x"), y1=field("low"), y2=field("y"), fill_alpha=alpha)
+        source = columns({"x": _short(x), "low": _short(low), "y": _short(high)})
+        self._add(glyph, source, colour, label, sign="▒")
 
     def stems(
         self, x: Array, low: float | Array, high: Array, *, colour: str, label: str = "",
         width: float = 3.0,
     ) -> None:  # fmt: skip
         """Upright lines from ``low`` to ``high``."""
-        source = self._source(x, high)
-        source.data["low"] = _short(np.broadcast_to(np.asarray(low, dtype=np.float64), high.shape))
-        drawn = self._figure.segment(
-            x0="x", y0="low", x1="x", y1="y", source=source, line_width=width, line_cap="butt"
-        )
-        self._add(drawn, colour, label, None, "", "┃")
+        feet = np.broadcast_to(np.asarray(low, dtype=np.float64), high.shape)
+        source = columns({"x": _short(x), "y": _short(high), "low": _short(feet)})
+        self._add(_segment("x", "low", "x", "y", width), source, colour, label, sign="┃")
 
     def ticks(self, x: Array, y: Array, half: float, *, colour: str, label: str = "") -> None:
         """Short level lines of half width ``half`` at every point."""
-        source = self._models.ColumnDataSource(
-            {"x0": _short(x - half), "x1": _short(x + half), "y": _short(y)}
-        )
-        drawn = self._figure.segment(
-            x0="x0", y0="y", x1="x1", y1="y", source=source, line_width=2.0
-        )
-        self._add(drawn, colour, label, None, "", "━")
+        source = columns({"x0": _short(x - half), "x1": _short(x + half), "y": _short(y)})
+        self._add(_segment("x0", "y", "x1", "y", 2.0), source, colour, label, sign="━")
 
     def bars(
         self, names: Sequence[str], values: Array, *, colour: str, hover: str = "",
         low: Array | None = None, high: Array | None = None,
     ) -> None:  # fmt: skip
         """Level bars of the categories, with intervals where given."""
-        source = self._models.ColumnDataSource({"y": list(names), "x": _short(values)})
-        drawn = self._figure.hbar(y="y", right="x", height=0.6, source=source, line_alpha=0.0)
-        self._add(drawn, colour, "", None, hover)
+        bar = model(
+            "HBar", y=field("y"), right=field("x"), height=value(0.6), line_alpha=value(0.0)
+        )
+        source = columns({"y": names, "x": _short(values)})
+        self._add(bar, source, colour, hover=hover)
         if low is not None and high is not None:
-            ends = self._models.ColumnDataSource(
-                {"y": list(names), "x0": _short(low), "x1": _short(high)}
-            )
-            error = self._figure.segment(
-                x0="x0", x1="x1", y0="y", y1="y", source=ends, line_width=2.0
-            )
-            self._add(error, "fore", "", None, "")
+            ends = columns({"y": names, "x0": _short(low), "x1": _short(high)})
+            self._add(_segment("x0", "y", "x1", "y", 2.0), ends, "fore")
 
     def level_stems(
         self, names: Sequence[str], low: float, values: Array, *, colour: str, hover: str = ""
     ) -> None:
         """Level lines of the categories from ``low`` to a dot at their value."""
-        data = {"y": list(names), "x": _short(values), "low": _short(np.full(len(names), low))}
-        source = self._models.ColumnDataSource(data)
-        line = self._figure.segment(
-            x0="low", x1="x", y0="y", y1="y", source=source, line_width=3.0, line_cap="butt"
-        )
-        self._add(line, colour, "", None, "")
-        dot = self._figure.scatter("x", "y", source=source, size=11.0, line_alpha=0.0)
-        self._add(dot, colour, "", None, hover)
+        feet = np.full(len(names), low)
+        source = columns({"y": names, "x": _short(values), "low": _short(feet)})
+        self._add(_segment("low", "y", "x", "y", 3.0), source, colour)
+        self._add(_marks("circle", 11.0), reference(source), colour, hover=hover)
 
     def upright(self, x: float, *, label: str) -> None:
         """A dashed line over the whole height."""
-        span = _span(x)
-        span.tags = ["colour:fore"]
-        self._figure.add_layout(span)
+        self._spans.append(
+            model(
+                "Span",
+                location=x,
+                dimension="height",
+                line_dash="dashed",
+                line_width=1.5,
+                tags=_tags("fore"),
+            )
+        )
         self._legend[label] = ("fore", "╍")
 
     def labels(self, x: Array, y: Array, texts: Sequence[str], inside: tuple[float, float]) -> None:
@@ -261,57 +208,30 @@ class Chart:
         low, high = inside
         place = (np.asarray(x, dtype=np.float64) - low) / (high - low)
         sides = ["left" if p < _EDGE else "right" if p > 1.0 - _EDGE else "center" for p in place]
-        source = self._models.ColumnDataSource(
-            {"x": _short(x), "y": _short(y), "text": list(texts), "side": sides}
+        glyph = model(
+            "Text",
+            x=field("x"),
+            y=field("y"),
+            text=field("text"),
+            text_align=field("side"),
+            text_baseline=value("bottom"),
+            text_font_size=value("11px"),
+            y_offset=value(-7),
         )
-        drawn = self._figure.text(
-            "x", "y", "text", source=source, text_align="side", text_baseline="bottom",
-            y_offset=-7, text_font_size="11px",
-        )  # fmt: skip
-        self._add(drawn, "fore", "", None, "")
+        source = columns({"x": _short(x), "y": _short(y), "text": texts, "side": sides})
+        self._add(glyph, source, "fore")
 
     def angle_axis(self, low: float, high: float, most: float = 9.0) -> None:
         """Ticks at whole parts of a turn, about ``most`` of them."""
-        for step in (0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 15.0, 30.0, 45.0, 90.0, 360.0, 1800.0):
-            if (high - low) / step <= most:
-                first = np.ceil(low / step)
-                ticks = step * np.arange(first, np.floor(high / step) + 1.0)
-                self._figure.xaxis.ticker = self._models.FixedTicker(ticks=ticks.tolist())
-                return
+        self._across.at_angles(low, high, most)
 
     def whole_axis(self, low: float, high: float, most: int) -> None:
         """Ticks at whole numbers, at most so many."""
-        step = next(
-            s for s in (1, 2, 5, 10, 20, 50, 100, 200, 500, 10**9) if (high - low) / s < most
-        )
-        ticks = np.arange(step * np.ceil(low / step), high + 1e-9, step)
-        self._figure.xaxis.ticker = self._models.FixedTicker(ticks=ticks.tolist())
-
-    def _log_axis(self, axis: Any, grid: Any, low: float, high: float) -> None:
-        """Ticks at 1, 2 and 5 of every decade while these are few, else at decades alone."""
-        decades = np.arange(np.floor(np.log10(low)), np.ceil(np.log10(high)) + 1.0)
-        marks = (1.0, 2.0, 5.0) if decades.size <= _FEW_DECADES else (1.0,)
-        ticks = [m * 10.0**d for d in decades for m in marks if low <= m * 10.0**d <= high]
-        ticker = self._models.FixedTicker(ticks=ticks)
-        axis.ticker = grid.ticker = ticker
-        axis.formatter = self._models.BasicTickFormatter(use_scientific=False)
+        self._across.at_whole(low, high, most)
 
     def drawn(self) -> dict[str, Any]:
         """The chart as plain values, ready for JSON."""
-        from bokeh import __version__
-        from bokeh.document import Document
-
-        for text, renderers in _grouped(self._hover):
-            self._figure.add_tools(
-                self._models.HoverTool(renderers=renderers, tooltips=text, mode="mouse")
-            )
-        document = Document(title="")
-        document.add_root(self._figure)
-        written = document.to_json(deferred=False)
-        root: dict[str, Any] = written["roots"][0]  # type: ignore[assignment]
-        # What is referred to, as renderers are by tools, must stand before that.
-        root["attributes"] = {"renderers": [], **root["attributes"]}
-        self._add_dots(root["attributes"])
+        root = self._root()
         return {
             "title": self.title,
             "grow": self.grow,
@@ -320,54 +240,92 @@ class Chart:
                 {"label": label, "colour": colour, "sign": sign}
                 for label, (colour, sign) in self._legend.items()
             ],
-            # What `bokeh.embed.json_item` gives, without going over all models four times.
-            "document": {
-                "target_id": None,
-                "root_id": self._figure.id,
-                "doc": written,
-                "version": __version__,
-            },
+            # The page's script adds the version of the library that it has.
+            "document": {"root_id": root["id"], "doc": {"title": "", "roots": [root]}},
         }
 
-    def _add_dots(self, written: dict[str, Any]) -> None:
-        """Put the dots among the renderers of the written figure, each above what it was above."""
-        renderers = written["renderers"]
-        for place, drawn, _ in reversed(self._dots):
-            renderers.insert(place, drawn)
-        for text, shown in _grouped([(text, drawn) for _, drawn, text in self._dots if text]):
-            written["toolbar"]["attributes"]["tools"].append(hover_copy(text, shown))
-
-    def _source(self, x: Array, y: Array) -> Any:
-        return self._models.ColumnDataSource({"x": _short(x), "y": _short(y)})
+    def _root(self) -> Model:
+        below, across = self._across.drawn(0)
+        left, up = self._up.drawn(1)
+        zoom = model("BoxZoomTool")
+        hover = [
+            model("HoverTool", renderers=[reference(r) for r in shown], tooltips=text, mode="mouse")
+            for text, shown in self._hover.items()
+        ]
+        tools = [zoom, model("PanTool"), model("ResetTool"), *hover]
+        return model(
+            "Figure",
+            # What is referred to, as renderers are by tools and axes by grids, stands before that.
+            renderers=self._renderers,
+            x_range=self._across.range(),
+            y_range=self._up.range(),
+            x_scale=self._across.scale(),
+            y_scale=self._up.scale(),
+            toolbar=model("Toolbar", tools=tools, active_drag=reference(zoom)),
+            toolbar_location=None,
+            left=[left],
+            below=[below],
+            center=[across, up, *self._spans],
+            sizing_mode="stretch_both",
+            # The page's paper shows through; a border once drawn would stay at the edges.
+            border_fill_color=None,
+            border_line_color=None,
+            background_fill_color=None,
+            # The last number of the axis reaches beyond it.
+            min_border_right=14,
+        )
 
     def _add(
-        self, drawn: Any, colour: str, label: str, run: int | None, hover: str, sign: str = ""
-    ) -> None:
-        drawn.tags = _tags(colour, run)
-        # Selections and hovering change nothing: one glyph is enough.
-        drawn.nonselection_glyph = drawn.muted_glyph = None
+        self, glyph: Model, source: Model, colour: str, label: str = "", run: int | None = None,
+        hover: str = "", sign: str = "",
+    ) -> None:  # fmt: skip
+        drawn = model(
+            "GlyphRenderer",
+            tags=_tags(colour, run),
+            data_source=source,
+            glyph=glyph,
+            # Selections and hovering change nothing: one glyph is enough.
+            nonselection_glyph=None,
+            muted_glyph=None,
+        )
+        self._renderers.append(drawn)
         if label:
             self._legend.setdefault(label, (colour, sign))
         if hover:
-            self._hover.append((hover, drawn))
+            self._hover.setdefault(hover, []).append(drawn)
 
 
-def _tags(colour: str, run: int | None) -> list[str]:
+def _tags(colour: str, run: int | None = None) -> list[str]:
     return [f"colour:{colour}"] + ([f"run:{run}"] if run is not None else [])
 
 
-def _span(x: float) -> Any:
-    from bokeh.models.annotations import Span
-
-    return Span(location=x, dimension="height", line_dash="dashed", line_width=1.5)
+def _points(x: Array, y: Array) -> Model:
+    return columns({"x": _short(x), "y": _short(y)})
 
 
-def _grouped(hover: Sequence[tuple[str, Any]]) -> list[tuple[str, list[Any]]]:
-    """Renderers of the same text together: one tool for all of them."""
-    found: dict[str, list[Any]] = {}
-    for text, drawn in hover:
-        found.setdefault(text, []).append(drawn)
-    return list(found.items())
+def _marks(marker: str, size: float, hollow: bool = False) -> Model:
+    return model(
+        "Scatter",
+        x=field("x"),
+        y=field("y"),
+        size=value(size),
+        marker=value(marker),
+        fill_alpha=value(0.0 if hollow else 1.0),
+        line_alpha=value(1.0 if hollow or marker == "cross" else 0.0),
+    )
+
+
+def _segment(x0: str, y0: str, x1: str, y1: str, width: float) -> Model:
+    """Lines between two points each, which end with these."""
+    return model(
+        "Segment",
+        x0=field(x0),
+        y0=field(y0),
+        x1=field(x1),
+        y1=field(y1),
+        line_width=value(width),
+        line_cap=value("butt"),
+    )
 
 
 def _short(values: Array) -> NDArray[np.float32]:

@@ -87,7 +87,7 @@ def _group(
         told = {"order": [f"{row['order']:g}" for row in some], "told": [r["told"] for r in some]}
         hover = f"order @order: {scale.read} @told"
         chart.stems(x, y_range[0], size, colour=colour, label=_once(label, joined))
-        chart.dots(x, size, colour=colour, size=7.0, hover=hover, columns=told, hollow=not kept)
+        chart.dots(x, size, colour=colour, size=7.0, hover=hover, more=told, hollow=not kept)
     limited = [row for row in rows if row["limit"] > 0.0]
     if limited:
         chart.ticks(

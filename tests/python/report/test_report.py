@@ -216,10 +216,13 @@ def test_bad_file_leaves_no_page(tmp_path, capsys) -> None:
     assert list(tmp_path.iterdir()) == [bad]
 
 
-def test_missing_extras_are_named(made, monkeypatch) -> None:
+@pytest.mark.parametrize("missing", ["jinja2", "bokeh"])
+def test_missing_extras_are_named(made, monkeypatch, missing: str) -> None:
     from trueangle.reports import page
 
-    monkeypatch.setitem(sys.modules, "jinja2", None)
+    monkeypatch.setattr(page, "find_spec", lambda name: None)
+    monkeypatch.setitem(sys.modules, missing, None)
+    page._library.cache_clear()
     with pytest.raises(MissingExtraError, match=r"trueangle\[report\]"):
         page.render(made)
 

@@ -61,6 +61,7 @@
 
   async function chart(specification, place) {
     const item = structuredClone(specification.document);
+    item.doc.version = Bokeh.version;
     const attributes = item.doc.roots[0].attributes;
     // Vectors on paper; on the screen a canvas is drawn faster.
     if (paper) attributes.output_backend = "svg";
