@@ -63,12 +63,13 @@ def read(
             yield from ahead(column_batches(path, names, batches))
         return
     with damage_told(path, "Arrow"), pa.memory_map(str(path), "r") as source:
-        schema = pa.ipc.open_file(source).schema
-        only = pa.ipc.IpcReadOptions(
-            included_fields=[schema.get_field_index(name) for name in names], use_threads=False
-        )
-        file = pa.ipc.open_file(source, options=only)
-        yield from column_batches(path, names, (_valid(file.get_batch(i)) for i in stretch))
+        file = pa.ipc.open_file(source)
+        if _compression(path, True) is not None:  # What lies there as it is would be copied.
+            wanted = [file.schema.get_field_index(name) for name in names]
+            only = pa.ipc.IpcReadOptions(included_fields=wanted, use_threads=False)
+            file = pa.ipc.open_file(source, options=only)
+        batches = (_valid(file.get_batch(i).select(names)) for i in stretch)
+        yield from column_batches(path, names, batches)
 
 
 def copy(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -25,23 +26,23 @@ def plain_block(data: bytes, header: Header, line: int) -> PlainBlock | None:
     """The block, or None for text that needs the standard library: blank lines, notes."""
     if header.trailing:
         return None
-    signs = np.frombuffer(data, dtype=np.uint8)
-    ends = np.flatnonzero(signs == _NEWLINE)
     width = len(header.ending)
-    starts = np.concatenate([[0], ends + 1])
-    if starts[-1] == len(data):
-        starts = starts[:-1]
-    # The first sign of every line, not a search through all of the text.
-    first = signs[starts]
-    if (first == _NOTE).any() or ((first == _END).any() and _has_end(data)):
+    signs = np.frombuffer(data, dtype=np.uint8)
+    is_end = signs == _NEWLINE
+    rows = int(np.count_nonzero(is_end)) + (not data.endswith(b"\n"))
+    # Looking whether a sign is there at all takes a fraction of looking where.
+    if (b"\r" in data) is (width == 1):
         return None
-    lengths = np.diff(starts, append=len(data))
-    returns = data.count(b"\r")
-    if (width == 1 and returns) or (width == 2 and not returns == ends.size == data.count(b"\r\n")):
+    if width == 2 and not data.count(b"\r") == data.count(b"\n") == data.count(b"\r\n"):
         return None
-    if lengths.size and lengths.min() <= width:
+    if is_end[width - 1] or (is_end[width:] & is_end[:-width]).any():
         return None
-    return PlainBlock(data, header, line, starts)
+    block = PlainBlock(data, header, line, rows)
+    if b"#" in data or b"F" in data:
+        first = signs[block.starts]
+        if (first == _NOTE).any() or ((first == _END).any() and _has_end(data)):
+            return None
+    return block
 
 
 def _has_end(data: bytes) -> bool:
@@ -51,18 +52,21 @@ def _has_end(data: bytes) -> bool:
 class PlainBlock:
     """Lines of text without quotes, every one a row."""
 
-    def __init__(self, data: bytes, header: Header, line: int, starts: NDArray[np.int64]) -> None:
+    def __init__(self, data: bytes, header: Header, line: int, rows: int) -> None:
         self.data = data
         self.header = header
         self.line = line
-        self._starts = starts
+        #: Number of lines.
+        self.rows = rows
         self._table: pa.Table = None
         self._quoted: QuotedBlock | None = None
 
-    @property
-    def rows(self) -> int:
-        """Number of lines."""
-        return int(self._starts.size)
+    @cached_property
+    def starts(self) -> NDArray[np.int64]:
+        """Place of the first sign of every line."""
+        ends = np.flatnonzero(np.frombuffer(self.data, dtype=np.uint8) == _NEWLINE)
+        starts = np.concatenate([[0], ends + 1])
+        return starts[:-1] if starts[-1] == len(self.data) else starts
 
     @property
     def lines(self) -> range:
@@ -110,7 +114,7 @@ class PlainBlock:
         """The text with a value added to every line; see `QuotedBlock.with_columns`."""
         if self._quoted is not None:
             return self._quoted.with_columns(columns)
-        offsets = np.append(self._starts, len(self.data)).astype(np.int64)
+        offsets = np.append(self.starts, len(self.data)).astype(np.int64)
         lines = pa.Array.from_buffers(
             pa.large_string(), self.rows, [None, pa.py_buffer(offsets), pa.py_buffer(self.data)]
         )

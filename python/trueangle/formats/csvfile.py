@@ -13,6 +13,8 @@ from collections.abc import Callable, Collection, Iterator, Sequence
 from pathlib import Path
 from typing import IO, TYPE_CHECKING, TypeAlias
 
+from .._core import thread_count
+from .ahead import side_by_side
 from .csvheader import LONGEST_LINE, Header
 from .csvrows import BLOCK, QuotedBlock, quoted_blocks, too_long
 from .format import TEXTS, Addition, Batch, Choose, Contents, Watch
@@ -53,9 +55,13 @@ def read(
         header = Header(path, file)
         # The length of a pipe is told as 0.
         small = 0 < path.stat().st_size <= SMALL
-        for block in _blocks(file, header, small):
+
+        def values(block: _Block) -> Batch:
             found: Batch = dict(block.numbers(numbers, labels, strict))
-            yield found | {name: block.labels(name) for name in labels}
+            return found | {name: block.labels(name) for name in labels}
+
+        workers = 1 if small else thread_count()
+        yield from side_by_side(values, _blocks(file, header, small), workers)
 
 
 def line_of(path: Path, row: int) -> int:

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import errno
 import json
+import math
 import os
 import shutil
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import h5py
 import numpy as np
@@ -20,12 +21,29 @@ from .checksum import Checksum
 from .damage import damage_told
 from .format import TEXTS, Addition, Batch, Choose, Contents, Watch, note
 
-__all__ = ["columns", "contents", "copy", "read"]
+__all__ = ["columns", "contents", "copy", "read", "stretches"]
 
-#: Readings taken together.
-_BLOCK = 1 << 20
+#: Readings taken together: what is read of them stays in the cache of the processor.
+_BLOCK = 1 << 17
+#: Rows of a part that is read on its own, and parts at most: each opens the file.
+_PART, _MOST_PARTS = 1 << 21, 64
+#: Places of HDF5's table of chunks in memory; a prime.
+_SLOTS = 521
 #: Attribute of a corrected data set that says how it was made.
 _ATTRIBUTE = "trueangle"
+
+
+class Part(NamedTuple):
+    """One of so many parts of every data set, in their order."""
+
+    number: int
+    parts: int
+
+    def rows(self, size: int, sets: Iterable[h5py.Dataset]) -> range:
+        """Its rows: whole chunks, where there are as many, which are unpacked once."""
+        chunk = max((max(data.chunks or (1,)) for data in sets), default=1)
+        each = -(-size // (self.parts * chunk)) * chunk
+        return range(size)[self.number * each : (self.number + 1) * each]
 
 
 def columns(path: Path, topic: str | None = None) -> list[str]:
@@ -34,11 +52,19 @@ def columns(path: Path, topic: str | None = None) -> list[str]:
         return _names(file)
 
 
+def stretches(path: Path) -> list[Part | None]:
+    """Parts of the data sets; HDF5 reads one at a time, while others are worked on."""
+    with _opened(path) as file:
+        size = max((file[name].size for name in _names(file)), default=0)
+    parts = min(size // _PART, _MOST_PARTS)
+    return [Part(i, parts) for i in range(parts)] or [None]
+
+
 def read(
     path: Path,
     names: Sequence[str],
     topic: str | None = None,
-    stretch: None = None,
+    stretch: Part | None = None,
     *,
     texts: Collection[str] = TEXTS,
     strict: bool = False,
@@ -48,8 +74,9 @@ def read(
         sets = {name: _data_set(path, file, name) for name in names}
         _check_lengths(path, sets)
         size = next(iter(sets.values())).size if sets else 0
-        for start in range(0, size, _BLOCK):
-            stop = min(start + _BLOCK, size)
+        rows = range(size) if stretch is None else stretch.rows(size, sets.values())
+        for start in rows[::_BLOCK]:
+            stop = min(start + _BLOCK, rows.stop)
             yield {name: _part(data, start, stop) for name, data in sets.items()}
 
 
@@ -74,13 +101,15 @@ def copy(
     sums: dict[str, Checksum] = {}
     with _opened(target, "r+") as file:
         for channel in channels:
-            indicated = file[channel.column]
-            corrected = _like(file, indicated, channel)
+            indicated = _cached(file, channel.column)
+            used = {signal: _cached(file, name) for signal, name in channel.signals.items()}
+            _create_like(file, indicated, channel)
+            corrected = _cached(file, channel.added)
             checks = [sums.setdefault(name, Checksum()) for name in (channel.column, channel.added)]
             for start in range(0, indicated.size, _BLOCK):
                 stop = min(start + _BLOCK, indicated.size)
                 given = _part(indicated, start, stop)
-                signals = {s: _part(file[n], start, stop) for s, n in channel.signals.items()}
+                signals = {signal: _part(data, start, stop) for signal, data in used.items()}
                 after = channel.correct(given, signals)
                 _put(corrected, start, stop, after)
                 for check, values in zip(checks, (given, after), strict=True):
@@ -100,7 +129,7 @@ def contents(path: Path, topic: str | None = None) -> Contents:
         corrected = [name for name in _names(file) if _ATTRIBUTE in file[name].attrs]
         sources = [_source_of(file[name]) for name in corrected]
         for name in dict.fromkeys([*sources, *corrected]):
-            data = file[name]
+            data = _cached(file, name)
             found = sums[name] = Checksum()
             for start in range(0, data.size, _BLOCK):
                 found.update(_part(data, start, min(start + _BLOCK, data.size)))
@@ -155,12 +184,29 @@ def _names(file: h5py.File) -> list[str]:
 
 
 def _data_set(path: Path, file: h5py.File, name: str) -> h5py.Dataset:
-    data = file[name]
+    data = _cached(file, name)
     if max(data.shape, default=0) != data.size:
         raise FileError(
             path, f"one angle after the other is needed, its shape is {data.shape}", column=name
         )
     return data
+
+
+def _cached(file: h5py.File, name: str) -> h5py.Dataset:
+    """A data set that keeps its last chunk where chunks are packed, and none where they are not.
+
+    HDF5 itself keeps chunks of up to 1 MB: it would copy small ones once more on their way, and
+    unpack larger ones again for every block that takes a part of them.
+    """
+    data = file[name]
+    if data.chunks is None:
+        return data
+    chunk = math.prod(data.chunks) * data.dtype.itemsize
+    packed = data.id.get_create_plist().get_nfilters() > 0
+    access = h5py.h5p.create(h5py.h5p.DATASET_ACCESS)
+    access.set_chunk_cache(_SLOTS, chunk if packed else 0, 1.0)
+    del data  # one that is open keeps the cache that it has
+    return h5py.Dataset(h5py.h5d.open(file.id, name.encode(), access))
 
 
 def _check_lengths(path: Path, sets: dict[str, h5py.Dataset]) -> None:
@@ -189,8 +235,8 @@ def _put(data: h5py.Dataset, start: int, stop: int, values: NDArray[Any]) -> Non
     data[place] = values.reshape(shape)
 
 
-def _like(file: h5py.File, indicated: h5py.Dataset, channel: Addition) -> h5py.Dataset:
-    """An empty data set beside ``indicated``, laid out and compressed like it."""
+def _create_like(file: h5py.File, indicated: h5py.Dataset, channel: Addition) -> None:
+    """Make an empty data set beside ``indicated``, laid out and compressed like it."""
     kind = (
         np.float32
         if indicated.dtype.kind == "f" and indicated.dtype.itemsize == 4
@@ -213,7 +259,6 @@ def _like(file: h5py.File, indicated: h5py.Dataset, channel: Addition) -> h5py.D
         if name in indicated.attrs:
             made.attrs[name] = indicated.attrs[name]
     made.attrs[_ATTRIBUTE] = note([channel])
-    return made
 
 
 def _source_of(corrected: h5py.Dataset) -> str:

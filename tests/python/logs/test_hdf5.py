@@ -10,6 +10,7 @@ import trueangle as ta
 from .conftest import made_angles, made_model, unwrapped_truth
 
 h5py = pytest.importorskip("h5py")
+from trueangle.formats import hdf5  # noqa: E402
 
 ROWS = 10_000
 
@@ -126,3 +127,34 @@ def test_damage_within_is_found(tmp_path, model):
     source.write_bytes(data)
     report = ta.correct_logs(source, model, tmp_path / "b.h5")
     assert "damaged" in str(report.logs[0].error)
+
+
+@pytest.mark.parametrize("packed", [True, False])
+def test_a_chunk_is_unpacked_once_whatever_takes_parts_of_it(tmp_path, packed):
+    options = {"compression": "gzip"} if packed else {}
+    source = made_file(tmp_path / "a.h5", made_angles(ROWS), chunks=(ROWS,), **options)
+    with h5py.File(source) as file:
+        data = hdf5._cached(file, "joint3/indicated_deg")
+        kept = data.id.get_access_plist().get_chunk_cache()[1]
+    # HDF5 keeps a chunk that is not larger than that; one that is as it is is read in place.
+    assert kept == (8 * ROWS if packed else 0)
+
+
+@pytest.mark.parametrize("chunk", [None, 700, ROWS])
+@pytest.mark.parametrize("parts", [1, 3, 20])
+def test_parts_hold_every_row_once_and_whole_chunks(tmp_path, monkeypatch, chunk, parts):
+    monkeypatch.setattr(hdf5, "_PART", ROWS // parts)
+    angles = made_angles(ROWS)
+    source = made_file(tmp_path / "a.h5", angles, chunks=chunk and (chunk,))
+    name = "joint3/indicated_deg"
+    stretches = hdf5.stretches(source)
+    assert len(stretches) == parts
+    read = [
+        np.concatenate(
+            [batch[name] for batch in hdf5.read(source, [name], stretch=stretch)] or [[]]
+        )
+        for stretch in stretches
+    ]
+    np.testing.assert_array_equal(np.concatenate(read), angles)
+    edges = np.cumsum([values.size for values in read])
+    assert not (edges[edges < ROWS] % (chunk or 1)).any()
