@@ -14,7 +14,6 @@ from pathlib import Path
 from typing import IO, TYPE_CHECKING, TypeAlias
 
 from .._core import thread_count
-from .ahead import side_by_side
 from .csvheader import LONGEST_LINE, Header
 from .csvrows import BLOCK, QuotedBlock, quoted_blocks, too_long
 from .format import TEXTS, Addition, Batch, Choose, Contents, Watch
@@ -60,8 +59,13 @@ def read(
             found: Batch = dict(block.numbers(numbers, labels, strict))
             return found | {name: block.labels(name) for name in labels}
 
-        workers = 1 if small else thread_count()
-        yield from side_by_side(values, _blocks(file, header, small), workers)
+        blocks = _blocks(file, header, small)
+        if small:
+            yield from map(values, blocks)
+            return
+        from .ahead import side_by_side  # and the threads of the standard library
+
+        yield from side_by_side(values, blocks, thread_count())
 
 
 def line_of(path: Path, row: int) -> int:
