@@ -5,10 +5,21 @@
 //! `indicated = phi + series(phi) + sum of terms(phi, signals)`, and
 //! `theta = phi + velocity * delay`.
 
+// Passes index slices instead of chaining closures, as kernels do.
+#![allow(clippy::needless_range_loop)]
+
+mod block;
 mod corrector;
+mod exponential;
 mod form;
+mod lines;
+mod lowpass;
+mod moving;
 mod prepared;
+mod search;
 mod signals;
+mod smooth;
+mod still;
 mod travel;
 
 pub use corrector::Corrector;

@@ -117,8 +117,12 @@ class HarmonicModel:
                 )
         self._core_corrector()  # refuses terms that leave no unique correction
 
-    def _core_corrector(self) -> _core.Corrector:
+    @cached_property
+    def _unused_corrector(self) -> _core.Corrector:
         return _core.Corrector(self._series, list(self.terms))
+
+    def _core_corrector(self) -> _core.Corrector:
+        return self._unused_corrector.fresh()
 
     @cached_property
     def _warn(self) -> SpanGuard:

@@ -165,20 +165,32 @@ impl<'a, X: Sample, Y: Real> Batch<'a, X, Y> {
             .then(|| unsafe { Batch::from_raw(self.x.cast(), self.out.cast(), self.len) })
     }
 
+    /// Samples from `start` on, as doubles.
+    pub fn widen(&self, start: usize, into: &mut [f64]) {
+        assert!(start + into.len() <= self.len);
+        for (i, x) in into.iter_mut().enumerate() {
+            // SAFETY: start + i < len.
+            *x = unsafe { self.x.add(start + i).read() }.widen();
+        }
+    }
+
+    /// Stores results from `start` on.
+    pub fn narrow(&mut self, start: usize, from: &[f64]) {
+        assert!(start + from.len() <= self.len);
+        for (i, &value) in from.iter().enumerate() {
+            // SAFETY: start + i < len.
+            unsafe { self.out.add(start + i).write(Y::narrow(value)) };
+        }
+    }
+
     /// Blocks as doubles through `f(samples, results)`.
     pub fn map_blocks(&mut self, mut f: impl FnMut(&[f64], &mut [f64])) {
         let (mut x, mut out) = ([0.0; BLOCK], [0.0; BLOCK]);
         for start in (0..self.len).step_by(BLOCK) {
             let len = BLOCK.min(self.len - start);
-            for (i, x) in x[..len].iter_mut().enumerate() {
-                // SAFETY: start + i < len.
-                *x = unsafe { self.x.add(start + i).read() }.widen();
-            }
+            self.widen(start, &mut x[..len]);
             f(&x[..len], &mut out[..len]);
-            for (i, &value) in out[..len].iter().enumerate() {
-                // SAFETY: start + i < len.
-                unsafe { self.out.add(start + i).write(Y::narrow(value)) };
-            }
+            self.narrow(start, &out[..len]);
         }
     }
 }

@@ -65,7 +65,7 @@ pub struct Evaluator {
     pub(super) reach: f64,
     pub(super) slope_bound: f64,
     pub(super) best: InstructionSet,
-    exact_error: Exact,
+    pub(super) exact_error: Exact,
     exact_slope: Exact,
     pub(super) errors: Tables,
     pub(super) corrections: Tables,
@@ -332,7 +332,11 @@ impl Evaluator {
     }
 
     /// Corrections without a table, block by block.
-    fn correct_exactly<X: Sample, Y: Real>(&self, set: InstructionSet, mut batch: Batch<'_, X, Y>) {
+    pub(super) fn correct_exactly<X: Sample, Y: Real>(
+        &self,
+        set: InstructionSet,
+        mut batch: Batch<'_, X, Y>,
+    ) {
         let newton = inverse::Newton {
             error: &self.exact_error,
             slope: (self.argument == Argument::Reference).then_some(&self.exact_slope),

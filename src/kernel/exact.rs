@@ -21,7 +21,7 @@ const MOST_SPAN: u32 = 16;
 const MOST_GAP: u32 = 6;
 
 /// Turns an angle may be away from zero; beyond, doubles carry no place within a turn.
-const FAR_TURNS: f64 = (1u64 << 50) as f64;
+pub(super) const FAR_TURNS: f64 = (1u64 << 50) as f64;
 
 /// A series, or its derivative, made ready for vectors.
 #[derive(Clone, Debug)]

@@ -55,6 +55,12 @@ impl<L: Lanes> Phase<L> {
         Self::within(sum, carry + low + own.low)
     }
 
+    /// In parts of a turn, rounded.
+    #[inline(always)]
+    pub fn turns(self) -> L {
+        self.high + self.low
+    }
+
     /// Phase of order `order` of the shaft.
     #[inline(always)]
     pub fn harmonic(self, order: f64) -> Self {

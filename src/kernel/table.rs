@@ -140,8 +140,9 @@ impl<const SUBTRACT: bool> Map for Lookup<'_, SUBTRACT> {
 }
 
 impl Table {
+    /// Value of the function at every lane.
     #[inline(always)]
-    fn value<L: Lanes>(&self, x: L) -> L {
+    pub(super) fn value<L: Lanes>(&self, x: L) -> L {
         let (place, u) = self.segments.locate(x);
         let (square, mask) = (u * u, self.segments.mask());
         // SAFETY: the mask is the number of rows less one.

@@ -93,6 +93,14 @@ impl PyCorrector {
         Ok(attached(py, || self.inner.correct(angle, &signals))??)
     }
 
+    /// Another one of the same terms that knows nothing of the past.
+    fn fresh(&self, py: Python<'_>) -> Self {
+        Self {
+            inner: Corrector::new(Arc::clone(self.inner.terms())),
+            parts: self.parts.clone_ref(py),
+        }
+    }
+
     fn reset(&mut self) {
         self.inner.reset();
     }

@@ -1,9 +1,7 @@
 //! Instruction sets, and work that is compiled for each of them.
 
 use super::lanes::Lanes;
-#[cfg(not(target_arch = "aarch64"))]
-use super::portable::Portable;
-use super::portable::TARGET_FUSES;
+use super::portable::{Portable, TARGET_FUSES};
 
 /// An instruction set kernels are compiled for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -100,4 +98,23 @@ pub fn dispatch<K: Kernel>(set: InstructionSet, kernel: K) {
     kernel.run::<super::neon::F64x4>();
     #[cfg(not(target_arch = "aarch64"))]
     kernel.run::<Portable<4, TARGET_FUSES>>();
+}
+
+/// Runs a kernel on one lane, with the roundings of an instruction set: what is computed
+/// lane by lane comes out as [`dispatch`] has it, to the last bit.
+pub fn dispatch_one<K: Kernel>(set: InstructionSet, kernel: K) {
+    #[cfg(target_arch = "x86_64")]
+    {
+        #[target_feature(enable = "fma")]
+        fn fused<K: Kernel>(kernel: K) {
+            kernel.run::<Portable<1, true>>();
+        }
+
+        if set.is_available() && set.fuses() {
+            // SAFETY: the processor has it.
+            return unsafe { fused(kernel) };
+        }
+    }
+    let _ = set;
+    kernel.run::<Portable<1, TARGET_FUSES>>();
 }

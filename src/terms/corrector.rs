@@ -3,11 +3,12 @@
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
+use super::block::{BLOCK, Block};
 use super::prepared::Terms;
 use super::signals::{Columns, Signal, Signals};
-use super::travel::{Heading, Travel};
+use super::travel::Travel;
 use crate::error::Error;
-use crate::kernel::{Batch, InstructionSet, Quantity, Real, Sample, Shared, Stretch};
+use crate::kernel::{Batch, Quantity, Real, Sample, Shared, Stretch};
 use crate::{interrupt, threads};
 
 /// Samples that are corrected between two looks at the clock, and by one thread at a time.
@@ -62,14 +63,19 @@ impl Corrector {
     /// The true angle behind an indicated one; NaN for what is not finite, which leaves
     /// the state alone.
     pub fn correct(&mut self, indicated: f64, signals: &Signals) -> Result<f64, Error> {
-        self.terms.check(|signal| signals.get(signal).is_some())?;
-        Ok(self.solve(indicated, signals))
+        self.one(Quantity::Correction, indicated, signals)
     }
 
     /// Error at the true angle `theta` (at the indicated one where that is the argument).
     pub fn error(&mut self, theta: f64, signals: &Signals) -> Result<f64, Error> {
-        self.terms.check(|signal| signals.get(signal).is_some())?;
-        Ok(self.indicate(theta, signals))
+        self.one(Quantity::Error, theta, signals)
+    }
+
+    fn one(&mut self, quantity: Quantity, x: f64, signals: &Signals) -> Result<f64, Error> {
+        let Self { terms, travel } = self;
+        terms.check(|signal| signals.get(signal).is_some())?;
+        let way = terms.way(|signal| signals.get(signal).is_some());
+        Ok(terms.alone(travel, quantity, x, signals, way))
     }
 
     /// `correct` of many samples, or `error` of them; returns how many results lie outside
@@ -94,13 +100,13 @@ impl Corrector {
             let start = i * size;
             let some = size.min(len - start);
             // SAFETY: parts lie within the batch, and each is taken once.
-            let (part, results) = unsafe {
+            let (mut part, results) = unsafe {
                 let batch = shared.get();
                 (batch.part(start, some), batch.part(start, some))
             };
-            corrector.run_part(quantity, part, columns, start);
+            corrector.run_part(quantity, &mut part, columns, start);
             if let Some(stretch) = stretch {
-                let count = stretch.outside(InstructionSet::best(), results);
+                let count = stretch.outside(corrector.terms.set, results);
                 outside.fetch_add(count, Ordering::Relaxed);
             }
         };
@@ -136,139 +142,83 @@ impl Corrector {
         (PART / (1 + lines / LINES_PER_SAMPLE)).max(LEAST_PART)
     }
 
-    /// Samples `start..` of all.
+    /// Samples `start..` of all, block by block.
     fn run_part<X: Sample, Y: Real>(
         &mut self,
         quantity: Quantity,
-        mut batch: Batch<'_, X, Y>,
+        batch: &mut Batch<'_, X, Y>,
         columns: &Columns<'_>,
         start: usize,
     ) {
-        let terms = Arc::clone(&self.terms);
-        let alone = !terms.has_travel && !terms.is_shaped && !terms.is_indicated();
-        let mut at = start..;
-        let mut next = || columns.at(at.next().unwrap_or_default());
-        if quantity != Quantity::Correction {
-            batch.map(|x| Y::narrow(self.indicate(x.widen(), &next())));
-        } else if !alone {
-            batch.map(|x| Y::narrow(self.solve(x.widen(), &next())));
+        let Self { terms, travel } = self;
+        let way = terms.way(|signal| columns.get(signal).is_some());
+        let mut block = Block::new();
+        for first in (0..batch.len()).step_by(Block::<BLOCK>::MOST) {
+            let len = Block::<BLOCK>::MOST.min(batch.len() - first);
+            block.x.fill(f64::NAN);
+            batch.widen(first, &mut block.x[..len]);
+            block.signals.load(columns, start + first, len);
+            terms.together(travel, quantity, &mut block, len, way);
+            batch.narrow(first, &block.out[..len]);
+        }
+    }
+}
+
+impl Terms {
+    /// `quantity` of the first `len` readings of a block; `way` is the signal whose sign is
+    /// the direction of travel.
+    fn together(
+        &self,
+        travel: &mut Travel,
+        quantity: Quantity,
+        block: &mut Block<BLOCK>,
+        len: usize,
+        way: Option<Signal>,
+    ) {
+        let is_error = quantity != Quantity::Correction;
+        if is_error && !self.is_indicated() {
+            self.error_still(block, len);
+            if self.has_travel {
+                self.error_moving(travel, block, len, way);
+            }
+            return;
+        }
+        if self.has_travel {
+            self.correct_moving(travel, block, len, way);
         } else {
-            // The terms do not depend on the angle: many samples at once.
-            let mut done = start;
-            batch.map_blocks(|x, y| {
-                for (i, (x, y)) in x.iter().zip(y.iter_mut()).enumerate() {
-                    *y = x - terms.level(&columns.at(done + i));
-                }
-                let all = Batch::in_place(&mut *y);
-                let corrected = terms
-                    .evaluator
-                    .run(Quantity::Correction, None, Some(1), all);
-                debug_assert!(
-                    corrected.is_ok(),
-                    "`Terms::new` refuses what cannot be inverted"
-                );
-                if terms.delay != 0.0 {
-                    for (i, y) in y.iter_mut().enumerate() {
-                        *y += terms.delayed(&columns.at(done + i));
-                    }
-                }
-                done += x.len();
-            });
+            self.correct_still(block, len);
+        }
+        if is_error {
+            for i in 0..len {
+                block.out[i] = block.x[i] - block.out[i];
+            }
         }
     }
 
-    fn solve(&mut self, indicated: f64, signals: &Signals) -> f64 {
-        let Self { terms, travel } = self;
-        let (level, delayed) = (terms.level(signals), terms.delayed(signals));
-        // The series is undone first where its argument is the indicated angle.
-        let (goal, invert) = if terms.is_indicated() {
-            (terms.plain.step(indicated) - level, false)
+    /// The same of one reading.
+    pub(super) fn alone(
+        &self,
+        travel: &mut Travel,
+        quantity: Quantity,
+        x: f64,
+        signals: &Signals,
+        way: Option<Signal>,
+    ) -> f64 {
+        let mut block = Block::one(x, signals);
+        let is_error = quantity != Quantity::Correction;
+        if is_error && !self.is_indicated() {
+            self.error_still(&mut block, 1);
+            if self.has_travel {
+                self.error_moving(travel, &mut block, 1, way);
+            }
+            return block.out[0];
+        }
+        let corrected = if self.has_travel {
+            self.correct_one(travel, &mut block, way)
         } else {
-            (indicated - level, true)
+            self.correct_still(&mut block, 1);
+            block.out[0]
         };
-        if !(goal + delayed).is_finite() {
-            return f64::NAN;
-        }
-        if !terms.has_travel && !terms.is_shaped {
-            return delayed + if invert { terms.plain.step(goal) } else { goal };
-        }
-        let find =
-            |travel: &Travel, heading: Heading| terms.find(travel, heading, goal, invert, signals);
-        if !terms.has_travel {
-            return delayed + find(travel, NOWHERE);
-        }
-        let constant = terms.evaluator.series().constant();
-        travel.align(indicated - constant, terms.period());
-        if let Some(signal) = travel_of(signals) {
-            let heading = travel.heading(signal);
-            let x = find(travel, heading);
-            if x.is_nan() || signal.is_nan() {
-                return f64::NAN;
-            }
-            travel.advance(&terms.elements, heading, x);
-            return x + delayed;
-        }
-        if !travel.is_known() {
-            let x = find(travel, NOWHERE);
-            if !x.is_nan() {
-                travel.advance(&terms.elements, NOWHERE, x);
-            }
-            return x + delayed;
-        }
-        // Play: the joint has moved where the angle leaves the band of the play.
-        let first = if travel.direction < 0.0 { -1.0 } else { 1.0 };
-        for direction in [first, -first] {
-            let heading = travel.heading(direction);
-            let x = find(travel, heading);
-            if x.is_nan() {
-                return x;
-            }
-            if (x - travel.farthest) * direction >= 0.0 {
-                travel.advance(&terms.elements, heading, x);
-                return x + delayed;
-            }
-        }
-        travel.farthest + delayed
-    }
-
-    fn indicate(&mut self, theta: f64, signals: &Signals) -> f64 {
-        if self.terms.is_indicated() {
-            return theta - self.solve(theta, signals);
-        }
-        let Self { terms, travel } = self;
-        let delayed = terms.delayed(signals);
-        let x = theta - delayed;
-        let mut value = [x];
-        let done = terms
-            .evaluator
-            .run(Quantity::Error, None, Some(1), Batch::in_place(&mut value));
-        debug_assert!(done.is_ok(), "an error can always be evaluated");
-        let mut error = value[0] + terms.level(signals) + terms.shape(signals, x).0;
-        if terms.has_travel && error.is_finite() {
-            travel.align(x, terms.period());
-            let way = x - travel.farthest;
-            let moved = if way.is_nan() { 0.0 } else { way };
-            let signal = travel_of(signals).unwrap_or(moved);
-            if signal.is_nan() {
-                return f64::NAN;
-            }
-            let heading = travel.heading(signal);
-            error += heading.direction * (terms.play + terms.place(x).0)
-                + travel.friction(&terms.elements, heading, x).0;
-            travel.advance(&terms.elements, heading, x);
-        }
-        error - delayed
+        if is_error { x - corrected } else { corrected }
     }
 }
-
-/// The signal whose sign is the direction of travel.
-fn travel_of(signals: &Signals) -> Option<f64> {
-    let velocity = signals.get(Signal::Velocity);
-    signals.get(Signal::Direction).or(velocity)
-}
-
-/// Before the first motion.
-const NOWHERE: Heading = Heading {
-    direction: 0.0,
-    turned: false,
-};

@@ -89,6 +89,13 @@ impl<T: Copy> BySignal<T> {
     }
 }
 
+impl Signals {
+    /// All of them.
+    pub(super) fn of(values: [f64; Signal::COUNT]) -> Self {
+        Self(values.map(Some))
+    }
+}
+
 impl Columns<'_> {
     /// Refuses columns that are neither of length `len` nor 1.
     pub fn check(&self, len: usize) -> Result<(), Error> {

@@ -1,5 +1,8 @@
 //! Travel since the last reversal and what it leaves in the springs of friction.
 
+use super::exponential::exp;
+use super::search::Friction;
+
 /// One presliding element: `z` relaxes towards the direction of travel over a length.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Element {
@@ -16,15 +19,28 @@ pub(super) struct Heading {
     pub turned: bool,
 }
 
+/// Before the first motion.
+pub(super) const NOWHERE: Heading = Heading {
+    direction: 0.0,
+    turned: false,
+};
+
 /// What travel so far has left behind.
+///
+/// The elements change with the way from the last reversal alone, so that they are kept as
+/// they were there: nothing adds up from reading to reading.
 #[derive(Clone, Debug)]
 pub(super) struct Travel {
     /// The farthest angle reached in the present direction; NaN before the first sample.
     pub farthest: f64,
     /// -1 or +1; 0 before the first motion.
     pub direction: f64,
+    /// Where it was turned into.
+    reversal: f64,
     /// State of every element there, in [-1, 1].
     state: Vec<f64>,
+    /// Likewise of a stretch that may begin.
+    next: Vec<f64>,
 }
 
 impl Travel {
@@ -32,24 +48,28 @@ impl Travel {
         Self {
             farthest: f64::NAN,
             direction: 0.0,
+            reversal: f64::NAN,
             state: vec![0.0; elements],
+            next: vec![0.0; elements],
         }
     }
 
     /// Everything as plain numbers; `restored` takes them back.
     pub fn store(&self) -> Vec<f64> {
-        let mut numbers = vec![self.farthest, self.direction];
+        let mut numbers = vec![self.farthest, self.direction, self.reversal];
         numbers.extend(&self.state);
         numbers
     }
 
     /// Travel with the numbers of another over as many elements; None when they are not.
     pub fn restored(&self, numbers: &[f64]) -> Option<Self> {
-        let (&[farthest, direction], state) = numbers.split_first_chunk()?;
+        let (&[farthest, direction, reversal], state) = numbers.split_first_chunk()?;
         (state.len() == self.state.len()).then(|| Self {
             farthest,
             direction,
+            reversal,
             state: state.to_vec(),
+            next: self.next.clone(),
         })
     }
 
@@ -57,15 +77,25 @@ impl Travel {
         !self.farthest.is_nan()
     }
 
-    /// Counts turns as `angle` does: steps between samples are below half a turn.
-    pub fn align(&mut self, angle: f64, period: f64) {
-        let turns = ((angle - self.farthest) / period).round_ties_even();
-        if turns != 0.0 && !turns.is_nan() {
-            self.farthest += turns * period;
+    /// Counts turns as `angle` does: steps between samples are below half a turn. True
+    /// where that moved what is known.
+    #[inline]
+    pub fn align(&mut self, angle: f64, period: f64) -> bool {
+        let away = angle - self.farthest;
+        if away.abs() <= 0.5 * period {
+            return false;
         }
+        let turns = (away / period).round_ties_even();
+        let moves = turns != 0.0 && !turns.is_nan();
+        if moves {
+            self.farthest += turns * period;
+            self.reversal += turns * period;
+        }
+        moves
     }
 
     /// Heading for a signed direction signal; 0 keeps the last one.
+    #[inline]
     pub fn heading(&self, signal: f64) -> Heading {
         let direction = if signal == 0.0 {
             self.direction
@@ -78,60 +108,90 @@ impl Travel {
         }
     }
 
-    /// Error of all elements at angle `x`, and its slope.
-    pub fn friction(&self, elements: &[Element], heading: Heading, x: f64) -> (f64, f64) {
-        let (mut sum, mut slope) = (0.0, 0.0);
-        let (way, towards) = self.way(heading, x);
-        for (element, &state) in elements.iter().zip(&self.state) {
-            let left = (towards - self.begun(element, state, heading)) * decay(way, element);
-            sum += element.amplitude * (towards - left);
-            slope += element.amplitude * left / element.length;
+    /// True where `x` is beyond the farthest angle.
+    #[inline]
+    pub fn goes_on(&self, heading: Heading, x: f64) -> bool {
+        (x - self.farthest) * heading.direction > 0.0
+    }
+
+    /// State of an element at `x` in the present stretch.
+    #[inline]
+    fn wound(&self, element: &Element, begun: f64, x: f64) -> f64 {
+        let way = (x - self.reversal) * self.direction;
+        let way = if way > 0.0 { way } else { 0.0 };
+        self.direction - (self.direction - begun) * exp(-way * (1.0 / element.length))
+    }
+
+    /// Error of all elements at the farthest angle.
+    #[inline]
+    pub fn held(&self, elements: &[Element]) -> f64 {
+        let mut sum = 0.0;
+        for (element, &begun) in elements.iter().zip(&self.state) {
+            sum += element.amplitude * self.wound(element, begun, self.farthest);
         }
-        (sum, if way > 0.0 { slope * towards } else { 0.0 })
+        sum
+    }
+
+    /// Friction along the present stretch.
+    #[inline]
+    pub fn along(&self) -> Friction<'_> {
+        if self.state.is_empty() {
+            return Friction::None;
+        }
+        Friction::From {
+            place: self.reversal,
+            direction: self.direction,
+            state: &self.state,
+        }
+    }
+
+    /// Friction along the stretch that a heading goes on with, or begins at the farthest
+    /// angle.
+    #[inline]
+    pub fn ahead(&mut self, elements: &[Element], heading: Heading) -> Friction<'_> {
+        if self.state.is_empty() || heading.direction == self.direction {
+            return self.along();
+        }
+        self.begin(elements, heading, self.farthest);
+        Friction::From {
+            place: self.farthest,
+            direction: heading.direction,
+            state: &self.next,
+        }
+    }
+
+    /// States of a stretch that begins at `place`: those there, or the wind-up that the first
+    /// motion finds in its direction.
+    #[inline]
+    fn begin(&mut self, elements: &[Element], heading: Heading, place: f64) {
+        for (i, element) in elements.iter().enumerate() {
+            self.next[i] = if self.direction == 0.0 {
+                element.start * heading.direction
+            } else {
+                self.wound(element, self.state[i], place)
+            };
+        }
     }
 
     /// Moves on to angle `x`.
-    pub fn advance(&mut self, elements: &[Element], heading: Heading, x: f64) {
-        let (way, towards) = self.way(heading, x);
-        for (i, element) in elements.iter().enumerate() {
-            let state = self.begun(element, self.state[i], heading);
-            self.state[i] = towards - (towards - state) * decay(way, element);
-        }
-        if way > 0.0 || !self.is_known() {
-            self.farthest = x;
-        }
-        self.direction = heading.direction;
-    }
-
-    /// The state before this way: the first motion finds some wind-up in its direction.
-    fn begun(&self, element: &Element, state: f64, heading: Heading) -> f64 {
-        if self.direction == 0.0 {
-            element.start * heading.direction
-        } else {
-            state
-        }
-    }
-
-    /// Way from the farthest point to `x`, and the direction it pulls the elements to.
     ///
     /// Coming back without having turned is noise of the reading and counts as no way;
     /// going on while turning belongs to the old direction.
-    fn way(&self, heading: Heading, x: f64) -> (f64, f64) {
-        let way = (x - self.farthest) * heading.direction;
-        if way > 0.0 {
-            (way, heading.direction)
-        } else if heading.turned && way < 0.0 {
-            (-way, -heading.direction)
-        } else {
-            (0.0, heading.direction)
+    #[inline]
+    pub fn advance(&mut self, elements: &[Element], heading: Heading, x: f64) {
+        let goes_on = self.goes_on(heading, x);
+        if heading.direction != self.direction {
+            let still_went_on = heading.turned && (x - self.farthest) * heading.direction < 0.0;
+            if still_went_on || !self.is_known() {
+                self.farthest = x;
+            }
+            self.begin(elements, heading, self.farthest);
+            std::mem::swap(&mut self.state, &mut self.next);
+            self.reversal = self.farthest;
+            self.direction = heading.direction;
         }
-    }
-}
-
-fn decay(way: f64, element: &Element) -> f64 {
-    if way > 0.0 {
-        (-way / element.length).exp()
-    } else {
-        1.0
+        if goes_on || !self.is_known() {
+            self.farthest = x;
+        }
     }
 }

@@ -1,0 +1,320 @@
+//! The angles at which the series and its terms add up to what is indicated.
+
+use super::block::{Given, Work};
+use super::exponential::exp;
+use super::prepared::Terms;
+use crate::simd::{InstructionSet, Kernel, Lanes, dispatch, dispatch_one};
+
+/// Steps before the signals are taken to leave no unique angle; as a rule two or three do.
+const MOST_STEPS: usize = 60;
+
+/// Part of a period that steps yet to come may add up to; corrections promise 1e-12.
+const SOLVED: f64 = 3e-13;
+
+/// Part of a period that the last step of a search is below where its bound of the second
+/// derivative is to be relied on.
+pub(super) const NEAR: f64 = 2.5e-5;
+
+/// Part of a period from a kink within which there is no such bound.
+pub(super) const KINK: f64 = 4.0 * NEAR;
+
+/// Steepest error of which one step may be the last.
+const GENTLE: f64 = 0.25;
+
+/// What travel adds to the error.
+pub(super) struct Pull<'a> {
+    /// Of travel at each reading.
+    pub direction: &'a [f64],
+    /// Of the elements of friction.
+    pub friction: Friction<'a>,
+}
+
+/// Error of the elements of friction.
+pub(super) enum Friction<'a> {
+    /// There are none.
+    None,
+    /// It follows the angle from a place on, and is there what it was.
+    From {
+        place: f64,
+        direction: f64,
+        state: &'a [f64],
+    },
+    /// At each reading, whatever the angle.
+    Held(&'a [f64]),
+}
+
+/// Runs a pass over a block or, one lane wide, over a single reading.
+pub(super) fn pass<const N: usize>(set: InstructionSet, kernel: impl Kernel) {
+    if N == 1 {
+        dispatch_one(set, kernel);
+    } else {
+        dispatch(set, kernel);
+    }
+}
+
+impl Terms {
+    /// Adds up what the terms are at every angle.
+    pub(super) fn fill_level<const N: usize>(&self, signals: &Given<N>, level: &mut [f64]) {
+        pass::<N>(
+            self.set,
+            Level {
+                terms: self,
+                signals,
+                level,
+            },
+        );
+    }
+
+    /// Error of the terms at angles `x` beyond the level and travel, into `work`.
+    pub(super) fn fill_shape<const N: usize>(
+        &self,
+        signals: &Given<N>,
+        x: &[f64],
+        work: &mut Work<N>,
+    ) {
+        pass::<N>(
+            self.set,
+            Shape {
+                terms: self,
+                signals,
+                x,
+                work,
+            },
+        );
+    }
+
+    /// Angles `x` with `x + series(x) + terms(x) = goal`, NaN where the signals leave no
+    /// unique one.
+    ///
+    /// Newton steps on the terms around the inverse of the series shrink by the product of
+    /// both slopes; the shrinking seen is carried on to its limit (Aitken). Every reading
+    /// stands still once it is found, so that it does not depend on those beside it.
+    pub(super) fn find<const N: usize>(
+        &self,
+        goal: &[f64],
+        pull: &Pull<'_>,
+        signals: &Given<N>,
+        x: &mut [f64],
+        work: &mut Work<N>,
+    ) {
+        for i in 0..x.len() {
+            let is_pulled = self.play != 0.0;
+            let play = if is_pulled {
+                self.play * pull.direction[i]
+            } else {
+                0.0
+            };
+            work.goal[i] = goal[i] - play;
+        }
+        let is_plain =
+            !self.is_shaped && self.place.is_none() && matches!(pull.friction, Friction::None);
+        if is_plain {
+            return self.invert(&work.goal[..x.len()], x);
+        }
+        let search = Search {
+            terms: self,
+            pull,
+            signals,
+            x,
+            work,
+        };
+        pass::<N>(self.set, search);
+    }
+
+    /// The inverse of the series, where its argument is the true angle.
+    fn invert(&self, goal: &[f64], x: &mut [f64]) {
+        if self.is_indicated() {
+            x.copy_from_slice(goal);
+        } else {
+            self.evaluator.corrections(goal, x);
+        }
+    }
+}
+
+struct Level<'a, const N: usize> {
+    terms: &'a Terms,
+    signals: &'a Given<N>,
+    level: &'a mut [f64],
+}
+
+impl<const N: usize> Kernel for Level<'_, N> {
+    #[inline(always)]
+    fn run<L: Lanes>(self) {
+        self.level.fill(0.0);
+        for term in &self.terms.smooth {
+            term.add_level(self.signals, self.level);
+        }
+    }
+}
+
+struct Shape<'a, const N: usize> {
+    terms: &'a Terms,
+    signals: &'a Given<N>,
+    x: &'a [f64],
+    work: &'a mut Work<N>,
+}
+
+impl<const N: usize> Kernel for Shape<'_, N> {
+    #[inline(always)]
+    fn run<L: Lanes>(self) {
+        let Self {
+            terms,
+            signals,
+            x,
+            work,
+        } = self;
+        work.error[..x.len()].fill(0.0);
+        for term in &terms.smooth {
+            term.add_shape::<L, N>(signals, x, false, work);
+        }
+    }
+}
+
+struct Search<'a, const N: usize> {
+    terms: &'a Terms,
+    pull: &'a Pull<'a>,
+    signals: &'a Given<N>,
+    x: &'a mut [f64],
+    work: &'a mut Work<N>,
+}
+
+impl<const N: usize> Search<'_, N> {
+    /// Error of terms and travel at the angles so far, and where `steep` its slope and a
+    /// bound of its second derivative.
+    #[inline(always)]
+    fn fill<L: Lanes>(&mut self, steep: bool) {
+        let Self {
+            terms,
+            pull,
+            signals,
+            x,
+            work,
+            ..
+        } = self;
+        let x: &[f64] = x;
+        let n = x.len();
+        work.error[..n].fill(0.0);
+        work.slope[..n].fill(0.0);
+        work.bend[..n].fill(0.0);
+        for term in &terms.smooth {
+            term.add_shape::<L, N>(signals, x, steep, work);
+        }
+        if let Some(place) = &terms.place {
+            work.factor[..n].copy_from_slice(pull.direction);
+            work.add_lines(place, x, steep);
+        }
+        match pull.friction {
+            Friction::None => {}
+            Friction::Held(error) => {
+                for i in 0..n {
+                    work.error[i] += error[i];
+                }
+            }
+            Friction::From {
+                place,
+                direction,
+                state,
+            } => {
+                let near = KINK * terms.period();
+                for (element, &begun) in terms.elements.iter().zip(state) {
+                    let (size, per_length) = (element.amplitude, 1.0 / element.length);
+                    for i in 0..n {
+                        let way = (x[i] - place) * direction;
+                        let way = if way > 0.0 { way } else { 0.0 };
+                        let left = (direction - begun) * exp(-way * per_length);
+                        work.error[i] += size * (direction - left);
+                        let slope = size * left * per_length;
+                        work.slope[i] += if way > 0.0 { slope * direction } else { 0.0 };
+                        work.bend[i] += if way > near {
+                            slope.abs() * per_length
+                        } else {
+                            f64::INFINITY
+                        };
+                    }
+                }
+            }
+        }
+    }
+}
+
+impl<const N: usize> Kernel for Search<'_, N> {
+    #[inline(always)]
+    fn run<L: Lanes>(mut self) {
+        let terms = self.terms;
+        let (n, period) = (self.x.len(), terms.period());
+        // The series is small beside the lengths on which terms change: a good start.
+        let (constant, steepness) = if terms.is_indicated() {
+            (0.0, 0.0)
+        } else {
+            (terms.evaluator.series().constant(), terms.steepness)
+        };
+        for i in 0..n {
+            let goal = self.work.goal[i];
+            self.x[i] = goal - constant;
+            self.work.open[i] = if goal.is_finite() { 1.0 } else { 0.0 };
+            self.work.last[i] = f64::NAN;
+        }
+        let (solved, near) = (SOLVED * period, NEAR * period);
+        for count in 0..=MOST_STEPS {
+            self.fill::<L>(count > 0);
+            let x = &mut *self.x;
+            let Work {
+                error,
+                slope,
+                bend,
+                value,
+                goal,
+                probe,
+                last,
+                open,
+                ..
+            } = &mut *self.work;
+            for i in 0..n {
+                value[i] = goal[i] - error[i];
+            }
+            terms.invert(&value[..n], &mut probe[..n]);
+            if count == 0 {
+                x.copy_from_slice(&probe[..n]);
+                continue;
+            }
+            let mut is_open = false;
+            for i in 0..n {
+                let tolerance = solved + 4.0 * f64::EPSILON * goal[i].abs();
+                let step = (probe[i] - x[i]) / (1.0 + slope[i]);
+                let size = step.abs();
+                let ratio = step / last[i];
+                let on = x[i] + step;
+                let carried = on + step * ratio / (1.0 - ratio);
+                let next = if ratio.abs() < 0.5 { carried } else { on };
+                // What is left is smaller by both slopes, and as much as was seen (NaN at
+                // first); or by a bound, four times as large as it need be.
+                let both = slope[i].abs() * steepness;
+                let seen = if ratio.abs() > both {
+                    ratio.abs()
+                } else {
+                    both
+                };
+                let is_seen = !ratio.is_nan() & (size * seen <= tolerance);
+                let is_bound = (slope[i].abs() < GENTLE)
+                    & (steepness < 1.0)
+                    & (size < near)
+                    & (4.0 * size * (both + size * bend[i]) <= tolerance);
+                let is_done = (size <= tolerance) | is_seen | is_bound;
+                let unique = if slope[i].abs() < 1.0 { next } else { f64::NAN };
+                let next = if is_done { unique } else { next };
+                let goes_on = !is_done & !next.is_nan();
+                x[i] = if open[i] > 0.0 { next } else { x[i] };
+                open[i] = if goes_on { open[i] } else { 0.0 };
+                last[i] = step;
+                is_open |= open[i] > 0.0;
+            }
+            if !is_open {
+                return;
+            }
+        }
+        for i in 0..n {
+            let is_lost = self.work.open[i] > 0.0;
+            self.x[i] = if is_lost { f64::NAN } else { self.x[i] };
+        }
+    }
+}

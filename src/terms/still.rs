@@ -1,0 +1,98 @@
+//! Readings that do not depend on those before: a block of them at once.
+
+use super::block::{Block, Given, Work, padded};
+use super::prepared::Terms;
+use super::search::{Friction, Pull};
+use super::signals::Signal;
+
+impl Terms {
+    /// Goals of the first `len` readings of a block, NaN where they have none, and the way
+    /// during the delay.
+    pub(super) fn aim<const N: usize>(&self, block: &mut Block<N>, len: usize) {
+        let n = padded::<N>(len);
+        let Block {
+            signals,
+            x,
+            goal,
+            delayed,
+            work,
+            ..
+        } = block;
+        let (x, goal) = (&x[..n], &mut goal[..n]);
+        self.fill_delayed(signals, &mut delayed[..n]);
+        let level = &mut work.value[..n];
+        self.fill_level(signals, level);
+        // The series is undone first where its argument is the indicated angle.
+        if self.is_indicated() {
+            self.evaluator.corrections(x, goal);
+        } else {
+            goal.copy_from_slice(x);
+        }
+        for i in 0..n {
+            let aim = goal[i] - level[i];
+            let is_aim = (aim + delayed[i]).is_finite();
+            goal[i] = if is_aim { aim } else { f64::NAN };
+        }
+    }
+
+    fn fill_delayed<const N: usize>(&self, signals: &Given<N>, delayed: &mut [f64]) {
+        if self.delay == 0.0 {
+            return delayed.fill(0.0);
+        }
+        let velocity = signals.of(Signal::Velocity);
+        for i in 0..delayed.len() {
+            delayed[i] = velocity[i] * self.delay;
+        }
+    }
+
+    /// True angles behind the first `len` readings.
+    pub(super) fn correct_still<const N: usize>(&self, block: &mut Block<N>, len: usize) {
+        let n = padded::<N>(len);
+        self.aim(block, len);
+        let Block {
+            signals,
+            out,
+            goal,
+            delayed,
+            direction,
+            work,
+            ..
+        } = block;
+        let pull = Pull {
+            direction: &direction[..n],
+            friction: Friction::None,
+        };
+        self.find(&goal[..n], &pull, signals, &mut out[..n], work);
+        for i in 0..n {
+            out[i] += delayed[i];
+        }
+    }
+
+    /// Errors at the angles of the first `len` readings, without what travel adds; the angles
+    /// that the encoder saw are in `onward`.
+    pub(super) fn error_still<const N: usize>(&self, block: &mut Block<N>, len: usize) {
+        let n = padded::<N>(len);
+        let Block {
+            signals,
+            x,
+            out,
+            goal,
+            delayed,
+            onward,
+            work,
+            ..
+        } = block;
+        self.fill_delayed(signals, &mut delayed[..n]);
+        let (seen, level) = (&mut onward[..n], &mut goal[..n]);
+        for i in 0..n {
+            seen[i] = x[i] - delayed[i];
+        }
+        self.evaluator.errors(seen, &mut out[..n]);
+        self.fill_level(signals, level);
+        self.fill_shape(signals, seen, work);
+        let Work { error, .. } = work;
+        for i in 0..n {
+            out[i] = out[i] + level[i] + error[i] - delayed[i];
+        }
+    }
+}
