@@ -324,7 +324,7 @@ def test_long_work_ends_with_ctrl_c(work):
         model = ta.HarmonicModel([wide], period=360.0)
         fast = ta.HarmonicModel([ta.Shaft("odd", 1.2345, range(1, 2001), a, a)], period=360.0)
         narrow = ta.Shaft("output", 1.0, range(1, 21), a[:20], a[:20])
-        terms = [ta.Backlash(0.01), ta.LocalDefect(1.0, 2.0, 0.01)]
+        terms = [ta.Backlash(0.01), *(ta.LocalDefect(9.0 * i, 2.0, 1e-3) for i in range(40))]
         backlash = ta.HarmonicModel([narrow], period=360.0, terms=terms)
         x = np.linspace(0.0, 360.0, 20_000_000)
         few = np.linspace(0.0, 360.0, 9000, endpoint=False)
