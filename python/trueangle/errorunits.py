@@ -28,7 +28,7 @@ _UNCERTAIN_DIGITS: Final = 2
 _DIGITS: Final = 4
 
 #: A size in a sentence.
-_SIZE: Final = re.compile(r"(-?\d+(?:\.\d+)?(?:e[+-]?\d+)?) arcsec\b")
+_SIZE: Final = r"(-?\d+(?:\.\d+)?(?:e[+-]?\d+)?) arcsec\b"
 
 #: Decimals are kept this far; beyond it a double has none.
 _MOST_DECIMALS: Final = 12
@@ -88,7 +88,7 @@ class ErrorUnit(NamedTuple):
         """
         if self.name == "arcsec":
             return sentence
-        return _SIZE.sub(lambda found: f"{self._converted(found[1])} {self.name}", sentence)
+        return re.sub(_SIZE, lambda found: f"{self._converted(found[1])} {self.name}", sentence)
 
     def _converted(self, number: str) -> str:
         written = number.partition("e")[0].replace(".", "").lstrip("-0").rstrip("0")

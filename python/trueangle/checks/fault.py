@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 __all__ = ["UNUSABLE", "DataFault"]
 
@@ -21,8 +20,7 @@ UNUSABLE = (
 LISTED = 100
 
 
-@dataclass(frozen=True)
-class DataFault:
+class DataFault(NamedTuple):
     """What is wrong with rows or runs, before any model.
 
     Attributes

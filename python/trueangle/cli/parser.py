@@ -15,9 +15,9 @@ __all__ = ["GROUPS", "Parser"]
 
 #: What argparse says of arguments that are not there, and what looks like an option.
 _MISSING: Final = "the following arguments are required"
-_OPTION: Final = re.compile(r"-{1,2}[A-Za-z]")
+_OPTION: Final = r"-{1,2}[A-Za-z]"
 
-_CHOICE = re.compile(r"invalid choice: '(?P<got>.*)' \(choose from (?P<known>.*)\)")
+_CHOICE = r"invalid choice: '(?P<got>.*)' \(choose from (?P<known>.*)\)"
 
 #: Headings of a command's help, in this order.
 GROUPS: Final = ("input", "model", "output", "other")
@@ -84,7 +84,7 @@ class Parser(argparse.ArgumentParser):
             name = word.partition("=")[0]
             if name == "--":
                 break
-            if not _OPTION.match(name) or any(option.startswith(name) for option in known):
+            if not re.match(_OPTION, name) or any(option.startswith(name) for option in known):
                 continue
             # A short option may hold its value: -ojoint.json.
             guess = did_you_mean(name, known)
@@ -96,7 +96,7 @@ class Parser(argparse.ArgumentParser):
         """Print usage and ``message`` with a suggestion, exit with status 2."""
         if message.startswith(_MISSING):  # perhaps because it was mistyped
             message = self._mistyped() or message
-        found = _CHOICE.search(message)
+        found = re.search(_CHOICE, message)
         if found is not None:
             known = re.findall(r"[\w-]+", found["known"])
             message += did_you_mean(found["got"], known)

@@ -15,10 +15,12 @@ STANDARD_OUTPUT: Final = "standard output"
 
 #: Control characters but tab and line end, what turns the direction of text, and halves of
 #: surrogates, which stand for bytes of file names that are no UTF-8.
-_UNPRINTABLE: Final = re.compile(
+_UNPRINTABLE: Final = (
     "[\x00-\x08\x0b-\x1f\x7f-\x9f\u061c\u200e\u200f\u202a-\u202e\u2028\u2029"
     "\u2066-\u2069\ufeff\ud800-\udfff]"
 )
+#: What lays out text is no control character here.
+_LAID_OUT: Final = {ord("\t"): None, ord("\n"): None}
 
 
 def printable(text: str) -> str:
@@ -29,7 +31,9 @@ def printable(text: str) -> str:
     >>> printable("run \x1b[31mred")
     'run \\x1b[31mred'
     """
-    return _UNPRINTABLE.sub(_escaped, text)
+    if text.isascii() and text.translate(_LAID_OUT).isprintable():
+        return text
+    return re.sub(_UNPRINTABLE, _escaped, text)
 
 
 def _escaped(found: re.Match[str]) -> str:

@@ -27,11 +27,11 @@ _WORDS = frozenset({"nan", "inf", "infinity", "+inf", "-inf", "+infinity", "-inf
 #: A name at the head of a time column of TwinCAT's exports, before the names it is for.
 _SCOPE = "Name"
 #: What a line of units holds: units in brackets, or short words without digits.
-_UNIT = re.compile(r"[\[(].*[\])]|[^\d\s]{0,8}(?:/[^\d\s]{1,4}\d?)?|-")
-_KNOWN_UNITS = re.compile(
+_UNIT = r"[\[(].*[\])]|[^\d\s]{0,8}(?:/[^\d\s]{1,4}\d?)?|-"
+# Compiled where a line asks for it: that takes longer than to read a small file.
+_KNOWN_UNITS = (
     r"[\[(]?(deg(rees?)?|rad(ians?)?|turns?|rev(olutions?)?|counts?|arcsec|arcmin|°|"
-    r"m?s|us|µs|ns|sec(onds?)?|volts?|m?v|m?a|[mc]?nm|n·?m|°?c|k|rpm|(deg|rad|turn|°)/s)[\])]?",
-    re.IGNORECASE,
+    r"m?s|us|µs|ns|sec(onds?)?|volts?|m?v|m?a|[mc]?nm|n·?m|°?c|k|rpm|(deg|rad|turn|°)/s)[\])]?"
 )
 
 
@@ -248,7 +248,7 @@ class Header:
             units = self._units_of(line.text, len(cells))
             if units is not None:
                 cells = [
-                    f"{name} [{unit}]" if unit and not _BRACKETED.search(name) else name
+                    f"{name} [{unit}]" if unit and not re.search(_BRACKETED, name) else name
                     for name, unit in zip(cells, units, strict=False)
                 ] + cells[len(units) :]
         return cells
@@ -271,9 +271,11 @@ class Header:
     def _units_of(self, text: str, width: int) -> list[str] | None:
         """Units of a line of units, or None for another line."""
         cells = self._cells(text)
-        if abs(len(cells) - width) > 1 or not any(_KNOWN_UNITS.fullmatch(c) for c in cells):
+        if abs(len(cells) - width) > 1 or not any(
+            re.fullmatch(_KNOWN_UNITS, cell, re.IGNORECASE) for cell in cells
+        ):
             return None
-        if not all(_UNIT.fullmatch(cell) for cell in cells):
+        if not all(re.fullmatch(_UNIT, cell) for cell in cells):
             return None
         return [cell.strip("[]() ") for cell in cells]
 
@@ -298,7 +300,7 @@ class Header:
 
 #: Names that this package gives its columns: a line with one is the line of names.
 _STANDARD = re.compile(r"(reference|indicated|corrected)_(deg|rad|turn|count)\b|\btime_s\b")
-_BRACKETED = re.compile(r"[\[(][^\])]*[\])]\s*$")
+_BRACKETED = r"[\[(][^\])]*[\])]\s*$"
 
 
 def is_comment(text: str) -> bool:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import importlib
 import json
-import re
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -146,7 +145,7 @@ class Format:
     extra: str | None = None
     unit: str | None = None
     magics: tuple[bytes, ...] = ()
-    pattern: re.Pattern[bytes] | None = None
+    pattern: bytes | None = None
 
     @cached_property
     def module(self) -> FormatModule:

@@ -11,7 +11,7 @@ from .format import Format
 __all__ = ["FORMATS", "find_format", "format_of_content", "known_format"]
 
 #: A process variable and a date, as camonitor begins a line.
-_CAMONITOR = re.compile(rb"\S+\s+\d{4}-\d\d-\d\d \d\d:\d\d:\d\d")
+_CAMONITOR = rb"\S+\s+\d{4}-\d\d-\d\d \d\d:\d\d:\d\d"
 
 FORMATS = (
     Format("Parquet", (".parquet", ".pq"), "parquet", "arrow", magics=(b"PAR1",)),
@@ -82,6 +82,6 @@ def format_of_content(path: Path) -> Format:
     if not path.is_dir():
         head = _head(path)
         for entry in FORMATS:
-            if head.startswith(entry.magics) or (entry.pattern and entry.pattern.match(head)):
+            if head.startswith(entry.magics) or (entry.pattern and re.match(entry.pattern, head)):
                 return entry
     return known_format(path) or FORMATS[-1]

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
-from typing import Final
+from typing import Final, NamedTuple
 
 from ..errors import ArgumentError
 from .members import FIXED_MEMBERS
@@ -28,8 +27,7 @@ COMMON_RATIOS: Final = (30, 50, 80, 100, 120, 160)
 HIGHEST_LOW_ORDER: Final = 17
 
 
-@dataclass(frozen=True)
-class Explanation:
+class Explanation(NamedTuple):
     """One physical reading of an order: which line of the joint it may be.
 
     Attributes

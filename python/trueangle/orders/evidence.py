@@ -10,8 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -174,8 +173,7 @@ def _inverse(gram: Array) -> Array:
     return np.asarray(inverse / scales)
 
 
-@dataclass(frozen=True, eq=False)
-class OrderTest:
+class OrderTest(NamedTuple):
     """Statistics of orders beside the chosen ones (or among them).
 
     Arrays have one entry per order asked for; ``cosine``/``sine`` are the coefficients
@@ -204,7 +202,9 @@ def examine_orders(
     """
     total, rhs, _ = sums.total()
     n = len(orders)
-    cosine, sine, variance, statistic = np.empty((4, n))
+    # Of orders that are aliases of the chosen ones nothing is known.
+    cosine, sine, of_one = np.full((3, n), math.nan)
+    gain = np.zeros(n)
     level = np.full(n, noise[0])
     dof = np.full(n, noise[1])
     if scatter is not None:
@@ -224,30 +224,33 @@ def examine_orders(
         slope = inverse @ cross
         blocks = total[np.ix_(other, other)] - cross.T @ slope
         scores = rhs[other] - cross.T @ coefficients
-    log_p = np.empty(n)
-    for i, k in enumerate(orders):
-        if k in position:
-            j = position[k]
-            pair = [j, j + size]
-            pair_inverse = inverse[np.ix_(pair, pair)]
-            value = coefficients[pair]
-            gain = float(value @ np.linalg.pinv(pair_inverse) @ value)
-        else:
-            j = outside.index(k)
-            pair = [j, j + len(outside)]
-            block = blocks[np.ix_(pair, pair)]
-            scale = float(np.trace(total[np.ix_(other[pair], other[pair])]))
-            if np.linalg.eigvalsh(block)[0] <= COLLINEAR * scale:
-                cosine[i] = sine[i] = variance[i] = math.nan
-                statistic[i], log_p[i] = 0.0, 0.0
-                continue
-            pair_inverse = np.asarray(np.linalg.inv(block))
-            value = pair_inverse @ scores[pair]
-            gain = float(value @ scores[pair])
-        cosine[i], sine[i] = value
-        variance[i] = level[i] * 0.5 * float(np.trace(pair_inverse))
-        statistic[i] = gain / level[i] if level[i] > 0.0 else math.inf
-        log_p[i] = float(log_tail(statistic[i], dof[i]))
+    # Those among the chosen ones, and those that would join them.
+    mine = np.array([i for i, k in enumerate(orders) if k in position], dtype=np.intp)
+    others = np.array([i for i, k in enumerate(orders) if k not in position], dtype=np.intp)
+    if mine.size:
+        place = np.array([position[orders[i]] for i in mine])
+        pair = np.stack([place, place + size], axis=1)
+        inverses = inverse[pair[:, :, None], pair[:, None, :]]
+        value = coefficients[pair]
+        gain[mine] = np.einsum("ki,kij,kj->k", value, np.linalg.pinv(inverses), value)
+        cosine[mine], sine[mine] = value.T
+        of_one[mine] = 0.5 * np.trace(inverses, axis1=1, axis2=2)
+    if others.size:
+        pair = np.stack([np.arange(others.size), np.arange(others.size) + others.size], axis=1)
+        block = blocks[pair[:, :, None], pair[:, None, :]]
+        energy = total.diagonal()[other][pair].sum(axis=1)
+        told = np.linalg.eigvalsh(block)[:, 0] > COLLINEAR * energy
+        others, score = others[told], scores[pair][told]
+        inverses = np.linalg.inv(block[told])
+        value = np.einsum("kij,kj->ki", inverses, score)
+        gain[others] = np.einsum("ki,ki->k", value, score)
+        cosine[others], sine[others] = value.T
+        of_one[others] = 0.5 * np.trace(inverses, axis1=1, axis2=2)
+    variance = level * of_one
+    with np.errstate(divide="ignore", invalid="ignore"):
+        statistic = np.where(level > 0.0, gain / level, math.inf)
+    statistic[np.isnan(cosine)] = 0.0
+    log_p = np.array([float(log_tail(t, v)) for t, v in zip(statistic, dof, strict=True)])
     return OrderTest(cosine, sine, variance, statistic, log_p)
 
 

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,8 +21,7 @@ _SWEEPS: Final = 20
 _ROOM: Final = 8
 
 
-@dataclass(frozen=True)
-class Noise:
+class Noise(NamedTuple):
     """Variance of one reading of weight 1.
 
     Attributes

@@ -69,7 +69,11 @@ class EvidenceSelection(EvidenceSearch):
     def result(self) -> OrderSelection:
         """The selection with its table."""
         chosen, dropped = self.search()
-        return self._report(self._lowest(chosen), dropped)
+        lookalikes = self._lookalikes(chosen)
+        lowest = self._lowest(chosen, lookalikes)
+        if lowest != chosen:
+            lookalikes = self._lookalikes(lowest)
+        return self._report(lowest, dropped, lookalikes)
 
     def _lookalikes(self, chosen: Sequence[int]) -> dict[int, dict[int, float]]:
         """Aliases of every chosen order that these readings cannot exclude."""
@@ -82,11 +86,13 @@ class EvidenceSelection(EvidenceSearch):
         )
         return dict(zip(chosen, found, strict=True))
 
-    def _lowest(self, chosen: list[int]) -> list[int]:
+    def _lowest(
+        self, chosen: list[int], lookalikes: Mapping[int, Mapping[int, float]]
+    ) -> list[int]:
         """Where the readings say nothing, the lowest candidate stands for its aliases."""
         result = list(chosen)
         enough = self.noise(chosen).variance
-        for i, losses in self._lookalikes(chosen).items():
+        for i, losses in lookalikes.items():
             lower = [m for m, loss in losses.items() if m < self.orders[i] and loss < enough]
             known = [j for j in self.candidates.main_indices if self.orders[j] in lower]
             free = [j for j in known if j not in result]
@@ -94,12 +100,16 @@ class EvidenceSelection(EvidenceSearch):
                 result[result.index(i)] = free[0]
         return result
 
-    def _report(self, chosen: list[int], dropped: Mapping[int, str]) -> OrderSelection:
+    def _report(
+        self,
+        chosen: list[int],
+        dropped: Mapping[int, str],
+        lookalikes: Mapping[int, Mapping[int, float]],
+    ) -> OrderSelection:
         shown = sorted({*chosen, *dropped, *self.candidates.main_indices})
         test = self.examined(chosen, shown)
         gains, model = self.gains_and_model(chosen, shown)
         phases = unit_phases(self.sums, chosen, shown)
-        lookalikes = self._lookalikes(chosen)
         verdicts = {**dict.fromkeys(chosen, "retained"), **dict.fromkeys(self.forced, "reference")}
         rows = []
         for n, i in enumerate(shown):
