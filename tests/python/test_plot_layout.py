@@ -45,3 +45,23 @@ def test_small_orders_of_a_gear_do_not_widen_the_model_to_a_ribbon(stepper) -> N
     assert "model" in names
     assert "envelope of the model" not in names
     matplotlib.pyplot.close(ax.figure)
+
+
+def test_long_names_leave_room_for_the_picture() -> None:
+    """Five names of some length once made a legend of one line that left no axes."""
+    theta = np.arange(20.0, 80.0, 1.5)
+    noise = np.random.default_rng(3).normal(0.0, 0.002, (5, theta.size))
+    runs = [
+        ta.CalibrationRun(theta, theta + e, 360.0, label=f"{'a rather long label ' * 4}{i}")
+        for i, e in enumerate(noise)
+    ]
+    ax = ta.fit(runs, [3]).plot("residuals")
+    figure = ax.figure
+    figure.canvas.draw()
+    assert ax.bbox.width > 0.8 * figure.bbox.width
+    box = ax.get_legend().get_window_extent()
+    assert figure.bbox.x0 <= box.x0
+    assert box.x1 <= figure.bbox.x1
+    names = [text.get_text() for text in ax.get_legend().get_texts()]
+    assert len(set(names)) == 5  # what is left out is in the middle
+    matplotlib.pyplot.close(figure)

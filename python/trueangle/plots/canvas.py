@@ -29,6 +29,10 @@ _MANY: int = 5
 #: as part of the axes'.
 _COLUMNS: int = 4
 _ROW: float = 0.09
+#: Width of axes that are alone in a figure, as part of it.
+_ALONE: float = 0.9
+#: Letters of an entry, of which longer ones lose the middle.
+_LONGEST: int = 48
 
 
 def new_axes(ax: Axes | None, *, polar: bool = False, height: float = 4.0) -> Axes:
@@ -119,12 +123,17 @@ def text_alternative(ax: Axes) -> str:
 
 def legend(ax: Axes, title: str | None = None) -> None:
     """The legend: inside while short, else beside the picture; inside where it has neighbours."""
-    handles, names = ax.get_legend_handles_labels()
+    handles, labels = ax.get_legend_handles_labels()
     if not handles:
         return
-    shared = len(ax.get_figure(root=True).axes) > 1  # type: ignore[union-attr]
+    names = [_shortened(name) for name in labels]
+    figure = ax.get_figure(root=True)
+    assert figure is not None
+    shared = len(figure.axes) > 1
     if len(handles) > _MANY and not shared:
         made = ax.legend(
+            handles,
+            names,
             title=title,
             loc="center left",
             bbox_to_anchor=(1.01, 0.5),
@@ -135,23 +144,34 @@ def legend(ax: Axes, title: str | None = None) -> None:
         )
         _opaque(made)
         return
-    columns = _columns(ax, names) if shared else len(handles)
-    rows = -(-len(handles) // columns)
+    room = ax.bbox.width if shared else _ALONE * figure.bbox.width
+    for columns in range(min(len(handles), _COLUMNS if shared else _MANY), 0, -1):
+        rows = -(-len(handles) // columns)
+        made = ax.legend(
+            handles,
+            names,
+            title=title,
+            loc="upper center",
+            ncols=columns,
+            frameon=False,
+            fontsize="small" if rows == 1 else "x-small",
+            markerscale=2.0,
+            columnspacing=1.0,
+            handletextpad=0.4,
+            borderaxespad=0.2,
+        )
+        if made.get_window_extent().width <= room:
+            break
     # Room above the data, so that no entry covers a reading.
     if ax.name != "polar":
         _room_above(ax, 0.11 + _ROW * rows)
-    made = ax.legend(
-        title=title,
-        loc="upper center",
-        ncols=columns,
-        frameon=False,
-        fontsize="small" if rows == 1 else "x-small",
-        markerscale=2.0,
-        columnspacing=1.0,
-        handletextpad=0.4,
-        borderaxespad=0.2,
-    )
     _opaque(made)
+
+
+def _shortened(name: str) -> str:
+    """A name that leaves room for the picture."""
+    half = _LONGEST // 2
+    return name if len(name) <= _LONGEST else f"{name[:half]}…{name[-half:]}"
 
 
 def _opaque(made: Legend) -> None:
@@ -161,14 +181,6 @@ def _opaque(made: Legend) -> None:
     for handle in made.legend_handles:
         if handle is not None and not isinstance(handle, Patch):
             handle.set_alpha(1.0)
-
-
-def _columns(ax: Axes, names: list[str]) -> int:
-    """Entries that fit side by side, by the width of the longest."""
-    figure = ax.get_figure(root=True)
-    inches = ax.get_position().width * figure.get_figwidth()  # type: ignore[union-attr]
-    longest = max(map(len, names))
-    return max(1, min(_COLUMNS, len(names), int(inches / (0.3 + 0.065 * longest))))
 
 
 def _room_above(ax: Axes, share: float) -> None:
