@@ -11,6 +11,8 @@ mod chunk;
 pub mod factor;
 pub mod normal;
 pub mod place;
+mod row;
 pub mod segment;
 pub mod spectrum;
 pub mod stream;
+pub mod waiting;

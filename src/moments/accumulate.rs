@@ -5,12 +5,13 @@
 //! that the binary digits of `j` name. The products span the same polynomials as
 //! `T_0, T_1, ...`, never exceed 1, and eight of them cost two vector multiplications.
 //!
-//! Readings that follow each other in one segment, as those of a joint that moves slowly,
-//! are taken side by side in the lanes of vectors; others one by one.
+//! Readings wait for others of their segment, which are taken side by side in the lanes of
+//! vectors, where the segments are few enough for that.
 
 use super::chunk::{CHUNK, Chunk};
 use super::place::{Around, Frame};
 use super::segment::{LANES, Segment};
+use super::waiting::Waiting;
 use crate::readings::Readings;
 use crate::simd::{InstructionSet, Kernel, Lanes, dispatch};
 
@@ -20,6 +21,7 @@ struct Call<'a, 'b> {
     around: &'a Around,
     readings: Readings<'a>,
     table: &'b mut [Segment],
+    waiting: &'b mut Waiting,
     squares: &'b mut f64,
 }
 
@@ -28,6 +30,7 @@ pub fn accumulate(
     frame: &Frame,
     around: &Around,
     readings: Readings<'_>,
+    waiting: &mut Waiting,
     table: &mut [Segment],
 ) -> f64 {
     let mut squares = 0.0;
@@ -36,6 +39,7 @@ pub fn accumulate(
         around,
         readings,
         table,
+        waiting,
         squares: &mut squares,
     };
     dispatch(InstructionSet::best(), call);
@@ -62,38 +66,49 @@ fn run<L: Lanes, const DIFFERENCE: bool, const WEIGHTED: bool>(call: Call<'_, '_
         around,
         readings,
         table,
+        waiting,
         squares: sum,
     } = call;
     let mut chunk = Chunk::new();
     let mut squares = [0.0; LANES];
-    for start in (0..readings.angle.len()).step_by(CHUNK) {
-        let len = CHUNK.min(readings.angle.len() - start);
-        let angle = load(readings.angle, start, len);
-        let error = load(readings.error, start, len);
-        let reference = match readings.reference {
-            Some(values) if DIFFERENCE => load(values, start, len),
-            _ => [0.0; CHUNK],
-        };
-        chunk.weight = match readings.weights {
-            Some(values) if WEIGHTED => load(values, start, len),
-            _ => [1.0; CHUNK],
-        };
+    let all = readings.angle.len();
+    let together = waiting.pays(all, table.len(), WEIGHTED);
+    let mut last = [[0.0; CHUNK]; 3];
+    let reference = readings.reference.unwrap_or(readings.error);
+    for start in (0..all).step_by(CHUNK) {
+        let len = CHUNK.min(all - start);
+        let [angle, error, other] = &mut last;
+        let angle = load(readings.angle, start, angle);
+        let error = load(readings.error, start, error);
+        let reference = load(reference, start, other);
+        if WEIGHTED && let Some(weights) = readings.weights {
+            chunk.weight[..len].copy_from_slice(&weights[start..start + len]);
+        }
         // What stands in for readings beyond the last does not count.
         chunk.weight[len..].fill(0.0);
-        chunk.prepare(frame, around, &angle, &error, &reference);
-        chunk.square(&mut squares);
-        chunk.add_all::<L>(table);
+        chunk.prepare::<DIFFERENCE>(frame, around, angle, error, reference, &mut squares);
+        if together {
+            waiting.take::<L, WEIGHTED>(&chunk, len, table);
+        } else {
+            chunk.add_all::<L>(len, table);
+        }
+    }
+    if together {
+        waiting.finish::<L, WEIGHTED>(table);
     }
     *sum = squares.iter().sum();
 }
 
-/// `CHUNK` values from `start`, the last repeated where there are only `len`.
+/// `CHUNK` values from `start`, in `room` where there are fewer, the last repeated.
 #[inline(always)]
-fn load(values: &[f64], start: usize, len: usize) -> [f64; CHUNK] {
+fn load<'a>(values: &'a [f64], start: usize, room: &'a mut [f64; CHUNK]) -> &'a [f64; CHUNK] {
     if let Some(full) = values[start..].first_chunk() {
-        return *full;
+        return full;
     }
-    std::array::from_fn(|i| values[start + i.min(len - 1)])
+    let rest = &values[start..];
+    room[..rest.len()].copy_from_slice(rest);
+    room[rest.len()..].fill(rest[rest.len() - 1]);
+    room
 }
 
 #[cfg(test)]
@@ -111,6 +126,64 @@ mod tests {
             .filter(|set| set.is_available())
     }
 
+    /// The weighted squares and the moments of some readings.
+    fn sums(
+        set: InstructionSet,
+        frame: &Frame,
+        around: &Around,
+        readings: Readings,
+    ) -> (f64, Vec<Segment>) {
+        let (mut squares, mut table) = (0.0, vec![Segment::EMPTY; 34]);
+        let call = Call {
+            frame,
+            around,
+            readings,
+            table: &mut table,
+            waiting: &mut Waiting::default(),
+            squares: &mut squares,
+        };
+        dispatch(set, call);
+        (squares, table)
+    }
+
+    /// Rows that fill several times give the sums of readings added one by one: of few at a
+    /// time none waits.
+    #[test]
+    fn waiting_gives_the_sums_of_single_readings() {
+        let period = Period::new(360.0).unwrap();
+        let (frame, around) = (Frame::new(period, 34), Around::new(period, 0.5));
+        // Long stretches in one segment, then disorder.
+        let angle: Vec<f64> = (0..20_011)
+            .map(|i| if i < 9000 { 0.02 } else { 137.5 } * f64::from(i))
+            .collect();
+        let error: Vec<f64> = angle.iter().map(|x| (0.1 * x).sin()).collect();
+        let weights: Vec<f64> = angle.iter().map(|x| 2.0 + (3.0 * x).cos()).collect();
+        for set in sets() {
+            for weights in [None, Some(&weights[..])] {
+                let readings = Readings {
+                    angle: &angle,
+                    error: &error,
+                    reference: None,
+                    weights,
+                };
+                let mut single = vec![Segment::EMPTY; 34];
+                for start in (0..angle.len()).step_by(100) {
+                    let few = readings.part(start, angle.len().min(start + 100));
+                    let found = sums(set, &frame, &around, few).1;
+                    for (a, b) in single.iter_mut().zip(found) {
+                        a.values_mut().zip(b.values()).for_each(|(a, b)| *a += b);
+                    }
+                }
+                let (_, table) = sums(set, &frame, &around, readings);
+                for (a, b) in table.iter().zip(&single) {
+                    for (a, b) in a.values().zip(b.values()) {
+                        assert!((a - b).abs() < 10.0 * ROUNDING, "{set:?}: {a} {b}");
+                    }
+                }
+            }
+        }
+    }
+
     /// Readings in order of angle, of which many follow each other in a segment, give the
     /// sums of the same readings in disorder, with every set of instructions.
     #[test]
@@ -121,22 +194,13 @@ mod tests {
             let angle: Vec<f64> = (0..1009).map(|i| 0.1 * order(i) as f64 - 50.0).collect();
             let error: Vec<f64> = angle.iter().map(|x| (0.1 * x).sin()).collect();
             let weights: Vec<f64> = angle.iter().map(|x| 2.0 + (3.0 * x).cos()).collect();
-            let (mut squares, mut table) = (0.0, vec![Segment::EMPTY; 34]);
             let readings = Readings {
                 angle: &angle,
                 error: &error,
                 reference: None,
                 weights: Some(&weights),
             };
-            let call = Call {
-                frame: &frame,
-                around: &around,
-                readings,
-                table: &mut table,
-                squares: &mut squares,
-            };
-            dispatch(set, call);
-            table
+            sums(set, &frame, &around, readings).1
         };
         for set in sets() {
             // 397 and the prime 1009: neighbours are far apart.
@@ -166,18 +230,7 @@ mod tests {
             .map(|(x, e)| x + e - 720.0)
             .collect();
         let ones = vec![1.0; angle.len()];
-        let sums = |set, readings| {
-            let (mut squares, mut table) = (0.0, vec![Segment::EMPTY; 34]);
-            let call = Call {
-                frame: &frame,
-                around: &around,
-                readings,
-                table: &mut table,
-                squares: &mut squares,
-            };
-            dispatch(set, call);
-            (squares, table)
-        };
+        let sums = |set, readings| sums(set, &frame, &around, readings);
         let plain = Readings {
             angle: &angle,
             error: &error,

@@ -3,6 +3,7 @@
 use super::accumulate::accumulate;
 use super::place::{Around, Frame};
 use super::segment::Segment;
+use super::waiting::Waiting;
 use crate::angle::{Period, two_sum};
 use crate::error::Error;
 use crate::readings::Readings;
@@ -166,10 +167,12 @@ impl Accumulator {
         let frame = Frame::new(self.base, self.block.len());
         let around = Around::new(self.period, self.centre);
         let full = BLOCK * self.block.len();
+        let mut waiting = Waiting::default();
         let mut start = 0;
         while start < readings.angle.len() {
             let end = readings.angle.len().min(start + full - self.pending);
-            let squares = accumulate(&frame, &around, readings.part(start, end), &mut self.block);
+            let part = readings.part(start, end);
+            let squares = accumulate(&frame, &around, part, &mut waiting, &mut self.block);
             compensate(&mut self.squares.0, &mut self.squares.1, squares);
             self.pending += end - start;
             start = end;

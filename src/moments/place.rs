@@ -10,6 +10,8 @@ const WHOLE: f64 = (1u64 << 52) as f64;
 pub struct Frame {
     turn: Wrap,
     half: f64,
+    /// Added to a whole number from `-half` on, it leaves the number of the segment in the low bits.
+    first: f64,
     scale: f64,
     scale_low: f64,
 }
@@ -48,6 +50,7 @@ impl Frame {
         Self {
             turn: Wrap::new(period),
             half: 0.5 * count,
+            first: 0.5 * count + WHOLE,
             scale,
             scale_low: rest / period.value(),
         }
@@ -59,7 +62,7 @@ impl Frame {
         let rest = self.turn.reduce(x, x);
         let floor = clamp((rest * self.scale).floor(), -self.half, self.half - 1.0);
         let part = rest.mul_add(self.scale, -floor) + rest * self.scale_low;
-        let segment = (floor + self.half + WHOLE).to_bits() as u32;
+        let segment = (floor + self.first).to_bits() as u32;
         (segment, clamp(part.mul_add(2.0, -1.0), -1.0, 1.0))
     }
 }
@@ -67,8 +70,9 @@ impl Frame {
 /// `x` between two bounds, the lower one for NaN: no angle can leave the table.
 #[inline(always)]
 fn clamp(x: f64, low: f64, high: f64) -> f64 {
-    let x = if x >= low { x } else { low };
-    if x <= high { x } else { high }
+    // One instruction each: of equal numbers the processor takes the second, too.
+    let x = if x > low { x } else { low };
+    if x < high { x } else { high }
 }
 
 /// Errors are taken around a centre, modulo their own turn.

@@ -47,6 +47,19 @@ pub trait Lanes: Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = S
     /// `self * b - product` for `product` the rounded `self * b`: exact everywhere.
     fn product_rest(self, b: Self, product: Self) -> Self;
 
+    /// The sum over the lanes of each of four vectors.
+    #[inline(always)]
+    fn totals(vectors: [Self; 4]) -> [f64; 4] {
+        let mut sums = [0.0; 4];
+        for (sum, vector) in sums.iter_mut().zip(vectors) {
+            let mut values = [0.0; MOST_LANES];
+            vector.to_array(&mut values);
+            *sum = (values[0] + values[2]) + (values[1] + values[3]);
+            *sum += (values[4] + values[6]) + (values[5] + values[7]);
+        }
+        sums
+    }
+
     /// True if any lane is beyond `limit` in magnitude (NaN is not).
     fn any_beyond(self, limit: f64) -> bool;
 

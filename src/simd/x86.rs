@@ -78,6 +78,11 @@ impl Lanes for F64x4 {
     }
 
     #[inline(always)]
+    fn totals(vectors: [Self; 4]) -> [f64; 4] {
+        unsafe { totals(vectors.map(|vector| vector.0)) }
+    }
+
+    #[inline(always)]
     fn any_beyond(self, limit: f64) -> bool {
         unsafe {
             let magnitude = _mm256_andnot_pd(_mm256_set1_pd(-0.0), self.0);
@@ -200,6 +205,19 @@ impl Lanes for F64x8 {
     }
 
     #[inline(always)]
+    fn totals(vectors: [Self; 4]) -> [f64; 4] {
+        unsafe {
+            totals(vectors.map(|vector| {
+                let (low, high) = (
+                    _mm512_castpd512_pd256(vector.0),
+                    _mm512_extractf64x4_pd::<1>(vector.0),
+                );
+                _mm256_add_pd(low, high)
+            }))
+        }
+    }
+
+    #[inline(always)]
     fn any_beyond(self, limit: f64) -> bool {
         unsafe {
             let magnitude = _mm512_abs_pd(self.0);
@@ -267,6 +285,19 @@ impl Lanes for F64x8 {
             _mm512_storeu_ps(values.as_mut_ptr(), value);
             values
         }
+    }
+}
+
+/// The sum of each of four vectors.
+#[inline(always)]
+unsafe fn totals([a, b, c, d]: [__m256d; 4]) -> [f64; 4] {
+    unsafe {
+        let (ab, cd) = (_mm256_hadd_pd(a, b), _mm256_hadd_pd(c, d));
+        let low = _mm256_permute2f128_pd::<0x20>(ab, cd);
+        let high = _mm256_permute2f128_pd::<0x31>(ab, cd);
+        let mut sums = [0.0; 4];
+        _mm256_storeu_pd(sums.as_mut_ptr(), _mm256_add_pd(low, high));
+        sums
     }
 }
 

@@ -324,7 +324,9 @@ def test_one_pass_takes_the_scatter_between_runs_under_correlated_noise(tmp_path
     runs = ta.read_runs([tmp_path / f"unit{i}.parquet" for i in range(8)])
     expected = ta.fit(runs, [1, 2], covariance="cluster")
     assert found.uncertainty.kind == "cluster"
-    np.testing.assert_allclose(found.covariance, expected.covariance, rtol=1e-6)
+    # Elements that vanish by symmetry are the rounding of two different orders of summation.
+    nothing = 1e-12 * np.abs(expected.covariance).max()
+    np.testing.assert_allclose(found.covariance, expected.covariance, rtol=1e-6, atol=nothing)
     np.testing.assert_allclose(found.interval(), expected.interval(), rtol=0, atol=1e-9)
     assert any("scatter between 8 runs" in note for note in found.notes)
     assert ta.fit_logs(tmp_path, [1, 2], covariance="white").uncertainty.kind == "white"

@@ -1,0 +1,163 @@
+//! Readings of one segment, added to its moments side by side: a reading to a lane.
+
+use super::chunk::Chunk;
+use super::segment::{LANES, Segment};
+use crate::simd::Lanes;
+
+/// Readings that are added together: the sums over the lanes at the end cost as much as
+/// some thirty.
+pub(super) const TOGETHER: usize = 128;
+
+/// As many, and the last of those that come by vectors.
+pub(super) const ROOM: usize = TOGETHER + LANES;
+
+/// Which sums a pass takes.
+const WEIGHTS: u8 = 1;
+const ERRORS: u8 = 2;
+
+/// Readings of one segment.
+#[derive(Clone)]
+#[repr(C, align(64))]
+pub(super) struct Row {
+    place: [f64; ROOM],
+    error: [f64; ROOM],
+}
+
+/// Weights of the readings of a row.
+pub(super) type RowWeights = [f64; ROOM];
+
+/// Those of readings that have none.
+pub(super) const ONES: RowWeights = [1.0; ROOM];
+
+impl Row {
+    pub(super) const EMPTY: Self = Self {
+        place: [0.0; ROOM],
+        error: [0.0; ROOM],
+    };
+
+    /// Puts `LEN` readings of a chunk, from the `i`-th, at `at`.
+    #[inline(always)]
+    pub(super) fn put<const LEN: usize>(&mut self, at: usize, chunk: &Chunk, i: usize) {
+        for k in 0..LEN {
+            self.place[at + k] = chunk.place[i + k];
+            self.error[at + k] = chunk.error[i + k];
+        }
+    }
+
+    /// Moves what is beyond the full row to its start.
+    #[inline(always)]
+    pub(super) fn keep_rest(&mut self) {
+        self.place.copy_within(TOGETHER.., 0);
+        self.error.copy_within(TOGETHER.., 0);
+    }
+
+    /// Adds the first `len` readings to the moments of their segment.
+    #[inline(always)]
+    pub(super) fn add_some<L: Lanes>(
+        &mut self,
+        len: usize,
+        weights: &mut RowWeights,
+        moments: &mut Segment,
+    ) {
+        // What fills the last vector does not count.
+        let full = len.next_multiple_of(L::N);
+        for column in [&mut self.place, &mut self.error, &mut *weights] {
+            column[len..full].fill(0.0);
+        }
+        self.add::<L, true>(full, weights, moments);
+    }
+
+    /// Adds the first `len` readings, whole vectors of them.
+    #[inline(always)]
+    pub(super) fn add<L: Lanes, const WEIGHTED: bool>(
+        &self,
+        len: usize,
+        weights: &RowWeights,
+        moments: &mut Segment,
+    ) {
+        // As many sums at a time as there are registers for.
+        if L::N == LANES {
+            self.pass::<L, WEIGHTED, 0, { WEIGHTS | ERRORS }>(len, weights, moments);
+            self.pass::<L, WEIGHTED, 1, { WEIGHTS | ERRORS }>(len, weights, moments);
+        } else {
+            self.pass::<L, WEIGHTED, 0, WEIGHTS>(len, weights, moments);
+            self.pass::<L, WEIGHTED, 0, ERRORS>(len, weights, moments);
+            self.pass::<L, WEIGHTED, 1, WEIGHTS>(len, weights, moments);
+            self.pass::<L, WEIGHTED, 1, ERRORS>(len, weights, moments);
+        }
+    }
+
+    /// The moments `4 HALF .. 4 HALF + 4`, and those above by 8 and 16.
+    #[inline(always)]
+    fn pass<L: Lanes, const WEIGHTED: bool, const HALF: usize, const SUMS: u8>(
+        &self,
+        len: usize,
+        weights: &RowWeights,
+        moments: &mut Segment,
+    ) {
+        let mut weight = [[L::splat(0.0); 4]; 3];
+        let mut error = [[L::splat(0.0); 4]; 2];
+        let double = |t: L| (t + t).mul_add(t, L::splat(-1.0));
+        for i in (0..len).step_by(L::N) {
+            let (t1, y) = (lanes::<L>(&self.place, i), lanes::<L>(&self.error, i));
+            let t2 = double(t1);
+            let t4 = double(t2);
+            let t8 = double(t4);
+            let mut first = L::splat(1.0);
+            if WEIGHTED {
+                first = lanes::<L>(weights, i);
+            }
+            if HALF == 1 {
+                first = first * t4;
+            }
+            let second = first * t1;
+            let low = [first, second, first * t2, second * t2];
+            if SUMS & WEIGHTS != 0 {
+                let t16 = double(t8);
+                for k in 0..4 {
+                    weight[0][k] = weight[0][k] + low[k];
+                    weight[1][k] = low[k].mul_add(t8, weight[1][k]);
+                    weight[2][k] = low[k].mul_add(t16, weight[2][k]);
+                }
+            }
+            if SUMS & ERRORS != 0 {
+                let high = t8 * y;
+                for k in 0..4 {
+                    error[0][k] = low[k].mul_add(y, error[0][k]);
+                    if HALF == 0 {
+                        error[1][k] = low[k].mul_add(high, error[1][k]);
+                    }
+                }
+            }
+        }
+        let first = 4 * HALF;
+        if SUMS & WEIGHTS != 0 {
+            add_totals(&mut moments.weight[first..], weight[0]);
+            add_totals(&mut moments.weight[LANES + first..], weight[1]);
+            add_totals(&mut moments.weight[2 * LANES + first..], weight[2]);
+        }
+        if SUMS & ERRORS != 0 {
+            add_totals(&mut moments.error[first..], error[0]);
+            if HALF == 0 {
+                add_totals(&mut moments.error[LANES..], error[1]);
+            }
+        }
+    }
+}
+
+/// Adds the sums over the lanes of four vectors to the first four moments.
+#[inline(always)]
+fn add_totals<L: Lanes>(moments: &mut [f64], sums: [L; 4]) {
+    let totals = L::totals(sums);
+    for k in 0..4 {
+        moments[k] += totals[k];
+    }
+}
+
+/// Values from the `i`-th, one to a lane.
+#[inline(always)]
+fn lanes<L: Lanes>(values: &[f64; ROOM], i: usize) -> L {
+    let mut array = [0.0; LANES];
+    array[..L::N].copy_from_slice(&values[i..i + L::N]);
+    L::from_array(&array)
+}

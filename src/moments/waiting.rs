@@ -1,0 +1,113 @@
+//! Readings that wait for others of their segment.
+//!
+//! A reading by itself moves all the moments of its segment through memory. Some dozen of
+//! one segment leave them in registers: they wait in a row until it is full. Of a sweep
+//! whole vectors of readings go to the same row, of angles in disorder one after the other.
+
+use super::chunk::Chunk;
+use super::row::{ONES, Row, RowWeights, TOGETHER};
+use super::segment::{LANES, Segment};
+use crate::simd::Lanes;
+
+/// Readings per segment from which there are rows.
+const READINGS: usize = 16;
+
+/// Segments beyond which rows would leave the second cache: 2 MB of them.
+const MOST_SEGMENTS: usize = 1024;
+
+/// Readings of every segment that are not in its moments yet.
+#[derive(Default)]
+pub struct Waiting {
+    rows: Vec<Row>,
+    /// Of the same readings, where they are weighted.
+    weights: Vec<RowWeights>,
+    /// How many there are of each segment.
+    lens: Vec<usize>,
+}
+
+impl Waiting {
+    /// Whether it pays that readings wait; makes room for them where it does.
+    pub(super) fn pays(&mut self, readings: usize, segments: usize, weighted: bool) -> bool {
+        if segments > MOST_SEGMENTS || readings < READINGS * segments {
+            return false;
+        }
+        self.rows.resize(segments, Row::EMPTY);
+        self.lens.resize(segments, 0);
+        if weighted {
+            self.weights.resize(segments, ONES);
+        }
+        true
+    }
+
+    /// Takes the first `len` readings of a chunk in, and adds full rows to their segments.
+    #[inline(always)]
+    pub(super) fn take<L: Lanes, const WEIGHTED: bool>(
+        &mut self,
+        chunk: &Chunk,
+        len: usize,
+        table: &mut [Segment],
+    ) {
+        let mut rows = Rows {
+            rows: &mut self.rows,
+            weights: &mut self.weights,
+            lens: &mut self.lens,
+            table,
+        };
+        for start in (0..len).step_by(LANES) {
+            if start + LANES <= len && chunk.is_one_segment(start) {
+                rows.put::<L, WEIGHTED, LANES>(chunk, start);
+                continue;
+            }
+            for i in start..len.min(start + LANES) {
+                rows.put::<L, WEIGHTED, 1>(chunk, i);
+            }
+        }
+    }
+
+    /// Adds all that still waits.
+    #[inline(always)]
+    pub(super) fn finish<L: Lanes, const WEIGHTED: bool>(&mut self, table: &mut [Segment]) {
+        let rows = self.rows.iter_mut().zip(&mut self.lens).zip(table);
+        for (i, ((row, len), moments)) in rows.enumerate() {
+            let mut weights = if WEIGHTED { self.weights[i] } else { ONES };
+            row.add_some::<L>(*len, &mut weights, moments);
+            *len = 0;
+        }
+    }
+}
+
+/// The rows and the segments that they are of: slices, which the loop keeps in registers.
+struct Rows<'a> {
+    rows: &'a mut [Row],
+    weights: &'a mut [RowWeights],
+    lens: &'a mut [usize],
+    table: &'a mut [Segment],
+}
+
+impl Rows<'_> {
+    /// Takes `LEN` readings of one segment in.
+    #[inline(always)]
+    fn put<L: Lanes, const WEIGHTED: bool, const LEN: usize>(&mut self, chunk: &Chunk, i: usize) {
+        let segment = chunk.segment[i] as usize;
+        let (row, at) = (&mut self.rows[segment], self.lens[segment]);
+        row.put::<LEN>(at, chunk, i);
+        if WEIGHTED {
+            self.weights[segment][at..at + LEN].copy_from_slice(&chunk.weight[i..i + LEN]);
+        }
+        let len = at + LEN;
+        self.lens[segment] = len;
+        if len < TOGETHER {
+            return;
+        }
+        let moments = &mut self.table[segment];
+        if WEIGHTED {
+            let weights = &mut self.weights[segment];
+            row.add::<L, true>(TOGETHER, weights, moments);
+            weights.copy_within(TOGETHER.., 0);
+        } else {
+            row.add::<L, false>(TOGETHER, &ONES, moments);
+        }
+        row.keep_rest();
+        self.lens[segment] = len - TOGETHER;
+    }
+}
