@@ -6,6 +6,7 @@ import struct
 from collections.abc import Collection, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
+from typing import NamedTuple
 
 import pyarrow as pa
 
@@ -27,8 +28,9 @@ _CODECS = {0: "lz4", 1: "zstd"}
 _RECORD_BATCH = 3
 #: Rows at once.
 _ROWS = 1 << 20
-#: Bytes of a stretch that is read on its own.
+#: Bytes of a stretch that is read on its own, and parts of a larger batch at most.
 _STRETCH = 1 << 24
+_MOST_PARTS = 64
 
 
 def columns(path: Path, topic: str | None = None) -> list[str]:
@@ -37,22 +39,44 @@ def columns(path: Path, topic: str | None = None) -> list[str]:
         return list(schema.names)
 
 
-def stretches(path: Path) -> list[range | None]:
+class Stretch(NamedTuple):
+    """Neighbouring record batches, or one of so many parts of a single large one."""
+
+    batches: range
+    part: int = 0
+    parts: int = 1
+
+    def of(self, batch: pa.RecordBatch) -> pa.RecordBatch:
+        """The rows of a batch that belong to it."""
+        start, stop = (batch.num_rows * k // self.parts for k in (self.part, self.part + 1))
+        return batch.slice(start, stop - start)
+
+
+def stretches(path: Path) -> list[Stretch | None]:
     """Record batches that are read together; None for the stream format, which has no index."""
     with damage_told(path, "Arrow"):
         if not _is_file(path):
             return [None]
         with pa.memory_map(str(path), "r") as source:
             batches = pa.ipc.open_file(source).num_record_batches
-    each = max(1, batches * _STRETCH // max(path.stat().st_size, 1))
-    return [range(i, min(i + each, batches)) for i in range(0, batches, each)] or [None]
+        size = max(path.stat().st_size, 1)
+        each = max(1, batches * _STRETCH // size)
+        parts = 1
+        # A part of a packed batch needs all of it unpacked.
+        if batches * _STRETCH < size and _compression(path, True) is None:
+            parts = min(-(-size // (max(batches, 1) * _STRETCH)), _MOST_PARTS)
+    return [
+        Stretch(range(i, min(i + each, batches)), part, parts)
+        for i in range(0, batches, each)
+        for part in range(parts)
+    ] or [None]
 
 
 def read(
     path: Path,
     names: Sequence[str],
     topic: str | None = None,
-    stretch: range | None = None,
+    stretch: Stretch | None = None,
     *,
     texts: Collection[str] = TEXTS,
     strict: bool = False,
@@ -68,8 +92,8 @@ def read(
             wanted = [file.schema.get_field_index(name) for name in names]
             only = pa.ipc.IpcReadOptions(included_fields=wanted, use_threads=False)
             file = pa.ipc.open_file(source, options=only)
-        batches = (_valid(file.get_batch(i).select(names)) for i in stretch)
-        yield from column_batches(path, names, batches)
+        batches = (stretch.of(file.get_batch(i).select(names)) for i in stretch.batches)
+        yield from column_batches(path, names, _cut(map(_valid, batches)))
 
 
 def copy(

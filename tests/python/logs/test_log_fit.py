@@ -83,12 +83,12 @@ def test_one_pass_gives_any_other_orders(folder):
     np.testing.assert_allclose(less.amplitudes, expected.amplitudes, rtol=0, atol=1e-13)
 
 
-@pytest.mark.parametrize("kind", ["parquet", "arrow", "lz4", "h5", "csv"])
+@pytest.mark.parametrize("kind", ["parquet", "arrow", "one batch", "lz4", "h5", "csv"])
 def test_threads_change_no_bit(tmp_path, monkeypatch, kind):
     monkeypatch.setattr("trueangle.formats.parquet._STRETCH", 4000)
     monkeypatch.setattr("trueangle.formats.arrow._STRETCH", 1 << 16)
     monkeypatch.setattr("trueangle.formats.csvfile.BLOCK", 1 << 16)
-    ending = "arrow" if kind == "lz4" else kind
+    ending = "arrow" if kind in ("lz4", "one batch") else kind
     for i in range(3):
         reference, indicated = readings(20_000, i, 100.0 * i)
         indicated[100 * i] = np.nan
@@ -132,7 +132,7 @@ def _write(path, kind, columns, monkeypatch):
     else:
         options = pa.ipc.IpcWriteOptions(compression="lz4" if kind == "lz4" else None)
         with pa.ipc.new_file(path, table.schema, options=options) as writer:
-            writer.write_table(table, max_chunksize=1500)
+            writer.write_table(table, max_chunksize=None if kind == "one batch" else 1500)
 
 
 @pytest.mark.parametrize("threads", [1, 2])
