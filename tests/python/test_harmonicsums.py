@@ -200,3 +200,22 @@ def test_parts_of_the_normal_matrix_are_parts_of_it(orders):
             assert np.allclose(
                 own[k], whole[np.ix_([k, k + size], [k, k + size])], rtol=1e-13, atol=0
             )
+
+
+@pytest.mark.parametrize("name", ["turns", "error", "weights"])
+def test_kept_spectra_are_those_of_the_same_readings_alone(name):
+    """The spectra of a unit are kept; one that differs in one reading has its own."""
+    (unit,) = some_units(count=1)
+    harmonic_sums([unit], [1, 2])
+    values = getattr(unit, name).copy()
+    values[17] *= 1.25
+    other = unit._replace(**{name: values})
+    found = harmonic_sums([other], [1, 2])
+    harmonicsums._few.cache_clear()
+    fresh = harmonic_sums([other], [1, 2])
+    for one, two in zip(found.total(), fresh.total(), strict=True):
+        np.testing.assert_array_equal(one, two)
+    before = harmonicsums._few.cache_info()
+    harmonic_sums([other], [1, 2])
+    after = harmonicsums._few.cache_info()
+    assert (after.hits, after.misses) == (before.hits + 1, before.misses)

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from functools import lru_cache
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -24,6 +25,9 @@ Array = NDArray[np.float64]
 
 #: From so many readings on the core's piecewise moments are faster than this file's powers.
 _LARGE: Final = 1024
+
+#: Units of fewer readings whose spectra are kept, some 40 kB each.
+_KEPT: Final = 64
 
 #: Readings handled at once: the working set stays in the cache.
 _CHUNK: Final = 1 << 15
@@ -258,8 +262,19 @@ def _spectra(
         sums.update(unit.turns, error / scale, unit.weights)
         weights, values, _, _, about = sums.spectrum()
         return weights, scale * (values + about * weights[: values.size])
-    both = np.stack([unit.weights, unit.weights * (unit.error - centre)], axis=1)
-    found = power_sums(unit.turns, both, 2 * highest + 1)
+    error = unit.error - centre
+    return _few(unit.turns.tobytes(), unit.weights.tobytes(), error.tobytes(), highest)
+
+
+@lru_cache(maxsize=_KEPT)
+def _few(
+    turns: bytes, weights: bytes, error: bytes, highest: int
+) -> tuple[NDArray[np.complex128], NDArray[np.complex128]]:
+    """`_spectra` of few readings: fits that leave each run out in turn ask for the same again."""
+    weight = np.frombuffer(weights)
+    both = np.stack([weight, weight * np.frombuffer(error)], axis=1)
+    found = power_sums(np.frombuffer(turns), both, 2 * highest + 1)
+    found.flags.writeable = False
     return found[:, 0], found[: highest + 1, 1]
 
 
