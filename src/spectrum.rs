@@ -5,6 +5,9 @@ use std::f64::consts::LN_2;
 /// Share of the highest level below which a level is rounding.
 const LEAST: f64 = 1e-12;
 
+/// Products in a row, each of which may round: less than 1e-14 in all.
+const RENEWED: usize = 32;
+
 /// Divides a spectrum by its level about every frequency, which lines do not raise.
 ///
 /// The level is the median of each block between `cuts` over ln 2 (the median of an exponential
@@ -36,24 +39,47 @@ pub fn divide_by_level(power: &mut [f64], cuts: &[usize]) {
         .windows(2)
         .map(|cut| 0.5 * (cut[0] as f64 + cut[1] as f64 - 1.0))
         .collect();
-    let mut block = 0;
-    for (k, x) in power.iter_mut().enumerate() {
-        let at = k as f64;
-        while block + 1 < middle.len() && middle[block + 1] <= at {
-            block += 1;
+    let mut from = 0;
+    for block in 0..level.len() {
+        let (to, slope) = match middle.get(block + 1) {
+            Some(next) => {
+                let slope = (level[block + 1] - level[block]) / (next - middle[block]);
+                (next.ceil() as usize, slope)
+            }
+            None => (power.len(), 0.0),
+        };
+        // Before the first middle the level is flat.
+        let flat = (middle[block].ceil() as usize).clamp(from, to);
+        for x in &mut power[from..flat] {
+            *x *= (-level[block]).exp();
         }
-        let mut value = level[block];
-        if at > middle[block] && block + 1 < middle.len() {
-            let share = (at - middle[block]) / (middle[block + 1] - middle[block]);
-            value += share * (level[block + 1] - value);
+        divide_by_slope(
+            &mut power[flat..to],
+            level[block] + slope * (flat as f64 - middle[block]),
+            slope,
+        );
+        from = to;
+    }
+}
+
+/// Divides by an exponential: every `RENEWED` numbers it is told anew.
+fn divide_by_slope(power: &mut [f64], start: f64, slope: f64) {
+    let step = (-slope).exp();
+    for (k, part) in power.chunks_mut(RENEWED).enumerate() {
+        let mut factor = (-(start + slope * (k * RENEWED) as f64)).exp();
+        for x in part {
+            *x *= factor;
+            factor *= step;
         }
-        *x *= (-value).exp();
     }
 }
 
 /// Adds to every total the running mean of `values` over so many of them, times a weight.
+///
+/// Totals may be shorter than the values, all alike: their means look beyond them.
 pub fn add_running_means(values: &[f64], boxes: &[(usize, f64)], totals: &mut [f64]) {
     let n = values.len();
+    let width = totals.len() / boxes.len().max(1);
     let mut sum = Vec::with_capacity(n + 1);
     let mut before = 0.0;
     sum.push(before);
@@ -61,16 +87,16 @@ pub fn add_running_means(values: &[f64], boxes: &[(usize, f64)], totals: &mut [f
         before += x;
         sum.push(before);
     }
-    for (&(width, weight), total) in boxes.iter().zip(totals.chunks_exact_mut(n)) {
-        if width <= 1 {
+    for (&(wide, weight), total) in boxes.iter().zip(totals.chunks_exact_mut(width.max(1))) {
+        if wide <= 1 {
             for (out, x) in total.iter_mut().zip(values) {
                 *out += weight * x;
             }
             continue;
         }
         for (k, out) in total.iter_mut().enumerate() {
-            let low = k.saturating_sub(width / 2);
-            let high = (k + width - width / 2).min(n);
+            let low = k.saturating_sub(wide / 2);
+            let high = (k + wide - wide / 2).min(n);
             *out += weight * (sum[high] - sum[low]) / (high - low) as f64;
         }
     }
@@ -127,5 +153,8 @@ mod tests {
         add_running_means(&values, &[(1, 2.0), (3, 1.0)], &mut totals);
         assert_eq!(totals[..4], [2.0, 4.0, 8.0, 16.0]);
         assert_eq!(totals[4..], [1.5, 7.0 / 3.0, 14.0 / 3.0, 6.0]);
+        let mut shorter = [0.0; 6];
+        add_running_means(&values, &[(1, 2.0), (3, 1.0)], &mut shorter);
+        assert_eq!(shorter, [2.0, 4.0, 8.0, 1.5, 7.0 / 3.0, 14.0 / 3.0]);
     }
 }

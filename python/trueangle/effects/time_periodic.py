@@ -250,21 +250,24 @@ def _fixed(frequencies: Array, p: Array, sizes: Array) -> tuple[NDArray[np.int64
 
 def _wandering(frequencies: Array, p: Array) -> tuple[NDArray[np.int64], float, float]:
     """Places of a frequency that differs a little from run to run."""
-    best = (np.zeros(p.shape[1], dtype=np.int64), -np.inf, 0.0)
-    middle = float(frequencies[0]) * (1.0 + WANDER)
+    nowhere = np.zeros(p.shape[1], dtype=np.int64)
     bands = np.log(frequencies[-1] / frequencies[0]) / WANDER
-    while middle < frequencies[-1]:
-        low, high = np.searchsorted(frequencies, middle * np.array([1.0 - WANDER, 1.0 + WANDER]))
-        if high - low > OVERSAMPLING:
-            band = p[low:high]
-            cells = (high - low) / OVERSAMPLING
-            deviance = float(band.max(axis=0).sum())
-            # A band of so many cells has one point more at which its power is of its own.
-            log_grid = float(np.log(2.0 * bands) + p.shape[1] * np.log(cells + 1.0))
-            if deviance - 2.0 * log_grid > best[1] - 2.0 * best[2]:
-                best = (low + band.argmax(axis=0), deviance, log_grid)
-        middle *= 1.0 + WANDER
-    return best
+    count = max(int(np.ceil(bands * WANDER / np.log1p(WANDER))) - 1, 0)
+    middles = float(frequencies[0]) * (1.0 + WANDER) ** np.arange(1, count + 1)
+    low, high = np.searchsorted(frequencies, np.outer([1.0 - WANDER, 1.0 + WANDER], middles))
+    wide = high - low > OVERSAMPLING
+    low, high = low[wide], high[wide]
+    if not low.size:
+        return nowhere, -np.inf, 0.0
+    # The power after the last frequency is never the largest: bands may end there.
+    padded = np.vstack([p, np.full((1, p.shape[1]), -np.inf)])
+    deviances = np.maximum.reduceat(padded, np.column_stack([low, high]).ravel())[::2].sum(axis=1)
+    cells = (high - low) / OVERSAMPLING
+    # A band of so many cells has one point more at which its power is of its own.
+    log_grids = np.log(2.0 * bands) + p.shape[1] * np.log(cells + 1.0)
+    k = int(np.argmax(deviances - 2.0 * log_grids))
+    places = low[k] + p[low[k] : high[k]].argmax(axis=0)
+    return places, float(deviances[k]), float(log_grids[k])
 
 
 def _refined(regression: Regression, frequencies: list[float], step: float) -> list[float]:

@@ -57,12 +57,16 @@ class Factor:
         effects: Sequence[RunEffect],
         weights: Array | None,
         before: Sequence[Factor] = (),
+        whole: Array | None = None,
     ) -> Factor:
-        """The factor of some blocks; what those ``before`` have done is taken from them."""
+        """The factor of some blocks; what those ``before`` have done is taken from them.
+
+        ``whole`` are the blocks side by side, where these are at hand.
+        """
         blocks = tuple(blocks)
         like = next((f for f in before if f.whiten.has(rho, effects, weights)), None)
         if like is None:
-            return cls._fresh(blocks, Whitener(bounds, rho, list(effects), weights))
+            return cls._fresh(blocks, Whitener(bounds, rho, list(effects), weights), whole)
         known = len(like.blocks)
         if (
             like.scaled is not None
@@ -72,12 +76,11 @@ class Factor:
             grown = like._grown(blocks)
             if grown is not None:
                 return grown
-        return cls._fresh(blocks, like.whiten)
+        return cls._fresh(blocks, like.whiten, whole)
 
     @classmethod
-    def _fresh(cls, blocks: tuple[Array, ...], whiten: Whitener) -> Factor:
-        x = np.hstack(blocks) if len(blocks) > 1 else blocks[0]
-        x = whiten(x)
+    def _fresh(cls, blocks: tuple[Array, ...], whiten: Whitener, whole: Array | None) -> Factor:
+        x = whiten(np.hstack(blocks) if whole is None else whole)
         made = _orthonormal(x)
         if made is not None:
             q, scaled, lengths = made

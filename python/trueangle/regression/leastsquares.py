@@ -130,8 +130,8 @@ class LeastSquares:
 
     def update(self) -> None:
         """Fit the terms: run effects, correlation, clipping, projection."""
-        design = np.hstack([self.base, *(term.columns for term in self.terms)])
-        self.design = design
+        blocks = [self.base, *(term.columns for term in self.terms)]
+        self.design = design = np.hstack(blocks) if len(blocks) > 1 else self.base
         effects = [term.run_effect for term in self.terms if term.run_effect is not None]
         target, rho = self.residual, self.fixed_rho or 0.0
         for _ in range(2):
@@ -173,7 +173,9 @@ class LeastSquares:
     def _project(self, target: Array, rho: float, effects: list[RunEffect]) -> None:
         """Fit the design to ``target`` under this noise."""
         blocks = [self.base, *(term.columns for term in self.terms)]
-        factor = Factor.of(blocks, self.bounds, rho, effects, self.weights, self._factors)
+        factor = Factor.of(
+            blocks, self.bounds, rho, effects, self.weights, self._factors, self.design
+        )
         # White and correlated noise take turns: the last two are kept.
         self._factors = (factor, *(f for f in self._factors if f.whiten is not factor.whiten))[:2]
         self.whiten, self.q, self.back = factor.whiten, factor.q, factor.back

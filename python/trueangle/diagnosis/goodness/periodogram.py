@@ -43,6 +43,9 @@ SHARED = 1.2
 #: Independent frequencies per resolution cell, for the maximum of a line's power.
 PER_CELL = 3.0
 
+#: Blocks beyond that of a frequency which its level depends on.
+SHARED_BLOCKS = 2
+
 #: Widths of bands, in resolution cells.
 WIDTHS = (1, 3, 9)
 
@@ -123,28 +126,33 @@ def periodogram(
     last = int(min(top / frequency[1], frequency.size - 1))
     if last - first < 4 * over:
         return None
-    total = np.zeros((len(WIDTHS), frequency.size))
-    known = np.zeros(frequency.size)
+    boxes = [int(width * over + 0.5) if width > 1 else 1 for width in WIDTHS]
+    total = np.zeros((len(WIDTHS), last))
+    known = np.zeros(last)
     freedom = np.zeros(len(WIDTHS))
-    raw = np.zeros(frequency.size)
+    # The amplitude of a line beside the highest frequency is told by those beyond it, too.
+    raw = np.zeros(min(last + boxes[-1], frequency.size))
     for (a, b), span in zip(kept, spans, strict=True):
         place = ((axis[a:b] - axis[a:b].min()) / cell + 0.5).astype(np.int64)
         e = values[a:b] - values[a:b].mean()
         spectrum = np.fft.rfft(np.bincount(place, weights=e, minlength=size)[:size])
+        cuts, cells = _blocks(frequency.size, over * longest / span)
+        # Levels are shared between blocks, and bands reach beyond their middle.
+        needed = np.searchsorted(cuts, last + boxes[-1]) + SHARED_BLOCKS
+        cuts = cuts[: needed + 1]
+        spectrum = spectrum[: cuts[-1]]
         power = spectrum.real**2
         power += spectrum.imag**2
-        raw += power * (4.0 / ((b - a) ** 2 * len(kept)))
-        cuts, cells = _blocks(power.size, over * longest / span)
-        known += cells
+        raw += power[: raw.size] * (4.0 / ((b - a) ** 2 * len(kept)))
+        known += cells[:last]
         held = [max(1.0, width * span / longest) for width in WIDTHS]
         freedom += held
-        boxes = [int(width * over + 0.5) if width > 1 else 1 for width in WIDTHS]
         _core.add_relative_power(power, cuts, list(zip(boxes, held, strict=True)), total)
     best: tuple[float, int, int] | None = None
     # Rounded down to a few values, each of which is one test of a maximum.
-    blocks = 2.0 ** (np.floor(2.0 * np.log2(np.maximum(known[first:last], 1.0))) / 2.0)
+    blocks = 2.0 ** (np.floor(2.0 * np.log2(np.maximum(known[first:], 1.0))) / 2.0)
     for k, width in enumerate(WIDTHS):
-        p, j = _likeliest(total[k, first:last], float(freedom[k]), blocks)
+        p, j = _likeliest(total[k, first:], float(freedom[k]), blocks)
         p = largest_of(p, (last - first) / over * PER_CELL / width)
         if best is None or p < best[0]:
             best = (p, k, first + j)
@@ -155,7 +163,7 @@ def periodogram(
     amplitude = float(np.sqrt(max(float(raw[near].max()), 0.0)))
     return Periodogram(
         frequency[first:last],
-        total[0, first:last] / freedom[0],
+        total[0, first:] / freedom[0],
         float(frequency[j]),
         WIDTHS[k],
         float(total[k, j] / freedom[k]),
