@@ -46,8 +46,9 @@ DECISIVE = 100.0
 #: Correlations of the noise that are one.
 SAME_CORRELATION = 0.02
 
-#: Times the gain of a step that each further one may bring. Gains fall from step to step but
-#: where causes show together only; a step of three times the one before it was seen.
+#: Times the gain of a step that the further ones may bring on average. Gains fall but where
+#: causes show together only: of 240 walks 2 in 100 rose by more than 2.6, none of them to
+#: another account.
 RISING = 4.0
 
 
