@@ -215,6 +215,30 @@ def test_scores_beside_further_columns_are_those_with_them_fitted(space):
     assert effect.deviance < 10.0
 
 
+@pytest.mark.parametrize("outliers", [0, 9])
+@pytest.mark.parametrize("effect", [False, True])
+def test_coefficients_without_some_terms_are_those_of_a_fit_of_the_others(space, effect, outliers):
+    rng = np.random.default_rng(12)
+    space.residual = space.residual + 0.0
+    space.residual[rng.integers(space.n, size=outliers)] += 40.0
+    space.fixed_rho = 0.3
+    terms = [
+        space.propose("missing_order", {"order": m}, np.cos(m * space.signals.theta)[:, None])
+        for m in (3.0, 3.1, 7.0)
+    ]
+    if effect:
+        terms.append(space.propose_run_effect("zero_slip", {}, np.ones((space.n, 1))))
+    full = space.with_terms(terms)
+    for group in ([0], [2], [0, 2], [0, 1, 2]):
+        rest = full.with_terms(t for k, t in enumerate(full.terms) if k not in group)
+        found = full.coefficients_without(group)
+        held = np.concatenate([full.place(k) for k in group])
+        size = np.abs(full.coefficients).max()
+        assert np.delete(found, held) == pytest.approx(rest.coefficients, abs=ROUNDING * size)
+        assert found[held] == pytest.approx(0.0, abs=ROUNDING * size)
+    assert full.outlying.any() == (outliers > 0)
+
+
 @pytest.mark.parametrize("width", [2, 20])
 def test_squares_saved_at_every_ratio_are_those_of_a_ridge(space, width):
     """Few columns go by their eigensystem, many by systems of the size of what is fitted."""

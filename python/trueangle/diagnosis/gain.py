@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ..joint.signals import Signals
 from ..pace import pace
 from ..regression.regression import Regression
-from .holdout import held_out, numbers, part, rebuilt, reducible_share, residual_at
+from .holdout import Law, held_out, numbers, part, rebuilt, reducible_share, residual_at
 from .levels import LevelGain, gains_by_level
 from .unnamed import effect_of
 
@@ -149,7 +149,7 @@ def measure_belief_gains(
         test = folds[unit] == fold
         fitted = part(regression, ~test).with_terms(rebuilt(t, ~test) for t in regression.terms)
         left = residual_at(
-            fitted, regression.signals.take(test), regression.residual[test], own_zero
+            Law.of(fitted), regression.signals.take(test), regression.residual[test], own_zero
         )
         after[:, test] = before[:, test] = left
         for k, where in enumerate(columns):

@@ -3,19 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..joint.pattern import line_columns
+from ..joint.pattern import Surroundings, line_columns
 from ..joint.signals import Signals
 from ..pace import pace
 from ..regression.regression import Extension, Regression
 from ..regression.whitening import RunEffect
 from .unnamed import effect_of
 
-__all__ = ["held_out", "numbers", "part", "rebuilt", "reducible_share", "residual_at"]
+__all__ = ["Law", "held_out", "numbers", "part", "rebuilt", "reducible_share", "residual_at"]
 
 Array = NDArray[np.float64]
 Rows = NDArray[np.bool_]
@@ -48,11 +48,50 @@ def held_out(
         if effect_of(cause).located and effect_of(cause).transfers:
             full = _searched_again(full, group)
     signals = regression.signals.take(test)
-    results = [residual_at(full, signals, regression.residual[test], own_zero)]
-    for group in groups:
-        rest = full.with_terms(t for k, t in enumerate(full.terms) if k not in group)
-        results.append(residual_at(rest, signals, regression.residual[test], own_zero))
-    return results
+    laws = [Law.of(full), *(_law_without(full, group) for group in groups)]
+    columns: dict[Extension, Array] = {}
+    return [residual_at(law, signals, regression.residual[test], own_zero, columns) for law in laws]
+
+
+@dataclass(frozen=True)
+class Law:
+    """What a fit says of readings that it has not seen.
+
+    Attributes
+    ----------
+    orders : ndarray
+        Of the lines that the simulation believes.
+    base : ndarray
+        Coefficients of the zero and of those lines.
+    terms : list of (Extension, ndarray)
+        With their coefficients.
+    around : Surroundings
+    """
+
+    orders: Array
+    base: Array
+    terms: list[tuple[Extension, Array]]
+    around: Surroundings
+
+    @classmethod
+    def of(cls, fitted: Regression) -> Law:
+        """That of a fit as it is."""
+        base = fitted.coefficients[: fitted.base.shape[1]]
+        return cls(fitted.belief.pattern.orders, base, fitted.fitted(), fitted.around)
+
+
+def _law_without(full: Regression, group: Sequence[int]) -> Law:
+    """That of the other terms alone, fitted to the same readings."""
+    kept = [k for k in range(len(full.terms)) if k not in group]
+    effects = sum(term.run_effect is not None for term in full.terms)
+    settles = effects > 1 or any(full.terms[k].run_effect is not None for k in group)
+    if settles or full.q.shape[1] < full.design.shape[1]:
+        # Run effects that are left find another size, columns that are alike another share.
+        return Law.of(full.with_terms(full.terms[k] for k in kept))
+    coefficients = full.coefficients_without(group)
+    terms = [(full.terms[k], coefficients[full.place(k)]) for k in kept]
+    base = coefficients[: full.base.shape[1]]
+    return Law(full.belief.pattern.orders, base, terms, full.surroundings(terms))
 
 
 def part(regression: Regression, rows: Rows) -> Regression:
@@ -94,19 +133,27 @@ def _searched_again(full: Regression, group: Sequence[int]) -> Regression:
     return full.with_terms(terms)
 
 
-def residual_at(fitted: Regression, signals: Signals, residual: Array, own_zero: bool) -> Array:
-    """Residual at other readings: lines and every regressor that can be rebuilt there."""
-    base = np.column_stack(
-        [
-            np.ones(len(signals)),
-            *(line_columns(signals.theta, m) for m in fitted.belief.pattern.orders),
-        ]
-    )
-    left = residual - base @ fitted.coefficients[: base.shape[1]]
-    for term, coefficients in fitted.fitted():
-        if coefficients.size and effect_of(term.cause).transfers:
-            columns = effect_of(term.cause).columns(signals, fitted.around, term.shape)
-            left = left - columns @ coefficients
+def residual_at(
+    law: Law,
+    signals: Signals,
+    residual: Array,
+    own_zero: bool,
+    columns: dict[Extension, Array] | None = None,
+) -> Array:
+    """Residual at other readings: lines and every regressor that can be rebuilt there.
+
+    ``columns`` keeps those that follow from the motion alone, for other laws of these readings.
+    """
+    columns = {} if columns is None else columns
+    lines = [line_columns(signals.theta, m) for m in law.orders]
+    left = residual - np.column_stack([np.ones(len(signals)), *lines]) @ law.base
+    for term, coefficients in law.terms:
+        effect = effect_of(term.cause)
+        if not (coefficients.size and effect.transfers):
+            continue
+        if term not in columns or not effect.of_motion:
+            columns[term] = effect.columns(signals, law.around, term.shape)
+        left = left - columns[term] @ coefficients
     if own_zero:
         for start, stop in signals.run_bounds():
             left[start:stop] -= np.median(left[start:stop])

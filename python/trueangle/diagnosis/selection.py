@@ -47,7 +47,7 @@ DECISIVE = 100.0
 SAME_CORRELATION = 0.02
 
 #: Times the gain of a step that the further ones may bring on average. Gains fall but where
-#: causes show together only: of 240 walks 2 in 100 rose by more than 2.6, none of them to
+#: causes show together only: of 240 walks 1 in 100 rose by more than 2.6, none of them to
 #: another account.
 RISING = 4.0
 

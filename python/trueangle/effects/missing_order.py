@@ -68,6 +68,7 @@ class MissingOrder(Effect):
     }
     located: ClassVar[bool] = True
     is_separate: ClassVar[bool] = True
+    of_motion: ClassVar[bool] = True
     is_doubted: ClassVar[bool] = False
 
     def signal(self, signals: Signals, around: Surroundings, rng: np.random.Generator) -> Array:

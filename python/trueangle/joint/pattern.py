@@ -137,13 +137,20 @@ class Pattern:
         return out
 
     def indicated_value(self, theta: Array, steps: int = 30) -> Array:
-        """Solution e of ``e = p(theta + e)``: the pattern evaluated at the indicated angle."""
+        """Solution e of ``e = p(theta + e)``: the pattern evaluated at the indicated angle.
+
+        By Newton's steps; where the pattern may be about as steep as the angle, which that of
+        no joint is, by putting e in.
+        """
+        steepest = float(np.abs(self.orders) @ np.hypot(self.cosine, self.sine)) / ARCSEC_PER_RAD
         error = self.value(theta)
         for _ in range(steps):
-            following = self.value(theta + error / ARCSEC_PER_RAD)
-            done = np.max(np.abs(following - error), initial=0.0) < 1e-9
-            error = following
-            if done:
+            at = theta + error / ARCSEC_PER_RAD
+            change = self.value(at) - error
+            if steepest < STEEP:
+                change = change / (1.0 - self.slope(at))
+            error = error + change
+            if np.max(np.abs(change), initial=0.0) < 1e-9:
                 break
         return error
 
@@ -155,6 +162,9 @@ class Surroundings:
     joint: Joint
     pattern: Pattern
 
+
+#: Slope from which on Newton's steps may lead away.
+STEEP = 0.9
 
 #: Rounding of angles of some hundred turns, per order.
 _VANISHES = 1e-11

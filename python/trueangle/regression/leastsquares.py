@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import replace
 from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..joint.pattern import Pattern, Surroundings, line_columns
+from ..joint.pattern import Surroundings, line_columns
 from ..joint.signals import Signals
-from ..quantiles import median
+from .coefficients import ENOUGH_RUNS, Coefficients
 from .extension import Extension, penalty_of_parameter
 from .factor import Factor
 from .lines import LineBasis
@@ -24,18 +24,11 @@ __all__ = ["ROUNDING", "LeastSquares"]
 
 Array = NDArray[np.float64]
 
-#: Residuals are taken at most this many robust standard deviations large: outliers
-#: must not make causes, and normal ones are not touched.
-CLIP = 4.0
-
 #: Arcsec below which what is left is the rounding of angles (1e-12 of a turn).
 ROUNDING = 1e-6
 
-#: Runs from which they, and not the readings, are what informs on a variance between runs.
-ENOUGH_RUNS = 8
 
-
-class LeastSquares:
+class LeastSquares(Coefficients):
     """Readings, what the simulation expects of them, and the terms chosen so far.
 
     Parameters
@@ -80,6 +73,9 @@ class LeastSquares:
         self.form_errors: Array | None = None
         self.correlation = LagCorrelation(signals.clock, self.bounds)
         self._factors: tuple[Factor, ...] = ()
+        #: What `design` is made of.
+        self._blocks: tuple[Array, ...] = (self.base,)
+        self.design = self.base
         #: What causes proposed beside given terms; shared by regressions of the same readings.
         self.memory: dict[Any, Any] = {}
         #: Evidence below which no candidate matters at the moment (`Regression.beaten`).
@@ -130,27 +126,17 @@ class LeastSquares:
 
     def update(self) -> None:
         """Fit the terms: run effects, correlation, clipping, projection."""
-        blocks = [self.base, *(term.columns for term in self.terms)]
-        self.design = design = np.hstack(blocks) if len(blocks) > 1 else self.base
+        self.design = design = self._grown_design()
         effects = [term.run_effect for term in self.terms if term.run_effect is not None]
         target, rho = self.residual, self.fixed_rho or 0.0
         for _ in range(2):
             self._project(target, rho, effects)
-            left = self.residual - design @ self.coefficients
-            left -= self.whiten.run_part(left)
-            scale = self.root_weights * left
-            spread = 1.4826 * float(median(np.abs(scale - median(scale))))
-            limit = CLIP * max(spread, 1e-12) / self.root_weights
-            outlying = np.abs(left) > limit
+            clipped, target, outlying = self.clipped(self.coefficients)
             if self.fixed_rho is None:
-                kept = np.clip(left, -limit, limit) * self.root_weights
-                rho = self.correlation(kept)
+                rho = self.correlation(clipped * self.root_weights)
             settled = not outlying.any() and rho == self.whiten.rho
             if settled:
                 break
-            target = np.where(
-                outlying, self.residual - left + np.clip(left, -limit, limit), self.residual
-            )
         if len(effects) > 1:
             for k in range(len(effects)):
                 effects[k] = self._refit_ratio(target, rho, effects, k)
@@ -163,18 +149,24 @@ class LeastSquares:
             for term in self.terms
         ]
         self.left = self.residual - design @ self.coefficients
-        self.around = Surroundings(self.belief.joint, self._pattern())
+        self.around = self.surroundings(self.fitted())
 
-    @property
-    def root_weights(self) -> Array:
-        """Square roots of the weights."""
-        return np.ones(self.n) if self.weights is None else np.sqrt(self.weights)
+    def _grown_design(self) -> Array:
+        """All columns side by side; those that the terms before have in common are not moved."""
+        blocks = (self.base, *(term.columns for term in self.terms))
+        like, design = self._blocks, self.design
+        same = 0
+        while same < min(len(like), len(blocks)) and like[same] is blocks[same]:
+            same += 1
+        self._blocks = blocks
+        kept = design[:, : sum(block.shape[1] for block in blocks[:same])]
+        further = [block for block in blocks[same:] if block.shape[1]]
+        return np.hstack([kept, *further]) if further else kept
 
     def _project(self, target: Array, rho: float, effects: list[RunEffect]) -> None:
         """Fit the design to ``target`` under this noise."""
-        blocks = [self.base, *(term.columns for term in self.terms)]
         factor = Factor.of(
-            blocks, self.bounds, rho, effects, self.weights, self._factors, self.design
+            self._blocks, self.bounds, rho, effects, self.weights, self._factors, self.design
         )
         # White and correlated noise take turns: the last two are kept.
         self._factors = (factor, *(f for f in self._factors if f.whiten is not factor.whiten))[:2]
@@ -198,11 +190,6 @@ class LeastSquares:
         seen = self._all_seen()
         return seen[:, :-1], seen[:, -1]
 
-    @property
-    def unscaled_covariance(self) -> Array:
-        """Covariance of all coefficients over the variance of one reading."""
-        return np.asarray(self.back @ self.back.T)
-
     def _refit_ratio(
         self, target: Array, rho: float, effects: list[RunEffect], k: int
     ) -> RunEffect:
@@ -216,78 +203,6 @@ class LeastSquares:
         """Best ratio of variances of a run effect beside what is fitted, and what it saves."""
         moments = columns.moments(self._all_seen())
         return best_ratio(columns.grams(self.whiten), moments, self.as_deviances)
-
-    def _pattern(self) -> Pattern:
-        """The believed pattern with the missing orders found so far.
-
-        Not with the fitted corrections: an effect on the pattern (a filter) would be
-        taken for one in part, and then act on a pattern that it has already changed.
-        """
-        belief = self.belief.pattern
-        orders = [*belief.orders]
-        pairs = [*zip(belief.cosine, belief.sine, strict=True)]
-        for term, coefficients in self.fitted():
-            if term.line is not None:
-                orders.append(term.line)
-                pairs.append((coefficients[0], coefficients[1]))
-        array = np.array(pairs, dtype=np.float64).reshape(-1, 2)
-        return Pattern(np.array(orders, dtype=np.float64), array[:, 0], array[:, 1])
-
-    def fitted(self) -> list[tuple[Extension, Array]]:
-        """Every term with its coefficients."""
-        found = []
-        start = self.base.shape[1]
-        for term in self.terms:
-            stop = start + term.columns.shape[1]
-            found.append((term, self.coefficients[start:stop]))
-            start = stop
-        return found
-
-    def place(self, k: int) -> NDArray[np.int64]:
-        """Columns of term ``k`` among those of the design."""
-        start = self.base.shape[1] + sum(t.columns.shape[1] for t in self.terms[:k])
-        return np.arange(start, start + self.terms[k].columns.shape[1])
-
-    def covariance(self, k: int) -> Array:
-        """Covariance of the coefficients of term ``k``."""
-        where = self.place(k)
-        return np.asarray(self.unscaled_covariance[np.ix_(where, where)] * self.variance)
-
-    def robust_covariance(self, k: int) -> Array:
-        """Covariance of the coefficients of term ``k``, widened by what its form leaves."""
-        return self.robust(self.place(k))
-
-    def sum_variance(self, terms: Sequence[Extension]) -> float:
-        """Variance of the sum of all coefficients of some of the terms, widened alike."""
-        places = [self.place(k) for k, term in enumerate(self.terms) if term in terms]
-        return float(self.robust(np.concatenate(places)).sum())
-
-    def robust(self, where: NDArray[np.int64]) -> Array:
-        r"""Covariance of some coefficients, at least as wide as runs disagree on them.
-
-        .. math:: V_s = \frac{R}{R - 1}\sum_j s_j s_j^T, \quad s_j = X^+_j r_j
-
-        with the residuals r of run j: no form is exact, and what it leaves is alike within a
-        run. Coefficients whose variance is larger by this than by the noise alone are
-        widened to it; from `ENOUGH_RUNS` runs on. `form_errors`, where known, come on top.
-        """
-        among = np.ix_(where, where)
-        plain = np.asarray(self.unscaled_covariance[among] * self.variance)
-        beyond = 0.0 if self.form_errors is None else self.form_errors[among]
-        runs = len(self.bounds)
-        if runs < ENOUGH_RUNS or not plain.size:
-            return np.asarray(plain + beyond)
-        scores = np.array(
-            [self.back[where] @ (self.q[a:b].T @ self.r[a:b]) for a, b in self.bounds]
-        )
-        between = (scores**2).sum(axis=0) * runs / (runs - 1.0)
-        wider = np.sqrt(np.maximum(between / np.maximum(np.diag(plain), 1e-300), 1.0))
-        return np.asarray(plain * np.outer(wider, wider) + beyond)
-
-    @property
-    def variance(self) -> float:
-        """Variance of one reading's noise, arcsec squared."""
-        return float(self.rss / max(self.n - self.q.shape[1], 1))
 
     @property
     def is_explained(self) -> bool:
