@@ -49,8 +49,10 @@ DAMPING = (0.4, 0.7, 1.1)
 NEWTON_STEPS = 8
 STEP = 0.01
 
-#: Change of a logarithm below which it is settled.
+#: Change of a logarithm below which it is settled, and of the deviance: a tenth of a standard
+#: error away it would be as large.
 ENOUGH = 1e-4
+ENOUGH_DEVIANCE = 0.01
 
 
 @dataclass(frozen=True)
@@ -326,7 +328,7 @@ def _settled(
 
     The filter is in the model at every step, so that what it explains is not clipped.
     """
-    best, lowest = shape, math.inf
+    best, lowest, before = shape, math.inf, math.inf
     for _ in range(NEWTON_STEPS):
         column = _lagged(waves, frequency, **shape)[:, None]
         extension = regression.propose(kind, shape, column)
@@ -334,8 +336,12 @@ def _settled(
         # With the coefficient 1: a free one stands for the cutoff far below it.
         left = regression.whiten(full.target - column[:, 0])
         left -= regression.q @ (regression.q.T @ left)
-        if float(left @ left) < lowest:
-            best, lowest = shape, float(left @ left)
+        rest = float(left @ left)
+        if rest < lowest:
+            best, lowest = shape, rest
+        if abs(before - rest) * regression.n < ENOUGH_DEVIANCE * rest:
+            return best
+        before = rest
         x, _ = regression.projected(_slopes(waves, frequency, **shape))
         moves = np.linalg.lstsq(x, left, rcond=1e-10)[0]
         if np.abs(moves).max() < ENOUGH:
