@@ -127,16 +127,10 @@ class Regression(LeastSquares):
         return found
 
     def remembered(self, name: str, key: object, build: Callable[[], Any]) -> Any:
-        """What ``build`` makes for ``key``; of every name the last one is kept.
-
-        The pattern is part of the key.
-        """
+        """`LineBasis.once` of what depends on the pattern, too."""
         pattern = self.around.pattern
-        key = (key, *(a.tobytes() for a in (pattern.orders, pattern.cosine, pattern.sine)))
-        kept = self.memory.get(("kept", name))
-        if kept is None or kept[0] != key:
-            kept = self.memory["kept", name] = (key, build())
-        return kept[1]
+        parts = (pattern.orders, pattern.cosine, pattern.sine)
+        return self.lines.once(name, (key, *(part.tobytes() for part in parts)), build)
 
     def asked(self, key: object, build: Callable[[], Any]) -> Any:
         """What ``build`` makes of this regression and its terms, made once; itself perhaps."""
