@@ -82,7 +82,7 @@ class PlainBlock:
         """
         try:
             self._table = pa.csv.read_csv(
-                pa.BufferReader(self.data),
+                pa.BufferReader(_owned_by_arrow(self.data)),
                 pa.csv.ReadOptions(column_names=self.header.names),
                 pa.csv.ParseOptions(delimiter=self.header.delimiter, quote_char=False),
                 pa.csv.ConvertOptions(
@@ -139,6 +139,17 @@ class PlainBlock:
         )
         ends = np.frombuffer(joined.buffers()[1], dtype=np.int64)
         return memoryview(joined.buffers()[2])[: ends[len(joined)]].tobytes()
+
+
+def _owned_by_arrow(data: bytes) -> pa.Buffer:
+    """A copy that Arrow frees by itself.
+
+    Its threads may let go of the text a moment after the table is made. If it is Python's they
+    wait for the interpreter then, and where that is ending, the process is aborted.
+    """
+    copy = pa.allocate_buffer(len(data))
+    memoryview(copy).cast("B")[:] = data
+    return copy
 
 
 def _is_finite(column: pa.ChunkedArray) -> bool:

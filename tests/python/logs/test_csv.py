@@ -2,6 +2,7 @@
 
 import csv
 import io
+import sys
 
 import numpy as np
 import pytest
@@ -118,3 +119,18 @@ def test_bad_lines_far_down_are_named(way, model, tmp_path):
     lines[2500] = "oops,1"
     with pytest.raises(ta.errors.FileError, match=r"line 2502.*oops"):
         corrected_text("\n".join(["indicated_deg,t", *lines]) + "\n", model, tmp_path)
+
+
+def test_threads_of_arrow_keep_no_text_of_pythons(tmp_path):
+    """One that lets go of it while Python ends would abort the process."""
+    csvblocks = pytest.importorskip("trueangle.formats.csvblocks")
+    path = tmp_path / "a.csv"
+    path.write_text("time_s,indicated_deg\n" + "0.25,12.5\n" * 100_000)
+    with path.open("rb") as file:
+        header = csvblocks.Header(path, file)
+        data = file.read()
+    for _ in range(100):
+        block = csvblocks.plain_block(data, header, 2)
+        before = sys.getrefcount(data)
+        block.numbers(["indicated_deg"])
+        assert sys.getrefcount(data) == before
