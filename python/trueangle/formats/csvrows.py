@@ -17,7 +17,7 @@ from .format import Labels, row_labels
 __all__ = ["BLOCK", "QuotedBlock", "quoted_blocks", "too_long"]
 
 #: Bytes taken together.
-BLOCK = 1 << 22
+BLOCK = 1 << 21
 
 
 class QuotedBlock:
