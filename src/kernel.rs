@@ -26,7 +26,7 @@ pub use crate::simd::InstructionSet;
 pub use batch::{Batch, Real, Sample, Shared};
 pub use cubics::Cubics;
 pub use evaluator::{Evaluator, THREADED, TOLERANCE};
-pub(crate) use pass::{phases, waves};
+pub(crate) use pass::{Pass, Wave};
 pub use route::{Path, Route};
 pub use stretch::Stretch;
 pub use table::{Scalar, Table};

@@ -1,114 +1,130 @@
-//! Passes over a few angles, for kernels of other rooms.
+//! Passes over a few angles, or one, for what goes over a block several times.
 
-use super::exact::FAR_TURNS;
+use std::sync::Arc;
+
+use super::exact::{Exact, FAR_TURNS};
 use super::sincos::{Phase, sin_cos};
-use super::sweep::Map;
-use super::{Batch, Evaluator, Quantity};
+use super::{Batch, Evaluator, Quantity, Scalar, Table};
 use crate::angle::Period;
-use crate::simd::{Kernel, Lanes, MOST_LANES, dispatch_one};
+use crate::simd::{InstructionSet, Kernel, Lanes, MOST_LANES, dispatch, dispatch_one};
 
-impl Evaluator {
-    /// The error at each of some angles.
-    pub(crate) fn errors(&self, x: &[f64], out: &mut [f64]) {
-        self.pass(Quantity::Error, x, out);
+/// A quantity of a series at some angles: of each the same, to the last bit, whether it is
+/// alone or in a block.
+#[derive(Debug)]
+pub(crate) enum Pass {
+    /// By a table: the errors, or the angles less what they are off.
+    Values(Arc<Table>, Scalar, InstructionSet),
+    Subtract(Arc<Table>, Scalar, InstructionSet),
+    /// Without one.
+    Exact(Exact, InstructionSet),
+    Newton(Arc<Evaluator>),
+}
+
+impl Pass {
+    /// Makes the table.
+    pub fn new(evaluator: &Arc<Evaluator>, quantity: Quantity) -> Self {
+        let set = evaluator.best;
+        match (evaluator.table(quantity).map(Arc::clone), quantity) {
+            (Some(table), Quantity::Correction) => {
+                Self::Subtract(table, Table::scalar_subtract(set), set)
+            }
+            (Some(table), _) => Self::Values(table, Table::scalar_value(set), set),
+            (None, Quantity::Correction) => Self::Newton(Arc::clone(evaluator)),
+            (None, _) => Self::Exact(evaluator.exact_error.clone(), set),
+        }
     }
 
-    /// The true angle behind each of some indicated ones.
-    pub(crate) fn corrections(&self, x: &[f64], out: &mut [f64]) {
-        self.pass(Quantity::Correction, x, out);
-    }
-
-    fn pass(&self, quantity: Quantity, x: &[f64], out: &mut [f64]) {
-        let table = self.table(quantity);
-        if x.len() == 1 && (table.is_some() || quantity == Quantity::Error) {
-            let work = One {
-                evaluator: self,
-                quantity,
-                x,
-                out,
-            };
-            return dispatch_one(self.best, work);
+    /// It at each of some angles.
+    pub fn run(&self, x: &[f64], out: &mut [f64]) {
+        if let (Self::Values(table, one, _) | Self::Subtract(table, one, _), [x]) = (self, x) {
+            // SAFETY: the function was chosen for this processor.
+            return out[0] = unsafe { one(table, *x) };
         }
         let batch = Batch::apart(x, out).expect("slices of one block are equally long");
-        match (table, quantity) {
-            (Some(table), Quantity::Correction) => table.subtract(self.best, batch),
-            (Some(table), _) => table.values(self.best, batch),
-            (None, Quantity::Correction) => self.correct_exactly(self.best, batch),
-            (None, _) => self.exact_error.run(self.best, batch),
+        match self {
+            Self::Values(table, _, set) => table.values(*set, batch),
+            Self::Subtract(table, _, set) => table.subtract(*set, batch),
+            Self::Exact(exact, set) => exact.run(*set, batch),
+            Self::Newton(evaluator) => evaluator.correct_exactly(evaluator.best, batch),
         }
     }
 }
 
-/// One angle, with what a batch does to it.
-struct One<'a> {
-    evaluator: &'a Evaluator,
-    quantity: Quantity,
-    x: &'a [f64],
+/// An order of a shaft at some angles, whose number is one or a multiple of the lanes.
+pub(crate) struct Wave<'a> {
+    pub period: Period,
+    pub cycles: f64,
+    pub order: f64,
+    pub x: &'a [f64],
+}
+
+impl Wave<'_> {
+    /// Its phases, in parts of its own turn around zero.
+    pub fn phases(&self, set: InstructionSet, out: &mut [f64]) {
+        self.run(set, |wave| Phases { wave, out });
+    }
+
+    /// Its sines and cosines.
+    pub fn sines(&self, set: InstructionSet, sine: &mut [f64], cosine: &mut [f64]) {
+        self.run(set, |wave| Sines { wave, sine, cosine });
+    }
+
+    fn run<'w, K: Kernel>(&'w self, set: InstructionSet, kernel: impl FnOnce(&'w Self) -> K) {
+        if self.x.len() == 1 {
+            dispatch_one(set, kernel(self));
+        } else {
+            dispatch(set, kernel(self));
+        }
+    }
+
+    #[inline(always)]
+    fn phase<L: Lanes>(&self, at: usize) -> Phase<L> {
+        let mut values = [0.0; MOST_LANES];
+        values[..L::N].copy_from_slice(&self.x[at..at + L::N]);
+        let (angles, far) = (L::from_array(&values), FAR_TURNS * self.period.value());
+        let near = if angles.any_beyond(far) {
+            angles.wrap_beyond(far, self.period)
+        } else {
+            angles
+        };
+        Phase::new(self.period, near, self.cycles).harmonic(self.order)
+    }
+}
+
+struct Phases<'a> {
+    wave: &'a Wave<'a>,
     out: &'a mut [f64],
 }
 
-impl Kernel for One<'_> {
+impl Kernel for Phases<'_> {
     #[inline(always)]
     fn run<L: Lanes>(self) {
-        let x = load::<L>(self.x, 0);
-        let result = match self.evaluator.table(self.quantity) {
-            Some(table) if self.quantity == Quantity::Correction => x - table.value(x),
-            Some(table) => table.value(x),
-            None => (&self.evaluator.exact_error).map([x])[0],
-        };
-        store(result, self.out, 0);
+        for at in (0..self.out.len()).step_by(L::N) {
+            store(self.wave.phase::<L>(at).turns(), self.out, at);
+        }
     }
 }
 
-/// The lanes of a slice from `at` on.
-#[inline(always)]
-fn load<L: Lanes>(from: &[f64], at: usize) -> L {
-    let mut values = [0.0; MOST_LANES];
-    values[..L::N].copy_from_slice(&from[at..at + L::N]);
-    L::from_array(&values)
+struct Sines<'a> {
+    wave: &'a Wave<'a>,
+    sine: &'a mut [f64],
+    cosine: &'a mut [f64],
 }
 
-/// Lanes into a slice from `at` on.
+impl Kernel for Sines<'_> {
+    #[inline(always)]
+    fn run<L: Lanes>(self) {
+        for at in (0..self.sine.len()).step_by(L::N) {
+            let (s, c) = sin_cos(self.wave.phase::<L>(at));
+            store(s, self.sine, at);
+            store(c, self.cosine, at);
+        }
+    }
+}
+
 #[inline(always)]
 fn store<L: Lanes>(lanes: L, into: &mut [f64], at: usize) {
     let mut values = [0.0; MOST_LANES];
     lanes.to_array(&mut values);
     into[at..at + L::N].copy_from_slice(&values[..L::N]);
-}
-
-/// Phase of a shaft at each of some angles, as many as a multiple of the lanes, in parts
-/// of its own turn around zero.
-#[inline(always)]
-pub fn phases<L: Lanes>(period: Period, cycles: f64, x: &[f64], out: &mut [f64]) {
-    for at in (0..x.len()).step_by(L::N) {
-        store(phase::<L>(period, cycles, x, at).turns(), out, at);
-    }
-}
-
-/// Sine and cosine of an order of a shaft there.
-#[inline(always)]
-pub fn waves<L: Lanes>(
-    period: Period,
-    cycles: f64,
-    order: f64,
-    x: &[f64],
-    sine: &mut [f64],
-    cosine: &mut [f64],
-) {
-    for at in (0..x.len()).step_by(L::N) {
-        let (s, c) = sin_cos(phase::<L>(period, cycles, x, at).harmonic(order));
-        store(s, sine, at);
-        store(c, cosine, at);
-    }
-}
-
-#[inline(always)]
-fn phase<L: Lanes>(period: Period, cycles: f64, x: &[f64], at: usize) -> Phase<L> {
-    let (angles, far) = (load::<L>(x, at), FAR_TURNS * period.value());
-    let near = if angles.any_beyond(far) {
-        angles.wrap_beyond(far, period)
-    } else {
-        angles
-    };
-    Phase::new(period, near, cycles)
 }

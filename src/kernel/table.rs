@@ -68,12 +68,21 @@ impl Table {
         dispatch(set, Sweep { map, batch });
     }
 
-    /// The function that does the same, to the last bit, to one sample. It may be called
-    /// on this processor.
+    /// The function that does what `values` does, to the last bit, to one sample. It may be
+    /// called on this processor.
+    pub fn scalar_value(set: InstructionSet) -> Scalar {
+        Self::scalar::<false>(set)
+    }
+
+    /// Likewise for `subtract`.
     pub fn scalar_subtract(set: InstructionSet) -> Scalar {
+        Self::scalar::<true>(set)
+    }
+
+    fn scalar<const SUBTRACT: bool>(set: InstructionSet) -> Scalar {
         #[inline(always)]
-        fn subtract<const FUSED: bool>(table: &Table, x: f64) -> f64 {
-            let [lane] = Lookup::<true>(table).map([Portable::<1, FUSED>::splat(x)]);
+        fn one<const SUBTRACT: bool, const FUSED: bool>(table: &Table, x: f64) -> f64 {
+            let [lane] = Lookup::<SUBTRACT>(table).map([Portable::<1, FUSED>::splat(x)]);
             let mut values = [0.0; MOST_LANES];
             lane.to_array(&mut values);
             values[0]
@@ -82,15 +91,15 @@ impl Table {
         #[cfg(target_arch = "x86_64")]
         {
             #[target_feature(enable = "fma")]
-            fn fused(table: &Table, x: f64) -> f64 {
-                subtract::<true>(table, x)
+            fn fused<const SUBTRACT: bool>(table: &Table, x: f64) -> f64 {
+                one::<SUBTRACT, true>(table, x)
             }
             if set.is_available() && set.fuses() {
-                return fused;
+                return fused::<SUBTRACT>;
             }
         }
         let _ = set;
-        subtract::<TARGET_FUSES>
+        one::<SUBTRACT, TARGET_FUSES>
     }
 
     /// Value and derivative at `offset` from the centre of `segment`: for building the
@@ -140,9 +149,8 @@ impl<const SUBTRACT: bool> Map for Lookup<'_, SUBTRACT> {
 }
 
 impl Table {
-    /// Value of the function at every lane.
     #[inline(always)]
-    pub(super) fn value<L: Lanes>(&self, x: L) -> L {
+    fn value<L: Lanes>(&self, x: L) -> L {
         let (place, u) = self.segments.locate(x);
         let (square, mask) = (u * u, self.segments.mask());
         // SAFETY: the mask is the number of rows less one.

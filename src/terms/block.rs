@@ -9,7 +9,7 @@ use crate::simd::MOST_LANES;
 
 /// Readings of a block with room for a whole vector from its last one on: what is computed
 /// of them stays in the first-level cache.
-pub(super) const BLOCK: usize = 64 + MOST_LANES;
+pub(super) const BLOCK: usize = 128 + MOST_LANES;
 
 /// So many readings, or a few more, to fill vectors.
 #[inline]
@@ -113,39 +113,63 @@ impl Block<1> {
     }
 }
 
-/// Room for what is computed of a block on the way.
-pub(super) struct Work<const N: usize> {
+/// Room for what is computed of a block on the way; passes take the [`Rows`] they need.
+pub(super) struct Work<const N: usize>([[f64; N]; 14]);
+
+/// The first readings of it: rows of one length, so that loops over them are vectors.
+pub(super) struct Rows<'a> {
     /// Error of the terms, its slope, and a bound of how much that changes.
-    pub error: [f64; N],
-    pub slope: [f64; N],
-    pub bend: [f64; N],
+    pub error: &'a mut [f64],
+    pub slope: &'a mut [f64],
+    pub bend: &'a mut [f64],
     /// Of the term at hand.
-    pub factor: [f64; N],
-    pub value: [f64; N],
-    pub rise: [f64; N],
-    pub waves: [[f64; N]; 4],
+    pub factor: &'a mut [f64],
+    pub value: &'a mut [f64],
+    pub rise: &'a mut [f64],
+    pub waves: [&'a mut [f64]; 4],
     /// Of the search for the angle.
-    pub goal: [f64; N],
-    pub probe: [f64; N],
-    pub last: [f64; N],
-    pub open: [f64; N],
+    pub goal: &'a mut [f64],
+    pub probe: &'a mut [f64],
+    pub last: &'a mut [f64],
+    pub open: &'a mut [f64],
 }
 
 impl<const N: usize> Work<N> {
     fn new() -> Self {
-        let row = [0.0; N];
-        Self {
-            error: row,
-            slope: row,
-            bend: row,
-            factor: row,
-            value: row,
-            rise: row,
-            waves: [row; 4],
-            goal: row,
-            probe: row,
-            last: row,
-            open: row,
+        Self([[0.0; N]; 14])
+    }
+
+    /// Rows of `n` readings.
+    #[inline(always)]
+    pub fn rows(&mut self, n: usize) -> Rows<'_> {
+        let [
+            error,
+            slope,
+            bend,
+            factor,
+            value,
+            rise,
+            a,
+            b,
+            c,
+            d,
+            goal,
+            probe,
+            last,
+            open,
+        ] = self.0.each_mut().map(|row| &mut row[..n]);
+        Rows {
+            error,
+            slope,
+            bend,
+            factor,
+            value,
+            rise,
+            waves: [a, b, c, d],
+            goal,
+            probe,
+            last,
+            open,
         }
     }
 }

@@ -1,10 +1,11 @@
 //! Harmonics that a term multiplies: their sum and its slope over a block.
 
 use std::f64::consts::TAU;
+use std::sync::Arc;
 
 use super::form::Line;
 use crate::error::Error;
-use crate::kernel::{Evaluator, Quantity};
+use crate::kernel::{Evaluator, Pass, Quantity};
 use crate::readings::Argument;
 use crate::series::{HarmonicSeries, Shaft};
 
@@ -14,9 +15,9 @@ const SLOPE_TOLERANCE: f64 = 1e-9;
 /// A sum of harmonics without a constant, by a table where they repeat after a turn.
 #[derive(Debug)]
 pub(super) struct Lines {
-    value: Evaluator,
+    value: Pass,
     /// The slope over `steepest`, which is large where the period is small.
-    slope: Evaluator,
+    slope: Pass,
     steepest: f64,
     /// Bound of the second derivative.
     pub bend: f64,
@@ -42,21 +43,21 @@ impl Lines {
         };
         let shafts = series.shafts().iter().map(turned).collect();
         let slope = HarmonicSeries::new(period, 0.0, shafts)?;
+        let slope = Evaluator::new(slope, Argument::Reference);
+        let pass = |evaluator: Evaluator| {
+            evaluator.room()?;
+            Ok::<_, Error>(Pass::new(&Arc::new(evaluator), Quantity::Error))
+        };
         let bends = series
             .lines()
             .map(|line| (rate * line.order).powi(2) * line.amplitude());
-        let made = Self {
+        Ok(Self {
             bend: bends.sum(),
             steepness: series.slope_bound(),
             steepest: rate * highest,
-            value: Evaluator::new(series, Argument::Reference),
-            slope: Evaluator::new(slope, Argument::Reference).with_tolerance(SLOPE_TOLERANCE)?,
-        };
-        for part in [&made.value, &made.slope] {
-            part.room()?;
-            part.table(Quantity::Error);
-        }
-        Ok(made)
+            value: pass(Evaluator::new(series, Argument::Reference))?,
+            slope: pass(slope.with_tolerance(SLOPE_TOLERANCE)?)?,
+        })
     }
 
     /// Of lines of any order, each on a shaft of its own; `None` where there are none.
@@ -69,12 +70,12 @@ impl Lines {
 
     /// The sum at each of some angles.
     pub fn values(&self, x: &[f64], out: &mut [f64]) {
-        self.value.errors(x, out);
+        self.value.run(x, out);
     }
 
     /// Its slope there.
     pub fn slopes(&self, x: &[f64], out: &mut [f64]) {
-        self.slope.errors(x, out);
+        self.slope.run(x, out);
         for slope in out {
             *slope *= self.steepest;
         }

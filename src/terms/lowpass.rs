@@ -2,11 +2,10 @@
 
 use std::f64::consts::TAU;
 
-use super::block::Work;
+use super::block::{Rows, Work};
 use crate::angle::Period;
-use crate::kernel::waves;
+use crate::kernel::{InstructionSet, Wave};
 use crate::series::{HarmonicSeries, Shaft};
-use crate::simd::Lanes;
 
 /// Orders between fresh sines and cosines: rounding grows by about 1e-16 per turn of one.
 const RESEED: u32 = 32;
@@ -21,6 +20,7 @@ pub(super) struct LowPass {
     shafts: Vec<Shaft>,
     frequency: f64,
     damping: Option<f64>,
+    set: InstructionSet,
     /// Bound of the second derivative.
     bend: f64,
 }
@@ -38,20 +38,23 @@ impl LowPass {
             shafts: series.shafts().to_vec(),
             frequency,
             damping,
+            set: InstructionSet::best(),
             bend: (1.0 + gain.max(1.0)) * bends.sum::<f64>(),
         }
     }
 
     /// Adds it at angles `x` and such velocities.
     #[inline(always)]
-    pub fn add<L: Lanes, const N: usize>(&self, speeds: &[f64], x: &[f64], work: &mut Work<N>) {
+    pub fn add<const N: usize>(&self, speeds: &[f64], x: &[f64], steep: bool, work: &mut Work<N>) {
         let per_turn = 1.0 / self.period.value();
-        for i in 0..x.len() {
-            work.factor[i] = speeds[i] * per_turn / self.frequency;
-            work.bend[i] += self.bend;
+        let n = x.len();
+        let (Rows { factor, bend, .. }, speeds) = (work.rows(n), &speeds[..n]);
+        for i in 0..n {
+            factor[i] = speeds[i] * per_turn / self.frequency;
+            bend[i] += self.bend;
         }
         for shaft in &self.shafts {
-            self.add_shaft::<L, N>(shaft, x, work);
+            self.add_shaft(shaft, x, steep, work);
         }
     }
 
@@ -61,18 +64,27 @@ impl LowPass {
     /// A line of order m is multiplied by the gain g at `w = m * factor`; of
     /// `A cos + B sin = Re (A - jB) exp(j m x)` there remains the part `g - 1`.
     #[inline(always)]
-    fn add_shaft<L: Lanes, const N: usize>(&self, shaft: &Shaft, x: &[f64], work: &mut Work<N>) {
+    fn add_shaft<const N: usize>(&self, shaft: &Shaft, x: &[f64], steep: bool, work: &mut Work<N>) {
         let n = x.len();
-        let [sine, cosine, own_sine, own_cosine] = &mut work.waves;
-        let (sine, cosine) = (&mut sine[..n], &mut cosine[..n]);
-        let (own_sine, own_cosine) = (&mut own_sine[..n], &mut own_cosine[..n]);
-        waves::<L>(self.period, shaft.cycles, 1.0, x, own_sine, own_cosine);
+        let Rows {
+            error,
+            slope,
+            factor,
+            waves: [sine, cosine, own_sine, own_cosine],
+            ..
+        } = work.rows(n);
+        let wave = |order| Wave {
+            period: self.period,
+            cycles: shaft.cycles,
+            order,
+            x,
+        };
+        wave(1.0).sines(self.set, own_sine, own_cosine);
         let (mut at, mut seeded) = (0, 0);
         let unit = TAU / self.period.value();
         for (j, &order) in shaft.orders.iter().enumerate() {
             if j == 0 || order - at > MOST_GAP || order - seeded >= RESEED {
-                let k = f64::from(order);
-                waves::<L>(self.period, shaft.cycles, k, x, sine, cosine);
+                wave(f64::from(order)).sines(self.set, sine, cosine);
                 (at, seeded) = (order, order);
             }
             while at < order {
@@ -86,11 +98,13 @@ impl LowPass {
             let cycles = f64::from(order) * shaft.cycles;
             let (a, b, rate) = (shaft.cosine[j], shaft.sine[j], unit * cycles);
             for i in 0..n {
-                let (real, imaginary) = change(cycles * work.factor[i], self.damping);
+                let (real, imaginary) = change(cycles * factor[i], self.damping);
                 // (A - jB)(real + j imaginary) as new coefficients.
                 let (p, q) = (a * real + b * imaginary, b * real - a * imaginary);
-                work.error[i] += p * cosine[i] + q * sine[i];
-                work.slope[i] += rate * (q * cosine[i] - p * sine[i]);
+                error[i] += p * cosine[i] + q * sine[i];
+                if steep {
+                    slope[i] += rate * (q * cosine[i] - p * sine[i]);
+                }
             }
         }
     }
@@ -102,9 +116,10 @@ impl LowPass {
 #[inline(always)]
 fn change(w: f64, damping: Option<f64>) -> (f64, f64) {
     let Some(damping) = damping else {
-        return (-w * w / (1.0 + w * w), -w / (1.0 + w * w));
+        let inverse = 1.0 / (1.0 + w * w);
+        return (-w * w * inverse, -w * inverse);
     };
     let (stiff, loss) = (1.0 - w * w, 2.0 * damping * w);
-    let size = stiff * stiff + loss * loss;
-    (stiff / size - 1.0, -loss / size)
+    let inverse = 1.0 / (stiff * stiff + loss * loss);
+    (stiff * inverse - 1.0, -loss * inverse)
 }

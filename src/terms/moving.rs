@@ -334,12 +334,13 @@ impl Terms {
             friction[i] = travel.held(&self.elements);
         }
         let n = padded::<N>(len);
-        work.value[..n].fill(0.0);
+        let value = work.rows(n).value;
+        value.fill(0.0);
         if let Some(place) = &self.place {
-            place.values(&seen[..n], &mut work.value[..n]);
+            place.values(&seen[..n], value);
         }
         for i in 0..len {
-            out[i] += direction[i] * (self.play + work.value[i]) + friction[i];
+            out[i] += direction[i] * (self.play + value[i]) + friction[i];
         }
     }
 }

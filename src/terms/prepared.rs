@@ -9,12 +9,16 @@ use super::signals::Signal;
 use super::smooth::Smooth;
 use super::travel::Element;
 use crate::error::Error;
-use crate::kernel::{Argument, Evaluator, InstructionSet, Quantity};
+use crate::kernel::{Argument, Evaluator, InstructionSet, Pass, Quantity};
+use crate::once::Once;
 
 /// A series and its terms: immutable, shared by its correctors.
 #[derive(Debug)]
 pub struct Terms {
     pub(super) evaluator: Arc<Evaluator>,
+    /// The series' own corrections, and its errors once they are asked for.
+    pub(super) corrections: Pass,
+    errors: Once<Pass>,
     /// What is computed on.
     pub(super) set: InstructionSet,
     pub(super) smooth: Vec<Smooth>,
@@ -36,8 +40,9 @@ impl Terms {
     pub fn new(evaluator: Arc<Evaluator>, terms: &[Term]) -> Result<Self, Error> {
         let period = evaluator.series().period().value();
         evaluator.check_invertible()?;
-        evaluator.table(Quantity::Correction);
         let mut ready = Self {
+            errors: Once::default(),
+            corrections: Pass::new(&evaluator, Quantity::Correction),
             evaluator,
             set: InstructionSet::best(),
             smooth: Vec::new(),
@@ -122,6 +127,11 @@ impl Terms {
     pub fn takes(&self, signal: Signal) -> bool {
         let travels = matches!(signal, Signal::Direction | Signal::Velocity) && self.has_travel;
         travels || self.needs.iter().any(|(needed, _)| *needed == signal)
+    }
+
+    pub(super) fn errors(&self) -> &Pass {
+        let make = || Pass::new(&self.evaluator, Quantity::Error);
+        self.errors.get_or_init(make)
     }
 
     /// The signal whose sign is the direction of travel, among those given.

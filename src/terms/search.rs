@@ -1,9 +1,9 @@
 //! The angles at which the series and its terms add up to what is indicated.
 
-use super::block::{Given, Work};
+use super::block::{Given, Rows, Work};
 use super::exponential::exp;
 use super::prepared::Terms;
-use crate::simd::{InstructionSet, Kernel, Lanes, dispatch, dispatch_one};
+use crate::simd::{InstructionSet, Kernel, Lanes, Portable, dispatch};
 
 /// Steps before the signals are taken to leave no unique angle; as a rule two or three do.
 const MOST_STEPS: usize = 60;
@@ -46,7 +46,8 @@ pub(super) enum Friction<'a> {
 /// Runs a pass over a block or, one lane wide, over a single reading.
 pub(super) fn pass<const N: usize>(set: InstructionSet, kernel: impl Kernel) {
     if N == 1 {
-        dispatch_one(set, kernel);
+        // No sum of products is rounded once here: it is the same on every processor.
+        kernel.run::<Portable<1, false>>();
     } else {
         dispatch(set, kernel);
     }
@@ -97,19 +98,24 @@ impl Terms {
         x: &mut [f64],
         work: &mut Work<N>,
     ) {
-        for i in 0..x.len() {
-            let is_pulled = self.play != 0.0;
-            let play = if is_pulled {
-                self.play * pull.direction[i]
-            } else {
-                0.0
-            };
-            work.goal[i] = goal[i] - play;
+        let n = x.len();
+        let (own, goal, direction) = (work.rows(n).goal, &goal[..n], &pull.direction[..n]);
+        own.copy_from_slice(goal);
+        if self.play != 0.0 {
+            for i in 0..n {
+                own[i] -= self.play * direction[i];
+            }
         }
-        let is_plain =
-            !self.is_shaped && self.place.is_none() && matches!(pull.friction, Friction::None);
+        if let Friction::Held(error) = pull.friction {
+            let error = &error[..n];
+            for i in 0..n {
+                own[i] -= error[i];
+            }
+        }
+        let is_pulled = matches!(pull.friction, Friction::From { .. });
+        let is_plain = !self.is_shaped && self.place.is_none() && !is_pulled;
         if is_plain {
-            return self.invert(&work.goal[..x.len()], x);
+            return self.invert(own, x);
         }
         let search = Search {
             terms: self,
@@ -126,7 +132,7 @@ impl Terms {
         if self.is_indicated() {
             x.copy_from_slice(goal);
         } else {
-            self.evaluator.corrections(goal, x);
+            self.corrections.run(goal, x);
         }
     }
 }
@@ -163,9 +169,9 @@ impl<const N: usize> Kernel for Shape<'_, N> {
             x,
             work,
         } = self;
-        work.error[..x.len()].fill(0.0);
+        work.rows(x.len()).error.fill(0.0);
         for term in &terms.smooth {
-            term.add_shape::<L, N>(signals, x, false, work);
+            term.add_shape(signals, x, false, work);
         }
     }
 }
@@ -182,7 +188,7 @@ impl<const N: usize> Search<'_, N> {
     /// Error of terms and travel at the angles so far, and where `steep` its slope and a
     /// bound of its second derivative.
     #[inline(always)]
-    fn fill<L: Lanes>(&mut self, steep: bool) {
+    fn fill(&mut self, steep: bool) {
         let Self {
             terms,
             pull,
@@ -193,44 +199,40 @@ impl<const N: usize> Search<'_, N> {
         } = self;
         let x: &[f64] = x;
         let n = x.len();
-        work.error[..n].fill(0.0);
-        work.slope[..n].fill(0.0);
-        work.bend[..n].fill(0.0);
+        let rows = work.rows(n);
+        for row in [rows.error, rows.slope, rows.bend] {
+            row.fill(0.0);
+        }
         for term in &terms.smooth {
-            term.add_shape::<L, N>(signals, x, steep, work);
+            term.add_shape(signals, x, steep, work);
         }
         if let Some(place) = &terms.place {
-            work.factor[..n].copy_from_slice(pull.direction);
+            work.rows(n).factor.copy_from_slice(pull.direction);
             work.add_lines(place, x, steep);
         }
-        match pull.friction {
-            Friction::None => {}
-            Friction::Held(error) => {
+        if let Friction::From {
+            place,
+            direction,
+            state,
+        } = pull.friction
+        {
+            let near = KINK * terms.period();
+            let rows = work.rows(n);
+            let (errors, slopes, bends) = (rows.error, rows.slope, rows.bend);
+            for (element, &begun) in terms.elements.iter().zip(state) {
+                let (size, per_length) = (element.amplitude, 1.0 / element.length);
                 for i in 0..n {
-                    work.error[i] += error[i];
-                }
-            }
-            Friction::From {
-                place,
-                direction,
-                state,
-            } => {
-                let near = KINK * terms.period();
-                for (element, &begun) in terms.elements.iter().zip(state) {
-                    let (size, per_length) = (element.amplitude, 1.0 / element.length);
-                    for i in 0..n {
-                        let way = (x[i] - place) * direction;
-                        let way = if way > 0.0 { way } else { 0.0 };
-                        let left = (direction - begun) * exp(-way * per_length);
-                        work.error[i] += size * (direction - left);
-                        let slope = size * left * per_length;
-                        work.slope[i] += if way > 0.0 { slope * direction } else { 0.0 };
-                        work.bend[i] += if way > near {
-                            slope.abs() * per_length
-                        } else {
-                            f64::INFINITY
-                        };
-                    }
+                    let way = (x[i] - place) * direction;
+                    let way = if way > 0.0 { way } else { 0.0 };
+                    let left = (direction - begun) * exp(-way * per_length);
+                    errors[i] += size * (direction - left);
+                    let slope = size * left * per_length;
+                    slopes[i] += if way > 0.0 { slope * direction } else { 0.0 };
+                    bends[i] += if way > near {
+                        slope.abs() * per_length
+                    } else {
+                        f64::INFINITY
+                    };
                 }
             }
         }
@@ -240,81 +242,113 @@ impl<const N: usize> Search<'_, N> {
 impl<const N: usize> Kernel for Search<'_, N> {
     #[inline(always)]
     fn run<L: Lanes>(mut self) {
-        let terms = self.terms;
-        let (n, period) = (self.x.len(), terms.period());
+        let (terms, n) = (self.terms, self.x.len());
         // The series is small beside the lengths on which terms change: a good start.
-        let (constant, steepness) = if terms.is_indicated() {
-            (0.0, 0.0)
+        let constant = if terms.is_indicated() {
+            0.0
         } else {
-            (terms.evaluator.series().constant(), terms.steepness)
+            terms.evaluator.series().constant()
         };
+        let (x, Rows { goal, open, .. }) = (&mut self.x[..n], self.work.rows(n));
         for i in 0..n {
-            let goal = self.work.goal[i];
-            self.x[i] = goal - constant;
-            self.work.open[i] = if goal.is_finite() { 1.0 } else { 0.0 };
-            self.work.last[i] = f64::NAN;
+            x[i] = goal[i] - constant;
+            open[i] = if goal[i].is_finite() { 1.0 } else { 0.0 };
         }
-        let (solved, near) = (SOLVED * period, NEAR * period);
-        for count in 0..=MOST_STEPS {
-            self.fill::<L>(count > 0);
-            let x = &mut *self.x;
-            let Work {
-                error,
-                slope,
-                bend,
-                value,
-                goal,
-                probe,
-                last,
-                open,
-                ..
-            } = &mut *self.work;
-            for i in 0..n {
-                value[i] = goal[i] - error[i];
-            }
-            terms.invert(&value[..n], &mut probe[..n]);
-            if count == 0 {
-                x.copy_from_slice(&probe[..n]);
-                continue;
-            }
-            let mut is_open = false;
-            for i in 0..n {
-                let tolerance = solved + 4.0 * f64::EPSILON * goal[i].abs();
-                let step = (probe[i] - x[i]) / (1.0 + slope[i]);
-                let size = step.abs();
-                let ratio = step / last[i];
-                let on = x[i] + step;
-                let carried = on + step * ratio / (1.0 - ratio);
-                let next = if ratio.abs() < 0.5 { carried } else { on };
-                // What is left is smaller by both slopes, and as much as was seen (NaN at
-                // first); or by a bound, four times as large as it need be.
-                let both = slope[i].abs() * steepness;
-                let seen = if ratio.abs() > both {
-                    ratio.abs()
-                } else {
-                    both
-                };
-                let is_seen = !ratio.is_nan() & (size * seen <= tolerance);
-                let is_bound = (slope[i].abs() < GENTLE)
-                    & (steepness < 1.0)
-                    & (size < near)
-                    & (4.0 * size * (both + size * bend[i]) <= tolerance);
-                let is_done = (size <= tolerance) | is_seen | is_bound;
-                let unique = if slope[i].abs() < 1.0 { next } else { f64::NAN };
-                let next = if is_done { unique } else { next };
-                let goes_on = !is_done & !next.is_nan();
-                x[i] = if open[i] > 0.0 { next } else { x[i] };
-                open[i] = if goes_on { open[i] } else { 0.0 };
-                last[i] = step;
-                is_open |= open[i] > 0.0;
-            }
+        self.fill(false);
+        self.probe();
+        self.x.copy_from_slice(self.work.rows(n).probe);
+        for count in 0..MOST_STEPS {
+            self.fill(true);
+            self.probe();
+            // Nothing has been seen at first, which saves two divisions.
+            let is_open = if count == 0 {
+                self.step(true)
+            } else {
+                self.step(false)
+            };
             if !is_open {
                 return;
             }
         }
+        let open = self.work.rows(n).open;
         for i in 0..n {
-            let is_lost = self.work.open[i] > 0.0;
-            self.x[i] = if is_lost { f64::NAN } else { self.x[i] };
+            self.x[i] = if open[i] > 0.0 { f64::NAN } else { self.x[i] };
         }
+    }
+}
+
+impl<const N: usize> Search<'_, N> {
+    /// Angles at which the series makes up for the terms as they are.
+    #[inline(always)]
+    fn probe(&mut self) {
+        let n = self.x.len();
+        let Rows {
+            error,
+            value,
+            goal,
+            probe,
+            ..
+        } = self.work.rows(n);
+        for i in 0..n {
+            value[i] = goal[i] - error[i];
+        }
+        self.terms.invert(value, probe);
+    }
+
+    /// A step from each angle that is not found yet; true where one is not found then.
+    #[inline(always)]
+    fn step(&mut self, is_first: bool) -> bool {
+        let (terms, period) = (self.terms, self.terms.period());
+        let steepness = if terms.is_indicated() {
+            0.0
+        } else {
+            terms.steepness
+        };
+        let (solved, near) = (SOLVED * period, NEAR * period);
+        let n = self.x.len();
+        let x = &mut self.x[..n];
+        let Rows {
+            slope,
+            bend,
+            goal,
+            probe,
+            last,
+            open,
+            ..
+        } = self.work.rows(n);
+        let mut is_open = false;
+        for i in 0..n {
+            let tolerance = solved + 4.0 * f64::EPSILON * goal[i].abs();
+            let step = (probe[i] - x[i]) / (1.0 + slope[i]);
+            let size = step.abs();
+            let ratio = if is_first { f64::NAN } else { step / last[i] };
+            let shrinks = ratio.abs() < 0.5;
+            let further = if shrinks {
+                step * ratio / (1.0 - ratio)
+            } else {
+                0.0
+            };
+            let next = x[i] + step + further;
+            // What is left is smaller by both slopes, and as much as was seen (NaN at
+            // first); or by a bound, four times as large as it need be.
+            let both = slope[i].abs() * steepness;
+            let most = if ratio.abs() > both {
+                ratio.abs()
+            } else {
+                both
+            };
+            let is_seen = !ratio.is_nan() & (size * most <= tolerance);
+            let is_gentle = (slope[i].abs() < GENTLE) & (steepness < 1.0) & (size < near);
+            let is_bound = is_gentle & (4.0 * size * (both + size * bend[i]) <= tolerance);
+            let is_done = (size <= tolerance) | is_seen | is_bound;
+            let unique = if slope[i].abs() < 1.0 { next } else { f64::NAN };
+            let next = if is_done { unique } else { next };
+            let goes_on = !is_done & !next.is_nan();
+            x[i] = if open[i] > 0.0 { next } else { x[i] };
+            open[i] = if goes_on { open[i] } else { 0.0 };
+            last[i] = step;
+            is_open |= open[i] > 0.0;
+        }
+        is_open
     }
 }

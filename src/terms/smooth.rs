@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use super::block::{Given, Work};
+use super::block::{Given, Rows, Work};
 use super::exponential::exp;
 use super::form::{Form, Line};
 use super::lines::{Lines, shafts};
@@ -10,9 +10,8 @@ use super::lowpass::LowPass;
 use super::signals::Signal;
 use crate::angle::Period;
 use crate::error::Error;
-use crate::kernel::phases;
+use crate::kernel::{InstructionSet, Wave};
 use crate::series::{HarmonicSeries, Shaft};
-use crate::simd::Lanes;
 
 /// A form that knows no past: what it adds whatever the angle, and what depends on it.
 #[derive(Debug)]
@@ -33,6 +32,7 @@ pub(super) enum Smooth {
     },
     Filter(LowPass),
     Bump {
+        set: InstructionSet,
         period: Period,
         place: f64,
         width: f64,
@@ -149,6 +149,7 @@ impl Smooth {
                 height,
                 cycles,
             } => Self::Bump {
+                set: InstructionSet::best(),
                 period: turn,
                 place,
                 width,
@@ -207,7 +208,7 @@ impl Smooth {
     /// Adds to `work` what it is at angles `x` beyond the level, and where `STEEP` its
     /// slope and a bound of its second derivative as far as the search goes.
     #[inline(always)]
-    pub(super) fn add_shape<L: Lanes, const N: usize>(
+    pub(super) fn add_shape<const N: usize>(
         &self,
         signals: &Given<N>,
         x: &[f64],
@@ -224,8 +225,9 @@ impl Smooth {
                 ..
             } => {
                 let values = &signals.of(signal)[..n];
+                let factors = work.rows(n).factor;
                 for i in 0..n {
-                    work.factor[i] = factor(values[i], origin, absolute);
+                    factors[i] = factor(values[i], origin, absolute);
                 }
                 work.add_lines(lines, x, steep);
             }
@@ -236,50 +238,72 @@ impl Smooth {
                 period,
             } => {
                 let loads = &signals.of(signal)[..n];
-                moment.values(x, &mut work.value[..n]);
+                let Rows {
+                    error,
+                    slope,
+                    bend,
+                    value,
+                    rise,
+                    ..
+                } = work.rows(n);
+                moment.values(x, value);
                 if steep {
-                    moment.slopes(x, &mut work.rise[..n]);
+                    moment.slopes(x, rise);
                 }
                 let (one, rate) = (1.0 / period, TAU / period);
                 for i in 0..n {
-                    let (error, slope) = spring.bent(loads[i] * (work.value[i] * one));
-                    work.error[i] += error;
+                    let (more, steeper) = spring.bent(loads[i] * (value[i] * one));
+                    error[i] += more;
                     if steep {
-                        work.slope[i] += slope * loads[i] * (work.rise[i] * one);
+                        slope[i] += steeper * loads[i] * (rise[i] * one);
                         let load = loads[i].abs();
                         let most = spring.linear.abs() + 9.0 * spring.cubic.abs() * load * load;
-                        work.bend[i] += most * load * rate * rate;
+                        bend[i] += most * load * rate * rate;
                     }
                 }
                 if steep && spring.beyond != 0.0 {
                     // It bends at once at the knee.
-                    work.bend[..n].fill(f64::INFINITY);
+                    bend.fill(f64::INFINITY);
                 }
             }
             Self::Filter(ref filter) => {
-                filter.add::<L, N>(signals.of(Signal::Velocity), x, work);
+                filter.add(signals.of(Signal::Velocity), x, steep, work);
             }
             Self::Bump {
+                set,
                 period,
                 place,
                 width,
                 height,
                 cycles,
             } => {
-                phases::<L>(period, cycles, x, &mut work.value[..n]);
+                let wave = Wave {
+                    period,
+                    cycles,
+                    order: 1.0,
+                    x,
+                };
+                let Rows {
+                    error,
+                    slope,
+                    bend,
+                    value,
+                    ..
+                } = work.rows(n);
+                wave.phases(set, value);
                 let turn = period.value();
                 let centre = period.wrap(place) / turn;
                 let (per_width, rate) = (turn / width, cycles / width);
                 for i in 0..n {
-                    let away = work.value[i] - centre;
+                    let away = value[i] - centre;
                     let whole = if away > 0.5 { 1.0 } else { 0.0 };
                     let whole = if away <= -0.5 { -1.0 } else { whole };
                     let away = (away - whole) * per_width;
-                    let error = height * exp(-0.5 * away * away);
-                    work.error[i] += error;
+                    let more = height * exp(-0.5 * away * away);
+                    error[i] += more;
                     if steep {
-                        work.slope[i] -= error * away * rate;
-                        work.bend[i] += height.abs() * rate * rate;
+                        slope[i] -= more * away * rate;
+                        bend[i] += height.abs() * rate * rate;
                     }
                 }
             }
@@ -289,16 +313,18 @@ impl Smooth {
                 stop,
                 near,
             } => {
+                let rows = work.rows(n);
+                let (errors, slopes, bends) = (rows.error, rows.slope, rows.bend);
                 let middle = 0.5 * (start + stop);
                 for i in 0..n {
                     let held = if x[i] < start { start } else { x[i] };
                     let held = if held > stop { stop } else { held };
-                    work.error[i] += slope * (held - middle);
+                    errors[i] += slope * (held - middle);
                     if steep {
                         let inside = start <= x[i] && x[i] <= stop;
-                        work.slope[i] += if inside { slope } else { 0.0 };
+                        slopes[i] += if inside { slope } else { 0.0 };
                         let away = (x[i] - start).abs().min((x[i] - stop).abs());
-                        work.bend[i] += if away > near { 0.0 } else { f64::INFINITY };
+                        bends[i] += if away > near { 0.0 } else { f64::INFINITY };
                     }
                 }
             }
@@ -312,15 +338,24 @@ impl<const N: usize> Work<N> {
     #[inline(always)]
     pub(super) fn add_lines(&mut self, lines: &Lines, x: &[f64], steep: bool) {
         let n = x.len();
-        lines.values(x, &mut self.value[..n]);
+        let Rows {
+            error,
+            slope,
+            bend,
+            factor,
+            value,
+            rise,
+            ..
+        } = self.rows(n);
+        lines.values(x, value);
         for i in 0..n {
-            self.error[i] += self.factor[i] * self.value[i];
+            error[i] += factor[i] * value[i];
         }
         if steep {
-            lines.slopes(x, &mut self.rise[..n]);
+            lines.slopes(x, rise);
             for i in 0..n {
-                self.slope[i] += self.factor[i] * self.rise[i];
-                self.bend[i] += self.factor[i].abs() * lines.bend;
+                slope[i] += factor[i] * rise[i];
+                bend[i] += factor[i].abs() * lines.bend;
             }
         }
     }

@@ -1,6 +1,6 @@
 //! Readings that do not depend on those before: a block of them at once.
 
-use super::block::{Block, Given, Work, padded};
+use super::block::{Block, Given, padded};
 use super::prepared::Terms;
 use super::search::{Friction, Pull};
 use super::signals::Signal;
@@ -18,13 +18,13 @@ impl Terms {
             work,
             ..
         } = block;
-        let (x, goal) = (&x[..n], &mut goal[..n]);
-        self.fill_delayed(signals, &mut delayed[..n]);
-        let level = &mut work.value[..n];
+        let (x, goal, delayed) = (&x[..n], &mut goal[..n], &mut delayed[..n]);
+        self.fill_delayed(signals, delayed);
+        let level = work.rows(n).value;
         self.fill_level(signals, level);
         // The series is undone first where its argument is the indicated angle.
         if self.is_indicated() {
-            self.evaluator.corrections(x, goal);
+            self.corrections.run(x, goal);
         } else {
             goal.copy_from_slice(x);
         }
@@ -39,7 +39,7 @@ impl Terms {
         if self.delay == 0.0 {
             return delayed.fill(0.0);
         }
-        let velocity = signals.of(Signal::Velocity);
+        let velocity = &signals.of(Signal::Velocity)[..delayed.len()];
         for i in 0..delayed.len() {
             delayed[i] = velocity[i] * self.delay;
         }
@@ -63,6 +63,7 @@ impl Terms {
             friction: Friction::None,
         };
         self.find(&goal[..n], &pull, signals, &mut out[..n], work);
+        let (out, delayed) = (&mut out[..n], &delayed[..n]);
         for i in 0..n {
             out[i] += delayed[i];
         }
@@ -84,13 +85,15 @@ impl Terms {
         } = block;
         self.fill_delayed(signals, &mut delayed[..n]);
         let (seen, level) = (&mut onward[..n], &mut goal[..n]);
+        let x = &x[..n];
         for i in 0..n {
             seen[i] = x[i] - delayed[i];
         }
-        self.evaluator.errors(seen, &mut out[..n]);
+        self.errors().run(seen, &mut out[..n]);
         self.fill_level(signals, level);
         self.fill_shape(signals, seen, work);
-        let Work { error, .. } = work;
+        let (out, error) = (&mut out[..n], work.rows(n).error);
+        let delayed = &delayed[..n];
         for i in 0..n {
             out[i] = out[i] + level[i] + error[i] - delayed[i];
         }
