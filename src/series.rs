@@ -159,6 +159,15 @@ impl HarmonicSeries {
         self.shafts.iter().flat_map(shaft_lines)
     }
 
+    /// An upper bound of `|d^2 error / dx^2|` over all angles: the sum of `(k f)^2 C_k`.
+    pub fn bend_bound(&self) -> f64 {
+        let rate = TAU / self.period.value();
+        let bends = self
+            .lines()
+            .map(|line| (rate * line.order).powi(2) * line.amplitude());
+        bends.sum()
+    }
+
     /// An upper bound of `|d error / dx|` over all angles.
     ///
     /// Cheap first: `sum of k f C_k`. Where that reaches 1 the slope is sampled on a

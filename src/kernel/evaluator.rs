@@ -64,6 +64,8 @@ pub struct Evaluator {
     lines: usize,
     pub(super) reach: f64,
     pub(super) slope_bound: f64,
+    /// Bound of the second derivative.
+    bend: f64,
     pub(super) best: InstructionSet,
     pub(super) exact_error: Exact,
     exact_slope: Exact,
@@ -78,6 +80,7 @@ impl Evaluator {
             lines: series.lines().count(),
             reach: series.amplitude_sum(),
             slope_bound: series.slope_bound(),
+            bend: series.bend_bound(),
             exact_error: Exact::error(&series),
             exact_slope: Exact::slope(&series),
             series,
@@ -341,6 +344,7 @@ impl Evaluator {
             error: &self.exact_error,
             slope: (self.argument == Argument::Reference).then_some(&self.exact_slope),
             reach: self.reach,
+            bend: (self.slope_bound <= 0.5).then_some(self.bend),
             set,
         };
         batch.map_blocks(|x, out| {

@@ -28,6 +28,16 @@ pub(super) struct Given<const N: usize> {
     pub first: usize,
 }
 
+impl Given<1> {
+    /// Those of one reading.
+    pub fn one(signals: &Signals) -> Self {
+        Self {
+            values: Signal::ALL.map(|signal| [signals.get(signal).unwrap_or(f64::NAN)]),
+            first: 0,
+        }
+    }
+}
+
 impl<const N: usize> Given<N> {
     fn new() -> Self {
         Self {
@@ -108,7 +118,7 @@ impl Block<1> {
     pub fn one(x: f64, signals: &Signals) -> Self {
         let mut block = Self::new();
         block.x = [x];
-        block.signals.values = Signal::ALL.map(|signal| [signals.get(signal).unwrap_or(f64::NAN)]);
+        block.signals = Given::one(signals);
         block
     }
 }
@@ -135,7 +145,7 @@ pub(super) struct Rows<'a> {
 }
 
 impl<const N: usize> Work<N> {
-    fn new() -> Self {
+    pub fn new() -> Self {
         Self([[0.0; N]; 14])
     }
 

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use super::block::{BLOCK, Block};
+use super::block::{BLOCK, Block, Given};
 use super::prepared::Terms;
 use super::signals::{Columns, Signal, Signals};
 use super::travel::Travel;
@@ -204,21 +204,16 @@ impl Terms {
         signals: &Signals,
         way: Option<Signal>,
     ) -> f64 {
-        let mut block = Block::one(x, signals);
         let is_error = quantity != Quantity::Correction;
         if is_error && !self.is_indicated() {
+            let mut block = Block::one(x, signals);
             self.error_still(&mut block, 1);
             if self.has_travel {
                 self.error_moving(travel, &mut block, 1, way);
             }
             return block.out[0];
         }
-        let corrected = if self.has_travel {
-            self.correct_one(travel, &mut block, way)
-        } else {
-            self.correct_still(&mut block, 1);
-            block.out[0]
-        };
+        let corrected = self.correct_one(travel, x, &Given::one(signals), way);
         if is_error { x - corrected } else { corrected }
     }
 }

@@ -48,11 +48,8 @@ impl Lines {
             evaluator.room()?;
             Ok::<_, Error>(Pass::new(&Arc::new(evaluator), Quantity::Error))
         };
-        let bends = series
-            .lines()
-            .map(|line| (rate * line.order).powi(2) * line.amplitude());
         Ok(Self {
-            bend: bends.sum(),
+            bend: series.bend_bound(),
             steepness: series.slope_bound(),
             steepest: rate * highest,
             value: pass(Evaluator::new(series, Argument::Reference))?,

@@ -29,17 +29,13 @@ impl LowPass {
     pub fn new(series: &HarmonicSeries, frequency: f64, damping: Option<f64>) -> Self {
         // What a line is multiplied by is at most the greatest gain and 1.
         let gain = damping.map_or(0.0, |d| 0.5 / (d * (1.0 - (d * d).min(0.5)).sqrt()));
-        let rate = TAU / series.period().value();
-        let bends = series
-            .lines()
-            .map(|line| (rate * line.order).powi(2) * line.amplitude());
         Self {
             period: series.period(),
             shafts: series.shafts().to_vec(),
             frequency,
             damping,
             set: InstructionSet::best(),
-            bend: (1.0 + gain.max(1.0)) * bends.sum::<f64>(),
+            bend: (1.0 + gain.max(1.0)) * series.bend_bound(),
         }
     }
 

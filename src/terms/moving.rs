@@ -4,7 +4,7 @@
 //! solved as if the joint went on as it does; the readings are then gone through in their
 //! order and taken as long as that was so.
 
-use super::block::{BLOCK, Block, padded};
+use super::block::{BLOCK, Block, Given, padded};
 use super::prepared::Terms;
 use super::search::{Friction, Pull};
 use super::signals::Signal;
@@ -15,30 +15,37 @@ use crate::kernel::Quantity;
 const LEAST: usize = 4;
 
 impl Terms {
-    /// The true angle behind the reading of a block; `way` is the signal whose sign is the
-    /// direction of travel.
+    /// The true angle behind one reading; `way` is the signal whose sign is the direction
+    /// of travel.
     pub(super) fn correct_one(
         &self,
         travel: &mut Travel,
-        block: &mut Block<1>,
+        indicated: f64,
+        signals: &Given<1>,
         way: Option<Signal>,
     ) -> f64 {
-        self.aim(block, 1);
-        if block.goal[0].is_nan() {
+        let (goal, delayed) = self.aim_one(indicated, signals);
+        if goal.is_nan() {
             return f64::NAN;
         }
-        let delayed = block.delayed[0];
+        if !self.has_travel {
+            let pull = Pull {
+                direction: &[0.0],
+                friction: Friction::None,
+            };
+            return self.find_one(goal, &pull, signals) + delayed;
+        }
         let constant = self.evaluator.series().constant();
-        travel.align(block.x[0] - constant, self.period());
+        travel.align(indicated - constant, self.period());
         if let Some(signal) = way {
-            let signal = block.signals.of(signal)[0];
+            let signal = signals.of(signal)[0];
             if signal.is_nan() {
                 return f64::NAN;
             }
             let heading = travel.heading(signal);
-            let mut x = self.ahead(travel, heading, block);
+            let mut x = self.ahead(travel, heading, goal, signals);
             if !self.elements.is_empty() && travel.is_known() && !travel.goes_on(heading, x) {
-                x = self.behind(travel, heading, block);
+                x = self.behind(travel, heading, goal, signals);
             }
             if !x.is_nan() {
                 travel.advance(&self.elements, heading, x);
@@ -46,7 +53,7 @@ impl Terms {
             return x + delayed;
         }
         if !travel.is_known() {
-            let x = self.ahead(travel, NOWHERE, block);
+            let x = self.ahead(travel, NOWHERE, goal, signals);
             if !x.is_nan() {
                 travel.advance(&self.elements, NOWHERE, x);
             }
@@ -56,7 +63,7 @@ impl Terms {
         let first = if travel.direction < 0.0 { -1.0 } else { 1.0 };
         for direction in [first, -first] {
             let heading = travel.heading(direction);
-            let x = self.ahead(travel, heading, block);
+            let x = self.ahead(travel, heading, goal, signals);
             if x.is_nan() {
                 return x;
             }
@@ -69,25 +76,17 @@ impl Terms {
     }
 
     /// The angle of a reading, if the joint went on with a heading.
-    fn ahead(&self, travel: &mut Travel, heading: Heading, block: &mut Block<1>) -> f64 {
+    fn ahead(&self, travel: &mut Travel, heading: Heading, goal: f64, signals: &Given<1>) -> f64 {
         let pull = Pull {
             direction: &[heading.direction],
             friction: travel.ahead(&self.elements, heading),
         };
-        let Block {
-            signals,
-            goal,
-            onward,
-            work,
-            ..
-        } = block;
-        self.find(goal, &pull, signals, onward, work);
-        onward[0]
+        self.find_one(goal, &pull, signals)
     }
 
     /// The angle of a reading, if it did not: friction is what it was or, while turning,
     /// goes on in the old direction.
-    fn behind(&self, travel: &Travel, heading: Heading, block: &mut Block<1>) -> f64 {
+    fn behind(&self, travel: &Travel, heading: Heading, goal: f64, signals: &Given<1>) -> f64 {
         let held = [travel.held(&self.elements)];
         let pull = Pull {
             direction: &[heading.direction],
@@ -97,15 +96,7 @@ impl Terms {
                 Friction::Held(&held)
             },
         };
-        let Block {
-            signals,
-            goal,
-            onward,
-            work,
-            ..
-        } = block;
-        self.find(goal, &pull, signals, onward, work);
-        onward[0]
+        self.find_one(goal, &pull, signals)
     }
 
     /// True angles behind the first `len` readings of a block.

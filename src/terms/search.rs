@@ -98,8 +98,37 @@ impl Terms {
         x: &mut [f64],
         work: &mut Work<N>,
     ) {
-        let n = x.len();
-        let (own, goal, direction) = (work.rows(n).goal, &goal[..n], &pull.direction[..n]);
+        let own = work.rows(x.len()).goal;
+        if self.is_pulled_alone(goal, pull, own) {
+            return self.invert(own, x);
+        }
+        let search = Search {
+            terms: self,
+            pull,
+            signals,
+            x,
+            work,
+        };
+        pass::<N>(self.set, search);
+    }
+
+    /// The same of one reading.
+    pub(super) fn find_one(&self, goal: f64, pull: &Pull<'_>, signals: &Given<1>) -> f64 {
+        let (mut own, mut x) = ([0.0], [0.0]);
+        if self.is_pulled_alone(&[goal], pull, &mut own) {
+            self.invert(&own, &mut x);
+        } else {
+            self.find(&[goal], pull, signals, &mut x, &mut Work::new());
+        }
+        x[0]
+    }
+
+    /// Takes off a goal what travel adds at every angle; true where nothing else depends on
+    /// the angle.
+    #[inline]
+    fn is_pulled_alone(&self, goal: &[f64], pull: &Pull<'_>, own: &mut [f64]) -> bool {
+        let n = own.len();
+        let (goal, direction) = (&goal[..n], &pull.direction[..n]);
         own.copy_from_slice(goal);
         if self.play != 0.0 {
             for i in 0..n {
@@ -112,19 +141,8 @@ impl Terms {
                 own[i] -= error[i];
             }
         }
-        let is_pulled = matches!(pull.friction, Friction::From { .. });
-        let is_plain = !self.is_shaped && self.place.is_none() && !is_pulled;
-        if is_plain {
-            return self.invert(own, x);
-        }
-        let search = Search {
-            terms: self,
-            pull,
-            signals,
-            x,
-            work,
-        };
-        pass::<N>(self.set, search);
+        let is_free = !matches!(pull.friction, Friction::From { .. });
+        is_free && !self.is_shaped && self.place.is_none()
     }
 
     /// The inverse of the series, where its argument is the true angle.

@@ -34,7 +34,8 @@ pub(super) enum Smooth {
     Bump {
         set: InstructionSet,
         period: Period,
-        place: f64,
+        /// In turns.
+        centre: f64,
         width: f64,
         height: f64,
         cycles: f64,
@@ -151,7 +152,7 @@ impl Smooth {
             } => Self::Bump {
                 set: InstructionSet::best(),
                 period: turn,
-                place,
+                centre: turn.wrap(place) / period,
                 width,
                 height,
                 cycles,
@@ -272,7 +273,7 @@ impl Smooth {
             Self::Bump {
                 set,
                 period,
-                place,
+                centre,
                 width,
                 height,
                 cycles,
@@ -292,7 +293,6 @@ impl Smooth {
                 } = work.rows(n);
                 wave.phases(set, value);
                 let turn = period.value();
-                let centre = period.wrap(place) / turn;
                 let (per_width, rate) = (turn / width, cycles / width);
                 for i in 0..n {
                     let away = value[i] - centre;

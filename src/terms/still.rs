@@ -1,6 +1,6 @@
 //! Readings that do not depend on those before: a block of them at once.
 
-use super::block::{Block, Given, padded};
+use super::block::{BLOCK, Block, Given, padded};
 use super::prepared::Terms;
 use super::search::{Friction, Pull};
 use super::signals::Signal;
@@ -10,17 +10,28 @@ impl Terms {
     /// during the delay.
     pub(super) fn aim<const N: usize>(&self, block: &mut Block<N>, len: usize) {
         let n = padded::<N>(len);
-        let Block {
-            signals,
-            x,
-            goal,
-            delayed,
-            work,
-            ..
-        } = block;
-        let (x, goal, delayed) = (&x[..n], &mut goal[..n], &mut delayed[..n]);
+        let (level, x) = (block.work.rows(n).value, &block.x[..n]);
+        let (goal, delayed) = (&mut block.goal[..n], &mut block.delayed[..n]);
+        self.aim_at(&block.signals, x, level, goal, delayed);
+    }
+
+    /// Goal and way of one reading.
+    pub(super) fn aim_one(&self, x: f64, signals: &Given<1>) -> (f64, f64) {
+        let (mut level, mut goal, mut delayed) = ([0.0], [0.0], [0.0]);
+        self.aim_at(signals, &[x], &mut level, &mut goal, &mut delayed);
+        (goal[0], delayed[0])
+    }
+
+    #[inline]
+    fn aim_at<const N: usize>(
+        &self,
+        signals: &Given<N>,
+        x: &[f64],
+        level: &mut [f64],
+        goal: &mut [f64],
+        delayed: &mut [f64],
+    ) {
         self.fill_delayed(signals, delayed);
-        let level = work.rows(n).value;
         self.fill_level(signals, level);
         // The series is undone first where its argument is the indicated angle.
         if self.is_indicated() {
@@ -28,7 +39,7 @@ impl Terms {
         } else {
             goal.copy_from_slice(x);
         }
-        for i in 0..n {
+        for i in 0..goal.len() {
             let aim = goal[i] - level[i];
             let is_aim = (aim + delayed[i]).is_finite();
             goal[i] = if is_aim { aim } else { f64::NAN };
@@ -46,8 +57,8 @@ impl Terms {
     }
 
     /// True angles behind the first `len` readings.
-    pub(super) fn correct_still<const N: usize>(&self, block: &mut Block<N>, len: usize) {
-        let n = padded::<N>(len);
+    pub(super) fn correct_still(&self, block: &mut Block<BLOCK>, len: usize) {
+        let n = padded::<BLOCK>(len);
         self.aim(block, len);
         let Block {
             signals,
