@@ -56,10 +56,13 @@ const CHANCE: f64 = 4.0;
 
 /// The turn without its widest gap, or the whole turn where no gap is missing travel.
 ///
-/// Exact for up to a few thousand angles, else the ends are those of 4096 bins of a turn.
-pub fn covered_span(angles: &[&[f64]], period: f64) -> Span {
-    let count: usize = angles.iter().map(|a| a.len()).sum();
-    let all = angles.iter().flat_map(|a| a.iter());
+/// Exact for up to a few thousand angles, else the ends are those of 4096 bins of a turn; of
+/// more than `most` every so many are looked at.
+pub fn covered_span(angles: &[&[f64]], period: f64, most: usize) -> Span {
+    let all: usize = angles.iter().map(|a| a.len()).sum();
+    let stride = (all / most.max(1)).max(1);
+    let count: usize = angles.iter().map(|a| a.len().div_ceil(stride)).sum();
+    let all = angles.iter().flat_map(|a| a.iter().step_by(stride));
     let fractions = all.map(|&x| {
         let part = turns(x, period);
         if part < 0.0 { part + 1.0 } else { part }
@@ -151,7 +154,10 @@ mod tests {
         let many: Vec<f64> = (0..40_000)
             .map(|i| 300.0 + 190.0 * f64::from(i) / 39_999.0)
             .collect();
-        let (exact, binned) = (covered_span(&[&few], 360.0), covered_span(&[&many], 360.0));
+        let (exact, binned) = (
+            covered_span(&[&few], 360.0, usize::MAX),
+            covered_span(&[&many], 360.0, usize::MAX),
+        );
         assert!(!exact.full && !binned.full);
         assert!((exact.start - 300.0).abs() < 1e-9 && (exact.stop - 490.0).abs() < 1e-9);
         let bin = 360.0 / SORTED as f64;
@@ -160,7 +166,7 @@ mod tests {
 
     #[test]
     fn one_place_is_no_travel_and_none_is_a_full_turn() {
-        assert_eq!(covered_span(&[&[90.0, 450.0]], 360.0).stop, 90.0);
-        assert!(covered_span(&[], 360.0).full);
+        assert_eq!(covered_span(&[&[90.0, 450.0]], 360.0, 2).stop, 90.0);
+        assert!(covered_span(&[], 360.0, 2).full);
     }
 }

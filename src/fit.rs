@@ -12,18 +12,19 @@ mod residuals;
 use std::f64::consts::TAU;
 
 use crate::angle::Period;
-use crate::design::Design;
+use crate::design::{Design, Frequencies};
 use crate::error::Error;
 use crate::lstsq::{Estimate, System};
 use crate::moments::accumulator::Accumulator;
 use crate::readings::Readings;
+use crate::series::{HarmonicSeries, Shaft};
 use crate::{rank, threads};
 
 pub use crate::readings::{Argument, Run};
 use counts::Counts;
 pub use folds::Fold;
 use reduction::Reduced;
-pub use residuals::{Scan, scan};
+pub use residuals::{Scan, median_magnitude, scan};
 
 /// How the least-squares problem was solved.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -59,6 +60,8 @@ pub struct Solution {
     pub method: Method,
     system: System,
     condition_number: Option<f64>,
+    /// What it does not exceed.
+    condition_bound: f64,
     scatter: f64,
     design: Design,
     centres: Vec<f64>,
@@ -81,12 +84,35 @@ impl Solution {
         self.condition_number.unwrap_or_else(made)
     }
 
+    /// Whether the condition number is below `limit`: where a bound of it is, it is not made.
+    pub fn is_conditioned_below(&self, limit: f64) -> bool {
+        self.condition_bound < limit || self.condition_number() < limit
+    }
+
+    /// The series fitted, its constant the mean zero.
+    pub fn series(&self) -> Result<HarmonicSeries, Error> {
+        let mut pairs = self.coefficients().chunks_exact(2);
+        let shaft = |frequencies: &Frequencies| {
+            let own = pairs.by_ref().take(frequencies.orders.len());
+            let (cosine, sine) = own.map(|pair| (pair[0], pair[1])).unzip();
+            Shaft {
+                cycles: frequencies.cycles,
+                orders: frequencies.orders.clone(),
+                cosine,
+                sine,
+            }
+        };
+        let shafts = self.design.shafts().iter().map(shaft).collect();
+        HarmonicSeries::new(self.design.period().value(), self.constant, shafts)
+    }
+
     /// The same readings under penalties on the squared coefficients: nothing is read again.
     pub fn penalised(&self, ridge: &[f64]) -> Result<Self, Error> {
         check::penalties(&self.design, ridge)?;
         let reduced = Reduced {
             system: self.system.clone(),
             condition_number: self.condition_number,
+            condition_bound: Some(self.condition_bound),
             method: self.method,
             scatter: self.scatter,
         };
@@ -151,7 +177,7 @@ pub fn fit(design: &Design, runs: &[Run], options: Options) -> Result<Solution, 
     };
     // A number that is not finite spoils every sum it enters: it is looked for when one has.
     let inspect = || check::angles(runs);
-    let reduced = match &counts {
+    let mut reduced = match &counts {
         Some(counts) => {
             let means: Vec<_> = counts.iter().map(Counts::readings).collect();
             let centres = vec![0.0; runs.len()];
@@ -174,8 +200,8 @@ pub fn fit(design: &Design, runs: &[Run], options: Options) -> Result<Solution, 
             let reach = angles().fold(period.value(), |reach, x| reach.max(x.abs()));
             TAU * f64::EPSILON * reach / period.value()
         };
-        let known = reduced.condition_number;
-        rank::check(design, &reduced.system, known, rounding, angles)?;
+        let bound = reduced.bound();
+        rank::check(design, &reduced.system, bound, rounding, angles)?;
     }
     let count = readings.iter().map(Readings::count).sum();
     conclude(design, reduced, &centres, count, ridge)
@@ -185,10 +211,10 @@ pub fn fit(design: &Design, runs: &[Run], options: Options) -> Result<Solution, 
 /// and not too high ones, of the moments' base shaft.
 pub fn fit_moments(design: &Design, runs: &[&Accumulator]) -> Result<Solution, Error> {
     check::have_readings(design, runs.iter().map(|run| run.count()))?;
-    let reduced = reduction::reduce_moments(design, runs)?;
+    let mut reduced = reduction::reduce_moments(design, runs)?;
     let rounding = || reduction::FACTOR_ROUNDING;
-    let known = reduced.condition_number;
-    rank::check(design, &reduced.system, known, rounding, std::iter::empty)?;
+    let bound = reduced.bound();
+    rank::check(design, &reduced.system, bound, rounding, std::iter::empty)?;
     let centres: Vec<_> = runs.iter().map(|run| run.centre()).collect();
     let count = runs.iter().map(|run| run.count()).sum();
     conclude(design, reduced, &centres, count, None)
@@ -238,6 +264,7 @@ fn conclude(
     let Reduced {
         system,
         condition_number,
+        condition_bound,
         method,
         scatter,
     } = reduced;
@@ -276,6 +303,7 @@ fn conclude(
         method,
         system,
         condition_number,
+        condition_bound: condition_bound.unwrap_or(f64::INFINITY),
         scatter,
         design: design.clone(),
         centres: centres.to_vec(),

@@ -6,6 +6,7 @@
 //! stand for. The design is never squared. This is the one module that knows nalgebra.
 
 mod blocked;
+mod householder;
 mod system;
 
 use std::borrow::Cow;

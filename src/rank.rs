@@ -32,19 +32,19 @@ struct Dependence {
 
 /// An error that names the orders at fault, or none when every unknown is determined.
 ///
-/// `condition` is the condition number where it is known already, `rounding` is what the angles are known to, in radians: it bounds how well a column is
+/// `bound` is what the condition number does not exceed, `rounding` is what the angles are known to, in radians: it bounds how well a column is
 /// known. `angles` are those read, or none where only their sums are left.
 pub fn check<I: Iterator<Item = f64>>(
     design: &Design,
     system: &System,
-    condition: Option<f64>,
+    bound: f64,
     rounding: impl Fn() -> f64,
     angles: impl Fn() -> I,
 ) -> Result<(), Error> {
-    if condition.is_none() && system.condition_bound() < SUSPICIOUS_CONDITION {
+    if bound < SUSPICIOUS_CONDITION {
         return Ok(());
     }
-    let condition = condition.unwrap_or_else(|| system.condition_number());
+    let condition = system.condition_number();
     if condition < SUSPICIOUS_CONDITION {
         return Ok(());
     }

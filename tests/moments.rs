@@ -165,3 +165,42 @@ proptest! {
         prop_assert_eq!(whole.count, merged.count);
     }
 }
+
+/// Stretches of the angle have the sums of their own readings, however many there are: few are
+/// added one by one, many wait for each other.
+#[test]
+fn stretches_have_the_sums_of_their_own_readings() {
+    let (period, highest) = (360.0, 5);
+    let ends = [-400.0, 0.0, 77.7];
+    for len in [300, 400_000] {
+        let data = readings(7, len, period);
+        let empty = || Accumulator::new(Period::new(period).unwrap(), 1.0, highest, 0.0);
+        let mut stretches: Vec<_> = (0..=ends.len()).map(|_| empty()).collect();
+        let all = Readings {
+            angle: &data[0],
+            error: &data[1],
+            reference: None,
+            weights: Some(&data[2]),
+        };
+        Accumulator::update_stretches(&mut stretches, &ends, all);
+        for (i, found) in stretches.iter().enumerate() {
+            let (low, high) = (
+                if i == 0 { f64::MIN } else { ends[i - 1] },
+                ends.get(i).copied().unwrap_or(f64::MAX),
+            );
+            let inside = |k: &usize| data[0][*k] > low && data[0][*k] <= high;
+            let pick = |column: &Vec<f64>| -> Vec<f64> {
+                (0..len).filter(inside).map(|k| column[k]).collect()
+            };
+            let expected = sums(period, highest, &data.each_ref().map(pick), 1);
+            assert_eq!(found.count(), expected.count());
+            let scale = expected.weight();
+            assert!((found.weight() - scale).abs() <= EXACT * scale);
+            assert!((found.squares() - expected.squares()).abs() <= EXACT * scale * period);
+            let pairs = [found, &expected].map(|sums| Spectrum::new(sums, highest));
+            for (a, b) in pairs[0].error.iter().zip(&pairs[1].error) {
+                assert!((a - b).norm() <= EXACT * scale * period, "{i}: {a} {b}");
+            }
+        }
+    }
+}

@@ -60,11 +60,13 @@ def check_follows(run: CalibrationRun) -> None:
         Angles whose error repeats with 360, and not with 2 pi.
     """
     stride = max(1, len(run) // _SAMPLE)
-    reference = np.ascontiguousarray(run.reference[::stride])
-    indicated = np.ascontiguousarray(run.indicated[::stride])
+    reference, indicated = run.reference, run.indicated
+    if stride > 1:
+        reference = np.ascontiguousarray(reference[::stride])
+        indicated = np.ascontiguousarray(indicated[::stride])
     if reference.size < 4:
         return
-    if run.period == _TURNS["radians"] and reference.max() > _MANY:
+    if run.period == _TURNS["radians"] and reference[reference.argmax()] > _MANY:
         _warn_of_degrees(run, reference, indicated)
     if _core.resultant(indicated, reference, run.period) >= _FOLLOWS:
         return

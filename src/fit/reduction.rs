@@ -37,6 +37,8 @@ pub struct Reduced {
     pub system: System,
     /// Where the choice of the path needed it.
     pub condition_number: Option<f64>,
+    /// What it does not exceed, once that is known.
+    pub condition_bound: Option<f64>,
     pub method: Method,
     /// Weighted sum of squares that no harmonic can explain, beside what is left over in
     /// the system: that of readings at one count about their mean.
@@ -48,6 +50,7 @@ impl Reduced {
         Self {
             system,
             condition_number: None,
+            condition_bound: None,
             method,
             scatter: 0.0,
         }
@@ -59,6 +62,13 @@ impl Reduced {
             .condition_number
             .get_or_insert_with(|| self.system.condition_number())
             < limit
+    }
+
+    /// What the condition number does not exceed: itself where it is known.
+    pub fn bound(&mut self) -> f64 {
+        let made = || self.system.condition_bound();
+        let bound = self.condition_number.or(self.condition_bound);
+        *self.condition_bound.insert(bound.unwrap_or_else(made))
     }
 
     /// The same from mean errors of counts, about which the readings scatter.

@@ -97,6 +97,18 @@ fn scan_part(
     Ok(scan)
 }
 
+/// The middle one of the absolute values of every so many, at most about `most` of them; of an
+/// even number the greater middle one. NaN without any.
+pub fn median_magnitude(values: &[f64], most: usize) -> f64 {
+    let stride = (values.len() / most.max(1)).max(1);
+    let mut sample: Vec<f64> = values.iter().step_by(stride).map(|x| x.abs()).collect();
+    if sample.is_empty() {
+        return f64::NAN;
+    }
+    let middle = sample.len() / 2;
+    *sample.select_nth_unstable_by(middle, f64::total_cmp).1
+}
+
 /// The greatest absolute value; NaN counts for nothing.
 fn largest(values: &[f64]) -> f64 {
     // Several side by side: one comparison need not wait for the one before.

@@ -3,6 +3,7 @@
 
 use nalgebra::{DMatrix, DMatrixView, DMatrixViewMut};
 
+use super::householder;
 use crate::interrupt;
 
 /// Size up to which a factorisation is done column by column; larger ones are halved, so
@@ -47,7 +48,7 @@ pub fn product(a: DMatrixView<f64>, b: DMatrixView<f64>) -> DMatrix<f64> {
 pub fn triangle(mut rows: DMatrix<f64>) -> DMatrix<f64> {
     let (height, columns) = rows.shape();
     if columns <= WHOLE {
-        return rows.qr().unpack_r();
+        return householder::triangle(&rows);
     }
     let last = height.min(columns);
     for start in (0..last).step_by(PANEL) {

@@ -15,6 +15,22 @@ use super::waiting::Waiting;
 use crate::readings::Readings;
 use crate::simd::{InstructionSet, Kernel, Lanes, dispatch};
 
+/// Stretches of the angle, each with segments of its own.
+struct Stretches<'a> {
+    /// Where all but the last end, ascending.
+    ends: &'a [f64],
+    tallies: &'a mut [Tally],
+}
+
+/// What is counted of the readings of a stretch.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Tally {
+    /// Weighted sum of squared errors.
+    pub squares: f64,
+    /// Readings of positive weight.
+    pub count: usize,
+}
+
 /// One call of the inner loop.
 struct Call<'a, 'b> {
     frame: &'a Frame,
@@ -23,6 +39,7 @@ struct Call<'a, 'b> {
     table: &'b mut [Segment],
     waiting: &'b mut Waiting,
     squares: &'b mut f64,
+    stretches: Option<Stretches<'b>>,
 }
 
 /// Adds readings to their segments; returns the weighted sum of squared errors.
@@ -41,9 +58,33 @@ pub fn accumulate(
         table,
         waiting,
         squares: &mut squares,
+        stretches: None,
     };
     dispatch(InstructionSet::best(), call);
     squares
+}
+
+/// Adds readings to the segments of the stretches of the angle that end at `ends`, whose
+/// tables follow each other; one of `tallies` for each.
+pub fn accumulate_stretches(
+    frame: &Frame,
+    around: &Around,
+    readings: Readings<'_>,
+    ends: &[f64],
+    waiting: &mut Waiting,
+    table: &mut [Segment],
+    tallies: &mut [Tally],
+) {
+    let call = Call {
+        frame,
+        around,
+        readings,
+        table,
+        waiting,
+        squares: &mut 0.0,
+        stretches: Some(Stretches { ends, tallies }),
+    };
+    dispatch(InstructionSet::best(), call);
 }
 
 impl Kernel for Call<'_, '_> {
@@ -68,6 +109,7 @@ fn run<L: Lanes, const DIFFERENCE: bool, const WEIGHTED: bool>(call: Call<'_, '_
         table,
         waiting,
         squares: sum,
+        mut stretches,
     } = call;
     let mut chunk = Chunk::new();
     let mut squares = [0.0; LANES];
@@ -87,6 +129,9 @@ fn run<L: Lanes, const DIFFERENCE: bool, const WEIGHTED: bool>(call: Call<'_, '_
         // What stands in for readings beyond the last does not count.
         chunk.weight[len..].fill(0.0);
         chunk.prepare::<DIFFERENCE>(frame, around, angle, error, reference, &mut squares);
+        if let Some(stretches) = &mut stretches {
+            stretches.tell_apart(&mut chunk, angle, len, table.len());
+        }
         if together {
             waiting.take::<L, WEIGHTED>(&chunk, len, table);
         } else {
@@ -97,6 +142,30 @@ fn run<L: Lanes, const DIFFERENCE: bool, const WEIGHTED: bool>(call: Call<'_, '_
         waiting.finish::<L, WEIGHTED>(table);
     }
     *sum = squares.iter().sum();
+}
+
+impl Stretches<'_> {
+    /// Moves readings to the segments of their stretches, of `places` in all.
+    #[inline(always)]
+    fn tell_apart(&mut self, chunk: &mut Chunk, angle: &[f64; CHUNK], len: usize, places: usize) {
+        let segments = (places / self.tallies.len()) as u32;
+        let mut stretch = [0; CHUNK];
+        // One end for all readings, not all ends for one: the loop that fits vectors.
+        for &end in self.ends {
+            for i in 0..CHUNK {
+                stretch[i] += u32::from(angle[i] > end);
+            }
+        }
+        for (segment, stretch) in chunk.segment.iter_mut().zip(&stretch) {
+            *segment += segments * stretch;
+        }
+        let readings = chunk.weight.iter().zip(&chunk.error).zip(&stretch);
+        for ((weight, error), stretch) in readings.take(len) {
+            let tally = &mut self.tallies[*stretch as usize];
+            tally.squares += weight * error * error;
+            tally.count += usize::from(*weight > 0.0);
+        }
+    }
 }
 
 /// `CHUNK` values from `start`, in `room` where there are fewer, the last repeated.
@@ -141,6 +210,7 @@ mod tests {
             table: &mut table,
             waiting: &mut Waiting::default(),
             squares: &mut squares,
+            stretches: None,
         };
         dispatch(set, call);
         (squares, table)

@@ -1,13 +1,13 @@
 //! Moments of one run: constant memory, mergeable, one pass.
 
-use super::accumulate::accumulate;
+use super::accumulate::{Tally, accumulate, accumulate_stretches};
 use super::place::{Around, Frame};
 use super::segment::Segment;
 use super::waiting::Waiting;
 use crate::angle::{Period, two_sum};
 use crate::error::Error;
 use crate::readings::Readings;
-use crate::{memory, threads};
+use crate::{interrupt, memory, threads};
 
 /// Readings per segment summed plainly before they join the compensated total: rounding
 /// stays that of a few hundred additions, whatever the number of readings.
@@ -95,16 +95,6 @@ impl Accumulator {
         memory::room(TABLES * size_of::<Segment>() * segments(highest) + 2 * PART_BYTES)
     }
 
-    /// Segments of its circle.
-    pub fn segments(&self) -> usize {
-        self.total.len()
-    }
-
-    /// Where on its circle readings lie.
-    pub fn frame(&self) -> Frame {
-        Frame::new(self.base, self.total.len())
-    }
-
     /// Turns of the base shaft per turn.
     pub fn cycles(&self) -> f64 {
         self.cycles
@@ -182,6 +172,47 @@ impl Accumulator {
         }
     }
 
+    /// Adds readings to the sums of the stretches of the angle that end at `ends`, one more
+    /// than ends; all are over the same segments.
+    pub fn update_stretches(stretches: &mut [Self], ends: &[f64], readings: Readings<'_>) {
+        let Some(Self {
+            base,
+            period,
+            centre,
+            ..
+        }) = stretches.first()
+        else {
+            return;
+        };
+        let segments = stretches[0].total.len();
+        let frame = Frame::new(*base, segments);
+        let around = Around::new(*period, *centre);
+        let mut table = vec![Segment::EMPTY; segments * stretches.len()];
+        let mut waiting = Waiting::default();
+        let len = readings.angle.len();
+        for start in (0..len).step_by(BLOCK * table.len()) {
+            interrupt::point();
+            let part = readings.part(start, len.min(start + BLOCK * table.len()));
+            let mut tallies = vec![Tally::default(); stretches.len()];
+            accumulate_stretches(
+                &frame,
+                &around,
+                part,
+                ends,
+                &mut waiting,
+                &mut table,
+                &mut tallies,
+            );
+            let tables = table.chunks_exact_mut(segments);
+            for ((sums, table), tally) in stretches.iter_mut().zip(tables).zip(tallies) {
+                sums.add_to_total(table);
+                compensate(&mut sums.squares.0, &mut sums.squares.1, tally.squares);
+                sums.count += tally.count;
+                table.fill(Segment::EMPTY);
+            }
+        }
+    }
+
     /// Adds the block under way to the total.
     fn flush(&mut self) {
         let mut block = std::mem::take(&mut self.block);
@@ -233,6 +264,11 @@ impl Accumulator {
         self.add_to_total(&other.carry);
         compensate(&mut self.squares.0, &mut self.squares.1, other.squares.0);
         compensate(&mut self.squares.0, &mut self.squares.1, other.squares.1);
+    }
+
+    /// Sum of the weights.
+    pub fn weight(&self) -> f64 {
+        self.sums().0
     }
 
     /// Sums of the weights and of the weighted errors.

@@ -97,11 +97,10 @@ impl Chunk {
     #[inline(always)]
     fn add<L: Lanes>(&self, i: usize, segment: &mut Segment) {
         let (weight, error, t1) = (self.weight[i], self.error[i], self.place[i]);
-        let double = |t: f64| fused::<L>(t + t, t, -1.0);
-        let t2 = double(t1);
-        let t4 = double(t2);
-        let t8 = double(t4);
-        let t16 = double(t8);
+        let t2 = fused::<L>(t1 + t1, t1, -1.0);
+        let t4 = fused::<L>(t2 + t2, t2, -1.0);
+        let t8 = fused::<L>(t4 + t4, t4, -1.0);
+        let t16 = fused::<L>(t8 + t8, t8, -1.0);
         let mut low = [0.0; LANES];
         for first in (0..LANES).step_by(L::N) {
             let product = factor::<L>(first, 0, t1) * factor::<L>(first, 1, t2);

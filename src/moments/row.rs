@@ -97,12 +97,11 @@ impl Row {
     ) {
         let mut weight = [[L::splat(0.0); 4]; 3];
         let mut error = [[L::splat(0.0); 4]; 2];
-        let double = |t: L| (t + t).mul_add(t, L::splat(-1.0));
         for i in (0..len).step_by(L::N) {
             let (t1, y) = (lanes::<L>(&self.place, i), lanes::<L>(&self.error, i));
-            let t2 = double(t1);
-            let t4 = double(t2);
-            let t8 = double(t4);
+            let t2 = doubled(t1);
+            let t4 = doubled(t2);
+            let t8 = doubled(t4);
             let mut first = L::splat(1.0);
             if WEIGHTED {
                 first = lanes::<L>(weights, i);
@@ -113,7 +112,7 @@ impl Row {
             let second = first * t1;
             let low = [first, second, first * t2, second * t2];
             if SUMS & WEIGHTS != 0 {
-                let t16 = double(t8);
+                let t16 = doubled(t8);
                 for k in 0..4 {
                     weight[0][k] = weight[0][k] + low[k];
                     weight[1][k] = low[k].mul_add(t8, weight[1][k]);
@@ -143,6 +142,12 @@ impl Row {
             }
         }
     }
+}
+
+/// `T_2n` from `T_n`. A function, as a closure is compiled for the baseline processor.
+#[inline(always)]
+fn doubled<L: Lanes>(t: L) -> L {
+    (t + t).mul_add(t, L::splat(-1.0))
 }
 
 /// Adds the sums over the lanes of four vectors to the first four moments.

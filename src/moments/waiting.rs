@@ -69,6 +69,9 @@ impl Waiting {
     pub(super) fn finish<L: Lanes, const WEIGHTED: bool>(&mut self, table: &mut [Segment]) {
         let rows = self.rows.iter_mut().zip(&mut self.lens).zip(table);
         for (i, ((row, len), moments)) in rows.enumerate() {
+            if *len == 0 {
+                continue;
+            }
             let mut weights = if WEIGHTED { self.weights[i] } else { ONES };
             row.add_some::<L>(*len, &mut weights, moments);
             *len = 0;

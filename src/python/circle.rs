@@ -46,8 +46,9 @@ pub fn covered_span(
     py: Python<'_>,
     angles: Vec<Bound<'_, PyArray1<f64>>>,
     period: f64,
+    most: usize,
 ) -> PyResult<(f64, f64, bool)> {
     let slices = angles.iter().map(slice).collect::<PyResult<Vec<_>>>()?;
-    let span = detached(py, || circle::covered_span(&slices, period))?;
+    let span = detached(py, || circle::covered_span(&slices, period, most))?;
     Ok((span.start, span.stop, span.full))
 }

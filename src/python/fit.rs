@@ -13,6 +13,7 @@ use crate::check::same_length;
 use crate::design::{Design, Frequencies};
 use crate::fit as core;
 use crate::fit::{Argument, Method, Options, Run};
+use crate::kernel::TOLERANCE;
 use crate::memory;
 
 /// Columns of one run. They are not borrowed one by one: the book that `numpy` keeps of
@@ -88,6 +89,16 @@ impl Solution {
     #[getter]
     fn condition_number(&self) -> f64 {
         self.inner.condition_number()
+    }
+
+    /// Whether the condition number is below `limit`: it is not made where a bound of it is.
+    fn is_conditioned_below(&self, py: Python<'_>, limit: f64) -> PyResult<bool> {
+        attached(py, || self.inner.is_conditioned_below(limit))
+    }
+
+    /// The series fitted, its constant the mean zero.
+    fn series(&self, py: Python<'_>) -> PyResult<PySeries> {
+        PySeries::of(py, self.inner.series()?, Argument::Reference, TOLERANCE)
     }
 
     /// The same readings under penalties on the squared coefficients, without another look.
@@ -256,6 +267,12 @@ pub fn scan_residuals<'py>(
     let look = || core::scan(evaluator, &run, argument, offset, stride, threads);
     let found = detached(py, look)??;
     Ok((vector(py, &found.sample)?, found.largest))
+}
+
+/// The middle one of the absolute values of some residuals: of about `most`, at even strides.
+#[pyfunction]
+pub fn median_magnitude(values: PyReadonlyArray1<'_, f64>, most: usize) -> PyResult<f64> {
+    Ok(core::median_magnitude(values.as_slice()?, most))
 }
 
 /// The argument of a name.

@@ -14,6 +14,7 @@ use super::step::PyCompensator;
 use super::threads::{Asked, threads};
 use crate::error::Error;
 use crate::kernel::{Batch, Evaluator, Quantity, Real, Route, Sample, Stretch, TOLERANCE};
+use crate::readings::Argument;
 use crate::series::{HarmonicSeries, Shaft};
 
 /// A harmonic series made ready; see `trueangle.HarmonicModel`.
@@ -60,6 +61,22 @@ type Parts = (
     f64,
 );
 
+impl PySeries {
+    /// A series made ready.
+    pub(super) fn of(
+        py: Python<'_>,
+        series: HarmonicSeries,
+        argument: Argument,
+        tolerance: f64,
+    ) -> PyResult<Self> {
+        let evaluator = attached(py, || Evaluator::new(series, argument))?;
+        Ok(Self {
+            evaluator: Arc::new(evaluator.with_tolerance(tolerance)?),
+            tolerance,
+        })
+    }
+}
+
 #[pymethods]
 impl PySeries {
     #[new]
@@ -103,11 +120,7 @@ impl PySeries {
             })
             .collect();
         let series = HarmonicSeries::new(period, constant, shafts)?;
-        let evaluator = attached(py, || Evaluator::new(series, argument))?;
-        Ok(Self {
-            evaluator: Arc::new(evaluator.with_tolerance(tolerance)?),
-            tolerance,
-        })
+        Self::of(py, series, argument, tolerance)
     }
 
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<(Bound<'py, PyAny>, Parts)> {

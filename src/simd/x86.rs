@@ -79,7 +79,8 @@ impl Lanes for F64x4 {
 
     #[inline(always)]
     fn totals(vectors: [Self; 4]) -> [f64; 4] {
-        unsafe { totals(vectors.map(|vector| vector.0)) }
+        let [a, b, c, d] = vectors;
+        unsafe { totals(a.0, b.0, c.0, d.0) }
     }
 
     #[inline(always)]
@@ -207,13 +208,8 @@ impl Lanes for F64x8 {
     #[inline(always)]
     fn totals(vectors: [Self; 4]) -> [f64; 4] {
         unsafe {
-            totals(vectors.map(|vector| {
-                let (low, high) = (
-                    _mm512_castpd512_pd256(vector.0),
-                    _mm512_extractf64x4_pd::<1>(vector.0),
-                );
-                _mm256_add_pd(low, high)
-            }))
+            let [a, b, c, d] = vectors;
+            totals(halves(a.0), halves(b.0), halves(c.0), halves(d.0))
         }
     }
 
@@ -290,7 +286,7 @@ impl Lanes for F64x8 {
 
 /// The sum of each of four vectors.
 #[inline(always)]
-unsafe fn totals([a, b, c, d]: [__m256d; 4]) -> [f64; 4] {
+unsafe fn totals(a: __m256d, b: __m256d, c: __m256d, d: __m256d) -> [f64; 4] {
     unsafe {
         let (ab, cd) = (_mm256_hadd_pd(a, b), _mm256_hadd_pd(c, d));
         let low = _mm256_permute2f128_pd::<0x20>(ab, cd);
@@ -298,6 +294,15 @@ unsafe fn totals([a, b, c, d]: [__m256d; 4]) -> [f64; 4] {
         let mut sums = [0.0; 4];
         _mm256_storeu_pd(sums.as_mut_ptr(), _mm256_add_pd(low, high));
         sums
+    }
+}
+
+/// The sum of both halves of a vector.
+#[inline(always)]
+unsafe fn halves(vector: __m512d) -> __m256d {
+    unsafe {
+        let low = _mm512_castpd512_pd256(vector);
+        _mm256_add_pd(low, _mm512_extractf64x4_pd::<1>(vector))
     }
 }
 

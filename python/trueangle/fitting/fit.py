@@ -176,9 +176,9 @@ def fit(
     weighted = weigh(problem, loss, _ROUNDING * problem.period)
     span = travelled_span(problem.angles, problem.period, problem.is_periodic)
     if ridge is None:
-        tame = (
-            span.full and problem.is_periodic
-        ) or weighted.fitted.solution.condition_number < CONDITION
+        tame = (span.full and problem.is_periodic) or weighted.fitted.solution.is_conditioned_below(
+            CONDITION
+        )
         ridge = 0.0
         if not tame:
             from .ridge import choose_ridge

@@ -59,13 +59,10 @@ class Fitted:
         #: Zero of every run; NaN for a run without any weight.
         self.offsets = offsets
         try:
-            self.series = _core.Series(
-                period,
-                solution.constant,
-                [shaft.cycles_per_turn for shaft in shafts],
-                [list(shaft.orders) for shaft in shafts],
-                solution.cosine,
-                solution.sine,
+            self.series = (
+                _series(solution, shafts, period)
+                if isinstance(solution, Solution)
+                else solution.series()
             )
         except ArgumentError:
             # Orders that all but cancel: coefficients beyond what any series may have.
@@ -97,6 +94,18 @@ class Fitted:
     def predict(self, angles: Array) -> Array:
         """Error at ``angles``, the runs' mean zero included."""
         return np.asarray(self.series.error(angles))
+
+
+def _series(solution: Solution, shafts: Sequence[ShaftOrders], period: float) -> _core.Series:
+    """The series of plain values."""
+    return _core.Series(
+        period,
+        solution.constant,
+        [shaft.cycles_per_turn for shaft in shafts],
+        [list(shaft.orders) for shaft in shafts],
+        solution.cosine,
+        solution.sine,
+    )
 
 
 class Problem:
@@ -132,6 +141,9 @@ class Problem:
         self.threads = threads
         self.period = runs[0].period
         self.base: list[Array | None] = [run.weights for run in runs]
+        #: Reference, indicated angle and weights of every run, as the core takes them.
+        self.rows = [(run.reference, run.indicated, run.weights) for run in self.runs]
+        self.readings = sum([row[0].size for row in self.rows])
         #: The argument of every run.
         self.angles: list[Array] = [getattr(run, argument) for run in self.runs]
         #: Cycles per turn of every shaft, and its orders, as the core takes them.
@@ -148,11 +160,10 @@ class Problem:
         ``penalty`` is relative to the sum of weights, see `trueangle.fitting.ridge.choose_ridge`.
         """
         used = [weight is None or bool(weight.any()) for weight in weights]
-        rows = [
-            (run.reference, run.indicated, weight)
-            for run, weight, taken in zip(self.runs, weights, used, strict=True)
-            if taken
-        ]
+        rows = self.rows
+        if weights is not self.base or not all(used):
+            every = zip(rows, weights, used, strict=True)
+            rows = [(x, y, weight) for (x, y, _), weight, taken in every if taken]
         if not rows:
             raise ArgumentError("every reading has weight 0: nothing is left to fit")
         ridge = self._penalties(weights, penalty) if penalty > 0.0 else None
@@ -192,18 +203,13 @@ class Problem:
 
     def scan(self, fitted: Fitted) -> tuple[Array, float]:
         """A sample of the residuals of weight above 0, and the largest, in constant memory."""
-        stride = max(1, sum(len(run) for run in self.runs) // _BLOCK)
-        offsets = (fitted.offsets - fitted.solution.constant).tolist()
+        stride = max(1, self.readings // _BLOCK)
+        series, constant = fitted.series, fitted.solution.constant
         found = [
             _core.scan_residuals(
-                fitted.series,
-                (run.reference, run.indicated, weight),
-                self.argument,
-                offset,
-                stride,
-                self.threads,
+                series, row, self.argument, offset - constant, stride, self.threads
             )
-            for run, weight, offset in zip(self.runs, self.base, offsets, strict=True)
+            for row, offset in zip(self.rows, fitted.offsets.tolist(), strict=True)
             if not math.isnan(offset)
         ]
         if len(found) == 1:

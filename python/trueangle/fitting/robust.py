@@ -13,6 +13,7 @@ from typing import Literal, NamedTuple, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from .. import _core
 from ..errors import ArgumentError
 from ..quantiles import median, quantile
 from ..runs import CalibrationRun
@@ -76,11 +77,7 @@ class Weighted(NamedTuple):
 
 def robust_scale(residuals: Array) -> float:
     """Standard deviation by the median absolute deviation: half the readings may be wild."""
-    stride = max(1, residuals.size // SAMPLE)
-    sample = np.abs(residuals[::stride])
-    middle = sample.size // 2
-    sample.partition(middle)
-    return MAD_TO_SIGMA * float(sample[middle])
+    return MAD_TO_SIGMA * _core.median_magnitude(np.ascontiguousarray(residuals), SAMPLE)
 
 
 def weigh(problem: Problem, loss: Loss, floor: float) -> Weighted:

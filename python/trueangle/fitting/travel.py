@@ -77,9 +77,7 @@ def covered_span(angles: Sequence[Array], period: float) -> Span:
     >>> covered_span([np.linspace(-40.0, 150.0, 96)], 360.0)
     Span(start=320.0, stop=510.0, full=False)
     """
-    stride = max(1, sum(x.size for x in angles) // _LOOKED_AT)
-    looked_at = angles if stride == 1 else [np.ascontiguousarray(x[::stride]) for x in angles]
-    return Span(*_core.covered_span(looked_at, period))
+    return Span(*_core.covered_span(angles, period, _LOOKED_AT))
 
 
 def travelled_span(angles: Sequence[Array], period: float, periodic: bool) -> Span:

@@ -126,7 +126,9 @@ def resolve_orders(
                 f"how fast shaft {name!r} turns is not known: give gear_ratio (--gear-ratio), or "
                 f"shafts={{{name!r}: cycles per output turn}}"
             )
-        checked = tuple(sorted({_order(order, name) for order in asked}))
+        checked = tuple(
+            sorted({k if type(k) is int and 0 < k < 2**31 else _order(k, name) for k in asked})
+        )
         if checked:
             wanted.append(ShaftOrders(name, float(cycles[name]), checked))
     return wanted
