@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -30,7 +31,8 @@ def one_blas_thread() -> Iterator[None]:
 
     They wait for each other in a loop, which costs a second processor and more time than they
     save where products take some microseconds. Given back at the end of the last of several
-    that overlap; holds for the whole process. Nothing is done where numpy brought no OpenBLAS.
+    that overlap; holds for the whole process. Nothing is done where numpy brought no OpenBLAS,
+    or was told by ``OPENBLAS_NUM_THREADS=1`` to have one thread only.
 
     Examples
     --------
@@ -40,7 +42,7 @@ def one_blas_thread() -> Iterator[None]:
     3.0
     """
     global _inside, _before
-    found = blas_threads()
+    found = None if os.environ.get("OPENBLAS_NUM_THREADS") == "1" else blas_threads()
     if found is None:
         yield
         return

@@ -127,6 +127,9 @@ def main(argv: Sequence[str] | None = None) -> int:
 def process() -> NoReturn:
     """Run one command as a process of its own, which ends with it."""
     gc.set_threshold(_KEPT, *gc.get_threshold()[1:])
+    if sys.argv[1:2] != ["bench"]:
+        # Beside the core's own threads (`trueangle.blas`); a bench lets numpy have its own.
+        os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     try:
         sys.exit(main())
     finally:

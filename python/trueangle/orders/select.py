@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..aliasing import distinct_positions
+from ..blas import one_blas_thread
 from ..errors import ArgumentError
 from ..fitting.argument import AnyArgument, at_indicated, choose_argument
 from ..fitting.travel import over_turns
@@ -25,6 +26,7 @@ Array = NDArray[np.float64]
 Method = Literal["evidence", "paper"]
 
 
+@one_blas_thread()
 def select_orders(
     runs: CalibrationRun | Iterable[CalibrationRun],
     candidates: Iterable[float] | None = None,

@@ -9,6 +9,7 @@ from os import PathLike
 from typing import TYPE_CHECKING, Any, TypeAlias, overload
 
 from ..angles import ARCSEC_PER_TURN, wrap
+from ..blas import one_blas_thread
 from ..checks.check import faults_of
 from ..checks.record import records_of
 from ..errors import ArgumentError
@@ -151,6 +152,7 @@ def report(
 ) -> Certificate: ...
 
 
+@one_blas_thread()
 def report(
     runs: CalibrationRun | Iterable[CalibrationRun],
     path: str | PathLike[str] | None = None,
