@@ -360,7 +360,7 @@ def test_an_update_that_is_called_off_has_added_nothing():
 
     old = signal.signal(signal.SIGALRM, called_off)
     try:
-        for delay in (0.02, 0.06, 0.1):
+        for delay in (0.01, 0.025, 0.04):
             signal.setitimer(signal.ITIMER_REAL, delay)
             try:
                 moments.update(many, many, threads=1)
