@@ -107,6 +107,23 @@ def test_agrees_with_numpy(case, zeros, method):
     assert solution.rank == len(expected)
 
 
+@pytest.mark.parametrize("weighted", [False, True])
+@pytest.mark.parametrize("turns", [1.0, 7.3])
+def test_a_sweep_agrees_with_numpy(turns, weighted):
+    """Readings that follow each other fill the rows of their segments by whole vectors."""
+    period, cycles, orders = CASES["degrees"]
+    ((reference, error, weights),) = make_runs(5, [20_011], period, cycles, orders, [0.0])[1]
+    order = np.argsort(reference)
+    reference = np.linspace(0.0, turns * period, reference.size) + 1e-3 * reference[order]
+    if not weighted:
+        weights = np.ones_like(weights)
+    given = (reference, reference + error, weights if weighted else None)
+    solution = _core.fit([given], period, cycles, orders, method="moments")
+    expected, *_ = numpy_fit([(reference, error, weights)], period, cycles, orders)
+    size = np.abs(expected).max()
+    np.testing.assert_allclose(coefficients(solution), expected[1:], rtol=0, atol=AGREES * size)
+
+
 @pytest.mark.parametrize("travel", [1.0, 0.5])
 def test_counts_agree_with_numpy(travel):
     period, orders = 4096.0, [[1, 2, 5]]

@@ -91,6 +91,18 @@ def test_any_choice_of_terms_is_inverted(seed, which):
     np.testing.assert_allclose(corrected, theta, rtol=0, atol=SOLVED * 360)
 
 
+@pytest.mark.parametrize("width", [0.15, 0.3, 1.0])
+def test_a_narrow_defect_beside_next_to_no_series_is_inverted(width):
+    """The slope changes much over a step, and no series tells how well the step went."""
+    shaft = ta.Shaft("output", 1.0, (1,), (1e-9,), (0.0,))
+    model = ta.HarmonicModel(
+        (shaft,), period=360.0, terms=(ta.LocalDefect(100.0, width, 0.1 * width, 1.0),)
+    )
+    theta = np.linspace(100.0 - 5.0 * width, 100.0 + 5.0 * width, 4001)
+    corrected = model.correct(theta + model.error(theta))
+    np.testing.assert_allclose(corrected, theta, rtol=0, atol=SOLVED * 360)
+
+
 def test_a_pattern_at_the_indicated_angle_is_taken_off_first():
     theta, signals = motion(np.random.default_rng(2))
     plain, terms = joint(argument="indicated"), every_term()
