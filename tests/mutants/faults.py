@@ -43,6 +43,8 @@ class Fault:
         found = [] if count == 1 else [f"{self.file} holds its text {count} times: {self.old!r}"]
         if self.old == self.new:
             found.append("it changes nothing")
+        if self.of_core and not (_may_be_expression(self.old) and _may_be_expression(self.new)):
+            found.append("its texts are no expressions")
         for test in self.tests:
             file = test.split("::")[0]
             if file.startswith("tests/") and not (root / file).exists():
@@ -55,6 +57,20 @@ class Fault:
         before = path.read_text(encoding="utf-8")
         path.write_text(before.replace(self.old, self.new), encoding="utf-8")
         return before
+
+
+def _may_be_expression(text: str) -> bool:
+    """Brackets are closed, and no statement stands outside of them."""
+    opened: list[str] = []
+    for sign in text:
+        if sign in "([{":
+            opened.append(sign)
+        elif sign in ")]}":
+            if not opened or opened.pop() + sign not in ("()", "[]", "{}"):
+                return False
+        elif sign == ";" and not opened:
+            return False
+    return not opened
 
 
 def read_faults(root: Path) -> list[Fault]:
