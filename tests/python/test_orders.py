@@ -318,3 +318,21 @@ def test_what_an_order_may_be_is_printed():
 def test_a_multiple_of_a_small_order_is_no_harmonic_of_it():
     assert explain_as_harmonic(12, {1: 90.0, 4: 5.0, 12: 2.0}) == ()
     assert explain_as_harmonic(12, {4: 5.0, 6: 7.0, 12: 2.0})[0].name.startswith("harmonic 2 of")
+
+
+@pytest.mark.parametrize(("travel", "candidates"), [(220.0, 40), (220.0, 2), (360.0, 40)])
+def test_orders_over_part_of_a_turn_stand_for_others(travel, candidates):
+    rng = np.random.default_rng(17)
+    theta = np.linspace(0.0, travel, 2000)
+    error = 0.1 * np.sin(np.radians(2.0 * theta)) + 0.001 * rng.normal(size=theta.size)
+    run = ta.CalibrationRun(theta, theta + error, period=360.0)
+    chosen = ta.select_orders(run, range(1, candidates + 1))
+    assert 2 in chosen.orders
+    said = [note for note in chosen.notes if "stand for each other" in note]
+    if travel == 360.0 or candidates == 2:
+        assert not said
+    else:
+        # 0.61 of 40, and one.
+        assert "over 220 deg" in said[0]
+        assert "of 40 about 25 are independent" in said[0]
+        assert said[0][:20] in chosen.summary()

@@ -152,6 +152,14 @@ def selection_notes(
             )
     if aliased:
         notes.append(_sentence(positions, candidates))
+    count = len(selection.table)
+    independent = round(positions.span * max((row.order for row in selection.table), default=0)) + 1
+    if retained and independent < count:
+        notes.append(
+            f"over {360.0 * positions.span:.0f} deg orders stand for each other: of {count} about "
+            f"{independent} are independent, so those retained tell the error within this travel, "
+            "and not for certain which orders it has; a full turn does"
+        )
     if candidates.unresolved:
         pairs = [f"{m:g} from {k:g}" for m, k in candidates.unresolved.items()]
         needed = 0.5 / min(abs(m - k) for m, k in candidates.unresolved.items())
