@@ -152,11 +152,11 @@ def selection_notes(
             )
     if aliased:
         notes.append(_sentence(positions, candidates))
-    count = len(selection.table)
+    orders = len(selection.table)
     independent = round(positions.span * max((row.order for row in selection.table), default=0)) + 1
-    if retained and independent < count:
+    if retained and independent < orders:
         notes.append(
-            f"over {360.0 * positions.span:.0f} deg orders stand for each other: of {count} about "
+            f"over {360.0 * positions.span:.0f} deg orders stand for each other: of {orders} about "
             f"{independent} are independent, so those retained tell the error within this travel, "
             "and not for certain which orders it has; a full turn does"
         )
