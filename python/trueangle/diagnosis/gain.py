@@ -149,7 +149,11 @@ def measure_belief_gains(
         test = folds[unit] == fold
         fitted = part(regression, ~test).with_terms(rebuilt(t, ~test) for t in regression.terms)
         left = residual_at(
-            Law.of(fitted), regression.signals.take(test), regression.residual[test], own_zero
+            Law.of(fitted),
+            regression.signals.take(test),
+            regression.base[test],
+            regression.residual[test],
+            own_zero,
         )
         after[:, test] = before[:, test] = left
         for k, where in enumerate(columns):

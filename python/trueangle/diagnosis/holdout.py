@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..joint.pattern import Surroundings, line_columns
+from ..joint.pattern import Surroundings
 from ..joint.signals import Signals
 from ..pace import pace
 from ..regression.regression import Extension, Regression
@@ -47,10 +47,11 @@ def held_out(
         cause = regression.terms[group[0]].cause
         if effect_of(cause).located and effect_of(cause).transfers:
             full = _searched_again(full, group)
-    signals = regression.signals.take(test)
+    signals, residual = regression.signals.take(test), regression.residual[test]
     laws = [Law.of(full), *(_law_without(full, group) for group in groups)]
     columns: dict[Extension, Array] = {}
-    return [residual_at(law, signals, regression.residual[test], own_zero, columns) for law in laws]
+    base = regression.base[test]
+    return [residual_at(law, signals, base, residual, own_zero, columns) for law in laws]
 
 
 @dataclass(frozen=True)
@@ -59,16 +60,13 @@ class Law:
 
     Attributes
     ----------
-    orders : ndarray
-        Of the lines that the simulation believes.
     base : ndarray
-        Coefficients of the zero and of those lines.
+        Coefficients of the zero and of the lines that the simulation believes.
     terms : list of (Extension, ndarray)
         With their coefficients.
     around : Surroundings
     """
 
-    orders: Array
     base: Array
     terms: list[tuple[Extension, Array]]
     around: Surroundings
@@ -77,7 +75,7 @@ class Law:
     def of(cls, fitted: Regression) -> Law:
         """That of a fit as it is."""
         base = fitted.coefficients[: fitted.base.shape[1]]
-        return cls(fitted.belief.pattern.orders, base, fitted.fitted(), fitted.around)
+        return cls(base, fitted.fitted(), fitted.around)
 
 
 def _law_without(full: Regression, group: Sequence[int]) -> Law:
@@ -91,7 +89,7 @@ def _law_without(full: Regression, group: Sequence[int]) -> Law:
     coefficients = full.coefficients_without(group)
     terms = [(full.terms[k], coefficients[full.place(k)]) for k in kept]
     base = coefficients[: full.base.shape[1]]
-    return Law(full.belief.pattern.orders, base, terms, full.surroundings(terms))
+    return Law(base, terms, full.surroundings(terms))
 
 
 def part(regression: Regression, rows: Rows) -> Regression:
@@ -136,17 +134,18 @@ def _searched_again(full: Regression, group: Sequence[int]) -> Regression:
 def residual_at(
     law: Law,
     signals: Signals,
+    base: Array,
     residual: Array,
     own_zero: bool,
     columns: dict[Extension, Array] | None = None,
 ) -> Array:
     """Residual at other readings: lines and every regressor that can be rebuilt there.
 
-    ``columns`` keeps those that follow from the motion alone, for other laws of these readings.
+    ``base`` are the columns of the zero and of the believed lines; ``columns`` keeps those that
+    follow from the motion alone, for other laws of these readings.
     """
     columns = {} if columns is None else columns
-    lines = [line_columns(signals.theta, m) for m in law.orders]
-    left = residual - np.column_stack([np.ones(len(signals)), *lines]) @ law.base
+    left = residual - base @ law.base
     for term, coefficients in law.terms:
         effect = effect_of(term.cause)
         if not (coefficients.size and effect.transfers):
