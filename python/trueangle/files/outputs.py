@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
+import contextlib
 import errno
 import os
 import stat
 from collections.abc import Iterable, Iterator
-from contextlib import contextmanager
 from os import PathLike
 from pathlib import Path
 from typing import IO, Final
@@ -16,12 +16,20 @@ from .inputs import is_null_device, sha256_of
 from .kinds import LOG_ENDINGS, Kind
 from .samefile import named_again, what_it_is
 
-__all__ = ["PARTIAL", "check_output", "publish", "sync", "written_atomically"]
+__all__ = [
+    "PARTIAL",
+    "check_output",
+    "hidden_beside",
+    "hidden_name",
+    "publish",
+    "sync",
+    "written_atomically",
+]
 
 #: Ending of what is being written beside its name.
 PARTIAL: Final = ".trueangle-partial"
-#: Of a name that its hidden neighbour repeats: names may have 255 bytes in all.
-LONGEST: Final = 50
+#: Characters of a name that its hidden neighbour repeats: names may have 255 bytes in all.
+_LONGEST: Final = 50
 
 
 def check_output(
@@ -106,7 +114,7 @@ def check_output(
     return target
 
 
-@contextmanager
+@contextlib.contextmanager
 def written_atomically(
     path: str | PathLike[str],
     newline: str | None = "\n",
@@ -127,15 +135,15 @@ def written_atomically(
         with open(target, "w", encoding="utf-8", newline=newline) as nowhere:
             yield nowhere
         return
-    beside: str | None = None
+    # Known before it is made: Ctrl-C may come with the call that makes it.
+    beside = os.fspath(hidden_beside(target))
     try:
-        handle, beside = _created_beside(target)
-        with os.fdopen(handle, "w", encoding="utf-8", newline=newline) as file:
+        with open(beside, "x", encoding="utf-8", newline=newline) as file:
             yield file
         publish(beside, target)
     except BaseException as error:
-        if beside is not None:
-            Path(beside).unlink(missing_ok=True)
+        with contextlib.suppress(OSError):  # not made, or named already
+            os.unlink(beside)
         if isinstance(error, OSError) and error.errno and error.filename in (None, beside):
             # Of writing: it says no name, or the hidden one.
             raise OSError(error.errno, os.strerror(error.errno), os.fspath(path)) from None
@@ -177,17 +185,14 @@ def sync(path: str | PathLike[str]) -> None:
         os.close(handle)
 
 
-def _created_beside(target: Path) -> tuple[int, str]:
-    """A new file in the folder of ``target`` with the permissions that open() would give."""
-    while True:
-        beside = target.with_name(f".{target.name[:LONGEST]}.{os.urandom(4).hex()}{PARTIAL}")
-        flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_CLOEXEC", 0)
-        try:
-            return os.open(beside, flags | getattr(os, "O_BINARY", 0), 0o666), str(beside)
-        except FileExistsError:
-            continue
-        except OSError as error:
-            raise OSError(error.errno, os.strerror(error.errno or 0), str(target)) from None
+def hidden_beside(target: Path) -> Path:
+    """A new name beside ``target``: no other file has it, for nobody draws 64 bits twice."""
+    return target.with_name(f"{hidden_name(target)}.{os.urandom(8).hex()}{PARTIAL}")
+
+
+def hidden_name(target: Path) -> str:
+    """What all of `hidden_beside` begin with."""
+    return f".{target.name[:_LONGEST]}"
 
 
 def _is_printed_into(found: os.stat_result) -> bool:

@@ -112,8 +112,7 @@ def correct_logs(
     with ExitStack() as stack:
         folders = dict.fromkeys(place.manifest for place in found if place.manifest is not None)
         manifests = {f: stack.enter_context(Manifest(f).opened()) for f in folders}
-        for place in found:
-            remove_leftovers(place.target)
+        remove_leftovers(place.target for place in found)
         try:
             if scheduler is None:
                 _one_by_one(found, result.logs, settings, manifests, shown, finished)
@@ -123,6 +122,8 @@ def correct_logs(
                 on_cluster(scheduler, found, result.logs, settings, manifests, shown, finished)
         except KeyboardInterrupt:
             result.interrupted = True
+            # It may have come while the place of a finished log was cleared.
+            remove_leftovers(place.target for place in found)
         finally:
             shown.clear()
     result.seconds = time.monotonic() - start

@@ -4,14 +4,12 @@ from __future__ import annotations
 
 import os
 import shutil
-import tempfile
-from collections.abc import Iterator
+from collections import defaultdict
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from ..files.outputs import LONGEST as _LONGEST
-from ..files.outputs import PARTIAL as _ENDING
-from ..files.outputs import sync
+from ..files.outputs import PARTIAL, hidden_beside, hidden_name, sync
 
 try:
     import fcntl
@@ -38,14 +36,14 @@ def workplace(target: Path) -> Iterator[Path]:
     The folder is locked as long as its process lives: `remove_leftovers` spares it.
     """
     target = Path(os.path.realpath(target))
-    folder = Path(
-        tempfile.mkdtemp(dir=target.parent, prefix=f".{target.name[:_LONGEST]}.", suffix=_ENDING)
-    )
+    # Known before it is made: Ctrl-C may come with the call that makes it.
+    folder = hidden_beside(target)
     try:
+        folder.mkdir(mode=0o700)
         with locked(folder):
             yield folder / target.name
     finally:
-        shutil.rmtree(folder, ignore_errors=True)
+        _remove(folder, [target])
 
 
 @contextmanager
@@ -85,22 +83,37 @@ def publish(aside: Path, target: Path) -> None:
     sync(target.parent)
 
 
-def remove_leftovers(target: Path) -> None:
-    """Remove what killed processes left of ``target``; put a replaced folder back."""
-    target = Path(os.path.realpath(target))
-    for folder in target.parent.glob(f".{glob_escape(target.name[:_LONGEST])}.*{_ENDING}"):
-        with locked(folder) as free:
-            if not free:
+def remove_leftovers(targets: Iterable[Path]) -> None:
+    """Remove what killed processes left of ``targets``; put replaced folders back.
+
+    Every folder is listed once, however many of the targets it has.
+    """
+    wanted: dict[Path, dict[str, list[Path]]] = defaultdict(lambda: defaultdict(list))
+    for target in targets:
+        target = Path(os.path.realpath(target))
+        wanted[target.parent][hidden_name(target)].append(target)
+    for parent, by_name in wanted.items():
+        try:
+            names = os.listdir(parent)
+        except OSError:  # it may be written to and not read
+            continue
+        for name in names:
+            # After the name that `hidden_beside` repeats come a point and what it draws.
+            of = name.endswith(PARTIAL) and by_name.get(name[: -len(PARTIAL)].rpartition(".")[0])
+            if not of:
                 continue
-            replaced = _replaced(folder / target.name)
-            if replaced.exists() and not target.exists():
-                os.replace(replaced, target)
-            shutil.rmtree(folder, ignore_errors=True)
+            with locked(parent / name) as free:
+                if free:
+                    _remove(parent / name, of)
 
 
-def glob_escape(name: str) -> str:
-    """``name`` without meaning to glob."""
-    return "".join(f"[{c}]" if c in "*?[" else c for c in name)
+def _remove(workplace: Path, targets: Iterable[Path]) -> None:
+    """Remove a workplace; a folder that was moved into it and not replaced goes back."""
+    for target in targets:
+        replaced = _replaced(workplace / target.name)
+        if replaced.exists() and not target.exists():
+            os.replace(replaced, target)
+    shutil.rmtree(workplace, ignore_errors=True)
 
 
 def _replaced(aside: Path) -> Path:

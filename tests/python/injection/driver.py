@@ -18,8 +18,8 @@ import traceback
 from pathlib import Path
 from typing import Any
 
-KINDS = ("open", "read", "write", "sync", "rename", "allocate", "thread")
-ACTIONS = ("fail", "kill", "half")
+KINDS = ("open", "read", "write", "sync", "rename", "allocate", "thread", "folder", "remove")
+ACTIONS = ("fail", "kill", "half", "interrupt")
 
 #: Seconds after which a fork counts as hanging.
 HANGS = 60
@@ -54,6 +54,8 @@ def child(job: dict[str, Any], shim: ctypes.CDLL, told: str) -> int:
     os.dup2(handle, 1)
     os.dup2(handle, 2)
     signal.alarm(HANGS)
+    # What a shell runs in the background is deaf to Ctrl-C.
+    signal.signal(signal.SIGINT, signal.default_int_handler)
     shim.shim_root(job["folder"].encode())
     begin, end = place_of_core()
     shim.shim_core(

@@ -1,8 +1,9 @@
 /* Calls of the system that fail when told to: loaded before libc (LD_PRELOAD) by the tests.
  *
  * `shim_arm(kind, n, action, error)` lets the n-th call of a kind (from 0) fail with `error`,
- * end the process as if by kill -9, or (writes) take only half. Calls on files below the root
- * count; of allocations those of at least so many bytes that the core itself makes.
+ * end the process as if by kill -9, come with Ctrl-C, or (writes) take only half. Calls on
+ * files below the root count; of allocations those of at least so many bytes that the core
+ * itself makes.
  */
 #define _GNU_SOURCE
 #include <dlfcn.h>
@@ -15,12 +16,13 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
 #include <sys/types.h>
 #include <sys/uio.h>
 #include <unistd.h>
 
-enum { OPEN, READ, WRITE, SYNC, RENAME, ALLOCATE, THREAD, KINDS };
-enum { FAIL, KILL, HALF };
+enum { OPEN, READ, WRITE, SYNC, RENAME, ALLOCATE, THREAD, FOLDER, REMOVE, KINDS };
+enum { FAIL, KILL, HALF, INTERRUPT };
 
 static char root[PATH_MAX];
 static long counts[KINDS];
@@ -47,10 +49,11 @@ long shim_count(int kind) { return counts[kind]; }
 
 void shim_stop(void) { counting = 0; }
 
-/* Whether this call is the one; a kill does not come back. */
+/* Whether this call is to fail; a kill does not come back, Ctrl-C lets it be done. */
 static int strikes(int kind) {
     if (__sync_fetch_and_add(&counts[kind], 1) != armed_n || kind != armed_kind) return 0;
     if (armed_action == KILL) kill(getpid(), SIGKILL), pause();
+    if (armed_action == INTERRUPT) return kill(getpid(), SIGINT), 0;
     errno = armed_error;
     return 1;
 }
@@ -142,6 +145,26 @@ int fsync(int fd) {
 int rename(const char *old, const char *fresh) {
     if (below(fresh) && strikes(RENAME)) return -1;
     return REAL(rename)(old, fresh);
+}
+
+int mkdir(const char *path, mode_t mode) {
+    if (below(path) && strikes(FOLDER)) return -1;
+    return REAL(mkdir)(path, mode);
+}
+
+int unlink(const char *path) {
+    if (below(path) && strikes(REMOVE)) return -1;
+    return REAL(unlink)(path);
+}
+
+int unlinkat(int fd, const char *path, int flags) {
+    if ((below(path) || of_root(fd)) && strikes(REMOVE)) return -1;
+    return REAL(unlinkat)(fd, path, flags);
+}
+
+int rmdir(const char *path) {
+    if (below(path) && strikes(REMOVE)) return -1;
+    return REAL(rmdir)(path);
 }
 
 int pthread_create(pthread_t *thread, const pthread_attr_t *attributes, void *(*start)(void *),

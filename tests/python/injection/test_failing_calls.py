@@ -17,6 +17,7 @@ FAILURES = {
     "short write": ("write", "half", 0),
     "sync": ("sync", "fail", IO_ERROR),
     "rename": ("rename", "fail", IO_ERROR),
+    "folder": ("folder", "fail", NO_SPACE),
 }
 
 #: Far more calls than any of the small commands makes.
@@ -52,7 +53,7 @@ def test_the_nth_call_fails(command, failure, driver, expected, tmp_path):
     kind, action, error = FAILURES[failure]
     written, counts = expected[command]
     arguments, output = COMMANDS[command]
-    assert (counts[kind] > 0) or kind in ("sync", "rename")
+    assert (counts[kind] > 0) or kind in ("sync", "rename", "folder")
     desk = tmp_path / "desk"
     furnish(desk)
     inputs = tree(desk)

@@ -15,6 +15,7 @@ import pytest
 
 import trueangle as ta
 from trueangle.cli import main
+from trueangle.files.outputs import PARTIAL, hidden_name
 from trueangle.logs import safety
 from trueangle.logs.manifest import MANIFEST
 
@@ -89,7 +90,7 @@ def test_killed_at_random_moments_then_resumed_equals_unbroken(logs, model_file,
             continue
         if broken.is_dir():
             for path in broken.rglob("[!.]*.parquet"):
-                if safety._ENDING not in str(path.parent):
+                if PARTIAL not in str(path.parent):
                     # What has its final name is complete.
                     assert path.read_bytes() == expected[str(path.relative_to(broken))]
     assert killed
@@ -250,11 +251,11 @@ def test_leftovers_of_the_living_are_spared(tmp_path):
     target = tmp_path / "a.csv"
     with safety.workplace(target) as aside:
         aside.write_text("x")
-        safety.remove_leftovers(target)
+        safety.remove_leftovers([target])
         assert aside.exists()
         dead = tmp_path / (aside.parent.name.replace(".a.csv.", ".a.csv.dead"))
         dead.mkdir()
-        safety.remove_leftovers(target)
+        safety.remove_leftovers([target])
         assert not dead.exists()
     assert list(tmp_path.iterdir()) == []
 
@@ -269,12 +270,58 @@ def test_a_folder_is_replaced_whole_and_put_back_when_killed_between(tmp_path):
         safety.publish(aside, target)
     assert (target / "x").read_text() == "new"
     # Killed after the old folder was moved aside, before the new one had its name.
-    dead = tmp_path / f".bag.dead{safety._ENDING}"
+    dead = tmp_path / f".bag.dead{PARTIAL}"
     dead.mkdir()
     os.replace(target, dead / "bag.replaced")
-    safety.remove_leftovers(target)
+    safety.remove_leftovers([target])
     assert (target / "x").read_text() == "new"
     assert not dead.exists()
+
+
+@pytest.mark.parametrize("ends", [KeyboardInterrupt, OSError])
+def test_a_folder_goes_back_when_its_replacement_ends_between(ends, tmp_path, monkeypatch):
+    """Ctrl-C or an error after the old folder was moved aside, before the new one has its name."""
+    target = tmp_path / "bag"
+    target.mkdir()
+    (target / "x").write_text("old")
+    replace = os.replace
+
+    def moved(old, new):
+        if str(new).endswith(".replaced"):
+            replace(old, new)
+            raise ends
+        replace(old, new)
+
+    def corrected():
+        with safety.workplace(target) as aside:
+            aside.mkdir()
+            (aside / "x").write_text("new")
+            monkeypatch.setattr(os, "replace", moved)
+            safety.publish(aside, target)
+
+    with pytest.raises(ends):
+        corrected()
+    assert (target / "x").read_text() == "old"
+    assert [p.name for p in tmp_path.iterdir()] == ["bag"]
+
+
+def test_leftovers_of_many_outputs_are_found_in_one_listing(tmp_path, monkeypatch):
+    """Names that begin alike share what is left of them; other outputs' is spared."""
+    long = "x" * 60
+    targets = [tmp_path / f"{long}{k}.csv" for k in range(3)] + [tmp_path / "[a].csv"]
+    left = [
+        tmp_path / f"{hidden_name(target)}.dead{k}{PARTIAL}" for k, target in enumerate(targets)
+    ]
+    spared = tmp_path / f".b.csv.dead{PARTIAL}"
+    for folder in (*left, spared):
+        folder.mkdir()
+    (left[0] / f"{long}2.csv.replaced").mkdir()
+    listed = []
+    listdir = os.listdir
+    monkeypatch.setattr(os, "listdir", lambda path: listed.append(path) or listdir(path))
+    safety.remove_leftovers(targets)
+    assert listed.count(tmp_path) == 1
+    assert sorted(p.name for p in tmp_path.iterdir()) == sorted([spared.name, f"{long}2.csv"])
 
 
 def test_permissions_are_kept_in_place(logs, model):
