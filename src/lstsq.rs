@@ -33,7 +33,12 @@ impl Triangle {
     pub fn absorb(&mut self, rows: &[f64]) {
         let columns = self.factor.ncols();
         let height = rows.len() / columns;
-        self.stack(&DMatrix::from_row_slice(height, columns, rows));
+        let rows = DMatrix::from_row_slice(height, columns, rows);
+        if self.factor.nrows() == 0 {
+            self.factor = triangle(rows);
+        } else {
+            self.stack(&rows);
+        }
     }
 
     /// The triangle of some rows, given one after the other.
@@ -51,7 +56,11 @@ impl Triangle {
 
     /// Adds the rows that another triangle stands for.
     pub fn merge(&mut self, other: &Self) {
-        self.stack(&other.factor);
+        if self.factor.nrows() == 0 {
+            self.factor.clone_from(&other.factor);
+        } else {
+            self.stack(&other.factor);
+        }
     }
 
     fn stack(&mut self, below: &DMatrix<f64>) {

@@ -3,9 +3,10 @@
 use std::f64::consts::TAU;
 
 use crate::angle::{Period, two_sum};
+use crate::circle::whole_number;
 
 /// Readings that a circular centre is taken from, at even strides.
-const CENTRE_READINGS: usize = 4096;
+const CENTRE_READINGS: usize = 1024;
 
 /// An angle and an error each, or the two angles that the error is the difference of.
 #[derive(Clone, Copy, Debug)]
@@ -60,15 +61,18 @@ impl Readings<'_> {
 
     /// Circular mean of the errors: no error is cut in two when wrapped around it.
     pub fn centre(&self, period: Period) -> f64 {
-        let turn = TAU / period.value();
+        // Any angle near the mean will do: what the differences lose of far turns is no matter.
+        let per_turn = 1.0 / period.value();
         let stride = self.angle.len().div_ceil(CENTRE_READINGS).max(1);
         let (mut sine, mut cosine) = (0.0, 0.0);
         for i in (0..self.angle.len()).step_by(stride) {
-            let (s, c) = (turn * self.error(i, 0.0, period)).sin_cos();
+            let reference = self.reference.map_or(0.0, |values| values[i]);
+            let turns = (self.error[i] - reference) * per_turn;
+            let (s, c) = (TAU * (turns - whole_number(turns))).sin_cos();
             sine += self.weight(i) * s;
             cosine += self.weight(i) * c;
         }
-        sine.atan2(cosine) / turn
+        sine.atan2(cosine) / TAU * period.value()
     }
 }
 

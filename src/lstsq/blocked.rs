@@ -142,10 +142,14 @@ pub fn invert_upper(mut r: DMatrixViewMut<f64>) {
     if n <= UNBLOCKED {
         for j in 0..n {
             let pivot = 1.0 / r[(j, j)];
-            for i in 0..j {
-                let row = r.view((i, i), (1, j - i));
-                r[(i, j)] = -pivot * row.transpose().dot(&r.view((i, j), (j - i, 1)));
+            // The columns before are those of the inverse already.
+            for k in 0..j {
+                let (before, mut own) = r.columns_range_pair_mut(k, j);
+                let share = own[k];
+                own.rows_mut(0, k).axpy(share, &before.rows(0, k), 1.0);
+                own[k] = share * before[k];
             }
+            r.view_mut((0, j), (j, 1)).scale_mut(-pivot);
             r[(j, j)] = pivot;
         }
         return;

@@ -112,7 +112,9 @@ def resolve_orders(
     ArgumentError
         A shaft of unknown speed, an order that is not a whole number from 1.
     """
-    cycles = shaft_cycles(gear_ratio, fixed_member) | dict(shafts or {})
+    cycles = shaft_cycles(gear_ratio, fixed_member)
+    if shafts:
+        cycles |= shafts
     by_shaft = orders if isinstance(orders, Mapping) else {"output": orders}
     for name, asked in by_shaft.items():
         if not isinstance(asked, Iterable):
@@ -126,11 +128,9 @@ def resolve_orders(
                 f"how fast shaft {name!r} turns is not known: give gear_ratio (--gear-ratio), or "
                 f"shafts={{{name!r}: cycles per output turn}}"
             )
-        checked = tuple(
-            sorted({k if type(k) is int and 0 < k < 2**31 else _order(k, name) for k in asked})
-        )
+        checked = {k if type(k) is int and 0 < k < 2**31 else _order(k, name) for k in asked}
         if checked:
-            wanted.append(ShaftOrders(name, float(cycles[name]), checked))
+            wanted.append(ShaftOrders(name, float(cycles[name]), tuple(sorted(checked))))
     return wanted
 
 
