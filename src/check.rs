@@ -1,6 +1,7 @@
 //! What must hold of numbers before they are used.
 
 use crate::error::Error;
+use crate::simd::{InstructionSet, Kernel, Lanes, dispatch};
 
 /// Values looked at together.
 const BLOCK: usize = 1024;
@@ -51,13 +52,31 @@ pub fn not_negative(what: &'static str, values: &[f64]) -> Result<(), Error> {
     }
 }
 
-/// Whether every value is finite; told without a branch for each.
+/// Whether every value is finite.
 pub fn all_finite(values: &[f64]) -> bool {
-    let finite = |part: &[f64]| {
-        let bad = part.iter().map(|v| i64::from(!v.is_finite()));
-        bad.fold(0, |any, one| any | one) == 0
-    };
-    values.chunks(BLOCK).all(finite)
+    let mut finite = true;
+    let found = &mut finite;
+    dispatch(InstructionSet::best(), Finite { values, found });
+    finite
+}
+
+/// The look for values that are not finite, in vectors: without a branch for each.
+struct Finite<'a> {
+    values: &'a [f64],
+    found: &'a mut bool,
+}
+
+impl Kernel for Finite<'_> {
+    #[inline(always)]
+    fn run<L: Lanes>(self) {
+        for part in self.values.chunks(BLOCK) {
+            let mut bad = 0;
+            for value in part {
+                bad |= i64::from(!value.is_finite());
+            }
+            *self.found &= bad == 0;
+        }
+    }
 }
 
 #[cfg(test)]

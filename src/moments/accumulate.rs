@@ -42,7 +42,8 @@ struct Call<'a, 'b> {
     stretches: Option<Stretches<'b>>,
 }
 
-/// Adds readings to their segments; returns the weighted sum of squared errors.
+/// Adds readings to their segments, but those that are left `waiting`; returns the weighted sum
+/// of the squared errors of all.
 pub fn accumulate(
     frame: &Frame,
     around: &Around,
@@ -114,7 +115,7 @@ fn run<L: Lanes, const DIFFERENCE: bool, const WEIGHTED: bool>(call: Call<'_, '_
     let mut chunk = Chunk::new();
     let mut squares = [0.0; LANES];
     let all = readings.angle.len();
-    let together = waiting.pays(all, table.len(), WEIGHTED);
+    let together = waiting.has_room();
     let mut last = [[0.0; CHUNK]; 3];
     let reference = readings.reference.unwrap_or(readings.error);
     for start in (0..all).step_by(CHUNK) {
@@ -137,9 +138,6 @@ fn run<L: Lanes, const DIFFERENCE: bool, const WEIGHTED: bool>(call: Call<'_, '_
         } else {
             chunk.add_all::<L>(len, table);
         }
-    }
-    if together {
-        waiting.finish::<L, WEIGHTED>(table);
     }
     *sum = squares.iter().sum();
 }
@@ -203,16 +201,19 @@ mod tests {
         readings: Readings,
     ) -> (f64, Vec<Segment>) {
         let (mut squares, mut table) = (0.0, vec![Segment::EMPTY; 34]);
+        let weighted = readings.weights.is_some();
+        let mut waiting = Waiting::new(readings.angle.len(), table.len(), weighted);
         let call = Call {
             frame,
             around,
             readings,
             table: &mut table,
-            waiting: &mut Waiting::default(),
+            waiting: &mut waiting,
             squares: &mut squares,
             stretches: None,
         };
         dispatch(set, call);
+        waiting.finish_by(set, &mut table);
         (squares, table)
     }
 

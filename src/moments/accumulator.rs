@@ -152,17 +152,39 @@ impl Accumulator {
         self.count += readings.count();
     }
 
-    /// Adds readings block by block.
+    /// Adds readings that come in pieces; `settle` adds what still waits at their end.
+    pub fn update_piece(&mut self, readings: Readings<'_>, waiting: &mut Waiting) {
+        self.add_piece(readings, waiting);
+        self.count += readings.count();
+    }
+
+    /// Adds what waits of pieces.
+    pub fn settle(&mut self, waiting: &mut Waiting) {
+        waiting.finish(&mut self.block);
+    }
+
+    /// Adds readings.
     fn add(&mut self, readings: Readings<'_>) {
+        let mut waiting = self.waiting(readings.angle.len(), readings.weights.is_some());
+        self.add_piece(readings, &mut waiting);
+        self.settle(&mut waiting);
+    }
+
+    /// Room for as many readings to wait for others of their segment.
+    pub fn waiting(&self, readings: usize, weighted: bool) -> Waiting {
+        Waiting::new(readings, self.block.len(), weighted)
+    }
+
+    /// Adds readings block by block, but those that are left waiting.
+    fn add_piece(&mut self, readings: Readings<'_>, waiting: &mut Waiting) {
         let frame = Frame::new(self.base, self.block.len());
         let around = Around::new(self.period, self.centre);
         let full = BLOCK * self.block.len();
-        let mut waiting = Waiting::default();
         let mut start = 0;
         while start < readings.angle.len() {
             let end = readings.angle.len().min(start + full - self.pending);
             let part = readings.part(start, end);
-            let squares = accumulate(&frame, &around, part, &mut waiting, &mut self.block);
+            let squares = accumulate(&frame, &around, part, waiting, &mut self.block);
             compensate(&mut self.squares.0, &mut self.squares.1, squares);
             self.pending += end - start;
             start = end;
@@ -188,8 +210,8 @@ impl Accumulator {
         let frame = Frame::new(*base, segments);
         let around = Around::new(*period, *centre);
         let mut table = vec![Segment::EMPTY; segments * stretches.len()];
-        let mut waiting = Waiting::default();
         let len = readings.angle.len();
+        let mut waiting = Waiting::new(len, table.len(), readings.weights.is_some());
         for start in (0..len).step_by(BLOCK * table.len()) {
             interrupt::point();
             let part = readings.part(start, len.min(start + BLOCK * table.len()));
@@ -203,6 +225,7 @@ impl Accumulator {
                 &mut table,
                 &mut tallies,
             );
+            waiting.finish(&mut table);
             let tables = table.chunks_exact_mut(segments);
             for ((sums, table), tally) in stretches.iter_mut().zip(tables).zip(tallies) {
                 sums.add_to_total(table);

@@ -4,6 +4,7 @@ use super::accumulator::Accumulator;
 use crate::angle::Period;
 use crate::check::all_finite;
 use crate::readings::{Argument, Run};
+use crate::simd::{InstructionSet, Kernel, Lanes, dispatch};
 
 /// Readings taken together: they stay in the first cache.
 const BLOCK: usize = 1024;
@@ -23,7 +24,8 @@ pub fn add_known(
     argument: Argument,
     travel: &mut [i64],
 ) -> usize {
-    let mut known = 0;
+    let (mut known, mut waiting) = (0, None);
+    let all = run.reference.len();
     let blocks = run.reference.chunks(BLOCK);
     for (mut reference, mut indicated) in blocks.zip(run.indicated.chunks(BLOCK)) {
         let kept: (Vec<f64>, Vec<f64>);
@@ -45,21 +47,46 @@ pub fn add_known(
         };
         let readings = part.readings(argument);
         note(travel, readings.angle, period);
-        sums.get_or_insert_with(|| fresh(readings.centre(period)))
-            .update(readings, 1);
+        let sums = sums.get_or_insert_with(|| fresh(readings.centre(period)));
+        let waiting = waiting.get_or_insert_with(|| sums.waiting(all, false));
+        sums.update_piece(readings, waiting);
+    }
+    if let (Some(sums), Some(waiting)) = (sums, &mut waiting) {
+        sums.settle(waiting);
     }
     known
 }
 
 /// Counts every `STRIDE`-th angle at its place in the turn.
 fn note(travel: &mut [i64], angles: &[f64], period: Period) {
-    let (turn, places) = (1.0 / period.value(), travel.len() as f64);
-    for angle in angles.iter().step_by(STRIDE) {
-        let part = angle * turn;
-        let place = ((part - part.floor()) * places) as usize;
-        // A tiny negative angle rounds up to the whole turn.
-        if let Some(count) = travel.get_mut(place.min(travel.len().saturating_sub(1))) {
-            *count += 1;
+    let turn = 1.0 / period.value();
+    let note = Note {
+        travel,
+        angles,
+        turn,
+    };
+    dispatch(InstructionSet::best(), note);
+}
+
+/// The loop of `note`, where the processor rounds down in one instruction.
+struct Note<'a> {
+    travel: &'a mut [i64],
+    angles: &'a [f64],
+    turn: f64,
+}
+
+impl Kernel for Note<'_> {
+    #[inline(always)]
+    fn run<L: Lanes>(self) {
+        let places = self.travel.len() as f64;
+        let last = self.travel.len().saturating_sub(1);
+        for angle in self.angles.iter().step_by(STRIDE) {
+            let part = angle * self.turn;
+            let place = ((part - part.floor()) * places) as usize;
+            // A tiny negative angle rounds up to the whole turn.
+            if let Some(count) = self.travel.get_mut(place.min(last)) {
+                *count += 1;
+            }
         }
     }
 }
@@ -85,7 +112,10 @@ mod tests {
             };
             let argument = Argument::Reference;
             let known = add_known(&mut sums, fresh, period, run, argument, &mut travel);
-            (sums.unwrap().store(), known, travel)
+            let sums = sums.unwrap();
+            // None still waits: each adds its weight of 1.
+            assert_eq!(sums.weight(), known as f64);
+            (sums.store(), known, travel)
         };
         let (whole, known, travel) = sums_of(&reference, &indicated);
         assert_eq!(known, 5000);

@@ -7,7 +7,7 @@
 use super::chunk::Chunk;
 use super::row::{ONES, Row, RowWeights, TOGETHER};
 use super::segment::{LANES, Segment};
-use crate::simd::Lanes;
+use crate::simd::{InstructionSet, Kernel, Lanes, dispatch};
 
 /// Readings per segment from which there are rows.
 const READINGS: usize = 16;
@@ -26,17 +26,22 @@ pub struct Waiting {
 }
 
 impl Waiting {
-    /// Whether it pays that readings wait; makes room for them where it does.
-    pub(super) fn pays(&mut self, readings: usize, segments: usize, weighted: bool) -> bool {
+    /// Room for `readings` that come in any number of pieces; none where it does not pay that
+    /// they wait.
+    pub fn new(readings: usize, segments: usize, weighted: bool) -> Self {
         if segments > MOST_SEGMENTS || readings < READINGS * segments {
-            return false;
+            return Self::default();
         }
-        self.rows.resize(segments, Row::EMPTY);
-        self.lens.resize(segments, 0);
-        if weighted {
-            self.weights.resize(segments, ONES);
+        Self {
+            rows: vec![Row::EMPTY; segments],
+            weights: vec![ONES; if weighted { segments } else { 0 }],
+            lens: vec![0; segments],
         }
-        true
+    }
+
+    /// Whether readings wait at all.
+    pub(super) fn has_room(&self) -> bool {
+        !self.rows.is_empty()
     }
 
     /// Takes the first `len` readings of a chunk in, and adds full rows to their segments.
@@ -65,14 +70,36 @@ impl Waiting {
     }
 
     /// Adds all that still waits.
+    pub fn finish(&mut self, table: &mut [Segment]) {
+        self.finish_by(InstructionSet::best(), table);
+    }
+
+    pub(super) fn finish_by(&mut self, set: InstructionSet, table: &mut [Segment]) {
+        let waiting = self;
+        dispatch(set, Finish { waiting, table });
+    }
+}
+
+/// The end of what waits.
+struct Finish<'a> {
+    waiting: &'a mut Waiting,
+    table: &'a mut [Segment],
+}
+
+impl Kernel for Finish<'_> {
     #[inline(always)]
-    pub(super) fn finish<L: Lanes, const WEIGHTED: bool>(&mut self, table: &mut [Segment]) {
-        let rows = self.rows.iter_mut().zip(&mut self.lens).zip(table);
+    fn run<L: Lanes>(self) {
+        let Waiting {
+            rows,
+            weights,
+            lens,
+        } = self.waiting;
+        let rows = rows.iter_mut().zip(lens).zip(self.table);
         for (i, ((row, len), moments)) in rows.enumerate() {
             if *len == 0 {
                 continue;
             }
-            let mut weights = if WEIGHTED { self.weights[i] } else { ONES };
+            let mut weights = weights.get(i).copied().unwrap_or(ONES);
             row.add_some::<L>(*len, &mut weights, moments);
             *len = 0;
         }
