@@ -1,16 +1,20 @@
-"""Arrow and Feather logs: record batch by record batch from mapped memory."""
+"""Arrow and Feather logs: numbers where they lie, else record batch by record batch.
+
+Batches that pyarrow has to look at, and are not packed, come from mapped memory.
+"""
 
 from __future__ import annotations
 
-import struct
 from collections.abc import Collection, Iterable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import NamedTuple
 
 import pyarrow as pa
 
 from .ahead import ahead
+from .arrowmessages import FILE_MAGIC, batch_message, codec_of, footer
+from .arrowplaces import placed_batch
 from .arrowtables import (
     ArrowDigest,
     add_corrected,
@@ -22,10 +26,6 @@ from .format import TEXTS, Batch, Choose, Contents, Watch
 
 __all__ = ["columns", "contents", "copy", "read", "stretches"]
 
-_FILE_MAGIC = b"ARROW1"
-#: Codecs by their number in the format's BodyCompression.
-_CODECS = {0: "lz4", 1: "zstd"}
-_RECORD_BATCH = 3
 #: Rows at once.
 _ROWS = 1 << 20
 #: Bytes of a stretch that is read on its own, and parts of a larger batch at most.
@@ -57,8 +57,8 @@ def stretches(path: Path) -> list[Stretch | None]:
     with damage_told(path, "Arrow"):
         if not _is_file(path):
             return [None]
-        with pa.memory_map(str(path), "r") as source:
-            batches = pa.ipc.open_file(source).num_record_batches
+        with path.open("rb", buffering=0) as raw:
+            batches = len(footer(raw).batches)
         size = max(path.stat().st_size, 1)
         each = max(1, batches * _STRETCH // size)
         parts = 1
@@ -86,14 +86,33 @@ def read(
         with _opened(path) as (_schema, batches, _options):
             yield from ahead(column_batches(path, names, batches))
         return
-    with damage_told(path, "Arrow"), pa.memory_map(str(path), "r") as source:
-        file = pa.ipc.open_file(source)
-        if _compression(path, True) is not None:  # What lies there as it is would be copied.
-            wanted = [file.schema.get_field_index(name) for name in names]
-            only = pa.ipc.IpcReadOptions(included_fields=wanted, use_threads=False)
-            file = pa.ipc.open_file(source, options=only)
-        batches = (stretch.of(file.get_batch(i).select(names)) for i in stretch.batches)
-        yield from column_batches(path, names, _cut(map(_valid, batches)))
+    with damage_told(path, "Arrow"), path.open("rb", buffering=0) as raw, ExitStack() as opened:
+        with pa.OSFile(str(path)) as source:
+            schema = pa.ipc.open_file(source).schema
+        end, library = footer(raw), None
+        for number in stretch.batches:
+            placed = placed_batch(raw, end, end.batches[number], schema, names)
+            if placed is not None:
+                yield from placed.read(raw, stretch.part, stretch.parts)
+                continue
+            if library is None:
+                library = opened.enter_context(_library(path, names))
+            batch = stretch.of(library.get_batch(number).select(names))
+            yield from column_batches(path, names, _cut([_valid(batch)]))
+
+
+@contextmanager
+def _library(path: Path, names: Sequence[str]) -> Iterator[pa.RecordBatchFileReader]:
+    """The file as pyarrow reads it, mapped where it is not packed: a batch may be large."""
+    if _compression(path, True) is None:
+        with pa.memory_map(str(path), "r") as source:
+            yield pa.ipc.open_file(source)
+        return
+    with pa.OSFile(str(path)) as source:
+        schema = pa.ipc.open_file(source).schema
+        wanted = [schema.get_field_index(name) for name in names]
+        only = pa.ipc.IpcReadOptions(included_fields=wanted, use_threads=False)
+        yield pa.ipc.open_file(source, options=only)
 
 
 def copy(
@@ -138,7 +157,7 @@ def contents(path: Path, topic: str | None = None) -> Contents:
 
 def _is_file(path: Path) -> bool:
     with path.open("rb") as file:
-        return file.read(len(_FILE_MAGIC)) == _FILE_MAGIC
+        return file.read(len(FILE_MAGIC)) == FILE_MAGIC
 
 
 def _valid(batch: pa.RecordBatch) -> pa.RecordBatch:
@@ -175,36 +194,13 @@ def _cut(batches: Iterable[pa.RecordBatch]) -> Iterator[pa.RecordBatch]:
 
 
 def _compression(path: Path, is_file: bool) -> str | None:
-    """Codec of the first record batch, which only the message's own header tells."""
+    """Codec of the first record batch, which only its own message tells."""
+    if is_file:
+        with path.open("rb", buffering=0) as raw:
+            blocks = footer(raw).batches
+            return batch_message(raw, blocks[0]).codec if blocks else None
     with pa.memory_map(str(path), "r") as source:
-        if is_file:
-            source.seek(8)  # the magic and its padding; a stream follows
-        reader = pa.ipc.MessageReader.open_stream(source)
-        for message in reader:
+        for message in pa.ipc.MessageReader.open_stream(source):
             if message.type == "record batch":
-                return _codec(message.metadata.to_pybytes())
+                return codec_of(message.metadata.to_pybytes())
     return None
-
-
-def _codec(header: bytes) -> str | None:
-    """The compression field of a record batch's flatbuffer (Message.fbs of Arrow)."""
-
-    def field(table: int, number: int) -> int | None:
-        vtable = table - struct.unpack_from("<i", header, table)[0]
-        if 4 + 2 * number >= struct.unpack_from("<H", header, vtable)[0]:
-            return None
-        offset = struct.unpack_from("<H", header, vtable + 4 + 2 * number)[0]
-        return table + offset if offset else None
-
-    def follow(place: int) -> int:
-        return int(place + struct.unpack_from("<I", header, place)[0])
-
-    message = follow(0)
-    kind, body = field(message, 1), field(message, 2)
-    if kind is None or body is None or header[kind] != _RECORD_BATCH:
-        return None
-    compression = field(follow(body), 3)
-    if compression is None:
-        return None
-    codec = field(follow(compression), 0)
-    return _CODECS[0 if codec is None else header[codec]]

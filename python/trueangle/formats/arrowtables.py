@@ -21,6 +21,7 @@ __all__ = [
     "add_corrected",
     "column_batches",
     "corrected_schema",
+    "dtype_of",
     "labels",
     "numbers",
     "values_of",
@@ -55,21 +56,25 @@ def numbers(path: object, name: str, column: pa.Array | pa.ChunkedArray) -> NDAr
     return values_of(column)
 
 
+def dtype_of(kind: pa.DataType) -> np.dtype[Any]:
+    """What numpy calls whole numbers or floats of Arrow."""
+    letter = "f" if pa.types.is_floating(kind) else "iu"[pa.types.is_unsigned_integer(kind)]
+    return np.dtype(f"{letter}{kind.bit_width // 8}")
+
+
 def values_of(column: pa.Array) -> NDArray[Any]:
     """Whole numbers or floats as `pyarrow.Array.to_numpy` gives them, nulls as NaN.
 
     That method imports pandas where it is installed, which takes longer than a million numbers.
     """
-    kind, data = column.type, column.buffers()[1]
-    letter = "f" if pa.types.is_floating(kind) else "iu"[pa.types.is_unsigned_integer(kind)]
-    dtype = np.dtype(f"{letter}{kind.bit_width // 8}")
+    data, dtype = column.buffers()[1], dtype_of(column.type)
     if data is None:  # nothing, or nulls alone
         values: NDArray[Any] = np.zeros(len(column), dtype)
     else:
         values = np.frombuffer(data, dtype, len(column), column.offset * dtype.itemsize)
     if column.null_count:
         missing = column.is_null().cast(pa.uint8()).buffers()[1]
-        values = values.astype(dtype if letter == "f" else np.float64)
+        values = values.astype(dtype if dtype.kind == "f" else np.float64)
         values[np.frombuffer(missing, np.bool_, len(column))] = np.nan
     return values
 

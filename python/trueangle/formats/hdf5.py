@@ -28,7 +28,9 @@ __all__ = ["columns", "contents", "copy", "read", "stretches"]
 #: Readings taken together: what is read of them stays in the cache of the processor.
 _BLOCK = 1 << 17
 #: Rows of a part that is read on its own, and parts at most: each opens the file.
-_PART, _MOST_PARTS = 1 << 21, 64
+_PART, _MOST_PARTS = 1 << 20, 64
+#: A multiple of so many parts, where there are as many: two or four threads end together.
+_EVEN = 4
 #: Places of HDF5's table of chunks in memory; a prime.
 _SLOTS = 521
 #: Attribute of a corrected data set that says how it was made.
@@ -44,8 +46,10 @@ class Part(NamedTuple):
     def rows(self, size: int, sets: Iterable[h5py.Dataset]) -> range:
         """Its rows: whole chunks, where there are as many, which are unpacked once."""
         chunk = max((max(data.chunks or (1,)) for data in sets), default=1)
-        each = -(-size // (self.parts * chunk)) * chunk
-        return range(size)[self.number * each : (self.number + 1) * each]
+        chunks = -(-size // chunk)
+        # Rounded up: of fewer chunks than parts the first part has one.
+        edges = (-(-chunks * k // self.parts) * chunk for k in (self.number, self.number + 1))
+        return range(size)[slice(*edges)]
 
 
 def columns(path: Path, topic: str | None = None) -> list[str]:
@@ -59,6 +63,7 @@ def stretches(path: Path) -> list[Part | None]:
     with _opened(path) as file:
         size = max((file[name].size for name in _names(file)), default=0)
     parts = min(size // _PART, _MOST_PARTS)
+    parts -= parts % _EVEN if parts > _EVEN else 0
     return [Part(i, parts) for i in range(parts)] or [None]
 
 
@@ -85,9 +90,11 @@ def read(
                     stop = min(start + ROWS, rows.stop)
                     yield {name: data.read(raw, start, stop) for name, data in places.items()}
             return
+        sets.clear()  # a data set that is open keeps the cache that it has
+        packed = {name: _cached(file, name) for name in names}
         for start in rows[::_BLOCK]:
             stop = min(start + _BLOCK, rows.stop)
-            yield {name: _part(data, start, stop) for name, data in sets.items()}
+            yield {name: _part(data, start, stop) for name, data in packed.items()}
 
 
 def copy(
@@ -194,7 +201,7 @@ def _names(file: h5py.File) -> list[str]:
 
 
 def _data_set(path: Path, file: h5py.File, name: str) -> h5py.Dataset:
-    data = _cached(file, name)
+    data = file[name]
     if max(data.shape, default=0) != data.size:
         raise FileError(
             path, f"one angle after the other is needed, its shape is {data.shape}", column=name

@@ -9,7 +9,11 @@ from trueangle.errors import FileError
 from trueangle.formats import stored
 
 h5py = pytest.importorskip("h5py")
-from trueangle.formats import hdf5  # noqa: E402
+pa = pytest.importorskip("pyarrow")
+from trueangle.formats import arrow, hdf5  # noqa: E402
+from trueangle.formats.arrowmessages import footer  # noqa: E402
+from trueangle.formats.arrowplaces import placed_batch  # noqa: E402
+from trueangle.formats.arrowtables import numbers  # noqa: E402
 from trueangle.formats.hdf5places import Places  # noqa: E402
 
 ROWS = 30_001
@@ -76,6 +80,92 @@ def test_a_file_that_is_cut_short_while_it_is_read_is_told(tmp_path: Path):
     with path.open("r+b") as file:
         file.truncate(20_000)
     with pytest.raises(FileError, match=r"log\.h5: is damaged or not HDF5: it ends \d+ bytes"):
+        list(batches)
+
+
+@pytest.mark.parametrize("chunk", [1, 700, ROWS])
+@pytest.mark.parametrize("size", [1, 699, ROWS])
+def test_the_first_part_has_the_first_row_and_parts_are_even(size: int, chunk: int, tmp_path: Path):
+    with h5py.File(tmp_path / "log.h5", "w") as file:
+        data = file.create_dataset("a", (size,), "f8", chunks=(min(chunk, size),))
+        rows = [hdf5.Part(i, PARTS).rows(size, [data]) for i in range(PARTS)]
+    assert [row for part in rows for row in part] == list(range(size))
+    assert rows[0].start == 0 < len(rows[0])
+    assert max(map(len, rows)) - min(map(len, rows)) < 2 * chunk  # the last may be shorter
+
+
+def made_arrow(path: Path, *, nulls: bool = False, **options: object) -> pa.Table:
+    """Three batches of many types, those that are read in place among them."""
+    rng = np.random.default_rng(12)
+    missing = rng.uniform(size=ROWS) < 0.2 if nulls else None
+    columns = {
+        "text": pa.array([f"row {i}" for i in range(ROWS)]),
+        "nothing": pa.nulls(ROWS),
+        "moving": pa.array(rng.uniform(size=ROWS) < 0.5),
+        "a": pa.array(rng.normal(size=ROWS), mask=missing),
+        "time": pa.array(np.arange(ROWS), pa.timestamp("us")),
+        "count": pa.array(rng.integers(0, 60_000, ROWS).astype(np.uint16), mask=missing),
+        "short": pa.array(rng.normal(size=ROWS).astype(np.float32)),
+        "label": pa.array(["x", "y", "z"] * (ROWS // 3) + ["x"]).dictionary_encode(),
+    }
+    table = pa.table(columns)
+    with pa.ipc.new_file(path, table.schema, **options) as writer:
+        writer.write_table(table, max_chunksize=12_001)
+    return table
+
+
+def arrow_read(path: Path, names: list[str], parts: int) -> dict[str, np.ndarray]:
+    batches = [
+        batch
+        for number in range(3)
+        for part in range(parts)
+        for batch in arrow.read(
+            path, names, None, arrow.Stretch(range(number, number + 1), part, parts)
+        )
+    ]
+    return {name: np.concatenate([batch[name] for batch in batches]) for name in names}
+
+
+@pytest.mark.parametrize("parts", [1, PARTS])
+@pytest.mark.parametrize("nulls", [False, True])
+@pytest.mark.parametrize("compression", [None, "lz4"])
+def test_columns_are_those_of_pyarrow(
+    compression: str | None, nulls: bool, parts: int, tmp_path: Path, monkeypatch
+):
+    monkeypatch.setattr("trueangle.formats.arrowplaces.ROWS", 997)
+    path = tmp_path / "log.arrow"
+    table = made_arrow(path, nulls=nulls, options=pa.ipc.IpcWriteOptions(compression=compression))
+    names = ["short", "a", "count"]
+    with path.open("rb", buffering=0) as raw:
+        end = footer(raw)
+        placed = placed_batch(raw, end, end.batches[1], table.schema, names)
+    assert (placed is None) == (compression is not None)
+    found = arrow_read(path, names, parts)
+    for name in names:
+        np.testing.assert_array_equal(found[name], numbers(path, name, table[name]))
+
+
+def test_labels_and_nested_columns_are_left_to_pyarrow(tmp_path: Path):
+    path = tmp_path / "log.arrow"
+    table = made_arrow(path)
+    nested = table.append_column("list", pa.array([[1.0]] * ROWS))
+    with path.open("rb", buffering=0) as raw:
+        end = footer(raw)
+        for schema, names in ((table.schema, ["a", "label"]), (nested.schema, ["a"])):
+            assert placed_batch(raw, end, end.batches[0], schema, names) is None
+        with pytest.raises(ValueError, match="other columns than its schema"):
+            placed_batch(raw, end, end.batches[0], table.schema.remove(0), ["a"])
+
+
+def test_an_arrow_file_that_is_cut_short_while_it_is_read_is_told(tmp_path: Path, monkeypatch):
+    monkeypatch.setattr("trueangle.formats.arrowplaces.ROWS", 997)
+    path = tmp_path / "log.arrow"
+    made_arrow(path)
+    batches = arrow.read(path, ["a"], None, arrow.Stretch(range(3)))
+    next(batches)
+    with path.open("r+b") as file:
+        file.truncate(9000)
+    with pytest.raises(FileError, match=r"log\.arrow: is damaged or not Arrow: it ends"):
         list(batches)
 
 
