@@ -46,6 +46,9 @@ pub struct Span {
 /// Beyond so many angles they are counted into bins instead of sorted.
 const SORTED: usize = 4096;
 
+/// One of so many angles is looked at first: where they lie everywhere, that is all.
+const FIRST: usize = 32;
+
 /// An arc without readings counts as missing travel when it is wider than this part of a
 /// turn (20 deg) ...
 const MISSING: f64 = 20.0 / 360.0;
@@ -62,25 +65,36 @@ pub fn covered_span(angles: &[&[f64]], period: f64, most: usize) -> Span {
     let all: usize = angles.iter().map(|a| a.len()).sum();
     let stride = (all / most.max(1)).max(1);
     let count: usize = angles.iter().map(|a| a.len().div_ceil(stride)).sum();
-    let all = angles.iter().flat_map(|a| a.iter().step_by(stride));
-    let fractions = all.map(|&x| {
-        let part = turns(x, period);
-        if part < 0.0 { part + 1.0 } else { part }
-    });
+    let fractions = |stride| {
+        let some = angles.iter().flat_map(move |a| a.iter().step_by(stride));
+        some.map(|&x| {
+            let part = turns(x, period);
+            if part < 0.0 { part + 1.0 } else { part }
+        })
+    };
     let mut places: Vec<f64> = if count <= SORTED {
-        fractions.collect()
+        fractions(stride).collect()
     } else {
         let mut seen = vec![false; SORTED];
-        for part in fractions {
-            seen[(part * SORTED as f64) as usize % SORTED] = true;
+        let mut look = |stride| -> Vec<f64> {
+            for part in fractions(stride) {
+                seen[(part * SORTED as f64) as usize % SORTED] = true;
+            }
+            let bins = (0..SORTED).filter(|&i| seen[i]);
+            bins.map(|i| i as f64 / SORTED as f64).collect()
+        };
+        // Gaps only shrink with every angle: where none is wide, no other need be looked at.
+        let first = look(FIRST * stride);
+        if widest_gap(&first).is_some_and(|(gap, _)| gap <= MISSING) {
+            first
+        } else {
+            look(stride)
         }
-        let bins = (0..SORTED).filter(|&i| seen[i]);
-        bins.map(|i| i as f64 / SORTED as f64).collect()
     };
     places.sort_unstable_by(f64::total_cmp);
     places.dedup();
     let (start, stop, full) =
-        widest_gap(&places).map_or((0.0, 1.0, true), |(start, stop)| (start, stop, false));
+        missing_travel(&places).map_or((0.0, 1.0, true), |(start, stop)| (start, stop, false));
     Span {
         start: start * period,
         stop: stop * period,
@@ -88,17 +102,18 @@ pub fn covered_span(angles: &[&[f64]], period: f64, most: usize) -> Span {
     }
 }
 
-/// Ends of the stretch outside the widest gap, where that is missing travel.
+/// The widest gap between ascending places of a turn, and where it ends.
 fn widest_gap(places: &[f64]) -> Option<(f64, f64)> {
     let (&first, &last) = (places.first()?, places.last()?);
     let across = (first + 1.0 - last, first);
-    let (gap, start) = places
-        .windows(2)
-        .map(|pair| (pair[1] - pair[0], pair[1]))
-        .fold(
-            across,
-            |best, next| if next.0 > best.0 { next } else { best },
-        );
+    let gaps = places.windows(2).map(|pair| (pair[1] - pair[0], pair[1]));
+    let wider = |best: (f64, f64), next: (f64, f64)| if next.0 > best.0 { next } else { best };
+    Some(gaps.fold(across, wider))
+}
+
+/// Ends of the stretch outside the widest gap, where that is missing travel.
+fn missing_travel(places: &[f64]) -> Option<(f64, f64)> {
+    let (gap, start) = widest_gap(places)?;
     let travelled = 1.0 - gap;
     let count = places.len() as f64;
     let chance = travelled / (count - 1.0).max(1.0) * (count.ln() + CHANCE);
@@ -162,6 +177,24 @@ mod tests {
         assert!((exact.start - 300.0).abs() < 1e-9 && (exact.stop - 490.0).abs() < 1e-9);
         let bin = 360.0 / SORTED as f64;
         assert!((binned.start - 300.0).abs() <= bin && (binned.stop - 490.0).abs() <= bin);
+    }
+
+    /// A gap between the angles that are looked at first is closed by the others, or is not.
+    #[test]
+    fn a_first_look_misses_no_travel() {
+        let sweep = |turn: f64| -> Vec<f64> {
+            (0..40_000)
+                .map(|i| turn * f64::from(i) / 40_000.0)
+                .collect()
+        };
+        assert!(covered_span(&[&sweep(359.0)], 360.0, usize::MAX).full);
+        let arc = covered_span(&[&sweep(339.0)], 360.0, usize::MAX);
+        assert!(!arc.full && (arc.stop - 339.0).abs() < 0.1);
+        // In each 32 readings: one below 180 deg, all others above it.
+        let shy: Vec<f64> = (0..40_000)
+            .map(|i| f64::from(i) * 0.004_5 + if i % 32 == 0 { 0.0 } else { 180.0 })
+            .collect();
+        assert!(covered_span(&[&shy], 360.0, usize::MAX).full);
     }
 
     #[test]

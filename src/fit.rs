@@ -6,6 +6,7 @@
 mod check;
 mod counts;
 mod folds;
+mod preview;
 mod reduction;
 mod residuals;
 
@@ -23,8 +24,9 @@ use crate::{rank, threads};
 pub use crate::readings::{Argument, Run};
 use counts::Counts;
 pub use folds::Fold;
+use preview::Watched;
 use reduction::Reduced;
-pub use residuals::{Scan, median_magnitude, scan};
+pub use residuals::{Scan, median_magnitude, sample, scan};
 
 /// How the least-squares problem was solved.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -58,6 +60,9 @@ pub struct Solution {
     pub rank: usize,
     /// The path taken.
     pub method: Method,
+    /// What no residual of a reading that counts exceeds, signs left away: infinite where that
+    /// was not looked for while the readings were summed.
+    pub residual_bound: f64,
     system: System,
     condition_number: Option<f64>,
     /// What it does not exceed.
@@ -115,6 +120,7 @@ impl Solution {
             condition_bound: Some(self.condition_bound),
             method: self.method,
             scatter: self.scatter,
+            watched: None,
         };
         conclude(
             &self.design,
@@ -147,6 +153,8 @@ pub struct Options<'a> {
     pub ridge: Option<&'a [f64]>,
     /// Threads; results do not depend on them.
     pub threads: usize,
+    /// Whether to look for [`Solution::residual_bound`] while many readings are summed.
+    pub watch: bool,
 }
 
 impl Default for Options<'_> {
@@ -156,6 +164,7 @@ impl Default for Options<'_> {
             method: None,
             ridge: None,
             threads: threads::available(),
+            watch: false,
         }
     }
 }
@@ -267,6 +276,7 @@ fn conclude(
         condition_bound,
         method,
         scatter,
+        watched,
     } = reduced;
     let period = design.period();
     let estimate = system.solve(ridge).ok_or_else(|| Error::Rank {
@@ -301,6 +311,7 @@ fn conclude(
         degrees_of_freedom,
         rank: system.unknowns(),
         method,
+        residual_bound: watched.map_or(f64::INFINITY, |watched| watched.bound(&estimate)),
         system,
         condition_number,
         condition_bound: condition_bound.unwrap_or(f64::INFINITY),

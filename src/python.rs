@@ -45,7 +45,9 @@ mod _core {
     use super::corrector::PyCorrector;
 
     #[pymodule_export]
-    use super::fit::{Solution, band, fit, folds, median_magnitude, scan_residuals, triangle};
+    use super::fit::{
+        Solution, band, fit, folds, median_magnitude, sample_residuals, scan_residuals, triangle,
+    };
 
     #[pymodule_export]
     use super::lines::{line_columns, line_sum, unit_sums};

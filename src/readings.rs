@@ -32,6 +32,17 @@ impl Readings<'_> {
         }
     }
 
+    /// The readings at some places.
+    pub fn pick(&self, places: &[usize]) -> Picked {
+        let pick = |values: &[f64]| places.iter().map(|&i| values[i]).collect();
+        Picked {
+            angle: pick(self.angle),
+            error: pick(self.error),
+            reference: self.reference.map(pick),
+            weights: self.weights.map(pick),
+        }
+    }
+
     /// Weight of reading `i`.
     pub fn weight(&self, i: usize) -> f64 {
         self.weights.map_or(1.0, |weights| weights[i])
@@ -73,6 +84,27 @@ impl Readings<'_> {
             cosine += self.weight(i) * c;
         }
         sine.atan2(cosine) / TAU * period.value()
+    }
+}
+
+/// Some readings, apart from those that they were picked from.
+#[derive(Clone, Debug)]
+pub struct Picked {
+    angle: Vec<f64>,
+    error: Vec<f64>,
+    reference: Option<Vec<f64>>,
+    weights: Option<Vec<f64>>,
+}
+
+impl Picked {
+    /// As readings.
+    pub fn readings(&self) -> Readings<'_> {
+        Readings {
+            angle: &self.angle,
+            error: &self.error,
+            reference: self.reference.as_deref(),
+            weights: self.weights.as_deref(),
+        }
     }
 }
 

@@ -177,6 +177,8 @@ class Solution:
     @property
     def residual_variance(self) -> float: ...
     @property
+    def residual_bound(self) -> float: ...
+    @property
     def degrees_of_freedom(self) -> float: ...
     @property
     def rank(self) -> int: ...
@@ -197,6 +199,7 @@ def fit(
     method: str | None = None,
     ridge: Sequence[float] | None = None,
     threads: int | None = None,
+    watch: bool = False,
 ) -> Solution: ...
 def band(
     theta: _Array,
@@ -250,6 +253,14 @@ def scan_residuals(
     stride: int,
     threads: int | None = None,
 ) -> tuple[NDArray[np.float64], float]: ...
+def sample_residuals(
+    series: Series,
+    run: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64] | None],
+    argument: str,
+    offset: float,
+    stride: int,
+    threads: int | None = None,
+) -> NDArray[np.float64]: ...
 def median_magnitude(values: NDArray[np.float64], most: int) -> float: ...
 def residuals(
     indicated: NDArray[np.float64],

@@ -79,23 +79,10 @@ fn gathered(
     centre: f64,
     threads: usize,
 ) -> Triangle {
-    let inside = |x: f64| before(x, ends) == fold;
-    let pick = |values: &[f64]| -> Vec<f64> {
-        let pairs = run.angle.iter().zip(values);
-        pairs
-            .filter(|(x, _)| inside(**x))
-            .map(|(_, v)| *v)
-            .collect()
-    };
-    let (angle, error) = (pick(run.angle), pick(run.error));
-    let (reference, weights) = (run.reference.map(pick), run.weights.map(pick));
-    let readings = Readings {
-        angle: &angle,
-        error: &error,
-        reference: reference.as_deref(),
-        weights: weights.as_deref(),
-    };
-    triangle(design, &readings, centre, threads)
+    let places = run.angle.iter().enumerate();
+    let places = places.filter(|(_, x)| before(**x, ends) == fold);
+    let inside = run.pick(&places.map(|(i, _)| i).collect::<Vec<_>>());
+    triangle(design, &inside.readings(), centre, threads)
 }
 
 /// Sum of the weights of one stretch.

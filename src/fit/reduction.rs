@@ -1,6 +1,7 @@
 //! The ways from readings to a system of equations.
 
-use super::{Method, Options};
+use super::preview::Preview;
+use super::{Method, Options, Watched};
 use crate::design::Design;
 use crate::error::Error;
 use crate::interrupt;
@@ -43,6 +44,8 @@ pub struct Reduced {
     /// Weighted sum of squares that no harmonic can explain, beside what is left over in
     /// the system: that of readings at one count about their mean.
     pub scatter: f64,
+    /// How far the readings are off a first fit of some of them, where that was looked for.
+    pub watched: Option<Watched>,
 }
 
 impl Reduced {
@@ -53,6 +56,7 @@ impl Reduced {
             condition_bound: None,
             method,
             scatter: 0.0,
+            watched: None,
         }
     }
 
@@ -76,6 +80,8 @@ impl Reduced {
         Self {
             method: Method::Counts,
             scatter,
+            // Means hide their farthest reading.
+            watched: None,
             ..self
         }
     }
@@ -100,12 +106,22 @@ pub fn reduce(
         let per_segment = readings / (segments * runs.len());
         let fits = segments <= MOST_SEGMENTS;
         if fits && (per_segment >= READINGS_PER_SEGMENT || asked.is_some()) {
-            let sum = |(run, &centre): (&Readings, &f64)| {
-                let mut sums = Accumulator::new(design.period(), cycles, highest, centre);
-                sums.update(*run, options.threads);
+            let preview = || Preview::of_runs(design, (cycles, &orders), runs, centres);
+            let preview = options.watch.then(preview).flatten();
+            let mut farthest = 0.0f64;
+            let sum = |(i, run): (usize, &Readings)| {
+                let mut sums = Accumulator::new(design.period(), cycles, highest, centres[i]);
+                if let Some(preview) = &preview {
+                    let expected = &preview.expected()[i];
+                    let off = sums.update_watched(*run, options.threads, expected);
+                    farthest = farthest.max(off);
+                } else {
+                    sums.update(*run, options.threads);
+                }
                 sums
             };
-            let sums: Vec<_> = runs.iter().zip(centres).map(sum).collect();
+            let sums: Vec<_> = runs.iter().enumerate().map(sum).collect();
+            let mut watched = preview.map(|preview| preview.watched(farthest));
             if !sums.iter().all(|sums| sums.squares().is_finite()) {
                 inspect()?;
             }
@@ -114,11 +130,13 @@ pub fn reduce(
                 && let Some(mut reduced) = by_moments(&sums, &orders, highest)
                 && (reduced.is_within(NORMAL_UP_TO) || asked.is_some())
             {
+                reduced.watched = watched.take();
                 return Ok(reduced);
             }
             if asked == Some(Method::Qr) || per_segment >= READINGS_PER_FACTOR {
                 let mut reduced = Reduced::new(factor::system(&sums, &orders), Method::Qr);
                 if reduced.is_within(FACTORS_UP_TO) || asked.is_some() {
+                    reduced.watched = watched.take();
                     return Ok(reduced);
                 }
             }

@@ -51,6 +51,45 @@ pub fn scan(
     Ok(whole)
 }
 
+/// The residuals that [`scan`] keeps of every `stride` that count, without a look at the others.
+pub fn sample(
+    fitted: &Evaluator,
+    run: &Run,
+    argument: Argument,
+    offset: f64,
+    stride: usize,
+    threads: usize,
+) -> Result<Vec<f64>, Error> {
+    check::lengths(run)?;
+    let len = run.reference.len();
+    let part = BLOCK * BLOCKS_PER_PART;
+    let parts = threads::map_parts(len.div_ceil(part), threads, |i| {
+        let run = run.part(i * part, len.min((i + 1) * part));
+        every(&run, stride)
+    });
+    let (mut reference, mut indicated) = (Vec::new(), Vec::new());
+    for (x, y) in parts {
+        reference.extend(x);
+        indicated.extend(y);
+    }
+    let some = Run {
+        reference: &reference,
+        indicated: &indicated,
+        weights: None,
+    };
+    Ok(scan(fitted, &some, argument, offset, 1, threads)?.sample)
+}
+
+/// Both angles of every `stride` readings that count.
+fn every(run: &Run, stride: usize) -> (Vec<f64>, Vec<f64>) {
+    let pairs = run.reference.iter().zip(run.indicated);
+    let Some(weights) = run.weights else {
+        return pairs.step_by(stride).unzip();
+    };
+    let counting = pairs.zip(weights).filter(|(_, weight)| **weight != 0.0);
+    counting.step_by(stride).map(|(pair, _)| pair).unzip()
+}
+
 fn scan_part(
     fitted: &Evaluator,
     run: &Run,

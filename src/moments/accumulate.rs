@@ -32,12 +32,12 @@ pub struct Tally {
 }
 
 /// One call of the inner loop.
-struct Call<'a, 'b> {
+struct Call<'a, 'b, 'c> {
     frame: &'a Frame,
     around: &'a Around,
     readings: Readings<'a>,
     table: &'b mut [Segment],
-    waiting: &'b mut Waiting,
+    waiting: &'b mut Waiting<'c>,
     squares: &'b mut f64,
     stretches: Option<Stretches<'b>>,
 }
@@ -88,7 +88,7 @@ pub fn accumulate_stretches(
     dispatch(InstructionSet::best(), call);
 }
 
-impl Kernel for Call<'_, '_> {
+impl Kernel for Call<'_, '_, '_> {
     /// The shapes of readings, each compiled on its own.
     #[inline(always)]
     fn run<L: Lanes>(self) {
@@ -102,7 +102,7 @@ impl Kernel for Call<'_, '_> {
 }
 
 #[inline(always)]
-fn run<L: Lanes, const DIFFERENCE: bool, const WEIGHTED: bool>(call: Call<'_, '_>) {
+fn run<L: Lanes, const DIFFERENCE: bool, const WEIGHTED: bool>(call: Call<'_, '_, '_>) {
     let Call {
         frame,
         around,

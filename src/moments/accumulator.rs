@@ -1,6 +1,7 @@
 //! Moments of one run: constant memory, mergeable, one pass.
 
 use super::accumulate::{Tally, accumulate, accumulate_stretches};
+use super::expected::Expected;
 use super::place::{Around, Frame};
 use super::segment::Segment;
 use super::waiting::Waiting;
@@ -122,11 +123,26 @@ impl Accumulator {
 
     /// Adds readings; the result does not depend on `threads`.
     pub fn update(&mut self, readings: Readings<'_>, threads: usize) {
+        self.take(readings, threads, None);
+    }
+
+    /// The same; returns how far the farthest of them that counts is off what is expected of
+    /// its error, from the centre: infinite where they are too few, or the segments too many.
+    pub fn update_watched(
+        &mut self,
+        readings: Readings<'_>,
+        threads: usize,
+        expected: &Expected,
+    ) -> f64 {
+        self.take(readings, threads, Some(expected))
+    }
+
+    fn take(&mut self, readings: Readings<'_>, threads: usize, expected: Option<&Expected>) -> f64 {
         let len = readings.angle.len();
         if len < THREADED {
-            self.add(readings);
+            let farthest = self.add(readings, expected);
             self.count += readings.count();
-            return;
+            return farthest;
         }
         let table = size_of::<Segment>() * self.total.len();
         let least = if table > MOST_PART_BYTES { 1 } else { 4 };
@@ -141,15 +157,18 @@ impl Accumulator {
         };
         let sums = threads::map_parts(parts, threads, |i| {
             let mut part = empty.clone();
-            part.add(readings.part(bounds[i], bounds[i + 1]));
-            part
+            let farthest = part.add(readings.part(bounds[i], bounds[i + 1]), expected);
+            (part, farthest)
         });
         // Work that is called off is called off before here: nothing is added by halves.
         let sums: Vec<_> = sums.collect();
-        for part in sums {
+        let mut farthest = 0.0f64;
+        for (part, own) in sums {
             self.absorb(part);
+            farthest = farthest.max(own);
         }
         self.count += readings.count();
+        farthest
     }
 
     /// Adds readings that come in pieces; `settle` adds what still waits at their end.
@@ -163,15 +182,17 @@ impl Accumulator {
         waiting.finish(&mut self.block);
     }
 
-    /// Adds readings.
-    fn add(&mut self, readings: Readings<'_>) {
-        let mut waiting = self.waiting(readings.angle.len(), readings.weights.is_some());
+    /// Adds readings; returns how far the farthest is off what is expected.
+    fn add(&mut self, readings: Readings<'_>, expected: Option<&Expected>) -> f64 {
+        let waiting = self.waiting(readings.angle.len(), readings.weights.is_some());
+        let mut waiting = waiting.watching(expected);
         self.add_piece(readings, &mut waiting);
         self.settle(&mut waiting);
+        waiting.farthest()
     }
 
     /// Room for as many readings to wait for others of their segment.
-    pub fn waiting(&self, readings: usize, weighted: bool) -> Waiting {
+    pub fn waiting(&self, readings: usize, weighted: bool) -> Waiting<'static> {
         Waiting::new(readings, self.block.len(), weighted)
     }
 

@@ -51,20 +51,28 @@ impl Row {
         self.error.copy_within(TOGETHER.., 0);
     }
 
-    /// Adds the first `len` readings to the moments of their segment.
+    /// Adds the first `len` readings to the moments of their segment; returns how many they
+    /// are with those that fill the last vector, which have no weight.
     #[inline(always)]
     pub(super) fn add_some<L: Lanes>(
         &mut self,
         len: usize,
         weights: &mut RowWeights,
         moments: &mut Segment,
-    ) {
+    ) -> usize {
         // What fills the last vector does not count.
         let full = len.next_multiple_of(L::N);
         for column in [&mut self.place, &mut self.error, &mut *weights] {
             column[len..full].fill(0.0);
         }
         self.add::<L, true>(full, weights, moments);
+        full
+    }
+
+    /// Places and errors of the readings from the `i`-th, one to a lane.
+    #[inline(always)]
+    pub(super) fn lanes<L: Lanes>(&self, i: usize) -> (L, L) {
+        (lanes(&self.place, i), lanes(&self.error, i))
     }
 
     /// Adds the first `len` readings, whole vectors of them.
@@ -98,7 +106,7 @@ impl Row {
         let mut weight = [[L::splat(0.0); 4]; 3];
         let mut error = [[L::splat(0.0); 4]; 2];
         for i in (0..len).step_by(L::N) {
-            let (t1, y) = (lanes::<L>(&self.place, i), lanes::<L>(&self.error, i));
+            let (t1, y) = self.lanes::<L>(i);
             let t2 = doubled(t1);
             let t4 = doubled(t2);
             let t8 = doubled(t4);

@@ -72,6 +72,22 @@ fn unfold(moments: &mut [f64]) {
     }
 }
 
+/// Coefficients of `T_0, T_1, ...` to those of the products: what [`unfold`] does to moments,
+/// transposed and the other way round.
+pub(super) fn fold(coefficients: &mut [f64]) {
+    if coefficients.len() <= 1 {
+        return;
+    }
+    let power = coefficients.len().next_power_of_two() / 2;
+    let (low, high) = coefficients.split_at_mut(power);
+    for a in 1..high.len() {
+        low[power - a] -= high[a];
+        high[a] *= 2.0;
+    }
+    fold(low);
+    fold(high);
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -5,6 +5,7 @@
 //! whole vectors of readings go to the same row, of angles in disorder one after the other.
 
 use super::chunk::Chunk;
+use super::expected::{Expected, Watch};
 use super::row::{ONES, Row, RowWeights, TOGETHER};
 use super::segment::{LANES, Segment};
 use crate::simd::{InstructionSet, Kernel, Lanes, dispatch};
@@ -13,19 +14,20 @@ use crate::simd::{InstructionSet, Kernel, Lanes, dispatch};
 const READINGS: usize = 16;
 
 /// Segments beyond which rows would leave the second cache: 2 MB of them.
-const MOST_SEGMENTS: usize = 1024;
+pub const MOST_SEGMENTS: usize = 1024;
 
 /// Readings of every segment that are not in its moments yet.
 #[derive(Default)]
-pub struct Waiting {
+pub struct Waiting<'a> {
     rows: Vec<Row>,
     /// Of the same readings, where they are weighted.
     weights: Vec<RowWeights>,
     /// How many there are of each segment.
     lens: Vec<usize>,
+    watch: Watch<'a>,
 }
 
-impl Waiting {
+impl<'a> Waiting<'a> {
     /// Room for `readings` that come in any number of pieces; none where it does not pay that
     /// they wait.
     pub fn new(readings: usize, segments: usize, weighted: bool) -> Self {
@@ -36,6 +38,23 @@ impl Waiting {
             rows: vec![Row::EMPTY; segments],
             weights: vec![ONES; if weighted { segments } else { 0 }],
             lens: vec![0; segments],
+            watch: Watch::default(),
+        }
+    }
+
+    /// The same; readings are held against what is expected of them.
+    pub(super) fn watching(mut self, expected: Option<&'a Expected>) -> Self {
+        self.watch.expected = expected;
+        self
+    }
+
+    /// How far the farthest reading is off what was expected of it; infinite where that was
+    /// not looked for.
+    pub(super) fn farthest(&self) -> f64 {
+        if self.has_room() && self.watch.expected.is_some() {
+            self.watch.farthest
+        } else {
+            f64::INFINITY
         }
     }
 
@@ -57,6 +76,7 @@ impl Waiting {
             weights: &mut self.weights,
             lens: &mut self.lens,
             table,
+            watch: &mut self.watch,
         };
         for start in (0..len).step_by(LANES) {
             if start + LANES <= len && chunk.is_one_segment(start) {
@@ -81,18 +101,19 @@ impl Waiting {
 }
 
 /// The end of what waits.
-struct Finish<'a> {
-    waiting: &'a mut Waiting,
+struct Finish<'a, 'b> {
+    waiting: &'a mut Waiting<'b>,
     table: &'a mut [Segment],
 }
 
-impl Kernel for Finish<'_> {
+impl Kernel for Finish<'_, '_> {
     #[inline(always)]
     fn run<L: Lanes>(self) {
         let Waiting {
             rows,
             weights,
             lens,
+            watch,
         } = self.waiting;
         let rows = rows.iter_mut().zip(lens).zip(self.table);
         for (i, ((row, len), moments)) in rows.enumerate() {
@@ -100,21 +121,23 @@ impl Kernel for Finish<'_> {
                 continue;
             }
             let mut weights = weights.get(i).copied().unwrap_or(ONES);
-            row.add_some::<L>(*len, &mut weights, moments);
+            let full = row.add_some::<L>(*len, &mut weights, moments);
+            watch.look::<L>(i, row, full, &weights);
             *len = 0;
         }
     }
 }
 
 /// The rows and the segments that they are of: slices, which the loop keeps in registers.
-struct Rows<'a> {
+struct Rows<'a, 'b> {
     rows: &'a mut [Row],
     weights: &'a mut [RowWeights],
     lens: &'a mut [usize],
     table: &'a mut [Segment],
+    watch: &'a mut Watch<'b>,
 }
 
-impl Rows<'_> {
+impl Rows<'_, '_> {
     /// Takes `LEN` readings of one segment in.
     #[inline(always)]
     fn put<L: Lanes, const WEIGHTED: bool, const LEN: usize>(&mut self, chunk: &Chunk, i: usize) {
@@ -133,9 +156,11 @@ impl Rows<'_> {
         if WEIGHTED {
             let weights = &mut self.weights[segment];
             row.add::<L, true>(TOGETHER, weights, moments);
+            self.watch.look::<L>(segment, row, TOGETHER, weights);
             weights.copy_within(TOGETHER.., 0);
         } else {
             row.add::<L, false>(TOGETHER, &ONES, moments);
+            self.watch.look::<L>(segment, row, TOGETHER, &ONES);
         }
         row.keep_rest();
         self.lens[segment] = len - TOGETHER;

@@ -81,6 +81,12 @@ impl Solution {
         self.inner.degrees_of_freedom
     }
 
+    /// What no residual of a reading that counts exceeds; infinite where that is not known.
+    #[getter]
+    fn residual_bound(&self) -> f64 {
+        self.inner.residual_bound
+    }
+
     #[getter]
     fn rank(&self) -> usize {
         self.inner.rank
@@ -130,7 +136,7 @@ impl Solution {
 
 /// Least squares of harmonic orders and one zero per run; see `trueangle.fit`.
 #[pyfunction]
-#[pyo3(signature = (runs, period, cycles, orders, argument="reference", method=None, ridge=None, threads=None))]
+#[pyo3(signature = (runs, period, cycles, orders, argument="reference", method=None, ridge=None, threads=None, watch=false))]
 #[allow(clippy::too_many_arguments)] // one Python call, its arguments by name
 pub fn fit(
     py: Python<'_>,
@@ -142,6 +148,7 @@ pub fn fit(
     method: Option<&str>,
     ridge: Option<Vec<f64>>,
     threads: Asked<'_>,
+    watch: bool,
 ) -> PyResult<Solution> {
     let argument = argument_named(py, argument)?;
     let method = match method {
@@ -165,6 +172,7 @@ pub fn fit(
         method,
         ridge: ridge.as_deref(),
         threads,
+        watch,
     };
     design.room()?;
     let inner = detached(py, || core::fit(&design, &runs, options))??;
@@ -267,6 +275,28 @@ pub fn scan_residuals<'py>(
     let look = || core::scan(evaluator, &run, argument, offset, stride, threads);
     let found = detached(py, look)??;
     Ok((vector(py, &found.sample)?, found.largest))
+}
+
+/// A sample of the residuals of one run, of every so many that count.
+#[pyfunction]
+#[pyo3(signature = (series, run, argument, offset, stride, threads=None))]
+pub fn sample_residuals<'py>(
+    py: Python<'py>,
+    series: &PySeries,
+    run: Readings<'py>,
+    argument: &str,
+    offset: f64,
+    stride: usize,
+    threads: Asked<'_>,
+) -> PyResult<Bound<'py, PyArray1<f64>>> {
+    let argument = argument_named(py, argument)?;
+    let run = slices(&run)?;
+    let threads = threads::count(py, threads.as_ref(), run.reference.len())?;
+    let evaluator = &series.evaluator;
+    let stride = stride.max(1);
+    memory::room(4 * size_of::<f64>() * (run.reference.len() / stride))?;
+    let look = || core::sample(evaluator, &run, argument, offset, stride, threads);
+    vector(py, &detached(py, look)??)
 }
 
 /// The middle one of the absolute values of some residuals: of about `most`, at even strides.

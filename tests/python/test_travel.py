@@ -26,6 +26,14 @@ def test_span(angles, expected):
     assert covered_span([angles], 360.0) == pytest.approx(expected)
 
 
+@pytest.mark.parametrize(("stop", "full"), [(339.0, False), (341.0, True)])
+def test_span_of_many_angles(stop, full):
+    """Of many angles, bins of a turn: a few show at first whether any travel may be missing."""
+    span = covered_span([np.linspace(0.0, stop, 40_000)], 360.0)
+    assert span.full == full
+    assert full or span.stop == pytest.approx(stop, abs=360.0 / 4096)
+
+
 @pytest.mark.parametrize("arc", [90.0, 190.0, 270.0])
 @pytest.mark.parametrize("runs", [1, 3])
 def test_an_arc_gives_a_usable_model_with_small_amplitudes(arc, runs):

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
-from typing import Any, Literal, NamedTuple, cast
+from collections.abc import Callable, Iterator, Sequence
+from typing import Any, Literal, NamedTuple, TypeVar, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +20,7 @@ from .travel import over_turns
 __all__ = ["METHODS", "Fitted", "Problem"]
 
 Array = NDArray[np.float64]
+_Look = TypeVar("_Look")
 
 #: Ways of solving; None takes the fastest that keeps QR's accuracy.
 METHODS = (None, "plain", "moments", "qr", "counts")
@@ -42,6 +43,7 @@ class Solution(NamedTuple):
     rank: int
     condition_number: float
     method: Literal["plain", "moments", "qr", "counts"]
+    residual_bound: float = math.inf
 
 
 class Fitted:
@@ -154,10 +156,13 @@ class Problem:
         """Two per order; the zeros of the runs are not counted."""
         return 2 * sum(len(shaft.orders) for shaft in self.shafts)
 
-    def solve(self, weights: Sequence[Array | None], penalty: float = 0.0) -> Fitted:
+    def solve(
+        self, weights: Sequence[Array | None], penalty: float = 0.0, watch: bool = False
+    ) -> Fitted:
         """Least squares under ``weights``, with an optional Tikhonov penalty.
 
         ``penalty`` is relative to the sum of weights, see `trueangle.fitting.ridge.choose_ridge`.
+        With ``watch`` the solution of many readings knows what no residual exceeds.
         """
         used = [weight is None or bool(weight.any()) for weight in weights]
         rows = self.rows
@@ -175,6 +180,7 @@ class Problem:
             self.method,
             ridge,
             self.threads,
+            watch,
         )
         offsets = solution.offsets
         if len(rows) < len(self.runs):
@@ -202,19 +208,32 @@ class Problem:
         return [np.concatenate(list(self._blocks(fitted, i))) for i in range(len(self.runs))]
 
     def scan(self, fitted: Fitted) -> tuple[Array, float]:
-        """A sample of the residuals of weight above 0, and the largest, in constant memory."""
+        """A sample of the residuals of weight above 0, and a bound of all, from few of them.
+
+        The bound is the largest of few readings, else what the solution knows, or infinite.
+        """
         stride = max(1, self.readings // _BLOCK)
+        if stride == 1:
+            found = self._each(_core.scan_residuals, fitted, 1)
+            if len(found) == 1:
+                return found[0]
+            return np.concatenate([part for part, _ in found]), max(most for _, most in found)
+        parts = self._each(_core.sample_residuals, fitted, stride)
+        return np.concatenate(parts), fitted.solution.residual_bound
+
+    def largest(self, fitted: Fitted) -> float:
+        """The largest of all residuals of weight above 0, signs left away; constant memory."""
+        found = self._each(_core.scan_residuals, fitted, self.readings)
+        return max(most for _, most in found)
+
+    def _each(self, look: Callable[..., _Look], fitted: Fitted, stride: int) -> list[_Look]:
+        """What the core sees in the residuals of each run that has a zero."""
         series, constant = fitted.series, fitted.solution.constant
-        found = [
-            _core.scan_residuals(
-                series, row, self.argument, offset - constant, stride, self.threads
-            )
+        return [
+            look(series, row, self.argument, offset - constant, stride, self.threads)
             for row, offset in zip(self.rows, fitted.offsets.tolist(), strict=True)
             if not math.isnan(offset)
         ]
-        if len(found) == 1:
-            return found[0]
-        return np.concatenate([part for part, _ in found]), max(most for _, most in found)
 
     def _blocks(self, fitted: Fitted, index: int) -> Iterator[Array]:
         """Residuals of one run, piece by piece."""

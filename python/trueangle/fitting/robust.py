@@ -127,11 +127,12 @@ def _share(residuals: Array, scale: float) -> float:
 
 
 def _set_aside(problem: Problem, floor: float) -> Weighted:
-    fitted = problem.solve(problem.base)
-    sample, largest = problem.scan(fitted)
+    fitted = problem.solve(problem.base, watch=True)
+    sample, bound = problem.scan(fitted)
     scale = robust_scale(sample)
     plain = Weighted(fitted, None, 0, _share(sample, scale))
-    hidden = largest <= max(WILD * scale, floor)
+    limit = max(WILD * scale, floor)
+    hidden = bound <= limit or problem.largest(fitted) <= limit
     # Many readings far off together widen the scale behind which they hide.
     if hidden and not (plain.far > MANY and scale > floor):
         return plain
