@@ -60,12 +60,19 @@ impl Reduced {
         }
     }
 
-    /// True where the condition number, which is then known, is below `limit`.
+    /// True where the condition number is below `limit`: it is made where no bound tells.
     fn is_within(&mut self, limit: f64) -> bool {
-        *self
-            .condition_number
-            .get_or_insert_with(|| self.system.condition_number())
-            < limit
+        if self.bound() < limit {
+            return true;
+        }
+        if self.condition_number.is_none() {
+            let bound = self.system.near_condition_bound();
+            self.condition_bound = Some(bound.min(self.bound()));
+            if bound >= limit {
+                self.condition_number = Some(self.system.condition_number());
+            }
+        }
+        self.bound() < limit
     }
 
     /// What the condition number does not exceed: itself where it is known.

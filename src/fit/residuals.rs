@@ -82,10 +82,11 @@ pub fn sample(
 
 /// Both angles of every `stride` readings that count.
 fn every(run: &Run, stride: usize) -> (Vec<f64>, Vec<f64>) {
-    let pairs = run.reference.iter().zip(run.indicated);
     let Some(weights) = run.weights else {
-        return pairs.step_by(stride).unzip();
+        let every = |values: &[f64]| values.iter().step_by(stride).copied().collect();
+        return (every(run.reference), every(run.indicated));
     };
+    let pairs = run.reference.iter().zip(run.indicated);
     let counting = pairs.zip(weights).filter(|(_, weight)| **weight != 0.0);
     counting.step_by(stride).map(|(pair, _)| pair).unzip()
 }

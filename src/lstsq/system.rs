@@ -179,24 +179,48 @@ impl System {
         if bound.is_nan() { f64::INFINITY } else { bound }
     }
 
+    /// A closer bound, which is near where the columns are nearly at right angles: by the
+    /// greatest sums over a row of the Gram matrix and of its inverse. Infinite for a large
+    /// system.
+    pub fn near_condition_bound(&self) -> f64 {
+        if self.unknowns() > SINGULAR_VALUES_UP_TO {
+            return f64::INFINITY;
+        }
+        let factor = self.factor();
+        let mut inverse = factor.clone();
+        invert_upper(inverse.as_view_mut());
+        let gram = product(factor.transpose().as_view(), factor.as_view());
+        let back = product(inverse.as_view(), inverse.transpose().as_view());
+        let bound = (greatest_row(&gram) * greatest_row(&back)).sqrt();
+        if bound.is_nan() { f64::INFINITY } else { bound }
+    }
+
+    /// The whole triangle: a row per run above the shared one.
+    fn factor(&self) -> DMatrix<f64> {
+        let (runs, n) = (self.runs.len(), self.columns());
+        let mut factor = DMatrix::zeros(runs + n, runs + n);
+        for (i, run) in self.runs.iter().enumerate() {
+            factor[(i, i)] = run.norm;
+            for (j, value) in run.coupling.iter().enumerate() {
+                factor[(i, runs + j)] = *value;
+            }
+        }
+        let square = self.shared.square();
+        let shared = square.view((0, 0), (n, n));
+        factor.view_mut((runs, runs), (n, n)).copy_from(&shared);
+        factor
+    }
+
     /// Ratio of the greatest to the least singular value of the weighted design with
     /// one column per run and one per shared coefficient.
     pub fn condition_number(&self) -> f64 {
         let (runs, n) = (self.runs.len(), self.columns());
-        let square = self.shared.square();
-        let shared = square.view((0, 0), (n, n));
         if runs + n <= SINGULAR_VALUES_UP_TO {
-            let mut factor = DMatrix::zeros(runs + n, runs + n);
-            for (i, run) in self.runs.iter().enumerate() {
-                factor[(i, i)] = run.norm;
-                for (j, value) in run.coupling.iter().enumerate() {
-                    factor[(i, runs + j)] = *value;
-                }
-            }
-            factor.view_mut((runs, runs), (n, n)).copy_from(&shared);
-            let values = factor.singular_values();
+            let values = self.factor().singular_values();
             return values.max() / values.min();
         }
+        let square = self.shared.square();
+        let shared = square.view((0, 0), (n, n));
         let greatest = power(runs + n, |v| self.squared(&shared, &v));
         let least = power(runs + n, |v| self.unsquared(&shared, v));
         (greatest * least).sqrt()
@@ -242,6 +266,13 @@ impl System {
         up.rows_mut(runs, shared.ncols()).copy_from(&below);
         up
     }
+}
+
+/// The greatest sum of a row's magnitudes, of a symmetric matrix: no eigenvalue exceeds it.
+fn greatest_row(matrix: &DMatrix<f64>) -> f64 {
+    let sums = matrix.column_iter().map(|column| column.abs().sum());
+    // A sum that is no number is kept.
+    sums.fold(0.0, |most, sum| if sum <= most { most } else { sum })
 }
 
 /// The coefficients of a triangle with its right-hand side; None when singular.

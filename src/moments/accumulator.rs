@@ -269,8 +269,7 @@ impl Accumulator {
     fn add_to_total(&mut self, moments: &[Segment]) {
         let sums = self.total.iter_mut().zip(&mut self.carry);
         for ((total, carry), moments) in sums.zip(moments) {
-            add_all(&mut total.weight, &mut carry.weight, &moments.weight);
-            add_all(&mut total.error, &mut carry.error, &moments.error);
+            total.add(carry, moments);
         }
     }
 
@@ -361,19 +360,15 @@ impl Accumulator {
 
     /// The moments of every segment over Chebyshev polynomials.
     pub fn moments(&self) -> Vec<Segment> {
-        let mut sums = self.clone();
-        sums.flush();
-        let carries = sums.carry.iter();
-        sums.total
-            .iter()
-            .zip(carries)
-            .map(|(total, carry)| {
-                let mut moments = *total;
-                let values = moments.values_mut().zip(carry.values());
-                values.for_each(|(value, carry)| *value += carry);
-                moments.chebyshev()
-            })
-            .collect()
+        let sums = self.total.iter().zip(&self.carry).zip(&self.block);
+        let moments = |((total, carry), block): ((&Segment, &Segment), &Segment)| {
+            let (mut moments, mut carry) = (*total, *carry);
+            moments.add(&mut carry, block);
+            let values = moments.values_mut().zip(carry.values());
+            values.for_each(|(value, carry)| *value += carry);
+            moments.chebyshev()
+        };
+        sums.map(moments).collect()
     }
 }
 
@@ -384,12 +379,12 @@ fn compensate(sum: &mut f64, carry: &mut f64, value: f64) {
     *carry += lost;
 }
 
-fn add_all<const TERMS: usize>(
-    sums: &mut [f64; TERMS],
-    carries: &mut [f64; TERMS],
-    values: &[f64; TERMS],
-) {
-    for i in 0..TERMS {
-        compensate(&mut sums[i], &mut carries[i], values[i]);
+impl Segment {
+    /// Adds moments; what rounding takes goes to `carry`.
+    fn add(&mut self, carry: &mut Self, moments: &Self) {
+        let sums = self.values_mut().zip(carry.values_mut());
+        for ((sum, carry), value) in sums.zip(moments.values()) {
+            compensate(sum, carry, *value);
+        }
     }
 }

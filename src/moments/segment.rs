@@ -58,17 +58,18 @@ impl Segment {
 /// From `2 T_a T_b = T_(a+b) + T_|a-b|`: once the moments of `T_a T_p` are known for
 /// `a < p`, a power of two, `T_(p+a) = 2 T_a T_p - T_(p-a)`. Every element moves by
 /// whole multiples of others, at most `j` of them: nothing is lost but a few ulp.
-fn unfold(moments: &mut [f64]) {
-    // The moment at p + a is of phi_a T_p; first make it one of T_a T_p, block by block.
-    if moments.len() <= 1 {
-        return;
-    }
-    let power = moments.len().next_power_of_two() / 2;
-    let (low, high) = moments.split_at_mut(power);
-    unfold(low);
-    unfold(high);
-    for a in 1..high.len() {
-        high[a] = 2.0 * high[a] - low[power - a];
+fn unfold<const TERMS: usize>(moments: &mut [f64; TERMS]) {
+    // The moment at p + a is of phi_a T_p; with the blocks of the powers below it has become
+    // one of T_a T_p.
+    let mut power = 2;
+    while power < TERMS {
+        for block in moments.chunks_mut(2 * power) {
+            let (low, high) = block.split_at_mut(power.min(block.len()));
+            for a in 1..high.len() {
+                high[a] = 2.0 * high[a] - low[power - a];
+            }
+        }
+        power *= 2;
     }
 }
 
@@ -102,7 +103,7 @@ mod tests {
             let bits = (0..5).filter(|bit| j >> bit & 1 == 1);
             bits.map(|bit| t(1 << bit)).product()
         };
-        let mut moments: Vec<f64> = (0..WEIGHT_TERMS).map(product).collect();
+        let mut moments: [f64; WEIGHT_TERMS] = std::array::from_fn(product);
         unfold(&mut moments);
         for (j, moment) in moments.iter().enumerate() {
             assert!((moment - t(j)).abs() < ROUNDING, "T_{j}: {moment}");
