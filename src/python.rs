@@ -50,7 +50,7 @@ mod _core {
     };
 
     #[pymodule_export]
-    use super::lines::{line_columns, line_sum, unit_sums};
+    use super::lines::{line_columns, line_sum, line_sum_and_slope, unit_sums};
 
     #[pymodule_export]
     use super::moments::{PyMoments, fit_moments};

@@ -283,6 +283,12 @@ def line_sum(
     cosine: NDArray[np.float64],
     sine: NDArray[np.float64],
 ) -> NDArray[np.float64]: ...
+def line_sum_and_slope(
+    theta: NDArray[np.float64],
+    orders: NDArray[np.float64],
+    cosine: NDArray[np.float64],
+    sine: NDArray[np.float64],
+) -> NDArray[np.float64]: ...
 def unit_sums(
     theta: NDArray[np.float64],
     values: NDArray[np.float64],

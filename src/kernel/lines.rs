@@ -75,51 +75,97 @@ impl<T: Stored> Kernel for Columns<'_, T> {
     }
 }
 
-/// `sum_k cosine_k cos(order_k angle) + sine_k sin(order_k angle)` at every angle.
-pub fn sum(
-    theta: &[f64],
-    orders: &[f64],
-    cosine: &[f64],
-    sine: &[f64],
-    out: &mut [f64],
-) -> Result<(), Error> {
+/// Lines of some orders: `sum_k cosine_k cos(order_k angle) + sine_k sin(order_k angle)`.
+#[derive(Clone, Copy, Debug)]
+pub struct Lines<'a> {
+    /// Of any value.
+    pub orders: &'a [f64],
+    /// As many.
+    pub cosine: &'a [f64],
+    /// As many.
+    pub sine: &'a [f64],
+}
+
+impl Lines<'_> {
+    fn check(&self) -> Result<(), Error> {
+        same_length("cosine", self.cosine.len(), "orders", self.orders.len())?;
+        same_length("sine", self.sine.len(), "orders", self.orders.len())
+    }
+}
+
+/// Their sum at every angle.
+pub fn sum(theta: &[f64], lines: Lines, out: &mut [f64]) -> Result<(), Error> {
+    lines.check()?;
     same_length("out", out.len(), "angles", theta.len())?;
-    same_length("cosine", cosine.len(), "orders", orders.len())?;
-    same_length("sine", sine.len(), "orders", orders.len())?;
-    let work = Sum {
-        theta,
-        orders,
-        cosine,
-        sine,
-        out,
-    };
-    dispatch(InstructionSet::best(), work);
+    dispatch(
+        InstructionSet::best(),
+        Sum::<false> {
+            theta,
+            lines,
+            out,
+            slope: &mut [],
+        },
+    );
     Ok(())
 }
 
-struct Sum<'a> {
-    theta: &'a [f64],
-    orders: &'a [f64],
-    cosine: &'a [f64],
-    sine: &'a [f64],
-    out: &'a mut [f64],
+/// Their sum and its derivative at every angle, by the same cosines and sines.
+pub fn sum_and_slope(
+    theta: &[f64],
+    lines: Lines,
+    out: &mut [f64],
+    slope: &mut [f64],
+) -> Result<(), Error> {
+    lines.check()?;
+    same_length("out", out.len(), "angles", theta.len())?;
+    same_length("slope", slope.len(), "angles", theta.len())?;
+    dispatch(
+        InstructionSet::best(),
+        Sum::<true> {
+            theta,
+            lines,
+            out,
+            slope,
+        },
+    );
+    Ok(())
 }
 
-impl Kernel for Sum<'_> {
+struct Sum<'a, const SLOPE: bool> {
+    theta: &'a [f64],
+    lines: Lines<'a>,
+    out: &'a mut [f64],
+    slope: &'a mut [f64],
+}
+
+impl<const SLOPE: bool> Kernel for Sum<'_, SLOPE> {
     #[inline(always)]
     fn run<L: Lanes>(self) {
+        let Lines {
+            orders,
+            cosine: a,
+            sine: b,
+        } = self.lines;
         let mut values = [0.0; MOST_LANES];
         for first in (0..self.theta.len()).step_by(L::N) {
             let some = L::N.min(self.theta.len() - first);
             let theta = vector::<L>(self.theta, first, some);
-            let mut total = L::splat(0.0);
-            for j in 0..self.orders.len() {
-                let (sine, cosine) = of_radians(theta * L::splat(self.orders[j]));
-                total = cosine.mul_add(L::splat(self.cosine[j]), total);
-                total = sine.mul_add(L::splat(self.sine[j]), total);
+            let (mut total, mut slope) = (L::splat(0.0), L::splat(0.0));
+            for j in 0..orders.len() {
+                let (sine, cosine) = of_radians(theta * L::splat(orders[j]));
+                total = cosine.mul_add(L::splat(a[j]), total);
+                total = sine.mul_add(L::splat(b[j]), total);
+                if SLOPE {
+                    slope = cosine.mul_add(L::splat(orders[j] * b[j]), slope);
+                    slope = sine.mul_add(L::splat(-orders[j] * a[j]), slope);
+                }
             }
             total.to_array(&mut values);
             self.out[first..first + some].copy_from_slice(&values[..some]);
+            if SLOPE {
+                slope.to_array(&mut values);
+                self.slope[first..first + some].copy_from_slice(&values[..some]);
+            }
         }
     }
 }

@@ -6,7 +6,7 @@ use pyo3::prelude::*;
 use super::array::{data, empty};
 use super::failure::argument_error;
 use super::release::detached;
-use crate::kernel::lines::{self, Ladder};
+use crate::kernel::lines::{self, Ladder, Lines};
 
 /// Cosines and sines of orders times angles, shape (n, 2 orders); in single precision where
 /// that is enough.
@@ -48,8 +48,37 @@ pub fn line_sum<'py>(
     let array = empty::<f64>(py, &[theta.len()], false)?;
     // SAFETY: a fresh contiguous array of this type and size.
     let out = unsafe { std::slice::from_raw_parts_mut(data::<f64>(&array), theta.len()) };
-    detached(py, || lines::sum(theta, orders, cosine, sine, out))??;
+    let lines = Lines {
+        orders,
+        cosine,
+        sine,
+    };
+    detached(py, || lines::sum(theta, lines, out))??;
     Ok(array.into_any().cast_into()?)
+}
+
+/// `line_sum` and its derivative, shape (2, n).
+#[pyfunction]
+pub fn line_sum_and_slope<'py>(
+    py: Python<'py>,
+    theta: PyReadonlyArray1<'py, f64>,
+    orders: PyReadonlyArray1<'py, f64>,
+    cosine: PyReadonlyArray1<'py, f64>,
+    sine: PyReadonlyArray1<'py, f64>,
+) -> PyResult<Bound<'py, PyUntypedArray>> {
+    let theta = theta.as_slice()?;
+    let lines = Lines {
+        orders: orders.as_slice()?,
+        cosine: cosine.as_slice()?,
+        sine: sine.as_slice()?,
+    };
+    let n = theta.len();
+    let array = empty::<f64>(py, &[2, n], false)?;
+    // SAFETY: a fresh contiguous array of this type and size.
+    let out = unsafe { std::slice::from_raw_parts_mut(data::<f64>(&array), 2 * n) };
+    let (value, slope) = out.split_at_mut(n);
+    detached(py, || lines::sum_and_slope(theta, lines, value, slope))??;
+    Ok(array)
 }
 
 /// Sums of values times `exp(-i order angle)` over units, real and imaginary parts, shape

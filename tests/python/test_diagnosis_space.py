@@ -125,9 +125,10 @@ def test_gains_of_blocks_are_those_of_each(space, noise):
 
 def test_a_factor_that_grows_is_the_one_made_at_once(space, noise):
     rng = np.random.default_rng(5)
-    base = np.column_stack([np.ones(space.n), rng.standard_normal((space.n, 3)) * [1e-6, 1.0, 1e6]])
+    sizes = [1e-6, 1.0, 1e6, 1.0, 1.0]
+    base = np.column_stack([np.ones(space.n), rng.standard_normal((space.n, 5)) * sizes])
     blocks = [base, base[:, 1:3] + 1e4 * rng.standard_normal((space.n, 2)), base[:, :0]]
-    near = base[:, 3:] + 1e-3 * rng.standard_normal((space.n, 1))  # beyond doubt alike
+    near = base[:, 3:4] + 1e-3 * rng.standard_normal((space.n, 1))  # beyond doubt alike
     y = rng.standard_normal(space.n)
     factors: list[Factor] = []
     for many in (1, 2, 3, 4, 2):
@@ -143,7 +144,28 @@ def test_a_factor_that_grows_is_the_one_made_at_once(space, noise):
         assert factor.q.T @ factor.q == pytest.approx(np.eye(kept.sum()), abs=ROUNDING)
         assert factor.back @ (factor.q.T @ y) == pytest.approx(slow, rel=1e-7)
         assert factor.whiten is factors[0].whiten
-    assert np.array_equal(factors[1].q[:, :4], factors[0].q)
+    assert np.array_equal(factors[1].q[:, :6], factors[0].q)
+
+
+@pytest.mark.parametrize("left_out", [1, 2, 3])
+@pytest.mark.parametrize("joins", [0, 2])
+def test_a_factor_without_a_block_is_the_one_made_anew(left_out, joins, space, noise):
+    """What stands before the block is taken as it is, whatever comes after it."""
+    rng = np.random.default_rng(6)
+    blocks = [rng.standard_normal((space.n, width)) for width in (9, 2, 1, 1)]
+    blocks[2] += 3.0 * blocks[1][:, :1]  # no columns are at right angles
+    y = rng.standard_normal(space.n)
+    whole = Factor.of(blocks, space.bounds, **noise)
+    parts = [block for k, block in enumerate(blocks) if k != left_out]
+    parts += [rng.standard_normal((space.n, joins))] if joins else []
+    factor = Factor.of(parts, space.bounds, **noise, before=[whole])
+    anew = Factor.of(parts, space.bounds, **noise)
+    assert factor.q.shape == anew.q.shape == (space.n, sum(part.shape[1] for part in parts))
+    assert factor.q.T @ factor.q == pytest.approx(np.eye(factor.q.shape[1]), abs=ROUNDING)
+    slow = anew.back @ (anew.q.T @ y)
+    assert factor.back @ (factor.q.T @ y) == pytest.approx(slow, rel=1e-7)
+    if left_out == 3 or not joins:
+        assert np.array_equal(factor.q[:, :9], whole.q[:, :9])
 
 
 def test_gains_are_those_of_least_squares(space):

@@ -233,7 +233,6 @@ def test_ctrl_c_gives_the_account_so_far(tmp_path):
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
-        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
     )
     first = json.loads(process.stderr.readline())
     process.send_signal(signal.SIGINT)

@@ -463,7 +463,6 @@ def test_ctrl_c_ends_every_process_and_gives_the_account_so_far(file):
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
-        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
     )
     while json.loads(process.stderr.readline())["done"] < 6:
         pass

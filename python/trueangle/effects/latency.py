@@ -95,7 +95,9 @@ class Latency(Effect):
     def columns(cls, signals: Signals, around: Surroundings, shape: dict[str, Any]) -> Array:
         """Column whose coefficient is tau, arcsec per second, to first order in tau."""
         speed = signals.turns_per_s * (360.0 * ARCSEC_PER_DEG)
-        return np.asarray(-(speed * (1.0 + around.pattern.slope(signals.theta)))[:, None])
+        return np.asarray(
+            -(speed * (1.0 + around.pattern.value_and_slope(signals.theta)[1]))[:, None]
+        )
 
     @classmethod
     def blind_spots(cls, regression: Regression, found: Sequence[Blindness]) -> Iterator[Blindness]:

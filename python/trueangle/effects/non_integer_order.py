@@ -8,7 +8,6 @@ from typing import ClassVar, Self
 
 import numpy as np
 
-from .. import _core
 from ..joint.pattern import Surroundings, line_columns
 from ..joint.signals import Signals
 from ..regression.estimate import Parameters, quantity
@@ -20,6 +19,7 @@ from .blindness import (
 from .drift_within_run import DriftWithinRun
 from .effect import ALWAYS, Effect
 from .missing_order import MissingOrder
+from .orderspectrum import OrderSpectrum
 from .search import (
     Array,
     Fitted,
@@ -160,8 +160,8 @@ class NonIntegerOrder(Effect):
             cls.kind, {"order": order}, line_columns(regression.signals.theta, order), log_grid
         )
 
-    @staticmethod
-    def _search(regression: Regression) -> tuple[Array, Array]:
+    @classmethod
+    def _search(cls, regression: Regression) -> tuple[Array, Array]:
         """Trial orders and the deviance of a run effect there, without cross terms."""
         theta = regression.signals.theta
         starts = np.array([start for start, _ in regression.bounds])
@@ -179,15 +179,17 @@ class NonIntegerOrder(Effect):
         orders = low + step * np.arange(count, dtype=np.float64)
         e = regression.left - regression.whiten.run_part(regression.left)
         e = np.where(regression.outlying, 0.0, e)
-        sums = _core.unit_sums(theta, e[None, :], starts.tolist(), low, step, count)
-        power = sums[:, :, 0] ** 2 + sums[:, :, 1] ** 2
+        spectrum: OrderSpectrum = regression.lines.once(
+            cls.kind,
+            (low, step, count),
+            lambda: OrderSpectrum(theta, starts.tolist(), low, step, count),
+        )
+        sums = spectrum.sums(e)
         # P: sum of the two squared normalised coefficients per run, 2 on average.
-        p = 2.0 * power / (sizes * regression.variance)
-        best = np.zeros(count)
-        for ratio in np.geomspace(1e-3, 1e3, 13):
-            x = ratio * sizes
-            deviance = (p * (x / (2.0 + x))).sum(axis=1) - 2.0 * np.log1p(x / 2.0).sum()
-            best = np.maximum(best, deviance)
+        p = (sums.real**2 + sums.imag**2) * (2.0 / (sizes * regression.variance))
+        ratios = np.outer(sizes, np.geomspace(1e-3, 1e3, 13))
+        saved = p @ (ratios / (2.0 + ratios)) - 2.0 * np.log1p(ratios / 2.0).sum(axis=0)
+        best = np.maximum(saved.max(axis=1), 0.0)
         return orders, best
 
     @classmethod

@@ -104,19 +104,19 @@ class Pattern:
             np.array([value.imag for value in values], dtype=np.float64),
         )
 
-    def _sum(self, theta: Array, cosine: Array, sine: Array) -> Array:
-        parts = (np.ravel(theta), self.orders, cosine, sine)
-        total = _core.line_sum(*(np.ascontiguousarray(part, dtype=np.float64) for part in parts))
-        return total.reshape(np.shape(theta))
+    def _lines(self, theta: Array) -> tuple[Array, Array, Array, Array]:
+        parts = (np.ravel(theta), self.orders, self.cosine, self.sine)
+        theta, orders, a, b = (np.ascontiguousarray(part, dtype=np.float64) for part in parts)
+        return theta, orders, a, b
 
     def value(self, theta: Array) -> Array:
         """p(theta), arcsec."""
-        return self._sum(theta, self.cosine, self.sine)
+        return _core.line_sum(*self._lines(theta)).reshape(np.shape(theta))
 
-    def slope(self, theta: Array) -> Array:
-        """dp/dtheta, arcsec per arcsec (no unit)."""
-        scale = self.orders / ARCSEC_PER_RAD
-        return self._sum(theta, scale * self.sine, -scale * self.cosine)
+    def value_and_slope(self, theta: Array) -> tuple[Array, Array]:
+        """p(theta) and dp/dtheta, arcsec per arcsec (no unit)."""
+        value, slope = _core.line_sum_and_slope(*self._lines(theta)).reshape(2, *np.shape(theta))
+        return value, slope / ARCSEC_PER_RAD
 
     def passed(
         self,
@@ -142,15 +142,19 @@ class Pattern:
         By Newton's steps; where the pattern may be about as steep as the angle, which that of
         no joint is, by putting e in.
         """
-        steepest = float(np.abs(self.orders) @ np.hypot(self.cosine, self.sine)) / ARCSEC_PER_RAD
+        sizes = np.hypot(self.cosine, self.sine)
+        steepest = float(self.orders @ sizes) / ARCSEC_PER_RAD
+        # What a step of Newton leaves of its own square.
+        bend = 0.5 * float(self.orders**2 @ sizes) / ARCSEC_PER_RAD**2 / max(1.0 - steepest, 0.1)
         error = self.value(theta)
         for _ in range(steps):
-            at = theta + error / ARCSEC_PER_RAD
-            change = self.value(at) - error
+            value, slope = self.value_and_slope(theta + error / ARCSEC_PER_RAD)
+            change = value - error
             if steepest < STEEP:
-                change = change / (1.0 - self.slope(at))
+                change = change / (1.0 - slope)
             error = error + change
-            if np.max(np.abs(change), initial=0.0) < 1e-9:
+            largest = float(np.max(np.abs(change), initial=0.0))
+            if min(largest, bend * largest**2 if steepest < STEEP else np.inf) < SOLVED:
                 break
         return error
 
@@ -165,6 +169,9 @@ class Surroundings:
 
 #: Slope from which on Newton's steps may lead away.
 STEEP = 0.9
+
+#: Arcsec that are left of an equation when it counts as solved: below any encoder's rounding.
+SOLVED = 1e-9
 
 #: Rounding of angles of some hundred turns, per order.
 _VANISHES = 1e-11

@@ -1,4 +1,4 @@
-"""Columns under some noise, made orthonormal: grown by further columns, not made anew."""
+"""Columns under some noise, made orthonormal: what blocks have in common is not made anew."""
 
 from __future__ import annotations
 
@@ -20,6 +20,10 @@ DISTINCT = 1e-7
 #: Condition up to which the triangle of the Gram matrix is as good as one of the columns: its
 #: square costs half of the digits. Up to the smaller one a single pass leaves 1e-13.
 WELL, VERY_WELL = 1e4, 10.0
+
+
+#: Columns in all for each one that growing by it is quicker than to begin anew.
+GROWN = 4
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,13 +71,12 @@ class Factor:
         like = next((f for f in before if f.whiten.has(rho, effects, weights)), None)
         if like is None:
             return cls._fresh(blocks, Whitener(bounds, rho, list(effects), weights), whole)
-        known = len(like.blocks)
-        if (
-            like.scaled is not None
-            and known <= len(blocks)
-            and all(a is b for a, b in zip(like.blocks, blocks[:known], strict=True))
-        ):
-            grown = like._grown(blocks)
+        same = 0
+        while same < min(len(like.blocks), len(blocks)) and like.blocks[same] is blocks[same]:
+            same += 1
+        further = sum(block.shape[1] for block in blocks[same:])
+        if like.scaled is not None and GROWN * further <= sum(b.shape[1] for b in blocks):
+            grown = like._first(same)._grown(blocks)
             if grown is not None:
                 return grown
         return cls._fresh(blocks, like.whiten, whole)
@@ -91,6 +94,16 @@ class Factor:
         kept = s > DISTINCT * s[0]
         back = vt[kept].T / s[kept] / lengths[:, None]
         return cls(whiten, blocks, u[:, kept], back, None, lengths)
+
+    def _first(self, count: int) -> Factor:
+        """That of the first blocks alone: no column depends on those after it."""
+        if count == len(self.blocks):
+            return self
+        assert self.scaled is not None
+        blocks = self.blocks[:count]
+        p = sum(block.shape[1] for block in blocks)
+        back, scaled = self.back[:p, :p], self.scaled[:p, :p]
+        return Factor(self.whiten, blocks, self.q[:, :p], back, scaled, self.lengths[:p])
 
     def _grown(self, blocks: tuple[Array, ...]) -> Factor | None:
         """With further blocks; None where they are nearly among those before."""

@@ -168,8 +168,8 @@ class LeastSquares(Coefficients):
         factor = Factor.of(
             self._blocks, self.bounds, rho, effects, self.weights, self._factors, self.design
         )
-        # White and correlated noise take turns: the last two are kept.
-        self._factors = (factor, *(f for f in self._factors if f.whiten is not factor.whiten))[:2]
+        # An update passes through white noise and two correlations: all three are kept.
+        self._factors = (factor, *(f for f in self._factors if f.whiten is not factor.whiten))[:3]
         self.whiten, self.q, self.back = factor.whiten, factor.q, factor.back
         y = self.whiten(target)
         inner = self.q.T @ y
