@@ -370,17 +370,28 @@ mod tests {
         let mut total = vec![0.0; theta.len()];
         columns(&theta, &orders, &mut wide).unwrap();
         columns(&theta, &orders, &mut single).unwrap();
-        sum(&theta, &orders, &cosine, &sine, &mut total).unwrap();
+        let (mut again, mut slope) = (total.clone(), total.clone());
+        let lines = Lines {
+            orders: &orders,
+            cosine: &cosine,
+            sine: &sine,
+        };
+        sum(&theta, lines, &mut total).unwrap();
+        sum_and_slope(&theta, lines, &mut again, &mut slope).unwrap();
+        assert_eq!(again, total);
         for (i, &x) in theta.iter().enumerate() {
-            let mut expected = 0.0;
+            let (mut expected, mut steep) = (0.0, 0.0);
             for (j, &order) in orders.iter().enumerate() {
                 let (s, c) = (order * x).sin_cos();
                 assert!((wide[6 * i + 2 * j] - c).abs() < ROUNDING);
                 assert!((wide[6 * i + 2 * j + 1] - s).abs() < ROUNDING);
                 assert_eq!(single[6 * i + 2 * j], wide[6 * i + 2 * j] as f32);
                 expected += cosine[j] * c + sine[j] * s;
+                steep += order * (sine[j] * c - cosine[j] * s);
             }
             assert!((total[i] - expected).abs() < 10.0 * ROUNDING);
+            let most: f64 = orders.iter().sum();
+            assert!((slope[i] - steep).abs() < 10.0 * ROUNDING * most);
         }
     }
 
@@ -418,7 +429,18 @@ mod tests {
     #[test]
     fn lengths_that_do_not_match_are_told() {
         assert!(columns(&[0.0], &[1.0], &mut [0.0_f64; 3]).is_err());
-        assert!(sum(&[0.0], &[1.0], &[1.0], &[], &mut [0.0]).is_err());
+        let lines = Lines {
+            orders: &[1.0],
+            cosine: &[1.0],
+            sine: &[],
+        };
+        assert!(sum(&[0.0], lines, &mut [0.0]).is_err());
+        let lines = Lines {
+            sine: &[1.0],
+            ..lines
+        };
+        assert!(sum(&[0.0], lines, &mut [0.0; 2]).is_err());
+        assert!(sum_and_slope(&[0.0], lines, &mut [0.0], &mut []).is_err());
         let orders = Ladder {
             first: 1.0,
             step: 1.0,
