@@ -3,7 +3,9 @@
     python benches/formats.py [--rows 20000000] [--rounds 5] [--only hdf5 ...]
 
 Every way is a process of its own, in turns; medians of seconds and of processor seconds (imports
-left out), and their ratios. Files are made in a temporary folder and removed.
+left out), and their ratios. ``blocks`` reads as a fit does and ``sums`` adds columns that are in
+memory, on one thread each: half of both is the least that a fit takes on two processors. Files are
+made in a temporary folder and removed.
 """
 
 from __future__ import annotations
@@ -24,6 +26,8 @@ ORDERS = range(1, 18)
 NAMES = ("reference_deg", "indicated_deg")
 #: Rows that readers in pieces take at a time.
 PIECE = 1 << 20
+#: Rows that a fit sums at a time.
+BLOCK = 1 << 16
 #: Rows of text at most: a file of it is four times as large.
 MOST_TEXT = 4_000_000
 
@@ -128,6 +132,26 @@ def fit(path: Path) -> None:
     ta.fit_logs(path, ORDERS, progress="none")
 
 
+def blocks(path: Path) -> None:
+    from trueangle.formats.formats import find_format
+
+    kind = find_format(path)
+    for part in kind.stretches(path):
+        for _ in kind.read(path, list(NAMES), None, part, texts=()):
+            pass
+
+
+def sums(table: dict[str, np.ndarray]) -> None:
+    import trueangle as ta
+
+    moments, travel = ta.Moments(ORDERS, period=360.0), np.zeros(360, dtype=np.int64)
+    for start in range(0, table[NAMES[0]].size, BLOCK):
+        reference, indicated = (table[name][start : start + BLOCK] for name in NAMES)
+        moments.update_known(reference, indicated, travel=travel)
+
+
+#: What a fit takes apart, on one thread.
+PARTS = ("blocks", "sums")
 #: Readers by format; the ratio is to the fastest.
 READERS = {
     "parquet": {"pyarrow": read_parquet},
@@ -138,9 +162,10 @@ READERS = {
 }
 
 
-def measured(kind: str, way: str, path: Path) -> dict[str, float]:
+def measured(kind: str, way: str, path: Path, rows: int) -> dict[str, float]:
     """Seconds of one way in a process of its own."""
     command = [sys.executable, __file__, "--way", way, "--only", kind, "--path", str(path)]
+    command += ["--rows", str(rows)]
     done = subprocess.run(command, capture_output=True, text=True, check=True)
     result: dict[str, float] = json.loads(done.stdout)
     return result
@@ -162,7 +187,13 @@ def main() -> None:
     parser.add_argument("--path", type=Path, help=argparse.SUPPRESS)
     args = parser.parse_args()
     if args.way:
-        way = fit if args.way == "fit" else READERS[args.only[0]][args.way]
+        way = {"fit": fit, "blocks": blocks, **READERS[args.only[0]]}.get(args.way)
+        if way is None:
+            table = columns(min(args.rows, MOST_TEXT) if args.only[0] == "csv" else args.rows)
+
+            def way(_: Path) -> None:
+                sums(table)
+
         with tempfile.TemporaryDirectory() as name:  # what is imported at the first file
             first = Path(name, f"first.{args.only[0]}")
             make(args.only[0], first, 20_000)
@@ -177,11 +208,11 @@ def main() -> None:
         with tempfile.TemporaryDirectory() as name:
             path = Path(name, f"log.{kind}")
             make(kind, path, args.rows)
-            ways = [*READERS[kind], "fit"]
+            ways = [*READERS[kind], "fit", *PARTS]
             found: dict[str, list[dict[str, float]]] = {way: [] for way in ways}
             for _ in range(args.rounds):
                 for way in ways:
-                    found[way].append(measured(kind, way, path))
+                    found[way].append(measured(kind, way, path, args.rows))
         median = {
             way: {k: statistics.median(one[k] for one in runs) for k in runs[0]}
             for way, runs in found.items()
