@@ -18,6 +18,7 @@ import subprocess
 import sys
 import tempfile
 import time
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
@@ -136,9 +137,15 @@ def blocks(path: Path) -> None:
     from trueangle.formats.formats import find_format
 
     kind = find_format(path)
-    for part in kind.stretches(path):
-        for _ in kind.read(path, list(NAMES), None, part, texts=()):
-            pass
+
+    def read() -> None:
+        for part in kind.stretches(path):
+            for _ in kind.read(path, list(NAMES), None, part, texts=()):
+                pass
+
+    # Threads keep freed memory; the main one, with little else, gives it back block by block.
+    with ThreadPoolExecutor(1) as pool:
+        pool.submit(read).result()
 
 
 def sums(table: dict[str, np.ndarray]) -> None:
