@@ -59,6 +59,7 @@ impl Period {
     }
 
     /// Whole turns nearest to `x`, and the rest as an unevaluated sum.
+    #[inline(always)]
     fn reduce(self, x: f64) -> (f64, f64, f64) {
         let turns = (x / self.high).round_ties_even();
         if turns.abs() > MANY_TURNS {
@@ -72,6 +73,7 @@ impl Period {
     }
 
     /// `x` moved by whole turns into `(-period/2, period/2]`.
+    #[inline(always)]
     pub fn wrap(self, x: f64) -> f64 {
         let (_, rest, carry) = self.reduce(x);
         let half = 0.5 * self.high;
@@ -87,6 +89,7 @@ impl Period {
 
     /// Phase of a shaft of `cycles` per turn at angle `x`: a part of its own turn,
     /// in `[-1/2, 1/2]`, as an unevaluated sum whose error is far below an ulp.
+    #[inline(always)]
     pub fn phase(self, x: f64, cycles: f64) -> (f64, f64) {
         let (turns, rest, carry) = self.reduce(x);
         let part = rest / self.high;
@@ -105,6 +108,7 @@ impl Period {
     }
 
     /// Phase of order `order` of a shaft, from the shaft's own phase.
+    #[inline(always)]
     pub fn harmonic(phase: (f64, f64), order: f64) -> (f64, f64) {
         let (product, low) = two_product(order, phase.0);
         let low = order.mul_add(phase.1, low);
@@ -114,6 +118,7 @@ impl Period {
 }
 
 /// Sine and cosine of a phase in parts of a turn.
+#[inline(always)]
 pub fn sin_cos_turns(phase: (f64, f64)) -> (f64, f64) {
     let (angle, low) = two_product(phase.0, TAU);
     let low = phase.1.mul_add(TAU, phase.0.mul_add(TAU_LOW, low));
@@ -123,6 +128,7 @@ pub fn sin_cos_turns(phase: (f64, f64)) -> (f64, f64) {
 }
 
 /// `a + b` as sum and remainder (Knuth).
+#[inline(always)]
 pub fn two_sum(a: f64, b: f64) -> (f64, f64) {
     let sum = a + b;
     let part = sum - a;
@@ -130,12 +136,14 @@ pub fn two_sum(a: f64, b: f64) -> (f64, f64) {
 }
 
 /// `a + b` as sum and remainder for `|a| >= |b|` (Dekker).
+#[inline(always)]
 pub fn fast_two_sum(a: f64, b: f64) -> (f64, f64) {
     let sum = a + b;
     (sum, b - (sum - a))
 }
 
 /// `a * b` as product and remainder.
+#[inline(always)]
 pub fn two_product(a: f64, b: f64) -> (f64, f64) {
     let product = a * b;
     (product, a.mul_add(b, -product))

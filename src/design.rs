@@ -116,6 +116,7 @@ impl Design {
     }
 
     /// Appends `scale * cos, scale * sin` of every harmonic at angle `x`.
+    #[inline(always)]
     pub fn extend_row(&self, row: &mut Vec<f64>, x: f64, scale: f64) {
         for shaft in &self.shafts {
             let mut rotation = Rotation::new(self.period.phase(x, shaft.cycles));

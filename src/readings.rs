@@ -63,6 +63,7 @@ impl Readings<'_> {
     }
 
     /// `error - centre` of reading `i` in `(-period/2, period/2]`.
+    #[inline(always)]
     pub fn error(&self, i: usize, centre: f64, period: Period) -> f64 {
         // The rounding of the difference matters after many turns: it is carried along.
         let reference = self.reference.map_or(0.0, |values| values[i]);

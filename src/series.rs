@@ -327,6 +327,7 @@ impl Rotation {
     /// Orders between fresh starts: rounding grows by about 1e-16 per step.
     const RESEED: u32 = 32;
 
+    #[inline(always)]
     pub(crate) fn new(phase: (f64, f64)) -> Self {
         let unit = sin_cos_turns(phase);
         Self {
@@ -339,6 +340,7 @@ impl Rotation {
     }
 
     /// Sine and cosine of `order` times the phase; `order` must not decrease.
+    #[inline(always)]
     pub(crate) fn advance(&mut self, order: u32) -> (f64, f64) {
         if order - self.seeded >= Self::RESEED {
             self.current = sin_cos_turns(Period::harmonic(self.phase, f64::from(order)));

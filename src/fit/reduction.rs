@@ -10,6 +10,7 @@ use crate::moments::accumulator::{Accumulator, segments};
 use crate::moments::spectrum::Spectrum;
 use crate::moments::{factor, normal};
 use crate::readings::Readings;
+use crate::simd::{InstructionSet, Kernel, Lanes, dispatch};
 
 /// Rows reduced at a time: enough to hide the triangle above them, few enough for the cache.
 const BLOCK_ROWS: usize = 512;
@@ -215,20 +216,46 @@ fn run_rows(design: &Design, run: &Readings, centre: f64) -> Triangle {
     let columns = design.columns() + 2;
     let mut rows = Vec::with_capacity(BLOCK_ROWS.min(run.angle.len()) * columns);
     let mut reduction = Reduction::default();
-    for (block, angles) in run.angle.chunks(BLOCK_ROWS).enumerate() {
+    for start in (0..run.angle.len()).step_by(BLOCK_ROWS) {
         interrupt::point();
         rows.clear();
-        for (i, &angle) in angles.iter().enumerate() {
-            let i = BLOCK_ROWS * block + i;
-            let scale = run.weight(i).sqrt();
+        let block = Block {
+            design,
+            readings: run.part(start, run.angle.len().min(start + BLOCK_ROWS)),
+            centre,
+            rows: &mut rows,
+        };
+        dispatch(InstructionSet::best(), block);
+        reduction.push(Triangle::of_rows(columns, &rows));
+    }
+    reduction.finish().unwrap_or_else(|| Triangle::new(columns))
+}
+
+/// Rows of some readings, made where a product and sum are one instruction.
+struct Block<'a> {
+    design: &'a Design,
+    readings: Readings<'a>,
+    centre: f64,
+    rows: &'a mut Vec<f64>,
+}
+
+impl Kernel for Block<'_> {
+    #[inline(always)]
+    fn run<L: Lanes>(self) {
+        let Self {
+            design,
+            readings,
+            centre,
+            rows,
+        } = self;
+        for (i, &angle) in readings.angle.iter().enumerate() {
+            let scale = readings.weight(i).sqrt();
             if scale == 0.0 {
                 continue;
             }
             rows.push(scale);
-            design.extend_row(&mut rows, angle, scale);
-            rows.push(scale * run.error(i, centre, design.period()));
+            design.extend_row(rows, angle, scale);
+            rows.push(scale * readings.error(i, centre, design.period()));
         }
-        reduction.push(Triangle::of_rows(columns, &rows));
     }
-    reduction.finish().unwrap_or_else(|| Triangle::new(columns))
 }
