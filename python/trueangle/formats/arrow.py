@@ -5,16 +5,16 @@ Batches that pyarrow has to look at, and are not packed, come from mapped memory
 
 from __future__ import annotations
 
+import struct
 from collections.abc import Collection, Iterable, Iterator, Sequence
-from contextlib import ExitStack, contextmanager
+from contextlib import contextmanager
 from pathlib import Path
 from typing import NamedTuple
 
 import pyarrow as pa
 
 from .ahead import ahead
-from .arrowmessages import FILE_MAGIC, batch_message, codec_of, footer
-from .arrowplaces import placed_batch
+from .arrowplaces import PlacedBatch, placed_batch
 from .arrowtables import (
     ArrowDigest,
     add_corrected,
@@ -26,6 +26,10 @@ from .format import TEXTS, Batch, Choose, Contents, Watch
 
 __all__ = ["columns", "contents", "copy", "read", "stretches"]
 
+_FILE_MAGIC = b"ARROW1"
+#: Codecs by their number in the format's BodyCompression.
+_CODECS = {0: "lz4", 1: "zstd"}
+_RECORD_BATCH = 3
 #: Rows at once.
 _ROWS = 1 << 20
 #: Bytes of a stretch that is read on its own, and parts of a larger batch at most.
@@ -57,8 +61,8 @@ def stretches(path: Path) -> list[Stretch | None]:
     with damage_told(path, "Arrow"):
         if not _is_file(path):
             return [None]
-        with path.open("rb", buffering=0) as raw:
-            batches = len(footer(raw).batches)
+        with pa.memory_map(str(path), "r") as source:
+            batches = pa.ipc.open_file(source).num_record_batches
         size = max(path.stat().st_size, 1)
         each = max(1, batches * _STRETCH // size)
         parts = 1
@@ -86,19 +90,24 @@ def read(
         with _opened(path) as (_schema, batches, _options):
             yield from ahead(column_batches(path, names, batches))
         return
-    with damage_told(path, "Arrow"), path.open("rb", buffering=0) as raw, ExitStack() as opened:
-        with pa.OSFile(str(path)) as source:
-            schema = pa.ipc.open_file(source).schema
-        end, library = footer(raw), None
-        for number in stretch.batches:
-            placed = placed_batch(raw, end, end.batches[number], schema, names)
-            if placed is not None:
-                yield from placed.read(raw, stretch.part, stretch.parts)
-                continue
-            if library is None:
-                library = opened.enter_context(_library(path, names))
-            batch = stretch.of(library.get_batch(number).select(names))
-            yield from column_batches(path, names, _cut([_valid(batch)]))
+    with damage_told(path, "Arrow"), path.open("rb", buffering=0) as raw:
+        if _compression(path, True) is None:
+            placed = _placed(path, names, stretch)
+            if placed:
+                for found in placed:
+                    yield from found.read(raw, stretch.part, stretch.parts)
+                return
+        with _library(path, names) as file:
+            batches = (stretch.of(file.get_batch(i).select(names)) for i in stretch.batches)
+            yield from column_batches(path, names, _cut(map(_valid, batches)))
+
+
+def _placed(path: Path, names: Sequence[str], stretch: Stretch) -> list[PlacedBatch]:
+    """Where the columns of its batches lie; none where pyarrow has to look at one of them."""
+    with pa.memory_map(str(path), "r") as mapped:
+        file = pa.ipc.open_file(mapped)
+        found = [placed_batch(mapped, file.get_batch(i), names) for i in stretch.batches]
+    return [] if None in found else [batch for batch in found if batch is not None]
 
 
 @contextmanager
@@ -157,7 +166,7 @@ def contents(path: Path, topic: str | None = None) -> Contents:
 
 def _is_file(path: Path) -> bool:
     with path.open("rb") as file:
-        return file.read(len(FILE_MAGIC)) == FILE_MAGIC
+        return file.read(len(_FILE_MAGIC)) == _FILE_MAGIC
 
 
 def _valid(batch: pa.RecordBatch) -> pa.RecordBatch:
@@ -194,13 +203,36 @@ def _cut(batches: Iterable[pa.RecordBatch]) -> Iterator[pa.RecordBatch]:
 
 
 def _compression(path: Path, is_file: bool) -> str | None:
-    """Codec of the first record batch, which only its own message tells."""
-    if is_file:
-        with path.open("rb", buffering=0) as raw:
-            blocks = footer(raw).batches
-            return batch_message(raw, blocks[0]).codec if blocks else None
+    """Codec of the first record batch, which only the message's own header tells."""
     with pa.memory_map(str(path), "r") as source:
-        for message in pa.ipc.MessageReader.open_stream(source):
+        if is_file:
+            source.seek(8)  # the magic and its padding; a stream follows
+        reader = pa.ipc.MessageReader.open_stream(source)
+        for message in reader:
             if message.type == "record batch":
-                return codec_of(message.metadata.to_pybytes())
+                return _codec(message.metadata.to_pybytes())
     return None
+
+
+def _codec(header: bytes) -> str | None:
+    """The compression field of a record batch's flatbuffer (Message.fbs of Arrow)."""
+
+    def field(table: int, number: int) -> int | None:
+        vtable = table - struct.unpack_from("<i", header, table)[0]
+        if 4 + 2 * number >= struct.unpack_from("<H", header, vtable)[0]:
+            return None
+        offset = struct.unpack_from("<H", header, vtable + 4 + 2 * number)[0]
+        return table + offset if offset else None
+
+    def follow(place: int) -> int:
+        return int(place + struct.unpack_from("<I", header, place)[0])
+
+    message = follow(0)
+    kind, body = field(message, 1), field(message, 2)
+    if kind is None or body is None or header[kind] != _RECORD_BATCH:
+        return None
+    compression = field(follow(body), 3)
+    if compression is None:
+        return None
+    codec = field(follow(compression), 0)
+    return _CODECS[0 if codec is None else header[codec]]

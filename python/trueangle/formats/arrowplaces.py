@@ -10,7 +10,6 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
-from .arrowmessages import Block, Footer, batch_message
 from .arrowtables import dtype_of
 from .stored import ROWS, stored_values
 
@@ -54,48 +53,37 @@ class PlacedBatch(NamedTuple):
 
 
 def placed_batch(
-    file: FileIO, footer: Footer, block: Block, schema: pa.Schema, names: Sequence[str]
+    mapped: pa.MemoryMappedFile, batch: pa.RecordBatch, names: Sequence[str]
 ) -> PlacedBatch | None:
-    """Where columns lie; None where pyarrow has to look at them: packed, texts, within others.
+    """Where columns of a batch of a mapped file lie, by the addresses that pyarrow gives them.
 
-    Raises
-    ------
-    ValueError, struct.error
-        The batch is damaged.
+    None where pyarrow has to look at them: packed, turned to another byte order, not numbers.
+    Of what is mapped nothing is read but what describes the batch.
     """
-    counts = [count for field in schema if (count := _buffers(field.type)) is not None]
-    wanted = {name: schema.get_field_index(name) for name in names}
-    plain = footer.is_little_endian and len(counts) == len(schema)
-    if not plain or any(i < 0 or not _is_number(schema.field(i).type) for i in wanted.values()):
-        return None
-    found = batch_message(file, block)
-    if found.codec is not None:
-        return None
-    starts = np.cumsum([0, *counts]).tolist()
-    if (len(found.nodes), len(found.buffers)) != (len(counts), starts[-1]):
-        raise ValueError("a record batch has other columns than its schema")
+    size, rows = mapped.size(), batch.num_rows
+    mapped.seek(0)
+    base = mapped.read_buffer(size).address
+
+    def place(part: pa.Buffer | None, least: int) -> int | None:
+        """The byte of the file that a part of so many bytes starts at."""
+        if part is None or part.size < least:
+            return None
+        start = part.address - base
+        return start if 0 <= start <= size - part.size else None
+
     places = {}
-    for name, index in wanted.items():
-        dtype = dtype_of(schema.field(index).type).newbyteorder("<")
-        rows, nulls = found.nodes[index]
-        bits, values = found.buffers[starts[index] :][:2]
-        held = min(values[1] // dtype.itemsize, 8 * bits[1] if nulls else rows)
-        if not 0 <= rows == found.rows <= held:
-            raise ValueError(f"column {name} holds fewer values than its record batch")
-        places[name] = Place(dtype, values[0], bits[0] if nulls else None)
-    return PlacedBatch(found.rows, places)
-
-
-def _buffers(kind: pa.DataType) -> int | None:
-    """Buffers of a column, None where they are not of the column alone."""
-    types = pa.types
-    if types.is_null(kind):
-        return 0
-    if types.is_primitive(kind) or types.is_decimal(kind) or types.is_dictionary(kind):
-        return 2
-    if types.is_string(kind) or types.is_large_string(kind):
-        return 3
-    return None
+    for name in names:
+        # A name that is there twice has no index.
+        if batch.schema.get_field_index(name) < 0 or not _is_number(batch[name].type):
+            return None
+        column = batch[name]
+        dtype, (known, values) = dtype_of(column.type), column.buffers()
+        at = place(values, rows * dtype.itemsize)
+        bits = place(known, -(-rows // 8)) if column.null_count else None
+        if column.offset or at is None or (column.null_count and bits is None):
+            return None
+        places[name] = Place(dtype, at, bits)
+    return PlacedBatch(rows, places)
 
 
 def _is_number(kind: pa.DataType) -> bool:

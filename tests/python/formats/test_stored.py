@@ -11,7 +11,6 @@ from trueangle.formats import stored
 h5py = pytest.importorskip("h5py")
 pa = pytest.importorskip("pyarrow")
 from trueangle.formats import arrow, hdf5  # noqa: E402
-from trueangle.formats.arrowmessages import footer  # noqa: E402
 from trueangle.formats.arrowplaces import placed_batch  # noqa: E402
 from trueangle.formats.arrowtables import numbers  # noqa: E402
 from trueangle.formats.hdf5places import Places  # noqa: E402
@@ -136,25 +135,38 @@ def test_columns_are_those_of_pyarrow(
     path = tmp_path / "log.arrow"
     table = made_arrow(path, nulls=nulls, options=pa.ipc.IpcWriteOptions(compression=compression))
     names = ["short", "a", "count"]
-    with path.open("rb", buffering=0) as raw:
-        end = footer(raw)
-        placed = placed_batch(raw, end, end.batches[1], table.schema, names)
+    with pa.memory_map(str(path)) as mapped:
+        placed = placed_batch(mapped, pa.ipc.open_file(mapped).get_batch(1), names)
     assert (placed is None) == (compression is not None)
     found = arrow_read(path, names, parts)
     for name in names:
         np.testing.assert_array_equal(found[name], numbers(path, name, table[name]))
 
 
-def test_labels_and_nested_columns_are_left_to_pyarrow(tmp_path: Path):
+def test_labels_and_columns_that_lie_elsewhere_are_left_to_pyarrow(tmp_path: Path):
     path = tmp_path / "log.arrow"
     table = made_arrow(path)
-    nested = table.append_column("list", pa.array([[1.0]] * ROWS))
-    with path.open("rb", buffering=0) as raw:
-        end = footer(raw)
-        for schema, names in ((table.schema, ["a", "label"]), (nested.schema, ["a"])):
-            assert placed_batch(raw, end, end.batches[0], schema, names) is None
-        with pytest.raises(ValueError, match="other columns than its schema"):
-            placed_batch(raw, end, end.batches[0], table.schema.remove(0), ["a"])
+    with pa.memory_map(str(path)) as mapped:
+        batch = pa.ipc.open_file(mapped).get_batch(0)
+        assert placed_batch(mapped, batch, ["a", "count"]) is not None
+        for name in ("label", "text", "moving", "nothing"):
+            assert placed_batch(mapped, batch, ["a", name]) is None
+        # What lies elsewhere: in memory, or behind a shifted start.
+        assert placed_batch(mapped, table.to_batches()[0], ["a"]) is None
+        assert placed_batch(mapped, batch.slice(5), ["a"]) is None
+    wanted = numbers(path, "a", table["a"])
+    batches = list(arrow.read(path, ["a", "label"], None, arrow.Stretch(range(3))))
+    np.testing.assert_array_equal(np.concatenate([batch["a"] for batch in batches]), wanted)
+
+
+def test_a_column_that_is_there_twice_is_left_to_pyarrow(tmp_path: Path):
+    path = tmp_path / "log.arrow"
+    column = pa.array(np.arange(50.0))
+    table = pa.Table.from_arrays([column, column], ["a", "a"])
+    with pa.ipc.new_file(path, table.schema) as writer:
+        writer.write_table(table)
+    with pa.memory_map(str(path)) as mapped:
+        assert placed_batch(mapped, pa.ipc.open_file(mapped).get_batch(0), ["a"]) is None
 
 
 def test_an_arrow_file_that_is_cut_short_while_it_is_read_is_told(tmp_path: Path, monkeypatch):
