@@ -59,8 +59,8 @@ def check_follows(run: CalibrationRun) -> None:
     UnitWarning
         Angles whose error repeats with 360, and not with 2 pi.
     """
-    stride = max(1, len(run) // _SAMPLE)
     reference, indicated = run.reference, run.indicated
+    stride = reference.size // _SAMPLE
     if stride > 1:
         reference = np.ascontiguousarray(reference[::stride])
         indicated = np.ascontiguousarray(indicated[::stride])

@@ -194,7 +194,7 @@ def fit(
     if problem.argument == "reference":
         check_invertible(fitted.series.slope_bound)
     joint = (gear_ratio, fixed_member)
-    remarks = list(filter(None, (choice.note, breakdown_sentence(problem, weighted))))
+    remarks = [note for note in (choice.note, breakdown_sentence(problem, weighted)) if note]
     if taken is not None:
         remarks += taken.sentences(problem.period)
     if len(found) > 1:
@@ -232,10 +232,14 @@ class _Beside(NamedTuple):
         return self.kinds != () or bool(self.reference)
 
 
+#: Where the pattern alone is asked for.
+_NOTHING = _Beside((), ())
+
+
 def _beside(nuisance: str | Iterable[str], reference_orders: Iterable[float]) -> _Beside:
     lines = tuple(map(float, reference_orders))
     if nuisance == "none":
-        return _Beside((), lines)
+        return _Beside((), lines) if lines else _NOTHING
     from .nuisance import asked_nuisance
 
     return _Beside(asked_nuisance(nuisance), lines)

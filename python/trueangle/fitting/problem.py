@@ -145,9 +145,9 @@ class Problem:
         self.base: list[Array | None] = [run.weights for run in runs]
         #: Reference, indicated angle and weights of every run, as the core takes them.
         self.rows = [(run.reference, run.indicated, run.weights) for run in self.runs]
-        self.readings = sum([row[0].size for row in self.rows])
         #: The argument of every run.
         self.angles: list[Array] = [getattr(run, argument) for run in self.runs]
+        self.readings = sum(map(len, self.angles))
         #: Cycles per turn of every shaft, and its orders, as the core takes them.
         self.design = ([s.cycles_per_turn for s in shafts], [list(s.orders) for s in shafts])
 
