@@ -382,9 +382,18 @@ fn compensate(sum: &mut f64, carry: &mut f64, value: f64) {
 impl Segment {
     /// Adds moments; what rounding takes goes to `carry`.
     fn add(&mut self, carry: &mut Self, moments: &Self) {
-        let sums = self.values_mut().zip(carry.values_mut());
-        for ((sum, carry), value) in sums.zip(moments.values()) {
-            compensate(sum, carry, *value);
-        }
+        add_all(&mut self.weight, &mut carry.weight, &moments.weight);
+        add_all(&mut self.error, &mut carry.error, &moments.error);
+    }
+}
+
+/// Arrays, not one iterator over both: the loop that fits vectors.
+fn add_all<const TERMS: usize>(
+    sums: &mut [f64; TERMS],
+    carries: &mut [f64; TERMS],
+    values: &[f64; TERMS],
+) {
+    for i in 0..TERMS {
+        compensate(&mut sums[i], &mut carries[i], values[i]);
     }
 }
