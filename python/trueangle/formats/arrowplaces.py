@@ -62,7 +62,7 @@ def placed_batch(
     """
     size, rows = mapped.size(), batch.num_rows
     mapped.seek(0)
-    base = mapped.read_buffer(size).address
+    base = mapped.read_buffer(1).address  # of more, the system would look at every page
 
     def place(part: pa.Buffer | None, least: int) -> int | None:
         """The byte of the file that a part of so many bytes starts at."""
