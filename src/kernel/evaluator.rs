@@ -344,7 +344,8 @@ impl Evaluator {
             error: &self.exact_error,
             slope: (self.argument == Argument::Reference).then_some(&self.exact_slope),
             reach: self.reach,
-            bend: (self.slope_bound <= 0.5).then_some(self.bend),
+            slope_bound: self.slope_bound,
+            bend: self.bend,
             set,
         };
         batch.map_blocks(|x, out| {

@@ -10,7 +10,7 @@ use super::table::{DEGREE, MOST_SEGMENTS, Table};
 use crate::chebyshev;
 use crate::interrupt;
 use crate::series::HarmonicSeries;
-use crate::simd::InstructionSet;
+use crate::simd::{InstructionSet, Kernel, Lanes, dispatch};
 
 /// Steps before giving up on another ulp: bisection alone needs about 60.
 const MOST_STEPS: usize = 100;
@@ -70,8 +70,9 @@ pub struct Newton<'e> {
     pub slope: Option<&'e Exact>,
     /// The sum of amplitudes.
     pub reach: f64,
-    /// Bound of its second derivative, where its slope is at most 1/2.
-    pub bend: Option<f64>,
+    /// Bounds of its slope and of its second derivative.
+    pub slope_bound: f64,
+    pub bend: f64,
     /// What to compute on.
     pub set: InstructionSet,
 }
@@ -91,42 +92,108 @@ impl Newton<'_> {
         };
         let mut steepness = vec![0.0; theta.len()];
         let mut last_step = vec![f64::INFINITY; theta.len()];
+        let mut limits = vec![0.0; theta.len()];
+        dispatch(self.set, self.limits(indicated, &mut limits));
         theta.copy_from_slice(indicated);
         for _ in 0..STEPS {
             self.fill(self.error, theta, &mut error);
             self.fill(slope, theta, &mut steepness);
-            for i in 0..theta.len() {
-                let step = ((theta[i] - indicated[i]) + error[i]) / (1.0 + steepness[i]);
-                // One that is found stands still: it does not depend on those beside it.
-                if !self.is_done(theta[i], last_step[i]) {
-                    theta[i] -= step;
-                    last_step[i] = step.abs();
-                }
-            }
-            if (0..theta.len()).all(|i| self.is_done(theta[i], last_step[i])) {
-                break;
+            let mut left = false;
+            let step = Step {
+                indicated,
+                error: &error,
+                steepness: &steepness,
+                limits: &limits,
+                theta: &mut *theta,
+                last_step: &mut last_step,
+                left: &mut left,
+            };
+            dispatch(self.set, step);
+            if !left {
+                return;
             }
         }
         for i in 0..theta.len() {
-            if !self.is_done(theta[i], last_step[i]) {
+            if last_step[i] > limits[i] {
                 theta[i] = safe(indicated[i]);
             }
         }
     }
 
-    /// True when the angle cannot be told from the solution, or there is none.
-    ///
-    /// Before a step s the angle was off by at most 3 s where no slope exceeds 1/2, and a
-    /// step of Newton leaves the square of that times the second derivative.
-    fn is_done(&self, theta: f64, last_step: f64) -> bool {
-        let resolution = f64::EPSILON * (theta.abs() + self.reach);
-        let is_sure = |bend: f64| 18.0 * bend * last_step * last_step <= resolution;
-        last_step.is_nan() || last_step <= resolution || self.bend.is_some_and(is_sure)
+    /// Before a step s the angle was off by at most `s (1 + l)/(1 - l)`, the slope l at most, and
+    /// a step of Newton leaves the square of that times the second derivative over `2 (1 - l)`:
+    /// half of a resolution is enough.
+    fn limits<'a>(&self, indicated: &'a [f64], limits: &'a mut [f64]) -> Limits<'a> {
+        /// Beyond any step, and its products are numbers.
+        const ANY: f64 = 1e150;
+        /// Slope from which on a small step says nothing.
+        const STEEP: f64 = 0.5;
+        let l = self.slope_bound;
+        let left = self.bend * ((1.0 + l) / (1.0 - l)).powi(2) / (1.0 - l);
+        let sure = if l <= STEEP { left.sqrt().recip() } else { 0.0 };
+        Limits {
+            indicated,
+            reach: self.reach,
+            sure: sure.min(ANY),
+            limits,
+        }
     }
 
     fn fill(&self, function: &Exact, x: &[f64], out: &mut [f64]) {
         let batch = Batch::apart(x, out).expect("blocks are equally long");
         function.run(self.set, batch);
+    }
+}
+
+/// Of every sample the last step after which the angle cannot be told from the solution.
+struct Limits<'a> {
+    indicated: &'a [f64],
+    reach: f64,
+    /// The step that leaves a resolution of 1.
+    sure: f64,
+    limits: &'a mut [f64],
+}
+
+impl Kernel for Limits<'_> {
+    #[inline(always)]
+    fn run<L: Lanes>(self) {
+        for (limit, x) in self.limits.iter_mut().zip(self.indicated) {
+            let resolution = f64::EPSILON * (x.abs() + self.reach);
+            let sure = self.sure * resolution.sqrt();
+            *limit = if sure > resolution { sure } else { resolution };
+        }
+    }
+}
+
+/// A step of Newton's method for every sample that is not found yet.
+struct Step<'a> {
+    indicated: &'a [f64],
+    error: &'a [f64],
+    steepness: &'a [f64],
+    limits: &'a [f64],
+    theta: &'a mut [f64],
+    last_step: &'a mut [f64],
+    /// Whether some are not found after it.
+    left: &'a mut bool,
+}
+
+impl Kernel for Step<'_> {
+    #[inline(always)]
+    fn run<L: Lanes>(self) {
+        let n = self.theta.len();
+        let (indicated, limits) = (&self.indicated[..n], &self.limits[..n]);
+        let (error, steepness) = (&self.error[..n], &self.steepness[..n]);
+        let (theta, last_step) = (&mut *self.theta, &mut self.last_step[..n]);
+        let mut left = false;
+        for i in 0..n {
+            let step = ((theta[i] - indicated[i]) + error[i]) / (1.0 + steepness[i]);
+            // One that is found stands still: it does not depend on those beside it.
+            let goes = last_step[i] > limits[i];
+            theta[i] = if goes { theta[i] - step } else { theta[i] };
+            last_step[i] = if goes { step.abs() } else { last_step[i] };
+            left |= last_step[i] > limits[i];
+        }
+        *self.left = left;
     }
 }
 
