@@ -11,6 +11,7 @@ mod evaluator;
 mod exact;
 mod expansion;
 mod inverse;
+pub mod ladder;
 pub mod lines;
 mod pass;
 mod route;

@@ -6,7 +6,8 @@ use pyo3::prelude::*;
 use super::array::{data, empty};
 use super::failure::argument_error;
 use super::release::detached;
-use crate::kernel::lines::{self, Ladder, Lines};
+use crate::kernel::ladder::{self, Ladder};
+use crate::kernel::lines::{self, Lines};
 
 /// Cosines and sines of orders times angles, shape (n, 2 orders); in single precision where
 /// that is enough.
@@ -109,6 +110,8 @@ pub fn unit_sums<'py>(
     // SAFETY: a fresh contiguous array of this type and size.
     let out = unsafe { std::slice::from_raw_parts_mut(data::<f64>(&array), size) };
     let orders = Ladder { first, step, count };
-    detached(py, || lines::unit_sums(theta, values, &starts, orders, out))??;
+    detached(py, || {
+        ladder::unit_sums(theta, values, &starts, orders, out)
+    })??;
     Ok(array)
 }
