@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from .whitening import RunEffect, Whitener
 
-__all__ = ["Factor", "orthonormal_basis"]
+__all__ = ["Factor", "in_common", "orthonormal_basis"]
 
 Array = NDArray[np.float64]
 
@@ -20,7 +20,6 @@ DISTINCT = 1e-7
 #: Condition up to which the triangle of the Gram matrix is as good as one of the columns: its
 #: square costs half of the digits. Up to the smaller one a single pass leaves 1e-13.
 WELL, VERY_WELL = 1e4, 10.0
-
 
 #: Columns in all for each one that growing by it is quicker than to begin anew.
 GROWN = 4
@@ -71,9 +70,7 @@ class Factor:
         like = next((f for f in before if f.whiten.has(rho, effects, weights)), None)
         if like is None:
             return cls._fresh(blocks, Whitener(bounds, rho, list(effects), weights), whole)
-        same = 0
-        while same < min(len(like.blocks), len(blocks)) and like.blocks[same] is blocks[same]:
-            same += 1
+        same = in_common(like.blocks, blocks)
         further = sum(block.shape[1] for block in blocks[same:])
         if like.scaled is not None and GROWN * further <= sum(b.shape[1] for b in blocks):
             grown = like._first(same)._grown(blocks)
@@ -136,6 +133,14 @@ class Factor:
         lengths = np.concatenate([self.lengths, lengths])
         back = whole / lengths[:, None]
         return Factor(self.whiten, blocks, np.hstack([self.q, q]), back, whole, lengths)
+
+
+def in_common(one: Sequence[Array], other: Sequence[Array]) -> int:
+    """How many blocks, the same arrays, two sequences begin with."""
+    same = 0
+    while same < min(len(one), len(other)) and one[same] is other[same]:
+        same += 1
+    return same
 
 
 def orthonormal_basis(x: Array) -> Array:

@@ -13,7 +13,7 @@ from ..joint.pattern import Surroundings, line_columns
 from ..joint.signals import Signals
 from .coefficients import ENOUGH_RUNS, Coefficients
 from .extension import Extension, penalty_of_parameter
-from .factor import Factor
+from .factor import Factor, in_common
 from .lines import LineBasis
 from .ratio import best_ratio
 from .repeats import repeated_part
@@ -154,12 +154,9 @@ class LeastSquares(Coefficients):
     def _grown_design(self) -> Array:
         """All columns side by side; those that the terms before have in common are not moved."""
         blocks = (self.base, *(term.columns for term in self.terms))
-        like, design = self._blocks, self.design
-        same = 0
-        while same < min(len(like), len(blocks)) and like[same] is blocks[same]:
-            same += 1
+        same = in_common(self._blocks, blocks)
         self._blocks = blocks
-        kept = design[:, : sum(block.shape[1] for block in blocks[:same])]
+        kept = self.design[:, : sum(block.shape[1] for block in blocks[:same])]
         further = [block for block in blocks[same:] if block.shape[1]]
         return np.hstack([kept, *further]) if further else kept
 
