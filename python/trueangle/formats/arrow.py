@@ -91,13 +91,14 @@ def read(
             yield from ahead(column_batches(path, names, batches))
         return
     with damage_told(path, "Arrow"), path.open("rb", buffering=0) as raw:
-        if _compression(path, True) is None:
+        packed = _compression(path, True) is not None
+        if not packed:
             placed = _placed(path, names, stretch)
             if placed:
                 for found in placed:
                     yield from found.read(raw, stretch.part, stretch.parts)
                 return
-        with _library(path, names) as file:
+        with _library(path, names, packed) as file:
             batches = (stretch.of(file.get_batch(i).select(names)) for i in stretch.batches)
             yield from column_batches(path, names, _cut(map(_valid, batches)))
 
@@ -111,9 +112,9 @@ def _placed(path: Path, names: Sequence[str], stretch: Stretch) -> list[PlacedBa
 
 
 @contextmanager
-def _library(path: Path, names: Sequence[str]) -> Iterator[pa.RecordBatchFileReader]:
+def _library(path: Path, names: Sequence[str], packed: bool) -> Iterator[pa.RecordBatchFileReader]:
     """The file as pyarrow reads it, mapped where it is not packed: a batch may be large."""
-    if _compression(path, True) is None:
+    if not packed:
         with pa.memory_map(str(path), "r") as source:
             yield pa.ipc.open_file(source)
         return
