@@ -81,3 +81,19 @@ def driver(tmp_path_factory):
     running = Driver(library, folder / "desk", [COMMANDS[name][0] for name in commands()])
     yield running
     running.close()
+
+
+@pytest.fixture(scope="session")
+def expected(driver, tmp_path_factory):
+    """What each command writes when nothing fails, and how often it calls the system."""
+    found = {}
+    for name in commands():
+        folder = tmp_path_factory.mktemp("whole") / "desk"
+        furnish(folder)
+        before = tree(folder)
+        answer = driver.run(folder, COMMANDS[name][0])
+        assert answer.status == 0, answer.told
+        written = {k: v for k, v in tree(folder).items() if k not in before}
+        assert written
+        found[name] = written, answer.counts
+    return found

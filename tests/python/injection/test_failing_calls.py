@@ -24,22 +24,6 @@ FAILURES = {
 MOST = 400
 
 
-@pytest.fixture(scope="module")
-def expected(driver, tmp_path_factory):
-    """What each command writes when nothing fails, and how often it calls the system."""
-    found = {}
-    for name in commands():
-        folder = tmp_path_factory.mktemp("whole") / "desk"
-        furnish(folder)
-        before = tree(folder)
-        answer = driver.run(folder, COMMANDS[name][0])
-        assert answer.status == 0, answer.told
-        written = {k: v for k, v in tree(folder).items() if k not in before}
-        assert written
-        found[name] = written, answer.counts
-    return found
-
-
 def same(name, content, whole):
     """Whether a file is the whole one: reports and models note when they were made."""
     if name.endswith(("jsonl", ".json", ".html")):

@@ -13,23 +13,11 @@ KINDS = ("open", "read", "write", "sync", "rename", "folder", "remove")
 INTERRUPTED = 130
 
 
-@pytest.fixture(scope="module")
-def whole(driver, tmp_path_factory):
-    """What each command writes where nothing comes between."""
-    found = {}
-    for name in commands():
-        desk = tmp_path_factory.mktemp("uninterrupted") / "desk"
-        furnish(desk)
-        inputs = tree(desk)
-        assert driver.run(desk, COMMANDS[name][0]).status == 0
-        found[name] = {k: v for k, v in tree(desk).items() if k not in inputs}
-    return found
-
-
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("command", commands())
-def test_ctrl_c_with_the_nth_call(command, kind, driver, whole, tmp_path):
+def test_ctrl_c_with_the_nth_call(command, kind, driver, expected, tmp_path):
     arguments, _ = COMMANDS[command]
+    whole = expected[command][0]
     struck = 0
     for n in range(MOST):
         desk = tmp_path / str(n)
@@ -41,7 +29,7 @@ def test_ctrl_c_with_the_nth_call(command, kind, driver, whole, tmp_path):
         hidden = [p.name for p in desk.rglob(".*")]
         assert not hidden, (n, answer.told)
         for name in after.keys() - inputs.keys() - {"out/trueangle-manifest.jsonl"}:
-            assert same(name, after[name], whole[command][name]), (n, name)
+            assert same(name, after[name], whole[name]), (n, name)
         if answer.counts.get(kind, MOST) <= n:
             assert answer.status == 0, (n, answer.told)
             break
@@ -56,7 +44,7 @@ def test_ctrl_c_with_the_nth_call(command, kind, driver, whole, tmp_path):
             assert again.status == 0, (n, again.told)
             done = {k: v for k, v in tree(desk).items() if k.startswith("out/") and "log" not in k}
             assert {k: done[k] for k in ("out/a.csv", "out/b.csv")} == {
-                k: whole[command][k] for k in ("out/a.csv", "out/b.csv")
+                k: whole[k] for k in ("out/a.csv", "out/b.csv")
             }
         shutil.rmtree(desk)
     else:
