@@ -16,11 +16,11 @@ import platform
 import numpy as np
 
 from trueangle.bench import evaluation
-from trueangle.bench.evaluation import Row
+from trueangle.bench.evaluation import EvaluationRow
 from trueangle.bench.latency import histogram, paced
 
 
-def show(title: str, rows: list[Row], base: str, ratio: str) -> None:
+def show(title: str, rows: list[EvaluationRow], base: str, ratio: str) -> None:
     print(f"\n{title}")
     unit = next(row for row in rows if row.name == base).timing
     for row in rows:
@@ -47,7 +47,7 @@ def latency(seconds: float, save: str | None) -> None:
         np.savez_compressed(save, **kept)
 
 
-def plot(rows: list[Row], file: str) -> None:
+def plot(rows: list[EvaluationRow], file: str) -> None:
     """Medians with their spread, fastest first, against a copy of the array."""
     from matplotlib.figure import Figure
 

@@ -16,11 +16,11 @@ from pathlib import Path
 import numpy as np
 
 from trueangle import _core
-from trueangle.bench.fit import Case, Row, measure, readings
+from trueangle.bench.fit import Case, FitRow, measure, readings
 from trueangle.bench.fitpeers import design, peers
 
 
-def show(rows: list[Row]) -> None:
+def show(rows: list[FitRow]) -> None:
     case, ours = rows[0].case, rows[0].timing.median
     print(f"\n{case.samples} readings, orders 1..{case.highest}, {case.arc_deg:g} deg")
     for row in rows:

@@ -59,12 +59,11 @@ const CHANCE: f64 = 4.0;
 
 /// The turn without its widest gap, or the whole turn where no gap is missing travel.
 ///
-/// Exact for up to a few thousand angles, else the ends are those of 4096 bins of a turn; of
-/// more than `most` every so many are looked at.
+/// Its ends are the first and the last angle. Where one of every so many of more than `most`
+/// angles lies everywhere, the others are not looked at.
 pub fn covered_span(angles: &[&[f64]], period: f64, most: usize) -> Span {
     let all: usize = angles.iter().map(|a| a.len()).sum();
     let stride = (all / most.max(1)).max(1);
-    let count: usize = angles.iter().map(|a| a.len().div_ceil(stride)).sum();
     let fractions = |stride| {
         let some = angles.iter().flat_map(move |a| a.iter().step_by(stride));
         some.map(|&x| {
@@ -72,29 +71,33 @@ pub fn covered_span(angles: &[&[f64]], period: f64, most: usize) -> Span {
             if part < 0.0 { part + 1.0 } else { part }
         })
     };
-    let mut places: Vec<f64> = if count <= SORTED {
-        fractions(stride).collect()
+    let (mut places, bins): (Vec<f64>, usize) = if all <= SORTED {
+        (fractions(1).collect(), usize::MAX)
     } else {
-        let mut seen = vec![false; SORTED];
-        let mut look = |stride| -> Vec<f64> {
+        // First and last place of every bin.
+        let mut seen = vec![(f64::INFINITY, f64::NEG_INFINITY); SORTED];
+        let mut look = |stride| -> (Vec<f64>, usize) {
             for part in fractions(stride) {
-                seen[(part * SORTED as f64) as usize % SORTED] = true;
+                let (first, last) = &mut seen[(part * SORTED as f64) as usize % SORTED];
+                (*first, *last) = (first.min(part), last.max(part));
             }
-            let bins = (0..SORTED).filter(|&i| seen[i]);
-            bins.map(|i| i as f64 / SORTED as f64).collect()
+            let bins = seen.iter().filter(|(first, last)| first <= last);
+            let places: Vec<_> = bins.flat_map(|&(first, last)| [first, last]).collect();
+            let count = places.len() / 2;
+            (places, count)
         };
         // Gaps only shrink with every angle: where none is wide, no other need be looked at.
         let first = look(FIRST * stride);
-        if widest_gap(&first).is_some_and(|(gap, _)| gap <= MISSING) {
+        if widest_gap(&first.0).is_some_and(|(gap, _)| gap <= MISSING) {
             first
         } else {
-            look(stride)
+            look(1)
         }
     };
     places.sort_unstable_by(f64::total_cmp);
     places.dedup();
-    let (start, stop, full) =
-        missing_travel(&places).map_or((0.0, 1.0, true), |(start, stop)| (start, stop, false));
+    let (start, stop, full) = missing_travel(&places, bins)
+        .map_or((0.0, 1.0, true), |(start, stop)| (start, stop, false));
     Span {
         start: start * period,
         stop: stop * period,
@@ -111,11 +114,11 @@ fn widest_gap(places: &[f64]) -> Option<(f64, f64)> {
     Some(gaps.fold(across, wider))
 }
 
-/// Ends of the stretch outside the widest gap, where that is missing travel.
-fn missing_travel(places: &[f64]) -> Option<(f64, f64)> {
+/// Ends of the stretch outside the widest gap, where that is missing travel of so many `bins`.
+fn missing_travel(places: &[f64], bins: usize) -> Option<(f64, f64)> {
     let (gap, start) = widest_gap(places)?;
     let travelled = 1.0 - gap;
-    let count = places.len() as f64;
+    let count = places.len().min(bins) as f64;
     let chance = travelled / (count - 1.0).max(1.0) * (count.ln() + CHANCE);
     (gap > MISSING.max(chance)).then_some((start, start + travelled))
 }
@@ -175,8 +178,12 @@ mod tests {
         );
         assert!(!exact.full && !binned.full);
         assert!((exact.start - 300.0).abs() < 1e-9 && (exact.stop - 490.0).abs() < 1e-9);
-        let bin = 360.0 / SORTED as f64;
-        assert!((binned.start - 300.0).abs() <= bin && (binned.stop - 490.0).abs() <= bin);
+        assert!((binned.start - 300.0).abs() < 1e-9 && (binned.stop - 490.0).abs() < 1e-9);
+        // One angle at each end, far from those that are looked at first.
+        let mut more = many;
+        more.splice(1..1, [299.99, 490.01]);
+        let wider = covered_span(&[&more], 360.0, 1 << 10);
+        assert!((wider.start - 299.99).abs() < 1e-9 && (wider.stop - 490.01).abs() < 1e-9);
     }
 
     /// A gap between the angles that are looked at first is closed by the others, or is not.

@@ -16,6 +16,6 @@ mod portable;
 #[cfg(target_arch = "x86_64")]
 mod x86;
 
-pub use dispatch::{InstructionSet, Kernel, dispatch, dispatch_one};
+pub use dispatch::{InstructionSet, Kernel, dispatch, dispatch_any};
 pub use lanes::{Lanes, MOST_LANES, Quad, ROUNDER, Row};
 pub use portable::{Portable, TARGET_FUSES};

@@ -26,20 +26,23 @@ fn angles() -> Vec<f64> {
 
 #[test]
 fn a_step_is_a_batch_of_one() {
-    for argument in [Argument::Reference, Argument::Indicated] {
-        let evaluator = evaluator(1e-2, 1.0, argument);
-        let compensator = Compensator::new(Arc::clone(&evaluator)).unwrap();
-        let x = angles();
-        let mut theta = x.clone();
-        let batch = Batch::in_place(&mut theta);
-        evaluator
-            .run(Quantity::Correction, None, None, batch)
-            .unwrap();
-        for (x, theta) in x.iter().zip(&theta) {
-            assert_eq!(compensator.step(*x), *theta, "at {x}");
-        }
-        for x in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
-            assert!(compensator.step(x).is_nan());
+    // With and without a table.
+    for cycles in [1.0, 2.5, 50.5] {
+        for argument in [Argument::Reference, Argument::Indicated] {
+            let evaluator = evaluator(1e-2 / cycles, cycles, argument);
+            let compensator = Compensator::new(Arc::clone(&evaluator)).unwrap();
+            let x = angles();
+            let mut theta = x.clone();
+            let batch = Batch::in_place(&mut theta);
+            evaluator
+                .run(Quantity::Correction, None, None, batch)
+                .unwrap();
+            for (x, theta) in x.iter().zip(&theta) {
+                assert_eq!(compensator.step(*x), *theta, "{cycles} cycles at {x}");
+            }
+            for x in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
+                assert!(compensator.step(x).is_nan());
+            }
         }
     }
 }

@@ -6,8 +6,8 @@ Run with ``python examples/paper/study.py``; prints tables only.
 import numpy as np
 
 import trueangle as ta
-from trueangle.paperstudy.report import short_report, study_table
-from trueangle.paperstudy.study import (
+from trueangle.cli.paperstudy.report import short_report, study_table
+from trueangle.cli.paperstudy.study import (
     GEAR_ORDERS,
     JOINT_A,
     JOINT_B,

@@ -6,43 +6,44 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 from ._core import __version__
+from .support import renamed
 
 if TYPE_CHECKING:
     from . import errors as errors
     from . import plots as plots
     from . import terms as terms
-    from .angles import wrap as wrap
-    from .checks import check as check
     from .diagnosis import Diagnosis as Diagnosis
     from .diagnosis.diagnose import diagnose as diagnose
     from .errors import TrueAngleError as TrueAngleError
+    from .estimation.moments import Moments as Moments
     from .export import compare as compare
     from .export import export_model as export_model
     from .export import import_model as import_model
     from .fitting.fit import fit as fit
+    from .fitting.orders.select import OrderSelection as OrderSelection
+    from .fitting.orders.select import select_orders as select_orders
     from .fitting.result import FitResult as FitResult
-    from .joining import join as join
+    from .joint.shafts import Shaft as Shaft
     from .logs.batch import correct_logs as correct_logs
     from .logs.fitting import fit_logs as fit_logs
     from .logs.frames import correct as correct
-    from .model import HarmonicModel as HarmonicModel
-    from .modelfile import load_model as load_model
-    from .moments import Moments as Moments
-    from .orders.select import OrderSelection as OrderSelection
-    from .orders.select import select_orders as select_orders
+    from .model.file import load_model as load_model
+    from .model.model import HarmonicModel as HarmonicModel
     from .planning.plan import plan_mounts as plan_mounts
     from .rehearsal import Rehearsal as Rehearsal
     from .rehearsal.rehearse import rehearse as rehearse
     from .reports import report as report
-    from .runcsv import write_runs as write_runs
-    from .runfiles import read_runs as read_runs
-    from .runs import CalibrationRun as CalibrationRun
+    from .runs.checks import check as check
+    from .runs.files import read_runs as read_runs
+    from .runs.joining import join as join
+    from .runs.run import CalibrationRun as CalibrationRun
+    from .runs.writing import write_runs as write_runs
     from .selfcalibration import SelfCalibration as SelfCalibration
     from .selfcalibration import selfcal as selfcal
-    from .shafts import Shaft as Shaft
     from .simulation import Simulation as Simulation
     from .simulation import load_simulation as load_simulation
     from .simulation import simulate as simulate
+    from .support.angles import wrap as wrap
     from .terms import Backlash as Backlash
     from .terms import FilterLag as FilterLag
     from .terms import Latency as Latency
@@ -56,28 +57,28 @@ if TYPE_CHECKING:
 #: Public names and the modules that define them; a module is imported at first use.
 _PUBLIC = {
     "TrueAngleError": "errors",
-    "wrap": "angles",
-    "CalibrationRun": "runs",
+    "wrap": "support.angles",
+    "CalibrationRun": "runs.run",
     "Diagnosis": "diagnosis",
-    "OrderSelection": "orders",
+    "OrderSelection": "fitting.orders",
     "plan_mounts": "planning",
-    "select_orders": "orders",
+    "select_orders": "fitting.orders",
     "FitResult": "fitting.result",
-    "HarmonicModel": "model",
+    "HarmonicModel": "model.model",
     "SelfCalibration": "selfcalibration",
-    "Shaft": "shafts",
-    "check": "checks",
+    "Shaft": "joint.shafts",
+    "check": "runs.checks",
     "correct": "logs.frames",
     "correct_logs": "logs.batch",
     "compare": "export",
     "export_model": "export",
     "import_model": "export",
-    "join": "joining",
+    "join": "runs.joining",
     "fit": "fitting.fit",
     "fit_logs": "logs.fitting",
-    "load_model": "modelfile",
-    "Moments": "moments",
-    "read_runs": "runfiles",
+    "load_model": "model.file",
+    "Moments": "estimation.moments",
+    "read_runs": "runs.files",
     "Rehearsal": "rehearsal",
     "rehearse": "rehearsal",
     "report": "reports",
@@ -86,7 +87,7 @@ _PUBLIC = {
     "diagnose": "diagnosis",
     "load_simulation": "simulation",
     "simulate": "simulation",
-    "write_runs": "runcsv",
+    "write_runs": "runs.writing",
     **dict.fromkeys(
         (
             "Backlash",
@@ -106,11 +107,13 @@ _PUBLIC = {
 #: Modules that are reached as attributes, likewise imported at first use.
 _MODULES = ("errors", "plots", "terms")
 
+renamed.install()
+
 __all__ = ["__version__", *sorted([*_PUBLIC, *_MODULES])]
 
 
 def __getattr__(name: str) -> Any:
-    if name in _MODULES:
+    if name in _MODULES or name in renamed.RENAMED:
         return importlib.import_module(f".{name}", __name__)
     module = _PUBLIC.get(name)
     if module is None:

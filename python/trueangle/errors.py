@@ -13,6 +13,8 @@ __all__ = [
     "MissingSignalError",
     "ModelFileError",
     "NoModelError",
+    "NoOrderError",
+    "NotCorrectedWarning",
     "NotInvertibleError",
     "OutsideSpanWarning",
     "RankError",
@@ -22,8 +24,29 @@ __all__ = [
 ]
 
 
+#: Characters of a message, at most: a file may name thousands of columns.
+_LONGEST = 2000
+
+
+def shortened(text: str) -> str:
+    """A message of bounded length: its beginning and its end, where the remedy stands.
+
+    Examples
+    --------
+    >>> len(shortened(30_000 * "x")) < 2100
+    True
+    """
+    if len(text) <= _LONGEST:
+        return text
+    kept = _LONGEST // 2
+    return f"{text[:kept]} ... ({len(text) - 2 * kept} characters) ... {text[-kept:]}"
+
+
 class TrueAngleError(ValueError):
     """Base of every error that trueangle raises on bad input."""
+
+    def __init__(self, *arguments: Any) -> None:
+        super().__init__(*(shortened(a) if isinstance(a, str) else a for a in arguments))
 
 
 class ArgumentError(TrueAngleError):
@@ -64,6 +87,10 @@ class NotInvertibleError(TrueAngleError):
 
 class NoModelError(TrueAngleError):
     """No model is supported by the data; the message says why."""
+
+
+class NoOrderError(NoModelError):
+    """The data support no order at all."""
 
 
 class MissingSignalError(TrueAngleError):
@@ -131,7 +158,11 @@ class OutsideSpanWarning(UserWarning):
 
 
 class UnitWarning(UserWarning):
-    """Angles that look like degrees were given without ``period=360``."""
+    """Angles look like another unit than the one they are taken for."""
+
+
+class NotCorrectedWarning(UserWarning):
+    """Angles are passed on as they are, since the readings support no order."""
 
 
 class UnlikeRunsWarning(UserWarning):

@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import math
+import warnings
 from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .errors import MissingExtraError, NoModelError
+from .errors import MissingExtraError, NoModelError, NotCorrectedWarning
 from .fitting.fit import fit
-from .model import HarmonicModel
-from .runs import CalibrationRun
+from .model.model import HarmonicModel
+from .runs.follows import check_follows
+from .runs.run import CalibrationRun
 
 try:
     from sklearn.base import BaseEstimator, OneToOneFeatureMixin, TransformerMixin
@@ -58,6 +60,13 @@ class AngleCorrector(OneToOneFeatureMixin, TransformerMixin, BaseEstimator):  # 
         In `fit`: a column that does not follow ``y`` at all (another unit or sign); and whatever
         else `trueangle.fit` refuses.
 
+    Warns
+    -----
+    UnitWarning
+        In `fit`: angles whose error repeats with 360 and not with the period given.
+    NotCorrectedWarning
+        In `fit`: a column whose readings support no order, which `transform` leaves as it is.
+
     Notes
     -----
     ``set_output(transform="pandas")`` and the like, pipelines, clones and searches over parameters
@@ -98,13 +107,19 @@ class AngleCorrector(OneToOneFeatureMixin, TransformerMixin, BaseEstimator):  # 
         by_angle = np.argsort(np.mod(true, self.period), kind="stable")
         reference = np.mod(true[by_angle], self.period)
         orders = self.orders if isinstance(self.orders, str) else list(self.orders)
+        ascending = np.argsort(true, kind="stable")
         self.models_: list[HarmonicModel | None] = []
-        for column in indicated.T:
+        for j, column in enumerate(indicated.T):
+            # Before it is taken within a turn, which may be that of another unit.
+            check_follows(CalibrationRun(true[ascending], column[ascending], self.period))
             run = CalibrationRun(reference, column[by_angle], self.period)
             try:
                 found = fit(run, orders, gear_ratio=self.gear_ratio, argument="reference")
-            except NoModelError:
+            except NoModelError as error:
                 self.models_.append(None)
+                warnings.warn(
+                    f"column {j} is left as it is: {error}", NotCorrectedWarning, stacklevel=2
+                )
             else:
                 self.models_.append(found.model)
         return self

@@ -179,7 +179,7 @@ pub fn reduce_moments(design: &Design, runs: &[&Accumulator]) -> Result<Reduced,
     let base = runs[0];
     let orders = design.whole_orders(base.cycles()).ok_or(Error::Method)?;
     let highest = orders.iter().copied().max().unwrap_or(0);
-    if highest > base.highest() {
+    if highest > base.reach() {
         return Err(Error::Method);
     }
     if let Some(mut reduced) = by_moments(runs, &orders, highest)

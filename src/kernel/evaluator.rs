@@ -294,12 +294,11 @@ impl Evaluator {
         Some((Arc::clone(table), Table::scalar_subtract(self.best)))
     }
 
-    /// The correction of one sample without a table.
+    /// The correction of one sample without a table, as a batch has it to the last bit.
     pub fn correct_one(&self, indicated: f64) -> f64 {
-        match self.argument {
-            Argument::Reference => inverse::solve(&self.series, self.reach, indicated),
-            Argument::Indicated => indicated - self.series.evaluate(indicated).0,
-        }
+        let mut theta = [0.0];
+        self.correct_block(self.best, &[indicated], &mut theta);
+        theta[0]
     }
 
     /// What the error of the default route is at most, in the unit of the angles.
@@ -340,16 +339,21 @@ impl Evaluator {
         set: InstructionSet,
         mut batch: Batch<'_, X, Y>,
     ) {
+        batch.map_blocks(|x, out| self.correct_block(set, x, out));
+    }
+
+    fn correct_block(&self, set: InstructionSet, indicated: &[f64], theta: &mut [f64]) {
         let newton = inverse::Newton {
             error: &self.exact_error,
             slope: (self.argument == Argument::Reference).then_some(&self.exact_slope),
+            constant: self.series.constant(),
             reach: self.reach,
             slope_bound: self.slope_bound,
             bend: self.bend,
             set,
         };
-        batch.map_blocks(|x, out| {
-            newton.solve(x, out, |x| self.correct_one(x));
+        newton.solve(indicated, theta, |x| {
+            inverse::solve(&self.series, self.reach, x)
         });
     }
 }

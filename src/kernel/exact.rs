@@ -7,12 +7,13 @@
 
 use std::f64::consts::TAU;
 
+use super::lines::vector;
 use super::sincos::{Phase, sin_cos};
 use super::sweep::{Map, Sweep};
 use super::{Batch, Real, Sample};
 use crate::angle::Period;
 use crate::series::HarmonicSeries;
-use crate::simd::{InstructionSet, Lanes, dispatch};
+use crate::simd::{InstructionSet, Kernel, Lanes, MOST_LANES, dispatch_any};
 
 /// Orders a group may span above its lowest: 16 steps of Horner's rule lose about 1e-15.
 const MOST_SPAN: u32 = 16;
@@ -58,7 +59,7 @@ impl Exact {
 
     /// Its values at every sample of a batch.
     pub fn run<X: Sample, Y: Real>(&self, set: InstructionSet, batch: Batch<'_, X, Y>) {
-        dispatch(set, Sweep { map: self, batch });
+        dispatch_any(set, batch.len(), Sweep { map: self, batch });
     }
 
     fn new(
@@ -120,26 +121,101 @@ impl Map for &Exact {
 
     #[inline(always)]
     fn map<L: Lanes, const W: usize>(&self, x: [L; W]) -> [L; W] {
-        let mut angles = x;
-        for x in &mut angles {
-            let far = FAR_TURNS * self.period.value();
-            if x.any_beyond(far) {
-                *x = x.wrap_beyond(far, self.period);
+        let [values] = values_of([*self], x);
+        values
+    }
+}
+
+/// Two functions of the same orders at every angle, by the same sines and cosines: each is what
+/// [`Exact::run`] has, to the last bit.
+pub struct Both<'a> {
+    /// The functions, made of one series.
+    pub functions: [&'a Exact; 2],
+    /// Where.
+    pub x: &'a [f64],
+    /// Their values there.
+    pub out: [&'a mut [f64]; 2],
+}
+
+impl Kernel for Both<'_> {
+    #[inline(always)]
+    fn run<L: Lanes>(self) {
+        match L::N {
+            8 => self.fill::<L, 4>(),
+            _ => self.fill::<L, 2>(),
+        }
+    }
+}
+
+impl Both<'_> {
+    #[inline(always)]
+    fn fill<L: Lanes, const W: usize>(mut self) {
+        let (whole, len) = (W * L::N, self.x.len());
+        let sides = len - len % whole;
+        for start in (0..sides).step_by(whole) {
+            self.part::<L, W>(start, L::N);
+        }
+        for start in (sides..len).step_by(L::N) {
+            self.part::<L, 1>(start, L::N.min(len - start));
+        }
+    }
+
+    /// `W` vectors from `start` on, `some` samples in each.
+    #[inline(always)]
+    fn part<L: Lanes, const W: usize>(&mut self, start: usize, some: usize) {
+        let mut x = [L::splat(0.0); W];
+        for w in 0..W {
+            x[w] = vector(self.x, start + w * L::N, some);
+        }
+        let values = values_of(self.functions, x);
+        let mut lanes = [0.0; MOST_LANES];
+        for f in 0..2 {
+            for w in 0..W {
+                values[f][w].to_array(&mut lanes);
+                let first = start + w * L::N;
+                self.out[f][first..first + some].copy_from_slice(&lanes[..some]);
             }
         }
-        let mut sum = [L::splat(self.constant); W];
-        for shaft in &self.shafts {
-            let mut phase = [Phase::splat(0.0); W];
-            for w in 0..W {
-                phase[w] = Phase::new(self.period, angles[w], shaft.cycles);
+    }
+}
+
+/// Functions of the same orders at `W` vectors of angles.
+#[inline(always)]
+fn values_of<L: Lanes, const W: usize, const F: usize>(
+    functions: [&Exact; F],
+    x: [L; W],
+) -> [[L; W]; F] {
+    let first = functions[0];
+    let mut angles = x;
+    for x in &mut angles {
+        let far = FAR_TURNS * first.period.value();
+        if x.any_beyond(far) {
+            *x = x.wrap_beyond(far, first.period);
+        }
+    }
+    let mut sum = [[L::splat(0.0); W]; F];
+    for f in 0..F {
+        sum[f] = [L::splat(functions[f].constant); W];
+    }
+    for (i, shaft) in first.shafts.iter().enumerate() {
+        let mut phase = [Phase::splat(0.0); W];
+        for w in 0..W {
+            phase[w] = Phase::new(first.period, angles[w], shaft.cycles);
+        }
+        let (mut sine, mut cosine) = ([L::splat(0.0); W], [L::splat(0.0); W]);
+        for w in 0..W {
+            (sine[w], cosine[w]) = sin_cos(phase[w]);
+        }
+        for (j, group) in shaft.groups.iter().enumerate() {
+            let (mut s, mut c) = (sine, cosine);
+            if group.lowest != 1.0 {
+                for w in 0..W {
+                    (s[w], c[w]) = sin_cos(phase[w].harmonic(group.lowest));
+                }
             }
-            let (mut sine, mut cosine) = ([L::splat(0.0); W], [L::splat(0.0); W]);
-            for w in 0..W {
-                (sine[w], cosine[w]) = sin_cos(phase[w]);
-            }
-            for group in &shaft.groups {
+            for f in 0..F {
                 let (mut re, mut im) = ([L::splat(0.0); W], [L::splat(0.0); W]);
-                for &(a, b) in &group.amplitudes {
+                for &(a, b) in &functions[f].shafts[i].groups[j].amplitudes {
                     let (a, b) = (L::splat(a), L::splat(b));
                     for w in 0..W {
                         let real = re[w].mul_add(cosine[w], im[w].neg_mul_add(sine[w], a));
@@ -148,15 +224,10 @@ impl Map for &Exact {
                     }
                 }
                 for w in 0..W {
-                    let (s, c) = if group.lowest == 1.0 {
-                        (sine[w], cosine[w])
-                    } else {
-                        sin_cos(phase[w].harmonic(group.lowest))
-                    };
-                    sum[w] = re[w].mul_add(c, im[w].neg_mul_add(s, sum[w]));
+                    sum[f][w] = re[w].mul_add(c[w], im[w].neg_mul_add(s[w], sum[f][w]));
                 }
             }
         }
-        sum
     }
+    sum
 }

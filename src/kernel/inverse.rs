@@ -3,14 +3,14 @@
 use std::f64::consts::{PI, TAU};
 
 use super::Batch;
-use super::exact::Exact;
+use super::exact::{Both, Exact};
 use super::expansion;
 use super::segments::OVERSHOOT;
 use super::table::{DEGREE, MOST_SEGMENTS, Table};
 use crate::chebyshev;
 use crate::interrupt;
 use crate::series::HarmonicSeries;
-use crate::simd::{InstructionSet, Kernel, Lanes, dispatch};
+use crate::simd::{InstructionSet, Kernel, Lanes, dispatch_any};
 
 /// Steps before giving up on another ulp: bisection alone needs about 60.
 const MOST_STEPS: usize = 100;
@@ -68,6 +68,8 @@ pub struct Newton<'e> {
     pub error: &'e Exact,
     /// Its slope, or `None` where `error` takes the indicated angle and one step is exact.
     pub slope: Option<&'e Exact>,
+    /// Its constant: the angles start without it, as it may be many turns of a high order.
+    pub constant: f64,
     /// The sum of amplitudes.
     pub reach: f64,
     /// Bounds of its slope and of its second derivative.
@@ -78,37 +80,64 @@ pub struct Newton<'e> {
 }
 
 impl Newton<'_> {
-    /// True angles `theta` of indicated ones; `safe` solves for a single one.
+    /// True angles `theta` of indicated ones, of each the same alone or among others;
+    /// `safe` solves for a single one.
     pub fn solve(&self, indicated: &[f64], theta: &mut [f64], safe: impl Fn(f64) -> f64) {
+        if theta.len() == 1 {
+            return self.solve_in(&mut [0.0; 4], indicated, theta, safe);
+        }
+        self.solve_in(&mut vec![0.0; 4 * theta.len()], indicated, theta, safe);
+    }
+
+    /// The same, with room for four rows of numbers.
+    fn solve_in(
+        &self,
+        room: &mut [f64],
+        indicated: &[f64],
+        theta: &mut [f64],
+        safe: impl Fn(f64) -> f64,
+    ) {
         /// Steps after which a sample is hopeless.
         const STEPS: usize = 8;
-        let mut error = vec![0.0; theta.len()];
+        let (error, room) = room.split_at_mut(theta.len());
         let Some(slope) = self.slope else {
-            self.fill(self.error, indicated, &mut error);
-            for ((theta, x), error) in theta.iter_mut().zip(indicated).zip(&error) {
-                *theta = x - error;
+            let batch = Batch::apart(indicated, error).expect("blocks are equally long");
+            self.error.run(self.set, batch);
+            for ((theta, x), error) in theta.iter_mut().zip(indicated).zip(error) {
+                *theta = x - *error;
             }
             return;
         };
-        let mut steepness = vec![0.0; theta.len()];
-        let mut last_step = vec![f64::INFINITY; theta.len()];
-        let mut limits = vec![0.0; theta.len()];
-        dispatch(self.set, self.limits(indicated, &mut limits));
-        theta.copy_from_slice(indicated);
+        let (steepness, room) = room.split_at_mut(theta.len());
+        let (last_step, limits) = room.split_at_mut(theta.len());
+        last_step.fill(f64::INFINITY);
+        dispatch_any(self.set, theta.len(), self.limits(indicated, limits));
+        for (theta, x) in theta.iter_mut().zip(indicated) {
+            // What is not finite has no angle, and asks for no steps.
+            *theta = if x.is_finite() {
+                x - self.constant
+            } else {
+                f64::NAN
+            };
+        }
         for _ in 0..STEPS {
-            self.fill(self.error, theta, &mut error);
-            self.fill(slope, theta, &mut steepness);
+            let both = Both {
+                functions: [self.error, slope],
+                x: theta,
+                out: [&mut *error, &mut *steepness],
+            };
+            dispatch_any(self.set, indicated.len(), both);
             let mut left = false;
             let step = Step {
                 indicated,
-                error: &error,
-                steepness: &steepness,
-                limits: &limits,
+                error,
+                steepness,
+                limits,
                 theta: &mut *theta,
-                last_step: &mut last_step,
+                last_step: &mut *last_step,
                 left: &mut left,
             };
-            dispatch(self.set, step);
+            dispatch_any(self.set, indicated.len(), step);
             if !left {
                 return;
             }
@@ -137,11 +166,6 @@ impl Newton<'_> {
             sure: sure.min(ANY),
             limits,
         }
-    }
-
-    fn fill(&self, function: &Exact, x: &[f64], out: &mut [f64]) {
-        let batch = Batch::apart(x, out).expect("blocks are equally long");
-        function.run(self.set, batch);
     }
 }
 

@@ -6,7 +6,7 @@ use super::exact::{Exact, FAR_TURNS};
 use super::sincos::{Phase, sin_cos};
 use super::{Batch, Evaluator, Quantity, Scalar, Table};
 use crate::angle::Period;
-use crate::simd::{InstructionSet, Kernel, Lanes, MOST_LANES, dispatch, dispatch_one};
+use crate::simd::{InstructionSet, Kernel, Lanes, MOST_LANES, dispatch_any};
 
 /// A quantity of a series at some angles: of each the same, to the last bit, whether it is
 /// alone or in a block.
@@ -70,11 +70,7 @@ impl Wave<'_> {
     }
 
     fn run<'w, K: Kernel>(&'w self, set: InstructionSet, kernel: impl FnOnce(&'w Self) -> K) {
-        if self.x.len() == 1 {
-            dispatch_one(set, kernel(self));
-        } else {
-            dispatch(set, kernel(self));
-        }
+        dispatch_any(set, self.x.len(), kernel(self));
     }
 
     #[inline(always)]

@@ -137,6 +137,9 @@ fn run<L: Lanes, const DIFFERENCE: bool, const WEIGHTED: bool>(call: Call<'_, '_
             waiting.take::<L, WEIGHTED>(&chunk, len, table);
         } else {
             chunk.add_all::<L>(len, table);
+            if waiting.notes {
+                chunk.note(len, table);
+            }
         }
     }
     *sum = squares.iter().sum();

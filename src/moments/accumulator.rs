@@ -106,6 +106,36 @@ impl Accumulator {
         self.highest
     }
 
+    /// Highest order that the segments hold to a part in 1e10 of the errors: half a segment
+    /// turns it by 1.4 at most, where the series of 12 terms ends at 6e-11.
+    pub fn reach(&self) -> u32 {
+        const MOST_TURN: f64 = 1.4;
+        let reach = MOST_TURN / std::f64::consts::PI * self.total.len() as f64;
+        self.highest.max(reach as u32)
+    }
+
+    /// Greatest and least angle and error of each segment that has readings whose extremes were
+    /// noted, in this order; the angle is in `-base / 2 .. base / 2`.
+    pub fn extremes(&self) -> Vec<[f64; 4]> {
+        let half = 0.5 * self.base.value() / self.total.len() as f64;
+        let segments = self.total.iter().zip(&self.block).enumerate();
+        let noted = segments.filter_map(|(i, (total, block))| {
+            let mut all = *total;
+            all.widen(block.extremes);
+            let [u, minus_u, y, minus_y] = all.extremes;
+            let middle = (2 * i + 1) as f64 - self.total.len() as f64;
+            let angle = |u: f64| (middle + u) * half;
+            let found = [
+                angle(u),
+                angle(-minus_u),
+                y + self.centre,
+                self.centre - minus_y,
+            ];
+            (u > f64::NEG_INFINITY).then_some(found)
+        });
+        noted.collect()
+    }
+
     /// The angle that errors are wrapped around and counted from.
     pub fn centre(&self) -> f64 {
         self.centre
@@ -335,6 +365,7 @@ impl Accumulator {
         for table in [&sums.total, &sums.carry] {
             numbers.extend(table.iter().flat_map(Segment::values));
         }
+        numbers.extend(sums.total.iter().flat_map(|segment| segment.extremes));
         numbers
     }
 
@@ -347,6 +378,8 @@ impl Accumulator {
         sums.centre = head[0];
         sums.count = head[1] as usize;
         sums.squares = (head[2], head[3]);
+        let extremes = values.len().checked_sub(4 * sums.total.len())?;
+        let (values, extremes) = values.split_at(extremes);
         let places = sums.total.iter_mut().chain(&mut sums.carry);
         let mut places: Vec<_> = places.flat_map(Segment::values_mut).collect();
         if places.len() != values.len() {
@@ -354,6 +387,9 @@ impl Accumulator {
         }
         for (place, value) in places.iter_mut().zip(values) {
             **place = *value;
+        }
+        for (segment, extremes) in sums.total.iter_mut().zip(extremes.as_chunks().0) {
+            segment.extremes = *extremes;
         }
         Some(sums)
     }
@@ -384,6 +420,7 @@ impl Segment {
     fn add(&mut self, carry: &mut Self, moments: &Self) {
         add_all(&mut self.weight, &mut carry.weight, &moments.weight);
         add_all(&mut self.error, &mut carry.error, &moments.error);
+        self.widen(moments.extremes);
     }
 }
 

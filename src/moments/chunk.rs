@@ -67,6 +67,14 @@ impl Chunk {
         other == 0
     }
 
+    /// Notes the extremes of the first `len` readings in their segments.
+    pub(super) fn note(&self, len: usize, table: &mut [Segment]) {
+        for i in 0..len {
+            let (u, y) = (self.place[i], self.error[i]);
+            table[self.segment[i] as usize].widen([u, -u, y, -y]);
+        }
+    }
+
     /// Adds the first `len` readings to their segments: those of a sweep side by side, others
     /// one by one.
     #[inline(always)]

@@ -51,6 +51,21 @@ impl Row {
         self.error.copy_within(TOGETHER.., 0);
     }
 
+    /// Notes the extremes of the first `len` readings.
+    #[inline(always)]
+    pub(super) fn note(&self, len: usize, moments: &mut Segment) {
+        let mut found = [[f64::NEG_INFINITY; 4]; LANES];
+        let pairs = self.place[..len].iter().zip(&self.error[..len]);
+        for (i, (&u, &y)) in pairs.enumerate() {
+            for (mine, other) in found[i % LANES].iter_mut().zip([u, -u, y, -y]) {
+                *mine = if other > *mine { other } else { *mine };
+            }
+        }
+        found
+            .into_iter()
+            .for_each(|extremes| moments.widen(extremes));
+    }
+
     /// Adds the first `len` readings to the moments of their segment; returns how many they
     /// are with those that fill the last vector, which have no weight.
     #[inline(always)]

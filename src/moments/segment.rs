@@ -17,6 +17,9 @@ pub struct Segment {
     pub weight: [f64; WEIGHT_TERMS],
     /// Moments of the weighted errors.
     pub error: [f64; ERROR_TERMS],
+    /// Greatest place and error with their opposites' greatest, `u, -u, y, -y`, where they are
+    /// noted: exact, in what is otherwise padding.
+    pub extremes: [f64; 4],
 }
 
 impl Segment {
@@ -24,6 +27,7 @@ impl Segment {
     pub const EMPTY: Self = Self {
         weight: [0.0; WEIGHT_TERMS],
         error: [0.0; ERROR_TERMS],
+        extremes: [f64::NEG_INFINITY; 4],
     };
 
     /// All moments.
@@ -41,7 +45,17 @@ impl Segment {
         for (error, weight) in self.error.iter_mut().zip(&self.weight) {
             *error += shift * weight;
         }
+        self.extremes[2] += shift;
+        self.extremes[3] -= shift;
         self
+    }
+
+    /// Takes in other extremes.
+    #[inline(always)]
+    pub fn widen(&mut self, others: [f64; 4]) {
+        for (mine, other) in self.extremes.iter_mut().zip(others) {
+            *mine = if other > *mine { other } else { *mine };
+        }
     }
 
     /// Moments over the Chebyshev polynomials themselves.

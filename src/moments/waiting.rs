@@ -25,6 +25,8 @@ pub struct Waiting<'a> {
     /// How many there are of each segment.
     lens: Vec<usize>,
     watch: Watch<'a>,
+    /// Whether the extremes of every segment are noted.
+    pub(super) notes: bool,
 }
 
 impl<'a> Waiting<'a> {
@@ -38,8 +40,14 @@ impl<'a> Waiting<'a> {
             rows: vec![Row::EMPTY; segments],
             weights: vec![ONES; if weighted { segments } else { 0 }],
             lens: vec![0; segments],
-            watch: Watch::default(),
+            ..Self::default()
         }
+    }
+
+    /// The same; the extremes of every segment are noted.
+    pub fn noting(mut self) -> Self {
+        self.notes = true;
+        self
     }
 
     /// The same; readings are held against what is expected of them.
@@ -77,6 +85,7 @@ impl<'a> Waiting<'a> {
             lens: &mut self.lens,
             table,
             watch: &mut self.watch,
+            notes: self.notes,
         };
         for start in (0..len).step_by(LANES) {
             if start + LANES <= len && chunk.is_one_segment(start) {
@@ -114,11 +123,15 @@ impl Kernel for Finish<'_, '_> {
             weights,
             lens,
             watch,
+            notes,
         } = self.waiting;
         let rows = rows.iter_mut().zip(lens).zip(self.table);
         for (i, ((row, len), moments)) in rows.enumerate() {
             if *len == 0 {
                 continue;
+            }
+            if *notes {
+                row.note(*len, moments);
             }
             let mut weights = weights.get(i).copied().unwrap_or(ONES);
             let full = row.add_some::<L>(*len, &mut weights, moments);
@@ -135,6 +148,7 @@ struct Rows<'a, 'b> {
     lens: &'a mut [usize],
     table: &'a mut [Segment],
     watch: &'a mut Watch<'b>,
+    notes: bool,
 }
 
 impl Rows<'_, '_> {
@@ -153,6 +167,9 @@ impl Rows<'_, '_> {
             return;
         }
         let moments = &mut self.table[segment];
+        if self.notes {
+            row.note(TOGETHER, moments);
+        }
         if WEIGHTED {
             let weights = &mut self.weights[segment];
             row.add::<L, true>(TOGETHER, weights, moments);

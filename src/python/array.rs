@@ -333,7 +333,7 @@ pub fn as_array<'py>(value: &Bound<'py, PyAny>, what: &str) -> PyResult<Labelled
             ));
         }
     } else if !value.is_instance_of::<PyList>() && !value.is_instance_of::<PyTuple>() {
-        (source, labels) = PyModule::import(py, "trueangle.labelled")?
+        (source, labels) = PyModule::import(py, "trueangle.support.labelled")?
             .call_method1(intern!(py, "take_apart"), (value,))?
             .extract()?;
     }

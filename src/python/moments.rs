@@ -1,6 +1,6 @@
 //! `_core.Moments`: the sums of one run, and `_core.fit_moments`.
 
-use numpy::{Complex64, PyArray1, PyReadonlyArray1, PyReadwriteArray1};
+use numpy::{Complex64, PyArray1, PyReadonlyArray1};
 use pyo3::prelude::*;
 
 use super::array::vector;
@@ -114,7 +114,6 @@ impl PyMoments {
         reference: PyReadonlyArray1<'_, f64>,
         indicated: PyReadonlyArray1<'_, f64>,
         of_indicated: bool,
-        mut travel: PyReadwriteArray1<'_, i64>,
     ) -> PyResult<usize> {
         let run = Run {
             reference: reference.as_slice()?,
@@ -128,7 +127,6 @@ impl PyMoments {
         };
         let wanted = run.reference.len();
         check::same_length("indicated", run.indicated.len(), "reference", wanted)?;
-        let travel = travel.as_slice_mut()?;
         let period = Period::new(self.period)?;
         let (cycles, highest) = (self.cycles, self.highest);
         if self.sums.is_none() {
@@ -136,7 +134,7 @@ impl PyMoments {
         }
         let fresh = |centre| Accumulator::new(period, cycles, highest, centre);
         let sums = &mut self.sums;
-        detached(py, || add_known(sums, fresh, period, run, argument, travel))
+        detached(py, || add_known(sums, fresh, period, run, argument))
     }
 
     /// Sums of their own with the same readings.
@@ -163,15 +161,25 @@ impl PyMoments {
         Ok(())
     }
 
+    /// Greatest and least angle and error of every segment of the turn in which `update_known`
+    /// found readings, four numbers each.
+    fn extremes<'py>(&self, py: Python<'py>) -> PyResult<Array<'py>> {
+        let found = self.sums.as_ref().map_or(vec![], Accumulator::extremes);
+        vector(py, found.as_flattened())
+    }
+
     /// `sum w e^(ikx)`, `sum w y e^(ikx)`, `sum w y^2`, readings, and what `y` is counted from.
+    #[pyo3(signature = (highest=None))]
     fn spectrum<'py>(
         &self,
         py: Python<'py>,
+        highest: Option<u32>,
     ) -> PyResult<(Complexes<'py>, Complexes<'py>, f64, usize, f64)> {
         Accumulator::room(self.highest)?;
         let empty = self.fresh(0.0)?;
         let sums = self.sums.as_ref().unwrap_or(&empty);
-        let spectrum = attached(py, || Spectrum::new(sums, self.highest))?;
+        let highest = highest.unwrap_or(self.highest).min(sums.reach());
+        let spectrum = attached(py, || Spectrum::new(sums, highest))?;
         Ok((
             vector(py, &spectrum.weight)?,
             vector(py, &spectrum.error)?,

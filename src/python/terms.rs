@@ -20,7 +20,7 @@ pub fn forms(terms: &[Bound<'_, PyAny>]) -> PyResult<Vec<Term>> {
     Ok(forms)
 }
 
-/// A form of `trueangle.correction.forms`, read attribute by attribute.
+/// A form of `trueangle.model.forms`, read attribute by attribute.
 fn form(object: &Bound<'_, PyAny>) -> PyResult<Form> {
     let number = |name: &str| object.getattr(name)?.extract::<f64>();
     let option = |name: &str| object.getattr(name)?.extract::<Option<f64>>();

@@ -102,7 +102,7 @@ pub fn dispatch<K: Kernel>(set: InstructionSet, kernel: K) {
 
 /// Runs a kernel on one lane, with the roundings of an instruction set: what is computed
 /// lane by lane comes out as [`dispatch`] has it, to the last bit.
-pub fn dispatch_one<K: Kernel>(set: InstructionSet, kernel: K) {
+fn dispatch_one<K: Kernel>(set: InstructionSet, kernel: K) {
     #[cfg(target_arch = "x86_64")]
     {
         #[target_feature(enable = "fma")]
@@ -117,4 +117,13 @@ pub fn dispatch_one<K: Kernel>(set: InstructionSet, kernel: K) {
     }
     let _ = set;
     kernel.run::<Portable<1, TARGET_FUSES>>();
+}
+
+/// [`dispatch`], or `dispatch_one` of a single sample, which needs no vector.
+pub fn dispatch_any<K: Kernel>(set: InstructionSet, samples: usize, kernel: K) {
+    if samples == 1 {
+        dispatch_one(set, kernel);
+    } else {
+        dispatch(set, kernel);
+    }
 }

@@ -6,15 +6,16 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import trueangle as ta
-from trueangle.aliasing import (
+from trueangle.errors import ArgumentError
+from trueangle.fitting.orders.verdicts import verified_positions
+from trueangle.joint.gear import explain_order, gear_orders
+from trueangle.runs.aliasing import (
     closure_errors,
     distinct_positions,
     energy_near_nyquist,
     fold,
     position_coherence,
 )
-from trueangle.errors import ArgumentError
-from trueangle.explanations import explain_order, gear_orders
 
 
 def run_at(angles, period=360.0):
@@ -194,3 +195,45 @@ def test_bad_ratio_is_named(wrong):
 def test_bad_member_is_named():
     with pytest.raises(ArgumentError, match="fixed_member"):
         gear_orders(100, "housing")
+
+
+@pytest.mark.parametrize("jitter", [5.0, 20.0])
+@pytest.mark.parametrize("places", [36, 48])
+def test_places_met_again_not_exactly_are_the_same_places(jitter, places):
+    for seed in range(5):
+        rng = np.random.default_rng(seed)
+        grid = np.arange(places) * 360.0 / places
+        runs = []
+        for label in "abcd":
+            theta = grid + rng.uniform(-jitter, jitter, places) / 3600.0
+            error = 0.05 * np.sin(np.radians(theta)) + rng.normal(0.0, 2e-3, places)
+            runs.append(ta.CalibrationRun(theta, theta + error, 360.0, label=label))
+        found = distinct_positions(runs)
+        assert (len(found), found.divisions) == (places, places), seed
+        assert verified_positions(runs).count == places
+        assert ta.select_orders(runs).to_dict()["distinct_positions"] == places
+
+
+def test_two_mounts_near_to_each_other_stay_two():
+    theta = np.concatenate([np.arange(36) * 10.0, np.arange(36) * 10.0 + 0.05])
+    assert len(distinct_positions(ta.CalibrationRun(theta, theta, 360.0))) == 72
+
+
+@pytest.mark.parametrize(("runs", "places"), [(16, 185), (8, 370), (1, 2960), (60, 41)])
+def test_free_places_leave_no_alias_in_question(runs, places):
+    rng = np.random.default_rng(29)
+    found = []
+    for k in range(runs):
+        even = np.arange(places) * 360.0 / places + rng.uniform(0.0, 360.0 / places)
+        theta = even if runs > 1 else np.sort(rng.uniform(0.0, 360.0, places))
+        error = 0.1 * np.sin(np.radians(theta)) + rng.normal(0.0, 1e-3, places)
+        found.append(ta.CalibrationRun(theta, theta + error, 360.0, label=str(k)))
+    assert verified_positions(found).between
+    assert "in between it is not" not in (ta.fit(found).model.fit.note or "")
+
+
+def test_one_grid_and_few_places_leave_aliases():
+    grid = np.tile(np.arange(36) * 10.0, 3)
+    few = np.random.default_rng(3).uniform(0.0, 360.0, 9)
+    for theta in (grid, few):
+        assert not verified_positions(ta.CalibrationRun(theta, theta, 360.0)).between

@@ -51,24 +51,24 @@ def test_make_lint_runs_it():
 
 
 def test_a_circle_inside_functions_is_seen(package):
-    plant(package / "angles.py", "\n\ndef planted():\n    from .runs import as_runs\n")
+    plant(package / "runs/run.py", "\n\ndef planted():\n    from .files import read_runs\n")
     (said,) = (line for line in check(package) if "circle" in line)
-    assert "angles:" in said
-    assert "runs:" in said
+    assert "runs.run:" in said
+    assert "runs.files:" in said
 
 
 #: Arrows that must never be: the file, an import, and a word of the reason.
 FORBIDDEN = {
-    "face": ("orders/verdicts.py", "from .. import fit", "face"),
-    "face, by its name": ("orders/verdicts.py", "import trueangle", "face"),
-    "drawing": ("correction/corrector.py", "from ..plots import curves", "draw"),
-    "drawing, by the full name": ("model.py", "import trueangle.plots.palette", "draw"),
-    "reports": ("diagnosis/levels.py", "from ..reports import page", "report"),
+    "face": ("fitting/orders/verdicts.py", "from ... import fit", "face"),
+    "face, by its name": ("fitting/orders/verdicts.py", "import trueangle", "face"),
+    "drawing": ("model/corrector.py", "from ..plots import curves", "plots stands above model"),
+    "drawing, by the full name": ("model/model.py", "import trueangle.plots.palette", "above"),
+    "reports": ("diagnosis/levels.py", "from ..reports import page", "reports stands above"),
     "a fit by a picture": ("plots/gains.py", "from ..fitting import fit", "do not fit"),
-    "a format and a model": ("formats/__init__.py", "from ..model import HarmonicModel", "format"),
-    "an effect and a diagnosis": ("effects/backlash.py", "from .. import diagnosis", "effect"),
-    "a fit and a cause": ("fitting/fit.py", "from ..effects import backlash", "causes"),
-    "the ground": ("files/outputs.py", "from ..model import HarmonicModel", "ground"),
+    "a format and a model": ("formats/__init__.py", "from ..model import model", "above formats"),
+    "an effect and a diagnosis": ("effects/backlash.py", "from .. import diagnosis", "above"),
+    "a fit and a diagnosis": ("fitting/fit.py", "from ..diagnosis import gain", "above fitting"),
+    "the ground": ("support/files/outputs.py", "from ...model import model", "above support"),
 }
 
 
@@ -103,8 +103,14 @@ def test_a_cause_named_in_another_file_is_seen(package):
 
 
 def test_an_exception_that_is_no_more_must_go(package):
-    path = package / "orders" / "table.py"
+    path = package / "plots" / "phasesoverruns.py"
     text = path.read_text("utf-8")
-    assert "from ..plots import amplitude_spectrum" in text
-    path.write_text(text.replace("from ..plots import amplitude_spectrum", "pass"), "utf-8")
-    assert "arrows.toml: 'orders.table -> plots' is declared and is no more" in check(package)
+    assert "from ..fitting.phases import " in text
+    path.write_text(text.replace("from ..fitting.phases import ", "from math import "), "utf-8")
+    declared = "'plots.phasesoverruns -> fitting.phases'"
+    assert check(package) == [f"arrows.toml: {declared} is declared and is no more"]
+
+
+def test_a_room_on_no_floor_is_seen(package):
+    (package / "attic.py").write_text("from . import errors\n", "utf-8")
+    assert check(package) == ["arrows.toml: the room 'attic' stands on no floor"]

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import trueangle as ta
-from trueangle.blas import blas_threads, one_blas_thread
+from trueangle.support.blas import blas_threads, one_blas_thread
 
 
 @pytest.fixture
@@ -71,7 +71,7 @@ def test_products_are_those_of_two_threads(count):
 @pytest.mark.parametrize(
     ("what", "within"),
     [
-        (ta.select_orders, "trueangle.orders.select.choose_argument"),
+        (ta.select_orders, "trueangle.fitting.orders.select.choose_argument"),
         (ta.report, "trueangle.reports.composition.check_output"),
     ],
 )

@@ -139,7 +139,7 @@ def test_a_log_is_never_its_own_output(fitted, tmp_path, capsys):
         (["fit", "missing.csv", "-o", "m.json", "--orders", "1"], r"missing\.csv.*No such file"),
         (["fit", "RUNS", "-o", "m.json", "--orders", "seventeen"], "orders.*seventeen"),
         (["fit", "RUNS", "-o", "m.json", "--orders", "5-1"], "orders.*5-1"),
-        (["fit", "RUNS", "-o", "m.json", "--orders", "motor:1"], "gear_ratio"),
+        (["fit", "RUNS", "-o", "m.json", "--orders", "motor:1"], "--gear-ratio"),
         (["fit", "RUNS", "-o", "nowhere/m.json", "--orders", "1"], "nowhere"),
         (["correct", "RUNS", "-m", "missing.json", "-o", "x.csv"], r"missing\.json"),
         (["correct", "RUNS", "-m", "RUNS", "-o", "x.csv"], "not complete JSON|not a model file"),

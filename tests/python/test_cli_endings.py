@@ -69,8 +69,8 @@ class Panic(BaseException):
     ],
 )
 def test_whatever_goes_wrong_is_one_line(error, said, desk, capsys, monkeypatch):
-    from trueangle import runfiles
     from trueangle.cli import run_lists
+    from trueangle.runs import files as runfiles
 
     def broken(*_args, **_more):
         raise error

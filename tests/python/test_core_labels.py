@@ -32,7 +32,7 @@ def models() -> dict[str, ta.HarmonicModel]:
 
 
 def partial(model: ta.HarmonicModel) -> ta.HarmonicModel:
-    from trueangle.records import FitRecord
+    from trueangle.model.records import FitRecord
 
     return model.replace(fit=FitRecord(samples=9, runs=1, span=(330.0, 400.0), residual=0.1))
 

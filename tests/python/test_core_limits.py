@@ -176,7 +176,7 @@ def test_a_large_batch_is_shared_by_threads_and_a_small_one_is_not():
 )
 @pytest.mark.parametrize("argument", ["reference", "indicated"])
 def test_numbers_that_no_model_may_have(change, message, argument):
-    from trueangle.records import FitRecord
+    from trueangle.model.records import FitRecord
 
     fields = {"shafts": [ta.Shaft("output", 1, [1], [0.0], [0.5])], "period": 360.0} | change
     span = fields.pop("span", (0.0, 360.0))
@@ -237,7 +237,7 @@ def test_memory_that_is_not_there_is_an_error_like_any_other(terms):
             except MemoryError:
                 caught += 1
         try:
-            ta.Moments(range(1, 40_000)).update(x[:10], x[:10])
+            ta.Moments({{"motor": [40_000]}}, gear_ratio=1.0).update(x[:10], x[:10])
         except MemoryError:
             caught += 1
         try:

@@ -8,9 +8,9 @@ import pytest
 
 import trueangle as ta
 from trueangle.cli import main
-from trueangle.distributions import student_quantile
 from trueangle.errors import ArgumentError
 from trueangle.fitting.clusters import Cluster, robust_covariance
+from trueangle.support.distributions import student_quantile
 
 #: Order, amplitude (deg), phase (deg).
 LINES = ((1, 0.1, 30.0), (2, 0.05, 200.0), (5, 0.03, 100.0))

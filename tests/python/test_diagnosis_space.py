@@ -7,13 +7,13 @@ import pytest
 
 from trueangle.diagnosis.discrepancy import noise_from_repeats
 from trueangle.effects.bends import LAG, _late
+from trueangle.estimation.batch import Blocks
+from trueangle.estimation.factor import Factor
+from trueangle.estimation.ratio import best_ratio
+from trueangle.estimation.regression import Regression
+from trueangle.estimation.runcolumns import RunEffectColumns
+from trueangle.estimation.whitening import LagCorrelation, RunEffect, Whitener
 from trueangle.joint.grid import UniformGrid, uniform_grid
-from trueangle.regression.batch import Blocks
-from trueangle.regression.factor import Factor
-from trueangle.regression.ratio import best_ratio
-from trueangle.regression.regression import Regression
-from trueangle.regression.runcolumns import RunColumns
-from trueangle.regression.whitening import LagCorrelation, RunEffect, Whitener
 from trueangle.simulation import Harmonic, Joint, RunDesign, Simulation, join_runs, simulate
 
 #: Relative rounding of double precision sums over a few hundred readings.
@@ -103,7 +103,7 @@ def test_products_under_a_noise_need_no_mapped_columns(space, noise):
             start = (0, 2, 3, 5)[k]
             mapped = whiten(x[:, start : start + products.width])
             assert gram == pytest.approx(mapped.T @ mapped, rel=ROUNDING, abs=ROUNDING)
-    drawn = RunColumns(x, space.bounds)
+    drawn = RunEffectColumns(x, space.bounds)
     grams, moments = drawn.grams(whiten), drawn.moments(whiten.transposed(whiten(y)))
     mapped, seen = whiten(x), whiten(y)
     for k, (a, b) in enumerate(space.bounds):
@@ -197,7 +197,7 @@ def test_gains_are_those_of_least_squares(space):
 @pytest.mark.parametrize("seconds", [5.0, 10.0, 14.0, 20.0])
 def test_run_effects_have_the_likelihood_of_the_dense_covariance(space, seconds):
     z = np.column_stack([np.ones(space.n), space.signals.clock / seconds])
-    ratio, deviance = space.ratio_of(RunColumns(z, space.bounds))
+    ratio, deviance = space.ratio_of(RunEffectColumns(z, space.bounds))
 
     def minus_two_log_likelihood(ratio):
         v = dense_covariance(space, 0.0, [RunEffect(z, ratio)], np.ones(space.n))
@@ -278,7 +278,7 @@ def test_squares_saved_at_every_ratio_are_those_of_a_ridge(space, width):
         seen.extend(saved)
         return 2.0 * saved
 
-    columns = RunColumns(z, space.bounds)
+    columns = RunEffectColumns(z, space.bounds)
     moments = columns.moments(np.column_stack([space.q, left]))
     ratio, deviance = best_ratio(columns.grams(space.whiten), moments, deviances)
     moment = own.T @ left

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from trueangle import distributions as ours
 from trueangle.errors import ArgumentError
+from trueangle.support import distributions as ours
 
 #: lgamma is good to an ulp of its value: with arguments up to 1e6 the front factor keeps this.
 RELATIVE = 2e-9

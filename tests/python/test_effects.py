@@ -16,8 +16,8 @@ PACKAGE = Path(trueangle.__file__).parent
 #: and the fault of data whose columns are at another ratio.
 WORDS = {
     ("outliers", "certificate/document.py"),
-    ("wrong_gear_ratio", "checks/angles.py"),
-    ("wrong_gear_ratio", "checks/fault.py"),
+    ("wrong_gear_ratio", "runs/checks/angles.py"),
+    ("wrong_gear_ratio", "runs/checks/fault.py"),
 }
 
 #: Most lines of an effect's file.

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 import trueangle as ta
 from trueangle.cli import build_parser, main
 from trueangle.errors import ArgumentError
-from trueangle.errorunits import ERROR_UNITS, error_unit, significant
+from trueangle.support.display_units import ERROR_UNITS, error_unit, significant
 
 #: Commands that print errors.
 PRINTING = {
@@ -48,7 +48,7 @@ def test_small_errors_stay_in_arcsec():
 
 def test_counts_are_those_of_the_readings():
     assert error_unit("count", period=4096.0).text(1_296_000.0 / 4096.0) == "1.000 count"
-    with pytest.raises(ArgumentError, match="--counts-per-turn"):
+    with pytest.raises(ArgumentError, match="`counts_per_turn="):
         error_unit("count", period=360.0)
 
 

@@ -9,9 +9,9 @@ import threading
 import pytest
 
 import trueangle as ta
-from trueangle import files
 from trueangle.errors import FileError
-from trueangle.files import inputs
+from trueangle.support import files
+from trueangle.support.files import inputs
 
 
 @pytest.fixture
@@ -281,7 +281,7 @@ def test_files_have_a_size_limit_that_the_message_names(tmp_path, monkeypatch):
 
 
 def test_what_is_written_is_small_enough_to_be_read(tmp_path, model, monkeypatch):
-    from trueangle import modeltext
+    from trueangle.model import text as modeltext
 
     monkeypatch.setattr(modeltext, "MODEL_BYTES", 100)
     with pytest.raises(ta.errors.ArgumentError, match="covariance"):

@@ -9,9 +9,9 @@ import trueangle as ta
 from trueangle.diagnosis import selection
 from trueangle.effects import EFFECTS, Quantisation, Sidebands
 from trueangle.effects.search import line_parameters
+from trueangle.estimation.regression import Regression
+from trueangle.estimation.whitening import LagCorrelation
 from trueangle.joint.signals import join_runs
-from trueangle.regression.regression import Regression
-from trueangle.regression.whitening import LagCorrelation
 from trueangle.simulation import Harmonic, Joint, RunDesign, Simulation
 
 JOINT = Joint(50.0, "circular_spline", "motor")

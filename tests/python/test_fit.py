@@ -11,7 +11,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import trueangle as ta
-from trueangle import errors, reference
+from trueangle import errors
+from trueangle.estimation import reference
 from trueangle.fitting.heldout import hold_out
 
 # Two backward-stable solutions of the same well-conditioned problem.
@@ -287,7 +288,7 @@ def test_results_show_themselves_in_a_line_and_a_notebook():
 
 def test_an_unknown_way_of_solving_is_an_error_of_ours():
     theta, error = readings(4)
-    with pytest.raises(errors.ArgumentError, match="method must be one of 'plain'"):
+    with pytest.raises(errors.ArgumentError, match="method must be one of plain"):
         fitted(theta, theta + error, method="foo")
 
 

@@ -7,8 +7,8 @@ import pytest
 
 import trueangle as ta
 from trueangle.errors import OutsideSpanWarning, RankError, UnlikeRunsWarning
-from trueangle.orders import unitgroups
-from trueangle.orders.harmonicsums import Readings, harmonic_sums
+from trueangle.fitting.orders import unitgroups
+from trueangle.fitting.orders.harmonicsums import ZeroGroupReadings, harmonic_sums
 
 ARCSEC = 1.0 / 3600.0
 
@@ -213,7 +213,7 @@ def test_many_runs_are_taken_together_with_the_same_sums():
     for number in range(unitgroups.MOST_UNITS + 5):
         turns = random.uniform(-2.0, 3.0, random.integers(2, 9))
         error = number + random.normal(0.0, 0.1, turns.size)
-        units.append(Readings(turns, error, random.uniform(0.5, 2.0, turns.size), ""))
+        units.append(ZeroGroupReadings(turns, error, random.uniform(0.5, 2.0, turns.size), ""))
     orders = (1, 2, 5, 40)
     sums = harmonic_sums(units, orders)
     assert sums.units == unitgroups.GROUPS

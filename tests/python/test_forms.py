@@ -11,8 +11,8 @@ import trueangle as ta
 from trueangle.diagnosis.forms import bends, with_form_errors
 from trueangle.effects import EFFECTS
 from trueangle.effects.bends import bent
+from trueangle.estimation.regression import Regression
 from trueangle.joint.signals import join_runs
-from trueangle.regression.regression import Regression
 from trueangle.simulation import RunDesign, Simulation, simulate
 
 #: Rounding of sums over some thousand readings.

@@ -4,17 +4,17 @@ import numpy as np
 import pytest
 
 import trueangle as ta
-from trueangle.aliasing import distinct_positions
-from trueangle.orders import harmonicsums, repeats
-from trueangle.orders.evidence import (
+from trueangle.fitting.orders import harmonicsums, repeats
+from trueangle.fitting.orders.evidence import (
     choose_forward,
     examine_orders,
     fit_subset,
     held_out_gains,
     log_tail,
 )
-from trueangle.orders.harmonicsums import Readings, harmonic_sums
-from trueangle.orders.zerogroups import units_of
+from trueangle.fitting.orders.harmonicsums import ZeroGroupReadings, harmonic_sums
+from trueangle.fitting.orders.zerogroups import units_of
+from trueangle.runs.aliasing import distinct_positions
 
 # Normal equations of a few hundred readings, relative to their size.
 ROUNDING = 1e-10
@@ -27,7 +27,7 @@ def some_units(seed=0, count=3):
         size = 80 + 10 * number
         turns = random.uniform(-2.0, 3.0, size)
         error = 7.0 + number + 0.3 * np.sin(2 * np.pi * 3 * turns) + random.normal(0, 0.1, size)
-        units.append(Readings(turns, error, random.uniform(0.5, 2.0, size), str(number)))
+        units.append(ZeroGroupReadings(turns, error, random.uniform(0.5, 2.0, size), str(number)))
     return units
 
 
@@ -57,7 +57,7 @@ def test_normal_equations_are_those_of_the_design_matrix(orders):
 def test_the_cores_sums_are_the_same(monkeypatch):
     random = np.random.default_rng(1)
     turns = random.uniform(-3.0, 5.0, 20_000)
-    unit = Readings(turns, random.normal(300.0, 40.0, turns.size), np.ones(turns.size), "")
+    unit = ZeroGroupReadings(turns, random.normal(300.0, 40.0, turns.size), np.ones(turns.size), "")
     large = harmonic_sums([unit], range(1, 451))
     monkeypatch.setattr(harmonicsums, "_LARGE", 10**9)
     small = harmonic_sums([unit], range(1, 451))
@@ -132,7 +132,7 @@ def test_held_out_errors_are_those_of_leaving_units_out():
 
 def test_forward_choice_takes_the_lowest_of_aliases():
     turns = np.arange(36) / 36.0
-    unit = Readings(turns, np.sin(2 * np.pi * 202 * turns), np.ones(36), "")
+    unit = ZeroGroupReadings(turns, np.sin(2 * np.pi * 202 * turns), np.ones(36), "")
     sums = harmonic_sums([unit], (14, 202, 22))
     assert choose_forward(sums, np.full(3, -3.0), 35, (0.01, 100.0)) == [0]
 
@@ -163,7 +163,7 @@ def test_noise_of_repeats_is_that_of_least_squares(monkeypatch):
     """A mean for each position and unit, however the pairs that occur are found."""
     rng = np.random.default_rng(9)
     turns = [rng.integers(0, 12, 60) / 12.0, rng.integers(0, 12, 40) / 12.0, np.array([0.31, 0.31])]
-    units = [Readings(t, rng.standard_normal(t.size), np.ones(t.size), "") for t in turns]
+    units = [ZeroGroupReadings(t, rng.standard_normal(t.size), np.ones(t.size), "") for t in turns]
     runs = [ta.CalibrationRun(360.0 * t, 360.0 * t, period=360.0) for t in turns]
     positions = distinct_positions(runs)
     unit = np.repeat(np.arange(3), [t.size for t in turns])
@@ -186,7 +186,9 @@ def test_parts_of_the_normal_matrix_are_parts_of_it(orders):
     print(f"seed {seed}")
     rng = np.random.default_rng(seed)
     units = [
-        Readings(rng.uniform(0.0, 1.0, n), rng.normal(size=n), rng.uniform(0.5, 2.0, n), "")
+        ZeroGroupReadings(
+            rng.uniform(0.0, 1.0, n), rng.normal(size=n), rng.uniform(0.5, 2.0, n), ""
+        )
         for n in (50, 700)
     ]
     sums = harmonic_sums(units, orders)

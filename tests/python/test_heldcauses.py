@@ -11,8 +11,8 @@ from trueangle.diagnosis.findings import Diagnosis
 from trueangle.diagnosis.gain import Gain, measure_gain
 from trueangle.diagnosis.holdout import held_out, reducible_share
 from trueangle.effects import EFFECTS
+from trueangle.estimation.regression import Regression
 from trueangle.joint.signals import join_runs
-from trueangle.regression.regression import Regression
 from trueangle.simulation import Harmonic, Joint, RunDesign, Simulation
 
 JOINT = Joint(50.0, "circular_spline", "motor")

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 import trueangle as ta
-from trueangle.angles import circular_mean
 from trueangle.errors import NoModelError
+from trueangle.support.angles import circular_mean
 
 SEED = 4099
 #: A mean of two angles of order one rounds so much; nothing else may be worse.

@@ -7,8 +7,8 @@ import pytest
 
 from trueangle.diagnosis.identifiability import blind_spots, doubts_about
 from trueangle.effects.missing_order import MissingOrder
+from trueangle.estimation.regression import Regression
 from trueangle.joint.signals import join_runs
-from trueangle.regression.regression import Regression
 from trueangle.simulation import Harmonic, Joint, RunDesign, Simulation, simulate
 
 JOINT = Joint(50.0, "circular_spline", "motor")

@@ -8,7 +8,7 @@ from trueangle.errors import NoModelError
 from trueangle.fitting.laterstretch import gains_of_stretches
 from trueangle.fitting.newrun import gains_of_runs
 from trueangle.fitting.problem import Problem
-from trueangle.shafts import resolve_orders
+from trueangle.joint.shafts import resolve_orders
 
 SEED = 20261
 

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 import trueangle as ta
-from trueangle import reference
-from trueangle.angles import wrap
+from trueangle.estimation import reference
+from trueangle.support.angles import wrap
 
 
 def left(model, runs):

@@ -11,7 +11,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import trueangle as ta
-from trueangle import errors, reference
+from trueangle import errors
+from trueangle.estimation import reference
 
 # Values of a series are sums of a few terms of size 1: a few units in the last place.
 ROUNDING = 5e-15
@@ -141,7 +142,7 @@ def test_impossible_models_are_refused_by_name(change, message):
 
 
 def test_correcting_outside_the_fitted_span_warns_once():
-    from trueangle.records import FitRecord
+    from trueangle.model.records import FitRecord
 
     record = FitRecord(samples=10, runs=1, span=(350.0, 480.0), residual=0.1)
     model = ta.HarmonicModel([ta.Shaft("output", 1, [1], [0.0], [0.5])], period=360.0, fit=record)

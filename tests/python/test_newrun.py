@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 import trueangle as ta
-from trueangle.angles import circular_mean
 from trueangle.errors import NoModelError
 from trueangle.fitting.newrun import gains_of_runs
+from trueangle.support.angles import circular_mean
 
 SEED = 41
 NOISE = 0.01

@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 
 import trueangle as ta
 from trueangle.errors import ArgumentError
+from trueangle.fitting.orders.verdicts import verified_positions
 from trueangle.joint.gear import explain_as_harmonic
-from trueangle.orders.verdicts import verified_positions
 
 GRID = np.arange(36) * 10.0
 NOISE = 5.0  # arcsec

@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 
 import trueangle as ta
-from trueangle.orders.evidence import (
+from trueangle.fitting.orders.evidence import (
     choose_forward,
     examine_orders,
     fit_subset,
     log_tail,
 )
-from trueangle.orders.harmonicsums import Readings, harmonic_sums
-from trueangle.orders.scatter import neighbour_scatter, pooled_scatter, run_scatter
+from trueangle.fitting.orders.harmonicsums import ZeroGroupReadings, harmonic_sums
+from trueangle.fitting.orders.scatter import neighbour_scatter, pooled_scatter, run_scatter
 
 SIGMA = 0.3
 
@@ -27,7 +27,7 @@ def noise_units(seed, units=3, size=60, line=None):
         error = SIGMA * rng.normal(size=size) + 5.0 * k
         if line is not None:
             error = error + 3.0 * np.sin(2.0 * np.pi * (line * turns + k / units))
-        found.append(Readings(turns, error, np.ones(size), str(k)))
+        found.append(ZeroGroupReadings(turns, error, np.ones(size), str(k)))
     return found
 
 
@@ -84,7 +84,7 @@ def test_few_readings_choose_no_order_of_noise_more_often_than_asked():
     chosen = 0
     for seed in range(400):
         rng = np.random.default_rng(seed)
-        unit = Readings(rng.uniform(0.0, 1.0, 9), rng.normal(size=9), np.ones(9), "")
+        unit = ZeroGroupReadings(rng.uniform(0.0, 1.0, 9), rng.normal(size=9), np.ones(9), "")
         sums = harmonic_sums([unit], (1, 2))
         chosen += bool(choose_forward(sums, np.full(2, math.log(0.01)), 8, None))
     # 8 of 400 are expected; 24 would be five standard deviations more.
@@ -92,7 +92,7 @@ def test_few_readings_choose_no_order_of_noise_more_often_than_asked():
     # And a line of six times the noise is taken.
     rng = np.random.default_rng(1)
     turns = np.arange(9) / 9.0
-    unit = Readings(turns, 6.0 * np.sin(2 * np.pi * turns) + 0.3 * rng.normal(size=9),
+    unit = ZeroGroupReadings(turns, 6.0 * np.sin(2 * np.pi * turns) + 0.3 * rng.normal(size=9),
                     np.ones(9), "")  # fmt: skip
     sums = harmonic_sums([unit], (1, 2))
     assert choose_forward(sums, np.full(2, math.log(0.01)), 8, None) == [0]
@@ -141,8 +141,8 @@ def test_an_order_of_the_paper_repeats_its_phase_within_60_degrees(spread, kept)
 @pytest.mark.parametrize(("size", "told"), [(1.0, True), (0.002, False)])
 def test_aliases_are_told_where_zeros_that_moved_decide(size, told):
     """Grids of 36 positions 0.3 deg apart: order 28 is turned against 8 by 11 deg."""
-    from trueangle.aliasing import distinct_positions
-    from trueangle.orders.lookalikes import find_lookalikes
+    from trueangle.fitting.orders.lookalikes import find_lookalikes
+    from trueangle.runs.aliasing import distinct_positions
 
     rng = np.random.default_rng(2)
     runs, units = [], []
@@ -150,6 +150,6 @@ def test_aliases_are_told_where_zeros_that_moved_decide(size, told):
         theta = np.arange(36) * 10.0 + shift
         error = size * np.sin(np.radians(8.0 * theta)) + 0.01 * rng.normal(size=36)
         runs.append(ta.CalibrationRun(theta, theta + error, 360.0))
-        units.append(Readings(theta / 360.0, error - error.mean(), np.ones(36), ""))
+        units.append(ZeroGroupReadings(theta / 360.0, error - error.mean(), np.ones(36), ""))
     (alike,) = find_lookalikes(units, distinct_positions(runs), [8.0], 0.01**2, 40)
     assert (28 not in alike) == told

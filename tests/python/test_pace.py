@@ -19,8 +19,8 @@ from trueangle import write_runs
 from trueangle.cli import main
 from trueangle.cli.durations import seconds
 from trueangle.errors import ArgumentError
-from trueangle.pace import Pace, ending_early, entered, pace, paced
 from trueangle.simulation import Backlash, Harmonic, Latency, RunDesign, Simulation, simulate
+from trueangle.support.deadline import Pace, ending_early, entered, pace, paced
 
 #: Seconds by which a diagnosis may take longer than it was given: what is in hand is ended (one
 #: search), and what is left is tested. Generous, as the machine that runs this may be busy.
@@ -170,6 +170,96 @@ def test_a_step_that_was_not_finished_names_nothing():
         result = ta.diagnose(simulate(TRUE, seed=5), BELIEVED)
     assert "trying causes" in result.notes[0]
     assert result.findings == []
+
+
+def test_work_without_a_time_given_is_bounded_by_its_readings_and_its_first_round():
+    now = [0.0]
+    for items, round_took, allowed in ((0, 0.1, 30.0), (10_000, 0.5, 60.0), (10_000, 5.0, 300.0)):
+        now[0] = 0.0
+        work = Pace(processor=lambda: now[0])
+        with work.bounded(items):
+            work.at("rounds", 0, 9)
+            now[0] = round_took
+            work.first_round_done()
+            work.first_round_done()  # the first one only
+            now[0] = allowed - 0.01
+            assert not work.over
+            with work.part(0.5):
+                assert work.over
+            now[0] = allowed
+            assert work.over
+            assert work.cut == "rounds"
+            assert f"the {allowed:.2g} s of the processor" in work.why
+        assert not work.over
+        assert work.cut == "", "what follows is no part of it"
+
+
+def test_a_time_that_is_given_is_the_only_one():
+    now = [0.0]
+    work = Pace(1e3, clock=lambda: 0.0, processor=lambda: now[0])
+    with work.bounded(10):
+        now[0] = 1e6
+        assert not work.over
+
+
+class Busy:
+    """A processor that is looked at, and has worked a while each time."""
+
+    def __init__(self, each):
+        self.seconds, self.each = 0.0, each
+
+    def __call__(self):
+        self.seconds += self.each
+        return self.seconds
+
+
+@pytest.mark.parametrize("command", [False, True])
+def test_a_diagnosis_comes_to_an_end_by_itself_and_says_so(command, files, capsys, monkeypatch):
+    """So slow a processor that the time is up after the first causes: what is there is told."""
+    import trueangle.support.deadline as module
+
+    monkeypatch.setattr(module, "ROUNDS", 3.0)
+    monkeypatch.chdir(files)
+    usual = Pace.__init__
+
+    def slow(self, *args, **more):
+        usual(self, *args, **{**more, "processor": Busy(1.0)})
+
+    monkeypatch.setattr(Pace, "__init__", slow)
+    if command:
+        assert main(["diagnose", "r.csv", "--simulation", "believed.toml"]) == 0
+        told = capsys.readouterr().out
+    else:
+        result = ta.diagnose(ta.read_runs("r.csv"), BELIEVED)
+        assert not result.complete
+        assert not result.is_enough
+        told = result.summary()
+    assert told.startswith("INCOMPLETE: the ")
+    assert "s of the processor that it has by default were up" in " ".join(told.split())
+    assert "Measured minus simulated" in told
+
+
+def test_a_search_that_was_cut_short_is_not_remembered():
+    """What it found so far would stand for its cause when rivals are told."""
+    from trueangle.diagnosis.candidates import extensions
+    from trueangle.estimation.regression import Regression
+    from trueangle.joint.signals import join_runs
+
+    runs = simulate(TRUE, seed=5)
+    signals = join_runs(runs)
+    error = 3600.0 * np.concatenate([run.error for run in runs])
+    start = Regression(signals, error, BELIEVED.surroundings)
+    for within in range(4, 40, 3):
+        with entered(Pace(float(within), clock=Ticks())) as at:
+            found = extensions(start, ["local_defect", "backlash"])
+            cut = at.over
+        if cut:
+            assert len(found) < 2
+        alone = Regression(signals, error, BELIEVED.surroundings)
+        for extension, _, gain in extensions(start, ["local_defect", "backlash"]):
+            fresh = [g for e, _, g in extensions(alone, [extension.cause])]
+            assert fresh == [gain]
+        start = Regression(signals, error, BELIEVED.surroundings)
 
 
 def test_it_ends_in_the_time_given():

@@ -9,10 +9,8 @@ import pytest
 
 import trueangle as ta
 from conftest import ROOT
-from trueangle.errors import ArgumentError
-from trueangle.orders.paper import select_by_paper
-from trueangle.paperstudy.report import short_report, study_table
-from trueangle.paperstudy.study import (
+from trueangle.cli.paperstudy.report import short_report, study_table
+from trueangle.cli.paperstudy.study import (
     GEAR_ORDERS,
     JOINT_A,
     JOINT_B,
@@ -22,6 +20,8 @@ from trueangle.paperstudy.study import (
     reduction,
     simulated_groups,
 )
+from trueangle.errors import ArgumentError
+from trueangle.fitting.orders.paper import select_by_paper
 
 GRID = np.arange(36) * 10.0
 

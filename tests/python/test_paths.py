@@ -6,7 +6,9 @@ import sys
 
 import pytest
 
+import trueangle as ta
 from conftest import ROOT
+from trueangle.support import renamed
 
 #: Rooms of the first release that the reference named, and what they held.
 EARLIER = {
@@ -100,13 +102,51 @@ def test_the_reference_names_what_there_is(path):
     assert resolved(path) is not None
 
 
+@pytest.mark.filterwarnings("ignore:trueangle.*is now:DeprecationWarning")
 @pytest.mark.parametrize("path", told_in_changelog())
 def test_the_changelog_names_what_there_is(path):
     assert resolved(path) is not None
 
 
+@pytest.mark.filterwarnings("ignore:trueangle.*is now:DeprecationWarning")
 @pytest.mark.parametrize(
     "path", [f"{room}.{name}" for room, names in EARLIER.items() for name in names.split()]
 )
 def test_paths_of_earlier_releases_stay(path):
     assert resolved(path) is not None
+
+
+#: One module was a room before: what it held is found in the room.
+ROOMS = {"trueangle.runs": "CalibrationRun", "trueangle.model": "HarmonicModel"}
+
+
+@pytest.mark.parametrize("name", renamed.RENAMED)
+def test_a_former_name_finds_the_module_and_says_so(name):
+    now = importlib.import_module(f"trueangle.{renamed.RENAMED[name]}")
+    sys.modules.pop(f"trueangle.{name}", None)
+    with pytest.warns(DeprecationWarning, match=f"trueangle.{name} is now {now.__name__};"):
+        before = importlib.import_module(f"trueangle.{name}")
+    held = {key: value for key, value in vars(now).items() if not key.startswith("__")}
+    assert held or hasattr(now, "__path__")
+    assert all(getattr(before, key) is value for key, value in held.items())
+
+
+@pytest.mark.parametrize("name", ROOMS)
+def test_a_module_that_became_a_room_still_holds_its_names(name):
+    with pytest.warns(DeprecationWarning, match=f"{name}.{ROOMS[name]} is now {name}"):
+        assert getattr(importlib.import_module(name), ROOMS[name]) is getattr(ta, ROOMS[name])
+    with pytest.raises(AttributeError, match="no attribute 'nothing'"):
+        _ = importlib.import_module(name).nothing
+
+
+def test_a_room_under_its_former_name_holds_the_same_modules():
+    assert renamed.moved_name("orders.select") == "fitting.orders.select"
+    sys.modules.pop("trueangle.orders.select", None)
+    with pytest.warns(DeprecationWarning, match="is now"):
+        found = importlib.import_module("trueangle.orders.select")
+    assert found.select_orders is ta.select_orders
+
+
+def test_what_never_was_is_not_found():
+    with pytest.raises(ModuleNotFoundError, match=r"trueangle\.nothing"):
+        importlib.import_module("trueangle.nothing")

@@ -7,10 +7,10 @@ import pytest
 
 import trueangle as ta
 from trueangle.cli import main
-from trueangle.distributions import student_quantile
 from trueangle.errors import NotInvertibleError, RankError
+from trueangle.estimation.reference import design_matrix
 from trueangle.fitting.penalty import bias_covariance, pattern_variances
-from trueangle.reference import design_matrix
+from trueangle.support.distributions import student_quantile
 
 SEED = 20261122
 #: Fits of a form. A fit's coefficients and angles hang together: the share of one fit held

@@ -172,3 +172,23 @@ def test_command_prints_text_and_refuses_too_few_mounts(capsys):
     assert "820 jittered positions" in capsys.readouterr().out
     assert main(["plan", "--orders", "1-x"]) == 1
     assert "'1-x'" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(("positions", "mounts"), [(36, 2), (35, 2), (24, 3), (13, 4), (5, 7)])
+@pytest.mark.parametrize("orders", [None, (1, 2)])
+def test_mounts_without_a_gear_tell_what_one_of_them_takes_for_one(positions, mounts, orders):
+    plan = plan_mounts(None, positions, mounts, orders=orders)
+    # All orders of one class that lie below the limit of all positions, in the dense design.
+    alike = [1, *(k * positions + s for k in range(1, mounts) for s in (-1, 1))]
+    alike = sorted(m for m in alike if 2 * m < positions * mounts)
+    offsets = np.array(plan.mount_offsets_deg)
+    turns = (np.arange(positions) / positions + offsets[:, None] / 360.0).ravel()
+    zeros = np.repeat(np.arange(mounts), positions)
+    assert noise_factors(turns, alike, zeros).max() == pytest.approx(1.0, abs=1e-6)
+    if orders is None:
+        assert set(alike) <= set(plan.noise_factors)
+        assert plan.worst_noise_factor == pytest.approx(1.0)
+
+
+def test_more_mounts_than_facets_are_planned():
+    assert len(plan_mounts(None, 3, 6).facet_shifts) == 6

@@ -11,12 +11,12 @@ import pytest
 import trueangle as ta
 from trueangle import plots, simulation
 from trueangle.errors import ArgumentError, MissingExtraError, RankError
-from trueangle.errorunits import significant
 from trueangle.fitting.phases import run_phases
 from trueangle.planning import plan_mounts, plan_tilts
 from trueangle.plots import curves, palette
 from trueangle.plots.orderaxis import OrderAxis
 from trueangle.simulation import Harmonic, Joint, RunDesign, Simulation
+from trueangle.support.display_units import significant
 
 matplotlib = pytest.importorskip("matplotlib")
 matplotlib.use("Agg")
@@ -296,7 +296,7 @@ def selection(runs: list[ta.CalibrationRun]) -> ta.OrderSelection:
 
 
 def test_threshold_parts_significant_orders_from_the_others(selection) -> None:
-    from trueangle.orders import FALSE_ALARM
+    from trueangle.fitting.orders import FALSE_ALARM
     from trueangle.plots.amplitudespectrum import thresholds
 
     limit = thresholds(selection)

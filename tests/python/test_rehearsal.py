@@ -29,7 +29,7 @@ from trueangle.rehearsal import trial as trials
 from trueangle.rehearsal.detection import Chance, binomial_interval
 from trueangle.rehearsal.nextrun import blind_causes, next_run
 from trueangle.rehearsal.search import next_steps
-from trueangle.rehearsal.trial import NOTHING, Outcome, Trial, asked, measured_signals
+from trueangle.rehearsal.trial import NOTHING, Trial, TrialOutcome, asked, measured_signals
 from trueangle.rehearsal.visibility import FIRST, NEAR, size_range
 from trueangle.rehearsal.workers import THREADS, WorkerError, Workers
 from trueangle.simulation import Backlash, Harmonic, Joint, RunDesign, Simulation
@@ -177,7 +177,9 @@ def test_a_diagnosis_that_fails_is_told_and_loses_nothing(monkeypatch):
 def test_what_is_taken_for_another_is_told(monkeypatch):
     monkeypatch.setattr(
         "trueangle.rehearsal.workers.asked",
-        lambda sim, signals, trial, seed: Outcome("taken_for_another", ("latency", "scale_error")),
+        lambda sim, signals, trial, seed: TrialOutcome(
+            "taken_for_another", ("latency", "scale_error")
+        ),
     )
     found = rehearse(SIM, causes=["backlash"], seeds=3, workers=1)["backlash"]
     assert found.confused_with == {"latency": 3, "scale_error": 3}
@@ -251,7 +253,7 @@ def test_processes_that_cannot_have_the_simulation_are_not_started():
     class Hidden(Local):
         pass
 
-    with pytest.raises(WorkerError, match="use workers=1"):
+    with pytest.raises(WorkerError, match="use `workers=1`"):
         Workers(SIM.with_effects([Hidden()]), 0, 1)
 
 
@@ -539,4 +541,4 @@ def is_alive(number):
 
 
 def test_nothing_is_an_outcome_too():
-    assert not Outcome(NOTHING).is_named
+    assert not TrialOutcome(NOTHING).is_named

@@ -51,7 +51,7 @@ def test_counts_are_reduced_to_the_unit_of_the_reference(tmp_path):
     path = written(tmp_path, "reference_deg,indicated_count\n90,1024\n")
     (run,) = ta.read_runs(path, counts_per_turn=4096)
     assert run.indicated[0] == 90.0
-    with pytest.raises(FileError, match="--counts-per-turn"):
+    with pytest.raises(FileError, match="`counts_per_turn="):
         ta.read_runs(path)
 
 

@@ -9,7 +9,7 @@ import pytest
 
 import trueangle as ta
 from trueangle.errors import ArgumentError
-from trueangle.runs import as_runs
+from trueangle.runs.run import as_runs
 
 THETA = np.arange(0.0, 360.0, 10.0)
 

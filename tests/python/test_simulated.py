@@ -9,8 +9,8 @@ import trueangle as ta
 from conftest import ROOT
 from trueangle.cli import main
 from trueangle.errors import ArgumentError
-from trueangle.joining import minus_simulated
-from trueangle.runtables import runs_of
+from trueangle.runs.joining import minus_simulated
+from trueangle.runs.tables import runs_of
 from trueangle.simulation import Backlash, Harmonic, RunDesign, Simulation
 
 ARCSEC = 3600.0

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import trueangle as ta
-from trueangle.errors import ArgumentError
+from trueangle.errors import ArgumentError, NotCorrectedWarning
 
 sklearn = pytest.importorskip("sklearn")
 
@@ -121,6 +121,7 @@ def test_what_is_no_angle_is_refused_and_nothing_is_made_of_noise():
         AngleCorrector().fit(3.7 * x, true)
     rng = np.random.default_rng(SEED)
     plain = true[:, None] + rng.normal(0.0, 0.01, (len(true), 1))
-    corrector = AngleCorrector().fit(plain, true)
+    with pytest.warns(NotCorrectedWarning, match="left as it is"):
+        corrector = AngleCorrector().fit(plain, true)
     assert corrector.models_ == [None]
     np.testing.assert_array_equal(corrector.transform(plain), plain)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import trueangle as ta
-from trueangle.orders.steepness import greatest_slope
+from trueangle.fitting.orders.steepness import greatest_slope
 
 
 @pytest.mark.parametrize("seed", range(5))

@@ -124,7 +124,7 @@ def test_files_with_impossible_terms_are_refused(tmp_path, term, said):
         (lambda: ta.LocalDefect(0.0, 1.0, 1.0, -1.0), "cycles_per_turn must be positive"),
         (lambda: ta.StiffeningCompliance(knee_Nm=-1.0), "knee_Nm must be 0 or more"),
         (lambda: ta.LoadDependentGearError([0.0], [1.0], [1.0]), "orders must be positive"),
-        (lambda: ta.LoadDependentGearError([1], [1], [1], "both"), "torque must be 'signed'"),
+        (lambda: ta.LoadDependentGearError([1], [1], [1], "both"), "torque must be one of signed"),
         (lambda: ta.LoadDependentGearError([1], [1, 2], [1]), "equally long"),
         (lambda: model_with("backlash"), r"terms\[0\] must be a term"),
     ],

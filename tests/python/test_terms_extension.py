@@ -8,15 +8,15 @@ import pytest
 import trueangle as ta
 from trueangle import errors
 from trueangle.cli import main
-from trueangle.simulation import Harmonic, Joint, RunDesign, Simulation
-from trueangle.simulation.effects import EFFECTS, Effect
-from trueangle.terms import TERMS
-from trueangle.terms.extension import (
+from trueangle.diagnosis.correction import (
     NOT_AT_RUN_TIME,
     extend_model,
     terms_from_effects,
     without_terms,
 )
+from trueangle.simulation import Harmonic, Joint, RunDesign, Simulation
+from trueangle.simulation.effects import EFFECTS, Effect
+from trueangle.terms import TERMS
 
 ARCSEC = 1.0 / 3600.0
 

@@ -6,8 +6,8 @@ import pytest
 import trueangle as ta
 from trueangle.fitting import ridge
 from trueangle.fitting.problem import Problem
-from trueangle.fitting.travel import Span, covered_span
-from trueangle.shafts import resolve_orders
+from trueangle.joint.shafts import resolve_orders
+from trueangle.runs.travel import Span, covered_span
 
 
 @pytest.mark.parametrize(

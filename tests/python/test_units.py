@@ -17,7 +17,7 @@ def said(theta):
 
 
 def test_degrees_without_their_period_are_warned_of():
-    with pytest.warns(UnitWarning, match=r"monday goes to 355.*give period=360"):
+    with pytest.warns(UnitWarning, match=r"monday goes to 355.*give `period=360`"):
         ta.fit(ta.CalibrationRun(THETA, said(THETA), label="monday"), orders=[1])
 
 

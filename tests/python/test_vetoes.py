@@ -5,8 +5,8 @@ import pytest
 
 import trueangle as ta
 from trueangle.effects import ArgumentShift, HeteroscedasticNoise, MissedCounts, Outliers
+from trueangle.estimation.regression import Regression
 from trueangle.joint.signals import join_runs
-from trueangle.regression.regression import Regression
 from trueangle.simulation import Harmonic, Joint, RunDesign, Simulation
 
 JOINT = Joint(50.0, "circular_spline", "motor")

@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ..model import HarmonicModel
+from ..model.model import HarmonicModel
 
 __all__ = ["FLAGS", "compiled", "is_available"]
 

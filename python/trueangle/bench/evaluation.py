@@ -9,12 +9,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..model import HarmonicModel
-from ..shafts import Shaft
+from ..joint.shafts import Shaft
+from ..model.model import HarmonicModel
 from .evaluationpeers import peers
 from .interleaved import Timing, interleave
 
-__all__ = ["ORDERS", "Row", "batches", "harmonics", "peer_batches", "single", "small"]
+__all__ = ["ORDERS", "EvaluationRow", "batches", "harmonics", "peer_batches", "single", "small"]
 
 #: Orders of the models timed, by name.
 ORDERS: dict[str, Sequence[int]] = {
@@ -27,7 +27,7 @@ ORDERS: dict[str, Sequence[int]] = {
 _CALLS = 10_000
 
 
-class Row(NamedTuple):
+class EvaluationRow(NamedTuple):
     """What one way took for so many samples."""
 
     name: str
@@ -50,12 +50,12 @@ def harmonics(orders: Sequence[int], period: float = 2.0 * math.pi, seed: int = 
     return HarmonicModel(period=period, shafts=(shaft,))
 
 
-def _rows(ways: dict[str, Callable[[], object]], samples: int, rounds: int) -> list[Row]:
+def _rows(ways: dict[str, Callable[[], object]], samples: int, rounds: int) -> list[EvaluationRow]:
     timings = interleave(ways, rounds)
-    return [Row(name, samples, timing) for name, timing in timings.items()]
+    return [EvaluationRow(name, samples, timing) for name, timing in timings.items()]
 
 
-def batches(samples: int, rounds: int) -> list[Row]:
+def batches(samples: int, rounds: int) -> list[EvaluationRow]:
     """Our paths and number types, and copies of the same arrays; random angles, seed 0."""
     rng = np.random.default_rng(0)
     theta = rng.uniform(0.0, 2.0 * math.pi, samples)
@@ -83,7 +83,7 @@ def batches(samples: int, rounds: int) -> list[Row]:
     return _rows(ways, samples, rounds)
 
 
-def peer_batches(samples: int, rounds: int) -> tuple[list[Row], list[str]]:
+def peer_batches(samples: int, rounds: int) -> tuple[list[EvaluationRow], list[str]]:
     """The peers on 17 orders, with ours beside them, and the names of those missing."""
     theta = np.random.default_rng(0).uniform(0.0, 2.0 * math.pi, samples)
     out = np.empty_like(theta)
@@ -101,7 +101,7 @@ def peer_batches(samples: int, rounds: int) -> tuple[list[Row], list[str]]:
     return _rows(ways, samples, rounds), missing
 
 
-def small(samples: int = 37, rounds: int = 200) -> list[Row]:
+def small(samples: int = 37, rounds: int = 200) -> list[EvaluationRow]:
     """Whole calls on few samples."""
     theta = np.random.default_rng(0).uniform(0.0, 2.0 * math.pi, samples)
     out = np.empty_like(theta)
@@ -121,7 +121,7 @@ def small(samples: int = 37, rounds: int = 200) -> list[Row]:
     return _rows(ways, len(calls), rounds)
 
 
-def single(rounds: int = 200) -> list[Row]:
+def single(rounds: int = 200) -> list[EvaluationRow]:
     """One float in, one float out; the loop around it is in every figure."""
     compensator = harmonics(ORDERS["17 orders"])._series.compensator()
     calls = range(_CALLS)

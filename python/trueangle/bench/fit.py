@@ -9,13 +9,14 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from .. import _core
+import trueangle._core as _core
+
 from ..fitting.fit import fit
-from ..runs import CalibrationRun
+from ..runs.run import CalibrationRun
 from .fitpeers import peers
 from .interleaved import Timing, interleave
 
-__all__ = ["Case", "Row", "measure", "quick", "readings"]
+__all__ = ["Case", "FitRow", "measure", "quick", "readings"]
 
 
 class Case(NamedTuple):
@@ -35,7 +36,7 @@ class Case(NamedTuple):
         return 2.0 * np.pi if self.counts is None else float(self.counts)
 
 
-class Row(NamedTuple):
+class FitRow(NamedTuple):
     """What one way of fitting took."""
 
     case: Case
@@ -89,7 +90,7 @@ def measure(
     only: Iterable[str] | None = None,
     threads: Iterable[int] = (1, 2),
     methods: Iterable[str] = (),
-) -> list[Row]:
+) -> list[FitRow]:
     """Time our fit, by numbers of threads and forced methods, and those of the peers."""
     theta, error = readings(case)
     unit = case.period / (2.0 * np.pi)
@@ -110,12 +111,12 @@ def measure(
     ours = next(iter(ways.values()))()
     scale = np.abs(ours).max()
     return [
-        Row(case, name, timing, float(np.abs(ways[name]() - ours).max() / scale))
+        FitRow(case, name, timing, float(np.abs(ways[name]() - ours).max() / scale))
         for name, timing in timings.items()
     ]
 
 
-def quick(samples: int, rounds: int) -> list[Row]:
+def quick(samples: int, rounds: int) -> list[FitRow]:
     """A polygon's problem and one of ``samples`` readings."""
     small = measure(Case(37, 5), 20 * rounds, threads=(1,))
     return small + measure(Case(samples, 17), rounds)

@@ -9,13 +9,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Latency", "histogram", "paced"]
+__all__ = ["CallTimes", "histogram", "paced"]
 
 #: Cycles before the first that counts.
 _WARM_UP = 100
 
 
-class Latency(NamedTuple):
+class CallTimes(NamedTuple):
     """Nanoseconds of the calls of one loop."""
 
     name: str
@@ -28,7 +28,7 @@ class Latency(NamedTuple):
         return {name: float(np.quantile(self.nanoseconds, q)) for name, q in parts.items()}
 
 
-def paced(name: str, function: Callable[[float], object], rate: float, calls: int) -> Latency:
+def paced(name: str, function: Callable[[float], object], rate: float, calls: int) -> CallTimes:
     """Call ``function`` every ``1 / rate`` seconds and time each call.
 
     The loop waits by looking at the clock, as a real-time loop on a core of its own does;
@@ -46,10 +46,10 @@ def paced(name: str, function: Callable[[float], object], rate: float, calls: in
         function(angle)
         taken[i] = clock() - start
         due += period
-    return Latency(name, rate, taken[_WARM_UP:])
+    return CallTimes(name, rate, taken[_WARM_UP:])
 
 
-def histogram(latency: Latency, width: int = 50) -> str:
+def histogram(latency: CallTimes, width: int = 50) -> str:
     """Counts over octaves of nanoseconds as lines of text."""
     octave = np.floor(np.log2(np.maximum(latency.nanoseconds, 1))).astype(int)
     counts = np.bincount(octave)

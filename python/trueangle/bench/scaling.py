@@ -14,7 +14,7 @@ import numpy as np
 
 from ..errors import MissingExtraError
 from ..fitting.fit import fit
-from ..runs import CalibrationRun
+from ..runs.run import CalibrationRun
 from .evaluation import harmonics
 from .fit import Case, readings
 from .interleaved import Timing, interleave

@@ -9,8 +9,8 @@ from functools import cached_property
 from types import MappingProxyType
 from typing import Final
 
-from ..distributions import student_quantile
 from ..errors import ArgumentError
+from ..support.distributions import student_quantile
 
 __all__ = ["DISTRIBUTIONS", "LEVEL", "Budget", "Contribution", "coverage_factor"]
 

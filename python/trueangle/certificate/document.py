@@ -11,12 +11,13 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from ..angles import ARCSEC_PER_TURN
 from ..errors import ArgumentError
-from ..errorunits import ErrorsIn, error_unit
-from ..plainresult import finite
-from ..provenance import provenance
-from ..runs import CalibrationRun, as_runs
+from ..runs.provenance import provenance
+from ..runs.run import CalibrationRun, as_runs
+from ..support.angles import ARCSEC_PER_TURN
+from ..support.display_units import ErrorsIn, error_unit
+from ..support.kinds import told_kinds
+from ..support.plainresult import finite
 from .budget import LEVEL, Budget, Contribution
 from .identity import ENTRIES, Identity, load_identity
 from .values import left_at_places, nominal_positions, reversal, values_at
@@ -61,6 +62,7 @@ class Certificate:
         write_pdf(self.content, path)
 
 
+@told_kinds
 def certify(
     runs: CalibrationRun | Iterable[CalibrationRun],
     identity: Identity | str | PathLike[str],

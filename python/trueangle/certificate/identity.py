@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import datetime
-import difflib
 import math
 import tomllib
 from collections.abc import Mapping
@@ -12,7 +11,9 @@ from os import PathLike
 from typing import Any, Final
 
 from ..errors import ArgumentError, FileError
-from ..files import read_whole
+from ..support.files import read_whole
+from ..support.kinds import told_kinds
+from ..support.suggestions import check_choice, did_you_mean
 from .budget import DISTRIBUTIONS, Contribution
 
 __all__ = ["ENTRIES", "Identity", "load_identity"]
@@ -80,6 +81,7 @@ class Identity:
         )
 
 
+@told_kinds
 def load_identity(path: str | PathLike[str]) -> Identity:
     """Read an identity file.
 
@@ -147,11 +149,7 @@ def _contribution(position: int, entry: object) -> Contribution:
     if ("half_width_arcsec" in entry) == ("standard_arcsec" in entry):
         raise ArgumentError(f"{where}: give either half_width_arcsec or standard_arcsec")
     distribution = entry.get("distribution", "normal" if "standard_arcsec" in entry else None)
-    if distribution not in DISTRIBUTIONS:
-        raise ArgumentError(
-            f"{where}: distribution must be one of {', '.join(DISTRIBUTIONS)}, "
-            f"got {'none' if distribution is None else repr(distribution)}"
-        )
+    check_choice(f"{where}: distribution", distribution, DISTRIBUTIONS)
     if "standard_arcsec" in entry:
         standard = _number(f"{where} standard_arcsec", entry["standard_arcsec"])
     else:
@@ -166,9 +164,10 @@ def _contribution(position: int, entry: object) -> Contribution:
 def _known(table: Mapping[str, Any], names: tuple[str, ...], where: str) -> None:
     for key in table:
         if key not in names:
-            close = difflib.get_close_matches(key, names, n=1)
-            hint = f"did you mean {close[0]!r}?" if close else f"known are {', '.join(names)}"
-            raise ArgumentError(f"{where} has an unknown entry {key!r}: {hint}")
+            raise ArgumentError(
+                f"{where} has an unknown entry {key!r}{did_you_mean(key, names)}; known are "
+                f"{', '.join(names)}"
+            )
 
 
 def _text(name: str, value: object) -> str:

@@ -10,9 +10,9 @@ from os import PathLike
 from pathlib import Path
 from typing import Any, Final
 
-from ..angles import ARCSEC_PER_TURN
 from ..errors import MissingExtraError
-from ..files import CERTIFICATE, check_output, publish
+from ..support.angles import ARCSEC_PER_TURN
+from ..support.files import CERTIFICATE, check_output, published
 
 __all__ = ["pictures", "typeset", "write_pdf"]
 
@@ -24,11 +24,8 @@ def write_pdf(content: dict[str, Any], path: str | PathLike[str]) -> None:
     hashes = [entry["sha256"] for entry in content["provenance"]["inputs"]]
     target = check_output(path, CERTIFICATE, hashes=hashes)
     pdf = typeset(content)
-    beside = target.parent if target.is_file() or not target.exists() else None
-    with tempfile.TemporaryDirectory(dir=beside, prefix=".certificate-") as folder:
-        printed = Path(folder, "certificate.pdf")
+    with published(target) as printed:
         printed.write_bytes(pdf)
-        publish(printed, target)
 
 
 def typeset(content: dict[str, Any]) -> bytes:
@@ -45,7 +42,7 @@ def pictures(content: dict[str, Any], dots_per_inch: float = 110.0) -> list[byte
 def _compiled(content: dict[str, Any], **how: Any) -> Any:
     try:
         import typst
-    except ImportError:
+    except ModuleNotFoundError:
         raise MissingExtraError(
             "certificates need typst: pip install 'trueangle[certificate]'"
         ) from None

@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from ..aliasing import distinct_positions
-from ..angles import ARCSEC_PER_TURN
 from ..errors import ArgumentError
+from ..estimation.reference import design_matrix
 from ..plots.curves import seen_span
-from ..reference import design_matrix
+from ..runs.aliasing import distinct_positions
+from ..support.angles import ARCSEC_PER_TURN
 from .budget import Contribution
 from .propagation import propagated
 

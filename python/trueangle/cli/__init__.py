@@ -14,10 +14,12 @@ from keyword import iskeyword
 from typing import NoReturn, Protocol
 
 from .._core import __version__
-from ..errors import TrueAngleError
+from ..errors import ArgumentError, TrueAngleError, shortened
 from .parser import Parser
 from .paths import check_paths
+from .signals import Ending, ending_by_signals
 from .terminal import STANDARD_OUTPUT, plain_streams, silence
+from .wording import Wording
 
 __all__ = ["COMMANDS", "main", "process"]
 
@@ -100,14 +102,18 @@ def main(argv: Sequence[str] | None = None) -> int:
     Returns
     -------
     int
-        0 done; 1 bad input or no result (one line on stderr); 2 usage (by argparse); 130
-        interrupted; 141 who read standard output has gone, as a shell says it.
+        0 done; 1 bad input or no result (one line on stderr); 2 usage (by argparse); as a
+        shell says it, 130, 143, 129 interrupted (Ctrl-C, SIGTERM, SIGHUP) and 141: who read
+        standard output has gone.
     """
-    with plain_streams():
+    wording = Wording()
+    with plain_streams(wording), ending_by_signals() as ending:
         words = list(sys.argv[1:] if argv is None else argv)
         # The others are looked at only where their names are to be told.
         called = words[:1] if words[:1] and words[0] in COMMANDS else COMMANDS
-        args = build_parser(words, called).parse_args(words)
+        parser = build_parser(words, called)
+        wording.parser = parser.commands.get(words[0] if words else "")
+        args = parser.parse_args(words)
         before, warnings.showwarning = warnings.showwarning, _print_warning
         try:
             check_paths(args)
@@ -118,7 +124,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         except SystemExit:
             raise
         except BaseException as error:  # a panic of the core is no Exception
-            return _failed(error, args.debug)
+            return _failed(error, ending, wording, args)
         finally:
             warnings.showwarning = before
     return status
@@ -128,7 +134,7 @@ def process() -> NoReturn:
     """Run one command as a process of its own, which ends with it."""
     gc.set_threshold(_KEPT, *gc.get_threshold()[1:])
     if sys.argv[1:2] != ["bench"]:
-        # Beside the core's own threads (`trueangle.blas`); a bench lets numpy have its own.
+        # Beside the core's own threads (`trueangle.support.blas`); a bench lets numpy have its own.
         os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     try:
         sys.exit(main())
@@ -136,22 +142,27 @@ def process() -> NoReturn:
         gc.freeze()  # all ends here: Python need not search it for circles once more
 
 
-def _failed(error: BaseException, debug: bool) -> int:
+def _failed(
+    error: BaseException, ending: Ending, wording: Wording, args: argparse.Namespace
+) -> int:
     """Tell an error in one line; the result is the exit status."""
-    if debug:
+    if args.debug:
         import traceback  # brings the tokenizer with it
 
         traceback.print_exception(error)
     if isinstance(error, KeyboardInterrupt):
         told = str(error)
-        _say("interrupted" + (f": {told}" if told else ""))
-        return 130
+        _say(ending.text + (f": {told}" if told else ""))
+        return ending.status
     if isinstance(error, OSError) and error.filename == STANDARD_OUTPUT:
         silence()
         if isinstance(error, BrokenPipeError):
             return 141
     if isinstance(error, TrueAngleError):
-        _say(f"error: {error}")
+        from .remedy import command_that_helps
+
+        said = wording.of_error(str(error)) if isinstance(error, ArgumentError) else str(error)
+        _say(f"error: {said}{command_that_helps(error, args, build_parser)}")
     elif isinstance(error, OSError):
         _say(f"error: {_system(error)}")
     elif isinstance(error, MemoryError):
@@ -159,6 +170,8 @@ def _failed(error: BaseException, debug: bool) -> int:
             f"error: out of memory ({str(error) or 'no more is given'}); take fewer "
             "readings at a time, or --one-pass where the command has it"
         )
+    elif isinstance(error, ImportError):  # one that is there: missing ones are told of above
+        _say(f"error: a library cannot be loaded: {error}; is there memory enough for it?")
     else:
         _say(
             f"error: unexpected {type(error).__name__}: {error}; this is a defect of "
@@ -181,7 +194,9 @@ def _say(text: str) -> None:
     """Tell it in one line, whatever lines it came in."""
     if sys.stderr is not None:
         with contextlib.suppress(OSError):  # a closed terminal
-            print(f"trueangle: {' '.join(text.split())}", file=sys.stderr, flush=True)
+            # Blanks stay as they are: a name of a file may have two.
+            line = shortened(" ".join(part.strip() for part in text.splitlines()))
+            print(f"trueangle: {line}", file=sys.stderr, flush=True)
 
 
 def _print_warning(message: Warning | str, *_: object, **__: object) -> None:

@@ -6,7 +6,7 @@ import argparse
 import json
 from typing import Any
 
-from ..files import PICTURE
+from ..support.files import PICTURE
 from .paths import Output
 
 HELP = "measure evaluation, correction and fits here, beside copies and other libraries"

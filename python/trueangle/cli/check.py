@@ -21,7 +21,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Print the check; 1 where a fault makes the data unusable."""
-    from ..checks import check
+    from ..runs.checks import check
 
     found = check(args.files, **reading(args))
     print(found.to_json() if args.json else found.summary())

@@ -8,7 +8,8 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 from ..errors import ArgumentError, TrueAngleError
-from ..errorunits import ErrorsIn, error_unit
+from ..support.display_units import ErrorsIn, error_unit
+from ..support.suggestions import listed
 from .error_units import add_errors_in, errors_in
 from .paths import Input, ModelInput
 from .signal_options import add_signals, signals_by_joint
@@ -16,6 +17,9 @@ from .terminal import own_interrupts
 
 if TYPE_CHECKING:
     from ..logs.batch import BatchReport, LogReport
+
+#: Logs that failed, or wait, that are told by name.
+_TOLD = 5
 
 HELP = "correct the indicated angles of logs with a saved model"
 EXAMPLE = "trueangle correct logs/*.parquet -m joint_a.json -o corrected/"
@@ -117,6 +121,8 @@ def run(args: argparse.Namespace) -> int:
     )
     if args.json:
         print(json.dumps(result.to_dict()))
+    else:
+        _total(result)
     return _status(result)
 
 
@@ -171,6 +177,21 @@ def _print(log: LogReport, asked: ErrorsIn) -> None:
         print(text, flush=True)
 
 
+def _total(result: BatchReport) -> None:
+    """Print what became of all logs together, where there are several."""
+    if len(result.logs) < 2:
+        return
+    done = [log for log in result.logs if log.status == "done"]
+    before = sum(log.status == "done before" for log in result.logs)
+    rows = sum(log.result["rows"] for log in done)
+    print(
+        f"{len(done)} of {len(result.logs)} logs corrected"
+        + (f", {before} already" if before else "")
+        + f": {rows} readings in {result.seconds:.1f} s",
+        flush=True,
+    )
+
+
 def _status(result: BatchReport) -> int:
     """0, or an error that lists what is not done."""
     if result.is_done and not result.interrupted:
@@ -181,9 +202,11 @@ def _status(result: BatchReport) -> int:
     done = sum(log.is_done for log in result.logs)
     waiting = [str(log.log) for log in result.logs if log.status == "not started"]
     parts = [f"{done} of {len(result.logs)} logs are corrected and complete"]
-    parts += [f"failed: {_told(log)}" for log in failed]
+    parts += [f"failed: {_told(log)}" for log in failed[:_TOLD]]
+    if failed[_TOLD:]:
+        parts.append(f"{len(failed) - _TOLD} more failed")
     if waiting:
-        parts.append(f"not started: {', '.join(waiting)}")
+        parts.append(f"not started: {listed(waiting, _TOLD)}")
     parts.append("run the same command again to go on")
     raise (KeyboardInterrupt if result.interrupted else TrueAngleError)("; ".join(parts))
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 
-from ..files import REPORT
+from ..support.files import REPORT
 from .paths import Output
 
 HELP = "fit, correct and diagnose simulated joints; needs no files"
@@ -42,7 +42,7 @@ def _corrected(seed: int) -> str:
     import numpy as np
 
     from ..fitting.fit import fit
-    from ..paperstudy.study import JOINT_A, PUBLISHED, simulated_groups
+    from .paperstudy.study import JOINT_A, PUBLISHED, simulated_groups
 
     *groups, unseen = simulated_groups(JOINT_A, seed=seed)
     model = fit(groups).model
@@ -64,8 +64,8 @@ def _corrected(seed: int) -> str:
 
 def _between(seed: int) -> str:
     """What the 36 positions cannot tell."""
-    from ..paperstudy.report import short_report
-    from ..paperstudy.study import paper_study
+    from .paperstudy.report import short_report
+    from .paperstudy.study import paper_study
 
     return short_report(paper_study(seed))
 

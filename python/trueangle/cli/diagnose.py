@@ -3,21 +3,26 @@
 from __future__ import annotations
 
 import argparse
+import sys
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
-from ..errors import ArgumentError
-from ..files import MODEL, SIMULATION
-from ..pace import STYLES, ending_early
+from ..errors import ArgumentError, TrueAngleError
+from ..support.deadline import STYLES, ending_early
+from ..support.files import MODEL, SIMULATION
 from .durations import seconds
 from .error_units import add_errors_in, errors_in
+from .fit import add_argument_choice, add_joint
+from .order_lists import declared_shafts
 from .paths import Input, Output
-from .signal_options import add_signals, reading, signals_by_joint
+from .signal_options import reading, signals_by_joint
 
 if TYPE_CHECKING:
     from ..diagnosis import Diagnosis
+    from ..model.model import HarmonicModel
+    from ..simulation import Simulation
 
-#: `trueangle.joining.simulated.BY`, not imported for a help text.
+#: `trueangle.runs.joining.simulated.BY`, not imported for a help text.
 BY = ("time", "angle")
 HELP = "name the physical causes that a simulation of the joint lacks"
 EXAMPLE = "trueangle diagnose runs.csv --simulation joint.toml --extend better.toml"
@@ -47,19 +52,26 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="FILE",
         help="write the simulation extended by the findings",
     )
-    add("--model", type=Input, metavar="FILE", help="correction model, to extend by the findings")
     add(
         "--corrected-model",
         type=Output.of(MODEL),
         metavar="FILE",
-        help="write that extended correction model",
+        help="write the correction model of what is confirmed; exit status 1 where nothing is",
     )
-    add_signals(parser)
+    add(
+        "--model",
+        type=Input,
+        metavar="FILE",
+        help="a correction model to extend by what is confirmed, in place of a new one",
+    )
+    add_argument_choice(parser)
+    add_joint(parser)
     add(
         "--within",
         type=seconds,
         metavar="TIME",
-        help="the best account in that time, as 10s, 2min or seconds; it says what is missing",
+        help="the best account in that time, as 10s, 2min or seconds; it says what is missing "
+        "(default: 30 s and 3 ms a reading of the processor, more on a slow machine)",
     )
     add(
         "--progress",
@@ -74,24 +86,22 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Print the diagnosis."""
     from ..diagnosis import diagnose
-    from ..joining import minus_simulated
-    from ..modelfile import load_model
-    from ..simulation import load_simulation
+    from ..model.file import load_model
+    from ..runs.joining import minus_simulated
     from .run_lists import read_checked
 
-    if (args.model is None) != (args.corrected_model is None):
+    if args.model is not None and args.corrected_model is None:
         raise ArgumentError(
             "--model FILE (the model to extend) and --corrected-model FILE (the one to write) "
             "belong together"
         )
-    if args.simulation is None and args.simulated is None:
-        raise ArgumentError("give --simulation FILE, or --simulated LOG, or both")
-    if args.simulated is not None and args.model is not None:
+    if args.simulated is not None and args.corrected_model is not None:
         raise ArgumentError(
-            "--model with --simulated: no correction model can hold what is known as a log only; "
-            "leave --model out"
+            "--corrected-model with --simulated: no correction model can hold what is known as a "
+            "log only; leave it out, or write what is found with --extend FILE"
         )
-    simulation = None if args.simulation is None else load_simulation(args.simulation)
+    simulation = _believed(args)
+    model = None if args.model is None else load_model(args.model)
     own = [entry for entry in args.signal or () if entry[0] == "simulated"]
     args.signal = [entry for entry in args.signal or () if entry[0] != "simulated"]
     runs = read_checked(args)
@@ -104,22 +114,77 @@ def run(args: argparse.Namespace) -> int:
         result = diagnose(
             runs, simulation, simulated=simulated, within=args.within, progress=args.progress
         )
+    extend = None if interruption.happened else args.extend
+    # Whatever fails from here on, the diagnosis is told.
+    print(result.to_json(extend) if args.json else result.summary(errors_in(args)), flush=True)
     if interruption.happened:
-        print(result.to_json() if args.json else result.summary(errors_in(args)))
         raise KeyboardInterrupt(_unwritten(args, result.complete))
-    if args.extend:
-        result.extended.save(args.extend)
-    if args.corrected_model:
-        result.correction(load_model(args.model), runs).save(args.corrected_model)
-    if args.json:
-        print(result.to_json(args.extend))
-    else:
-        print(result.summary(errors_in(args)))
-        if args.extend:
-            print(f"\nExtended simulation: {args.extend}")
-        if args.corrected_model:
-            print("\n".join(_corrected(result, args.corrected_model)))
+    _written(result, args, model)
     return 0
+
+
+def _believed(args: argparse.Namespace) -> Simulation | None:
+    """The simulation: that of the file, or of a joint of which nothing else is believed.
+
+    Raises
+    ------
+    ArgumentError
+        Neither, and no log; or both.
+    """
+    from ..joint.declared import DeclaredShaft
+    from ..joint.joint import Joint
+    from ..simulation import Simulation, load_simulation
+
+    stated = args.gear_ratio is not None or args.shaft
+    if args.simulation is not None:
+        if stated:
+            raise ArgumentError(
+                "--gear-ratio and --shaft with --simulation: the simulation states the joint; "
+                "leave them out"
+            )
+        return load_simulation(args.simulation)
+    if not stated:
+        if args.simulated is not None:
+            return None
+        raise ArgumentError(
+            "give --simulation FILE, or --simulated LOG, or both; where nothing is believed, "
+            "--gear-ratio R of the joint (--gear-ratio 1 --fixed-member none without a gear)"
+        )
+    shafts = declared_shafts(args.shaft).items()
+    ratio = args.gear_ratio
+    return Simulation(
+        Joint(
+            1.0 if ratio is None else ratio,
+            "none" if ratio is None else args.fixed_member,
+            declared=tuple(DeclaredShaft(name, cycles) for name, cycles in shafts),
+        )
+    )
+
+
+def _written(result: Diagnosis, args: argparse.Namespace, model: HarmonicModel | None) -> None:
+    """Write the files that were asked for, each whether or not another can be."""
+
+    def extend() -> str:
+        result.extended.save(args.extend)
+        return f"\nExtended simulation: {args.extend}"
+
+    def correct() -> str:
+        result.correction(model, argument=args.argument).save(args.corrected_model)
+        return "\n".join(_corrected(result, args.corrected_model, model is not None))
+
+    failed: list[TrueAngleError | OSError] = []
+    for path, write in ((args.extend, extend), (args.corrected_model, correct)):
+        try:
+            told = write() if path else ""
+        except (TrueAngleError, OSError) as error:
+            failed.append(error)
+        else:
+            if told and not args.json:
+                print(told)
+    for other in failed[:-1]:
+        print(f"trueangle: error: {other}", file=sys.stderr)
+    if failed:
+        raise failed[-1]
 
 
 def _unwritten(args: argparse.Namespace, complete: bool) -> str:
@@ -129,11 +194,13 @@ def _unwritten(args: argparse.Namespace, complete: bool) -> str:
     return told + (f", and {' and '.join(map(str, files))} not written" if files else "")
 
 
-def _corrected(result: Diagnosis, path: str) -> Iterator[str]:
-    """What the extended correction model takes off, and what it cannot."""
+def _corrected(result: Diagnosis, path: str, extended: bool) -> Iterator[str]:
+    """What the correction model takes off, and what it cannot."""
     from ..diagnosis.correction import NOT_AT_RUN_TIME
 
-    yield f"\nExtended correction model: {path}"
+    yield f"\n{'Extended correction' if extended else 'Correction'} model: {path}"
     for finding in result.findings:
         if finding.cause in NOT_AT_RUN_TIME:
             yield f"  not corrected: {finding.cause} ({NOT_AT_RUN_TIME[finding.cause]})"
+        elif not finding.confirmed:
+            yield f"  not corrected: {finding.cause} (not confirmed)"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 
-from ..errorunits import ERROR_UNITS, ErrorsIn
+from ..support.display_units import ERROR_UNITS, ErrorsIn
 
 __all__ = ["add_errors_in", "errors_in"]
 

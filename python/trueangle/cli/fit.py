@@ -5,9 +5,9 @@ from __future__ import annotations
 import argparse
 import json
 
-from ..files import MODEL
+from ..support.files import MODEL
 from .error_units import add_errors_in, errors_in
-from .onepass import add_one_pass, saved, wants_one_pass
+from .onepass import add_one_pass, log_options, wants_one_pass
 from .order_lists import declared_shafts, orders_by_shaft, parse_orders
 from .paths import Input, Output
 from .signal_options import add_signals
@@ -123,23 +123,31 @@ def add_covariance(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Fit, save, print."""
-    from ..fitting.fit import fit
-    from .run_lists import read_selected
-
+    orders = orders_by_shaft(args.orders, declared_shafts(args.shaft))
     if wants_one_pass(args):
-        return saved(args, orders_by_shaft(args.orders, declared_shafts(args.shaft)))
-    result = fit(
-        read_selected(args),
-        orders=orders_by_shaft(args.orders, declared_shafts(args.shaft)),
-        gear_ratio=args.gear_ratio,
-        fixed_member=args.fixed_member,
-        argument=args.argument,
-        loss=args.loss,
-        covariance=args.covariance,
-        nuisance=args.nuisance,
-        reference_orders=parse_orders(args.reference_orders) if args.reference_orders else (),
-        shafts=declared_shafts(args.shaft),
-    )
+        from ..logs.fitting import fit_logs
+
+        result = fit_logs(
+            args.runs, orders, loss=args.loss, checksums=args.checksums, **log_options(args)
+        )
+    else:
+        from ..fitting.fit import fit
+        from .run_lists import read_selected
+
+        result = fit(
+            read_selected(args),
+            orders=orders,
+            gear_ratio=args.gear_ratio,
+            fixed_member=args.fixed_member,
+            argument=args.argument,
+            loss=args.loss,
+            covariance=args.covariance,
+            nuisance=args.nuisance,
+            reference_orders=parse_orders(args.reference_orders, "--reference-orders")
+            if args.reference_orders
+            else (),
+            shafts=declared_shafts(args.shaft),
+        )
     result.model.save(args.output)
     if args.json:
         print(json.dumps({"model": args.output, **result.to_dict()}))

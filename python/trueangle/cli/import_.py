@@ -5,8 +5,8 @@ from __future__ import annotations
 import argparse
 import json
 
-from ..errorunits import error_unit
-from ..files import MODEL
+from ..support.display_units import error_unit
+from ..support.files import MODEL
 from .error_units import add_errors_in, errors_in
 from .export import add_target_options, target_options
 from .paths import Input, Output
@@ -45,8 +45,8 @@ def run(args: argparse.Namespace) -> int:
     """Read the table and write the model."""
     import math
 
-    from ..angles import ARCSEC_PER_TURN
     from ..export import import_model
+    from ..support.angles import ARCSEC_PER_TURN
 
     model = import_model(args.file, args.source, args.output, **target_options(args))
     unit = ARCSEC_PER_TURN / model.period

@@ -6,7 +6,7 @@ import argparse
 import json
 from typing import Any
 
-from ..files import RUNS
+from ..support.files import RUNS
 from .error_units import add_errors_in, errors_in
 from .paths import Input, Output
 from .signal_options import add_signals, signals_by_joint
@@ -50,7 +50,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Join, write, print."""
-    from ..joining import join
+    from ..runs.joining import join
 
     found = join(
         args.first,

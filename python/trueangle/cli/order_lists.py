@@ -6,7 +6,8 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 
 from ..errors import ArgumentError
-from ..suggestions import did_you_mean
+from ..joint.shafts import counted_orders
+from ..support.suggestions import did_you_mean
 
 __all__ = ["SHAFTS", "declared_shafts", "orders_by_shaft", "parse_orders"]
 
@@ -14,15 +15,20 @@ __all__ = ["SHAFTS", "declared_shafts", "orders_by_shaft", "parse_orders"]
 SHAFTS = ("output", "motor", "wave_generator")
 
 
-def parse_orders(text: str) -> tuple[float, ...]:
+def parse_orders(text: str, option: str = "--orders") -> tuple[float, ...]:
     """Orders of a list such as ``1-17,100,202``, ascending and without repeats.
+
+    Raises
+    ------
+    ArgumentError
+        Something else: names ``option``.
 
     Examples
     --------
     >>> parse_orders("1-4,8,7.3")
     (1, 2, 3, 4, 7.3, 8)
     """
-    found: set[float] = set()
+    found: list[float] = []
     for part in text.split(","):
         first, dash, last = part.strip().partition("-")
         try:
@@ -30,16 +36,19 @@ def parse_orders(text: str) -> tuple[float, ...]:
                 low, high = int(first), int(last)
                 if low > high:
                     raise ValueError
-                found.update(float(k) for k in range(low, high + 1))
+                found += counted_orders(range(low, high + 1), f"{option} {part.strip()}")
             else:
-                found.add(float(first))
+                found.append(float(first))
+        except ArgumentError:
+            raise
         except ValueError:
             raise ArgumentError(
-                f"orders must look like 1-17 or 1,4,8, got {part.strip()!r} in {text!r}"
+                f"{option} must look like 1-17 or 1,4,8, got {part.strip()!r} in {text!r}"
             ) from None
     if not all(0.0 < k < 1e6 for k in found):
-        raise ArgumentError(f"orders must be positive and below a million, got {text!r}")
-    return tuple(int(k) if k.is_integer() else k for k in sorted(found))
+        raise ArgumentError(f"{option} must be positive and below a million, got {text!r}")
+    whole = (int(k) if float(k).is_integer() else k for k in sorted(set(found)))
+    return tuple(counted_orders(whole, f"{option} {text!r:.60}"))
 
 
 def orders_by_shaft(

@@ -3,12 +3,17 @@
 from __future__ import annotations
 
 import argparse
+from typing import TYPE_CHECKING
 
+from ..errors import ArgumentError
 from .error_units import add_errors_in, errors_in
 from .fit import add_argument_choice, add_covariance, add_joint, add_nuisance
-from .onepass import add_one_pass, printed_orders, wants_one_pass
+from .onepass import add_one_pass, log_options, wants_one_pass
 from .order_lists import declared_shafts, parse_orders
 from .paths import Input
+
+if TYPE_CHECKING:
+    from ..fitting.orders.table import OrderSelection
 
 HELP = "say which orders of the angle error are real, and what they may be"
 EXAMPLE = "trueangle orders joint_a.csv --gear-ratio 100"
@@ -38,16 +43,26 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Print the table of orders."""
+    selection = _in_one_pass(args) if wants_one_pass(args) else _in_memory(args)
+    if args.json:
+        print(selection.to_json())
+    else:
+        print(selection.summary(errors_in(args)))
+    return 0
+
+
+def _in_memory(args: argparse.Namespace) -> OrderSelection:
+    from ..fitting.orders.select import select_orders
     from ..fitting.robust import without_spikes
-    from ..orders.select import select_orders
     from .run_lists import read_selected
 
-    if wants_one_pass(args):
-        return printed_orders(args)
-    runs = read_selected(args)
-    reference = () if args.reference_orders is None else parse_orders(args.reference_orders)
-    selection = select_orders(
-        [without_spikes(run) for run in runs],
+    reference = (
+        ()
+        if args.reference_orders is None
+        else parse_orders(args.reference_orders, "--reference-orders")
+    )
+    return select_orders(
+        [without_spikes(run) for run in read_selected(args)],
         None if args.orders is None else parse_orders(args.orders),
         args.gear_ratio,
         args.fixed_member,
@@ -58,8 +73,11 @@ def run(args: argparse.Namespace) -> int:
         shafts=declared_shafts(args.shaft),
         reference_orders=reference,
     )
-    if args.json:
-        print(selection.to_json())
-    else:
-        print(selection.summary(errors_in(args)))
-    return 0
+
+
+def _in_one_pass(args: argparse.Namespace) -> OrderSelection:
+    from ..logs.fitting import select_log_orders
+
+    if args.orders is not None or args.method != "evidence":
+        raise ArgumentError("--orders and --method do not go with logs in one pass")
+    return select_log_orders(args.runs, **log_options(args))

@@ -8,7 +8,7 @@ import sys
 from collections.abc import Sequence
 from typing import Any, Final, NoReturn
 
-from ..suggestions import did_you_mean
+from ..support.suggestions import did_you_mean
 from .paths import Input
 
 __all__ = ["GROUPS", "Parser"]

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator
 from typing import Any
 
 from ..errors import ArgumentError
-from ..files import Kind, check_input, check_output, same_file
+from ..support.files import Kind, check_input, check_output, same_file
 
 __all__ = ["Input", "ModelInput", "Output", "check_paths"]
 

@@ -3,13 +3,8 @@
 from __future__ import annotations
 
 import argparse
-import math
-from typing import TYPE_CHECKING
 
 from .selfplan import add_self_arguments, run_self
-
-if TYPE_CHECKING:
-    from ..planning.plan import CalibrationPlan
 
 HELP = "propose calibration positions that keep the wanted orders apart"
 EXAMPLE = "trueangle plan --gear-ratio 100 --positions 36 --mounts 2"
@@ -74,44 +69,5 @@ def run(args: argparse.Namespace) -> int:
         else:
             mounts = 2 if args.mounts is None else args.mounts
             plan = planning.plan_mounts(args.gear_ratio, positions, mounts, **common)
-    print(plan.to_json() if args.json else render(plan))
+    print(plan.to_json() if args.json else plan.summary())
     return 0
-
-
-def render(plan: CalibrationPlan) -> str:
-    """The plan as text."""
-    offsets = ", ".join(f"{o:.4g}" for o in plan.mount_offsets_deg)
-    if plan.kind == "encoder":
-        lines = [
-            f"{plan.positions} jittered positions of a free reference encoder",
-            f"  clamp it at            {offsets} deg",
-        ]
-    else:
-        what = "mounts" if plan.kind == "mounts" else "tilts"
-        lines = [
-            f"{len(plan.mount_offsets_deg)} {what} of {plan.positions} positions",
-            f"  offsets                {offsets} deg",
-            f"  tolerance              {plan.tolerance_deg:.2g} deg, known to 0.01 deg",
-        ]
-    if plan.kind == "mounts":
-        shifts = ", ".join(str(s) for s in plan.facet_shifts)
-        facet = plan.facet_noise_factor
-        factor = f"{facet:.2f}" if math.isfinite(facet) else "impossible with one mount"
-        lines += [
-            f"  facet shifts           {shifts} facets",
-            f"  artefact fitted too    factor {factor}",
-        ]
-    lines += [
-        f"  worst noise factor     {plan.worst_noise_factor:.2f}",
-        "  noise factor per order",
-        *_table(plan.noise_factors),
-    ]
-    if plan.readings is not None:
-        lines.append(f"  readings needed        {plan.readings}")
-    lines += [f"  note: {note}" for note in plan.notes]
-    return "\n".join(lines)
-
-
-def _table(factors: dict[float, float]) -> list[str]:
-    entries = [f"{m:>5g} {f:5.2f}" for m, f in factors.items()]
-    return ["  " + "  ".join(entries[i : i + 6]) for i in range(0, len(entries), 6)]

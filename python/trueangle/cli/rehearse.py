@@ -7,8 +7,8 @@ import io
 from pathlib import Path
 from typing import TYPE_CHECKING, TextIO, cast
 
-from ..files import PICTURE, written_atomically
-from ..pace import STYLES, ending_early
+from ..support.deadline import STYLES, ending_early
+from ..support.files import PICTURE, written_atomically
 from .durations import seconds
 from .paths import Input, Output
 

@@ -6,8 +6,8 @@ import argparse
 import json
 
 from ..errors import ArgumentError
-from ..files import PDF, REPORT
-from ..pace import STYLES, paced
+from ..support.deadline import STYLES, paced
+from ..support.files import PDF, REPORT
 from .error_units import add_errors_in, errors_in
 from .fit import add_joint
 from .order_lists import declared_shafts, orders_by_shaft

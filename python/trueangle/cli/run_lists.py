@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import argparse
+import os
 import sys
 from collections.abc import Sequence
+from pathlib import Path
 
 from ..errors import ArgumentError
-from ..runfiles import read_runs
-from ..runs import CalibrationRun
-from ..suggestions import did_you_mean
+from ..runs.files import read_runs
+from ..runs.run import CalibrationRun
+from ..support.suggestions import did_you_mean, listed
 from .signal_options import reading
 
 __all__ = ["listed", "read_selected"]
@@ -44,22 +46,22 @@ def read_selected(args: argparse.Namespace) -> list[CalibrationRun]:
 
 def read_checked(args: argparse.Namespace) -> list[CalibrationRun]:
     """Runs of the files; faults of the data are told on stderr, in the words of ``check``."""
-    from ..checks.check import faults_of
-    from ..checks.record import records_of
+    from ..runs.checks.check import faults_of
+    from ..runs.checks.record import records_of
 
-    runs = read_runs(args.runs, **reading(args))
+    runs = read_runs(_files(args.runs), **reading(args))
     for fault in faults_of(records_of(runs)):
         print(f"trueangle: warning: {fault}", file=sys.stderr)
     return runs
 
 
-def listed(names: Sequence[str], most: int = 12) -> str:
-    """The first names, and how many more there are.
+def _files(paths: Sequence[str]) -> Sequence[str | Path]:
+    """The files, those in folders included."""
+    if not any(map(os.path.isdir, paths)):
+        return paths
+    from ..logs.sources import find_logs
 
-    Examples
-    --------
-    >>> listed(["a", "b", "c"], most=2)
-    'a, b and 1 more'
-    """
-    more = len(names) - most
-    return ", ".join(names[:most]) + (f" and {more} more" if more > 0 else "")
+    found: list[str | Path] = []
+    for path in paths:
+        found += [log for log, _ in find_logs([path])] if os.path.isdir(path) else [path]
+    return found

@@ -18,9 +18,9 @@ EXAMPLE = "trueangle selfcal coast.csv -o joint.json --loop open"
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command's arguments."""
-    from ..files import MODEL
     from ..selfcalibration.calibrate import METHODS
     from ..selfcalibration.loop import LOOPS
+    from ..support.files import MODEL
 
     add = parser.add_argument
     add("logs", nargs="+", type=Input, metavar="LOGS", help="CSV or Parquet logs of the joint")
@@ -46,7 +46,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="was the speed held by a loop closed on this encoder? (default: %(default)s)",
     )
     add("--loop-bandwidth", type=float, metavar="HZ", help="of that loop")
-    add("--gear-ratio", type=float, metavar="R", help="motor turns per output turn")
+    add("--gear-ratio", type=float, metavar="R", help="motor turns per output turn: stays as given")
+    add(
+        "--fit-ratio",
+        action="store_true",
+        help="estimate the gear ratio jointly with orders 1 and 2 of the output",
+    )
     add(
         "--ripple",
         default="auto",
@@ -75,6 +80,7 @@ def run(args: argparse.Namespace) -> int:
         loop=args.loop,
         loop_bandwidth=args.loop_bandwidth,
         gear_ratio=args.gear_ratio,
+        fit_ratio=args.fit_ratio,
         ripple=ripple if ripple in ("auto", "none") else _whole(ripple, "--ripple"),
         head_angles=None if args.head_angles is None else _numbers(args.head_angles),
         **reading(args),
@@ -95,7 +101,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _whole(text: str, option: str) -> tuple[float, ...]:
-    orders = parse_orders(text)
+    orders = parse_orders(text, option)
     if any(k != int(k) for k in orders):
         raise ArgumentError(f"{option}: orders of a self-calibration are whole, got {text!r}")
     return orders

@@ -4,13 +4,9 @@ from __future__ import annotations
 
 import argparse
 import math
-from typing import TYPE_CHECKING, Any
 
 from ..errors import ArgumentError
 from .paths import Input
-
-if TYPE_CHECKING:
-    from ..planning.selfplan import SelfPlan
 
 __all__ = ["add_self_arguments", "run_self"]
 
@@ -62,7 +58,7 @@ def run_self(args: argparse.Namespace, orders: tuple[float, ...] | None) -> int:
 
         given = designed(load_simulation(args.simulation), args.self_method) | given
     plan = plan_self(args.self_method, **given)
-    print(plan.to_json() if args.json else render(plan))
+    print(plan.to_json() if args.json else plan.summary())
     return 0
 
 
@@ -74,38 +70,3 @@ def _angles(text: str) -> list[float]:
     if len(found) < 2 or not all(map(math.isfinite, found)):
         raise ArgumentError(f"--angles: two angles or more in degrees, such as 0,90, got {text!r}")
     return found
-
-
-def render(plan: SelfPlan) -> str:
-    """The plan as text."""
-    lines = [f"{plan.method}, without a reference"]
-    if plan.angles_deg:
-        lines.append(f"  angles                 {', '.join(f'{a:g}' for a in plan.angles_deg)} deg")
-    if plan.speed_ratio is not None:
-        table = ", ".join(f"{r:g}: {f:.2g}" for r, f in plan.speed_ratio_factors.items())
-        lines += [
-            f"  speed ratio            {plan.speed_ratio:g}",
-            f"  factor by ratio        {table}",
-            f"  knots per turn         at most {plan.knots_per_turn:g}, in the slowest part",
-        ]
-    lines.append(f"  worst noise factor     {plan.worst_noise_factor:.2f}")
-    if plan.turns is not None:
-        lines.append(f"  turns                  {plan.turns:.3g}")
-    if plan.readings is not None:
-        lines.append(f"  readings needed        {plan.readings}")
-    if plan.seconds is not None:
-        lines.append(f"  seconds                {plan.seconds:.3g}")
-    if plan.given:
-        given: Any = plan.given
-        lines.append(
-            f"  the given angles       factor {given['worst_noise_factor']:.2f}, "
-            f"{given['worse_by']:.2f} times the best"
-        )
-        if given["blind_orders"]:
-            names = ", ".join(f"{k:g}" for k in given["blind_orders"])
-            lines.append(f"                         blind to {names}")
-    entries = [f"{k:>5g} {f:5.2f}" for k, f in plan.noise_factors.items()]
-    lines.append("  noise factor per order")
-    lines += ["  " + "  ".join(entries[i : i + 6]) for i in range(0, len(entries), 6)]
-    lines += [f"  note: {note}" for note in plan.notes]
-    return "\n".join(lines)

@@ -45,9 +45,9 @@ def add_signals(parser: argparse.ArgumentParser, counts: bool = True) -> None:
 
 
 class _Entry(tuple[str | None, str, str, str | None]):
-    """Joint, role, column and unit of one ``--signal``."""
+    """Joint, role, column and unit of one ``--signal``; ``text`` is what was typed."""
 
-    __slots__ = ()
+    text: str
 
 
 def signal_argument(text: str) -> _Entry:
@@ -58,7 +58,7 @@ def signal_argument(text: str) -> _Entry:
     >>> signal_argument("arm.torque=tau"), signal_argument("reference=IOC:m1.RBV")
     (('arm', 'torque', 'tau', None), (None, 'reference', 'IOC:m1.RBV', None))
     """
-    from ..columns import role_kind, wanted_unit  # takes numpy, which a help does without
+    from ..formats.columns import role_kind, wanted_unit  # takes numpy, which a help does without
 
     left, equals, name = text.partition("=")
     joint, _, role = left.rpartition(".")
@@ -70,7 +70,9 @@ def signal_argument(text: str) -> _Entry:
         raise argparse.ArgumentTypeError(str(error)) from None
     column, colon, ending = name.rpartition(":")
     unit = wanted_unit(ending, role) if colon and column else None
-    return _Entry((joint or None, role, column if unit else name, unit))
+    entry = _Entry((joint or None, role, column if unit else name, unit))
+    entry.text = text
+    return entry
 
 
 def signals_by_joint(

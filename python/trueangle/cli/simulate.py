@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import json
 
-from ..files import RUNS
+from ..support.files import RUNS
 from .paths import Input, Output
 
 HELP = "measure a simulated joint: calibration runs from a simulation file"
@@ -35,7 +35,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Write the runs."""
-    from ..runcsv import write_runs
+    from ..runs.writing import write_runs
     from ..simulation import load_simulation, simulate
 
     if args.seed < 0:

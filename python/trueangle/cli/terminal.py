@@ -6,7 +6,7 @@ import contextlib
 import os
 import re
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import Any, Final, TextIO
 
 __all__ = ["STANDARD_OUTPUT", "Plain", "own_interrupts", "plain_streams", "printable", "silence"]
@@ -51,6 +51,8 @@ class Plain:
     stream : text stream
     name : str
         Of the stream, as the file name of errors that it meets.
+    wording : callable, optional
+        Takes every text before it is passed on: `trueangle.cli.wording.Wording`.
 
     Attributes
     ----------
@@ -58,13 +60,19 @@ class Plain:
         The stream itself, for the program's own line of progress.
     """
 
-    def __init__(self, stream: TextIO, name: str = STANDARD_OUTPUT) -> None:
+    def __init__(
+        self,
+        stream: TextIO,
+        name: str = STANDARD_OUTPUT,
+        wording: Callable[[str], str] = str,
+    ) -> None:
         self.steering = stream
         self._name = name
+        self._wording = wording
 
     def write(self, text: str) -> int:
         """Write; signs that the stream's encoding lacks become escapes."""
-        shown = printable(text)
+        shown = printable(self._wording(text))
         with self._named():
             try:
                 self.steering.write(shown)
@@ -95,15 +103,15 @@ class Plain:
 
 
 @contextlib.contextmanager
-def plain_streams() -> Iterator[None]:
-    """Let everything that is printed pass `Plain`."""
+def plain_streams(wording: Callable[[str], str] = str) -> Iterator[None]:
+    """Let everything that is printed pass `Plain`, in the words of a command."""
     # A process started without them (pythonw, closed descriptors) has None.
     out, err = sys.stdout, sys.stderr
     with contextlib.ExitStack() as stack:
         if out is not None:
-            stack.enter_context(contextlib.redirect_stdout(Plain(out)))
+            stack.enter_context(contextlib.redirect_stdout(Plain(out, wording=wording)))
         if err is not None:
-            stack.enter_context(contextlib.redirect_stderr(Plain(err, "standard error")))
+            stack.enter_context(contextlib.redirect_stderr(Plain(err, "standard error", wording)))
         yield
 
 

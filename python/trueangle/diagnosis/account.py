@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 from ..effects import EFFECTS
 from ..effects.blindness import Blindness
 from ..effects.scatter import NEW_SCATTER, ScatterFinding
+from ..estimation.regression import Regression
 from ..joint.signals import Signals
-from ..pace import pace
-from ..regression.regression import Regression
 from ..simulation.simulation import Simulation
+from ..support.deadline import pace
 from .believed import corrected_effects
 from .gearedlines import GearedLines, Ratio
 from .gearratio import aligned, find_ratio, near_ratio
@@ -32,7 +32,7 @@ MOST_READINGS = 40_000
 
 
 @dataclass(frozen=True)
-class Choice:
+class CauseSelection:
     """What was chosen for readings against a simulation.
 
     Attributes
@@ -98,7 +98,7 @@ class Account:
     """
 
     seen: Seen
-    choice: Choice
+    choice: CauseSelection
     believed: Simulation
 
 
@@ -159,14 +159,14 @@ def _start(seen: Seen, sim: Simulation) -> Regression:
     return Regression(seen.signals, seen.error - sim.predict(seen.signals), sim.surroundings)
 
 
-def _chosen(seen: Seen, sim: Simulation) -> Choice:
+def _chosen(seen: Seen, sim: Simulation) -> CauseSelection:
     """Choose the causes by which readings differ from a simulation."""
     start = _start(seen, sim)
     spots = blind_spots(start)
     chosen = select(start)
     scatter: list[ScatterFinding] = []
     if pace().over:
-        return Choice(start, chosen, scatter, spots)  # what is left is no scatter yet
+        return CauseSelection(start, chosen, scatter, spots)  # what is left is no scatter yet
     uneven = next(iter(_scatter(chosen, weighs=True)), None)
     if uneven is not None and uneven.bic_gain > NEW_SCATTER + misfit_of_scatter(start, chosen):
         scatter.append(uneven)
@@ -177,7 +177,7 @@ def _chosen(seen: Seen, sim: Simulation) -> Choice:
     if not all(map(is_named, chosen.terms)) and not unexplained_after(chosen).found:
         chosen = select(start, unnamed=False)
     scatter += [i for i in _scatter(chosen, weighs=False) if i.bic_gain > NEW_CAUSE]
-    return Choice(start, chosen, scatter, spots)
+    return CauseSelection(start, chosen, scatter, spots)
 
 
 def _scatter(regression: Regression, weighs: bool) -> list[ScatterFinding]:

@@ -15,7 +15,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..distributions import chi_squared_tail, normal_tail
+from ..support.distributions import chi_squared_tail, normal_tail
+from ..support.plainresult import Shown
 
 __all__ = ["Belief", "judge_line", "verdict_of_factor"]
 
@@ -37,7 +38,7 @@ SAME_PHASE = 20.0
 
 
 @dataclass(frozen=True)
-class Belief:
+class Belief(Shown):
     """One claim of the simulation, judged.
 
     Attributes

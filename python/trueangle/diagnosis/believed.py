@@ -8,15 +8,15 @@ from dataclasses import fields, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..distributions import normal_tail
 from ..effects import EFFECTS, Effect
 from ..effects.blindness import Blindness
 from ..effects.missing_order import MissingOrder
+from ..estimation.extension import Extension
+from ..estimation.regression import ROUNDING, Regression
 from ..joint.pattern import Harmonic, Surroundings
 from ..joint.signals import Signals
-from ..regression.extension import Extension
-from ..regression.regression import ROUNDING, Regression
 from ..simulation.simulation import Simulation
+from ..support.distributions import normal_tail
 from .beliefs import LEVEL, Belief, judge_line, verdict_of_factor
 from .gain import measure_belief_gains
 from .identifiability import doubts_about

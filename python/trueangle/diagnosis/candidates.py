@@ -6,8 +6,8 @@ from collections.abc import Callable, Sequence
 from typing import TypeAlias
 
 from ..effects import Effect
-from ..pace import pace
-from ..regression.regression import Extension, Regression
+from ..estimation.regression import Extension, Regression
+from ..support.deadline import pace
 from .forms import told_from_forms
 from .penalty import left_by_forms, misfit, penalty_of, total_penalty
 from .unnamed import effect_of
@@ -36,9 +36,9 @@ def extensions(
     """What every cause proposes: the extension, what it extends, its net BIC gain.
 
     A cause that contains chosen ones as special cases takes their place. Those left when the
-    time is up are not tried (`trueangle.pace`). Of candidates that stay below ``least``, the
-    gain that matters beside those found so far, only as much is searched as tells that; the
-    strongest beside other terms are therefore tried first.
+    time is up are not tried (`trueangle.support.deadline`). Of candidates that stay below
+    ``least``, the gain that matters beside those found so far, only as much is searched as tells
+    that; the strongest beside other terms are therefore tried first.
     """
     found: list[Candidate] = []
     proposed_by: list[str] = []
@@ -65,13 +65,18 @@ def extensions(
         wanted = max(least(found) + penalty, 0.0) if start.terms and least is not None else 0.0
         if key not in memory or memory["least", key] > wanted:
             start.least = wanted
-            memory[key], memory["least", key] = propose(effect, start), wanted
+            found_now = propose(effect, start)
             start.least = 0.0
+            if at.over:
+                break  # a search that was cut short says nothing of its cause
+            memory[key], memory["least", key] = found_now, wanted
         extension = memory[key]
         if extension is not None:
             memory["gain", cause] = extension.bic_gain
             found.append((extension, start, extension.bic_gain - penalty))
             proposed_by.append(cause)
+    else:
+        at.first_round_done()
     # What is as good comes in the order of the causes.
     by_place = sorted(range(len(found)), key=lambda k: causes.index(proposed_by[k]))
     return [found[k] for k in by_place]

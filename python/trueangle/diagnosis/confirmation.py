@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 from ..effects import EFFECTS
 from ..effects.local_defect import LocalDefect
 from ..effects.non_integer_order import NonIntegerOrder
-from ..errorunits import brief
+from ..estimation.regression import Regression
 from ..joint.pattern import line_columns
-from ..regression.regression import Regression
+from ..support.display_units import brief
 from .gain import Gain
 from .goodness.periodogram import order_test, time_test
 from .penalty import NEW_CAUSE, cause_terms

@@ -2,21 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..correction.term import Term
 from ..effects import EFFECTS, Effect
 from ..errors import ArgumentError
 from ..fitting.fit import fit
 from ..joint.signals import join_runs
-from ..runs import CalibrationRun, as_runs
+from ..model.model import HarmonicModel
+from ..model.term import Term
+from ..runs.run import CalibrationRun, as_runs
+from ..simulation.simulation import EFFECT
+from ..support.oftype import of_type
 
 if TYPE_CHECKING:
-    from ..model import Argument, HarmonicModel
+    from ..fitting.argument import AnyArgument
     from ..simulation.simulation import Simulation
 
 __all__ = ["NOT_AT_RUN_TIME", "extend_model", "terms_from_effects", "without_terms"]
@@ -58,10 +61,11 @@ def terms_from_effects(
     """
     cycles = {"output": 1.0, **(shafts or {})}
     terms: list[Term] = []
-    for effect in effects:
+    for i, effect in enumerate(effects):
         if isinstance(effect, Mapping):
             table = dict(effect)
             effect = EFFECTS[table.pop("kind")].from_table(table)
+        of_type(f"effects[{i}]", effect, Effect, EFFECT)
         terms += effect.to_terms(period, cycles)
     return tuple(terms)
 
@@ -105,9 +109,10 @@ def without_terms(
 
 
 def extend_model(
-    model: HarmonicModel,
+    model: HarmonicModel | None,
     runs: CalibrationRun | Iterable[CalibrationRun],
     simulation: Simulation,
+    argument: AnyArgument = "auto",
 ) -> HarmonicModel:
     """The correction model extended by the effects of a simulation, fitted to the runs.
 
@@ -117,49 +122,77 @@ def extend_model(
 
     Parameters
     ----------
-    model : HarmonicModel
-        Its orders and argument are kept; terms it has are replaced.
+    model : HarmonicModel or None
+        Its orders and argument are kept; terms it has are replaced. Without one the orders are
+        the simulation's own lines and those of its effects.
     runs : CalibrationRun or iterable of them
         In the unit of the model.
     simulation : Simulation
         As `trueangle.diagnose` extended it.
+    argument : {"auto", "reference", "indicated"}
+        As of `trueangle.fit`; ``"auto"`` is that of the model, where there is one.
 
     Raises
     ------
     MissingSignalError
         A run lacks a signal that a term needs.
+    NotInvertibleError
+        The error is too steep for a model of the true angle.
     """
     found = as_runs(runs)
-    cycles, orders = _shafts(model, simulation)
+    if argument == "auto":
+        argument = _argument(model, simulation)
+    start = model
+    if start is None:
+        start = HarmonicModel((), period=found[0].period)
+        beside = tuple((line.shaft, line.order) for line in simulation.harmonics)
+    else:
+        beside = ()
+    if argument == "indicated":
+        start = start.replace(argument=argument)
+    cycles, orders = _shafts(start, simulation, beside)
     travel = [360.0 / run.period * run.unwrapped_reference for run in found]
     span = min(float(x.min()) for x in travel), max(float(x.max()) for x in travel)
     effects = [effect.over(*span) for effect in simulation.effects]
-    terms = terms_from_effects(effects, model.period, simulation.joint.shafts)
-    extended = model.replace(terms=terms)
+    terms = terms_from_effects(effects, start.period, simulation.joint.shafts)
+    extended = start.replace(terms=terms)
     for _ in range(_ROUNDS):
         fitted = fit(
             without_terms(found, extended),
             orders,
             shafts=cycles,
-            argument=_argument(model, simulation),
+            argument=argument,
         ).model
-        extended = fitted.replace(terms=extended.terms)
+        record = None if fitted.fit is None else replace(fitted.fit, signals=_ranges(found))
+        extended = fitted.replace(terms=extended.terms, fit=record)
         if not any(term.is_built_on_harmonics for term in extended.terms):
             break
     return extended
 
 
-def _argument(model: HarmonicModel, simulation: Simulation) -> Argument:
+def _ranges(runs: Sequence[CalibrationRun]) -> tuple[tuple[str, float, float], ...]:
+    """Each signal of the runs with its lowest and highest value."""
+    ranges = []
+    for name in ("velocity", "temperature", "torque", "current"):
+        columns = [run.speed if name == "velocity" else run.signal(name) for run in runs]
+        values = [column[np.isfinite(column)] for column in columns if column is not None]
+        if any(column.size for column in values):
+            everything = np.concatenate(values)
+            ranges.append((name, float(everything.min()), float(everything.max())))
+    return tuple(ranges)
+
+
+def _argument(model: HarmonicModel | None, simulation: Simulation) -> AnyArgument:
     """The pattern's argument: an effect may say that it is the indicated angle."""
     if any(effect.changes_argument for effect in simulation.effects):
         return "indicated"
-    return model.argument
+    return "auto" if model is None else model.argument
 
 
 def _shafts(
-    model: HarmonicModel, simulation: Simulation
+    model: HarmonicModel, simulation: Simulation, lines: Iterable[tuple[str, float]]
 ) -> tuple[dict[str, float], dict[str, set[int]]]:
-    """Cycles and orders of the model's shafts and of the lines found.
+    """Cycles and orders of the model's shafts, of ``lines`` and of those found.
 
     A line that is no whole order of its shaft gets a shaft of its own.
     """
@@ -167,7 +200,8 @@ def _shafts(
     orders = {shaft.name: set(shaft.orders) for shaft in model.shafts}
     joint = simulation.joint
     known = np.array(model.orders)
-    for shaft, order in (line for effect in simulation.effects for line in effect.to_lines()):
+    found = (line for effect in simulation.effects for line in effect.to_lines())
+    for shaft, order in (*lines, *found):
         at = joint.output_order(shaft, order)
         if np.isclose(known, at, rtol=1e-9).any():
             continue

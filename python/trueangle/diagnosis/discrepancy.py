@@ -8,9 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..angles import circular_mean, wrap
 from ..joint.signals import Signals
-from ..runs import CalibrationRun
+from ..runs.run import CalibrationRun
+from ..support.angles import circular_mean, wrap
+from ..support.plainresult import Shown
 
 __all__ = ["Discrepancy", "compare", "noise_from_repeats", "unfolded_error"]
 
@@ -24,7 +25,7 @@ LEAST_REPEATS = 0.25
 
 
 @dataclass(frozen=True)
-class Discrepancy:
+class Discrepancy(Shown):
     """Measured minus simulated, about the common zero, arcsec.
 
     Attributes

@@ -3,18 +3,22 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
-from ..checks import DataFault
 from ..effects import EFFECTS, Effect
 from ..effects.blindness import Blindness
-from ..errorunits import ErrorsIn
-from ..joining import MeasuredMinusSimulated
-from ..plainresult import PlainResult
-from ..regression.estimate import Parameters
+from ..errors import ArgumentError, NoModelError
+from ..estimation.estimate import Parameters, Quantity
+from ..model.model import HarmonicModel
+from ..runs.checks import DataFault
+from ..runs.joining import MeasuredMinusSimulated
 from ..simulation.simulation import Simulation
+from ..support.display_units import ErrorsIn
+from ..support.drawn import drawn
+from ..support.oftype import of_type
+from ..support.plainresult import PlainResult, Shown, counted
 from .beliefs import Belief
 from .confirmation import CONFIRMED
 from .correction import extend_model
@@ -25,14 +29,14 @@ from .goodness import Unexplained
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from ..model import HarmonicModel
-    from ..runs import CalibrationRun
+    from ..fitting.argument import AnyArgument
+    from ..runs.run import CalibrationRun
 
 __all__ = ["Diagnosis", "Finding"]
 
 
 @dataclass(frozen=True)
-class Finding:
+class Finding(Shown):
     """One cause that the readings support.
 
     Attributes
@@ -74,6 +78,16 @@ class Finding:
     def confirmed(self) -> bool:
         """Fit to extend the simulation and to correct."""
         return self.status == CONFIRMED
+
+    def _brief(self) -> str:
+        sizes = [f"{name} {q.value:.4g}" for name, q in self.parameters.items() if _is_number(q)]
+        return ", ".join([self.cause, *sizes[:2], self.status])
+
+    def summary(self) -> str:
+        """The finding as readable text."""
+        from .summary import finding_text
+
+        return finding_text(self)
 
     @property
     def sentence(self) -> str:
@@ -134,6 +148,8 @@ class Diagnosis(PlainResult):
         False where it was ended early: by the time given, or by Ctrl-C.
     simulated : MeasuredMinusSimulated or None
         The log of another simulator that the simulation stands on.
+    runs : list of CalibrationRun
+        The readings, as given.
     """
 
     discrepancy: Discrepancy
@@ -153,6 +169,7 @@ class Diagnosis(PlainResult):
     notes: list[str] = field(default_factory=list)
     complete: bool = True
     simulated: MeasuredMinusSimulated | None = None
+    runs: list[CalibrationRun] = field(repr=False, compare=False, default_factory=list)
 
     @property
     def is_enough(self) -> bool:
@@ -168,16 +185,92 @@ class Diagnosis(PlainResult):
         )
 
     def correction(
-        self, model: HarmonicModel, runs: CalibrationRun | Iterable[CalibrationRun]
+        self,
+        model: HarmonicModel | None = None,
+        runs: CalibrationRun | Iterable[CalibrationRun] | None = None,
+        *,
+        argument: AnyArgument = "auto",
     ) -> HarmonicModel:
-        """The correction model extended by the findings and fitted anew to the runs.
+        """The correction model of what was confirmed, fitted to the runs.
 
-        See `trueangle.diagnosis.correction.extend_model`.
+        Parameters
+        ----------
+        model : HarmonicModel, optional
+            One to extend. Without it the lines that the simulation believes, as measured, and
+            those of the findings are its orders, and other findings its terms.
+        runs : CalibrationRun or iterable of them, optional
+            In place of those that were diagnosed.
+        argument : {"auto", "reference", "indicated"}
+            As of `trueangle.fit`; by itself that of the model.
+
+        Returns
+        -------
+        HarmonicModel
+            See `trueangle.diagnosis.correction.extend_model`.
+
+        Raises
+        ------
+        NoModelError
+            Nothing was confirmed that a corrector can take off; says why and what to measure.
+        NotInvertibleError
+            The error is too steep for a model of the true angle.
+        KindError
+            What is given as model is none.
+        ArgumentError
+            Nothing to extend, and the diagnosis stands on the log of another simulator.
+
+        Examples
+        --------
+        >>> from trueangle import diagnose, simulate
+        >>> from trueangle.simulation import Backlash, RunDesign, Simulation
+        >>> sim = Simulation(sigma_arcsec=1.0, runs=(RunDesign(reversals=(0.5,)),
+        ...                                          RunDesign(reversals=(0.5,), speed_deg_s=30)))
+        >>> model = diagnose(simulate(sim.with_effects([Backlash(36.0)])), sim).correction()
+        >>> round(model.terms[0].half_width, 3)
+        0.01
         """
-        return extend_model(model, runs, self.extended)
+        if model is None:
+            self._check_correctable()
+        else:
+            of_type("model", model, HarmonicModel, "a trueangle.HarmonicModel, or left out")
+        given = self.runs if runs is None else runs
+        return extend_model(model, given, self.extended, argument)
+
+    def _check_correctable(self) -> None:
+        """Raise where there is nothing that a model could be made of."""
+        if self.simulated is not None:
+            raise ArgumentError(
+                "no correction model can hold what is known as a log only: give the model to extend"
+            )
+        effects = self.extended.effects
+        if self.extended.harmonics or any(not effect.not_at_run_time for effect in effects):
+            return
+        raise NoModelError(
+            "no correction can be given: nothing was confirmed that a corrector can take off"
+            + "".join(f"; {reason}" for reason in self._uncorrected())
+        )
+
+    def _uncorrected(self) -> Iterator[str]:
+        """Why nothing can be taken off, and what to measure."""
+        sure = [f for f in self.findings if f.confirmed]
+        if sure:
+            why = (f"{f.cause} ({EFFECTS[f.cause].not_at_run_time or 'no term'})" for f in sure)
+            yield f"confirmed: {', '.join(why)}"
+        if len(sure) < len(self.findings):
+            why = (f"{f.cause} ({f.reason})" for f in self.findings if not f.confirmed)
+            yield f"not confirmed: {', '.join(why)}"
+        seen = [spot for spot in self.not_identifiable if spot.supported]
+        told = {spot.measure: ", ".join(spot.causes) for spot in reversed(seen)}
+        if told:
+            yield from (f"to tell {causes} apart: {measure}" for measure, causes in told.items())
+        else:
+            yield (
+                "measure more runs, in both directions and at two speeds, before it is diagnosed "
+                "again"
+            )
 
     def to_dict(self, extended_simulation: str | None = None) -> dict[str, Any]:
-        """The object that ``trueangle diagnose --json`` prints."""
+        """The object that ``trueangle diagnose`` prints as JSON."""
         return {
             "simulation": {
                 "rms_arcsec": self.discrepancy.rms,
@@ -216,15 +309,23 @@ class Diagnosis(PlainResult):
         """`to_dict` as JSON text."""
         return json.dumps(self.to_dict(extended_simulation), indent=2, allow_nan=False)
 
+    def _brief(self) -> str:
+        sure = [finding.cause for finding in self.findings if finding.confirmed]
+        parts = [] if self.complete else ["incomplete"]
+        parts.append(f"{len(sure)} of {counted(self.findings, 'finding')} confirmed")
+        if self.unexplained is not None and self.unexplained.found:
+            parts.append("more is unexplained")
+        parts.append(f"noise {self.noise:.3g} arcsec of {self.readings} readings")
+        return ", ".join(parts) + (f": {', '.join(sure)}" if sure else "")
+
     def plot(self, ax: Axes | None = None) -> Axes:
         """Gain of every finding with its interval (needs ``trueangle[plot]``).
 
         `trueangle.plots.measured_and_simulated` and `trueangle.plots.error_left` show the
         readings themselves.
         """
-        from ..plots import gains
-
-        return gains(self, ax)
+        axes: Axes = drawn(self, ax)
+        return axes
 
     def summary(self, errors_in: ErrorsIn = "auto") -> str:
         """A readable account (`trueangle.diagnosis.summary.render`).
@@ -238,3 +339,7 @@ class Diagnosis(PlainResult):
         from .summary import render
 
         return render(self, errors_in)
+
+
+def _is_number(quantity: Quantity) -> bool:
+    return isinstance(quantity.value, int | float)

@@ -9,8 +9,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..regression.extension import Extension
-from ..regression.regression import Regression
+from ..estimation.extension import Extension
+from ..estimation.regression import Regression
 from .unnamed import effect_of, is_named
 
 __all__ = ["FORM", "beside_bends", "share_beside", "told_from_forms", "with_form_errors"]

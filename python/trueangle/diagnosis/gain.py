@@ -9,9 +9,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..estimation.regression import Regression
 from ..joint.signals import Signals
-from ..pace import pace
-from ..regression.regression import Regression
+from ..support.deadline import pace
+from ..support.plainresult import Shown
 from .holdout import Law, held_out, numbers, part, rebuilt, reducible_share, residual_at
 from .levels import LevelGain, gains_by_level
 from .unnamed import effect_of
@@ -27,7 +28,7 @@ SHUFFLES = 3
 
 
 @dataclass(frozen=True)
-class Gain:
+class Gain(Shown):
     """What a finding gains on held-out runs.
 
     Attributes
@@ -59,6 +60,10 @@ class Gain:
     note: str
     by_level: LevelGain | None = None
 
+    def _brief(self) -> str:
+        share = "" if self.reducible_share is None else f", share {self.reducible_share:.3g}"
+        return f"rms {self.before[0]:.4g} -> {self.after[0]:.4g} arcsec{share}, {self.holdout}"
+
     def to_dict(self) -> dict[str, Any]:
         """The ``gain`` object of a finding."""
         found: dict[str, Any] = {"holdout": self.holdout}
@@ -81,7 +86,8 @@ def measure_gain(
     In every fold the model is fitted to the other runs alone, and what was searched for
     (orders, lengths, places) is searched there again, for the first `SEARCHED` findings.
     A single run is left out in stretches of its record. Causes of a factor with levels
-    are measured on left out levels as well. None where the time is up before (`trueangle.pace`).
+    are measured on left out levels as well. None where the time is up before
+    (`trueangle.support.deadline`).
     """
     rng = np.random.default_rng(seed)
     unit, what = _units(regression)

@@ -8,11 +8,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ..estimation.regression import Extension, Regression
+from ..estimation.whitening import RunEffect
 from ..joint.pattern import Surroundings
 from ..joint.signals import Signals
-from ..pace import pace
-from ..regression.regression import Extension, Regression
-from ..regression.whitening import RunEffect
+from ..support.deadline import pace
 from .unnamed import effect_of
 
 __all__ = ["Law", "held_out", "numbers", "part", "rebuilt", "reducible_share", "residual_at"]
@@ -163,6 +163,7 @@ def reducible_share(
     before: Array, after: Array, unit: NDArray[np.int64], variance: float, rng: np.random.Generator
 ) -> tuple[float, tuple[float, float]]:
     """Reducible share and its bootstrap interval over the units held out."""
+    _, unit = np.unique(unit, return_inverse=True)  # a run all of outliers says nothing
     count = np.bincount(unit).astype(np.float64)
     power0 = np.bincount(unit, weights=before**2)
     power1 = np.bincount(unit, weights=after**2)

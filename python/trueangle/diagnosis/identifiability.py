@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from ..effects import EFFECTS
 from ..effects.blindness import Blindness
-from ..regression.regression import Extension, Regression
+from ..estimation.regression import Extension, Regression
 
 __all__ = ["Blindness", "blind_spots", "doubts_about"]
 

@@ -12,9 +12,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..estimation.regression import Regression
 from ..joint.signals import Signals
-from ..pace import pace
-from ..regression.regression import Regression
+from ..support.deadline import pace
 from .holdout import held_out, numbers, part, rebuilt, reducible_share
 from .unnamed import effect_of
 

@@ -8,9 +8,9 @@ from dataclasses import replace
 from ..effects import EFFECTS
 from ..effects.blindness import Blindness
 from ..effects.scatter import ScatterFinding
-from ..pace import pace
-from ..regression.estimate import Parameters
-from ..regression.regression import Regression
+from ..estimation.estimate import Parameters
+from ..estimation.regression import Regression
+from ..support.deadline import pace
 from .candidates import Candidate, extensions, propose
 from .confirmation import CONFIRMED, NOT_CONFIRMED, status_of
 from .findings import Finding

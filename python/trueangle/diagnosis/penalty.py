@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..effects.missing_order import MissingOrder
-from ..regression.regression import Extension, Regression
+from ..estimation.regression import Extension, Regression
 from .forms import FORM
 from .unnamed import effect_of
 

@@ -7,10 +7,10 @@ from collections.abc import Collection
 import numpy as np
 from numpy.typing import NDArray
 
+from ..estimation.lines import LineBasis
+from ..estimation.regression import Regression
+from ..estimation.whitening import Whitener
 from ..joint.signals import Signals
-from ..regression.lines import LineBasis
-from ..regression.regression import Regression
-from ..regression.whitening import Whitener
 from .goodness import Leftover, Unexplained, goodness_of_fit
 from .unnamed import is_named
 

@@ -12,8 +12,8 @@ from ..effects.effect import ALWAYS
 from ..effects.local_defect import LocalDefect
 from ..effects.missing_order import MissingOrder
 from ..effects.zero_slip import ZeroSlip
-from ..pace import pace
-from ..regression.regression import BEYOND_SHOWN, Extension, Regression
+from ..estimation.regression import BEYOND_SHOWN, Extension, Regression
+from ..support.deadline import pace
 from .candidates import Scores, extensions
 from .forms import beside_bends, share_beside
 from .goodness import estimate_noise

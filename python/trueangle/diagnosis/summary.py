@@ -6,8 +6,8 @@ import textwrap
 from typing import TYPE_CHECKING, Any
 
 from ..effects.blindness import Blindness
-from ..errorunits import ErrorsIn, ErrorUnit, error_unit
-from ..regression.estimate import Quantity
+from ..estimation.estimate import Quantity
+from ..support.display_units import ErrorsIn, ErrorUnit, error_unit
 from .beliefs import Belief
 from .goodness.evidence import Evidence
 from .goodness.scatter import AGAINST_STATED
@@ -16,7 +16,7 @@ from .levels import LevelGain
 if TYPE_CHECKING:
     from .findings import Diagnosis, Finding
 
-__all__ = ["headline", "render"]
+__all__ = ["finding_text", "headline", "render"]
 
 WIDTH = 88
 
@@ -51,7 +51,7 @@ def render(diagnosis: Diagnosis, errors_in: ErrorsIn = "auto") -> str:
     if diagnosis.readings_used < diagnosis.readings:
         lines.append(f"{diagnosis.readings_used} of the readings, spread evenly, were used.")
     for k, finding in enumerate(diagnosis.findings, 1):
-        lines += ["", *_finding(k, finding, unit)]
+        lines += ["", *_finding(f"{k}. ", finding, unit)]
     wrong = [belief for belief in diagnosis.beliefs if belief.verdict != "confirmed"]
     if wrong:
         lines += ["", "What the simulation claims and the readings do not show:"]
@@ -163,9 +163,15 @@ def _chance(p: float) -> str:
     return "below 1e-12" if p < 1e-12 else f"{p:.1g}"
 
 
-def _finding(number: int, finding: Finding, unit: ErrorUnit) -> list[str]:
+def finding_text(finding: Finding) -> str:
+    """One finding by itself."""
+    largest = 0.0 if finding.gain is None else finding.gain.before[2]
+    return "\n".join(_finding("", finding, error_unit("auto", largest)))
+
+
+def _finding(number: str, finding: Finding, unit: ErrorUnit) -> list[str]:
     n = unit.number
-    lines = [f"{number}. {finding.cause}"]
+    lines = [number + finding.cause]
     if not finding.confirmed:
         lines[0] += f" (NOT CONFIRMED: {finding.reason})"
         lines = _wrapped(lines[0], 3)

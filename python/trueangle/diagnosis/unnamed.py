@@ -15,10 +15,10 @@ from numpy.typing import NDArray
 
 from ..effects import EFFECTS, Effect
 from ..effects.time_periodic import WANDER, TimePeriodic
+from ..estimation.extension import Extension
+from ..estimation.regression import Regression
 from ..joint.pattern import Surroundings, line_columns
 from ..joint.signals import Signals
-from ..regression.extension import Extension
-from ..regression.regression import Regression
 from .goodness.periodogram import periodogram
 
 __all__ = [

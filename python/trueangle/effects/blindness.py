@@ -8,9 +8,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..regression.estimate import Parameters
-from ..regression.factor import orthonormal_basis
-from ..regression.regression import Regression
+from ..estimation.estimate import Parameters
+from ..estimation.factor import orthonormal_basis
+from ..estimation.regression import Regression
+from ..support.plainresult import Shown
 
 __all__ = [
     "LEAST_KELVIN",
@@ -37,7 +38,7 @@ RUNS_PER_LEVEL = 3
 
 
 @dataclass(frozen=True)
-class Blindness:
+class Blindness(Shown):
     """Causes that this data cannot tell apart, or not see at all.
 
     Attributes
@@ -71,6 +72,10 @@ class Blindness:
     factor: str = "run"
     common: str = ""
     is_open: bool = False
+
+    def _brief(self) -> str:
+        seen = "one of them is seen" if self.supported else "not seen"
+        return f"{', '.join(self.causes)}: {seen}"
 
     def hides(self, cause: str) -> bool:
         """Whether naming this cause would be a guess."""

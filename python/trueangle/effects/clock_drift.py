@@ -8,11 +8,11 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from ..estimation.estimate import Parameters, quantity
+from ..estimation.extension import Extension
+from ..estimation.regression import Regression
 from ..joint.pattern import Surroundings
 from ..joint.signals import Signals
-from ..regression.estimate import Parameters, quantity
-from ..regression.extension import Extension
-from ..regression.regression import Regression
 from .blindness import OWN_OF_VELOCITY, Blindness, share_left
 from .drift_within_run import DriftWithinRun
 from .effect import Effect

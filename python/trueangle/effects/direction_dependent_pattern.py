@@ -8,15 +8,15 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
-from ..correction import forms
-from ..correction.forms import Form
-from ..correction.term import Term, line_values
 from ..errors import ArgumentError
+from ..estimation.estimate import Parameters, quantity
+from ..estimation.extension import Extension
+from ..estimation.regression import Regression
 from ..joint.pattern import Surroundings, line_columns, line_sum
 from ..joint.signals import Signals
-from ..regression.estimate import Parameters, quantity
-from ..regression.extension import Extension
-from ..regression.regression import Regression
+from ..model import forms
+from ..model.forms import Form
+from ..model.term import Term, line_values
 from .backlash import ONE_WAY, Backlash, goes_both_ways
 from .blindness import Blindness
 from .drawing import phase
@@ -100,9 +100,8 @@ class DirectionalPattern(Effect):
         if float(signals.run_turns().max()) < TOLD_APART:
             orders = orders[orders <= LIKELY]
         shapes = [{"order": float(m)} for m in orders if m not in present]
-        others = float(np.log(2.0 * len(shapes)))
-        likely = float(np.log(2.0 * LIKELY))
-        log_grids = [likely if shape["order"] <= LIKELY else others for shape in shapes]
+        counts = [LIKELY if shape["order"] <= LIKELY else len(shapes) for shape in shapes]
+        log_grids = [float(np.log(2.0 * count)) for count in counts]
         return best_shape(cls, regression, shapes, log_grids)
 
     @classmethod

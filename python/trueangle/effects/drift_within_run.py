@@ -8,14 +8,15 @@ from typing import ClassVar, Self
 
 import numpy as np
 
-from .. import _core
+import trueangle._core as _core
+
+from ..estimation.estimate import Parameters, quantity
+from ..estimation.extension import Extension
+from ..estimation.regression import Regression
+from ..estimation.runcolumns import RunEffectColumns
+from ..estimation.whitening import wander_basis
 from ..joint.pattern import Surroundings
 from ..joint.signals import Signals
-from ..regression.estimate import Parameters, quantity
-from ..regression.extension import Extension
-from ..regression.regression import Regression
-from ..regression.runcolumns import RunColumns
-from ..regression.whitening import wander_basis
 from .backlash import Backlash
 from .blindness import (
     OWN_OF_VELOCITY,
@@ -168,7 +169,7 @@ class DriftWithinRun(Effect):
         columns = regression.lines.once(
             f"{form} {terms}",
             None,
-            lambda: RunColumns(cls._shapes(regression, form, terms), regression.bounds),
+            lambda: RunEffectColumns(cls._shapes(regression, form, terms), regression.bounds),
         )
         log_grid = float(np.log(UNLIKE_FORMS))
         shape = {"form": form, "terms": terms}

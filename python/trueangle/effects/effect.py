@@ -9,13 +9,13 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
-from ..correction.term import Term
 from ..errors import ArgumentError
+from ..estimation.estimate import Parameters
+from ..estimation.extension import Extension
+from ..estimation.regression import Regression
 from ..joint.pattern import Surroundings
 from ..joint.signals import Signals
-from ..regression.estimate import Parameters
-from ..regression.extension import Extension
-from ..regression.regression import Regression
+from ..model.term import Term
 from .bends import bent
 from .blindness import Blindness
 from .parameters import checked, plain
@@ -89,6 +89,7 @@ class Effect:
         The largest size that has a meaning.
     """
 
+    noun: ClassVar[str] = "the effect of a simulation"
     kind: ClassVar[str]
     sentence: ClassVar[str]
     needs: ClassVar[tuple[str, ...]] = ()

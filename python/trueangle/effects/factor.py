@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 
+from ..estimation.extension import Extension
+from ..estimation.regression import Regression
 from ..joint.pattern import Surroundings, line_columns
 from ..joint.signals import Signals
-from ..regression.extension import Extension
-from ..regression.regression import Regression
 from .effect import Effect
 from .search import (
     Array,

@@ -11,15 +11,16 @@ from typing import Any, ClassVar, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from .. import _core
-from ..correction import forms
-from ..correction.forms import Form
-from ..correction.term import Term
+import trueangle._core as _core
+
+from ..estimation.estimate import Parameters, quantity
+from ..estimation.extension import Extension
+from ..estimation.regression import Regression
 from ..joint.pattern import Pattern, Surroundings
 from ..joint.signals import Signals
-from ..regression.estimate import Parameters, quantity
-from ..regression.extension import Extension
-from ..regression.regression import Regression
+from ..model import forms
+from ..model.forms import Form
+from ..model.term import Term
 from .blindness import (
     Blindness,
 )

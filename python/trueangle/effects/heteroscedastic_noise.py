@@ -8,10 +8,10 @@ from typing import ClassVar, Self
 
 import numpy as np
 
+from ..estimation.estimate import Parameters, quantity
+from ..estimation.regression import EXCITED, Regression
 from ..joint.pattern import Surroundings
 from ..joint.signals import Signals
-from ..regression.estimate import Parameters, quantity
-from ..regression.regression import Regression
 from .effect import Effect
 from .outliers import Outliers
 from .scatter import ScatterFinding, standardised
@@ -23,6 +23,10 @@ __all__ = ["HeteroscedasticNoise"]
 
 #: Squared residuals are taken at most this many variances large.
 SQUARE_CLIP = 9.0
+
+#: Logarithm of the largest ratio of a reading's variance to the mean one: a thousand times the
+#: standard deviation is more than noise of one kind does.
+WIDEST = 2.0 * float(np.log(1e3))
 
 
 @dataclass(frozen=True)
@@ -122,7 +126,10 @@ class HeteroscedasticNoise(Effect):
                 if name in chosen:
                     continue
                 wider = np.hstack([design, columns])
-                q, _ = np.linalg.qr(wider)
+                q, r = np.linalg.qr(wider)
+                own = np.abs(np.diag(r)[design.shape[1] :])
+                if (own**2 <= EXCITED * np.einsum("ij,ij->j", columns, columns)).any():
+                    continue  # these readings never show it apart
                 saved = float(np.sum((q.T @ rest) ** 2))
                 gain = n * saved / power - penalties[name]
                 if gain > best[0]:
@@ -165,10 +172,12 @@ class HeteroscedasticNoise(Effect):
 def _log_variance(design: Array, square: Array) -> tuple[Array, Array]:
     """Coefficients of the log variance by iterated weighted least squares."""
     gamma = np.zeros(design.shape[1])
-    gamma[0] = np.log(square.mean())
+    gamma[0] = mean = np.log(square.mean())
     inverse = np.linalg.inv(design.T @ design)
     for _ in range(30):
         step = inverse @ (design.T @ (square * np.exp(-(design @ gamma)) - 1.0))
+        if np.abs(design @ (gamma + step) - mean).max() > WIDEST:
+            break  # readings that do not scatter at all have no largest likelihood
         gamma += step
         if np.abs(step).max() < 1e-10:
             break

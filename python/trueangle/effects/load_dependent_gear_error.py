@@ -8,14 +8,15 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
-from ..correction import forms
-from ..correction.forms import Form
-from ..correction.term import Term, line_values
+from ..estimation.estimate import Parameters, quantity
+from ..estimation.extension import Extension
+from ..estimation.regression import Regression
 from ..joint.pattern import Surroundings, line_columns, line_sum
 from ..joint.signals import Signals
-from ..regression.estimate import Parameters, quantity
-from ..regression.extension import Extension
-from ..regression.regression import Regression
+from ..model import forms
+from ..model.forms import Form
+from ..model.term import Term, line_values
+from ..support.suggestions import check_choice
 from .blindness import (
     OWN_OF_VELOCITY,
     OWN_POWER,
@@ -207,8 +208,7 @@ class LoadDependentGearErrorTerm(Term):
 
     def check(self) -> None:
         self._check_lines()
-        if self.torque not in ("signed", "absolute"):
-            raise self._out_of_range("torque", "'signed' or 'absolute'")
+        check_choice(f"{self.kind}: torque", self.torque, ("signed", "absolute"))
 
     def forms(self) -> tuple[Form, ...]:
         absolute = self.torque == "absolute"

@@ -11,16 +11,17 @@ from typing import Any, ClassVar, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from ..correction import forms
-from ..correction.forms import Form
-from ..correction.term import Term, from_arcsec
 from ..errors import ArgumentError
+from ..estimation.estimate import Parameters, quantity
+from ..estimation.extension import Extension
+from ..estimation.regression import Regression
 from ..joint.grid import uniform_grid
 from ..joint.pattern import Surroundings
 from ..joint.signals import Signals
-from ..regression.estimate import Parameters, quantity
-from ..regression.extension import Extension
-from ..regression.regression import Regression
+from ..model import forms
+from ..model.forms import Form
+from ..model.term import Term, from_arcsec
+from ..support.deadline import pace
 from .argument_error import ArgumentShift
 from .blindness import (
     Blindness,
@@ -126,6 +127,8 @@ class LocalDefect(Effect):
         best: Extension | None = None
         for shaft, cycles in joint.shafts.items():
             for score, place, width in cls._search(regression, cycles, e):
+                if pace().over:
+                    return best
                 shape = {"shaft": shaft, "place_deg": place, "width_deg": width}
                 if not (
                     regression.hopeless(score / regression.variance, 3, log_grid)
@@ -217,6 +220,8 @@ class LocalDefect(Effect):
         Clipped at so many standard deviations it has a flat top, and looks wide.
         """
         for _ in range(UNCLIPPED):
+            if pace().over:
+                return shape
             columns = cls.columns(regression.signals, regression.around, shape)
             if not regression.outlying[columns[:, 0] > ON_BUMP].any():
                 return shape

@@ -8,12 +8,12 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
+from ..estimation.estimate import Parameters, quantity
+from ..estimation.extension import Extension
+from ..estimation.regression import Regression
 from ..joint.grid import uniform_grid
 from ..joint.pattern import Surroundings, line_columns, line_sum
 from ..joint.signals import Signals
-from ..regression.estimate import Parameters, quantity
-from ..regression.extension import Extension
-from ..regression.regression import Regression
 from .blindness import (
     Blindness,
 )
@@ -31,7 +31,7 @@ __all__ = ["MissingOrder"]
 
 FREE_ANGLES = (
     "readings at jittered or free angles, or one more round with the artefact clamped "
-    "off the grid (plan with 'trueangle plan'; about 2.14 deg for 36 positions)"
+    "off the grid (`ta.plan_mounts(...)` proposes them; about 2.14 deg for 36 positions)"
 )
 
 #: Periods over the travel below which there is no line.

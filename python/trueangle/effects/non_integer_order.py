@@ -8,11 +8,12 @@ from typing import ClassVar, Self
 
 import numpy as np
 
+from ..estimation.estimate import Parameters, quantity
+from ..estimation.extension import Extension
+from ..estimation.regression import Regression
 from ..joint.pattern import Surroundings, line_columns
 from ..joint.signals import Signals
-from ..regression.estimate import Parameters, quantity
-from ..regression.extension import Extension
-from ..regression.regression import Regression
+from ..support.deadline import pace
 from .blindness import (
     Blindness,
 )
@@ -110,6 +111,8 @@ class NonIntegerOrder(Effect):
             return None
         peaks = np.flatnonzero((net[1:-1] >= net[:-2]) & (net[1:-1] >= net[2:])) + 1
         for k in peaks[np.argsort(net[peaks])[::-1][:PEAKS]]:
+            if pace().over:
+                return best
             extension = cls._at(regression, float(orders[k]), float(penalty[k]))
             if best is None or extension.bic_gain > best.bic_gain:
                 best = extension
@@ -167,12 +170,13 @@ class NonIntegerOrder(Effect):
         starts = np.array([start for start, _ in regression.bounds])
         sizes = np.array([stop - start for start, stop in regression.bounds], dtype=np.float64)
         turns = regression.signals.run_turns()
-        if sizes.min() < 8 or turns.max() <= 0.0:
+        usual = float(np.median(turns))
+        if sizes.min() < 8 or usual <= 0.0:  # most runs stand still
             return np.zeros(0), np.zeros(0)
         top = float(regression.lines.orders.max()) * 0.75
-        low = max(LOWEST, LEAST_CYCLES / float(np.median(turns)))
+        low = max(LOWEST, LEAST_CYCLES / usual)
         # Half the mean rate of readings is as far as a run can tell.
-        step = 1.0 / (OVERSAMPLING * float(np.median(turns)))
+        step = 1.0 / (OVERSAMPLING * usual)
         count = int(min((top - low) / step, MOST_TRIALS))
         if count < 3:
             return np.zeros(0), np.zeros(0)

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from .. import _core
+import trueangle._core as _core
 
 __all__ = ["OrderSpectrum"]
 

@@ -10,10 +10,10 @@ from typing import ClassVar, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from ..estimation.estimate import Parameters, quantity
+from ..estimation.regression import Regression
 from ..joint.pattern import Surroundings
 from ..joint.signals import Signals
-from ..regression.estimate import Parameters, quantity
-from ..regression.regression import Regression
 from .effect import Effect
 from .local_defect import LocalDefect
 from .scatter import ScatterFinding, standardised
@@ -47,6 +47,9 @@ HIDDEN = 3.0
 
 #: Standard deviations from which on a reading that stands out alone is not its neighbours'.
 WILD = 6.0
+
+#: Scale below which no normal is narrow: readings that are all alike have none.
+NARROWEST = 1e-6
 
 #: Steps of expectation-maximisation.
 EM_STEPS = 60
@@ -283,7 +286,7 @@ def _two_normals(e: Array, start: float) -> tuple[float, float, float, float]:
         chance = wide / np.maximum(narrow + wide, 1e-300)
         share = float(np.clip(chance.mean(), 1.0 / e.size, 0.2))
         kept = 1.0 - chance
-        scale = float(np.sqrt((kept @ square) / kept.sum()))
+        scale = max(float(np.sqrt((kept @ square) / max(kept.sum(), 1e-300))), NARROWEST)
         size = max(float(np.sqrt((chance @ square) / max(chance.sum(), 1e-300))) / scale, 2.0)
     log_narrow = np.log1p(-share) - 0.5 * square / scale**2
     log_wide = np.log(share / size) - 0.5 * square / (scale * size) ** 2

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import ArgumentError
+from ..support.suggestions import did_you_mean
 
 if TYPE_CHECKING:
     from .effect import Effect
@@ -28,7 +29,7 @@ def checked(effect: type[Effect], table: Mapping[str, Any]) -> dict[str, Any]:
     for name in table:
         if name not in known:
             raise ArgumentError(
-                f"effect '{effect.kind}' has no parameter '{name}'; "
+                f"effect '{effect.kind}' has no parameter '{name}'{did_you_mean(name, known)}; "
                 f"it has {', '.join(known) or 'none'}"
             )
     values: dict[str, Any] = {}

@@ -8,14 +8,14 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
-from ..correction import forms
-from ..correction.forms import Form
-from ..correction.term import Term, from_arcsec
+from ..estimation.estimate import Parameters, quantity
+from ..estimation.extension import Extension
+from ..estimation.regression import Regression
 from ..joint.pattern import Surroundings
 from ..joint.signals import Signals
-from ..regression.estimate import Parameters, quantity
-from ..regression.extension import Extension
-from ..regression.regression import Regression
+from ..model import forms
+from ..model.forms import Form
+from ..model.term import Term, from_arcsec
 from .backlash import (
     ONE_WAY,
     Backlash,

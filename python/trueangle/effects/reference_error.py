@@ -9,11 +9,11 @@ from typing import Any, ClassVar, Self
 import numpy as np
 
 from ..errors import ArgumentError
+from ..estimation.estimate import Parameters, quantity
+from ..estimation.extension import Extension
+from ..estimation.regression import Regression
 from ..joint.pattern import Surroundings, line_columns, line_sum
 from ..joint.signals import Signals
-from ..regression.estimate import Parameters, quantity
-from ..regression.extension import Extension
-from ..regression.regression import Regression
 from .blindness import (
     Blindness,
 )

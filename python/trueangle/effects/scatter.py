@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..regression.estimate import Parameters
-from ..regression.regression import Regression
+from ..estimation.estimate import Parameters
+from ..estimation.regression import Regression
 from .search import Array
 
 if TYPE_CHECKING:

@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from ..estimation.batch import Blocks
+from ..estimation.extension import Extension
+from ..estimation.regression import Regression
 from ..joint.grid import uniform_grid
 from ..joint.pattern import Surroundings
-from ..regression.batch import Blocks
-from ..regression.extension import Extension
-from ..regression.regression import Regression
 from .blindness import Blindness
 
 if TYPE_CHECKING:

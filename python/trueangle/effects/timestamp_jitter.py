@@ -8,11 +8,11 @@ from typing import ClassVar
 
 import numpy as np
 
-from ..angles import ARCSEC_PER_DEG
+from ..estimation.estimate import quantity
+from ..estimation.regression import Regression
 from ..joint.pattern import Surroundings
 from ..joint.signals import Signals
-from ..regression.estimate import quantity
-from ..regression.regression import Regression
+from ..support.angles import ARCSEC_PER_DEG
 from .effect import Effect
 from .heteroscedastic_noise import SQUARE_CLIP, HeteroscedasticNoise
 from .scatter import NEW_SCATTER, ScatterFinding, standardised

@@ -8,13 +8,13 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from ..correction import forms
-from ..correction.forms import Form
-from ..correction.term import Term, from_arcsec, line_values
+from ..estimation.estimate import Parameters, quantity
+from ..estimation.regression import Regression
 from ..joint.pattern import Surroundings, line_columns, line_sum
 from ..joint.signals import Signals
-from ..regression.estimate import Parameters, quantity
-from ..regression.regression import Regression
+from ..model import forms
+from ..model.forms import Form
+from ..model.term import Term, from_arcsec, line_values
 from .blindness import (
     OWN_POWER,
     Blindness,

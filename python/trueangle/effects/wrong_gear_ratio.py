@@ -8,13 +8,13 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
+from ..estimation.estimate import Parameters, quantity
+from ..estimation.extension import Extension
+from ..estimation.regression import Regression
 from ..joint.joint import Joint
 from ..joint.pattern import Pattern, Surroundings, line_columns
 from ..joint.shafts import shaft_cycles
 from ..joint.signals import Signals
-from ..regression.estimate import Parameters, quantity
-from ..regression.extension import Extension
-from ..regression.regression import Regression
 from .drawing import carrier_order
 from .effect import Effect
 from .missing_order import MissingOrder

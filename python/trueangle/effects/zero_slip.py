@@ -8,11 +8,11 @@ from typing import ClassVar
 
 import numpy as np
 
+from ..estimation.estimate import Parameters, quantity
+from ..estimation.extension import Extension
+from ..estimation.regression import Regression
 from ..joint.pattern import Surroundings
 from ..joint.signals import Signals
-from ..regression.estimate import Parameters, quantity
-from ..regression.extension import Extension
-from ..regression.regression import Regression
 from .backlash import Backlash, goes_both_ways
 from .blindness import (
     RUNS_PER_LEVEL,

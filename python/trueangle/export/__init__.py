@@ -4,7 +4,8 @@ A target is one file in this package and one line in `trueangle.export.targets`.
 """
 
 from .comparison import Comparison, compare
-from .export import Exported, export_model, import_model
+from .export import export_model, import_model
+from .exported import Exported
 from .targets import TARGETS
 
 __all__ = ["TARGETS", "Comparison", "Exported", "compare", "export_model", "import_model"]

@@ -10,15 +10,15 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from ..angles import ARCSEC_PER_TURN
 from ..errors import ArgumentError
-from ..files import Kind
 from ..joint.shafts import Shaft
-from ..model import HarmonicModel
-from ..records import FitRecord
-from .pattern import Pattern
+from ..model.model import HarmonicModel
+from ..model.records import FitRecord
+from ..support.angles import ARCSEC_PER_TURN
+from ..support.files import Kind
+from .pattern import TurnPattern
 from .reading import failed
-from .target import Header, Made, Option, Part, Target
+from .target import CommentBlock, Made, Option, TablePart, Target
 
 __all__ = ["Admt4000"]
 
@@ -37,7 +37,7 @@ Array = NDArray[np.float64]
 
 
 class Admt4000(Target):
-    """``--to admt4000``: one line per register of page 2."""
+    """Target ``admt4000``: one line per register of page 2."""
 
     name = "admt4000"
     what = "the harmonic registers of an ADMT4000"
@@ -50,7 +50,7 @@ class Admt4000(Target):
     arithmetic_known = False
     options = {"bits": Option(int, 24, "bits of a reading: so many are all evaluated, up to 24")}
 
-    def make(self, pattern: Pattern, options: Mapping[str, Any]) -> Made:
+    def make(self, pattern: TurnPattern, options: Mapping[str, Any]) -> Made:
         pattern.check_one_turn(self.name)
         x = np.arange(_GRID) / _GRID
         values = pattern.correction(x)
@@ -61,16 +61,17 @@ class Admt4000(Target):
             a, b = spectrum[order].real, -spectrum[order].imag
             magnitude = round(math.hypot(a, b) * 360.0 * _CORDIC / _MAGNITUDE)
             if magnitude >= 1 << bits:
+                deg = math.hypot(a, b) * 360.0
                 raise ArgumentError(
-                    f"admt4000: order {order} has {math.hypot(a, b) * 360.0:.4g} deg, and its "
-                    f"register holds {((1 << bits) - 1) * _MAGNITUDE / _CORDIC:.4g}; use --to c"
+                    f"admt4000: order {order} has {deg:.4g} deg, and its register "
+                    f'holds {((1 << bits) - 1) * _MAGNITUDE / _CORDIC:.4g}; use `target="c"`'
                 )
             phase = round(math.degrees(math.atan2(a, b)) / _PHASE) % (1 << _PHASE_BITS)
             codes[order] = magnitude, phase if magnitude else 0
         if not any(magnitude for magnitude, _ in codes.values()):
             raise ArgumentError(
                 "admt4000 holds orders 1, 2, 3 and 8, of which the model has none that reaches "
-                f"its step of {_MAGNITUDE / _CORDIC:.3g} deg; use --to c"
+                f'its step of {_MAGNITUDE / _CORDIC:.3g} deg; use `target="c"`'
             )
         mean = float(np.mean(values))
         left = values - mean - _series(codes, x)
@@ -88,11 +89,9 @@ class Admt4000(Target):
                 f"no register: {rms:.4g} arcsec rms are left",
             )
 
-        def text(header: Header) -> str:
-            lines = [
-                "# page 2 of the ADMT4000: register, address, value, bits that are written",
-                f"# made by {header.package}; model sha256 {header.sha256}",
-            ]
+        def text(header: CommentBlock) -> str:
+            own = "page 2 of the ADMT4000: register, address, value, bits that are written"
+            lines = header.comment("# ", own)
             for order, (magnitude, phase) in codes.items():
                 at_magnitude, at_phase, bits = REGISTERS[order]
                 lines.append(
@@ -106,12 +105,10 @@ class Admt4000(Target):
             text=text,
             entries=8,
             bytes=16,
-            parts=(
-                Part(
-                    (lambda angles: _series(codes, angles / 2.0**32),),
-                    lambda x: pattern.correction(x) - mean,
-                    2.0 * pattern.slope,
-                ),
+            part=TablePart.at_readings(
+                pattern,
+                lambda angles: _series(codes, angles / 2.0**32),
+                zero=pattern.zero + mean,
             ),
             floor_arcsec=math.sqrt(len(codes) / 24.0) * step * ARCSEC_PER_TURN,
             step=step,
@@ -133,9 +130,9 @@ class Admt4000(Target):
             bits = REGISTERS[order][2]
             sizes.append((codes[order]["MAG"] & ((1 << bits) - 1)) * _MAGNITUDE / _CORDIC)
             phases.append(math.radians((codes[order]["PH"] & 0xFFF) * _PHASE))
-        from ..files import sha256_of
-        from ..records import Provenance
-        from ..runs import Source
+        from ..model.records import Provenance, TableRecord
+        from ..runs.run import Source
+        from ..support.files import sha256_of
 
         step = _MAGNITUDE / _CORDIC
         std = step / math.sqrt(12.0)
@@ -159,6 +156,7 @@ class Admt4000(Target):
                 residual=std,
                 method="table",
                 note="read from registers of an ADMT4000, whose argument is the indicated angle",
+                table=TableRecord(self.name, self.argument, 0.0, 0.0),
             ),
             provenance=Provenance((Source(path, sha256_of(path)),)),
         )

@@ -6,11 +6,11 @@ from typing import ClassVar
 
 import numpy as np
 
-from ..files import Kind
+from ..support.files import Kind
 from .chain import Chain
 from .portable import PortableTarget, identifier, self_test, table_lines
 from .table import PER_RADIAN, Table
-from .target import Header, comment_lines
+from .target import CommentBlock
 
 __all__ = ["CHeader"]
 
@@ -37,13 +37,13 @@ _MEMORY = """\
 
 
 class CHeader(PortableTarget):
-    """``--to c``: for any microcontroller with a C99 compiler."""
+    """Target ``c``: for any microcontroller with a C99 compiler."""
 
     name = "c"
     what = "a C99 header with tables and one inline function per shaft"
     kind: ClassVar[Kind] = Kind("a C header", (".h", ".hpp"))
 
-    def write(self, chain: Chain, header: Header) -> str:
+    def write(self, chain: Chain, header: CommentBlock) -> str:
         """The header."""
         name = identifier(header.name)
         guard = f"TRUEANGLE_{name.upper()}_H"
@@ -52,7 +52,7 @@ class CHeader(PortableTarget):
             f"#ifndef {guard}\n#define {guard}\n\n#include <stdint.h>\n\n{_MEMORY}",
             "/* Right shifts of negative numbers must keep the sign. */\n"
             f"typedef char {name}_shifts_arithmetically\n"
-            "    [(INT32_C(-1) >> 1) == INT32_C(-1) ? 1 : -1];\n",
+            "    [(INT32_C(-1) >> 1) == -1 && (INT64_C(-1) >> 1) == -1 ? 1 : -1];\n",
         ]
         names = _table_names(chain)
         parts += [
@@ -60,7 +60,8 @@ class CHeader(PortableTarget):
             for shaft, table in zip(names, chain.tables, strict=True)
         ]
         if chain.whole:
-            parts += [_corrected(name, names, chain), _self_test(name, chain)]
+            parts.append(_corrected(name, names, chain))
+        parts += [_unwrapped(name, names, chain), _self_test(name, chain)]
         parts.append(f"#endif /* {guard} */\n")
         return "\n".join(parts)
 
@@ -69,11 +70,11 @@ def _table_names(chain: Chain) -> list[str]:
     return [identifier(table.shaft) for table in chain.tables]
 
 
-def _comment(name: str, chain: Chain, header: Header) -> str:
+def _comment(name: str, chain: Chain, header: CommentBlock) -> str:
     proof = header.proof
-    bits = f"{proof.inputs.bit_length() - 1} bits" if proof.every_input else "32 bits"
-    text = [
-        f"{name}: correction of an indicated angle. Made by {header.package}; do not edit.",
+    bits = f"{(proof.inputs // chain.turns[0]).bit_length() - 1}" if proof.every_input else "32"
+    own = [
+        f"{name}: correction of an indicated angle; do not edit.",
         "",
         "Angles: uint32_t, 2^-32 turns, so that they wrap by themselves. A reading of n bits is "
         "shifted left by 32 - n.",
@@ -85,21 +86,15 @@ def _comment(name: str, chain: Chain, header: Header) -> str:
         ),
     ]
     if chain.whole:
-        text.append(f"Use: uint32_t corrected = {name}_correct(indicated);")
-    else:
-        text.append(
-            "Use: subtract the corrections of the shafts from the indicated output angle, each "
-            "looked up at the unwrapped angle of its own shaft, modulo one of its turns."
-        )
-    text += [
-        f"Differs from the model by at most {proof.max_arcsec:.6g} arcsec for every input of up to "
-        f"{bits}, rms {proof.rms_arcsec:.4g} arcsec ({proof.how}).",
-        f"Model: sha256 {header.sha256}",
+        own.append(f"Use: uint32_t corrected = {name}_correct(indicated);")
+    own += [
+        f"{'Or' if chain.whole else 'Use'}: int64_t corrected = {name}_correct_unwrapped(turns, "
+        "indicated), in 2^-32 turns: the whole turns that the output has made since the model's "
+        "zero, negative backwards, and the reading within the turn; (uint32_t) of it is the angle.",
+        f"The bound holds for every input of up to {bits} bits.",
         *table_lines(chain),
     ]
-    text += [f"Note: {note}." for note in header.notes]
-    lines = [line for part in text for line in comment_lines(98, part, " * ")]
-    return "/*\n" + "\n".join(lines) + "\n */"
+    return "/*\n" + "\n".join(header.comment(" * ", *own)) + "\n */"
 
 
 def _number(value: float, number: str) -> str:
@@ -224,37 +219,91 @@ static inline int32_t @name@_correction(uint32_t angle)
 }
 
 
-def _corrected(name: str, names: list[str], chain: Chain) -> str:
-    lines = [
-        "/* The true angle behind an indicated one. */",
-        f"static inline uint32_t {name}_correct(uint32_t indicated)",
-        "{",
-        f"    const uint32_t start = indicated - UINT32_C({chain.zero % 2**32});",
-        "    uint32_t corrected = start;",
-    ]
+def _steps(name: str, names: list[str], chain: Chain) -> list[str]:
+    """From ``start`` to ``corrected``, one line per table."""
+    lines = []
     for shaft, table in zip(names, chain.tables, strict=True):
         at = "start" if chain.at_indicated else "corrected"
-        if table.cycles != 1:
-            at += f" * UINT32_C({int(table.cycles)})"
-        lines.append(f"    corrected -= (uint32_t){name}_{shaft}_correction({at});")
-    return "\n".join([*lines, "    return corrected;", "}", ""])
+        if table.cycles != int(table.cycles):
+            at = f"{name}_{shaft}_place({at})"
+        elif table.cycles != 1:
+            at = f"(uint32_t){at} * UINT32_C({int(table.cycles)})"
+        else:
+            at = f"(uint32_t){at}"
+        lines.append(f"{name}_{shaft}_correction({at});")
+    return lines
+
+
+def _corrected(name: str, names: list[str], chain: Chain) -> str:
+    return "\n".join(
+        [
+            "/* The true angle behind an indicated one. */",
+            f"static inline uint32_t {name}_correct(uint32_t indicated)",
+            "{",
+            f"    const uint32_t start = indicated - UINT32_C({chain.zero % 2**32});",
+            "    uint32_t corrected = start;",
+            *(f"    corrected -= (uint32_t){step}" for step in _steps(name, names, chain)),
+            "    return corrected;",
+            "}",
+            "",
+        ]
+    )
+
+
+def _unwrapped(name: str, names: list[str], chain: Chain) -> str:
+    places = []
+    for shaft, table in zip(names, chain.tables, strict=True):
+        if table.cycles != int(table.cycles):
+            turns, fraction = table.ratio
+            places.append(
+                f"""\
+/* The angle of a shaft that makes {table.cycles:.17g} turns per output turn. */
+static inline uint32_t {name}_{shaft}_place(int64_t output)
+{{
+    return (uint32_t)(((uint64_t)(output >> 32) * UINT64_C({turns})
+        + (uint64_t)(uint32_t)output * UINT64_C({fraction})) >> 32);
+}}
+
+"""
+            )
+    return "".join(places) + "\n".join(
+        [
+            "/* The same with the whole turns of the output, before and after; 2^-32 turns. */",
+            f"static inline int64_t {name}_correct_unwrapped(int32_t turns, uint32_t angle)",
+            "{",
+            f"    const int64_t start = turns * INT64_C(4294967296) + angle - {_wide(chain.zero)};",
+            "    int64_t corrected = start;",
+            *(f"    corrected -= {step}" for step in _steps(name, names, chain)),
+            "    return corrected;",
+            "}",
+            "",
+        ]
+    )
+
+
+def _wide(value: int) -> str:
+    return f"INT64_C({value})" if value >= 0 else f"(-INT64_C({-value}))"
 
 
 def _self_test(name: str, chain: Chain) -> str:
-    pairs = self_test(chain)
     # Contracted products move a float's last bit: some 2^-32 turns.
     close = 0 if all(table.number != "f32" for table in chain.tables) else 64
-    rows = ",\n".join(f"        {{UINT32_C({a}), UINT32_C({b})}}" for a, b in pairs)
+    rows = ",\n".join(
+        f"        {{{turn}, UINT32_C({a}), UINT32_C({b})}}" for turn, a, b in self_test(chain)
+    )
+    result = f"{name}_correct(tests[i].angle)"
+    if not chain.whole:
+        result = f"(uint32_t){name}_correct_unwrapped(tests[i].turns, tests[i].angle)"
     return f"""\
 /* 0 where this program computes what was proven: run it once on the device. */
 static inline int {name}_self_test(void)
 {{
-    static const uint32_t pairs[{len(pairs)}][2] = {{
+    static const struct {{ int32_t turns; uint32_t angle, corrected; }} tests[8] = {{
 {rows}
     }};
     int i;
-    for (i = 0; i < {len(pairs)}; i++) {{
-        const uint32_t off = {name}_correct(pairs[i][0]) - pairs[i][1];
+    for (i = 0; i < 8; i++) {{
+        const uint32_t off = {result} - tests[i].corrected;
         if (off + UINT32_C({close}) > UINT32_C({2 * close})) {{
             return i + 1;
         }}

@@ -8,20 +8,23 @@ leaves 4.
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
+from fractions import Fraction
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .pattern import Pattern
+from .pattern import TurnPattern
 from .table import TURN, Table, make_table
 
 __all__ = ["Chain", "identifier", "make_chain"]
 
 Array = NDArray[np.float64]
 Angles = NDArray[np.uint32]
+Places = NDArray[np.int64] | Angles
 
 
 @dataclass(frozen=True)
@@ -31,7 +34,7 @@ class Chain:
     Attributes
     ----------
     zero : int
-        2^-32 turns that are subtracted first: the model's constant.
+        2^-32 turns that are subtracted first: the model's constant, whole turns kept.
     tables : tuple of Table
         Slow shafts first.
     at_indicated : bool
@@ -47,22 +50,47 @@ class Chain:
         """Whether one angle of the output is enough to find every table's place."""
         return all(table.cycles == int(table.cycles) for table in self.tables)
 
+    @property
+    def turns(self) -> tuple[int, bool]:
+        """Output turns to look at, and whether every table is back at its start after them."""
+        shared = 1
+        for table in self.tables:
+            ratio = Fraction(table.cycles).limit_denominator(_MOST_TURNS)
+            if abs(float(ratio) - table.cycles) > _SAME_RATIO * table.cycles:
+                return _TURNS, False
+            shared = math.lcm(shared, ratio.denominator)
+        return (shared, True) if shared <= _MOST_TURNS else (_TURNS, False)
+
     def corrected(self, angles: Angles, contracted: bool = False) -> Angles:
         """True angles behind indicated ones, both in 2^-32 turns."""
-        left = angles - np.uint32(self.zero % 2**32)
+        return self.corrected_unwrapped(angles, contracted).astype(np.uint32)
+
+    def corrected_unwrapped(self, places: Places, contracted: bool = False) -> Places:
+        """True angles behind indicated ones, with their turns, in 2^-32 turns."""
+        left = np.asarray(places).astype(np.int64) - self.zero
         start = left
         for table in self.tables:
-            at = (start if self.at_indicated else left) * np.uint32(int(table.cycles))
-            left = left - table.correction(at, contracted).astype(np.uint32)
+            at = table.place(start if self.at_indicated else left)
+            left = left - table.correction(at, contracted)
         return left
 
-    def correction(self, angles: Angles, contracted: bool = False) -> Array:
-        """What is subtracted in all, less the zero, in turns."""
-        taken = angles - self.corrected(angles, contracted) - np.uint32(self.zero % 2**32)
-        return taken.astype(np.int32) / TURN
+    def correction(self, places: Places, contracted: bool = False) -> Array:
+        """What is subtracted in all, in turns."""
+        taken = np.asarray(places).astype(np.int64) - self.corrected_unwrapped(places, contracted)
+        return np.asarray(taken / TURN)
 
 
-def make_chain(pattern: Pattern, method: str, number: str, entries: int | Sequence[int]) -> Chain:
+#: Turns after which shafts may be back together, and those looked at of shafts that never are.
+_MOST_TURNS = 64
+_TURNS = 16
+
+#: Of a ratio that is a fraction: its rounding in a double.
+_SAME_RATIO = 1e-15
+
+
+def make_chain(
+    pattern: TurnPattern, method: str, number: str, entries: int | Sequence[int]
+) -> Chain:
     """Tables of every shaft of a pattern; one number of entries for all, or one each."""
     shafts = pattern.shafts()
     sizes = [entries] * len(shafts) if isinstance(entries, int) else list(entries)
@@ -73,7 +101,7 @@ def make_chain(pattern: Pattern, method: str, number: str, entries: int | Sequen
         # Looked up at the zeroed reading: the place of an indicated-argument pattern moves.
         move = pattern.zero * cycles if at_indicated else 0.0
 
-        def moved(x: Array, part: Pattern = part, move: float = move) -> Array:
+        def moved(x: Array, part: TurnPattern = part, move: float = move) -> Array:
             return part.correction(x + move)
 
         name = _unlike(name, [table.shaft for table in tables])

@@ -10,13 +10,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..angles import ARCSEC_PER_TURN
 from ..errors import ArgumentError
-from ..errorunits import ErrorsIn, error_unit
-from ..model import HarmonicModel
-from ..modelfile import load_model
-from ..plainresult import PlainResult
-from .pattern import Pattern
+from ..model.file import load_model
+from ..model.model import HarmonicModel
+from ..support.angles import ARCSEC_PER_TURN
+from ..support.display_units import ErrorsIn, ErrorUnit, error_unit
+from ..support.kinds import told_kinds
+from ..support.plainresult import PlainResult, counted
+from .pattern import TurnPattern
 
 __all__ = ["Comparison", "compare"]
 
@@ -45,7 +46,11 @@ class Comparison(PlainResult):
     zero_deg : float
         Difference of the constants.
     argument : str
-        Angle of which it is a function.
+        Angle of which it is a function: the reading where one of them was read from a table that
+        is looked up there, which knows no other zero.
+    table_rms_arcsec, table_max_abs_arcsec : float or None
+        What tables that were read do beside their models: the lines between their entries and
+        their whole numbers add at most so much; None where neither was read from one.
     differ_in : list of str
         Terms that only one of them has, or with other parameters: not compared.
     """
@@ -57,10 +62,18 @@ class Comparison(PlainResult):
     zero_deg: float
     argument: str
     differ_in: list[str]
+    table_rms_arcsec: float | None = None
+    table_max_abs_arcsec: float | None = None
 
     def to_dict(self) -> dict[str, Any]:
         """All of it."""
         return dict(vars(self))
+
+    def _brief(self) -> str:
+        return (
+            f"{self.rms_arcsec:.4g} arcsec rms, {self.max_abs_arcsec:.4g} max abs, "
+            f"{counted(self.orders, 'order')}"
+        )
 
     def summary(self, errors_in: ErrorsIn = "auto") -> str:
         """The numbers as lines of text.
@@ -76,6 +89,7 @@ class Comparison(PlainResult):
             f"difference: {unit.text(self.rms_arcsec)} rms, {unit.number(self.max_abs_arcsec)} "
             f"max abs, zero {self.zero_deg:.6g} deg"
             + ("" if self.std_arcsec is None else f"; known to {unit.text(self.std_arcsec)}"),
+            *self._arithmetic(unit),
             f"  order  {f'amplitude/{unit.name}':>16}  phase/deg  {f'std/{unit.name}':>10}",
         ]
         for row in self.orders:
@@ -84,7 +98,16 @@ class Comparison(PlainResult):
         lines += [f"not compared: {kind}" for kind in self.differ_in]
         return "\n".join(lines)
 
+    def _arithmetic(self, unit: ErrorUnit) -> list[str]:
+        if self.table_max_abs_arcsec is None or self.table_rms_arcsec is None:
+            return []
+        return [
+            f"the table's own arithmetic adds at most {unit.text(self.table_max_abs_arcsec)}, "
+            f"{unit.number(self.table_rms_arcsec)} rms: lines between its entries, whole numbers"
+        ]
 
+
+@told_kinds
 def compare(
     a: HarmonicModel | str | PathLike[str], b: HarmonicModel | str | PathLike[str]
 ) -> Comparison:
@@ -92,7 +115,12 @@ def compare(
 
     .. math:: \Delta(\theta) = \varepsilon_b(\theta) - \varepsilon_a(\theta)
 
-    at the true angle, also of a model whose argument is the indicated one.
+    at the true angle, also of a model whose argument is the indicated one. Where one of them was
+    read from a table that is looked up at the reading r, whose true angle has an unknown zero,
+
+    .. math:: \Delta(r) = \theta_a(r) - \theta_b(r)
+
+    with its mean taken out: two corrections of one device, whatever their zeros.
 
     Parameters
     ----------
@@ -117,33 +145,38 @@ def compare(
     360.0
     """
     first, second = (m if isinstance(m, HarmonicModel) else load_model(m) for m in (a, b))
-    one, two = Pattern(first), Pattern(second)
+    one, two = TurnPattern(first), TurnPattern(second)
     orders = sorted({*one.lines, *two.lines})
     if not (one.is_periodic and two.is_periodic) and first.argument != second.argument:
         raise ArgumentError(
             "models of other arguments, with shafts that do not come back to their start after "
-            "one output turn, cannot be compared per order: fit both with the same --argument"
+            "one output turn, cannot be compared per order: fit both with the same `argument=`"
         )
-    same = first.argument == second.argument
+    at_readings = _is_looked_up(first) or _is_looked_up(second)
+    same = first.argument == second.argument and not at_readings
     turns = 1 if one.is_periodic and two.is_periodic else _TURNS
     top = max(orders, default=1.0)
     points = 1 << math.ceil(math.log2(max(4096.0, _POINTS * top * turns)))
     if points > _MOST_POINTS:
         raise ArgumentError(f"order {top:g} is too high to be compared over a turn")
-    theta = np.arange(points, dtype=np.float64) * (turns / points)
-    if same:
-        difference = two.error(theta) - one.error(theta)
+    x = np.arange(points, dtype=np.float64) * (turns / points)
+    if at_readings:
+        difference = two.correction(x) - one.correction(x)
+    elif same:
+        difference = two.error(x) - one.error(x)
     else:
-        difference = _at_truth(two, theta) - _at_truth(one, theta)
-    zero = float(np.mean(difference)) if turns == 1 else 0.0
+        difference = _at_truth(two, x) - _at_truth(one, x)
+    zero = float(np.mean(difference)) if turns == 1 or at_readings else 0.0
     difference = difference - zero
+    spectrum = np.fft.rfft(difference) * (2.0 / points)
     rows: list[dict[str, float | None]] = []
     for order in orders:
         if same:
             z = _line(second, order) - _line(first, order)
+        elif turns == 1:
+            z = complex(spectrum[round(order)].conjugate())
         else:
-            z = complex(2.0 * np.mean(difference * np.exp(-2j * np.pi * order * theta)))
-            z = complex(z.real, -z.imag)
+            z = complex(2.0 * np.mean(difference * np.exp(2j * np.pi * order * x)))
         rows.append(
             {
                 "order": order,
@@ -152,6 +185,8 @@ def compare(
                 "std_arcsec": _std(first, second, order),
             }
         )
+    tables = [m.fit.table for m in (first, second) if m.fit is not None and m.fit.table is not None]
+    per_unit = [ARCSEC_PER_TURN / m.period for m in (first, second) if m.fit and m.fit.table]
     terms = [
         kind
         for kind in dict.fromkeys(t.kind for t in (*first.terms, *second.terms))
@@ -162,17 +197,35 @@ def compare(
         rms_arcsec=float(np.sqrt(np.mean(difference**2))) * ARCSEC_PER_TURN,
         max_abs_arcsec=float(np.max(np.abs(difference))) * ARCSEC_PER_TURN,
         std_arcsec=_over_a_turn(one, two),
-        zero_deg=(two.zero - one.zero + zero) * 360.0,
-        argument=first.argument if same else "reference",
+        zero_deg=_signed(two.zero - one.zero + zero) * 360.0,
+        argument="indicated" if at_readings else first.argument if same else "reference",
         differ_in=terms,
+        table_rms_arcsec=math.hypot(*(t.rms * u for t, u in zip(tables, per_unit, strict=True)))
+        if tables
+        else None,
+        table_max_abs_arcsec=sum(t.max_abs * u for t, u in zip(tables, per_unit, strict=True))
+        if tables
+        else None,
     )
+
+
+def _is_looked_up(model: HarmonicModel) -> bool:
+    """Whether a model was read from a table that a device looks up at its reading."""
+    fit = model.fit
+    if fit is None or fit.method != "table":
+        return False
+    return fit.table is None or fit.table.argument == "indicated"
+
+
+def _signed(turns: float) -> float:
+    return turns - math.ceil(turns - 0.5)
 
 
 #: Turns over which shafts that do not come back are looked at.
 _TURNS = 32
 
 
-def _at_truth(pattern: Pattern, theta: Array) -> Array:
+def _at_truth(pattern: TurnPattern, theta: Array) -> Array:
     return pattern.reading(theta) - theta - pattern.zero
 
 
@@ -206,7 +259,7 @@ def _std(first: HarmonicModel, second: HarmonicModel, order: float) -> float | N
     return math.sqrt(total) * ARCSEC_PER_TURN if known else None
 
 
-def _over_a_turn(one: Pattern, two: Pattern) -> float | None:
+def _over_a_turn(one: TurnPattern, two: TurnPattern) -> float | None:
     known = [p.uncertainty_arcsec for p in (one, two) if p.uncertainty_arcsec is not None]
     return math.hypot(*known) if known else None
 

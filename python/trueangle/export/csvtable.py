@@ -9,15 +9,17 @@ from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar
 
 import numpy as np
+from numpy.typing import NDArray
 
-from ..angles import ARCSEC_PER_TURN
 from ..errors import ArgumentError
-from ..files import Kind
-from ..model import HarmonicModel
+from ..model.model import HarmonicModel
+from ..support.angles import ARCSEC_PER_TURN
+from ..support.files import Kind
 from .knots import linear_knots
-from .pattern import Pattern
+from .pattern import TurnPattern
+from .proof import Correction, Places, enough_bits
 from .reading import failed, sampled_model
-from .target import Header, Made, Option, Part, Target
+from .target import CommentBlock, Made, Option, TablePart, Target
 
 __all__ = ["CsvTable"]
 
@@ -27,35 +29,32 @@ _SIZES = (36, 45, 60, 72, 90, 120, 180, 240, 360, 720, 1440, 3600, 7200, 36000)
 
 
 class CsvTable(Target):
-    """``--to csv``: ``indicated_deg, correction_deg``, to be interpolated linearly."""
+    """Target ``csv``: ``indicated_deg, correction_deg``, to be interpolated linearly."""
 
     name = "csv"
     what = "lines of indicated_deg,correction_deg to interpolate between"
     kind: ClassVar[Kind] = Kind("a table of corrections (CSV)", (".csv",))
     sign = "subtract"
     options = {
-        "bits": Option(int, 24, "bits of a reading: so many are all evaluated, up to 24"),
+        "bits": Option(int, 20, "2^bits readings are evaluated, and more where entries are many"),
         "entries": Option(int, 360, "lines to a turn (the first one is repeated at 360)"),
     }
 
     def sizes(self, options: Mapping[str, Any]) -> Sequence[int]:
         return _SIZES
 
-    def make(self, pattern: Pattern, options: Mapping[str, Any]) -> Made:
+    def make(self, pattern: TurnPattern, options: Mapping[str, Any]) -> Made:
         entries = options["entries"]
         if not 4 <= entries <= 1_000_000:
-            raise ArgumentError(f"--entries must be from 4 to 1000000, got {entries}")
+            raise ArgumentError(f"entries must be from 4 to 1000000, got {entries}")
         pattern.check_one_turn(self.name)
         top = max(pattern.lines, default=0.0)
-        pattern.check_orders(entries, self.name, f"use --entries {int(2 * top) + 1} or more")
+        pattern.check_orders(entries, self.name, f"use `entries={int(2 * top) + 1}` or more")
         values = np.round(linear_knots(pattern.correction, entries) * 360.0, 9)
         knots = np.concatenate([values, values[:1]])
         places = np.arange(entries + 1) * 360.0 / entries
 
-        def correction(angles: Any) -> Any:
-            return np.interp(angles * (360.0 / 2.0**32), places, knots) / 360.0
-
-        def text(header: Header) -> str:
+        def text(header: CommentBlock) -> str:
             out = io.StringIO()
             writer = csv.writer(out, lineterminator="\n")
             writer.writerow(["indicated_deg", "correction_deg"])
@@ -66,10 +65,13 @@ class CsvTable(Target):
             text=text,
             entries=entries,
             bytes=16 * (entries + 1),
-            parts=(Part((correction,), pattern.correction, 2.0 * pattern.slope),),
+            part=TablePart.at_readings(
+                pattern, _interpolated(values), zero=pattern.zero, continuous=True
+            ),
             floor_arcsec=_LAST_DIGIT / math.sqrt(18.0) / 360.0 * ARCSEC_PER_TURN,
             step=_LAST_DIGIT / 360.0,
             zero_deg=pattern.zero * 360.0,
+            bits=enough_bits(options["bits"], entries),
         )
 
     def read(self, text: str, path: str, options: Mapping[str, Any]) -> HarmonicModel:
@@ -90,6 +92,18 @@ class CsvTable(Target):
             table[:, 0], np.arange(len(table)) * 360.0 / (len(table) - 1), atol=1e-6
         ):
             raise failed(path, "lines must stand at equal distances from 0 to 360 degrees")
+        values = table[:-1, 1]
         return sampled_model(
-            table[:-1, 1] / 360.0, path, text, step=_LAST_DIGIT / 360.0, name=self.name
+            values / 360.0, path, self, _interpolated(values), step=_LAST_DIGIT / 360.0
         )
+
+
+def _interpolated(values: NDArray[np.float64]) -> Correction:
+    """Of values in degrees at equal distances; the first one again at the end of the turn."""
+    knots = np.append(values, values[0])
+    places = np.arange(len(knots)) * (2.0**32 / len(values))
+
+    def correction(angles: Places) -> NDArray[np.float64]:
+        return np.asarray(np.interp(angles % 2**32, places, knots) / 360.0)
+
+    return correction

@@ -5,25 +5,26 @@ from __future__ import annotations
 import hashlib
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from os import PathLike, fspath
 from pathlib import Path
 from typing import Any
 
 from .._core import __version__
-from ..angles import ARCSEC_PER_TURN
 from ..errors import ArgumentError, TrueAngleError
-from ..errorunits import ErrorsIn, error_unit
-from ..files import check_output, read_whole, written_atomically
-from ..model import HarmonicModel
-from ..modelfile import load_model, model_text
-from ..plainresult import PlainResult
-from .pattern import Pattern
-from .proof import Proof, lost_orders, prove
-from .target import Header, Made, Target
+from ..model.file import load_model, model_text
+from ..model.model import HarmonicModel
+from ..support.display_units import error_unit
+from ..support.files import check_output, read_whole, written_atomically
+from ..support.kinds import told_kinds
+from .exported import HEADER_DIGITS, Exported
+from .leftout import left_out
+from .pattern import TurnPattern, of_direction
+from .proof import Proof, lost_orders, prove, upward
+from .target import CommentBlock, Made, Target
 from .targets import target_of
 
-__all__ = ["Exported", "export_model", "import_model"]
+__all__ = ["export_model", "import_model"]
 
 #: Most bytes of a table that is read: a Mechaduino's takes 200 kB as text.
 TABLE_BYTES = 16 << 20
@@ -32,88 +33,7 @@ TABLE_BYTES = 16 << 20
 _ROUGH_BITS = 14
 
 
-@dataclass(frozen=True)
-class Exported(PlainResult):
-    """A table made of a model, and how far it is from it.
-
-    Attributes
-    ----------
-    target, sign, argument : str
-        ``sign`` is what the target does with a value, ``argument`` the angle at which it
-        looks up.
-    entries, bytes : int
-        Numbers of the table and the memory they take on the target.
-    max_difference_arcsec, rms_difference_arcsec : float
-        From the model, over every input, in the target's own arithmetic.
-    floor_arcsec : float
-        rms that the number format alone leaves.
-    lost : list of dict
-        ``{"order", "arcsec"}``: amplitude by which each order of the model differs.
-    proven : bool
-        Every input was evaluated, or a bound covers what lies between those that were.
-    proof : str
-        How.
-    zero_deg : float
-        Constant of the model that the table leaves to the target's own zero.
-    left_out : list of str
-        Terms of the model that the table cannot hold.
-    notes : list of str
-        What to know before it is used.
-    text : str
-        The file's content.
-    output : str or None
-        Where it was written.
-    """
-
-    target: str
-    sign: str
-    argument: str
-    entries: int
-    bytes: int
-    max_difference_arcsec: float
-    rms_difference_arcsec: float
-    floor_arcsec: float
-    lost: list[dict[str, float]]
-    proven: bool
-    proof: str
-    zero_deg: float
-    left_out: list[str]
-    notes: list[str]
-    tables: list[dict[str, Any]]
-    sha256: str
-    text: str = field(repr=False)
-    output: str | None = None
-
-    def to_dict(self) -> dict[str, Any]:
-        """Everything but the text."""
-        return {key: value for key, value in vars(self).items() if key != "text"}
-
-    def summary(self, errors_in: ErrorsIn = "auto") -> str:
-        """What a person wants to know, in some lines.
-
-        Parameters
-        ----------
-        errors_in : {"auto", "arcsec", "deg", "mrad", "count"} or float
-            Unit of the errors; by itself arcsec, or degrees where one reaches a degree. A
-            number is the counts of a turn.
-        """
-        unit = error_unit(errors_in, self.max_difference_arcsec)
-        where = f"{self.output}: " if self.output else ""
-        lines = [
-            f"{where}{self.entries} entries for {self.target}, {self.bytes} bytes; "
-            f"{self.sign}, looked up at the {self.argument} angle",
-            f"differs from the model by at most {unit.text(self.max_difference_arcsec)}, "
-            f"{unit.number(self.rms_difference_arcsec)} rms ({self.proof}); "
-            f"the number format alone leaves {unit.number(self.floor_arcsec)} rms",
-        ]
-        worst = max(self.lost, key=lambda row: row["arcsec"], default=None)
-        if worst is not None:
-            lines.append(
-                f"of the orders, {worst['order']:g} loses most: {unit.text(worst['arcsec'])}"
-            )
-        return "\n".join([*lines, *(f"note: {note}" for note in self.notes)])
-
-
+@told_kinds
 def export_model(
     model: HarmonicModel | str | PathLike[str],
     target: str,
@@ -139,7 +59,8 @@ def export_model(
     path : path, optional
         File to write; without, the text is in the result only.
     max_arcsec : float, optional
-        Take the smallest table that differs by at most this, or refuse.
+        Take the smallest table that differs by at most this, what is left out included, or
+        refuse.
     **options
         Of the target: ``entries``, ``bits``, ``method``, ``number`` ...
 
@@ -179,37 +100,35 @@ def export_model(
             given["name"] = Path(path).stem
     if "name" in given and given["name"] is None:
         given["name"] = "angle"
-    pattern = Pattern(loaded)
+    pattern = TurnPattern(loaded)
     if pattern.is_empty and not (found.takes_direction and pattern.has_direction):
         raise ArgumentError(
             "the model has no harmonics and nothing else that follows the angle: there is nothing "
             "to put into a table"
         )
+    rows = left_out(pattern, found.takes_direction)
+    beside = sum(row["size_arcsec"] for row in rows)
     if max_arcsec is None:
         made = found.make(pattern, given)
     else:
-        made = _smallest(found, pattern, given, max_arcsec)
+        made = _smallest(found, pattern, given, _share(max_arcsec, beside, rows))
     proof = _proven(made, given.get("bits", 24))
-    if max_arcsec is not None and proof.max_arcsec > max_arcsec:
+    largest = upward(proof.max_arcsec)
+    total = upward(largest + beside) if rows else largest
+    if max_arcsec is not None and total > max_arcsec:
         raise ArgumentError(
-            f"{target} differs by up to {proof.max_arcsec:.4g} arcsec with these options, and at "
+            f"{target} differs by up to {total:.4g} arcsec with these options, and at "
             f"most {max_arcsec:g} is asked for"
         )
     notes = [*made.notes, *_notes(found, pattern, made)]
-    header = Header(
-        given.get("name", "angle"), sha256, f"trueangle {__version__}", proof, tuple(notes)
-    )
-    text = made.text(header)
-    if path is not None:
-        with written_atomically(path, kind=found.kind, inputs=inputs, hashes=[sha256]) as file:
-            file.write(text)
-    return Exported(
+    result = Exported(
         target=target,
         sign=found.sign_of(given),
         argument=found.argument,
         entries=made.entries,
         bytes=made.bytes,
-        max_difference_arcsec=proof.max_arcsec,
+        max_difference_arcsec=largest,
+        max_difference_total_arcsec=total,
         rms_difference_arcsec=proof.rms_arcsec,
         floor_arcsec=made.floor_arcsec,
         lost=_lost(made, pattern),
@@ -218,15 +137,28 @@ def export_model(
         if found.arithmetic_known
         else f"{proof.how} as its description has it, the device's own arithmetic is not known",
         zero_deg=made.zero_deg,
-        left_out=_left_out(found, pattern),
+        left_out=rows,
         notes=notes,
         tables=list(made.tables),
         sha256=sha256,
-        text=text,
+        text="",
         output=None if path is None else fspath(path),
     )
+    header = CommentBlock(
+        given.get("name", "angle"),
+        f"D{result.difference(error_unit('arcsec'), HEADER_DIGITS)[1:]}.",
+        proof,
+        _source(pattern, sha256, None if isinstance(model, HarmonicModel) else fspath(model)),
+        tuple(notes),
+    )
+    text = made.text(header)
+    if path is not None:
+        with written_atomically(path, kind=found.kind, inputs=inputs, hashes=[sha256]) as file:
+            file.write(text)
+    return replace(result, text=text)
 
 
+@told_kinds
 def import_model(
     path: str | PathLike[str],
     target: str,
@@ -287,30 +219,51 @@ def _model(
     )
 
 
+def _source(pattern: TurnPattern, sha256: str, path: str | None) -> tuple[str, ...]:
+    """Lines on the model of a table: its file, what it was made from, where it holds."""
+    model = pattern.source
+    names = ", ".join(source.file for source in model.provenance.inputs[:_MOST_FILES])
+    more = len(model.provenance.inputs) - _MOST_FILES
+    lines = [
+        f"Made by trueangle {__version__}. Model: {path or 'in memory'}, sha256 {sha256}"
+        + (f", fitted from {names}" if names else "")
+        + (f" and {more} more" if more > 0 else "")
+    ]
+    span = model.partial_span
+    if span is not None:
+        turn = 360.0 / pattern.period
+        lines.append(f"Calibrated from {span[0] * turn:.6g} to {span[1] * turn:.6g} deg.")
+    return tuple(lines)
+
+
+#: Files of readings that a table names.
+_MOST_FILES = 4
+
+
+def _share(max_arcsec: float, beside: float, rows: list[dict[str, Any]]) -> float:
+    """What of the largest difference is left to the table."""
+    if not (math.isfinite(max_arcsec) and max_arcsec > 0.0):
+        raise ArgumentError(f"max_arcsec must be a positive number, got {max_arcsec!r}")
+    if beside >= max_arcsec:
+        names = ", ".join(f"{row['term']} {row['size_arcsec']:.4g} arcsec" for row in rows)
+        raise ArgumentError(
+            f"a table of the angle leaves out {names}, and at most {max_arcsec:g} is asked for"
+        )
+    return max_arcsec - beside
+
+
 def _proven(made: Made, bits: int) -> Proof:
     bits = made.bits or bits
     if not 1 <= bits <= 32:
-        raise ArgumentError(f"--bits must be from 1 to 32, got {bits}")
-    found = [
-        prove(part.corrections, part.exact, bits, part.slope, part.resolution)
-        for part in made.parts
-    ]
-    if len(found) == 1 and not made.neglected:
-        return found[0]
-    return Proof(
-        max_arcsec=sum(p.max_arcsec for p in found) + made.neglected * ARCSEC_PER_TURN,
-        rms_arcsec=math.hypot(*(p.rms_arcsec for p in found)),
-        inputs=found[0].inputs,
-        every_input=all(p.every_input for p in found),
-        margin_arcsec=sum(p.margin_arcsec for p in found) + made.neglected * ARCSEC_PER_TURN,
-        worst=found[0].worst,
-    )
+        raise ArgumentError(f"bits must be from 1 to 32, got {bits}")
+    part = made.part
+    return prove(part.corrections, part.exact, bits, part.resolution, part.turns, part.continuous)
 
 
-def _smallest(target: Target, pattern: Pattern, options: dict[str, Any], max_arcsec: float) -> Made:
+def _smallest(
+    target: Target, pattern: TurnPattern, options: dict[str, Any], max_arcsec: float
+) -> Made:
     """The first size that keeps ``max_arcsec`` on a rough grid and then on every input."""
-    if not (math.isfinite(max_arcsec) and max_arcsec > 0.0):
-        raise ArgumentError(f"--max-arcsec must be a positive number, got {max_arcsec!r}")
     sizes = target.sizes(options)
     if not sizes:
         return target.make(pattern, options)
@@ -325,7 +278,7 @@ def _smallest(target: Target, pattern: Pattern, options: dict[str, Any], max_arc
 
 def _first(
     target: Target,
-    pattern: Pattern,
+    pattern: TurnPattern,
     options: dict[str, Any],
     max_arcsec: float,
     sizes: Sequence[int],
@@ -338,7 +291,11 @@ def _first(
         except TrueAngleError as error:
             refused = error
             continue
-        rough = _proven(replace(made, bits=min(_ROUGH_BITS, made.bits or bits)), 1).max_arcsec
+        part = made.part._replace(continuous=False)
+        rough_bits = min(_ROUGH_BITS, made.bits or bits)
+        looked = _proven(replace(made, part=part, bits=rough_bits), 1)
+        # What lies between the few readings of a rough look is left to the closer one.
+        rough = looked.max_arcsec - looked.margin_arcsec
         best = min(best, rough)
         if rough <= max_arcsec:
             exact = _proven(made, bits).max_arcsec
@@ -353,27 +310,21 @@ def _first(
     )
 
 
-def _lost(made: Made, pattern: Pattern) -> list[dict[str, float]]:
+def _lost(made: Made, pattern: TurnPattern) -> list[dict[str, float]]:
     if made.lost is not None:
         return made.lost()
-    part = made.parts[0]
+    part = made.part
     found = lost_orders(part.corrections[0], part.exact, pattern.lines)
     return [{"order": float(order), "arcsec": lost} for order, lost in found.items()]
 
 
-def _left_out(target: Target, pattern: Pattern) -> list[str]:
-    return [
-        kind for kind, directed in pattern.left_out if not (directed and target.takes_direction)
-    ]
-
-
-def _notes(target: Target, pattern: Pattern, made: Made) -> list[str]:
+def _notes(target: Target, pattern: TurnPattern, made: Made) -> list[str]:
     notes = []
-    left_out = _left_out(target, pattern)
-    if left_out:
+    beside = [t.kind for t in pattern.left_out if not (target.takes_direction and of_direction(t))]
+    if beside:
         notes.append(
-            f"the model's {', '.join(left_out)} cannot be held by a table of the angle and "
-            f"{'is' if len(left_out) == 1 else 'are'} not exported"
+            f"the model's {', '.join(beside)} cannot be held by a table of the angle and "
+            f"{'is' if len(beside) == 1 else 'are'} not exported"
         )
     uncertainty = pattern.uncertainty_arcsec
     if uncertainty is not None and made.floor_arcsec > uncertainty:
@@ -385,6 +336,11 @@ def _notes(target: Target, pattern: Pattern, made: Made) -> list[str]:
         notes.append(
             f"a constant of {made.zero_deg:.9g} deg is not in the table: the corrected angle is "
             "larger by it, so take it off where the target sets its zero"
+            + (
+                ""
+                if target.argument == "indicated"
+                else "; do so before the table is used, whose positions are true angles"
+            )
         )
     span = pattern.source.partial_span
     if span is not None:

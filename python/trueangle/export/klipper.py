@@ -15,14 +15,15 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from ..angles import ARCSEC_PER_TURN
 from ..errors import ArgumentError
-from ..files import Kind, read_whole
-from ..model import HarmonicModel
+from ..model.model import HarmonicModel
+from ..support.angles import ARCSEC_PER_TURN
+from ..support.files import Kind, read_whole
 from .knots import linear_knots, rounded_knots
-from .pattern import Pattern
+from .pattern import TurnPattern
+from .proof import Correction, Places
 from .reading import ReadTable, failed, function_model
-from .target import Header, Made, Option, Part, Target
+from .target import CommentBlock, Made, Option, TablePart, Target
 
 __all__ = ["Klipper", "calibrated", "solved_knots"]
 
@@ -38,10 +39,10 @@ Whole = NDArray[np.int64]
 
 
 class Klipper(Target):
-    """``--to klipper --existing printer.cfg``: the lines of ``calibrate``."""
+    """Target ``klipper``: the lines of ``calibrate``."""
 
     name = "klipper"
-    what = "the calibrate list of an [angle] section; needs --existing printer.cfg"
+    what = 'the calibrate list of an [angle] section; needs `existing="printer.cfg"`'
     kind: ClassVar[Kind] = Kind("a section of a printer.cfg", (".cfg", ".txt"))
     sign = "absolute"
     files = ("existing",)
@@ -55,19 +56,21 @@ class Klipper(Target):
         "bits": Option(int, 16, "bits of a reading: Klipper's are 16"),
     }
 
-    def make(self, pattern: Pattern, options: Mapping[str, Any]) -> Made:
+    def make(self, pattern: TurnPattern, options: Mapping[str, Any]) -> Made:
         if options["existing"] is None:
             raise ArgumentError(
-                "klipper needs --existing, the printer.cfg (or its saved part) with the calibrate "
+                "klipper needs `existing=`, the printer.cfg (or its saved part) with the calibrate "
                 "list that ANGLE_CALIBRATE made: where the list begins sets the motor's phase"
             )
         if options["bits"] > 16:
-            raise ArgumentError("--bits must be at most 16: Klipper's angles have 65536 counts")
+            raise ArgumentError("bits must be at most 16: Klipper's angles have 65536 counts")
         path = options["existing"]
         raw = read_whole(path, _CONFIG_BYTES, "a printer.cfg")
         section, present = _list_of(raw.decode("utf-8", "replace"), path, options["section"])
         pattern.check_one_turn(self.name)
-        pattern.check_orders(KNOTS, self.name, "Klipper has 64 knots and no setting; use --to c")
+        pattern.check_orders(
+            KNOTS, self.name, 'Klipper has 64 knots and no setting; use `target="c"`'
+        )
         steps = len(present)
         backwards = present[-2] > present[-1]
         direction = -1 if backwards else 1
@@ -85,25 +88,23 @@ class Klipper(Target):
             )
         values, knots, zero = _values(pattern, start, places)
 
-        def correction(angles: NDArray[np.uint32]) -> Array:
-            counts = (angles >> np.uint32(16)).astype(np.int64)
-            return np.asarray((counts - calibrated(counts, knots)) / TURN - zero)
-
-        def text(header: Header) -> str:
+        def text(header: CommentBlock) -> str:
             cells = [f"{value:.1f}" for value in values]
             lines = [", ".join(cells[i : i + 8]) for i in range(0, steps, 8)]
             body = ",\n".join(f"\t{line}" for line in lines)
-            return f"[{section}]\ncalibrate =\n{body}\n"
+            lines = header.comment("# ", "Readings of the sensor at consecutive full steps.")
+            return "\n".join([f"[{section}]", *lines, "calibrate =", body, ""])
 
         return Made(
             text=text,
             entries=steps,
             bytes=8 * (KNOTS + 1),
-            parts=(Part((correction,), pattern.correction),),
+            # Klipper's positions count from the full step whose true angle is ``zero``.
+            part=TablePart.at_readings(pattern, _device(knots), zero=-zero),
             # Knots and results are whole counts.
             floor_arcsec=math.sqrt(1.0 / 18.0 + 1.0 / 12.0) / TURN * ARCSEC_PER_TURN,
             step=1.0 / TURN,
-            zero_deg=(pattern.zero + zero) * 360.0,
+            zero_deg=-zero * 360.0,
             notes=(
                 f"replaces the values of calibrate in [{section}]; the other keys of the section "
                 "stay as they are",
@@ -128,13 +129,22 @@ class Klipper(Target):
         return function_model(
             [ReadTable("output", 1.0, lambda x: function(x) - mean, KNOTS, 1.0 / TURN)],
             path,
-            self.name,
+            self,
+            _device(knots),
             note="solved from a calibrate list as Klipper does; its zero is a full step and "
             "taken out; the uncertainty is that of whole counts",
         )
 
 
-def _values(pattern: Pattern, start: float, places: Array) -> tuple[Array, Whole, float]:
+def _device(knots: Whole) -> Correction:
+    def correction(angles: Places) -> Array:
+        counts = angles % 2**32 >> 16
+        return np.asarray((counts - calibrated(counts, knots)) / TURN)
+
+    return correction
+
+
+def _values(pattern: TurnPattern, start: float, places: Array) -> tuple[Array, Whole, float]:
     """The list, the knots that Klipper solves from it, and the true angle of its position 0.
 
     Klipper rounds the knots it solves. The readings of the model would give it knots that are
@@ -186,7 +196,7 @@ def _list_of(text: str, path: str, section: str | None) -> tuple[str, Array]:
     if len(chosen) != 1:
         have = ", ".join(f"[{n}]" for n in found) or "none"
         raise failed(
-            path, f"one section with a calibrate list is wanted, {have} there; give --section"
+            path, f"one section with a calibrate list is wanted, {have} there; give `section=`"
         )
     ((name, (at, cells)),) = chosen.items()
     try:

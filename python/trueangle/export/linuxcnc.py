@@ -9,14 +9,15 @@ from typing import Any, ClassVar
 import numpy as np
 
 from ..errors import ArgumentError
-from ..files import Kind
-from ..model import HarmonicModel
+from ..model.model import HarmonicModel
+from ..support.files import Kind
 from .oneturn import line_floor
-from .pattern import Pattern
+from .pattern import TurnPattern
+from .proof import enough_bits
 from .reading import failed
-from .setpoint import Travel, steepness
+from .setpoint import NOMINAL_DECIMALS, Travel, steepness
 from .setpointreading import travel_model
-from .target import Header, Made, Option, Target
+from .target import CommentBlock, Made, Option, Target
 
 __all__ = ["LinuxCnc"]
 
@@ -28,7 +29,7 @@ _SIZES = (12, 18, 24, 36, 48, 60, 72, 90, 120, 180, 240)
 
 
 class LinuxCnc(Target):
-    """``--to linuxcnc``: the file that ``COMP_FILE`` of a joint names."""
+    """Target ``linuxcnc``: the file that ``COMP_FILE`` of a joint names."""
 
     name = "linuxcnc"
     what = "a COMP_FILE of a rotary joint, forward and reverse"
@@ -43,42 +44,44 @@ class LinuxCnc(Target):
     options = {
         "type": Option(("0", "1"), "1", "COMP_FILE_TYPE: 0 positions, 1 trims"),
         "entries": Option(int, 180, "to a turn; 256 in all"),
-        "start": Option(float, 0.0, "of the travel, degrees"),
-        "stop": Option(float, 360.0, "of the travel, degrees"),
-        "bits": Option(int, 24, "bits of a position over the travel"),
+        "start": Option(
+            float, None, "of the travel, degrees (default: what the model was fitted on, else 0)"
+        ),
+        "stop": Option(float, None, "of the travel, degrees (default: likewise, else 360)"),
+        "bits": Option(int, 20, "2^bits positions are evaluated, and more where entries are many"),
     }
 
     def sizes(self, options: Mapping[str, Any]) -> Sequence[int]:
         return _SIZES
 
-    def make(self, pattern: Pattern, options: Mapping[str, Any]) -> Made:
-        travel = Travel.of(
-            pattern, self.name, options["start"], options["stop"], options["entries"], MOST
-        )
+    def make(self, pattern: TurnPattern, options: Mapping[str, Any]) -> Made:
+        travel = Travel.of(pattern, self.name, options, MOST)
         # The motor is told position + trim: the trim is the error.
         forward, reverse = (
             np.round(values * 360.0, _DECIMALS) for values in (travel.forward, travel.reverse)
         )
-        nominal = np.round(travel.nominal, _DECIMALS)
         positions = options["type"] == "0"
 
-        def text(header: Header) -> str:
+        def text(header: CommentBlock) -> str:
             rows = []
-            for x, f, r in zip(nominal, forward, reverse, strict=True):
+            for x, f, r in zip(travel.nominal, forward, reverse, strict=True):
                 a, b = (x - f, x - r) if positions else (f, r)
-                rows.append(f"{x:.{_DECIMALS}f} {a:.{_DECIMALS}f} {b:.{_DECIMALS}f}")
-            return "\n".join(rows) + "\n"
+                rows.append(f"{x:.{NOMINAL_DECIMALS}f} {a:.{_DECIMALS}f} {b:.{_DECIMALS}f}")
+            # LinuxCNC reads up to the first line that is not three numbers.
+            own = f"{self.what}, COMP_FILE_TYPE = {options['type']}; degrees."
+            return "\n".join([*rows, *header.comment("# ", own), ""])
 
         slope, bend = steepness(travel)
         step = 10.0**-_DECIMALS / 360.0
         return Made(
             text=text,
-            entries=len(nominal),
-            bytes=24 * len(nominal),
-            parts=(travel.part(pattern, forward / 360.0, reverse / 360.0),),
+            entries=len(forward),
+            bytes=24 * len(forward),
+            part=travel.part(pattern, forward / 360.0, reverse / 360.0),
             floor_arcsec=line_floor(step),
             step=step,
             zero_deg=pattern.zero * 360.0,
+            bits=enough_bits(options["bits"], len(forward)),
             lost=lambda: travel.lost(pattern),
             notes=(
                 f"set COMP_FILE_TYPE = {options['type']} of the joint",
@@ -90,6 +93,7 @@ class LinuxCnc(Target):
 
     def read(self, text: str, path: str, options: Mapping[str, Any]) -> HarmonicModel:
         rows: list[list[float]] = []
+        decimals = 0
         for number, line in enumerate(text.split("\n"), 1):
             words = line.split()
             try:
@@ -97,7 +101,8 @@ class LinuxCnc(Target):
                 if len(triplet) != 3 or not all(map(math.isfinite, triplet)):
                     raise ValueError
             except ValueError:
-                if any(part.strip() for part in text.split("\n")[number - 1 :]):
+                rest = [part.strip() for part in text.split("\n")[number - 1 :]]
+                if any(part and part[0] not in "#;" for part in rest):
                     raise failed(
                         path,
                         f"three numbers are wanted, got {line.strip()[:40]!r}: LinuxCNC stops "
@@ -108,6 +113,7 @@ class LinuxCnc(Target):
             if rows and triplet[0] <= rows[-1][0]:
                 raise failed(path, "nominal positions must increase", number)
             rows.append(triplet)
+            decimals = max(decimals, *(len(word.partition(".")[2]) for word in words[:3]))
         if not 4 <= len(rows) <= MOST:
             raise failed(path, f"{len(rows)} lines: LinuxCNC takes 4 to {MOST} here")
         table = np.array(rows)
@@ -116,15 +122,11 @@ class LinuxCnc(Target):
         largest = float(np.max(np.abs(table[:, 1:])))
         if largest > _LARGEST:
             raise ArgumentError(
-                f"{path}: trims of up to {largest:.4g} deg: are these positions? give --type "
-                f"{'1' if options['type'] == '0' else '0'}"
+                f"{path}: trims of up to {largest:.4g} deg: are these positions? give "
+                f"`type={'1' if options['type'] == '0' else '0'!r}`"
             )
-        return travel_model(table, path, self.name, 10.0 ** -_decimals(text))
+        return travel_model(table, path, self, 10.0**-decimals)
 
 
 #: Degrees: no trim of an axis that works is larger.
 _LARGEST = 30.0
-
-
-def _decimals(text: str) -> int:
-    return max((len(word.partition(".")[2]) for word in text.split()), default=0)

@@ -9,14 +9,15 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from ..angles import ARCSEC_PER_TURN
 from ..errors import ArgumentError
-from ..files import Kind, read_whole
-from ..model import HarmonicModel
+from ..model.model import HarmonicModel
+from ..support.angles import ARCSEC_PER_TURN
+from ..support.files import Kind, read_whole
 from .oneturn import array_of, rows
-from .pattern import Pattern
+from .pattern import TurnPattern
+from .proof import Correction, Places
 from .reading import failed, sampled_model
-from .target import Header, Made, Option, Part, Target, comment_lines
+from .target import CommentBlock, Made, Option, TablePart, Target
 
 __all__ = ["Mechaduino"]
 
@@ -29,7 +30,7 @@ Array = NDArray[np.float64]
 
 
 class Mechaduino(Target):
-    """``--to mechaduino``: the array to paste into ``Parameters.cpp``."""
+    """Target ``mechaduino``: the array to paste into ``Parameters.cpp``."""
 
     name = "mechaduino"
     what = "the lookup array of Mechaduino's Parameters.cpp"
@@ -40,17 +41,17 @@ class Mechaduino(Target):
         "existing": Option(str, None, "Parameters.cpp whose lookup gives the zero to keep"),
     }
 
-    def make(self, pattern: Pattern, options: Mapping[str, Any]) -> Made:
+    def make(self, pattern: TurnPattern, options: Mapping[str, Any]) -> Made:
         pattern.check_one_turn(self.name)
-        pattern.check_orders(ENTRIES, self.name, "use --to c")
+        pattern.check_orders(ENTRIES, self.name, 'use `target="c"`')
         counts = np.arange(ENTRIES) / ENTRIES
         exact = counts - pattern.correction(counts)
         zero = 0.0
         notes = []
         if options["existing"] is None:
             notes.append(
-                "the zero of lookup sets the phase of the motor's currents: give --existing "
-                "Parameters.cpp to keep the one that the motor's own calibration found"
+                "the zero of lookup sets the phase of the motor's currents: give "
+                '`existing="Parameters.cpp"` to keep the one that its own calibration found'
             )
         else:
             path = options["existing"]
@@ -60,21 +61,10 @@ class Mechaduino(Target):
             zero = float(np.angle(np.mean(away))) / (2.0 * math.pi)
             notes.append(f"the zero of {path} is kept: {zero * 360.0:.6g} deg")
         table = np.round((exact + zero) % 1.0 * 360.0, _DECIMALS) % 360.0
-        single = table.astype(np.float32).astype(np.float64) / 360.0
 
-        def correction(angles: NDArray[np.uint32]) -> Array:
-            return np.asarray(angles / 2.0**32 - single[angles >> np.uint32(18)] + zero)
-
-        def text(header: Header) -> str:
-            comment = [
-                "Corrected angle in degrees of every count of the encoder, the indicated angle. "
-                f"Made by {header.package}.",
-                f"Differs from the model by at most {header.proof.max_arcsec:.4g} arcsec, rms "
-                f"{header.proof.rms_arcsec:.3g} ({header.proof.how}).",
-                f"Model: sha256 {header.sha256}",
-                *(f"Note: {note}." for note in header.notes),
-            ]
-            lines = [line for part in comment for line in comment_lines(98, part, "// ")]
+        def text(header: CommentBlock) -> str:
+            own = "Corrected angle in degrees of every count of the encoder, the indicated angle."
+            lines = header.comment("// ", own)
             body = rows([f"{value:.{_DECIMALS}f}" for value in table], lead="")
             return "\n".join(
                 [*lines, f"const PROGMEM float lookup[{ENTRIES}] = {{", body, "};", ""]
@@ -85,10 +75,10 @@ class Mechaduino(Target):
             text=text,
             entries=ENTRIES,
             bytes=4 * ENTRIES,
-            parts=(Part((correction,), pattern.correction),),
+            part=TablePart.at_readings(pattern, _device(table), zero=pattern.zero + zero),
             floor_arcsec=step / math.sqrt(12.0) * ARCSEC_PER_TURN,
             step=step,
-            zero_deg=(pattern.zero - zero) * 360.0,
+            zero_deg=(pattern.zero + zero) * 360.0,
             notes=tuple(notes),
             bits=_BITS,
         )
@@ -102,8 +92,18 @@ class Mechaduino(Target):
         step = 10.0 ** -min(decimals, 6)
         # Its zero is the motor's phase.
         return sampled_model(
-            (away - np.mean(away)) / 360.0, path, text, step=step / 360.0, name=self.name
+            (away - np.mean(away)) / 360.0, path, self, _device(table), step=step / 360.0
         )
+
+
+def _device(table: Array) -> Correction:
+    """What is taken off readings by degrees that the firmware holds as floats."""
+    single = table.astype(np.float32).astype(np.float64) / 360.0
+
+    def correction(angles: Places) -> Array:
+        return np.asarray(angles / 2.0**32 - single[angles % 2**32 >> (32 - _BITS)])
+
+    return correction
 
 
 def _lookup(text: str, path: str) -> tuple[Array, int]:

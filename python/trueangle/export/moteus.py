@@ -11,13 +11,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import ArgumentError
-from ..files import Kind
-from ..model import HarmonicModel
+from ..model.model import HarmonicModel
+from ..support.files import Kind
 from .knots import rounded_knots
 from .oneturn import line_floor, one_turn_knots
-from .pattern import Pattern
+from .pattern import TurnPattern
+from .proof import Correction, Places
 from .reading import failed, sampled_model
-from .target import Header, Made, Option, Part, Target
+from .target import CommentBlock, Made, Option, TablePart, Target
 
 __all__ = ["Moteus", "compensated"]
 
@@ -32,7 +33,7 @@ _LINE = re.compile(
 
 
 class Moteus(Target):
-    """``--to moteus``: lines for ``moteus_tool --write-config``."""
+    """Target ``moteus``: lines for ``moteus_tool`` to write."""
 
     name = "moteus"
     what = "conf set lines of a position source's compensation table"
@@ -48,22 +49,16 @@ class Moteus(Target):
         "bits": Option(int, 24, "bits of a reading: so many are all evaluated, up to 24"),
     }
 
-    def make(self, pattern: Pattern, options: Mapping[str, Any]) -> Made:
+    def make(self, pattern: TurnPattern, options: Mapping[str, Any]) -> Made:
         source = options["source"]
         if source not in (0, 1, 2):
-            raise ArgumentError(f"--source must be 0, 1 or 2, got {source}")
+            raise ArgumentError(f"source must be 0, 1 or 2, got {source}")
         if options["bits"] > 24:
-            raise ArgumentError("--bits must be at most 24: moteus takes readings as floats")
+            raise ArgumentError("bits must be at most 24: moteus takes readings as floats")
         knots = -one_turn_knots(pattern, ENTRIES, self.name, True)
         scale, table = _scaled(knots)
 
-        def correction(angles: NDArray[np.uint32], contracted: bool) -> NDArray[np.float64]:
-            cpr = 1 << options["bits"]
-            reading = angles >> np.uint32(32 - options["bits"])
-            out = compensated(reading, table, scale, cpr, contracted)
-            return np.asarray((reading - out) / cpr)
-
-        def text(header: Header) -> str:
+        def text(header: CommentBlock) -> str:
             lead = f"conf set motor_position.sources.{source}.compensation_"
             lines = [f"{lead}scale {float(scale):.9g}"]
             lines += [f"{lead}table.{i} {int(value)}" for i, value in enumerate(table)]
@@ -74,12 +69,8 @@ class Moteus(Target):
             text=text,
             entries=ENTRIES,
             bytes=ENTRIES + 4,
-            parts=(
-                Part(
-                    tuple(partial(correction, contracted=c) for c in (False, True)),
-                    pattern.correction,
-                    2.0 * pattern.slope,
-                ),
+            part=TablePart.at_readings(
+                pattern, *_device(table, scale, options["bits"]), zero=pattern.zero
             ),
             floor_arcsec=line_floor(step),
             step=step,
@@ -118,8 +109,23 @@ class Moteus(Target):
                 "compensation_table are there; write them by moteus_tool --dump-config",
             )
         return sampled_model(
-            -table * scale / 127.0, path, text, step=abs(scale) / 127.0 or 2**-24, name=self.name
+            -table * scale / 127.0,
+            path,
+            self,
+            _device(table.astype(np.int8), np.float32(scale), options["bits"])[0],
+            step=abs(scale) / 127.0 or 2**-24,
         )
+
+
+def _device(table: NDArray[np.int8], scale: np.float32, bits: int) -> tuple[Correction, ...]:
+    """What the firmware takes off, without and with contracted products."""
+
+    def correction(angles: Places, contracted: bool) -> NDArray[np.float64]:
+        reading = angles % 2**32 >> (32 - bits)
+        out = compensated(reading, table, scale, 1 << bits, contracted)
+        return np.asarray((reading - out) / (1 << bits))
+
+    return tuple(partial(correction, contracted=c) for c in (False, True))
 
 
 def _scaled(knots: NDArray[np.float64]) -> tuple[np.float32, NDArray[np.int8]]:
@@ -139,7 +145,7 @@ def _scaled(knots: NDArray[np.float64]) -> tuple[np.float32, NDArray[np.int8]]:
 
 
 def compensated(
-    reading: NDArray[np.uint32],
+    reading: NDArray[np.integer[Any]],
     table: NDArray[np.int8],
     scale: np.float32,
     cpr: int,

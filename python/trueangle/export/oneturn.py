@@ -9,9 +9,9 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from ..angles import ARCSEC_PER_TURN
+from ..support.angles import ARCSEC_PER_TURN
 from .knots import linear_knots
-from .pattern import Pattern
+from .pattern import TurnPattern
 from .reading import failed
 
 __all__ = ["array_of", "line_floor", "one_turn_knots", "rows", "without_mean"]
@@ -21,7 +21,7 @@ Array = NDArray[np.float64]
 _NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?")
 
 
-def one_turn_knots(pattern: Pattern, entries: int, target: str, fixed: bool) -> Array:
+def one_turn_knots(pattern: TurnPattern, entries: int, target: str, fixed: bool) -> Array:
     """Least-squares knots, in turns, of the correction of a reading.
 
     Raises
@@ -31,12 +31,12 @@ def one_turn_knots(pattern: Pattern, entries: int, target: str, fixed: bool) -> 
     """
     pattern.check_one_turn(target)
     top = int(max(pattern.lines, default=0.0))
-    smallest = "use --to c" if fixed else f"use --entries {2 * top + 1} or more"
+    smallest = 'use `target="c"`' if fixed else f"use `entries={2 * top + 1}` or more"
     pattern.check_orders(entries, target, smallest)
     return linear_knots(pattern.correction, entries)
 
 
-def without_mean(knots: Array, pattern: Pattern) -> tuple[Array, float]:
+def without_mean(knots: Array, pattern: TurnPattern) -> tuple[Array, float]:
     """Knots with their mean removed, and what the table then leaves to the zero, in degrees."""
     mean = float(np.mean(knots))
     return knots - mean, (mean + pattern.zero) * 360.0

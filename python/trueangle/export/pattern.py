@@ -3,23 +3,24 @@
 from __future__ import annotations
 
 import math
-from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..angles import ARCSEC_PER_TURN
 from ..errors import ArgumentError
 from ..joint.shafts import Shaft
-from ..model import HarmonicModel
+from ..model.model import HarmonicModel
+from ..model.term import Term
+from ..support.angles import ARCSEC_PER_TURN
 from ..terms import LocalDefect
+from .inversion import inverse
 
-__all__ = ["Pattern"]
+__all__ = ["TurnPattern", "of_direction"]
 
 Array = NDArray[np.float64]
 
 
-class Pattern:
+class TurnPattern:
     r"""The part of a model that follows the angle alone, with every angle in turns.
 
     .. math:: g(r) = r - C_0 - \theta(r), \qquad r = \theta + \varepsilon(\theta)
@@ -33,18 +34,13 @@ class Pattern:
 
     Attributes
     ----------
-    left_out : tuple of (str, bool)
-        Kinds of the model's terms that no table of the angle can hold, and whether two
-        tables, one a direction, could.
+    left_out : tuple of Term
+        Terms of the model that no table of the angle can hold.
     """
 
     def __init__(self, model: HarmonicModel) -> None:
         held = [term for term in model.terms if isinstance(term, LocalDefect)]
-        self.left_out = tuple(
-            (term.kind, _of_direction(term))
-            for term in model.terms
-            if not isinstance(term, LocalDefect)
-        )
+        self.left_out = tuple(term for term in model.terms if not isinstance(term, LocalDefect))
         self.source = model
         #: Without the record of the fit: a table covers the turn, and warns in words.
         self.model = model.replace(terms=tuple(held), fit=None, covariance=None)
@@ -59,6 +55,10 @@ class Pattern:
         corrected = np.asarray(self.model.correct(indicated * self.period)) / self.period
         return np.asarray(indicated - corrected - self.zero)
 
+    def taken_off(self, indicated: Array) -> Array:
+        """All that correcting takes off readings in turns: ``g`` and the constant."""
+        return self.correction(indicated) + self.zero
+
     def error(self, theta: Array) -> Array:
         """The error without its constant at true angles in turns (or the model's argument)."""
         return np.asarray(self.model.error(theta * self.period)) / self.period - self.zero
@@ -67,11 +67,8 @@ class Pattern:
         """What the device indicates at true angles, the constant included."""
         if self.model.argument == "reference":
             return theta + self.error(theta) + self.zero
-        # r - error(r) = theta: a fixed point, found as fast as the slope is small.
-        reading = theta + self.zero
-        for _ in range(_FIXED_POINT_STEPS):
-            reading = theta + self.error(reading) + self.zero
-        return reading
+        points = max(_BRACKETS, math.ceil(_BRACKETS_PER_WAVE * max(self.lines, default=1.0)))
+        return inverse(lambda r: r - self.error(r) - self.zero, theta, points)
 
     def directed(self, theta: Array, direction: int) -> Array:
         """The error without its constant far from a reversal, travelling one way.
@@ -83,7 +80,7 @@ class Pattern:
             fit=None,
             covariance=None,
             terms=tuple(
-                t for t in self.source.terms if isinstance(t, LocalDefect) or _of_direction(t)
+                t for t in self.source.terms if isinstance(t, LocalDefect) or of_direction(t)
             ),
         )
         way = theta if direction > 0 else theta[::-1]
@@ -96,7 +93,7 @@ class Pattern:
     @property
     def has_direction(self) -> bool:
         """Whether something of what is left out follows the direction of travel alone."""
-        return any(_of_direction(term) for term in self.source.terms)
+        return any(of_direction(term) for term in self.source.terms)
 
     # -- what it consists of ----------------------------------------------------------
 
@@ -107,15 +104,6 @@ class Pattern:
         for order, amplitude in zip(self.model.orders, self.model.amplitudes, strict=True):
             found[order] = math.hypot(found.get(order, 0.0), amplitude / self.period)
         return dict(sorted(found.items()))
-
-    @cached_property
-    def slope(self) -> float:
-        """A bound of ``|g'|``: s / (1 - s), with s the sum of k C_k in radians."""
-        s = sum(2.0 * math.pi * k * c for k, c in self.lines.items())
-        s += sum(abs(t.height) * t.cycles_per_turn / t.width for t in self._defects)
-        if self.model.argument == "indicated":
-            return s
-        return s / (1.0 - s) if s < 1.0 else math.inf
 
     @property
     def uncertainty_arcsec(self) -> float | None:
@@ -165,10 +153,10 @@ class Pattern:
             raise ArgumentError(
                 f"{target} holds one turn of the output, and shaft {', '.join(strangers)} does "
                 "not come back to its start in one: export its model from the shaft's own "
-                "encoder, or use --to c, which writes one function per shaft"
+                'encoder, or use `target="c"`, which writes one function per shaft'
             )
 
-    def shafts(self) -> list[tuple[str, float, Pattern]]:
+    def shafts(self) -> list[tuple[str, float, TurnPattern]]:
         """``(name, cycles, pattern in turns of that shaft)``, slow shafts first.
 
         The pattern of a shaft is inverted as a function of the shaft's own reading; its
@@ -203,17 +191,19 @@ class Pattern:
                     if t.cycles_per_turn == f
                 ),
             )
-            parts.append((shaft.name, f, Pattern(alone)))
+            parts.append((shaft.name, f, TurnPattern(alone)))
         return parts
 
 
-#: Passes until a fixed point with a slope of 1/2 is within 1e-15.
-_FIXED_POINT_STEPS = 50
+#: Brackets in which readings of the indicated argument are looked for, to a turn and to a
+#: wave of the highest order.
+_BRACKETS = 1024
+_BRACKETS_PER_WAVE = 64.0
 
 
-def _of_direction(term: object) -> bool:
-    needs = set(getattr(term, "needs", ()))
-    return bool(getattr(term, "follows_travel", False)) and needs <= {"direction"}
+def of_direction(term: Term) -> bool:
+    """Whether two tables, one for each direction of travel, hold a term."""
+    return term.follows_travel and set(term.needs) <= {"direction"}
 
 
 def _orders(orders: list[float]) -> str:

@@ -10,14 +10,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..angles import ARCSEC_PER_TURN
 from ..errors import ArgumentError
-from ..model import HarmonicModel
+from ..model.model import HarmonicModel
+from ..support.angles import ARCSEC_PER_TURN
 from .chain import Chain, identifier, make_chain
-from .pattern import Pattern
+from .pattern import TurnPattern
 from .proof import lost_orders
 from .table import METHODS, NUMBERS, TURN, Table
-from .target import Header, Made, Option, Part, Target
+from .target import CommentBlock, Made, Option, TablePart, Target
+
+Array = NDArray[np.float64]
+Places = NDArray[np.int64]
 
 __all__ = ["PortableTarget", "identifier", "self_test", "table_lines"]
 
@@ -58,30 +61,29 @@ class PortableTarget(Target):
             return None
         return {**options, "method": "cubic", "number": "q31"}
 
-    def make(self, pattern: Pattern, options: Mapping[str, Any]) -> Made:
+    def make(self, pattern: TurnPattern, options: Mapping[str, Any]) -> Made:
         chain = _chain(pattern, options)
         bits = options["bits"]
         if not 1 <= bits <= 32:
-            raise ArgumentError(f"--bits must be from 1 to 32, got {bits}")
+            raise ArgumentError(f"bits must be from 1 to 32, got {bits}")
         floating = any(table.number == "f32" for table in chain.tables)
         notes = []
         if not chain.whole:
             notes.append(
-                "a shaft does not turn a whole number of times per output turn: pass each "
-                "function the unwrapped angle of its own shaft; no function corrects the output "
-                "angle alone"
+                "a shaft does not turn a whole number of times per output turn: correct_unwrapped "
+                "finds the unwrapped angle of its own shaft from the turns of the output, counted "
+                "as in the readings that the model was fitted to, and its angle"
             )
         if floating:
             notes.append(
                 "float: the same bits everywhere with -ffp-contract=off; the stated maximum holds "
                 "without it"
             )
-        parts, neglected = _parts(chain, pattern, floating)
         return Made(
             text=lambda header: self.write(chain, header),
             entries=sum(table.entries for table in chain.tables),
             bytes=sum(table.bytes for table in chain.tables),
-            parts=parts,
+            part=_part(chain, pattern, floating),
             floor_arcsec=math.hypot(*(table.floor_arcsec for table in chain.tables), 0.0),
             step=1.0 / TURN,
             lost=lambda: _lost(chain, pattern),
@@ -97,17 +99,16 @@ class PortableTarget(Target):
                 }
                 for table in chain.tables
             ),
-            neglected=neglected,
         )
 
-    def write(self, chain: Chain, header: Header) -> str:
+    def write(self, chain: Chain, header: CommentBlock) -> str:
         """The file's text."""
         raise NotImplementedError
 
     def read(self, text: str, path: str, options: Mapping[str, Any]) -> HarmonicModel:
         from .reading import portable_model
 
-        return portable_model(text, path)
+        return portable_model(text, path, self)
 
 
 def table_lines(chain: Chain) -> list[str]:
@@ -118,16 +119,20 @@ def table_lines(chain: Chain) -> list[str]:
         "output turn."
         for table in chain.tables
     ]
-    return [*lines, f"Zero: {chain.zero % 2**32} is subtracted first."]
+    # Where a shaft's place depends on the turn, the zero's own turn counts.
+    zero = chain.zero % 2**32 if chain.whole else chain.zero
+    return [*lines, f"Zero: {zero} is subtracted first."]
 
 
-def self_test(chain: Chain) -> list[tuple[int, int]]:
-    """Eight readings and what the device makes of them."""
-    angles = np.array(_TEST_ANGLES, dtype=np.uint32)
-    return list(zip(_TEST_ANGLES, (int(a) for a in chain.corrected(angles)), strict=True))
+def self_test(chain: Chain) -> list[tuple[int, int, int]]:
+    """Eight readings, turn and angle, and what the device makes of the angle."""
+    turns = [0 if chain.whole else i - 3 for i in range(len(_TEST_ANGLES))]
+    places = np.array([t * 2**32 + a for t, a in zip(turns, _TEST_ANGLES, strict=True)])
+    found = (int(a) for a in chain.corrected(places))
+    return list(zip(turns, _TEST_ANGLES, found, strict=True))
 
 
-def _chain(pattern: Pattern, options: Mapping[str, Any]) -> Chain:
+def _chain(pattern: TurnPattern, options: Mapping[str, Any]) -> Chain:
     shafts = pattern.shafts()
     if not shafts:
         raise ArgumentError("the model has no harmonics: there is nothing to put into a table")
@@ -149,7 +154,7 @@ def _chain(pattern: Pattern, options: Mapping[str, Any]) -> Chain:
 
 
 def _first_that_fits(
-    pattern: Pattern, method: str | None, number: str | None, sizes: list[int]
+    pattern: TurnPattern, method: str | None, number: str | None, sizes: list[int]
 ) -> Chain:
     """int16 lines where their floor is below the model's uncertainty, else int32."""
     if number is None:
@@ -165,73 +170,60 @@ def _first_that_fits(
     return make_chain(pattern, method or "linear", number, sizes)
 
 
-def _check(shafts: Sequence[tuple[str, float, Pattern]], entries: int) -> None:
+def _check(shafts: Sequence[tuple[str, float, TurnPattern]], entries: int) -> None:
     for name, _, part in shafts:
         top = max(part.lines, default=0.0)
         needed = 1 << (int(2 * top) + 1).bit_length() if top else 4
-        part.check_orders(entries, f"shaft {name}", f"use --entries {max(needed, 4)} or more")
+        part.check_orders(entries, f"shaft {name}", f"use `entries={max(needed, 4)}` or more")
 
 
-def _smallest(part: Pattern, cycles: float, method: str, number: str, allowed: float | None) -> int:
+def _smallest(
+    part: TurnPattern, cycles: float, method: str, number: str, allowed: float | None
+) -> int:
     """Entries for which a rough rms is below what is allowed, or a thousandth of the pattern."""
     amplitude = math.sqrt(sum(c * c for c in part.lines.values()) / 2.0) / cycles
     wanted = 1e-3 * amplitude * ARCSEC_PER_TURN if allowed is None else allowed
-    probe = (np.arange(4096) * 0x9E3779B1 % 2**32).astype(np.uint32)
+    probe = np.arange(4096) * 0x9E3779B1 % 2**32
     top = max(part.lines, default=0.0)
     for size in _SIZES:
         if size <= 2.0 * top or (size > _LARGEST_DEFAULT and size > 8.0 * top):
             continue
         chain = make_chain(part, method, "f32" if number == "q15" else number, size)
-        difference = chain.correction(probe) - part.correction(probe / TURN)
+        difference = chain.correction(probe) - part.taken_off(probe / TURN)
         if float(np.sqrt(np.mean(difference**2))) / cycles * ARCSEC_PER_TURN <= wanted:
             return size
         largest = size
     return largest
 
 
-def _lost(chain: Chain, pattern: Pattern) -> list[dict[str, float]]:
+def _lost(chain: Chain, pattern: TurnPattern) -> list[dict[str, float]]:
     rows = []
     for table, (_, cycles, part) in zip(chain.tables, pattern.shafts(), strict=True):
-        alone = _alone(table, part, cycles, chain, pattern, False)
-        found = lost_orders(alone.corrections[0], alone.exact, part.lines)
+        # One table and its shaft's exact correction, both in turns of the output.
+        move = pattern.zero * cycles if chain.at_indicated else 0.0
+
+        def alone(angles: Places, table: Table = table) -> Array:
+            return np.asarray(table.correction(angles.astype(np.uint32)) / TURN)
+
+        def exact(
+            x: Array, part: TurnPattern = part, cycles: float = cycles, move: float = move
+        ) -> Array:
+            return part.correction(x + move) / cycles
+
+        found = lost_orders(alone, exact, part.lines)
         rows += [{"order": k * cycles, "arcsec": lost} for k, lost in found.items()]
     return sorted(rows, key=lambda row: row["order"])
 
 
-def _alone(
-    table: Table, part: Pattern, cycles: float, chain: Chain, pattern: Pattern, floating: bool
-) -> Part:
-    """One table and its shaft's exact correction, both in turns of the output."""
-    move = pattern.zero * cycles if chain.at_indicated else 0.0
+def _part(chain: Chain, pattern: TurnPattern, floating: bool) -> TablePart:
     # With and without contracted products: the maximum holds for both.
-    return Part(
-        tuple(partial(_turns, table, contracted) for contracted in (False, True)[: 1 + floating]),
-        lambda x: part.correction(x + move) / cycles,
-        2.0 * part.slope / cycles,
-        2.0 / TURN,
+    variants = (False, True)[: 1 + floating]
+    turns, closes = chain.turns
+    return TablePart.at_readings(
+        pattern,
+        *(partial(chain.correction, contracted=c) for c in variants),
+        zero=0.0,
+        resolution=2.0 * len(chain.tables) / TURN,
+        turns=turns,
+        continuous=not closes,
     )
-
-
-def _turns(table: Table, contracted: bool, angles: NDArray[np.uint32]) -> NDArray[np.float64]:
-    return np.asarray(table.correction(angles, contracted) / TURN)
-
-
-def _parts(chain: Chain, pattern: Pattern, floating: bool) -> tuple[tuple[Part, ...], float]:
-    if chain.whole:
-        variants = (False, True)[: 1 + floating]
-        whole = Part(
-            tuple(partial(chain.correction, contracted=c) for c in variants),
-            pattern.correction,
-            2.0 * pattern.slope,
-            2.0 * len(chain.tables) / TURN,
-        )
-        return (whole,), 0.0
-    # No output angle finds every table's place: each is proven on its own shaft. The chain
-    # neglects the slopes of the slower patterns times the faster correction.
-    parts, neglected, slope = [], 0.0, 0.0
-    grid = np.arange(_LARGEST_DEFAULT) / _LARGEST_DEFAULT
-    for table, (_, cycles, part) in zip(chain.tables, pattern.shafts(), strict=True):
-        parts.append(_alone(table, part, cycles, chain, pattern, floating))
-        neglected += slope * float(np.max(np.abs(part.correction(grid)))) / cycles
-        slope += part.slope
-    return tuple(parts), 0.0 if chain.at_indicated else neglected

@@ -11,9 +11,19 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..angles import ARCSEC_PER_TURN
+from ..errors import ArgumentError
+from ..support.angles import ARCSEC_PER_TURN
 
-__all__ = ["EVERY_INPUT_BITS", "Proof", "lost_orders", "prove"]
+__all__ = [
+    "EVERY_INPUT_BITS",
+    "Correction",
+    "Places",
+    "Proof",
+    "enough_bits",
+    "lost_orders",
+    "prove",
+    "upward",
+]
 
 #: Readings of so many bits are all evaluated; finer ones on the grid of these, with a bound.
 EVERY_INPUT_BITS = 24
@@ -21,17 +31,20 @@ EVERY_INPUT_BITS = 24
 #: Readings evaluated at once: they fit the caches together with what is made of them.
 _BATCH = 1 << 16
 
+#: Turns within which the model's own correction is found.
+_INVERSE = 1e-12
+
 _THREADS = min(8, os.cpu_count() or 1)
 
 Array = NDArray[np.float64]
-Angles = NDArray[np.uint32]
-#: Correction in turns at readings in 2^-32 turns.
-Correction = Callable[[Angles], Array]
+Places = NDArray[np.int64]
+#: Correction in turns at readings in 2^-32 turns, of one turn or of several.
+Correction = Callable[[Places], Array]
 
 
 @dataclass(frozen=True)
 class Proof:
-    """What was found over the inputs.
+    """What was found over the inputs, all of it of the corrected angle at the joint.
 
     Attributes
     ----------
@@ -46,6 +59,8 @@ class Proof:
         is part of ``max_arcsec``.
     worst : int
         The input, in 2^-32 turns, that differs most.
+    turns : int
+        Of the output, over which the inputs are.
     """
 
     max_arcsec: float
@@ -54,26 +69,61 @@ class Proof:
     every_input: bool
     margin_arcsec: float
     worst: int
+    turns: int = 1
 
     @property
     def how(self) -> str:
         """In a few words."""
+        inputs = f"{self.inputs} inputs" + (f" over {self.turns} turns" if self.turns > 1 else "")
         if self.every_input:
-            return f"every one of {self.inputs} inputs evaluated"
+            return f"every one of {inputs} evaluated"
         return (
-            f"{self.inputs} inputs evaluated, and {self.margin_arcsec:.2g} arcsec for what lies "
-            "between them, by the slopes"
+            f"{inputs} evaluated, and {self.margin_arcsec:.2g} arcsec for what lies "
+            "between them, by the steps from one to the next"
         )
+
+
+def upward(value: float, digits: int = 6) -> float:
+    """``value`` rounded up to so many digits: a bound that is printed stays one.
+
+    Examples
+    --------
+    >>> upward(0.123456001), upward(2.5, 2)
+    (0.123457, 2.5)
+    """
+    shown = float(f"{value:.{digits - 1}e}")
+    if shown < value:
+        last = 10.0 ** (math.floor(math.log10(abs(value))) - digits + 1)
+        shown = float(f"{value + last:.{digits - 1}e}")
+    return shown
+
+
+def enough_bits(asked: int, entries: float) -> int:
+    """Bits of inputs that stand close enough for what lies between them to be bounded.
+
+    Of a line between two of ``entries`` the steps beside its ends are seen then.
+    """
+    if not 1 <= asked <= 32:
+        raise ArgumentError(f"bits must be from 1 to 32, got {asked}")
+    return max(asked, math.ceil(math.log2(_POINTS_PER_LINE * entries)))
+
+
+#: Inputs that are evaluated on a line between two entries, at least.
+_POINTS_PER_LINE = 16
 
 
 def prove(
     corrections: Iterable[Correction],
     exact: Callable[[Array], Array],
     bits: int,
-    slope: float,
     resolution: float = 0.0,
+    turns: int = 1,
+    continuous: bool = False,
 ) -> Proof:
     """Largest and rms difference of corrections from the exact one.
+
+    Between inputs that are not all there are, a difference exceeds the larger of its two
+    neighbours by at most half of the step from one to the next.
 
     Parameters
     ----------
@@ -84,43 +134,52 @@ def prove(
         Correction in turns at readings in turns.
     bits : int
         Of a reading.
-    slope : float
-        Bound of the slopes of table and model together, for readings of more bits.
     resolution : float
-        Turns by which the target rounds its result, for the same.
+        Turns by which the target rounds its result, for readings of more bits.
+    turns : int
+        Over which a joint is looked at whose shafts do not come back after one.
+    continuous : bool
+        An input is a real number: no grid holds them all.
     """
     variants = tuple(corrections)
-    width = min(bits, EVERY_INPUT_BITS)
-    inputs = 1 << width
+    most = (1 << EVERY_INPUT_BITS) // turns
+    width = min(bits, most.bit_length() - 1)
+    inputs = turns << width
+    every = bits == width and not continuous
 
-    def batch(start: int) -> tuple[float, int, list[float]]:
-        worst, at, squares = 0.0, 0, []
-        counts = np.arange(start, min(start + _BATCH, inputs), dtype=np.uint32)
-        angles = counts << np.uint32(32 - width)
-        truth = exact(counts / inputs)
+    def batch(start: int) -> tuple[float, int, list[float], float]:
+        worst, at, squares, step = 0.0, 0, [], 0.0
+        stop = min(start + _BATCH, inputs)
+        # One more, for the step to it.
+        counts = np.arange(start, stop + (not every), dtype=np.int64)
+        places = counts << (32 - width)
+        truth = exact(counts / (1 << width))
         for correction in variants:
-            difference = correction(angles) - truth
+            difference = correction(places) - truth
             difference -= np.rint(difference)
+            if not every:
+                step = max(step, float(np.max(np.abs(np.diff(difference)))))
+                difference = difference[:-1]
             squares.append(float(difference @ difference))
             k = int(np.argmax(np.abs(difference)))
             if abs(difference[k]) > worst:
-                worst, at = abs(float(difference[k])), int(angles[k])
-        return worst, at, squares
+                worst, at = abs(float(difference[k])), int(places[k])
+        return worst, at, squares, step
 
     # numpy and the core work without the interpreter's lock.
     with ThreadPoolExecutor(_THREADS) as pool:
         found = list(pool.map(batch, range(0, inputs, _BATCH)))
-    worst, at, _ = max(found, key=lambda part: part[0])
+    worst, at, _, _ = max(found, key=lambda part: part[0])
     squares = np.sum([part[2] for part in found], axis=0)
-    every = bits <= EVERY_INPUT_BITS
-    margin = 0.0 if every else 0.5 / inputs * slope + resolution
+    margin = 0.0 if every else max(part[3] for part in found) / 2.0 + resolution
     return Proof(
-        max_arcsec=(worst + margin) * ARCSEC_PER_TURN,
+        max_arcsec=(worst + margin + _INVERSE) * ARCSEC_PER_TURN,
         rms_arcsec=math.sqrt(float(squares.max()) / inputs) * ARCSEC_PER_TURN,
         inputs=inputs,
         every_input=every,
         margin_arcsec=margin * ARCSEC_PER_TURN,
         worst=at,
+        turns=turns,
     )
 
 
@@ -132,8 +191,8 @@ def lost_orders(
     if not wanted:
         return {}
     width = min(max(12, math.ceil(math.log2(32 * wanted[-1]))), EVERY_INPUT_BITS)
-    counts = np.arange(1 << width, dtype=np.uint32)
-    found = correction(counts << np.uint32(32 - width)) - exact(counts / (1 << width))
+    counts = np.arange(1 << width, dtype=np.int64)
+    found = correction(counts << (32 - width)) - exact(counts / (1 << width))
     found -= np.rint(found)
     spectrum = np.abs(np.fft.rfft(found)) * (2.0 * ARCSEC_PER_TURN / (1 << width))
     return {order: float(spectrum[order]) for order in wanted if order < len(spectrum)}

@@ -4,17 +4,23 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Iterable
-from typing import Any, NamedTuple
+from collections.abc import Callable, Iterable, Sequence
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import FileError
+from ..errors import FileError, NotInvertibleError
 from ..joint.shafts import Shaft
-from ..model import HarmonicModel
-from ..records import FitRecord
+from ..model.model import HarmonicModel
+from ..model.records import FitRecord
+from .chain import Chain
+from .inversion import inverse
+from .proof import Correction
 from .table import TURN, Table
+
+if TYPE_CHECKING:
+    from .target import Target
 
 __all__ = ["ReadTable", "failed", "function_model", "portable_model", "sampled_model"]
 
@@ -26,11 +32,8 @@ Function = Callable[[Array], Array]
 _FINE = 64
 _LARGEST_GRID = 1 << 18
 
-#: Passes of theta = r - T(r): a slope of 1/2 is then within 1e-16 of a turn.
-_PASSES = 60
-
-#: Turns within which the passes must end: coarser than any rounding of a table's arithmetic.
-_SETTLED = 1e-6
+#: Readings at which a table's own arithmetic is held against the model made of it.
+_PROBES = 1 << 18
 
 #: Orders smaller than so many standard deviations of the table's rounding are not told from it.
 _SIGNIFICANT = 3.0
@@ -71,7 +74,7 @@ def failed(path: str, problem: str, line: int | None = None) -> FileError:
 
 
 def sampled_model(
-    values: Array, path: str, text: str, *, step: float, name: str, zero: float = 0.0
+    values: Array, path: str, target: Target, device: Correction, *, step: float
 ) -> HarmonicModel:
     """Model of equidistant corrections (turns) between which a target interpolates."""
     closed = np.append(values, values[0])
@@ -80,37 +83,62 @@ def sampled_model(
     def function(x: Array) -> Array:
         return np.asarray(np.interp(x % 1.0, places, closed))
 
-    return function_model(
-        [ReadTable("output", 1.0, function, len(values), step)], path, name, zero=zero
-    )
+    table = ReadTable("output", 1.0, function, len(values), step)
+    return function_model([table], path, target, device)
 
 
 def function_model(
-    tables: Iterable[ReadTable],
+    tables: Sequence[ReadTable],
     path: str,
-    name: str,
+    target: Target,
+    device: Correction,
     *,
     zero: float = 0.0,
     at_indicated: bool = False,
     terms: Iterable[Any] = (),
+    turns: int = 1,
     note: str = "",
 ) -> HarmonicModel:
     r"""Model, in degrees, whose correction is that of the tables.
 
     The correction T of a reading becomes the error at the true angle by solving
     :math:`r = \theta + T(r)`, and that becomes harmonics up to the table's Nyquist order.
+    Where those are too steep to be corrected by, they are of T itself, at the indicated angle.
     The standard deviation of their coefficients is that of numbers rounded to the table's
-    step; orders that do not exceed three of it are left out.
+    step; orders that do not exceed three of it are left out. What ``device``, the target's own
+    arithmetic, does beside the harmonics is in the record of the fit.
 
     Raises
     ------
     FileError
-        A table whose correction could not be inverted.
+        A table that is not monotone: it gives one corrected angle for several readings.
     """
+    try:
+        return _model(tables, path, target, device, zero, at_indicated, tuple(terms), turns, note)
+    except NotInvertibleError:
+        if len(tables) > 1 or tables[0].forward or at_indicated:
+            raise failed(path, "the tables are too steep to be corrected by") from None
+    return _model(tables, path, target, device, zero, True, tuple(terms), turns, note)
+
+
+def _model(
+    tables: Sequence[ReadTable],
+    path: str,
+    target: Target,
+    device: Correction,
+    zero: float,
+    at_indicated: bool,
+    terms: tuple[Any, ...],
+    turns: int,
+    note: str,
+) -> HarmonicModel:
     shafts, variances, residual, samples = [], [0.0], 0.0, 0
     constant = zero
     for table in tables:
-        cosine, sine, mean = _harmonics(table, path, at_indicated)
+        try:
+            cosine, sine, mean = _harmonics(table, at_indicated)
+        except NotInvertibleError as error:
+            raise failed(path, f"is no correction: {error}") from None
         constant += mean
         sigma = table.step / math.sqrt(12.0)
         std = sigma * math.sqrt(2.0 / table.entries)
@@ -130,45 +158,59 @@ def function_model(
         variances[0] += sigma**2 / table.entries
         residual = math.hypot(residual, sigma)
         samples += table.entries
-    from ..files import sha256_of
-    from ..records import Provenance
-    from ..runs import Source
+    from ..model.records import Provenance, TableRecord
+    from ..runs.run import Source
+    from ..support.files import sha256_of
 
+    model = HarmonicModel(
+        tuple(shafts),
+        constant=constant * 360.0,
+        period=360.0,
+        argument="indicated" if at_indicated else "reference",
+        covariance=np.diag(variances) * 360.0**2,
+        provenance=Provenance((Source(path, sha256_of(path)),)),
+        terms=terms,
+    )
+    rms, largest = _arithmetic(model.replace(terms=()), target, device, turns)
     record = FitRecord(
         samples=samples,
         runs=1,
         span=(0.0, 360.0),
         residual=residual * 360.0,
         method="table",
-        note=note or f"read from a table of {name}; the uncertainty is that of its numbers",
+        note=note or f"read from a table of {target.name}; the uncertainty is that of its numbers",
+        table=TableRecord(target.name, target.argument, rms * 360.0, largest * 360.0),
     )
-    return HarmonicModel(
-        tuple(shafts),
-        constant=constant * 360.0,
-        period=360.0,
-        argument="indicated" if at_indicated else "reference",
-        covariance=np.diag(variances) * 360.0**2,
-        fit=record,
-        provenance=Provenance((Source(path, sha256_of(path)),)),
-        terms=tuple(terms),
-    )
+    return model.replace(fit=record)
 
 
-def _harmonics(table: ReadTable, path: str, at_indicated: bool) -> tuple[Array, Array, float]:
+def _arithmetic(
+    model: HarmonicModel, target: Target, device: Correction, turns: int
+) -> tuple[float, float]:
+    """Rms and maximum, in turns, of what a device does beside its model, their zeros apart."""
+    places = np.arange(_PROBES, dtype=np.int64) * (turns * 2**32 // _PROBES)
+    x = places / TURN
+    if target.argument == "indicated":
+        difference = x - np.asarray(model.correct(x * 360.0)) / 360.0 - device(places)
+    else:
+        difference = np.asarray(model.correct((x + device(places)) * 360.0)) / 360.0 - x
+    difference -= np.rint(difference - difference[0])
+    difference -= np.mean(difference)
+    return float(np.sqrt(np.mean(difference**2))), float(np.max(np.abs(difference)))
+
+
+def _harmonics(table: ReadTable, at_indicated: bool) -> tuple[Array, Array, float]:
     """Cosine and sine of orders from 1, and the mean, in turns of the output."""
     points = min(1 << math.ceil(math.log2(_FINE * table.entries)), _LARGEST_GRID)
     x = np.arange(points) / points
-    if table.forward or at_indicated:
+    if table.forward:
         error = table.function(x)
     else:
-        reading = x.copy()
-        for _ in range(_PASSES):
-            reading = x + table.cycles * table.function(reading)
-        if np.max(np.abs(x + table.cycles * table.function(reading) - reading)) > _SETTLED:
-            raise failed(
-                path, "the table's slope reaches 1: one reading would stand for several angles"
-            )
-        error = (reading - x) / table.cycles
+        # Knots are ends of brackets.
+        brackets = table.entries * max(1, _LARGEST_GRID // table.entries // 4)
+        brackets = min(brackets, table.entries * _FINE)
+        reading = inverse(lambda r: r - table.cycles * table.function(r), x, brackets)
+        error = table.function(x) if at_indicated else (reading - x) / table.cycles
     spectrum = np.fft.rfft(error) / points
     top = (table.entries - 1) // 2
     return 2.0 * spectrum.real[1 : top + 1], -2.0 * spectrum.imag[1 : top + 1], spectrum[0].real
@@ -178,11 +220,11 @@ _TABLE = re.compile(
     r"Table (?P<shaft>\w+): (?P<entries>\d+) entries, \d+ bytes, (?P<method>linear|cubic), "
     r"(?P<number>q15|q31|f32), shift (?P<shift>\d+), (?P<cycles>[-+.e\d]+) cycles"
 )
-_ZERO = re.compile(r"Zero: (\d+) ")
+_ZERO = re.compile(r"Zero: (-?\d+) ")
 _TYPES = {"q15": np.int16, "q31": np.int32, "f32": np.float32}
 
 
-def portable_model(text: str, path: str) -> HarmonicModel:
+def portable_model(text: str, path: str, target: Target) -> HarmonicModel:
     """Model of the tables of an exported C header or Rust module."""
     flowing = re.sub(r"\n(?: \*|//!) ?", " ", text)
     found = list(_TABLE.finditer(flowing))
@@ -190,12 +232,15 @@ def portable_model(text: str, path: str) -> HarmonicModel:
     if not found or zero is None:
         raise failed(path, "no export of trueangle: its comment names no table")
     at_indicated = "all tables at the same" in flowing
-    tables = []
+    # Before turns were counted, the zero was written modulo one.
+    whole = int(zero[1]) if int(zero[1]) < 1 << 31 else int(zero[1]) - (1 << 32)
+    tables, read = [], []
     for match in found:
         shaft, number = match["shaft"], match["number"]
         entries, cycles = int(match["entries"]), float(match["cycles"])
         body = re.search(
-            rf"(?:\b\w*{shaft}_knots\[\d+\][^=]*|const {shaft.upper()}: [^=]*)= [{{\[](.*?)[}}\]];",
+            rf"(?:\b(?:\w+_)?{shaft}_knots\[\d+\][^=]*|const {shaft.upper()}(?:_KNOTS)?: [^=]*)"
+            r"= [{\[](.*?)[}\]];",
             text,
             re.S,
         )
@@ -219,14 +264,18 @@ def portable_model(text: str, path: str) -> HarmonicModel:
             knots.reshape(-1, 2) if wide == 2 else knots,
         )
         # Tables are looked up at the zeroed reading; an indicated argument is the reading.
-        move = _signed(int(zero[1])) / TURN * cycles if at_indicated else 0.0
+        move = whole / TURN * cycles if at_indicated else 0.0
+        read.append(table)
         tables.append(ReadTable(shaft, cycles, _function(table, move), entries, table.step))
+    chain = Chain(whole, tuple(read), at_indicated)
     return function_model(
         tables,
         path,
-        "trueangle",
-        zero=_signed(int(zero[1])) / TURN,
+        target,
+        chain.correction,
+        zero=whole / TURN,
         at_indicated=at_indicated,
+        turns=chain.turns[0],
     )
 
 
@@ -236,7 +285,3 @@ def _function(table: Table, move: float) -> Function:
         return table.correction(angles) / TURN
 
     return function
-
-
-def _signed(zero: int) -> int:
-    return zero - (1 << 32) if zero >= 1 << 31 else zero

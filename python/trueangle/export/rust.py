@@ -7,12 +7,13 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from .. import _core
-from ..files import Kind
+import trueangle._core as _core
+
+from ..support.files import Kind
 from .chain import Chain
 from .portable import PortableTarget, identifier, self_test, table_lines
 from .table import PER_RADIAN, Table
-from .target import Header, comment_lines
+from .target import CommentBlock
 
 __all__ = ["RustModule"]
 
@@ -21,41 +22,40 @@ _ENDINGS = {"q15": "i16", "q31": "i32", "f32": "f32"}
 
 
 class RustModule(PortableTarget):
-    """``--to rust``: a file to name in ``mod``; no std, no allocation, no dependencies."""
+    """Target ``rust``: a file to name in ``mod``; no std, no allocation, no dependencies."""
 
     name = "rust"
     what = "a Rust module without std, tables and one function per shaft"
     kind: ClassVar[Kind] = Kind("a Rust module", (".rs",))
 
-    def write(self, chain: Chain, header: Header) -> str:
+    def write(self, chain: Chain, header: CommentBlock) -> str:
         """The module."""
         parts = [_comment(chain, header)]
         parts += [_table(table) for table in chain.tables]
         if chain.whole:
-            parts += [_corrected(chain), _self_test(chain)]
+            parts.append(_corrected(chain))
+        parts += [_unwrapped(chain), _self_test(chain)]
         parts += [_arithmetic(table) for table in _different(chain.tables)]
         return "\n".join(parts)
 
 
-def _comment(chain: Chain, header: Header) -> str:
-    proof = header.proof
-    text = [
-        f"Correction of an indicated angle. Made by {header.package}; do not edit.",
+def _comment(chain: Chain, header: CommentBlock) -> str:
+    own = [
+        "Correction of an indicated angle; do not edit.",
         "",
         "Angles are `u32`, 2^-32 turns, so that they wrap by themselves. A reading of n bits is "
         "shifted left by 32 - n. Corrected = indicated - correction, looked up at the indicated "
         "angle" + ("; all tables at the same one." if chain.at_indicated else "."),
-        f"Differs from the model by at most {proof.max_arcsec:.6g} arcsec, rms "
-        f"{proof.rms_arcsec:.4g} arcsec ({proof.how}).",
-        f"Model: sha256 {header.sha256}",
+        "`correct_unwrapped` takes and gives the whole turns of the output as well.",
         *table_lines(chain),
     ]
-    text += [f"Note: {note}." for note in header.notes]
-    return "\n".join(line for part in text for line in comment_lines(98, part, "//! ")) + "\n"
+    return "\n".join(header.comment("//! ", *own)) + "\n"
 
 
 def _table(table: Table) -> str:
     name = identifier(table.shaft)
+    # An ending of its own: no shaft has the name of another constant.
+    knots = f"{name.upper()}_KNOTS"
     values = np.asarray(table.knots)
     kind = _TYPES[table.number]
     element = kind if values.ndim == 1 else f"[{kind}; 2]"
@@ -64,12 +64,12 @@ def _table(table: Table) -> str:
     lines = ",\n".join("    " + ", ".join(rows[i : i + width]) for i in range(0, len(rows), width))
     shift = f", {table.shift}" if table.number == "q15" else ""
     function = f"{table.method}_{_ENDINGS[table.number]}"
-    call = f"{function}(&{name.upper()}, {table.bits}{shift}, angle)"
+    call = f"{function}(&{knots}, {table.bits}{shift}, angle)"
     if table.number == "f32":
         call = f"({call} * {float(PER_RADIAN):.1f}) as i32"
     return f"""\
 #[rustfmt::skip]
-const {name.upper()}: [{element}; {len(rows)}] = [
+const {knots}: [{element}; {len(rows)}] = [
 {lines},
 ];
 
@@ -90,31 +90,80 @@ def _element(value: Any, number: str) -> str:
     return text if any(c in text for c in ".e") else text + ".0"
 
 
+def _steps(chain: Chain) -> list[str]:
+    """What each table takes off ``left``, an expression in it and in ``start``."""
+    steps = []
+    for table in chain.tables:
+        at, name = "start" if chain.at_indicated else "left", identifier(table.shaft)
+        if table.cycles != int(table.cycles):
+            at = f"{name}_place({at})"
+        else:
+            at = f"({at} as u32)" if table.cycles != 1 else f"{at} as u32"
+            if table.cycles != 1:
+                at += f".wrapping_mul({int(table.cycles)})"
+        steps.append(f"{name}_correction({at})")
+    return steps
+
+
 def _corrected(chain: Chain) -> str:
     lines = [
         "/// The true angle behind an indicated one.",
         "#[inline]",
         "pub fn correct(indicated: u32) -> u32 {",
-        f"    let start = indicated.wrapping_sub({chain.zero % 2**32});",
+        "    correct_unwrapped(0, indicated) as u32",
+        "}",
     ]
-    last = "start"
+    return "\n".join([*lines, ""])
+
+
+def _unwrapped(chain: Chain) -> str:
+    places = []
     for table in chain.tables:
-        at = "start" if chain.at_indicated else last
-        if table.cycles != 1:
-            at += f".wrapping_mul({int(table.cycles)})"
-        name = identifier(table.shaft)
-        lines.append(f"    let left = {last}.wrapping_sub({name}_correction({at}) as u32);")
-        last = "left"
-    return "\n".join([*lines, f"    {last}", "}", ""])
+        if table.cycles != int(table.cycles):
+            turns, fraction = table.ratio
+            places.append(
+                f"""\
+/// The angle of a shaft that makes {table.cycles:.17g} turns per output turn.
+#[inline]
+pub fn {identifier(table.shaft)}_place(output: i64) -> u32 {{
+    let turns = ((output >> 32) as u64).wrapping_mul({turns});
+    let angle = u64::from(output as u32).wrapping_mul({fraction});
+    (turns.wrapping_add(angle) >> 32) as u32
+}}
+
+"""
+            )
+    lines = [
+        "/// The true angle with its whole turns, in 2^-32 turns, behind an indicated one.",
+        "#[inline]",
+        "pub fn correct_unwrapped(turns: i32, indicated: u32) -> i64 {",
+        f"    let start = (i64::from(turns) << 32) + i64::from(indicated) - ({chain.zero});",
+        "    let left = start;",
+        *(f"    let left = left - i64::from({step});" for step in _steps(chain)),
+        "    left",
+        "}",
+        "",
+    ]
+    return "".join(places) + "\n".join(lines)
 
 
 def _self_test(chain: Chain) -> str:
-    pairs = ",\n".join(f"    ({a}, {b})" for a, b in self_test(chain))
-    return f"""\
+    tests = self_test(chain)
+    if chain.whole:
+        pairs = ",\n".join(f"    ({a}, {b})" for _, a, b in tests)
+        return f"""\
 /// Readings and what `correct` makes of them.
 #[rustfmt::skip]
 pub const SELF_TEST: [(u32, u32); 8] = [
 {pairs},
+];
+"""
+    triples = ",\n".join(f"    ({turn}, {a}, {b})" for turn, a, b in tests)
+    return f"""\
+/// Turns and readings, and the angle that `correct_unwrapped` makes of them.
+#[rustfmt::skip]
+pub const SELF_TEST: [(i32, u32, u32); 8] = [
+{triples},
 ];
 """
 

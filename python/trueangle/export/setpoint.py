@@ -8,25 +8,30 @@ column for each direction of travel.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import ArgumentError
 from .knots import linear_knots
-from .pattern import Pattern
+from .pattern import TurnPattern
 from .proof import Correction, lost_orders
-from .target import Part
+from .target import TablePart
 
-__all__ = ["Travel", "steepness"]
+__all__ = ["NOMINAL_DECIMALS", "Travel", "calibrated_travel", "steepness"]
 
 Array = NDArray[np.float64]
 Function = Callable[[Array], Array]
 
-#: Points per turn at which a pattern that follows direction is taken between.
-_GRID = 1 << 16
+#: Of a degree, as nominal positions are written.
+NOMINAL_DECIMALS = 7
+
+#: Points per turn between which a pattern that follows direction is taken: 1e-4 arcsec off where
+#: order 8 is as steep as may be.
+_GRID = 1 << 18
 
 
 @dataclass(frozen=True)
@@ -53,29 +58,30 @@ class Travel:
     reverse: Array
 
     @classmethod
-    def of(
-        cls, pattern: Pattern, target: str, start: float, stop: float, entries: int, most: int
-    ) -> Travel:
-        """Knots over the travel.
+    def of(cls, pattern: TurnPattern, target: str, options: Mapping[str, Any], most: int) -> Travel:
+        """Knots over the travel that is asked for, else over what the model was fitted on.
 
         Raises
         ------
         ArgumentError
             More entries than the target takes, too few for the orders, no travel.
         """
+        entries = options["entries"]
+        ends = zip(("start", "stop"), calibrated_travel(pattern), strict=True)
+        start, stop = (end if options[key] is None else options[key] for key, end in ends)
         if not stop > start:
-            raise ArgumentError(f"--stop must be above --start, got {start:g} to {stop:g} deg")
+            raise ArgumentError(f"stop must be above `start=`, got {start:g} to {stop:g} deg")
         pattern.check_one_turn(target)
         if not 4 <= entries <= 36_000:
-            raise ArgumentError(f"--entries must be from 4 to 36000 a turn, got {entries}")
+            raise ArgumentError(f"entries must be from 4 to 36000 a turn, got {entries}")
         top = int(max(pattern.lines, default=0.0))
-        pattern.check_orders(entries, target, f"use --entries {2 * top + 1} or more")
+        pattern.check_orders(entries, target, f"use `entries={2 * top + 1}` or more")
         count = math.ceil((stop - start) * entries / 360.0 - 1e-9) + 1
         if count > most:
             fits = int((most - 1) * 360.0 / (stop - start))
             raise ArgumentError(
                 f"{target} takes {most} entries, and {entries} a turn over {stop - start:g} deg "
-                f"are {count}: use --entries {fits} or less, or a shorter travel"
+                f"are {count}: use `entries={fits}` or less, or a shorter travel"
             )
         first = start / 360.0
         forward, reverse = (
@@ -84,35 +90,40 @@ class Travel:
             ]
             for direction in (1, -1)
         )
-        nominal = np.asarray(start + np.arange(count) * (360.0 / entries), dtype=np.float64)
+        nominal = np.round(start + np.arange(count) * (360.0 / entries), NOMINAL_DECIMALS)
         return cls(start, stop, entries, nominal, forward, reverse)
 
-    def part(self, pattern: Pattern, forward: Array, reverse: Array) -> Part:
-        """Proof of printed values (turns of error) at set points over the travel."""
+    def part(self, pattern: TurnPattern, forward: Array, reverse: Array) -> TablePart:
+        """Proof of printed values (turns of error) at set points over the travel.
 
-        def difference(values: Array, direction: int) -> Correction:
-            error = _error(pattern, direction)
+        The drive stands where its encoder reads the set point and the value: how far the joint
+        is then from the set point is what counts.
+        """
 
-            def at(angles: NDArray[np.uint32]) -> Array:
+        def standing(values: Array, direction: int) -> Correction:
+            joint = _joint(pattern, direction)
+
+            def at(places: NDArray[np.int64]) -> Array:
                 # The inputs are spread over the travel.
-                x = self.start + angles / 2.0**32 * (self.stop - self.start)
-                found = np.interp(x, self.nominal, values)
-                return np.asarray(found - error(x / 360.0))
+                x = self.start + places / 2.0**32 * (self.stop - self.start)
+                told = np.interp(x, self.nominal, values)
+                return joint(x / 360.0 + told) - x / 360.0
 
             return at
 
-        both = tuple(difference(values, d) for values, d in ((forward, 1), (reverse, -1)))
-        spread = (self.stop - self.start) / 360.0
-        return Part(both, np.zeros_like, 2.0 * pattern.slope * spread)
+        ways = ((forward, 1), (reverse, -1)) if pattern.has_direction else ((forward, 1),)
+        return TablePart(
+            tuple(standing(values, d) for values, d in ways), np.zeros_like, continuous=True
+        )
 
-    def lost(self, pattern: Pattern) -> list[dict[str, float]]:
+    def lost(self, pattern: TurnPattern) -> list[dict[str, float]]:
         """What one turn of least-squares lines loses of each order."""
         error = _error(pattern, 1)
         knots = linear_knots(error, self.entries)
         closed = np.append(knots, knots[0])
         places = np.arange(self.entries + 1) / self.entries
 
-        def table(angles: NDArray[np.uint32]) -> Array:
+        def table(angles: NDArray[np.int64]) -> Array:
             return np.asarray(np.interp(angles / 2.0**32, places, closed))
 
         found = lost_orders(table, error, pattern.lines)
@@ -123,27 +134,47 @@ def _moved(error: Function, first: float) -> Function:
     return lambda x: error(x + first)
 
 
-def _error(pattern: Pattern, direction: int) -> Function:
+def calibrated_travel(pattern: TurnPattern) -> tuple[float, float]:
+    """Degrees over which the model holds: its span, or one turn."""
+    span = pattern.source.partial_span
+    if span is None:
+        return 0.0, 360.0
+    # Degrees as one would write them: the list of a control may have no more digits.
+    start, stop = (round(end / pattern.period * 360.0, 4) for end in span)
+    return start, stop
+
+
+def _error(pattern: TurnPattern, direction: int) -> Function:
     """Error at true angles in turns, without the constant, travelling one way."""
     if not pattern.has_direction:
+        return lambda x: np.asarray(pattern.reading(x) - x - pattern.zero)
+    places, values = _directed(pattern, direction)
+    return lambda x: np.asarray(np.interp(x % 1.0, places, values - places))
 
-        def plain(x: Array) -> Array:
-            return np.asarray(pattern.reading(x) - x - pattern.zero)
 
-        return plain
+def _joint(pattern: TurnPattern, direction: int) -> Function:
+    """True angles in turns where the encoder has been brought to readings, the zero apart."""
+    if not pattern.has_direction:
+        return lambda r: r - pattern.correction(r + pattern.zero)
+    places, values = _directed(pattern, direction)
+
+    def joint(reading: Array) -> Array:
+        turn = np.floor(reading - values[0])
+        return np.asarray(np.interp(reading - turn, values, places) + turn)
+
+    return joint
+
+
+def _directed(pattern: TurnPattern, direction: int) -> tuple[Array, Array]:
+    """Places over a turn and readings there, travelling one way."""
     if pattern.model.argument == "indicated":
         raise ArgumentError(
             "a model with terms of direction and the indicated argument has no error at the true "
-            "angle in one pass: fit it with --argument reference"
+            'angle in one pass: fit it with `argument="reference"`'
         )
     grid = np.arange(_GRID) / _GRID
-    values = pattern.directed(grid, direction)
-    closed, places = np.append(values, values[0]), np.append(grid, 1.0)
-
-    def directed(x: Array) -> Array:
-        return np.asarray(np.interp(x % 1.0, places, closed))
-
-    return directed
+    values = grid + pattern.directed(grid, direction)
+    return np.append(grid, 1.0), np.append(values, values[0] + 1.0)
 
 
 def steepness(travel: Travel) -> tuple[float, float]:

@@ -7,15 +7,17 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from ..model import HarmonicModel
+from ..model.model import HarmonicModel
 from .reading import ReadTable, failed, function_model
+from .table import TURN
+from .target import Target
 
 __all__ = ["travel_model"]
 
 Array = NDArray[np.float64]
 
 
-def travel_model(table: Array, path: str, name: str, last_digit: float) -> HarmonicModel:
+def travel_model(table: Array, path: str, target: Target, last_digit: float) -> HarmonicModel:
     """Model of ``nominal, forward, reverse`` in degrees, the error at the true angle.
 
     The mean of the two columns is the pattern; the mean of half of their difference is a
@@ -57,7 +59,7 @@ def travel_model(table: Array, path: str, name: str, last_digit: float) -> Harmo
     play = float(np.mean(half))
     varies = float(np.sqrt(np.mean((half - play) ** 2)))
     terms = [Backlash(play)] if abs(play) > last_digit / math.sqrt(12.0 * len(half)) else []
-    note = f"read from a table of {name}; the uncertainty is that of its numbers"
+    note = f"read from a table of {target.name}; the uncertainty is that of its numbers"
     if varies > last_digit:
         note += (
             f"; forward and reverse differ by a pattern of {varies * 3600.0:.4g} arcsec rms "
@@ -66,7 +68,8 @@ def travel_model(table: Array, path: str, name: str, last_digit: float) -> Harmo
     return function_model(
         [ReadTable("output", 1.0, function, entries, last_digit / 360.0, forward=True)],
         path,
-        name,
+        target,
+        lambda places: function(places / TURN),
         terms=terms,
         note=note,
     )

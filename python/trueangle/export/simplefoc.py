@@ -11,15 +11,16 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from ..angles import ARCSEC_PER_TURN
 from ..errors import ArgumentError
-from ..files import Kind
-from ..model import HarmonicModel
+from ..model.model import HarmonicModel
+from ..support.angles import ARCSEC_PER_TURN
+from ..support.files import Kind
 from .knots import rounded_knots
 from .oneturn import array_of, line_floor, one_turn_knots, rows, without_mean
-from .pattern import Pattern
+from .pattern import TurnPattern
+from .proof import Correction, Places
 from .reading import failed, sampled_model
-from .target import Header, Made, Option, Part, Target, comment_lines
+from .target import CommentBlock, Made, Option, TablePart, Target
 
 __all__ = ["SimpleFoc", "corrected_float", "corrected_short"]
 
@@ -43,7 +44,7 @@ _SIZES = (16, 24, 32, 48, 64, 100, 128, 200, 256, 400, 512, 800, 1024, 2048, 409
 
 
 class SimpleFoc(Target):
-    """``--to simplefoc``: lines to paste above ``CalibratedSensor``."""
+    """Target ``simplefoc``: lines to paste above ``CalibratedSensor``."""
 
     name = "simplefoc"
     what = "the calibrationLut array of SimpleFOC's CalibratedSensor"
@@ -65,12 +66,12 @@ class SimpleFoc(Target):
     def sign_of(self, options: Mapping[str, Any]) -> str:
         return "add" if options["variant"] == "plus-float" else "subtract"
 
-    def make(self, pattern: Pattern, options: Mapping[str, Any]) -> Made:
+    def make(self, pattern: TurnPattern, options: Mapping[str, Any]) -> Made:
         variant = options["variant"]
         old = variant == "plus-float"
         entries = _FIXED if old else options["entries"]
         if not 4 <= entries <= 32767:
-            raise ArgumentError(f"--entries must be from 4 to 32767, got {entries}")
+            raise ArgumentError(f"entries must be from 4 to 32767, got {entries}")
         if not old:
             knots = one_turn_knots(pattern, entries, self.name, False)
         else:
@@ -88,27 +89,12 @@ class SimpleFoc(Target):
             table = (-radians if old else radians).astype(np.float32)
             # Printed to 8 decimals; the sensor's own angle is a float of up to a turn.
             step = float(np.spacing(np.float32(2.0 * math.pi))) / (2.0 * math.pi)
-        mean = zero_deg / 360.0 - pattern.zero
-
-        def correction(angles: NDArray[np.uint32], contracted: bool) -> NDArray[np.float64]:
-            raw = (angles * (2.0 * math.pi / 2.0**32)).astype(np.float32)
-            if variant == "minus-u16":
-                out = corrected_short(raw, table, contracted)
-            else:
-                out = corrected_float(raw, table, 1.0 if old else -1.0, contracted)
-            return np.asarray(angles / 2.0**32 - out.astype(np.float64) / (2.0 * math.pi))
-
         return Made(
             text=lambda header: self._text(header, variant, table),
             entries=entries,
             bytes=table.nbytes,
-            parts=(
-                Part(
-                    tuple(partial(correction, contracted=c) for c in (False, True)),
-                    lambda x: pattern.correction(x) - mean,
-                    2.0 * pattern.slope,
-                    3.0 * 2.0**-24,
-                ),
+            part=TablePart.at_readings(
+                pattern, *_device(variant, table), zero=zero_deg / 360.0, resolution=3.0 * 2.0**-24
             ),
             floor_arcsec=line_floor(step)
             if variant == "minus-u16"
@@ -126,7 +112,7 @@ class SimpleFoc(Target):
             ),
         )
 
-    def _text(self, header: Header, variant: str, table: NDArray[Any]) -> str:
+    def _text(self, header: CommentBlock, variant: str, table: NDArray[Any]) -> str:
         array = "calibrationLut"
         kind = "uint16_t" if variant == "minus-u16" else "float"
         if variant == "minus-u16":
@@ -134,7 +120,7 @@ class SimpleFoc(Target):
         else:
             values = [f"{float(value):.9g}" for value in table]
         guard = variant != "plus-float"
-        comment = [
+        own = [
             f"CalibratedSensor table, variant {variant}: {VARIANTS[variant]}.",
             f"Entry i is at i*2*pi/{len(table)} of the wrapped sensor's mechanical angle, the "
             "indicated one; "
@@ -143,18 +129,14 @@ class SimpleFoc(Target):
                 if variant == "plus-float"
                 else "it is the error, and subtracted."
             ),
-            f"Differs from the model by at most {header.proof.max_arcsec:.4g} arcsec, rms "
-            f"{header.proof.rms_arcsec:.3g} ({header.proof.how}). Made by {header.package}.",
-            f"Model: sha256 {header.sha256}",
         ]
         if guard:
-            comment.append(
+            own.append(
                 "The last number repeats the first: just below a full turn the library may read "
                 "one number beyond n_lut."
             )
             values.append(values[0])
-        comment += [f"Note: {note}." for note in header.notes[1:]]
-        lines = [line for part in comment for line in comment_lines(98, part, "// ")]
+        lines = header.comment("// ", *own)
         lines += [
             f"const int n_lut = {len(table)};",
             f"{kind} {array}[{'n_lut + 1' if guard else 'n_lut'}] = {{",
@@ -184,18 +166,36 @@ class SimpleFoc(Target):
             raise failed(
                 path,
                 f"these are {'whole numbers' if whole else 'radians'}, and variant {variant} is "
-                f"asked for; give --variant {'minus-u16' if whole else 'minus-float'}"
+                f"asked for; give `variant={'minus-u16' if whole else 'minus-float'!r}`"
                 f"{'' if whole else ' or plus-float'}",
                 line,
             )
         if variant == "minus-u16":
+            table: NDArray[Any] = numbers.astype(np.uint16)
             turns = (numbers - _MIDDLE) / (float(_PER_RADIAN) * 2.0 * math.pi)
             step = 1.0 / (float(_PER_RADIAN) * 2.0 * math.pi)
         else:
+            table = numbers.astype(np.float32)
             turns = numbers / (2.0 * math.pi) * (-1.0 if variant == "plus-float" else 1.0)
             # The library prints six decimals; a float holds nine of such numbers.
             step = 10.0 ** -min(decimals or 6, 9) / (2.0 * math.pi)
-        return sampled_model(turns, path, text, step=step, name=f"{self.name}, {variant}")
+        device = _device(variant, table)[0]
+        return sampled_model(turns, path, self, device, step=step)
+
+
+def _device(variant: str, table: NDArray[Any]) -> tuple[Correction, ...]:
+    """What a version of the library takes off, without and with contracted products."""
+
+    def correction(angles: Places, contracted: bool) -> NDArray[np.float64]:
+        raw = (angles * (2.0 * math.pi / 2.0**32)).astype(np.float32)
+        if variant == "minus-u16":
+            out = corrected_short(raw, table, contracted)
+        else:
+            sign = 1.0 if variant == "plus-float" else -1.0
+            out = corrected_float(raw, table, sign, contracted)
+        return np.asarray(angles / 2.0**32 - out.astype(np.float64) / (2.0 * math.pi))
+
+    return tuple(partial(correction, contracted=c) for c in (False, True))
 
 
 def _index(raw: Single, entries: int) -> tuple[NDArray[np.intp], np.float32]:

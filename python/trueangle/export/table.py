@@ -5,14 +5,16 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from fractions import Fraction
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .. import _core
-from ..angles import ARCSEC_PER_TURN
+import trueangle._core as _core
+
 from ..errors import ArgumentError
+from ..support.angles import ARCSEC_PER_TURN
 from .knots import cubic_knots, linear_knots, rounded_knots
 
 __all__ = ["METHODS", "NUMBERS", "Table", "make_table"]
@@ -83,6 +85,23 @@ class Table:
         """What rounding the knots alone leaves, rms."""
         return self.step / math.sqrt(18.0) * ARCSEC_PER_TURN
 
+    @property
+    def ratio(self) -> tuple[int, int]:
+        """Turns of the shaft per turn and per 2^-32 turns of the output, modulo one, times 2^64.
+
+        Products of these with an angle in whole numbers of 64 bits are places of the shaft.
+        """
+        exact = Fraction(self.cycles)
+        return round(exact % 1 * 2**64) % 2**64, round(exact * 2**32) % 2**64
+
+    def place(self, position: NDArray[np.int64]) -> NDArray[np.uint32]:
+        """2^-32 turns of the shaft, at positions of the output with their turns."""
+        turns, fraction = (np.uint64(part) for part in self.ratio)
+        low = position.astype(np.uint32).astype(np.uint64)
+        return (
+            ((position >> 32).astype(np.uint64) * turns + low * fraction) >> np.uint64(32)
+        ).astype(np.uint32)
+
     def correction(self, angles: NDArray[np.uint32], contracted: bool = False) -> NDArray[np.int32]:
         """2^-32 turns to subtract, at angles of the shaft in that unit."""
         if contracted:
@@ -149,7 +168,7 @@ def make_table(
     if largest > limit:
         raise ArgumentError(
             f"shaft {shaft} needs corrections of {largest / TURN * 360.0:.3g} deg: {number} "
-            f"{method} tables hold {limit / TURN * 360.0:.3g}; use --number f32"
+            f'{method} tables hold {limit / TURN * 360.0:.3g}; use `number="f32"`'
         )
     if number == "q31":
         return Table(shaft, cycles, method, number, bits, 0, np.rint(values).astype(np.int32))
@@ -159,7 +178,7 @@ def make_table(
         if shift > 15:
             raise ArgumentError(
                 f"shaft {shaft}: 16 bits do not hold its corrections of up to "
-                f"{largest / TURN * 360.0:.3g} deg with {entries} entries; use --number q31"
+                f'{largest / TURN * 360.0:.3g} deg with {entries} entries; use `number="q31"`'
             )
     if method == "linear":
         whole = rounded_knots(values[:-1] / 2.0**shift)

@@ -11,12 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import ArgumentError
-from ..files import Kind
-from ..model import HarmonicModel
-from .pattern import Pattern
+from ..model.model import HarmonicModel
+from ..support.files import Kind
+from ..support.suggestions import check_choice, did_you_mean
+from .pattern import TurnPattern
 from .proof import Correction, Proof
 
-__all__ = ["Header", "Made", "Option", "Part", "Target", "comment_lines"]
+__all__ = ["CommentBlock", "Made", "Option", "TablePart", "Target", "comment_lines"]
 
 Array = NDArray[np.float64]
 
@@ -33,18 +34,35 @@ class Option(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Header:
-    """What is known when a file is written and stands in its comment."""
+class CommentBlock:
+    """What is known when a file is written and stands in its comment.
+
+    Attributes
+    ----------
+    name : str
+        Of the functions, where there are any.
+    difference : str
+        One line: how far the corrected angle is from the model's, all that is left out with it.
+    proof : Proof
+    source : tuple of str
+        Lines on the model: its file and sha256, what it was made from, where it holds.
+    notes : tuple of str
+    """
 
     name: str
-    sha256: str
-    package: str
+    difference: str
     proof: Proof
+    source: tuple[str, ...]
     notes: tuple[str, ...]
 
+    def comment(self, lead: str, *own: str) -> list[str]:
+        """Lines of a file's comment: the difference first, ``own`` words on the table, the rest."""
+        parts = [self.difference, *own, *self.source, *(f"Note: {note}." for note in self.notes)]
+        return [line for part in parts for line in comment_lines(98, part, lead)]
 
-class Part(NamedTuple):
-    """A table in the target's arithmetic, and what it should be.
+
+class TablePart(NamedTuple):
+    """What a target does of itself, and what it should do.
 
     Attributes
     ----------
@@ -52,16 +70,26 @@ class Part(NamedTuple):
         Turns subtracted at readings in 2^-32 turns; several where compilers differ.
     exact : callable
         What it should be, at readings in turns.
-    slope : float
-        Bound of the slopes of table and exact correction together.
     resolution : float
         Turns by which a result is rounded.
+    turns : int
+        Of the output, over which shafts are looked at that do not come back after one.
+    continuous : bool
+        Inputs are real numbers.
     """
 
     corrections: tuple[Correction, ...]
     exact: Callable[[Array], Array]
-    slope: float = 0.0
     resolution: float = 0.0
+    turns: int = 1
+    continuous: bool = False
+
+    @classmethod
+    def at_readings(
+        cls, pattern: TurnPattern, *corrections: Correction, zero: float, **more: Any
+    ) -> TablePart:
+        """Of a table that is looked up at the reading; ``zero`` turns are left to the target."""
+        return cls(corrections, lambda x: pattern.taken_off(x) - zero, **more)
 
 
 @dataclass(frozen=True)
@@ -74,36 +102,33 @@ class Made:
         The file's content, which states what was proven.
     entries, bytes : int
         Numbers of the table, and the memory they take on the target.
-    parts : tuple of Part
-        What is proven; of several the maxima add up.
+    part : Part
+        What is proven: how far the corrected angle is off.
     floor_arcsec : float
         rms that the number format alone leaves.
     step : float
         Distance of two numbers of the format, in turns.
     zero_deg : float
-        A constant that the table leaves to the target's own zero.
+        A constant by which the corrected angle is larger: left to the target's own zero.
     lost : callable, optional
         Of its own where several tables are not one of the output's turn.
     notes : tuple of str
     tables : tuple of dict
         One line on each table, where there are several.
-    neglected : float
-        Turns by which several parts together may differ more than each alone.
     bits : int, optional
         Of a reading, where the target fixes them.
     """
 
-    text: Callable[[Header], str]
+    text: Callable[[CommentBlock], str]
     entries: int
     bytes: int
-    parts: tuple[Part, ...]
+    part: TablePart
     floor_arcsec: float
     step: float
     zero_deg: float = 0.0
     lost: Callable[[], list[dict[str, float]]] | None = None
     notes: tuple[str, ...] = ()
     tables: tuple[dict[str, Any], ...] = ()
-    neglected: float = 0.0
     bits: int | None = None
 
 
@@ -144,7 +169,7 @@ class Target(ABC):
     takes_direction: ClassVar[bool] = False
 
     @abstractmethod
-    def make(self, pattern: Pattern, options: Mapping[str, Any]) -> Made:
+    def make(self, pattern: TurnPattern, options: Mapping[str, Any]) -> Made:
         """The target's table of a pattern."""
 
     @abstractmethod
@@ -173,9 +198,9 @@ class Target(ABC):
         """
         for name, value in given.items():
             if value is not None and name not in self.options:
-                known = ", ".join(f"--{known.replace('_', '-')}" for known in self.options)
+                known = ", ".join(f"`{known}=`" for known in self.options)
                 raise ArgumentError(
-                    f"{self.name} has no option --{name.replace('_', '-')}; "
+                    f"{self.name} has no option `{name}=`{did_you_mean(name, self.options)}; "
                     f"it has {known or 'none'}"
                 )
         found = {}
@@ -186,11 +211,8 @@ class Target(ABC):
 
 
 def _checked(name: str, option: Option, value: Any) -> Any:
-    shown = f"--{name.replace('_', '-')}"
     if isinstance(option.values, tuple):
-        if value not in option.values:
-            raise ArgumentError(f"{shown} must be {' or '.join(option.values)}, got {value!r}")
-        return value
+        return check_choice(name, value, option.values)
     try:
         if option.values is int and float(value) != int(value):
             raise ValueError
@@ -199,18 +221,22 @@ def _checked(name: str, option: Option, value: Any) -> Any:
             raise ValueError
     except (TypeError, ValueError, OverflowError):
         raise ArgumentError(
-            f"{shown} must be {'a whole number' if option.values is int else 'a number'}, "
+            f"{name} must be {'a whole number' if option.values is int else 'a number'}, "
             f"got {value!r}"
         ) from None
     return converted
 
 
 def comment_lines(width: int, text: str, lead: str) -> list[str]:
-    """``text`` broken into comment lines of at most ``width`` characters."""
+    """``text`` broken into comment lines of at most ``width`` characters.
+
+    Nothing in it ends the comment or takes the next line into it.
+    """
     import textwrap
 
+    text = text.replace("*/", "* /").replace("\\", "/")
     return [
         f"{lead}{line}".rstrip()
-        for paragraph in text.split("\n")
+        for paragraph in text.splitlines() or [""]
         for line in textwrap.wrap(paragraph, width - len(lead)) or [""]
     ]

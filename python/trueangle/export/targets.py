@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from ..errors import ArgumentError
+from ..support.suggestions import did_you_mean
 from .admt4000 import Admt4000
 from .c import CHeader
 from .csvtable import CsvTable
@@ -46,5 +47,8 @@ def target_of(name: str) -> Target:
         There is none.
     """
     if name not in TARGETS:
-        raise ArgumentError(f"there is no target {name!r}; the targets are {', '.join(TARGETS)}")
+        raise ArgumentError(
+            f"there is no target {name!r}{did_you_mean(name, TARGETS)}; the targets are "
+            f"{', '.join(TARGETS)}"
+        )
     return TARGETS[name]

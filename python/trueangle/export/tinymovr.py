@@ -9,13 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import ArgumentError
-from ..files import Kind
-from ..model import HarmonicModel
+from ..model.model import HarmonicModel
+from ..support.files import Kind
 from .knots import rounded_knots
 from .oneturn import array_of, line_floor, one_turn_knots, rows
-from .pattern import Pattern
+from .pattern import TurnPattern
+from .proof import Correction, Places
 from .reading import failed, sampled_model
-from .target import Header, Made, Option, Part, Target, comment_lines
+from .target import CommentBlock, Made, Option, TablePart, Target
 
 __all__ = ["Tinymovr", "rectified"]
 
@@ -23,7 +24,7 @@ Whole = NDArray[np.int64]
 
 
 class Tinymovr(Target):
-    """``--to tinymovr``: ``rec_table`` of a sensor's configuration."""
+    """Target ``tinymovr``: ``rec_table`` of a sensor's configuration."""
 
     name = "tinymovr"
     what = "the rec_table of a Tinymovr sensor"
@@ -39,12 +40,12 @@ class Tinymovr(Target):
         "entries": Option(int, 64, "ECN_SIZE of the firmware, a power of two"),
     }
 
-    def make(self, pattern: Pattern, options: Mapping[str, Any]) -> Made:
+    def make(self, pattern: TurnPattern, options: Mapping[str, Any]) -> Made:
         bits, entries = options["bits"], options["entries"]
         if not 8 <= bits <= 20:
-            raise ArgumentError(f"--bits must be from 8 to 20, got {bits}")
+            raise ArgumentError(f"bits must be from 8 to 20, got {bits}")
         if entries & (entries - 1) or not 4 <= entries <= 1 << bits:
-            raise ArgumentError(f"--entries must be a power of two up to 2^bits, got {entries}")
+            raise ArgumentError(f"entries must be a power of two up to 2^bits, got {entries}")
         ticks = 1 << bits
         knots = -one_turn_knots(pattern, entries, self.name, False) * ticks
         # The shift between two entries cuts down: half a tick less on the mean.
@@ -56,20 +57,12 @@ class Tinymovr(Target):
         ]
         table = tried[int(np.argmin(left))]
 
-        def correction(angles: NDArray[np.uint32]) -> NDArray[np.float64]:
-            reading = (angles >> np.uint32(32 - bits)).astype(np.int64)
-            return np.asarray((reading - rectified(reading, table, bits)) / ticks)
-
-        def text(header: Header) -> str:
-            comment = [
+        def text(header: CommentBlock) -> str:
+            own = [
                 f"rec_table for a sensor of {bits} bits and ECN_SIZE {entries}: ticks that are "
-                f"added at the indicated angle. Made by {header.package}.",
-                f"Differs from the model by at most {header.proof.max_arcsec:.4g} arcsec, rms "
-                f"{header.proof.rms_arcsec:.3g} ({header.proof.how}).",
-                f"Model: sha256 {header.sha256}",
-                *(f"Note: {note}." for note in header.notes),
+                "added at the indicated angle.",
             ]
-            lines = [line for part in comment for line in comment_lines(98, part, "// ")]
+            lines = header.comment("// ", *own)
             values = rows([str(int(value)) for value in table])
             return "\n".join(
                 [*lines, ".rec_table = {", values, "},", ".rec_calibrated = true,", ""]
@@ -79,7 +72,7 @@ class Tinymovr(Target):
             text=text,
             entries=entries,
             bytes=4 * entries,
-            parts=(Part((correction,), pattern.correction),),
+            part=TablePart.at_readings(pattern, _device(table, bits), zero=pattern.zero),
             # Whole ticks: of the entries, and of what is between them.
             floor_arcsec=line_floor(1.0 / ticks) * 2.5**0.5,
             step=1.0 / ticks,
@@ -92,7 +85,16 @@ class Tinymovr(Target):
         if len(table) & (len(table) - 1) or np.any(table != np.rint(table)):
             raise failed(path, "rec_table holds whole ticks, a power of two of them", line)
         ticks = 1 << options["bits"]
-        return sampled_model(-table / ticks, path, text, step=1.0 / ticks, name=self.name)
+        device = _device(table.astype(np.int64), options["bits"])
+        return sampled_model(-table / ticks, path, self, device, step=1.0 / ticks)
+
+
+def _device(table: Whole, bits: int) -> Correction:
+    def correction(angles: Places) -> NDArray[np.float64]:
+        reading = angles % 2**32 >> (32 - bits)
+        return np.asarray((reading - rectified(reading, table, bits)) / (1 << bits))
+
+    return correction
 
 
 def rectified(reading: Whole, table: Whole, bits: int) -> Whole:

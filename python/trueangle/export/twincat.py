@@ -7,19 +7,21 @@ import io
 import math
 import re
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any, ClassVar
 
 import numpy as np
 
 from ..errors import ArgumentError
-from ..files import Kind
-from ..model import HarmonicModel
+from ..model.model import HarmonicModel
+from ..support.files import Kind
 from .oneturn import line_floor
-from .pattern import Pattern
+from .pattern import TurnPattern
+from .proof import enough_bits
 from .reading import failed
 from .setpoint import Travel
 from .setpointreading import travel_model
-from .target import Header, Made, Option, Target, comment_lines
+from .target import CommentBlock, Made, Option, Target
 
 __all__ = ["TwinCat"]
 
@@ -33,7 +35,7 @@ _LINE = re.compile(r"^\s*kw\.ssfk\.(\w+)(?:\[(\d+)\]\.(\w+))?\s+(-?\d+)")
 
 
 class TwinCat(Target):
-    """``--to twincat``: ``--variant cnc`` or ``nc``."""
+    """Target ``twincat``: variant ``cnc`` or ``nc``."""
 
     name = "twincat"
     what = "the leadscrew compensation of a TwinCAT CNC axis, or points for an NC axis"
@@ -48,9 +50,11 @@ class TwinCat(Target):
     options = {
         "variant": Option(("cnc", "nc"), "cnc", "cnc: kw.ssfk list; nc: Position,Compensation"),
         "entries": Option(int, 360, "to a turn"),
-        "start": Option(float, 0.0, "of the travel, degrees"),
-        "stop": Option(float, 360.0, "of the travel, degrees"),
-        "bits": Option(int, 24, "bits of a position over the travel"),
+        "start": Option(
+            float, None, "of the travel, degrees (default: what the model was fitted on, else 0)"
+        ),
+        "stop": Option(float, None, "of the travel, degrees (default: likewise, else 360)"),
+        "bits": Option(int, 20, "2^bits positions are evaluated, and more where entries are many"),
     }
 
     def sizes(self, options: Mapping[str, Any]) -> Sequence[int]:
@@ -59,37 +63,29 @@ class TwinCat(Target):
     def sign_of(self, options: Mapping[str, Any]) -> str:
         return "add" if options["variant"] == "nc" else "subtract"
 
-    def make(self, pattern: Pattern, options: Mapping[str, Any]) -> Made:
+    def make(self, pattern: TurnPattern, options: Mapping[str, Any]) -> Made:
         cnc = options["variant"] == "cnc"
-        travel = Travel.of(
-            pattern, self.name, options["start"], options["stop"], options["entries"],
-            MOST if cnc else 100_000,
-        )  # fmt: skip
-        return self._cnc(pattern, travel) if cnc else self._nc(pattern, travel)
+        travel = Travel.of(pattern, self.name, options, MOST if cnc else 100_000)
+        made = self._cnc(pattern, travel) if cnc else self._nc(pattern, travel)
+        return replace(made, bits=enough_bits(options["bits"], made.entries))
 
-    def _cnc(self, pattern: Pattern, travel: Travel) -> Made:
+    def _cnc(self, pattern: TurnPattern, travel: Travel) -> Made:
         if TENTHS % travel.entries:
             raise ArgumentError(
-                f"--entries {travel.entries} a turn are no whole number of 0.0001 deg apart: use "
+                f"`entries={travel.entries}` a turn are no whole number of 0.0001 deg apart: use "
                 "a divisor of 3600000, such as 360 or 720"
             )
         interval = TENTHS // travel.entries
         start = round(travel.start * 1e4)
         if abs(start - travel.start * 1e4) > 1e-6:
-            raise ArgumentError(f"--start must be a whole number of 0.0001 deg, got {travel.start}")
+            raise ArgumentError(f"start must be a whole number of 0.0001 deg, got {travel.start}")
         # The list holds actual less programmed: minus the error.
         values = [np.rint(-v * TENTHS).astype(int) for v in (travel.forward, travel.reverse)]
         whole = math.isclose(travel.stop - travel.start, 360.0)
 
-        def text(header: Header) -> str:
-            comment = [
-                f"Leadscrew error compensation, 0.0001 deg: actual less programmed position. "
-                f"Made by {header.package}.",
-                f"Differs from the model by at most {header.proof.max_arcsec:.4g} arcsec.",
-                f"Model: sha256 {header.sha256}",
-                *(f"Note: {note}." for note in header.notes),
-            ]
-            lines = [line for part in comment for line in comment_lines(98, part, "# ")]
+        def text(header: CommentBlock) -> str:
+            own = "Leadscrew error compensation, 0.0001 deg: actual less programmed position."
+            lines = header.comment("# ", own)
             lines += [
                 f"kw.ssfk.interval {interval}",
                 f"kw.ssfk.kw_startpos {start}",
@@ -106,7 +102,7 @@ class TwinCat(Target):
             text=text,
             entries=len(values[0]),
             bytes=8 * len(values[0]),
-            parts=(travel.part(pattern, *(-v / TENTHS for v in values)),),
+            part=travel.part(pattern, *(-v / TENTHS for v in values)),
             floor_arcsec=line_floor(step),
             step=step,
             zero_deg=pattern.zero * 360.0,
@@ -114,10 +110,10 @@ class TwinCat(Target):
             notes=("switch it on by lr_param.ssfk 1 of the axis",),
         )
 
-    def _nc(self, pattern: Pattern, travel: Travel) -> Made:
+    def _nc(self, pattern: TurnPattern, travel: Travel) -> Made:
         columns = [np.round(v * 360.0, _DECIMALS) for v in (travel.forward, travel.reverse)]
 
-        def text(header: Header) -> str:
+        def text(header: CommentBlock) -> str:
             out = io.StringIO()
             writer = csv.writer(out, lineterminator="\n")
             writer.writerow(["Position", "Compensation_positive", "Compensation_negative"])
@@ -130,7 +126,7 @@ class TwinCat(Target):
             text=text,
             entries=len(travel.nominal),
             bytes=16 * len(travel.nominal),
-            parts=(travel.part(pattern, *(v / 360.0 for v in columns)),),
+            part=travel.part(pattern, *(v / 360.0 for v in columns)),
             floor_arcsec=line_floor(step),
             step=step,
             zero_deg=pattern.zero * 360.0,
@@ -143,8 +139,8 @@ class TwinCat(Target):
 
     def read(self, text: str, path: str, options: Mapping[str, Any]) -> HarmonicModel:
         if "kw.ssfk." in text:
-            return travel_model(_cnc_table(text, path), path, self.name, 1e-4)
-        return travel_model(_nc_table(text, path), path, self.name, 10.0**-_DECIMALS)
+            return travel_model(_cnc_table(text, path), path, self, 1e-4)
+        return travel_model(_nc_table(text, path), path, self, 10.0**-_DECIMALS)
 
 
 def _cnc_table(text: str, path: str) -> np.ndarray[Any, np.dtype[np.float64]]:

@@ -8,14 +8,15 @@ from typing import Final, Literal, NamedTuple, TypeAlias
 
 import numpy as np
 
-from ..angles import circular_mean, wrap
-from ..errors import ArgumentError, TrueAngleError
-from ..model import Argument
-from ..runs import CalibrationRun
-from ..shafts import ShaftOrders
+from ..errors import TrueAngleError
+from ..joint.shafts import ShaftOrders
+from ..model.model import Argument
+from ..runs.run import CalibrationRun
+from ..support.angles import circular_mean, wrap
+from ..support.suggestions import check_choice
 from .problem import Problem
 
-__all__ = ["ARGUMENTS", "AnyArgument", "Choice", "at_indicated", "choose_argument"]
+__all__ = ["ARGUMENTS", "AnyArgument", "ArgumentChoice", "at_indicated", "choose_argument"]
 
 AnyArgument: TypeAlias = Literal["auto", "reference", "indicated"]
 ARGUMENTS: tuple[AnyArgument, ...] = ("auto", "reference", "indicated")
@@ -34,21 +35,21 @@ _MORE: Final = 1.05
 _DECISIVE: Final = 60.0
 
 
-class Choice(NamedTuple):
+class ArgumentChoice(NamedTuple):
     """The angle, and why where it is not what a user expects."""
 
     argument: Argument
     note: str = ""
 
 
-_REFERENCE: Final = Choice("reference")
+_REFERENCE: Final = ArgumentChoice("reference")
 
 
 def choose_argument(
     runs: Sequence[CalibrationRun],
     argument: AnyArgument,
     shafts: Sequence[ShaftOrders] | None = None,
-) -> Choice:
+) -> ArgumentChoice:
     """The angle asked for; of ``"auto"`` the true one, unless its zero is new in every run.
 
     Where a rig homes its reference anew for every run, the same place of the joint has
@@ -63,19 +64,16 @@ def choose_argument(
     """
     if argument == "auto" and len(runs) < 2:
         return _REFERENCE
-    if argument not in ARGUMENTS:
-        raise ArgumentError(
-            f"argument must be 'auto', 'reference' or 'indicated', got {argument!r}"
-        )
+    check_choice("argument", argument, ARGUMENTS)
     if argument != "auto":
-        return Choice(argument)
+        return ArgumentChoice(argument)
     period = runs[0].period
     runs = runs[:: max(1, len(runs) // _MOST_RUNS)]
     looked_at = [_some(run, max(64, _LOOKED_AT // len(runs))) for run in runs]
     zeros = np.array([circular_mean(r.indicated - r.reference, period) for r in looked_at])
     moved = float(np.abs(wrap(zeros - zeros[0], period)).max())
     if moved < _MOVED * period:
-        return Choice("reference")
+        return ArgumentChoice("reference")
     asked = shafts or [ShaftOrders("output", 1.0, _LOW_ORDERS)]
     left: list[float] = []
     for angle in ("reference", "indicated"):
@@ -83,14 +81,14 @@ def choose_argument(
             problem = Problem(looked_at, asked, angle)
             solution = problem.solve(problem.base).solution
         except TrueAngleError:
-            return Choice("reference")
+            return ArgumentChoice("reference")
         left.append(solution.residual_variance * solution.degrees_of_freedom)
     energy = sum(_energy(run) for run in looked_at)
     noise = left[1] / solution.degrees_of_freedom
     true, own = (energy - rest for rest in left)
     if not (own > _MORE * true and own - true > _DECISIVE * noise):
-        return Choice("reference")
-    return Choice(
+        return ArgumentChoice("reference")
+    return ArgumentChoice(
         "indicated",
         "the reference has a zero of its own in every run (they differ by up to "
         f"{moved * 360.0 / period:.3g} deg) and the pattern stays with the joint's own reading: "

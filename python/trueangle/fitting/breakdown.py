@@ -8,7 +8,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errorunits import brief
+from ..support.display_units import brief
 from .problem import Problem
 from .robust import FAR, MANY, Weighted, robust_scale
 
@@ -25,7 +25,7 @@ _BENT: Final = 3.0
 
 def breakdown_sentence(problem: Problem, weighted: Weighted) -> str:
     """What to tell of a robust fit at the end of its powers; empty where it is not."""
-    share, robust = weighted.far, weighted.weights is not None
+    share, robust = weighted.far, weighted.weights is not None or weighted.wild > 0
     if share <= MANY and not robust:
         return ""
     rest = problem.residuals(weighted.fitted)

@@ -8,12 +8,10 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from .. import _core
-from ..angles import circular_mean
 from .clusters import Cluster
 from .problem import Fitted, Problem
 
-__all__ = ["clusters_of", "coefficients_of", "runs_together", "sums_of", "weight_of"]
+__all__ = ["clusters_of", "coefficients_of", "runs_together", "weight_of"]
 
 Array = NDArray[np.float64]
 
@@ -33,32 +31,11 @@ def weight_of(weights: Array | None, size: int) -> float:
     return float(size) if weights is None else float(weights.sum())
 
 
-def sums_of(
-    problem: Problem, weights: Sequence[Array | None], index: int, count: int
-) -> list[Array]:
-    """Sums of products of ``[1, columns, error]`` of a run, in so many stretches in a row."""
-    run, weight = problem.runs[index], weights[index]
-    zero = circular_mean(run.indicated - run.reference, problem.period)
-    found = []
-    for part in np.array_split(np.arange(len(run)), count) if count > 1 else [slice(None)]:
-        rows = _core.triangle(
-            (run.reference[part], run.indicated[part], None if weight is None else weight[part]),
-            problem.period,
-            [shaft.cycles_per_turn for shaft in problem.shafts],
-            [list(shaft.orders) for shaft in problem.shafts],
-            problem.argument,
-            zero,
-            problem.threads,
-        )
-        found.append(rows.T @ rows)
-    return found
-
-
 def clusters_of(
     problem: Problem, fitted: Fitted, weights: Sequence[Array | None], index: int, count: int
 ) -> list[Cluster]:
     """Sums of a run in so many stretches of readings in a row, about the run's mean."""
-    sums = sums_of(problem, weights, index, count)
+    sums = problem.products(weights, index, count)
     whole = np.sum(sums, axis=0)
     mean = whole[0] / whole[0, 0]
     coefficients = coefficients_of(fitted)

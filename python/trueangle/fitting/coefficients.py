@@ -8,20 +8,20 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from ..distributions import student_quantile
 from ..errors import ArgumentError
-from ..model import HarmonicModel
-from ..plainresult import PlainResult
+from ..model.model import HarmonicModel
+from ..support.distributions import student_quantile
+from ..support.plainresult import PlainResult
 
 if TYPE_CHECKING:
     from .uncertainty import Uncertainty
 
-__all__ = ["Coefficients"]
+__all__ = ["FittedCoefficients"]
 
 Array = NDArray[np.float64]
 
 
-class Coefficients(PlainResult):
+class FittedCoefficients(PlainResult):
     """Coefficients with their uncertainty: what fits of runs and of logs have in common."""
 
     if TYPE_CHECKING:

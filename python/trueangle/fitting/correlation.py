@@ -9,8 +9,9 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from .. import _core
-from ..distributions import chi_squared_tail
+import trueangle._core as _core
+
+from ..support.distributions import chi_squared_tail
 from .clusters import scatter_statistic
 from .clustersums import clusters_of, runs_together
 from .problem import Fitted, Problem

@@ -6,30 +6,34 @@ import warnings
 from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from ..errors import ArgumentError, NoModelError, UnlikeRunsWarning
-from ..model import Argument
-from ..runs import CalibrationRun, as_runs
-from ..shafts import resolve_orders
-from ..units import check_follows
-from ..validity import check_invertible
-from .argument import ARGUMENTS, AnyArgument, Choice, choose_argument
+from ..errors import ArgumentError, NoOrderError, UnlikeRunsWarning
+from ..joint.shafts import counted_orders, resolve_orders
+from ..model.model import Argument
+from ..model.validity import check_invertible
+from ..runs.follows import check_follows
+from ..runs.run import CalibrationRun, as_runs
+from ..runs.travel import CONDITION, travelled_span, without_drift
+from ..support.kinds import told_kinds
+from ..support.suggestions import check_choice
+from .argument import ARGUMENTS, AnyArgument, ArgumentChoice, choose_argument
 from .breakdown import breakdown_sentence
 from .problem import Problem
 from .result import FitResult
-from .robust import Loss, weigh, without_spikes
-from .travel import CONDITION, travelled_span
+from .robust import Loss, unsettled_sentence, weigh, weighed, without_spikes
 from .uncertainty import CovarianceKind, check_covariance
 
 if TYPE_CHECKING:
-    from ..orders.select import OrderSelection
+    from .orders.select import OrderSelection
+    from .summed import Summed
 
-__all__ = ["fit"]
+__all__ = ["ROUNDING", "fit", "fitted_to"]
 
 #: Rounding of angles around a whole turn, in parts of a turn: smaller deviations are
 #: never taken for wild readings.
-_ROUNDING = 1e-12
+ROUNDING = 1e-12
 
 
+@told_kinds
 def fit(
     runs: CalibrationRun | Iterable[CalibrationRun],
     orders: Iterable[float] | Mapping[str, Iterable[float]] | str | None = None,
@@ -129,11 +133,42 @@ def fit(
     >>> result.model.shafts[0].sine[0].__round__(9)
     0.5
     """
-    found = as_runs(runs)
-    if argument not in ARGUMENTS:
-        raise ArgumentError(
-            f"argument must be 'auto', 'reference' or 'indicated', got {argument!r}"
-        )
+    return fitted_to(
+        as_runs(runs),
+        orders,
+        gear_ratio=gear_ratio,
+        fixed_member=fixed_member,
+        shafts=shafts,
+        argument=argument,
+        loss=loss,
+        ridge=ridge,
+        covariance=covariance,
+        nuisance=nuisance,
+        reference_orders=reference_orders,
+        method=method,
+        threads=threads,
+    )
+
+
+def fitted_to(
+    found: Sequence[CalibrationRun],
+    orders: Iterable[float] | Mapping[str, Iterable[float]] | str | None,
+    *,
+    gear_ratio: float | None,
+    fixed_member: str,
+    shafts: Mapping[str, float] | None,
+    argument: AnyArgument,
+    loss: Loss,
+    ridge: float | None = None,
+    covariance: CovarianceKind,
+    nuisance: str | Iterable[str] = "none",
+    reference_orders: Iterable[float] = (),
+    method: str | None = None,
+    threads: int | None = None,
+    summed: Summed | None = None,
+) -> FitResult:
+    """As `fit`; with ``summed`` of all readings of which the runs are some."""
+    check_choice("argument", argument, ARGUMENTS)
     check_covariance(covariance, len(found))
     for run in found:
         check_follows(run)
@@ -154,7 +189,7 @@ def fit(
             "shafts": shafts,
             "reference_orders": beside.reference,
         }
-        selection, orders = _selected(found, orders, loss, sought)
+        selection, orders = _selected(found, orders, loss, sought, summed)
     wanted = resolve_orders(orders, gear_ratio, fixed_member, shafts)
     taken = None
     if beside.wanted:
@@ -165,16 +200,25 @@ def fit(
             given, beside.kinds, wanted, likely, _angle(argument), beside.reference
         )
     if selection is not None:
-        choice = Choice(selection.argument)
+        choice = ArgumentChoice(selection.argument)
+        if any(row.verdict == "too long" for row in selection.table):
+            cycles = [k * shaft.cycles_per_turn for shaft in wanted for k in shaft.orders]
+            found = [without_drift(run, cycles) for run in found]
         if len(found) > 1:
             from .newrun import check_new_run
 
-            check_new_run(found, wanted, choice.argument)
+            check_new_run(found, wanted, choice.argument, summed)
     else:
         choice = choose_argument(found, argument, wanted)
-    problem = Problem(found, wanted, choice.argument, method, threads)
-    weighted = weigh(problem, loss, _ROUNDING * problem.period)
-    span = travelled_span(problem.angles, problem.period, problem.is_periodic)
+    if summed is None:
+        problem = Problem(found, wanted, choice.argument, method, threads)
+        weighted = weigh(problem, loss, ROUNDING * problem.period)
+    else:
+        from .summed import SummedProblem
+
+        problem = SummedProblem(summed, wanted, threads)
+        weighted = weighed(problem, len(summed.outliers))
+    span = travelled_span(problem.travel, problem.period, problem.is_periodic)
     if ridge is None:
         tame = (span.full and problem.is_periodic) or weighted.fitted.solution.is_conditioned_below(
             CONDITION
@@ -198,13 +242,17 @@ def fit(
     if taken is not None:
         remarks += taken.sentences(problem.period)
     if len(found) > 1:
-        from .likeness import unlike_runs, unlike_sentence
+        from .likeness import names_of, unlike_runs, unlike_sentence
 
         unlike = unlike_runs(problem, fitted)
         if unlike:
-            labels = [found[i].label or str(i + 1) for i in unlike]
-            remarks.append(unlike_sentence(labels, len(found)))
-            warnings.warn(remarks[-1], UnlikeRunsWarning, stacklevel=2)
+            names = names_of(found)
+            remarks.append(unlike_sentence([names[i] for i in unlike], len(found)))
+            warnings.warn(remarks[-1], UnlikeRunsWarning, stacklevel=4)
+    if weighted.unsettled:
+        remarks.append(unsettled_sentence(weighted))
+    if summed is not None:
+        remarks.append(summed.note)
     return FitResult(
         problem,
         fitted,
@@ -237,7 +285,7 @@ _NOTHING = _Beside((), ())
 
 
 def _beside(nuisance: str | Iterable[str], reference_orders: Iterable[float]) -> _Beside:
-    lines = tuple(map(float, reference_orders))
+    lines = tuple(map(float, counted_orders(reference_orders, "reference_orders")))
     if nuisance == "none":
         return _Beside((), lines) if lines else _NOTHING
     from .nuisance import asked_nuisance
@@ -250,16 +298,20 @@ def _angle(argument: AnyArgument) -> Argument:
 
 
 def _selected(
-    runs: Sequence[CalibrationRun], orders: str | None, loss: Loss, sought: dict[str, Any]
+    runs: Sequence[CalibrationRun],
+    orders: str | None,
+    loss: Loss,
+    sought: dict[str, Any],
+    summed: Summed | None,
 ) -> tuple[OrderSelection, Mapping[str, Iterable[float]]]:
     """Orders with evidence, from readings without spikes."""
     if orders not in (None, "auto"):
         raise ArgumentError(f"orders must be whole numbers, a mapping or 'auto', got {orders!r}")
-    from ..orders.select import select_orders
+    from .orders.select import selected_of
 
     if loss != "linear":
         runs = [without_spikes(run) for run in runs]
-    selection = select_orders(runs, **sought)
+    selection = selected_of(runs, **sought, summed=summed)
     if not selection.orders:
-        raise NoModelError(f"no order is supported by the data: {selection.reason}")
+        raise NoOrderError(f"no order is supported by the data: {selection.reason}")
     return selection, selection.by_shaft

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib
 import math
 import warnings
 from collections.abc import Sequence
@@ -12,7 +11,6 @@ from typing import TYPE_CHECKING, Any, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from ..angles import ARCSEC_PER_TURN, circular_mean, wrap
 from ..errors import (
     ArgumentError,
     NoModelError,
@@ -20,8 +18,11 @@ from ..errors import (
     TrueAngleError,
     UnlikeRunsWarning,
 )
-from ..model import HarmonicModel
-from ..runs import CalibrationRun
+from ..model.model import HarmonicModel
+from ..runs.run import CalibrationRun
+from ..support.angles import ARCSEC_PER_TURN, circular_mean, wrap
+from ..support.plainresult import Shown
+from ..support.renamed import attribute
 from .robust import Loss
 
 if TYPE_CHECKING:
@@ -59,7 +60,7 @@ class HeldOutRun:
 
 
 @dataclass(frozen=True, eq=False)
-class HeldOut:
+class HeldOut(Shown):
     """Gain on held-out runs.
 
     Attributes
@@ -214,7 +215,5 @@ def _rms(parts: Sequence[Array]) -> float:
 
 
 def __getattr__(name: str) -> Any:
-    # Its place before it moved to the diagnosis, which this room does not import.
-    if name == "hold_out_extended":
-        return importlib.import_module("trueangle.diagnosis.heldout").hold_out_extended
-    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    # `hold_out_extended` moved to the diagnosis, which this room does not import.
+    return attribute(__name__, "trueangle.diagnosis.heldout", name)

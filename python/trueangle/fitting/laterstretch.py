@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import NoModelError, TrueAngleError
-from ..runs import CalibrationRun
+from ..runs.run import CalibrationRun
+from ..runs.travel import CONDITION, travelled_span
 from .problem import Problem
-from .travel import CONDITION, travelled_span
 
 __all__ = ["check_later_stretch", "gains_of_stretches"]
 
@@ -53,8 +53,8 @@ def check_later_stretch(problem: Problem, weights: Sequence[Array | None]) -> No
         f"no correction can be given: what the rest of the run says of order {listed} would make "
         f"the error of {int(np.count_nonzero(gains <= 0.0))} of {gains.size} stretches of it "
         "larger, and that of the others unevenly smaller; the error is not one of the angle alone: "
-        "run trueangle diagnose, take out what is beside the pattern (--nuisance auto), or declare "
-        "the orders (--orders) or the shafts (--shaft)"
+        'run `ta.diagnose(...)`, take out what is beside the pattern (`nuisance="auto"`), or '
+        "declare the `orders=` or the `shafts=`"
     )
 
 

@@ -8,12 +8,14 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from .. import _core
-from ..angles import circular_mean
-from ..quantiles import median
+import trueangle._core as _core
+
+from ..runs.run import CalibrationRun
+from ..support.angles import circular_mean
+from ..support.quantiles import median
 from .problem import Fitted, Problem
 
-__all__ = ["RunSums", "far_runs", "unlike_runs", "unlike_sentence"]
+__all__ = ["RunSums", "far_runs", "names_of", "unlike_runs", "unlike_sentence"]
 
 Array = NDArray[np.float64]
 
@@ -104,6 +106,19 @@ def _solved(gram: Array, moment: Array) -> tuple[Array, int, bool]:
     return solution, int(np.count_nonzero(seen)), bool(values[0] > _SPEAKS**2 * values[-1])
 
 
+def names_of(runs: Sequence[CalibrationRun]) -> list[str]:
+    """What to call each run: its label, or its file where that tells runs apart, or its number."""
+    labels = [run.label or "" for run in runs]
+    files = ["" if run.source is None else run.source.file for run in runs]
+    several = len(set(files)) > 1
+    alike = len({*labels}) < len(labels)
+    return [
+        ":".join(filter(None, (file if several and (alike or not label) else "", label)))
+        or str(number)
+        for number, (file, label) in enumerate(zip(files, labels, strict=True), 1)
+    ]
+
+
 def unlike_sentence(labels: Sequence[str], count: int) -> str:
     """What to tell of runs, out of so many, that are unlike the others."""
     more = f" and {len(labels) - _NAMED} more" if len(labels) > _NAMED else ""
@@ -116,6 +131,13 @@ def unlike_sentence(labels: Sequence[str], count: int) -> str:
 
 
 def _sums(problem: Problem, index: int) -> RunSums:
+    if problem.summed is not None:
+        (products,) = problem.products(problem.base, index, 1)
+        readings = float(products[0, 0])
+        share = min(1.0, _READINGS / readings)
+        about = share * (products - np.outer(products[0], products[0]) / readings)
+        moment = about[1:-1, -1]
+        return RunSums(about[1:-1, 1:-1], moment, float(about[-1, -1]), share * readings)
     rows, used = _rows(problem, index)
     design, error = rows[:, :-1], rows[:, -1]
     return RunSums(design.T @ design, design.T @ error, float(error @ error), used)

@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from .._core import __version__
-from ..angles import wrap
-from ..model import HarmonicModel
-from ..records import FitRecord, Provenance
-from ..shafts import Shaft
+from ..joint.shafts import Shaft
+from ..model.model import HarmonicModel
+from ..model.records import FitRecord, Provenance
+from ..support.angles import wrap
 
 if TYPE_CHECKING:
     from .result import FitResult
@@ -48,6 +48,9 @@ def fit_notes(fit: FitResult) -> Iterable[str]:
     span, weighted = fit.span, fit.weighted
     if not span.full:
         yield f"Fitted on {span.describe(fit.problem.period)} only: outside it is extrapolated."
+    if fit.missing:
+        rows = "row" if fit.missing == 1 else "rows"
+        yield f"{fit.missing} {rows} with an empty cell left out."
     yield from (_sentence(remark) for remark in fit.remarks)
     if fit.ridge > 0.0:
         where = "arc" if fit.problem.is_periodic else "travel"
@@ -57,7 +60,7 @@ def fit_notes(fit: FitResult) -> Iterable[str]:
             "and intervals hold what the ridge may have taken from the pattern, for patterns "
             "of the sizes that the readings show, on average over the travel."
         )
-    if weighted.weights is not None and weighted.wild:
+    if weighted.wild:
         yield f"{weighted.wild} wild reading{'s' if weighted.wild > 1 else ''} set aside."
     if fit.uncertainty.note:
         yield _sentence(fit.uncertainty.note)
@@ -84,7 +87,7 @@ def _record(fit: FitResult) -> FitRecord:
     around = wrap(used - solution.constant, problem.period)
     verified = _verified(fit)
     return FitRecord(
-        samples=sum(len(run) for run in problem.runs),
+        samples=problem.readings,
         runs=len(problem.runs),
         span=(fit.span.start, fit.span.stop),
         residual=math.sqrt(variance) if math.isfinite(variance) else None,
@@ -101,10 +104,10 @@ def _record(fit: FitResult) -> FitRecord:
 
 def _verified(fit: FitResult) -> tuple[int, str] | None:
     """Distinct positions and where the model is verified; None for free or many angles."""
-    from ..orders.verdicts import verified_positions
+    from .orders.verdicts import verified_positions
 
     runs = fit.problem.runs
-    if sum(len(run) for run in runs) > _COUNTED:
+    if fit.problem.readings > _COUNTED:
         return None
     verified = verified_positions(runs, *fit.joint)
     return None if verified.between else (verified.count, verified.sentence)

@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Final, NamedTuple
+from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..distributions import student_quantile
 from ..errors import NoModelError
-from ..errorunits import brief
-from ..runs import CalibrationRun
-from ..shafts import ShaftOrders
+from ..joint.shafts import ShaftOrders
+from ..runs.run import CalibrationRun
+from ..support.display_units import brief
+from ..support.distributions import student_quantile
+
+if TYPE_CHECKING:
+    from .summed import Summed
 
 __all__ = ["RunGains", "check_new_run", "gains_of_runs"]
 
@@ -59,7 +62,10 @@ class RunGains(NamedTuple):
 
 
 def check_new_run(
-    runs: Sequence[CalibrationRun], wanted: Sequence[ShaftOrders], argument: str
+    runs: Sequence[CalibrationRun],
+    wanted: Sequence[ShaftOrders],
+    argument: str,
+    summed: Summed | None = None,
 ) -> None:
     r"""Raise where orders selected by evidence would not help a further run.
 
@@ -78,20 +84,18 @@ def check_new_run(
         The runs contradict each other: says in how many the error would be larger.
     """
     orders = [k * shaft.cycles_per_turn for shaft in wanted for k in shaft.orders]
-    found = gains_of_runs(runs, orders, argument)
+    found = gains_of_runs(runs, orders, argument, summed)
     if found is None:
         return
     gains, noise, shown, shared = found
     mean, scatter = float(gains.mean()), float(gains.std(ddof=1))
     listed = ", ".join(f"{order:g}" for order in orders[:6]) + (" ..." if orders[6:] else "")
-    mend = (
-        "they seem to be of unlike joints: fit each alone (--run), or declare the orders (--orders)"
-    )
+    mend = "they seem to be of unlike joints: fit each by itself, or declare the `orders=`"
     if mean <= _SURE * np.sqrt(max(0.0, scatter**2 - noise)):
         worse = int(np.count_nonzero(gains < 0.0))
         raise NoModelError(
             f"no correction can be given: what the other runs say of order {listed} would make the "
-            f"error of {worse} of {len(runs)} runs larger, and that of the rest unevenly smaller; "
+            f"error of {worse} of {len(gains)} runs larger, and that of the rest unevenly smaller; "
             f"{mend}"
         )
     bound = student_quantile(1.0 - _CHANCE / _SEARCHED, len(runs) - 1) / np.sqrt(len(runs))
@@ -105,55 +109,70 @@ def check_new_run(
 
 
 def gains_of_runs(
-    runs: Sequence[CalibrationRun], orders: Sequence[float], argument: str
+    runs: Sequence[CalibrationRun],
+    orders: Sequence[float],
+    argument: str,
+    summed: Summed | None = None,
 ) -> RunGains | None:
     """Decrease of every run's mean square by a fit to the others, and what noise makes of it.
 
     None where a run alone, or too few readings, cannot say.
     """
     columns = 2 * len(orders)
-    total = sum(map(len, runs))
+    total = sum(map(len, runs)) if summed is None else summed.moments.count
     share = min(1.0, _LOOKED_AT / total, _CELLS / (columns * total))
     if len(runs) < 2 or share * total < _PER_COLUMN * columns * len(runs):
         return None
-    rng = np.random.default_rng(0)
     every = np.array([*orders, *(k for k in _SHOWN if k not in orders)])
     wanted = np.repeat([np.arange(every.size) < len(orders)], 2, axis=0).ravel()
     grams, moments, lefts, shown, sizes = [], [], [], [], []
     wholes: list[tuple[Array, Array]] = []
-    for run in runs:
-        keep = slice(None) if share == 1.0 else np.flatnonzero(rng.random(len(run)) < share)
-        x = (2.0 * np.pi / run.period * getattr(run, argument))[keep, None] * every
-        if len(x) < 2:
+    parts = (
+        _looked_at(runs, every, argument, share) if summed is None else summed.parts(every, share)
+    )
+    for gram, moment, energy, size in parts:
+        if size < 2:
             return None
-        weight = np.ones(len(x)) if run.weights is None else run.weights[keep]
-        if not weight.any():
-            return None
-        root = np.sqrt(weight / weight.mean())[:, None]
-        design = root * _about(np.hstack([np.cos(x), np.sin(x)]), weight)
-        error = root[:, 0] * _about(run.centred_error[keep, None], weight)[:, 0]
-        gram, moment, energy = design.T @ design, design.T @ error, float(error @ error)
         grams.append(gram[np.ix_(wanted, wanted)])
         moments.append(moment[wanted])
         lefts.append(max(0.0, energy - float(_solved(grams[-1], moments[-1]) @ moments[-1])))
-        sizes.append(len(x))
+        sizes.append(size)
         wholes.append((gram, moment))
-        by_chance = 2.0 * every.size / max(len(x), 1)
+        by_chance = 2.0 * every.size / size
         alone = float(_solved(gram, moment) @ moment)
-        shown.append(max(0.0, alone - by_chance * max(0.0, energy - alone)) / len(x))
-    gains, noise = np.empty(len(runs)), 0.0
+        shown.append(max(0.0, alone - by_chance * max(0.0, energy - alone)) / size)
+    gains, noise = np.empty(len(sizes)), 0.0
     gram, moment = sum(grams), sum(moments)
     for i, (own, mine) in enumerate(zip(grams, moments, strict=True)):
         others = _solved(gram - own, moment - mine)
         power = float(others @ own @ others)
         gains[i] = (2.0 * float(others @ mine) - power) / sizes[i]
-        noise += 4.0 * lefts[i] * power / sizes[i] ** 3 / len(runs)
-    gram, moment = sum(whole for whole, _ in wholes), sum(whole for _, whole in wholes)
+        noise += 4.0 * lefts[i] * power / sizes[i] ** 3 / len(sizes)
+    gram = np.sum([whole for whole, _ in wholes], axis=0)
+    moment = np.sum([whole for _, whole in wholes], axis=0)
     shared = 0.0
     for (own, mine), size in zip(wholes, sizes, strict=True):
         others = _solved(gram - own, moment - mine)
-        shared += float(2.0 * others @ mine - others @ own @ others) / size / len(runs)
+        shared += float(2.0 * others @ mine - others @ own @ others) / size / len(sizes)
     return RunGains(gains, noise, float(np.mean(shown)), shared)
+
+
+def _looked_at(
+    runs: Sequence[CalibrationRun], orders: Array, argument: str, share: float
+) -> Iterator[tuple[Array, Array, float, float]]:
+    """Normal equations of a share of every run's readings about their mean, and how many."""
+    rng = np.random.default_rng(0)
+    for run in runs:
+        keep: Any = slice(None) if share == 1.0 else np.flatnonzero(rng.random(len(run)) < share)
+        x = (2.0 * np.pi / run.period * getattr(run, argument))[keep, None] * orders
+        weight = np.ones(len(x)) if run.weights is None else run.weights[keep]
+        if len(x) < 2 or not weight.any():
+            yield np.zeros((0, 0)), np.zeros(0), 0.0, 0
+            return
+        root = np.sqrt(weight / weight.mean())[:, None]
+        design = root * _about(np.hstack([np.cos(x), np.sin(x)]), weight)
+        error = root[:, 0] * _about(run.centred_error[keep, None], weight)[:, 0]
+        yield design.T @ design, design.T @ error, float(error @ error), len(x)
 
 
 def _about(columns: Array, weight: Array) -> Array:

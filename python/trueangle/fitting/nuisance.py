@@ -18,9 +18,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import ArgumentError
-from ..runs import CalibrationRun
-from ..shafts import ShaftOrders, shaft_cycles
-from .nuisancechoice import FOLDS, Rows, choose, inflation, solved, stiffest, turns
+from ..joint.shafts import ShaftOrders, shaft_cycles
+from ..runs.run import CalibrationRun
+from ..support.suggestions import did_you_mean
+from .nuisancechoice import FOLDS, FoldRows, choose, inflation, solved, stiffest, turns
 
 __all__ = ["KINDS", "Nuisance", "asked_nuisance", "likely_orders", "take_out", "take_out_beside"]
 
@@ -118,7 +119,7 @@ class Nuisance:
         for kind in self.unseparated:
             yield (
                 f"{words[kind].split(' of ')[0]} would lower the error too, but this design cannot "
-                "tell it from the pattern: run trueangle diagnose, or measure in both directions, "
+                "tell it from the pattern: run `ta.diagnose(...)`, or measure in both directions, "
                 "at several speeds and over more turns"
             )
 
@@ -145,6 +146,7 @@ def asked_nuisance(asked: str | Iterable[str]) -> tuple[str, ...] | None:
     if unknown:
         raise ArgumentError(
             f"nuisance must be 'auto', 'none' or some of {', '.join(KINDS)}, got {unknown[0]!r}"
+            f"{did_you_mean(unknown[0], ('auto', 'none', *KINDS))}"
         )
     return tuple(kind for kind in KINDS if kind in names)
 
@@ -224,7 +226,7 @@ def take_out(
     return [_without(run, i, nuisance, drifts) for i, run in enumerate(runs)], nuisance
 
 
-def _lines_of_reference(rows: Rows) -> str:
+def _lines_of_reference(rows: FoldRows) -> str:
     """Whether the lines of the reference are the same in every run, or are new in each.
 
     The other group leaves the rows.
@@ -302,7 +304,7 @@ def _columns(
     stride: int,
     kinds: tuple[str, ...] | None,
     reference_orders: Sequence[float],
-) -> Rows:
+) -> FoldRows:
     wanted = KINDS if kinds is None else kinds
     timed = all(run.time is not None and np.ptp(run.time) > 0.0 for run in runs)
     speeds = [run.speed for run in runs] if "velocity" in wanted else []
@@ -336,7 +338,7 @@ def _columns(
         errors.append(_about(run.centred_error[take, None], used)[:, 0])
         folds.append((np.arange(len(x)) * _STRETCHES // len(x) + i) % FOLDS)
     groups = {name: np.vstack(v) for name, v in parts.items()}
-    return Rows(
+    return FoldRows(
         np.vstack(patterns),
         {name: v for name, v in groups.items() if np.abs(v).max() > 0.0},
         np.concatenate(errors),

@@ -8,7 +8,7 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["FOLDS", "Rows", "choose", "inflation", "solved", "stiffest", "turns"]
+__all__ = ["FOLDS", "FoldRows", "choose", "inflation", "solved", "stiffest", "turns"]
 
 Array = NDArray[np.float64]
 
@@ -29,7 +29,7 @@ _ALIKE: Final = 0.02
 _SEEN: Final = 1e-9
 
 
-class Rows(NamedTuple):
+class FoldRows(NamedTuple):
     """Columns by name, each about its run's mean, the errors, and the fold of each reading."""
 
     pattern: Array
@@ -38,7 +38,7 @@ class Rows(NamedTuple):
     fold: NDArray[np.intp]
 
 
-def _design(rows: Rows, chosen: Sequence[str]) -> Array:
+def _design(rows: FoldRows, chosen: Sequence[str]) -> Array:
     return np.hstack([rows.pattern, *(rows.groups[name] for name in chosen)])
 
 
@@ -52,7 +52,7 @@ def _solution(gram: Array, moment: Array) -> Array:
     return np.asarray(vectors[:, seen] @ (turned / values[seen]) / scale)
 
 
-def _held_out(rows: Rows, chosen: Sequence[str]) -> Array:
+def _held_out(rows: FoldRows, chosen: Sequence[str]) -> Array:
     """Sum of squares of each fold under the fit of the others."""
     design = _design(rows, chosen)
     masks = [rows.fold == f for f in range(FOLDS)]
@@ -67,7 +67,7 @@ def _held_out(rows: Rows, chosen: Sequence[str]) -> Array:
     return np.array(found)
 
 
-def _told(rows: Rows, chosen: Sequence[str], name: str) -> float:
+def _told(rows: FoldRows, chosen: Sequence[str], name: str) -> float:
     """Part of a group's energy that the pattern and the chosen ones leave."""
     design, columns = _design(rows, chosen), rows.groups[name]
     gram, cross = design.T @ design, design.T @ columns
@@ -77,7 +77,9 @@ def _told(rows: Rows, chosen: Sequence[str], name: str) -> float:
     return float((left**2).sum() / (columns**2).sum())
 
 
-def choose(rows: Rows, forced: list[str]) -> tuple[list[str], list[tuple[str, float]], list[str]]:
+def choose(
+    rows: FoldRows, forced: list[str]
+) -> tuple[list[str], list[tuple[str, float]], list[str]]:
     """Groups taken one by one while the best lowers the held-out error."""
     chosen = list(forced)
     shares: list[tuple[str, float]] = []
@@ -114,20 +116,20 @@ def choose(rows: Rows, forced: list[str]) -> tuple[list[str], list[tuple[str, fl
         before = good[best]
 
 
-def turns(rows: Rows) -> bool:
+def turns(rows: FoldRows) -> bool:
     """Whether lines of the reference in every run for itself lower the held-out error."""
     before, after = _held_out(rows, ["reference"]), _held_out(rows, ["turned"])
     lower = np.count_nonzero(after < before) > FOLDS // 2
     return bool(lower and after.sum() < (1.0 - _GAIN) * before.sum())
 
 
-def stiffest(rows: Rows, chosen: Sequence[str]) -> str:
+def stiffest(rows: FoldRows, chosen: Sequence[str]) -> str:
     """The spline that lowers the held-out error most."""
     names = [name for name in rows.groups if name.startswith("drift")]
     return min(names, key=lambda name: float(_held_out(rows, [*chosen, name]).sum()))
 
 
-def inflation(rows: Rows, chosen: Sequence[str]) -> list[float]:
+def inflation(rows: FoldRows, chosen: Sequence[str]) -> list[float]:
     """Standard errors of ``A, B`` of each order beside the chosen groups, over those without."""
     pattern, design = rows.pattern, _design(rows, chosen)
     size = pattern.shape[1]
@@ -141,7 +143,7 @@ def inflation(rows: Rows, chosen: Sequence[str]) -> list[float]:
     return [float(v) for v in ratio.reshape(2, -1).T.ravel()]
 
 
-def solved(rows: Rows, chosen: Sequence[str]) -> dict[str, Array]:
+def solved(rows: FoldRows, chosen: Sequence[str]) -> dict[str, Array]:
     """Coefficients of the chosen groups beside the pattern."""
     design = _design(rows, chosen)
     solution = _solution(design.T @ design, design.T @ rows.error)

@@ -8,8 +8,8 @@ from typing import cast
 import numpy as np
 from numpy.typing import NDArray
 
-from ..angles import ARCSEC_PER_TURN
 from ..errors import RankError, TrueAngleError
+from ..support.angles import ARCSEC_PER_TURN
 from .fit import fit as fit_runs
 from .result import FitResult
 from .robust import Loss

@@ -1,37 +1,36 @@
-"""A fit as plain values, of runs in memory and of logs in one pass alike."""
+"""A fit as plain values."""
 
 from __future__ import annotations
 
 import math
 from typing import TYPE_CHECKING, Any
 
-from ..angles import arcsec
-from ..plainresult import finite
+from ..support.angles import arcsec
+from ..support.plainresult import finite
 
 if TYPE_CHECKING:
-    from ..logs.logfit import LogFit
     from .result import FitResult
 
 __all__ = ["plain_fit"]
 
 
-def plain_fit(found: FitResult | LogFit) -> dict[str, Any]:
+def plain_fit(found: FitResult) -> dict[str, Any]:
     """The fit with the same names whatever way it took; angles in arcsec."""
     period = found.model.period
     record = found.model.fit
     return {
         "readings": found.readings,
-        "missing": getattr(found, "missing", 0),
+        "missing": found.missing,
         "runs": 0 if record is None else record.runs,
         "residual_arcsec": finite(arcsec(found.residual_std, period)),
         "condition_number": finite(found.condition_number),
         "method": found.method,
         "argument": found.model.argument,
-        "ridge": getattr(found, "ridge", 0.0),
+        "ridge": found.ridge,
         "offset_spread_arcsec": arcsec(found.offset_spread, period),
         "covariance": found.uncertainty.kind,
-        "intervals_hold": ["noise", "ridge"] if getattr(found, "ridge", 0.0) > 0.0 else ["noise"],
-        "wild": [list(place) for place in getattr(found, "wild", ())],
+        "intervals_hold": ["noise", "ridge"] if found.ridge > 0.0 else ["noise"],
+        "wild": [list(place) for place in found.wild],
         "orders": [
             {
                 "shaft": shaft,
@@ -49,30 +48,25 @@ def plain_fit(found: FitResult | LogFit) -> dict[str, Any]:
     }
 
 
-def _evidence(found: FitResult | LogFit) -> list[dict[str, Any]]:
+def _evidence(found: FitResult) -> list[dict[str, Any]]:
     """The evidence for every order that was looked at; empty where the orders were given."""
     scale = arcsec(1.0, found.model.period)
-    selection = getattr(found, "selection", None)
-    if selection is not None:
-        rows = [("output", r.order, r, r.standard_error, r.holdout_gain) for r in selection.table]
-    else:
-        rows = [(r.shaft, r.order, r, r.std, r.held_out_gain) for r in getattr(found, "table", ())]
     return [
         {
-            "shaft": shaft,
-            "order": order,
+            "shaft": "output",
+            "order": row.order,
             "retained": row.retained,
             "amplitude_arcsec": finite(scale * row.amplitude),
-            "std_arcsec": finite(scale * std),
+            "std_arcsec": finite(scale * row.standard_error),
             "phase_deg": finite(row.phase_deg % 360.0),
-            "holdout_gain": finite(gain),
+            "holdout_gain": finite(row.holdout_gain),
             "reason": row.reason,
         }
-        for shaft, order, row, std, gain in rows
+        for row in (() if found.selection is None else found.selection.table)
     ]
 
 
-def _spread(found: FitResult | LogFit, n: int) -> dict[str, Any]:
+def _spread(found: FitResult, n: int) -> dict[str, Any]:
     """Standard error and 95 % interval of one amplitude; null where nothing tells them."""
     if found.model.covariance is None:
         return {"std_arcsec": None, "interval_arcsec": None}

@@ -4,18 +4,23 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Sequence
-from typing import Any, Literal, NamedTuple, TypeVar, cast
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple, TypeVar, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .. import _core
-from ..angles import circular_mean
+import trueangle._core as _core
+
 from ..errors import ArgumentError, RankError
-from ..model import Argument
-from ..runs import CalibrationRun
-from ..shafts import ShaftOrders
-from .travel import over_turns
+from ..joint.shafts import ShaftOrders
+from ..model.model import Argument
+from ..runs.run import CalibrationRun
+from ..runs.travel import over_turns
+from ..support.angles import circular_mean
+from ..support.suggestions import check_choice
+
+if TYPE_CHECKING:
+    from .summed import Summed
 
 __all__ = ["METHODS", "Fitted", "Problem"]
 
@@ -135,9 +140,8 @@ class Problem:
         self.is_periodic = all(s.cycles_per_turn % 1.0 == 0.0 for s in shafts)
         self.runs = runs if self.is_periodic else [over_turns(run) for run in runs]
         self.shafts = shafts
-        if method not in METHODS:
-            known = ", ".join(repr(name) for name in METHODS[1:])
-            raise ArgumentError(f"method must be one of {known} or None, got {method!r}")
+        if method is not None:
+            check_choice("method", method, filter(None, METHODS))
         self.argument = argument
         self.method = method
         self.threads = threads
@@ -148,8 +152,13 @@ class Problem:
         #: The argument of every run.
         self.angles: list[Array] = [getattr(run, argument) for run in self.runs]
         self.readings = sum(map(len, self.angles))
+        #: Angles that hold both ends of the travel.
+        self.travel: list[Array] = self.angles
         #: Cycles per turn of every shaft, and its orders, as the core takes them.
         self.design = ([s.cycles_per_turn for s in shafts], [list(s.orders) for s in shafts])
+
+    #: Sums of readings too many to keep, of which the runs are some.
+    summed: Summed | None = None
 
     @property
     def unknowns(self) -> int:
@@ -197,11 +206,35 @@ class Problem:
 
     def _penalties(self, weights: Sequence[Array | None], penalty: float) -> list[float]:
         """Of every coefficient, for one relative to the sum of weights."""
-        total = sum(
+        return [penalty * self._weight(weights)] * self.unknowns
+
+    def _weight(self, weights: Sequence[Array | None]) -> float:
+        """Sum of the weights of all readings."""
+        return sum(
             len(run) if weight is None else float(weight.sum())
             for run, weight in zip(self.runs, weights, strict=True)
         )
-        return [penalty * total] * self.unknowns
+
+    def products(self, weights: Sequence[Array | None], index: int, count: int) -> list[Array]:
+        """Sums of products of ``[1, columns, error]`` of a run, in so many segments in a row."""
+        run, weight = self.runs[index], weights[index]
+        zero = circular_mean(run.indicated - run.reference, self.period)
+        found = []
+        for part in np.array_split(np.arange(len(run)), count) if count > 1 else [slice(None)]:
+            rows = _core.triangle(
+                (
+                    run.reference[part],
+                    run.indicated[part],
+                    None if weight is None else weight[part],
+                ),
+                self.period,
+                *self.design,
+                self.argument,
+                zero,
+                self.threads,
+            )
+            found.append(rows.T @ rows)
+        return found
 
     def residuals(self, fitted: Fitted) -> list[Array]:
         """Measured less fitted error of every run, each around its own zero."""

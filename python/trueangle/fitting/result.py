@@ -10,21 +10,25 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errorunits import ErrorsIn
-from ..model import HarmonicModel
-from ..runs import CalibrationRun
-from .coefficients import Coefficients
+from ..errors import ArgumentError
+from ..model.model import HarmonicModel
+from ..runs.run import CalibrationRun
+from ..runs.travel import Span
+from ..support.display_units import ErrorsIn
+from ..support.drawn import drawn
+from .coefficients import FittedCoefficients
 from .model import build_model, fit_notes
 from .problem import Fitted, Problem
 from .robust import Weighted
-from .travel import Span
 from .uncertainty import CovarianceKind, Uncertainty, uncertainty
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from ..orders.select import OrderSelection
+    from ..estimation.moments import Moments
     from .nuisance import Nuisance
+    from .orders.select import OrderSelection
+    from .summed import Summed
 
 __all__ = ["FitResult"]
 
@@ -32,10 +36,12 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class FitResult(Coefficients):
+class FitResult(FittedCoefficients):
     """A fitted model and everything needed to judge it.
 
     All angles, amplitudes and errors are in the unit of the runs (`HarmonicModel.period`).
+    Of logs too large to keep (`trueangle.fit_logs`) the readings are known by their sums:
+    then `moments` has them, `weights` is None, and `runs`, `residuals` and `plot` raise.
 
     Attributes
     ----------
@@ -93,12 +99,39 @@ class FitResult(Coefficients):
     @property
     def readings(self) -> int:
         """Readings of all runs."""
-        return sum(len(run) for run in self.problem.runs)
+        return self.problem.readings
+
+    @property
+    def missing(self) -> int:
+        """Rows of the files that an empty cell kept out."""
+        if self._summed is not None:
+            return self._summed.missing
+        return sum(run.left_out for run in self.problem.runs)
+
+    @property
+    def moments(self) -> Moments | None:
+        """Sums of logs that were fitted in one pass; None where the readings are in memory."""
+        return None if self._summed is None else self._summed.moments
 
     @property
     def runs(self) -> tuple[CalibrationRun, ...]:
-        """The runs fitted, as given but for `nuisance`."""
+        """The runs fitted, as given but for `nuisance`.
+
+        Raises
+        ------
+        ArgumentError
+            The readings were too many to keep.
+        """
+        if self._summed is not None:
+            raise ArgumentError(
+                f"the {self.readings} readings were summed in one pass and are not kept: fit runs "
+                "in memory (trueangle.fit) for their residuals and plots"
+            )
         return tuple(self.problem.runs)
+
+    @property
+    def _summed(self) -> Summed | None:
+        return self.problem.summed
 
     @property
     def offsets(self) -> Array:
@@ -160,13 +193,13 @@ class FitResult(Coefficients):
     @cached_property
     def residuals(self) -> Array:
         """Measured less fitted error of every reading, run after run, zeros removed."""
-        return np.concatenate(self.problem.residuals(self.fitted))
+        return np.concatenate(self.problem.residuals(self.fitted)[: len(self.runs)])
 
     @property
     def wild(self) -> tuple[tuple[str, int], ...]:
         """Label and row (from 0) of every reading that was set aside."""
         if self.weights is None:
-            return ()
+            return () if self._summed is None else self._summed.outliers
         return tuple(
             (run.label or str(i), int(row))
             for i, (run, weights) in enumerate(zip(self.runs, self.weights, strict=True))
@@ -190,12 +223,11 @@ class FitResult(Coefficients):
         -------
         matplotlib Axes
         """
-        from ..plots import fit_plot
-
-        return fit_plot(self, kind, ax, **options)
+        axes: Axes = drawn(self, kind, ax, **options)
+        return axes
 
     def to_dict(self) -> dict[str, Any]:
-        """The object that ``trueangle fit --json`` prints beside the model."""
+        """The object that ``trueangle fit`` prints as JSON beside the model."""
         from .plain import plain_fit
 
         return plain_fit(self)
@@ -216,7 +248,7 @@ class FitResult(Coefficients):
     def __repr__(self) -> str:
         return (
             f"FitResult({len(self.orders)} orders from {self.readings} readings in "
-            f"{len(self.runs)} runs, residual {self.residual_std:.3g}, "
+            f"{len(self.problem.runs)} runs, residual {self.residual_std:.3g}, "
             f"period={self.model.period:g})"
         )
 

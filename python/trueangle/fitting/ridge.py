@@ -8,9 +8,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from .. import _core
-from ..angles import circular_mean, wrap
-from ..runs import CalibrationRun
+import trueangle._core as _core
+
+from ..runs.run import CalibrationRun
+from ..support.angles import circular_mean, wrap
 from .problem import Problem
 
 __all__ = ["REACH", "choose_ridge", "error_range"]

@@ -13,10 +13,11 @@ from typing import Literal, NamedTuple, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from .. import _core
-from ..errors import ArgumentError
-from ..quantiles import median, quantile
-from ..runs import CalibrationRun
+import trueangle._core as _core
+
+from ..runs.run import CalibrationRun
+from ..support.quantiles import median, quantile
+from ..support.suggestions import check_choice
 from .problem import Fitted, Problem
 
 __all__ = ["LOSSES", "Loss", "Weighted", "robust_scale", "weigh", "without_spikes"]
@@ -52,9 +53,15 @@ MANY = 0.06
 #: Readings that hid behind the scale are wild when without them it falls by this factor.
 HIDDEN = 5.0
 
-#: Iterations of re-weighting end when no weight moves by more than this, or after `STEPS`.
+#: Rounds of re-weighting end when no weight moves by more than this, or after `STEPS`; of many
+#: orders, which each round solves anew, earlier: after so many multiplications, but not before
+#: `FEWEST_STEPS`.
 SETTLED = 1e-4
 STEPS = 50
+FEWEST_STEPS = 6
+_WORK = 4e9
+#: Readings for each unknown beyond which a solution takes them in one pass.
+_BY_ROWS = 32
 
 #: Readings whose median a spike is held against.
 _NEIGHBOURS = 7
@@ -66,13 +73,15 @@ SAMPLE = 4096
 class Weighted(NamedTuple):
     """A robust fit: its weights (None where all are as given) and what it ended with.
 
-    ``far`` is the share of readings beyond `FAR` robust standard deviations.
+    ``far`` is the share of readings beyond `FAR` robust standard deviations; ``unsettled`` the
+    rounds after which weights or outliers still changed, 0 where they settled.
     """
 
     fitted: Fitted
     weights: list[Array] | None
     wild: int
     far: float = 0.0
+    unsettled: int = 0
 
 
 def robust_scale(residuals: Array) -> float:
@@ -101,22 +110,46 @@ def weigh(problem: Problem, loss: Loss, floor: float) -> Weighted:
     Weighted
         ``wild`` counts readings of weight 0 that were given more.
     """
-    if loss not in LOSSES:
-        raise ArgumentError(f"loss must be one of {', '.join(LOSSES)}, got {loss!r}")
+    check_choice("loss", loss, LOSSES)
     if loss == "linear":
         return Weighted(problem.solve(problem.base), None, 0)
     if loss == "auto":
         return _set_aside(problem, floor)
-    weights = _iterate(problem, _huber, problem.base, floor)
+    weights, unsettled = _iterate(problem, _huber, problem.base, floor)
     if loss == "tukey":
-        weights = _iterate(problem, _tukey, weights, floor)
+        weights, unsettled = _iterate(problem, _tukey, weights, floor)
     wild = sum(
         int(np.count_nonzero((w == 0.0) & (_given(b, w.size) > 0.0)))
         for w, b in zip(weights, problem.base, strict=True)
     )
     fitted = problem.solve(weights)
     everything = np.concatenate(problem.residuals(fitted))
-    return Weighted(fitted, weights, wild, _share(everything, robust_scale(everything)))
+    far = _share(everything, robust_scale(everything))
+    return Weighted(fitted, weights, wild, far, unsettled)
+
+
+def weighed(problem: Problem, outliers: int) -> Weighted:
+    """The plain fit of a problem from which so many outliers were set aside before."""
+    fitted = problem.solve(problem.base)
+    if outliers:
+        return Weighted(fitted, None, outliers, outliers / problem.readings)
+    sample, _ = problem.scan(fitted)
+    return Weighted(fitted, None, 0, _share(sample, robust_scale(sample)))
+
+
+def unsettled_sentence(weighted: Weighted) -> str:
+    """That re-weighting was broken off."""
+    return (
+        f"outliers still changed after {weighted.unsettled} rounds of setting them aside and "
+        "solving anew, the most for so many orders: fit fewer, or take loss='linear'"
+    )
+
+
+def _rounds(problem: Problem) -> int:
+    """Rounds of re-weighting that a problem may take."""
+    unknowns = problem.unknowns + len(problem.runs)
+    work = unknowns**2 * min(problem.readings, _BY_ROWS * unknowns)
+    return max(FEWEST_STEPS, min(STEPS, int(_WORK / max(work, 1))))
 
 
 def _share(residuals: Array, scale: float) -> float:
@@ -137,8 +170,10 @@ def _set_aside(problem: Problem, floor: float) -> Weighted:
     if hidden and not (plain.far > MANY and scale > floor):
         return plain
     found = plain
-    wild = _wild(problem, problem.solve(_iterate(problem, _huber, problem.base, floor)), floor)
-    for _ in range(STEPS):
+    start, _ = _iterate(problem, _huber, problem.base, floor)
+    wild = _wild(problem, problem.solve(start), floor)
+    rounds = _rounds(problem)
+    for _ in range(rounds):
         share = np.count_nonzero(wild) / wild.size
         if share == 0.0 or share > WILD_SHARE:
             return plain
@@ -153,6 +188,8 @@ def _set_aside(problem: Problem, floor: float) -> Weighted:
         if (again == wild).all():
             break
         wild = again
+    else:
+        found = found._replace(unsettled=rounds)
     if hidden and HIDDEN * robust_scale(problem.scan(found.fitted)[0]) > scale:
         return plain  # what the model lacks does not go away with some readings
     return found
@@ -198,11 +235,12 @@ def _iterate(
     weight: Callable[[Array], Array],
     start: Sequence[Array | None],
     floor: float,
-) -> list[Array]:
-    """Re-weight from ``start`` until no weight moves."""
+) -> tuple[list[Array], int]:
+    """Re-weight from ``start`` until no weight moves; rounds after which they still did, or 0."""
     current: Sequence[Array | None] = start
     weights: list[Array] = []
-    for _ in range(STEPS):
+    rounds = _rounds(problem)
+    for _ in range(rounds):
         residuals = problem.residuals(problem.solve(current))
         scale = max(robust_scale(np.concatenate(residuals)), floor)
         weights = [
@@ -215,8 +253,8 @@ def _iterate(
         )
         current = weights
         if moved <= SETTLED:
-            break
-    return weights
+            return weights, 0
+    return weights, rounds
 
 
 def _given(weights: Array | None, size: int) -> Array:

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..angles import arcsec, unit_name
-from ..distributions import student_quantile
-from ..errorunits import ErrorsIn, ErrorUnit, error_unit
+from ..support.angles import arcsec, unit_name
+from ..support.display_units import ErrorsIn, ErrorUnit, error_unit
+from ..support.distributions import student_quantile
 
 if TYPE_CHECKING:
     from .result import FitResult
@@ -21,11 +21,10 @@ def fit_summary(fit: FitResult, errors_in: ErrorsIn = "auto") -> str:
     """See `FitResult.summary`."""
     model = fit.model
     period = model.period
-    readings = sum(len(run) for run in fit.runs)
-    unit = unit_name(period)
+    runs, unit = len(fit.problem.runs), unit_name(period)
     shown = _unit(fit, errors_in)
     head = [
-        ("readings", f"{readings} in {len(fit.runs)} run{'s' if len(fit.runs) > 1 else ''}"),
+        ("readings", f"{fit.readings} in {runs} run{'s' if runs > 1 else ''}"),
         ("argument", f"{model.argument} angle"),
         ("zero", f"{model.constant:.6g} {unit}" + _spread(fit, shown)),
         ("residual", f"{_residual(fit, shown)} standard deviation, ")
@@ -61,10 +60,10 @@ def _residual(fit: FitResult, shown: ErrorUnit) -> str:
 
 
 def _spread(fit: FitResult, shown: ErrorUnit) -> str:
-    if len(fit.runs) < 2:
+    if len(fit.problem.runs) < 2:
         return ""
     return (
-        f", circular mean of {len(fit.runs)} runs that differ by "
+        f", circular mean of {len(fit.problem.runs)} runs that differ by "
         f"{shown.text(arcsec(fit.offset_spread, fit.model.period))} (standard deviation)"
     )
 

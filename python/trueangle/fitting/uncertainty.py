@@ -2,23 +2,20 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from typing import Final, Literal, NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..distributions import chi_squared_tail
 from ..errors import ArgumentError
-from ..errorunits import brief
-from ..quantiles import median
-from .clusters import Cluster, robust_covariance, scatter_statistic
-from .clustersums import clusters_of, runs_together, sums_of, weight_of
+from ..support.quantiles import median
+from ..support.suggestions import check_choice
+from .clusters import robust_covariance
+from .clustersums import clusters_of, runs_together, weight_of
 from .correlation import (
     FEWEST_RUNS,
     FEWEST_STRETCHES,
-    SCATTER,
     correlation_found,
     memory_of,
 )
@@ -31,7 +28,6 @@ __all__ = [
     "Uncertainty",
     "check_covariance",
     "uncertainty",
-    "uncertainty_of_sums",
 ]
 
 Array = NDArray[np.float64]
@@ -82,9 +78,7 @@ def check_covariance(kind: str, runs: int) -> None:
     ArgumentError
         An unknown name; clusters of a single run.
     """
-    if kind not in COVARIANCES:
-        known = ", ".join(repr(name) for name in COVARIANCES)
-        raise ArgumentError(f"covariance must be one of {known}, got {kind!r}")
+    check_choice("covariance", kind, COVARIANCES)
     if kind == "cluster" and runs < 2:
         raise ArgumentError(
             "covariance='cluster' takes whole runs as clusters and needs two at least: measure "
@@ -139,9 +133,10 @@ def _noise(
         note = said + _between(len(clusters), len(used))
     else:
         memory, stretches = memory_of(problem, fitted, weights, used)
-        if min(stretches) < FEWEST_STRETCHES:
-            count = sum(len(problem.runs[i]) for i in used)
-            return _thinned(white, count / memory, problem.unknowns + len(used), memory, said)
+        if problem.summed or min(stretches) < FEWEST_STRETCHES:
+            why = _SUMMED if problem.summed else _SHORT
+            unknowns = problem.unknowns + len(used)
+            return _thinned(white, problem.readings / memory, unknowns, memory, said, why)
         clusters = [
             cluster
             for i, count in zip(used, stretches, strict=True)
@@ -161,8 +156,12 @@ def _noise(
     return Uncertainty(kind, *_with_constant(white, *robust), note)
 
 
+_SHORT: Final = "The runs are too short for their memory"
+_SUMMED: Final = "One pass keeps no segments of them"
+
+
 def _thinned(
-    white: Array, independent: float, unknowns: int, memory: float, said: str
+    white: Array, independent: float, unknowns: int, memory: float, said: str, why: str
 ) -> Uncertainty:
     """As if one reading in so many as the noise remembers were there, and independent.
 
@@ -171,8 +170,8 @@ def _thinned(
     """
     note = (
         f"{said}standard errors as if one in {memory:.0f} readings, so many as the residuals "
-        "remember, stood for itself. The runs are too short for their memory, and the covariance "
-        f"is not known: measure {_ENOUGH_RUNS} runs and more"
+        f"remember, stood for itself. {why}, and the covariance is not known: measure "
+        f"{_ENOUGH_RUNS} runs and more"
     )
     # Of so many independent readings the fit takes its unknowns, and the residuals are smaller.
     left = max(independent - unknowns, 1.0)
@@ -187,7 +186,7 @@ def _bias(
     from .ridge import REACH, error_range
 
     used = [i for i in range(len(problem.runs)) if not np.isnan(fitted.offsets[i])]
-    parts = [sums_of(problem, weights, i, 1)[0] for i in used]
+    parts = [problem.products(weights, i, 1)[0] for i in used]
     means = [part[0] / part[0, 0] for part in parts]
     about = np.sum(
         [p - p[0, 0] * np.outer(m, m) for p, m in zip(parts, means, strict=True)], axis=0
@@ -220,49 +219,6 @@ def _untold(problem: Problem, used: Sequence[int]) -> str:
         "neighbours correlate: the standard errors hold if they do not, else the covariance is not "
         f"known; measure {_ENOUGH_RUNS} runs and more"
     )
-
-
-def uncertainty_of_sums(
-    white: Array, freedom: float, clusters: Sequence[Cluster], variance: float, kind: CovarianceKind
-) -> Uncertainty:
-    """Covariance from the sums of each run: of logs that were read once.
-
-    The order of the readings is gone: correlation shows in the scatter between runs alone.
-
-    Raises
-    ------
-    ArgumentError
-        ``"hac"``, which needs the readings in their order.
-    """
-    if kind == "hac":
-        raise ArgumentError(
-            "covariance='hac' needs the readings in their order, which one pass does not keep: "
-            "take 'cluster', or fit the runs in memory"
-        )
-    plain = Uncertainty("white", white, np.full(len(white), freedom))
-    if kind == "white" or len(white) == 1 or not np.isfinite(white).all():
-        return plain
-    said = ""
-    if kind == "auto":
-        if len(clusters) < FEWEST_RUNS:
-            return plain._replace(
-                note="one pass over so few runs does not tell whether neighbours correlate: the "
-                "standard errors hold if they do not, else the covariance is not known; measure "
-                f"{_ENOUGH_RUNS} runs and more"
-            )
-        statistic, dof = scatter_statistic(runs_together(list(clusters)), variance)
-        if not variance > 0.0 or chi_squared_tail(statistic, dof) >= SCATTER:
-            return plain
-        said = _said(
-            f"coefficients scatter {brief(math.sqrt(statistic / dof))} times as much between runs"
-        )
-    together = runs_together(list(clusters))
-    try:
-        robust = robust_covariance(together)
-    except np.linalg.LinAlgError:
-        return plain._replace(note=_CANCEL)
-    note = said + _between(len(together), len(clusters))
-    return Uncertainty("cluster", *_with_constant(white, *robust), note)
 
 
 def _said(found: str) -> str:

@@ -21,15 +21,16 @@ from .arrowtables import (
     column_batches,
     corrected_schema,
 )
+from .budget import check_part
 from .damage import damage_told
 from .format import TEXTS, Batch, Choose, Contents, Watch
 
-__all__ = ["columns", "contents", "copy", "read", "stretches"]
+__all__ = ["columns", "contents", "copy", "decoded", "read", "stretches"]
 
 _FILE_MAGIC = b"ARROW1"
 #: Codecs by their number in the format's BodyCompression.
 _CODECS = {0: "lz4", 1: "zstd"}
-_RECORD_BATCH = 3
+_DICTIONARY, _RECORD_BATCH = 2, 3
 #: Rows at once.
 _ROWS = 1 << 20
 #: Bytes of a stretch that is read on its own, and parts of a larger batch at most.
@@ -43,7 +44,7 @@ def columns(path: Path, topic: str | None = None) -> list[str]:
         return list(schema.names)
 
 
-class Stretch(NamedTuple):
+class BatchRange(NamedTuple):
     """Neighbouring record batches, or one of so many parts of a single large one."""
 
     batches: range
@@ -56,11 +57,18 @@ class Stretch(NamedTuple):
         return batch.slice(start, stop - start)
 
 
-def stretches(path: Path) -> list[Stretch | None]:
+def decoded(path: Path, names: Sequence[str], topic: str | None = None) -> int:
+    """Bytes of columns in memory; see `format.FormatModule`."""
+    with damage_told(path, "Arrow"):
+        return 8 * len(names) * sum(max(batch.rows, 0) for batch in _packed(path, _is_file(path)))
+
+
+def stretches(path: Path) -> list[BatchRange | None]:
     """Record batches that are read together; None for the stream format, which has no index."""
     with damage_told(path, "Arrow"):
         if not _is_file(path):
             return [None]
+        _check_batches(path, True)
         with pa.memory_map(str(path), "r") as source:
             batches = pa.ipc.open_file(source).num_record_batches
         size = max(path.stat().st_size, 1)
@@ -70,7 +78,7 @@ def stretches(path: Path) -> list[Stretch | None]:
         if batches * _STRETCH < size and _compression(path, True) is None:
             parts = min(-(-size // (max(batches, 1) * _STRETCH)), _MOST_PARTS)
     return [
-        Stretch(range(i, min(i + each, batches)), part, parts)
+        BatchRange(range(i, min(i + each, batches)), part, parts)
         for i in range(0, batches, each)
         for part in range(parts)
     ] or [None]
@@ -80,7 +88,7 @@ def read(
     path: Path,
     names: Sequence[str],
     topic: str | None = None,
-    stretch: Stretch | None = None,
+    stretch: BatchRange | None = None,
     *,
     texts: Collection[str] = TEXTS,
     strict: bool = False,
@@ -103,7 +111,7 @@ def read(
             yield from column_batches(path, names, _cut(map(_valid, batches)))
 
 
-def _placed(path: Path, names: Sequence[str], stretch: Stretch) -> list[PlacedBatch]:
+def _placed(path: Path, names: Sequence[str], stretch: BatchRange) -> list[PlacedBatch]:
     """Where the columns of its batches lie; none where pyarrow has to look at one of them."""
     with pa.memory_map(str(path), "r") as mapped:
         file = pa.ipc.open_file(mapped)
@@ -183,6 +191,7 @@ def _opened(
     """Schema, batches and how they are compressed, of the file or of the stream format."""
     with damage_told(path, "Arrow"), pa.memory_map(str(path), "r") as source:
         is_file = _is_file(path)
+        _check_batches(path, is_file)
         options = pa.ipc.IpcWriteOptions(compression=_compression(path, is_file))
         if is_file:
             file = pa.ipc.open_file(source)
@@ -203,20 +212,42 @@ def _cut(batches: Iterable[pa.RecordBatch]) -> Iterator[pa.RecordBatch]:
             yield batch.slice(start, _ROWS)
 
 
-def _compression(path: Path, is_file: bool) -> str | None:
-    """Codec of the first record batch, which only the message's own header tells."""
+class _Packed(NamedTuple):
+    """What the header of a record batch says: rows, codec, bytes of all columns once unpacked."""
+
+    rows: int
+    codec: str | None
+    size: int
+
+
+def _packed(path: Path, is_file: bool) -> Iterator[_Packed]:
+    """The headers of all record batches, and of dictionaries, which count as batches of no row."""
     with pa.memory_map(str(path), "r") as source:
         if is_file:
             source.seek(8)  # the magic and its padding; a stream follows
-        reader = pa.ipc.MessageReader.open_stream(source)
-        for message in reader:
-            if message.type == "record batch":
-                return _codec(message.metadata.to_pybytes())
-    return None
+        for message in pa.ipc.MessageReader.open_stream(source):
+            if message.type in ("record batch", "dictionary"):
+                yield _header(message.metadata.to_pybytes(), message.body)
 
 
-def _codec(header: bytes) -> str | None:
-    """The compression field of a record batch's flatbuffer (Message.fbs of Arrow)."""
+def _check_batches(path: Path, is_file: bool) -> None:
+    """Refuse a batch that unpacks to more than the budget: it is unpacked as a whole."""
+    for batch in _packed(path, is_file):
+        if batch.codec is None:
+            return  # mapped, not unpacked
+        check_part(path, batch.size, "record batch")
+
+
+def _compression(path: Path, is_file: bool) -> str | None:
+    """Codec of the first record batch, which only the message's own header tells."""
+    return next((batch.codec for batch in _packed(path, is_file) if batch.rows >= 0), None)
+
+
+def _header(header: bytes, body: pa.Buffer) -> _Packed:
+    """What the flatbuffer of a record batch says (Message.fbs of Arrow).
+
+    A buffer that is packed begins with the bytes that it unpacks to, -1 where it is none.
+    """
 
     def field(table: int, number: int) -> int | None:
         vtable = table - struct.unpack_from("<i", header, table)[0]
@@ -229,11 +260,30 @@ def _codec(header: bytes) -> str | None:
         return int(place + struct.unpack_from("<I", header, place)[0])
 
     message = follow(0)
-    kind, body = field(message, 1), field(message, 2)
-    if kind is None or body is None or header[kind] != _RECORD_BATCH:
-        return None
-    compression = field(follow(body), 3)
+    kind, batch = field(message, 1), field(message, 2)
+    rows = 0
+    if kind is not None and batch is not None and header[kind] == _DICTIONARY:
+        batch, rows = field(follow(batch), 1), -1
+    elif kind is None or header[kind] != _RECORD_BATCH:
+        batch = None
+    if batch is None:
+        return _Packed(-1, None, 0)
+    table = follow(batch)
+    length, buffers, compression = (field(table, number) for number in (0, 2, 3))
+    if rows == 0 and length is not None:
+        rows = max(int(struct.unpack_from("<q", header, length)[0]), 0)
     if compression is None:
-        return None
+        return _Packed(rows, None, body.size)
     codec = field(follow(compression), 0)
-    return _CODECS[0 if codec is None else header[codec]]
+    name = _CODECS[0 if codec is None else header[codec]]
+    size = 0
+    if buffers is not None:
+        place = follow(buffers)
+        (count,) = struct.unpack_from("<I", header, place)
+        view = memoryview(body)
+        for i in range(count):
+            start, stored = struct.unpack_from("<qq", header, place + 4 + 16 * i)
+            if stored >= 8 and 0 <= start <= body.size - 8:
+                (unpacked,) = struct.unpack_from("<q", view, start)
+                size += stored if unpacked < 0 else unpacked
+    return _Packed(rows, name, size)

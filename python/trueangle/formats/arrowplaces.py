@@ -16,7 +16,7 @@ from .stored import ROWS, stored_values
 __all__ = ["PlacedBatch", "placed_batch"]
 
 
-class Place(NamedTuple):
+class ColumnBuffers(NamedTuple):
     """Where the values of a column lie, and the bits that are 0 where one is null."""
 
     dtype: np.dtype[Any]
@@ -42,7 +42,7 @@ class PlacedBatch(NamedTuple):
     """Some columns of a record batch."""
 
     rows: int
-    places: dict[str, Place]
+    places: dict[str, ColumnBuffers]
 
     def read(self, file: FileIO, part: int, parts: int) -> Iterator[dict[str, NDArray[Any]]]:
         """One of so many parts of the rows, in blocks."""
@@ -82,7 +82,7 @@ def placed_batch(
         bits = place(known, -(-rows // 8)) if column.null_count else None
         if column.offset or at is None or (column.null_count and bits is None):
             return None
-        places[name] = Place(dtype, at, bits)
+        places[name] = ColumnBuffers(dtype, at, bits)
     return PlacedBatch(rows, places)
 
 

@@ -69,7 +69,7 @@ def copy(
     raise FileError(
         source,
         "a log of camonitor has no room for corrected angles; make a table of it first "
-        "(trueangle join), or correct the runs that it was joined to",
+        "(`ta.join(...)`), or correct the runs that it was joined to",
     )
 
 

@@ -6,6 +6,7 @@ everything without pyarrow, through the standard library.
 
 from __future__ import annotations
 
+import contextlib
 import functools
 import importlib.util
 import zlib
@@ -13,15 +14,19 @@ from collections.abc import Callable, Collection, Iterator, Sequence
 from pathlib import Path
 from typing import IO, TYPE_CHECKING, TypeAlias
 
+import numpy as np
+from numpy.typing import NDArray
+
 from .._core import thread_count
+from ..errors import FileError
 from .csvheader import LONGEST_LINE, Header
 from .csvrows import BLOCK, QuotedBlock, quoted_blocks, too_long
-from .format import TEXTS, Addition, Batch, Choose, Contents, Watch
+from .format import TEXTS, Addition, Batch, Choose, Contents, Watch, refuse_corrected
 
 if TYPE_CHECKING:
     from .csvblocks import PlainBlock
 
-__all__ = ["columns", "contents", "copy", "line_of", "read"]
+__all__ = ["columns", "contents", "copy", "header_line", "line_of", "read"]
 
 _Block: TypeAlias = "QuotedBlock | PlainBlock"
 
@@ -68,6 +73,13 @@ def read(
         yield from side_by_side(values, blocks, thread_count())
 
 
+def header_line(path: Path) -> int:
+    """The line of the names; 1 where there is none."""
+    with path.open("rb") as file, contextlib.suppress(FileError):
+        return max(Header(path, file).place, 0) + 1
+    return 1
+
+
 def line_of(path: Path, row: int) -> int:
     """The line of the file that a row came from."""
     with path.open("rb") as file:
@@ -97,12 +109,16 @@ def copy(
         output.write(head)
         check = zlib.crc32(head, check)
         for block in _blocks(file, header):
+            # Where nothing names a column, nothing names a corrected one.
+            others = _all_numbers(block) if header.place < 0 and not rows else {}
             values = block.numbers(used)
             corrected = []
             for channel in channels:
                 signals = {name: values[column] for name, column in channel.signals.items()}
                 indicated = values[channel.column]
-                corrected.append((channel.column, channel.correct(indicated, signals)))
+                after = channel.correct(indicated, signals)
+                refuse_corrected(source, others, channel, after)
+                corrected.append((channel.column, after))
             data = block.with_columns(corrected)
             output.write(data)
             check = zlib.crc32(data, check)
@@ -121,6 +137,15 @@ def contents(path: Path, topic: str | None = None) -> Contents:
             rows += block.rows
             check = zlib.crc32(block.data, check)
     return Contents(rows, {"bytes": f"{check:08x}"})
+
+
+def _all_numbers(block: _Block) -> dict[str, NDArray[np.float64]]:
+    """Those columns of a block that hold numbers."""
+    found: dict[str, NDArray[np.float64]] = {}
+    for name in block.header.names:
+        with contextlib.suppress(FileError):
+            found |= block.numbers([name])
+    return found
 
 
 def _used(channels: Sequence[Addition]) -> list[str]:

@@ -35,7 +35,7 @@ _KNOWN_UNITS = (
 )
 
 
-class _Line(NamedTuple):
+class _TextLine(NamedTuple):
     raw: bytes
     text: str
     #: Number of the line, from 1.
@@ -115,7 +115,7 @@ class Header:
             head[i] = body + text.encode(self.encoding, "replace") + ending
         return b"".join(head)
 
-    def _refuse_blanks(self, reading: list[_Line]) -> None:
+    def _refuse_blanks(self, reading: list[_TextLine]) -> None:
         """Of one cell in which several numbers stand apart by blanks."""
         for line in reading:
             words = line.text.split()
@@ -131,8 +131,8 @@ class Header:
     def _is_units(self, raw: bytes) -> bool:
         return self._units_of(raw.decode(self.encoding, "replace"), len(self.names)) is not None
 
-    def _lines(self, file: IO[bytes]) -> list[_Line]:
-        found: list[_Line] = []
+    def _lines(self, file: IO[bytes]) -> list[_TextLine]:
+        found: list[_TextLine] = []
         data = file.read(_HEAD)
         if data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
             raise FileError(self.path, "is UTF-16 text; save it as CSV in UTF-8", line=1)
@@ -155,17 +155,20 @@ class Header:
                     ) from None
                 self.encoding = "cp1252"
                 text = body.decode("cp1252", "replace")
-            found.append(_Line(raw, text.rstrip("\r\n"), i + 1))
+            found.append(_TextLine(raw, text.rstrip("\r\n"), i + 1))
         return found
 
-    def _found(self, lines: list[_Line]) -> tuple[int, int]:
+    def _found(self, lines: list[_TextLine]) -> tuple[int, int]:
         """Index of the line of names, -1 without, and of the first line of readings."""
         solid = [i for i, line in enumerate(lines) if line.text.strip()]
         plain = [i for i in solid if not is_comment(lines[i].text)]
         first = plain[0] if plain else solid[0]
         self.delimiter = max(",;\t", key=lines[first].text.count)
-        if _STANDARD.search(lines[first].text):
-            return first, self._after_units(lines, first)
+        # Names of this package are taken at their word, wherever the readings begin.
+        known = [i for i in plain if _STANDARD.search(lines[i].text)] or [-1]
+        if known[-1] >= 0 and (known[-1] == first or self._is_names(lines, plain, known[-1])):
+            self.delimiter = max(",;\t", key=lines[known[-1]].text.count)
+            return known[-1], self._after_units(lines, known[-1])
         for delimiter in (";", "\t", ","):
             begin = self._first_reading(lines, plain, delimiter)
             if begin is None:
@@ -194,12 +197,19 @@ class Header:
             return -1, first
         return first, self._after_units(lines, first)
 
-    def _is_talk(self, cells: list[str], reading: _Line) -> bool:
+    def _is_names(self, lines: list[_TextLine], plain: list[int], place: int) -> bool:
+        """Whether a line has as many cells as each of those that follow it."""
+        delimiter = max(",;\t", key=lines[place].text.count)
+        below = [i for i in plain if i > place][:_LOOKED_AT]
+        width = lines[place].text.count(delimiter)
+        return bool(below) and all(lines[i].text.count(delimiter) == width for i in below)
+
+    def _is_talk(self, cells: list[str], reading: _TextLine) -> bool:
         """One cell above several that are filled: words of a firmware, no names."""
         below = self._cells(reading.text)
         return len(cells) == 1 and len(below) > 1 and bool(below[-1])
 
-    def _scope(self, lines: list[_Line], before: list[int], width: int, last: int) -> int:
+    def _scope(self, lines: list[_TextLine], before: list[int], width: int, last: int) -> int:
         """The line of names in a preamble of TwinCAT's exports, else ``last``."""
         rows = {j: self._cells(lines[j].text) for j in before}
         if not any(cells[0] == "Data-Type" for cells in rows.values()):
@@ -207,7 +217,7 @@ class Header:
         names = [j for j, cells in rows.items() if cells[0] == _SCOPE and len(cells) == width]
         return names[-1] if names else last
 
-    def _after_units(self, lines: list[_Line], first: int) -> int:
+    def _after_units(self, lines: list[_TextLine], first: int) -> int:
         width = len(self._cells(lines[first].text))
         for i in range(first + 1, len(lines)):
             text = lines[i].text
@@ -215,7 +225,9 @@ class Header:
                 return i + 1 if self._units_of(text, width) is not None else first + 1
         return first + 1
 
-    def _first_reading(self, lines: list[_Line], plain: list[int], delimiter: str) -> int | None:
+    def _first_reading(
+        self, lines: list[_TextLine], plain: list[int], delimiter: str
+    ) -> int | None:
         """The first of some lines in a row that are equally wide and hold numbers."""
         looked_at = [(i, self._split(lines[i].text, delimiter)) for i in plain]
         decimal = "." if delimiter == "," else ","
@@ -229,7 +241,7 @@ class Header:
                     return looked_at[k][0]
         return None
 
-    def _decimal(self, lines: list[_Line]) -> str:
+    def _decimal(self, lines: list[_TextLine]) -> str:
         if self.delimiter == ",":
             return "."
         for line in lines:
@@ -238,7 +250,7 @@ class Header:
                     return ","
         return "."
 
-    def _named(self, cells: list[str], between: list[_Line]) -> list[str]:
+    def _named(self, cells: list[str], between: list[_TextLine]) -> list[str]:
         self._is_open = len(cells) > 1 and not cells[-1]
         if self._is_open:
             cells = cells[:-1]
@@ -253,7 +265,7 @@ class Header:
                 ] + cells[len(units) :]
         return cells
 
-    def _scope_names(self, cells: list[str], between: list[_Line]) -> list[str]:
+    def _scope_names(self, cells: list[str], between: list[_TextLine]) -> list[str]:
         """Names of TwinCAT's exports: a time column before each group of channels."""
         rows = {self._cells(line.text)[0]: self._cells(line.text) for line in between}
         units = rows.get("Unit", [])
@@ -279,7 +291,7 @@ class Header:
             return None
         return [cell.strip("[]() ") for cell in cells]
 
-    def _trailing(self, first: list[_Line]) -> bool:
+    def _trailing(self, first: list[_TextLine]) -> bool:
         if not first:
             return False
         cells = self._cells(first[0].text)

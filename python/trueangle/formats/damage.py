@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 
@@ -28,12 +29,29 @@ def damage_told(path: object, name: str, hint: str = "") -> Iterator[None]:
             path, "asks for more memory than there is: it is damaged, or its parts are too large"
         ) from None
     except OSError as cause:
+        _raise_if_of_machine(cause)
         # An invalid argument is a place that a damaged file named.
         if cause.errno is not None and cause.errno > 0 and cause.errno != errno.EINVAL:
             raise
         raise FileError(path, f"is damaged or not {name}: {_told(cause)}{hint}") from cause
     except Exception as cause:
+        _raise_if_of_machine(cause)
         raise FileError(path, f"is damaged or not {name}: {_told(cause)}{hint}") from cause
+
+
+#: What libraries say of a full disk, or of too little memory, in errors of their own kinds.
+_DISK_FULL = ("disk is full", "no space left", "errno = 28")
+_NO_MEMORY = ("out of memory", "cannot allocate memory", "malloc of size", "can't start new thread")
+
+
+def _raise_if_of_machine(cause: Exception) -> None:
+    """A full disk and too little memory are no fault of the file that is read."""
+    told = str(cause).lower()
+    if any(words in told for words in _DISK_FULL):
+        # Without a name: what is being written is known further up.
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC)) from None
+    if any(words in told for words in _NO_MEMORY):
+        raise MemoryError(_told(cause)) from None
 
 
 def _told(error: Exception) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib
 import json
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -14,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .._core import __version__
-from ..errors import MissingExtraError
+from ..errors import FileError, MissingExtraError
 
 __all__ = [
     "TEXTS",
@@ -26,6 +27,7 @@ __all__ = [
     "Labels",
     "Watch",
     "note",
+    "refuse_corrected",
     "row_labels",
 ]
 
@@ -89,6 +91,25 @@ def note(additions: Sequence[Addition]) -> str:
     return json.dumps({"package": f"trueangle {__version__}", "corrected": entries})
 
 
+def refuse_corrected(
+    path: Path, columns: Mapping[str, NDArray[Any]], addition: Addition, corrected: NDArray[Any]
+) -> None:
+    """Refuse a table whose columns have no names of their own and hold what is to be added.
+
+    Raises
+    ------
+    FileError
+        It was corrected before, with this model.
+    """
+    own = columns.get(addition.column)
+    if own is None or np.array_equal(corrected, own, equal_nan=True):
+        return  # a model that changes nothing
+    for name, values in columns.items():
+        if np.array_equal(values, corrected.astype(values.dtype), equal_nan=True):
+            problem = "holds these corrected angles already: this log was corrected before"
+            raise FileError(path, problem, column=name)
+
+
 class FormatModule(Protocol):
     """What the module of a format defines."""
 
@@ -110,7 +131,8 @@ class FormatModule(Protocol):
         Modules that define ``stretches(path)`` take one of them: then the batches of that
         stretch only. Stretches of a file may be read side by side. Formats of text take
         ``texts`` for labels and refuse, where ``strict``, numbers that are not finite; those
-        that define ``line_of(path, row)`` tell the line a row came from.
+        that define ``line_of(path, row)`` tell the line a row came from, and those that define
+        ``decoded(path, names, topic)`` how many bytes columns take in memory.
         """
 
     def copy(
@@ -182,6 +204,24 @@ class Format:
     ) -> Iterator[Batch]:
         """Batches of one of the `stretches`."""
         return self.module.read(path, names, topic, stretch, texts=texts)
+
+    def decoded(self, path: Path, names: Sequence[str], topic: str | None) -> int:
+        """Bytes that columns take in memory by what the file says of itself; 0 unknown."""
+        asked = getattr(self.module, "decoded", None)
+        return 0 if asked is None or not names else int(asked(path, names, topic))
+
+    @contextmanager
+    def at_header(self, path: Path) -> Iterator[None]:
+        """Let errors of the header, told of line 1, name the line where the names stand."""
+        try:
+            yield
+        except FileError as error:
+            find = getattr(self.module, "header_line", None)
+            line = 1 if find is None or error.line != 1 else find(path)
+            if line == 1:
+                raise
+            kind = type(error)
+            raise kind(error.path, error.problem, line=line, column=error.column) from None
 
     def line_of(self, path: Path, row: int) -> int:
         """The line of a row counted from 0; formats without lines count as if under a header."""

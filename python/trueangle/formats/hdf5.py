@@ -17,13 +17,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import FileError
+from . import budget
 from .checksum import Checksum
 from .damage import damage_told
 from .format import TEXTS, Addition, Batch, Choose, Contents, Watch, note
 from .hdf5places import Places
 from .stored import ROWS
 
-__all__ = ["columns", "contents", "copy", "read", "stretches"]
+__all__ = ["columns", "contents", "copy", "decoded", "read", "stretches"]
 
 #: Readings taken together: what is read of them stays in the cache of the processor.
 _BLOCK = 1 << 17
@@ -33,11 +34,13 @@ _PART, _MOST_PARTS = 1 << 20, 64
 _EVEN = 4
 #: Places of HDF5's table of chunks in memory; a prime.
 _SLOTS = 521
+#: Share of a data set beyond the budget that must be stored.
+_LEAST_STORED = 0.5
 #: Attribute of a corrected data set that says how it was made.
 _ATTRIBUTE = "trueangle"
 
 
-class Part(NamedTuple):
+class RowRange(NamedTuple):
     """One of so many parts of every data set, in their order."""
 
     number: int
@@ -58,20 +61,26 @@ def columns(path: Path, topic: str | None = None) -> list[str]:
         return _names(file)
 
 
-def stretches(path: Path) -> list[Part | None]:
+def decoded(path: Path, names: Sequence[str], topic: str | None = None) -> int:
+    """Bytes of data sets in memory; see `format.FormatModule`."""
+    with _opened(path) as file:
+        return sum(int(file[name].size) * max(file[name].dtype.itemsize, 8) for name in names)
+
+
+def stretches(path: Path) -> list[RowRange | None]:
     """Parts of the data sets; HDF5 reads one at a time, while others are worked on."""
     with _opened(path) as file:
         size = max((file[name].size for name in _names(file)), default=0)
     parts = min(size // _PART, _MOST_PARTS)
     parts -= parts % _EVEN if parts > _EVEN else 0
-    return [Part(i, parts) for i in range(parts)] or [None]
+    return [RowRange(i, parts) for i in range(parts)] or [None]
 
 
 def read(
     path: Path,
     names: Sequence[str],
     topic: str | None = None,
-    stretch: Part | None = None,
+    stretch: RowRange | None = None,
     *,
     texts: Collection[str] = TEXTS,
     strict: bool = False,
@@ -161,7 +170,9 @@ def together(path: Path, needed: Sequence[str], others: Sequence[str]) -> list[s
         return [
             name
             for name in others
-            if file[name].size in sizes and max(file[name].shape) == file[name].size
+            if file[name].size in sizes
+            and max(file[name].shape) == file[name].size
+            and not _is_elsewhere(file[name])
         ]
 
 
@@ -206,7 +217,49 @@ def _data_set(path: Path, file: h5py.File, name: str) -> h5py.Dataset:
         raise FileError(
             path, f"one angle after the other is needed, its shape is {data.shape}", column=name
         )
+    if _is_elsewhere(data):
+        raise _elsewhere(path, name)
+    _check_stored(path, data, name)
     return data
+
+
+def _is_elsewhere(data: h5py.Dataset) -> bool:
+    """Whether its values are those of other data sets or files.
+
+    The library follows such a chain without an end where it leads back to itself, until the
+    process ends; nothing is asked of its values before this.
+    """
+    return bool(data.is_virtual or data.external)
+
+
+def _elsewhere(path: Path, name: str) -> FileError:
+    return FileError(
+        path,
+        "its values are in other data sets or files (a virtual or external data set), which are "
+        "not followed; write them into this file (h5repack, or h5py with its values)",
+        column=name,
+    )
+
+
+def _check_stored(path: Path, data: h5py.Dataset, name: str) -> None:
+    """Refuse a large data set that is hardly stored: all else of it is filled in.
+
+    A file of kilobytes can call for terabytes of nothing, which a copy would write out.
+    """
+    size = int(data.size) * data.dtype.itemsize
+    if data.chunks is None:
+        share = 1.0 if data.id.get_storage_size() else 0.0
+    else:
+        budget.check_part(path, math.prod(data.chunks) * data.dtype.itemsize, "chunk", name)
+        most = math.prod(-(-n // c) for n, c in zip(data.shape, data.chunks, strict=True))
+        share = data.id.get_num_chunks() / most if size > budget.DECODED_BYTES else 1.0
+    if size > budget.DECODED_BYTES and share < _LEAST_STORED:
+        raise FileError(
+            path,
+            f"says to hold {data.size} values, but {100.0 * share:.2g} % of them are stored, the "
+            "others are filled in; write it with all of its values",
+            column=name,
+        )
 
 
 def _cached(file: h5py.File, name: str) -> h5py.Dataset:
@@ -216,6 +269,8 @@ def _cached(file: h5py.File, name: str) -> h5py.Dataset:
     unpack larger ones again for every block that takes a part of them.
     """
     data = file[name]
+    if _is_elsewhere(data):  # which a note may name
+        raise _elsewhere(Path(file.filename), name)
     if data.chunks is None:
         return data
     chunk = math.prod(data.chunks) * data.dtype.itemsize

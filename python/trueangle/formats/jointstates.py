@@ -105,7 +105,7 @@ def _layout(data: bytes, is_ros1: bool) -> _Layout:
     return _Layout(order, stamp, names, fields, cursor.free)
 
 
-class _Alike(NamedTuple):
+class _LayoutGroup(NamedTuple):
     """Messages of one layout: their places in the block, and their bytes, one a row."""
 
     layout: _Layout
@@ -186,7 +186,7 @@ class Block:
 
     def _changed(
         self, positions: Mapping[str, NDArray[np.float64]]
-    ) -> Iterator[tuple[_Alike, NDArray[np.uint8]]]:
+    ) -> Iterator[tuple[_LayoutGroup, NDArray[np.uint8]]]:
         for part in self._parts:
             names, (place, count) = part.layout.names, part.layout.fields["position"]
             if count != len(names):
@@ -199,7 +199,7 @@ class Block:
             yield part, data
 
 
-def _alike(messages: Sequence[bytes] | NDArray[np.uint8], is_ros1: bool) -> Iterator[_Alike]:
+def _alike(messages: Sequence[bytes] | NDArray[np.uint8], is_ros1: bool) -> Iterator[_LayoutGroup]:
     """The messages by their layouts."""
     for rows, data in _by_size(messages):
         while rows.size:
@@ -207,9 +207,9 @@ def _alike(messages: Sequence[bytes] | NDArray[np.uint8], is_ros1: bool) -> Iter
             fixed = ~layout.free
             same = (data[:, fixed] == data[0, fixed]).all(axis=1)
             if same.all():
-                yield _Alike(layout, rows, data)
+                yield _LayoutGroup(layout, rows, data)
                 break
-            yield _Alike(layout, rows[same], data[same])
+            yield _LayoutGroup(layout, rows[same], data[same])
             rows, data = rows[~same], data[~same]
 
 

@@ -13,6 +13,8 @@ from collections.abc import Iterator
 from math import prod
 from typing import Final, NamedTuple
 
+from . import budget
+
 __all__ = ["check_elements"]
 
 _HEADER: Final = 128
@@ -24,9 +26,8 @@ _CELL, _STRUCT, _OBJECT, _CHAR, _SPARSE = 1, 2, 3, 4, 5
 _NUMBERS: Final = range(6, 16)
 _FUNCTION, _OPAQUE = 16, 17
 _COMPLEX: Final = 0x0800
-#: Arrays within arrays, and bytes that one compressed variable may become.
+#: Arrays within arrays.
 _DEEPEST: Final = 32
-_MOST_BYTES: Final = 1 << 30
 
 
 class _Element(NamedTuple):
@@ -55,18 +56,22 @@ def check_elements(data: bytes) -> None:
     order = {b"IM": "<", b"MI": ">"}.get(data[_HEADER - 2 : _HEADER])
     if order is None or data[:4].find(b"\0") >= 0:
         return
+    left = budget.DECODED_BYTES
     for element in _elements(data, _HEADER, len(data), order):
         if element.kind == _COMPRESSED:
-            _check_variable(_inflated(data[element.start : element.stop]), order)
+            whole = _inflated(data[element.start : element.stop], left)
+            left -= len(whole)
+            _check_variable(whole, order)
         else:
             _check_matrix(data, element, order, 0)
 
 
-def _inflated(data: bytes) -> bytes:
+def _inflated(data: bytes, most: int) -> bytes:
     inflate = zlib.decompressobj()
-    whole = inflate.decompress(data, _MOST_BYTES)
+    whole = inflate.decompress(data, max(most, 1))
     if not inflate.eof:
-        raise ValueError("a compressed variable is cut off, or larger than 1 GiB")
+        told = f"all of them unpack to more than {budget.DECODED_BYTES >> 20} MiB"
+        raise ValueError(f"a compressed variable is cut off, or {told}")
     return whole
 
 

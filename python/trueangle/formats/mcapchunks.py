@@ -19,9 +19,10 @@ from rosbags.rosbag2 import CompressionMode, Reader, StoragePlugin, Writer
 from rosbags.rosbag2.reader import DirectoryReader
 from rosbags.rosbag2.storage_mcap import McapReader, McapWriter, PendingChunk, decompress
 
-from .mcaprows import Rows, interleaved
+from .budget import check_part
+from .mcaprows import RecordRows, interleaved
 
-__all__ = ["BagReader", "BagWriter", "ChunkReader", "ChunkWriter"]
+__all__ = ["BagReader", "ChunkReader", "ChunkWriter", "ChunkedBagWriter"]
 
 _MESSAGE, _CHUNK, _MESSAGE_INDEX = 0x05, 0x06, 0x07
 #: Start of a chunk without messages.
@@ -42,14 +43,14 @@ _by_time = itemgetter(1)
 class ChunkReader(McapReader):  # type: ignore[misc]
     """The MCAP storage of rosbags, with whole chunks of messages taken apart at once."""
 
-    #: Whether messages that are alike may come as `Rows`, and their first time before them.
+    #: Whether messages that are alike may come as `RecordRows`, and their first time before them.
     by_rows = False
     #: Whether the order of messages of unlike topics is of no account.
     by_topic = False
 
     def messages(
         self, connections: Collection[Any], start: int | None = None, stop: int | None = None
-    ) -> Iterator[tuple[Any, int, bytes | Rows]]:
+    ) -> Iterator[tuple[Any, int, bytes | RecordRows]]:
         """Connection, time and data of every message, in the order of time.
 
         Raises
@@ -66,11 +67,12 @@ class ChunkReader(McapReader):  # type: ignore[misc]
                 continue
             self.bio.seek(chunk.chunk_start_offset)
             *_times, size, check = _CHUNK_HEAD.unpack(self.bio.read(_CHUNK_HEAD.size))
+            check_part(self.path, size, "chunk")
             self.bio.seek(4 + len(chunk.compression) + 8, 1)
             packed = self.bio.read(chunk.compressed_size)
             data = decompress(packed, chunk.compression, size, check)
             mixed = self.by_topic or len(wanted) == 1
-            alike = Rows.of_chunk(data, mixed) if self.by_rows else None
+            alike = RecordRows.of_chunk(data, mixed) if self.by_rows else None
             if alike is None:
                 yield from sorted(_messages(data, wanted), key=_by_time)
                 continue
@@ -145,7 +147,7 @@ class ChunkWriter(McapWriter):  # type: ignore[misc]
         if place + size > _FULL:
             self.close_chunk()
 
-    def write_rows(self, parts: Sequence[tuple[Any, Rows]]) -> None:
+    def write_rows(self, parts: Sequence[tuple[Any, RecordRows]]) -> None:
         """Write rows of several connections, row by row: as `write` would, one by one."""
         rows = interleaved([(connection.id, rows) for connection, rows in parts])
         width, size = rows.records.shape[1], rows.messages.shape[1]
@@ -154,7 +156,7 @@ class ChunkWriter(McapWriter):  # type: ignore[misc]
             chunk = self.chunk
             place = chunk.bio.tell()
             most = max(0, (_FULL - size - place) // width + 1) + 1
-            part = Rows(rows.records[done : done + most])
+            part = RecordRows(rows.records[done : done + most])
             times = part.times
             chunk.message_start_time = min(chunk.message_start_time, int(times[0]))
             chunk.message_end_time = max(chunk.message_end_time, int(times[-1]))
@@ -207,7 +209,7 @@ def _text(text: str) -> bytes:
     return struct.pack("<I", len(text)) + text.encode()
 
 
-class BagWriter(Writer):  # type: ignore[misc]
+class ChunkedBagWriter(Writer):  # type: ignore[misc]
     """The writer of rosbags for bags of ROS 2, with `ChunkWriter`."""
 
     STORAGE_PLUGINS: ClassVar[Any] = {
@@ -223,7 +225,7 @@ class BagWriter(Writer):  # type: ignore[misc]
             return cast("Callable[[Any, int, bytes], None]", self.storage.write)
         return cast("Callable[[Any, int, bytes], None]", self.write)
 
-    def write_rows(self, parts: Sequence[tuple[Any, Rows]]) -> None:
+    def write_rows(self, parts: Sequence[tuple[Any, RecordRows]]) -> None:
         """Write rows of several connections, row by row."""
         self.storage.write_rows(parts)
 

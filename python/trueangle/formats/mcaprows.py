@@ -12,7 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Rows", "interleaved"]
+__all__ = ["RecordRows", "interleaved"]
 
 Bytes = NDArray[np.uint8]
 
@@ -28,7 +28,7 @@ _UNCOUNTED = 9
 _MOST = 16_384
 
 
-class Rows:
+class RecordRows:
     """Whole records of one channel and one length, one a row, in the order of time.
 
     Parameters
@@ -58,9 +58,9 @@ class Rows:
         """The messages without their heads, one a row."""
         return self.records[:, _HEAD:]
 
-    def with_messages(self, messages: Bytes) -> Rows:
+    def with_messages(self, messages: Bytes) -> RecordRows:
         """Other messages of the same length at the same times."""
-        return Rows(np.concatenate([self.records[:, :_HEAD], messages], axis=1))
+        return RecordRows(np.concatenate([self.records[:, :_HEAD], messages], axis=1))
 
     def checksum(self, before: int) -> int:
         """CRC-32 of time and message of every row, after ``before``."""
@@ -68,7 +68,7 @@ class Rows:
         return zlib.crc32(told.tobytes(), before)
 
     @classmethod
-    def of_chunk(cls, data: bytes, mixed: bool = False) -> list[Rows] | None:
+    def of_chunk(cls, data: bytes, mixed: bool = False) -> list[RecordRows] | None:
         """The records of a chunk, some thousands at a time; None where they are not all alike.
 
         Of several channels where ``mixed``, one channel after the other.
@@ -95,7 +95,7 @@ class Rows:
         return [cls(part[i : i + _MOST]) for part in parts for i in range(0, len(part), _MOST)]
 
 
-def interleaved(parts: Sequence[tuple[int, Rows]]) -> Rows:
+def interleaved(parts: Sequence[tuple[int, RecordRows]]) -> RecordRows:
     """Row 0 of every part, row 1 of every part ..., each on the channel that stands before it.
 
     Numbers are 0 and times of publishing those of logging, as for messages written one by one.
@@ -105,4 +105,4 @@ def interleaved(parts: Sequence[tuple[int, Rows]]) -> Rows:
         made[:, i, _CHANNEL] = np.frombuffer(channel.to_bytes(2, "little"), dtype=np.uint8)
     made[:, :, _NUMBER] = 0
     made[:, :, _PUBLISHED] = made[:, :, _LOGGED]
-    return Rows(made.reshape(-1, made.shape[2]))
+    return RecordRows(made.reshape(-1, made.shape[2]))

@@ -7,11 +7,13 @@ from collections.abc import Collection, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
+from xml.sax.saxutils import escape
 
 import numpy as np
 from asammdf import MDF, Signal
 from asammdf.blocks.mdf_v4 import MDF4
 from asammdf.blocks.utils import DataBlockInfo
+from asammdf.blocks.v4_blocks import FileHistory
 from numpy.typing import NDArray
 
 from ..errors import FileError
@@ -20,7 +22,7 @@ from .damage import damage_told
 from .format import TEXTS, Addition, Batch, Choose, Contents, Watch, note
 from .mdfblocks import check_chains
 
-__all__ = ["columns", "contents", "copy", "read"]
+__all__ = ["columns", "contents", "copy", "decoded", "read"]
 
 #: Bytes that one byte of a file can stand for: deflate reaches 1032.
 _MOST_COMPRESSED = 2000
@@ -102,8 +104,18 @@ def copy(
                 done += corrected.size
                 watch(corrected.size, done / total)
             sums[channel.added] = check.text()
-        mdf.save(target, overwrite=True, compression=compression)
+        mdf.file_history.append(_history(mdf, note(channels)))
+        mdf.save(target, overwrite=True, compression=compression, add_history_block=False)
     return Contents(max(rows), sums)
+
+
+def _history(mdf: MDF, comment: str) -> FileHistory:
+    """What is told of the copy; of the time of the last entry, so that a log gives one copy."""
+    known = mdf.file_history
+    made = FileHistory()
+    made.comment = f"<FHcomment><TX>{escape(comment)}</TX><tool_id>trueangle</tool_id></FHcomment>"
+    made.time_stamp = known[-1].time_stamp if known else mdf.header.start_time
+    return made
 
 
 def contents(path: Path, topic: str | None = None) -> Contents:
@@ -111,6 +123,12 @@ def contents(path: Path, topic: str | None = None) -> Contents:
     with _opened(path) as mdf:
         rows = [_cycles(mdf, i) for i in range(len(mdf.groups)) if _is_ours(mdf, i)]
         return Contents(max(rows, default=0), _kept(path, mdf))
+
+
+def decoded(path: Path, names: Sequence[str], topic: str | None = None) -> int:
+    """Bytes of channels in memory; see `format.FormatModule`."""
+    with _opened(path) as mdf:
+        return 8 * sum(_cycles(mdf, _place(mdf, name)[0]) for name in names)
 
 
 def together(path: Path, needed: Sequence[str], others: Sequence[str]) -> list[str]:

@@ -6,17 +6,17 @@ import zlib
 from collections.abc import Collection, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 import numpy as np
-from numpy.lib.format import open_memmap
+from numpy.lib import format as npy
 from numpy.typing import NDArray
 
 from ..errors import FileError
 from .damage import damage_told
-from .format import TEXTS, Addition, Batch, Choose, Contents, Watch, row_labels
+from .format import TEXTS, Addition, Batch, Choose, Contents, Watch, refuse_corrected, row_labels
 
-__all__ = ["columns", "contents", "copy", "read"]
+__all__ = ["columns", "contents", "copy", "read", "read_header", "write_header"]
 
 #: Readings taken together.
 _BLOCK = 1 << 18
@@ -56,15 +56,16 @@ def copy(
 
     Records get further fields; plain columns become those of one table, whose order is kept.
     """
-    with _opened(source) as array:
-        additions = choose(_names(array))
+    with _opened(source) as array, target.open("wb") as output:
+        names = _names(array)
+        additions = choose(names)
         kind, width = _enlarged(array, additions)
         shape = (len(array),) if kind.names else (len(array), width + len(additions))
-        made = open_memmap(target, "w+", kind, shape)
+        write_header(output, kind, shape)
         check = 0
         for start in range(0, len(array), _BLOCK):
             part = array[start : start + _BLOCK]
-            put = made[start : start + _BLOCK]
+            put = np.empty((len(part), *shape[1:]), kind)
             if kind.names:
                 for name in array.dtype.names or ():
                     put[name] = part[name]
@@ -73,10 +74,13 @@ def copy(
             for i, addition in enumerate(additions):
                 signals = {s: _values(part, array, n) for s, n in addition.signals.items()}
                 after = addition.correct(_values(part, array, addition.column), signals)
+                if not kind.names and start == 0:
+                    columns = {name: _values(part, array, name) for name in names}
+                    refuse_corrected(source, columns, addition, after)
                 put[addition.added if kind.names else (slice(None), width + i)] = after
-            check = zlib.crc32(np.ascontiguousarray(put).tobytes(), check)
+            check = zlib.crc32(put.data.cast("B"), check)
+            output.write(put.data)
             watch(len(part), (start + len(part)) / len(array))
-        made.flush()
         return Contents(len(array), {"bytes": f"{check:08x}"})
 
 
@@ -90,10 +94,38 @@ def contents(path: Path, topic: str | None = None) -> Contents:
         return Contents(len(array), {"bytes": f"{check:08x}"})
 
 
+def read_header(file: IO[bytes]) -> tuple[tuple[int, ...], np.dtype[Any]]:
+    """Shape and type of the array that begins here.
+
+    Raises
+    ------
+    ValueError
+        No array of numpy, or one that holds objects or nothing at all: numpy divides by the
+        width of a type, and the process would end where that is 0.
+    """
+    version = npy.read_magic(file)
+    reading = npy.read_array_header_1_0 if version == (1, 0) else npy.read_array_header_2_0
+    shape, _, kind = reading(file)
+    if kind.hasobject or not kind.itemsize or min(shape, default=0) < 0:
+        raise ValueError(f"an array of the type {kind.str!r} and the shape {shape}")
+    return shape, kind
+
+
+def write_header(file: IO[bytes], kind: np.dtype[Any], shape: tuple[int, ...]) -> None:
+    """Begin an array in the order of C."""
+    told = {"descr": npy.dtype_to_descr(kind), "fortran_order": False, "shape": shape}
+    try:
+        npy.write_array_header_1_0(file, told)
+    except ValueError:  # names of more than 64 kB
+        npy.write_array_header_2_0(file, told)
+
+
 @contextmanager
 def _opened(path: Path) -> Iterator[NDArray[Any]]:
     """The array in mapped memory, its errors told with its name."""
     with damage_told(path, "an array of numpy"):
+        with path.open("rb") as file:
+            read_header(file)
         array = np.load(path, mmap_mode="r", allow_pickle=False)
         if not isinstance(array, np.ndarray) or array.ndim not in (1, 2) or not array.size:
             raise FileError(path, "one column, or several side by side, are needed")

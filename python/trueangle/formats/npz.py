@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import math
 import shutil
 import zipfile
 import zlib
@@ -12,14 +13,15 @@ from pathlib import Path
 from typing import IO, Any, NamedTuple
 
 import numpy as np
-from numpy.lib import format as npy
 from numpy.typing import NDArray
 
 from ..errors import FileError
+from .budget import check_part
 from .damage import damage_told
 from .format import TEXTS, Addition, Batch, Choose, Contents, Watch, note, row_labels
+from .npy import read_header, write_header
 
-__all__ = ["columns", "contents", "copy", "read", "together"]
+__all__ = ["columns", "contents", "copy", "decoded", "read", "together"]
 
 #: Readings taken together.
 _BLOCK = 1 << 18
@@ -27,7 +29,7 @@ _BLOCK = 1 << 18
 _NOTE = "trueangle.json"
 
 
-class _Column(NamedTuple):
+class _ArrayHeader(NamedTuple):
     """An array of one dimension: its type and length."""
 
     kind: np.dtype[Any]
@@ -38,6 +40,13 @@ def columns(path: Path, topic: str | None = None) -> list[str]:
     """Names of the arrays that are vectors of numbers or texts."""
     with _opened(path) as archive:
         return list(_columns(archive))
+
+
+def decoded(path: Path, names: Sequence[str], topic: str | None = None) -> int:
+    """Bytes of arrays in memory; see `format.FormatModule`."""
+    with _opened(path) as archive:
+        found = _columns(archive)
+    return sum(found[name].size * max(found[name].kind.itemsize, 8) for name in names)
 
 
 def together(path: Path, needed: Sequence[str], others: Sequence[str]) -> list[str]:
@@ -100,7 +109,8 @@ def copy(
             sums[name] = f"{check:08x}"
             rows = max(rows, size)
         told = note(additions).encode()
-        output.writestr(_NOTE, told)
+        # Of no time of day: the same log gives the same bytes.
+        output.writestr(zipfile.ZipInfo(_NOTE), told)
         sums[_NOTE] = f"{zlib.crc32(told):08x}"
     return Contents(rows, sums)
 
@@ -126,7 +136,7 @@ def _opened(path: Path) -> Iterator[zipfile.ZipFile]:
         yield archive
 
 
-def _columns(archive: zipfile.ZipFile) -> dict[str, _Column]:
+def _columns(archive: zipfile.ZipFile) -> dict[str, _ArrayHeader]:
     found = {}
     for member in archive.infolist():
         if member.filename.endswith(".npy"):
@@ -137,15 +147,16 @@ def _columns(archive: zipfile.ZipFile) -> dict[str, _Column]:
     return found
 
 
-def _header(given: IO[bytes]) -> _Column | None:
+def _header(given: IO[bytes]) -> _ArrayHeader | None:
     """Type and length of a vector of numbers or texts; None for other arrays."""
-    version = npy.read_magic(given)
-    reading = npy.read_array_header_1_0 if version == (1, 0) else npy.read_array_header_2_0
-    shape, _, kind = reading(given)
-    size = int(np.prod(shape, dtype=object))
-    if kind.hasobject or kind.kind not in "fiuSU" or not shape or max(shape) != size:
+    try:
+        shape, kind = read_header(given)
+    except ValueError:
         return None
-    return _Column(kind, size)
+    size = math.prod(shape)
+    if kind.kind not in "fiuSU" or not shape or max(shape) != size:
+        return None
+    return _ArrayHeader(kind, size)
 
 
 def _batches(path: Path, archive: zipfile.ZipFile, names: Sequence[str]) -> Iterator[Batch]:
@@ -155,6 +166,7 @@ def _batches(path: Path, archive: zipfile.ZipFile, names: Sequence[str]) -> Iter
             given = stack.enter_context(archive.open(f"{name}.npy"))
             column = _header(given)
             assert column is not None  # `columns` lists no other
+            check_part(path, column.kind.itemsize * min(column.size, _BLOCK), "array", name)
             streams[name] = (given, column)
         sizes = {name: column.size for name, (_given, column) in streams.items()}
         if len(set(sizes.values())) > 1:
@@ -166,7 +178,7 @@ def _batches(path: Path, archive: zipfile.ZipFile, names: Sequence[str]) -> Iter
             yield {name: _part(path, name, *stream, count) for name, stream in streams.items()}
 
 
-def _part(path: Path, name: str, given: IO[bytes], column: _Column, count: int) -> Any:
+def _part(path: Path, name: str, given: IO[bytes], column: _ArrayHeader, count: int) -> Any:
     data = given.read(count * column.kind.itemsize)
     if len(data) != count * column.kind.itemsize:
         raise FileError(path, "is shorter than its header says: it is damaged", column=name)
@@ -178,13 +190,12 @@ def _part(path: Path, name: str, given: IO[bytes], column: _Column, count: int) 
 
 
 def _corrected(
-    path: Path, archive: zipfile.ZipFile, addition: Addition, column: _Column
+    path: Path, archive: zipfile.ZipFile, addition: Addition, column: _ArrayHeader
 ) -> Iterator[bytes]:
     """The bytes of a corrected array: float32 where its source is, else float64."""
     kind = np.dtype(np.float32 if column.kind.newbyteorder("=") == np.float32 else np.float64)
     head = io.BytesIO()
-    described = {"descr": npy.dtype_to_descr(kind), "fortran_order": False, "shape": (column.size,)}
-    npy.write_array_header_1_0(head, described)
+    write_header(head, kind, (column.size,))
     yield head.getvalue()
     names = [addition.column, *addition.signals.values()]
     for batch in _batches(path, archive, list(dict.fromkeys(names))):

@@ -23,7 +23,7 @@ from .arrowtables import (
 from .damage import damage_told
 from .format import TEXTS, Addition, Batch, Choose, Contents, Watch
 
-__all__ = ["columns", "contents", "copy", "read", "stretches"]
+__all__ = ["columns", "contents", "copy", "decoded", "read", "rows", "stretches"]
 
 #: Bytes of decoded columns in hand at once; larger row groups are cut.
 _BYTES = 1 << 25
@@ -37,7 +37,7 @@ _STRETCH = 1 << 20
 _BATCH = 1 << 15
 
 
-class Stretch(NamedTuple):
+class RowGroupRange(NamedTuple):
     """Neighbouring row groups, and the footer that tells where they are."""
 
     groups: list[int]
@@ -50,7 +50,18 @@ def columns(path: Path, topic: str | None = None) -> list[str]:
         return list(file.schema_arrow.names)
 
 
-def stretches(path: Path) -> list[Stretch | None]:
+def decoded(path: Path, names: Sequence[str], topic: str | None = None) -> int:
+    """Bytes of columns in memory; see `format.FormatModule`."""
+    return 8 * rows(path) * len(names)
+
+
+def rows(path: Path) -> int:
+    """How many rows there are, by the footer."""
+    with _opened(path) as file:
+        return int(file.metadata.num_rows)
+
+
+def stretches(path: Path) -> list[RowGroupRange | None]:
     """Row groups that are read together; None where that is the whole file."""
     with _opened(path) as file:
         footer = file.metadata
@@ -62,14 +73,14 @@ def stretches(path: Path) -> list[Stretch | None]:
             rows = 0
         found[-1].append(group)
         rows += footer.row_group(group).num_rows
-    return [Stretch(groups, footer) for groups in found] if len(found) > 1 else [None]
+    return [RowGroupRange(groups, footer) for groups in found] if len(found) > 1 else [None]
 
 
 def read(
     path: Path,
     names: Sequence[str],
     topic: str | None = None,
-    stretch: Stretch | None = None,
+    stretch: RowGroupRange | None = None,
     *,
     texts: Collection[str] = TEXTS,
     strict: bool = False,

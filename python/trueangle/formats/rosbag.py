@@ -17,13 +17,14 @@ from rosbags.typesys import Stores, get_typestore
 
 from ..errors import FileError
 from .damage import damage_told
-from .format import TEXTS, Addition, Batch, Choose, Contents, Watch, note
+from .format import TEXTS, Addition, Batch, Choose, Contents, Watch
 from .jointstates import Block
 from .mcapchunks import BagReader, ChunkReader
-from .mcaprows import Rows
+from .mcaprows import RecordRows
+from .rosbagmarks import corrected_topics, custom_of, made_note, refuse_again
 from .rosbagwriter import opened_writer
 
-__all__ = ["columns", "contents", "copy", "read"]
+__all__ = ["columns", "contents", "copy", "decoded", "read"]
 
 _JOINT_STATE = "sensor_msgs/msg/JointState"
 #: Signals of a joint in the message, under the names of columns.
@@ -39,6 +40,12 @@ def columns(path: Path, topic: str | None = None) -> list[str]:
     """Joints of the JointState topic, their signals as ``JOINT/velocity_rad_s``, the time."""
     with _opened(path) as bag:
         return bag.columns(bag.topic(topic))
+
+
+def decoded(path: Path, names: Sequence[str], topic: str | None = None) -> int:
+    """Bytes of positions and signals in memory; see `format.FormatModule`."""
+    with _opened(path) as bag:
+        return 8 * len(names) * sum(int(c.msgcount) for c in bag.topic(topic))
 
 
 def read(
@@ -78,21 +85,27 @@ def copy(
         channels = choose(bag.columns(connections))
         name = connections[0].topic
         output = output_topic or f"{name}_corrected"
+        refuse_again(source, bag, name, channels)
         if output != name and any(c.topic == output for c in bag.reader.connections):
             raise FileError(
-                source, f"topic {output} is there already: corrected before, or --output-topic"
+                source, f"topic {output} is there already: corrected before, or `output_topic=`"
             )
         total = max(bag.reader.message_count, 1)
         joints = bag.joints(connections)
         digest = _Digest()
         done = 0
-        with opened_writer(bag, target, note(channels)) as writer:
-            copies = {c.id: writer.add(c, c.topic) for c in bag.reader.connections}
+        ours = {c.id for c in connections}
+        with opened_writer(bag, target, made_note(bag, channels, output)) as writer:
+            copies = {
+                c.id: writer.add(c, c.topic, output == name and c.id in ours)
+                for c in bag.reader.connections
+            }
             outputs = {
-                c.id: copies[c.id] if output == name else writer.add(c, output) for c in connections
+                c.id: copies[c.id] if output == name else writer.add(c, output, True)
+                for c in connections
             }
             for block in bag.blocks():
-                if isinstance(block, Alike):
+                if isinstance(block, MessageGroup):
                     connection, rows = block
                     parts = [(copies[connection.id], connection.topic, rows)]
                     if connection.id in outputs:
@@ -132,7 +145,7 @@ def contents(path: Path, topic: str | None = None) -> Contents:
         for storage in bag.chunked:
             storage.by_topic = True
         for block in bag.blocks():
-            if isinstance(block, Alike):
+            if isinstance(block, MessageGroup):
                 digest.update_rows(block.connection.topic, block.rows)
                 continue
             for connection, time, data in block:
@@ -140,11 +153,11 @@ def contents(path: Path, topic: str | None = None) -> Contents:
     return digest.contents()
 
 
-class Alike(NamedTuple):
+class MessageGroup(NamedTuple):
     """Messages of a connection that are alike in length."""
 
     connection: Any
-    rows: Rows
+    rows: RecordRows
 
 
 class Bag:
@@ -158,17 +171,21 @@ class Bag:
         self.path = path
         self.reader = reader
         self.is_ros1 = isinstance(reader, Reader1)
+        #: What the writer of a bag of ROS 2 noted beside the messages.
+        self.custom = {} if self.is_ros1 else custom_of(reader)
         self.types = get_typestore(Stores.ROS1_NOETIC if self.is_ros1 else Stores.LATEST)
         self.chunked = [] if self.is_ros1 else list(_chunked(reader))
         for storage in self.chunked:
             storage.by_rows = True
 
     def topic(self, name: str | None) -> list[Any]:
-        """Connections of the JointState topic ``name``, or of the only one."""
+        """Connections of the JointState topic ``name``, or of the only one that was recorded."""
         states = [c for c in self.reader.connections if c.msgtype == _JOINT_STATE]
         topics = list(dict.fromkeys(c.topic for c in states))
-        if name is None and len(topics) == 1:
-            (name,) = topics
+        if name is None:
+            made = corrected_topics(self)
+            recorded = [topic for topic in topics if topic not in made] or topics
+            name = recorded[0] if len(recorded) == 1 else None
         if name not in topics:
             listed = ", ".join(topics) or "none"
             problem = (
@@ -176,7 +193,7 @@ class Bag:
                 if name is None and topics
                 else (f"no JointState topic {name}" if name else "no JointState topic")
             )
-            raise FileError(self.path, f"{problem}: name one with --topic; there are {listed}")
+            raise FileError(self.path, f"{problem}: name one with `topic=`; there are {listed}")
         return [c for c in states if c.topic == name]
 
     def joints(self, connections: Sequence[Any]) -> list[str]:
@@ -184,16 +201,16 @@ class Bag:
         first = next(iter(self.blocks(connections)), None)
         return [] if first is None else self.states(first).joints
 
-    def blocks(self, connections: Sequence[Any] = ()) -> Iterator[list[Any] | Alike]:
-        """Messages of these connections, or of all: some thousands, or `Rows` that are alike."""
+    def blocks(self, connections: Sequence[Any] = ()) -> Iterator[list[Any] | MessageGroup]:
+        """Messages of these connections, or of all: some thousands, or such as are alike."""
         block: list[Any] = []
         for message in self.reader.messages(connections):
             rows = message[2]
-            if isinstance(rows, Rows):
+            if isinstance(rows, RecordRows):
                 if block:
                     yield block
                     block = []
-                yield Alike(message[0], rows)
+                yield MessageGroup(message[0], rows)
                 continue
             block.append(message)
             if len(block) == _BLOCK:
@@ -202,9 +219,9 @@ class Bag:
         if block:
             yield block
 
-    def states(self, block: list[Any] | Alike) -> Block:
+    def states(self, block: list[Any] | MessageGroup) -> Block:
         """Joint states of a block."""
-        if isinstance(block, Alike):
+        if isinstance(block, MessageGroup):
             return Block(block.rows.messages, self.is_ros1)
         return Block([data for _connection, _time, data in block], self.is_ros1)
 
@@ -238,7 +255,7 @@ class _Digest:
         if len(waiting) >= 2 * _BLOCK:
             self._sum(topic)
 
-    def update_rows(self, topic: str, rows: Rows) -> None:
+    def update_rows(self, topic: str, rows: RecordRows) -> None:
         """Add messages that are alike."""
         if topic in self._waiting:
             self._sum(topic)

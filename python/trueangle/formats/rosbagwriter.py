@@ -15,15 +15,14 @@ from rosbags.rosbag2 import StoragePlugin
 from rosbags.rosbag2.enums import CompressionFormat, CompressionMode
 
 from ..errors import FileError
-from .mcapchunks import BagWriter as Writer
+from .mcapchunks import ChunkedBagWriter as Writer
 from .mcapchunks import ChunkReader
+from .rosbagmarks import KEY, caller_note
 
 if TYPE_CHECKING:
     from .rosbag import Bag
 
 __all__ = ["BagWriter", "opened_writer"]
-
-_KEY = "trueangle"
 
 
 class BagWriter:
@@ -37,8 +36,11 @@ class BagWriter:
         #: Of bags of ROS 2 in MCAP files, from which alone rows are read.
         self.write_rows: Any = getattr(writer, "write_rows", None)
 
-    def add(self, connection: Any, topic: str) -> Any:
+    def add(self, connection: Any, topic: str, is_corrected: bool) -> Any:
         """A connection like one that was read, perhaps of another topic.
+
+        In bags of ROS 1, which hold notes nowhere else, the header of one whose positions are
+        corrected says so: its caller is the note, in which the caller stands that it had.
 
         Raises
         ------
@@ -46,7 +48,8 @@ class BagWriter:
             An old bag holds no definition of a type of its own.
         """
         if self._bag.is_ros1:
-            caller = connection.ext.callerid if topic == connection.topic else self._note
+            caller = connection.ext.callerid
+            caller = caller_note(self._note, caller) if is_corrected else caller
             return self._writer.add_connection(
                 topic,
                 connection.msgtype,
@@ -96,9 +99,8 @@ def opened_writer(bag: Bag, target: Path, note: str) -> Iterator[BagWriter]:
         writer.set_compression(CompressionMode.STORAGE, CompressionFormat.ZSTD)
     elif mode:
         writer.set_compression(CompressionMode[mode.upper()], CompressionFormat.ZSTD)
-    for key, value in (storage.metadata.custom or {}).items():
+    for key, value in {**bag.custom, KEY: note}.items():
         writer.set_custom_data(key, value)
-    writer.set_custom_data(_KEY, note)
     with writer:
         yield BagWriter(bag, writer, note)
     if single:

@@ -7,6 +7,8 @@ from collections.abc import Iterable, Mapping
 from typing import Final, NamedTuple
 
 from ..errors import ArgumentError
+from ..support.kinds import told_kinds
+from ..support.suggestions import check_choice
 from .members import FIXED_MEMBERS
 
 __all__ = [
@@ -87,10 +89,7 @@ def gear_orders(gear_ratio: float, fixed_member: str = "circular_spline") -> dic
         raise ArgumentError(
             f"gear_ratio must be positive (motor turns per output turn), got {gear_ratio!r}"
         )
-    if fixed_member not in FIXED_MEMBERS:
-        raise ArgumentError(
-            f"fixed_member must be one of {', '.join(FIXED_MEMBERS)}, got {fixed_member!r}"
-        )
+    check_choice("fixed_member", fixed_member, FIXED_MEMBERS)
     i = float(gear_ratio)
     if fixed_member == "none":
         if i == 1.0:
@@ -117,6 +116,7 @@ def gear_orders(gear_ratio: float, fixed_member: str = "circular_spline") -> dic
     }
 
 
+@told_kinds
 def wanted_orders(
     gear_ratio: float | None,
     fixed_member: str = "circular_spline",

@@ -5,6 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from ..errors import ArgumentError
+from ..support.kinds import told_kinds
+from ..support.oftype import all_of_type
+from ..support.suggestions import check_choice
 from .declared import Bearing, DeclaredShaft, Head
 from .members import FIXED_MEMBERS
 from .shafts import shaft_cycles
@@ -23,6 +26,7 @@ MOST_HEADS = 99
 SLIP = 0.02
 
 
+@told_kinds
 @dataclass(frozen=True)
 class Joint:
     """Geometry of one joint.
@@ -58,16 +62,15 @@ class Joint:
     heads: tuple[Head, ...] = ()
 
     def __post_init__(self) -> None:
+        for name, kind in (("declared", DeclaredShaft), ("bearings", Bearing), ("heads", Head)):
+            wanted = f"a {kind.__name__} of trueangle.joint.declared"
+            found: tuple[object, ...] = all_of_type(name, getattr(self, name), kind, wanted)
+            object.__setattr__(self, name, found)
         if not 0.0 < self.gear_ratio < float("inf"):
             raise ArgumentError(f"gear_ratio must be positive and finite, got {self.gear_ratio!r}")
-        if self.fixed_member not in FIXED_MEMBERS:
-            raise ArgumentError(
-                f"fixed_member must be one of {', '.join(FIXED_MEMBERS)}, got {self.fixed_member!r}"
-            )
-        if self.encoder_side not in ENCODER_SIDES:
-            raise ArgumentError(
-                f"encoder_side must be one of {', '.join(ENCODER_SIDES)}, got {self.encoder_side!r}"
-            )
+        check_choice("fixed_member", self.fixed_member, FIXED_MEMBERS)
+        shaft_cycles(self.gear_ratio, self.fixed_member)  # refuses a generator that stands
+        check_choice("encoder_side", self.encoder_side, ENCODER_SIDES)
         if self.pole_pairs < 1:
             raise ArgumentError(f"pole_pairs must be at least 1, got {self.pole_pairs!r}")
         names = [shaft.name for shaft in self.declared]
@@ -92,11 +95,8 @@ class Joint:
 
     def output_order(self, shaft: str, order: float) -> float:
         """Cycles per output turn of ``order`` of ``shaft``."""
-        try:
-            return order * self.shafts[shaft]
-        except KeyError:
-            known = ", ".join(self.shafts)
-            raise ArgumentError(f"shaft must be one of {known}, got {shaft!r}") from None
+        turns = self.shafts
+        return order * turns[check_choice("shaft", shaft, turns)]
 
     def gear_orders(self) -> list[tuple[str, int]]:
         """Orders a gear and its motor-side encoder are known to leave: (shaft, order).

@@ -9,8 +9,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .. import _core
+import trueangle._core as _core
+
 from ..errors import ArgumentError
+from ..support.kinds import told_kinds
 from .joint import Joint
 
 __all__ = [
@@ -28,6 +30,7 @@ Array = NDArray[np.float64]
 ARCSEC_PER_RAD = 1_296_000.0 / (2.0 * math.pi)
 
 
+@told_kinds
 @dataclass(frozen=True)
 class Harmonic:
     r"""One line: :math:`C \sin(k\,f\,\theta + \varphi)` of a shaft that turns f times.

@@ -4,22 +4,38 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from typing import NamedTuple, TypeAlias
+from itertools import islice
+from typing import Final, NamedTuple, TypeAlias, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import ArgumentError
+from ..support.kinds import told_kinds
+from ..support.suggestions import check_choice
 from .members import FIXED_MEMBERS
 
-__all__ = ["FIXED_MEMBERS", "Shaft", "ShaftOrders", "resolve_orders", "shaft_cycles"]
+__all__ = [
+    "FIXED_MEMBERS",
+    "MOST_ORDERS",
+    "Shaft",
+    "ShaftOrders",
+    "counted_orders",
+    "resolve_orders",
+    "shaft_cycles",
+]
 
 Array: TypeAlias = NDArray[np.float64]
+T = TypeVar("T")
+
+#: Orders that are looked at together, at most: the core's limit of one fit.
+MOST_ORDERS: Final = 4096
 
 #: Turns of the wave generator against the output member, less those of the motor.
 _WAVE_GENERATOR = {"circular_spline": 1.0, "flexspline": -1.0, "none": 0.0}
 
 
+@told_kinds
 @dataclass(frozen=True)
 class Shaft:
     """Harmonics of one shaft: order ``k`` is the output order ``k * cycles_per_turn``.
@@ -83,10 +99,7 @@ def shaft_cycles(
     >>> shaft_cycles(100.0)
     {'output': 1.0, 'motor': 100.0, 'wave_generator': 101.0}
     """
-    if fixed_member not in FIXED_MEMBERS:
-        raise ArgumentError(
-            f"fixed_member must be one of {', '.join(FIXED_MEMBERS)}, got {fixed_member!r}"
-        )
+    check_choice("fixed_member", fixed_member, FIXED_MEMBERS)
     cycles = {"output": 1.0}
     if gear_ratio is not None:
         if not 0.0 < gear_ratio < float("inf"):
@@ -95,8 +108,32 @@ def shaft_cycles(
             )
         cycles["motor"] = float(gear_ratio)
         if fixed_member != "none":
-            cycles["wave_generator"] = float(gear_ratio) + _WAVE_GENERATOR[fixed_member]
+            generator = float(gear_ratio) + _WAVE_GENERATOR[fixed_member]
+            if generator <= 0.0:
+                raise ArgumentError(
+                    "gear_ratio must be above 1 where the flexspline is fixed (the wave generator "
+                    f"turns gear_ratio - 1 times), got {gear_ratio!r}"
+                )
+            cycles["wave_generator"] = generator
     return cycles
+
+
+def counted_orders(orders: Iterable[T], what: str = "orders") -> list[T]:
+    """Orders as a list, at most `MOST_ORDERS` of them; more are refused before they are made.
+
+    Examples
+    --------
+    >>> counted_orders(range(1, 4))
+    [1, 2, 3]
+    >>> counted_orders(range(1, 10**9))
+    Traceback (most recent call last):
+    ...
+    trueangle.errors.ArgumentError: orders are too many: 4096 at a time, at most
+    """
+    found = list(islice(orders, MOST_ORDERS + 1))
+    if len(found) > MOST_ORDERS:
+        raise ArgumentError(f"{what} are too many: {MOST_ORDERS} at a time, at most")
+    return found
 
 
 def resolve_orders(
@@ -125,10 +162,13 @@ def resolve_orders(
     for name, asked in by_shaft.items():
         if name not in cycles:
             raise ArgumentError(
-                f"how fast shaft {name!r} turns is not known: give gear_ratio (--gear-ratio), or "
-                f"shafts={{{name!r}: cycles per output turn}}"
+                f"how fast shaft {name!r} turns is not known: give `gear_ratio=`, or its "
+                f"cycles per output turn as `shafts={{{name!r}: CYCLES}}`"
             )
-        checked = {k if type(k) is int and 0 < k < 2**31 else _order(k, name) for k in asked}
+        checked = {
+            k if type(k) is int and 0 < k < 2**31 else _order(k, name)
+            for k in counted_orders(asked, f"orders of shaft {name!r}")
+        }
         if checked:
             wanted.append(ShaftOrders(name, float(cycles[name]), tuple(sorted(checked))))
     return wanted

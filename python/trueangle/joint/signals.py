@@ -10,9 +10,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..angles import ARCSEC_PER_TURN
-from ..quantiles import median
-from ..runs import CalibrationRun
+from ..runs.run import CalibrationRun
+from ..support.angles import ARCSEC_PER_TURN
+from ..support.quantiles import median
 from .grid import lattice_step
 
 __all__ = ["Signals", "join_runs"]

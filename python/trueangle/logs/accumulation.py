@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+import math
+from collections import Counter
+from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping, Sequence
+from copy import copy, deepcopy
 from dataclasses import dataclass, field
 from functools import reduce
 from itertools import groupby
@@ -14,22 +17,38 @@ from typing import Any, NamedTuple, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from .. import _core
-from ..angles import UNIT_PERIODS
-from ..columns import matching
+import trueangle._core as _core
+
 from ..errors import FileError
-from ..model import Argument
-from ..moments import Moments
-from ..runs import CalibrationRun
-from ..units import check_follows
-from .ahead import side_by_side
-from .columns import RUN_COLUMN, find_angle_column, find_reference
-from .formats import Labels, LogFormat, find_format
+from ..estimation.moments import Moments
+from ..formats.ahead import side_by_side
+from ..formats.columns import find_columns, signal_code
+from ..formats.format import Format as LogFormat
+from ..formats.format import Labels
+from ..formats.formats import find_format
+from ..model.model import Argument, HarmonicModel
+from ..runs.follows import check_follows
+from ..runs.run import CalibrationRun
+from ..support.angles import UNIT_PERIODS, wrap
+from ..support.files import partition_keys
+from .columns import find_angle_column, find_reference
+from .keeping import SAMPLE, Kept
 
-__all__ = ["Accumulated", "LogFitSettings", "accumulate", "accumulate_each", "merged"]
+__all__ = [
+    "LABELS",
+    "Accumulated",
+    "LogFitSettings",
+    "OutlierLimits",
+    "accumulate",
+    "accumulate_each",
+    "merged",
+]
 
-#: Places in the turn, a degree each, where readings are looked for.
-_BINS = 360
+Array: TypeAlias = NDArray[np.float64]
+
+#: Roles whose columns tell runs apart.
+LABELS = ("unit", "run")
+
 #: Readings taken together: what is computed of them stays in the cache.
 _BLOCK = 1 << 16
 #: Readings, at most, of the first batch that are checked for wrong units and signs.
@@ -46,7 +65,8 @@ class LogFitSettings:
     """What to accumulate; sent to the workers of a cluster.
 
     ``orders`` maps shaft names to all orders that may be asked for, ``shafts`` shaft names
-    to their turns per output turn.
+    to their turns per output turn. Of every log ``kept`` readings are kept, a ``part`` of the
+    blocks at most, and outliers left out where it is told what they are.
     """
 
     orders: Mapping[str, tuple[int, ...]]
@@ -58,49 +78,104 @@ class LogFitSettings:
     topic: str | None = None
     threads: int | None = None
     checksums: bool = False
+    kept: int = SAMPLE
+    part: float = 1.0
+    outliers: OutlierLimits | None = None
+
+    @property
+    def is_periodic(self) -> bool:
+        """Whether the error repeats after one turn of the output."""
+        return all(cycles % 1.0 == 0.0 for cycles in self.shafts.values())
+
+
+@dataclass(frozen=True)
+class OutlierLimits:
+    """Readings farther than ``limit`` from a model and the zero of their run."""
+
+    model: HarmonicModel
+    zeros: Mapping[Hashable, float]
+    limit: float
+
+    def find(self, run: Hashable, x: Array, y: Array, argument: Argument) -> NDArray[np.bool_]:
+        """Which of the readings of a run are outliers."""
+        angle = y if argument == "indicated" else x
+        expected = np.asarray(self.model.error(angle)) - self.model.constant + self.zeros[run]
+        return np.asarray(np.abs(wrap(y - x - expected, self.model.period)) > self.limit)
+
+
+@dataclass
+class Tally:
+    """What is counted of a run.
+
+    Attributes
+    ----------
+    rows : int
+        Known readings.
+    low, high : float
+        Ends of its angles over the turns, where the error does not repeat after one.
+    outliers : list of int
+        Rows among the known readings of those that were left out.
+    """
+
+    rows: int = 0
+    low: float = math.inf
+    high: float = -math.inf
+    outliers: list[int] = field(default_factory=list)
+
+    def add(self, other: Tally) -> None:
+        """The next readings of the run."""
+        self.outliers += [self.rows + row for row in other.outliers]
+        self.rows += other.rows
+        self.low, self.high = min(self.low, other.low), max(self.high, other.high)
 
 
 @dataclass
 class Accumulated:
-    """Moments of some logs, one run per log and label of its ``run`` column.
+    """Moments of some logs, one run per log and label of its columns ``unit`` and ``run``.
 
     Attributes
     ----------
     moments : Moments
-        Runs are labelled ``(file, run)``.
+        Runs are labelled ``(file, unit, run)``.
     files, sha256 : tuple of str
         Checksums are empty where they were not asked for, and of folders.
     rows, missing : int
         Readings, and those without a reference or indicated angle.
-    travel : ndarray
-        Readings seen in each degree of the turn, one of 16 looked at.
+    tallies : dict
+        What is counted of every run.
+    kept : Kept
+        Some readings of every run.
     """
 
     moments: Moments
+    kept: Kept
     files: tuple[str, ...] = ()
     sha256: tuple[str, ...] = ()
     rows: int = 0
     missing: int = 0
-    travel: NDArray[np.int64] = field(default_factory=lambda: np.zeros(_BINS, dtype=np.int64))
+    tallies: dict[Hashable, Tally] = field(default_factory=dict)
 
     def add(self, other: Accumulated) -> Accumulated:
-        """Itself with the next stretch of the same log taken in."""
+        """Itself with the next stretch of the same log, or the next log, taken in."""
         self.moments.merge(other.moments)
+        self.kept.add(other.kept)
         self.rows += other.rows
         self.missing += other.missing
-        self.travel += other.travel
+        for run, tally in other.tallies.items():
+            self.tallies.setdefault(run, Tally()).add(tally)
         return self
 
 
-class _Stretch(NamedTuple):
+class _LogPart(NamedTuple):
     """A part of a log and how to read it."""
 
     path: Path
     kind: LogFormat
     part: Any
-    is_first: bool
+    number: int
     size: float
     names: Sequence[str]
+    roles: Sequence[str]
     period: float
     reference_scale: float
     scale: float
@@ -128,20 +203,26 @@ def accumulate_each(
     bit for bit, whatever the number of threads.
     """
     workers = _core.thread_count(settings.threads)
-    stretches = (stretch for path in paths for stretch in _stretches(path, settings))
+    stretches = (stretch for path in paths for stretch in _found(path, settings))
 
-    def work(stretch: _Stretch) -> tuple[Path, Accumulated]:
+    def work(stretch: _LogPart) -> tuple[Path, Accumulated]:
         return stretch.path, _accumulate(stretch, settings, advance)
 
     done = side_by_side(work, stretches, workers)
     for path, parts in groupby(done, key=itemgetter(0)):
         found = reduce(Accumulated.add, (part for _, part in parts))
+        found.kept.thinned(settings.kept)
         if not found.moments.count:
             raise FileError(path, "has no readings")
         yield found
 
 
-def _stretches(path: Path, settings: LogFitSettings) -> Iterator[_Stretch]:
+def _found(path: Path, settings: LogFitSettings) -> list[_LogPart]:
+    with find_format(path).at_header(path):
+        return list(_stretches(path, settings))
+
+
+def _stretches(path: Path, settings: LogFitSettings) -> Iterator[_LogPart]:
     kind = find_format(path)
     header = kind.module.columns(path, settings.topic)
     wanted = dict(settings.signals)
@@ -153,8 +234,8 @@ def _stretches(path: Path, settings: LogFitSettings) -> Iterator[_Stretch]:
     ):
         raise FileError(
             path,
-            "its unit is not known: give it as --signal reference=NAME:UNIT, counts with "
-            "--counts-per-turn-reference",
+            f"its unit is not known: give it as {signal_code('reference')}, counts with "
+            "`counts_per_turn_reference=`",
             line=1,
             column=reference.name,
         )
@@ -168,9 +249,9 @@ def _stretches(path: Path, settings: LogFitSettings) -> Iterator[_Stretch]:
         counts_per_turn=settings.counts_per_turn,
         fresh=False,
     )
-    run = wanted["run"][0] if "run" in wanted else RUN_COLUMN
-    run = matching(path, header, run) if "run" in wanted else run
-    names = [reference.name, indicated.name, *([run] if run in header else [])]
+    roles = find_columns(path, header, wanted)
+    labels = {role: roles[role].name for role in LABELS if role in roles}
+    names = [reference.name, indicated.name, *labels.values()]
     parts = kind.stretches(path)
     size = path.stat().st_size / len(parts)
     scales = (
@@ -178,92 +259,120 @@ def _stretches(path: Path, settings: LogFitSettings) -> Iterator[_Stretch]:
         period / indicated.period,
     )
     for i, part in enumerate(parts):
-        yield _Stretch(path, kind, part, i == 0, size, names, period, *scales)
+        yield _LogPart(path, kind, part, i, size, names, [*labels], period, *scales)
 
 
-def _accumulate(stretch: _Stretch, settings: LogFitSettings, advance: Advance) -> Accumulated:
+def _accumulate(stretch: _LogPart, settings: LogFitSettings, advance: Advance) -> Accumulated:
     """Moments of one stretch of a log."""
-    path, period = stretch.path, stretch.period
+    path, period, argument = stretch.path, stretch.period, settings.argument
+    is_first = stretch.number == 0
     found = Accumulated(
         Moments(settings.orders, period=period, shafts=settings.shafts),
+        Kept(settings.kept, settings.part),
         (str(path),),
-        (_sha256(path) if settings.checksums and stretch.is_first else "",),
+        (_sha256(path) if settings.checksums and is_first else "",),
     )
-    reference, indicated, *run = stretch.names
+    reference, indicated, *labels = stretch.names
     left = stretch.size
-    for batch in stretch.kind.read(
-        path, stretch.names, settings.topic, stretch.part, texts=stretch.names[2:]
-    ):
+    folders = partition_keys(path)
+    taken_of: Counter[Hashable] = Counter()
+    for batch in stretch.kind.read(path, stretch.names, settings.topic, stretch.part, texts=labels):
         true, said = batch[reference], batch[indicated]
         if stretch.reference_scale != 1.0:
             true = true * stretch.reference_scale
-        if stretch.is_first and found.rows == 0:
+        if is_first and found.rows == 0:
             _check_follows(path, true, said * stretch.scale, period)
-        runs = batch[run[0]] if run else None
+        columns = [batch[name] for name in labels]
         for start in range(0, true.size, _BLOCK):
             block = slice(start, start + _BLOCK)
-            for label, rows in _runs(runs, block):
+            for label, rows in _runs(columns, block):
+                own = folders | dict(zip(stretch.roles, label, strict=True))
+                run = (found.files[0], *map(own.get, LABELS))
                 x = np.ascontiguousarray(true[block][rows], dtype=np.float64)
                 y = np.ascontiguousarray(said[block][rows], dtype=np.float64)
-                known = found.moments.update_known(
-                    x,
-                    y if stretch.scale == 1.0 else y * stretch.scale,
-                    travel=found.travel,
-                    argument=settings.argument,
-                    run=(found.files[0], label),
-                )
+                y = y if stretch.scale == 1.0 else y * stretch.scale
                 found.rows += x.size
-                found.missing += x.size - known
+                tally = found.tallies.setdefault(run, Tally())
+                if settings.outliers is not None and run in settings.outliers.zeros:
+                    y = _without(settings.outliers, run, x, y, argument, tally)
+                known = found.moments.update_known(x, y, argument=argument, run=run)
+                if settings.outliers is None:
+                    tally.rows += known
+                if known and not settings.is_periodic:
+                    angle = y if argument == "indicated" else x
+                    tally.low = min(tally.low, float(np.nanmin(angle)))
+                    tally.high = max(tally.high, float(np.nanmax(angle)))
+                found.kept.take(run, stretch.number, taken_of[run], x, y)
+                taken_of[run] += x.size
         taken = min(float(true.size * _BYTES), left)
         left -= taken
         advance(true.size, taken)
     advance(0, left)
+    found.missing = found.rows - sum(tally.rows for tally in found.tallies.values())
+    found.tallies = {run: tally for run, tally in found.tallies.items() if tally.rows}
     return found
 
 
+def _without(
+    outliers: OutlierLimits, run: Hashable, x: Array, y: Array, argument: Argument, tally: Tally
+) -> Array:
+    """The readings with NaN for the outliers, which are noted."""
+    known = np.flatnonzero(np.isfinite(x) & np.isfinite(y))
+    far = np.flatnonzero(outliers.find(run, x[known], y[known], argument))
+    tally.outliers += (tally.rows + far).tolist()
+    tally.rows += known.size
+    if far.size:
+        y = y.copy()
+        y[known[far]] = np.nan
+    return y
+
+
 def _runs(
-    runs: NDArray[Any] | Labels | None, block: slice
-) -> Iterator[tuple[str | float | None, Any]]:
-    """Every label in a block of readings, None where there is none, and its readings."""
-    if runs is None:
-        yield None, slice(None)
+    columns: Sequence[NDArray[Any] | Labels], block: slice
+) -> Iterator[tuple[tuple[str | float | None, ...], Any]]:
+    """Every label in a block of readings, in the order of their first, and its readings."""
+    codes = [(c.codes if isinstance(c, Labels) else c)[block] for c in columns]
+    if all(code.size == 0 or (code == code[0]).all() for code in codes):
+        if not codes or codes[0].size:
+            yield (
+                tuple(_name(c, code[0]) for c, code in zip(columns, codes, strict=True)),
+                slice(None),
+            )
         return
-    codes = (runs.codes if isinstance(runs, Labels) else runs)[block]
-    if codes.size and (codes == codes[0]).all():
-        found, each = codes[:1], [slice(None)]
-    else:
-        found, place = np.unique(codes, return_inverse=True)
-        each = [place == i for i in range(found.size)]
-    for code, rows in zip(found.tolist(), each, strict=True):
-        if isinstance(runs, Labels):
-            yield runs.names[code], rows
-        else:
-            yield (code if code == code else None), rows  # NaN
+    place = np.zeros(codes[0].size, dtype=np.int64)
+    for code in codes:
+        values, own = np.unique(code, return_inverse=True)
+        place = place * values.size + own
+    _, first, place = np.unique(place, return_index=True, return_inverse=True)
+    for i in np.argsort(first).tolist():
+        at = first[i]
+        label = tuple(_name(c, code[at]) for c, code in zip(columns, codes, strict=True))
+        yield label, place == i
+
+
+def _name(column: NDArray[Any] | Labels, code: Any) -> str | float | None:
+    if isinstance(column, Labels):
+        return column.names[int(code)]
+    value: float = code.item()
+    return value if value == value else None  # NaN
 
 
 def merged(parts: Sequence[Accumulated]) -> Accumulated:
-    """All parts as one; neighbours are merged first, in a tree."""
-    while len(parts) > 1:
-        parts = [_merged_pair(*parts[i : i + 2]) for i in range(0, len(parts), 2)]
-    return parts[0]
-
-
-def _merged_pair(first: Accumulated, second: Accumulated | None = None) -> Accumulated:
-    if second is None:
-        return first
-    if first.moments.period != second.moments.period:
-        raise FileError(
-            second.files[0],
-            f"its reference is in another unit than that of {first.files[0]}; convert one",
-        )
-    return Accumulated(
-        first.moments + second.moments,
-        first.files + second.files,
-        first.sha256 + second.sha256,
-        first.rows + second.rows,
-        first.missing + second.missing,
-        first.travel + second.travel,
-    )
+    """All parts as one, in their order."""
+    for part in parts[1:]:
+        if part.moments.period != parts[0].moments.period:
+            raise FileError(
+                part.files[0],
+                f"its reference is in another unit than that of {parts[0].files[0]}; convert one",
+            )
+    # On a cluster a part may be merged again, after its worker was lost: none is changed.
+    found = copy(parts[0])
+    found.moments, found.kept = found.moments.copy(), deepcopy(found.kept)
+    found.tallies = deepcopy(found.tallies)
+    for part in parts[1:]:
+        found.add(part)
+        found.files, found.sha256 = found.files + part.files, found.sha256 + part.sha256
+    return found
 
 
 def _sha256(path: Path) -> str:

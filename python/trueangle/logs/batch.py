@@ -3,25 +3,28 @@
 from __future__ import annotations
 
 import time
+import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import ExitStack
 from os import PathLike
 from pathlib import Path
 from typing import Any
 
-from ..errors import TrueAngleError
-from ..model import HarmonicModel
+from ..errors import TrueAngleError, UnitWarning
+from ..model.model import HarmonicModel
+from ..support.kinds import told_kinds
 from .correction import Task, correct_log, is_disk_full, states_after
 from .joints import JointState, LogSettings, joints_of
 from .manifest import Manifest
 from .progress import Progress
 from .report import BatchReport, LogReport, done_before
 from .safety import remove_leftovers, stamp
-from .sources import Place, places
+from .sources import LogTarget, places
 
 __all__ = ["BatchReport", "LogReport", "correct_logs"]
 
 
+@told_kinds
 def correct_logs(
     logs: str | PathLike[str] | Iterable[str | PathLike[str]],
     model: HarmonicModel | str | PathLike[str] | Mapping[str, Any],
@@ -122,12 +125,26 @@ def correct_logs(
                 on_cluster(scheduler, found, result.logs, settings, manifests, shown, finished)
         except KeyboardInterrupt:
             result.interrupted = True
-            # It may have come while the place of a finished log was cleared.
-            remove_leftovers(place.target for place in found)
         finally:
             shown.clear()
+            # Ctrl-C may have come while the place of a finished log was cleared, and a worker
+            # of a cluster may have been killed.
+            remove_leftovers(place.target for place in found)
     result.seconds = time.monotonic() - start
+    _warn_of_units(result.logs)
     return result
+
+
+def _warn_of_units(logs: Sequence[LogReport]) -> None:
+    """Tell once of each column whose readings look like another unit, and of how many logs."""
+    told: dict[str, list[str]] = {}
+    for log in logs:
+        for joint in (log.result or {}).get("joints", ()):
+            if log.is_done and joint.get("unit_note"):
+                told.setdefault(joint["column"], []).append(f"{log.log}: {joint['unit_note']}")
+    for notes in told.values():
+        more = f"; so in {len(notes)} logs" if len(notes) > 1 else ""
+        warnings.warn(f"{notes[0]}{more}", UnitWarning, stacklevel=3)
 
 
 def _files_of(model: Any) -> list[str | PathLike[str]]:
@@ -137,7 +154,7 @@ def _files_of(model: Any) -> list[str | PathLike[str]]:
 
 
 def _one_by_one(
-    found: Sequence[Place],
+    found: Sequence[LogTarget],
     logs: Sequence[LogReport],
     settings: LogSettings,
     manifests: Mapping[Path, Manifest],

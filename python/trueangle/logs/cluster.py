@@ -9,16 +9,18 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from ..errors import ArgumentError, FileError, MissingExtraError, TrueAngleError
+from ..runs.files import read_runs
+from ..runs.run import CalibrationRun
 from .accumulation import Accumulated, LogFitSettings, accumulate, merged
 from .correction import Task, correct_log, count_turns, is_disk_full, states_after
 from .joints import JointState, LogSettings
 from .manifest import Manifest
 from .progress import Progress
 from .report import LogReport, done_before
-from .sources import Place
+from .sources import LogTarget
 from .turns import TurnSpan, TurnState
 
-__all__ = ["accumulated_on_cluster", "connected", "on_cluster"]
+__all__ = ["accumulated_on_cluster", "connected", "on_cluster", "read_on_cluster"]
 
 #: Seconds to wait for the scheduler.
 _TIMEOUT = 20
@@ -39,9 +41,9 @@ def connected(scheduler: str) -> Iterator[Any]:
     try:
         client = distributed.Client(scheduler, timeout=_TIMEOUT, set_as_default=False)
     except (OSError, TimeoutError, ValueError) as cause:
-        raise ArgumentError(f"--scheduler {scheduler}: no Dask scheduler answers ({cause})") from (
-            None
-        )
+        raise ArgumentError(
+            f"`scheduler={str(scheduler)!r}`: no Dask scheduler answers ({cause})"
+        ) from (None)
     with client:
         yield client
 
@@ -49,7 +51,7 @@ def connected(scheduler: str) -> Iterator[Any]:
 def _distributed() -> Any:
     try:
         import distributed
-    except ImportError:
+    except ModuleNotFoundError:
         raise MissingExtraError(
             "a cluster needs distributed: pip install 'trueangle[dask]'"
         ) from None
@@ -58,7 +60,7 @@ def _distributed() -> Any:
 
 def on_cluster(
     scheduler: str,
-    found: Sequence[Place],
+    found: Sequence[LogTarget],
     logs: Sequence[LogReport],
     settings: LogSettings,
     manifests: Mapping[Path, Manifest],
@@ -106,8 +108,17 @@ def accumulated_on_cluster(
     return found
 
 
+def read_on_cluster(
+    scheduler: str, paths: Sequence[Path], files: Mapping[str, Any]
+) -> list[CalibrationRun]:
+    """The runs of all logs, a log read by each worker."""
+    with connected(scheduler) as client:
+        parts = [client.submit(read_runs, path.resolve(), **files) for path in paths]
+        return [run for part in client.gather(parts) for run in part]
+
+
 def _submitted(
-    client: Any, found: Sequence[Place], logs: Sequence[LogReport], settings: LogSettings
+    client: Any, found: Sequence[LogTarget], logs: Sequence[LogReport], settings: LogSettings
 ) -> dict[Any, LogReport]:
     """The report to fill by the future of every log that is not done.
 
@@ -118,7 +129,7 @@ def _submitted(
     before: Any = None
     for place, log in zip(found, logs, strict=True):
         if log.is_done:
-            before = _Outcome(log.result)
+            before = _LogOutcome(log.result)
             continue
         # Not resolved: links are followed where files are written, and the manifest's names stay.
         manifest = None if place.manifest is None else place.manifest.absolute()
@@ -131,23 +142,23 @@ def _submitted(
     return futures
 
 
-class _Outcome(NamedTuple):
+class _LogOutcome(NamedTuple):
     """What became of a log: an error does not keep the log after it from being corrected."""
 
     result: Mapping[str, Any]
     error: Exception | None = None
 
 
-def _correct(task: Task, before: _Outcome | None) -> _Outcome:
+def _correct(task: Task, before: _LogOutcome | None) -> _LogOutcome:
     """On a worker. A log that a lost worker had finished is not done twice."""
     if before is not None:
         task = replace(task, before=states_after(before.result))
     try:
-        return _Outcome(_known(task) or correct_log(task))
+        return _LogOutcome(_known(task) or correct_log(task))
     except (TrueAngleError, OSError) as error:
         # A worker thought lost may have finished it in the meantime.
         known = _known(task)
-        return _Outcome({}, error) if known is None else _Outcome(known)
+        return _LogOutcome({}, error) if known is None else _LogOutcome(known)
 
 
 def _known(task: Task) -> dict[str, Any] | None:
@@ -169,7 +180,7 @@ def _outcome(future: Any, log: LogReport) -> tuple[str, Mapping[str, Any], Excep
 
 
 def _turns(
-    client: Any, found: Sequence[Place], settings: LogSettings
+    client: Any, found: Sequence[LogTarget], settings: LogSettings
 ) -> dict[Path, dict[str, JointState]]:
     """Where every log begins, for models that count turns: one more pass, side by side."""
     if not settings.counts_turns:

@@ -5,14 +5,22 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
-from ..angles import UNIT_PERIODS, unit_name
-from ..columns import ANGLE_UNITS, Column, Wanted, find_columns, listed, matching, unit_in_name
 from ..errors import FileError
-from ..signals import SIGNALS
-from ..suggestions import did_you_mean
+from ..formats.columns import (
+    ANGLE_UNITS,
+    Column,
+    Wanted,
+    find_columns,
+    listed,
+    matching,
+    signal_code,
+    unit_in_name,
+)
+from ..formats.signals import SIGNALS
+from ..support.angles import UNIT_PERIODS, unit_name
+from ..support.suggestions import check_choice, did_you_mean
 
 __all__ = [
-    "RUN_COLUMN",
     "SIGNAL_COLUMNS",
     "UNITS",
     "AngleColumn",
@@ -24,9 +32,6 @@ __all__ = [
 ]
 
 UNITS = (*UNIT_PERIODS, "count")
-
-#: Labels of the runs of a calibration log.
-RUN_COLUMN = "run"
 
 #: Column endings of the signals that terms of a model may need.
 SIGNAL_COLUMNS = {
@@ -44,6 +49,8 @@ class AngleColumn(NamedTuple):
     unit: str
     period: float
     corrected: str
+    assumed: bool = False
+    """Whether nobody stated the unit: it is that of the model."""
 
 
 def find_angle_column(
@@ -71,15 +78,18 @@ def find_angle_column(
         No such column, or several; counts without ``counts_per_turn``; a column of the
         result's name is there already.
     """
+    if unit is not None:
+        check_choice("unit", unit, (*ANGLE_UNITS, "count"))
     column = _search(path, header, joint) if column is None else matching(path, header, column)
-    unit = unit or _unit_of(column, joint) or unit_name(model_period)
+    stated = unit or _unit_of(column, joint)
+    unit = stated or unit_name(model_period)
     period = ANGLE_UNITS.get(unit) or counts_per_turn
     if period is None and unit_name(model_period) == "count":
         period = model_period
     if period is None:
         raise FileError(
             path,
-            "counts need their number per output turn: give --counts-per-turn",
+            "counts need their number per output turn: give `counts_per_turn=`",
             line=1,
             column=column,
         )
@@ -88,7 +98,7 @@ def find_angle_column(
         raise FileError(
             path, "is there already: this log was corrected before", line=1, column=corrected
         )
-    return AngleColumn(column, unit, float(period), corrected)
+    return AngleColumn(column, unit, float(period), corrected, stated is None)
 
 
 def find_reference(path: object, header: Sequence[str], wanted: Wanted) -> Column:
@@ -105,7 +115,7 @@ def find_reference(path: object, header: Sequence[str], wanted: Wanted) -> Colum
         raise FileError(
             path,
             "one column reference_deg, _rad or _turn is needed and there is none: name another "
-            f"with --signal reference=NAME:UNIT; {listed(header)}",
+            f"with {signal_code('reference')}; {listed(header)}",
             line=1,
         )
     return column
@@ -163,7 +173,9 @@ def _search(path: object, header: Sequence[str], joint: str | None) -> str:
         guesses = (did_you_mean(name, header) for name in sorted(wanted) if not found)
         guess = next(filter(None, guesses), "")
         raise FileError(
-            path, f"{problem}: name the angle with --column{guess}; {listed(header)}", line=1
+            path,
+            f"{problem}: name the angle with `column=`{guess}; {listed(header)}",
+            line=1,
         )
     for candidates in _joint_names(joint):
         found = [name for name in candidates if name in header]
@@ -173,13 +185,13 @@ def _search(path: object, header: Sequence[str], joint: str | None) -> str:
             raise FileError(
                 path,
                 f"several columns of joint {joint} ({', '.join(found)}): name one with "
-                f"--column {joint}=NAME",
+                f"`column={{{joint!r}: 'NAME'}}`",
                 line=1,
             )
     raise FileError(
         path,
         f"no column of joint {joint}, such as {joint}_indicated_deg: name it with "
-        f"--column {joint}=NAME; {listed(header)}",
+        f"`column={{{joint!r}: 'NAME'}}`; {listed(header)}",
         line=1,
     )
 

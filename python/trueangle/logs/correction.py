@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import errno
-import shutil
 import time
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
@@ -14,9 +13,9 @@ from typing import Any
 import numpy as np
 
 from ..errors import FileError
-from ..files.outputs import PARTIAL
 from ..formats.format import Watch
 from ..formats.formats import find_format
+from ..support.files.workplace import PARTIAL
 from .joints import Channel, JointState, LogSettings
 from .manifest import Manifest
 from .safety import publish, stamp, workplace
@@ -71,7 +70,7 @@ def correct_log(task: Task, watch: Watch = lambda rows, part: None) -> dict[str,
         channels.extend(settings.channels(source, header, task.before, kind.unit))
         return channels
 
-    with _named(target), workplace(target) as aside:
+    with kind.at_header(source), _named(target), workplace(target) as aside:
         written = module.copy(source, aside, choose, watch, settings.topic, settings.output_topic)
         read_back = module.contents(aside, settings.topic)
         if written != read_back:
@@ -97,8 +96,6 @@ def correct_log(task: Task, watch: Watch = lambda rows, part: None) -> dict[str,
             "joints": [channel.summary() for channel in channels],
             "after": {c.name: c.state for c in channels},
         }
-        if target.is_file() and aside.is_file():
-            shutil.copymode(target, aside)
         if task.manifest is not None:
             Manifest(task.manifest).record(
                 source, target, settings.digest, before, stamp(aside), result

@@ -1,57 +1,50 @@
-"""Fitting a model to calibration logs of any size in one pass."""
+"""Fitting a model to calibration logs of any size."""
 
 from __future__ import annotations
 
-import math
-import warnings
 from collections.abc import Iterable, Mapping, Sequence
 from os import PathLike
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
 
-import numpy as np
-
-from .._core import __version__
-from ..angles import wrap
-from ..columns import wanted_columns
-from ..errors import ArgumentError, NoModelError, UnlikeRunsWarning
-from ..fitting.clusters import Cluster
-from ..fitting.likeness import RunSums, far_runs, unlike_sentence
-from ..fitting.travel import Span, covered_span
-from ..fitting.uncertainty import (
-    CovarianceKind,
-    Uncertainty,
-    check_covariance,
-    uncertainty_of_sums,
+from ..errors import (
+    ArgumentError,
+    FileError,
+    NoModelError,
 )
-from ..model import Argument
-from ..moments import Moments, MomentsFit
-from ..orders.search import FALSE_ALARM, EvidenceSearch
-from ..orders.verdicts import because
-from ..records import FitRecord, Provenance
-from ..runs import Source
-from ..shafts import resolve_orders, shaft_cycles
-from .accumulation import Accumulated, LogFitSettings, accumulate_each, merged
-from .logfit import LogFit, LogOrder
-from .momentsums import sums_of
-from .progress import Progress
-from .sources import find_logs
+from ..fitting.argument import AnyArgument
+from ..fitting.fit import fit, fitted_to
+from ..fitting.orders.select import OrderSelection, select_orders, selected_of
+from ..fitting.result import FitResult
+from ..fitting.robust import (
+    without_spikes,
+)
+from ..fitting.summed import Summed
+from ..fitting.uncertainty import CovarianceKind, check_covariance
+from ..joint.shafts import resolve_orders
+from ..runs.files import read_runs
+from ..runs.follows import check_follows
+from ..runs.run import CalibrationRun
+from ..support.kinds import told_kinds
+from .keeping import KEPT
+from .passes import Passes
+from .sources import find_logs, hold_at_most
 
-__all__ = ["LogFit", "LogOrder", "fit_logs"]
+__all__ = ["fit_logs", "select_log_orders"]
 
-#: Orders of the output that are looked at when none are asked for, and of other shafts.
-_OUTPUT_ORDERS = tuple(range(1, 18))
-_SHAFT_ORDERS = (1, 2, 4)
+_Logs: TypeAlias = str | PathLike[str] | Iterable[str | PathLike[str]]
 
 
+@told_kinds
 def fit_logs(
-    logs: str | PathLike[str] | Iterable[str | PathLike[str]],
-    orders: Iterable[int] | Mapping[str, Iterable[int]] | str | None = None,
+    logs: _Logs,
+    orders: Iterable[float] | Mapping[str, Iterable[float]] | str | None = None,
     *,
     gear_ratio: float | None = None,
     fixed_member: str = "circular_spline",
     shafts: Mapping[str, float] | None = None,
-    argument: Argument = "reference",
+    argument: AnyArgument = "auto",
+    loss: str = "auto",
     covariance: CovarianceKind = "auto",
     counts_per_turn: float | None = None,
     counts_per_turn_reference: float | None = None,
@@ -61,13 +54,15 @@ def fit_logs(
     threads: int | None = None,
     checksums: bool = False,
     progress: str = "none",
-) -> LogFit:
-    r"""Fit a model to logs of any size: one pass, constant memory, any set of orders.
+) -> FitResult:
+    r"""Fit a model to logs of any size, in memory or in one pass over them.
 
     .. math:: e_{rj} = z_r + \sum_s \sum_k A_{sk} \cos(k f_s x_{rj}) + B_{sk} \sin(k f_s x_{rj})
 
-    by least squares from mergeable moments (`Moments`), with one zero per log and label of
-    its ``run`` column.
+    by least squares with one zero per run: what `fit` gives for the runs of these files. Up to
+    2^20 readings are read into runs and fitted so. Of more, all are summed (`Moments`) and some
+    65 000 are kept, in blocks at random: these tell what needs readings in their order, the sums
+    all else, and a note says so.
 
     Parameters
     ----------
@@ -76,14 +71,12 @@ def fit_logs(
         ``_rad``, ``_turn``, ``indicated_count``), see `read_runs`; missing readings are left
         out and counted.
     orders : iterable of int, mapping of shaft to orders, "auto" or None
-        None and ``"auto"``: those of 1 .. 17 on the output, and of 1, 2, 4 on the shafts
-        that a gear ratio makes known, which are significant, lower the error of held-out
-        runs and are not negligible.
-    gear_ratio, fixed_member, shafts, argument
-        As in `fit`.
-    covariance : {"auto", "white", "cluster"}
-        As in `fit`; by the scatter between the runs only, for one pass does not keep the order
-        of the readings.
+    gear_ratio, fixed_member, shafts, argument, covariance
+        As in `fit`. ``"hac"`` takes whole runs apart, which sums do not: as if one in so many
+        readings as the noise remembers stood for itself.
+    loss : {"auto", "linear"}
+        As in `fit`: ``"auto"`` sets outliers aside, which takes a second pass where there are
+        some.
     counts_per_turn, counts_per_turn_reference : float, optional
     signals : mapping of role to column, optional
         Columns with other names, as in `read_runs`.
@@ -91,15 +84,17 @@ def fit_logs(
         JointState topic of ROS bags.
     scheduler : str, optional
         Address of a Dask scheduler whose workers share the file system: a log on each, the
-        moments merged in a tree; the numbers are the same, bit for bit.
+        sums merged in a tree; the numbers are the same, bit for bit.
     threads : int, optional
     checksums : bool
-        Keep the sha256 of every log in the model's provenance: some 0.5 ns a byte more.
+        Keep the sha256 of every log in the model's provenance also in one pass: some 0.5 ns a
+        byte more.
     progress : {"auto", "text", "json", "none"}
 
     Returns
     -------
-    LogFit
+    FitResult
+        In one pass without `FitResult.runs`, `residuals`, `weights` and plots.
 
     Raises
     ------
@@ -107,18 +102,23 @@ def fit_logs(
         A log cannot be used; a fit does not leave logs out silently.
     NoModelError
         No order is supported by the readings.
+    ArgumentError
+        In one pass, angles within one turn of a shaft that does not turn a whole number of times
+        in it.
     RankError, NotInvertibleError
         As in `fit`.
 
     Notes
     -----
-    Wild readings are not set aside: that needs the readings twice. About 5 ns a reading
-    beyond reading the file, stretches of Parquet and Arrow files side by side; some 100 kB
-    per run for 17 orders. The numbers do not depend on ``threads``.
+    About 5 ns a reading beyond reading the file, segments of Parquet and Arrow files side by
+    side; 100 kB per run for 17 orders, 1 MB where orders up to 450 are judged (so for up to 64
+    logs; with more, up to 100 and those of the gear). One pass reads angles and labels only: a
+    row that lacks another signal counts. The numbers do not depend on ``threads``.
 
     Examples
     --------
-    >>> import tempfile
+    >>> import math, tempfile
+    >>> import numpy as np
     >>> folder = Path(tempfile.mkdtemp())
     >>> theta = np.arange(0.0, 360.0, 0.5)
     >>> rows = [f"{x},{x + 0.5 * math.sin(math.radians(x))}" for x in theta.tolist()]
@@ -127,194 +127,84 @@ def fit_logs(
     0.5
     """
     check_covariance(covariance, 2)
-    given = [logs] if isinstance(logs, (str, PathLike)) else list(logs)
-    paths = [path for path, _name in find_logs(given)]
-    cycles = shaft_cycles(gear_ratio, fixed_member) | dict(shafts or {})
-    automatic = orders is None or orders == "auto"
-    if automatic:
-        asked = {name: _OUTPUT_ORDERS if name == "output" else _SHAFT_ORDERS for name in cycles}
-    elif isinstance(orders, str):
-        raise ArgumentError(f"orders must be whole numbers, a mapping or 'auto', got {orders!r}")
+    if loss not in ("auto", "linear"):
+        raise ArgumentError(f"loss must be 'auto' or 'linear' for logs, got {loss!r}")
+    joint = {"gear_ratio": gear_ratio, "fixed_member": fixed_member, "shafts": shafts}
+    options = {**joint, "argument": argument, "covariance": covariance, "loss": loss}
+    files = {
+        "counts_per_turn": counts_per_turn,
+        "counts_per_turn_reference": counts_per_turn_reference,
+        "signals": signals,
+        "topic": topic,
+    }
+    paths = [path for path, _name in find_logs(_listed(logs))]
+    if hold_at_most(paths, KEPT, topic):
+        runs = _runs_of(paths, files, scheduler)
+        return fit(runs, orders, threads=threads, **options)  # type: ignore[arg-type]
+    asked = (
+        None
+        if orders is None or isinstance(orders, str)
+        else list(resolve_orders(orders, gear_ratio, fixed_member, shafts))
+    )
+    passes = Passes(paths, asked, joint, files, threads, checksums, scheduler, progress, KEPT)
+
+    def fitted(summed: Summed) -> FitResult:
+        return fitted_to(summed.runs, orders, summed=summed, threads=threads, **options)  # type: ignore[arg-type]
+
+    return fitted(passes.first(argument)) if loss == "linear" else passes.settled(argument, fitted)
+
+
+def select_log_orders(
+    logs: _Logs,
+    *,
+    gear_ratio: float | None = None,
+    fixed_member: str = "circular_spline",
+    shafts: Mapping[str, float] | None = None,
+    argument: AnyArgument = "auto",
+    covariance: CovarianceKind = "auto",
+    scheduler: str | None = None,
+    threads: int | None = None,
+    progress: str = "none",
+    **files: Any,
+) -> OrderSelection:
+    """Orders that logs of any size support: `select_orders` for what `fit_logs` reads."""
+    joint = {"gear_ratio": gear_ratio, "fixed_member": fixed_member, "shafts": shafts}
+    options = {**joint, "argument": argument, "covariance": covariance}
+    paths = [path for path, _name in find_logs(_listed(logs))]
+    if hold_at_most(paths, KEPT, files.get("topic")):
+        runs = [without_spikes(run) for run in _runs_of(paths, files, scheduler)]
+        return select_orders(runs, **options)  # type: ignore[arg-type]
+    passes = Passes(paths, None, joint, files, threads, False, scheduler, progress, KEPT)
+
+    def fitted(summed: Summed) -> FitResult:
+        return fitted_to(summed.runs, None, loss="auto", summed=summed, **options)  # type: ignore[arg-type]
+
+    try:
+        found = passes.settled(argument, fitted).selection
+        assert found is not None
+    except NoModelError:
+        summed = passes.last
+        runs = [without_spikes(run) for run in summed.runs]
+        found = selected_of(runs, **options, summed=summed)  # type: ignore[arg-type]
+    return found.with_notes((*found.notes, passes.last.note))
+
+
+def _listed(logs: _Logs) -> list[str | PathLike[str]]:
+    return [logs] if isinstance(logs, (str, PathLike)) else list(logs)
+
+
+def _runs_of(
+    paths: Sequence[Path], files: Mapping[str, Any], scheduler: str | None
+) -> list[CalibrationRun]:
+    if scheduler is None:
+        runs = read_runs(paths, **files)
     else:
-        wanted = resolve_orders(orders or (), gear_ratio, fixed_member, shafts)
-        asked = {shaft.name: shaft.orders for shaft in wanted}
-    settings = LogFitSettings(
-        asked,
-        {name: cycles[name] for name in asked},
-        argument,
-        counts_per_turn,
-        counts_per_turn_reference,
-        wanted_columns(signals),
-        topic,
-        threads=threads,
-        checksums=checksums,
-    )
-    found = _accumulated(paths, settings, scheduler, progress)
-    table = _judged(found.moments, asked, cycles, covariance) if automatic else ()
-    retained = asked
-    if automatic:
-        retained = {
-            name: tuple(row.order for row in table if row.shaft == name and row.retained)
-            for name in asked
-        }
-        retained = {name: kept for name, kept in retained.items() if kept}
-        if not retained:
-            raise NoModelError("no order is supported by the logs: none is significant")
-    fit = found.moments.solve(retained)
-    return _result(found, fit, argument, table, covariance)
+        from .cluster import read_on_cluster
 
-
-def _accumulated(
-    paths: Sequence[Path], settings: LogFitSettings, scheduler: str | None, progress: str
-) -> Accumulated:
-    if scheduler is not None:
-        from .cluster import accumulated_on_cluster
-
-        return accumulated_on_cluster(scheduler, paths, settings)
-    shown = Progress(len(paths), sum(path.stat().st_size for path in paths), progress)
-    parts = []
-    try:
-        for part in accumulate_each(paths, settings, shown.add):
-            parts.append(part)
-            shown.files += 1
-    finally:
-        shown.clear()
-    return merged(parts)
-
-
-def _judged(
-    moments: Moments,
-    asked: Mapping[str, Sequence[int]],
-    cycles: Mapping[str, float],
-    covariance: CovarianceKind,
-) -> tuple[LogOrder, ...]:
-    """Every order with its evidence, by the search that runs in memory take."""
-    pairs = [(name, k) for name, orders in asked.items() for k in orders]
-    sums = sums_of(moments, [k * cycles[name] for name, k in pairs])
-    several = sums.units > 1
-    search = EvidenceSearch(
-        sums,
-        np.full(len(pairs), math.log(FALSE_ALARM / len(pairs))),
-        moments.period,
-        int(sums.count.sum()) - sums.units,
-        sums if several else None,
-        covariance=covariance,
-    )
-    chosen, dropped = search.search()
-    everything = list(range(len(pairs)))
-    test = search.examined(chosen, everything)
-    gains, _ = search.gains_and_model(chosen, everything)
-    reasons = {i: because(verdict) for i, verdict in dropped.items() if verdict != "noise"}
-    return tuple(
-        LogOrder(
-            name,
-            k,
-            i in chosen,
-            float(np.hypot(test.cosine[i], test.sine[i])),
-            math.sqrt(float(test.variance[i])) if test.variance[i] >= 0.0 else math.nan,
-            math.degrees(math.atan2(test.cosine[i], test.sine[i])) % 360.0,
-            float(gains[i]),
-            "" if i in chosen else reasons.get(i, "not significant"),
-        )
-        for i, (name, k) in enumerate(pairs)
-    )
-
-
-def _result(
-    found: Accumulated,
-    fit: MomentsFit,
-    argument: Argument,
-    table: tuple[LogOrder, ...],
-    covariance: CovarianceKind,
-) -> LogFit:
-    span = _span(found)
-    offsets = np.array(list(fit.offsets.values()))
-    around = wrap(offsets - fit.constant, fit.period)
-    runs = _run_sums(found.moments, fit)
-    how = _uncertainty(fit, runs, covariance)
-    notes = (*_notes(found, span, table), *_unlike(found.moments, runs))
-    if how.note:
-        notes = (*notes, f"{how.note[:1].upper()}{how.note[1:]}.")
-    record = FitRecord(
-        samples=found.moments.count,
-        runs=len(found.moments.runs),
-        span=(span.start, span.stop),
-        residual=math.sqrt(fit.residual_variance),
-        method=fit.method,
-        loss="linear",
-        offset_spread=float(around.std(ddof=1)) if offsets.size > 1 else 0.0,
-        note=" ".join(notes),
-    )
-    files = zip(found.files, found.sha256, strict=True)
-    sources = tuple(Source(Path(file).name, sha256) for file, sha256 in files)
-    model = fit.model(argument).replace(
-        fit=record,
-        covariance=how.covariance,
-        provenance=Provenance(sources, f"trueangle {__version__}"),
-    )
-    return LogFit(model, fit, found.moments, table, found.rows, found.missing, notes, how)
-
-
-def _run_sums(moments: Moments, fit: MomentsFit) -> list[RunSums]:
-    """Normal equations of every run; none where they are not of whole orders."""
-    orders = [k * s.cycles_per_turn for s in fit.shafts for k in s.orders]
-    try:
-        sums = sums_of(moments, orders)
-    except ArgumentError:
-        return []
-    every = range(len(orders))
-    # Cosines, then sines: as A, B of each order in turn.
-    turn = np.arange(2 * len(orders)).reshape(2, -1).T.ravel()
-    return [
-        RunSums(
-            sums.gram(unit, every)[np.ix_(turn, turn)],
-            sums.rhs(unit, every)[turn],
-            float(sums.squares[unit]),
-            float(sums.count[unit]),
-        )
-        for unit in range(sums.units)
-    ]
-
-
-def _uncertainty(
-    fit: MomentsFit, runs: Sequence[RunSums], covariance: CovarianceKind
-) -> Uncertainty:
-    coefficients = np.column_stack([fit.cosine, fit.sine]).ravel()
-    clusters = [Cluster(run.gram, run.moment - run.gram @ coefficients) for run in runs]
-    kind: CovarianceKind = covariance if clusters or covariance == "hac" else "white"
-    return uncertainty_of_sums(
-        fit.covariance, fit.degrees_of_freedom, clusters, fit.residual_variance, kind
-    )
-
-
-def _unlike(moments: Moments, runs: Sequence[RunSums]) -> Iterable[str]:
-    """A warning, and its words, where runs do not show one pattern."""
-    far = [place for place, _ in far_runs(runs)]
-    if far:
-        labels = [_label(moments.runs[place]) for place in far]
-        said = unlike_sentence(labels, len(runs))
-        warnings.warn(said, UnlikeRunsWarning, stacklevel=4)
-        yield f"{said[:1].upper()}{said[1:]}."
-
-
-def _label(run: object) -> str:
-    """A run's name: of its file, and of its label where the file has several."""
-    file, label = run if isinstance(run, tuple) else (run, None)
-    return Path(str(file)).name if label is None else f"{Path(str(file)).name}:{label}"
-
-
-def _span(found: Accumulated) -> Span:
-    period = found.moments.period
-    bins = found.travel.size
-    centres = (np.arange(bins, dtype=np.float64) + 0.5) * (period / bins)
-    return covered_span([centres[found.travel > 0]], period)
-
-
-def _notes(found: Accumulated, span: Span, table: Sequence[LogOrder]) -> Iterable[str]:
-    if not span.full:
-        stretch = span.describe(found.moments.period)
-        yield f"Fitted on {stretch} only: outside it is extrapolated."
-    if found.missing:
-        yield f"{found.missing} readings without a reference or indicated angle left out."
-    if table and len(found.moments.runs) < 2:
-        yield "One run only: no order was tried on readings left out of the fit."
+        runs = read_on_cluster(scheduler, paths, files)
+    for run in runs:
+        try:
+            check_follows(run)
+        except ValueError as cause:
+            raise FileError("" if run.source is None else run.source.file, str(cause)) from None
+    return runs

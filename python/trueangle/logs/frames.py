@@ -10,8 +10,9 @@ from typing import Any
 import numpy as np
 
 from ..errors import ArgumentError, MissingExtraError
-from ..labelled import take_apart
-from ..model import HarmonicModel
+from ..model.model import HarmonicModel
+from ..support.kinds import told_kinds
+from ..support.labelled import take_apart
 from .joints import Channel, JointState, LogSettings, joints_of
 
 __all__ = ["correct"]
@@ -19,6 +20,7 @@ __all__ = ["correct"]
 _DATA = "data"
 
 
+@told_kinds
 def correct(
     data: Any,
     model: HarmonicModel | str | PathLike[str] | Mapping[str, Any],
@@ -105,7 +107,7 @@ def correct(
 def _pyarrow() -> Any:
     try:
         import pyarrow
-    except ImportError:
+    except ModuleNotFoundError:
         raise MissingExtraError("Arrow streams need pyarrow: pip install 'trueangle[arrow]'") from (
             None
         )
@@ -272,7 +274,7 @@ def _block(block: Any, settings: LogSettings, state: Any = None) -> Any:
 
 def _array_channel(settings: LogSettings, state: Any = None) -> Channel:
     """Bare angles are those of the one joint, in the model's unit."""
-    from ..angles import unit_name
+    from ..support.angles import unit_name
     from .columns import AngleColumn
 
     if len(settings.joints) > 1:

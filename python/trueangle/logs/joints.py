@@ -16,22 +16,23 @@ from typing import Any, NamedTuple, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from ..columns import Column, wanted_columns
 from ..errors import ArgumentError, FileError, OutsideSpanWarning
-from ..files import sha256_of
-from ..model import HarmonicModel
-from ..modelfile import load_model
+from ..formats.columns import Column, signal_code, wanted_columns
+from ..model.file import load_model
+from ..model.model import HarmonicModel
+from ..support.files import sha256_of
 from .columns import SIGNAL_COLUMNS, AngleColumn, find_angle_column, find_signal
 from .statistics import CorrectionStatistics
 from .turns import TurnCounter, TurnState
+from .unitevidence import UnitEvidence
 
-__all__ = ["Channel", "Joint", "JointState", "LogSettings", "joints_of"]
+__all__ = ["Channel", "JointState", "LogJoint", "LogSettings", "joints_of"]
 
 Array: TypeAlias = NDArray[np.floating[Any]]
 
 
 @dataclass(frozen=True)
-class Joint:
+class LogJoint:
     """A joint and how to find it in a log.
 
     Parameters
@@ -66,7 +67,7 @@ class Joint:
         column: str | None = None,
         signals: Mapping[str, tuple[str, str | None]] | None = None,
         unit: str | None = None,
-    ) -> Joint:
+    ) -> LogJoint:
         """Joint of the model file ``path``."""
         model = load_model(path)  # lets in models of a bounded size only
         digest = sha256_of(path)
@@ -91,7 +92,7 @@ class LogSettings:
     the correction.
     """
 
-    joints: tuple[Joint, ...]
+    joints: tuple[LogJoint, ...]
     unit: str | None = None
     counts_per_turn: float | None = None
     topic: str | None = None
@@ -157,7 +158,7 @@ class LogSettings:
         return self.counts_turns or self.follows_travel
 
 
-def signal_columns(path: object, header: Sequence[str], joint: Joint) -> dict[str, Column]:
+def signal_columns(path: object, header: Sequence[str], joint: LogJoint) -> dict[str, Column]:
     """Columns of the signals that the joint's model uses; time stands in for velocity.
 
     Raises
@@ -183,7 +184,7 @@ def signal_columns(path: object, header: Sequence[str], joint: Joint) -> dict[st
                 raise FileError(
                     path,
                     f"no column {columns}: the model's term '{term.kind}' needs {signal}; "
-                    f"name its column with --signal {signal}=NAME",
+                    f"name its column with {signal_code(signal, unit=None)}",
                     line=1,
                 )
     return found
@@ -215,7 +216,7 @@ class Channel:
 
     def __init__(
         self,
-        joint: Joint,
+        joint: LogJoint,
         angle: AngleColumn,
         signals: Mapping[str, Column],
         before: JointState,
@@ -233,6 +234,7 @@ class Channel:
         self._counts = settings.counts_per_turn
         if self._corrector is not None and before.travel:
             self._corrector.state = before.travel
+        self._evidence = UnitEvidence(angle.period) if angle.assumed else None
         self._counter = None if model.is_periodic else TurnCounter(angle.period, before.turns)
         span = model.partial_span
         self._span = None if span is None else (span[0] / self._scale, span[1] / self._scale)
@@ -288,6 +290,8 @@ class Channel:
             offset = self._counter.count(indicated) * self.angle.period
             corrected = (self._apply(indicated + offset, signals) - offset).astype(kept)
         self.statistics.update(indicated, corrected, self.angle.period, self._span)
+        if self._evidence is not None:
+            self._evidence.update(indicated)
         return corrected
 
     def _apply(self, angle: NDArray[Any], signals: Mapping[str, NDArray[Any]] | None) -> Array:
@@ -306,7 +310,7 @@ class Channel:
         return corrected if scale == 1.0 else corrected / scale
 
     def summary(self) -> dict[str, Any]:
-        """Counts and sizes for people and for ``--json``."""
+        """Counts and sizes for people and for JSON."""
         numbers = self.statistics
         return {
             "joint": self.joint.name,
@@ -316,6 +320,7 @@ class Channel:
             "max_abs_correction_arcsec": numbers.max_abs_arcsec,
             "missing": numbers.missing,
             "outside_span": numbers.outside if self._span is not None else None,
+            "unit_note": self._evidence and self._evidence.sentence(self.angle.name, self._span),
         }
 
 
@@ -330,7 +335,7 @@ def joints_of(
     model: HarmonicModel | str | PathLike[str] | Mapping[str, Any],
     column: str | Mapping[str, str] | None = None,
     signals: Mapping[str, Any] | None = None,
-) -> tuple[Joint, ...]:
+) -> tuple[LogJoint, ...]:
     """Joints from one model (or its file) or a mapping of joint names to models.
 
     ``column`` and ``signals`` are those of the joint, or mappings by joint name.
@@ -362,7 +367,7 @@ def _check_known(names: Iterable[Any], known: Mapping[Any, Any], argument: str) 
 
 def _joint(
     entry: Any, name: str | None, column: str | None, signals: dict[str, tuple[str, str | None]]
-) -> Joint:
+) -> LogJoint:
     unit = None
     if "indicated" in signals:
         if column is not None:
@@ -371,7 +376,7 @@ def _joint(
             )
         column, unit = signals.pop("indicated")
     if isinstance(entry, HarmonicModel):
-        return Joint(entry, name, column, signals, unit=unit)
+        return LogJoint(entry, name, column, signals, unit=unit)
     if isinstance(entry, (str, PathLike)):
-        return Joint.load(entry, name, column, signals, unit)
+        return LogJoint.load(entry, name, column, signals, unit)
     raise ArgumentError(f"model must be a HarmonicModel or its file, got {type(entry).__name__}")

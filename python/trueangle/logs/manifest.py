@@ -9,9 +9,9 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from ..decoding import finite
 from ..errors import ArgumentError
-from ..files import check_output
+from ..support.decoding import finite
+from ..support.files import check_output
 from .safety import Stamp, locked, stamp
 
 __all__ = ["MANIFEST", "Manifest"]

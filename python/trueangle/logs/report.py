@@ -7,10 +7,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from ..plainresult import PlainResult
+from ..support.plainresult import PlainResult
 from .joints import LogSettings
 from .manifest import Manifest
-from .sources import Place
+from .sources import LogTarget
 
 __all__ = ["BatchReport", "LogReport", "done_before"]
 
@@ -80,7 +80,7 @@ class BatchReport(PlainResult):
 
 
 def done_before(
-    place: Place, log: LogReport, settings: LogSettings, manifests: Mapping[Path, Manifest]
+    place: LogTarget, log: LogReport, settings: LogSettings, manifests: Mapping[Path, Manifest]
 ) -> bool:
     """Whether the manifest knows the output; the report is then filled from it."""
     if place.manifest is None:

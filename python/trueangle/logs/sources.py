@@ -4,20 +4,34 @@ from __future__ import annotations
 
 import os
 import re
+import warnings
 from collections.abc import Iterable
 from os import PathLike
 from pathlib import Path
 from typing import NamedTuple
 
-from ..errors import ArgumentError, FileError
-from ..files import check_input, check_output, kind_of_log, promised_format, same_file
-from ..formats.formats import known_format
+from ..errors import ArgumentError, FileError, TrueAngleError
+from ..formats.formats import find_format, known_format
+from ..support.files import (
+    RUNS_BYTES,
+    check_input,
+    check_output,
+    kind_of_log,
+    promised_format,
+    restore,
+    same_file,
+)
 from .manifest import MANIFEST
 
-__all__ = ["Place", "find_logs", "places"]
+__all__ = ["LogTarget", "find_logs", "hold_at_most", "places"]
+
+#: Bytes of a text that tell how long its lines are.
+_HEAD = 1 << 16
+#: Rows that a byte of a packed file holds, at most, where nothing else is known.
+_PACKED = 64
 
 
-class Place(NamedTuple):
+class LogTarget(NamedTuple):
     """A log, its output, and the folder whose manifest notes it (None: none is kept)."""
 
     source: Path
@@ -34,15 +48,16 @@ def find_logs(paths: Iterable[str | PathLike[str]]) -> list[tuple[Path, Path]]:
     Raises
     ------
     ArgumentError
-        A file that is not there, a folder without logs.
+        A file that is not there, a folder without logs, no file at all.
     """
     found: list[tuple[Path, Path]] = []
     for entry in paths:
         path = Path(entry)
-        if not path.exists():
-            raise ArgumentError(f"{path}: no such file")
-        if not path.is_dir() or known_format(path):
+        try:
             check_input(path, whole=True)
+        except FileNotFoundError:
+            raise ArgumentError(f"{path}: no such file") from None
+        if not path.is_dir() or known_format(path):
             found.append((path, Path(path.name)))
             continue
         inside = sorted(_walk(path), key=_natural)
@@ -51,7 +66,43 @@ def find_logs(paths: Iterable[str | PathLike[str]]) -> list[tuple[Path, Path]]:
         for log in inside:
             check_input(log, whole=True)
         found += [(log, log.relative_to(path)) for log in inside]
+    if not found:
+        raise ArgumentError("logs is empty: at least one log is needed")
     return found
+
+
+def hold_at_most(paths: Iterable[Path], most: int, topic: str | None = None) -> bool:
+    """Whether logs hold at most so many rows; those of texts as their first lines tell."""
+    for path in paths:
+        if not path.is_dir() and path.stat().st_size > RUNS_BYTES:
+            return False
+        most -= _rows(path, most, topic)
+        if most < 0:
+            return False
+    return True
+
+
+def _rows(path: Path, most: int, topic: str | None) -> int:
+    """Rows of a log, about; one more than ``most`` where they are more."""
+    kind = find_format(path).module
+    size = path.stat().st_size
+    if hasattr(kind, "line_of"):
+        with path.open("rb") as file:
+            head = file.read(_HEAD)
+        return size * (head.count(b"\n") + 1) // max(len(head), 1)
+    if hasattr(kind, "rows"):
+        return int(kind.rows(path))
+    if path.is_file() and size <= most // _PACKED:
+        return size
+    try:
+        rows = 0
+        for batch in kind.read(path, kind.columns(path, topic)[:1], topic):
+            rows += len(next(iter(batch.values())))
+            if rows > most:
+                break
+        return rows
+    except (TrueAngleError, IndexError):
+        return 0  # who reads it whole says what is wrong
 
 
 def places(
@@ -59,7 +110,7 @@ def places(
     output: str | PathLike[str] | None,
     in_place: bool,
     models: Iterable[str | PathLike[str]] = (),
-) -> list[Place]:
+) -> list[LogTarget]:
     """Where every log goes; never onto a log, but in place, and never onto one of the models.
 
     Several logs, a folder, or an ``output`` that is a folder or ends with a slash go into
@@ -74,11 +125,11 @@ def places(
     """
     given = list(paths)
     if in_place == (output is not None):
-        raise ArgumentError("give either an output (-o) or in place (--in-place)")
+        raise ArgumentError("give either `output=` or `in_place=True`")
     logs = find_logs(given)
     if output is None:
         several = len(logs) > 1
-        found = [Place(log, log, log.parent if several else None) for log, _name in logs]
+        found = [LogTarget(log, log, log.parent if several else None) for log, _name in logs]
     elif len(logs) > 1 or _is_folder(output) or logs[0][0] != Path(given[0]):
         folder = Path(output)
         if not folder.is_dir() and promised_format(folder) and not str(output).endswith(os.sep):
@@ -87,9 +138,9 @@ def places(
                 f"{len(logs)} logs go into a folder, and this is the name of a file; "
                 "name a folder (with / at its end)",
             )
-        found = [Place(log, folder / name, folder) for log, name in logs]
+        found = [LogTarget(log, folder / name, folder) for log, name in logs]
     else:
-        found = [Place(logs[0][0], Path(output), None)]
+        found = [LogTarget(logs[0][0], Path(output), None)]
     _check(found, in_place, list(models))
     for place in found:
         if place.manifest is not None:
@@ -97,7 +148,7 @@ def places(
     return found
 
 
-def _check(found: list[Place], in_place: bool, models: list[str | PathLike[str]]) -> None:
+def _check(found: list[LogTarget], in_place: bool, models: list[str | PathLike[str]]) -> None:
     taken: dict[str, Path] = {}
     sources = {_identity(place.source): place.source for place in found}
     for source, target, manifest in found:
@@ -134,8 +185,12 @@ def _is_folder(output: str | PathLike[str]) -> bool:
 
 def _walk(folder: Path, above: tuple[tuple[int, int], ...] = ()) -> Iterable[Path]:
     here = (*above, _identity(folder))
+    restore(folder)
     for path in folder.iterdir():
         if path.name.startswith(".") or path.name == MANIFEST:
+            continue
+        if not path.exists():
+            warnings.warn(f"{path}: is a link to nothing and is left out", stacklevel=4)
             continue
         if known_format(path):
             yield path

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..angles import arcsec
+from ..support.angles import arcsec
 
 __all__ = ["CorrectionStatistics"]
 
@@ -75,4 +75,5 @@ class CorrectionStatistics:
 
 def _squares(values: NDArray[np.float64]) -> float:
     """Sum of squares by one thread: that of BLAS wakes threads that fight for the cores."""
-    return float(np.einsum("i,i->", values, values))
+    flat = values.ravel()
+    return float(np.einsum("i,i->", flat, flat))

@@ -22,6 +22,12 @@ TOLERATED_FACTOR: Final = 2.0
 #: Steps in which offsets are searched, per pitch (0.01 deg for 36 facets).
 _STEPS: Final = 1000
 
+#: Rounding of a factor that is ideal, 1.
+_IDEAL: Final = 1e-9
+
+#: Sets of facet shifts that are all tried: four mounts of 48 facets.
+_SHIFTS: Final = 17_000
+
 _STARTS: Final = 4000  # random starts of the search for three mounts and more
 _REFINED: Final = 8  # of these, the best are refined
 _SWEEPS: Final = 6  # coordinate sweeps of a refinement
@@ -32,10 +38,17 @@ def _worst(positions: int, offsets: Array, orders: Sequence[float]) -> Array:
 
 
 def search_offsets(positions: int, mounts: int, orders: Sequence[float]) -> list[float]:
-    """Offsets in degrees with the least worst factor, the first one 0."""
+    """Offsets in degrees with the least worst factor, the first one 0.
+
+    Even parts of the pitch where none are better: of all offsets that serve the wanted orders
+    equally they tell the others apart up to the highest, that of one grid of all positions.
+    """
     if mounts == 1:
         return [0.0]
     pitch = 360.0 / positions
+    even = np.arange(mounts) * (pitch / mounts)
+    if float(_worst(positions, even[None], orders)[0]) <= 1.0 + _IDEAL:
+        return [round(float(o), 9) for o in even]
     steps = np.arange(1, _STEPS) * (pitch / _STEPS)
     if mounts == 2:
         trial = np.stack([np.zeros_like(steps), steps], axis=1)
@@ -67,10 +80,11 @@ def _refine(positions: int, start: Array, steps: Array, orders: Sequence[float])
 
 
 def search_shifts(positions: int, mounts: int) -> tuple[tuple[int, ...], float]:
-    """Facet shifts with the least worst factor: all of up to 4 mounts, then one by one."""
+    """Facet shifts with the least worst factor: all of a few mounts, then one by one."""
     if mounts == 1:
         return (0,), math.inf
-    head = min(mounts, 4 if positions <= 48 else 3)
+    head = max(h for h in (2, 3, 4) if h == 2 or math.comb(positions - 1, h - 1) <= _SHIFTS)
+    head = min(head, mounts, positions)
     combinations = itertools.combinations(range(1, positions), head - 1)
     trial = np.array([(0, *rest) for rest in combinations], dtype=np.int64)
     best = trial[int(np.argmin(np.round(facet_noise_factor(positions, trial), 9)))]

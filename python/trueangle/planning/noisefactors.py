@@ -13,8 +13,8 @@ from typing import Final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..aliasing import fold
 from ..errors import ArgumentError
+from ..runs.aliasing import fold
 
 __all__ = ["facet_noise_factor", "mount_noise_factors", "noise_factors"]
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any
 
-from ..plainresult import finite
+from ..support.plainresult import finite
 
 if TYPE_CHECKING:
     from .plan import CalibrationPlan

@@ -12,10 +12,13 @@ from typing import Any
 
 import numpy as np
 
-from ..aliasing import fold
 from ..errors import ArgumentError, NoModelError
 from ..joint.gear import HIGHEST_LOW_ORDER, wanted_orders
-from ..plainresult import PlainResult
+from ..joint.shafts import counted_orders
+from ..runs.aliasing import fold
+from ..support.distributions import random_numbers
+from ..support.kinds import told_kinds
+from ..support.plainresult import PlainResult, counted
 from .mountsearch import offset_tolerance, search_offsets, search_shifts
 from .noisefactors import mount_noise_factors, noise_factors
 
@@ -80,12 +83,23 @@ class CalibrationPlan(PlainResult):
         return tuple(m for m, f in self.noise_factors.items() if not math.isfinite(f))
 
     def to_dict(self) -> dict[str, Any]:
-        """The object that ``trueangle plan --json`` prints."""
+        """The object that ``trueangle plan`` prints as JSON."""
         from .plain import plain_plan
 
         return plain_plan(self)
 
+    def summary(self) -> str:
+        """The plan as text."""
+        from .summary import plan_summary
 
+        return plan_summary(self)
+
+    def _brief(self) -> str:
+        mounts = counted(self.mount_offsets_deg, "mount")
+        return f"{self.positions} positions, {mounts}, worst factor {self.worst_noise_factor:.3g}"
+
+
+@told_kinds
 def readings_needed(noise: float, standard_error: float, factor: float = 1.0) -> int:
     r"""Readings that bring an order's standard error down to ``standard_error``.
 
@@ -102,6 +116,7 @@ def readings_needed(noise: float, standard_error: float, factor: float = 1.0) ->
     return math.ceil(2.0 * (factor * noise / standard_error) ** 2)
 
 
+@told_kinds
 def plan_mounts(
     gear_ratio: float | None = 100.0,
     positions: int = 36,
@@ -122,6 +137,7 @@ def plan_mounts(
     fixed_member : {"circular_spline", "flexspline", "none"}
     orders : iterable of int, optional
         Orders wanted; default `wanted_orders`, the low ones as far as one mount sees them.
+        Without a gear also their aliases on one mount, as far as all mounts together see them.
     noise, standard_error : float, optional
         Scatter of one reading and the standard error wanted, in one unit: together they
         give the number of readings.
@@ -147,12 +163,14 @@ def plan_mounts(
     limit = (positions - 1) // 2
     if orders is None:
         wanted = wanted_orders(gear_ratio, fixed_member, min(HIGHEST_LOW_ORDER, limit))
+        if gear_ratio is None:
+            wanted = _with_aliases(wanted, positions, mounts)
     else:
-        wanted = tuple(sorted({*orders}))
+        wanted = tuple(sorted(set(counted_orders(orders))))
     if any(m != int(m) for m in wanted):
         raise ArgumentError(
             "a gear ratio whose orders are not whole needs several turns of a free reference "
-            "encoder; plan one with --reference encoder"
+            "encoder; plan one by `trueangle.planning.plan_encoder(...)`"
         )
     seen = [m for m in wanted if fold(int(m), positions)[0] != 0]
     if not seen:
@@ -191,6 +209,7 @@ def plan_mounts(
     )
 
 
+@told_kinds
 def plan_tilts(
     gear_ratio: float | None = 100.0,
     positions: int = 36,
@@ -218,7 +237,12 @@ def plan_tilts(
         raise ArgumentError(f"tilt_arcsec must be positive, got {tilt_arcsec!r}")
     limit = (positions - 1) // 2
     low = min(HIGHEST_LOW_ORDER, limit)
-    wanted = wanted_orders(gear_ratio, fixed_member, low) if orders is None else tuple(orders)
+    wanted = (
+        wanted_orders(gear_ratio, fixed_member, low)
+        if orders is None
+        else tuple(counted_orders(orders))
+    )
+    _check_orders(wanted)
     offsets = [float(o) for o in np.linspace(-tilt_arcsec, tilt_arcsec, tilts) / 3600.0]
     found = mount_noise_factors(positions, offsets, wanted).tolist()
     factors = dict(zip(wanted, found, strict=True))
@@ -247,6 +271,7 @@ def plan_tilts(
     )
 
 
+@told_kinds
 def plan_encoder(
     gear_ratio: float | None = 100.0,
     positions: int | None = None,
@@ -267,10 +292,13 @@ def plan_encoder(
     >>> plan_encoder(100).positions
     820
     """
-    wanted = wanted_orders(gear_ratio, fixed_member) if orders is None else tuple(orders)
+    wanted = (
+        wanted_orders(gear_ratio, fixed_member) if orders is None else tuple(counted_orders(orders))
+    )
+    _check_orders(wanted)
     count = 2 * math.ceil(max(wanted)) + 20 if positions is None else positions
     _check_count("positions", count, 3)
-    jitter = np.random.default_rng(seed).uniform(size=count)
+    jitter = random_numbers(seed).uniform(size=count)
     found = noise_factors((np.arange(count) + jitter) / count, wanted)
     if not np.isfinite(found).all():
         raise NoModelError(
@@ -296,9 +324,21 @@ def plan_encoder(
     )
 
 
+def _check_orders(wanted: tuple[float, ...]) -> None:
+    if not wanted:
+        raise ArgumentError("orders is empty: name one at least, or leave it out for the usual")
+
+
 def _check_count(name: str, value: int, least: int) -> None:
     if value != int(value) or value < least:
         raise ArgumentError(f"{name} must be a whole number of at least {least}, got {value!r}")
+
+
+def _with_aliases(orders: Sequence[float], positions: int, mounts: int) -> tuple[float, ...]:
+    """The orders and what looks like them on one mount, below the limit of all positions."""
+    beyond = range(positions, (positions * mounts - 1) // 2 + positions, positions)
+    aliases = {abs(turn + sign * k) for turn in beyond for k in orders for sign in (-1, 1)}
+    return (*orders, *sorted(m for m in aliases if 2 * m < positions * mounts))
 
 
 def _crowded_class(positions: int, orders: Sequence[float]) -> list[float]:

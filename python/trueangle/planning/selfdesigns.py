@@ -50,7 +50,7 @@ def designed(sim: Simulation, method: str) -> dict[str, Any]:
         return found | _angles(shifts, "[[run]] tables with shift_deg")
     if method == "dual":
         if sim.joint.gear_ratio == 1.0:
-            raise ArgumentError("the simulation's joint has no gear_ratio for --self dual")
+            raise ArgumentError("the simulation's joint has no gear_ratio for the method dual")
         return found | {"gear_ratio": sim.joint.gear_ratio}
     coasts = [run for run in sim.runs if run.decay_per_s > 0.0]
     if not coasts:

@@ -11,7 +11,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import ArgumentError
-from ..plainresult import PlainResult
+from ..joint.shafts import counted_orders
+from ..support.kinds import told_kinds
+from ..support.plainresult import PlainResult, counted
+from ..support.suggestions import check_choice
 from .plan import readings_needed
 
 __all__ = ["SELF_METHODS", "SelfPlan", "angle_factors", "best_angles", "plan_self", "speed_factor"]
@@ -84,10 +87,20 @@ class SelfPlan(PlainResult):
         return tuple(k for k, f in self.noise_factors.items() if not math.isfinite(f))
 
     def to_dict(self) -> dict[str, Any]:
-        """The object that ``trueangle plan --self METHOD --json`` prints."""
+        """The object that ``trueangle plan`` prints as JSON."""
         from .plain import plain_self_plan
 
         return plain_self_plan(self)
+
+    def summary(self) -> str:
+        """The plan as text."""
+        from .summary import self_plan_summary
+
+        return self_plan_summary(self)
+
+    def _brief(self) -> str:
+        orders = counted(self.orders, "order")
+        return f"{self.method}, {orders}, worst factor {self.worst_noise_factor:.3g}"
 
 
 def angle_factors(angles_deg: ArrayLike, orders: Sequence[float]) -> Array:
@@ -174,6 +187,7 @@ def speed_factor(ratio: float) -> float:
     return cost_of_ripple(np.exp(np.linspace(0.0, 2.0 * math.log(ratio), 4001)))
 
 
+@told_kinds
 def plan_self(
     method: str,
     orders: Iterable[float] | None = None,
@@ -213,9 +227,10 @@ def plan_self(
     >>> plan.angles_deg, round(plan.worst_noise_factor, 2), plan.readings
     ((0.0, 40.0), 2.92, 1710)
     """
-    if method not in SELF_METHODS:
-        raise ArgumentError(f"method must be one of {', '.join(SELF_METHODS)}, got {method!r}")
-    wanted = tuple(sorted({float(k) for k in (range(1, 9) if orders is None else orders)}))
+    check_choice("method", method, SELF_METHODS)
+    wanted = tuple(
+        sorted({float(k) for k in counted_orders(range(1, 9) if orders is None else orders)})
+    )
     if not wanted or any(not (math.isfinite(k) and k > 0.0) for k in wanted):
         raise ArgumentError(f"orders must be positive numbers, got {orders!r}")
     if method == "spin-down":

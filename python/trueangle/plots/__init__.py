@@ -16,6 +16,7 @@ from .detection import detection
 from .errorcurves import error_curves
 from .errorleft import error_left
 from .gains import gains
+from .kinds import drawn as drawn
 from .kinds import fit_plot
 from .measuredsimulated import measured_and_simulated
 from .phasesoverruns import phases_over_runs

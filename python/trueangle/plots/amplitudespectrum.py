@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from ..angles import ARCSEC_PER_TURN
-from ..errorunits import ErrorsIn, ErrorUnit, error_unit, significant
-from ..orders.selection import FALSE_ALARM
-from ..orders.table import OrderRow, OrderSelection
+from ..fitting.orders.selection import FALSE_ALARM
+from ..fitting.orders.table import OrderRow, OrderSelection
+from ..support.angles import ARCSEC_PER_TURN
+from ..support.display_units import ErrorsIn, ErrorUnit, error_unit, significant
 from . import palette
 from .canvas import described, grid, legend, new_axes
 from .curves import CONFIDENCE

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..errorunits import ErrorsIn, error_unit, significant
-from ..runs import CalibrationRun, as_runs
+from ..runs.run import CalibrationRun, as_runs
+from ..support.display_units import ErrorsIn, error_unit, significant
 from . import palette
 from .canvas import described, legend, new_axes, turn_axis
 from .curves import greatest, held_out_points, seen_span, thinned
@@ -16,7 +16,7 @@ from .curves import greatest, held_out_points, seen_span, thinned
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from ..model import HarmonicModel
+    from ..model.model import HarmonicModel
 
 __all__ = ["before_after"]
 

@@ -79,7 +79,7 @@ def new_figure(rows: int, columns: int, width: float, height: float) -> tuple[Fi
 def _pyplot() -> Any:
     try:
         from matplotlib import pyplot
-    except ImportError:
+    except ModuleNotFoundError:
         raise MissingExtraError("pictures need matplotlib: pip install 'trueangle[plot]'") from None
     return pyplot
 

@@ -10,11 +10,12 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from ..angles import ARCSEC_PER_TURN, wrap
 from ..errors import ArgumentError
 from ..fitting.heldout import correct_held_out
-from ..model import HarmonicModel
-from ..runs import CalibrationRun
+from ..model.model import HarmonicModel
+from ..runs.run import CalibrationRun
+from ..support.angles import ARCSEC_PER_TURN, wrap
+from ..support.suggestions import check_choice
 
 if TYPE_CHECKING:
     from ..fitting.result import FitResult
@@ -227,8 +228,7 @@ def residual_points(fit: FitResult, against: str = "angle") -> list[Points]:
     ArgumentError
         An unknown signal, or one that no run has.
     """
-    if against not in SIGNALS:
-        raise ArgumentError(f"against must be one of {', '.join(SIGNALS)}, got {against!r}")
+    check_choice("against", against, SIGNALS)
     factor = ARCSEC_PER_TURN / fit.model.period
     low, _ = seen_span(fit.model)
     parts = np.split(fit.residuals, np.cumsum([len(run) for run in fit.runs])[:-1])

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..errorunits import ErrorsIn, error_unit, significant
+from ..support.display_units import ErrorsIn, error_unit, significant
 from . import palette
 from .canvas import described, legend, new_axes, turn_axis
 from .curves import (

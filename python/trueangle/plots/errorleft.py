@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from ..errors import ArgumentError
-from ..errorunits import ErrorsIn, error_unit
+from ..support.display_units import ErrorsIn, error_unit
 from . import palette
 from .canvas import described, new_axes
 from .simulatedcurves import left_without

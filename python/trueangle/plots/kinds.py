@@ -1,12 +1,14 @@
-"""Pictures by name, for the ``plot`` methods of results."""
+"""Which picture the ``plot`` method of a result draws."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from ..errors import ArgumentError
+from ..support.suggestions import check_choice
 from .amplitudespectrum import amplitude_spectrum
+from .detection import detection
 from .errorcurves import error_curves
+from .gains import gains
 from .phasesoverruns import phases_over_runs
 from .residualpictures import residuals
 
@@ -15,7 +17,7 @@ if TYPE_CHECKING:
 
     from ..fitting.result import FitResult
 
-__all__ = ["fit_plot"]
+__all__ = ["drawn", "fit_plot"]
 
 _FIT = {
     "errors": error_curves,
@@ -27,8 +29,20 @@ _FIT = {
 
 def fit_plot(fit: FitResult, kind: str = "errors", ax: Axes | None = None, **options: Any) -> Axes:
     """See `trueangle.FitResult.plot`."""
-    draw: Any = _FIT.get(kind)
-    if draw is None:
-        raise ArgumentError(f"kind must be one of {', '.join(_FIT)}, got {kind!r}")
+    draw: Any = _FIT[check_choice("kind", kind, _FIT)]
     axes: Axes = draw(fit, ax=ax, **options)
     return axes
+
+
+#: Results by the names of their classes, which need not be imported to be drawn.
+_RESULTS: dict[str, Any] = {
+    "FitResult": fit_plot,
+    "OrderSelection": amplitude_spectrum,
+    "Diagnosis": gains,
+    "Rehearsal": detection,
+}
+
+
+def drawn(result: object, *args: Any, **options: Any) -> Any:
+    """The picture of a result (`trueangle.support.drawn.drawn`)."""
+    return _RESULTS[type(result).__name__](result, *args, **options)

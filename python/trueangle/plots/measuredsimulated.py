@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..errorunits import ErrorsIn, error_unit, significant
-from ..runs import CalibrationRun, as_runs
+from ..runs.run import CalibrationRun, as_runs
+from ..support.display_units import ErrorsIn, error_unit, significant
 from . import palette
 from .canvas import described, legend, new_axes, turn_axis
 from .curves import greatest, thinned

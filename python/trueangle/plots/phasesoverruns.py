@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..errorunits import ErrorsIn, error_unit
 from ..fitting.phases import run_phases
+from ..support.display_units import ErrorsIn, error_unit
 from . import palette
 from .canvas import described, grid, new_axes
 

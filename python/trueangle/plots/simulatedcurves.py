@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..angles import ARCSEC_PER_TURN, circular_mean, wrap
-from ..runs import CalibrationRun
+from ..runs.run import CalibrationRun
+from ..support.angles import ARCSEC_PER_TURN, circular_mean, wrap
 from .curves import Points, degrees, label_of
 from .findingnames import finding_names
 

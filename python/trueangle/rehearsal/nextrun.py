@@ -11,11 +11,12 @@ import numpy as np
 from ..diagnosis.identifiability import blind_spots
 from ..effects import EFFECTS
 from ..effects.blindness import Blindness
+from ..estimation.regression import Regression
 from ..joint.signals import join_runs
-from ..pace import pace
-from ..regression.regression import Regression
 from ..simulation.designs import RunDesign
 from ..simulation.simulation import Simulation, simulate
+from ..support.deadline import pace
+from ..support.plainresult import Shown
 from .trial import measured_signals
 from .visibility import size_range
 
@@ -26,7 +27,7 @@ MOST_CHANGES = 4
 
 
 @dataclass(frozen=True)
-class NextRun:
+class NextRun(Shown):
     """One further run, and the causes that it opens.
 
     Attributes

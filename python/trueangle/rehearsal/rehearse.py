@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable
-from difflib import get_close_matches
 from typing import Any
 
 from ..effects import EFFECTS
 from ..errors import ArgumentError
-from ..pace import Pace, paced
-from ..simulation.simulation import Simulation
+from ..simulation.simulation import SIMULATION, Simulation
+from ..support.deadline import Pace, paced
+from ..support.kinds import told_kinds
+from ..support.oftype import of_type
+from ..support.suggestions import check_choice
 from .nextrun import NextRun, blind_causes, next_run
 from .result import Rehearsal, RehearsedCause
 from .search import SizeSearch
@@ -32,6 +34,7 @@ FORMS = (
 )
 
 
+@told_kinds
 def rehearse(
     sim: Simulation,
     *,
@@ -100,6 +103,7 @@ def rehearse(
     >>> print(result["thermal_drift"].blind_because)
     the temperature varies by less than 2 K
     """
+    of_type("sim", sim, Simulation, SIMULATION)
     names = _checked(sim, causes, seeds, seed, workers)
     with paced(within, progress) as at:
         signals = measured_signals(sim)
@@ -175,12 +179,7 @@ def _checked(
     if not names:
         raise ArgumentError("no cause to hide: name one at least, or leave causes out for all")
     for name in names:
-        if name not in EFFECTS:
-            near = get_close_matches(name, EFFECTS, n=1)
-            guess = f"; did you mean {near[0]}?" if near else ""
-            raise ArgumentError(
-                f"no cause is called {name!r}{guess} The causes are {', '.join(EFFECTS)}"
-            )
+        check_choice("causes", name, EFFECTS)
     return names
 
 

@@ -6,7 +6,8 @@ from collections import Counter
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
-from ..plainresult import PlainResult
+from ..support.drawn import drawn
+from ..support.plainresult import PlainResult, Shown, counted
 from .detection import Chance, binomial_interval
 from .nextrun import NextRun
 from .visibility import Range
@@ -14,7 +15,7 @@ from .visibility import Range
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from .trial import Outcome
+    from .trial import TrialOutcome
 
 __all__ = ["Rehearsal", "RehearsedCause"]
 
@@ -23,7 +24,7 @@ SHARES = (0.5, 0.95)
 
 
 @dataclass(frozen=True)
-class RehearsedCause:
+class RehearsedCause(Shown):
     """From which size on one cause would be named.
 
     Attributes
@@ -104,7 +105,7 @@ def rehearsed(
     cause: str,
     size_name: str,
     sizes: Range | None,
-    answers: list[tuple[int, Outcome]],
+    answers: list[tuple[int, TrialOutcome]],
     blind_because: str | None,
     measure: str | None,
 ) -> RehearsedCause:
@@ -184,7 +185,7 @@ class Rehearsal(PlainResult):
         raise KeyError(cause)
 
     def to_dict(self) -> dict[str, Any]:
-        """The object that ``trueangle rehearse --json`` prints."""
+        """The object that ``trueangle rehearse`` prints as JSON."""
         return {
             "causes": [cause.to_dict() for cause in self.causes],
             "next_run": None if self.next_run is None else self.next_run.to_dict(),
@@ -198,6 +199,11 @@ class Rehearsal(PlainResult):
             "notes": self.notes,
         }
 
+    def _brief(self) -> str:
+        named = sum(cause.named_50 is not None for cause in self.causes)
+        ended = "" if self.complete else ", incomplete"
+        return f"{named} of {counted(self.causes, 'cause')} named, {self.trials} trials{ended}"
+
     def summary(self) -> str:
         """A readable account (`trueangle.rehearsal.summary.render`)."""
         from .summary import render
@@ -206,6 +212,5 @@ class Rehearsal(PlainResult):
 
     def plot(self) -> Figure:
         """Detection against size, a small picture for every cause (needs ``trueangle[plot]``)."""
-        from ..plots import detection
-
-        return detection(self)
+        figure: Figure = drawn(self)
+        return figure

@@ -15,7 +15,7 @@ from ..effects import EFFECTS
 from ..effects.blindness import Blindness
 from .detection import Chance
 from .result import RehearsedCause, rehearsed
-from .trial import Outcome, Trial
+from .trial import Trial, TrialOutcome
 from .visibility import Range
 
 __all__ = ["SizeSearch", "next_steps"]
@@ -78,8 +78,8 @@ class SizeSearch:
     spot: Blindness | None
     seeds: int
     start: int = 0
-    answers: list[tuple[int, Outcome]] = field(default_factory=list)
-    round: dict[int, tuple[int, Outcome | None]] = field(default_factory=dict)
+    answers: list[tuple[int, TrialOutcome]] = field(default_factory=list)
+    round: dict[int, tuple[int, TrialOutcome | None]] = field(default_factory=dict)
     done: bool = False
 
     @classmethod
@@ -110,7 +110,7 @@ class SizeSearch:
         self.round = {first + k: (step, None) for k, step in enumerate(steps)}
         return [Trial(self.cause, s, self.sizes.size(s), n) for n, (s, _) in self.round.items()]
 
-    def answered(self, trial: Trial, outcome: Outcome) -> list[Trial]:
+    def answered(self, trial: Trial, outcome: TrialOutcome) -> list[Trial]:
         """Take an answer; the next round where it was the last of its own."""
         self.round[trial.number] = trial.step, outcome
         if any(answer is None for _, answer in self.round.values()):

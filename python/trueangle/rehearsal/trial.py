@@ -18,8 +18,8 @@ __all__ = [
     "ENDED",
     "FAILED",
     "NAMED",
-    "Outcome",
     "Trial",
+    "TrialOutcome",
     "asked",
     "drawn_effect",
     "measured_signals",
@@ -61,7 +61,7 @@ class Trial:
 
 
 @dataclass(frozen=True)
-class Outcome:
+class TrialOutcome:
     """What a diagnosis said of a hidden cause.
 
     Attributes
@@ -103,40 +103,40 @@ def drawn_effect(
     return EFFECTS[cause].drawn(size, signals, around, rng)
 
 
-def asked(sim: Simulation, signals: Signals, trial: Trial, seed: int) -> Outcome:
+def asked(sim: Simulation, signals: Signals, trial: Trial, seed: int) -> TrialOutcome:
     """Hide the effect of a trial in readings of the simulation, diagnose them, and compare."""
     rng = rng_of(seed, trial.cause, trial.number)
     effect = drawn_effect(trial.cause, trial.size, signals, sim.surroundings, rng)
     if effect is None:
-        return Outcome(NOTHING)
+        return TrialOutcome(NOTHING)
     runs = simulate(sim.with_effects([effect]), rng)
     try:
         result = diagnose(runs, sim)
     except TrueAngleError:
         raise
     except Exception as failure:  # told with the result: hours of other trials are not lost
-        return Outcome(FAILED, failure=f"{type(failure).__name__}: {failure}")
-    return judged(result, trial.cause) if result.complete else Outcome(ENDED)
+        return TrialOutcome(FAILED, failure=f"{type(failure).__name__}: {failure}")
+    return judged(result, trial.cause) if result.complete else TrialOutcome(ENDED)
 
 
-def judged(result: Diagnosis, cause: str) -> Outcome:
+def judged(result: Diagnosis, cause: str) -> TrialOutcome:
     """What a diagnosis says where ``cause`` alone is hidden."""
     confirmed = [finding.cause for finding in result.findings if finding.confirmed]
     refuted = [belief.what for belief in result.beliefs if belief.verdict != "confirmed"]
     others = tuple(dict.fromkeys(c for c in confirmed if c != cause))
     if cause in confirmed or cause in refuted:
-        return Outcome(NAMED, beside=others)
+        return TrialOutcome(NAMED, beside=others)
     if any(finding.cause == cause for finding in result.findings):
-        return Outcome(LISTED, others)
+        return TrialOutcome(LISTED, others)
     seen = [spot for spot in result.not_identifiable if spot.supported]
     for spot in seen:
         if cause in spot.causes:
-            return Outcome(UNTOLD, tuple(c for c in spot.causes if c != cause))
+            return TrialOutcome(UNTOLD, tuple(c for c in spot.causes if c != cause))
     others += tuple(c for spot in seen for c in spot.causes if c not in others)
     # A refuted line or effect of the simulation is another name for what is hidden.
     others += tuple(w for w in refuted if w in EFFECTS)
     if others or refuted:
-        return Outcome(OTHER, others)
+        return TrialOutcome(OTHER, others)
     if result.unexplained is not None and result.unexplained.found:
-        return Outcome(UNEXPLAINED)
-    return Outcome(NOTHING)
+        return TrialOutcome(UNEXPLAINED)
+    return TrialOutcome(NOTHING)

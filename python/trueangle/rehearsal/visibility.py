@@ -7,11 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..angles import ARCSEC_PER_DEG
 from ..effects import EFFECTS, Effect
+from ..estimation.regression import Regression
 from ..joint.signals import Signals
-from ..regression.regression import Regression
 from ..simulation.simulation import Simulation
+from ..support.angles import ARCSEC_PER_DEG
 from .trial import drawn_effect, rng_of
 
 __all__ = ["STEPS", "Range", "size_range"]

@@ -15,9 +15,9 @@ from typing import Any
 
 from ..errors import TrueAngleError
 from ..joint.signals import Signals
-from ..pace import Pace, entered, pace
 from ..simulation.simulation import Simulation
-from .trial import ENDED, Outcome, Trial, asked
+from ..support.deadline import Pace, entered, pace
+from .trial import ENDED, Trial, TrialOutcome, asked
 
 __all__ = ["Here", "WorkerError", "Workers", "cores"]
 
@@ -58,7 +58,7 @@ class Here:
         """Ask this as well."""
         self._ready.append(trial)
 
-    def answers(self) -> Iterator[tuple[Trial, Outcome]]:
+    def answers(self) -> Iterator[tuple[Trial, TrialOutcome]]:
         """Answers as they come, until none is outstanding or the time is up."""
         sim, signals, seed = self._asked
         at = pace()
@@ -87,7 +87,7 @@ class Workers:
             start = pickle.dumps((sim, seed))
         except Exception as reason:
             raise WorkerError(
-                f"the simulation cannot be given to another process ({reason}); use workers=1"
+                f"the simulation cannot be given to another process ({reason}); use `workers=1`"
             ) from None
         self._ready: queue.SimpleQueue[Trial | None] = queue.SimpleQueue()
         self._done: queue.SimpleQueue[tuple[Trial | None, Any]] = queue.SimpleQueue()
@@ -102,7 +102,7 @@ class Workers:
         self._outstanding += 1
         self._ready.put(trial)
 
-    def answers(self) -> Iterator[tuple[Trial, Outcome]]:
+    def answers(self) -> Iterator[tuple[Trial, TrialOutcome]]:
         """Answers as they come, until none is outstanding or the time is up."""
         at = pace()
         while self._outstanding and not at.over:

@@ -2,25 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sized
 from dataclasses import dataclass
 from functools import cached_property
 from os import PathLike
 from typing import TYPE_CHECKING, Any, TypeAlias, overload
 
-from ..angles import ARCSEC_PER_TURN, wrap
-from ..blas import one_blas_thread
-from ..checks.check import faults_of
-from ..checks.record import records_of
 from ..errors import ArgumentError
-from ..errorunits import ErrorsIn
-from ..files import CERTIFICATE, PDF, REPORT, check_output, written_atomically
 from ..fitting.heldout import HeldOut
-from ..model import HarmonicModel
-from ..pace import pace
+from ..model.model import HarmonicModel
 from ..plots.curves import Points, degrees, error_points, label_of, travelled
-from ..provenance import provenance
-from ..runs import CalibrationRun, as_runs
+from ..runs.checks.check import faults_of
+from ..runs.checks.record import records_of
+from ..runs.provenance import provenance
+from ..runs.run import CalibrationRun, as_runs
+from ..support.angles import ARCSEC_PER_TURN, wrap
+from ..support.blas import one_blas_thread
+from ..support.deadline import pace
+from ..support.display_units import ErrorsIn
+from ..support.files import CERTIFICATE, PDF, REPORT, check_output, written_atomically
+from ..support.kinds import told_kinds
+from ..support.oftype import of_type
+from ..support.plainresult import Shown
 from . import diagnosisfigures, figures
 from .diagnosed import diagnosed
 from .fitted import extended, fitted, gear_of, held_out, joint_of
@@ -36,8 +39,8 @@ from .unknowns import unknowns
 
 if TYPE_CHECKING:
     from ..certificate import Certificate, Identity
+    from ..fitting.orders.select import OrderSelection
     from ..fitting.result import FitResult
-    from ..orders.select import OrderSelection
     from ..simulation import Simulation
 
 __all__ = ["Report", "report"]
@@ -52,7 +55,7 @@ _STAGES = 4
 
 
 @dataclass(frozen=True, eq=False)
-class Report:
+class Report(Shown):
     """A report on calibration runs.
 
     Attributes
@@ -153,6 +156,7 @@ def report(
 
 
 @one_blas_thread()
+@told_kinds
 def report(
     runs: CalibrationRun | Iterable[CalibrationRun],
     path: str | PathLike[str] | None = None,
@@ -215,6 +219,12 @@ def report(
     360.0
     """
     found = as_runs(runs)
+    if isinstance(orders, Sized) and not len(orders):
+        raise ArgumentError("orders is empty: name one at least, or leave it out for those found")
+    if simulation is not None:
+        from ..simulation.simulation import SIMULATION, Simulation
+
+        of_type("simulation", simulation, Simulation, SIMULATION)
     if path is not None:  # before the work
         kind = REPORT if certificate is None else CERTIFICATE
         check_output(path, kind, hashes=[run.source.sha256 for run in found if run.source])

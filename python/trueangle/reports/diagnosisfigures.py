@@ -17,7 +17,7 @@ from .scale import Scale
 
 if TYPE_CHECKING:
     from ..diagnosis import Diagnosis
-    from ..runs import CalibrationRun
+    from ..runs.run import CalibrationRun
     from ..simulation import Simulation
 
 __all__ = ["figures_of"]

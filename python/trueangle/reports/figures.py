@@ -16,8 +16,8 @@ from .scale import Scale
 if TYPE_CHECKING:
     from ..fitting.heldout import HeldOut
     from ..fitting.result import FitResult
-    from ..model import HarmonicModel
-    from ..runs import CalibrationRun
+    from ..model.model import HarmonicModel
+    from ..runs.run import CalibrationRun
 
 __all__ = ["before_after", "errors_of_runs", "residuals", "signals_present", "turn"]
 

@@ -9,13 +9,13 @@ from ..errors import NoModelError, TrueAngleError
 from ..fitting.heldout import HeldOut, hold_out
 from ..joint.declared import DeclaredShaft
 from ..joint.joint import Joint
-from ..runs import CalibrationRun
+from ..runs.run import CalibrationRun
 from .gained import extended_model
 
 if TYPE_CHECKING:
     from ..diagnosis import Diagnosis
+    from ..fitting.orders.select import OrderSelection
     from ..fitting.result import FitResult
-    from ..orders.select import OrderSelection
     from ..simulation import Simulation
 
 __all__ = ["extended", "fitted", "gear_of", "held_out", "joint_of"]
@@ -57,7 +57,7 @@ def fitted(
     try:
         fit = fit_runs(runs, orders, **gear_of(joint))
     except NoModelError as reason:
-        from ..orders.select import select_orders
+        from ..fitting.orders.select import select_orders
 
         selection = select_orders(runs, **gear_of(joint))
         return None, selection, str(reason)

@@ -6,7 +6,7 @@ from dataclasses import fields
 from typing import Any
 
 from ..fitting.heldout import HeldOut
-from ..model import HarmonicModel
+from ..model.model import HarmonicModel
 from .measured import error_size
 
 __all__ = ["extended_model", "gained"]

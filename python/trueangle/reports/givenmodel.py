@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..angles import ARCSEC_PER_TURN, circular_mean, wrap
-from ..model import HarmonicModel
-from ..runs import CalibrationRun
+from ..model.model import HarmonicModel
+from ..runs.run import CalibrationRun
+from ..support.angles import ARCSEC_PER_TURN, circular_mean, wrap
 
 __all__ = ["given_model"]
 
@@ -24,7 +24,7 @@ def given_model(
     Every run keeps a zero of its own. Models that need signals are described only.
     """
     if not isinstance(model, HarmonicModel):
-        from ..modelfile import load_model
+        from ..model.file import load_model
 
         model = load_model(model)
     record = model.fit

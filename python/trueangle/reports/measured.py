@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..aliasing import distinct_positions
-from ..angles import ARCSEC_PER_TURN, unit_name, wrap
-from ..runs import CalibrationRun
+from ..runs.aliasing import distinct_positions
+from ..runs.run import CalibrationRun
+from ..support.angles import ARCSEC_PER_TURN, unit_name, wrap
 
 __all__ = ["error_size", "measured"]
 

@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from ..angles import ARCSEC_PER_TURN
-from ..plainresult import finite
+from ..support.angles import ARCSEC_PER_TURN
+from ..support.plainresult import finite
 from .linenames import LineNames
 
 if TYPE_CHECKING:
+    from ..fitting.orders.select import OrderSelection
     from ..fitting.result import FitResult
-    from ..orders.select import OrderSelection
 
 __all__ = ["modelled", "selected"]
 

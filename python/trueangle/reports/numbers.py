@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from typing import Any, Final
 
-from ..errorunits import ErrorUnit
+from ..support.display_units import ErrorUnit
 
 __all__ = ["NONE", "Numbers", "formatted", "lookup", "shortened"]
 

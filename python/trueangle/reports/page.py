@@ -27,7 +27,7 @@ def render(report: Report) -> str:
     try:
         from jinja2 import Environment, FileSystemLoader, StrictUndefined
         from markupsafe import Markup
-    except ImportError:
+    except ModuleNotFoundError:
         raise MissingExtraError(
             "reports need bokeh and jinja2: pip install 'trueangle[report]'"
         ) from None

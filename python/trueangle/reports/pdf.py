@@ -5,13 +5,12 @@ from __future__ import annotations
 import os
 import shutil
 import subprocess
-import tempfile
 from os import PathLike
 from pathlib import Path
 from typing import Final
 
 from ..errors import ArgumentError
-from ..files import PDF, check_output, publish
+from ..support.files import PDF, check_output, published
 
 __all__ = ["find_browser", "print_pdf"]
 
@@ -26,6 +25,10 @@ _BROWSERS: Final = (
     "microsoft-edge",
 )
 _TIMEOUT_S: Final = 120
+
+
+#: Of the browser.
+_OPTIONS = ("headless", "disable-gpu", "no-pdf-header-footer", "virtual-time-budget=20000")
 
 
 def find_browser() -> str | None:
@@ -48,20 +51,16 @@ def print_pdf(html: str, path: str | PathLike[str], browser: str | None = None) 
             "or open the HTML report and print it"
         )
     target = check_output(path, PDF)
-    beside = target.parent if target.is_file() or not target.exists() else None
-    with tempfile.TemporaryDirectory(dir=beside, prefix=".report-") as folder:
-        page, printed = Path(folder, "report.html"), Path(folder, "report.pdf")
+    with published(target) as printed:
+        folder = printed.parent
+        page = folder / "report.html"
         page.write_text(html, encoding="utf-8")
-        command = [program, "--headless", "--disable-gpu", "--no-pdf-header-footer"]
+        options = [*_OPTIONS, f"user-data-dir={Path(folder, 'profile')}", f"print-to-pdf={printed}"]
         # A browser that runs as root (containers, CI) refuses its own sandbox.
-        command += ["--no-sandbox"] if getattr(os, "geteuid", lambda: 1)() == 0 else []
-        command += [
-            f"--user-data-dir={Path(folder, 'profile')}",
-            "--virtual-time-budget=20000",
-            f"--print-to-pdf={printed}",
-            # The fragment makes the page lay itself out for paper from the start.
-            f"{page.resolve().as_uri()}#print",
-        ]
+        options += ["no-sandbox"] if getattr(os, "geteuid", lambda: 1)() == 0 else []
+        # The fragment makes the page lay itself out for paper from the start.
+        address = f"{page.resolve().as_uri()}#print"
+        command = [program, *(f"--{option}" for option in options), address]
         try:
             done = subprocess.run(command, capture_output=True, text=True, timeout=_TIMEOUT_S)
         except subprocess.TimeoutExpired:
@@ -69,4 +68,3 @@ def print_pdf(html: str, path: str | PathLike[str], browser: str | None = None) 
         if not printed.is_file():
             last = (done.stderr.strip().splitlines() or ["no message"])[-1]
             raise ArgumentError(f"{program} did not print: {last}")
-        publish(printed, target)

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from ..errors import RankError
-from ..errorunits import significant
 from ..fitting.phases import Phases, run_phases
+from ..support.display_units import significant
 from .charts import Chart, Figure, figure, run_colour, run_marker
 from .linenames import LineNames
 from .scale import Scale

@@ -9,9 +9,9 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errorunits import ErrorsIn, ErrorUnit, error_unit
 from ..plots.curves import Curve, Points
-from ..runs import CalibrationRun
+from ..runs.run import CalibrationRun
+from ..support.display_units import ErrorsIn, ErrorUnit, error_unit
 
 __all__ = ["Scale", "scale_of"]
 

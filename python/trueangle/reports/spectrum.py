@@ -6,17 +6,17 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from ..angles import ARCSEC_PER_TURN
 from ..plots.amplitudespectrum import likely_aliases, thresholds
 from ..plots.curves import CONFIDENCE
 from ..plots.orderaxis import order_groups
+from ..support.angles import ARCSEC_PER_TURN
 from .charts import Chart, Figure, figure
 from .linenames import LineNames
 from .scale import Scale
 
 if TYPE_CHECKING:
+    from ..fitting.orders.select import OrderSelection
     from ..fitting.result import FitResult
-    from ..orders.select import OrderSelection
 
 __all__ = ["spectrum"]
 

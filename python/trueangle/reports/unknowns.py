@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from ..errorunits import ErrorUnit
 from ..plots.amplitudespectrum import likely_aliases
-from ..runs import CalibrationRun
+from ..runs.run import CalibrationRun
+from ..support.display_units import ErrorUnit
 
 if TYPE_CHECKING:
-    from ..orders.select import OrderSelection
+    from ..fitting.orders.select import OrderSelection
 
 __all__ = ["unknowns"]
 

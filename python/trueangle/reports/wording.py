@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any, Final
 
-from ..errorunits import ErrorUnit
+from ..support.display_units import ErrorUnit
 
 __all__ = [
     "FIGURE_TITLES",

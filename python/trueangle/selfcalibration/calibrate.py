@@ -8,9 +8,12 @@ from typing import Any, Final
 
 from numpy.typing import ArrayLike
 
-from ..angles import check_period
 from ..errors import ArgumentError, NoModelError
-from ..runs import CalibrationRun
+from ..joint.shafts import MOST_ORDERS, counted_orders
+from ..runs.run import CalibrationRun
+from ..support.angles import check_period
+from ..support.kinds import told_kinds
+from ..support.suggestions import check_choice
 from .dual import dual
 from .heads import heads
 from .loop import check_loop
@@ -26,6 +29,7 @@ METHODS: Final = ("auto", "spin-down", "heads", "shifts", "dual")
 Log = str | PathLike[str] | Mapping[str, ArrayLike] | CalibrationRun
 
 
+@told_kinds
 def selfcal(
     logs: Log | Sequence[Log],
     *,
@@ -34,6 +38,7 @@ def selfcal(
     loop: str = "unknown",
     loop_bandwidth: float | None = None,
     gear_ratio: float | None = None,
+    fit_ratio: bool = False,
     ripple: str | Sequence[float] = "auto",
     head_angles: Sequence[float] | None = None,
     counts_per_turn: float | None = None,
@@ -61,7 +66,11 @@ def selfcal(
     loop_bandwidth : float, optional
         Of that loop, in hertz: orders that pass below twice of it are refused.
     gear_ratio : float, optional
-        Motor turns per output turn, for ``"dual"``.
+        Motor turns per output turn, for ``"dual"``: a count of teeth, which stays.
+    fit_ratio : bool
+        For ``"dual"``: estimate the ratio jointly with orders 1 and 2 of the output (as is done
+        where no ratio is given); what was given, or a whole number, stays unless it is more
+        than four standard errors off.
     ripple : {"auto", "none"} or sequence of int
         Orders at which the speed may ripple. ``"auto"``: all, weighed by the evidence;
         ``"none"``: the motion is known to be smooth.
@@ -110,8 +119,7 @@ def selfcal(
     """
     check_period(period)
     check_loop(loop, loop_bandwidth)
-    if method not in METHODS:
-        raise ArgumentError(f"method must be one of {', '.join(METHODS)}, got {method!r}")
+    check_choice("method", method, METHODS)
     wanted = _orders(orders)
     recordings = as_recordings(
         logs,
@@ -120,12 +128,14 @@ def selfcal(
         topic=topic,
     )
     chosen = _method(recordings) if method == "auto" else method
+    if fit_ratio and chosen != "dual":
+        raise ArgumentError(f"fit_ratio needs the motor's angle (method 'dual'), not {chosen!r}")
     if chosen == "heads":
         return heads(recordings, wanted, angles=head_angles, period=period)
     if chosen == "shifts":
         return shifts(recordings, wanted, period=period)
     if chosen == "dual":
-        return dual(recordings, wanted, gear_ratio=gear_ratio, period=period)
+        return dual(recordings, wanted, gear_ratio=gear_ratio, fit_ratio=fit_ratio, period=period)
     return spin_down(
         recordings,
         wanted,
@@ -160,10 +170,12 @@ def _orders(orders: Any) -> str | tuple[float, ...]:
             return orders
         raise ArgumentError(f"orders must be 'auto' or whole numbers from 1, got {orders!r}")
     try:
-        found = sorted({float(k) for k in orders})
+        found = sorted({float(k) for k in counted_orders(orders)})
+    except ArgumentError:
+        raise
     except (TypeError, ValueError):
         found = []
-    if not found or any(k < 1.0 or k != int(k) or k > 4096 for k in found):
+    if not found or any(k < 1.0 or k != int(k) or k > MOST_ORDERS for k in found):
         raise ArgumentError(f"orders must be 'auto' or whole numbers from 1, got {orders!r}")
     return tuple(found)
 

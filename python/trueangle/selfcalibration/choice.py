@@ -7,11 +7,11 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from ..distributions import chi_squared_quantile
+from ..support.distributions import chi_squared_quantile
 from .colour import spectrum_at
 from .pattern import ENCODER, pattern_series
 from .projected import pairs
-from .readings import Readings
+from .readings import SegmentReadings
 from .steady import SteadyFit, fit_steady
 
 __all__ = ["HIGHEST", "choose_orders", "highest_order"]
@@ -30,14 +30,14 @@ _CHANCE: Final = 0.01
 _ROUNDS: Final = 5
 
 
-def highest_order(readings: Readings) -> int:
+def highest_order(readings: SegmentReadings) -> int:
     """Highest order that is read at least twice per wave at the usual speed."""
     usual = float(np.median(readings.speed))
     step = float(np.median(np.diff(readings.time)[np.diff(readings.stretch) == 0]))
     return max(1, min(HIGHEST, int(0.45 / (usual * max(step, 1e-12)))))
 
 
-def choose_orders(readings: Readings, highest: int | None = None) -> tuple[float, ...]:
+def choose_orders(readings: SegmentReadings, highest: int | None = None) -> tuple[float, ...]:
     """Orders that stand out of the noise beside them.
 
     The lowest eight are fitted first, then those at which what is left peaks, until none

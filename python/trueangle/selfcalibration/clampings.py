@@ -10,8 +10,8 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from ..angles import wrap
 from ..errors import NoModelError
+from ..support.angles import wrap
 from .recording import Recording
 
 __all__ = ["Clampings", "clampings_of"]

@@ -8,7 +8,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from ..distributions import chi_squared_tail
+from ..support.distributions import chi_squared_tail
 from .projected import harmonic_rows
 
 __all__ = ["noise_beside", "spectrum_at"]

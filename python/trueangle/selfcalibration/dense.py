@@ -10,9 +10,9 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from .projected import NOT_SEEN, Column, Projected
+from .projected import NOT_SEEN, Projected, Unknown
 
-__all__ = ["DenseFit", "Rows", "fit_dense"]
+__all__ = ["DenseFit", "DenseRows", "fit_dense", "low_frequency_inflation"]
 
 Array = NDArray[np.float64]
 
@@ -25,7 +25,7 @@ _BLOCKS: Final = 40
 
 
 @dataclass(frozen=True)
-class Rows:
+class DenseRows:
     """A part of the readings: patterns (n, m), nuisances (n, p), target (n)."""
 
     patterns: Array
@@ -56,11 +56,13 @@ class DenseFit:
     covariance: Array
     """Of the patterns; from blocks where neighbouring residuals agree."""
     correlated: bool
+    triangle: Array
+    """Of nuisances, patterns and target: all that fits of fewer columns need."""
 
 
 def fit_dense(
-    parts: Sequence[Rows],
-    columns: Sequence[Column],
+    parts: Sequence[DenseRows],
+    columns: Sequence[Unknown],
     random: Sequence[int] = (),
     freedom_lost: float = 0.0,
     floor: float = NOT_SEEN,
@@ -122,10 +124,11 @@ def fit_dense(
         residuals,
         covariance,
         correlated,
+        triangle,
     )
 
 
-def _triangle(parts: Iterable[Rows]) -> Array:
+def _triangle(parts: Iterable[DenseRows]) -> Array:
     """The triangle of ``[nuisances | patterns | target]``, part by part."""
     triangle: Array | None = None
     for part in parts:
@@ -207,8 +210,29 @@ def _best_variance(triangle: Array, p: int, m: int, random: Sequence[int], count
     return 10.0**best if math.isfinite(best) else 0.0
 
 
+def low_frequency_inflation(fit: DenseFit) -> float:
+    """Variance of slow patterns relative to independent residuals; 1 at least.
+
+    By the greater of two: means over blocks, less what slow patterns take up of them; and
+    neighbours, ``(1 + r) / (1 - r)``, for noise that outlasts a block's share of that.
+    """
+    if not fit.correlated:
+        return 1.0
+    left = fit.residuals
+    size = max(1, left.size // _BLOCKS)
+    means = left[: _BLOCKS * size].reshape(_BLOCKS, size).mean(axis=1)
+    free = max(_BLOCKS - fit.patterns.size, _BLOCKS // 2)
+    r = float(left[:-1] @ left[1:]) / float(left @ left)
+    blocks = size * float(means @ means) / free / fit.projected.variance
+    return max(1.0, blocks, (1.0 + r) / (1.0 - r))
+
+
 def _from_blocks(
-    parts: Sequence[Rows], projected: Projected, inverse: Array, beside: Array, residuals: Array
+    parts: Sequence[DenseRows],
+    projected: Projected,
+    inverse: Array,
+    beside: Array,
+    residuals: Array,
 ) -> Array:
     """Covariance of the patterns from scores summed over blocks of neighbours."""
     through = inverse @ beside  # what the nuisances take of the patterns
@@ -223,7 +247,7 @@ def _from_blocks(
     return np.asarray(projected.inverse @ middle @ projected.inverse)
 
 
-def _blocks(parts: Sequence[Rows], residuals: Array) -> Iterator[tuple[Rows, Array]]:
+def _blocks(parts: Sequence[DenseRows], residuals: Array) -> Iterator[tuple[DenseRows, Array]]:
     total = residuals.size
     size = max(1, total // _BLOCKS)
     at = 0
@@ -232,7 +256,7 @@ def _blocks(parts: Sequence[Rows], residuals: Array) -> Iterator[tuple[Rows, Arr
         for a in range(0, n, size):
             b = min(a + size, n)
             yield (
-                Rows(part.patterns[a:b], part.nuisances[a:b], part.target[a:b]),
+                DenseRows(part.patterns[a:b], part.nuisances[a:b], part.target[a:b]),
                 residuals[at + a : at + b],
             )
         at += n

@@ -2,7 +2,8 @@
 
 ``o - m/i = error_o(theta) - error_m(i theta)/i + gear + play + c``: at every order only the sum
 is seen, and its number stands under all its names. Patterns are functions of the motor's
-angle: harmonics of the reading that is explained would explain it by itself.
+angle: harmonics of the reading that is explained would explain it by itself. A ratio that is
+given is a count of teeth: it is not estimated unless that is asked for.
 
 What it can never see: which of output encoder, gear and motor encoder an order belongs to;
 where the ratio is whole, output order k i and motor order k are one; the zero; orders that
@@ -14,17 +15,28 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..distributions import f_tail
 from ..errors import ArgumentError, NoModelError
-from .dense import DenseFit, Rows, fit_dense
-from .gearlines import SLIP, Channels, Line, channels_of, lines_of, motion, slope_ratio, varied
+from ..runs.travel import Span, travelled_span
+from ..support.distributions import f_tail
+from .dense import fit_dense
+from .dualfit import (
+    BESIDE_RATIO,
+    DualFit,
+    RatioEstimate,
+    Sample,
+    chosen_lines,
+    estimate_ratio,
+    fit_lines,
+    rows_of,
+)
+from .gearlines import Channels, SharedLine, channels_of, lines_of, slope_ratio, varied
 from .modelling import made_model
-from .projected import Column, pairs
+from .projected import pairs
 from .recording import Recording
 from .result import ARCSEC, Blind, HeldOut, OrderEstimate, SelfCalibration, estimates
 from .summary import listed
@@ -33,19 +45,34 @@ __all__ = ["dual"]
 
 Array = NDArray[np.float64]
 
-#: An order of which less is left beside line, direction and the others is not told.
-_LEAST: Final = 0.02
+#: A ratio is taken for another than the given or a whole one beyond so many standard errors:
+#: a chance of 6e-5.
+_FAR: Final = 4.0
 
-#: An estimated ratio within so many standard errors of a whole number is taken for it.
-_WHOLE: Final = 4.0
+#: Over less than a turn no ratio is taken that needs orders 1 and 2 of more than this, a
+#: degree: a ratio that asks for none is likelier than an encoder so eccentric.
+_ECCENTRIC: Final = math.radians(1.0)
 
-#: Output turns from which its low orders stand apart from the ratio.
-_WHOLE_TURNS: Final = 1.5
+#: Where nobody asked for the ratio, it is doubted beyond so many, and by such a share.
+_DOUBTED: Final = 6.0
+_SHARE: Final = 1e-4
 
-#: Fits in which the ratio settles beside the patterns.
-_RATIOS: Final = 3
+#: Both halves of a run are the same places where they share this part of the travel.
+_SAME_PLACES: Final = 0.8
 
-_CHUNK: Final = 8192
+#: Blocks in turn that predict each other where a run passes every place once.
+_BLOCKS: Final = 20
+
+#: Readings from which parts of them predict each other.
+_READINGS: Final = 200
+
+
+class _UsedRatio(NamedTuple):
+    """The ratio that is used, what the readings say of it, and how that is told."""
+
+    used: float
+    measured: RatioEstimate
+    note: str
 
 
 def dual(
@@ -53,56 +80,47 @@ def dual(
     orders: str | Sequence[float] = "auto",
     *,
     gear_ratio: float | None = None,
+    fit_ratio: bool = False,
     period: float = 360.0,
 ) -> SelfCalibration:
     """Sums at every order with their names; see `trueangle.selfcal`."""
     if gear_ratio is not None and not (math.isfinite(gear_ratio) and gear_ratio != 0.0):
         raise ArgumentError(f"gear_ratio must be motor turns per output turn, got {gear_ratio!r}")
     channels = channels_of(recordings)
-    estimated = gear_ratio is None
-    ratio = slope_ratio(channels) if gear_ratio is None else float(gear_ratio)
-    turns = sum(float(np.ptp(m)) for m in channels.motor) / abs(ratio) / (2.0 * math.pi)
-    for _ in range(_RATIOS if estimated else 1):
-        lines = lines_of(orders, ratio, turns)
-        if turns < _WHOLE_TURNS:  # the output's own orders would pass for a slope
-            lines = [line for line in lines if line.motor]
-        fit = _fit(channels, ratio, lines)
-        # What the slope says of the ratio: o = theta (1 + slope).
-        measured = ratio / (1.0 + float(fit.nuisances[0]))
-        slope_std = float(fit.nuisance_std[0])
-        if estimated:
-            ratio = measured
-    whole = round(abs(ratio))
-    doubt = abs(ratio) * slope_std
-    if estimated and whole and doubt * turns < SLIP and abs(abs(ratio) - whole) < _WHOLE * doubt:
-        ratio = math.copysign(float(whole), ratio)
+    start = slope_ratio(channels) if gear_ratio is None else float(gear_ratio)
+    turns = sum(float(np.ptp(m)) for m in channels.motor) / abs(start) / (2.0 * math.pi)
+    found = _ratio(channels, start, orders, turns, gear_ratio is not None, fit_ratio)
+    ratio = found.used
     lines = lines_of(orders, ratio, turns)
-    fit = _fit(channels, ratio, lines)
-    retained = fit.projected.retained()
-    lost = [
-        line for i, line in enumerate(lines) if float(retained[2 * i : 2 * i + 2].min()) < _LEAST
-    ]
-    kept = [line for line in lines if line not in lost]
     if isinstance(orders, str):
-        kept = _significant(fit, lines, kept)
+        kept, lost = chosen_lines(channels, ratio, lines)
+    else:
+        kept, lost = lines, []
     if not kept:
         raise NoModelError(
             f"{recordings[0].named}: no order of either shaft stands out of what is left; record "
             "more travel (whole output turns)"
         )
-    fit = _fit(channels, ratio, kept)
+    fit = fit_lines(channels, ratio, kept)
+    dense = fit.dense
     count = sum(o.size for o in channels.output)
-    noise = math.sqrt(fit.projected.variance)
+    noise = math.sqrt(dense.projected.variance)
     table = estimates(
         [line.order for line in kept],
-        fit.patterns,
-        fit.covariance,
-        fit.projected.retained(),
+        dense.patterns,
+        dense.covariance,
+        dense.projected.retained(),
         noise * math.sqrt(2.0 / count),
         [line.of for line in kept],
     )
-    blind = _blind(kept, lost, ratio, channels)
-    notes = _notes(fit, ratio, measured, abs(measured) * slope_std, estimated, channels)
+    places = [(m / ratio + z) for m, z in zip(channels.motor, fit.zeros, strict=True)]
+    whole = all(line.output for line in kept) or float(ratio).is_integer()
+    span = travelled_span([x * period / (2.0 * math.pi) for x in places], period, whole)
+    # What was read at its ends is corrected to within the noise of them.
+    room = 0.0 if span.full else _FAR * noise * period / (2.0 * math.pi)
+    blind = _blind(kept, lost, ratio, turns)
+    notes = [note for note in (found.note, _arc_note(span, kept, period)) if note]
+    notes += _notes(fit, ratio, channels)
     pairs_ = list(zip(kept, table, strict=True))
     model = made_model(
         [o for line, o in pairs_ if line.output],
@@ -115,8 +133,9 @@ def dual(
         period=period,
         motor=(
             abs(ratio),
-            [_at_output(o, line, channels, ratio) for line, o in pairs_ if not line.output],
+            [_at_output(o, line, fit.zeros[0]) for line, o in pairs_ if not line.output],
         ),
+        span=(span.start - room, span.stop + room),
     )
     return SelfCalibration(
         method="dual",
@@ -124,87 +143,72 @@ def dual(
         orders=tuple(table),
         sums=(),
         blind=tuple(blind),
-        held_out=_held_out(channels, ratio, kept),
+        held_out=_held_out(channels, ratio, fit),
         notes=tuple(notes),
         noise_arcsec=noise * ARCSEC,
         readings=count,
-        turns=sum(float(np.ptp(m)) for m in channels.motor) / abs(ratio) / (2.0 * math.pi),
-        beside=_beside(fit, ratio, measured, abs(measured) * slope_std, channels),
+        turns=turns,
+        beside=_beside(fit, found, channels),
     )
 
 
-def _at_output(o: OrderEstimate, line: Line, channels: Channels, ratio: float) -> OrderEstimate:
-    """A motor's order as a function of the output's reading in the first run."""
-    zero = float(np.median(channels.output[0] - channels.motor[0] / ratio))
+def _ratio(
+    channels: Channels,
+    start: float,
+    orders: str | Sequence[float],
+    turns: float,
+    given: bool,
+    asked: bool,
+) -> _UsedRatio:
+    """The ratio to use: as given, else whole unless the readings exclude that."""
+    measured = estimate_ratio(channels, start, orders, turns)
+    whole = math.copysign(max(round(abs(measured.value)), 1), start)
+    far = _FAR * measured.std
+    told = f"{measured.value:.7g} (std {measured.std:.2g})"
+    if not math.isfinite(measured.std):
+        note = "the readings do not tell the gear ratio from orders of the output"
+        note += f": {start:g} is kept" if given else "; give it as `gear_ratio=`"
+        return _UsedRatio(start if given else whole, measured, note if asked or not given else "")
+    if given and not asked:
+        off = abs(measured.value - start)
+        doubted = off > _DOUBTED * measured.std and off > _SHARE * abs(start)
+        note = f"the readings show a gear ratio of {told}, not {start:g}, which is kept; "
+        note += "`fit_ratio=True` takes what they show"
+        return _UsedRatio(start, measured, note if doubted else "")
+    if given and abs(measured.value - start) <= far:
+        return _UsedRatio(
+            start, measured, f"the readings show a gear ratio of {told}; {start:g} stays"
+        )
+    note = f"the gear ratio is estimated: {told}"
+    if given:
+        note += f", not {start:g}"
+    used = whole if abs(measured.value - whole) <= far else measured.value
+    if far > 0.5:
+        low, high = sorted(abs(measured.value + sign * far) for sign in (-1.0, 1.0))
+        note += (
+            f"; over this travel any from {low:.4g} to {high:.4g} explains the readings as well: "
+            "give the count of teeth as `gear_ratio=`"
+        )
+    if not given and turns < 1.0 and _eccentricity(channels, used, turns) > _ECCENTRIC:
+        used = estimate_ratio(channels, start, orders, turns, ()).value
+        note += "; orders 1 and 2 of more than a degree apart"
+    return _UsedRatio(used, measured, f"{note}, taken as {used:.7g}")
+
+
+def _eccentricity(channels: Channels, ratio: float, turns: float) -> float:
+    """Amplitude, in radians, of orders 1 and 2 that a ratio asks for."""
+    lines = [line for line in lines_of(BESIDE_RATIO, ratio, turns) if not line.motor]
+    return float(np.linalg.norm(fit_lines(channels, ratio, lines).dense.patterns))
+
+
+def _at_output(o: OrderEstimate, line: SharedLine, zero: float) -> OrderEstimate:
+    """A motor's order as a function of the corrected output of the first run."""
     turned = complex(o.cosine, o.sine) * np.exp(1j * line.order * zero)
     return replace(o, cosine=turned.real, sine=turned.imag)
 
 
-def _fit(
-    channels: Channels, ratio: float, lines: Sequence[Line], half: int | None = None
-) -> DenseFit:
-    columns: list[Column] = [c for line in lines for c in pairs(line.of, [line.order])]
-    parts = _parts(channels, ratio, lines, half)
-    return fit_dense(parts, columns)
-
-
-def _parts(
-    channels: Channels, ratio: float, lines: Sequence[Line], half: int | None = None
-) -> list[Rows]:
-    """Nuisances: ratio, direction, velocity where time is known, a zero per run."""
-    runs = len(channels.motor)
-    reversing, timed = varied(channels, ratio)
-    parts = []
-    for j, (m, o, t) in enumerate(zip(*channels, strict=True)):
-        theta = m / ratio
-        centre = float(np.mean(theta))
-        way, speed = motion(theta, t)
-        # By whole turns the output's zero is any; its patterns count from its own reading.
-        zero = float((o - theta)[0])
-        target = o - theta - zero
-        place = theta + float(np.median(o - theta))
-        size = o.size
-        nuisances = np.zeros((size, 1 + reversing + timed + runs))
-        nuisances[:, 0] = theta - centre
-        if reversing:
-            nuisances[:, 1] = way
-        if timed:
-            nuisances[:, 1 + reversing] = speed
-        nuisances[:, 1 + reversing + timed + j] = 1.0
-        rows = np.empty((size, 2 * len(lines)))
-        for i, line in enumerate(lines):
-            angle = line.order * place if line.output else line.motor * np.sign(ratio) * m
-            rows[:, 2 * i], rows[:, 2 * i + 1] = np.cos(angle), np.sin(angle)
-        part = (
-            slice(0, size)
-            if half is None
-            else slice(0, size // 2)
-            if half == 0
-            else slice(size // 2, size)
-        )
-        for a in range(part.start, part.stop, _CHUNK):
-            b = min(a + _CHUNK, part.stop)
-            parts.append(Rows(rows[a:b], nuisances[a:b], target[a:b]))
-    return parts
-
-
-def _significant(fit: DenseFit, lines: Sequence[Line], among: Sequence[Line]) -> list[Line]:
-    from ..distributions import chi_squared_quantile
-
-    limit = chi_squared_quantile(1.0 - 0.01 / max(len(lines), 1), 2.0)
-    kept = []
-    for i, line in enumerate(lines):
-        if line not in among:
-            continue
-        pair = slice(2 * i, 2 * i + 2)
-        value, block = fit.patterns[pair], fit.covariance[pair, pair]
-        if float(value @ np.linalg.pinv(block, hermitian=True) @ value) > limit:
-            kept.append(line)
-    return kept
-
-
 def _blind(
-    kept: Sequence[Line], lost: Sequence[Line], ratio: float, channels: Channels
+    kept: Sequence[SharedLine], lost: Sequence[SharedLine], ratio: float, turns: float
 ) -> list[Blind]:
     blind = [
         Blind(
@@ -223,19 +227,23 @@ def _blind(
     both = [line for line in kept if line.output and line.motor]
     if both:
         names = ", ".join(f"output {line.output} with motor {line.motor}" for line in both)
+        exact = float(ratio).is_integer()
         blind.append(
             Blind(
                 tuple(line.order for line in both),
-                f"the ratio of {abs(ratio):g} is whole: {names} are one number each",
-                "a spin-down of the motor alone, or gears of a ratio that is not whole",
+                f"the ratio of {abs(ratio):g} is whole: {names} are one number each"
+                if exact
+                else f"over {turns:.2g} turns {names} are one number each",
+                "a spin-down of the motor alone, or gears of a ratio that is not whole"
+                if exact
+                else "more turns of the output",
             )
         )
     if lost:
-        travel = sum(float(np.ptp(m)) for m in channels.motor) / abs(ratio) / (2.0 * math.pi)
         blind.append(
             Blind(
                 tuple(line.order for line in lost),
-                f"{travel:.2g} turns of the output hold too little of them beside zero, ratio and "
+                f"{turns:.2g} turns of the output hold too little of them beside the zero and "
                 "the other orders",
                 "travel over whole turns of the output",
             )
@@ -243,42 +251,38 @@ def _blind(
     return blind
 
 
-def _beside(
-    fit: DenseFit, ratio: float, measured: float, std: float, channels: Channels
-) -> dict[str, Any]:
-    reversing, timed = varied(channels, ratio)
+def _beside(fit: DualFit, ratio: _UsedRatio, channels: Channels) -> dict[str, Any]:
+    reversing, timed = map(int, varied(channels, ratio.used))
+    std = ratio.measured.std
     found: dict[str, Any] = {
-        "gear_ratio": ratio,
-        "gear_ratio_measured": measured,
-        "gear_ratio_std": std,
+        "gear_ratio": ratio.used,
+        "gear_ratio_measured": ratio.measured.value,
+        "gear_ratio_std": std if math.isfinite(std) else None,
     }
+    values, errors = fit.dense.nuisances, fit.dense.nuisance_std
     if reversing:
-        found["reversal_error_arcsec"] = 2.0 * float(fit.nuisances[1]) * ARCSEC
-        found["reversal_error_std_arcsec"] = 2.0 * float(fit.nuisance_std[1]) * ARCSEC
+        found["reversal_error_arcsec"] = 2.0 * float(values[0]) * ARCSEC
+        found["reversal_error_std_arcsec"] = 2.0 * float(errors[0]) * ARCSEC
     if timed:
-        found["delay_s"] = -float(fit.nuisances[1 + reversing])
-        found["delay_std_s"] = float(fit.nuisance_std[1 + reversing])
+        found["delay_s"] = -float(values[reversing])
+        found["delay_std_s"] = float(errors[reversing])
     return found
 
 
-def _notes(
-    fit: DenseFit,
-    ratio: float,
-    measured: float,
-    std: float,
-    estimated: bool,
-    channels: Channels,
-) -> list[str]:
+def _arc_note(span: Span, kept: Sequence[SharedLine], period: float) -> str:
+    """What orders of the output mean where a turn was not travelled."""
+    low = [float(line.output) for line in kept if line.output and not line.motor]
+    if not low or span.stop - span.start >= period:
+        return ""
+    return (
+        f"over {span.describe(period)} {listed(low)} of the output tell the error within this "
+        "travel: beyond it they are extrapolated, and others would fit as well"
+    )
+
+
+def _notes(fit: DualFit, ratio: float, channels: Channels) -> list[str]:
     notes = []
-    if estimated:
-        notes.append(
-            f"the gear ratio is estimated: {measured:.6g} (std {std:.2g}), taken as {ratio:.7g}"
-        )
-    elif abs(measured - ratio) > 5.0 * std and abs(measured / ratio - 1.0) > 1e-4:
-        notes.append(
-            f"the readings show a gear ratio of {measured:.6g} (std {std:.2g}), not {ratio:g}"
-        )
-    if fit.correlated:
+    if fit.dense.correlated:
         notes.append("neighbouring residuals agree: standard errors are taken from blocks")
     if not varied(channels, ratio)[0]:
         notes.append("one direction of travel only: reversal error is not seen")
@@ -288,28 +292,41 @@ def _notes(
     return notes
 
 
-def _held_out(channels: Channels, ratio: float, lines: Sequence[Line]) -> dict[str, HeldOut]:
-    """First half of every run against the second."""
-    if min(o.size for o in channels.output) < 200:
+def _held_out(channels: Channels, ratio: float, fit: DualFit) -> dict[str, HeldOut]:
+    """One part of the readings predicts the other: halves, or blocks in turn over one pass."""
+    if min(o.size for o in channels.output) < _READINGS:
         return {}
-    first = _fit(channels, ratio, lines, 0)
-    plain = _fit(channels, ratio, [], 1)
-    left = []
-    parts = _parts(channels, ratio, lines, 1)
-    nuisances = np.concatenate([p.nuisances for p in parts])
-    target = np.concatenate([p.target - p.patterns @ first.patterns for p in parts])
-    left = target - nuisances @ np.linalg.lstsq(nuisances, target, rcond=1e-12)[0]
-    before = math.sqrt(float(np.mean(plain.residuals**2)))
-    after = math.sqrt(float(np.mean(left**2)))
-    own = _fit(channels, ratio, lines, 1)
+    halves = all(_same_places(m) for m in channels.motor)
+    blocks = 2 if halves else _BLOCKS
+    columns = [c for line in fit.lines for c in pairs(line.of, [line.order])]
+    trained, judged = (
+        list(rows_of(channels, ratio, fit.lines, fit.zeros, Sample(blocks, first)))
+        for first in (0, 1)
+    )
+    first = fit_dense(trained, columns)
+    own = fit_dense(judged, columns)
+    nuisances = np.concatenate([p.nuisances for p in judged])
+    plain = np.concatenate([p.target for p in judged])
+    predicted = plain - np.concatenate([p.patterns @ first.patterns for p in judged])
+    before, after = (
+        math.sqrt(float(np.mean((y - nuisances @ np.linalg.lstsq(nuisances, y, 1e-12)[0]) ** 2)))
+        for y in (plain, predicted)
+    )
     ratio_f = after**2 / max(own.projected.variance, 1e-300)
     free = float(own.residuals.size) / (1.0 if not own.correlated else own.residuals.size / 40.0)
+    names = ("the first half", "the second half") if halves else ("odd blocks", "even blocks")
     return {
-        "halves": HeldOut(
-            "the first half",
-            "the second half",
+        "halves" if halves else "blocks": HeldOut(
+            *names,
             before * ARCSEC,
             after * ARCSEC,
-            f_tail(ratio_f / (1.0 + 4.0 * len(lines) / free), free, free),
+            f_tail(ratio_f / (1.0 + 4.0 * len(fit.lines) / free), free, free),
         )
     }
+
+
+def _same_places(motor: Array) -> bool:
+    """Whether both halves of a run travel the same arc, or a turn and more each."""
+    first, second = np.array_split(motor, 2)
+    shared = min(first.max(), second.max()) - max(first.min(), second.min())
+    return bool(shared >= _SAME_PLACES * float(np.ptp(motor)))

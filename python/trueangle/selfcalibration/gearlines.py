@@ -12,7 +12,17 @@ from numpy.typing import NDArray
 from ..errors import NoModelError
 from .recording import Recording
 
-__all__ = ["SLIP", "Channels", "Line", "channels_of", "lines_of", "motion", "slope_ratio", "varied"]
+__all__ = [
+    "SLIP",
+    "Channels",
+    "SharedLine",
+    "channels_of",
+    "lines_of",
+    "motion",
+    "slope_ratio",
+    "turning",
+    "varied",
+]
 
 Array = NDArray[np.float64]
 
@@ -22,11 +32,14 @@ _HIGHEST: Final = 8
 #: Turns by which two orders must part over the travel to be two numbers.
 SLIP: Final = 0.05
 
+#: Steps whose mean says the direction.
+_WIDTH: Final = 5
+
 #: Speed is a regressor of its own where it varies by this share of the highest.
 _VARIED: Final = 0.2
 
 
-class Line(NamedTuple):
+class SharedLine(NamedTuple):
     """One order of the output, with every shaft that has it."""
 
     order: float
@@ -91,23 +104,23 @@ def slope_ratio(channels: Channels) -> float:
         bottom += float(dm @ do)
     if bottom == 0.0:
         raise NoModelError(
-            "the output does not move with the motor: give --gear-ratio, or record motion"
+            "the output does not move with the motor: give `gear_ratio=`, or record motion"
         )
     return top / bottom
 
 
-def lines_of(orders: str | Sequence[float], ratio: float, turns: float) -> list[Line]:
+def lines_of(orders: str | Sequence[float], ratio: float, turns: float) -> list[SharedLine]:
     """Orders of both shafts; those that the travel cannot tell apart stand once."""
     size = abs(ratio)
     numbers = range(1, _HIGHEST + 1) if isinstance(orders, str) else [int(k) for k in orders]
-    lines = {float(k): Line(float(k), k, 0) for k in numbers}
+    lines = {float(k): SharedLine(float(k), k, 0) for k in numbers}
     for j in range(1, _HIGHEST + 1):
         order = j * size
         near = round(order)
         if near >= 1 and abs(order - near) * turns < SLIP:
-            lines[float(near)] = Line(float(near), near, j)
+            lines[float(near)] = SharedLine(float(near), near, j)
         else:
-            lines[order] = Line(order, 0, j)
+            lines[order] = SharedLine(order, 0, j)
     return [lines[k] for k in sorted(lines)]
 
 
@@ -127,8 +140,7 @@ def varied(channels: Channels, ratio: float) -> tuple[bool, bool]:
 def motion(theta: Array, time: Array | None) -> tuple[Array, Array]:
     """Direction of travel (-1, 1) and speed of the output in radians per second."""
     step = np.diff(theta, prepend=theta[0])
-    width = 5
-    smooth = np.convolve(step, np.ones(width) / width, "same")
+    smooth = np.convolve(step, np.ones(_WIDTH) / _WIDTH, "same")
     sign = np.sign(smooth)
     moving = np.flatnonzero(sign)
     if moving.size == 0:
@@ -145,3 +157,17 @@ def motion(theta: Array, time: Array | None) -> tuple[Array, Array]:
     )
     speed[:spread], speed[-spread:] = speed[spread], speed[-spread - 1]
     return np.asarray(way), speed
+
+
+def turning(way: Array) -> NDArray[np.bool_]:
+    """Readings so near to a reversal that the direction of a smoothed step is none of theirs.
+
+    Examples
+    --------
+    >>> turning(np.repeat([1.0, -1.0], 6)).astype(int)
+    array([0, 0, 0, 1, 1, 1, 1, 1, 1, 0, 0, 0])
+    """
+    near = np.zeros(way.size, dtype=bool)
+    for k in np.flatnonzero(np.diff(way)):
+        near[max(0, k - _WIDTH // 2) : k + 2 + _WIDTH // 2] = True
+    return near

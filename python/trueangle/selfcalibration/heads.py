@@ -16,9 +16,9 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from ..angles import wrap
 from ..errors import ArgumentError, NoModelError
-from .dense import DenseFit, Rows, fit_dense
+from ..support.angles import wrap
+from .dense import DenseFit, DenseRows, fit_dense
 from .modelling import made_model
 from .pattern import ENCODER, pattern_model
 from .projected import harmonic_rows, names_in_words, pairs
@@ -141,7 +141,7 @@ def _places(
         if shared and angles is None:
             raise NoModelError(
                 f"{r.named}: the heads read the same angle, so their zeros were set alike and "
-                "where they stand is not known: give it (--head-angles 0,119.2,203.7)"
+                "where they stand is not known: give it (`head_angles=[0, 119.2, 203.7]`)"
             )
         found.append(
             (r, given - given[0] if shared and angles is not None else np.zeros(len(numbers)))
@@ -169,7 +169,9 @@ def _fit(readings: Sequence[Array], orders: Sequence[float]) -> DenseFit:
     return fit
 
 
-def _rows(readings: Sequence[Array], orders: Sequence[float], coefficients: Array) -> list[Rows]:
+def _rows(
+    readings: Sequence[Array], orders: Sequence[float], coefficients: Array
+) -> list[DenseRows]:
     """Differences to the mean of the heads, a zero for every head and run."""
     model = pattern_model(orders, coefficients)
     runs, n = len(readings), len(readings[0])
@@ -191,7 +193,7 @@ def _rows(readings: Sequence[Array], orders: Sequence[float], coefficients: Arra
                 column[i] += 1.0
                 nuisances[:, :, j * (n - 1) + i - 1] = column[:, None]
             parts.append(
-                Rows(
+                DenseRows(
                     rows.transpose(0, 2, 1).reshape(n * size, -1),
                     nuisances.reshape(n * size, -1),
                     gap.ravel(),
@@ -228,7 +230,8 @@ def _blind(
             lost,
             f"with heads at {where} deg all heads see these orders alike ({names} is the same at "
             "every head): differences hold nothing of them",
-            "move one head, or add one, off the equal spacing (plan --self heads)",
+            "move one head, or add one, off the equal spacing "
+            '(`trueangle.planning.plan_self("heads")`)',
         )
     ]
 

@@ -8,6 +8,7 @@ from dataclasses import replace
 from typing import Final
 
 from ..errors import ArgumentError
+from ..support.suggestions import check_choice
 from .result import Blind, OrderEstimate
 
 __all__ = ["LOOPS", "check_loop", "followed_orders", "followed_share", "widened"]
@@ -20,8 +21,7 @@ FOLLOWS_BELOW: Final = 2.0
 
 def check_loop(loop: str, bandwidth: float | None) -> None:
     """Raise on a loop that is none of `LOOPS` and on an impossible bandwidth."""
-    if loop not in LOOPS:
-        raise ArgumentError(f"loop must be one of {', '.join(LOOPS)}, got {loop!r}")
+    check_choice("loop", loop, LOOPS)
     if bandwidth is not None:
         if not (isinstance(bandwidth, (int, float)) and math.isfinite(bandwidth) and bandwidth > 0):
             raise ArgumentError(f"loop_bandwidth must be positive hertz, got {bandwidth!r}")
@@ -58,8 +58,8 @@ def followed_orders(
             tuple(orders),
             f"encoder or loop: {how}; a loop closed on this encoder moves the shaft by its error, "
             "and the log shows what is left",
-            "coast down with the drive off or turn by an open-loop field (--loop open), or state "
-            "the loop's bandwidth (--loop closed --loop-bandwidth HZ)",
+            'coast down with the drive off or turn by an open-loop field (`loop="open"`), or '
+            'state the loop\'s bandwidth (`loop="closed", loop_bandwidth=HZ`)',
         )
     refused = tuple(k for k in orders if k * slowest < FOLLOWS_BELOW * bandwidth)
     if not refused:

@@ -8,9 +8,9 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 
 from .._core import __version__
-from ..model import HarmonicModel
-from ..records import FitRecord, Provenance
-from ..shafts import Shaft
+from ..joint.shafts import Shaft
+from ..model.model import HarmonicModel
+from ..model.records import FitRecord, Provenance
 from .recording import Recording
 from .result import ARCSEC, OrderEstimate
 

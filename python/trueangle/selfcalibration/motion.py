@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .banded import BandedFactor
-from .projected import Column, Projected
+from .projected import Projected, Unknown
 from .splines import (
     Knots,
     Wander,
@@ -137,7 +137,7 @@ class MotionSearch:
     """
 
     def __init__(
-        self, sums: MotionSums, motion: Array, columns: Sequence[Column], trends: Sequence[int]
+        self, sums: MotionSums, motion: Array, columns: Sequence[Unknown], trends: Sequence[int]
     ) -> None:
         self.sums, self.motion, self.columns = sums, motion, tuple(columns)
         self.trends = tuple(trends)
@@ -330,7 +330,7 @@ def _without(information: Array, alone: Array, m: int) -> Array:
     return np.asarray(information[:m, :m] - moved @ moved.T)
 
 
-def _nothing(columns: Sequence[Column]) -> Projected:
+def _nothing(columns: Sequence[Unknown]) -> Projected:
     m = len(columns)
     zero = np.zeros((m, m))
     return Projected(tuple(columns), zero, np.zeros(m), np.ones(m), math.inf, 1.0)

@@ -9,9 +9,10 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from .. import _core
-from ..model import HarmonicModel
-from ..shafts import Shaft
+import trueangle._core as _core
+
+from ..joint.shafts import Shaft
+from ..model.model import HarmonicModel
 
 __all__ = ["ENCODER", "RIPPLE", "pattern_model", "pattern_series", "steepness"]
 

@@ -10,12 +10,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from .. import _core
+import trueangle._core as _core
 
 __all__ = [
     "NOT_SEEN",
-    "Column",
     "Projected",
+    "Unknown",
     "harmonic_rows",
     "harmonic_sum",
     "names_in_words",
@@ -33,7 +33,7 @@ NOT_SEEN = 1e-9
 _SHARE = 0.01
 
 
-class Column(NamedTuple):
+class Unknown(NamedTuple):
     """What an unknown is: ``order`` 3 of ``"the encoder"``, its cosine or sine."""
 
     source: str
@@ -45,9 +45,9 @@ class Column(NamedTuple):
         return f"order {self.order:g} of {self.source}" if self.part else self.source
 
 
-def pairs(source: str, orders: Iterable[float]) -> list[Column]:
+def pairs(source: str, orders: Iterable[float]) -> list[Unknown]:
     """Cosine and sine columns of each order of one source."""
-    return [Column(source, float(k), part) for k in orders for part in ("cos", "sin")]
+    return [Unknown(source, float(k), part) for k in orders for part in ("cos", "sin")]
 
 
 def harmonic_rows(
@@ -103,7 +103,7 @@ class Projected:
         Degrees of freedom behind it.
     """
 
-    columns: tuple[Column, ...]
+    columns: tuple[Unknown, ...]
     information: Array
     right: Array
     alone: Array
@@ -160,7 +160,7 @@ class Projected:
 
     def index(self, source: str, order: float) -> tuple[int, int]:
         """Places of the cosine and sine columns."""
-        first = self.columns.index(Column(source, float(order), "cos"))
+        first = self.columns.index(Unknown(source, float(order), "cos"))
         return first, first + 1
 
     def null_vectors(self) -> list[list[tuple[str, float]]]:

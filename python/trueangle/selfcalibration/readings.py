@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .splines import Knots
-from .stretches import Stretch, ripple_lead
+from .stretches import Segment, ripple_lead
 
-__all__ = ["PER_KNOT", "Readings"]
+__all__ = ["PER_KNOT", "SegmentReadings"]
 
 Array = NDArray[np.float64]
 
@@ -25,10 +25,10 @@ _TRENDS: Final = 7
 _TURNS_PER_TREND: Final = 5.0
 
 
-class Readings:
+class SegmentReadings:
     """Readings of all stretches in one list, with what does not change from fit to fit."""
 
-    def __init__(self, stretches: Sequence[Stretch]) -> None:
+    def __init__(self, stretches: Sequence[Segment]) -> None:
         self.stretches = list(stretches)
         self.size = sum(s.time.size for s in stretches)
         self.stretch = np.repeat(np.arange(len(stretches)), [s.time.size for s in stretches])

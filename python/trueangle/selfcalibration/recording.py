@@ -12,9 +12,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..columns import Column, find_columns, role_kind, wanted_columns
 from ..errors import ArgumentError, FileError
-from ..runs import CalibrationRun, Source
+from ..formats.columns import Column, find_columns, role_kind, signal_code, wanted_columns
+from ..runs.run import CalibrationRun, Source
 
 __all__ = ["Counts", "Recording", "as_recordings"]
 
@@ -137,7 +137,7 @@ def _of_mapping(table: Mapping[str, ArrayLike], counts: Counts) -> list[Recordin
 def _of_file(
     path: Path, counts: Counts, signals: Mapping[str, Any] | None, topic: str | None
 ) -> list[Recording]:
-    from ..runfiles import read_readings
+    from ..runs.files import read_readings
 
     table = read_readings(path, signals, topic)
     channels = {
@@ -168,10 +168,10 @@ def _in_radians(column: Column, raw: Array, counts: Counts, file: str) -> Array:
     turn = counts.reference if column.role == "reference" else counts.reading
     message = ""
     if role_kind(column.role) == "angle" and column.unit is None:
-        message = f"its unit is not known; give it: --signal {column.role}={column.name}:deg"
+        message = f"its unit is not known; give it: {signal_code(column.role, column.name, 'deg')}"
     elif column.unit == "count" and turn is None:
-        option = "-reference" if column.role == "reference" else ""
-        message = f"counts need their number per turn: give --counts-per-turn{option}"
+        beside = "_reference" if column.role == "reference" else ""
+        message = f"counts need their number per turn: give `counts_per_turn{beside}=`"
     if message:
         if file:
             raise FileError(file, message, line=1, column=column.name)

@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..angles import ARCSEC_PER_TURN
-from ..errorunits import ErrorsIn
-from ..model import HarmonicModel
-from ..plainresult import PlainResult
+from ..model.model import HarmonicModel
+from ..support.angles import ARCSEC_PER_TURN
+from ..support.display_units import ErrorsIn
+from ..support.plainresult import PlainResult, counted
 
 __all__ = ["Blind", "HeldOut", "OrderEstimate", "SelfCalibration"]
 
@@ -156,6 +156,12 @@ class SelfCalibration(PlainResult):
             "beside": dict(self.beside),
             "notes": list(self.notes),
         }
+
+    def _brief(self) -> str:
+        return (
+            f"{self.method}, {counted(self.orders, 'order')} of {self.readings} readings, noise "
+            f"{self.noise_arcsec:.3g} arcsec"
+        )
 
     def summary(self, errors_in: ErrorsIn = "auto") -> str:
         """The result as text.

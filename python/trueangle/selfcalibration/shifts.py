@@ -17,14 +17,14 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from ..angles import wrap
-from ..distributions import f_tail
 from ..errors import NoModelError
+from ..support.angles import wrap
+from ..support.distributions import f_tail
 from .clampings import Clampings, clampings_of
-from .dense import DenseFit, Rows, fit_dense
+from .dense import DenseFit, DenseRows, fit_dense
 from .modelling import made_model
 from .pattern import ENCODER, pattern_model
-from .projected import Column, harmonic_rows, pairs
+from .projected import Unknown, harmonic_rows, pairs
 from .recording import Recording
 from .result import ARCSEC, Blind, HeldOut, SelfCalibration, estimates
 from .significance import chosen_orders
@@ -105,7 +105,8 @@ def shifts(
                 lost,
                 f"at shifts of {where} deg order k of {ENCODER} together with order k of {what} is "
                 "all that is seen: k times every shift is the same part of a turn",
-                "clamp at one more angle, off the equal spacing (plan --self shifts)",
+                "clamp at one more angle, off the equal spacing "
+                '(`trueangle.planning.plan_self("shifts")`)',
             )
         )
     notes = [*design.notes, *_notes(design, fit)]
@@ -135,10 +136,10 @@ def shifts(
     )
 
 
-def _columns(design: Clampings, orders: Sequence[float]) -> list[Column]:
+def _columns(design: Clampings, orders: Sequence[float]) -> list[Unknown]:
     columns = pairs(ENCODER, orders)
     if design.facets:
-        return columns + [Column(f"facet {i}", 0.0, "") for i in range(design.facets)]
+        return columns + [Unknown(f"facet {i}", 0.0, "") for i in range(design.facets)]
     return columns + pairs(OTHER, orders)
 
 
@@ -175,7 +176,7 @@ def _rows(
     orders: Sequence[float],
     coefficients: Array,
     coupling: bool,
-) -> Rows:
+) -> DenseRows:
     """Patterns of one clamping; nuisances: its zero and its coupling."""
     a, b = design.joint[j], design.other[j]
     m = 2 * len(orders)
@@ -201,7 +202,7 @@ def _rows(
     if coupling:
         nuisances[:, runs + 4 * i : runs + 4 * i + 4] = harmonic_rows(place, _COUPLING).T
     target = zero + wrap(a - b - zero)
-    return Rows(np.concatenate([mine, theirs]).T, nuisances, np.asarray(target))
+    return DenseRows(np.concatenate([mine, theirs]).T, nuisances, np.asarray(target))
 
 
 def _lost(fit: DenseFit, orders: Sequence[float]) -> tuple[float, ...]:

@@ -8,7 +8,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from ..distributions import chi_squared_quantile
+from ..support.distributions import chi_squared_quantile
 from .projected import Projected
 
 __all__ = ["chosen_orders"]

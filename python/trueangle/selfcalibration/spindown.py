@@ -20,7 +20,7 @@ from .colour import noise_beside
 from .loop import followed_orders, followed_share, widened
 from .modelling import made_model
 from .pattern import ENCODER, pattern_series
-from .readings import Readings
+from .readings import SegmentReadings
 from .recording import Recording
 from .result import ARCSEC, Blind, OrderEstimate, SelfCalibration, estimates
 from .ripple import LARGEST_COST, averaged_over_ripple, cost_of_ripple
@@ -51,7 +51,7 @@ def spin_down(
 ) -> SelfCalibration:
     """Patterns from time stamps; see `trueangle.selfcal`."""
     stretches = cut_stretches(recordings)
-    readings = Readings(stretches)
+    readings = SegmentReadings(stretches)
     notes: list[str] = []
     most = highest_order(readings)
     chosen = choose_orders(readings) if isinstance(orders, str) else tuple(map(float, orders))
@@ -62,7 +62,7 @@ def spin_down(
         )
     if not chosen:
         raise NoModelError(
-            "no order stands out of the noise: record more turns, or name the orders (--orders 1-8)"
+            "no order stands out of the noise: record more turns, or name the `orders=`"
         )
     with_current = _add_current(readings, loop)
     rippling, separable = _ripple_orders(readings, chosen, ripple)
@@ -147,7 +147,7 @@ def spin_down(
 
 
 def _ripple_orders(
-    readings: Readings, orders: tuple[float, ...], ripple: str | Sequence[float]
+    readings: SegmentReadings, orders: tuple[float, ...], ripple: str | Sequence[float]
 ) -> tuple[tuple[float, ...], bool]:
     """Orders that get ripple columns, and whether the speeds tell ripple from pattern."""
     separable = cost_of_ripple(readings.ripple) <= LARGEST_COST
@@ -156,7 +156,7 @@ def _ripple_orders(
     return (tuple(map(float, ripple)) if separable else ()), separable
 
 
-def _add_current(readings: Readings, loop: str) -> bool:
+def _add_current(readings: SegmentReadings, loop: str) -> bool:
     """The motion that the motor current makes, where the log has it and a loop is closed."""
     if loop != "closed":
         return False
@@ -188,7 +188,7 @@ def _twice_integrated(time: Array, values: Array) -> Array:
 
 def _sorted_out(
     table: list[OrderEstimate],
-    readings: Readings,
+    readings: SegmentReadings,
     loop: str,
     bandwidth: float | None,
     separable: bool,
@@ -267,7 +267,7 @@ def _may_be_ripple(o: OrderEstimate, first: OrderEstimate | None) -> bool:
 
 def _notes(
     fit: SteadyFit,
-    readings: Readings,
+    readings: SegmentReadings,
     colour: Array,
     chosen: Sequence[float],
     given: Sequence[OrderEstimate],

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from .motion import MotionFit
 from .pattern import ENCODER, RIPPLE
-from .projected import Column, Projected, pairs
-from .readings import PER_KNOT, Readings
+from .projected import Projected, Unknown, pairs
+from .readings import PER_KNOT, SegmentReadings
 from .steps import Steps
 
 __all__ = ["SteadyFit", "fit_steady"]
@@ -47,7 +47,7 @@ class SteadyFit:
     unknowns: Array
     """In radians, in the order of ``motion.projected.columns``."""
     motion: MotionFit
-    readings: Readings
+    readings: SegmentReadings
     residuals: Array
     """Of every reading in radians."""
     valid: NDArray[np.bool_]
@@ -65,7 +65,7 @@ class SteadyFit:
 
 
 def fit_steady(
-    readings: Readings,
+    readings: SegmentReadings,
     orders: Sequence[float],
     ripple: Sequence[float] = (),
     *,
@@ -98,9 +98,9 @@ def fit_steady(
     orders, ripple = tuple(orders), tuple(ripple)
     sets = 1 if groups is None else 2
     names = tuple(f"{ENCODER}, part {i + 1}" for i in range(2)) if sets == 2 else (ENCODER,)
-    columns: list[Column] = [c for name in names for c in pairs(name, orders)]
+    columns: list[Unknown] = [c for name in names for c in pairs(name, orders)]
     columns += pairs(RIPPLE, ripple)
-    columns += [Column(name, 0.0, "") for name in readings.extra_names]
+    columns += [Unknown(name, 0.0, "") for name in readings.extra_names]
     unknowns = np.zeros(len(columns))
     if start is not None:
         for source in (*names, RIPPLE):

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from .motion import MotionFit, MotionSearch
 from .pattern import pattern_model, pattern_series, steepness
-from .projected import Column, harmonic_rows, harmonic_sum
-from .readings import Readings
+from .projected import Unknown, harmonic_rows, harmonic_sum
+from .readings import SegmentReadings
 from .splines import Knots, basis, evaluate
 from .sums import accumulate
 
@@ -28,11 +28,11 @@ class Steps:
 
     def __init__(
         self,
-        readings: Readings,
+        readings: SegmentReadings,
         orders: Sequence[float],
         ripple: Sequence[float],
         groups: NDArray[np.int64] | None,
-        columns: Sequence[Column],
+        columns: Sequence[Unknown],
     ) -> None:
         self.readings, self.orders, self.ripple = readings, orders, ripple
         self.groups, self.columns = groups, columns

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from ..errors import FileError, NoModelError
 from .recording import Recording
 
-__all__ = ["Stretch", "cut_stretches", "ripple_lead"]
+__all__ = ["Segment", "cut_stretches", "ripple_lead"]
 
 Array = NDArray[np.float64]
 
@@ -34,7 +34,7 @@ _BLOCKS: Final = 400  # a log is looked at in about so many pieces
 
 
 @dataclass(frozen=True)
-class Stretch:
+class Segment:
     """Readings of one stretch: time in seconds, reading in radians without jumps."""
 
     time: Array
@@ -81,7 +81,7 @@ class Stretch:
         return np.asarray(np.exp(result))
 
 
-def ripple_lead(stretch: Stretch, speed: Array) -> Array:
+def ripple_lead(stretch: Segment, speed: Array) -> Array:
     r"""Phase by which the ripple of order 1 leads that of a shaft at constant speed.
 
     A rotor of friction :math:`f(\omega)` answers the torque :math:`T e^{ik\theta}` by
@@ -107,7 +107,7 @@ def ripple_lead(stretch: Stretch, speed: Array) -> Array:
     return np.repeat(stretch.direction * lead, step)[: speed.size]
 
 
-def cut_stretches(recordings: Iterable[Recording]) -> list[Stretch]:
+def cut_stretches(recordings: Iterable[Recording]) -> list[Segment]:
     """Stretches of motion in one direction, neither slow nor reversing.
 
     Raises
@@ -116,7 +116,7 @@ def cut_stretches(recordings: Iterable[Recording]) -> list[Stretch]:
         No time stamps, too few readings or turns, motion that is too fast for the rate
         of readings: each says what to record.
     """
-    found: list[Stretch] = []
+    found: list[Segment] = []
     recordings = list(recordings)
     for recording in recordings:
         found += _cut(recording)
@@ -135,7 +135,7 @@ def cut_stretches(recordings: Iterable[Recording]) -> list[Stretch]:
     return found
 
 
-def _cut(recording: Recording) -> list[Stretch]:
+def _cut(recording: Recording) -> list[Segment]:
     if recording.indicated is None:
         raise _fault(
             recording, "no column indicated_deg (or _rad, _turn, _count): the reading is needed"
@@ -177,7 +177,7 @@ def _cut(recording: Recording) -> list[Stretch]:
             if state[i] == 0.0:
                 continue
             rows = slice(int(starts[i]), int(starts[j]) if j < state.size else b)
-            stretch = Stretch(time[rows], angle[rows], recording, rows)
+            stretch = Segment(time[rows], angle[rows], recording, rows)
             if rows.stop - rows.start >= _SHORTEST[1] and stretch.turns >= _SHORTEST[0]:
                 found.append(stretch)
         del a

@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from ..errorunits import ErrorsIn, ErrorUnit, error_unit
+from ..support.display_units import ErrorsIn, ErrorUnit, error_unit
 
 if TYPE_CHECKING:
     from .result import OrderEstimate, SelfCalibration

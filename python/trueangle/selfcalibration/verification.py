@@ -9,8 +9,8 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from ..distributions import chi_squared_tail
-from .readings import Readings
+from ..support.distributions import chi_squared_tail
+from .readings import SegmentReadings
 from .result import ARCSEC, HeldOut
 from .steady import SteadyFit, fit_steady
 
@@ -73,7 +73,7 @@ def held_out(fit: SteadyFit, tested: Sequence[float], colour: float = 1.0) -> di
     return found
 
 
-def _turn_numbers(readings: Readings) -> NDArray[np.int64]:
+def _turn_numbers(readings: SegmentReadings) -> NDArray[np.int64]:
     """Turns counted from the start of each stretch, and on from stretch to stretch.
 
     A part of a turn at the end of a stretch counts with the turn before.

@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 
 from ..errors import ArgumentError
 from ..joint.pattern import Pattern
-from ..runs import CalibrationRun
+from ..runs.run import CalibrationRun
+from ..support.kinds import told_kinds
 from .rotor import Motion, turned
 
 __all__ = ["MAX_SAMPLES", "SPACINGS", "RunDesign"]
@@ -28,6 +29,7 @@ SPACINGS = ("uniform", "jittered", "random", "clock")
 _NO_LINES = Pattern(np.zeros(0), np.zeros(0), np.zeros(0))
 
 
+@told_kinds
 @dataclass(frozen=True)
 class RunDesign:
     """One ``[[run]]`` of a simulation file.

@@ -21,9 +21,9 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..angles import ARCSEC_PER_TURN
 from ..errors import ArgumentError
 from ..joint.pattern import Pattern
+from ..support.angles import ARCSEC_PER_TURN
 
 if TYPE_CHECKING:
     from .designs import RunDesign

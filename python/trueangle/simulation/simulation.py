@@ -9,22 +9,32 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ..angles import ARCSEC_PER_DEG
-from ..effects import Effect, ReferenceLines
+from ..effects import EFFECTS, Effect, ReferenceLines
 from ..errors import ArgumentError
 from ..joint.joint import Joint
 from ..joint.pattern import Harmonic, Pattern, Surroundings
 from ..joint.signals import Signals, join_runs
-from ..runs import CalibrationRun, as_runs
+from ..runs.run import CalibrationRun, as_runs
+from ..support.angles import ARCSEC_PER_DEG
+from ..support.distributions import random_numbers
+from ..support.kinds import told_kinds
+from ..support.oftype import all_of_type, of_type
+from ..support.plainresult import Shown, counted
 from .designs import RunDesign
 
 __all__ = ["Simulation", "simulate"]
 
 Array = NDArray[np.float64]
 
+#: What must be given, for messages.
+SIMULATION = "a trueangle.Simulation (trueangle.load_simulation reads one)"
+LINE, DESIGN = "a trueangle.simulation.Harmonic", "a trueangle.simulation.RunDesign"
+EFFECT = "an effect of a simulation, in arcsec and degrees"
 
+
+@told_kinds
 @dataclass(frozen=True)
-class Simulation:
+class Simulation(Shown):
     r"""What is believed of a joint, and how it is measured.
 
     .. math:: \varepsilon = p(\theta) + \sum_e \varepsilon_e + n
@@ -65,6 +75,11 @@ class Simulation:
     source: str | None = field(default=None, compare=False)
 
     def __post_init__(self) -> None:
+        put = object.__setattr__
+        of_type("joint", self.joint, Joint, "a trueangle.simulation.Joint")
+        put(self, "harmonics", all_of_type("harmonics", self.harmonics, Harmonic, LINE))
+        put(self, "effects", _effects(self.effects))
+        put(self, "runs", all_of_type("runs", self.runs, RunDesign, DESIGN))
         if not 0.0 <= self.sigma_arcsec < float("inf"):
             raise ArgumentError(f"sigma_arcsec must not be negative, got {self.sigma_arcsec!r}")
         for line in self.harmonics:
@@ -80,9 +95,30 @@ class Simulation:
         """What effects are given beyond the readings."""
         return Surroundings(self.joint, self.pattern)
 
+    def _brief(self) -> str:
+        return (
+            f"gear {self.joint.gear_ratio:g}, {counted(self.harmonics, 'line')}, "
+            f"{counted(self.effects, 'effect')}, {counted(self.runs, 'run')}, noise "
+            f"{self.sigma_arcsec:g} arcsec"
+        )
+
+    def summary(self) -> str:
+        """What is believed as a simulation file has it, and the names of the runs."""
+        from .simulationtext import dumps
+
+        named = ", ".join(design.label or str(i) for i, design in enumerate(self.runs, 1))
+        told = f"\n# {counted(self.runs, 'run')}" + (f": {named}" if named else "")
+        return dumps(replace(self, source=None, runs=())) + told
+
     def with_effects(self, effects: Iterable[Effect]) -> Simulation:
-        """The simulation with further effects."""
-        return replace(self, effects=(*self.effects, *effects))
+        """The simulation with further effects.
+
+        Raises
+        ------
+        KindError
+            Something that is no effect, such as a term of a correction model.
+        """
+        return replace(self, effects=(*self.effects, *_effects(effects)))
 
     def predict(self, runs: CalibrationRun | Iterable[CalibrationRun] | Signals) -> Array:
         """Expected error at every reading of ``runs`` one after the other, arcsec.
@@ -103,6 +139,7 @@ class Simulation:
         write(self, path)
 
 
+@told_kinds
 def simulate(
     sim: Simulation, seed: int | np.random.Generator = 0, runs: Iterable[RunDesign] | None = None
 ) -> list[CalibrationRun]:
@@ -124,6 +161,8 @@ def simulate(
 
     Raises
     ------
+    KindError
+        What is given is no simulation, or a run that is no design of one.
     ArgumentError
         No run is designed.
 
@@ -135,10 +174,11 @@ def simulate(
     >>> run.error.round(6) + 0.0
     array([ 1.,  0., -1.,  0.])
     """
-    rng = np.random.default_rng(seed)
-    designs = tuple(sim.runs if runs is None else runs)
+    of_type("sim", sim, Simulation, SIMULATION)
+    rng = random_numbers(seed)
+    designs = sim.runs if runs is None else all_of_type("runs", runs, RunDesign, DESIGN)
     if not designs:
-        raise ArgumentError("the simulation designs no run: add a [[run]] table or pass runs=")
+        raise ArgumentError("the simulation designs no run: add a [[run]] table or pass `runs=`")
     around = sim.surroundings
     ideal = [design.measure(rng, str(j + 1), around.pattern) for j, design in enumerate(designs)]
     signals = join_runs(ideal)
@@ -173,6 +213,19 @@ def simulate(
             )
         )
     return runs_made
+
+
+def _effects(effects: Iterable[Effect]) -> tuple[Effect, ...]:
+    """The effects, checked: terms of a correction model have like names, and other units."""
+    return all_of_type("effects", effects, Effect, EFFECT, _meant)
+
+
+def _meant(value: object) -> str:
+    """The effect that stands for what was given."""
+    effect = EFFECTS.get(getattr(value, "kind", ""))
+    if effect is None:
+        return ""
+    return f"the effect of kind '{effect.kind}' is trueangle.simulation.{effect.__name__}"
 
 
 def _written(sim: Simulation, degrees: Array) -> Array:

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from ..support.kinds import told_kinds
 from .simulation import Simulation
 from .simulationtext import decoded, dumps, guarded, to_table, write
 
 __all__ = ["dumps", "load_simulation", "to_table", "write"]
 
 
+@told_kinds
 def load_simulation(path: str | Path) -> Simulation:
     """Read a simulation file.
 

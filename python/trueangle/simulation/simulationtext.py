@@ -8,13 +8,14 @@ from dataclasses import fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
-from ..decoding import finite, read_text, shown
 from ..effects import EFFECTS, Effect
 from ..errors import ArgumentError, FileError
-from ..files import SIMULATION, SIMULATION_BYTES, written_atomically
 from ..joint.declared import Bearing, DeclaredShaft, Head
 from ..joint.joint import Joint
 from ..joint.pattern import Harmonic
+from ..support.decoding import finite, read_text, shown
+from ..support.files import SIMULATION, SIMULATION_BYTES, written_atomically
+from ..support.suggestions import did_you_mean
 from .designs import MAX_SAMPLES, RunDesign
 
 if TYPE_CHECKING:
@@ -70,7 +71,9 @@ def _decoded(path: str | Path, document: Mapping[str, Any]) -> Decoded:
     for name in document:
         if name not in _TABLES:
             raise FileError(
-                path, f"unknown table {shown(name)}; a simulation has {', '.join(_TABLES)}"
+                path,
+                f"unknown table {shown(name)}{did_you_mean(name, _TABLES)}; a simulation has "
+                f"{', '.join(_TABLES)}",
             )
     joint = _joint(path, document)
     harmonics = tuple(
@@ -105,7 +108,9 @@ def _joint(path: str | Path, document: Mapping[str, Any]) -> Joint:
     for name in table:
         if name not in _JOINT_KEYS:
             raise FileError(
-                path, f"[joint]: unknown key {shown(name)}; it has {', '.join(_JOINT_KEYS)}"
+                path,
+                f"[joint]: unknown key {shown(name)}{did_you_mean(name, _JOINT_KEYS)}; it has "
+                f"{', '.join(_JOINT_KEYS)}",
             )
     gear = _build(path, "[joint]", Joint, _geared(table))
     further: dict[str, Any] = {
@@ -149,7 +154,11 @@ def _build(path: str | Path, where: str, kind: type[T], table: Mapping[str, Any]
     values = {}
     for name, value in table.items():
         if name not in known:
-            raise FileError(path, f"{where}: unknown key {shown(name)}; it has {', '.join(known)}")
+            raise FileError(
+                path,
+                f"{where}: unknown key {shown(name)}{did_you_mean(name, known)}; it has "
+                f"{', '.join(known)}",
+            )
         values[name] = _value(path, where, name, value, known[name])
     try:
         return guarded(path, where, lambda: kind(**values))
@@ -188,7 +197,9 @@ def _effect(path: str | Path, where: str, table: dict[str, Any]) -> Effect:
     kind = parameters.pop("kind", None)
     if not isinstance(kind, str) or kind not in EFFECTS:
         raise FileError(
-            path, f"{where}: kind must be one of {', '.join(EFFECTS)}, got {shown(kind)}"
+            path,
+            f"{where}: kind must be one of {', '.join(EFFECTS)}, got {shown(kind)}"
+            f"{did_you_mean(kind, EFFECTS) if isinstance(kind, str) else ''}",
         )
     for name, value in parameters.items():
         parameters[name] = _checked_numbers(path, f"{where}: {shown(name)}", value)

@@ -11,7 +11,7 @@ import pytest
 import trueangle as ta
 from trueangle.certificate import Identity, certify, typesetting
 from trueangle.errors import ArgumentError
-from trueangle.errorunits import error_unit
+from trueangle.support.display_units import error_unit
 
 typst = pytest.importorskip("typst")
 
@@ -98,7 +98,7 @@ def test_the_content_is_the_same_in_every_unit(runs) -> None:
     assert made[0]["errors_in"] == {"unit": "arcsec", "per_arcsec": 1.0}
     for name in ("positions", "budget", "harmonics", "readings"):
         assert made[0][name] == made[1][name]
-    with pytest.raises(ArgumentError, match="--counts-per-turn"):
+    with pytest.raises(ArgumentError, match="`counts_per_turn="):
         certify(runs, Identity("1", "joint"), orders=[1], errors_in="count")
 
 

@@ -61,7 +61,7 @@ def test_reading_does_without_pandas(tmp_path: Path, ending: str):
     script = (
         "import sys, trueangle as ta\n"
         f"assert len(ta.read_runs({str(path)!r})[0]) == 9000\n"
-        f"assert ta.fit_logs({str(path)!r}, [1], progress='none').rows == 9000\n"
+        f"assert ta.fit_logs({str(path)!r}, [1], progress='none').readings == 9000\n"
         "assert 'pyarrow' in sys.modules\n"
         "sys.exit('pandas' in sys.modules)\n"
     )

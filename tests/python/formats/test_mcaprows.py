@@ -15,7 +15,7 @@ from rosbags.rosbag2 import Writer as PlainWriter
 from rosbags.typesys import Stores, get_typestore
 
 from trueangle.formats import rosbag
-from trueangle.formats.mcaprows import Rows, interleaved
+from trueangle.formats.mcaprows import RecordRows, interleaved
 
 SEED = 33
 STORE = get_typestore(Stores.LATEST)
@@ -91,13 +91,13 @@ def record(channel, time, text, kind=5):
 
 def test_only_records_that_are_alike_are_rows():
     alike = record(1, 10, b"abc") + record(1, 10, b"xyz") + record(1, 20, b"ijk")
-    (rows,) = Rows.of_chunk(alike)
+    (rows,) = RecordRows.of_chunk(alike)
     assert rows.channel == 1
     assert rows.times.tolist() == [10, 10, 20]
     assert rows.messages.tobytes() == b"abcxyzijk"
     other = alike + record(2, 30, b"opq")
-    assert Rows.of_chunk(other) is None
-    assert [part.channel for part in Rows.of_chunk(other, mixed=True)] == [1, 2]
+    assert RecordRows.of_chunk(other) is None
+    assert [part.channel for part in RecordRows.of_chunk(other, mixed=True)] == [1, 2]
     for bad in (
         b"",
         alike[:-1],
@@ -106,11 +106,11 @@ def test_only_records_that_are_alike_are_rows():
         alike + record(1, 30, b"abc", kind=4),
         struct.pack("<BQ", 5, 3) + b"abc" * 20,  # shorter than a head
     ):
-        assert Rows.of_chunk(bad, mixed=True) is None
+        assert RecordRows.of_chunk(bad, mixed=True) is None
 
 
 def test_rows_are_written_row_by_row_on_their_channels():
-    (rows,) = Rows.of_chunk(record(1, 10, b"abc") + record(1, 20, b"xyz"))
+    (rows,) = RecordRows.of_chunk(record(1, 10, b"abc") + record(1, 20, b"xyz"))
     made = interleaved([(3, rows), (4, rows.with_messages(rows.messages + np.uint8(1)))])
     heads = [struct.unpack_from("<BQHIQQ", row) for row in made.records]
     assert [head[2:] for head in heads] == [

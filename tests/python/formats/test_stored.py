@@ -29,7 +29,6 @@ LAYOUTS = {
     "in small chunks": ({"chunks": (100,)}, "<f8", False),
     "packed": ({"chunks": (8192,), "compression": "gzip"}, "<f8", False),
     "behind a user block": ({"chunks": (8192,)}, "<f8", False),
-    "in another file": ({}, "<f8", False),
     "partly never written": ({"chunks": (8192,)}, "<f8", False),
 }
 
@@ -44,8 +43,6 @@ def made(path: Path, layout: str) -> np.ndarray:
     values = np.random.default_rng(11).normal(0.0, 100.0, ROWS)
     values = np.abs(values).astype(kind) if kind == "<u2" else values.astype(kind)
     with h5py.File(path, "w", userblock_size=512 * ("user block" in layout)) as file:
-        if layout == "in another file":
-            options = {"external": [(f"{path}.raw", 0, h5py.h5f.UNLIMITED)]}
         if layout == "partly never written":
             values[9000:] = 7.0
             data = file.create_dataset("a", (ROWS,), kind, fillvalue=7.0, **options)
@@ -62,7 +59,7 @@ def test_values_are_those_of_the_library(layout: str, tmp_path: Path):
     wanted = made(path, layout)
     with h5py.File(path) as file:
         assert (Places.of(file["a"], range(ROWS)) is not None) == LAYOUTS[layout][2]
-    for parts in ([None], [hdf5.Part(i, PARTS) for i in range(PARTS)]):
+    for parts in ([None], [hdf5.RowRange(i, PARTS) for i in range(PARTS)]):
         batches = [batch for part in parts for batch in hdf5.read(path, ["a", "b"], None, part)]
         found = np.concatenate([batch["a"] for batch in batches])
         np.testing.assert_array_equal(found, wanted)
@@ -87,7 +84,7 @@ def test_a_file_that_is_cut_short_while_it_is_read_is_told(tmp_path: Path):
 def test_the_first_part_has_the_first_row_and_parts_are_even(size: int, chunk: int, tmp_path: Path):
     with h5py.File(tmp_path / "log.h5", "w") as file:
         data = file.create_dataset("a", (size,), "f8", chunks=(min(chunk, size),))
-        rows = [hdf5.Part(i, PARTS).rows(size, [data]) for i in range(PARTS)]
+        rows = [hdf5.RowRange(i, PARTS).rows(size, [data]) for i in range(PARTS)]
     assert [row for part in rows for row in part] == list(range(size))
     assert rows[0].start == 0 < len(rows[0])
     assert max(map(len, rows)) - min(map(len, rows)) < 2 * chunk  # the last may be shorter
@@ -119,7 +116,7 @@ def arrow_read(path: Path, names: list[str], parts: int) -> dict[str, np.ndarray
         for number in range(3)
         for part in range(parts)
         for batch in arrow.read(
-            path, names, None, arrow.Stretch(range(number, number + 1), part, parts)
+            path, names, None, arrow.BatchRange(range(number, number + 1), part, parts)
         )
     ]
     return {name: np.concatenate([batch[name] for batch in batches]) for name in names}
@@ -155,7 +152,7 @@ def test_labels_and_columns_that_lie_elsewhere_are_left_to_pyarrow(tmp_path: Pat
         assert placed_batch(mapped, table.to_batches()[0], ["a"]) is None
         assert placed_batch(mapped, batch.slice(5), ["a"]) is None
     wanted = numbers(path, "a", table["a"])
-    batches = list(arrow.read(path, ["a", "label"], None, arrow.Stretch(range(3))))
+    batches = list(arrow.read(path, ["a", "label"], None, arrow.BatchRange(range(3))))
     np.testing.assert_array_equal(np.concatenate([batch["a"] for batch in batches]), wanted)
 
 
@@ -173,7 +170,7 @@ def test_an_arrow_file_that_is_cut_short_while_it_is_read_is_told(tmp_path: Path
     monkeypatch.setattr("trueangle.formats.arrowplaces.ROWS", 997)
     path = tmp_path / "log.arrow"
     made_arrow(path)
-    batches = arrow.read(path, ["a"], None, arrow.Stretch(range(3)))
+    batches = arrow.read(path, ["a"], None, arrow.BatchRange(range(3)))
     next(batches)
     with path.open("r+b") as file:
         file.truncate(9000)

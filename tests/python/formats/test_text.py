@@ -119,7 +119,7 @@ def test_a_correction_keeps_every_byte_that_it_does_not_change(case, tmp_path):
 def test_counts_on_both_sides(tmp_path):
     path = tmp_path / "counts.csv"
     path.write_text("reference_count,indicated_count\n0,0\n100,1024\n")
-    with pytest.raises(FileError, match="--counts-per-turn-reference"):
+    with pytest.raises(FileError, match="`counts_per_turn_reference=`"):
         ta.read_runs(path, counts_per_turn=4096)
     (run,) = ta.read_runs(path, counts_per_turn=4096, counts_per_turn_reference=400)
     np.testing.assert_allclose(run.reference, [0.0, 90.0])

@@ -70,15 +70,20 @@ def desk(tmp_path):
 
 
 @pytest.fixture(scope="session")
-def driver(tmp_path_factory):
-    """The process whose calls of the system can be made to fail."""
+def shim(tmp_path_factory):
+    """The library that lets calls of the system fail."""
     compiler = shutil.which("cc") or shutil.which("gcc")
     if not sys.platform.startswith("linux") or compiler is None:
         pytest.skip("calls of the system are made to fail on Linux with a C compiler")
+    return compiled(tmp_path_factory.mktemp("shim"), compiler)
+
+
+@pytest.fixture(scope="session")
+def driver(shim, tmp_path_factory):
+    """The process whose calls of the system can be made to fail."""
     folder = tmp_path_factory.mktemp("driver")
     furnish(folder / "desk")
-    library = compiled(folder, compiler)
-    running = Driver(library, folder / "desk", [COMMANDS[name][0] for name in commands()])
+    running = Driver(shim, folder / "desk", [COMMANDS[name][0] for name in commands()])
     yield running
     running.close()
 

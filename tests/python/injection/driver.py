@@ -11,6 +11,7 @@ from __future__ import annotations
 import ctypes
 import json
 import os
+import shutil
 import signal
 import sys
 import time
@@ -18,8 +19,14 @@ import traceback
 from pathlib import Path
 from typing import Any
 
-KINDS = ("open", "read", "write", "sync", "rename", "allocate", "thread", "folder", "remove")
-ACTIONS = ("fail", "kill", "half", "interrupt")
+KINDS = (
+    *("open", "read", "write", "sync", "rename", "allocate", "thread", "folder", "remove"),
+    "change",
+)
+ACTIONS = ("fail", "kill", "half", "interrupt", "terminate", "hang up", "pause")
+
+#: In the names of what is being written aside.
+PARTIAL = ".trueangle-partial"
 
 #: Seconds after which a fork counts as hanging.
 HANGS = 60
@@ -57,10 +64,13 @@ def child(job: dict[str, Any], shim: ctypes.CDLL, told: str) -> int:
     # What a shell runs in the background is deaf to Ctrl-C.
     signal.signal(signal.SIGINT, signal.default_int_handler)
     shim.shim_root(job["folder"].encode())
+    shim.shim_exchange(int(job.get("exchange", True)))
     begin, end = place_of_core()
     shim.shim_core(
         ctypes.c_void_p(begin), ctypes.c_void_p(end), ctypes.c_size_t(job.get("least", 0))
     )
+    if "states" in job:
+        job |= {"kind": "change", "action": "pause"}
     kind = KINDS.index(job["kind"]) if "kind" in job else -1
     action = ACTIONS.index(job.get("action", "fail"))
     shim.shim_arm(kind, ctypes.c_long(job.get("n", -1)), action, job.get("error", 5))
@@ -89,6 +99,29 @@ def child(job: dict[str, Any], shim: ctypes.CDLL, told: str) -> int:
     return status
 
 
+def kept_states(pid: int, folder: Path, states: Path) -> int:
+    """Copy what is on the disk whenever a process pauses, until it ends; its status.
+
+    A call that leaves everything as it was makes no further copy, nor does one that goes on
+    with what is being written aside: nobody reads that.
+    """
+    known, count = None, 0
+    while True:
+        _, status = os.waitpid(pid, os.WUNTRACED)
+        paths = sorted(folder.rglob("*"))
+        found = [
+            (path, path.read_bytes() if path.is_file() and PARTIAL not in str(path) else b"")
+            for path in paths
+        ]
+        if found != known:
+            known = found
+            shutil.copytree(folder, states / f"{count:03d}")
+            count += 1
+        if not os.WIFSTOPPED(status):
+            return status
+        os.kill(pid, signal.SIGCONT)
+
+
 def main() -> None:
     """Answer jobs until standard input ends."""
     first = json.loads(sys.stdin.readline())
@@ -111,7 +144,11 @@ def main() -> None:
         if "kill_after" in job:
             time.sleep(job["kill_after"])
             os.kill(pid, signal.SIGKILL)
-        _, status = os.waitpid(pid, 0)
+        status = (
+            kept_states(pid, Path(job["folder"]), Path(job["states"]))
+            if "states" in job
+            else (os.waitpid(pid, 0)[1])
+        )
         answer = {
             "status": os.waitstatus_to_exitcode(status),
             "told": Path(job["told"]).read_text(errors="replace"),

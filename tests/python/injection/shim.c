@@ -1,9 +1,10 @@
 /* Calls of the system that fail when told to: loaded before libc (LD_PRELOAD) by the tests.
  *
  * `shim_arm(kind, n, action, error)` lets the n-th call of a kind (from 0) fail with `error`,
- * end the process as if by kill -9, come with Ctrl-C, or (writes) take only half. Calls on
- * files below the root count; of allocations those of at least so many bytes that the core
- * itself makes.
+ * end the process as if by kill -9, come with Ctrl-C, SIGTERM or SIGHUP, or (writes) take only
+ * half. Calls on files below the root count; of allocations those of at least so many bytes
+ * that the core itself makes. CHANGE counts all that change what is on the disk; with PAUSE the
+ * process stops before each of them until it is told to go on.
  */
 #define _GNU_SOURCE
 #include <dlfcn.h>
@@ -21,8 +22,8 @@
 #include <sys/uio.h>
 #include <unistd.h>
 
-enum { OPEN, READ, WRITE, SYNC, RENAME, ALLOCATE, THREAD, FOLDER, REMOVE, KINDS };
-enum { FAIL, KILL, HALF, INTERRUPT };
+enum { OPEN, READ, WRITE, SYNC, RENAME, ALLOCATE, THREAD, FOLDER, REMOVE, CHANGE, KINDS };
+enum { FAIL, KILL, HALF, INTERRUPT, TERMINATE, HANG_UP, PAUSE };
 
 static char root[PATH_MAX];
 static long counts[KINDS];
@@ -49,11 +50,17 @@ long shim_count(int kind) { return counts[kind]; }
 
 void shim_stop(void) { counting = 0; }
 
-/* Whether this call is to fail; a kill does not come back, Ctrl-C lets it be done. */
+/* Whether this call is to fail; a kill does not come back, other signals let it be done. */
 static int strikes(int kind) {
+    static const int signals[] = {[INTERRUPT] = SIGINT, [TERMINATE] = SIGTERM, [HANG_UP] = SIGHUP};
+    int changes = kind != READ && kind != ALLOCATE && kind != THREAD && kind != CHANGE;
+    if (changes && armed_kind == CHANGE) {
+        if (armed_action == PAUSE) kill(getpid(), SIGSTOP);
+        if (strikes(CHANGE)) return 1;
+    }
     if (__sync_fetch_and_add(&counts[kind], 1) != armed_n || kind != armed_kind) return 0;
     if (armed_action == KILL) kill(getpid(), SIGKILL), pause();
-    if (armed_action == INTERRUPT) return kill(getpid(), SIGINT), 0;
+    if (armed_action >= INTERRUPT) return kill(getpid(), signals[armed_action]), 0;
     errno = armed_error;
     return 1;
 }
@@ -145,6 +152,17 @@ int fsync(int fd) {
 int rename(const char *old, const char *fresh) {
     if (below(fresh) && strikes(RENAME)) return -1;
     return REAL(rename)(old, fresh);
+}
+
+static int cannot_exchange;
+
+/* Whether names can be exchanged in one step: not on every system. */
+void shim_exchange(int possible) { cannot_exchange = !possible; }
+
+int renameat2(int old_fd, const char *old, int fresh_fd, const char *fresh, unsigned flags) {
+    if (counting && cannot_exchange) return errno = ENOSYS, -1;
+    if (below(fresh) && strikes(RENAME)) return -1;
+    return REAL(renameat2)(old_fd, old, fresh_fd, fresh, flags);
 }
 
 int mkdir(const char *path, mode_t mode) {

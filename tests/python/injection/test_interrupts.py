@@ -1,4 +1,4 @@
-"""Ctrl-C with every call of the system, in every command: nothing is half-written or left."""
+"""Ctrl-C, SIGTERM, SIGHUP with any call of the system, in every command: nothing is left."""
 
 import shutil
 
@@ -10,20 +10,37 @@ from .test_failing_calls import MOST, same
 #: Calls that Ctrl-C comes with: the moment between a call and what Python does next.
 KINDS = ("open", "read", "write", "sync", "rename", "folder", "remove")
 
-INTERRUPTED = 130
+#: What ends a command, and how it is told: status and words.
+ENDINGS = {
+    "interrupt": (130, "trueangle: interrupted"),
+    "terminate": (143, "trueangle: interrupted by SIGTERM"),
+    "hang up": (129, "trueangle: interrupted by SIGHUP"),
+}
 
 
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("command", commands())
 def test_ctrl_c_with_the_nth_call(command, kind, driver, expected, tmp_path):
+    ended_with_every_call("interrupt", command, kind, driver, expected, tmp_path)
+
+
+@pytest.mark.parametrize("action", ["terminate", "hang up"])
+@pytest.mark.parametrize("command", commands())
+def test_a_signal_with_the_nth_call(command, action, driver, expected, tmp_path):
+    """Of kill, a service manager or a closed terminal: as Ctrl-C."""
+    ended_with_every_call(action, command, "change", driver, expected, tmp_path)
+
+
+def ended_with_every_call(action, command, kind, driver, expected, tmp_path):
     arguments, _ = COMMANDS[command]
+    ended, words = ENDINGS[action]
     whole = expected[command][0]
     struck = 0
     for n in range(MOST):
         desk = tmp_path / str(n)
         furnish(desk)
         inputs = tree(desk)
-        answer = driver.run(desk, arguments, kind=kind, n=n, action="interrupt")
+        answer = driver.run(desk, arguments, kind=kind, n=n, action=action)
         after = tree(desk)
         assert {k: after.get(k) for k in inputs} == inputs, (n, "an input was changed")
         hidden = [p.name for p in desk.rglob(".*")]
@@ -34,10 +51,10 @@ def test_ctrl_c_with_the_nth_call(command, kind, driver, expected, tmp_path):
             assert answer.status == 0, (n, answer.told)
             break
         struck += 1
-        assert answer.status == INTERRUPTED, (n, answer)
+        assert answer.status == ended, (n, answer)
         told = [line for line in answer.told.splitlines() if line.startswith("trueangle: ")]
         assert len(told) == 1, (n, answer.told)
-        assert told[0].startswith("trueangle: interrupted"), (n, answer.told)
+        assert told[0].startswith(words), (n, answer.told)
         assert "Traceback" not in answer.told, (n, answer.told)
         if command == "correct":  # goes on where it stopped, to the same bytes
             again = driver.run(desk, arguments)

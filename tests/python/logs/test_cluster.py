@@ -75,7 +75,7 @@ def test_any_number_of_workers_gives_the_bytes_of_one_process(workers, two, logs
     expected = ta.fit_logs(logs, [1, 2, 3])
     assert fit.model.shafts == expected.model.shafts
     assert fit.model.constant == expected.model.constant
-    np.testing.assert_array_equal(fit.fit.covariance, expected.fit.covariance)
+    np.testing.assert_array_equal(fit.covariance, expected.covariance)
 
 
 def test_a_lost_worker_changes_nothing(logs, alone, tmp_path):

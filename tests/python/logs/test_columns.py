@@ -24,12 +24,12 @@ def test_found_by_name(joint, columns, name, unit, corrected):
 
 
 REFUSED = [
-    ({}, ["a", "b"], "no indicated_deg.*--column.*a, b"),
-    ({}, ["indicated_deg", "indicated_rad"], "several.*--column"),
-    ({"joint": "j1"}, ["indicated_deg"], "joint j1.*--column j1=NAME"),
+    ({}, ["a", "b"], "no indicated_deg.*`column=`.*a, b"),
+    ({}, ["indicated_deg", "indicated_rad"], "several.*`column=`"),
+    ({"joint": "j1"}, ["indicated_deg"], "joint j1.*`column=.*j1.*NAME"),
     ({"joint": "j1"}, ["j1_indicated_deg", "indicated_deg_j1"], "several columns of joint j1"),
     ({"column": "x"}, ["y"], "'x': no such column"),
-    ({"column": "x", "unit": "count"}, ["x"], "--counts-per-turn"),
+    ({"column": "x", "unit": "count"}, ["x"], "`counts_per_turn=`"),
     ({}, ["indicated_deg", "corrected_deg"], "corrected before"),
 ]
 

@@ -230,9 +230,9 @@ def test_single_precision_stays_where_turns_are_counted(angles, tmp_path):
 @pytest.mark.parametrize("dtype", [np.float32, np.float64, np.int32])
 def test_corrected_readings_have_the_precision_of_the_column(dtype):
     """Where turns are counted too: a format that takes what it is given must get it right."""
-    from trueangle.logs.joints import Joint, LogSettings
+    from trueangle.logs.joints import LogJoint, LogSettings
 
-    (channel,) = LogSettings((Joint(turning()),)).channels("log", ["indicated_deg"])
+    (channel,) = LogSettings((LogJoint(turning()),)).channels("log", ["indicated_deg"])
     assert channel.counts_turns
     found = channel.correct(np.array([350, 5, 20], dtype=dtype))
     assert found.dtype == (np.float32 if dtype is np.float32 else np.float64)
@@ -241,15 +241,15 @@ def test_corrected_readings_have_the_precision_of_the_column(dtype):
 def test_every_setting_that_changes_the_output_belongs_to_the_request():
     from dataclasses import replace
 
-    from trueangle.logs.joints import Joint, LogSettings
+    from trueangle.logs.joints import LogJoint, LogSettings
 
-    plain = LogSettings((Joint(made_model()),), "deg", 4096.0, "/joints", "/corrected", 2)
+    plain = LogSettings((LogJoint(made_model()),), "deg", 4096.0, "/joints", "/corrected", 2)
     changes = {
         "unit": "rad",
         "counts_per_turn": 8192.0,
         "topic": "/other",
         "output_topic": "/other",
-        "joints": (Joint(made_model(), unit="rad"),),
+        "joints": (LogJoint(made_model(), unit="rad"),),
     }
     digests = {plain.digest, *(replace(plain, **{k: v}).digest for k, v in changes.items())}
     assert len(digests) == 1 + len(changes)

@@ -195,7 +195,7 @@ def test_turns_are_counted_over_messages(positions, tmp_path, monkeypatch):
 
 REFUSED = [
     ({"shoulder": 0}, {}, "no column of joint shoulder.*elbow, wrist"),
-    ({"elbow": 0}, {"topic": "/other"}, "no JointState topic /other.*--topic.*/joint_states"),
+    ({"elbow": 0}, {"topic": "/other"}, "no JointState topic /other.*`topic=`.*/joint_states"),
     ({"elbow": 0}, {"output_topic": "/log"}, "/log is there already"),
 ]
 

@@ -15,9 +15,10 @@ import pytest
 
 import trueangle as ta
 from trueangle.cli import main
-from trueangle.files.outputs import PARTIAL, hidden_name
 from trueangle.logs import safety
 from trueangle.logs.manifest import MANIFEST
+from trueangle.support.files import workplace
+from trueangle.support.files.workplace import PARTIAL, hidden_name
 
 from .conftest import made_angles
 
@@ -281,6 +282,7 @@ def test_a_folder_is_replaced_whole_and_put_back_when_killed_between(tmp_path):
 @pytest.mark.parametrize("ends", [KeyboardInterrupt, OSError])
 def test_a_folder_goes_back_when_its_replacement_ends_between(ends, tmp_path, monkeypatch):
     """Ctrl-C or an error after the old folder was moved aside, before the new one has its name."""
+    monkeypatch.setattr(workplace, "exchanged", lambda first, second: False)
     target = tmp_path / "bag"
     target.mkdir()
     (target / "x").write_text("old")
@@ -334,8 +336,8 @@ def test_permissions_are_kept_in_place(logs, model):
 @pytest.mark.parametrize(
     ("more", "message"),
     [
-        (["-o", "OUT", "--in-place"], "either an output"),
-        ([], "either an output"),
+        (["-o", "OUT", "--in-place"], "either --output or --in-place"),
+        ([], "either --output or --in-place"),
         (["-o", "LOGS"], "overwrite"),
         (["-o", "OUT", "--column", "j1=x"], "j1"),
     ],

@@ -83,7 +83,7 @@ def test_heads_that_share_a_zero_need_their_angles():
         name: np.mod(values - np.radians(a), 2.0 * np.pi)
         for (name, values), a in zip(log.items(), [0.0, 119.2, 203.7], strict=True)
     }
-    with pytest.raises(NoModelError, match="--head-angles"):
+    with pytest.raises(NoModelError, match="`head_angles="):
         ta.selfcal(shared)
     found = ta.selfcal(shared, orders=range(1, 9), head_angles=[0.0, 119.2, 203.7])
     assert np.abs(off(found)).max() < FAR

@@ -7,6 +7,8 @@ from typing import Any
 
 import numpy as np
 
+from ...support.plainresult import finite
+
 __all__ = ["Evidence", "largest_of"]
 
 
@@ -44,7 +46,7 @@ class Evidence:
         """The entry of ``unexplained.evidence``."""
         return {
             "test": self.test,
-            "statistic": self.statistic,
+            "statistic": finite(self.statistic),
             "p": self.p,
             "says": self.says,
             "decides": self.decides,

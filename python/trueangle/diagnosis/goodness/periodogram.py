@@ -17,9 +17,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ... import _core
-from ...distributions import f_tail
-from ...errorunits import brief
+import trueangle._core as _core
+
+from ...support.display_units import brief
+from ...support.distributions import f_tail
 from .evidence import Evidence, largest_of
 from .leftover import Leftover
 
@@ -108,9 +109,13 @@ def periodogram(
     Returns
     -------
     Periodogram or None
-        None where the runs are too short.
+        None where the runs are too short, or do not scatter.
     """
-    kept = [(a, b) for a, b in bounds if b - a >= LEAST_READINGS and np.ptp(axis[a:b]) > 0.0]
+    kept = [
+        (a, b)
+        for a, b in bounds
+        if b - a >= LEAST_READINGS and np.ptp(axis[a:b]) > 0.0 and np.ptp(values[a:b]) > 0.0
+    ]
     if not kept:
         return None
     spans = np.array([float(np.ptp(axis[a:b])) for a, b in kept])

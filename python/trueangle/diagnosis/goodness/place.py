@@ -24,9 +24,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ... import _core
-from ...distributions import incomplete_gamma_tail, student_tail
-from ...errorunits import brief
+import trueangle._core as _core
+
+from ...support.display_units import brief
+from ...support.distributions import incomplete_gamma_tail, student_tail
 from .evidence import Evidence, largest_of
 from .leftover import Leftover
 

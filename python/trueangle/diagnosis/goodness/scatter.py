@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ...distributions import chi_squared_tail, f_tail, normal_tail
+from ...support.distributions import chi_squared_tail, f_tail, normal_tail
 from .evidence import Evidence
 from .leftover import Leftover
 from .noise import Noise

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from ...support.plainresult import Shown
 from .evidence import Evidence
 from .leftover import Leftover
 from .noise import Noise, estimate_noise
@@ -25,7 +26,7 @@ SMALLEST = 1e-9
 
 
 @dataclass(frozen=True)
-class Unexplained:
+class Unexplained(Shown):
     """What tests that need no name say of the residual.
 
     Attributes

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ...distributions import f_tail
-from ...errorunits import brief
+from ...support.display_units import brief
+from ...support.distributions import f_tail
 from .evidence import Evidence
 from .leftover import Leftover
 from .noise import Noise

@@ -57,6 +57,8 @@ int main(void)
         }
     }
     print_number("hash", hash);
+    print_number("none", empty(1));
+    print_number("once", timed(1));
     print_number("loop", empty(TIMES));
     print_number("call", timed(TIMES));
     finish();

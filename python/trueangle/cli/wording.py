@@ -1,0 +1,176 @@
+"""Messages in the words of a command: the Python that they name becomes options.
+
+A message is written once, in Python: what a caller would type stands in backquotes, as
+```bits=16```, ```signals={"torque": "tau"}``` or ```ta.diagnose(...)```. A command prints
+``--bits 16``, ``--signal torque=tau`` and ``trueangle diagnose``.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Final
+
+if TYPE_CHECKING:
+    import argparse
+    import ast
+
+__all__ = ["Wording"]
+
+_CODE: Final = re.compile(r"`([^`\n]{1,300})`")
+_ARGUMENT: Final = re.compile(r"\w+=")
+_CALL: Final = re.compile(r"(?:ta|trueangle)\.[\w.]+\(.*\)")
+
+#: How an error begins that is of one argument.
+_LEADING: Final = re.compile(r"(\w+)(?= (?:must|needs|has|is) )")
+
+#: Arguments of Python whose options have another name; the first that a command has is meant.
+_OPTIONS: Final = {
+    "candidates": ("orders",),
+    "column": ("column", "signal"),
+    "max_gap_s": ("max_gap",),
+    "method": ("method", "self_method"),
+    "noise": ("noise_arcsec",),
+    "offset_s": ("offset",),
+    "rate_ppm": ("rate",),
+    "shafts": ("shaft",),
+    "signals": ("signal",),
+    "standard_error": ("std_arcsec",),
+    "target": ("to", "source"),
+}
+
+#: Functions of Python that are commands of another name.
+_COMMANDS: Final = {
+    "correct_logs": "correct",
+    "export_model": "export",
+    "fit_logs": "fit --one-pass",
+    "import_model": "import",
+    "plan_encoder": "plan --reference encoder",
+    "plan_mounts": "plan",
+    "plan_self": "plan --self",
+    "plan_tilts": "plan --reference off-null",
+    "select_orders": "orders",
+}
+
+
+class Wording:
+    """What a text is to those who typed a command; until one is known, the text itself.
+
+    Examples
+    --------
+    >>> import argparse
+    >>> parser = argparse.ArgumentParser()
+    >>> _ = parser.add_argument("--gear-ratio"), parser.add_argument("--signal")
+    >>> words = Wording()
+    >>> words.parser = parser
+    >>> words('give `gear_ratio=100` or `signals={"motor": ("q m", "rad")}`')
+    "give --gear-ratio 100 or --signal 'motor=q m:rad'"
+    >>> words("run `ta.diagnose(...)`"), words.of_error("gear_ratio must be positive")
+    ('run trueangle diagnose', '--gear-ratio must be positive')
+    """
+
+    def __init__(self) -> None:
+        #: That of the command.
+        self.parser: argparse.ArgumentParser | None = None
+
+    def __call__(self, text: str) -> str:
+        """``text`` with options in place of Python."""
+        if self.parser is None or "`" not in text:
+            return text
+        return _CODE.sub(self._told, text)
+
+    def of_error(self, text: str) -> str:
+        """The same of an error of an argument, which may begin with its bare name."""
+        found = _LEADING.match(text)
+        option = found and self._option(found[1])
+        return text if not found or not option else option + text[found.end() :]
+
+    def _told(self, found: re.Match[str]) -> str:
+        code = found[1].replace('\\"', '"')  # as JSON has it
+        if _ARGUMENT.fullmatch(code):
+            return self._option(code[:-1]) or found[0]
+        if not (_ARGUMENT.match(code) or _CALL.fullmatch(code)):
+            return found[0]
+        import ast  # needed only where something is wrong
+
+        try:
+            call = ast.parse(code if _CALL.fullmatch(code) else f"f({code})", mode="eval").body
+            assert isinstance(call, ast.Call)
+            words = [*self._command(call), *self._options(call)]
+        except (SyntaxError, ValueError):
+            return found[0]
+        told = " ".join(words)
+        return found[0] if '"' in told or "\\" in told else told
+
+    def _command(self, call: ast.Call) -> Iterator[str]:
+        import ast
+
+        if isinstance(call.func, ast.Attribute):
+            name = call.func.attr
+            yield f"trueangle {_COMMANDS.get(name, name)}"
+            yield from (
+                str(a.value) for a in call.args if isinstance(a, ast.Constant) and _is_text(a)
+            )
+
+    def _options(self, call: ast.Call) -> Iterator[str]:
+        for keyword in call.keywords:
+            name = keyword.arg or ""
+            # Of another command than that which runs the option is named as a rule is.
+            option = self._option(name) or f"--{name.replace('_', '-')}"
+            values = _values(keyword.value)
+            yield from (f"{option} {value}" for value in values) if values else (option,)
+
+    def _option(self, name: str) -> str:
+        """The option of an argument, or the place of one that has none; empty without both."""
+        actions = self.parser._actions if self.parser is not None else ()
+        for dest in (*_OPTIONS.get(name, (name,)), f"option_{name}"):
+            for action in actions:
+                if action.dest == dest:
+                    long = [o for o in action.option_strings if o.startswith("--")]
+                    place = action.metavar if isinstance(action.metavar, str) else dest.upper()
+                    return long[0] if long else place
+        return ""
+
+
+def _is_text(node: ast.expr) -> bool:
+    return isinstance(getattr(node, "value", None), str)
+
+
+def _values(node: ast.expr) -> list[str]:
+    """What stands after an option, once for each time it is given; nothing after a switch."""
+    import ast
+    from shlex import quote
+
+    if isinstance(node, ast.Dict):
+        return [quote(entry) for entry in _entries(node)]
+    if isinstance(node, ast.Constant) and node.value is True:
+        return []
+    return [quote(_text(node))]
+
+
+def _entries(node: ast.Dict, prefix: str = "") -> Iterator[str]:
+    """``NAME=VALUE`` of every entry, ``OUTER.NAME=VALUE`` of those within another."""
+    import ast
+
+    for key, value in zip(node.keys, node.values, strict=True):
+        name = prefix + ("" if key is None else _text(key))
+        if isinstance(value, ast.Dict):
+            yield from _entries(value, f"{name}.")
+        else:
+            yield f"{name}={_text(value, ':')}"
+
+
+def _text(node: ast.expr, between: str = ",") -> str:
+    """A value as it is typed: text and names as they are, lists with commas, ranges with a dash."""
+    import ast
+
+    match node:
+        case ast.Constant(value=value):
+            return str(value)
+        case ast.Name(id=name):
+            return name
+        case ast.List(elts=several) | ast.Tuple(elts=several):
+            return between.join(map(_text, several))
+        case ast.Call(args=[first, ast.Constant(value=int(end))]):
+            return f"{_text(first)}-{end - 1}"
+    raise ValueError("no value of an option")

@@ -1,1 +1,0 @@
-"""What a model corrects beyond harmonics: forms, terms, and the corrector that holds state."""

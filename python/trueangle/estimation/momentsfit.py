@@ -1,0 +1,98 @@
+"""What is found from sums over readings, and the sums of one run."""
+
+from __future__ import annotations
+
+from collections.abc import Hashable
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..joint.shafts import Shaft
+from ..model.model import Argument, HarmonicModel
+from ..support.plainresult import Shown
+
+__all__ = ["MomentsFit", "Spectrum"]
+
+
+class Spectrum(NamedTuple):
+    r"""Sums over the readings of one run from which any orders can be fitted.
+
+    Order ``k`` counts cycles of the base shaft, ``cycles`` per output turn; ``y`` is the
+    error counted from ``centre``.
+    """
+
+    weight: NDArray[np.complex128]
+    r""":math:`\sum w e^{ikx}` for ``k`` from 0 to twice the highest order."""
+    error: NDArray[np.complex128]
+    r""":math:`\sum w y e^{ikx}` for ``k`` from 0 to the highest order."""
+    squares: float
+    r""":math:`\sum w y^2`."""
+    samples: int
+    """Readings of positive weight."""
+    centre: float
+    """The angle that ``y`` is counted from."""
+    cycles: float
+    """Turns of the base shaft per output turn."""
+
+
+@dataclass(frozen=True)
+class MomentsFit(Shown):
+    """What `Moments.solve` found; angles in the unit of the moments' period."""
+
+    shafts: tuple[Shaft, ...]
+    constant: float
+    """Circular mean of the zeros of the runs."""
+    offsets: dict[Hashable, float]
+    """Zero of each run."""
+    offset_std: dict[Hashable, float]
+    covariance: NDArray[np.float64]
+    """Of ``[constant, A, B of each order of each shaft in turn]``."""
+    residual_variance: float
+    degrees_of_freedom: float
+    condition_number: float
+    period: float
+    method: str
+    """``"moments"`` (normal equations) or ``"qr"`` (factors of segments)."""
+
+    @property
+    def orders(self) -> tuple[int, ...]:
+        """Orders of each shaft in turn."""
+        return tuple(k for shaft in self.shafts for k in shaft.orders)
+
+    @property
+    def cosine(self) -> NDArray[np.float64]:
+        """``A`` of each order."""
+        return np.array([a for shaft in self.shafts for a in shaft.cosine])
+
+    @property
+    def sine(self) -> NDArray[np.float64]:
+        """``B`` of each order."""
+        return np.array([b for shaft in self.shafts for b in shaft.sine])
+
+    @property
+    def amplitudes(self) -> NDArray[np.float64]:
+        """``C = hypot(A, B)`` of each order."""
+        return np.hypot(self.cosine, self.sine)
+
+    @property
+    def phases(self) -> NDArray[np.float64]:
+        """``phi = atan2(A, B)`` of each order, in radians."""
+        return np.arctan2(self.cosine, self.sine)
+
+    @property
+    def std(self) -> NDArray[np.float64]:
+        """Standard errors of ``[constant, A, B ...]``."""
+        return np.sqrt(np.diag(self.covariance))
+
+    def model(self, argument: Argument = "reference") -> HarmonicModel:
+        """The fitted series as a model that corrects."""
+        return HarmonicModel(
+            self.shafts,
+            self.constant,
+            self.period,
+            argument,
+            covariance=self.covariance,
+            condition_number=self.condition_number,
+        )

@@ -1,0 +1,227 @@
+"""Candidate orders of a selection, and how much false alarm each may use up."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...errors import ArgumentError
+from ...joint.gear import COMMON_RATIOS, HIGHEST_LOW_ORDER, gear_orders
+from ...joint.shafts import counted_orders
+from ...runs.aliasing import POSITION_TOLERANCE, Positions, distinct_positions, position_coherence
+from ...runs.run import CalibrationRun
+
+__all__ = ["Candidates", "choose_candidates", "effective_positions"]
+
+Array = NDArray[np.float64]
+
+#: Low orders looked at when no gear is declared and the angles are free.
+HIGHEST_FREE_ORDER: Final = 100
+
+#: Harmonics of a declared shaft that are looked at.
+SHAFT_HARMONICS: Final = (1, 2, 3, 4)
+
+#: Orders scanned beyond the low ones where the angles are free.
+HIGHEST_SCANNED: Final = 450
+
+#: Part of the allowed false alarm that the scan may use up.
+_SCAN_SHARE: Final = 0.2
+
+#: Coherence from which two orders are hardly told apart: they come half a cycle apart over the
+#: travel. Fitted side by side they nearly cancel, and part again where nothing was read.
+_UNRESOLVED: Final = 2.0 / math.pi
+
+#: Coherence from which two orders are one at the positions, whatever the noise.
+_SAME: Final = 1.0 - 1e-9
+
+#: Aliases are listed at least up to this order.
+_LEAST_ALIAS: Final = 404
+
+#: Side bands of a reference order: modulation by its eccentricity and tilt.
+_SIDE_BANDS: Final = (-2, -1, 1, 2)
+
+
+@dataclass(frozen=True)
+class Candidates:
+    """Orders to look at.
+
+    Attributes
+    ----------
+    orders : tuple of float
+        All of them, ascending.
+    main : frozenset of float
+        Those looked at closely; the others are scanned.
+    reference : tuple of float
+        Orders of the reference itself, side bands included.
+    carriers : tuple of float
+        The reference orders as they were declared.
+    gear_ratio : float or None
+    fixed_member : str
+    highest : int
+        Nyquist limit of the positions for orders that are not named.
+    effective : Positions
+        The positions as a grid even where small shifts of the zero blur it.
+    unresolved : mapping of float to float
+        Orders of the gear that are not looked at, for over this travel they are hardly told
+        from a low order, which stands for both.
+    shafts : mapping of str to float
+        Further shafts that were declared, and their cycles per output turn.
+    local : frozenset of float
+        Of ``reference``: orders that a short single pass does not tell from drift in time.
+    """
+
+    orders: tuple[float, ...]
+    main: frozenset[float]
+    reference: tuple[float, ...]
+    carriers: tuple[float, ...]
+    gear_ratio: float | None
+    fixed_member: str
+    highest: int
+    effective: Positions
+    unresolved: Mapping[float, float] = field(default_factory=dict)
+    shafts: Mapping[str, float] = field(default_factory=dict)
+    local: frozenset[float] = frozenset()
+
+    @property
+    def highest_alias(self) -> int:
+        """Highest order listed as an alias: 4 motor turns' worth, at least 400."""
+        ratio = max(COMMON_RATIOS) if self.gear_ratio is None else self.gear_ratio
+        return max(_LEAST_ALIAS, math.ceil(4.0 * ratio) + 4)
+
+    @property
+    def whole(self) -> bool:
+        """Whether all orders are whole."""
+        return all(float(k).is_integer() for k in self.orders)
+
+    @property
+    def main_indices(self) -> list[int]:
+        """Indices of the orders looked at closely."""
+        return [i for i, k in enumerate(self.orders) if k in self.main]
+
+    def log_limits(self, false_alarm: float) -> NDArray[np.float64]:
+        """Log of the false-alarm chance of each order, ``false_alarm`` in all."""
+        main = np.array([k in self.main for k in self.orders], dtype=bool)
+        scanned = int((~main).sum())
+        share = 1.0 - _SCAN_SHARE if scanned else 1.0
+        limits = np.empty(main.size)
+        limits[main] = math.log(share * false_alarm / max(1, int(main.sum())))
+        limits[~main] = math.log(_SCAN_SHARE * false_alarm / max(1, scanned))
+        return limits
+
+
+def effective_positions(positions: Positions) -> Positions:
+    """Positions as a grid even where small shifts of the zero blur it.
+
+    Unnamed orders are looked for only below the Nyquist limit of that grid.
+    """
+    if positions.divisions is not None:
+        return positions
+    once = CalibrationRun(positions.turns, positions.turns, period=1.0)
+    for widening in (10.0, 100.0):
+        blurred = distinct_positions(once, widening * POSITION_TOLERANCE)
+        if blurred.divisions is not None and len(blurred) < len(positions):
+            return blurred
+    return positions
+
+
+def choose_candidates(
+    positions: Positions,
+    candidates: Iterable[float] | None,
+    gear_ratio: float | None,
+    fixed_member: str,
+    reference_orders: Sequence[float],
+    travelled: Array | None = None,
+    shafts: Mapping[str, float] | None = None,
+    held_from: float = 0.0,
+) -> Candidates:
+    """Candidates as asked for, or low orders, the gear's own and a scan.
+
+    ``travelled`` are angles of the readings in turns, whole turns kept: they tell how far an
+    order that is not whole is told from its neighbours. Undeclared orders below ``held_from``
+    are fitted jointly and not kept.
+
+    Raises
+    ------
+    ArgumentError
+        Orders that are not positive and finite.
+    """
+    gear = [] if gear_ratio is None else [float(m) for m in gear_orders(gear_ratio, fixed_member)]
+    gear += [k * float(f) for f in (shafts or {}).values() for k in SHAFT_HARMONICS]
+    effective = effective_positions(positions)
+    highest = effective.highest_order
+    if effective.divisions is None:
+        highest = min(highest, math.floor((len(positions) - 1) / (2.0 * positions.span)))
+    carriers = tuple(_checked(reference_orders, "reference_orders"))
+    reference = sorted(
+        {k + s for k in carriers for s in (0, *_SIDE_BANDS) if k + s > max(_SIDE_BANDS)}
+        | set(carriers)
+    )
+    scanned: list[float] = []
+    unresolved: dict[float, float] = {}
+    if candidates is not None:
+        main = _checked(candidates, "candidates")
+    else:
+        unresolved = _unresolved(gear, min(HIGHEST_LOW_ORDER, highest), travelled)
+        told = [m for m in gear if m not in unresolved]
+        # A gear none of whose orders can be told says nothing about where to look.
+        limit = HIGHEST_LOW_ORDER if told else HIGHEST_FREE_ORDER
+        main = [float(k) for k in range(1, min(limit, highest) + 1)]
+        for m in told:
+            if m not in main and _apart(positions, m, main):
+                main.append(m)
+        if positions.span == 1.0:
+            top = min(HIGHEST_SCANNED, highest)
+            scanned = [float(k) for k in range(1, top + 1) if float(k) not in main]
+    local: list[float] = []
+    if candidates is None and held_from > 0.0:
+        local = [k for k in main if k < held_from and k not in gear]
+        main, scanned = [k for k in main if k not in local], []
+        reference = sorted({*reference, *local})
+    orders = sorted({*main, *scanned, *reference})
+    tidy = tuple(int(k) if k.is_integer() else k for k in orders)
+    return Candidates(
+        orders=tidy,
+        main=frozenset({*main, *reference}),
+        reference=tuple(reference),
+        carriers=carriers,
+        gear_ratio=gear_ratio,
+        fixed_member=fixed_member,
+        highest=highest,
+        effective=effective,
+        unresolved=unresolved,
+        shafts=dict(shafts or {}),
+        local=frozenset(local),
+    )
+
+
+def _unresolved(gear: Sequence[float], low: int, travelled: Array | None) -> dict[float, float]:
+    """Orders of the gear hardly told from a low order over the travel, and that order."""
+    found: dict[float, float] = {}
+    if travelled is None:
+        return found
+    for m in gear:
+        nearest = min(max(round(m), 0), low)
+        alike = abs(np.exp(2j * math.pi * (m - nearest) * travelled).mean())
+        if not m.is_integer() and alike > _UNRESOLVED:
+            found[m] = float(nearest)
+    return found
+
+
+def _apart(positions: Positions, order: float, others: Sequence[float]) -> bool:
+    """Whether the positions tell ``order`` from the constant and from all of ``others``."""
+    return bool(position_coherence(positions, order, [0.0, *others]).max() < _SAME)
+
+
+def _checked(orders: Iterable[float], name: str) -> list[float]:
+    found = []
+    for k in counted_orders(orders, name):
+        value = float(k)
+        if not (math.isfinite(value) and value > 0.0):
+            raise ArgumentError(f"{name} must be positive orders, got {k!r}")
+        found.append(value)
+    return sorted(set(found))

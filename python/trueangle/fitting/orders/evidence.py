@@ -1,0 +1,331 @@
+"""Evidence for orders: significance with a bound for the search, and held-out gain.
+
+All of it works on the normal equations of `HarmonicSums`; the readings are not touched
+again. An order has two coefficients, so that with noise variance s^2 known from v
+degrees of freedom the statistic ``T = gain / s^2`` of a line that is not there follows
+``2 F(2, v)``, whose tail is ``(1 + T / v)^(-v / 2)``.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Final, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .harmonicsums import HarmonicSums
+
+__all__ = [
+    "COLLINEAR",
+    "OVERDISPERSED",
+    "OrderTest",
+    "choose_forward",
+    "examine_orders",
+    "fit_subset",
+    "held_out_gains",
+    "log_chi2_tail",
+    "log_tail",
+]
+
+Array = NDArray[np.float64]
+Index = NDArray[np.intp]
+
+#: A candidate whose columns keep less than this of their energy beside those already
+#: chosen is an alias of them.
+COLLINEAR: Final = 1e-8
+
+#: Columns that keep this part of their length beside all others are inverted directly.
+_REGULAR: Final = 1e-4
+
+#: Least degrees of freedom that a residual must keep.
+_LEAST_DOF: Final = 3
+
+
+#: Scatter between runs counts as an order's own where chance makes it rarer than this.
+OVERDISPERSED: Final = 1e-3
+
+
+def log_tail(statistic: Array | float, dof: float) -> Array:
+    """Logarithm of the probability that noise alone reaches ``statistic``."""
+    t = np.maximum(np.asarray(statistic, dtype=np.float64), 0.0)
+    return np.asarray(-0.5 * t if math.isinf(dof) else -0.5 * dof * np.log1p(t / dof))
+
+
+def log_chi2_tail(x: Array, dof: int) -> Array:
+    """Log of the upper tail of chi-square with an even number of degrees of freedom."""
+    half = 0.5 * np.asarray(x, dtype=np.float64)[..., None]
+    i = np.arange(dof // 2)
+    terms = i * np.log(np.maximum(half, 1e-300)) - np.array([math.lgamma(j + 1.0) for j in i])
+    top = terms.max(axis=-1, keepdims=True)
+    return np.asarray(-half[..., 0] + top[..., 0] + np.log(np.exp(terms - top).sum(axis=-1)))
+
+
+def _pairs(matrix: Array, n: int) -> tuple[Array, Array, Array]:
+    """Entries aa, ab, bb of the 2x2 diagonal blocks of orders."""
+    i = np.arange(n)
+    return matrix[i, i], matrix[i, i + n], matrix[i + n, i + n]
+
+
+def choose_forward(
+    sums: HarmonicSums,
+    log_limits: Array,
+    readings: int,
+    noise: tuple[float, float] | None,
+    forced: Sequence[int] = (),
+    barred: Sequence[int] = (),
+) -> list[int]:
+    """Indices of orders, taken one by one while the best of the rest is significant.
+
+    Parameters
+    ----------
+    sums : HarmonicSums
+    log_limits : ndarray, shape (orders,)
+        Log of the false-alarm probability that each order may use up.
+    readings : int
+        Degrees of freedom before any order: readings less zeros.
+    noise : (variance, degrees of freedom) or None
+        None takes the residual of the orders chosen so far, the one on trial included.
+    forced : sequence of int
+        Taken first, whatever they bring.
+    barred : sequence of int
+        Never taken.
+
+    Returns
+    -------
+    list of int
+        In the order of their choice; among aliases the lowest of the likeliest.
+    """
+    gram, rhs, rest = sums.total()
+    gram, rhs = gram.copy(), rhs.copy()
+    n = sums.orders.size
+    aa, ab, bb = _pairs(gram, n)
+    # Scale free: energy of both columns, the smaller direction counts.
+    energy = 0.5 * (aa + bb)
+    alive = energy > 0.0
+    alive[list(barred)] = False
+    chosen: list[int] = []
+    queue = list(forced)
+    while alive.any():
+        dof = readings - 2 * len(chosen) - 2
+        if dof < _LEAST_DOF:
+            break
+        aa, ab, bb = _pairs(gram, n)
+        det = aa * bb - ab * ab
+        alive &= det > (COLLINEAR * energy) ** 2
+        alive &= np.minimum(aa, bb) > COLLINEAR * energy
+        safe = np.where(alive, det, 1.0)
+        a, b = rhs[:n], rhs[n:]
+        gain = np.where(alive, (bb * a * a - 2.0 * ab * a * b + aa * b * b) / safe, 0.0)
+        if queue:
+            best = queue.pop(0)
+            if not alive[best]:
+                continue
+        else:
+            if noise is None:
+                # Of collinear columns rounding makes a gain beyond all there is.
+                left = np.maximum(rest - gain, 1e-200)
+                score = log_tail(gain * dof / left, dof) - log_limits
+            else:
+                score = log_tail(gain / noise[0], noise[1]) - log_limits
+            score = np.where(alive, score, math.inf)
+            top = int(np.argmin(score))
+            if not score[top] <= 0.0:
+                break
+            # Aliases explain equally much: keep one that was asked for, and the lowest.
+            same = np.flatnonzero(alive & (gain >= gain[top] * (1.0 - 1e-9)))
+            best = int(same[np.lexsort((sums.orders[same], -log_limits[same]))[0]])
+        chosen.append(best)
+        pivot = sums.columns([best])
+        factor = np.linalg.solve(gram[np.ix_(pivot, pivot)], gram[pivot])
+        rest -= float(gain[best])
+        rhs -= factor.T @ rhs[pivot]
+        gram -= gram[:, pivot] @ factor
+        alive[best] = False
+    return chosen
+
+
+def fit_subset(sums: HarmonicSums, chosen: Sequence[int]) -> tuple[Array, Array, float]:
+    """Coefficients of the chosen orders, inverse normal matrix, residual sum of squares."""
+    gram, rhs, squares = sums.total()
+    columns = sums.columns(chosen)
+    if columns.size == 0:
+        return np.zeros(0), np.zeros((0, 0)), squares
+    inverse = _inverse(gram[columns[:, None], columns])
+    coefficients = inverse @ rhs[columns]
+    return coefficients, inverse, max(0.0, squares - float(rhs[columns] @ coefficients))
+
+
+def _inverse(gram: Array) -> Array:
+    """Inverse of a normal matrix; directions that the readings do not see get zero."""
+    scale = np.sqrt(np.maximum(gram.diagonal(), 1e-300))
+    scales = scale[:, None] * scale
+    unit = gram / scales
+    try:
+        root = np.linalg.cholesky(unit)
+        if float(root.diagonal().min(initial=1.0)) > _REGULAR:
+            # By its factor: of columns that nearly cancel in many steps the inverse of the
+            # matrix itself has negative variances, however long each of them is.
+            half = np.linalg.inv(root)
+            return np.asarray(half.T @ half / scales)
+    except np.linalg.LinAlgError:
+        pass
+    values, vectors = np.linalg.eigh(unit)
+    keep = values > 1e-12 * values[-1]
+    inverse = (vectors[:, keep] / values[keep]) @ vectors[:, keep].T
+    return np.asarray(inverse / scales)
+
+
+class OrderTest(NamedTuple):
+    """Statistics of orders beside the chosen ones (or among them).
+
+    Arrays have one entry per order asked for; ``cosine``/``sine`` are the coefficients
+    with all chosen orders in the model.
+    """
+
+    cosine: Array
+    sine: Array
+    variance: Array
+    statistic: Array
+    log_p: Array
+
+
+def examine_orders(
+    sums: HarmonicSums,
+    chosen: Sequence[int],
+    orders: Sequence[int],
+    noise: tuple[float, float],
+    scatter: Array | None,
+    freedom: int | None = None,
+) -> OrderTest:
+    """Significance of ``orders``, each beside the other chosen ones.
+
+    ``scatter`` (from `run_scatter`, or `neighbour_scatter` with its ``freedom``) replaces the
+    noise for an order where it is more than the noise.
+    """
+    total, rhs, _ = sums.total()
+    n = len(orders)
+    # Of orders that are aliases of the chosen ones nothing is known.
+    cosine, sine, of_one = np.full((3, n), math.nan)
+    gain = np.zeros(n)
+    level = np.full(n, noise[0])
+    dof = np.full(n, noise[1])
+    if scatter is not None:
+        each = 2 * (sums.units - 1) if freedom is None else freedom
+        ratio = np.maximum(scatter, 0.0) / noise[0] * each
+        own = np.isfinite(scatter) & (log_chi2_tail(ratio, each) < math.log(OVERDISPERSED))
+        np.copyto(level, scatter, where=own)
+        dof[own] = each
+    position = {k: i for i, k in enumerate(chosen)}
+    coefficients, inverse, _ = fit_subset(sums, chosen)
+    base = sums.columns(chosen)
+    size = len(chosen)
+    outside = [k for k in orders if k not in position]
+    if outside:
+        other = sums.columns(outside)
+        cross = total[np.ix_(base, other)]
+        slope = inverse @ cross
+        blocks = total[np.ix_(other, other)] - cross.T @ slope
+        scores = rhs[other] - cross.T @ coefficients
+    # Those among the chosen ones, and those that would join them.
+    mine = np.array([i for i, k in enumerate(orders) if k in position], dtype=np.intp)
+    others = np.array([i for i, k in enumerate(orders) if k not in position], dtype=np.intp)
+    if mine.size:
+        place = np.array([position[orders[i]] for i in mine])
+        pair = np.stack([place, place + size], axis=1)
+        inverses = inverse[pair[:, :, None], pair[:, None, :]]
+        value = coefficients[pair]
+        gain[mine] = np.einsum("ki,kij,kj->k", value, np.linalg.pinv(inverses), value)
+        cosine[mine], sine[mine] = value.T
+        of_one[mine] = 0.5 * np.trace(inverses, axis1=1, axis2=2)
+    if others.size:
+        pair = np.stack([np.arange(others.size), np.arange(others.size) + others.size], axis=1)
+        block = blocks[pair[:, :, None], pair[:, None, :]]
+        energy = total.diagonal()[other][pair].sum(axis=1)
+        # Where orders nearly cancel, rounding leaves no symmetric block, and its inverse no
+        # positive variances: those of its symmetric part are.
+        values, vectors = np.linalg.eigh(0.5 * (block + block.transpose(0, 2, 1)))
+        told = values[:, 0] > COLLINEAR * energy
+        others, score, vectors = others[told], scores[pair][told], vectors[told]
+        inverses = (vectors / values[told][:, None, :]) @ vectors.transpose(0, 2, 1)
+        value = np.einsum("kij,kj->ki", inverses, score)
+        gain[others] = np.einsum("ki,ki->k", value, score)
+        cosine[others], sine[others] = value.T
+        of_one[others] = 0.5 * np.trace(inverses, axis1=1, axis2=2)
+    variance = level * of_one
+    # Of orders that nearly are each other rounding leaves nothing, or less.
+    variance = np.maximum(variance, 0.0)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        statistic = np.where(level > 0.0, gain / level, math.inf)
+    statistic[np.isnan(cosine)] = 0.0
+    log_p = np.array([float(log_tail(t, v)) for t, v in zip(statistic, dof, strict=True)])
+    return OrderTest(cosine, sine, variance, statistic, log_p)
+
+
+def held_out_gains(
+    sums: HarmonicSums, chosen: Sequence[int], orders: Sequence[int]
+) -> tuple[Array, Array, float]:
+    """Held-out sum of squares with and without each order, one unit left out at a time.
+
+    The left-out unit keeps its own zero, the chosen orders come from the other units.
+
+    Returns
+    -------
+    without, with_ : ndarray, shape (len(orders),)
+        For an order among the chosen ones ``with_`` is the model itself; for another one
+        ``without`` is. Entry by entry their difference is the gain of that order.
+    model : float
+        Held-out sum of squares of the chosen orders.
+    """
+    position = {k: i for i, k in enumerate(chosen)}
+    outside = [k for k in orders if k not in position]
+    both = np.asarray([*chosen, *outside], dtype=np.intp)
+    size, every = len(chosen), both.size
+    base = np.concatenate([np.arange(size), np.arange(size) + every])
+    other = np.stack([np.arange(size, every), np.arange(size, every) + every], axis=1)
+    grams = [sums.gram(u, both) for u in range(sums.units)]
+    rhs = [sums.rhs(u, both) for u in range(sums.units)]
+    total, whole = np.sum(grams, axis=0), np.sum(rhs, axis=0)
+    model = 0.0
+    dropped, added = np.zeros(size), np.zeros(len(outside))
+    for gram, mine, squares in zip(grams, rhs, sums.squares, strict=True):
+        train, score = total - gram, whole - mine
+        inverse = _inverse(train[np.ix_(base, base)]) if size else np.zeros((0, 0))
+        fitted = inverse @ score[base]
+        here = gram[np.ix_(base, base)]
+        left = mine - gram[:, base] @ fitted
+        error = float(squares - fitted @ (mine[base] + left[base]))
+        model += error
+        # Dropping order j moves all coefficients by -inverse_j inverse_jj^-1 fitted_j.
+        pairs = np.stack([np.arange(size), np.arange(size) + size], axis=1)
+        own = np.linalg.pinv(inverse[pairs[:, :, None], pairs[:, None, :]], hermitian=True)
+        back = np.einsum("bki,kij,kj->bk", inverse[:, pairs], own, fitted[pairs])
+        dropped += error + 2.0 * left[base] @ back + np.einsum("bk,bk->k", back, here @ back)
+        # Adding an order moves the others by -slope times its own coefficients.
+        slope = (inverse @ train[np.ix_(base, other.ravel())]).reshape(2 * size, len(outside), 2)
+        flat = train[np.ix_(base, other.ravel())].reshape(2 * size, len(outside), 2)
+        blocks = train[other[:, :, None], other[:, None, :]] - np.einsum(
+            "bki,bkj->kij", flat, slope
+        )
+        step = np.einsum(
+            "kij,kj->ki",
+            np.linalg.pinv(blocks, rcond=COLLINEAR, hermitian=True),
+            score[other] - np.einsum("bki,b->ki", flat, fitted),
+        )
+        move = np.einsum("bki,ki->bk", slope, step)
+        linear = np.einsum("ki,ki->k", step, left[other]) - left[base] @ move
+        mixed = gram[np.ix_(base, other.ravel())].reshape(2 * size, len(outside), 2)
+        square = (
+            np.einsum("ki,kij,kj->k", step, gram[other[:, :, None], other[:, None, :]], step)
+            - 2.0 * np.einsum("bk,bki,ki->k", move, mixed, step)
+            + np.einsum("bk,bk->k", move, here @ move)
+        )
+        added += square - 2.0 * linear
+    without, with_ = np.full(len(orders), model), np.full(len(orders), model)
+    for i, k in enumerate(orders):
+        if k in position:
+            without[i] = dropped[position[k]]
+        else:
+            with_[i] += added[outside.index(k)]
+    return without, with_, model

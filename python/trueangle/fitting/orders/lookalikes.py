@@ -1,0 +1,73 @@
+"""Orders that the readings themselves cannot tell from those retained.
+
+On one grid an alias explains exactly as much. Where the zeros of the runs differ a
+little, an order m turns by ``m`` times the shift: given noise and amplitude, that may
+or may not decide. The likelihood says which.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Final
+
+import numpy as np
+
+from ...runs.aliasing import Positions, position_coherence
+from .evidence import fit_subset
+from .harmonicsums import ZeroGroupReadings, harmonic_sums
+
+__all__ = ["DECISIVE", "find_lookalikes", "substitution_losses"]
+
+#: Two orders are told apart when one explains better by this many noise variances: a
+#: likelihood ratio of e^5, about 150 to 1.
+DECISIVE: Final = 10.0
+
+#: From here on two orders are one at the positions, whatever the noise.
+_SAME: Final = 1.0 - 1e-9
+
+#: Only orders this alike at the positions are tried: one below explains at most
+#: ``coherence^2`` of the other's energy and fails by itself.
+_ALIKE: Final = 0.9
+
+
+def find_lookalikes(
+    units: Sequence[ZeroGroupReadings],
+    positions: Positions,
+    orders: Sequence[float],
+    variance: float,
+    highest: int,
+) -> list[dict[int, float]]:
+    """For each of ``orders``, those up to ``highest`` that could take its place.
+
+    Returns
+    -------
+    list of dict of int to float
+        Ascending, with the increase of the sum of squares that each would cost; empty
+        where the readings decide.
+    """
+    every = np.arange(1, highest + 1)
+    found: list[dict[int, float]] = []
+    for order in orders:
+        coherence = position_coherence(positions, order, every.astype(np.float64))
+        coherence[[int(k) - 1 for k in orders if k <= highest and k == int(k)]] = 0.0
+        same = {int(m): 0.0 for m in every[coherence > _SAME]}
+        alike = [int(m) for m in every[coherence > _ALIKE] if m not in same]
+        losses = substitution_losses(units, orders, order, alike) if alike else []
+        tried = same | dict(zip(alike, losses, strict=True))
+        found.append({m: tried[m] for m in sorted(tried) if tried[m] < DECISIVE * variance})
+    return found
+
+
+def substitution_losses(
+    units: Sequence[ZeroGroupReadings],
+    orders: Sequence[float],
+    order: float,
+    others: Sequence[float],
+) -> list[float]:
+    """Increase of the sum of squares when each of ``others`` takes the place of ``order``."""
+    rest = [k for k in orders if k != order]
+    together = [*rest, order, *others]
+    sums = harmonic_sums(units, together)
+    kept = list(range(len(rest)))
+    best = fit_subset(sums, [*kept, len(rest)])[2]
+    return [fit_subset(sums, [*kept, len(rest) + 1 + j])[2] - best for j in range(len(others))]

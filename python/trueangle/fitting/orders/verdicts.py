@@ -1,0 +1,262 @@
+"""What a selection means, in words: reasons per order, notes, verified positions."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from typing import Final
+
+import numpy as np
+
+from ...joint.gear import (
+    HIGHEST_LOW_ORDER,
+    explain_as_harmonic,
+    explain_by_shafts,
+    explain_order,
+    wanted_orders,
+)
+from ...runs.aliasing import (
+    Positions,
+    closure_errors,
+    distinct_positions,
+    energy_near_nyquist,
+    fold,
+)
+from ...runs.run import CalibrationRun, as_runs
+from ...support.angles import arcsec
+from .candidates import Candidates, choose_candidates
+from .table import OrderRow, OrderSelection
+
+__all__ = ["VerifiedPositions", "because", "explained", "selection_notes", "verified_positions"]
+
+#: Share of the energy in the upper half of the orders from which under-sampling is said.
+_UNDER_SAMPLED: Final = 0.25
+
+#: Largest noise factor with which mounts count as telling orders apart.
+_TELLING_FACTOR: Final = 5.0
+
+_VERDICTS: Final = {
+    "noise": "does not stand out of the noise",
+    "weak": "significant by itself, but taken up by the retained orders",
+    "no held-out gain": "does not lower the error of readings held out of the fit",
+    "negligible": "significant, but too small to change any reading",
+    "too steep": "with it an indicated angle would stand for several true ones: "
+    "it can be corrected with argument='indicated' only",
+    "small": "has no prominent amplitude",
+    "phase varies": "its phase varies from run to run",
+    "too long": "over so short a travel, passed once, it is not told from drift in time (fitted "
+    "jointly, not kept): run it there and back, or declare the orders",
+    "alias": "cannot be told from retained orders at these positions",
+}
+
+
+def because(verdict: str) -> str:
+    """Why an order of this verdict is not retained, as the rest of a sentence."""
+    return _VERDICTS[verdict]
+
+
+def explained(
+    row: OrderRow, candidates: Candidates, positions: Positions, retained: Mapping[float, float]
+) -> OrderRow:
+    """The row with its explanations and the reason of its verdict.
+
+    ``retained`` are the amplitudes of the retained orders.
+    """
+    ratio, member = candidates.gear_ratio, candidates.fixed_member
+    if row.order in candidates.local:
+        return replace(row, verdict="too long", reason=_VERDICTS["too long"])
+    if row.verdict == "reference":
+        return replace(row, reason=_reference_reason(row.order, candidates.carriers))
+    if not row.retained:
+        return replace(row, reason=_VERDICTS[row.verdict])
+    explanations = (
+        *explain_order(row.order, row.aliases, ratio, member),
+        *explain_by_shafts(row.order, candidates.shafts),
+        *explain_as_harmonic(row.order, retained),
+    )
+    reason = "significant, and lowers the error of readings held out of the fit"
+    rivals = [str(e) for e in explanations if e.order != row.order]
+    named = {e.order for e in explanations}
+    low = _seen_at(row.order, candidates)
+    if low is not None and not rivals:
+        reason += f", and these positions tell it from {low}"
+    # Where the readings only hint at a high order, the low one is a rival too.
+    rivals += [f"{m:g}" for m in row.aliases if m in candidates.main and m not in named]
+    if rivals:
+        reason = (
+            f"{row.order:g} may be {' or '.join(rivals)}; these positions cannot tell. "
+            f"Measure {_measure(positions, ratio, member)}"
+        )
+    return replace(row, explanations=explanations, reason=reason, doubtful=bool(rivals))
+
+
+def _seen_at(order: float, candidates: Candidates) -> int | None:
+    """The low order that one grid of the positions would show instead, if any."""
+    divisions = candidates.effective.divisions
+    if divisions is None or not float(order).is_integer():
+        return None
+    low = fold(int(order), divisions)[0]
+    return low if low != order else None
+
+
+def _reference_reason(order: float, carriers: Sequence[float]) -> str:
+    if order in carriers:
+        return "the reference's own, as declared"
+    carrier = min(carriers, key=lambda c: abs(order - c))
+    return f"the reference's own: side band {order - carrier:+g} of its order {carrier:g}"
+
+
+def _measure(positions: Positions, ratio: float | None, member: str) -> str:
+    """What to measure to tell aliases apart."""
+    if positions.divisions is None:
+        return "over more of the turn, or at more positions"
+    offset = _separating_offset(positions.divisions, ratio, member)
+    where = (
+        f"again with the reference turned by {offset:.4g} deg on its mount"
+        if offset
+        else ("at free angles between these positions")
+    )
+    return f"{where} (`ta.plan_mounts(...)`)"
+
+
+@lru_cache(maxsize=32)
+def _separating_offset(divisions: int, ratio: float | None, member: str) -> float | None:
+    """Offset of a second mount that serves the declared gear, or ratio 100."""
+    from ...planning.plan import plan_mounts
+
+    try:
+        plan = plan_mounts(ratio or 100.0, divisions, 2, fixed_member=member)
+    except ValueError:
+        return None
+    return plan.mount_offsets_deg[1]
+
+
+def selection_notes(
+    selection: OrderSelection, candidates: Candidates, runs: Sequence[CalibrationRun]
+) -> tuple[str, ...]:
+    """What a user must know before trusting the orders."""
+    positions = selection.positions
+    notes = []
+    closure = closure_errors(runs)
+    if closure.size:
+        worst = arcsec(float(np.abs(closure).max()), selection.period)
+        count = f"{closure.size} run{'s' if closure.size > 1 else ''}"
+        notes.append(
+            f"closure: the last reading repeats the first position in {count}, and differs by "
+            f"{worst:.3g} arcsec at most"
+        )
+    retained = [row for row in selection.table if row.retained]
+    aliased = [row for row in retained if row.aliases]
+    grid = positions.divisions is not None and len(positions.offsets) == 1
+    if grid and retained:
+        share = energy_near_nyquist(
+            [row.order for row in retained],
+            [row.amplitude for row in retained],
+            positions.highest_order,
+        )
+        if share > _UNDER_SAMPLED:
+            notes.append(
+                f"{100.0 * share:.0f} % of the energy lies in the upper half of the orders that "
+                "these positions hold: the mark of orders beyond them"
+            )
+    if aliased:
+        notes.append(_sentence(positions, candidates))
+    orders = len(selection.table)
+    independent = round(positions.span * max((row.order for row in selection.table), default=0)) + 1
+    if retained and independent < orders:
+        notes.append(
+            f"over {360.0 * positions.span:.0f} deg orders stand for each other: of {orders} about "
+            f"{independent} are independent, so those retained tell the error within this travel, "
+            "and not for certain which orders it has; a full turn does"
+        )
+    if candidates.local:
+        notes.append(
+            f"over this travel, passed once, orders below {max(candidates.local) + 1.0:g} are not "
+            "told from drift in time: what is slow is fitted jointly and not kept in the model"
+        )
+    if candidates.unresolved:
+        pairs = [f"{m:g} from {k:g}" for m, k in candidates.unresolved.items()]
+        needed = 0.5 / min(abs(m - k) for m, k in candidates.unresolved.items())
+        notes.append(
+            f"over this travel the gear's orders {', '.join(pairs)} cannot be told: the low "
+            f"order stands for both, within this travel only; {needed:.3g} turns tell them"
+        )
+    if candidates.gear_ratio is not None and not candidates.whole:
+        notes.append(
+            f"gear ratio {candidates.gear_ratio:g} is not whole: the error is not periodic in "
+            "one output turn"
+        )
+    return tuple(notes)
+
+
+@dataclass(frozen=True)
+class VerifiedPositions:
+    """Where a model fitted to some readings is verified.
+
+    Attributes
+    ----------
+    count : int
+        Distinct positions modulo a turn.
+    between : bool
+        Whether the readings also speak for the angles in between.
+    sentence : str
+    """
+
+    count: int
+    between: bool
+    sentence: str
+
+
+def verified_positions(
+    runs: CalibrationRun | Iterable[CalibrationRun],
+    gear_ratio: float | None = None,
+    fixed_member: str = "circular_spline",
+) -> VerifiedPositions:
+    """At which positions the readings can verify a model, and whether also in between.
+
+    In between is verified where the positions are no grid, or a grid (or union of grids)
+    that tells the low orders and all orders of the gear from each other; without a
+    declared gear the orders of the common ratios are taken.
+
+    Examples
+    --------
+    >>> run = CalibrationRun(np.arange(36) * 10.0, np.arange(36) * 10.0, period=360.0)
+    >>> verified_positions(run, gear_ratio=100).between
+    False
+    """
+    found = as_runs(runs)
+    positions = distinct_positions(found)
+    candidates = choose_candidates(positions, None, gear_ratio, fixed_member, ())
+    return VerifiedPositions(
+        len(positions), _between(positions, candidates), _sentence(positions, candidates)
+    )
+
+
+def _between(positions: Positions, candidates: Candidates) -> bool:
+    """Whether the readings tell the low orders from those of the gear."""
+    if len(positions.offsets) != 1 and not positions.has_alias(candidates.highest_alias):
+        return True
+    grid = candidates.effective
+    if grid.divisions is None:
+        return False
+    if grid.divisions > 2 * candidates.highest_alias:
+        return True
+    if candidates.gear_ratio is None or not candidates.whole:
+        return False
+    from ...planning.noisefactors import mount_noise_factors
+
+    low = min(HIGHEST_LOW_ORDER, grid.highest_order)
+    orders = wanted_orders(candidates.gear_ratio, candidates.fixed_member, low)
+    if any(m % 1.0 for m in orders):  # the candidates left those of the gear out
+        return False
+    offsets = 360.0 * np.asarray(grid.offsets)
+    worst = float(mount_noise_factors(grid.divisions, offsets, orders).max())
+    return worst <= _TELLING_FACTOR
+
+
+def _sentence(positions: Positions, candidates: Candidates) -> str:
+    where = f"verified at {positions.describe()}"
+    if _between(positions, candidates):
+        return f"{where}, and in between for the orders these tell apart"
+    return f"{where}; in between it is not: higher orders look like those retained"

@@ -1,0 +1,77 @@
+"""Units of readings with a zero of their own, and folds of a single run."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...runs.aliasing import Positions
+from ...runs.run import CalibrationRun
+from ...runs.travel import over_turns
+from ...support.angles import wrap
+from .harmonicsums import ZeroGroupReadings
+
+__all__ = ["angle_blocks", "units_of"]
+
+#: Folds of a single run: whole blocks of neighbouring positions, dealt in turn.
+_FOLDS: Final = 6
+_BLOCKS: Final = 24
+
+#: Readings a run up to which the call of a function costs more than what it computes.
+_SHORT: Final = 1000
+
+
+def units_of(
+    runs: Sequence[CalibrationRun], whole: bool
+) -> tuple[list[ZeroGroupReadings], NDArray[np.intp]]:
+    """Units with a zero of their own: runs, split where the mount changes within one.
+
+    Returns the units and the place of each of their readings among all readings of the
+    runs. Angles are taken over turns unless ``whole`` (all orders are whole).
+    """
+    units, places, start = [], [], 0
+    for number, (run, error) in enumerate(zip(runs, _centred(runs), strict=True)):
+        label = run.label or str(number + 1)
+        angle = (run if whole else over_turns(run)).reference
+        weights = np.ones(len(run)) if run.weights is None else run.weights
+        everything = ZeroGroupReadings(angle / run.period, error, weights, label)
+        place = np.arange(start, start + len(run))
+        if run.mount is not None and np.unique(run.mount).size > 1:
+            for mount in np.unique(run.mount):
+                mask = run.mount == mount
+                units.append(everything.part(mask, f"{label}, mount {mount:g}"))
+                places.append(place[mask])
+        else:
+            units.append(everything)
+            places.append(place)
+        start += len(run)
+    return units, np.concatenate(places)
+
+
+def _centred(runs: Sequence[CalibrationRun]) -> Iterator[NDArray[np.float64]]:
+    """Error of every run unfolded around its zero; of many short runs all at once."""
+    sizes = np.array([len(run) for run in runs])
+    if sizes.mean() > _SHORT or len({run.period for run in runs}) > 1:
+        yield from (run.centred_error for run in runs)
+        return
+    period = runs[0].period
+    error = np.concatenate([run.indicated for run in runs])
+    error -= np.concatenate([run.reference for run in runs])
+    ends = np.cumsum(sizes)
+    vectors = np.add.reduceat(np.exp(error * (2j * math.pi / period)), ends - sizes)
+    zero = np.repeat(wrap(np.angle(vectors) * (period / (2.0 * math.pi)), period), sizes)
+    yield from np.split(zero + wrap(error - zero, period), ends[:-1])
+
+
+def angle_blocks(unit: ZeroGroupReadings, positions: Positions) -> list[ZeroGroupReadings]:
+    """Folds of a single run: blocks of neighbouring positions, dealt in turn."""
+    blocks = min(_BLOCKS, len(positions) // 2)
+    folds = min(_FOLDS, blocks)
+    if folds < 2:
+        return []
+    fold = (positions.index * blocks // len(positions)) % folds
+    return [unit.part(fold == f, f"block {f + 1}") for f in range(folds)]

@@ -1,0 +1,199 @@
+"""Signals of a run beside its two angles: the one list of their names, units and columns.
+
+A further signal is a line of `SIGNALS`: columns of files, `CalibrationRun.signal` and the
+option for signals follow it.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Mapping
+from typing import Generic, NamedTuple, TypeAlias, TypedDict, TypeVar
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..errors import ArgumentError
+from ..support.suggestions import did_you_mean
+
+__all__ = [
+    "AT_RUN_TIME",
+    "FIELDS",
+    "SIGNALS",
+    "GivenSignals",
+    "Signal",
+    "Signals",
+    "check_names",
+    "column",
+    "find_signal",
+    "signal_columns",
+]
+
+#: Values by the name of the signal; one per reading, or one for all.
+Signals: TypeAlias = Mapping[str, ArrayLike]
+
+
+T = TypeVar("T")
+
+
+class GivenSignals(TypedDict, Generic[T], total=False):
+    """Keyword arguments of corrections: the signals a joint's control loop can have.
+
+    Attributes
+    ----------
+    direction
+        Sign of travel; 0 keeps the last one.
+    velocity
+        Angle units per second.
+    temperature
+        Degrees Celsius.
+    torque
+        Newton metres at the output.
+    current
+        Amperes of the motor.
+    """
+
+    direction: T | None
+    velocity: T | None
+    temperature: T | None
+    torque: T | None
+    current: T | None
+
+
+#: Names of the signals that a correction may take.
+AT_RUN_TIME: tuple[str, ...] = tuple(GivenSignals.__annotations__)
+
+
+def check_names(given: Iterable[str]) -> None:
+    """Refuse keyword arguments that no correction takes, as Python does.
+
+    Raises
+    ------
+    TypeError
+    """
+    for name in given:
+        if name not in AT_RUN_TIME:
+            raise TypeError(
+                f"got an unexpected keyword argument {name!r}{did_you_mean(name, AT_RUN_TIME)}; "
+                f"signals are {', '.join(AT_RUN_TIME)}"
+            )
+
+
+class Signal(NamedTuple):
+    """One signal.
+
+    Attributes
+    ----------
+    name : str
+    kind : {"time", "angle", "velocity", "plain"}
+        What its unit is one of. Angles and velocities are kept in the unit of the run's
+        period, times in seconds, others in the unit of their only column.
+    column : str
+        Name of its column; of angles and velocities, with ``{}`` for the unit.
+    meaning : str
+    """
+
+    name: str
+    kind: str
+    column: str
+    meaning: str
+
+
+#: Every signal by its name.
+SIGNALS: Mapping[str, Signal] = {
+    signal.name: signal
+    for signal in (
+        Signal("time", "time", "time_s", "seconds, not decreasing within a run"),
+        Signal("temperature", "plain", "temperature_C", "degrees Celsius"),
+        Signal("torque", "plain", "torque_Nm", "newton metres at the output"),
+        Signal("current", "plain", "current_A", "of the motor, amperes, with its sign"),
+        Signal("velocity", "velocity", "velocity_{}_s", "of the output"),
+        Signal("direction", "plain", "direction", "of travel: -1, 0 or 1"),
+        Signal("mount", "angle", "mount_{}", "how far the reference was turned on its mount"),
+        Signal("shift", "angle", "shift_{}", "how far one of two encoders was turned"),
+        Signal("motor", "angle", "motor_{}", "the motor's own angle, not reduced"),
+    )
+}
+
+#: Signals that are fields of `CalibrationRun`; the others are in its ``signals``.
+FIELDS = ("time", "temperature", "torque", "mount", "velocity")
+
+_HEAD = re.compile(r"head[1-9][0-9]?")
+
+
+def find_signal(name: str) -> Signal:
+    """The signal called ``name``; ``head1`` to ``head99`` are readings of several heads.
+
+    Raises
+    ------
+    ArgumentError
+        No signal has this name.
+
+    Examples
+    --------
+    >>> find_signal("head2").column
+    'head2_{}'
+    """
+    if _HEAD.fullmatch(name):
+        return Signal(name, "angle", f"{name}_{{}}", "one of several heads on one disc")
+    try:
+        return SIGNALS[name]
+    except KeyError:
+        known = [*SIGNALS, "head1", "head2"]
+        raise ArgumentError(
+            f"no signal is called {name!r}{did_you_mean(name, known)}; signals are "
+            f"{', '.join(known)}"
+        ) from None
+
+
+def signal_columns(
+    signals: Signals, size: int, reserved: tuple[str, ...] = FIELDS
+) -> dict[str, NDArray[np.float64]]:
+    """``signals`` as one read-only array of ``size`` finite numbers each.
+
+    Raises
+    ------
+    ArgumentError
+        A name that no signal has, or one of ``reserved``, which are given on their own.
+    """
+    if not isinstance(signals, Mapping):
+        raise ArgumentError(
+            f"signals must be a mapping of names to values, got {type(signals).__name__}"
+        )
+    found = {}
+    for name, values in signals.items():
+        signal = find_signal(name)
+        if signal.name in reserved:
+            raise ArgumentError(
+                f"{name} is an argument of its own: give `{name}=` beside `signals=`"
+            )
+        found[name] = column(f"signals[{name!r}]", values, size)
+    return found
+
+
+def column(name: str, values: ArrayLike, size: int | None) -> NDArray[np.float64]:
+    """``values`` as a read-only one-dimensional float array of ``size`` finite numbers.
+
+    One number stands for ``size`` of them; without ``size`` any length but zero will do.
+    """
+    try:
+        array = np.array(values, dtype=np.float64)
+    except (TypeError, ValueError) as cause:
+        raise ArgumentError(f"{name} must be numbers: {cause}") from None
+    if size is not None and array.ndim == 0:
+        array = np.full(size, float(array))
+    if array.ndim != 1:
+        raise ArgumentError(f"{name} must be one-dimensional, got shape {array.shape}")
+    if size is None and array.size == 0:
+        raise ArgumentError(f"{name} is empty: a run needs at least one reading")
+    if size is not None and array.size != size:
+        raise ArgumentError(f"{name} has {array.size} readings, reference has {size}")
+    bad = np.flatnonzero(~np.isfinite(array))
+    if bad.size:
+        i = int(bad[0])
+        raise ArgumentError(
+            f"{name}[{i}] is {array[i]}: readings must be finite; drop the row "
+            f"({bad.size} such value{'s' if bad.size > 1 else ''})"
+        )
+    array.flags.writeable = False
+    return array

@@ -1,0 +1,266 @@
+"""Passes over logs whose readings are summed: one, and more where outliers ask for it."""
+
+from __future__ import annotations
+
+import math
+import warnings
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..errors import (
+    NoModelError,
+    TrueAngleError,
+    UnlikeRunsWarning,
+)
+from ..estimation.moments import Moments
+from ..fitting.argument import AnyArgument, choose_argument
+from ..fitting.fit import ROUNDING, fit
+from ..fitting.orders.candidates import HIGHEST_FREE_ORDER, HIGHEST_SCANNED, SHAFT_HARMONICS
+from ..fitting.problem import Fitted
+from ..fitting.result import FitResult
+from ..fitting.robust import (
+    FAR,
+    HIDDEN,
+    MANY,
+    WILD,
+    WILD_SHARE,
+    robust_scale,
+)
+from ..fitting.summed import Summed
+from ..formats.columns import wanted_columns
+from ..joint.gear import gear_orders
+from ..joint.shafts import Shaft, ShaftOrders, shaft_cycles
+from ..model.model import Argument, HarmonicModel
+from ..runs.run import CalibrationRun, Source
+from ..support.angles import wrap
+from ..support.files import partition_name
+from .accumulation import Accumulated, LogFitSettings, OutlierLimits, accumulate_each, merged
+from .keeping import SAMPLE
+from .progress import Progress
+
+__all__ = ["Passes"]
+
+#: Orders per order of the table that sums of segments hold to a part in 1e10.
+_REACH = 2.89
+#: With more logs, each with its sums, the scan beyond the low orders is left out.
+_MOST_SCANNED = 64
+#: Places across a segment at which the model is looked at.
+_ACROSS = np.linspace(0.0, 1.0, 5)
+#: Passes, at most, in which outliers are set aside and looked for anew.
+_PASSES = 4
+
+
+class Passes:
+    """Passes over logs: one, and more where outliers or the angle of the errors ask for it."""
+
+    def __init__(
+        self,
+        paths: Sequence[Path],
+        asked: Sequence[ShaftOrders] | None,
+        joint: Mapping[str, Any],
+        files: Mapping[str, Any],
+        threads: int | None,
+        checksums: bool,
+        scheduler: str | None,
+        progress: str,
+        most: int,
+    ) -> None:
+        self.paths, self.asked, self.joint = paths, asked, joint
+        self.scheduler, self.progress = scheduler, progress
+        cycles = shaft_cycles(joint["gear_ratio"], joint["fixed_member"])
+        cycles |= dict(joint["shafts"] or {})
+        if asked is None:
+            orders = _table(cycles, joint, len(paths))
+        else:
+            orders = {shaft.name: shaft.orders for shaft in asked}
+            cycles = {shaft.name: shaft.cycles_per_turn for shaft in asked}
+            # The ends of the travel are those within a turn of the output.
+            orders.setdefault("output", (1,))
+            cycles.setdefault("output", 1.0)
+        self.settings = LogFitSettings(
+            orders,
+            cycles,
+            counts_per_turn=files.get("counts_per_turn"),
+            counts_per_turn_reference=files.get("counts_per_turn_reference"),
+            signals=wanted_columns(files.get("signals")),
+            topic=files.get("topic"),
+            threads=threads,
+            checksums=checksums,
+            kept=max(min(most, SAMPLE) // len(paths), 1),
+            part=min(1.0, SAMPLE / most),
+        )
+
+    def first(self, argument: AnyArgument) -> Summed:
+        """All readings, at the angle that the error is a function of."""
+        given: Argument = "indicated" if argument == "indicated" else "reference"
+        found = self._pass(given)
+        chosen = choose_argument(found.runs, argument, self.asked).argument
+        return found if chosen == given else self._pass(chosen)
+
+    def settled(self, argument: AnyArgument, fitted: Callable[[Summed], FitResult]) -> FitResult:
+        """The fit of all readings but the outliers, which `weigh` would set aside as well."""
+        plain = _Judged(self.first(argument), fitted)
+        start = plain.start()
+        if start is None:
+            return plain.answer()
+        judged, outliers = plain, start
+        for _ in range(_PASSES):
+            before = judged.summed.outliers
+            found = self._pass(plain.summed.argument, outliers)
+            if not 0.0 < len(found.outliers) / found.readings <= WILD_SHARE:
+                return plain.answer()
+            judged = _Judged(found, fitted)
+            if found.outliers == before or judged.result is None:
+                break
+            outliers = judged.outliers(judged.result.fitted)
+        if plain.is_hidden and HIDDEN * judged.scale > plain.scale:
+            return plain.answer()  # what the model lacks does not go away with some readings
+        return judged.answer()
+
+    def _pass(self, argument: Argument, outliers: OutlierLimits | None = None) -> Summed:
+        settings = replace(self.settings, argument=argument, outliers=outliers)
+        found = _accumulated(self.paths, settings, self.scheduler, self.progress)
+        self.last = _summed(found, argument)
+        return self.last
+
+
+class _Judged:
+    """The fit of what a pass found, and how far its readings are off."""
+
+    def __init__(self, summed: Summed, fitted: Callable[[Summed], FitResult]) -> None:
+        self.summed, self._fitted = summed, fitted
+        self.result: FitResult | None = None
+        self.scale, self.is_hidden = 0.0, True
+        with warnings.catch_warnings(record=True) as told:
+            warnings.simplefilter("always", UnlikeRunsWarning)
+            try:
+                self.result = fitted(summed)
+            except NoModelError:
+                return
+        self._told = told
+        problem = self.result.problem
+        self._floor = ROUNDING * problem.period
+        self.sample = np.concatenate(problem.residuals(self.result.fitted))
+        self.scale = robust_scale(self.sample)
+
+    def answer(self) -> FitResult:
+        """The fit; raises where there is none."""
+        if self.result is None:
+            return self._fitted(self.summed)
+        for one in self._told:
+            warnings.warn(one.message, one.category, stacklevel=4)
+        return self.result
+
+    def start(self) -> OutlierLimits | None:
+        """What is an outlier, by a robust fit of the readings kept; None where none can be."""
+        orders = None
+        if self.result is not None:
+            self.is_hidden = not _is_beyond(self.summed.moments, self.outliers(self.result.fitted))
+            many = (
+                np.count_nonzero(np.abs(self.sample) > FAR * self.scale) > MANY * self.sample.size
+            )
+            if self.is_hidden and not (many and self.scale > self._floor):
+                return None
+            orders = self.result.problem.shafts
+        try:
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore", UnlikeRunsWarning)
+                rough = fit(
+                    self.summed.runs,
+                    None if orders is None else {s.name: s.orders for s in orders},
+                    shafts={s.name: s.cycles_per_turn for s in orders or ()},
+                    argument=self.summed.argument,
+                )
+        except TrueAngleError:
+            return None
+        self.scale = self.scale or math.inf
+        return self.outliers(rough.fitted, robust_scale(rough.residuals))
+
+    def outliers(self, fitted: Fitted, scale: float | None = None) -> OutlierLimits:
+        """Readings that are outliers to a fit of these runs."""
+        limit = max(WILD * (self.scale if scale is None else scale), ROUNDING * fitted.period)
+        zeros = dict(zip(self.summed.moments.runs, fitted.offsets.tolist(), strict=True))
+        return OutlierLimits(_model(fitted), zeros, limit)
+
+
+def _model(fitted: Fitted) -> HarmonicModel:
+    """The series of a fit without its zero."""
+    solution = fitted.solution
+    pairs = zip(fitted.shafts, solution.cosine, solution.sine, strict=True)
+    return HarmonicModel(
+        tuple(Shaft(s.name, s.cycles_per_turn, s.orders, tuple(a), tuple(b)) for s, a, b in pairs),
+        period=fitted.period,
+    )
+
+
+def _is_beyond(moments: Moments, outliers: OutlierLimits) -> bool:
+    """Whether in any segment an error is beyond the limit from all that the model has there."""
+    for run in moments.runs:
+        high, low, most, least = moments.extremes(run).T
+        expected = np.asarray(outliers.model.error(low + (high - low) * _ACROSS[:, None]))
+        most, least = (wrap(y - outliers.zeros[run], moments.period) for y in (most, least))
+        far = np.maximum(most - expected.max(axis=0), expected.min(axis=0) - least)
+        if float(far.max()) > outliers.limit:
+            return True
+    return False
+
+
+def _table(cycles: Mapping[str, float], joint: Mapping[str, Any], logs: int) -> dict[str, Any]:
+    """Orders of sums that serve every candidate of a selection."""
+    ratio, declared = joint["gear_ratio"], (joint["shafts"] or {}).values()
+    highest = HIGHEST_SCANNED if logs <= _MOST_SCANNED else HIGHEST_FREE_ORDER
+    gear = [] if ratio is None else gear_orders(ratio, joint["fixed_member"])
+    most = max(highest, *map(float, gear), *(SHAFT_HARMONICS[-1] * float(f) for f in declared), 0.0)
+    return dict.fromkeys(cycles, (1,)) | {"output": (1, math.ceil(most / _REACH))}
+
+
+def _summed(found: Accumulated, argument: Argument) -> Summed:
+    """What a pass found, its runs named as they are in memory."""
+    moments, tallies = found.moments, found.tallies
+    sources = {
+        file: Source(partition_name(file), sha256)
+        for file, sha256 in zip(found.files, found.sha256, strict=True)
+    }
+    runs, outliers, ends = [], [], []
+    for i, run in enumerate(moments.runs):
+        assert isinstance(run, tuple)
+        file, unit, label = run
+        kept = found.kept.columns(run)
+        unit, label = (None if name is None else str(name) for name in (unit, label))
+        runs.append(
+            CalibrationRun(*kept, moments.period, label=label, unit=unit, source=sources[file])
+        )
+        outliers += [(label or str(i), row) for row in tallies[run].outliers]
+        ends.append(moments.extremes(run)[:, :2].ravel())
+    return Summed(
+        moments,
+        tuple(runs),
+        np.concatenate(ends),
+        np.array([v for tally in tallies.values() for v in (tally.low, tally.high)]),
+        argument,
+        sum(tally.rows for tally in tallies.values()),
+        found.missing,
+        tuple(outliers),
+    )
+
+
+def _accumulated(
+    paths: Sequence[Path], settings: LogFitSettings, scheduler: str | None, progress: str
+) -> Accumulated:
+    if scheduler is not None:
+        from .cluster import accumulated_on_cluster
+
+        return accumulated_on_cluster(scheduler, paths, settings)
+    shown = Progress(len(paths), sum(path.stat().st_size for path in paths), progress)
+    parts = []
+    try:
+        for part in accumulate_each(paths, settings, shown.add):
+            parts.append(part)
+            shown.files += 1
+    finally:
+        shown.clear()
+    return merged(parts)

@@ -1,0 +1,12 @@
+"""What a model corrects beyond harmonics: forms, terms, and the corrector that holds state."""
+
+from __future__ import annotations
+
+from typing import Any
+
+
+def __getattr__(name: str) -> Any:
+    # `trueangle.model` was one module.
+    from ..support.renamed import attribute
+
+    return attribute(__name__, f"{__name__}.model", name)

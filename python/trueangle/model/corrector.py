@@ -1,0 +1,139 @@
+"""Correction of samples in the order they were taken, with the state that needs."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import TYPE_CHECKING, Any, Unpack
+
+from numpy.typing import ArrayLike, NDArray
+
+from ..formats.signals import GivenSignals, check_names
+from .velocity import Velocity
+
+if TYPE_CHECKING:
+    from .model import HarmonicModel, Step
+
+__all__ = ["Corrector"]
+
+
+class Corrector:
+    """Corrects batches and single samples, one after the other, of one log or one joint.
+
+    Made by `HarmonicModel.corrector`. Backlash and hysteresis depend on travel before:
+    the state is carried from call to call, so that batches of a log give bit for bit what
+    the whole log gives at once, and single steps the same.
+
+    A corrector belongs to one thread: called by two at once it raises `RuntimeError` or
+    takes the samples in an order that nobody chose. Models, and `step` of a model without
+    terms, hold no state and may be shared by any number of threads.
+
+    Parameters
+    ----------
+    model : HarmonicModel
+
+    Examples
+    --------
+    A log in two batches, with the play crossed in the second one:
+
+    >>> import trueangle as ta
+    >>> model = ta.HarmonicModel([], period=360.0, terms=[ta.Backlash(0.5)])
+    >>> corrector = model.corrector()
+    >>> corrector([10.5, 11.5, 12.5], velocity=1.0)
+    array([10., 11., 12.])
+    >>> corrector([11.5, 10.5], velocity=-1.0)
+    array([12., 11.])
+    >>> corrector.reset()
+    """
+
+    def __init__(self, model: HarmonicModel) -> None:
+        self._model = model
+        self._core = model._core_corrector()
+        self._velocity = Velocity(model.period)
+
+    @property
+    def step(self) -> Step:
+        """``step(indicated, velocity=, temperature=, torque=, direction=, current=) -> corrected``.
+
+        One sample, in the state of this corrector: a bound method of the compiled core
+        without allocation but the result. A signal the model needs and does not get is a
+        `MissingSignalError`; others are ignored.
+        """
+        return self._core.step
+
+    def __reduce__(self) -> tuple[Any, ...]:  # copies go on from where this one stands
+        return _rebuild, (self._model, self.state)
+
+    def reset(self) -> None:
+        """Forget the past: the next sample is the first one."""
+        self._core.reset()
+        self._velocity.reset()
+
+    @property
+    def state(self) -> tuple[float, ...]:
+        """All that later samples need to know of the past, as numbers to keep and to set.
+
+        Raises
+        ------
+        ArgumentError
+            When set: not the state of a corrector of this model.
+        """
+        return (*self._velocity.state, *self._core.store())
+
+    @state.setter
+    def state(self, numbers: Iterable[float]) -> None:
+        angle, time, last, *travel = (*numbers,)
+        self._core.restore(travel)
+        self._velocity.state = angle, time, last
+
+    def __call__(
+        self,
+        indicated: ArrayLike,
+        out: NDArray[Any] | None = None,
+        *,
+        time: ArrayLike | None = None,
+        threads: int | None = None,
+        **signals: Unpack[GivenSignals[ArrayLike]],
+    ) -> float | NDArray[Any]:
+        """True angles behind the next indicated ones; see `HarmonicModel.correct`.
+
+        Parameters
+        ----------
+        indicated : float or array_like
+            In the order taken (C order); steps below half a turn.
+        out : ndarray, optional
+        time : array_like, optional
+            Seconds of every sample: in place of a velocity that is not given, backward
+            differences of the indicated angle. At equal times the last velocity holds; the
+            very first sample takes that of the second.
+        threads : int, optional
+        direction, velocity, temperature, torque, current : float or array_like, optional
+            Signals, broadcast against ``indicated``. Those that the model does not use
+            are ignored.
+
+        Returns
+        -------
+        float or ndarray
+            Of the broadcast shape. NaN for samples with an angle or a signal that is not
+            finite, which leave the state alone.
+
+        Raises
+        ------
+        MissingSignalError
+            Names the signal and the term that needs it.
+        ArgumentError
+            Shapes that do not fit.
+        """
+        check_names(signals)
+        if (
+            time is not None
+            and signals.get("velocity") is None
+            and "velocity" in self._model.uses_signals
+        ):
+            signals["velocity"] = self._velocity(indicated, time)
+        return self._core.correct(indicated, out, threads=threads, **signals)[0]
+
+
+def _rebuild(model: HarmonicModel, state: tuple[float, ...]) -> Corrector:
+    corrector = model.corrector()
+    corrector.state = state
+    return corrector

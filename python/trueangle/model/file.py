@@ -1,0 +1,352 @@
+"""The model file: JSON that states sign, unit and argument, checked when read."""
+
+from __future__ import annotations
+
+import warnings
+from dataclasses import fields
+from os import PathLike
+from pathlib import Path
+from typing import Any, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import ArgumentError, FileError, ModelFileError, OutsideSpanWarning
+from ..joint.shafts import Shaft
+from ..runs.run import Source
+from ..support.decoding import (
+    MAX_LINE_ORDERS,
+    MAX_LINES,
+    MAX_ORDER,
+    Decoder,
+    json_text,
+    read_text,
+    shown,
+)
+from ..support.files import MODEL_BYTES
+from ..support.kinds import told_kinds
+from .model import HarmonicModel
+from .records import FitRecord, Provenance, TableRecord
+from .term import Term, known_terms
+from .text import FORMAT, VERSION, model_text, save_model
+
+__all__ = ["FORMAT", "VERSION", "load_model", "model_text", "save_model"]
+
+Array: TypeAlias = NDArray[np.float64]
+
+#: Key of the file -> whether it must be there.
+_KEYS = {
+    "format": True,
+    "version": True,
+    "period": True,
+    "argument": True,
+    "shafts": True,
+    "constant": True,
+    "terms": False,
+    "covariance": False,
+    "condition_number": False,
+    "fit": False,
+    "provenance": False,
+}
+#: Terms of a model, lines of one term, and runs or files that a record lists, at most.
+MAX_TERMS = 64
+MAX_TERM_LINES = 4096
+MAX_OFFSETS = 1_000_000
+#: Turns, at most, of angles and amplitudes: beyond, angles have no digits left.
+_MOST_TURNS = 1e9
+#: Smallest turn in the unit of angles, and the inverse of the largest.
+_LEAST_PERIOD = 1e-12
+#: Sentences that a record says of what its model is blind to.
+_MOST_SENTENCES = 1000
+#: Highest order times number of harmonics up to which the greatest slope of a steep model is
+#: looked for: a second of work.
+_STEEP_LINE_ORDERS = 3e5
+#: Signals (velocity in turns per second) at which any model must correct.
+_NORMAL = (
+    {"velocity": 0.01, "temperature": 20.0, "torque": 1.0, "current": 1.0, "direction": 1.0},
+    {"velocity": -0.01, "temperature": 40.0, "torque": -1.0, "current": -1.0, "direction": -1.0},
+)
+_SHAFT_KEYS = ("name", "cycles_per_turn", "orders", "cosine", "sine")
+
+
+@told_kinds
+def load_model(path: str | PathLike[str]) -> HarmonicModel:
+    """Read and check a model file; nothing in it is executed.
+
+    Raises
+    ------
+    ModelFileError
+        Not JSON, truncated, of a later version, unknown or missing keys, numbers that
+        are not finite, a model that cannot be inverted: names the key and what to do.
+    """
+    return _Reader(Path(path), ModelFileError).model()
+
+
+class _Reader(Decoder):
+    """Checks one file key by key; every refusal names file and key."""
+
+    def content(self) -> dict[str, Any]:
+        text = read_text(self.path, MODEL_BYTES, self.kind, "a model")
+        value = json_text(self.path, text, self.kind, "a model file")
+        if not isinstance(value, dict) or value.get("format") != FORMAT:
+            raise self.error(f'is not a model file: "format" must be "{FORMAT}"')
+        return value
+
+    def model(self) -> HarmonicModel:
+        content = self.content()
+        version = self.whole(content.get("version"), "version", 1)
+        if version > VERSION:
+            raise self.error(
+                f"{version} is later than {VERSION}, the latest this release reads; "
+                "upgrade trueangle",
+                "version",
+            )
+        self.table(content, _KEYS)
+        argument = content["argument"]
+        if argument not in ("reference", "indicated"):
+            raise self.error(
+                f"must be 'reference' or 'indicated', got {shown(argument)}", "argument"
+            )
+        condition = content.get("condition_number")
+        period = self.number(content["period"], "period")
+        if not _LEAST_PERIOD <= period <= 1.0 / _LEAST_PERIOD:
+            raise self.error(
+                f"one turn in the unit of the angles (360 for degrees) is needed, got {period!r}",
+                "period",
+            )
+        shafts = self.shafts(content["shafts"], _MOST_TURNS * period)
+        if argument == "reference":
+            self.check_steepness(shafts, period)
+        try:
+            model = HarmonicModel(
+                shafts=shafts,
+                constant=self.number(content["constant"], "constant"),
+                period=period,
+                argument=argument,
+                covariance=self.covariance(content.get("covariance"), shafts),
+                condition_number=None if condition is None else self.condition(condition),
+                fit=self.fit(content.get("fit"), period),
+                provenance=self.provenance(content.get("provenance")),
+                terms=self.terms(content.get("terms")),
+            )
+            if model.terms:
+                self.check_finite(model)
+        except FileError:
+            raise
+        except ValueError as cause:  # the model's own checks, under the file's name
+            raise self.error(str(cause)) from None
+        return model
+
+    def check_steepness(self, shafts: tuple[Shaft, ...], period: float) -> None:
+        """Refuse steep models of so high orders that nobody waits for their proof."""
+        harmonics = sum(len(shaft.orders) for shaft in shafts)
+        highest = max((s.cycles_per_turn * max(s.orders, default=0) for s in shafts), default=0.0)
+        if harmonics * highest <= _STEEP_LINE_ORDERS:
+            return
+        slope = sum(
+            float(np.dot(np.asarray(s.orders) * s.cycles_per_turn, sizes))
+            for s in shafts
+            if (sizes := _sizes(s)).size == len(s.orders)
+        )
+        if slope * 2.0 * np.pi / period >= 1.0:
+            raise self.error(
+                f"|error'| may reach {slope * 2.0 * np.pi / period:.3g}, and {harmonics} "
+                f"harmonics of up to {highest:.6g} cycles per turn are too many to look for its "
+                "greatest value; use fewer or lower orders",
+                "shafts",
+            )
+
+    def check_finite(self, model: HarmonicModel) -> None:
+        """Terms whose numbers leave no finite correction at a joint's normal signals."""
+        angles = np.arange(0.0, 1.0, 1.0 / 16.0) * model.period
+        start = 0.0 if model.fit is None else model.fit.span[0]
+        for signals in _NORMAL:
+            given: Any = {
+                name: value * model.period if name == "velocity" else value
+                for name, value in signals.items()
+                if name in model.uses_signals
+            }
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore", OutsideSpanWarning)
+                corrected = model.correct(start + angles, **given)
+            if not np.isfinite(corrected).all():
+                listed = ", ".join(f"{name} {value:g}" for name, value in given.items())
+                raise self.error(f"leave no finite correction at {listed or 'any angle'}", "terms")
+
+    def condition(self, value: Any) -> float:
+        number = self.number(value, "condition_number")
+        if number < 0.0:
+            raise self.error(f"must not be negative, got {number!r}", "condition_number")
+        return number
+
+    def covariance(self, value: Any, shafts: tuple[Shaft, ...]) -> Array | None:
+        if value is None:
+            return None
+        size = 1 + 2 * sum(len(shaft.orders) for shaft in shafts)
+        rows = self.items(value, "covariance", "rows")
+        if len(rows) != size:
+            raise self.error(
+                f"must be square, {size} x {size} for these shafts, got {len(rows)} rows",
+                "covariance",
+            )
+        found = np.empty((size, size))
+        for i, row in enumerate(rows):
+            numbers = self.numbers(row, f"covariance[{i}]")
+            if len(numbers) != size:
+                raise self.error(f"must be square, {size} x {size}", "covariance")
+            found[i] = numbers
+        return found
+
+    def shafts(self, value: Any, most: float) -> tuple[Shaft, ...]:
+        shafts = []
+        harmonics, highest = 0, 0.0
+        for i, entry in enumerate(self.items(value, "shafts", "shafts")):
+            where = f"shafts[{i}]"
+            table = self.table(entry, dict.fromkeys(_SHAFT_KEYS, True), where)
+            cycles = self.number(table["cycles_per_turn"], f"{where}.cycles_per_turn")
+            if not cycles > 0.0:
+                raise self.error(f"must be positive, got {cycles!r}", f"{where}.cycles_per_turn")
+            listed = self.items(table["orders"], f"{where}.orders", "orders")
+            orders = tuple(
+                self.whole(k, f"{where}.orders[{j}]", 1, 2**32 - 1) for j, k in enumerate(listed)
+            )
+            harmonics += len(orders)
+            highest = max(highest, cycles * max(orders, default=0))
+            if highest > MAX_ORDER:
+                raise self.error(
+                    f"{highest:.6g} cycles per output turn are more than {MAX_ORDER:.0f}", where
+                )
+            if harmonics > MAX_LINES or harmonics * highest > MAX_LINE_ORDERS:
+                raise self.error(
+                    f"{harmonics} harmonics of up to {highest:.6g} cycles per turn are too many: "
+                    f"at most {MAX_LINES}, and {MAX_LINE_ORDERS:.0g} of their product",
+                    "shafts",
+                )
+            shafts.append(
+                Shaft(
+                    self.text(table["name"], f"{where}.name"),
+                    cycles,
+                    orders,
+                    self.amplitudes(table["cosine"], f"{where}.cosine", most),
+                    self.amplitudes(table["sine"], f"{where}.sine", most),
+                )
+            )
+        return tuple(shafts)
+
+    def amplitudes(self, value: Any, key: str, most: float) -> tuple[float, ...]:
+        found = self.numbers(value, key)
+        for i, amplitude in enumerate(found):
+            if abs(amplitude) > most:
+                raise self.error(f"more than {_MOST_TURNS:.0g} turns: {amplitude!r}", f"{key}[{i}]")
+        return found
+
+    def terms(self, value: Any) -> tuple[Term, ...]:
+        if value is None:
+            return ()
+        terms = []
+        kinds = known_terms()
+        for i, entry in enumerate(self.items(value, "terms", "terms", MAX_TERMS)):
+            where = f"terms[{i}]"
+            if not isinstance(entry, dict):
+                raise self.error(f"an object is needed, got {shown(entry)}", where)
+            kind = entry.get("kind")
+            if not isinstance(kind, str) or kind not in kinds:
+                raise self.error(
+                    f"{shown(kind)} is unknown; the kinds are {', '.join(kinds)}; "
+                    "a later trueangle may know it",
+                    f"{where}.kind",
+                )
+            table = {key: self.parameter(v, f"{where}.{key}") for key, v in entry.items()}
+            table.pop("kind")
+            try:
+                terms.append(kinds[kind].from_table(table))
+            except ArgumentError as cause:
+                raise self.error(str(cause), where) from None
+        return tuple(terms)
+
+    def parameter(self, value: Any, key: str) -> Any:
+        """A parameter of a term: a number, a text, none, or lists of numbers."""
+        if value is None or isinstance(value, str):
+            return value
+        if not isinstance(value, list):
+            number = self.number(value, key)
+            if key.endswith("order") and abs(number) > MAX_ORDER:
+                raise self.error(f"more than {MAX_ORDER:.0f} cycles per turn", key)
+            return value
+        found = self.items(value, key, "numbers", MAX_TERM_LINES)
+        for i, entry in enumerate(found):
+            if isinstance(entry, list):
+                self.numbers(entry, f"{key}[{i}]", MAX_TERM_LINES)
+            elif self.number(entry, f"{key}[{i}]") > MAX_ORDER and key.endswith("orders"):
+                raise self.error(f"more than {MAX_ORDER:.0f} cycles per turn", f"{key}[{i}]")
+        return found
+
+    def fit(self, value: Any, period: float) -> FitRecord | None:
+        if value is None:
+            return None
+        needed = ("samples", "runs", "span", "residual")
+        table = self.table(value, {f.name: f.name in needed for f in fields(FitRecord)}, "fit")
+        checked: dict[str, Any] = {}
+        for key, entry in table.items():
+            name = f"fit.{key}"
+            if key in ("method", "loss", "note"):
+                checked[key] = self.text(entry, name)
+            elif key == "calibrated_without_reference":
+                if not isinstance(entry, bool):
+                    raise self.error(f"true or false is needed, got {shown(entry)}", name)
+                checked[key] = entry
+            elif key == "blind":
+                texts = self.items(entry, name, "texts", _MOST_SENTENCES)
+                checked[key] = tuple(self.text(t, f"{name}[{i}]") for i, t in enumerate(texts))
+            elif key == "signals":
+                ranges = self.items(entry, name, "ranges", MAX_TERMS)
+                checked[key] = tuple(self.range(r, f"{name}[{i}]") for i, r in enumerate(ranges))
+            elif key == "table":
+                read = self.table(entry, {f.name: True for f in fields(TableRecord)}, name)
+                checked[key] = TableRecord(
+                    self.text(read["target"], f"{name}.target"),
+                    self.text(read["argument"], f"{name}.argument"),
+                    self.number(read["rms"], f"{name}.rms"),
+                    self.number(read["max_abs"], f"{name}.max_abs"),
+                )
+            elif key in ("span", "offsets"):
+                checked[key] = self.numbers(entry, name, MAX_OFFSETS)
+            elif key in ("samples", "runs", "wild", "positions"):
+                unknown = entry is None and key == "positions"
+                checked[key] = None if unknown else self.whole(entry, name)
+            elif entry is None and key == "residual":
+                checked[key] = None
+            else:
+                checked[key] = self.number(entry, name)
+        span = checked["span"]
+        if len(span) != 2 or span[0] > span[1] or max(map(abs, span)) > _MOST_TURNS * period:
+            raise self.error(
+                f"two angles, the first the smaller, are needed, got {span}", "fit.span"
+            )
+        return FitRecord(**checked)
+
+    def range(self, value: Any, key: str) -> tuple[str, float, float]:
+        found = self.items(value, key, "a name and two numbers", 3)
+        if len(found) != 3:
+            raise self.error(f"a name and two numbers are needed, got {shown(found)}", key)
+        low, high = (self.number(end, key) for end in found[1:])
+        return self.text(found[0], key), low, high
+
+    def provenance(self, value: Any) -> Provenance:
+        if value is None:
+            return Provenance()
+        table = self.table(value, {"inputs": True, "package": True}, "provenance")
+        inputs = []
+        listed = self.items(table["inputs"], "provenance.inputs", "files", MAX_OFFSETS)
+        for i, entry in enumerate(listed):
+            where = f"provenance.inputs[{i}]"
+            source = self.table(entry, {"file": True, "sha256": True}, where)
+            texts = (self.text(source[key], f"{where}.{key}") for key in ("file", "sha256"))
+            inputs.append(Source(*texts))
+        return Provenance(tuple(inputs), self.text(table["package"], "provenance.package"))
+
+
+def _sizes(shaft: Shaft) -> Array:
+    """Amplitudes; none where cosines and sines differ in number, which is refused elsewhere."""
+    same = len(shaft.cosine) == len(shaft.sine)
+    return np.asarray(np.hypot(shaft.cosine, shaft.sine)) if same else np.empty(0)

@@ -1,0 +1,63 @@
+"""A model in words: one line, and a table of its harmonics."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+from ..support.angles import arcsec, unit_name
+
+if TYPE_CHECKING:
+    from .model import HarmonicModel
+
+__all__ = ["one_line", "summary"]
+
+#: Lines that a summary lists before it says how many more there are.
+_LISTED = 40
+
+#: Names that one line lists, and their letters.
+_NAMED, _LETTERS = 4, 24
+
+
+def one_line(model: HarmonicModel) -> str:
+    """What the model is, in one line of a screen."""
+    lines = len(model.orders)
+    parts = [
+        f"{lines} {'order' if lines == 1 else 'orders'}"
+        + (f" of {_listed([shaft.name for shaft in model.shafts])}" if model.shafts else ""),
+        f"period {model.period:g}",
+        f"argument {model.argument}",
+    ]
+    if model.terms:
+        parts.append(f"with {_listed([term.kind for term in model.terms])}")
+    return f"<HarmonicModel: {', '.join(parts)}>"
+
+
+def summary(model: HarmonicModel) -> str:
+    """The harmonics by shaft and order, in arcseconds, and what is known of the fit."""
+    period, unit = model.period, unit_name(model.period)
+    lines = [
+        one_line(model)[1:-1],
+        f"constant {model.constant:.6g} {unit}, {arcsec(model.constant, period):.6g} arcsec",
+        f"{'shaft':16s} {'order':>10s} {'amplitude, arcsec':>18s} {'phase, deg':>11s}",
+    ]
+    rows = [
+        f"{shaft.name:16.16s} {k:10d} {arcsec(c, period):18.4f} {math.degrees(p):11.2f}"
+        for shaft in model.shafts
+        for k, c, p in zip(shaft.orders, shaft.amplitudes, shaft.phases, strict=True)
+    ]
+    lines += rows[:_LISTED]
+    if len(rows) > _LISTED:
+        lines.append(f"... and {len(rows) - _LISTED} more")
+    if model.fit is not None:
+        start, stop = model.fit.span
+        lines.append(
+            f"fitted to {model.fit.samples} readings of {model.fit.runs} runs "
+            f"between {start:.6g} and {stop:.6g} {unit}"
+        )
+    return "\n".join(lines)
+
+
+def _listed(names: list[str]) -> str:
+    more = f" and {len(names) - _NAMED} more" if len(names) > _NAMED else ""
+    return ", ".join(name[:_LETTERS] for name in names[:_NAMED]) + more

@@ -1,0 +1,79 @@
+"""The text of a model file, and writing it."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import asdict
+from os import PathLike
+from typing import TYPE_CHECKING, Any
+
+from ..errors import ArgumentError
+from ..support.files import MODEL, MODEL_BYTES, written_atomically
+
+if TYPE_CHECKING:
+    from .model import HarmonicModel
+    from .records import FitRecord
+
+__all__ = ["FORMAT", "VERSION", "model_text", "save_model"]
+
+FORMAT = "trueangle-model"
+VERSION = 1
+
+
+def model_text(model: HarmonicModel) -> str:
+    """What the file of a model holds."""
+    content = {
+        "format": FORMAT,
+        "version": VERSION,
+        "period": model.period,
+        "argument": model.argument,
+        "shafts": [asdict(shaft) for shaft in model.shafts],
+        "constant": model.constant,
+        "terms": [term.to_table() for term in model.terms],
+        "covariance": None if model.covariance is None else model.covariance.tolist(),
+        "condition_number": model.condition_number,
+        "fit": None if model.fit is None else _record(model.fit),
+        "provenance": {
+            "inputs": [source._asdict() for source in model.provenance.inputs],
+            "package": model.provenance.package,
+        },
+    }
+    return _pretty(content) + "\n"
+
+
+def save_model(model: HarmonicModel, path: str | PathLike[str]) -> None:
+    """Write ``model``; see `HarmonicModel.save`."""
+    text = model_text(model)
+    if len(text) > MODEL_BYTES:
+        raise ArgumentError(
+            f"{path}: the model takes {len(text)} bytes, and at most {MODEL_BYTES} are read back; "
+            "save it without its covariance"
+        )
+    hashes = [source.sha256 for source in model.provenance.inputs]
+    with written_atomically(path, kind=MODEL, hashes=hashes) as file:
+        file.write(text)
+
+
+def _record(record: FitRecord) -> dict[str, Any]:
+    """The record; what only a calibration without a reference says, only of one."""
+    table = asdict(record)
+    if not record.calibrated_without_reference:
+        del table["calibrated_without_reference"], table["blind"]
+    for name in ("signals", "table"):
+        if not table[name]:
+            del table[name]
+    return table
+
+
+def _pretty(value: Any, indent: int = 0) -> str:
+    """JSON with one line per key and per list of plain numbers."""
+    pad = "  " * (indent + 1)
+    end = "\n" + "  " * indent
+    if isinstance(value, Mapping) and value:
+        items = [f"{pad}{json.dumps(key)}: {_pretty(v, indent + 1)}" for key, v in value.items()]
+        return "{\n" + ",\n".join(items) + end + "}"
+    nested = isinstance(value, (list, tuple)) and any(isinstance(v, (Mapping, list)) for v in value)
+    if nested:
+        return "[\n" + ",\n".join(pad + _pretty(v, indent + 1) for v in value) + end + "]"
+    return json.dumps(value, allow_nan=False)

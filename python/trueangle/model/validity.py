@@ -1,0 +1,66 @@
+"""What numbers a model may hold."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..errors import ArgumentError, NotInvertibleError
+from .records import FitRecord
+
+__all__ = ["check_fit", "check_invertible", "check_number", "checked_covariance"]
+
+#: Ends of a span are within so many turns.
+_MOST_TURNS = 1e9
+
+#: What a condition number may be below 1 by rounding.
+ROUNDING = 1e-6
+
+
+def check_number(what: str, value: object, least: float, most: float) -> None:
+    """Raise `ArgumentError` unless ``value`` is a finite number from ``least`` to ``most``."""
+    number = isinstance(value, (int, float, np.integer, np.floating))
+    if not (number and math.isfinite(value) and least <= value <= most):  # type: ignore[arg-type,operator]
+        bounds = f"at least {least:g}" if math.isinf(most) else f"from {least:g} to {most:g}"
+        raise ArgumentError(f"{what} must be a finite number, {bounds}, got {value!r}")
+
+
+def check_invertible(slope: float) -> None:
+    """Raise `NotInvertibleError` when ``|d error / d angle|`` may reach 1."""
+    if slope >= 1.0:
+        raise NotInvertibleError(
+            f"|error'| may reach {slope:.3g}: from 1 on an indicated angle stands for several "
+            "true angles and cannot be corrected; use fewer or lower orders, or "
+            "`argument='indicated'`",
+            slope,
+        )
+
+
+def check_fit(fit: FitRecord, period: float) -> None:
+    """Raise `ArgumentError` for numbers that no fit of angles of this period has."""
+    far = _MOST_TURNS * period
+    for what, value in zip(("start", "stop"), fit.span, strict=True):
+        check_number(f"fit.span's {what}", value, -far, far)
+    if fit.span[0] > fit.span[1]:
+        raise ArgumentError(f"fit.span must not stop before it starts, got {fit.span!r}")
+    if fit.residual is not None:
+        check_number("fit.residual", fit.residual, 0.0, far)
+    for what in ("samples", "runs", "ridge", "offset_spread"):
+        check_number(f"fit.{what}", getattr(fit, what), 0.0, math.inf)
+    for i, offset in enumerate(fit.offsets):
+        check_number(f"fit.offsets[{i}]", offset, -far, far)
+
+
+def checked_covariance(covariance: ArrayLike, harmonics: int) -> NDArray[np.float64]:
+    """A read-only copy of the covariance of the constant and both parts of ``harmonics``."""
+    matrix = np.array(covariance, dtype=np.float64)
+    size = 1 + 2 * harmonics
+    if matrix.shape != (size, size) or not np.isfinite(matrix).all():
+        raise ArgumentError(
+            f"covariance must be {size} x {size} finite numbers "
+            f"(constant, then A and B of every order), got shape {matrix.shape}"
+        )
+    matrix.flags.writeable = False
+    return matrix

@@ -1,0 +1,268 @@
+"""Faults of the two angles: unit, sign, ratio, wrap, which is which."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...support.quantiles import median, quantile
+from .fault import DataFault
+from .record import Record
+
+__all__ = ["mixed_units", "ratio_of", "suggestion", "swapped", "wrapped", "wrong_ratio"]
+
+Array = NDArray[np.float64]
+
+#: Travel (degrees) from which on a ratio of the channels means anything, and how far from 1
+#: it may be: errors of several degrees over a short travel are still errors.
+LEAST_TRAVEL, AGREES = 5.0, 0.15
+
+#: Ratios by which angles in one unit differ from those in another.
+UNITS = {
+    "radians in a column of degrees": 180.0 / math.pi,
+    "turns in a column of degrees": 360.0,
+    "turns in a column of radians": 2.0 * math.pi,
+}
+
+#: Denominators of gear ratios that are offered, round ones first, and how near one must be.
+DENOMINATORS = (1, 2, 3, 4, 5, 10, 6, 7, 8, 9, 11, 12, 13)
+RATIONAL = 2e-3
+
+#: Share by which a part's values and steps are those of another unit.
+UNIT_SPREAD = 0.35
+
+#: Noise of the reference against that of the joint from which on the two may be swapped.
+NOISIER = 10.0
+
+#: Departure of steps, in shares of one, that are all alike.
+EVEN = 1e-3
+
+#: Roughness of steps, in shares of a step, that is none.
+EXACT = 1e-6
+
+#: Part of a jump by which the angles may close up again: their error, and none of the jump.
+STAYS = 0.3
+
+#: Blocks of a run that are compared.
+BLOCKS = 8
+
+
+def ratio_of(records: list[Record]) -> float | None:
+    """Indicated per reference travel: the median slope of the runs; None without travel."""
+    slopes = [slope for record in records if (slope := _slope(record)) is not None]
+    return float(median(slopes)) if slopes else None
+
+
+def suggestion(ratio: float | None) -> str:
+    """What a ratio of indicated to reference suggests.
+
+    Examples
+    --------
+    >>> suggestion(1.0002)
+    'the indicated angle is reduced to the output'
+    >>> suggestion(7.3)
+    'a gear of ratio 73/10 between the two that is not reduced'
+    """
+    if ratio is None:
+        return "the joint hardly moved"
+    if abs(ratio - 1.0) < AGREES:
+        return "the indicated angle is reduced to the output"
+    if abs(ratio + 1.0) < AGREES:
+        return "the indicated angle counts the other way"
+    from fractions import Fraction  # loads decimal: for joints that are wrong only
+
+    size = abs(ratio)
+    sign = ", counted the other way" if ratio < 0.0 else ""
+    for text, factor in UNITS.items():
+        for name, value in ((f"indicated: {text}", 1.0 / factor), (f"reference: {text}", factor)):
+            if abs(size / value - 1.0) < 0.01:
+                return name + sign
+    for denominator in DENOMINATORS:
+        best = Fraction(round(size * denominator), denominator)
+        if best > 0 and abs(float(best) / size - 1.0) < RATIONAL:
+            return f"a gear of ratio {best} between the two that is not reduced{sign}"
+    return f"the indicated angle moves {size:.4g} times as far as the reference{sign}"
+
+
+def wrong_ratio(records: list[Record]) -> Iterator[DataFault]:
+    """A sign, unit or gear ratio that is not the output's."""
+    turned: dict[str, list[tuple[str, float]]] = {}
+    for record in records:
+        slope = _slope(record)
+        if slope is None or abs(slope - 1.0) < AGREES:
+            continue
+        kind = "wrong_sign" if abs(slope + 1.0) < AGREES else "wrong_gear_ratio"
+        turned.setdefault(kind, []).append((record.label, slope))
+    for kind, found in turned.items():
+        labels = [label for label, _ in found]
+        value = float(median([slope for _, slope in found]))
+        which = "all runs" if len(found) == len(records) else f"run {', '.join(labels[:4])}"
+        if kind == "wrong_sign":
+            yield DataFault.of(
+                kind,
+                labels,
+                (),
+                f"in {which} the indicated angle falls where the reference rises",
+                "change the sign of one of the two columns",
+            )
+        else:
+            yield DataFault.of(
+                kind,
+                labels,
+                (),
+                f"in {which} the indicated angle moves {value:.6g} times as far as the "
+                f"reference: {suggestion(value)}",
+                f"divide the indicated angle by {value:.6g}, or give the right unit",
+            )
+
+
+def mixed_units(records: list[Record]) -> Iterator[DataFault]:
+    """Runs, or parts of one, whose angles stand in another unit than the others."""
+    sizes = np.array([float(np.abs(record.reference).max(initial=0.0)) for record in records])
+    travel = np.array([float(np.ptp(record.reference)) for record in records])
+    whole, largest = float(travel.max(initial=0.0)), float(sizes.max(initial=0.0))
+    small = [
+        k
+        for k in range(len(records))
+        if whole > 30.0
+        and sizes[k] <= largest * np.pi / 180.0 * (1.0 + UNIT_SPREAD)
+        and len(records[k]) >= BLOCKS
+        and abs(travel[k] * 180.0 / np.pi / whole - 1.0) < UNIT_SPREAD
+    ]
+    if small:
+        labels = [records[k].label for k in small]
+        yield DataFault.of(
+            "mixed_units",
+            labels,
+            (),
+            f"run {', '.join(labels[:4])} looks like radians among degrees: its angles "
+            f"cover {float(median(travel[small])):.3g} where other runs cover {whole:.4g}",
+            "multiply its angles by 180/pi",
+        )
+    for k, record in enumerate(records):
+        if k not in small:
+            yield from _parts_in_other_units(record)
+
+
+def _parts_in_other_units(record: Record) -> Iterator[DataFault]:
+    if len(record) < 4 * BLOCKS:
+        return
+    steps = np.abs(np.diff(record.reference))
+    edges = np.linspace(0, len(record), BLOCKS + 1).astype(int)
+    typical = np.array([median(steps[a : max(b - 1, a + 1)]) for a, b in itertools.pairwise(edges)])
+    top = np.array([np.abs(record.reference[a:b]).max() for a, b in itertools.pairwise(edges)])
+    large = float(median(typical[typical > 0.3 * typical.max()])) if typical.max() > 0 else 0.0
+    if large == 0.0 or top.max() < 30.0:
+        return
+    other = (top <= top.max() * np.pi / 180.0 * (1.0 + UNIT_SPREAD)) & (
+        np.abs(typical * 180.0 / np.pi / large - 1.0) < UNIT_SPREAD
+    )
+    if other.any() and not other.all():
+        first = int(np.flatnonzero(other)[0])
+        rows = np.concatenate([record.rows[edges[j] : edges[j + 1]] for j in np.flatnonzero(other)])
+        yield DataFault.of(
+            "mixed_units",
+            [record.label],
+            rows.tolist(),
+            f"a part of run {record.label} (from about row {record.rows[edges[first]]}) looks "
+            "like radians among degrees",
+            "convert it, or give it another file",
+        )
+
+
+def wrapped(records: list[Record]) -> Iterator[DataFault]:
+    """A reference that wraps at something else than a turn."""
+    for record in records:
+        if len(record) < BLOCKS:
+            continue
+        reference, indicated = np.diff(record.reference), np.diff(record.indicated)
+        ahead = indicated - 360.0 * np.round(indicated / 360.0)
+        slip = reference - ahead
+        slip -= 360.0 * np.round(slip / 360.0)
+        spread = 1.4826 * float(median(np.abs(slip - median(slip))))
+        typical = float(median(np.abs(ahead)))
+        jumps = np.flatnonzero(np.abs(slip) > max(20.0 * spread, 10.0 * typical, 20.0))
+        if jumps.size == 0:
+            continue
+        # A wrap falls from one end of the range to the other.
+        low, high = float(record.reference.min()), float(record.reference.max())
+        ends = np.minimum(record.reference[jumps], record.reference[jumps + 1])
+        tops = np.maximum(record.reference[jumps], record.reference[jumps + 1])
+        near = 0.02 * (high - low) + 5.0 * typical
+        at_ends = (ends - low < near) & (high - tops < near)
+        if not at_ends.all() or not _stays(record, jumps, slip[jumps]):
+            continue
+        period = float(median(tops - ends)) + typical
+        yield DataFault.of(
+            "wrapped_reference",
+            [record.label],
+            record.rows[jumps + 1].tolist(),
+            f"the reference of run {record.label} wraps after {period:.4g} deg, which is no "
+            "turn: the same number stands for several places",
+            "log the reference over a whole turn, or unwrap it before",
+        )
+
+
+def _stays(record: Record, jumps: NDArray[np.intp], slip: Array) -> bool:
+    """Whether the two angles stay apart by each jump: what follows a command closes up again."""
+    apart = record.reference - record.indicated
+    bounds = [0, *(jumps + 1).tolist(), len(record)]
+    levels = []
+    for a, b in itertools.pairwise(bounds):
+        part = apart[a:b] - apart[a]
+        levels.append(apart[a] + float(median(part - 360.0 * np.round(part / 360.0))))
+    off = np.diff(levels) - slip
+    off -= 360.0 * np.round(off / 360.0)
+    return bool((np.abs(off) <= STAYS * np.abs(slip)).all())
+
+
+def swapped(records: list[Record]) -> Iterator[DataFault]:
+    """A reference that is much noisier than the joint it is to judge."""
+    ratios = []
+    for record in records:
+        if len(record) < 30:
+            continue
+        reference, indicated = record.unwrapped
+        own, other = (_roughness(x, record.time) for x in (reference, indicated))
+        steps = np.abs(np.diff(indicated))
+        typical = float(median(steps))
+        least = EXACT * typical
+        # Readings taken at even counts of the joint say nothing of its noise.
+        even = float(np.mean(np.abs(steps - typical) <= EVEN * typical)) > 0.5
+        if own > least and not even:
+            ratios.append(own / max(other, least, 1e-300))
+    if ratios and float(median(ratios)) > NOISIER:
+        yield DataFault.of(
+            "swapped_channels",
+            [record.label for record in records],
+            (),
+            f"the reference scatters {min(float(median(ratios)), 1e6):.3g} times as much as "
+            "the joint that it is to judge: the two columns may be swapped",
+            "exchange the columns, or go on where the reference really is the noisier one",
+        )
+
+
+def _roughness(x: Array, time: Array | None) -> float:
+    """Typical distance of a reading from the line between its neighbours in time."""
+    t = np.arange(x.size, dtype=np.float64) if time is None else time
+    before, after = t[1:-1] - t[:-2], t[2:] - t[1:-1]
+    whole = before + after
+    even = whole > 0.0
+    line = (x[:-2] * after + x[2:] * before)[even] / whole[even]
+    return float(median(np.abs(x[1:-1][even] - line))) if even.any() else 0.0
+
+
+def _slope(record: Record) -> float | None:
+    """Travel of the indicated angle per travel of the reference; None without travel."""
+    reference, indicated = record.unwrapped
+    if len(record) < 4 or np.ptp(reference) < LEAST_TRAVEL:
+        return None
+    steps = np.abs(np.diff(reference))
+    if float(quantile(steps, 0.9)) > 90.0:
+        return None  # too coarse to say which way it went
+    x = reference - reference.mean()
+    return float(x @ (indicated - indicated.mean()) / (x @ x))

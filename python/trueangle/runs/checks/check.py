@@ -1,0 +1,131 @@
+"""Check data before anything is fitted."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from os import PathLike
+from typing import TYPE_CHECKING, Any
+
+from ...errors import ArgumentError
+from ...support.kinds import told_kinds
+from ..run import CalibrationRun
+from .angles import mixed_units, ratio_of, suggestion, swapped, wrapped, wrong_ratio
+from .fault import DataFault
+from .record import Record, records_of
+from .rows import duplicate_rows, duplicate_runs, unsorted_time
+from .still import stuck_readings
+
+if TYPE_CHECKING:
+    from .result import Check
+
+__all__ = ["check", "faults_of"]
+
+#: Every test of the data, in the order in which they are told.
+TESTS = (
+    unsorted_time,
+    mixed_units,
+    wrapped,
+    wrong_ratio,
+    swapped,
+    duplicate_runs,
+    duplicate_rows,
+    stuck_readings,
+)
+
+
+#: Faults after which the angles of a run mean nothing to further tests.
+UNSURE = ("mixed_units", "wrapped_reference", "unsorted_time")
+
+
+@told_kinds
+def check(
+    data: str
+    | PathLike[str]
+    | CalibrationRun
+    | Iterable[str | PathLike[str]]
+    | Iterable[CalibrationRun],
+    *,
+    counts_per_turn: float | None = None,
+    counts_per_turn_reference: float | None = None,
+    signals: Mapping[str, Any] | None = None,
+    topic: str | None = None,
+) -> Check:
+    """Say whether data are fit to be used before anything is fitted.
+
+    Parameters
+    ----------
+    data : path, run, or iterable of either
+        Files as `trueangle.read_runs` takes them, which may be faulty, or runs.
+    counts_per_turn, counts_per_turn_reference, signals, topic
+        As in `trueangle.read_runs`.
+
+    Returns
+    -------
+    Check
+        Faults of the data, the ratio of the two angles, what was moved, and what can and
+        cannot be known. About 0.1 s for 100 000 readings; no model is fitted.
+
+    Raises
+    ------
+    FileError
+        A file that holds no table of runs at all.
+    ArgumentError
+        No data.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> theta = np.linspace(0.0, 350.0, 60)
+    >>> run = ta.CalibrationRun(theta, 3.0 - theta, period=360.0, label="a")
+    >>> [fault.fault for fault in check(run).data_faults]
+    ['wrong_sign']
+    """
+    given = {
+        "counts_per_turn": counts_per_turn,
+        "counts_per_turn_reference": counts_per_turn_reference,
+        "signals": signals,
+        "topic": topic,
+    }
+    from .extent import extent_of, verdicts
+    from .result import Check
+
+    records = _records(data, given)
+    if not records:
+        raise ArgumentError("no data: give at least one file or run")
+    extent = extent_of(records)
+    ratio = ratio_of(records)
+    can, cannot = verdicts(extent)
+    return Check(
+        tuple(faults_of(records)),
+        ratio,
+        suggestion(ratio),
+        extent,
+        tuple(can),
+        tuple(cannot),
+        {role: found for record in records for role, found in record.columns.items()},
+    )
+
+
+def faults_of(records: list[Record]) -> list[DataFault]:
+    """Faults of the data; where units are mixed, what follows from that is not told twice."""
+    found: list[DataFault] = []
+    for test in TESTS:
+        mixed = {label for fault in found if fault.fault in UNSURE for label in fault.runs}
+        angles = test in (wrapped, wrong_ratio, swapped, stuck_readings)
+        found += test([r for r in records if not (angles and r.label in mixed)])
+    return found
+
+
+def _records(data: object, given: Mapping[str, Any]) -> list[Record]:
+    from .files import read_records
+
+    if isinstance(data, CalibrationRun):
+        return records_of([data])
+    if isinstance(data, (str, PathLike)):
+        return read_records([data], **given)
+    if not isinstance(data, Iterable):
+        raise ArgumentError(f"data must be files or runs, got {type(data).__name__}")
+    entries = list(data)
+    if all(isinstance(entry, CalibrationRun) for entry in entries):
+        return records_of(entries)
+    return read_records(entries, **given)

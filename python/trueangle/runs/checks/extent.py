@@ -1,0 +1,164 @@
+"""What was moved and measured, and what such data can and cannot tell."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...support.quantiles import median, quantile
+from .record import Record
+
+__all__ = ["Extent", "extent_of", "verdicts"]
+
+Array = NDArray[np.float64]
+
+#: Levels are apart by this share of their range, and by so much at least.
+GAP = 0.1
+LEAST_GAP = {"speed": 0.5, "load": 0.05, "temperature": 1.0, "mount": 0.5}
+
+#: Degrees of step beyond which an angle is not followed from reading to reading.
+FOLLOWED = 90.0
+
+
+@dataclass(frozen=True)
+class Extent:
+    """The design of the runs as the readings show it.
+
+    Attributes
+    ----------
+    readings, runs : int
+    span_deg : float
+        Width of the places visited, at most 360.
+    turns : float
+        Largest travel of a run between its ends.
+    directions : tuple of int
+        Of -1 and +1 those that were travelled.
+    speeds, loads, temperatures, mounts : tuple of float
+        Levels (mean of a run): deg/s, Nm, Celsius, degrees; empty where not recorded.
+    timed : bool
+    """
+
+    readings: int
+    runs: int
+    span_deg: float
+    turns: float
+    directions: tuple[int, ...]
+    speeds: tuple[float, ...]
+    loads: tuple[float, ...]
+    temperatures: tuple[float, ...]
+    mounts: tuple[float, ...]
+    timed: bool
+
+
+def extent_of(records: list[Record]) -> Extent:
+    """Extent of some records."""
+    places = np.concatenate([np.mod(record.reference, 360.0) for record in records])
+    travels, directions, speeds = [], set(), []
+    for record in records:
+        reference, _ = record.unwrapped
+        travels.append(float(np.ptp(reference)) / 360.0)
+        steps = np.diff(reference)
+        moving = (
+            steps[np.abs(steps) > 0.25 * float(quantile(np.abs(steps), 0.9, axis=0))]
+            if (steps.size)
+            else steps
+        )
+        for sign in (-1, 1):
+            if np.mean(np.sign(moving) == sign) > 0.05 if moving.size else False:
+                directions.add(sign)
+        if record.velocity is not None:
+            speeds.append(float(median(np.abs(record.velocity))))
+        elif record.time is not None and np.ptp(record.time) > 0.0:
+            speeds.append(float(np.abs(steps).sum() / np.ptp(record.time)))
+    return Extent(
+        sum(len(record) for record in records),
+        len(records),
+        _span(places),
+        max(travels, default=0.0),
+        tuple(sorted(directions)),
+        _levels(speeds, "speed"),
+        _levels(_means(records, "torque"), "load"),
+        _levels(_means(records, "temperature"), "temperature"),
+        _levels(_means(records, "mount"), "mount"),
+        all(record.time is not None for record in records),
+    )
+
+
+def verdicts(extent: Extent) -> tuple[list[str], list[dict[str, str]]]:
+    """What can be known from such data; what cannot, why, and which measurement tells it."""
+    can = ["the periodic error at the places visited"]
+    cannot: list[dict[str, str]] = []
+
+    def no(what: str, because: str, measure: str) -> None:
+        cannot.append({"what": what, "because": because, "measure": measure})
+
+    if extent.span_deg >= 350.0:
+        can.append("integer orders of a whole turn")
+    else:
+        no(
+            "orders apart from each other over a whole turn",
+            f"{extent.span_deg:.0f} deg of travel",
+            "a whole turn, or a correction for this travel alone",
+        )
+    if len(extent.directions) == 2:
+        can.append("reversal error")
+    else:
+        no("reversal error", "one direction of travel", "runs in both directions")
+    if not extent.timed:
+        no("delay, drift and lines in time", "no time stamps", "log time_s")
+    elif len(extent.speeds) > 1:
+        can.append("delay and filters (several speeds)")
+    else:
+        no("delay apart from reversal error or zero", "one speed", "runs at another speed")
+    for name, what, levels, measure in (
+        ("torque", "compliance", extent.loads, "runs at several loads, torque_Nm logged"),
+        (
+            "temperature",
+            "thermal drift",
+            extent.temperatures,
+            "runs at several temperatures, temperature_C logged",
+        ),
+        (
+            "mount of the reference",
+            "the reference's own error apart from the joint's",
+            extent.mounts,
+            "runs with the reference turned on its mount, mount_deg logged",
+        ),
+    ):
+        if len(levels) > 1:
+            can.append(what)
+        else:
+            no(what, f"{'one' if levels else 'no'} {name}", measure)
+    if extent.runs > 2:
+        can.append("how far the zero and the pattern repeat from run to run")
+    else:
+        no("what changes from run to run", f"{extent.runs} run(s)", "more runs")
+    return can, cannot
+
+
+def _means(records: list[Record], name: str) -> list[float]:
+    values = [getattr(record, name) for record in records]
+    return [float(np.mean(v)) for v in values if v is not None]
+
+
+def _levels(values: list[float], kind: str) -> tuple[float, ...]:
+    """Means of groups of values that lie closer together than the gaps between groups."""
+    if not values:
+        return ()
+    ordered = np.sort(np.array(values))
+    gap = max(GAP * float(np.ptp(ordered)), LEAST_GAP[kind])
+    groups = np.split(ordered, np.flatnonzero(np.diff(ordered) > gap) + 1)
+    return tuple(float(f"{np.mean(group):.4g}") for group in groups)
+
+
+def _span(places: Array) -> float:
+    """360 less the widest gap between places."""
+    ordered = np.sort(places)
+    if ordered.size < 2:
+        return 0.0
+    gaps = np.diff(np.append(ordered, ordered[0] + 360.0))
+    widest = float(gaps.max())
+    # Evenly spaced places leave no gap but their step.
+    return 360.0 if widest < 3.0 * float(median(gaps[gaps > 0.0])) else 360.0 - widest

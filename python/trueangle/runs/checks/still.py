@@ -1,0 +1,276 @@
+"""Readings that stand still while the other channel moves: at a limit, or repeated.
+
+A column also stands still when the joint rests, when a command waits for the joint to follow,
+and between two counts. So it is no fault that it stands, but what it does when it goes on:
+
+- a *repeated* reading is made up for: the next new one has moved as far as the other column did
+  since the last new one, while the joint was moving throughout;
+- a column at a *limit* stands at one end of its range, the joint passes by in the same motion
+  before and after, and the column leaves the limit where it met it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Final, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...support.quantiles import median, quantile
+from .fault import DataFault
+from .record import Record
+
+__all__ = ["stuck_readings"]
+
+Array = NDArray[np.float64]
+
+#: What the other channel must have passed by: in noise (a chance of 1e-9), in counts of a
+#: column that has a lattice, and of one whose steps only look like it (no count is so long).
+_FAR: Final = 6.0
+_COUNTS: Final = 1.5
+_STEPS: Final = 2.5
+
+#: Rows from which on stale readings are a fault of the data and no coincidence, where they
+#: come more than once; at one place a command that is held would do.
+_LEAST_STALE: Final = 3
+
+#: Readings in a row at an end of the range that are a limit.
+_LEAST_STUCK: Final = 5
+
+#: Readings of a column that is sampled and held at most; a command is held for longer.
+_HELD: Final = 10
+
+#: Speeds are alike within this factor, and a movement is made up for to within this part
+#: (errors that change with the angle) and the noise.
+_ALIKE: Final = 0.3
+_MADE_UP: Final = 0.15
+
+#: Share of the travel that no joint runs on after its command has stopped.
+_RUN_ON: Final = 0.5
+
+#: Share of its range that a channel must have gone onward, and not to and fro.
+_ONWARD: Final = 0.7
+
+#: Readings on both sides whose speeds are compared.
+_BESIDE: Final = 5
+
+#: A column has a lattice where its steps take so few values, each so many times.
+_VALUES: Final = 12
+_TIMES: Final = 5
+
+#: Steps are even to this part of one.
+_EVEN: Final = 1e-3
+
+#: Repeats are the exception below this share of readings, and a rule where so many of them
+#: last equally long.
+_RARE: Final = 0.2
+_RULE: Final = 0.9
+
+
+class _AnglePair(NamedTuple):
+    """One column, the other, and the speed of the other at every step."""
+
+    own: Array
+    other: Array
+    speed: Array
+    least: float
+    """What the other must pass by."""
+    apart: tuple[float, float]
+    """How far the two are apart where ``own`` does not stand for long."""
+
+
+def stuck_readings(records: list[Record]) -> Iterator[DataFault]:
+    """Readings that stand still while the other channel moves: at a limit, or stale."""
+    for record in records:
+        reference, indicated = record.unwrapped
+        for name, own, other in (
+            ("indicated", indicated, reference),
+            ("reference", reference, indicated),
+        ):
+            yield from _stuck(record, name, own, other)
+
+
+def _stuck(record: Record, name: str, own: Array, other: Array) -> Iterator[DataFault]:
+    if own.size < 2 * _LEAST_STUCK or np.ptp(own) == 0.0:
+        return
+    still = np.concatenate([[False], np.diff(own) == 0.0])
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], still.astype(np.int8), [0]])))
+    # From the reading before to the last that repeats it.
+    first, last = edges[::2] - 1, edges[1::2] - 1
+    apart = (own - other)[~_within(first, last, last - first >= _LEAST_STUCK, own.size)]
+    channels = _AnglePair(
+        own,
+        other,
+        _speeds(other, record.time),
+        _least(own, other, last - first),
+        (float(apart.min()), float(apart.max())) if apart.size else (0.0, 0.0),
+    )
+    limit: list[int] = []
+    stale: list[int] = []
+    times = 0
+    passed = np.abs(other[last] - other[first])
+    long = last - first >= _LEAST_STUCK
+    low, high = float(own.min()), float(own.max())
+    for i in np.flatnonzero((passed >= channels.least) | long).tolist():
+        a, b = int(first[i]), int(last[i])
+        if own[a] in (low, high) and long[i] and _is_limit(channels, a, b):
+            limit += range(a + 1, b + 1)
+        elif passed[i] >= channels.least and _is_stale(channels, a, b):
+            stale += range(a + 1, b + 1)
+            times += 1
+    if limit:
+        rows = record.rows[np.array(limit)]
+        value = float(own[limit[0]])
+        yield DataFault.of(
+            "saturated_travel",
+            [record.label],
+            rows.tolist(),
+            f"the {name} angle of run {record.label} stands at {value:g} deg, the end of its "
+            f"range, in {rows.size} rows (first: row {rows[0]}) while the joint moves on",
+            "leave these rows out, or measure inside the range",
+        )
+    if len(stale) >= (_LEAST_STALE if times > 1 else _HELD):
+        rows = record.rows[np.array(stale)]
+        yield DataFault.of(
+            "stale_samples",
+            [record.label],
+            rows.tolist(),
+            f"{rows.size} {name} readings of run {record.label} (first: row {rows[0]}) repeat "
+            "the one before while the joint moves: old samples were logged again",
+            "drop these rows, or log each sample once with its own time stamp",
+        )
+
+
+def _within(
+    first: NDArray[np.intp], last: NDArray[np.intp], which: NDArray[np.bool_], size: int
+) -> NDArray[np.bool_]:
+    """Readings that lie in one of the spans ``first .. last``."""
+    edges = np.zeros(size + 1, dtype=np.int64)
+    edges[first[which]] += 1
+    edges[last[which] + 1] -= 1
+    return np.asarray(np.cumsum(edges)[:-1] > 0)
+
+
+def _least(own: Array, other: Array, lengths: NDArray[np.intp]) -> float:
+    """Travel of the other channel that noise and counts of this one do not explain."""
+    slip = np.diff(own - other)
+    noise = 1.4826 * float(median(np.abs(slip - median(slip))))
+    mine, beside = _lattice(own), _lattice(other)
+    if not (mine and beside):  # places that are evenly spaced are no counts
+        mine, beside = (0.0 if _is_even(x) else c for x, c in ((own, mine), (other, beside)))
+    if mine == 0.0 and int(lengths.sum()) > _RARE * own.size:
+        repeats = float(np.mean(lengths == median(lengths)))
+        if repeats < _RULE:  # counts that are not of one size
+            steps = np.abs(np.diff(own))
+            mine = _STEPS / _COUNTS * float(quantile(steps[steps > 0.0], 0.01))
+    return _FAR * noise + _COUNTS * mine + beside
+
+
+def _lattice(angle: Array) -> float:
+    """The count of a column whose steps take few values, else 0."""
+    steps = np.abs(np.diff(angle))
+    moved = steps[steps > 0.0]
+    # `np.unique` would import `numpy.ma`, a tenth of a small command's time.
+    values = 1 + np.count_nonzero(np.diff(np.sort(np.round(moved, 7))))
+    if moved.size == 0 or values > _VALUES or moved.size < _TIMES * values:
+        return 0.0
+    return float(quantile(moved, 0.01))
+
+
+def _is_even(angle: Array) -> bool:
+    """Whether nearly all steps are one and the same."""
+    steps = np.abs(np.diff(angle))
+    typical = float(median(steps))
+    return typical > 0.0 and float(np.mean(np.abs(steps - typical) <= _EVEN * typical)) >= _RULE
+
+
+def _speeds(other: Array, time: Array | None) -> Array:
+    """Travel per second, or per reading where time is not known."""
+    steps = np.diff(other)
+    if time is None:
+        return steps
+    dt = np.diff(time)
+    return np.divide(steps, dt, out=np.zeros_like(steps), where=dt > 0.0)
+
+
+def _is_stale(c: _AnglePair, a: int, b: int) -> bool:
+    """Whether ``own`` makes up after reading ``b`` for what it missed since reading ``a``."""
+    if b + 1 == c.own.size:
+        return b - a >= _LEAST_STUCK and _moves_on(c, a, b)
+    missed = float(c.other[b] - c.other[a])
+    near = _MADE_UP * abs(missed) + 0.4 * c.least
+    made_up = float(c.own[b + 1] - c.own[b]) - float(c.other[b + 1] - c.other[b])
+    if abs(_turned(made_up - missed)) > near:
+        return False
+    if b - a >= _LEAST_STUCK:  # else a joint that stood when the column went on
+        passes = a == 0 or _passes(c, a, b - a, 1)
+        if not (passes and _passes(c, b, b - a, -1)):
+            return False
+    elif abs(missed) < _ONWARD * float(np.ptp(c.other[a : b + 1])) or not _alike(
+        float(c.speed[b : b + 2].mean()), float(c.speed[a:b].mean())
+    ):
+        return False
+    if a > 0:
+        before = float(c.own[a] - c.own[a - 1]) - float(c.other[a] - c.other[a - 1])
+        if abs(_turned(before)) <= near:
+            return True  # the reading before it was new
+    size = np.abs(c.speed[a : b + 1])
+    return b - a < _HELD and bool(size.min() >= _ALIKE * size.max())
+
+
+def _is_limit(c: _AnglePair, a: int, b: int) -> bool:
+    """Whether the joint passes by while ``own`` stands at an end of its range."""
+    if a == 0 or b + 1 == c.own.size:
+        return _moves_on(c, a, b)
+    if not (_passes(c, a, b - a, 1) and _passes(c, b, b - a, -1)):
+        return False
+    beyond = float(np.abs(c.other[a : b + 1] - c.other[a]).max())
+    # It meets and leaves the limit between two readings each.
+    step = float(np.abs(np.diff(c.other[[a - 1, a, b, b + 1]])[[0, 2]]).sum())
+    back = abs(float(c.other[b] - c.other[a]))
+    return beyond >= c.least and back <= _MADE_UP * beyond + step + 0.4 * c.least
+
+
+def _moves_on(c: _AnglePair, a: int, b: int) -> bool:
+    """Whether the joint moves on while ``own`` stands to the last reading, or from the first.
+
+    What catches up with a command that stopped comes to rest, and no farther from it than it
+    has been before.
+    """
+    passed = abs(float(c.other[b] - c.other[a]))
+    if passed < c.least or (a == 0 and b + 1 == c.own.size):
+        return False
+    at, far = (b, slice(a, a + _BESIDE)) if a == 0 else (a, slice(b - _BESIDE, b))
+    if not _passes(c, at, b - a, 1 if at == a else -1):
+        return False
+    apart = float((c.own - c.other)[a if a == 0 else b])
+    low, high = c.apart
+    beyond = apart < low - c.least or apart > high + c.least
+    near = slice(b, b + _BESIDE) if a == 0 else slice(a - _BESIDE if a > _BESIDE else 0, a)
+    moving = _alike(float(c.speed[far].mean()), float(c.speed[near].mean()))
+    return (beyond and moving) or passed >= _RUN_ON * float(np.ptp(c.other))
+
+
+def _passes(c: _AnglePair, at: int, length: int, end: int) -> bool:
+    """Whether the joint keeps its speed where ``own``, which went with it, begins to stand.
+
+    ``end`` is 1 there and -1 where ``own`` goes on.
+    """
+    width = min(_BESIDE, length)
+    before, after = slice(max(at - width, 0), at), slice(at, at + width)
+    beside = before if end == 1 else slice(at + 1, at + 1 + width)
+    own, other = (x[beside.start : beside.stop + 1] for x in (c.own, c.other))
+    if own.size < 2:
+        return False
+    speeds = float(c.speed[before].mean()), float(c.speed[after].mean())
+    return _alike(float(own[-1] - own[0]), float(other[-1] - other[0])) and _alike(*speeds)
+
+
+def _alike(x: float, y: float) -> bool:
+    return x * y > 0.0 and _ALIKE <= x / y <= 1.0 / _ALIKE
+
+
+def _turned(x: float) -> float:
+    """Between half a turn back and half a turn ahead."""
+    return x - 360.0 * round(x / 360.0)

@@ -1,0 +1,336 @@
+"""Calibration runs from files of any format, one row per reading."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Iterable, Mapping
+from os import PathLike
+from pathlib import Path
+from typing import Any, NamedTuple, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import EmptyCellsWarning, FileError
+from ..formats.columns import Column, count_turn, listed, signal_code, unit_in_name, wanted_columns
+from ..formats.signals import FIELDS
+from ..support.angles import UNIT_PERIODS
+from ..support.kinds import told_kinds
+from ..support.suggestions import did_you_mean
+from .readings import Readings, named, read_readings, readings_of
+from .run import CalibrationRun, Source
+
+__all__ = [
+    "Readings",
+    "RunColumns",
+    "read_columns",
+    "read_readings",
+    "read_runs",
+    "runs_of_readings",
+]
+
+#: Unit, label and rows of every run.
+Groups: TypeAlias = list[tuple[str | None, str | None, NDArray[np.intp]]]
+
+#: Unit of the run's angles where the reference has none that a run may be in.
+_PERIOD = 360.0
+
+
+@told_kinds
+def read_runs(
+    path: str | PathLike[str] | Iterable[str | PathLike[str]],
+    *,
+    counts_per_turn: float | None = None,
+    counts_per_turn_reference: float | None = None,
+    signals: Mapping[str, Any] | None = None,
+    topic: str | None = None,
+) -> list[CalibrationRun]:
+    """Calibration runs of one file or several, in the order the files name them.
+
+    Parameters
+    ----------
+    path : path or iterable of paths
+        CSV (comma, semicolon or tab, decimal points or commas, lines before the names,
+        notes that begin with #, a line of units), Parquet, Arrow, HDF5, MATLAB, numpy, ROS
+        bags, MCAP, MDF4. Columns: ``reference_deg`` and ``indicated_deg`` (or ``_rad``,
+        ``_turn``, ``_count``, or a unit in brackets), and optionally ``run``, ``unit`` and
+        those of `trueangle.formats.signals.SIGNALS`. Others are kept in `CalibrationRun.columns`.
+    counts_per_turn, counts_per_turn_reference : float, optional
+        Counts in one turn of the output, of an indicated angle or reference in counts.
+    signals : mapping of role to column, optional
+        Columns with other names: ``{"torque": "tau", "reference": ("pos act", "rad")}``.
+    topic : str, optional
+        JointState topic of a ROS bag (default: the only one).
+
+    Returns
+    -------
+    list of CalibrationRun
+        One per unit, label of ``run`` and file; rows stay in their order. The period of a
+        run is that of its reference column: 360, ``2*pi`` or 1; 360 for other units.
+
+    Raises
+    ------
+    FileError
+        Names file, line (header = 1) and column: a missing or doubled column, text or
+        a non-finite value where a number belongs, units mixed within a file, time that
+        runs backwards within a run, an empty file.
+    MissingExtraError
+        A format whose library is not installed.
+
+    Warns
+    -----
+    EmptyCellsWarning
+        Rows with an empty cell were left out; `CalibrationRun.left_out` counts them.
+    """
+    wanted = wanted_columns(signals)
+    indicated = count_turn(counts_per_turn, "counts_per_turn")
+    reference = count_turn(counts_per_turn_reference, "counts_per_turn_reference")
+    paths = [path] if isinstance(path, (str, PathLike)) else list(path)
+
+    def read(file: Path) -> list[CalibrationRun]:
+        return runs_of_readings(readings_of(file, wanted, topic), indicated, reference)
+
+    runs = [run for entry in paths for run in named(Path(entry), read)]
+    units = {run.period: run for run in runs}
+    if len(units) > 1:
+        first, other = list(units.values())[:2]
+        raise FileError(
+            other.source.file if other.source else "runs",
+            f"its angles are in another unit (period {other.period:g}) than those of "
+            f"{first.source.file if first.source else 'the first file'} "
+            f"(period {first.period:g}); convert one of them",
+        )
+    return runs
+
+
+class RunColumns(NamedTuple):
+    """Columns of one file of runs as they were read, nothing of them judged but the numbers.
+
+    Angles and signals are in the unit of ``period``; ``groups`` are unit, label, and the
+    rows without an empty cell of every run, in the order of their first row.
+    """
+
+    table: Readings
+    period: float
+    reference: NDArray[np.float64]
+    indicated: NDArray[np.float64]
+    signals: dict[str, NDArray[np.float64]]
+    groups: Groups
+    left_out: list[int]
+    source: Source
+
+
+def read_columns(
+    path: str | PathLike[str],
+    counts_per_turn: float | None = None,
+    counts_per_turn_reference: float | None = None,
+    signals: Mapping[str, Any] | None = None,
+    topic: str | None = None,
+) -> RunColumns:
+    """The columns of one file, grouped by run; time may run backwards. As `read_runs`."""
+    wanted = wanted_columns(signals)
+    indicated = count_turn(counts_per_turn, "counts_per_turn")
+    reference = count_turn(counts_per_turn_reference, "counts_per_turn_reference")
+    return named(
+        Path(path), lambda file: _columns(readings_of(file, wanted, topic), indicated, reference)
+    )
+
+
+def _columns(table: Readings, counts: float | None, reference_counts: float | None) -> RunColumns:
+    asked = {role for role, column in table.roles.items() if column.is_asked}
+    filled = any(len(column) for column in table.columns.values())
+    # A log of an angle called indicated_deg is no table.
+    if len(table.columns) == 1 and filled and table.roles.keys() <= asked & {"indicated"}:
+        return _entries(table, counts)
+    roles, path = table.roles, table.path
+    for role in ("reference", "indicated"):
+        if role not in roles:
+            _refuse_missing(table, role)
+    if not len(next(iter(table.columns.values()))):
+        raise FileError(path, "has a header but no readings", line=1)
+    period, reference, indicated = _angles(table, counts, reference_counts)
+    signals = {}
+    for role, column in roles.items():
+        if role not in ("reference", "indicated", "run", "unit"):
+            if (column.unit or "").startswith("count"):
+                raise table.error(
+                    "counts of this signal have no known turn; give it in deg, rad or turn",
+                    column.name,
+                )
+            signals[role] = column.values(table.raw(column), period)
+    missing = np.zeros(reference.size, dtype=bool)
+    for values in (reference, indicated, *signals.values()):
+        missing |= np.isnan(values)
+    groups, left_out = [], []
+    for unit, label, rows in _groups(table, reference.size):
+        present = rows[~missing[rows]]
+        if not present.size:
+            raise FileError(path, f"every row of run {label or path.name} has an empty cell")
+        groups.append((unit, label, present))
+        left_out.append(rows.size - present.size)
+    _warn_of_empty(table, missing, {"reference": reference, "indicated": indicated, **signals})
+    return RunColumns(table, period, reference, indicated, signals, groups, left_out, table.source)
+
+
+def _entries(table: Readings, counts: float | None) -> RunColumns:
+    """A table of a turn as firmware holds it: entry i of n is the reading at i/n of a turn."""
+    (name,) = table.columns
+    column = table.roles.get("indicated", Column("indicated", name, None))
+    unit = column.unit or unit_in_name(name, "indicated") or (None if counts is None else "count")
+    if unit is None or (unit == "count" and counts is None):
+        raise table.error(
+            "one column is taken for a table whose entry i of n is the reading at i/n of a turn, "
+            f"and its unit is not known: give {signal_code('indicated', name, 'deg')} (or another "
+            "unit), or `counts_per_turn=`; or name the file's reference column",
+            name,
+        )
+    indicated = column._replace(unit=unit).values(table.raw(column), _PERIOD, counts)
+    reference = np.linspace(0.0, _PERIOD, indicated.size, endpoint=False, dtype=np.float64)
+    rows = np.flatnonzero(~np.isnan(indicated))
+    if not rows.size:
+        raise FileError(table.path, "has a header but no readings", line=1)
+    left_out = indicated.size - rows.size
+    _warn_of_empty(table, np.isnan(indicated), {"indicated": indicated})
+    groups: Groups = [(None, None, rows)]
+    return RunColumns(table, _PERIOD, reference, indicated, {}, groups, [left_out], table.source)
+
+
+def runs_of_readings(
+    table: Readings, counts_per_turn: float | None, counts_per_turn_reference: float | None
+) -> list[CalibrationRun]:
+    """Runs of the rows of a table; raises as `read_runs`."""
+    found = _columns(table, counts_per_turn, counts_per_turn_reference)
+    signals = found.signals
+    used = {c.name for role, c in table.roles.items() if c.is_asked or role in _USED}
+    others = {name: values for name, values in table.columns.items() if name not in used}
+    runs = []
+    for (unit, label, rows), left_out in zip(found.groups, found.left_out, strict=True):
+        if "time" in signals:
+            _check_time(table, signals["time"], rows)
+        fields: dict[str, Any] = {k: v[rows] for k, v in signals.items() if k in FIELDS}
+        runs.append(
+            CalibrationRun(
+                found.reference[rows],
+                found.indicated[rows],
+                **fields,
+                period=found.period,
+                label=label,
+                unit=unit,
+                left_out=left_out,
+                signals={k: v[rows] for k, v in signals.items() if k not in FIELDS},
+                columns={name: values[rows] for name, values in others.items()},
+                source=found.source,
+            )
+        )
+    return runs
+
+
+#: Roles whose columns are not repeated among the other columns of a run.
+_USED = ("time", "temperature", "torque", "run", "unit")
+
+
+def _warn_of_empty(
+    table: Readings, missing: NDArray[np.bool_], values: Mapping[str, NDArray[np.float64]]
+) -> None:
+    count = int(np.count_nonzero(missing))
+    if count:
+        row = int(np.flatnonzero(missing)[0])
+        role = next(role for role, found in values.items() if np.isnan(found[row]))
+        line = table.format.line_of(table.path, row)
+        warnings.warn(
+            f"{table.path}: {count} of {missing.size} rows have an empty cell and are left out, "
+            f"the first at line {line}, column '{_column_of(table, role)}'",
+            EmptyCellsWarning,
+            stacklevel=9,
+        )
+
+
+def _column_of(table: Readings, role: str) -> str:
+    return table.roles[role].name if role in table.roles else next(iter(table.columns))
+
+
+def _refuse_missing(table: Readings, role: str) -> None:
+    units = (*UNIT_PERIODS, "count") if role == "indicated" else tuple(UNIT_PERIODS)
+    names = ", ".join(f"{role}_{unit}" for unit in units)
+    header = list(table.columns)
+    guess = next(filter(None, (did_you_mean(f"{role}_{unit}", header) for unit in units)), "")
+    raise FileError(
+        table.path,
+        f"no column {role}_deg (one of {names} is needed, or another named with "
+        f"{signal_code(role)}){guess}; {listed(header)}",
+        line=1,
+    )
+
+
+def _angles(
+    table: Readings, counts: float | None, reference_counts: float | None
+) -> tuple[float, NDArray[np.float64], NDArray[np.float64]]:
+    """Period of the file and its two angles in that unit."""
+    default = table.format.unit
+    reference, indicated = (
+        column._replace(unit=column.unit or default)
+        for column in (table.roles["reference"], table.roles["indicated"])
+    )
+    if reference.unit is None:
+        raise table.error(
+            f"its unit is not known; give it: {signal_code('reference', reference.name, 'deg')}",
+            reference.name,
+        )
+    if reference.unit == "count" and reference_counts is None:
+        raise table.error(
+            "a reference in counts needs their number per turn: give `counts_per_turn_reference=`",
+            reference.name,
+        )
+    indicated = indicated._replace(unit=indicated.unit or reference.unit)
+    if indicated.unit == "count" and counts is None:
+        raise table.error(
+            "counts need their number per output turn: give `counts_per_turn=`",
+            indicated.name,
+        )
+    by_name = not (reference.is_asked or indicated.is_asked)
+    suffixes = [c.name == f"{c.role}_{c.unit}" for c in (reference, indicated)]
+    differ = reference.unit != indicated.unit and "count" not in (reference.unit, indicated.unit)
+    if differ and by_name and all(suffixes):
+        raise table.error(
+            f"units are mixed: reference in {reference.unit}, indicated in {indicated.unit}; "
+            f"convert one, or name both with `signals=`",
+            indicated.name,
+        )
+    period = UNIT_PERIODS.get(reference.unit, _PERIOD)
+    return (
+        period,
+        reference.values(table.raw(reference), period, reference_counts),
+        indicated.values(table.raw(indicated), period, counts),
+    )
+
+
+def _groups(table: Readings, size: int) -> Groups:
+    """Unit, label and rows of every run, in the order of their first row."""
+    names = {role: table.roles[role].name for role in ("unit", "run") if role in table.roles}
+    if not names:
+        return [(None, None, np.arange(size))]
+    rows: dict[tuple[str, ...], list[int]] = {}
+    keys = zip(*(map(_label, table.columns[name].tolist()) for name in names.values()), strict=True)
+    for i, key in enumerate(keys):
+        rows.setdefault(key, []).append(i)
+    found = []
+    for key, places in rows.items():
+        labels = dict(zip(names, key, strict=True))
+        found.append((labels.get("unit"), labels.get("run"), np.array(places, dtype=np.intp)))
+    return found
+
+
+def _label(value: Any) -> str:
+    return "" if value is None else str(value)
+
+
+def _check_time(table: Readings, time: NDArray[np.float64], rows: NDArray[np.intp]) -> None:
+    back = np.flatnonzero(np.diff(time[rows]) < 0.0)
+    if back.size:
+        row = int(rows[back[0] + 1])
+        raise table.error(
+            f"time runs backwards within the run: {time[row]:g} after "
+            f"{time[rows[back[0]]]:g}; sort the rows or give the part another run label",
+            table.roles["time"].name,
+            row,
+        )

@@ -1,0 +1,152 @@
+"""Does the indicated angle follow the reference? Wrong units and signs found out."""
+
+from __future__ import annotations
+
+import math
+import warnings
+from typing import TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+import trueangle._core as _core
+
+from ..errors import ArgumentError, UnitWarning
+from ..support.angles import wrap
+from ..support.quantiles import quantile
+from .checks.angles import AGREES, ratio_of, suggestion
+from .checks.record import records_of
+from .run import CalibrationRun
+
+__all__ = ["check_follows"]
+
+Array: TypeAlias = NDArray[np.float64]
+
+#: Readings looked at; a mistake of unit shows in any few.
+_SAMPLE = 1000
+
+#: Resultant length (1 = all differences equal, 0 = spread over the turn). Errors of a
+#: whole 60 deg standard deviation still give 0.58.
+_FOLLOWS = 0.5
+
+#: A remedy is only named when it makes the differences agree this well.
+_REMEDIED = 0.95
+
+#: How near a measured ratio is to that of two units.
+_NEAR = 0.01
+
+#: Step of the indicated angle (degrees) that may be a turn more or less.
+_FAST = 120.0
+
+#: Radians beyond which a reference may as well be degrees: ten turns.
+_MANY = 20.0 * math.pi
+
+#: Highest order, and the share of the error's power left by it, by which degrees are told.
+_HIGHEST, _LEFT = 3, 0.25
+
+_TURNS = {"degrees": 360.0, "radians": 2.0 * math.pi, "turns": 1.0}
+
+
+def check_follows(run: CalibrationRun) -> None:
+    """Raise when ``indicated - reference`` is spread over the whole turn.
+
+    Raises
+    ------
+    ArgumentError
+        Says what the indicated angle looks like instead: another unit, the other sign.
+
+    Warns
+    -----
+    UnitWarning
+        Angles whose error repeats with 360, and not with 2 pi.
+    """
+    reference, indicated = run.reference, run.indicated
+    stride = reference.size // _SAMPLE
+    if stride > 1:
+        reference = np.ascontiguousarray(reference[::stride])
+        indicated = np.ascontiguousarray(indicated[::stride])
+    if reference.size < 4:
+        return
+    if run.period == _TURNS["radians"] and reference[reference.argmax()] > _MANY:
+        _warn_of_degrees(run, reference, indicated)
+    if _core.resultant(indicated, reference, run.period) >= _FOLLOWS:
+        return
+    ratio = _ratio(run)
+    # By the travel where readings are dense enough to follow it; else, where steps of more
+    # than half a turn hide it, by what would make the differences agree.
+    found = (
+        text
+        for text, factor in _remedies(run.period).items()
+        if (
+            abs(factor * ratio - 1.0) < _NEAR
+            if ratio is not None
+            else _core.resultant(factor * indicated, reference, run.period) > _REMEDIED
+        )
+    )
+    remedy = next(found, None) or _moves(ratio)
+    raise ArgumentError(
+        f"the indicated angle{_of(run)} does not follow the reference "
+        f"(their differences are spread over the whole turn): {remedy}"
+    )
+
+
+def _of(run: CalibrationRun) -> str:
+    return f" of run {run.label}" if run.label else ""
+
+
+def _warn_of_degrees(run: CalibrationRun, reference: Array, indicated: Array) -> None:
+    """Warn where low orders of 360 explain the error, and those of 2 pi do not.
+
+    A motor of some sixty turns to one of its output shows much the same: no error then.
+    """
+    left = {}
+    for period in (_TURNS["radians"], _TURNS["degrees"]):
+        error = wrap(indicated - reference, period)
+        angle = np.outer(reference, np.arange(1, _HIGHEST + 1)) * (2.0 * math.pi / period)
+        lines = np.column_stack([np.ones(angle.shape[0]), np.cos(angle), np.sin(angle)])
+        if angle.shape[0] <= 2 * lines.shape[1]:
+            return
+        rest = error - lines @ np.linalg.lstsq(lines, error, rcond=None)[0]
+        left[period] = float(rest @ rest)
+    if left[_TURNS["degrees"]] < _LEFT * left[_TURNS["radians"]]:
+        warnings.warn(
+            f"the reference{_of(run)} goes to {float(reference.max()):.6g}, and its error repeats "
+            "with 360: if these are degrees, give `period=360` (the default is 2*pi, radians)",
+            UnitWarning,
+            stacklevel=6,
+        )
+
+
+def _remedies(period: float) -> dict[str, float]:
+    """What the indicated angle may be instead, with the factor that puts it right."""
+    found = {"it runs backwards: change its sign": -1.0}
+    # A column is converted when it is read: its unit need not be that of the run, which
+    # is only the likeliest.
+    columns = sorted(_TURNS, key=lambda unit: not math.isclose(_TURNS[unit], period))
+    for column in columns:
+        for unit, turn in _TURNS.items():
+            if unit != column:
+                found[f"it looks like {unit} in a column of {column}"] = _TURNS[column] / turn
+    return found
+
+
+def _ratio(run: CalibrationRun) -> float | None:
+    """Travel of the indicated angle per travel of the reference, where readings tell it."""
+    (record,) = records_of([run])
+    ratio = ratio_of([record])
+    if ratio is None or ratio == 0.0:
+        return None
+    reference, indicated = record.unwrapped
+    fast = float(quantile(np.abs(np.diff(indicated)), 0.9)) > _FAST
+    agree = _core.resultant(indicated / ratio, reference, 360.0) > _REMEDIED
+    return ratio if agree and not fast else None
+
+
+def _moves(ratio: float | None) -> str:
+    if ratio is None or abs(ratio - 1.0) < AGREES:
+        return "check units, sign, gear ratio and that the rows belong together"
+    return (
+        f"it moves {ratio:.6g} times as far as the reference, which looks like "
+        f"{suggestion(ratio)}; unwrap it and divide it by {ratio:.6g}, so that it is reduced to "
+        "the output"
+    )

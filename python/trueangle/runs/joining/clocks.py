@@ -1,0 +1,233 @@
+"""Offset and rate of two clocks, from a motion that both streams saw."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...errors import ArgumentError
+from .stream import Stream
+
+__all__ = ["Clocks", "estimated_clocks"]
+
+Array = NDArray[np.float64]
+
+#: Points of the grid on which the coarse offset is searched, at most.
+_GRID = 1 << 20
+#: Share of the shorter stream that must overlap.
+_OVERLAP = 0.25
+#: Mean square differences of velocities that are alike: times the least, and as a share of
+#: the mean square of the velocity.
+_AS_WELL = 1.5
+_TIE = 1e-3
+#: Variation of the velocity, as a share of its root mean square, below which one speed is seen.
+_ONE_SPEED = 0.02
+#: Orders of the joint that may not pass for a motion of the clock.
+_ORDERS = (1, 2, 3, 4)
+#: Rounds of refining; each is linear, and the third changes nothing measurable.
+_ROUNDS = 8
+#: Standard errors that a rate must differ from zero by.
+_SIGNIFICANT = 5.0
+
+
+@dataclass(frozen=True)
+class Clocks:
+    r"""How the clock of one stream runs against that of the other.
+
+    .. math:: t_B = t_A + \mathrm{offset} + 10^{-6}\,\mathrm{rate}\,(t_A - t_0)
+
+    with :math:`t_0` the first reading of A; standard errors in ``offset_std``, ``rate_std``
+    (None where it was declared or the motion does not tell), that of a time on the other
+    clock, root mean square over the log, in ``timing_std``.
+    """
+
+    start: float
+    offset: float
+    rate: float = 0.0
+    offset_std: float | None = None
+    rate_std: float | None = None
+    timing_std: float = 0.0
+    notes: tuple[str, ...] = ()
+
+    def to_other(self, time: Array) -> Array:
+        """Times of clock A on clock B."""
+        return np.asarray(time + self.offset + 1e-6 * self.rate * (time - self.start))
+
+
+def estimated_clocks(
+    indicated: Stream, reference: Stream, offset: float | None, rate: float | None
+) -> Clocks:
+    """Offset and rate from the motion, but those that are declared.
+
+    Raises
+    ------
+    ArgumentError
+        The streams share no time and the motion does not tell the offset.
+    """
+    start = float(indicated.time[0])
+    notes = []
+    if offset is None:
+        coarse, others = _coarse(indicated, reference)
+        if others:
+            listed = ", ".join(f"{other:.6g}" for other in others[:4])
+            notes.append(
+                f"the motion repeats itself: offsets of {listed} s fit about as well; the one "
+                "with most readings in common is taken; declare it (`offset_s=`) where it is known"
+            )
+        if others is None:
+            notes.append(
+                "one speed only: the offset of the clocks cannot be told and is taken as "
+                f"{coarse:g} s; declare it (`offset_s=`) or log a motion that stops or reverses"
+            )
+            return Clocks(start, coarse, rate or 0.0, notes=tuple(notes))
+    else:
+        coarse = offset
+    clocks = Clocks(start, coarse, rate or 0.0)
+    wanted = [name for name, given in (("offset", offset), ("rate", rate)) if given is None]
+    if not wanted:
+        return clocks
+    clocks = _refined(indicated, reference, clocks, wanted)
+    if clocks.rate_std is None and rate is None:
+        notes.append("the rate of the clocks cannot be told from this motion; taken as equal")
+    if offset is None:
+        notes.append(
+            "the offset holds any constant delay between the two channels: no log can tell them "
+            "apart; what varies with speed is left to diagnose"
+        )
+    return replace(clocks, notes=tuple(notes))
+
+
+def _coarse(indicated: Stream, reference: Stream) -> tuple[float, list[float] | None]:
+    """The offset at which the velocities agree best, and others at which they do as well.
+
+    None instead of others where the motion does not tell an offset.
+    """
+    step = max(indicated.step, reference.step)
+    longest = max(np.ptp(indicated.time), np.ptp(reference.time))
+    step = max(step, float(longest) / _GRID)
+    curves = []
+    for stream in (indicated, reference):
+        grid = np.arange(stream.time[0], stream.time[-1], step)
+        if grid.size < 8:
+            raise ArgumentError("too few readings to bring two clocks together: at least 8 each")
+        curves.append(np.diff(stream.at(grid, cubic=False)[0]) / step)
+    a, b = curves
+    size = math.sqrt(float(np.mean(b**2)))
+    shared = min(indicated.time[-1], reference.time[-1]) - max(indicated.time[0], reference.time[0])
+    if float(np.std(b)) < _ONE_SPEED * size or float(np.std(a)) < _ONE_SPEED * size:
+        if shared <= 0.0:
+            raise ArgumentError(
+                "the two logs share no time, and with one speed only the motion does not tell "
+                "the offset of their clocks; declare it (`offset_s=`)"
+            )
+        return 0.0, None
+    # Mean square difference at every lag, over what overlaps.
+    n = 1 << (a.size + b.size - 1).bit_length()
+    transform = [np.fft.rfft(x, n) for x in (a, b, a**2, b**2, np.ones_like(a), np.ones_like(b))]
+    fa, fb, faa, fbb, one_a, one_b = transform
+
+    def correlation(first: NDArray[np.complex128], second: NDArray[np.complex128]) -> Array:
+        return np.asarray(np.fft.irfft(np.conj(first) * second, n))
+
+    count = correlation(one_a, one_b)
+    total = correlation(faa, one_b) + correlation(one_a, fbb) - 2.0 * correlation(fa, fb)
+    enough = count > _OVERLAP * min(a.size, b.size)
+    cost = np.where(enough, total / np.maximum(count, 1.0), np.inf)
+    shift = np.roll(cost, n // 2)
+    least = np.flatnonzero((shift < np.roll(shift, 1)) & (shift <= np.roll(shift, -1)))
+    limit = _AS_WELL * float(shift.min()) + _TIE * size**2
+    alike = least[shift[least] <= limit]
+    best = int(alike[np.argmax(np.roll(count, n // 2)[alike])])
+    # Sample i of A stands at sample i + lag of B.
+    start = float(reference.time[0] - indicated.time[0])
+    offsets = [start + (int(place) - n // 2) * step for place in alike if place != best]
+    return start + (best - n // 2) * step, offsets
+
+
+def _refined(indicated: Stream, reference: Stream, clocks: Clocks, wanted: list[str]) -> Clocks:
+    """Least squares over the readings of A, beside a zero, a ramp and the lowest orders."""
+    if "rate" in wanted:
+        found = _solved(indicated, reference, clocks, wanted)
+        if (
+            found is not None
+            and found.rate_std is not None
+            and abs(found.rate) > _SIGNIFICANT * found.rate_std
+        ):
+            return found
+    if "offset" not in wanted:
+        return clocks
+    only = _solved(indicated, reference, clocks, ["offset"])
+    return clocks if only is None else only
+
+
+def _solved(
+    indicated: Stream, reference: Stream, clocks: Clocks, wanted: list[str]
+) -> Clocks | None:
+    offset, rate = clocks.offset, clocks.rate
+    std: dict[str, float] = {}
+    t = indicated.time - clocks.start
+    for _ in range(_ROUNDS):
+        there = indicated.time + offset + 1e-6 * rate * t
+        inside = reference.covers(there)
+        if np.count_nonzero(inside) < 16:
+            return None
+        angle, velocity = reference.at(there[inside])
+        error = indicated.angle[inside] - angle
+        turn = np.radians(angle)
+        nuisance = [np.ones_like(angle), angle - angle.mean()]
+        if np.ptp(angle) > 300.0:
+            nuisance += [f(k * turn) for k in _ORDERS for f in (np.cos, np.sin)]
+        columns = {"offset": velocity, "rate": 1e-6 * t[inside] * velocity}
+        design = np.column_stack([columns[name] for name in wanted] + nuisance)
+        scale = np.sqrt(np.mean(design**2, axis=0))
+        if not (scale > 0.0).all():
+            return None
+        u, s, vt = np.linalg.svd(design / scale, full_matrices=False)
+        if s[-1] < 1e-6 * s[0]:
+            return None
+        weight = np.ones(error.size)
+        solution = vt.T @ ((u.T @ error) / s)
+        rest = error - (design / scale) @ solution
+        spread = 1.4826 * float(np.median(np.abs(rest)))
+        if spread > 0.0:  # wild readings do not move a clock
+            weight = np.minimum(1.0, 3.0 * spread / np.maximum(np.abs(rest), 1e-300))
+            root = np.sqrt(weight)
+            u, s, vt = np.linalg.svd(design / scale * root[:, None], full_matrices=False)
+            solution = vt.T @ ((u.T @ (error * root)) / s)
+            rest = error - (design / scale) @ solution
+        covariance = (vt.T / s**2) @ vt * float(np.mean(weight * rest**2)) * _inflation(rest)
+        change = solution / scale
+        for j, name in enumerate(wanted):
+            std[name] = math.sqrt(float(covariance[j, j])) / float(scale[j])
+        moved = change[wanted.index("offset")] if "offset" in wanted else 0.0
+        offset += moved
+        if "rate" in wanted:
+            rate += change[wanted.index("rate")]
+        if abs(moved) < 1e-9:
+            break
+    timed = (
+        np.column_stack([np.ones_like(t) if name == "offset" else 1e-6 * t for name in wanted])
+        / scale[: len(wanted)]
+    )
+    inner = covariance[: len(wanted), : len(wanted)]
+    timing = math.sqrt(max(float(np.mean(np.einsum("ij,jk,ik->i", timed, inner, timed))), 0.0))
+    return replace(
+        clocks,
+        offset=float(offset),
+        rate=float(rate),
+        offset_std=std.get("offset"),
+        rate_std=std.get("rate"),
+        timing_std=timing,
+    )
+
+
+def _inflation(rest: Array) -> float:
+    """Factor on the variance of neighbours that are alike (first-order correlation)."""
+    power = float(rest @ rest)
+    if power <= 0.0:
+        return 1.0
+    alike = min(max(float(rest[1:] @ rest[:-1]) / power, 0.0), 0.99)
+    return (1.0 + alike) / (1.0 - alike)

@@ -1,0 +1,113 @@
+"""What a joining made, and how far it can be trusted."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from os import PathLike
+from typing import Any, NamedTuple
+
+from ...support.display_units import ErrorsIn, error_unit
+from ...support.plainresult import PlainResult, counted
+from ..run import CalibrationRun
+
+__all__ = ["Gap", "Joined"]
+
+
+class Gap(NamedTuple):
+    """A pause of the reference, on its own clock, and the readings left out over it."""
+
+    start_s: float
+    end_s: float
+    left_out: int
+
+
+@dataclass(frozen=True)
+class Joined(PlainResult):
+    """Two logs as calibration runs.
+
+    Attributes
+    ----------
+    runs : list of CalibrationRun
+        In degrees, a reading for every indicated one whose reference is known; time is that
+        of the indicated log.
+    offset_s, rate_ppm : float
+        ``t_reference = t_indicated + offset + rate * (t_indicated - start)``.
+    offset_std_s, rate_std_ppm : float or None
+        Their standard errors; None where they are declared, or the motion does not tell.
+    std_arcsec : float
+        Standard deviation that the joining adds to an error: of interpolation and clocks.
+    gaps : tuple of Gap
+    left_out : int
+        Indicated readings without a reference: over gaps, before its start, after its end.
+    on_change : tuple of str
+        Which of the logs, ``"indicated"`` and ``"reference"``, hold changes only.
+    notes : tuple of str
+    """
+
+    runs: list[CalibrationRun]
+    offset_s: float
+    rate_ppm: float
+    offset_std_s: float | None
+    rate_std_ppm: float | None
+    std_arcsec: float
+    gaps: tuple[Gap, ...]
+    left_out: int
+    on_change: tuple[str, ...]
+    notes: tuple[str, ...]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain values."""
+        return {
+            "readings": sum(len(run) for run in self.runs),
+            "runs": len(self.runs),
+            "left_out": self.left_out,
+            "offset_s": self.offset_s,
+            "offset_std_s": self.offset_std_s,
+            "rate_ppm": self.rate_ppm,
+            "rate_std_ppm": self.rate_std_ppm,
+            "std_arcsec": self.std_arcsec,
+            "gaps": [gap._asdict() for gap in self.gaps],
+            "on_change": list(self.on_change),
+            "notes": list(self.notes),
+        }
+
+    def _brief(self) -> str:
+        readings = sum(len(run) for run in self.runs)
+        return (
+            f"{readings} readings in {counted(self.runs, 'run')}, offset {self.offset_s:.6g} s, "
+            f"rate {self.rate_ppm:.4g} ppm"
+        )
+
+    def summary(self, errors_in: ErrorsIn = "auto") -> str:
+        """The result as text.
+
+        Parameters
+        ----------
+        errors_in : {"auto", "arcsec", "deg", "mrad", "count"} or float
+            Unit of the errors; by itself arcsec, or degrees where one reaches a degree. A
+            number is the counts of a turn.
+        """
+
+        def told(value: float, std: float | None, unit: str) -> str:
+            return f"{value:.9g} {unit}" + ("" if std is None else f" +- {std:.2g}")
+
+        unit = error_unit(errors_in, self.std_arcsec)
+        found = self.to_dict()
+        lines = [
+            f"{found['readings']} readings joined in {found['runs']} run(s), "
+            f"{self.left_out} without a reference left out",
+            f"  offset    {told(self.offset_s, self.offset_std_s, 's')}",
+            f"  rate      {told(self.rate_ppm, self.rate_std_ppm, 'ppm')}",
+            f"  joining   adds {unit.text(self.std_arcsec)} standard deviation",
+            f"  gaps      {len(self.gaps)}",
+        ]
+        if self.on_change:
+            lines.append(f"  on change {', '.join(self.on_change)}: held over its pauses")
+        lines += [f"  [{i}] {note}" for i, note in enumerate(self.notes, 1)]
+        return "\n".join(lines)
+
+    def save(self, path: str | PathLike[str]) -> int:
+        """Write the runs as CSV, complete or not at all; the number of readings."""
+        from ..writing import write_runs
+
+        return write_runs(self.runs, str(path))

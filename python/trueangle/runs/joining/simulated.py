@@ -1,0 +1,286 @@
+"""What a simulator's log says, taken off the measured runs: by time or by angle."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...errors import ArgumentError
+from ...formats.signals import FIELDS
+from ...support.angles import ARCSEC_PER_TURN
+from ...support.plainresult import Shown
+from ..run import CalibrationRun, as_runs
+from ..tables import runs_of
+from .clocks import estimated_clocks
+from .stream import Stream
+from .travel import Travelled
+
+__all__ = ["BY", "MeasuredMinusSimulated", "minus_simulated"]
+
+Array = NDArray[np.float64]
+
+#: How a log may be brought to the readings.
+BY = ("time", "angle")
+#: rms by which two motions differ, as a share of their own, from which on they are not the same.
+SAME_MOTION = 0.05
+#: Share of a run's readings that the log must cover in time.
+COVERED = 0.5
+#: Times by which another offset of the clocks must bring the motions nearer to be taken.
+NEARER = 2.0
+#: Readings that a run is made of, at least.
+_LEAST = 4
+
+
+@dataclass(frozen=True)
+class MeasuredMinusSimulated(Shown):
+    """Measured runs without the error that a simulator's log says.
+
+    Attributes
+    ----------
+    runs : list of CalibrationRun
+        ``indicated`` is lowered by the simulated error: what is left is for a diagnosis.
+    source : str
+        The log.
+    by : tuple of str
+        "time" or "angle", for each run.
+    left_out : int
+        Readings at which the log says nothing.
+    offsets_s : tuple of float
+        Seconds from the clock of every run to that of the log; 0 where it is joined by angle.
+    std_arcsec : float
+        Standard deviation that the joining adds to an error.
+    notes : tuple of str
+    """
+
+    runs: list[CalibrationRun]
+    source: str
+    by: tuple[str, ...]
+    left_out: int
+    offsets_s: tuple[float, ...]
+    std_arcsec: float
+    notes: tuple[str, ...]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain values."""
+        return {
+            "source": self.source,
+            "joined_by": list(self.by),
+            "left_out": self.left_out,
+            "offsets_s": list(self.offsets_s),
+            "std_arcsec": self.std_arcsec,
+            "notes": list(self.notes),
+        }
+
+    def summary(self) -> str:
+        """How the log was joined, in a line and its notes."""
+        how = " and ".join(dict.fromkeys(self.by))
+        text = (
+            f"Simulated: {self.source}, joined by {how}; joining adds {self.std_arcsec:.2g} arcsec"
+        )
+        if self.left_out:
+            text += f"; {self.left_out} readings at which it says nothing are left out"
+        return ". ".join([text, *self.notes]) + "."
+
+
+class _Expected(NamedTuple):
+    """The simulated error at the readings of a run, degrees, where the log says one."""
+
+    by: str
+    error: Array
+    known: NDArray[np.bool_]
+    std: float
+    offset: float = 0.0
+    note: str = ""
+
+
+def minus_simulated(
+    runs: CalibrationRun | Iterable[CalibrationRun],
+    simulated: Any,
+    *,
+    by: str | None = None,
+    **reading: Any,
+) -> MeasuredMinusSimulated:
+    r"""Measured runs without what a simulator's log says of the same joint.
+
+    .. math:: r_i' = r_i - \varepsilon_\text{sim}(t_i) \quad\text{or}\quad
+              r_i' = r_i - \varepsilon_\text{sim}(\theta_i, \operatorname{sgn}\dot\theta_i)
+
+    Parameters
+    ----------
+    runs : CalibrationRun or iterable of CalibrationRun
+    simulated : path, table or iterable of CalibrationRun
+        The log, as `trueangle.runs.tables.runs_of` takes it: ``reference`` is the simulator's
+        true output angle, ``indicated`` what the simulated encoder (or command) says. One run
+        for all measured runs, or runs of the same labels.
+    by : {"time", "angle"}, optional
+        By default by time where both have one and the motions are the same, else by angle.
+    **reading
+        ``signals``, ``counts_per_turn`` ... of the log, as in `trueangle.read_runs`.
+
+    Returns
+    -------
+    MeasuredMinusSimulated
+
+    Raises
+    ------
+    ArgumentError
+        Runs without a counterpart, no time, or nothing in common.
+    FileError
+        As `trueangle.read_runs`, for the log.
+
+    Notes
+    -----
+    In time by lines or cubics through the log's own readings, exact at equal times; an offset
+    of the clocks is found where the motion tells one. By angle over the log's whole travel if
+    that holds the measured one, else modulo a turn, for each direction that the log has; there
+    the log must count its angle from the same place. Cost: a sort of each run.
+
+    Examples
+    --------
+    >>> theta = np.arange(0.0, 360.0)
+    >>> run = CalibrationRun(theta, theta + 0.3, period=360.0)
+    >>> log = {"reference_deg": theta, "indicated_deg": theta + 0.1}
+    >>> left = minus_simulated(run, log)
+    >>> left.by, round(float(left.runs[0].error.mean()), 9)
+    (('angle',), 0.2)
+    """
+    if by is not None and by not in BY:
+        raise ArgumentError(f"by must be {' or '.join(BY)}, got {by!r}")
+    measured = as_runs(runs)
+    logs = runs_of(simulated, name="simulated", **reading)
+    source = logs[0].source.file if logs and logs[0].source else "simulated runs"
+    found, kept = [], []
+    for run, log in zip(measured, _counterparts(measured, logs, source), strict=True):
+        expected = _expected(run, log, by, source)
+        if np.count_nonzero(expected.known) < _LEAST:
+            raise ArgumentError(
+                f"{source} says nothing of {np.count_nonzero(~expected.known)} of the {len(run)} "
+                f"readings of run {run.label or '1'}: its {expected.by} is another"
+            )
+        kept.append(_lowered(run, expected))
+        found.append(expected)
+    return MeasuredMinusSimulated(
+        kept,
+        source,
+        tuple(part.by for part in found),
+        sum(int(np.count_nonzero(~part.known)) for part in found),
+        tuple(part.offset for part in found),
+        math.sqrt(float(np.mean([part.std**2 for part in found]))) * ARCSEC_PER_TURN / 360.0,
+        tuple(dict.fromkeys(part.note for part in found if part.note)),
+    )
+
+
+def _counterparts(
+    measured: Sequence[CalibrationRun], logs: Sequence[CalibrationRun], source: str
+) -> list[CalibrationRun]:
+    """The simulated run of every measured one."""
+    if len(logs) == 1:
+        return [logs[0]] * len(measured)
+    by_label = {log.label: log for log in logs}
+    missing = [run.label for run in measured if run.label not in by_label]
+    if missing or len(by_label) < len(logs):
+        raise ArgumentError(
+            f"{source} has {len(logs)} runs ({', '.join(str(log.label) for log in logs[:6])}), "
+            f"none of them for run {missing[0] if missing else measured[0].label}: give its runs "
+            "the labels of the measured ones, or one run that holds all motion"
+        )
+    return [by_label[run.label] for run in measured]
+
+
+def _lowered(run: CalibrationRun, expected: _Expected) -> CalibrationRun:
+    """The run's readings at which the log says an error, lowered by it."""
+    rows = expected.known
+    lowered = run.indicated[rows] - expected.error[rows] * (run.period / 360.0)
+    fields = {
+        name: values[rows]
+        for name in (*FIELDS, "weights")
+        if (values := getattr(run, name)) is not None
+    }
+    return replace(
+        run,
+        reference=run.reference[rows],
+        indicated=lowered,
+        signals={name: values[rows] for name, values in run.signals.items()},
+        columns={name: np.asarray(values)[rows] for name, values in run.columns.items()},
+        **fields,
+    )
+
+
+def _expected(run: CalibrationRun, log: CalibrationRun, by: str | None, source: str) -> _Expected:
+    if by != "angle":
+        if run.time is not None and log.time is not None:
+            found = _in_time(run, log, is_asked=by == "time")
+            if found is not None:
+                return found
+        elif by == "time":
+            lacks = source if log.time is None else f"run {run.label or '1'}"
+            raise ArgumentError(f"{lacks} has no time: give a column time_s, or join by angle")
+    travelled = Travelled(_degrees(log), _error(log), log.direction)
+    error, known = travelled.at(_degrees(run), run.direction)
+    note = ""
+    if by is None and run.time is not None and log.time is not None:
+        note = f"The motion of {source} is another than that of the readings"
+    if not travelled.has_both and np.unique(run.direction).size > 1:
+        note += (". " if note else "") + f"{source} moves in one direction only: its error is "
+        note += "taken for both"
+    return _Expected("angle", error, known, travelled.std, note=note)
+
+
+def _in_time(run: CalibrationRun, log: CalibrationRun, is_asked: bool) -> _Expected | None:
+    """The log's error at the times of the run; None where the two moved otherwise."""
+    assert run.time is not None
+    assert log.time is not None
+    own, other = Stream.of(run.time, _degrees(run)), Stream.of(log.time, _degrees(log))
+    offset, apart = 0.0, _apart(own, other, 0.0)
+    size = float(np.std(own.angle))
+    if apart > 0.0:
+        try:
+            clocks = estimated_clocks(own, other, None, 0.0)
+        except ArgumentError:
+            clocks = None
+        if clocks is not None and clocks.offset_std is not None:
+            nearer = _apart(own, other, clocks.offset)
+            if NEARER * nearer < apart:
+                offset, apart = clocks.offset, nearer
+    if apart > SAME_MOTION * size and not (is_asked and math.isfinite(apart)):
+        if not is_asked:
+            return None
+        raise ArgumentError(
+            "the log and the readings share no time: give the log the same clock, or join by angle"
+        )
+    error = Stream(*_each_time_once(log.time, _error(log)))
+    there = run.time + offset
+    known = error.covers(there)
+    inside = np.clip(there, error.time[0], error.time[-1])
+    exact = bool(np.isin(inside[known], error.time).all())
+    note = f"The clock of the log is taken as shifted by {offset:.6g} s" if offset else ""
+    std = 0.0 if exact else error.interpolation_std
+    return _Expected("time", error.at(inside)[0], known, std, offset, note)
+
+
+def _apart(own: Stream, other: Stream, offset: float) -> float:
+    """How far two motions differ (rms, degrees) beyond a constant; infinite with no common time."""
+    there = own.time + offset
+    inside = other.covers(there)
+    if np.count_nonzero(inside) < max(_LEAST, COVERED * inside.size):
+        return math.inf
+    difference = own.angle[inside] - other.at(there[inside])[0]
+    return float(np.sqrt(np.mean((difference - np.median(difference)) ** 2)))
+
+
+def _each_time_once(time: Array, values: Array) -> tuple[Array, Array]:
+    stamps, first, count = np.unique(time, return_index=True, return_counts=True)
+    return stamps, np.add.reduceat(values, first) / count
+
+
+def _degrees(run: CalibrationRun) -> Array:
+    return run.unwrapped_reference * (360.0 / run.period)
+
+
+def _error(run: CalibrationRun) -> Array:
+    return run.centred_error * (360.0 / run.period)

@@ -1,0 +1,254 @@
+"""All readings of one file, of any format, before they are runs."""
+
+from __future__ import annotations
+
+import os
+import re
+import stat
+from collections import Counter
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from os import PathLike
+from pathlib import Path
+from typing import Any, NamedTuple, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import FileError
+from ..formats.budget import DecodedSizeError, check_decoded
+from ..formats.columns import Column, find_columns, wanted_columns
+from ..formats.csvheader import number
+from ..formats.format import TEXTS, Batch, Format, Labels
+from ..formats.formats import format_of_content
+from ..support.files import (
+    RUNS_BYTES,
+    check_input,
+    partition_keys,
+    partition_name,
+    read_whole,
+    sha256_of,
+)
+from .run import Source
+
+__all__ = ["Readings", "named", "read_readings", "readings_of"]
+
+T = TypeVar("T")
+
+#: Columns that are kept although nothing is known of them, at most: a wide log has thousands.
+_KEPT = 256
+
+
+class Readings(NamedTuple):
+    """Rows of one file as they are, before they are runs.
+
+    Attributes
+    ----------
+    path : Path
+    format : Format
+    roles : dict of str to Column
+        What is known of the columns.
+    columns : dict of str to array
+        By name; texts as arrays of objects.
+    source : Source
+    """
+
+    path: Path
+    format: Format
+    roles: dict[str, Column]
+    columns: dict[str, NDArray[Any]]
+    source: Source
+
+    def error(self, problem: str, column: str | None = None, row: int | None = None) -> FileError:
+        """The error that says ``problem`` of a column, at the line of a row."""
+        line = 1 if row is None else self.format.line_of(self.path, row)
+        return FileError(self.path, problem, line=line, column=column)
+
+    def raw(self, column: Column) -> NDArray[np.float64]:
+        """A column as finite numbers, NaN where a cell is empty."""
+        values = self.columns[column.name]
+        if values.dtype == object:
+            row = next((i for i, value in enumerate(values) if value is not None), 0)
+            got = repr(values[row])[:60]
+            raise self.error(f"a number is needed, got {got}", column.name, row)
+        numbers = np.asarray(values, dtype=np.float64)
+        infinite = np.flatnonzero(np.isinf(numbers))
+        if infinite.size:
+            row = int(infinite[0])
+            problem = f"readings must be finite, got {numbers[row]}; drop the row"
+            raise self.error(problem, column.name, row)
+        return numbers
+
+
+def read_readings(
+    path: str | PathLike[str], signals: Mapping[str, Any] | None = None, topic: str | None = None
+) -> Readings:
+    """All rows of one file with the columns that are known, needed or not.
+
+    For logs without a reference, such as those that a self-calibration starts from.
+
+    Raises
+    ------
+    FileError
+        As `read_runs`, but no column is needed.
+    """
+    wanted = wanted_columns(signals)
+    return named(Path(path), lambda file: readings_of(file, wanted, topic))
+
+
+def named(path: Path, read: Callable[[Path], T]) -> T:
+    """What ``read`` makes of a file; a pipe is written to a file first, and keeps its name."""
+    found = check_input(path)
+    if stat.S_ISREG(found.st_mode) or (path.is_dir() and (path / "metadata.yaml").is_file()):
+        if found.st_size > RUNS_BYTES:
+            raise FileError(
+                path,
+                f"has {found.st_size} bytes, but a table of runs is read up to "
+                f"{RUNS_BYTES >> 30} GiB; `ta.fit_logs(...)` reads more, in "
+                "constant memory",
+            )
+        with format_of_content(path).at_header(path):
+            return read(path)
+    with _spooled(path) as file:
+        try:
+            with format_of_content(file).at_header(file):
+                return read(file)
+        except FileError as error:
+            raise type(error)(path, error.problem, line=error.line, column=error.column) from None
+
+
+@contextmanager
+def _spooled(path: Path) -> Iterator[Path]:
+    import tempfile  # pipes only
+
+    data = read_whole(path, RUNS_BYTES, "a table of runs")
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder, os.path.basename(path) or "runs")
+        file.write_bytes(data)
+        yield file
+
+
+def readings_of(path: Path, wanted: Mapping[str, Any], topic: str | None) -> Readings:
+    """All rows of a regular file; ``wanted`` as `columns.wanted_columns` makes it."""
+    kind = format_of_content(path)
+    header = kind.module.columns(path, topic)
+    if len(set(header)) < len(header):
+        doubled = next((name for name, n in Counter(header).items() if name and n > 1), None)
+        if doubled is not None:
+            raise FileError(path, "the column appears twice", line=1, column=doubled)
+    # Of a partitioned folder; what the file itself says comes first.
+    keys = {k: v for k, v in partition_keys(path).items() if k not in header}
+    roles = find_columns(path, [*header, *keys], wanted)
+    needed = list(dict.fromkeys(c.name for c in roles.values() if c.name not in keys))
+    known = set(needed)
+    others = [name for name in header if name not in known][:_KEPT]
+    together = getattr(kind.module, "together", None)
+    if together is not None:  # formats whose columns need not be equally long
+        if not needed and len(header) > 1:  # which belong together nobody said
+            empty = dict.fromkeys(header, np.empty(0))
+            return Readings(path, kind, roles, empty, _source(path))
+        others = together(path, needed, others)
+    labels = {column.name for column in roles.values() if column.role in ("run", "unit")}
+    try:
+        columns = _columns(kind, path, needed, others, labels, topic)
+    except DecodedSizeError:
+        if not needed or not others:
+            raise
+        columns = _columns(kind, path, needed, [], labels, topic)
+    size = next((len(values) for values in columns.values()), 0)
+    columns |= {key: _repeated(value, size, key in TEXTS) for key, value in keys.items()}
+    return Readings(path, kind, roles, columns, _source(path))
+
+
+def _source(path: Path) -> Source:
+    return Source(partition_name(path), "" if path.is_dir() else sha256_of(path))
+
+
+def _repeated(value: str, size: int, is_text: bool) -> NDArray[Any]:
+    """A column of one value: a number where it is written as one and is no label."""
+    found = None if is_text or not _is_number(value) else number(value, ".")
+    return np.full(size, value, dtype=object) if found is None else np.full(size, found)
+
+
+def _columns(
+    kind: Format,
+    path: Path,
+    needed: list[str],
+    others: list[str],
+    labels: set[str],
+    topic: str | None,
+) -> dict[str, NDArray[Any]]:
+    """Whole columns; ``others`` are texts where they are not all numbers."""
+    names = [*needed, *others]
+    check_decoded(path, kind.decoded(path, names, topic), len(names))
+    numeric = _numeric(kind, path, others, topic)
+    try:
+        return _joined(kind, path, names, labels | set(others) - numeric, topic)
+    except FileError as error:
+        if error.column not in numeric:
+            raise
+        return _joined(kind, path, names, labels | set(others), topic)
+
+
+def _numeric(kind: Format, path: Path, names: list[str], topic: str | None) -> set[str]:
+    """Columns of a text file that look like numbers in its first rows."""
+    if not names or not hasattr(kind.module, "line_of"):
+        return set()
+    first = next(iter(kind.module.read(path, names, topic, texts=names)), {})
+    return {name for name, labels in first.items() if all(map(_is_number, labels.names))}
+
+
+def _is_number(text: str | None) -> bool:
+    """A number that is written as one: 007 is a name."""
+    if text is None:
+        return True
+    return number(text, ",") is not None and not _NUMBERED.match(text)
+
+
+_NUMBERED = re.compile(r"[+-]?0\d")
+
+
+def _joined(
+    kind: Format, path: Path, names: list[str], texts: set[str], topic: str | None
+) -> dict[str, NDArray[Any]]:
+    """Whole columns."""
+    parts: dict[str, list[Any]] = {name: [] for name in names}
+    rows = size = 0
+    for batch in kind.module.read(path, names, topic, texts=texts, strict=True):
+        for name in names:
+            bad = _undecoded(batch[name])
+            if bad is not None:
+                line = kind.line_of(path, rows + bad)
+                problem = "is not UTF-8 text; save it as CSV in UTF-8"
+                raise FileError(path, problem, line=line, column=name)
+            parts[name].append(_plain_values(batch, name))
+            size += parts[name][-1].nbytes
+        check_decoded(path, size, len(names))
+        rows += len(parts[names[0]][-1])
+    return {name: np.concatenate(found) if found else np.empty(0) for name, found in parts.items()}
+
+
+def _undecoded(values: Any) -> int | None:
+    """The first row of a text that no output could hold; None without."""
+    if not isinstance(values, Labels) or _is_text("".join(map(str, values.names))):
+        return None
+    code = next(i for i, text in enumerate(values.names) if not _is_text(str(text)))
+    return int(np.argmax(values.codes == code))
+
+
+def _is_text(text: str) -> bool:
+    try:
+        text.encode()
+    except UnicodeEncodeError:  # bytes that were no UTF-8 stand in it as halves of characters
+        return False
+    return True
+
+
+def _plain_values(batch: Batch, name: str) -> NDArray[Any]:
+    """Numbers as they are; texts as objects, since an array of texts is as wide as the longest."""
+    values = batch[name]
+    if isinstance(values, Labels):
+        texts = np.empty(len(values.names) + 1, dtype=object)
+        texts[:-1] = values.names
+        return np.asarray(texts[values.codes])
+    return np.asarray(values)

@@ -1,0 +1,254 @@
+"""One calibration run: paired readings of a reference and of the joint's own encoder."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, fields
+from types import MappingProxyType
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import ArgumentError, KindError
+from ..formats.signals import FIELDS, column, find_signal, signal_columns
+from ..support.angles import check_period, circular_mean, wrap
+from ..support.kinds import told_kinds
+
+__all__ = ["CalibrationRun", "Source", "as_runs"]
+
+Array = NDArray[np.float64]
+
+
+class Source(NamedTuple):
+    """A file that readings came from: its name and the sha256 of its bytes."""
+
+    file: str
+    sha256: str
+
+
+@told_kinds
+@dataclass(frozen=True, eq=False)
+class CalibrationRun:
+    """Readings of one run, in the order they were taken.
+
+    Parameters
+    ----------
+    reference : array_like, shape (n,)
+        True output angle; may cross 0/period any number of times in either direction.
+    indicated : array_like, shape (n,)
+        The joint's reading reduced to the output, in the same unit, with any zero.
+    period : float
+        One turn in the unit of both: ``2*pi`` (default), 360, 1, or counts per turn.
+    time : array_like, shape (n,), optional
+        Seconds, not decreasing.
+    temperature : array_like or float, optional
+        Degrees Celsius.
+    torque : array_like or float, optional
+        Newton metres at the output.
+    mount : array_like or float, optional
+        How far the reference artefact was turned on its mount, unit of ``reference``.
+    label : str, optional
+    velocity : array_like, optional
+        Output velocity in angle units per second; derived from ``reference`` and
+        ``time`` where absent (`CalibrationRun.speed`).
+    weights : array_like, shape (n,), optional
+        Relative weights of the readings (inverse variances), not negative.
+    signals : mapping of str to array_like or float, optional
+        Further signals of `trueangle.formats.signals.SIGNALS` by name: ``current`` (A), ``shift``
+        and the angles ``motor``, ``head1``, ``head2`` ... in the unit of ``reference``.
+    unit : str, optional
+        Label of the joint that the run is of, where runs of several are read together.
+    left_out : int
+        Rows of the file that an empty cell kept out of the run.
+    columns : mapping of str to array_like, optional
+        Further columns of the file, kept and ignored.
+    source : Source, optional
+        The file the readings came from, for the provenance of models.
+
+    Raises
+    ------
+    ArgumentError
+        Arrays that differ in length, are empty or not one-dimensional, values that
+        are not finite, or decreasing ``time``.
+
+    Examples
+    --------
+    >>> run = CalibrationRun([0.0, 90.0, 180.0], [359.9, 90.1, 180.0], period=360.0)
+    >>> run.error.round(6)
+    array([-0.1,  0.1,  0. ])
+    """
+
+    reference: Array
+    indicated: Array
+    period: float = 2.0 * math.pi
+    time: Array | None = None
+    temperature: Array | None = None
+    torque: Array | None = None
+    mount: Array | None = None
+    label: str | None = None
+    velocity: Array | None = field(default=None, kw_only=True)
+    weights: Array | None = field(default=None, kw_only=True)
+    signals: Mapping[str, Any] = field(default_factory=dict, kw_only=True)
+    unit: str | None = field(default=None, kw_only=True)
+    left_out: int = field(default=0, kw_only=True)
+    columns: Mapping[str, Any] = field(default_factory=dict, kw_only=True)
+    source: Source | None = field(default=None, kw_only=True)
+
+    def __post_init__(self) -> None:
+        put = object.__setattr__
+        put(self, "period", check_period(self.period))
+        reference = column("reference", self.reference, None)
+        put(self, "reference", reference)
+        put(self, "indicated", column("indicated", self.indicated, reference.size))
+        for name in (*FIELDS, "weights"):
+            values = getattr(self, name)
+            if values is not None:
+                put(self, name, column(name, values, reference.size))
+        put(self, "signals", MappingProxyType(signal_columns(self.signals, reference.size)))
+        if self.time is not None:
+            back = np.flatnonzero(np.diff(self.time) < 0.0)
+            if back.size:
+                i = int(back[0]) + 1
+                raise ArgumentError(
+                    f"time must not decrease within a run{self._named()}: "
+                    f"time[{i}] = {self.time[i]:g} after {self.time[i - 1]:g}; "
+                    "sort the rows or split the run there"
+                )
+        if self.weights is not None and (self.weights < 0.0).any():
+            i = int(np.flatnonzero(self.weights < 0.0)[0])
+            raise ArgumentError(f"weights[{i}] must not be negative, got {self.weights[i]:g}")
+        put(self, "columns", MappingProxyType(dict(self.columns)))
+
+    def __len__(self) -> int:
+        return int(self.reference.size)
+
+    def __repr__(self) -> str:
+        return f"CalibrationRun({self.label!r}, {len(self)} readings, period={self.period:g})"
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        values = {entry.name: getattr(self, entry.name) for entry in fields(self)}
+        plain = {"columns": dict(self.columns), "signals": dict(self.signals)}
+        return _rebuild, (values | plain,)
+
+    def _named(self) -> str:
+        return f" ({self.label})" if self.label else ""
+
+    def signal(self, name: str) -> Array | None:
+        """Values of the signal ``name``, whether a field of its own or not; None without.
+
+        Examples
+        --------
+        >>> run = CalibrationRun([0.0, 1.0], [0.0, 1.0], torque=2.0, signals={"current": 0.5})
+        >>> run.signal("torque"), run.signal("current"), run.signal("shift")
+        (array([2., 2.]), array([0.5, 0.5]), None)
+        """
+        if name in FIELDS:
+            values: Array | None = getattr(self, name)
+            return values
+        return self.signals.get(find_signal(name).name)
+
+    @property
+    def heads(self) -> dict[str, Array]:
+        """The signals ``head1``, ``head2`` ... in the order of their numbers."""
+        names = [name for name in self.signals if name.startswith("head")]
+        return {name: self.signals[name] for name in sorted(names, key=lambda n: int(n[4:]))}
+
+    @property
+    def zero(self) -> float:
+        """Circular mean of ``indicated - reference``: the run's zero offset, about."""
+        return circular_mean(self.indicated - self.reference, self.period)
+
+    @property
+    def error(self) -> Array:
+        """``indicated - reference`` wrapped into ``(-period/2, period/2]``."""
+        return wrap(self.indicated - self.reference, self.period)
+
+    @property
+    def centred_error(self) -> Array:
+        """`error` unfolded around `zero`, so that no reading jumps by a turn.
+
+        The run's own zero is still in it; values may lie outside half a turn.
+        """
+        zero = self.zero
+        return zero + wrap(self.indicated - self.reference - zero, self.period)
+
+    @property
+    def unwrapped_reference(self) -> Array:
+        """``reference`` without jumps at 0/period (steps are taken below half a turn)."""
+        return np.unwrap(self.reference, period=self.period)
+
+    @property
+    def speed(self) -> Array | None:
+        """Signed output velocity per reading, or None without ``time`` and ``velocity``.
+
+        ``velocity`` where given, else central differences of the unwrapped reference.
+        """
+        if self.velocity is not None:
+            return self.velocity
+        if self.time is None or len(self) < 2:
+            return None
+        # Equal time stamps: average the angle over them first, then differentiate.
+        time, inverse = np.unique(self.time, return_inverse=True)
+        if time.size < 2:
+            return None
+        count = np.bincount(inverse)
+        angle = np.bincount(inverse, weights=self.unwrapped_reference) / count
+        return np.asarray(np.gradient(angle, time)[inverse])
+
+    @property
+    def direction(self) -> Array:
+        """Direction of travel per reading: -1 or +1, 0 before the first motion.
+
+        The signal ``direction`` where given, else the sign of ``velocity``, else of the
+        last step of the reference that was not zero; a reading belongs to the step that
+        led to it, the first reading to the step that leaves it.
+        """
+        given = self.signals.get("direction", self.velocity)
+        if given is not None:
+            sign = np.sign(given)
+        elif len(self) < 2:
+            return np.zeros(len(self))
+        else:
+            steps = np.sign(np.diff(self.unwrapped_reference))
+            sign = np.concatenate([steps[:1], steps])
+        moving = np.flatnonzero(sign)
+        if moving.size == 0:
+            return np.zeros(len(self))
+        last = np.maximum.accumulate(np.where(sign != 0.0, np.arange(sign.size), moving[0]))
+        return np.asarray(sign[last])
+
+
+def as_runs(runs: CalibrationRun | Iterable[CalibrationRun]) -> list[CalibrationRun]:
+    """One run or several as a list of runs that share a period.
+
+    Raises
+    ------
+    ArgumentError
+        No run at all, something else than runs, or runs in different units.
+    """
+    if isinstance(runs, CalibrationRun):
+        return [runs]
+    if not isinstance(runs, Iterable):
+        raise KindError(f"runs must be a CalibrationRun or a list of them, got {runs!r:.60}")
+    found = list(runs)
+    if not found:
+        raise ArgumentError("runs is empty: at least one CalibrationRun is needed")
+    for i, run in enumerate(found):
+        if not isinstance(run, CalibrationRun):
+            raise ArgumentError(
+                f"runs[{i}] must be a CalibrationRun, got {type(run).__name__}; "
+                "read files with trueangle.read_runs"
+            )
+    periods = sorted({run.period for run in found})
+    if len(periods) > 1:
+        raise ArgumentError(
+            f"the runs are in different units (periods {', '.join(f'{p:g}' for p in periods)}): "
+            "convert them to one"
+        )
+    return found
+
+
+def _rebuild(values: dict[str, Any]) -> CalibrationRun:
+    return CalibrationRun(**values)

@@ -1,0 +1,80 @@
+"""Write runs as the CSV that `trueangle.read_runs` reads."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Iterable
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..formats.signals import find_signal
+from ..support.files import RUNS, written_atomically
+from ..support.kinds import told_kinds
+from .run import CalibrationRun, as_runs
+
+__all__ = ["write_runs"]
+
+#: Signals that stand first, in the order that these files have always had.
+_ORDER = ("time", "velocity", "torque", "temperature", "mount")
+
+
+@told_kinds
+def write_runs(runs: CalibrationRun | Iterable[CalibrationRun], path: str | Path) -> int:
+    """Write ``runs`` in degrees, beside and then renamed; floats round-trip exactly.
+
+    Columns: run, reference_deg, indicated_deg and those of the signals of
+    `trueangle.formats.signals.SIGNALS` that every run has, such as time_s and current_A; ``unit``
+    where a run has one.
+
+    Parameters
+    ----------
+    runs : CalibrationRun or iterable of CalibrationRun
+    path : str or path
+        A CSV file; another ending is refused.
+
+    Returns
+    -------
+    int
+        Number of readings written.
+
+    Raises
+    ------
+    ArgumentError, FileError
+        No runs; a file that cannot be written, which then is as it was.
+
+    Examples
+    --------
+    >>> import tempfile, trueangle as ta
+    >>> path = tempfile.mkdtemp() + "/runs.csv"
+    >>> ta.write_runs(ta.CalibrationRun([0.0, 90.0], [0.1, 90.2], period=360.0), path)
+    2
+    >>> ta.read_runs(path)[0].indicated
+    array([ 0.1, 90.2])
+    """
+    found = as_runs(runs)
+    scale = 360.0 / found[0].period
+    kept = [("reference_deg", "reference", scale), ("indicated_deg", "indicated", scale)]
+    for name in (*_ORDER, *found[0].signals):
+        if all(run.signal(name) is not None for run in found):
+            signal = find_signal(name)
+            is_angle = signal.kind in ("angle", "velocity")
+            kept.append((signal.column.format("deg"), name, scale if is_angle else 1.0))
+    has_units = any(run.unit is not None for run in found)
+    with written_atomically(path, kind=RUNS) as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow([*(["unit"] if has_units else []), "run", *(name for name, _, _ in kept)])
+        for j, run in enumerate(found):
+            label = run.label or str(j + 1)
+            texts = [run.unit or "", label] if has_units else [label]
+            columns = [(_values(run, name) * factor).tolist() for _, name, factor in kept]
+            for values in zip(*columns, strict=True):
+                writer.writerow([*texts, *map(repr, values)])
+    return sum(len(run) for run in found)
+
+
+def _values(run: CalibrationRun, name: str) -> NDArray[np.float64]:
+    found = getattr(run, name) if name in ("reference", "indicated") else run.signal(name)
+    assert found is not None
+    return found

@@ -1,0 +1,246 @@
+"""Both encoders of a geared joint by least squares: lines beside zero, direction and speed.
+
+Over an arc the output's low orders, its zero and the slope of one reading over the other are
+nearly one another. So a ratio is estimated beside orders 1 and 2 whatever they bring, and of
+the output's orders no more are taken than the readings ask for, the lowest first.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from typing import Final, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..support.distributions import chi_squared_quantile
+from .dense import DenseFit, DenseRows, fit_dense, low_frequency_inflation
+from .gearlines import Channels, SharedLine, lines_of, motion, turning, varied
+from .projected import Unknown, pairs
+
+__all__ = [
+    "BESIDE_RATIO",
+    "DualFit",
+    "RatioEstimate",
+    "Sample",
+    "chosen_lines",
+    "estimate_ratio",
+    "fit_lines",
+    "rows_of",
+]
+
+Array = NDArray[np.float64]
+
+#: Probability of taking up any line that is not there.
+_CHANCE: Final = 0.01
+
+#: Orders of the output beside which a ratio is estimated: eccentricity and ellipse.
+BESIDE_RATIO: Final = (1, 2)
+
+#: Fits in which a ratio settles, and in which the zeros settle, beside the patterns.
+_RATIOS: Final = 3
+_ZEROS: Final = 2
+
+#: The column of the ratio among the patterns.
+_RATIO: Final = Unknown("the gear ratio", 0.0, "")
+
+_CHUNK: Final = 8192
+
+
+class Sample(NamedTuple):
+    """Readings that take part: even or odd ones of so many blocks of a run; all where 1."""
+
+    blocks: int = 1
+    first: int = 0
+
+    def of(self, size: int) -> NDArray[np.bool_]:
+        """Which of ``size`` readings."""
+        block = np.arange(size) * self.blocks // size
+        return np.asarray(block % 2 == self.first) if self.blocks > 1 else np.ones(size, bool)
+
+
+class DualFit(NamedTuple):
+    """Lines fitted to both channels."""
+
+    dense: DenseFit
+    lines: tuple[SharedLine, ...]
+    zeros: tuple[float, ...]
+    """Of each run, radians: the place is the motor's angle over the ratio and this."""
+
+
+class RatioEstimate(NamedTuple):
+    """Motor turns per output turn, and its standard error; infinite where not seen."""
+
+    value: float
+    std: float
+
+
+def fit_lines(
+    channels: Channels,
+    ratio: float,
+    lines: Sequence[SharedLine],
+    *,
+    slope: bool = False,
+    settled: bool = True,
+) -> DualFit:
+    """Least squares for the lines, and with ``slope`` for the ratio as the last pattern.
+
+    The patterns are functions of the corrected place, so that its zero is that of the fit.
+    """
+    columns = [c for line in lines for c in pairs(line.of, [line.order])]
+    columns += [_RATIO] * slope
+    zeros = [float(np.median(o - m / ratio)) for m, o in zip(*channels[:2], strict=True)]
+    for _ in range(_ZEROS if settled and any(line.output for line in lines) else 1):
+        at = tuple(zeros)
+        dense = fit_dense(list(rows_of(channels, ratio, lines, at, slope=slope)), columns)
+        zeros = [z + float(dz) for z, dz in zip(at, dense.nuisances[-len(at) :], strict=True)]
+    slow = [2 * i + j for i, line in enumerate(lines) if not line.motor for j in (0, 1)]
+    return DualFit(_with_slow(dense, [*slow, *([len(columns) - 1] * slope)]), tuple(lines), at)
+
+
+def _with_slow(fit: DenseFit, slow: Sequence[int]) -> DenseFit:
+    """The fit with the covariance of slow patterns: blocks hold too few of their waves."""
+    if not fit.correlated or not slow:
+        return fit
+    covariance, at = fit.covariance.copy(), np.ix_(slow, slow)
+    covariance[at] = fit.projected.covariance[at] * low_frequency_inflation(fit)
+    return replace(fit, covariance=covariance)
+
+
+def rows_of(
+    channels: Channels,
+    ratio: float,
+    lines: Sequence[SharedLine],
+    zeros: Sequence[float],
+    sample: Sample | None = None,
+    *,
+    slope: bool = False,
+) -> Iterator[DenseRows]:
+    """Nuisances: direction, velocity where time is known, a zero per run (the last ones)."""
+    reversing, timed = map(int, varied(channels, ratio))
+    for j, (m, o, t) in enumerate(zip(*channels, strict=True)):
+        theta = m / ratio
+        way, speed = motion(theta, t)
+        place = theta + zeros[j]
+        nuisances = np.zeros((o.size, reversing + timed + len(zeros)))
+        if reversing:
+            nuisances[:, 0] = way
+        if timed:
+            nuisances[:, reversing] = speed
+        nuisances[:, reversing + timed + j] = 1.0
+        rows = np.empty((o.size, 2 * len(lines) + slope))
+        for i, line in enumerate(lines):
+            angle = line.order * place if line.output else line.motor * np.sign(ratio) * m
+            rows[:, 2 * i], rows[:, 2 * i + 1] = np.cos(angle), np.sin(angle)
+        if slope:
+            rows[:, -1] = theta - float(np.mean(theta))
+        target = o - place
+        sampled = (sample or Sample()).of(o.size)
+        known = ~turning(way)
+        if reversing and np.mean(known) > 0.5:  # else it is noise that turns
+            sampled &= known
+        used = np.flatnonzero(sampled)
+        for a in range(0, used.size, _CHUNK):
+            part = used[a : a + _CHUNK]
+            yield DenseRows(rows[part], nuisances[part], target[part])
+
+
+def chosen_lines(
+    channels: Channels,
+    ratio: float,
+    lines: Sequence[SharedLine],
+    *,
+    slope: bool = False,
+    held: Sequence[int] = (),
+) -> tuple[list[SharedLine], list[SharedLine]]:
+    """Lines that stand out, and those of which the travel holds too little to say.
+
+    ``held`` are orders of the output that are kept whatever they bring.
+
+    Of the output's own orders the first few are taken beyond which no higher one is missed;
+    of these, and of the motor's, those are left out that do not stand out.
+    """
+    fit = fit_lines(channels, ratio, lines, slope=slope, settled=False).dense
+    scale = fit.projected.variance * low_frequency_inflation(fit)
+    own = [i for i, line in enumerate(lines) if not line.motor]
+    fixed = [i for i in own if lines[i].output in held]
+    motor = [i for i, line in enumerate(lines) if line.motor]
+    triangle = fit.triangle
+    beside = triangle.shape[1] - 1 - 2 * len(lines) - slope
+
+    def squares(kept: Sequence[int]) -> float:
+        columns = [*range(beside), *(beside + 2 * i + j for i in (*motor, *kept) for j in (0, 1))]
+        columns += [triangle.shape[1] - 2] * slope
+        design, target = triangle[:, columns], triangle[:, -1]
+        left = target - design @ np.linalg.lstsq(design, target, rcond=1e-12)[0]
+        return float(left @ left)
+
+    everything = squares(own)
+    kept: list[int] = own
+    for count in range(len(fixed), len(own)):
+        limit = chi_squared_quantile(1.0 - _CHANCE, 2.0 * (len(own) - count))
+        if squares(own[:count]) - everything < limit * scale:
+            kept = own[:count]
+            break
+    limit = chi_squared_quantile(1.0 - _CHANCE / max(len(lines), 1), 2.0)
+    while droppable := [i for i in kept if i not in fixed]:
+        loss = [squares([i for i in kept if i != j]) for j in droppable]
+        if min(loss) - squares(kept) >= limit * scale:
+            break
+        kept = [i for i in kept if i != droppable[int(np.argmin(loss))]]
+    retained = fit.projected.retained()
+    lost = [i for i in own if i not in kept and float(retained[2 * i : 2 * i + 2].min()) < _LEAST]
+    candidates = [lines[i] for i in sorted((*motor, *kept))]
+    fit = fit_lines(channels, ratio, candidates, slope=slope, settled=False).dense
+    told = [
+        line
+        for i, line in enumerate(candidates)
+        if not line.motor or _statistic(fit, slice(2 * i, 2 * i + 2)) > limit
+    ]
+    return told, [lines[i] for i in lost]
+
+
+#: An order of which less is left beside the others is not told.
+_LEAST: Final = 0.02
+
+
+def _statistic(fit: DenseFit, pair: slice) -> float:
+    value, block = fit.patterns[pair], fit.covariance[pair, pair]
+    return float(value @ np.linalg.pinv(block, hermitian=True) @ value)
+
+
+def estimate_ratio(
+    channels: Channels,
+    start: float,
+    orders: str | Sequence[float],
+    turns: float,
+    beside: Sequence[int] = BESIDE_RATIO,
+) -> RatioEstimate:
+    """The ratio jointly with orders 1 and 2 of the output, and what else stands out.
+
+    Examples
+    --------
+    >>> theta = np.linspace(0.0, 5.0, 1500)
+    >>> noise = 1e-5 * np.random.default_rng(1).normal(size=theta.size)
+    >>> channels = Channels([101.0 * theta], [theta + 2e-3 * np.sin(theta) + noise], [None])
+    >>> found = estimate_ratio(channels, 101.2, "auto", 0.8)
+    >>> abs(found.value - 101.0) < 4.0 * found.std < 0.1
+    True
+    """
+    if not isinstance(orders, str):
+        orders = sorted({*orders, *beside})
+    ratio = start
+    for _ in range(_RATIOS):
+        lines = lines_of(orders, ratio, turns)
+        if isinstance(orders, str):
+            lines = chosen_lines(channels, ratio, lines, slope=True, held=beside)[0]
+        fit = fit_lines(channels, ratio, lines, slope=True).dense
+        if not fit.projected.seen[-1]:
+            return RatioEstimate(start, math.inf)
+        slope, variance = float(fit.patterns[-1]), float(fit.covariance[-1, -1])
+        ratio /= 1.0 + slope
+        if abs(slope) < 0.1 * math.sqrt(variance):
+            break
+    return RatioEstimate(ratio, abs(ratio) * math.sqrt(max(variance, 0.0)))

@@ -1,0 +1,1 @@
+"""What every room uses: angles and units, files, distributions, deadlines, suggestions."""

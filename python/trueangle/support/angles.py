@@ -1,0 +1,101 @@
+"""Units of angle, wrapping, unwrapping and circular means."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..errors import ArgumentError
+from .kinds import told_kinds
+from .unit_periods import ARCSEC_PER_DEG, ARCSEC_PER_TURN, UNIT_PERIODS
+
+__all__ = [
+    "ARCSEC_PER_DEG",
+    "ARCSEC_PER_TURN",
+    "UNIT_PERIODS",
+    "arcsec",
+    "check_period",
+    "circular_mean",
+    "unit_name",
+    "wrap",
+]
+
+
+def check_period(period: float) -> float:
+    """``period`` as a float, or an `ArgumentError` that says what it must be."""
+    try:
+        value = float(period)
+    except (TypeError, ValueError):
+        value = math.nan
+    if not 1e-30 <= value <= 1e30:  # nor NaN
+        raise ArgumentError(
+            "period must be a positive finite number "
+            f"(2*pi, 360, 1 or the counts per turn; 1e-30 to 1e30), got {period!r}"
+        )
+    return value
+
+
+def unit_name(period: float) -> str:
+    """Name of the unit in which one turn is ``period``: deg, rad, turn or count."""
+    for name, value in UNIT_PERIODS.items():
+        if period == value:
+            return name
+    return "count"
+
+
+def arcsec(angle: float, period: float) -> float:
+    """``angle`` (one turn = ``period``) in seconds of arc."""
+    return angle * (ARCSEC_PER_TURN / period)
+
+
+@told_kinds
+def wrap(angle: ArrayLike, period: float = 2.0 * math.pi) -> NDArray[np.float64]:
+    r"""Angle moved by whole turns into ``(-period/2, period/2]``.
+
+    .. math:: \mathrm{wrap}(x) = x - p\,\lceil x/p - 1/2 \rceil
+
+    Parameters
+    ----------
+    angle : array_like
+        Any shape; NaN and infinities give NaN.
+    period : float
+        One turn in the unit of ``angle``.
+
+    Returns
+    -------
+    ndarray of float64
+        Same shape. Exact for angles within half a turn, else within one rounding
+        of ``angle``.
+
+    Examples
+    --------
+    >>> wrap([190.0, -180.0, 360.5], period=360.0)
+    array([-170. ,  180. ,    0.5])
+    """
+    x = np.asarray(angle, dtype=np.float64)
+    with np.errstate(invalid="ignore"):
+        wrapped = x - period * np.ceil(x / period - 0.5)
+    # x / period may round across the half turn: put such values back inside.
+    half = 0.5 * period
+    wrapped = np.where(wrapped <= -half, wrapped + period, wrapped)
+    return np.where(wrapped > half, wrapped - period, wrapped)
+
+
+def circular_mean(
+    angle: ArrayLike, period: float = 2.0 * math.pi, weights: ArrayLike | None = None
+) -> float:
+    """Direction of the mean of unit vectors at ``angle``, in ``(-period/2, period/2]``.
+
+    Unlike the arithmetic mean it does not depend on where the turn is cut.
+
+    Examples
+    --------
+    >>> round(circular_mean([359.0, 3.0], period=360.0), 9)
+    1.0
+    """
+    turns = np.asarray(angle, dtype=np.float64) * (2.0 * math.pi / period)
+    unit = np.exp(1j * turns)
+    vector = unit.mean() if weights is None else (unit * np.asarray(weights)).sum()
+    return float(wrap(np.angle(vector) * (period / (2.0 * math.pi)), period))

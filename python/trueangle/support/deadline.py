@@ -1,0 +1,274 @@
+"""Time of long work: how far it is, what is left, when it must end.
+
+What works consults the `Pace` that is in force (`pace`) and needs no argument for it; who asked for
+the work enters one with `paced`, and may let Ctrl-C end it early (`ending_early`).
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import math
+import signal
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextvars import ContextVar
+from types import FrameType
+from typing import Final, TextIO
+
+from ..errors import ArgumentError
+from .suggestions import check_choice
+
+__all__ = ["STYLES", "Interruption", "Pace", "ending_early", "entered", "pace", "paced"]
+
+#: What work may take where no time was given, in seconds of its thread's processor: so many times
+#: what its first round took, whatever the machine, and at least so much, and so much for each
+#: item. Work on ordinary readings takes 2 to 11 first rounds, and less than half of the rest.
+ROUNDS, LEAST, PER_ITEM = 60.0, 30.0, 3e-3
+
+#: Ways of showing progress.
+STYLES: Final = ("auto", "text", "json", "none")
+
+#: Seconds before anything is shown, and between two times that it is.
+_FIRST, _INTERVAL = 1.0, 0.5
+
+
+class Pace:
+    """How far a piece of work is, and whether it must end.
+
+    Parameters
+    ----------
+    within : float, optional
+        Seconds that it may take; any time where not given.
+    style : {"auto", "text", "json", "none"}
+        Text rewrites one line of stderr; JSON prints an object a line; ``"auto"`` is text
+        on a terminal and nothing elsewhere. Nothing is shown in the first second.
+    stream : text stream, optional
+        In place of stderr.
+    clock, processor : callable
+        Seconds that pass, and seconds that the processor spends on this thread.
+
+    Attributes
+    ----------
+    within : float or None
+    stopped : bool
+        Ctrl-C asked for its end.
+
+    Raises
+    ------
+    ArgumentError
+        A time that is not above zero, or an unknown style.
+    """
+
+    def __init__(
+        self,
+        within: float | None = None,
+        style: str = "none",
+        stream: TextIO | None = None,
+        clock: Callable[[], float] = time.monotonic,
+        processor: Callable[[], float] = time.thread_time,
+    ) -> None:
+        if within is not None and not (within > 0.0 and math.isfinite(within)):
+            raise ArgumentError(f"within must be a time above zero in seconds, got {within!r}")
+        check_choice("progress", style, STYLES)
+        found = sys.stderr if stream is None else stream
+        # The line that rewrites itself steers the terminal, which printed text must not.
+        self._stream: TextIO | None = getattr(found, "steering", found)
+        if style == "auto":
+            style = "text" if self._stream is not None and self._stream.isatty() else "none"
+        self._style = "none" if self._stream is None else style
+        self._clock, self._processor = clock, processor
+        self._begun = self._shown = clock()
+        self._shown += _FIRST - _INTERVAL
+        self._share = 1.0
+        self._stage, self._entered = "", self._begun
+        self._width = 0
+        self._cut = ""
+        #: Of `bounded` work: when it began, what it may take, and whether the first round is done.
+        self._started, self._bound, self._known = 0.0, math.inf, True
+        self.within = within
+        self.stopped = False
+
+    @property
+    def seconds(self) -> float:
+        """Seconds since it began."""
+        return self._clock() - self._begun
+
+    @property
+    def over(self) -> bool:
+        """The work must end now: its time is up, or Ctrl-C was pressed."""
+        if self.within is not None:
+            late = self.seconds >= self._share * self.within
+        else:
+            late = math.isfinite(self._bound) and self._spent >= self._share * self._bound
+        if (late or self.stopped) and not self._cut:
+            self._cut = self._stage or "starting"
+        return late or self.stopped
+
+    @property
+    def _spent(self) -> float:
+        return self._processor() - self._started
+
+    @property
+    def why(self) -> str:
+        """Why work was told to end."""
+        if self.stopped:
+            return "it was interrupted"
+        if self.within is not None:
+            return f"the {self.within:g} s given were up"
+        return (
+            f"the {self._bound:.2g} s of the processor that it has by default were up (a longer "
+            "time can be given, as within)"
+        )
+
+    @contextlib.contextmanager
+    def bounded(self, items: int) -> Iterator[None]:
+        """Work on so many items that must come to an end where no time was given.
+
+        The processor's time is counted, of this thread alone: it is the same on a busy machine.
+        """
+        before = self._started, self._bound, self._known, self._cut
+        self._started, self._bound = self._processor(), LEAST + PER_ITEM * items
+        self._known, self._cut = False, ""
+        try:
+            yield
+        finally:
+            self._started, self._bound, self._known, self._cut = before
+
+    def first_round_done(self) -> None:
+        """Everything was tried once: what follows may take so many times as long."""
+        if not self._known:
+            self._known = True
+            self._bound = max(self._bound, ROUNDS * self._spent)
+
+    @property
+    def cut(self) -> str:
+        """What was being done when the work was first told to end; empty where it never was."""
+        return self._cut
+
+    @contextlib.contextmanager
+    def part(self, share: float) -> Iterator[None]:
+        """Work that must end when ``share`` of the time is up: the rest is for what follows."""
+        before, self._share = self._share, min(share, self._share)
+        try:
+            yield
+        finally:
+            self._share = before
+
+    def at(
+        self, stage: str, done: int, total: int, then: float = 0.0, bound: str = "at least"
+    ) -> None:
+        """``done`` of ``total`` are done of a stage; seconds that follow it, where known.
+
+        ``bound`` says what the time left is where none was given.
+        """
+        now = self._clock()
+        if stage != self._stage or done == 0:
+            self._stage, self._entered = stage, now
+        if self._style == "none" or now - self._shown < _INTERVAL:
+            return
+        self._shown = now
+        left, open_end = self._left(now, done, total, then)
+        if self._style == "json":
+            state = {"stage": stage, "done": done, "total": total}
+            times = {"seconds": now - self._begun, "seconds_left": left}
+            self._write(json.dumps(state | {k: v and round(v, 1) for k, v in times.items()}) + "\n")
+            return
+        text = f"{stage}: {done} of {total}"
+        if left is not None:
+            text += f", {f'{bound} ' if open_end else ''}{_clock_text(left)} left"
+        self._write("\r" + text.ljust(self._width))
+        self._width = max(self._width, len(text))
+
+    def clear(self) -> None:
+        """Remove the line of text."""
+        if self._width:
+            self._write("\r" + " " * self._width + "\r")
+            self._width = 0
+
+    def _left(self, now: float, done: int, total: int, then: float) -> tuple[float | None, bool]:
+        """Seconds left, and whether it may take longer."""
+        if self.within is not None:
+            return max(self.within - (now - self._begun), 0.0), False
+        if done == 0:
+            return None, True
+        return (now - self._entered) * (total - done) / done + then, True
+
+    def _write(self, text: str) -> None:
+        assert self._stream is not None
+        with contextlib.suppress(OSError):  # a closed terminal
+            self._stream.write(text)
+            self._stream.flush()
+
+
+_CURRENT: ContextVar[Pace | None] = ContextVar("pace", default=None)
+
+
+def pace() -> Pace:
+    """The pace in force; an endless, silent one where nobody entered any."""
+    found = _CURRENT.get()
+    return Pace() if found is None else found
+
+
+@contextlib.contextmanager
+def entered(own: Pace) -> Iterator[Pace]:
+    """Work at this pace."""
+    token = _CURRENT.set(own)
+    try:
+        yield own
+    finally:
+        _CURRENT.reset(token)
+        own.clear()
+
+
+@contextlib.contextmanager
+def paced(within: float | None = None, style: str = "none") -> Iterator[Pace]:
+    """Work at a pace of its own; parameters are those of `Pace`.
+
+    Work inside other work that asks for neither has the pace of that.
+    """
+    outer = _CURRENT.get()
+    if outer is not None and within is None and style == "none":
+        yield outer
+        return
+    with entered(Pace(within, style)) as own:
+        yield own
+
+
+class Interruption:
+    """Whether Ctrl-C ended the work."""
+
+    happened = False
+
+
+@contextlib.contextmanager
+def ending_early() -> Iterator[Interruption]:
+    """Let a first Ctrl-C ask the work at its pace to end with what it has; a second one ends it.
+
+    Where no pace is in force, outside the main thread, or where Ctrl-C is ignored (a job in the
+    background), it is what it always is.
+    """
+    found = Interruption()
+    ignored = signal.getsignal(signal.SIGINT) in (signal.SIG_IGN, None)
+    if ignored or threading.current_thread() is not threading.main_thread():
+        yield found
+        return
+
+    def stop(number: int, frame: FrameType | None) -> None:
+        current = _CURRENT.get()
+        if current is None or current.stopped:
+            raise KeyboardInterrupt
+        found.happened = current.stopped = True
+
+    before = signal.signal(signal.SIGINT, stop)
+    try:
+        yield found
+    finally:
+        signal.signal(signal.SIGINT, before)
+
+
+def _clock_text(seconds: float) -> str:
+    minutes, rest = divmod(math.ceil(seconds), 60)
+    return f"{minutes}:{rest:02d} min" if minutes else f"{rest} s"

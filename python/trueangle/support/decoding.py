@@ -1,0 +1,180 @@
+"""Decoding what files say: any text gives checked values, or an error that names the place."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping
+from os import PathLike
+from pathlib import Path
+from typing import Any
+
+from ..errors import FileError
+from .files import read_whole
+
+__all__ = [
+    "MAX_LINES",
+    "MAX_LINE_ORDERS",
+    "MAX_ORDER",
+    "Decoder",
+    "finite",
+    "json_text",
+    "read_text",
+    "shown",
+]
+
+#: Highest order of the output, in cycles per output turn: the lines of a disc of a million.
+MAX_ORDER = 1_000_000.0
+#: Harmonics, at most, of a model or simulation.
+MAX_LINES = 65_536
+#: Highest order times number of harmonics: checks sample each several times in a cycle.
+MAX_LINE_ORDERS = 1e7
+
+
+def shown(value: Any, most: int = 60) -> str:
+    """``value`` as it is told in a message: in one piece, of bounded length."""
+    try:
+        text = repr(value)
+    except (ValueError, RecursionError):  # whole numbers of thousands of digits
+        return f"a {type(value).__name__} too large to show"
+    return text if len(text) <= most else f"{text[: most - 4]} ..."
+
+
+def finite(value: Any) -> float | None:
+    """``value`` as a float, or None where it is no finite number; true is no number."""
+    if isinstance(value, bool) or not isinstance(value, (int, float)):
+        return None
+    try:
+        number = float(value)
+    except OverflowError:
+        return None
+    return number if math.isfinite(number) else None
+
+
+def read_text(path: str | PathLike[str], most: int, kind: type[FileError], what: str) -> str:
+    """The text of a file of at most ``most`` bytes.
+
+    Raises
+    ------
+    FileError
+        It is not UTF-8, larger, or no file: no ``what`` is.
+    """
+    data = read_whole(path, most, what)
+    try:
+        return data.decode("utf-8")
+    except UnicodeDecodeError as cause:
+        line = data.count(b"\n", 0, cause.start) + 1
+        raise kind(path, f"is not {what}: not UTF-8 text", line=line) from None
+
+
+def json_text(path: Path, text: str, kind: type[FileError], what: str) -> Any:
+    """The value of a JSON text whose keys are unique and whose numbers are finite.
+
+    Raises
+    ------
+    FileError
+        Names the line where the text ends being JSON, or the key at fault.
+    """
+
+    def pairs(items: list[tuple[str, Any]]) -> dict[str, Any]:
+        found = dict(items)
+        if len(found) < len(items):
+            seen: set[str] = set()
+            for key, _value in items:
+                if key in seen:
+                    raise kind(path, f"key {shown(key)}: appears twice; keep one")
+                seen.add(key)
+        return found
+
+    def constant(name: str) -> float:
+        raise kind(path, f"holds {name}; every number must be finite")
+
+    try:
+        return json.loads(text, object_pairs_hook=pairs, parse_constant=constant)
+    except json.JSONDecodeError as cause:
+        raise kind(
+            path,
+            f"is not complete JSON ({cause.msg}): truncated or not {what}; save it again",
+            line=cause.lineno,
+        ) from None
+    except RecursionError:
+        raise kind(path, f"is not {what}: nested too deeply") from None
+    except FileError:
+        raise
+    except ValueError:  # whole numbers of thousands of digits
+        raise kind(
+            path, "holds a number of thousands of digits, which cannot be read; write fewer"
+        ) from None
+
+
+class Decoder:
+    """Checks plain values of one file; every refusal names the file and the key.
+
+    Parameters
+    ----------
+    path : Path
+    kind : type of FileError
+        What is raised.
+    """
+
+    def __init__(self, path: Path, kind: type[FileError] = FileError) -> None:
+        self.path = path
+        self.kind = kind
+
+    def error(self, problem: str, key: str | None = None) -> FileError:
+        """The error that says ``problem`` of ``key``."""
+        return self.kind(self.path, f"key '{key}': {problem}" if key else problem)
+
+    def table(
+        self, value: Any, known: Mapping[str, bool], key: str | None = None
+    ) -> dict[str, Any]:
+        """An object with the keys ``known``, each needed where its value there is true."""
+        if not isinstance(value, dict):
+            raise self.error(f"an object is needed, got {shown(value)}", key)
+        where = f"{key}." if key else ""
+        for name in value:
+            if name not in known:
+                raise self.error(
+                    f"is unknown; the keys are {', '.join(known)}", f"{where}{shown(name)[1:-1]}"
+                )
+        for name, needed in known.items():
+            if needed and name not in value:
+                raise self.error("is missing", f"{where}{name}")
+        return value
+
+    def items(self, value: Any, key: str, what: str, most: int = MAX_LINES) -> list[Any]:
+        """A list of at most ``most``."""
+        if not isinstance(value, list):
+            raise self.error(f"a list of {what} is needed, got {shown(value)}", key)
+        if len(value) > most:
+            raise self.error(f"holds {len(value)} {what}; at most {most} are allowed", key)
+        return value
+
+    def number(self, value: Any, key: str) -> float:
+        """A finite number."""
+        number = finite(value)
+        if number is None:
+            is_number = isinstance(value, (int, float)) and not isinstance(value, bool)
+            wanted = "a finite number within double range" if is_number else "a number"
+            raise self.error(f"{wanted} is needed, got {shown(value)}", key)
+        return number
+
+    def numbers(self, value: Any, key: str, most: int = MAX_LINES) -> tuple[float, ...]:
+        """A list of finite numbers."""
+        found = self.items(value, key, "numbers", most)
+        return tuple(self.number(entry, f"{key}[{i}]") for i, entry in enumerate(found))
+
+    def whole(self, value: Any, key: str, least: int = 0, most: int = 2**53) -> int:
+        """A whole number from ``least`` to ``most``."""
+        number = finite(value)
+        if number is None or number != math.floor(number) or not least <= number <= most:
+            raise self.error(
+                f"a whole number from {least} to {most} is needed, got {shown(value)}", key
+            )
+        return int(number)
+
+    def text(self, value: Any, key: str) -> str:
+        """A text."""
+        if not isinstance(value, str):
+            raise self.error(f"a text is needed, got {shown(value)}", key)
+        return value

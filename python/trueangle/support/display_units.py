@@ -1,0 +1,177 @@
+"""Units that errors are shown in, and numbers rounded to their uncertainty.
+
+Results keep errors in arcsec, or in the unit of their period; a summary chooses one unit for
+all that it prints, so that its numbers can be compared.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from typing import Final, NamedTuple, TypeAlias
+
+from ..errors import ArgumentError
+from .suggestions import check_choice
+from .unit_periods import ARCSEC_PER_TURN, UNIT_PERIODS
+
+__all__ = ["ERROR_UNITS", "ErrorUnit", "ErrorsIn", "brief", "error_unit", "significant"]
+
+#: What may be asked for by name; a number is the counts of a turn.
+ERROR_UNITS: Final = ("auto", "arcsec", "deg", "mrad", "count")
+
+ErrorsIn: TypeAlias = str | float
+
+#: Largest error in arcsec from which on a summary is in degrees: one of them.
+LARGE: Final = 3600.0
+
+#: Digits of an uncertainty (GUM 7.2.6), and of a number that has none.
+_UNCERTAIN_DIGITS: Final = 2
+_DIGITS: Final = 4
+
+#: A size in a sentence.
+_SIZE: Final = r"(-?\d+(?:\.\d+)?(?:e[+-]?\d+)?) arcsec\b"
+
+#: Decimals are kept this far; beyond it a double has none.
+_MOST_DECIMALS: Final = 12
+
+
+class ErrorUnit(NamedTuple):
+    """A unit, and how many of it one second of arc is.
+
+    Examples
+    --------
+    >>> degrees = error_unit("auto", largest=7228.0)
+    >>> degrees.text(7228.0, 3.1)
+    '2.00778 +- 0.00086 deg'
+    >>> error_unit("arcsec").pair(180.0583, 0.1561)
+    ('180.06', '0.16')
+    """
+
+    name: str
+    per_arcsec: float
+
+    def number(self, arcsec: float, std: float | None = None) -> str:
+        """An error to the digits that its standard deviation leaves; without one, to four."""
+        return self.pair(arcsec, std)[0]
+
+    def pair(self, arcsec: float, std: float | None) -> tuple[str, str]:
+        """The number and its standard deviation (two digits), with equal decimals."""
+        value = arcsec * self.per_arcsec
+        spread = math.nan if std is None else std * self.per_arcsec
+        if not (math.isfinite(spread) and spread > 0.0):
+            return significant(value, _DIGITS), "-"
+        decimals = _decimals(spread, _UNCERTAIN_DIGITS)
+        return _fixed(value, decimals), _fixed(spread, decimals)
+
+    def text(self, arcsec: float, std: float | None = None) -> str:
+        """The number, its standard deviation where there is one, and the unit."""
+        value, spread = self.pair(arcsec, std)
+        return f"{value} {self.name}" if spread == "-" else f"{value} +- {spread} {self.name}"
+
+    def decimals(self, arcsec: float, digits: int = _UNCERTAIN_DIGITS) -> int:
+        """Decimals that show so many digits of an error; none where it is zero or unknown.
+
+        Examples
+        --------
+        >>> error_unit("deg").decimals(36.0), error_unit("arcsec").decimals(36.0)
+        (3, 0)
+        """
+        value = arcsec * self.per_arcsec
+        return _decimals(value, digits) if value and math.isfinite(value) else 0
+
+    def spoken(self, sentence: str) -> str:
+        """A sentence with its sizes, written in arcsec, in this unit and to as many digits.
+
+        Examples
+        --------
+        >>> error_unit("deg").spoken("strongest at order 4, about 26000 arcsec")
+        'strongest at order 4, about 7.2 deg'
+        """
+        if self.name == "arcsec":
+            return sentence
+        return re.sub(_SIZE, lambda found: f"{self._converted(found[1])} {self.name}", sentence)
+
+    def _converted(self, number: str) -> str:
+        written = number.partition("e")[0].replace(".", "").lstrip("-0").rstrip("0")
+        digits = max(len(written), _UNCERTAIN_DIGITS)
+        return significant(float(number) * self.per_arcsec, digits)
+
+
+def error_unit(
+    asked: ErrorsIn = "auto", largest: float = 0.0, period: float | None = None
+) -> ErrorUnit:
+    """The unit asked for; by itself arcsec, or degrees where an error reaches a degree.
+
+    Parameters
+    ----------
+    asked : str or float
+        One of `ERROR_UNITS`, or the counts of a turn.
+    largest : float
+        Largest error that will be shown, arcsec; ``"auto"`` goes by it.
+    period : float, optional
+        Of the readings: the counts of a turn where they are in counts.
+
+    Raises
+    ------
+    ArgumentError
+        Another word; counts where nothing says how many a turn has.
+
+    Examples
+    --------
+    >>> error_unit(65536).text(1296000.0 / 65536)
+    '1.000 count'
+    """
+    if not isinstance(asked, str):
+        if not (math.isfinite(asked) and asked > 0.0):
+            raise ArgumentError(f"errors_in: counts per turn must be positive, got {asked!r}")
+        return ErrorUnit("count", asked / ARCSEC_PER_TURN)
+    if asked == "auto":
+        asked = "deg" if largest >= LARGE else "arcsec"
+    if asked == "count":
+        if period is None or period in UNIT_PERIODS.values():
+            raise ArgumentError(
+                "errors in counts need the counts of a turn: give "
+                "`counts_per_turn=N`, of a summary `errors_in=N`"
+            )
+        return ErrorUnit("count", period / ARCSEC_PER_TURN)
+    turns = {"arcsec": ARCSEC_PER_TURN, "deg": 360.0, "mrad": 2000.0 * math.pi}
+    if asked not in turns:
+        check_choice("errors_in", asked, ERROR_UNITS)
+    return ErrorUnit(asked, turns[asked] / ARCSEC_PER_TURN)
+
+
+def significant(value: float, digits: int = _DIGITS) -> str:
+    """``value`` with so many significant digits, written without an exponent.
+
+    Examples
+    --------
+    >>> significant(0.012345), significant(123456.0), significant(0.0), significant(9.9996)
+    ('0.01235', '123456', '0', '10.00')
+    """
+    if not math.isfinite(value):
+        return "-"
+    return _fixed(value, _decimals(value, digits)) if value else "0"
+
+
+def brief(value: float) -> str:
+    """``value`` with two significant digits, or all before the point: for sentences.
+
+    Examples
+    --------
+    >>> brief(0.301), brief(7.25), brief(103.6)
+    ('0.3', '7.2', '104')
+    """
+    return f"{value:.2g}" if abs(value) < 99.5 else f"{value:.0f}"
+
+
+def _decimals(value: float, digits: int) -> int:
+    """Decimals that show ``digits`` significant digits of the rounded value."""
+    exponent = int(f"{abs(value):.{digits - 1}e}".partition("e")[2])
+    return min(max(0, digits - 1 - exponent), _MOST_DECIMALS)
+
+
+def _fixed(value: float, decimals: int) -> str:
+    if not math.isfinite(value):
+        return "-"
+    text = f"{value:.{decimals}f}"
+    return text.removeprefix("-") if not float(text) else text

@@ -1,0 +1,56 @@
+"""The one door for files: what may be read, what may be written, and that it appears whole."""
+
+from .inputs import (
+    MODEL_BYTES,
+    RUNS_BYTES,
+    SIMULATION_BYTES,
+    check_input,
+    read_whole,
+    sha256_of,
+)
+from .kinds import (
+    CERTIFICATE,
+    MODEL,
+    PAGE,
+    PDF,
+    PICTURE,
+    REPORT,
+    RUNS,
+    SIMULATION,
+    Kind,
+    kind_of_log,
+    promised_format,
+)
+from .outputs import check_output, publish, published, written_atomically
+from .partition import partition_keys, partition_name
+from .samefile import same_file
+from .workplace import remove_leftovers, restore
+
+__all__ = [
+    "CERTIFICATE",
+    "MODEL",
+    "MODEL_BYTES",
+    "PAGE",
+    "PDF",
+    "PICTURE",
+    "REPORT",
+    "RUNS",
+    "RUNS_BYTES",
+    "SIMULATION",
+    "SIMULATION_BYTES",
+    "Kind",
+    "check_input",
+    "check_output",
+    "kind_of_log",
+    "partition_keys",
+    "partition_name",
+    "promised_format",
+    "publish",
+    "published",
+    "read_whole",
+    "remove_leftovers",
+    "restore",
+    "same_file",
+    "sha256_of",
+    "written_atomically",
+]

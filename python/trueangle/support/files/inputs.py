@@ -1,0 +1,174 @@
+"""Reading files: what may be read, and how much of it."""
+
+from __future__ import annotations
+
+import io
+import os
+import stat
+from os import PathLike
+from pathlib import Path
+from typing import Final
+
+from ...errors import FileError, KindError
+from .samefile import what_it_is
+from .workplace import restore
+
+__all__ = [
+    "MODEL_BYTES",
+    "RUNS_BYTES",
+    "SIMULATION_BYTES",
+    "check_input",
+    "is_null_device",
+    "read_whole",
+    "sha256_of",
+]
+
+#: Most bytes of files that are read whole. The covariance of a model of 1800 orders, the
+#: largest part of any model, takes 256 MiB as text; a simulation is written by hand; larger
+#: tables of readings go through the readers of logs, in constant memory.
+MODEL_BYTES: Final = 256 << 20
+SIMULATION_BYTES: Final = 16 << 20
+RUNS_BYTES: Final = 1 << 30
+
+#: Bytes asked for at a time where the size is not known before.
+_CHUNK: Final = 1 << 20
+
+#: Milliseconds between two looks for Ctrl-C while a pipe is waited for.
+_LOOK_MS: Final = 100
+
+
+def check_input(path: str | PathLike[str], *, whole: bool = False) -> os.stat_result:
+    """Refuse what cannot be read to an end: devices and sockets.
+
+    Regular files, folders, pipes, terminals and the null device are let in; with ``whole``
+    (formats that are read more than once or in any order) regular files and folders only.
+
+    Raises
+    ------
+    FileError
+    KindError
+        No name of a file.
+    OSError
+        Nothing of this name.
+    """
+    if not isinstance(path, str | PathLike):  # a number would be an open file
+        raise KindError(f"path must be the name of a file, got {path!r:.60}")
+    try:
+        try:
+            found = os.stat(path)
+        except FileNotFoundError:
+            # A bag whose replacement was killed half-way has its name again.
+            if not restore(Path(os.path.realpath(path)).parent):
+                raise
+            found = os.stat(path)
+    except ValueError:
+        raise FileError(path, "is no name of a file: it holds a NUL character") from None
+    mode = found.st_mode
+    if stat.S_ISREG(mode) or stat.S_ISDIR(mode):
+        return found
+    if whole:
+        raise FileError(
+            path, f"is {what_it_is(mode)}, which can be read only once; write it to a file first"
+        )
+    if stat.S_ISFIFO(mode) or is_null_device(found):
+        return found
+    if stat.S_ISCHR(mode) and _is_terminal(path):
+        return found
+    raise FileError(path, f"is {what_it_is(mode)}, not a file; name a file or a pipe")
+
+
+def read_whole(path: str | PathLike[str], limit: int, what: str, instead: str = "") -> bytes:
+    """All bytes of a file or pipe, at most ``limit``.
+
+    Waiting for a pipe ends with Ctrl-C, at most a tenth of a second later.
+
+    Parameters
+    ----------
+    path : path
+    limit : int
+        Most bytes that are read, one of the constants of this module.
+    what : str
+        What the file should hold, as the message names it: ``"a model"``.
+    instead : str, optional
+        What to do with more.
+
+    Raises
+    ------
+    FileError
+        A folder, a device, more than ``limit`` bytes.
+    OSError
+        Nothing of this name, no permission.
+    """
+    found = check_input(path)
+    if stat.S_ISDIR(found.st_mode):
+        raise FileError(path, "is a folder; name a file in it")
+    advice = f"; {instead}" if instead else ""
+    if found.st_size > limit:
+        raise FileError(
+            path,
+            f"has {found.st_size} bytes, but {what} is read up to {_size(limit)} only{advice}",
+        )
+    parts, total = [], 0
+    with open(path, "rb", buffering=0) as file:
+        # Files of a size: in one piece, without a copy. Pipes and growing files: to the end.
+        wanted = found.st_size or _CHUNK
+        waits = not stat.S_ISREG(found.st_mode)
+        while part := (_wait_for(file) if waits else file).read(wanted):
+            parts.append(part)
+            total += len(part)
+            wanted = _CHUNK
+            if total > limit:
+                raise FileError(
+                    path,
+                    f"goes on after {_size(limit)}, the most that is read of {what}{advice}",
+                )
+    return parts[0] if len(parts) == 1 else b"".join(parts)
+
+
+def _wait_for(file: io.FileIO) -> io.FileIO:
+    """Return once a pipe has bytes or has ended.
+
+    A signal between Python's last look for signals and the system call of ``read`` only leaves
+    a mark that nobody looks at until bytes come. Short waits look at it ten times a second.
+    """
+    import select  # pipes only
+
+    if hasattr(select, "poll"):  # Windows waits for sockets only
+        poll = select.poll()
+        poll.register(file, select.POLLIN)
+        while not poll.poll(_LOOK_MS):
+            pass
+    return file
+
+
+def sha256_of(path: str | PathLike[str]) -> str:
+    """Hexadecimal sha256 of a regular file, in constant memory."""
+    import hashlib  # brings OpenSSL with it
+
+    with open(path, "rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
+
+
+def is_null_device(found: os.stat_result) -> bool:
+    """Whether this is the device that swallows everything."""
+    if not stat.S_ISCHR(found.st_mode):
+        return False
+    try:
+        return found.st_rdev == os.stat(os.devnull).st_rdev
+    except OSError:  # pragma: no cover - a system without one
+        return False
+
+
+def _is_terminal(path: str | PathLike[str]) -> bool:
+    try:
+        handle = os.open(path, os.O_RDONLY | getattr(os, "O_NOCTTY", 0))
+    except OSError:
+        return False
+    try:
+        return os.isatty(handle)
+    finally:
+        os.close(handle)
+
+
+def _size(count: int) -> str:
+    return f"{count >> 20} MiB" if count < 1 << 30 else f"{count >> 30} GiB"

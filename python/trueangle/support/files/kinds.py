@@ -1,0 +1,137 @@
+"""Kinds of files that are written, and the endings that name them."""
+
+from __future__ import annotations
+
+from os import PathLike
+from pathlib import Path
+from typing import Final, NamedTuple
+
+from ...errors import FileError
+
+__all__ = [
+    "LOG_ENDINGS",
+    "MODEL",
+    "PAGE",
+    "PDF",
+    "PICTURE",
+    "REPORT",
+    "RUNS",
+    "SIMULATION",
+    "Kind",
+    "kind_of_log",
+    "promised_format",
+]
+
+#: Endings that promise a format, by its name: a file of another must not bear them.
+_FORMATS: Final[dict[str, tuple[str, ...]]] = {
+    "CSV": (".csv",),
+    "tab-separated text": (".tsv", ".tab"),
+    "Parquet": (".parquet", ".pq"),
+    "Arrow": (".arrow", ".feather", ".ipc"),
+    "an Arrow stream": (".arrows",),
+    "HDF5": (".h5", ".hdf5", ".hdf", ".he5"),
+    "MATLAB": (".mat",),
+    "NetCDF": (".nc",),
+    "numpy": (".npy", ".npz"),
+    "a ROS bag": (".bag",),
+    "a ROS 2 bag": (".db3",),
+    "MCAP": (".mcap",),
+    "MDF4": (".mf4", ".mdf"),
+    "JSON": (".json",),
+    "JSON lines": (".jsonl", ".ndjson"),
+    "TOML": (".toml",),
+    "YAML": (".yaml", ".yml"),
+    "XML": (".xml",),
+    "HTML": (".html", ".htm"),
+    "PDF": (".pdf",),
+    "a text document": (".doc", ".docx", ".odt", ".rtf"),
+    "a spreadsheet": (".xls", ".xlsx", ".xlsm", ".ods"),
+    "a picture": (".png", ".jpg", ".jpeg", ".svg", ".gif", ".webp", ".tif", ".tiff"),
+    "Markdown": (".md",),
+    "a compressed file": (".gz", ".zip", ".bz2", ".xz", ".zst", ".lz4", ".7z", ".tar", ".tgz"),
+    "a database": (".db", ".sqlite", ".sqlite3"),
+    "a pickle": (".pkl", ".pickle"),
+    "C": (".c", ".h", ".cpp", ".hpp"),
+    "Rust": (".rs",),
+    "Python": (".py", ".ipynb"),
+}
+
+#: Endings of the files that a folder among the inputs stands for.
+LOG_ENDINGS: Final = (
+    *(".csv", ".tsv", ".txt", ".parquet", ".pq", ".arrow", ".arrows", ".feather", ".ipc"),
+    *(".h5", ".hdf5", ".hdf", ".he5", ".mat", ".nc", ".npy", ".npz"),
+    *(".bag", ".db3", ".mcap", ".mf4", ".mdf"),
+)
+
+
+class Kind(NamedTuple):
+    """A kind of file: what it is called, and the endings it may bear.
+
+    Endings that promise no format (``.txt``, ``.dat``, none) fit every kind.
+
+    Examples
+    --------
+    >>> MODEL.check("joint.json"), MODEL.check("joint.model")
+    (None, None)
+    >>> MODEL.check("joint.csv")
+    Traceback (most recent call last):
+    ...
+    trueangle.errors.FileError: joint.csv: the ending .csv means CSV, but what is written is \
+a model (JSON); name it joint.json
+    """
+
+    what: str
+    endings: tuple[str, ...]
+
+    def check(self, path: str | PathLike[str]) -> None:
+        """Refuse an ending that promises another format.
+
+        Raises
+        ------
+        FileError
+        """
+        named = Path(path)
+        ending = named.suffix.lower()
+        if ending in self.endings:
+            return
+        promised = promised_format(path)
+        if promised is not None:
+            better = named.with_suffix(self.endings[0])
+            raise FileError(
+                path,
+                f"the ending {ending} means {promised}, but what is written is {self.what}; "
+                f"name it {better}",
+            )
+
+
+def kind_of_log(path: str | PathLike[str]) -> Kind:
+    """What a corrected copy of a log is: of the log's own format.
+
+    Examples
+    --------
+    >>> kind_of_log("a.hdf5").what
+    'HDF5, as the log is'
+    """
+    ending = Path(path).suffix.lower()
+    for name, endings in _FORMATS.items():
+        if ending in endings:
+            return Kind(f"{name}, as the log is", (ending, *endings))
+    return Kind("text, as the log is", (".txt", ".csv", ".tsv", ".tab"))
+
+
+def promised_format(path: str | PathLike[str]) -> str | None:
+    """Name of the format that the ending of ``path`` promises, if it does."""
+    ending = Path(path).suffix.lower()
+    return next((name for name, known in _FORMATS.items() if ending in known), None)
+
+
+MODEL: Final = Kind("a model (JSON)", (".json",))
+SIMULATION: Final = Kind("a simulation (TOML)", (".toml",))
+RUNS: Final = Kind("a table of runs (CSV)", (".csv",))
+PAGE: Final = Kind("a report (HTML)", (".html", ".htm"))
+PDF: Final = Kind("a report (PDF)", (".pdf",))
+#: What a picture is written as, by the ending.
+PICTURE: Final = Kind("a picture (PNG, SVG or PDF)", (".png", ".svg", ".pdf"))
+CERTIFICATE: Final = Kind("a certificate (PDF)", (".pdf",))
+#: What `Report.save` writes, by the ending.
+REPORT: Final = Kind("a report (HTML or PDF)", (*PAGE.endings, *PDF.endings))

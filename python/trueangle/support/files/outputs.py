@@ -1,0 +1,238 @@
+"""Writing files: only regular ones, never an input, complete or not there at all."""
+
+from __future__ import annotations
+
+import contextlib
+import errno
+import os
+import stat
+from collections.abc import Iterable, Iterator
+from os import PathLike
+from pathlib import Path
+from typing import IO
+
+from ...errors import FileError, KindError
+from .inputs import is_null_device, sha256_of
+from .kinds import LOG_ENDINGS, Kind
+from .samefile import named_again, what_it_is
+from .workplace import (
+    PARTIAL,
+    hidden_name,
+    made_beside,
+    remove_leftovers,
+    replace_folder,
+    workplace,
+)
+
+__all__ = [
+    "PARTIAL",
+    "check_output",
+    "hidden_name",
+    "publish",
+    "published",
+    "sync",
+    "written_atomically",
+]
+
+
+def check_output(
+    path: str | PathLike[str],
+    kind: Kind | None = None,
+    inputs: Iterable[str | PathLike[str]] = (),
+    hashes: Iterable[str] = (),
+    *,
+    regular: bool = False,
+    in_new_folder: bool = False,
+) -> Path:
+    """Where an output goes: the file that ``path`` leads to, links followed.
+
+    Parameters
+    ----------
+    path : path
+    kind : Kind, optional
+        What is written; its endings are checked.
+    inputs : iterable of paths
+        What was read: none of it is overwritten.
+    hashes : iterable of str
+        sha256 of what was read, where its place is not known.
+    regular : bool
+        Refuse the null device too: what is written is read back.
+    in_new_folder : bool
+        Its folder will be made.
+
+    Returns
+    -------
+    Path
+        A regular file, the null device, or nothing yet in a folder that is there.
+
+    Raises
+    ------
+    FileError
+        A folder, device, pipe or socket; an input; an ending that promises another format;
+        the file that the command prints into.
+    OSError
+        No such folder, no permission.
+    """
+    if not isinstance(path, str | PathLike):
+        raise KindError(f"path must be the name of a file, got {path!r:.60}")
+    text = os.fspath(path)
+    if text == "-":
+        raise FileError(path, "standard output is not written to; name a file (./- for this name)")
+    if not text or "\0" in text:
+        raise FileError(repr(text), "is no name of a file")
+    if kind is not None:
+        kind.check(path)
+    try:
+        found = os.stat(path)
+    except FileNotFoundError:
+        found = None
+    target = Path(os.path.realpath(path))
+    if found is None:
+        if text.endswith(os.sep):
+            raise FileError(path, "names a folder; name a file in it")
+        if not in_new_folder and not target.parent.is_dir():
+            parent = Path(path).parent
+            missing = target.parent if parent.is_dir() else parent
+            raise FileNotFoundError(errno.ENOENT, "No such folder", str(missing))
+    elif stat.S_ISDIR(found.st_mode):
+        raise FileError(path, "is a folder; name a file in it")
+    elif is_null_device(found) and not regular:
+        return target
+    elif not stat.S_ISREG(found.st_mode):
+        raise FileError(
+            path, f"is {what_it_is(found.st_mode)}: only files are written; name a file"
+        )
+    elif not os.access(target, os.W_OK):
+        raise PermissionError(errno.EACCES, "is write-protected", text)
+    again = named_again(path, inputs, LOG_ENDINGS)
+    if again is not None:
+        also = "" if again == text else f" (as {again})"
+        raise FileError(path, f"is also read{also}: it would be overwritten; name another file")
+    if found is not None:
+        if _is_printed_into(found):
+            raise FileError(path, "is where this program's printed text goes; name another file")
+        known = {digest for digest in hashes if digest}
+        if known and sha256_of(target) in known:
+            raise FileError(
+                path, "holds what was read (same content): it would be overwritten; name another"
+            )
+    return target
+
+
+@contextlib.contextmanager
+def written_atomically(
+    path: str | PathLike[str],
+    newline: str | None = "\n",
+    *,
+    kind: Kind | None = None,
+    inputs: Iterable[str | PathLike[str]] = (),
+    hashes: Iterable[str] = (),
+) -> Iterator[IO[str]]:
+    """Text file that takes the name ``path`` only once it is complete and synced.
+
+    It is written beside the file that ``path`` leads to (links are followed and stay) under
+    a hidden name and renamed at the end; an exception inside the block, or a full disk,
+    leaves ``path`` as it was. The null device takes everything and keeps its place. What
+    may be written is said by `check_output`, which takes the other arguments.
+    """
+    target = check_output(path, kind, inputs, hashes)
+    if target.exists() and not target.is_file():  # the null device
+        with open(target, "w", encoding="utf-8", newline=newline) as nowhere:
+            yield nowhere
+        return
+    remove_leftovers([target])
+    try:
+        with _file_beside(target) as beside:
+            with open(beside, "r+", encoding="utf-8", newline=newline) as file:
+                yield file
+            publish(beside, target)
+    except OSError as error:
+        if error.errno and (error.filename is None or PARTIAL in os.fsdecode(error.filename)):
+            # Of writing: it says no name, or the hidden one.
+            raise OSError(error.errno, os.strerror(error.errno), os.fspath(path)) from None
+        raise
+
+
+@contextlib.contextmanager
+def published(target: Path) -> Iterator[Path]:
+    """Path of a file to be made by another program, which has the name ``target`` at the end.
+
+    It is alone in a folder of its own beside it. Of the null device that is elsewhere.
+    """
+    if target.exists() and not target.is_file():  # the null device
+        import tempfile
+
+        with tempfile.TemporaryDirectory() as folder:
+            yield Path(folder, target.name)
+        return
+    remove_leftovers([target])
+    with workplace(target) as aside:
+        yield aside
+        publish(aside, target)
+
+
+def _file_beside(target: Path) -> contextlib.AbstractContextManager[Path]:
+    """A new empty file beside ``target``; see `made_beside`."""
+
+    def make(beside: Path) -> int:
+        handle = os.open(beside, os.O_CREAT | os.O_EXCL | os.O_RDWR, 0o666)
+        if os.name != "nt":
+            return handle
+        os.close(handle)  # pragma: no cover - an open file has no new name there
+        return -1  # pragma: no cover
+
+    return made_beside(target, make)
+
+
+def publish(aside: str | PathLike[str], target: str | PathLike[str]) -> None:
+    """Sync the finished file or folder ``aside`` to the disk and rename it ``target``.
+
+    A symbolic link stays; what it leads to is replaced, a folder as `replace_folder` says. A
+    file that is replaced hands on its permissions; the null device takes the file and stays.
+    """
+    target = os.path.realpath(target)
+    try:
+        found = os.stat(target)
+    except FileNotFoundError:
+        found = None
+    if found is not None:
+        if is_null_device(found):
+            os.unlink(aside)
+            return
+        if stat.S_ISREG(found.st_mode):
+            os.chmod(aside, stat.S_IMODE(found.st_mode) & 0o777)
+    for inside in Path(aside).rglob("*"):
+        sync(inside)
+    sync(aside)
+    if found is not None and stat.S_ISDIR(found.st_mode):
+        replace_folder(Path(aside), Path(target))
+    else:
+        os.replace(aside, target)
+    sync(Path(target).parent)
+
+
+def sync(path: str | PathLike[str]) -> None:
+    """Wait until a file, or the names in a folder, are on the disk."""
+    if os.name == "nt" and os.path.isdir(path):  # pragma: no cover - folders have no handle there
+        return
+    handle = os.open(path, os.O_RDONLY)
+    try:
+        os.fsync(handle)
+    except OSError as error:
+        # Some network file systems cannot sync folders: the rename itself is done.
+        if not (os.path.isdir(path) and error.errno in (errno.EINVAL, errno.ENOTSUP)):
+            raise
+    finally:
+        os.close(handle)
+
+
+def _is_printed_into(found: os.stat_result) -> bool:
+    """Whether standard output or error goes to this file: printing on would lose it."""
+    for handle in (1, 2):
+        try:
+            printed = os.fstat(handle)
+        except OSError:
+            continue
+        if stat.S_ISREG(printed.st_mode) and os.path.samestat(found, printed):
+            return True
+    return False

@@ -1,0 +1,164 @@
+"""Arguments of a wrong kind, named after a call has failed of one."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from functools import wraps
+from typing import Any, TypeVar
+
+from ..errors import KindError, TrueAngleError
+
+__all__ = ["told_kinds"]
+
+F = TypeVar("F", bound=Callable[..., Any])
+
+#: What code raises that meets an object it cannot use.
+_FAILURES = (TypeError, AttributeError, ValueError, LookupError, ArithmeticError)
+
+
+def told_kinds(function: F) -> F:
+    """A function or class whose failures name an argument that is not what it is declared to be.
+
+    Nothing is looked at before the call and where it succeeds. One that fails for another
+    reason, with every argument of its kind, fails as it did.
+
+    Raises
+    ------
+    KindError
+        Names the argument, its declared kind and what was got.
+
+    Examples
+    --------
+    >>> @told_kinds
+    ... def half(angle: float) -> float:
+    ...     return angle / 2
+    >>> half("x")
+    Traceback (most recent call last):
+    ...
+    trueangle.errors.KindError: angle must be float, got 'x' (str)
+    """
+    if isinstance(function, type):
+        made: Any = function
+        made.__init__ = told_kinds(made.__init__)
+        return function
+
+    @wraps(function)
+    def told(*args: Any, **kwargs: Any) -> Any:
+        try:
+            return function(*args, **kwargs)
+        except _FAILURES as error:
+            if isinstance(error, KindError) or not isinstance(error, TrueAngleError):
+                _refuse(function, args, kwargs, error)
+            raise
+
+    return told  # type: ignore[return-value]
+
+
+def _refuse(
+    function: Callable[..., Any], args: Any, kwargs: Mapping[str, Any], error: Exception
+) -> None:
+    """Raise where an argument is at fault, unless the error says of it what was found within."""
+    import inspect
+
+    signature = inspect.signature(function)
+    try:
+        given = signature.bind(*args, **kwargs).arguments
+    except TypeError:
+        return
+    names = _Names(function)
+    for name, value in given.items():
+        parameter = signature.parameters[name]
+        wanted = parameter.annotation
+        if parameter.kind in (parameter.VAR_POSITIONAL, parameter.VAR_KEYWORD):
+            continue
+        try:
+            kind = eval(wanted, {}, names) if isinstance(wanted, str) else wanted
+        except (NameError, TypeError, AttributeError):
+            continue
+        if kind is not parameter.empty and not _fits(value, kind):
+            if isinstance(error, KindError) and str(error).startswith(name):
+                return
+            raise KindError(
+                f"{name} must be {wanted}, got {value!r:.60} ({type(value).__name__})"
+            ) from error
+
+
+class _Names(dict[str, Any]):
+    """What the names in a declaration stand for; those that are not known, for anything."""
+
+    def __init__(self, function: Any) -> None:
+        import builtins
+        from os import PathLike
+
+        import numpy as np
+
+        arrays = dict.fromkeys(("Array", "ArrayLike", "NDArray"), np.ndarray)
+        known = {"PathLike": PathLike, **function.__globals__}
+        super().__init__({**vars(builtins), **known, **arrays})
+
+    def __missing__(self, name: str) -> Any:
+        """A class that the module of the declaration knows for type checkers alone."""
+        import sys
+
+        package = __name__.partition(".")[0]
+        modules = [m for key, m in list(sys.modules.items()) if key.partition(".")[0] == package]
+        found = {kind for m in modules if isinstance(kind := vars(m).get(name), type)}
+        return found.pop() if len(found) == 1 else Any
+
+
+def _fits(value: Any, kind: Any) -> bool:
+    """Whether a value is of a kind, as far as a look at it can tell."""
+    import typing
+    from os import PathLike
+    from types import UnionType
+
+    import numpy as np
+
+    origin, inner = typing.get_origin(kind) or kind, typing.get_args(kind)
+    if origin is Any or isinstance(origin, typing.TypeVar):
+        return True
+    if origin in (typing.Union, UnionType):
+        return any(_fits(value, one) for one in inner)
+    if origin is typing.Literal:
+        return isinstance(value, str | None) and value in inner
+    if kind is None or origin is type(None):
+        return value is None
+    if origin is np.ndarray:
+        return _is_numbers(value)
+    if origin in (int, float):
+        kinds = "iu" if origin is int else "iuf"
+        return np.ndim(value) == 0 and not isinstance(value, str) and _is_numbers(value, kinds)
+    if origin is PathLike:
+        return isinstance(value, str | PathLike)
+    if not isinstance(origin, type):
+        return True
+    if issubclass(origin, Mapping):
+        return isinstance(value, Mapping) and _all_fit(value.items(), inner)
+    if issubclass(origin, str) or not issubclass(origin, Iterable) or hasattr(origin, "summary"):
+        return isinstance(value, origin)
+    if isinstance(value, str | bytes | Mapping) or not _is_iterable(value):
+        return False
+    if isinstance(value, Iterator) or not inner:
+        return True
+    return all(_fits(item, inner[0]) for item in value)
+
+
+def _all_fit(items: Iterable[tuple[Any, Any]], inner: tuple[Any, ...]) -> bool:
+    return not inner or all(_fits(k, inner[0]) and _fits(v, inner[1]) for k, v in items)
+
+
+def _is_iterable(value: Any) -> bool:
+    try:
+        iter(value)
+    except TypeError:
+        return False
+    return True
+
+
+def _is_numbers(value: Any, kinds: str = "iuf") -> bool:
+    import numpy as np
+
+    try:
+        return np.asarray(value).dtype.kind in kinds
+    except (TypeError, ValueError):
+        return False

@@ -1,0 +1,92 @@
+"""Results that show themselves, and results as plain values and as JSON text."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Iterator, Sized
+from typing import Any
+
+__all__ = ["PlainResult", "Shown", "counted", "finite"]
+
+#: Characters of a result's ``repr`` at most: one line of a screen.
+WIDTH = 100
+
+#: Characters of a text that a ``repr`` shows by itself.
+_SHORT = 30
+
+
+class Shown:
+    """A result that shows itself: one line as ``repr``, its summary as text and in notebooks.
+
+    A class says what its line holds by ``_brief``, the two or three numbers that matter, and has
+    a ``summary``; without them its plain fields are shown.
+    """
+
+    __slots__ = ()
+
+    def __init_subclass__(cls, **options: Any) -> None:
+        super().__init_subclass__(**options)
+        # `dataclass` leaves alone what a class defines itself.
+        if "__repr__" not in cls.__dict__:
+            cls.__repr__ = Shown.__repr__  # type: ignore[method-assign]
+
+    def _brief(self) -> str:
+        """What stands in the brackets of the line."""
+        return ", ".join(self._plain_fields())
+
+    def _plain_fields(self) -> Iterator[str]:
+        known: dict[str, Any] = getattr(self, "__dataclass_fields__", {})
+        for field in known.values():
+            value = getattr(self, field.name)
+            if not field.repr:
+                continue
+            if isinstance(value, float):
+                yield f"{field.name}={value:.4g}"
+            elif isinstance(value, int) or (isinstance(value, str) and 0 < len(value) < _SHORT):
+                yield f"{field.name}={value!r}"
+
+    def __repr__(self) -> str:
+        name, brief = type(self).__name__, " ".join(self._brief().split())
+        left = WIDTH - len(name) - 2
+        return f"{name}({brief if len(brief) <= left else brief[: left - 3] + '...'})"
+
+    def __str__(self) -> str:
+        summary = getattr(self, "summary", None)
+        return repr(self) if summary is None else str(summary())
+
+    def _repr_html_(self) -> str:
+        from html import escape
+
+        return f"<pre>{escape(str(self))}</pre>"
+
+
+class PlainResult(Shown):
+    """A result whose ``to_dict`` holds plain values: strings, numbers, lists and mappings."""
+
+    __slots__ = ()
+
+    def to_dict(self) -> dict[str, Any]:
+        """The result as plain values; what is not a finite number is None."""
+        raise NotImplementedError
+
+    def to_json(self) -> str:
+        """`to_dict` as JSON text."""
+        return json.dumps(self.to_dict(), indent=2, allow_nan=False)
+
+
+def counted(things: Sized | int, one: str, several: str = "") -> str:
+    """How many there are, in words.
+
+    Examples
+    --------
+    >>> counted(1, "run"), counted([1, 2], "run"), counted(0, "reversal", "reversals")
+    ('1 run', '2 runs', '0 reversals')
+    """
+    n = things if isinstance(things, int) else len(things)
+    return f"{n} {one if n == 1 else several or one + 's'}"
+
+
+def finite(value: float) -> float | None:
+    """A number that JSON can hold, else None."""
+    return float(value) if math.isfinite(value) else None

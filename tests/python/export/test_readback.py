@@ -1,0 +1,173 @@
+"""Tables read back, steep ones too, and compared as functions of the reading."""
+
+import json
+
+import numpy as np
+import pytest
+
+import trueangle as ta
+from trueangle.cli import main
+from trueangle.export.inversion import inverse
+
+from .test_bounds import AT_READINGS, existing, random_model, wrapped
+
+SEED = 90_217
+
+#: A model read from a table ends at the table's own Nyquist order; of a table so coarse that it
+#: is degrees off its model, that end takes some of the table's own difference more.
+COARSE = 1.25
+
+#: Of a Mechaduino's 16384 angles, orders below three deviations of their rounding are left out:
+#: arcsec where the correction rises thirtyfold.
+BETWEEN_COUNTS = 10.0
+
+ENDINGS = {
+    "c": ".h", "rust": ".rs", "csv": ".csv", "simplefoc": ".h", "moteus": ".cfg",
+    "linuxcnc": ".comp", "twincat": ".lis", "klipper": ".cfg", "admt4000": ".txt",
+    "mechaduino": ".cpp", "tinymovr": ".h",
+}  # fmt: skip
+CASES = [
+    ("c", {"number": "f32", "entries": 256}), ("rust", {"number": "f32", "method": "cubic"}),
+    ("csv", {}), ("simplefoc", {"variant": "minus-u16"}), ("simplefoc", {"variant": "minus-float"}),
+    ("simplefoc", {"variant": "plus-float"}), ("moteus", {}), ("linuxcnc", {"type": "0"}),
+    ("linuxcnc", {"type": "1"}), ("twincat", {"variant": "cnc"}), ("twincat", {"variant": "nc"}),
+    ("klipper", {}), ("mechaduino", {}), ("tinymovr", {"bits": 14, "entries": 256}),
+]  # fmt: skip
+
+
+def there_and_back(model, target, options, folder, name="table"):
+    given = dict(options)
+    if target == "klipper":
+        given["existing"] = existing(folder, model)
+    if target not in ("mechaduino", "tinymovr"):
+        given["bits"] = 14
+    path = folder / f"{name}{ENDINGS[target]}"
+    made = ta.export_model(model, target, path, **given)
+    asked = {k: v for k, v in given.items() if k in ("variant", "type", "bits")}
+    return made, ta.import_model(path, target, **asked)
+
+
+def without_mean(degrees):
+    off = wrapped(degrees - degrees[0])
+    return off - np.mean(off)
+
+
+@pytest.mark.parametrize("steep", [0.49, 0.7, 0.97])
+@pytest.mark.parametrize(("target", "options"), CASES)
+def test_a_steep_table_is_read_back(target, options, steep, tmp_path):
+    seed = SEED + len(target) + int(100 * steep)
+    print(f"seed {seed}")
+    model = random_model(np.random.default_rng(seed), steep, top=5, count=2)
+    made, back = there_and_back(model, target, options, tmp_path)
+    x = np.arange(16384) * (360.0 / 16384)
+    if made.argument == "indicated":
+        off = without_mean(np.asarray(back.correct(x)) - np.asarray(model.correct(x)))
+    else:
+        off = np.asarray(back.error(x)) - np.asarray(model.error(x)) + model.constant
+    worst = float(np.max(np.abs(off))) * 3600.0
+    print(f"stated {made.max_difference_arcsec}, model read back {worst}")
+    assert worst <= COARSE * made.max_difference_arcsec + BETWEEN_COUNTS * (target == "mechaduino")
+    result = ta.compare(model, back)
+    finer = 0.1 + BETWEEN_COUNTS * (target == "mechaduino")  # it looks between the counts
+    assert result.max_abs_arcsec == pytest.approx(worst, rel=0.05, abs=finer)
+
+
+def test_order_4_of_seven_degrees_is_read_back(tmp_path):
+    shaft = ta.Shaft("output", 1, [4], [0.0], [7.02])
+    model = ta.HarmonicModel([shaft], period=360.0)
+    made, back = there_and_back(model, "csv", {}, tmp_path)
+    result = ta.compare(model, back)
+    assert result.max_abs_arcsec <= made.max_difference_arcsec
+    assert result.orders[0]["amplitude_arcsec"] < 1.0
+
+
+def test_what_is_not_monotone_is_refused(tmp_path):
+    lines = ["indicated_deg,correction_deg"]
+    values = 20.0 * np.sin(np.radians(4 * np.arange(0.0, 361.0)))
+    lines += [f"{i},{v:.9f}" for i, v in enumerate(values)]
+    path = tmp_path / "a.csv"
+    path.write_text("\n".join(lines) + "\n")
+    with pytest.raises(ta.errors.FileError, match=r"not monotone between .* and .* deg"):
+        ta.import_model(path, "csv")
+
+
+def test_brackets_hold_where_newton_would_not():
+    seed = SEED
+    print(f"seed {seed}")
+    rng = np.random.default_rng(seed)
+    for _ in range(40):
+        knots = np.cumsum(rng.exponential(1.0, 64) ** 3 + 1e-6)
+        knots = np.append(0.0, knots) / knots[-1]
+
+        def line(x, knots=knots):
+            return np.floor(x) + np.interp(x % 1.0, np.arange(65) / 64, knots)
+
+        x = rng.uniform(-3.0, 3.0, 500)
+        np.testing.assert_allclose(line(inverse(line, line(x), 256)), line(x), atol=1e-13)
+
+
+@pytest.mark.parametrize("name", [n for n in AT_READINGS if n != "klipper"] + ["admt4000"])
+def test_right_and_wrong_tables_of_a_model_with_a_zero(name, tmp_path):
+    """A table of the model is near, one with the pattern at the model's own zero is far."""
+    print(f"seed {SEED}")
+    rng = np.random.default_rng(SEED)
+    _, options, _ = AT_READINGS.get(name, (None, {}, None))
+    target = name.split(",")[0]
+    orders = [1, 2, 3] if target == "admt4000" else [1, 2, 4]
+    size, phase = np.array([0.4, 0.3, 0.1]), rng.uniform(0.0, 6.0, 3)
+    shaft = ta.Shaft("output", 1, orders, size * np.sin(phase), size * np.cos(phase))
+    model = ta.HarmonicModel([shaft], constant=109.4, period=360.0)
+    made, right = there_and_back(model, target, options, tmp_path, "right")
+    _, wrong = there_and_back(model.replace(constant=0.0), target, options, tmp_path, "wrong")
+    near, far = ta.compare(model, right), ta.compare(model, wrong)
+    assert near.argument == far.argument == "indicated"
+    assert near.max_abs_arcsec <= made.max_difference_arcsec * 1.05 + 0.01
+    x = np.arange(3600.0) / 10.0
+    true = without_mean(np.asarray(wrong.correct(x)) - np.asarray(model.correct(x)))
+    assert far.rms_arcsec == pytest.approx(float(np.std(true)) * 3600.0, rel=1e-3)
+    assert far.rms_arcsec > 500.0
+    # Table against table, and whichever comes first.
+    assert ta.compare(right, wrong).rms_arcsec == pytest.approx(far.rms_arcsec, rel=0.1)
+    assert ta.compare(wrong, model).rms_arcsec == pytest.approx(far.rms_arcsec, rel=1e-9)
+
+
+def test_tables_of_other_targets_counts_and_units(tmp_path):
+    model = random_model(np.random.default_rng(SEED), 0.1, zero=-75.0)
+    radians = ta.HarmonicModel(
+        [
+            ta.Shaft(s.name, 1, s.orders, np.radians(s.cosine), np.radians(s.sine))
+            for s in model.shafts
+        ],
+        constant=np.radians(model.constant),
+    )
+    _, coarse = there_and_back(radians, "tinymovr", {"bits": 14, "entries": 128}, tmp_path)
+    _, fine = there_and_back(model, "simplefoc", {"variant": "minus-float"}, tmp_path)
+    _, lines = there_and_back(model, "csv", {"entries": 90}, tmp_path)
+    for a, b in ((coarse, fine), (fine, lines), (radians, fine), (lines, radians)):
+        assert ta.compare(a, b).max_abs_arcsec < 60.0
+    assert abs(ta.compare(model, radians).max_abs_arcsec) < 1e-6
+    assert ta.compare(model, fine).zero_deg == pytest.approx(75.0, abs=0.01)
+
+
+@pytest.mark.parametrize(
+    ("target", "options"), [("moteus", {}), ("tinymovr", {}), ("csv", {"entries": 60})]
+)
+def test_the_tables_own_arithmetic_is_added(target, options, tmp_path, capsys):
+    """What the machine makes is within what is compared and what its arithmetic adds."""
+    rng = np.random.default_rng(SEED)
+    model = random_model(rng, 0.15, zero=20.0)
+    made, back = there_and_back(model, target, options, tmp_path)
+    result = ta.compare(model, back)
+    total = result.max_abs_arcsec + result.table_max_abs_arcsec
+    assert made.max_difference_arcsec <= total * 1.01 + 0.5 / 8192 * 1_296_000 * (
+        target == "tinymovr"
+    )
+    assert result.table_max_abs_arcsec > 3.0 * result.max_abs_arcsec
+    assert "the table's own arithmetic adds at most" in result.summary()
+    back.save(tmp_path / "back.json")
+    model.save(tmp_path / "model.json")
+    paths = [str(tmp_path / name) for name in ("model.json", "back.json")]
+    assert main(["compare", *paths, "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["table_max_abs_arcsec"] == pytest.approx(result.table_max_abs_arcsec)
+    assert ta.compare(model, model).table_max_abs_arcsec is None

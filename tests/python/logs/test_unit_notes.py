@@ -1,0 +1,123 @@
+"""Readings in another unit than the model's are told; ordinary motion in its unit is not."""
+
+import numpy as np
+import pytest
+
+import trueangle as ta
+from trueangle.cli import main
+from trueangle.errors import NotCorrectedWarning, UnitWarning
+from trueangle.logs.unitevidence import UnitEvidence
+
+DEG, RAD, TURN = 360.0, 2.0 * np.pi, 1.0
+
+
+def seen(values, period, span=None, batches=3):
+    evidence = UnitEvidence(period)
+    for batch in np.array_split(np.asarray(values), batches):
+        evidence.update(batch)
+    return evidence.unit(span)
+
+
+def wrapped(turn, turns=3.0, low=0.0, count=900):
+    return np.mod(turns * turn * np.linspace(0.0, 1.0, count) - low, turn) + low
+
+
+@pytest.mark.parametrize(
+    ("values", "period", "span", "unit"),
+    [
+        (np.linspace(-3.1, 3.1, 400), DEG, None, "rad"),
+        (np.linspace(0.2, 6.2, 400), DEG, None, "rad"),
+        (wrapped(RAD, low=-np.pi), DEG, None, "rad"),
+        (wrapped(TURN), DEG, None, "turn"),
+        (wrapped(TURN), RAD, None, "turn"),
+        (wrapped(DEG, low=-180.0), RAD, None, "deg"),
+        (np.linspace(-150.0, 170.0, 400), RAD, None, "deg"),
+        (wrapped(16384.0).astype(np.int64), DEG, None, "count"),
+        (np.linspace(0.6, 1.9, 200), DEG, (30.0, 120.0), "rad"),
+    ],
+)
+def test_another_unit_is_seen(values, period, span, unit):
+    assert seen(values, period, span) == unit
+
+
+@pytest.mark.parametrize(
+    ("values", "period", "span"),
+    [
+        (np.full(500, 1.2), DEG, None),
+        (1.2 + 0.3 * np.sin(np.linspace(0.0, 60.0, 500)), DEG, None),
+        (np.linspace(-1.0, 1.2, 300), DEG, (-90.0, 90.0)),
+        (wrapped(DEG), DEG, None),
+        (np.linspace(-170.0, 170.0, 300), DEG, None),
+        (np.linspace(0.0, 3000.0, 300), DEG, None),
+        (np.linspace(-3.1, 3.1, 300), RAD, None),
+        (np.linspace(0.0, 40.0, 300), RAD, None),
+        (np.linspace(0.0, 2500.0, 300), RAD, None),
+        (np.linspace(-120.0, -60.0, 300), DEG, (0.0, 90.0)),
+        (np.linspace(400.0, 440.0, 300), DEG, (30.0, 120.0)),
+        (np.array([0.0, 6.28]), DEG, None),
+        (np.full(300, np.nan), DEG, None),
+    ],
+)
+def test_ordinary_readings_are_not_doubted(values, period, span):
+    assert seen(values, period, span) is None
+
+
+def model_file(folder, period):
+    theta = np.arange(0.0, 1.0, 1.0 / 36.0) * period
+    error = 1e-3 * period * np.sin(theta * 2.0 * np.pi / period)
+    path = folder / "model.json"
+    ta.fit(ta.CalibrationRun(theta, theta + error, period=period), orders=[1]).model.save(path)
+    return str(path)
+
+
+def written(path, name, values):
+    np.savetxt(path, values, header=name, comments="", fmt="%.9g")
+    return str(path)
+
+
+@pytest.mark.filterwarnings("always::trueangle.errors.UnitWarning")
+@pytest.mark.parametrize(
+    ("period", "values", "unit"),
+    [(DEG, np.linspace(-3.0, 3.1, 200), "rad"), (RAD, np.linspace(-170.0, 160.0, 200), "deg")],
+)
+def test_the_command_tells_in_one_line(tmp_path, capsys, period, values, unit):
+    model = model_file(tmp_path, period)
+    logs = [written(tmp_path / f"{k}.csv", "q", values) for k in range(2)]
+    for folder in ("out", "again"):
+        (tmp_path / folder).mkdir()
+    out = str(tmp_path / "out")
+    assert main(["correct", *logs, "-m", model, "--column", "q", "-o", out, "--json"]) == 0
+    lines = capsys.readouterr().err.strip().splitlines()
+    assert len(lines) == 1
+    assert f"--unit {unit}" in lines[0]
+    assert "2 logs" in lines[0]
+    # A unit that was stated is not doubted, in the name or by the option.
+    stated = ["--unit", unit, "-o", str(tmp_path / "again")]
+    assert main(["correct", *logs, "-m", model, "--column", "q", *stated]) == 0
+    named = written(tmp_path / "named.csv", "q_deg", values)
+    into = str(tmp_path / "named_out.csv")
+    assert main(["correct", named, "-m", model, "--column", "q_deg", "-o", into]) == 0
+    assert not capsys.readouterr().err
+
+
+def test_the_python_interface_warns(tmp_path):
+    model = model_file(tmp_path, DEG)
+    log = written(tmp_path / "q.csv", "q", wrapped(RAD))
+    with pytest.warns(UnitWarning, match="look like rad"):
+        ta.correct_logs(log, model, tmp_path / "o.csv", column="q")
+
+
+def test_the_transformer_tells_degrees_and_what_it_leaves():
+    sklearn = pytest.importorskip("trueangle.sklearn")
+    theta = np.linspace(0.0, 360.0, 300, endpoint=False)
+    rng = np.random.default_rng(11)
+    rows = rng.permutation(300)
+    noise = rng.normal(0.0, 1e-3, 300)
+    read = theta + 0.5 * np.sin(np.radians(theta)) + noise
+    with (
+        pytest.warns(UnitWarning, match="period=360"),
+        pytest.warns(NotCorrectedWarning, match="column 0 is left as it is"),
+    ):
+        sklearn.AngleCorrector().fit(read[rows, None], theta[rows])
+    with pytest.warns(NotCorrectedWarning):
+        sklearn.AngleCorrector(period=360.0).fit((theta + noise)[:, None], theta)

@@ -1,0 +1,31 @@
+"""The table of rooms and the architecture page say where things are, and they are there."""
+
+import re
+import tomllib
+
+import pytest
+
+from conftest import ROOT
+
+PACKAGE = ROOT / "python" / "trueangle"
+CONTRIBUTING = (ROOT / "CONTRIBUTING.md").read_text("utf-8")
+PAGE = (ROOT / "docs" / "architecture.md").read_text("utf-8")
+
+
+def rooms_of_the_table():
+    start, end = (CONTRIBUTING.index(f"<!-- {mark} -->") for mark in ("rooms", "end of rooms"))
+    firsts = re.findall(r"^\| (`[^|]+) \|", CONTRIBUTING[start:end], re.MULTILINE)
+    return [name.rstrip("/") for cell in firsts for name in re.findall(r"`([^`]+)`", cell)]
+
+
+def test_the_table_has_every_room_in_the_order_of_the_floors():
+    floors = tomllib.loads((ROOT / ".ci" / "arrows.toml").read_text("utf-8"))["floors"]
+    assert rooms_of_the_table() == [room for room in floors if not room.startswith("_")]
+    there = {path.parent.name for path in PACKAGE.glob("*/__init__.py")}
+    there |= {path.stem for path in PACKAGE.glob("*.py") if not path.stem.startswith("_")}
+    assert set(rooms_of_the_table()) == there
+
+
+@pytest.mark.parametrize("place", sorted(set(re.findall(r"`([\w/]+(?:/|\.py|\.rs))`", PAGE))))
+def test_what_the_page_names_is_there(place):
+    assert (PACKAGE / place).exists() or (ROOT / place).exists()

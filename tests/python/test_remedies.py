@@ -1,0 +1,311 @@
+"""Whoever is refused is told the command that helps, and it works as it is printed."""
+
+from __future__ import annotations
+
+import json
+import shlex
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import trueangle as ta
+from trueangle.cli import main
+from trueangle.errors import ArgumentError, KindError, NoModelError, NotInvertibleError
+from trueangle.simulation import (
+    Backlash,
+    Harmonic,
+    Joint,
+    Latency,
+    Outliers,
+    RunDesign,
+    Simulation,
+    TimePeriodic,
+)
+
+NOISE = 1.0
+
+#: Times the noise that a correction of all that was hidden may leave, of readings held out.
+LEFT = 1.15
+
+BELIEVED = Simulation(
+    Joint(100.0, "circular_spline", "motor"),
+    harmonics=(Harmonic("output", 1, 30.0, 40.0),),
+    sigma_arcsec=NOISE,
+    runs=tuple(
+        RunDesign(label=f"{v:g} deg/s", samples=300, speed_deg_s=v, turns=2.0, reversals=(0.5,))
+        for v in (5.0, 12.0, 30.0)
+    ),
+)
+TRUE = Simulation(
+    BELIEVED.joint,
+    (*BELIEVED.harmonics, Harmonic("motor", 2, 9.0, 70.0)),
+    (Backlash(25.0), Latency(4e-4)),
+    NOISE,
+    BELIEVED.runs,
+)
+
+
+@pytest.fixture
+def desk(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    BELIEVED.save(tmp_path / "joint.toml")
+    ta.write_runs(ta.simulate(TRUE, seed=21), "runs.csv")
+    return tmp_path
+
+
+def rms_arcsec(model: ta.HarmonicModel, runs: list[ta.CalibrationRun]) -> float:
+    left = []
+    for run in runs:
+        fixed = model.correct(run.indicated, velocity=run.speed, direction=run.direction)
+        error = fixed - run.reference
+        left.append(3600.0 * (error - error.mean()))
+    return float(np.sqrt(np.mean(np.concatenate(left) ** 2)))
+
+
+# -- a correction without a model to begin with --------------------------------------
+
+
+def test_what_is_confirmed_is_a_model_by_itself(
+    desk: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    command = ["diagnose", "runs.csv", "--simulation", "joint.toml", "--corrected-model", "m.json"]
+    assert main(command) == 0
+    assert "\nCorrection model: m.json" in capsys.readouterr().out
+    model = ta.load_model("m.json")
+    assert set(model.orders) == {1.0, 200.0}
+    assert {term.kind for term in model.terms} == {"backlash", "latency"}
+    assert model.argument == "reference"
+    assert model.fit is not None
+    assert model.fit.samples == 900
+    assert model.fit.runs == 3
+    assert [source.file for source in model.provenance.inputs] == ["runs.csv"]
+    held_out = ta.simulate(TRUE, seed=22)
+    assert rms_arcsec(model, held_out) < LEFT * NOISE
+    # In Python the same, from the readings that were diagnosed.
+    found = ta.diagnose(ta.read_runs("runs.csv"), ta.load_simulation("joint.toml"))
+    assert found.correction() == model
+    assert found.correction(None, ta.read_runs("runs.csv")) == model
+
+
+def test_other_arguments_of_a_correction_are_refused(desk: Path) -> None:
+    found = ta.diagnose(ta.simulate(TRUE, seed=24), BELIEVED)
+    with pytest.raises(KindError, match="model must be a trueangle"):
+        found.correction(ta.simulate(TRUE, seed=24))  # type: ignore[arg-type]
+    log = ta.simulate(BELIEVED, seed=24)
+    on_log = ta.diagnose(ta.simulate(TRUE, seed=24), simulated=log)
+    with pytest.raises(ArgumentError, match="known as a log only"):
+        on_log.correction()
+
+
+def test_a_log_cannot_be_corrected_by_a_model(
+    desk: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    words = ["diagnose", "runs.csv", "--simulated", "joint.csv", "--corrected-model", "m.json"]
+    ta.write_runs(ta.simulate(BELIEVED, seed=25), "joint.csv")
+    assert main(words) == 1
+    assert "--extend FILE" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("effects", [(), (TimePeriodic(0.7, 12.0),), (Outliers(0.02, 90.0),)])
+def test_where_nothing_can_be_taken_off_the_diagnosis_is_all(
+    effects: tuple[object, ...], desk: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    plain = Simulation(sigma_arcsec=NOISE, runs=BELIEVED.runs)
+    plain.save(desk / "plain.toml")
+    ta.write_runs(ta.simulate(plain.with_effects(effects), seed=26), "plain.csv")  # type: ignore[arg-type]
+    command = ["diagnose", "plain.csv", "--simulation", "plain.toml", "--json"]
+    assert main([*command, "--corrected-model", "m.json"]) == 1
+    shown = capsys.readouterr()
+    names = [finding["cause"] for finding in json.loads(shown.out)["findings"]]
+    assert names == [effect.kind for effect in effects]  # type: ignore[attr-defined]
+    assert not Path("m.json").exists()
+    assert shown.err.count("\n") == 1
+    assert "nothing was confirmed that a corrector can take off" in shown.err
+    assert all(name in shown.err for name in names)
+    assert "measure" in shown.err
+    with pytest.raises(NoModelError, match="nothing was confirmed"):
+        ta.diagnose(ta.read_runs("plain.csv"), plain).correction()
+
+
+# -- a diagnosis is told whatever becomes of what follows ----------------------------
+
+STEEP = Simulation(
+    harmonics=(Harmonic("output", 40, 7200.0, 10.0),),
+    sigma_arcsec=NOISE,
+    runs=tuple(RunDesign(samples=400, speed_deg_s=v, turns=2.0) for v in (5.0, 20.0)),
+)
+
+
+@pytest.mark.parametrize("form", [[], ["--json"]])
+def test_a_correction_too_steep_loses_no_diagnosis(
+    form: list[str], desk: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    ta.write_runs(ta.simulate(STEEP, seed=31), "steep.csv")
+    words = ["diagnose", "steep.csv", "--gear-ratio", "1", "--fixed-member", "none", *form]
+    assert main(words) == 0
+    alone = capsys.readouterr().out
+    assert main([*words, "--corrected-model", "m.json"]) == 1
+    shown = capsys.readouterr()
+    assert shown.out == alone
+    assert shown.err.count("\n") == 1
+    assert "|error'| may reach" in shown.err
+    assert not Path("m.json").exists()
+    with pytest.raises(NotInvertibleError):
+        ta.diagnose(ta.read_runs("steep.csv"), Simulation()).correction()
+
+
+@pytest.mark.parametrize("option", ["--extend", "--corrected-model"])
+def test_a_place_that_takes_no_file_loses_no_diagnosis(
+    option: str,
+    desk: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """The disk is full; the other file is written all the same."""
+    import trueangle.model.model as model
+    import trueangle.simulation.simulation as simulation
+
+    def full(self: object, path: object) -> None:
+        raise OSError(28, "No space left on device", str(path))
+
+    owner = simulation.Simulation if option == "--extend" else model.HarmonicModel
+    monkeypatch.setattr(owner, "save", full)
+    files = {"--extend": "better.toml", "--corrected-model": "m.json"}
+    words = [word for pair in files.items() for word in pair]
+    assert main(["diagnose", "runs.csv", "--simulation", "joint.toml", *words]) == 1
+    shown = capsys.readouterr()
+    assert "1. " in shown.out
+    assert "No space left" in shown.err
+    for name, path in files.items():
+        assert Path(path).exists() == (name != option)
+
+
+# -- refusals name a command that works ----------------------------------------------
+
+
+def one_run(theta: np.ndarray, error: np.ndarray, label: str = "a  b") -> list[ta.CalibrationRun]:
+    """A run whose label, as a file's name, needs quotes."""
+    time = 0.01 * np.arange(theta.size)
+    return [ta.CalibrationRun(theta, theta + error / 3600.0, 360.0, time=time, label=label)]
+
+
+def noise() -> list[ta.CalibrationRun]:
+    rng = np.random.default_rng(41)
+    theta = np.sort(rng.uniform(0.0, 720.0, 500))
+    return one_run(theta, rng.normal(0.0, 2.0, theta.size))
+
+
+def wandering() -> list[ta.CalibrationRun]:
+    """Play and a lag beside a walk in one run: orders do not hold from stretch to stretch."""
+    rng = np.random.default_rng(43)
+    there = np.linspace(0.0, 1000.0, 600)
+    theta = np.concatenate([there, there[::-1]])
+    way = np.repeat([1.0, -1.0], 600)
+    walk = np.cumsum(rng.normal(0.0, 1.0, theta.size))
+    return one_run(theta, 300.0 * way + walk + rng.normal(0.0, 2.0, theta.size))
+
+
+def steep() -> list[ta.CalibrationRun]:
+    rng = np.random.default_rng(44)
+    theta = np.sort(rng.uniform(0.0, 720.0, 1500))
+    return one_run(theta, 10_800.0 * np.sin(24.0 * np.radians(theta)))
+
+
+def coarse() -> list[ta.CalibrationRun]:
+    theta = np.arange(0.0, 360.0, 10.0)
+    return one_run(theta, 300.0 * np.sin(np.radians(theta)))
+
+
+#: What is refused: readings, the command, words of the message, the command that helps.
+REFUSALS: dict[str, tuple[Callable[[], list[ta.CalibrationRun]], list[str], str, str]] = {
+    "no order": (noise, ["fit", "R", "-o", "m.json"], "no order is supported", "diagnose"),
+    "no order, a gear": (
+        noise,
+        ["fit", "R", "-o", "m.json", "--gear-ratio", "50.5", "--fixed-member", "none"],
+        "no order is supported",
+        "diagnose",
+    ),
+    "too steep": (
+        steep,
+        ["fit", "R", "-o", "m.json", "--orders", "24"],
+        "may reach",
+        "fit",
+    ),
+    "too steep, diagnosed": (
+        steep,
+        ["diagnose", "R", "--gear-ratio", "1", "--corrected-model", "m.json"],
+        "may reach",
+        "diagnose",
+    ),
+    "not told apart": (
+        coarse,
+        ["fit", "R", "-o", "m.json", "--orders", "1,37"],
+        "cannot be told from",
+        "orders",
+    ),
+    "not told apart, other names": (
+        coarse,
+        ["fit", "R", "-o", "m.json", "--orders", "1,37", "--signal", "indicated=indicated_deg:deg"],
+        "cannot be told from",
+        "orders",
+    ),
+    "no motion to calibrate by": (
+        noise,
+        ["selfcal", "R", "-o", "m.json", "--method", "heads"],
+        "two heads",
+        "plan",
+    ),
+}
+
+
+@pytest.mark.parametrize("what", REFUSALS)
+def test_the_command_that_is_named_works(
+    what: str, desk: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    readings, words, told, command = REFUSALS[what]
+    ta.write_runs(readings(), "two  blanks.csv")
+    assert main(["two  blanks.csv" if word == "R" else word for word in words]) == 1
+    said = capsys.readouterr().err
+    assert told in said
+    program, *again = shlex.split(said.split("; run: ")[1])
+    assert (program, again[0]) == ("trueangle", command)
+    assert main(again) == 0
+    assert capsys.readouterr().out
+
+
+def test_where_a_fit_is_refused_the_diagnosis_writes_what_it_confirms(
+    desk: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    ta.write_runs(
+        ta.simulate(
+            Simulation(effects=(Backlash(60.0),), sigma_arcsec=2.0, runs=BELIEVED.runs), seed=45
+        ),
+        "play.csv",
+    )
+    assert main(["fit", "play.csv", "-o", "m.json"]) == 1
+    said = capsys.readouterr().err
+    assert "--corrected-model FILE" in said
+    again = shlex.split(said.split("; run: ")[1])[1:]
+    assert main([*again, "--corrected-model", "m.json"]) == 0
+    (term,) = ta.load_model("m.json").terms
+    assert term.kind == "backlash"
+    assert term.half_width == pytest.approx(60.0 / 3600.0, rel=0.05)  # type: ignore[attr-defined]
+
+
+def test_nothing_believed_needs_a_joint_and_a_joint_no_file(
+    desk: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["diagnose", "runs.csv"]) == 1
+    assert "--gear-ratio" in capsys.readouterr().err
+    assert main(["diagnose", "runs.csv", "--simulation", "joint.toml", "--gear-ratio", "3"]) == 1
+    assert "the simulation states the joint" in capsys.readouterr().err
+    assert main(["diagnose", "runs.csv", "--gear-ratio", "100", "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    orders = [
+        f["parameters"]["output_order"]["value"]
+        for f in found["findings"]
+        if f["cause"] == "missing_order"
+    ]
+    assert 200.0 in orders

@@ -1,0 +1,151 @@
+"""Every public result shows itself: one line as ``repr``, its summary as text and in notebooks."""
+
+from __future__ import annotations
+
+import html
+import importlib
+import pickle
+import pkgutil
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+import trueangle as ta
+from trueangle.planning import plan_mounts, plan_self
+from trueangle.simulation import Backlash, Harmonic, RunDesign, Simulation
+from trueangle.support.plainresult import Shown
+
+#: Characters of one line of a screen.
+LINE = 120
+
+#: Lines that a person reads of a result; the readings themselves are in none.
+SCREENS = 400
+
+SIM = Simulation(
+    harmonics=(Harmonic("output", 1, 40.0, 30.0),),
+    sigma_arcsec=1.0,
+    runs=tuple(
+        RunDesign(label=f"{v:g}", samples=120, speed_deg_s=v, reversals=(0.5,)) for v in (5.0, 30.0)
+    ),
+)
+RUNS = ta.simulate(SIM.with_effects([Backlash(20.0)]), seed=81)
+FIT = ta.fit(RUNS, orders=[1, 2])
+
+
+def diagnosed() -> ta.Diagnosis:
+    return ta.diagnose(RUNS, SIM)
+
+
+def moments() -> ta.Moments:
+    found = ta.Moments([1, 2], period=360.0)
+    found.update(RUNS[0].reference, RUNS[0].error)
+    return found
+
+
+def joined() -> object:
+    table = {"time_s": RUNS[0].time, "reference_deg": RUNS[0].reference}
+    other = {"time_s": RUNS[0].time, "indicated_deg": RUNS[0].indicated}
+    return ta.join(other, table)
+
+
+#: One of every kind that a public function returns.
+MADE: dict[str, Callable[[], object]] = {
+    "fit": lambda: FIT,
+    "model": lambda: FIT.model,
+    "model with terms": lambda: diagnosed().correction(),
+    "selection": lambda: ta.select_orders(RUNS),
+    "diagnosis": diagnosed,
+    "finding": lambda: diagnosed().findings[0],
+    "gain": lambda: diagnosed().findings[0].gain,
+    "belief": lambda: diagnosed().beliefs[0],
+    "not identifiable": lambda: diagnosed().not_identifiable[0],
+    "unexplained": lambda: diagnosed().unexplained,
+    "discrepancy": lambda: diagnosed().discrepancy,
+    "comparison": lambda: ta.compare(FIT.model, FIT.model),
+    "check": lambda: ta.check(RUNS),
+    "plan": plan_mounts,
+    "plan without a reference": lambda: plan_self("heads", orders=range(1, 5)),
+    "rehearsal": lambda: ta.rehearse(SIM, causes=["thermal_drift"], seeds=4, workers=1),
+    "simulation": lambda: SIM,
+    "export": lambda: ta.export_model(FIT.model, "csv"),
+    "moments": moments,
+    "solved moments": lambda: moments().solve(),
+}
+
+
+@pytest.mark.parametrize("what", MADE)
+def test_a_result_is_one_line_and_a_summary(what: str) -> None:
+    made = MADE[what]()
+    line, text = repr(made), str(made)
+    assert "\n" not in line
+    assert 0 < len(line) <= LINE, line
+    assert type(made).__name__ in line
+    assert "array(" not in text
+    assert text.count("\n") < SCREENS
+    summary = getattr(made, "summary", None)
+    if summary is not None:
+        assert text == summary()
+    shown = made._repr_html_()  # type: ignore[attr-defined]
+    assert html.unescape(shown.removeprefix("<pre>").removesuffix("</pre>")) == text
+
+
+def test_the_line_tells_what_matters() -> None:
+    found = diagnosed()
+    assert "backlash" in repr(found)
+    assert "240 readings" in repr(found)
+    assert repr(found.findings[0]).startswith("Finding(backlash, half_width_arcsec ")
+    assert "usable" in repr(ta.check(RUNS))
+
+
+def returns_text(method: object) -> bool:
+    return getattr(method, "__annotations__", {}).get("return") == "str"
+
+
+def test_every_public_result_class_shows_itself() -> None:
+    """Whoever has a summary or plain values has the three ways of showing them."""
+    found = set()
+    for module in pkgutil.walk_packages(ta.__path__, "trueangle."):
+        if ".cli" in module.name or module.name.endswith("__main__"):
+            continue
+        try:
+            loaded = importlib.import_module(module.name)
+        except ImportError:
+            continue  # an extra that is not installed
+        for value in vars(loaded).values():
+            if isinstance(value, type) and value.__module__.startswith("trueangle."):
+                found.add(value)
+    results = {kind for kind in found if returns_text(getattr(kind, "summary", None))}
+    assert len(results) > 10
+    for kind in sorted(results, key=lambda kind: kind.__qualname__):
+        assert issubclass(kind, Shown), kind
+        assert "__str__" not in kind.__dict__, f"{kind}: its text is its summary"
+    for kind in found:
+        if issubclass(kind, Shown) and "__dataclass_fields__" in kind.__dict__:
+            own = kind.__dict__["__repr__"]
+            assert own.__qualname__.startswith((kind.__qualname__, "Shown")), kind
+
+
+def test_names_in_a_notebook_are_no_markup() -> None:
+    run = ta.CalibrationRun(RUNS[0].reference, RUNS[0].indicated, 360.0, label="<b>&run")
+    shown = ta.fit([run], orders=[1])._repr_html_()
+    assert "<b>" not in shown
+
+
+def test_what_shows_itself_is_pickled_as_before() -> None:
+    again = pickle.loads(pickle.dumps(diagnosed()))
+    assert str(again) == str(diagnosed())
+
+
+def test_a_long_line_is_cut() -> None:
+    wide = Simulation(
+        runs=tuple(RunDesign(label="x" * 40) for _ in range(3)), sigma_arcsec=float(np.pi)
+    )
+
+    class Wordy(Shown):
+        def _brief(self) -> str:
+            return "word " * 100
+
+    assert len(repr(wide)) <= LINE
+    assert repr(Wordy()).endswith("...)")
+    assert len(repr(Wordy())) <= LINE
