@@ -54,7 +54,7 @@ python:             ## tests of the package
 
 exam:               ## the diagnosis' own exam at full size: an hour or more, figures asserted
 	TRUEANGLE_NIGHTLY=1 TRUEANGLE_EXAM_SEEDS=20 $(PYTHON) -m pytest -s \
-	  tests/python/hidden tests/python/test_diagnosis.py
+	  tests/python/hidden tests/python/diagnosis/test_diagnosis.py
 
 docs:               ## documentation, warnings are errors
 	$(PYTHON) -m sphinx -W --keep-going -q docs docs/_build/html

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import trueangle as ta
-from selfcal.rotor import ARCSEC
+from selfcalibration.rotor import ARCSEC
 from trueangle.cli import main
 from trueangle.errors import ArgumentError
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from selfcal import exam
+from selfcalibration import exam
 
 #: Seeds of these tests: none of the exam's.
 FIRST = 7_300_000

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import trueangle as ta
-from selfcal.rotor import ARCSEC, coefficients, encoder
+from selfcalibration.rotor import ARCSEC, coefficients, encoder
 from trueangle.errors import NoModelError
 
 LINES = {k: (300.0 / k, 0.7 * k) for k in range(1, 9)}

@@ -29,3 +29,11 @@ def test_the_table_has_every_room_in_the_order_of_the_floors():
 @pytest.mark.parametrize("place", sorted(set(re.findall(r"`([\w/]+(?:/|\.py|\.rs))`", PAGE))))
 def test_what_the_page_names_is_there(place):
     assert (PACKAGE / place).exists() or (ROOT / place).exists()
+
+
+def test_tests_mirror_rooms():
+    """A folder of tests is a room's, or one of those that belong to none."""
+    apart = {"core", "hidden", "injection", "project"}
+    folders = {path.parent.name for path in (ROOT / "tests" / "python").glob("*/__init__.py")}
+    assert folders - apart <= set(rooms_of_the_table())
+    assert not [path.name for path in (ROOT / "tests" / "python").glob("test_*.py")]

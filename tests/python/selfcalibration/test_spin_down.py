@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import trueangle as ta
-from selfcal.rotor import ARCSEC, coast, coefficients, encoder, held_by_loop
+from selfcalibration.rotor import ARCSEC, coast, coefficients, encoder, held_by_loop
 from trueangle import cli
 from trueangle.errors import ArgumentError, FileError, NoModelError
 

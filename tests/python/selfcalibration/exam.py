@@ -1,4 +1,4 @@
-"""The table of targets, measured: ``python -m tests.python.selfcal.exam --rows ROW --seeds N``.
+"""The table of targets, measured: ``python -m tests.python.selfcalibration.exam --rows ROW --seeds N``.
 
 Every row prints what was measured on seeds that nothing was tuned on and what is wanted, and
 says whether it was met; rows on measured data need them beside the repository (or in
@@ -21,7 +21,7 @@ HERE = Path(__file__).resolve()
 sys.path.insert(0, str(HERE.parents[1]))
 
 import trueangle as ta  # noqa: E402
-from selfcal.rotor import ARCSEC, coast, coefficients, encoder, held_by_loop  # noqa: E402
+from selfcalibration.rotor import ARCSEC, coast, coefficients, encoder, held_by_loop  # noqa: E402
 
 LINES = {1: (300.0, 0.3), 2: (150.0, 1.0), 4: (50.0, 2.0)}
 FIRST = 910_000  # seeds begin here
