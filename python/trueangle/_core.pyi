@@ -4,8 +4,8 @@ from typing import Any, Literal, Unpack, final, overload
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .signals import GivenSignals
-from .step import Step
+from .formats.signals import GivenSignals
+from .model.step import Step
 
 __version__: str
 

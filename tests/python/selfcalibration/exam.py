@@ -1,4 +1,4 @@
-"""The table of targets, measured: ``python -m tests.python.selfcalibration.exam --rows ROW --seeds N``.
+"""The table of targets: ``python -m tests.python.selfcalibration.exam --rows ROW --seeds N``.
 
 Every row prints what was measured on seeds that nothing was tuned on and what is wanted, and
 says whether it was met; rows on measured data need them beside the repository (or in
