@@ -219,7 +219,7 @@ def report(
     360.0
     """
     found = as_runs(runs)
-    if isinstance(orders, Sized) and not len(orders):
+    if isinstance(orders, Sized) and not any(True for _ in orders):  # a range may have no length
         raise ArgumentError("orders is empty: name one at least, or leave it out for those found")
     if simulation is not None:
         from ..simulation.simulation import SIMULATION, Simulation

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from functools import wraps
+from itertools import islice
 from typing import Any, TypeVar
 
 from ..errors import KindError, TrueAngleError
@@ -11,6 +12,9 @@ from ..errors import KindError, TrueAngleError
 __all__ = ["told_kinds"]
 
 F = TypeVar("F", bound=Callable[..., Any])
+
+#: How many items of a collection are looked at: one may be longer than there is time for.
+MOST_ITEMS = 1000
 
 #: What code raises that meets an object it cannot use.
 _FAILURES = (TypeError, AttributeError, ValueError, LookupError, ArithmeticError)
@@ -140,7 +144,7 @@ def _fits(value: Any, kind: Any) -> bool:
         return False
     if isinstance(value, Iterator) or not inner:
         return True
-    return all(_fits(item, inner[0]) for item in value)
+    return all(_fits(item, inner[0]) for item in islice(value, MOST_ITEMS))
 
 
 def _all_fit(items: Iterable[tuple[Any, Any]], inner: tuple[Any, ...]) -> bool:
@@ -158,6 +162,8 @@ def _is_iterable(value: Any) -> bool:
 def _is_numbers(value: Any, kinds: str = "iuf") -> bool:
     import numpy as np
 
+    if isinstance(value, range):
+        return "i" in kinds  # as an array it may be larger than the memory
     try:
         return np.asarray(value).dtype.kind in kinds
     except (TypeError, ValueError):

@@ -117,7 +117,7 @@ def test_the_papers_method_needs_three_runs():
     runs = simulated_groups(JOINT_A)[:2]
     with pytest.raises(ArgumentError, match="three or more"):
         ta.select_orders(runs, method="paper")
-    with pytest.raises(ArgumentError, match="'evidence' or 'paper'"):
+    with pytest.raises(ArgumentError, match="one of evidence, paper, got 'eye'"):
         ta.select_orders(runs, method="eye")
 
 
