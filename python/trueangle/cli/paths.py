@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Callable, Iterator
+from importlib import import_module
 from typing import Any
 
 from ..errors import ArgumentError
@@ -63,6 +64,7 @@ def check_paths(args: argparse.Namespace) -> None:
     ArgumentError
         Two outputs are one file.
     """
+    import_module("trueangle.formats")  # whose endings no other output may bear; takes numpy
     values = list(_values(vars(args)))
     inputs = [value.file for value in values if isinstance(value, Input)]
     outputs = [value for value in values if isinstance(value, Output)]

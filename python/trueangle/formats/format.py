@@ -155,19 +155,29 @@ class FormatModule(Protocol):
 
 @dataclass(frozen=True)
 class Format:
-    """A format: how its files are told, its module and the extra that it needs.
+    """A format: its module, how its files are told and the extra that it needs.
 
+    ``promises`` holds its endings by what each is called; those of "" promise nothing.
     ``magics`` are first bytes of its files, ``pattern`` matches them; ``unit`` is that of all
     angles of formats that define it.
     """
 
-    name: str
-    endings: tuple[str, ...]
     module_name: str
+    promises: Mapping[str, tuple[str, ...]]
     extra: str | None = None
     unit: str | None = None
     magics: tuple[bytes, ...] = ()
     pattern: bytes | None = None
+
+    @property
+    def name(self) -> str:
+        """What messages call it."""
+        return next(iter(self.promises), "").removeprefix("a ")
+
+    @property
+    def endings(self) -> tuple[str, ...]:
+        """All endings of its files."""
+        return tuple(ending for endings in self.promises.values() for ending in endings)
 
     @cached_property
     def module(self) -> FormatModule:

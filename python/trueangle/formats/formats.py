@@ -6,6 +6,7 @@ import re
 from pathlib import Path
 
 from ..errors import FileError
+from ..support.files import declare_endings, promised_format
 from .format import Format
 
 __all__ = ["FORMATS", "find_format", "format_of_content", "known_format"]
@@ -14,67 +15,69 @@ __all__ = ["FORMATS", "find_format", "format_of_content", "known_format"]
 _CAMONITOR = rb"\S+\s+\d{4}-\d\d-\d\d \d\d:\d\d:\d\d"
 
 FORMATS = (
-    Format("Parquet", (".parquet", ".pq"), "parquet", "arrow", magics=(b"PAR1",)),
+    Format("parquet", {"Parquet": (".parquet", ".pq")}, "arrow", magics=(b"PAR1",)),
     Format(
-        "Arrow", (".arrow", ".arrows", ".feather", ".ipc"), "arrow", "arrow", magics=(b"ARROW1",)
+        "arrow",
+        {"Arrow": (".arrow", ".feather", ".ipc"), "an Arrow stream": (".arrows",)},
+        "arrow",
+        magics=(b"ARROW1",),
     ),
     Format(
-        "HDF5",
-        (".h5", ".hdf5", ".hdf", ".he5", ".mat", ".nc"),
         "hdf5",
+        {"HDF5": (".h5", ".hdf5", ".hdf", ".he5"), "MATLAB": (".mat",), "NetCDF": (".nc",)},
         "hdf5",
         magics=(b"\x89HDF\r\n\x1a\n", b"MATLAB 7.3"),
     ),
-    Format("MATLAB", (".mat",), "matlab", "matlab", magics=(b"MATLAB 5.0",)),
+    Format("matlab", {"MATLAB": (".mat",)}, "matlab", magics=(b"MATLAB 5.0",)),
     Format(
-        "ROS bag",
-        (".bag", ".db3", ".mcap"),
         "rosbag",
+        {"a ROS bag": (".bag",), "a ROS 2 bag": (".db3",), "MCAP": (".mcap",)},
         "ros",
         unit="rad",
         magics=(b"#ROSBAG", b"SQLite format 3", b"\x89MCAP"),
     ),
-    Format("MDF4", (".mf4", ".mdf"), "mdf", "mdf", magics=(b"MDF     ", b"UnFinMF ")),
-    Format("numpy array", (".npy",), "npy", magics=(b"\x93NUMPY",)),
-    Format("numpy archive", (".npz",), "npz", magics=(b"PK\x03\x04",)),
-    Format("EPICS log", (".camonitor",), "camonitor", pattern=_CAMONITOR),
-    Format("CSV", (".csv", ".tsv", ".txt"), "csvfile"),
+    Format("mdf", {"MDF4": (".mf4", ".mdf")}, "mdf", magics=(b"MDF     ", b"UnFinMF ")),
+    Format("npy", {"numpy": (".npy",)}, magics=(b"\x93NUMPY",)),
+    Format("npz", {"numpy": (".npz",)}, magics=(b"PK\x03\x04",)),
+    Format("camonitor", {"EPICS": (".camonitor",)}, pattern=_CAMONITOR),
+    Format("csvfile", {"CSV": (".csv",), "tab-separated text": (".tsv", ".tab"), "": (".txt",)}),
 )
+for _format in FORMATS:
+    declare_endings(_format.promises)
 
+#: What a file is of that no other format knows.
+_TEXT = FORMATS[-1]
 #: Bytes looked at for what a file begins with.
-_HEAD = 128
+_HEAD = 1 << 12
 
 
 def find_format(path: Path) -> Format:
-    """Format of ``path`` by its ending; of a folder, that of a ROS 2 bag.
+    """Format of ``path`` by its first bytes, else by its ending; text where nothing tells.
 
     Raises
     ------
     FileError
-        No format has this ending.
+        A folder that is no log, or the ending of something that is none.
     """
-    found = known_format(path)
-    if found is None:
+    found = format_of_content(path)
+    ending = path.suffix.lower()
+    if known_format(path) is None and (path.is_dir() or (found is _TEXT and promised_format(path))):
         endings = ", ".join(ending for entry in FORMATS for ending in entry.endings)
-        raise FileError(path, f"no log format has this ending; known are {endings}")
+        what = f"the ending {ending}" if ending else "a folder"
+        raise FileError(path, f"no log format has {what}; known are {endings}")
     return found
 
 
 def known_format(path: Path) -> Format | None:
-    """Format of ``path``, or None for other files and for plain folders."""
+    """Format of ``path`` by its ending, or None for other files and for plain folders."""
     ending = path.suffix.lower()
     if path.is_dir():
         ending = ".db3" if (path / "metadata.yaml").is_file() else "/"
     found = [entry for entry in FORMATS if ending in entry.endings]
-    if len(found) > 1 and path.is_file():  # MATLAB's ending stands for two formats
+    if len(found) > 1 and path.is_file():  # MATLAB's ending stands for several formats
         head = _head(path)
-        found.sort(key=lambda entry: not head.startswith(entry.magics))
+        found.sort(key=lambda entry: not _begins(entry, head))
     return found[0] if found else None
-
-
-def _head(path: Path) -> bytes:
-    with path.open("rb") as file:
-        return file.read(_HEAD)
 
 
 def format_of_content(path: Path) -> Format:
@@ -82,6 +85,17 @@ def format_of_content(path: Path) -> Format:
     if not path.is_dir():
         head = _head(path)
         for entry in FORMATS:
-            if head.startswith(entry.magics) or (entry.pattern and re.match(entry.pattern, head)):
+            if _begins(entry, head):
                 return entry
-    return known_format(path) or FORMATS[-1]
+    return known_format(path) or _TEXT
+
+
+def _head(path: Path) -> bytes:
+    with path.open("rb") as file:
+        return file.read(_HEAD)
+
+
+def _begins(entry: Format, head: bytes) -> bool:
+    return head.startswith(entry.magics) or bool(
+        entry.pattern and re.match(entry.pattern, head, re.DOTALL)
+    )

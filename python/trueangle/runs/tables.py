@@ -26,7 +26,7 @@ class _Memory(Format):
         return row + 1
 
 
-_MEMORY = _Memory("a table in memory", (), "")
+_MEMORY = _Memory("", {"a table in memory": ()})
 
 
 def runs_of(

@@ -18,6 +18,7 @@ from .kinds import (
     RUNS,
     SIMULATION,
     Kind,
+    declare_endings,
     kind_of_log,
     promised_format,
 )
@@ -41,6 +42,7 @@ __all__ = [
     "Kind",
     "check_input",
     "check_output",
+    "declare_endings",
     "kind_of_log",
     "partition_keys",
     "partition_name",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from os import PathLike
 from pathlib import Path
 from typing import Final, NamedTuple
@@ -9,7 +10,6 @@ from typing import Final, NamedTuple
 from ...errors import FileError
 
 __all__ = [
-    "LOG_ENDINGS",
     "MODEL",
     "PAGE",
     "PDF",
@@ -18,25 +18,15 @@ __all__ = [
     "RUNS",
     "SIMULATION",
     "Kind",
+    "declare_endings",
     "kind_of_log",
+    "log_endings",
     "promised_format",
 ]
 
-#: Endings that promise a format, by its name: a file of another must not bear them.
+#: Endings that promise a format, by its name: a file of another must not bear them. Those of
+#: logs are declared by their formats.
 _FORMATS: Final[dict[str, tuple[str, ...]]] = {
-    "CSV": (".csv",),
-    "tab-separated text": (".tsv", ".tab"),
-    "Parquet": (".parquet", ".pq"),
-    "Arrow": (".arrow", ".feather", ".ipc"),
-    "an Arrow stream": (".arrows",),
-    "HDF5": (".h5", ".hdf5", ".hdf", ".he5"),
-    "MATLAB": (".mat",),
-    "NetCDF": (".nc",),
-    "numpy": (".npy", ".npz"),
-    "a ROS bag": (".bag",),
-    "a ROS 2 bag": (".db3",),
-    "MCAP": (".mcap",),
-    "MDF4": (".mf4", ".mdf"),
     "JSON": (".json",),
     "JSON lines": (".jsonl", ".ndjson"),
     "TOML": (".toml",),
@@ -56,12 +46,19 @@ _FORMATS: Final[dict[str, tuple[str, ...]]] = {
     "Python": (".py", ".ipynb"),
 }
 
-#: Endings of the files that a folder among the inputs stands for.
-LOG_ENDINGS: Final = (
-    *(".csv", ".tsv", ".txt", ".parquet", ".pq", ".arrow", ".arrows", ".feather", ".ipc"),
-    *(".h5", ".hdf5", ".hdf", ".he5", ".mat", ".nc", ".npy", ".npz"),
-    *(".bag", ".db3", ".mcap", ".mf4", ".mdf"),
-)
+#: Endings of logs by what each is called.
+_LOGS: Final[dict[str, tuple[str, ...]]] = {}
+
+
+def declare_endings(promises: Mapping[str, tuple[str, ...]]) -> None:
+    """Take in the endings of a format of logs, by the name that each promises."""
+    for name, endings in promises.items():
+        _LOGS[name] = tuple(dict.fromkeys((*_LOGS.get(name, ()), *endings)))
+
+
+def log_endings() -> tuple[str, ...]:
+    """Endings of the files that a folder among the inputs stands for."""
+    return tuple(ending for endings in _LOGS.values() for ending in endings)
 
 
 class Kind(NamedTuple):
@@ -113,8 +110,8 @@ def kind_of_log(path: str | PathLike[str]) -> Kind:
     'HDF5, as the log is'
     """
     ending = Path(path).suffix.lower()
-    for name, endings in _FORMATS.items():
-        if ending in endings:
+    for name, endings in _LOGS.items():
+        if ending in endings and name:
             return Kind(f"{name}, as the log is", (ending, *endings))
     return Kind("text, as the log is", (".txt", ".csv", ".tsv", ".tab"))
 
@@ -122,7 +119,8 @@ def kind_of_log(path: str | PathLike[str]) -> Kind:
 def promised_format(path: str | PathLike[str]) -> str | None:
     """Name of the format that the ending of ``path`` promises, if it does."""
     ending = Path(path).suffix.lower()
-    return next((name for name, known in _FORMATS.items() if ending in known), None)
+    known = {**_LOGS, **_FORMATS}.items()
+    return next((name for name, endings in known if name and ending in endings), None)
 
 
 MODEL: Final = Kind("a model (JSON)", (".json",))

@@ -13,7 +13,7 @@ from typing import IO
 
 from ...errors import FileError, KindError
 from .inputs import is_null_device, sha256_of
-from .kinds import LOG_ENDINGS, Kind
+from .kinds import Kind, log_endings
 from .samefile import named_again, what_it_is
 from .workplace import (
     PARTIAL,
@@ -104,7 +104,7 @@ def check_output(
         )
     elif not os.access(target, os.W_OK):
         raise PermissionError(errno.EACCES, "is write-protected", text)
-    again = named_again(path, inputs, LOG_ENDINGS)
+    again = named_again(path, inputs, log_endings())
     if again is not None:
         also = "" if again == text else f" (as {again})"
         raise FileError(path, f"is also read{also}: it would be overwritten; name another file")
