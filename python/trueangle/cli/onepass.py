@@ -63,11 +63,6 @@ def wants_one_pass(args: argparse.Namespace) -> bool:
 
 def _is_large(args: argparse.Namespace) -> bool:
     paths = [Path(path) for path in args.runs]
-    # A line holds a byte of each angle at least.
-    files = all(path.is_file() and path.stat().st_size <= _READINGS for path in paths)
-    texts = {".csv", ".tsv", ".txt"}
-    if files and all(path.suffix.lower() in texts for path in paths):
-        return False
     if not all(path.is_file() or path.is_dir() for path in paths):
         return False  # a pipe is read once
     from ..logs.sources import find_logs, hold_at_most

@@ -21,11 +21,11 @@ from .arrowtables import (
     column_batches,
     corrected_schema,
 )
-from .budget import check_part
+from .budget import Extent, check_part
 from .damage import damage_told
 from .format import TEXTS, Batch, Choose, Contents, Watch
 
-__all__ = ["columns", "contents", "copy", "decoded", "read", "stretches"]
+__all__ = ["columns", "contents", "copy", "extent", "read", "stretches"]
 
 _FILE_MAGIC = b"ARROW1"
 #: Codecs by their number in the format's BodyCompression.
@@ -57,10 +57,11 @@ class BatchRange(NamedTuple):
         return batch.slice(start, stop - start)
 
 
-def decoded(path: Path, names: Sequence[str], topic: str | None = None) -> int:
-    """Bytes of columns in memory; see `format.FormatModule`."""
+def extent(path: Path, names: Sequence[str] = (), topic: str | None = None) -> Extent:
+    """Rows and bytes of columns; see `format.FormatModule`."""
     with damage_told(path, "Arrow"):
-        return 8 * len(names) * sum(max(batch.rows, 0) for batch in _packed(path, _is_file(path)))
+        rows = sum(max(batch.rows, 0) for batch in _packed(path, _is_file(path)))
+    return Extent(rows, 8 * rows * len(names))
 
 
 def stretches(path: Path) -> list[BatchRange | None]:

@@ -1,4 +1,4 @@
-"""How much of a file may be in memory once it is unpacked: one budget for all formats.
+"""What a file holds before it is read, and how much of it may be in memory: one budget for all.
 
 A packed file says nothing of what it unpacks to: kilobytes stand for gigabytes. It is asked
 before memory is taken, from what the file says of itself, and again while it is read.
@@ -7,14 +7,39 @@ before memory is taken, from what the file says of itself, and again while it is
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Final
+from typing import Final, NamedTuple
 
 from ..errors import FileError
 
-__all__ = ["DECODED_BYTES", "DecodedSizeError", "check_decoded", "check_part"]
+__all__ = [
+    "DECODED_BYTES",
+    "DecodedSizeError",
+    "Extent",
+    "check_decoded",
+    "check_part",
+    "text_extent",
+]
 
 #: Bytes of unpacked columns, at most: as much as a table of runs may have as a file.
 DECODED_BYTES: Final = 1 << 30
+
+
+#: Bytes of a text that tell how long its lines are.
+_HEAD: Final = 1 << 16
+
+
+class Extent(NamedTuple):
+    """What a file holds: its rows, about, and the bytes of columns in memory (0: not known)."""
+
+    rows: int
+    size: int
+
+
+def text_extent(path: Path) -> Extent:
+    """Rows of a text, as its first lines tell; their numbers are counted while it is read."""
+    with path.open("rb") as file:
+        head = file.read(_HEAD)
+    return Extent(path.stat().st_size * (head.count(b"\n") + 1) // max(len(head), 1), 0)
 
 
 class DecodedSizeError(FileError):

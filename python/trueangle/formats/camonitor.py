@@ -12,9 +12,10 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import FileError
+from .budget import Extent, text_extent
 from .format import TEXTS, Batch, Choose, Contents, Watch
 
-__all__ = ["LINE", "columns", "contents", "copy", "read"]
+__all__ = ["LINE", "columns", "contents", "copy", "extent", "read"]
 
 #: Name, date, time, value; what follows (alarms) is of no concern.
 LINE = re.compile(rb"(\S+)\s+(\d{4}-\d\d-\d\d)\s(\d\d:\d\d:\d\d(?:\.\d{1,9})?)\s+(\S+)")
@@ -55,6 +56,11 @@ def read(
             name: times if name == _TIME else np.where(name_of == name, number, np.nan)
             for name in names
         }
+
+
+def extent(path: Path, names: Sequence[str] = (), topic: str | None = None) -> Extent:
+    """Lines as the first ones tell; see `format.FormatModule`."""
+    return text_extent(path)
 
 
 def copy(

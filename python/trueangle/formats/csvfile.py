@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from .._core import thread_count
 from ..errors import FileError
+from .budget import Extent, text_extent
 from .csvheader import LONGEST_LINE, Header
 from .csvrows import BLOCK, QuotedBlock, quoted_blocks, too_long
 from .format import TEXTS, Addition, Batch, Choose, Contents, Watch, refuse_corrected
@@ -26,7 +27,7 @@ from .format import TEXTS, Addition, Batch, Choose, Contents, Watch, refuse_corr
 if TYPE_CHECKING:
     from .csvblocks import PlainBlock
 
-__all__ = ["columns", "contents", "copy", "header_line", "line_of", "read"]
+__all__ = ["columns", "contents", "copy", "extent", "header_line", "line_of", "read"]
 
 _Block: TypeAlias = "QuotedBlock | PlainBlock"
 
@@ -71,6 +72,11 @@ def read(
         from .ahead import side_by_side  # and the threads of the standard library
 
         yield from side_by_side(values, blocks, thread_count())
+
+
+def extent(path: Path, names: Sequence[str] = (), topic: str | None = None) -> Extent:
+    """Rows as the first lines tell, bytes once it is read; see `format.FormatModule`."""
+    return text_extent(path)
 
 
 def header_line(path: Path) -> int:

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from .._core import __version__
 from ..errors import FileError, MissingExtraError
+from .budget import Extent
 
 __all__ = [
     "TEXTS",
@@ -111,7 +112,14 @@ def refuse_corrected(
 
 
 class FormatModule(Protocol):
-    """What the module of a format defines."""
+    """What the module of a format defines.
+
+    Beside these a module may define ``stretches(path)``, parts of a file that `read` takes one
+    of: then the batches of that part only, and parts may be read side by side; ``line_of(path,
+    row)`` and ``header_line(path)``, formats of text, the line that a row or the names come
+    from; and ``together(path, needed, others)``, formats whose columns need not be equally
+    long, those of ``others`` that are.
+    """
 
     def columns(self, path: Path, topic: str | None) -> list[str]:
         """Names of the columns that hold numbers or labels."""
@@ -128,12 +136,12 @@ class FormatModule(Protocol):
     ) -> Iterator[Batch]:
         """Some columns in batches of bounded size, NaN where a value is missing.
 
-        Modules that define ``stretches(path)`` take one of them: then the batches of that
-        stretch only. Stretches of a file may be read side by side. Formats of text take
-        ``texts`` for labels and refuse, where ``strict``, numbers that are not finite; those
-        that define ``line_of(path, row)`` tell the line a row came from, and those that define
-        ``decoded(path, names, topic)`` how many bytes columns take in memory.
+        Formats of text take ``texts`` for labels and refuse, where ``strict``, numbers that
+        are not finite.
         """
+
+    def extent(self, path: Path, names: Sequence[str] = (), topic: str | None = None) -> Extent:
+        """Rows of a file and bytes of columns in memory, by what the file says of itself."""
 
     def copy(
         self,
@@ -214,11 +222,6 @@ class Format:
     ) -> Iterator[Batch]:
         """Batches of one of the `stretches`."""
         return self.module.read(path, names, topic, stretch, texts=texts)
-
-    def decoded(self, path: Path, names: Sequence[str], topic: str | None) -> int:
-        """Bytes that columns take in memory by what the file says of itself; 0 unknown."""
-        asked = getattr(self.module, "decoded", None)
-        return 0 if asked is None or not names else int(asked(path, names, topic))
 
     @contextmanager
     def at_header(self, path: Path) -> Iterator[None]:

@@ -18,13 +18,14 @@ from numpy.typing import NDArray
 
 from ..errors import FileError
 from . import budget
+from .budget import Extent
 from .checksum import Checksum
 from .damage import damage_told
 from .format import TEXTS, Addition, Batch, Choose, Contents, Watch, note
 from .hdf5places import Places
 from .stored import ROWS
 
-__all__ = ["columns", "contents", "copy", "decoded", "read", "stretches"]
+__all__ = ["columns", "contents", "copy", "extent", "read", "stretches"]
 
 #: Readings taken together: what is read of them stays in the cache of the processor.
 _BLOCK = 1 << 17
@@ -61,10 +62,12 @@ def columns(path: Path, topic: str | None = None) -> list[str]:
         return _names(file)
 
 
-def decoded(path: Path, names: Sequence[str], topic: str | None = None) -> int:
-    """Bytes of data sets in memory; see `format.FormatModule`."""
+def extent(path: Path, names: Sequence[str] = (), topic: str | None = None) -> Extent:
+    """Rows and bytes of data sets; see `format.FormatModule`."""
     with _opened(path) as file:
-        return sum(int(file[name].size) * max(file[name].dtype.itemsize, 8) for name in names)
+        rows = [int(file[name].size) for name in names or _names(file)]
+        size = sum(int(file[name].size) * max(file[name].dtype.itemsize, 8) for name in names)
+    return Extent(max(rows, default=0), size)
 
 
 def stretches(path: Path) -> list[RowRange | None]:

@@ -13,11 +13,12 @@ from numpy.typing import NDArray
 from scipy.io import loadmat, savemat
 
 from ..errors import FileError
+from .budget import Extent
 from .damage import damage_told
 from .format import TEXTS, Batch, Choose, Contents, Watch, note, row_labels
 from .matlabelements import check_elements
 
-__all__ = ["columns", "contents", "copy", "read", "together"]
+__all__ = ["columns", "contents", "copy", "extent", "read", "together"]
 
 #: Bytes of the header of a file, whose last two tell the order of bytes.
 _HEADER = 128
@@ -28,6 +29,13 @@ _NOTE = "trueangle_note"
 def columns(path: Path, topic: str | None = None) -> list[str]:
     """Names of the variables that are vectors, fields of structures as ``structure/field``."""
     return list(_vectors(path))
+
+
+def extent(path: Path, names: Sequence[str] = (), topic: str | None = None) -> Extent:
+    """Rows and bytes of variables; see `format.FormatModule`."""
+    found = _vectors(path)
+    rows = [len(found[name]) for name in names or found]
+    return Extent(max(rows, default=0), 8 * sum(rows) if names else 0)
 
 
 def together(path: Path, needed: Sequence[str], others: Sequence[str]) -> list[str]:

@@ -21,6 +21,7 @@ from rosbags.rosbag2.storage_mcap import McapReader, McapWriter, PendingChunk, d
 
 from .budget import check_part
 from .mcaprows import RecordRows, interleaved
+from .unpacking import unpacked
 
 __all__ = ["BagReader", "ChunkReader", "ChunkWriter", "ChunkedBagWriter"]
 
@@ -70,7 +71,9 @@ class ChunkReader(McapReader):  # type: ignore[misc]
             check_part(self.path, size, "chunk")
             self.bio.seek(4 + len(chunk.compression) + 8, 1)
             packed = self.bio.read(chunk.compressed_size)
-            data = decompress(packed, chunk.compression, size, check)
+            if chunk.compression in ("lz4", "zstd"):  # no farther than the budget
+                packed = unpacked(self.path, chunk.compression, "chunk", packed)
+            data = decompress(packed, "", size, check)
             mixed = self.by_topic or len(wanted) == 1
             alike = RecordRows.of_chunk(data, mixed) if self.by_rows else None
             if alike is None:
@@ -112,6 +115,23 @@ def _messages(data: bytes, wanted: dict[int, Any]) -> Iterator[tuple[Any, int, b
 
 class _Directory(DirectoryReader):  # type: ignore[misc]
     STORAGE_PLUGINS: ClassVar[Any] = {**DirectoryReader.STORAGE_PLUGINS, "mcap": ChunkReader}
+    metadata: Any
+
+    def messages(
+        self, connections: Collection[Any], start: int | None = None, stop: int | None = None
+    ) -> Iterator[tuple[Any, int, Any]]:
+        """As of rosbags; messages that are packed one by one, no farther than the budget."""
+        told = self.metadata
+        if told.compression_mode != "message":
+            yield from super().messages(connections, start, stop)
+            return
+        path = self.path
+        self.metadata = told._replace(compression_mode=None)  # packed, as they are
+        try:
+            for connection, time, data in super().messages(connections, start, stop):
+                yield connection, time, unpacked(path, "zstd", "message", data)
+        finally:
+            self.metadata = told
 
 
 class BagReader(Reader):  # type: ignore[misc]

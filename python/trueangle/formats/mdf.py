@@ -17,12 +17,13 @@ from asammdf.blocks.v4_blocks import FileHistory
 from numpy.typing import NDArray
 
 from ..errors import FileError
+from .budget import Extent
 from .checksum import Checksum
 from .damage import damage_told
 from .format import TEXTS, Addition, Batch, Choose, Contents, Watch, note
 from .mdfblocks import check_chains
 
-__all__ = ["columns", "contents", "copy", "decoded", "read"]
+__all__ = ["columns", "contents", "copy", "extent", "read"]
 
 #: Bytes that one byte of a file can stand for: deflate reaches 1032.
 _MOST_COMPRESSED = 2000
@@ -125,10 +126,12 @@ def contents(path: Path, topic: str | None = None) -> Contents:
         return Contents(max(rows, default=0), _kept(path, mdf))
 
 
-def decoded(path: Path, names: Sequence[str], topic: str | None = None) -> int:
-    """Bytes of channels in memory; see `format.FormatModule`."""
+def extent(path: Path, names: Sequence[str] = (), topic: str | None = None) -> Extent:
+    """Rows and bytes of channels; see `format.FormatModule`."""
     with _opened(path) as mdf:
-        return 8 * sum(_cycles(mdf, _place(mdf, name)[0]) for name in names)
+        groups = [_place(mdf, name)[0] for name in names] or range(len(mdf.groups))
+        rows = [_cycles(mdf, group) for group in groups]
+    return Extent(max(rows, default=0), 8 * sum(rows) if names else 0)
 
 
 def together(path: Path, needed: Sequence[str], others: Sequence[str]) -> list[str]:

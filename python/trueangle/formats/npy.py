@@ -13,10 +13,11 @@ from numpy.lib import format as npy
 from numpy.typing import NDArray
 
 from ..errors import FileError
+from .budget import Extent
 from .damage import damage_told
 from .format import TEXTS, Addition, Batch, Choose, Contents, Watch, refuse_corrected, row_labels
 
-__all__ = ["columns", "contents", "copy", "read", "read_header", "write_header"]
+__all__ = ["columns", "contents", "copy", "extent", "read", "read_header", "write_header"]
 
 #: Readings taken together.
 _BLOCK = 1 << 18
@@ -26,6 +27,12 @@ def columns(path: Path, topic: str | None = None) -> list[str]:
     """Names of the fields, else ``column1``, ``column2`` and so on."""
     with _opened(path) as array:
         return _names(array)
+
+
+def extent(path: Path, names: Sequence[str] = (), topic: str | None = None) -> Extent:
+    """Rows and bytes of columns; see `format.FormatModule`."""
+    with _opened(path) as array:
+        return Extent(len(array), 8 * len(array) * len(names))
 
 
 def read(

@@ -16,12 +16,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import FileError
-from .budget import check_part
+from .budget import Extent, check_part
 from .damage import damage_told
 from .format import TEXTS, Addition, Batch, Choose, Contents, Watch, note, row_labels
 from .npy import read_header, write_header
 
-__all__ = ["columns", "contents", "copy", "decoded", "read", "together"]
+__all__ = ["columns", "contents", "copy", "extent", "read", "together"]
 
 #: Readings taken together.
 _BLOCK = 1 << 18
@@ -42,11 +42,12 @@ def columns(path: Path, topic: str | None = None) -> list[str]:
         return list(_columns(archive))
 
 
-def decoded(path: Path, names: Sequence[str], topic: str | None = None) -> int:
-    """Bytes of arrays in memory; see `format.FormatModule`."""
+def extent(path: Path, names: Sequence[str] = (), topic: str | None = None) -> Extent:
+    """Rows and bytes of arrays; see `format.FormatModule`."""
     with _opened(path) as archive:
         found = _columns(archive)
-    return sum(found[name].size * max(found[name].kind.itemsize, 8) for name in names)
+    rows = max((found[name].size for name in names or found), default=0)
+    return Extent(rows, sum(found[name].size * max(found[name].kind.itemsize, 8) for name in names))
 
 
 def together(path: Path, needed: Sequence[str], others: Sequence[str]) -> list[str]:

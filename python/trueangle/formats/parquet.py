@@ -20,10 +20,11 @@ from .arrowtables import (
     column_batches,
     corrected_schema,
 )
+from .budget import Extent
 from .damage import damage_told
 from .format import TEXTS, Addition, Batch, Choose, Contents, Watch
 
-__all__ = ["columns", "contents", "copy", "decoded", "read", "rows", "stretches"]
+__all__ = ["columns", "contents", "copy", "extent", "read", "stretches"]
 
 #: Bytes of decoded columns in hand at once; larger row groups are cut.
 _BYTES = 1 << 25
@@ -50,15 +51,11 @@ def columns(path: Path, topic: str | None = None) -> list[str]:
         return list(file.schema_arrow.names)
 
 
-def decoded(path: Path, names: Sequence[str], topic: str | None = None) -> int:
-    """Bytes of columns in memory; see `format.FormatModule`."""
-    return 8 * rows(path) * len(names)
-
-
-def rows(path: Path) -> int:
-    """How many rows there are, by the footer."""
+def extent(path: Path, names: Sequence[str] = (), topic: str | None = None) -> Extent:
+    """Rows and bytes of columns, by the footer; see `format.FormatModule`."""
     with _opened(path) as file:
-        return int(file.metadata.num_rows)
+        rows = int(file.metadata.num_rows)
+    return Extent(rows, 8 * rows * len(names))
 
 
 def stretches(path: Path) -> list[RowGroupRange | None]:

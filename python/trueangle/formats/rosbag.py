@@ -7,15 +7,18 @@ import zlib
 from collections import defaultdict
 from collections.abc import Collection, Iterator, Sequence
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from rosbags.rosbag1 import Reader as Reader1
+from rosbags.rosbag1.reader import decompressors
 from rosbags.typesys import Stores, get_typestore
 
 from ..errors import FileError
+from .budget import Extent
 from .damage import damage_told
 from .format import TEXTS, Addition, Batch, Choose, Contents, Watch
 from .jointstates import Block
@@ -23,8 +26,9 @@ from .mcapchunks import BagReader, ChunkReader
 from .mcaprows import RecordRows
 from .rosbagmarks import corrected_topics, custom_of, made_note, refuse_again
 from .rosbagwriter import opened_writer
+from .unpacking import unpacked
 
-__all__ = ["columns", "contents", "copy", "decoded", "read"]
+__all__ = ["columns", "contents", "copy", "extent", "read"]
 
 _JOINT_STATE = "sensor_msgs/msg/JointState"
 #: Signals of a joint in the message, under the names of columns.
@@ -42,10 +46,11 @@ def columns(path: Path, topic: str | None = None) -> list[str]:
         return bag.columns(bag.topic(topic))
 
 
-def decoded(path: Path, names: Sequence[str], topic: str | None = None) -> int:
-    """Bytes of positions and signals in memory; see `format.FormatModule`."""
+def extent(path: Path, names: Sequence[str] = (), topic: str | None = None) -> Extent:
+    """Messages and bytes of their values; see `format.FormatModule`."""
     with _opened(path) as bag:
-        return 8 * len(names) * sum(int(c.msgcount) for c in bag.topic(topic))
+        rows = sum(int(c.msgcount) for c in bag.topic(topic))
+    return Extent(rows, 8 * rows * len(names))
 
 
 def read(
@@ -153,6 +158,24 @@ def contents(path: Path, topic: str | None = None) -> Contents:
     return digest.contents()
 
 
+class _Bag1(Reader1):  # type: ignore[misc]
+    """The reader of rosbags for bags of ROS 1, chunks unpacked no farther than the budget."""
+
+    def __init__(self, path: Path) -> None:
+        super().__init__(path)
+        #: How its chunks are packed.
+        self.codecs: set[str] = set()
+
+    def read_chunk(self) -> Any:
+        """Where a chunk is and how it is unpacked."""
+        chunk = super().read_chunk()
+        codec = next(name for name, made in decompressors.items() if made is chunk.decompressor)
+        if codec == "none":
+            return chunk
+        self.codecs.add(codec)
+        return chunk._replace(decompressor=partial(unpacked, self.path, codec, "chunk"))
+
+
 class MessageGroup(NamedTuple):
     """Messages of a connection that are alike in length."""
 
@@ -237,7 +260,7 @@ def _opened(path: Path) -> Iterator[Bag]:
     """The bag, its errors told with its name."""
     with (
         damage_told(path, "a bag"),
-        Reader1(path) if path.suffix == ".bag" else BagReader(path) as bag,
+        _Bag1(path) if path.suffix == ".bag" else BagReader(path) as bag,
     ):
         yield Bag(path, bag)
 

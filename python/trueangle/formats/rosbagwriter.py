@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any
 
 from rosbags.interfaces import MessageDefinitionFormat
 from rosbags.rosbag1 import Writer as Writer1
-from rosbags.rosbag1.reader import decompressors
 from rosbags.rosbag2 import StoragePlugin
 from rosbags.rosbag2.enums import CompressionFormat, CompressionMode
 
@@ -110,8 +109,7 @@ def opened_writer(bag: Bag, target: Path, note: str) -> Iterator[BagWriter]:
 
 def _ros1(bag: Bag, target: Path) -> Any:
     writer = Writer1(target)
-    used = {chunk.decompressor for chunk in bag.reader.chunks.values()}
     for compression in Writer1.CompressionFormat:
-        if decompressors[compression.name.lower()] in used:
+        if compression.name.lower() in bag.reader.codecs:
             writer.set_compression(compression)
     return writer

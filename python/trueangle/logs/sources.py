@@ -25,8 +25,6 @@ from .manifest import MANIFEST
 
 __all__ = ["LogTarget", "find_logs", "hold_at_most", "places"]
 
-#: Bytes of a text that tell how long its lines are.
-_HEAD = 1 << 16
 #: Rows that a byte of a packed file holds, at most, where nothing else is known.
 _PACKED = 64
 
@@ -72,7 +70,7 @@ def find_logs(paths: Iterable[str | PathLike[str]]) -> list[tuple[Path, Path]]:
 
 
 def hold_at_most(paths: Iterable[Path], most: int, topic: str | None = None) -> bool:
-    """Whether logs hold at most so many rows; those of texts as their first lines tell."""
+    """Whether logs hold at most so many rows, by what they say of themselves."""
     for path in paths:
         if not path.is_dir() and path.stat().st_size > RUNS_BYTES:
             return False
@@ -83,25 +81,13 @@ def hold_at_most(paths: Iterable[Path], most: int, topic: str | None = None) -> 
 
 
 def _rows(path: Path, most: int, topic: str | None) -> int:
-    """Rows of a log, about; one more than ``most`` where they are more."""
-    kind = find_format(path).module
+    """Rows of a log, about; of a small one its bytes, without a look into it."""
     size = path.stat().st_size
-    if hasattr(kind, "line_of"):
-        with path.open("rb") as file:
-            head = file.read(_HEAD)
-        return size * (head.count(b"\n") + 1) // max(len(head), 1)
-    if hasattr(kind, "rows"):
-        return int(kind.rows(path))
     if path.is_file() and size <= most // _PACKED:
         return size
     try:
-        rows = 0
-        for batch in kind.read(path, kind.columns(path, topic)[:1], topic):
-            rows += len(next(iter(batch.values())))
-            if rows > most:
-                break
-        return rows
-    except (TrueAngleError, IndexError):
+        return find_format(path).module.extent(path, (), topic).rows
+    except TrueAngleError:
         return 0  # who reads it whole says what is wrong
 
 

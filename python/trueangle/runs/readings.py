@@ -180,7 +180,8 @@ def _columns(
 ) -> dict[str, NDArray[Any]]:
     """Whole columns; ``others`` are texts where they are not all numbers."""
     names = [*needed, *others]
-    check_decoded(path, kind.decoded(path, names, topic), len(names))
+    if names:
+        check_decoded(path, kind.module.extent(path, names, topic).size, len(names))
     numeric = _numeric(kind, path, others, topic)
     try:
         return _joined(kind, path, names, labels | set(others) - numeric, topic)

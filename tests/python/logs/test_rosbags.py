@@ -1,17 +1,26 @@
 """ROS bags written by rosbags itself: joint states corrected, other topics untouched."""
 
+import bz2
+import tracemalloc
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 import trueangle as ta
+from trueangle.errors import FileError
+from trueangle.formats.formats import find_format
 
 from .conftest import made_angles, made_model, unwrapped_truth
 
 rosbags = pytest.importorskip("rosbags")
 
+import lz4.frame  # noqa: E402
 from rosbags import rosbag1, rosbag2  # noqa: E402
 from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin  # noqa: E402
 from rosbags.typesys import Stores, get_typestore  # noqa: E402
+
+from trueangle.formats import unpacking  # noqa: E402
 
 MESSAGES = 300
 JOINTS = ["elbow", "wrist"]
@@ -233,3 +242,41 @@ def test_a_bag_is_read_as_runs_with_the_times_of_its_messages(storage, tmp_path)
     assert run.left_out == 30
     np.testing.assert_allclose(run.error, 0.01, atol=1e-9)
     np.testing.assert_array_equal(run.time[:5], np.arange(5.0))
+
+
+@pytest.mark.parametrize(
+    ("kind", "part"),
+    [
+        ("mcap, compressed", "chunk"),
+        ("sqlite3, compressed messages", "message"),
+        ("ROS 1, compressed", "chunk"),
+    ],
+)
+def test_chunks_and_messages_are_unpacked_no_farther_than_the_budget(
+    kind, part, tmp_path, positions, monkeypatch
+):
+    name, write = BAGS[kind]
+    path = write(tmp_path / name, positions)
+    columns = find_format(path).module.columns
+    assert columns(path, None)[:2] == JOINTS[:2]
+    monkeypatch.setattr("trueangle.formats.budget.DECODED_BYTES", 100)
+    with pytest.raises(FileError, match=f"one {part} unpacks to .* at most 100 bytes"):
+        columns(path, None)
+
+
+@pytest.mark.parametrize("codec", ["bz2", "lz4", "zstd"])
+def test_a_part_that_unpacks_to_gigabytes_takes_no_more_than_the_budget(codec, monkeypatch):
+    """Whatever its header says: the unpacking itself is bounded."""
+    zeros = bytes(1 << 24)
+    packed = {"bz2": bz2.compress, "lz4": lz4.frame.compress, "zstd": unpacking.zstd.compress}[
+        codec
+    ](zeros)
+    assert unpacking.unpacked(Path("a.bag"), codec, "chunk", packed) == zeros
+    with pytest.raises(EOFError, match="a chunk ends before its end"):
+        unpacking.unpacked(Path("a.bag"), codec, "chunk", packed[:-10])
+    monkeypatch.setattr("trueangle.formats.budget.DECODED_BYTES", 1 << 20)
+    tracemalloc.start()
+    with pytest.raises(FileError, match=r"unpacks to 1 MiB \(.*but at most 1 MiB"):
+        unpacking.unpacked(Path("a.bag"), codec, "chunk", packed)
+    assert tracemalloc.get_traced_memory()[1] < 4 << 20
+    tracemalloc.stop()
