@@ -65,7 +65,8 @@ def _is_large(args: argparse.Namespace) -> bool:
     paths = [Path(path) for path in args.runs]
     if not all(path.is_file() or path.is_dir() for path in paths):
         return False  # a pipe is read once
-    from ..logs.sources import find_logs, hold_at_most
+    from ..logs.sources import hold_at_most
+    from ..runs.paths import find_logs
 
     found = [path for path, _ in find_logs(paths)]
     return not hold_at_most(found, _READINGS, args.topic)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Callable, Iterator
+from glob import has_magic
 from importlib import import_module
 from typing import Any
 
@@ -66,7 +67,8 @@ def check_paths(args: argparse.Namespace) -> None:
     """
     import_module("trueangle.formats")  # whose endings no other output may bear; takes numpy
     values = list(_values(vars(args)))
-    inputs = [value.file for value in values if isinstance(value, Input)]
+    given = [value.file for value in values if isinstance(value, Input)]
+    inputs = [path for name in given for path in _matched(name)]
     outputs = [value for value in values if isinstance(value, Output)]
     for path in inputs:
         check_input(path)
@@ -74,6 +76,15 @@ def check_paths(args: argparse.Namespace) -> None:
         check_output(path, path.kind, inputs)
         if any(same_file(path, other) for other in outputs[:i]):
             raise ArgumentError(f"{path}: two outputs of this name; name another file for one")
+
+
+def _matched(name: str) -> list[str]:
+    """The file of this name, or those that a pattern stands for."""
+    if not has_magic(name):
+        return [name]
+    from ..runs.paths import matched  # takes numpy, which most commands do without here
+
+    return [*map(str, matched([name]))]
 
 
 def _values(given: dict[str, Any]) -> Iterator[Any]:

@@ -3,10 +3,7 @@
 from __future__ import annotations
 
 import argparse
-import os
 import sys
-from collections.abc import Sequence
-from pathlib import Path
 
 from ..errors import ArgumentError
 from ..runs.files import read_runs
@@ -49,19 +46,7 @@ def read_checked(args: argparse.Namespace) -> list[CalibrationRun]:
     from ..runs.checks.check import faults_of
     from ..runs.checks.record import records_of
 
-    runs = read_runs(_files(args.runs), **reading(args))
+    runs = read_runs(args.runs, **reading(args))
     for fault in faults_of(records_of(runs)):
         print(f"trueangle: warning: {fault}", file=sys.stderr)
     return runs
-
-
-def _files(paths: Sequence[str]) -> Sequence[str | Path]:
-    """The files, those in folders included."""
-    if not any(map(os.path.isdir, paths)):
-        return paths
-    from ..logs.sources import find_logs
-
-    found: list[str | Path] = []
-    for path in paths:
-        found += [log for log, _ in find_logs([path])] if os.path.isdir(path) else [path]
-    return found

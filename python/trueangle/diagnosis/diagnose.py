@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from typing import Any
+from typing import Any, Unpack
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,8 +15,10 @@ from ..estimation.regression import Regression
 from ..joint.signals import join_runs
 from ..runs.checks.check import faults_of
 from ..runs.checks.record import records_of
+from ..runs.files import runs_of
 from ..runs.joining import MeasuredMinusSimulated, minus_simulated
-from ..runs.run import CalibrationRun, as_runs
+from ..runs.run import CalibrationRun
+from ..runs.source import Reading
 from ..simulation.simulation import SIMULATION, Simulation
 from ..support.blas import one_blas_thread
 from ..support.deadline import Pace, pace, paced
@@ -49,13 +50,14 @@ FOR_CHOICE, FOR_FINDINGS = 0.6, 0.9
 
 @told_kinds
 def diagnose(
-    runs: CalibrationRun | Iterable[CalibrationRun],
+    runs: Any,
     sim: Simulation | None = None,
     *,
     simulated: Any = None,
     gain: bool = True,
     within: float | None = None,
     progress: str = "none",
+    **reading: Unpack[Reading],
 ) -> Diagnosis:
     r"""Name the physical causes that a simulation of the joint lacks.
 
@@ -74,8 +76,9 @@ def diagnose(
 
     Parameters
     ----------
-    runs : CalibrationRun or iterable of CalibrationRun
-        Time, velocity, torque, temperature and mount where known.
+    runs : CalibrationRun, path, table, or iterable of them
+        Time, velocity, torque, temperature and mount where known; files, folders, patterns and
+        tables in memory as `trueangle.read_runs` takes them.
     sim : Simulation, optional
         What is believed; may be left out where there is a log.
     simulated : path, table, iterable of CalibrationRun or MeasuredMinusSimulated, optional
@@ -92,6 +95,8 @@ def diagnose(
     progress : {"none", "auto", "text", "json"}
         What is done and how much is left, on stderr, after the first second; ``"auto"`` is
         text on a terminal and nothing elsewhere.
+    **reading
+        ``signals``, ``period``, ``by`` ... of files and tables, as in `trueangle.read_runs`.
 
     Returns
     -------
@@ -120,7 +125,7 @@ def diagnose(
     >>> diagnose(runs, sim).findings[0].cause
     'backlash'
     """
-    measured = as_runs(runs)
+    measured = runs_of(runs, reading)
     if sim is not None:
         of_type("sim", sim, Simulation, SIMULATION)
     log = None

@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Iterable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, Unpack
 
 from ..errors import ArgumentError, NoOrderError, UnlikeRunsWarning
 from ..joint.shafts import counted_orders, resolve_orders
 from ..model.model import Argument
 from ..model.validity import check_invertible
+from ..runs.files import runs_of
 from ..runs.follows import check_follows
-from ..runs.run import CalibrationRun, as_runs
+from ..runs.run import CalibrationRun
+from ..runs.source import Reading
 from ..runs.travel import CONDITION, travelled_span, without_drift
 from ..support.kinds import told_kinds
 from ..support.suggestions import check_choice
@@ -35,7 +37,7 @@ ROUNDING = 1e-12
 
 @told_kinds
 def fit(
-    runs: CalibrationRun | Iterable[CalibrationRun],
+    runs: Any,
     orders: Iterable[float] | Mapping[str, Iterable[float]] | str | None = None,
     *,
     gear_ratio: float | None = None,
@@ -49,6 +51,7 @@ def fit(
     reference_orders: Iterable[float] = (),
     method: str | None = None,
     threads: int | None = None,
+    **reading: Unpack[Reading],
 ) -> FitResult:
     r"""Fit a harmonic model to one run or several.
 
@@ -58,8 +61,9 @@ def fit(
 
     Parameters
     ----------
-    runs : CalibrationRun or iterable of them
-        Readings in any unit, at any angles, with any zero and any number of turns.
+    runs : CalibrationRun, path, table, or iterable of them
+        Readings in any unit, at any angles, with any zero and any number of turns: runs, or
+        files, folders, patterns and tables in memory as `trueangle.read_runs` takes them.
     orders : iterable of int, mapping, "auto" or None
         Orders of the output shaft; or ``{"output": [1, 2], "motor": [1, 2, 4]}``. None and
         ``"auto"`` select them by evidence (`select_orders`).
@@ -102,6 +106,8 @@ def fit(
         equations or with QR, or one mean error per count of an encoder that counts (whole
         numbers, at most 2^17 to a turn). By default the fastest that keeps QR's accuracy.
     threads : int, optional
+    **reading
+        ``signals``, ``period``, ``by`` ... of files and tables, as in `trueangle.read_runs`.
 
     Returns
     -------
@@ -134,7 +140,7 @@ def fit(
     0.5
     """
     return fitted_to(
-        as_runs(runs),
+        runs_of(runs, reading),
         orders,
         gear_ratio=gear_ratio,
         fixed_member=fixed_member,

@@ -24,11 +24,12 @@ from ..fitting.uncertainty import CovarianceKind, check_covariance
 from ..joint.shafts import resolve_orders
 from ..runs.files import read_runs
 from ..runs.follows import check_follows
+from ..runs.paths import find_logs
 from ..runs.run import CalibrationRun
 from ..support.kinds import told_kinds
 from .keeping import KEPT
 from .passes import Passes
-from .sources import find_logs, hold_at_most
+from .sources import hold_at_most
 
 __all__ = ["fit_logs", "select_log_orders"]
 

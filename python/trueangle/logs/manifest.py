@@ -10,13 +10,12 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import ArgumentError
+from ..runs.paths import MANIFEST
 from ..support.decoding import finite
 from ..support.files import check_output
 from .safety import Stamp, locked, stamp
 
 __all__ = ["MANIFEST", "Manifest"]
-
-MANIFEST = "trueangle-manifest.jsonl"
 
 
 class Manifest:

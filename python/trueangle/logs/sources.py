@@ -1,10 +1,8 @@
-"""Which logs are meant by paths and folders, and where each output goes."""
+"""How many rows logs hold, and where each output goes."""
 
 from __future__ import annotations
 
 import os
-import re
-import warnings
 from collections.abc import Iterable
 from os import PathLike
 from pathlib import Path
@@ -12,18 +10,16 @@ from typing import NamedTuple
 
 from ..errors import ArgumentError, FileError, TrueAngleError
 from ..formats.formats import find_format, known_format
+from ..runs.paths import find_logs
 from ..support.files import (
     RUNS_BYTES,
-    check_input,
     check_output,
     kind_of_log,
     promised_format,
-    restore,
     same_file,
 )
-from .manifest import MANIFEST
 
-__all__ = ["LogTarget", "find_logs", "hold_at_most", "places"]
+__all__ = ["LogTarget", "hold_at_most", "places"]
 
 #: Rows that a byte of a packed file holds, at most, where nothing else is known.
 _PACKED = 64
@@ -35,38 +31,6 @@ class LogTarget(NamedTuple):
     source: Path
     target: Path
     manifest: Path | None
-
-
-def find_logs(paths: Iterable[str | PathLike[str]]) -> list[tuple[Path, Path]]:
-    """Logs with the name each has below what was given; folders in natural order.
-
-    In a folder every file of a known format is a log, also in folders below, hidden files
-    excepted; a folder that is a ROS 2 bag is one log.
-
-    Raises
-    ------
-    ArgumentError
-        A file that is not there, a folder without logs, no file at all.
-    """
-    found: list[tuple[Path, Path]] = []
-    for entry in paths:
-        path = Path(entry)
-        try:
-            check_input(path, whole=True)
-        except FileNotFoundError:
-            raise ArgumentError(f"{path}: no such file") from None
-        if not path.is_dir() or known_format(path):
-            found.append((path, Path(path.name)))
-            continue
-        inside = sorted(_walk(path), key=_natural)
-        if not inside:
-            raise ArgumentError(f"{path}: no logs of a known format in this folder")
-        for log in inside:
-            check_input(log, whole=True)
-        found += [(log, log.relative_to(path)) for log in inside]
-    if not found:
-        raise ArgumentError("logs is empty: at least one log is needed")
-    return found
 
 
 def hold_at_most(paths: Iterable[Path], most: int, topic: str | None = None) -> bool:
@@ -167,24 +131,3 @@ def _is_folder(output: str | PathLike[str]) -> bool:
     path = Path(output)
     ends_so = isinstance(output, str) and output.endswith("/")
     return ends_so or (path.is_dir() and known_format(path) is None)
-
-
-def _walk(folder: Path, above: tuple[tuple[int, int], ...] = ()) -> Iterable[Path]:
-    here = (*above, _identity(folder))
-    restore(folder)
-    for path in folder.iterdir():
-        if path.name.startswith(".") or path.name == MANIFEST:
-            continue
-        if not path.exists():
-            warnings.warn(f"{path}: is a link to nothing and is left out", stacklevel=4)
-            continue
-        if known_format(path):
-            yield path
-        elif path.is_dir() and _identity(path) not in here:  # a link may lead up again
-            yield from _walk(path, here)
-
-
-def _natural(path: Path) -> list[tuple[int, str]]:
-    """Sorts log2 before log10."""
-    parts = re.split(r"(\d+)", str(path))
-    return [(int(part), "") if part.isdecimal() else (-1, part) for part in parts]

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping, Sized
 from dataclasses import dataclass
 from functools import cached_property
 from os import PathLike
-from typing import TYPE_CHECKING, Any, TypeAlias, overload
+from typing import TYPE_CHECKING, Any, TypeAlias, Unpack, overload
 
 from ..errors import ArgumentError
 from ..fitting.heldout import HeldOut
@@ -14,8 +14,10 @@ from ..model.model import HarmonicModel
 from ..plots.curves import Points, degrees, error_points, label_of, travelled
 from ..runs.checks.check import faults_of
 from ..runs.checks.record import records_of
+from ..runs.files import runs_of
 from ..runs.provenance import provenance
-from ..runs.run import CalibrationRun, as_runs
+from ..runs.run import CalibrationRun
+from ..runs.source import Reading
 from ..support.angles import ARCSEC_PER_TURN, wrap
 from ..support.blas import one_blas_thread
 from ..support.deadline import pace
@@ -122,7 +124,7 @@ class Report(Shown):
 
 @overload
 def report(
-    runs: CalibrationRun | Iterable[CalibrationRun],
+    runs: Any,
     path: str | PathLike[str] | None = None,
     *,
     simulation: Simulation | None = None,
@@ -135,12 +137,13 @@ def report(
     positions: None = None,
     model: HarmonicModel | str | PathLike[str] | None = None,
     errors_in: ErrorsIn = "auto",
+    **reading: Unpack[Reading],
 ) -> Report: ...
 
 
 @overload
 def report(
-    runs: CalibrationRun | Iterable[CalibrationRun],
+    runs: Any,
     path: str | PathLike[str] | None = None,
     *,
     simulation: Simulation | None = None,
@@ -152,13 +155,14 @@ def report(
     certificate: Identity | str | PathLike[str],
     positions: int | None = None,
     errors_in: ErrorsIn = "auto",
+    **reading: Unpack[Reading],
 ) -> Certificate: ...
 
 
 @one_blas_thread()
 @told_kinds
 def report(
-    runs: CalibrationRun | Iterable[CalibrationRun],
+    runs: Any,
     path: str | PathLike[str] | None = None,
     *,
     simulation: Simulation | None = None,
@@ -171,12 +175,14 @@ def report(
     positions: int | None = None,
     model: HarmonicModel | str | PathLike[str] | None = None,
     errors_in: ErrorsIn = "auto",
+    **reading: Unpack[Reading],
 ) -> Report | Certificate:
     """Fit, select orders, hold out, diagnose and put it all on one page; or certify.
 
     Parameters
     ----------
-    runs : CalibrationRun or iterable of them
+    runs : CalibrationRun, path, table, or iterable of them
+        As `trueangle.fit` takes them.
     path : path, optional
         Where to write the page (HTML).
     simulation : Simulation, optional
@@ -200,6 +206,8 @@ def report(
         Unit of every error on the page or in the certificate: ``"arcsec"``, ``"deg"``,
         ``"mrad"``, ``"count"``, or the counts of a turn; ``"auto"`` is arcsec, or degrees
         where an error reaches a degree. The content stays in arcsec.
+    **reading
+        ``signals``, ``period``, ``by`` ... of files and tables, as in `trueangle.read_runs`.
 
     Returns
     -------
@@ -218,7 +226,7 @@ def report(
     >>> round(made.content["model"]["coefficients"][0]["amplitude_arcsec"], 6)
     360.0
     """
-    found = as_runs(runs)
+    found = runs_of(runs, reading)
     if isinstance(orders, Sized) and not any(True for _ in orders):  # a range may have no length
         raise ArgumentError("orders is empty: name one at least, or leave it out for those found")
     if simulation is not None:

@@ -1,31 +1,30 @@
-"""Calibration runs from files of any format, one row per reading."""
+"""Calibration runs from files and tables, one row per reading."""
 
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterable, Mapping
-from os import PathLike
-from pathlib import Path
-from typing import Any, NamedTuple, TypeAlias
+from collections.abc import Iterator, Mapping
+from typing import Any, NamedTuple, TypeAlias, Unpack
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import EmptyCellsWarning, FileError
-from ..formats.columns import Column, count_turn, listed, signal_code, unit_in_name, wanted_columns
+from ..formats.columns import Column, count_turn, listed, signal_code, unit_in_name
 from ..formats.signals import FIELDS
 from ..support.angles import UNIT_PERIODS
+from ..support.caller import level_of_caller
 from ..support.kinds import told_kinds
 from ..support.suggestions import did_you_mean
-from .readings import Readings, named, read_readings, readings_of
-from .run import CalibrationRun, Source
+from .readings import Readings
+from .run import CalibrationRun, Source, as_runs, given_runs
+from .source import Reading, checked_reading, each_table
 
 __all__ = [
-    "Readings",
     "RunColumns",
     "read_columns",
-    "read_readings",
     "read_runs",
+    "runs_of",
     "runs_of_readings",
 ]
 
@@ -37,43 +36,42 @@ _PERIOD = 360.0
 
 
 @told_kinds
-def read_runs(
-    path: str | PathLike[str] | Iterable[str | PathLike[str]],
-    *,
-    counts_per_turn: float | None = None,
-    counts_per_turn_reference: float | None = None,
-    signals: Mapping[str, Any] | None = None,
-    topic: str | None = None,
-) -> list[CalibrationRun]:
-    """Calibration runs of one file or several, in the order the files name them.
+def read_runs(path: Any, **reading: Unpack[Reading]) -> list[CalibrationRun]:
+    """Calibration runs of files or tables, in the order these name them.
 
     Parameters
     ----------
-    path : path or iterable of paths
-        CSV (comma, semicolon or tab, decimal points or commas, lines before the names,
-        notes that begin with #, a line of units), Parquet, Arrow, HDF5, MATLAB, numpy, ROS
-        bags, MCAP, MDF4. Columns: ``reference_deg`` and ``indicated_deg`` (or ``_rad``,
-        ``_turn``, ``_count``, or a unit in brackets), and optionally ``run``, ``unit`` and
-        those of `trueangle.formats.signals.SIGNALS`. Others are kept in `CalibrationRun.columns`.
-    counts_per_turn, counts_per_turn_reference : float, optional
-        Counts in one turn of the output, of an indicated angle or reference in counts.
-    signals : mapping of role to column, optional
-        Columns with other names: ``{"torque": "tau", "reference": ("pos act", "rad")}``.
-    topic : str, optional
-        JointState topic of a ROS bag (default: the only one).
+    path : path, table, or iterable of them
+        Files, folders (and all below), patterns (``"logs/*.csv"``): CSV (comma, semicolon or
+        tab, decimal points or commas, lines before the names, notes that begin with #, a line
+        of units), Parquet, Arrow, HDF5, MATLAB, numpy, ROS bags, MCAP, MDF4. Tables in memory:
+        a mapping of names to arrays, a structured array, or one of pandas, polars (also lazy),
+        pyarrow, DuckDB, xarray, Dask. Columns: ``reference_deg`` and ``indicated_deg`` (or
+        ``_rad``, ``_turn``, ``_count``, or a unit in brackets), and optionally ``run``,
+        ``unit`` and those of `trueangle.formats.signals.SIGNALS`. Others are kept in
+        `CalibrationRun.columns`.
+    **reading
+        ``counts_per_turn``, ``counts_per_turn_reference``: counts in one turn of the output,
+        of an indicated angle or reference in counts. ``signals``: columns with other names,
+        ``{"torque": "tau", "reference": ("pos act", "rad")}``. ``period``: one turn in the unit
+        of angles whose columns name none; these may then be called ``reference`` and
+        ``indicated``. ``by``: the column that tells the runs apart (default: ``run``).
+        ``topic``: JointState topic of a ROS bag (default: the only one).
 
     Returns
     -------
     list of CalibrationRun
-        One per unit, label of ``run`` and file; rows stay in their order. The period of a
-        run is that of its reference column: 360, ``2*pi`` or 1; 360 for other units.
+        One per unit, label of ``run`` and file or table; rows stay in their order. The period
+        of a run is that of its reference column: 360, ``2*pi`` or 1; 360 for other units.
 
     Raises
     ------
     FileError
         Names file, line (header = 1) and column: a missing or doubled column, text or
         a non-finite value where a number belongs, units mixed within a file, time that
-        runs backwards within a run, an empty file.
+        runs backwards within a run, an empty file. Rows of a table count from 1.
+    ArgumentError
+        Neither paths nor tables.
     MissingExtraError
         A format whose library is not installed.
 
@@ -81,16 +79,45 @@ def read_runs(
     -----
     EmptyCellsWarning
         Rows with an empty cell were left out; `CalibrationRun.left_out` counts them.
+
+    Examples
+    --------
+    >>> read_runs({"reference": [0.0, 90.0], "indicated": [0.1, 90.1]}, period=360.0)
+    [CalibrationRun(None, 2 readings, period=360)]
     """
-    wanted = wanted_columns(signals)
-    indicated = count_turn(counts_per_turn, "counts_per_turn")
-    reference = count_turn(counts_per_turn_reference, "counts_per_turn_reference")
-    paths = [path] if isinstance(path, (str, PathLike)) else list(path)
+    return _read(path, checked_reading(reading), "path")
 
-    def read(file: Path) -> list[CalibrationRun]:
-        return runs_of_readings(readings_of(file, wanted, topic), indicated, reference)
 
-    runs = [run for entry in paths for run in named(Path(entry), read)]
+def runs_of(data: Any, reading: Mapping[str, Any], name: str = "runs") -> list[CalibrationRun]:
+    """Runs as they are, those of what `read_runs` reads, or of a list of both.
+
+    Parameters
+    ----------
+    data : CalibrationRun, path, table, or iterable of them
+    reading : mapping
+        Keywords of `read_runs`; runs do not need them.
+    name : str
+        What messages call the data.
+
+    Raises
+    ------
+    ArgumentError
+        None of these; no run at all; runs in different units.
+    FileError
+        As `read_runs`; ``name`` stands in place of a table's file.
+    """
+    asked = checked_reading(reading)
+    data = list(data) if isinstance(data, Iterator) else data
+    runs = given_runs(data)
+    if runs is not None:
+        return as_runs(runs)
+    return _read(data, asked, name)
+
+
+def _read(data: Any, reading: Reading, name: str) -> list[CalibrationRun]:
+    indicated, reference = _counts(reading)
+    found = each_table(data, lambda t: runs_of_readings(t, indicated, reference), reading, name)
+    runs = [run for part in found for run in part]
     units = {run.period: run for run in runs}
     if len(units) > 1:
         first, other = list(units.values())[:2]
@@ -101,6 +128,13 @@ def read_runs(
             f"(period {first.period:g}); convert one of them",
         )
     return runs
+
+
+def _counts(reading: Reading) -> tuple[float | None, float | None]:
+    return (
+        count_turn(reading["counts_per_turn"], "counts_per_turn"),
+        count_turn(reading["counts_per_turn_reference"], "counts_per_turn_reference"),
+    )
 
 
 class RunColumns(NamedTuple):
@@ -120,20 +154,10 @@ class RunColumns(NamedTuple):
     source: Source
 
 
-def read_columns(
-    path: str | PathLike[str],
-    counts_per_turn: float | None = None,
-    counts_per_turn_reference: float | None = None,
-    signals: Mapping[str, Any] | None = None,
-    topic: str | None = None,
-) -> RunColumns:
-    """The columns of one file, grouped by run; time may run backwards. As `read_runs`."""
-    wanted = wanted_columns(signals)
-    indicated = count_turn(counts_per_turn, "counts_per_turn")
-    reference = count_turn(counts_per_turn_reference, "counts_per_turn_reference")
-    return named(
-        Path(path), lambda file: _columns(readings_of(file, wanted, topic), indicated, reference)
-    )
+def read_columns(data: Any, reading: Reading, name: str = "data") -> list[RunColumns]:
+    """The columns of every file or table, grouped by run; time may run backwards."""
+    indicated, reference = _counts(reading)
+    return each_table(data, lambda table: _columns(table, indicated, reference), reading, name)
 
 
 def _columns(table: Readings, counts: float | None, reference_counts: float | None) -> RunColumns:
@@ -241,7 +265,7 @@ def _warn_of_empty(
             f"{table.path}: {count} of {missing.size} rows have an empty cell and are left out, "
             f"the first at line {line}, column '{_column_of(table, role)}'",
             EmptyCellsWarning,
-            stacklevel=9,
+            stacklevel=level_of_caller(),
         )
 
 

@@ -16,7 +16,7 @@ from ..formats.signals import FIELDS, column, find_signal, signal_columns
 from ..support.angles import check_period, circular_mean, wrap
 from ..support.kinds import told_kinds
 
-__all__ = ["CalibrationRun", "Source", "as_runs"]
+__all__ = ["CalibrationRun", "Source", "as_runs", "given_runs"]
 
 Array = NDArray[np.float64]
 
@@ -248,6 +248,21 @@ def as_runs(runs: CalibrationRun | Iterable[CalibrationRun]) -> list[Calibration
             "convert them to one"
         )
     return found
+
+
+def given_runs(data: Any) -> list[CalibrationRun] | None:
+    """The list where ``data`` is a run or a list that holds one; None of anything else."""
+    if isinstance(data, CalibrationRun):
+        return [data]
+    if not isinstance(data, list | tuple) or not any(isinstance(r, CalibrationRun) for r in data):
+        return None
+    for i, run in enumerate(data):
+        if not isinstance(run, CalibrationRun):
+            raise KindError(
+                f"runs[{i}] must be a CalibrationRun as the others, got {type(run).__name__}; "
+                "read files with trueangle.read_runs"
+            )
+    return list(data)
 
 
 def _rebuild(values: dict[str, Any]) -> CalibrationRun:

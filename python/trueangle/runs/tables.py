@@ -1,22 +1,23 @@
-"""Calibration runs from whatever holds them: files, tables in memory, runs themselves."""
+"""Tables in memory, of any library, as the readings that a file would hold."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
-from os import PathLike
+import sys
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from ..errors import ArgumentError, KindError
-from ..formats.columns import count_turn, find_columns, wanted_columns
+from ..errors import ArgumentError, KindError, MissingExtraError
+from ..formats.columns import Wanted, find_columns
 from ..formats.format import Format
-from .files import read_runs, runs_of_readings
+from ..support.labelled import take_apart
 from .readings import Readings
-from .run import CalibrationRun, Source
+from .run import Source
 
-__all__ = ["runs_of"]
+__all__ = ["table_readings"]
 
 
 class _Memory(Format):
@@ -29,99 +30,101 @@ class _Memory(Format):
 _MEMORY = _Memory("", {"a table in memory": ()})
 
 
-def runs_of(
-    data: Any,
-    *,
-    name: str = "table",
-    counts_per_turn: float | None = None,
-    counts_per_turn_reference: float | None = None,
-    signals: Mapping[str, Any] | None = None,
-    topic: str | None = None,
-) -> list[CalibrationRun]:
-    """Runs of a path or several, of a table in memory, or runs as they are.
+def table_readings(data: Any, name: str, wanted: Wanted) -> Readings | None:
+    """The readings of a table; None of what is none.
 
     Parameters
     ----------
-    data : CalibrationRun, path, table, or iterable of runs or paths
-        A table is a mapping of names to arrays, or a frame of pandas, polars, pyarrow or xarray,
-        with the columns that a file of runs has.
+    data : table
+        A mapping of names to arrays, a structured array, or a table of pandas, polars (a lazy
+        one is collected), pyarrow, xarray, Dask (computed), or any other with the Arrow stream
+        ``__arrow_c_stream__`` (a relation of DuckDB).
     name : str
-        What messages call the table.
-    counts_per_turn, counts_per_turn_reference, signals, topic
-        As `trueangle.read_runs`.
+        What messages call it.
+    wanted : mapping
+        Columns asked for, as `columns.wanted_columns` makes it.
 
     Raises
     ------
-    ArgumentError
-        Neither runs nor a table nor a path.
+    ArgumentError, KindError
+        Columns that are no vectors of one length, or have other names than texts.
     FileError
-        As `trueangle.read_runs`; ``name`` stands in place of a file.
-
-    Examples
-    --------
-    >>> runs_of({"reference_deg": [0.0, 90.0], "indicated_deg": [0.1, 90.1]})
-    [CalibrationRun(None, 2 readings, period=360)]
+        A column that was asked for is missing; ``name`` stands in place of a file.
     """
-    if isinstance(data, CalibrationRun):
-        return [data]
-    names = _names(data)
-    held = getattr(data, "variables", data)  # xarray's coordinates count as well
-    if names is not None and isinstance(held, Mapping) and not {*names} <= {*held}:
-        raise KindError(f"{name}: columns must have text for names, got {list(data)!r:.60}")
-    if names is not None:
-        columns = {column: _values(held[column]) for column in names}
-        path = Path(name)
-        roles = find_columns(path, names, wanted_columns(signals))
-        for column, values in columns.items():
-            if values.ndim != 1 or values.size != next(iter(columns.values())).size:
-                raise ArgumentError(
-                    f"{name}: column {column!r} has the shape {values.shape}; columns must be "
-                    "one-dimensional and equally long"
-                )
-        table = Readings(path, _MEMORY, roles, columns, Source(name, ""))
-        return runs_of_readings(
-            table,
-            count_turn(counts_per_turn, "counts_per_turn"),
-            count_turn(counts_per_turn_reference, "counts_per_turn_reference"),
+    held = _columns(data)
+    if held is None:
+        return None
+    if not all(isinstance(column, str) for column in held):
+        raise KindError(f"{name}: columns must have text for names, got {list(held)!r:.60}")
+    columns = {column: _values(values) for column, values in held.items()}
+    path = Path(name)
+    roles = find_columns(path, list(columns), wanted)
+    for column, values in columns.items():
+        if values.ndim != 1 or values.size != next(iter(columns.values())).size:
+            raise ArgumentError(
+                f"{name}: column {column!r} has the shape {values.shape}; columns must be "
+                "one-dimensional and equally long"
+            )
+    return Readings(path, _MEMORY, roles, columns, Source(name, ""))
+
+
+def _columns(data: Any) -> dict[Any, Any] | None:
+    """Columns by name, as the library holds them."""
+    if isinstance(data, Mapping) and not hasattr(data, "variables"):
+        return dict(data)
+    if isinstance(data, np.ndarray):
+        return None if data.dtype.names is None else {name: data[name] for name in data.dtype.names}
+    if type(data).__name__ == "LazyFrame":
+        data = data.collect()
+    elif hasattr(data, "map_partitions") and hasattr(data, "compute"):
+        data = data.compute()
+    held = getattr(data, "variables", None)  # xarray's coordinates count as well
+    if isinstance(held, Mapping):
+        return dict(held)
+    frames = {"pandas": "DataFrame", "polars": "DataFrame"}
+    for library, kind in frames.items():
+        module = sys.modules.get(library)
+        if module is not None and isinstance(data, getattr(module, kind)):
+            return {column: data[column] for column in data.columns}
+    if not hasattr(data, "__arrow_c_stream__") and not hasattr(data, "__arrow_c_array__"):
+        return None
+    if not hasattr(data, "column_names"):
+        data = _arrow_table(data)
+    return {column: data.column(i) for i, column in enumerate(data.column_names)}
+
+
+def _arrow_table(data: Any) -> Any:
+    try:
+        import pyarrow
+    except ModuleNotFoundError:
+        raise MissingExtraError("Arrow streams need pyarrow: pip install 'trueangle[arrow]'") from (
+            None
         )
-    if isinstance(data, (str, PathLike)):
-        given: Any = data
-    elif isinstance(data, Iterable) and getattr(data, "ndim", True):
-        given = list(data)
-        if given and all(isinstance(entry, CalibrationRun) for entry in given):
-            return list(given)
-        if not given or not all(isinstance(entry, (str, PathLike)) for entry in given):
-            raise ArgumentError(f"{name} holds neither runs nor paths: {given!r:.60}")
-    else:
-        raise ArgumentError(
-            f"{name} must be a path, runs, a mapping of names to arrays, or a table of pandas, "
-            f"polars, pyarrow or xarray; got {type(data).__name__}"
-        )
-    return read_runs(
-        given,
-        counts_per_turn=counts_per_turn,
-        counts_per_turn_reference=counts_per_turn_reference,
-        signals=signals,
-        topic=topic,
-    )
+    if hasattr(data, "read_all"):
+        return data.read_all()
+    if not hasattr(data, "__arrow_c_stream__"):
+        return pyarrow.record_batch(data)
+    return pyarrow.RecordBatchReader.from_stream(data).read_all()
 
 
-def _names(data: Any) -> list[str] | None:
-    """Names of the columns of a table; None of what is none."""
-    if hasattr(data, "variables"):
-        return [str(name) for name in data.variables]
-    if isinstance(data, Mapping):
-        return [str(name) for name in data]
-    for attribute in ("column_names", "columns"):
-        found = getattr(data, attribute, None)
-        if found is not None and hasattr(data, "__getitem__"):
-            return [str(name) for name in found]
-    return None
+def _values(column: Any) -> NDArray[Any]:
+    """A column as numbers, NaN where one is missing, or as objects where it holds others.
 
-
-def _values(column: Any) -> np.ndarray[Any, Any]:
-    """A column as numbers, or as objects where it holds anything else."""
-    values = np.asarray(column)
+    Times of day and durations are seconds, from the first and as they are.
+    """
+    values = np.asarray(take_apart(column)[0])
+    if values.dtype.kind == "M" and values.ndim == 1:
+        values = values - values[:1]
     if values.dtype.kind == "m":
         return np.asarray(values / np.timedelta64(1, "s"))
-    return values if values.dtype.kind in "fiub" else values.astype(object)
+    if values.dtype.kind in "fiub":
+        return values
+    objects = values.astype(object)
+    missing = [value is None or value != value for value in objects.ravel()]
+    if any(missing) and all(m or _is_number(v) for m, v in zip(missing, objects, strict=False)):
+        return np.array([np.nan if m else v for m, v in zip(missing, objects, strict=True)], float)
+    return objects
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, int | float | np.number) and not isinstance(value, bool)

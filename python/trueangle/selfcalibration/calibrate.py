@@ -2,22 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from os import PathLike
-from typing import Any, Final
-
-from numpy.typing import ArrayLike
+from collections.abc import Sequence
+from typing import Any, Final, Unpack
 
 from ..errors import ArgumentError, NoModelError
 from ..joint.shafts import MOST_ORDERS, counted_orders
-from ..runs.run import CalibrationRun
+from ..runs.source import OtherReading
 from ..support.angles import check_period
 from ..support.kinds import told_kinds
 from ..support.suggestions import check_choice
 from .dual import dual
 from .heads import heads
 from .loop import check_loop
-from .recording import Counts, Recording, as_recordings
+from .recording import Recording, as_recordings
 from .result import SelfCalibration
 from .shifts import shifts
 from .spindown import spin_down
@@ -26,12 +23,10 @@ __all__ = ["METHODS", "selfcal"]
 
 METHODS: Final = ("auto", "spin-down", "heads", "shifts", "dual")
 
-Log = str | PathLike[str] | Mapping[str, ArrayLike] | CalibrationRun
-
 
 @told_kinds
 def selfcal(
-    logs: Log | Sequence[Log],
+    logs: Any,
     *,
     method: str = "auto",
     orders: str | Sequence[float] = "auto",
@@ -41,11 +36,8 @@ def selfcal(
     fit_ratio: bool = False,
     ripple: str | Sequence[float] = "auto",
     head_angles: Sequence[float] | None = None,
-    counts_per_turn: float | None = None,
-    counts_per_turn_reference: float | None = None,
-    signals: Mapping[str, Any] | None = None,
-    topic: str | None = None,
-    period: float = 360.0,
+    period: float | None = None,
+    **reading: Unpack[OtherReading],
 ) -> SelfCalibration:
     r"""Calibrate a joint without a reference: from time stamps, heads, shifts or a motor.
 
@@ -54,8 +46,9 @@ def selfcal(
 
     Parameters
     ----------
-    logs : path, mapping of columns to arrays, CalibrationRun, or a sequence of them
-        Columns ``time_s``, ``indicated_deg`` (or ``_rad``, ``_turn``, ``_count``), ``run``,
+    logs : path, table, CalibrationRun, or iterable of them
+        Files, folders, patterns and tables in memory as `trueangle.read_runs` takes them, or
+        runs. Columns ``time_s``, ``indicated_deg`` (or ``_rad``, ``_turn``, ``_count``), ``run``,
         ``head1_deg`` ..., ``shift_deg``, ``motor_deg``, ``current_A``.
     method : {"auto", "spin-down", "heads", "shifts", "dual"}
         ``"auto"`` looks at the columns.
@@ -76,14 +69,11 @@ def selfcal(
         ``"none"``: the motion is known to be smooth.
     head_angles : sequence of float, optional
         Where the heads stand, in degrees, when their readings were set to one zero.
-    counts_per_turn, counts_per_turn_reference : float, optional
-        Of ``_count`` columns, of the reference's.
-    signals : mapping of role to column, optional
-        Columns with other names, as for `trueangle.read_runs`.
-    topic : str, optional
-        Of a ROS bag.
-    period : float
-        One turn in the unit of the model.
+    period : float, optional
+        One turn in the unit of the model (360), and of angles whose columns name none.
+    **reading
+        ``signals``, ``by``, ``counts_per_turn``, ``counts_per_turn_reference``, ``topic``, as in
+        `trueangle.read_runs`.
 
     Returns
     -------
@@ -117,32 +107,27 @@ def selfcal(
     >>> round(found.orders[1].amplitude)
     206
     """
-    check_period(period)
+    turn = 360.0 if period is None else check_period(period)
     check_loop(loop, loop_bandwidth)
     check_choice("method", method, METHODS)
     wanted = _orders(orders)
-    recordings = as_recordings(
-        logs,
-        counts=Counts(counts_per_turn, counts_per_turn_reference),
-        signals=signals,
-        topic=topic,
-    )
+    recordings = as_recordings(logs, {**reading, "period": period})
     chosen = _method(recordings) if method == "auto" else method
     if fit_ratio and chosen != "dual":
         raise ArgumentError(f"fit_ratio needs the motor's angle (method 'dual'), not {chosen!r}")
     if chosen == "heads":
-        return heads(recordings, wanted, angles=head_angles, period=period)
+        return heads(recordings, wanted, angles=head_angles, period=turn)
     if chosen == "shifts":
-        return shifts(recordings, wanted, period=period)
+        return shifts(recordings, wanted, period=turn)
     if chosen == "dual":
-        return dual(recordings, wanted, gear_ratio=gear_ratio, fit_ratio=fit_ratio, period=period)
+        return dual(recordings, wanted, gear_ratio=gear_ratio, fit_ratio=fit_ratio, period=turn)
     return spin_down(
         recordings,
         wanted,
         loop=loop,
         bandwidth=loop_bandwidth,
         ripple=_ripple(ripple),
-        period=period,
+        period=turn,
     )
 
 

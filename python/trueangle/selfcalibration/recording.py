@@ -2,21 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from os import PathLike
-from pathlib import Path
 from types import MappingProxyType
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from ..errors import ArgumentError, FileError
-from ..formats.columns import Column, find_columns, role_kind, signal_code, wanted_columns
-from ..runs.run import CalibrationRun, Source
+from ..formats.columns import Column, role_kind, signal_code
+from ..runs.readings import Readings
+from ..runs.run import CalibrationRun, Source, given_runs
+from ..runs.source import Reading, checked_reading, each_table
 
-__all__ = ["Counts", "Recording", "as_recordings"]
+__all__ = ["Recording", "as_recordings"]
 
 Array = NDArray[np.float64]
 
@@ -55,45 +55,23 @@ class Recording:
         return ", ".join(part for part in (self.file, run) if part) or "the log"
 
 
-class Counts(NamedTuple):
-    """Counts per turn of the readings and of a reference."""
+def as_recordings(logs: Any, reading: Mapping[str, Any]) -> list[Recording]:
+    """Recordings of files, folders, patterns, tables in memory, calibration runs.
 
-    reading: float | None = None
-    reference: float | None = None
-
-
-def as_recordings(
-    logs: Any,
-    *,
-    counts: Counts | None = None,
-    signals: Mapping[str, Any] | None = None,
-    topic: str | None = None,
-) -> list[Recording]:
-    """Recordings of files, calibration runs, or mappings of column names to arrays.
+    ``reading`` are keywords of `trueangle.read_runs`.
 
     Raises
     ------
     FileError, ArgumentError
         Files that cannot be read; columns in no known unit, of different lengths.
     """
-    if isinstance(logs, (str, PathLike, Mapping, CalibrationRun, Recording)):
-        logs = [logs]
-    if not isinstance(logs, Iterable):
-        raise ArgumentError(f"logs must be files or tables, got {type(logs).__name__}")
-    counts = counts or Counts()
-    found: list[Recording] = []
-    for log in logs:
-        if isinstance(log, Recording):
-            found.append(log)
-        elif isinstance(log, CalibrationRun):
-            found.append(_of_run(log))
-        elif isinstance(log, Mapping):
-            found += _of_mapping(log, counts)
-        else:
-            found += _of_file(Path(log), counts, signals, topic)
-    if not found:
-        raise ArgumentError("logs is empty: at least one log is needed")
-    return found
+    asked = checked_reading(reading)
+    logs = list(logs) if isinstance(logs, Iterator) else logs
+    runs = given_runs(logs)
+    if runs is not None:
+        return [_of_run(run) for run in runs]
+    parts = each_table(logs, lambda table: _of_table(table, asked), asked, "logs")
+    return [recording for part in parts for recording in part]
 
 
 def _of_run(run: CalibrationRun) -> Recording:
@@ -118,76 +96,51 @@ def _of_run(run: CalibrationRun) -> Recording:
     )
 
 
-def _of_mapping(table: Mapping[str, ArrayLike], counts: Counts) -> list[Recording]:
-    columns = {str(name): np.asarray(values) for name, values in table.items()}
-    shapes = {values.shape for values in columns.values()}
-    if len(shapes) != 1 or any(len(shape) != 1 for shape in shapes):
-        sizes = {name: values.shape for name, values in columns.items()}
-        raise ArgumentError(f"columns must be vectors of one length, got {sizes}")
-    roles = find_columns("the table", list(columns), wanted_columns(None))
-    channels = {}
-    for role, column in roles.items():
-        if role not in _LABELS:
-            raw = np.asarray(columns[column.name], dtype=np.float64)
-            channels[role] = _in_radians(column, raw, counts, "")
-    labels = [columns[roles[role].name] for role in _LABELS if role in roles]
-    return _split(channels, labels, "", None)
-
-
-def _of_file(
-    path: Path, counts: Counts, signals: Mapping[str, Any] | None, topic: str | None
-) -> list[Recording]:
-    from ..runs.files import read_readings
-
-    table = read_readings(path, signals, topic)
+def _of_table(table: Readings, reading: Reading) -> list[Recording]:
     channels = {
         role: _in_radians(
             column._replace(unit=column.unit or table.format.unit)
             if role_kind(role) == "angle"
             else column,
-            table.raw(column),
-            counts,
-            str(path),
+            table,
+            reading,
         )
         for role, column in table.roles.items()
         if role not in _LABELS
     }
     if not any(role in channels for role in ("indicated", "motor", "head1")):
         raise FileError(
-            path,
+            table.path,
             "no column indicated_deg (or _rad, _turn, _count), head1_deg or motor_deg; its "
             f"columns are {', '.join(list(table.columns)[:12])}",
             line=1,
         )
     labels = [table.columns[table.roles[role].name] for role in _LABELS if role in table.roles]
-    return _split(channels, labels, str(path), table.source)
+    return _split(channels, labels, str(table.path), table.source)
 
 
-def _in_radians(column: Column, raw: Array, counts: Counts, file: str) -> Array:
+def _in_radians(column: Column, table: Readings, reading: Reading) -> Array:
     """A channel in radians, seconds or the unit of its only column."""
-    turn = counts.reference if column.role == "reference" else counts.reading
-    message = ""
+    beside = "_reference" if column.role == "reference" else ""
+    turn = reading["counts_per_turn_reference" if beside else "counts_per_turn"]
     if role_kind(column.role) == "angle" and column.unit is None:
-        message = f"its unit is not known; give it: {signal_code(column.role, column.name, 'deg')}"
-    elif column.unit == "count" and turn is None:
-        beside = "_reference" if column.role == "reference" else ""
+        code = signal_code(column.role, column.name, "deg")
+        raise table.error(f"its unit is not known; give it: {code}", column.name)
+    if column.unit == "count" and turn is None:
         message = f"counts need their number per turn: give `counts_per_turn{beside}=`"
-    if message:
-        if file:
-            raise FileError(file, message, line=1, column=column.name)
-        raise ArgumentError(f"column {column.name!r}: {message}")
-    return column.values(raw, 2.0 * np.pi, turn)
+        raise table.error(message, column.name)
+    return column.values(table.raw(column), 2.0 * np.pi, turn)
 
 
 def _split(
     channels: Mapping[str, Array],
     labels: Sequence[NDArray[Any]],
     file: str,
-    source: Source | None,
+    source: Source,
 ) -> list[Recording]:
     """One recording per unit and run, in the order of their first row, without empty rows."""
     if not channels:
-        raise ArgumentError(f"{file or 'the table'} holds no column that is known")
+        raise ArgumentError(f"{file} holds no column that is known")
     used = {name: values for name, values in channels.items() if name in _CHANNELS or _head(name)}
     size = next(iter(channels.values())).size
     present = np.ones(size, dtype=bool)

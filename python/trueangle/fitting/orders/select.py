@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Final, Literal
+from typing import TYPE_CHECKING, Any, Final, Literal, Unpack
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +12,9 @@ from numpy.typing import NDArray
 from ...errors import ArgumentError
 from ...joint.shafts import counted_orders
 from ...runs.aliasing import distinct_positions
-from ...runs.run import CalibrationRun, as_runs
+from ...runs.files import runs_of
+from ...runs.run import CalibrationRun
+from ...runs.source import Reading
 from ...runs.travel import held_orders, over_turns
 from ...support.blas import one_blas_thread
 from ...support.kinds import told_kinds
@@ -34,7 +36,7 @@ Method = Literal["evidence", "paper"]
 
 @told_kinds
 def select_orders(
-    runs: CalibrationRun | Iterable[CalibrationRun],
+    runs: Any,
     candidates: Iterable[float] | None = None,
     gear_ratio: float | None = None,
     fixed_member: str = "circular_spline",
@@ -46,6 +48,7 @@ def select_orders(
     nuisance: str | Iterable[str] = "none",
     reference_orders: Iterable[float] = (),
     tolerance: float | None = None,
+    **reading: Unpack[Reading],
 ) -> OrderSelection:
     r"""Orders of the angle error that the readings support.
 
@@ -62,8 +65,9 @@ def select_orders(
 
     Parameters
     ----------
-    runs : CalibrationRun or iterable of them
-        Each with its own zero. Readings of weight 0 take no part.
+    runs : CalibrationRun, path, table, or iterable of them
+        Each run with its own zero; readings of weight 0 take no part. Files, folders, patterns
+        and tables in memory as `trueangle.read_runs` takes them.
     candidates : iterable of float, optional
         Orders to look at. By default 1 .. 17 and the gear's own orders when
         ``gear_ratio`` is given, else 1 .. 100, as far as the positions can tell them; and
@@ -93,6 +97,8 @@ def select_orders(
         phases are new in every run (the reference was mounted anew) they are taken out first.
     tolerance : float, optional
         Positions closer than this are one, default 0.01 degree; unit of the runs.
+    **reading
+        ``signals``, ``period``, ``by`` ... of files and tables, as in `trueangle.read_runs`.
 
     Returns
     -------
@@ -121,7 +127,7 @@ def select_orders(
     (3,)
     """
     return selected_of(
-        as_runs(runs),
+        runs_of(runs, reading),
         candidates,
         gear_ratio,
         fixed_member,

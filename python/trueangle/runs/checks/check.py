@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
-from os import PathLike
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterator, Mapping
+from typing import TYPE_CHECKING, Any, Unpack
 
 from ...errors import ArgumentError
 from ...support.kinds import told_kinds
-from ..run import CalibrationRun
+from ..run import given_runs
+from ..source import Reading
 from .angles import mixed_units, ratio_of, suggestion, swapped, wrapped, wrong_ratio
 from .fault import DataFault
 from .record import Record, records_of
@@ -38,25 +38,14 @@ UNSURE = ("mixed_units", "wrapped_reference", "unsorted_time")
 
 
 @told_kinds
-def check(
-    data: str
-    | PathLike[str]
-    | CalibrationRun
-    | Iterable[str | PathLike[str]]
-    | Iterable[CalibrationRun],
-    *,
-    counts_per_turn: float | None = None,
-    counts_per_turn_reference: float | None = None,
-    signals: Mapping[str, Any] | None = None,
-    topic: str | None = None,
-) -> Check:
+def check(data: Any, **reading: Unpack[Reading]) -> Check:
     """Say whether data are fit to be used before anything is fitted.
 
     Parameters
     ----------
-    data : path, run, or iterable of either
-        Files as `trueangle.read_runs` takes them, which may be faulty, or runs.
-    counts_per_turn, counts_per_turn_reference, signals, topic
+    data : path, table, CalibrationRun, or iterable of them
+        Files and tables as `trueangle.read_runs` takes them, which may be faulty, or runs.
+    **reading
         As in `trueangle.read_runs`.
 
     Returns
@@ -80,16 +69,10 @@ def check(
     >>> [fault.fault for fault in check(run).data_faults]
     ['wrong_sign']
     """
-    given = {
-        "counts_per_turn": counts_per_turn,
-        "counts_per_turn_reference": counts_per_turn_reference,
-        "signals": signals,
-        "topic": topic,
-    }
     from .extent import extent_of, verdicts
     from .result import Check
 
-    records = _records(data, given)
+    records = _records(data, reading)
     if not records:
         raise ArgumentError("no data: give at least one file or run")
     extent = extent_of(records)
@@ -116,16 +99,11 @@ def faults_of(records: list[Record]) -> list[DataFault]:
     return found
 
 
-def _records(data: object, given: Mapping[str, Any]) -> list[Record]:
+def _records(data: Any, reading: Mapping[str, Any]) -> list[Record]:
+    data = list(data) if isinstance(data, Iterator) else data
+    runs = given_runs(data)
+    if runs is not None:
+        return records_of(runs)
     from .files import read_records
 
-    if isinstance(data, CalibrationRun):
-        return records_of([data])
-    if isinstance(data, (str, PathLike)):
-        return read_records([data], **given)
-    if not isinstance(data, Iterable):
-        raise ArgumentError(f"data must be files or runs, got {type(data).__name__}")
-    entries = list(data)
-    if all(isinstance(entry, CalibrationRun) for entry in entries):
-        return records_of(entries)
-    return read_records(entries, **given)
+    return read_records(data, reading)

@@ -1,20 +1,19 @@
-"""Records of files, read without the trust that runs deserve."""
+"""Records of files and tables, read without the trust that runs deserve."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from os import PathLike
-from pathlib import Path
+from collections.abc import Mapping
 from typing import Any
 
 from ..files import read_columns
+from ..source import checked_reading
 from .record import Record
 
 __all__ = ["read_records"]
 
 
-def read_records(paths: Iterable[str | PathLike[str]], **given: Any) -> list[Record]:
-    """One record per run and file; time may run backwards. ``given`` as in `read_columns`.
+def read_records(data: Any, reading: Mapping[str, Any]) -> list[Record]:
+    """One record per run of every file or table; time may run backwards.
 
     Raises
     ------
@@ -22,8 +21,7 @@ def read_records(paths: Iterable[str | PathLike[str]], **given: Any) -> list[Rec
         No table of runs: a missing column, text where a number belongs.
     """
     found: list[Record] = []
-    for path in paths:
-        table = read_columns(Path(path), **given)
+    for table in read_columns(data, checked_reading(reading)):
         scale = 360.0 / table.period
         columns = {role: (c.name, c.unit) for role, c in table.table.roles.items()}
         for _, label, rows in table.groups:

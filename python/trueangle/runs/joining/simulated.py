@@ -14,8 +14,8 @@ from ...errors import ArgumentError
 from ...formats.signals import FIELDS
 from ...support.angles import ARCSEC_PER_TURN
 from ...support.plainresult import Shown
-from ..run import CalibrationRun, as_runs
-from ..tables import runs_of
+from ..files import runs_of
+from ..run import CalibrationRun
 from .clocks import estimated_clocks
 from .stream import Stream
 from .travel import Travelled
@@ -114,7 +114,7 @@ def minus_simulated(
     ----------
     runs : CalibrationRun or iterable of CalibrationRun
     simulated : path, table or iterable of CalibrationRun
-        The log, as `trueangle.runs.tables.runs_of` takes it: ``reference`` is the simulator's
+        The log, as `trueangle.runs.files.runs_of` takes it: ``reference`` is the simulator's
         true output angle, ``indicated`` what the simulated encoder (or command) says. One run
         for all measured runs, or runs of the same labels.
     by : {"time", "angle"}, optional
@@ -151,8 +151,8 @@ def minus_simulated(
     """
     if by is not None and by not in BY:
         raise ArgumentError(f"by must be {' or '.join(BY)}, got {by!r}")
-    measured = as_runs(runs)
-    logs = runs_of(simulated, name="simulated", **reading)
+    measured = runs_of(runs, {})
+    logs = runs_of(simulated, reading, "simulated")
     source = logs[0].source.file if logs and logs[0].source else "simulated runs"
     found, kept = [], []
     for run, log in zip(measured, _counterparts(measured, logs, source), strict=True):

@@ -1,0 +1,165 @@
+"""What holds readings: files, folders, patterns, tables in memory; one door for all of them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import replace
+from os import PathLike
+from typing import Any, TypedDict, TypeVar
+
+from ..errors import ArgumentError, KindError
+from ..formats.columns import Column, wanted_columns
+from ..support.angles import check_period, unit_name
+from ..support.suggestions import did_you_mean
+from .paths import find_logs
+from .readings import Readings, named, readings_of
+from .tables import table_readings
+
+__all__ = ["OtherReading", "Reading", "checked_reading", "each_table"]
+
+T = TypeVar("T")
+
+
+class OtherReading(TypedDict, total=False):
+    """How columns are read, but for the unit of those that name none.
+
+    Attributes
+    ----------
+    signals
+        Columns with other names: ``{"torque": "tau", "reference": ("pos act", "rad")}``.
+    by
+        Column whose values tell the runs apart, in place of ``run``.
+    counts_per_turn, counts_per_turn_reference
+        Counts in one turn of the output, of an indicated angle or reference in counts.
+    topic
+        JointState topic of a ROS bag (default: the only one).
+    """
+
+    signals: Mapping[str, Any] | None
+    by: str | None
+    counts_per_turn: float | None
+    counts_per_turn_reference: float | None
+    topic: str | None
+
+
+class Reading(OtherReading, total=False):
+    """Keyword arguments of all that takes files or tables of readings.
+
+    Attributes
+    ----------
+    period
+        One turn in the unit of angles whose columns do not name one: 360.0, ``2*pi``, 1.0, or
+        counts. With it columns may be called just ``reference`` and ``indicated``.
+    """
+
+    period: float | None
+
+
+def checked_reading(given: Mapping[str, Any]) -> Reading:
+    """Keywords of reading, whole and checked; a ``period`` in counts is the counts of a turn.
+
+    Raises
+    ------
+    TypeError
+        A keyword of another name.
+    ArgumentError
+        A value that it cannot have.
+    """
+    for name in given:
+        if name not in Reading.__annotations__:
+            raise TypeError(
+                f"got an unexpected keyword argument {name!r}"
+                f"{did_you_mean(name, Reading.__annotations__)}"
+            )
+    signals, by = given.get("signals"), given.get("by")
+    if signals is not None and not isinstance(signals, Mapping):
+        raise KindError(f"signals must be a mapping of roles to columns, got {signals!r:.60}")
+    if by is not None and not isinstance(by, str):
+        raise KindError(f"by must be the name of a column, got {by!r:.60}")
+    if by is not None and "run" in (signals or {}):
+        raise ArgumentError("by= and signals={'run': ...} both name the column of runs; give one")
+    found = Reading(
+        signals={**(signals or {}), **({} if by is None else {"run": by})},
+        period=given.get("period"),
+        by=None,
+        counts_per_turn=given.get("counts_per_turn"),
+        counts_per_turn_reference=given.get("counts_per_turn_reference"),
+        topic=given.get("topic"),
+    )
+    if found["period"] is not None:
+        check_period(found["period"])
+        if unit_name(found["period"]) == "count":
+            if found["counts_per_turn"] is None:
+                found["counts_per_turn"] = found["period"]
+            if found["counts_per_turn_reference"] is None:
+                found["counts_per_turn_reference"] = found["period"]
+    return found
+
+
+def each_table(
+    data: Any, read: Callable[[Readings], T], reading: Reading, name: str = "runs"
+) -> list[T]:
+    """What ``read`` makes of every table: one of each file, one of each table in memory.
+
+    Parameters
+    ----------
+    data : path, table, or iterable of them
+        Paths of files, folders and patterns (``"log*.csv"``); tables as
+        `tables.table_readings` takes them.
+    read : callable
+    reading : Reading
+        As `checked_reading` gives it.
+    name : str
+        What messages call the data.
+
+    Raises
+    ------
+    ArgumentError, KindError
+        Neither a path nor a table; no data.
+    FileError
+        A file cannot be read.
+    """
+    wanted = wanted_columns(reading["signals"])
+    period, topic = reading["period"], reading["topic"]
+    if isinstance(data, str | PathLike):
+        return [
+            named(path, lambda file: read(_with_unit(readings_of(file, wanted, topic), period)))
+            for path, _ in find_logs([data], whole=False)
+        ]
+    table = table_readings(data, name, wanted)
+    if table is not None:
+        return [read(_with_unit(table, period))]
+    if not isinstance(data, Iterable) or not getattr(data, "ndim", True):
+        raise KindError(
+            f"{name} must be paths, runs, or tables (a mapping of names to arrays; pandas, polars, "
+            f"pyarrow, DuckDB, xarray), got {data!r:.60} ({type(data).__name__})"
+        )
+    entries = list(data)
+    if not entries:
+        raise ArgumentError(f"{name} is empty: at least one file, table or run is needed")
+    found: list[T] = []
+    for i, entry in enumerate(entries):
+        if isinstance(entry, Iterable) and not isinstance(entry, list | tuple | bytes):
+            found += each_table(entry, read, reading, f"{name}[{i}]")
+        elif isinstance(entry, PathLike):
+            found += each_table(entry, read, reading)
+        else:
+            raise KindError(
+                f"{name}[{i}] must be a path, a run or a table, got {entry!r:.60} "
+                f"({type(entry).__name__})"
+            )
+    return found
+
+
+def _with_unit(table: Readings, period: float | None) -> Readings:
+    """Angles without a unit of their own are in that of ``period``."""
+    if period is None:
+        return table
+    unit = unit_name(period)
+    bare: dict[str, Column] = {
+        role: Column(role, role, unit, True)
+        for role in ("reference", "indicated")
+        if role not in table.roles and role in table.columns
+    }
+    kind = replace(table.format, unit=unit)
+    return table._replace(roles={**table.roles, **bare}, format=kind)
