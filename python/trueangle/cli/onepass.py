@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
 from typing import Any, Final
 
 from ..errors import ArgumentError
@@ -62,11 +61,12 @@ def wants_one_pass(args: argparse.Namespace) -> bool:
 
 
 def _is_large(args: argparse.Namespace) -> bool:
-    paths = [Path(path) for path in args.runs]
+    from ..runs.paths import find_logs, matched
+
+    paths = matched(args.runs)
     if not all(path.is_file() or path.is_dir() for path in paths):
         return False  # a pipe is read once
     from ..logs.sources import hold_at_most
-    from ..runs.paths import find_logs
 
     found = [path for path, _ in find_logs(paths)]
     return not hold_at_most(found, _READINGS, args.topic)

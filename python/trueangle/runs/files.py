@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from typing import Any, NamedTuple, TypeAlias, Unpack
 
 import numpy as np
@@ -88,7 +88,9 @@ def read_runs(path: Any, **reading: Unpack[Reading]) -> list[CalibrationRun]:
     return _read(path, checked_reading(reading), "path")
 
 
-def runs_of(data: Any, reading: Mapping[str, Any], name: str = "runs") -> list[CalibrationRun]:
+def runs_of(
+    data: Any, reading: Mapping[str, Any], name: str = "runs", table: str = "table"
+) -> list[CalibrationRun]:
     """Runs as they are, those of what `read_runs` reads, or of a list of both.
 
     Parameters
@@ -96,27 +98,26 @@ def runs_of(data: Any, reading: Mapping[str, Any], name: str = "runs") -> list[C
     data : CalibrationRun, path, table, or iterable of them
     reading : mapping
         Keywords of `read_runs`; runs do not need them.
-    name : str
-        What messages call the data.
+    name, table : str
+        What messages call the data, and a table in memory in place of a file.
 
     Raises
     ------
     ArgumentError
         None of these; no run at all; runs in different units.
     FileError
-        As `read_runs`; ``name`` stands in place of a table's file.
+        As `read_runs`.
     """
     asked = checked_reading(reading)
-    data = list(data) if isinstance(data, Iterator) else data
-    runs = given_runs(data)
+    runs, data = given_runs(data)
     if runs is not None:
         return as_runs(runs)
-    return _read(data, asked, name)
+    return _read(data, asked, name, table)
 
 
-def _read(data: Any, reading: Reading, name: str) -> list[CalibrationRun]:
-    indicated, reference = _counts(reading)
-    found = each_table(data, lambda t: runs_of_readings(t, indicated, reference), reading, name)
+def _read(data: Any, reading: Reading, name: str, table: str = "table") -> list[CalibrationRun]:
+    counts = _counts(reading)
+    found = each_table(data, lambda t: runs_of_readings(t, *counts), reading, name, table)
     runs = [run for part in found for run in part]
     units = {run.period: run for run in runs}
     if len(units) > 1:
@@ -156,8 +157,8 @@ class RunColumns(NamedTuple):
 
 def read_columns(data: Any, reading: Reading, name: str = "data") -> list[RunColumns]:
     """The columns of every file or table, grouped by run; time may run backwards."""
-    indicated, reference = _counts(reading)
-    return each_table(data, lambda table: _columns(table, indicated, reference), reading, name)
+    counts = _counts(reading)
+    return each_table(data, lambda table: _columns(table, *counts), reading, name)
 
 
 def _columns(table: Readings, counts: float | None, reference_counts: float | None) -> RunColumns:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, fields
 from types import MappingProxyType
 from typing import Any, NamedTuple
@@ -250,19 +250,21 @@ def as_runs(runs: CalibrationRun | Iterable[CalibrationRun]) -> list[Calibration
     return found
 
 
-def given_runs(data: Any) -> list[CalibrationRun] | None:
-    """The list where ``data`` is a run or a list that holds one; None of anything else."""
+def given_runs(data: Any) -> tuple[list[CalibrationRun] | None, Any]:
+    """The list where ``data`` is a run or runs, else None; and the data, iterators as lists."""
     if isinstance(data, CalibrationRun):
-        return [data]
+        return [data], data
+    if isinstance(data, Iterator) and not hasattr(data, "__arrow_c_stream__"):
+        data = list(data)
     if not isinstance(data, list | tuple) or not any(isinstance(r, CalibrationRun) for r in data):
-        return None
+        return None, data
     for i, run in enumerate(data):
         if not isinstance(run, CalibrationRun):
             raise KindError(
                 f"runs[{i}] must be a CalibrationRun as the others, got {type(run).__name__}; "
                 "read files with trueangle.read_runs"
             )
-    return list(data)
+    return list(data), data
 
 
 def _rebuild(values: dict[str, Any]) -> CalibrationRun:

@@ -97,7 +97,11 @@ def checked_reading(given: Mapping[str, Any]) -> Reading:
 
 
 def each_table(
-    data: Any, read: Callable[[Readings], T], reading: Reading, name: str = "runs"
+    data: Any,
+    read: Callable[[Readings], T],
+    reading: Reading,
+    name: str = "runs",
+    table: str = "table",
 ) -> list[T]:
     """What ``read`` makes of every table: one of each file, one of each table in memory.
 
@@ -109,8 +113,8 @@ def each_table(
     read : callable
     reading : Reading
         As `checked_reading` gives it.
-    name : str
-        What messages call the data.
+    name, table : str
+        What messages call the data, and a table in memory in place of a file.
 
     Raises
     ------
@@ -121,33 +125,35 @@ def each_table(
     """
     wanted = wanted_columns(reading["signals"])
     period, topic = reading["period"], reading["topic"]
-    if isinstance(data, str | PathLike):
-        return [
-            named(path, lambda file: read(_with_unit(readings_of(file, wanted, topic), period)))
-            for path, _ in find_logs([data], whole=False)
-        ]
-    table = table_readings(data, name, wanted)
-    if table is not None:
-        return [read(_with_unit(table, period))]
+
+    def of_one(entry: Any, called: str) -> list[T] | None:
+        if isinstance(entry, str | PathLike):
+            return [
+                named(path, lambda file: read(_with_unit(readings_of(file, wanted, topic), period)))
+                for path, _ in find_logs([entry], whole=False)
+            ]
+        held = table_readings(entry, called, wanted)
+        return None if held is None else [read(_with_unit(held, period))]
+
+    found = of_one(data, table)
+    if found is not None:
+        return found
     if not isinstance(data, Iterable) or not getattr(data, "ndim", True):
         raise KindError(
             f"{name} must be paths, runs, or tables (a mapping of names to arrays; pandas, polars, "
             f"pyarrow, DuckDB, xarray), got {data!r:.60} ({type(data).__name__})"
         )
-    entries = list(data)
-    if not entries:
-        raise ArgumentError(f"{name} is empty: at least one file, table or run is needed")
-    found: list[T] = []
-    for i, entry in enumerate(entries):
-        if isinstance(entry, Iterable) and not isinstance(entry, list | tuple | bytes):
-            found += each_table(entry, read, reading, f"{name}[{i}]")
-        elif isinstance(entry, PathLike):
-            found += each_table(entry, read, reading)
-        else:
+    found = []
+    for i, entry in enumerate(data):
+        of_entry = of_one(entry, f"{table}[{i}]")
+        if of_entry is None:
             raise KindError(
                 f"{name}[{i}] must be a path, a run or a table, got {entry!r:.60} "
                 f"({type(entry).__name__})"
             )
+        found += of_entry
+    if not found:
+        raise ArgumentError(f"{name} is empty: at least one file, table or run is needed")
     return found
 
 

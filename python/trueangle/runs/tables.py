@@ -120,10 +120,19 @@ def _values(column: Any) -> NDArray[Any]:
     if values.dtype.kind in "fiub":
         return values
     objects = values.astype(object)
-    missing = [value is None or value != value for value in objects.ravel()]
+    missing = [_is_missing(value) for value in objects.ravel()]
     if any(missing) and all(m or _is_number(v) for m, v in zip(missing, objects, strict=False)):
         return np.array([np.nan if m else v for m, v in zip(missing, objects, strict=True)], float)
     return objects
+
+
+def _is_missing(value: Any) -> bool:
+    """None, NaN, and what pandas has in place of them."""
+    return (
+        value is None
+        or (isinstance(value, float) and value != value)
+        or type(value).__name__ in ("NAType", "NaTType")
+    )
 
 
 def _is_number(value: Any) -> bool:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import Any
@@ -66,8 +66,7 @@ def as_recordings(logs: Any, reading: Mapping[str, Any]) -> list[Recording]:
         Files that cannot be read; columns in no known unit, of different lengths.
     """
     asked = checked_reading(reading)
-    logs = list(logs) if isinstance(logs, Iterator) else logs
-    runs = given_runs(logs)
+    runs, logs = given_runs(logs)
     if runs is not None:
         return [_of_run(run) for run in runs]
     parts = each_table(logs, lambda table: _of_table(table, asked), asked, "logs")

@@ -98,6 +98,9 @@ def doors(joint, folder, seed):
         shutil.copy(columns / f"{i}.parquet", nested / "below" / f"{i}.parquet")
     files = [str(path) for path in sorted(split.iterdir())]
     return {
+        "pattern": [str(split / "*.csv")],
+        "pattern of folders": [str(folder / "nest[a-f]d" / "**" / "?.parquet")],
+        "pattern, one pass": [str(columns / "*.parquet"), "--one-pass"],
         "file": [str(whole / "all.csv")],
         "files": files,
         "folder of one": [str(whole)],
@@ -223,3 +226,164 @@ def test_what_one_pass_does_not_keep_is_refused_in_words(tmp_path, few_kept):
     assert (
         found.to_dict().keys() == ta.fit(ta.read_runs(tmp_path / "a.parquet"), [1]).to_dict().keys()
     )
+
+
+def frames(table):
+    """The table as every library holds one, by the name of the library."""
+    import dask.dataframe as dd
+    import duckdb
+    import pandas as pd
+    import polars as pl
+    import xarray as xr
+
+    arrow = pa.table(table)
+    pandas = pd.DataFrame(table)
+    records = np.rec.fromarrays(list(table.values()), names=list(table))
+    return {
+        "dict": table,
+        "records": records,
+        "pandas": pandas,
+        "pandas of Arrow": pandas.convert_dtypes(dtype_backend="pyarrow"),
+        "polars": pl.DataFrame(table),
+        "lazy polars": pl.DataFrame(table).lazy(),
+        "Arrow": arrow,
+        "Arrow batches": arrow.to_reader(max_chunksize=999),
+        "DuckDB": duckdb.from_arrow(arrow),
+        "xarray": xr.Dataset({name: ("row", values) for name, values in table.items()}),
+        "dask": dd.from_pandas(pandas, npartitions=3, sort=False),
+        "list of one": [table],
+    }
+
+
+def without(plain, *names):
+    """A plain result without what names its files, tells the time or was written."""
+    if isinstance(plain, dict):
+        return {k: without(v, *names) for k, v in plain.items() if k not in names}
+    if isinstance(plain, list):
+        return [without(value, *names) for value in plain]
+    return plain
+
+
+#: Every verb that takes readings, and its answer as plain values.
+VERBS = {
+    "fit": lambda data, **o: without(ta.fit(data, [1, 2], **o).to_dict(), "files", "inputs"),
+    "orders": lambda data, **o: ta.select_orders(data, range(1, 9), **o).to_dict(),
+    "check": lambda data, **o: ta.check(data, **o).to_dict(),
+    "read_runs": lambda data, **o: [
+        (run.label, run.period, run.reference.tolist(), run.indicated.tolist(), run.time.tolist())
+        for run in ta.read_runs(data, **o)
+    ],
+    "diagnose": lambda data, **o: without(
+        ta.diagnose(data, ta.Simulation(), gain=False, **o).to_dict(), "seconds", "extended"
+    ),
+    "report": lambda data, **o: without(
+        ta.report(data, orders=[1, 2], **o).content, "provenance", "title"
+    ),
+    "selfcal": lambda data, **o: without(
+        ta.selfcal(data, orders=[1, 2], method="spin-down", **o).to_dict(), "source", "sources"
+    ),
+}
+
+
+def few_readings(seed):
+    """Columns of two short runs that turn evenly."""
+    rng = np.random.default_rng(seed)
+    print(f"seed {seed}")
+    time = np.tile(np.arange(400) * 0.01, 2)
+    turned = np.tile(np.arange(400) * 2.9, 2) + np.repeat([0.0, 1.4], 400)
+    error = 0.05 * np.sin(np.radians(turned) + 0.3) + 0.02 * np.cos(2.0 * np.radians(turned))
+    return {
+        "run": np.repeat(["a", "b"], 400),
+        "time_s": time,
+        "reference_deg": turned,
+        "indicated_deg": turned + error + rng.normal(0.0, 1e-3, turned.size),
+    }
+
+
+def written(table, path):
+    rows = (
+        ",".join(map(str, row)) for row in zip(*(v.tolist() for v in table.values()), strict=True)
+    )
+    path.write_text("\n".join([",".join(table), *rows]))
+    return path
+
+
+@pytest.mark.parametrize("verb", VERBS)
+def test_every_table_in_memory_gives_the_answer_of_its_file(verb, tmp_path):
+    table = few_readings(41)
+    wanted = VERBS[verb](written(table, tmp_path / "a.csv"))
+    cheap = ("fit", "check", "read_runs")
+    few = ("lazy polars", "DuckDB", "xarray")  # of those verbs that take long
+    for library, data in frames(table).items():
+        if verb in cheap or library in few:
+            assert VERBS[verb](data) == wanted, library
+    for data in (tmp_path, str(tmp_path / "*.csv"), [tmp_path / "a.csv"]):
+        if verb in cheap or data == tmp_path:
+            assert VERBS[verb](data) == wanted, data
+
+
+@pytest.mark.parametrize("verb", VERBS)
+def test_every_verb_reads_columns_by_the_same_keywords(verb):
+    table = few_readings(42)
+    wanted = VERBS[verb](table)
+    names = {"run": "series", "time_s": "t", "reference_deg": "ref", "indicated_deg": "enc"}
+    other = {names[name]: values for name, values in table.items()}
+    signals = {"time": "t", "reference": ("ref", "deg"), "indicated": "enc"}
+    given = {"by": "series", "signals": signals, "period": 360.0}
+    assert without(VERBS[verb](other, **given), "columns") == without(wanted, "columns")
+    with pytest.raises(TypeError, match=r"'signal'.*did you mean signals"):
+        VERBS[verb](other, signal=signals)
+
+
+@pytest.mark.parametrize("period", [360.0, 2.0 * math.pi, 1.0, 65536.0])
+def test_a_period_is_the_unit_of_columns_that_name_none(period):
+    table = few_readings(43)
+    scale = period / 360.0
+    bare = {
+        name.removesuffix("_deg"): values * scale if name.endswith("_deg") else values
+        for name, values in table.items()
+    }
+    found, wanted = ta.read_runs(bare, period=period), ta.read_runs(table)
+    for kind in ("reference", "indicated"):
+        mine, theirs = (getattr(runs[0], kind) / runs[0].period for runs in (found, wanted))
+        np.testing.assert_allclose(mine, theirs, rtol=1e-14, atol=1e-14)
+
+
+def test_empty_cells_of_a_table_are_left_out_as_those_of_its_file(tmp_path):
+    import pandas as pd
+
+    table = few_readings(44)
+    frame = pd.DataFrame(table).convert_dtypes(dtype_backend="pyarrow")
+    frame.loc[7, "indicated_deg"] = None
+    frame.to_csv(tmp_path / "a.csv", index=False)
+    for data in (frame, tmp_path / "a.csv", frame.astype({"indicated_deg": object})):
+        with pytest.warns(ta.errors.EmptyCellsWarning, match="1 of 800 rows"):
+            runs = ta.read_runs(data)
+        assert [run.left_out for run in runs] == [1, 0]
+
+
+@pytest.mark.parametrize(
+    ("data", "says"),
+    [
+        (5, "runs must be paths, runs, or tables .* got 5"),
+        ([], "runs is empty"),
+        (
+            [{"reference_deg": [1.0], "indicated_deg": [1.0]}, 5],
+            r"runs\[1\] must be a path, a run or a table, got 5",
+        ),
+        ({"reference_deg": [1.0]}, "no column indicated_deg"),
+        ({1: [2.0]}, "columns must have text for names"),
+        ({"reference_deg": [1.0, 2.0], "indicated_deg": [1.0]}, "equally long"),
+        ("nothing*.csv", "no file matches this pattern"),
+    ],
+)
+def test_what_holds_no_readings_is_refused_in_words(data, says, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(ta.TrueAngleError, match=says):
+        ta.fit(data, [1])
+
+
+def test_an_unquoted_name_with_brackets_is_a_file(tmp_path):
+    path = written(few_readings(45), tmp_path / "run[1].csv")
+    assert len(ta.read_runs(path)) == 2
+    assert main(["check", str(path)]) == 0

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, Unpack
 
 from ...errors import ArgumentError
@@ -100,8 +100,7 @@ def faults_of(records: list[Record]) -> list[DataFault]:
 
 
 def _records(data: Any, reading: Mapping[str, Any]) -> list[Record]:
-    data = list(data) if isinstance(data, Iterator) else data
-    runs = given_runs(data)
+    runs, data = given_runs(data)
     if runs is not None:
         return records_of(runs)
     from .files import read_records

@@ -152,7 +152,7 @@ def minus_simulated(
     if by is not None and by not in BY:
         raise ArgumentError(f"by must be {' or '.join(BY)}, got {by!r}")
     measured = runs_of(runs, {})
-    logs = runs_of(simulated, reading, "simulated")
+    logs = runs_of(simulated, reading, "simulated", "simulated")
     source = logs[0].source.file if logs and logs[0].source else "simulated runs"
     found, kept = [], []
     for run, log in zip(measured, _counterparts(measured, logs, source), strict=True):
