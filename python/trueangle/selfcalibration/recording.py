@@ -115,7 +115,8 @@ def _of_table(table: Readings, reading: Reading) -> list[Recording]:
             line=1,
         )
     labels = [table.columns[table.roles[role].name] for role in _LABELS if role in table.roles]
-    return _split(channels, labels, str(table.path), table.source)
+    file = str(table.path) if table.format.module_name else ""  # none of a table in memory
+    return _split(channels, labels, file, table.source)
 
 
 def _in_radians(column: Column, table: Readings, reading: Reading) -> Array:
@@ -139,7 +140,7 @@ def _split(
 ) -> list[Recording]:
     """One recording per unit and run, in the order of their first row, without empty rows."""
     if not channels:
-        raise ArgumentError(f"{file} holds no column that is known")
+        raise ArgumentError(f"{file or 'the table'} holds no column that is known")
     used = {name: values for name, values in channels.items() if name in _CHANNELS or _head(name)}
     size = next(iter(channels.values())).size
     present = np.ones(size, dtype=bool)
