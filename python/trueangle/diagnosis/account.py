@@ -15,6 +15,7 @@ from ..joint.signals import Signals
 from ..simulation.simulation import Simulation
 from ..support.deadline import pace
 from .believed import corrected_effects
+from .commonform import in_common_form
 from .gearedlines import GearedLines, Ratio
 from .gearratio import aligned, find_ratio, near_ratio
 from .identifiability import blind_spots
@@ -176,6 +177,7 @@ def _chosen(seen: Seen, sim: Simulation) -> CauseSelection:
         chosen = select(start, chosen.terms)
     if not all(map(is_named, chosen.terms)) and not unexplained_after(chosen).found:
         chosen = select(start, unnamed=False)
+    chosen = in_common_form(chosen, spots)
     scatter += [i for i in _scatter(chosen, weighs=False) if i.bic_gain > NEW_CAUSE]
     return CauseSelection(start, chosen, scatter, spots)
 

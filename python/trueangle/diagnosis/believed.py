@@ -19,7 +19,7 @@ from ..simulation.simulation import Simulation
 from ..support.distributions import normal_tail
 from .beliefs import LEVEL, Belief, judge_line, verdict_of_factor
 from .gain import measure_belief_gains
-from .identifiability import doubts_about
+from .identifiability import doubts_about, open_origins, with_open_origins
 from .penalty import NEW_CAUSE
 from .unnamed import effect_of
 
@@ -192,20 +192,23 @@ def _lines(
 def _doubt(
     regression: Regression, order: float, change: Array, spread: Array, spots: list[Blindness]
 ) -> bool:
-    """Whether another cause may be behind the change of a line; it is then told among spots."""
+    """Whether a line may be another one behind the positions.
+
+    That, or what else may have changed it, is then told among ``spots``.
+    """
     log_grid = float(np.log(regression.belief.pattern.orders.size))
     extension = Extension(
         MissingOrder.kind, {"output_order": order}, np.zeros((regression.n, 0)), 2, log_grid
     )
     doubt = doubts_about(extension, regression, spots)
-    if doubt is None:
+    origins = open_origins(extension, regression, spots) if doubt is None else [doubt]
+    if not origins:
         return False
     deviance = float(change @ np.linalg.pinv(spread) @ change)
     evidence = deviance - 2.0 * regression.log_n - 2.0 * log_grid
     if evidence > NEW_CAUSE:
-        spots[:] = [spot for spot in spots if spot != doubt]
-        spots.append(replace(doubt, supported=True, evidence=evidence))
-    return True
+        spots[:] = with_open_origins(spots, origins, evidence)
+    return doubt is not None
 
 
 def _corrected(

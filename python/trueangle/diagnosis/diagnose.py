@@ -166,7 +166,7 @@ def _diagnosis(
         if rest.found:
             findings = reconsidered(chosen, findings, rest.size)
     beliefs, corrected = judged_beliefs(chosen, sim, account.believed, spots, gain)
-    in_doubt = any(spot.supported for spot in spots)
+    in_doubt = any(spot.supported and not spot.common for spot in spots)
     for item in account.choice.scatter:
         if in_doubt and item.size < OUTLYING_ANYWAY:
             spots.append(scatter_doubt(item))

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
 
 from ..effects import EFFECTS
 from ..effects.blindness import Blindness
 from ..estimation.regression import Extension, Regression
 
-__all__ = ["Blindness", "blind_spots", "doubts_about"]
+__all__ = ["Blindness", "blind_spots", "doubts_about", "open_origins", "with_open_origins"]
 
 #: Factors of a design in the order in which their blind spots are told.
 FACTORS = (
@@ -39,17 +40,51 @@ def blind_spots(regression: Regression) -> list[Blindness]:
 def doubts_about(
     extension: Extension, regression: Regression, spots: Sequence[Blindness]
 ) -> Blindness | None:
-    """The reason not to name a supported cause, or None."""
+    """The reason not to name a supported cause, or None.
+
+    Where all that it may be have one form, and it is that, only its origin is open
+    (`open_origins`): what is seen has a size, and is named.
+    """
     cause = extension.cause
     if EFFECTS[cause].is_doubted:
         for spot in spots:
             if spot.hides(cause) and not (
-                (spot.common or spot.is_open) and EFFECTS[cause].told(extension, regression)
+                spot.common and EFFECTS[cause].told(extension, regression)
             ):
                 return spot
-    doubts = (effect.doubt(extension, regression, spots) for effect in EFFECTS.values())
-    found = [doubt for doubt in doubts if doubt is not None]
+    found = [doubt for doubt in _doubts(extension, regression, spots) if doubt.common != cause]
     return min(found, key=lambda spot: _place(spot, DOUBTS), default=None)
+
+
+def open_origins(
+    extension: Extension, regression: Regression, spots: Sequence[Blindness]
+) -> list[Blindness]:
+    """What else may make an error of this form, in the order of `DOUBTS`."""
+    cause = extension.cause
+    found = [spot for spot in spots if spot.common == cause and cause in spot.causes]
+    for doubt in _doubts(extension, regression, spots):
+        if doubt.common == cause and doubt not in found:
+            found.append(doubt)
+    return sorted(found, key=lambda spot: _place(spot, DOUBTS))
+
+
+def with_open_origins(
+    spots: Sequence[Blindness], origins: Sequence[Blindness], evidence: float
+) -> list[Blindness]:
+    """Blind spots, and those by which only the origin of what is named is open."""
+
+    def is_told(spot: Blindness) -> bool:
+        return any(set(spot.causes) <= set(of.causes) for of in origins)
+
+    kept = [spot for spot in spots if not is_told(spot)]
+    return kept + [replace(spot, supported=True, evidence=evidence) for spot in origins]
+
+
+def _doubts(
+    extension: Extension, regression: Regression, spots: Sequence[Blindness]
+) -> Iterator[Blindness]:
+    doubts = (effect.doubt(extension, regression, spots) for effect in EFFECTS.values())
+    yield from (doubt for doubt in doubts if doubt is not None)
 
 
 def _place(spot: Blindness, order: tuple[str, ...]) -> int:

@@ -8,7 +8,7 @@ from dataclasses import replace
 from ..effects import EFFECTS
 from ..effects.blindness import Blindness
 from ..effects.scatter import ScatterFinding
-from ..estimation.estimate import Parameters
+from ..estimation.estimate import Parameters, Quantity, quantity
 from ..estimation.regression import Regression
 from ..support.deadline import pace
 from .candidates import Candidate, extensions, propose
@@ -16,7 +16,7 @@ from .confirmation import CONFIRMED, NOT_CONFIRMED, status_of
 from .findings import Finding
 from .forms import with_form_errors
 from .gain import Gain, measure_gain
-from .identifiability import doubts_about
+from .identifiability import doubts_about, open_origins, with_open_origins
 from .penalty import cause_terms, finding_groups
 from .selection import is_flexible
 from .unnamed import is_named
@@ -44,17 +44,20 @@ def findings_of(
     spots = list(spots)
     groups = finding_groups(regression.terms)
     named = []
+    origins: dict[int, list[Blindness]] = {}
     for group in groups:
         if not is_named(regression.terms[group[0]]):
             continue
         doubt = doubts_about(regression.terms[group[0]], regression, spots)
+        evidence = sum(regression.terms[k].bic_gain for k in group)
         if doubt is None:
             named.append(group)
             # What sets it apart from the common form was seen after all.
             cause = regression.terms[group[0]].cause
             spots = [spot for spot in spots if not (spot.common and spot.hides(cause))]
+            origins[group[0]] = open_origins(regression.terms[group[0]], regression, spots)
+            spots = with_open_origins(spots, origins[group[0]], evidence)
             continue
-        evidence = sum(regression.terms[k].bic_gain for k in group)
         spots = [spot for spot in spots if spot != doubt]
         estimates = _estimates(regression, group, doubt.causes)
         spots.append(replace(doubt, supported=True, evidence=evidence, estimates=estimates))
@@ -69,6 +72,8 @@ def findings_of(
         terms = [(*fitted[k], widened.robust_covariance(k)) for k in group]
         cause = terms[0][0].cause
         parameters, effects = EFFECTS[cause].report(widened, terms)
+        if origins[group[0]]:
+            parameters["explanations"] = _explanations(parameters, cause, origins[group[0]])
         rivals = _rivals(regression, group) if len(findings) < RIVALLED and not pace().over else []
         weight = {
             "bic_gain": float(sum(t.bic_gain for t, _, _ in terms)),
@@ -110,6 +115,18 @@ def reconsidered(
             finding = replace(finding, status=status, reason=reason)
         found.append(finding)
     return found
+
+
+def _explanations(parameters: Parameters, cause: str, origins: Sequence[Blindness]) -> Quantity:
+    """What is known to make such an error, and the causes that these runs do not rule out."""
+    known = parameters["explanations"].value if "explanations" in parameters else []
+    others = [
+        f"{other}: {EFFECTS[other].sentence} Not ruled out, as {spot.because}"
+        for spot in origins
+        for other in spot.causes
+        if other != cause
+    ]
+    return quantity([*(known if isinstance(known, list) else []), *others])
 
 
 def _estimates(

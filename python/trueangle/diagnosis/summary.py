@@ -106,7 +106,7 @@ def headline(diagnosis: Diagnosis, unit: ErrorUnit) -> list[str]:
         told = "; ".join(f"{b.what} {b.verdict.replace('_', ' ')}" for b in wrong[:4])
         lines += _wrapped(f"Wrong in the simulation: {told}.", 2)
     for spot in diagnosis.not_identifiable:
-        if spot.supported:
+        if spot.supported and not spot.common:
             lines += _wrapped(f"Seen, and not told apart: {_seen(spot, unit)}.", 2)
     noise = [] if rest is None else [item for item in rest.noise_firing if _is_material(item)]
     if lines:

@@ -57,10 +57,8 @@ class Blindness(Shown):
         "temperature", "direction", "run", "time".
     common : str
         The cause whose form is what all of them share, where there is one: naming it claims
-        no more than is seen.
-    is_open : bool
-        The readings may show what the design does not promise to (`Effect.told`), and then leave
-        the others in doubt.
+        no more than is seen. Another one is named where the readings show what the design does
+        not promise to (`Effect.told`).
     """
 
     causes: tuple[str, ...]
@@ -71,7 +69,6 @@ class Blindness(Shown):
     estimates: dict[str, Parameters] = field(default_factory=dict)
     factor: str = "run"
     common: str = ""
-    is_open: bool = False
 
     def _brief(self) -> str:
         seen = "one of them is seen" if self.supported else "not seen"

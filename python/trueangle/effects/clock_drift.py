@@ -25,6 +25,10 @@ __all__ = ["ClockDrift"]
 #: Arcsec that one degree per second makes of a second's millionth.
 ARCSEC_PER_PPM = 3600.0 * 1e-6
 
+#: By how much its BIC must beat that of a ramp in angle to be told from one in runs whose design
+#: does not promise to: "very strong" on the scale of Kass and Raftery.
+TOLD = 10.0
+
 
 @dataclass(frozen=True)
 class ClockDrift(Effect):
@@ -91,4 +95,13 @@ class ClockDrift(Effect):
                 "each run has one speed and at most one reversal: a ramp in time times speed is "
                 "a ramp in angle",
                 ScaleError,
+                common=ScaleError,
             )
+
+    @classmethod
+    def told(cls, extension: Extension, regression: Regression) -> bool:
+        """Whether the speeds of the runs, unlike for a ramp in angle, stand out."""
+        others = [t for t in regression.terms if t.cause not in (cls.kind, ScaleError.kind)]
+        rest = regression.with_terms(others, regression.whiten.rho)
+        ramp = ScaleError.propose(rest)
+        return ramp is None or rest.bic - ramp.bic_gain - regression.bic > TOLD

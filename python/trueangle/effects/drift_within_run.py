@@ -229,7 +229,7 @@ class DriftWithinRun(Effect):
         left = share_left(regression, signals.theta[:, None], clock[:, None])
         if left < OWN_OF_VELOCITY and np.ptp(signals.direction) == 0.0:
             because = "one direction: a ramp in angle is a ramp in time"
-            yield replace(cls.blind(because, ScaleError, first=False), is_open=True)
+            yield cls.blind(because, ScaleError, first=False, common=ScaleError)
 
     @classmethod
     def told(cls, extension: Extension, regression: Regression) -> bool:

@@ -205,7 +205,7 @@ class Effect:
     def told(cls, extension: Extension, regression: Regression) -> bool:
         """Whether the readings show what the design alone does not promise to tell.
 
-        Asked of a blind spot that is open, or whose causes have a common form (`Blindness`).
+        Asked of a blind spot whose causes have a common form (`Blindness`).
         """
         return False
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 from typing import Any, ClassVar, Self
 
@@ -245,7 +245,7 @@ class FilterLag(Effect):
         if known and is_gear_order(regression.belief, order):
             for spot in spots:
                 if spot.causes == (cls.kind,):
-                    return replace(spot, causes=(MissingOrder.kind, cls.kind))
+                    return MissingOrder.also_from(cls, spot)
         return None
 
     def to_terms(self, period: float, shafts: Mapping[str, float]) -> tuple[Term, ...]:

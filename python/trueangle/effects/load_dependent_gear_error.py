@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any, ClassVar, Self
 
 import numpy as np
@@ -95,7 +95,7 @@ class LoadDependentGearError(FactorEffect):
     @classmethod
     def shapes(cls, regression: Regression) -> list[dict[str, Any]]:
         torque = regression.signals.torque
-        if torque is None or not torque.any():
+        if torque is None or not torque.any() or cls._is_lines(regression):
             return []
         both_signs = torque.min() < 0.0 < torque.max()
         return [
@@ -157,15 +157,26 @@ class LoadDependentGearError(FactorEffect):
         if because:
             yield cls.blind(because)
             return
+        if cls._is_lines(regression):
+            yield cls.blind(
+                "one load: gear lines that grow with it are only other lines, or sidebands"
+            )
+
+    @classmethod
+    def _is_lines(cls, regression: Regression) -> bool:
+        """All runs have one load: a gear line that grows with it is another line, or sidebands."""
+        signals = regression.signals
         gear = [m for m in regression.lines.orders[regression.lines.plausible] if m > 40.0][:2]
-        if gear:
+        if not gear:
+            return False
+
+        def build() -> bool:
             m = float(gear[-1])
             beside = np.hstack([line_columns(signals.theta, m + k) for k in (-1, 0, 1)])
             loaded = torque_of(signals)[:, None] * line_columns(signals.theta, m)
-            if share_left(regression, loaded, beside) < OWN_POWER:
-                yield cls.blind(
-                    "one load: gear lines that grow with it are only other lines, or sidebands"
-                )
+            return share_left(regression, loaded, beside) < OWN_POWER
+
+        return bool(regression.remembered(f"{cls.kind} as lines", None, build))
 
     @classmethod
     def doubt(
@@ -176,7 +187,7 @@ class LoadDependentGearError(FactorEffect):
         if is_gear_order(regression.belief, float(extension.shape["output_order"])):
             for spot in spots:
                 if spot.causes == (cls.kind,):
-                    return replace(spot, causes=(MissingOrder.kind, cls.kind))
+                    return MissingOrder.also_from(cls, spot)
         return None
 
     def to_terms(self, period: float, shafts: Mapping[str, float]) -> tuple[Term, ...]:

@@ -23,6 +23,7 @@ from .scale_error import ScaleError
 from .search import (
     Array,
     Fitted,
+    known_orders,
     line_parameters,
 )
 from .torsional_compliance import TorsionalCompliance
@@ -156,8 +157,12 @@ class MissingOrder(Effect):
         order = float(extension.shape["output_order"])
         torque = regression.signals.torque
         grid = uniform_grid(regression.signals.theta)
+        gear = [] if grid is None else known_orders(regression.belief)
         for spot in spots:
+            # The lowest order is meant, but where one that the gear has looks the same.
             if spot.factor == "grid" and grid is not None:
+                if all(m == order or grid.folded(m) != grid.folded(order) for m in gear):
+                    continue
                 aliases = ", ".join(f"{m:g}" for m in grid.aliases(order, 3))
                 because = (
                     f"order {order:g} and {aliases} are the same numbers at these "
@@ -168,9 +173,13 @@ class MissingOrder(Effect):
             for spot in spots:
                 if spot.causes == (TorsionalCompliance.kind,) and (torque is None or torque.any()):
                     because = f"{spot.because}: order 1 may be gravity's"
-                    causes = (cls.kind, TorsionalCompliance.kind)
-                    return replace(spot, causes=causes, because=because)
+                    return cls.also_from(TorsionalCompliance, replace(spot, because=because))
         return None
+
+    @classmethod
+    def also_from(cls, other: type[Effect], spot: Blindness) -> Blindness:
+        """That ``other`` may make a line for the reason of ``spot``: a line it is in any case."""
+        return replace(spot, causes=(cls.kind, other.kind), common=cls.kind)
 
     def to_lines(self) -> Sequence[tuple[str, float]]:
         return ((self.shaft, self.order),)

@@ -173,5 +173,5 @@ class ReferenceLines(Effect):
         if order <= REFERENCE_ORDERS[-1] and not is_gear_order(regression.belief, order):
             for spot in spots:
                 if cls.kind in spot.causes:
-                    return replace(spot, causes=(MissingOrder.kind, cls.kind))
+                    return MissingOrder.also_from(cls, spot)
         return None

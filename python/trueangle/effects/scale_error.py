@@ -57,14 +57,16 @@ class ScaleError(Effect):
     def propose(cls, regression: Regression) -> Extension | None:
         if regression.has(cls.kind):
             return None
+        # Of one run the zero is free, and both are the same.
+        origins = ("zero", "start") if regression.signals.runs > 1 else ("zero",)
         extensions = [
             regression.propose(
                 cls.kind,
-                shape,
-                cls.columns(regression.signals, regression.around, shape),
-                log_grid=float(np.log(2.0)),
+                {"from": origin},
+                cls.columns(regression.signals, regression.around, {"from": origin}),
+                log_grid=float(np.log(len(origins))),
             )
-            for shape in ({"from": "zero"}, {"from": "start"})
+            for origin in origins
         ]
         return max(extensions, key=lambda p: p.bic_gain)
 

@@ -69,7 +69,8 @@ class TorsionalCompliance(FactorEffect):
     @classmethod
     def shapes(cls, regression: Regression) -> list[dict[str, Any]]:
         torque = regression.signals.torque
-        if torque is None or not torque.any():
+        # Where its columns are those of a line, a line is what the readings show.
+        if torque is None or not torque.any() or cls._is_line(regression):
             return []
         return [{"what": "zero"}, {"what": "line", "order": 1.0}]
 
@@ -97,11 +98,20 @@ class TorsionalCompliance(FactorEffect):
         if because:
             yield cls.blind(because)
             return
-        signals = regression.signals
-        assert signals.torque is not None
-        first = line_columns(signals.theta, 1)
-        if share_left(regression, signals.torque[:, None], first) < OWN_POWER:
+        if cls._is_line(regression):
             yield cls.blind("one load: what it bends is part of the zero or of order 1")
+
+    @classmethod
+    def _is_line(cls, regression: Regression) -> bool:
+        """All runs have one load: the twist is part of the zero or of order 1."""
+        signals = regression.signals
+
+        def build() -> bool:
+            torque = torque_of(signals)[:, None]
+            first = line_columns(signals.theta, 1)
+            return share_left(regression, torque, first) < OWN_POWER
+
+        return bool(regression.remembered(f"{cls.kind} as a line", None, build))
 
     def to_terms(self, period: float, shafts: Mapping[str, float]) -> tuple[Term, ...]:
         lines = line_values(self.lines_per_Nm, period)

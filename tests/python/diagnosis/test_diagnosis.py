@@ -9,6 +9,7 @@ import json
 import os
 import secrets
 import time
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -199,20 +200,32 @@ def test_gear_orders_behind_the_paper_grid_are_not_accepted():
     [
         (Backlash(3.0), {"reversals": (), "direction": 1}, {"backlash"}),
         (Latency(1e-4), {"speed_deg_s": 30.0}, {"backlash", "latency"}),
-        (ReferenceLines((3.0,), (3.0,), (0.0,)), {"mount_deg": 0.0}, {"reference_error"}),
         (ThermalDrift(0.3), {"temperature_C": 35.0}, {"thermal_drift"}),
         (TorsionalCompliance(1.0), {"gravity_Nm": 5.0}, {"torsional_compliance"}),
     ],
 )
 def test_a_design_that_cannot_tell_says_so(effect, change, blind):
-    from dataclasses import replace
-
     sim = believed([replace(design, **change) for design in rich(3)])
     result = ta.diagnose(simulate(sim.with_effects([effect]), 3), sim)
     assert result.findings == [], result.summary()
     told = {cause for spot in result.not_identifiable for cause in spot.causes}
     assert blind <= told
     assert all(spot.because and spot.measure for spot in result.not_identifiable)
+
+
+def test_a_line_of_the_reference_or_of_the_joint_is_a_line():
+    sim = believed([replace(design, mount_deg=0.0) for design in rich(3)])
+    effect = ReferenceLines((3.0,), (3.0,), (0.0,))
+    result = ta.diagnose(simulate(sim.with_effects([effect]), 3), sim)
+    (line,) = result.findings
+    assert (line.cause, line.status) == ("missing_order", "confirmed")
+    amplitude = line.parameters["amplitude_arcsec"]
+    assert abs(amplitude.value - 3.0) < 4.0 * amplitude.std
+    assert any("reference_error" in text for text in line.parameters["explanations"].value)
+    (spot,) = [spot for spot in result.not_identifiable if "reference_error" in spot.causes]
+    assert spot.supported
+    assert "turn the reference" in spot.measure
+    assert "Seen, and not told apart" not in result.summary()
 
 
 def test_units_order_of_runs_and_zero_do_not_matter():
