@@ -27,6 +27,7 @@ class Answer:
     case: Case
     found: tuple[str, ...]  # causes in the order found
     blind: tuple[str, ...]  # causes reported as not identifiable
+    untold: tuple[tuple[str, ...], ...]  # causes of which one is seen, and not told which
     scores: dict[str, float]  # (estimate - truth) / std of the shared parameters
     shares: dict[str, float]  # reducible share per finding
     reasons: str  # text of not_identifiable
@@ -60,8 +61,13 @@ class Answer:
 
     @property
     def honest(self) -> bool:
-        """Every hidden cause is reported as not identifiable, and no wrong one is named."""
-        return set(self.case.causes) <= set(self.blind) and not self.extra
+        """Every hidden cause is reported as not identifiable, and no wrong one is named.
+
+        The form that it shares with others is no wrong name where it is said which they are.
+        """
+        hidden = set(self.case.causes)
+        open_origin = {c for causes in self.untold if hidden & set(causes) for c in causes}
+        return hidden <= set(self.blind) and set(self.extra) <= open_origin
 
     def record(self) -> dict[str, Any]:
         """A row for the artefact file."""
@@ -103,6 +109,7 @@ def judge(question: Question) -> Answer:
         case=question.case,
         found=tuple(finding["cause"] for finding in findings),
         blind=tuple(cause for entry in blind for cause in entry["causes"]),
+        untold=tuple(tuple(entry["causes"]) for entry in blind if entry["supported"]),
         scores=scores,
         shares={f["cause"]: _share(f) for f in findings},
         reasons=" | ".join(f"{entry['because']} -> {entry['measure']}" for entry in blind),

@@ -58,7 +58,7 @@ def attempt(case: Case) -> Answer:
     except Exception as failure:
         where = traceback.extract_tb(failure.__traceback__)[-1]
         name = f"{type(failure).__name__} in {Path(where.filename).name}:{where.lineno}"
-        return Answer(case, (name,), (), {}, {}, str(failure), math.nan, math.nan)
+        return Answer(case, (name,), (), (), {}, {}, str(failure), math.nan, math.nan)
 
 
 def _told(found: Iterable[Answer], show: bool) -> Iterator[Answer]:
