@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar, Self
 
@@ -14,6 +14,7 @@ from ..estimation.extension import Extension
 from ..estimation.regression import Regression
 from ..joint.pattern import Surroundings, line_columns, line_sum
 from ..joint.signals import Signals
+from .blindness import Blindness
 from .drawing import carrier_order, phase
 from .effect import Effect
 from .missing_order import FREE_ANGLES, MissingOrder
@@ -30,6 +31,12 @@ __all__ = ["Sidebands"]
 #: Periods of the modulation that a run must cover for sidebands to be looked for.
 RESOLVED = 0.75
 
+
+#: What tells a sideband from a line of another shaft at the same order.
+TURNED = (
+    "clamp the output turned against the gear and repeat: the phase of a sideband turns with it, "
+    "that of a shaft's own line does not"
+)
 
 #: Share of the larger line below which the other of a pair is none: a modulation makes both.
 ONE_LINE = 0.1
@@ -89,14 +96,20 @@ class Sidebands(Effect):
                 carriers.append(m)
         present = {float(m) for m in regression.around.pattern.orders}
         travel = regression.signals.run_turns().max()
+        known = set(known_orders(regression.around))
         shapes: list[dict[str, Any]] = []
         # Over less than that the pair and the line between them are hardly told apart.
         offsets = [k for k in (1, 2) if k * travel > RESOLVED]
         for m in carriers:
             for k in offsets:
-                if m in present:
-                    shapes += [{"carrier": m, "offset": k, "form": f} for f in ("AM", "PM")]
-                shapes.append({"carrier": m, "offset": k, "form": "free"})
+                forms = ["free"]
+                if not {m - k, m + k} & known:
+                    forms = ["AM", "PM", "free"] if m in present else ["free"]
+                # A line of another shaft at the same order, where it is known, takes up the
+                # sideband: only the other one is seen.
+                elif {m - k, m + k} & present:
+                    forms = [f for f, x in (("lower", m - k), ("upper", m + k)) if x not in known]
+                shapes += [{"carrier": m, "offset": k, "form": form} for form in forms]
         log_grid = float(np.log(max(len(shapes), 1)))
         while shapes:
             best = best_shape(cls, regression, shapes, [log_grid] * len(shapes))
@@ -108,8 +121,9 @@ class Sidebands(Effect):
     @classmethod
     def columns(cls, signals: Signals, around: Surroundings, shape: dict[str, Any]) -> Array:
         theta, carrier, k = signals.theta, shape["carrier"], shape["offset"]
-        if shape["form"] == "free":
-            return np.hstack([line_columns(theta, carrier - k), line_columns(theta, carrier + k)])
+        if shape["form"] in _SEEN:
+            lines = [line_columns(theta, carrier + s * k) for s in _SEEN[shape["form"]]]
+            return np.hstack(lines)
         a, b = cls._carrier(around, carrier)
         if shape["form"] == "PM":
             a, b = b, -a
@@ -138,9 +152,9 @@ class Sidebands(Effect):
     def _bands(
         cls, around: Surroundings, extension: Extension, coefficients: Array, covariance: Array
     ) -> tuple[Array, Array]:
-        """Cosine and sine of the lower and upper line and their covariance."""
+        """Cosine and sine of the lines that are seen and their covariance."""
         shape = extension.shape
-        if shape["form"] == "free":
+        if shape["form"] in _SEEN:
             return coefficients, covariance
         a, b = cls._carrier(around, shape["carrier"])
         if shape["form"] == "PM":
@@ -158,11 +172,13 @@ class Sidebands(Effect):
         for extension, coefficients, covariance in terms:
             pair, spread = cls._bands(regression.around, extension, coefficients, covariance)
             k, carrier = extension.shape["offset"], extension.shape["carrier"]
-            for j, offset in ((0, -k), (2, k)):
+            signs = _SEEN.get(extension.shape["form"], _SEEN["free"])
+            for j, sign in zip((0, 2), signs, strict=False):
                 line = line_parameters(pair[j : j + 2], spread[j : j + 2, j : j + 2])
-                rows.append((carrier, offset, *line))
-            lower, upper = rows[-2:]
-            effects.append(Sidebands(carrier, (-k, k), (lower[2], upper[2]), (lower[3], upper[3])))
+                rows.append((carrier, sign * k, *line))
+            own = rows[-len(signs) :]
+            _, seen, sizes, phases, *_ = zip(*own, strict=True)
+            effects.append(Sidebands(carrier, seen, sizes, phases))
         parameters = {
             "carrier": quantity(rows[0][0]),
             "amplitudes": quantity([row[2] for row in rows], [row[4] for row in rows]),
@@ -173,8 +189,34 @@ class Sidebands(Effect):
             parameters["carriers"] = quantity([row[0] for row in rows])
         return parameters, effects
 
+    @classmethod
+    def doubt(
+        cls, extension: Extension, regression: Regression, spots: Sequence[Blindness]
+    ) -> Blindness | None:
+        if extension.cause != cls.kind:
+            return None
+        carrier, k = extension.shape["carrier"], extension.shape["offset"]
+        shared = [f"order {m:g} is {name}" for m, name in _shared(regression, carrier, k)]
+        if not shared:
+            return None
+        because = f"{', '.join(shared)} as well as a sideband of order {carrier:g}"
+        causes = (cls.kind, MissingOrder.kind)
+        return Blindness(causes, because, TURNED, factor="angle", common=cls.kind)
+
     def to_lines(self) -> Sequence[tuple[str, float]]:
         return tuple(("output", self.carrier + offset) for offset in self.offsets)
+
+
+#: Sides of the carrier on which a form has lines of their own.
+_SEEN = {"free": (-1, 1), "lower": (-1,), "upper": (1,)}
+
+
+def _shared(regression: Regression, carrier: float, offset: float) -> Iterator[tuple[float, str]]:
+    """Sidebands at orders that another shaft is known to have, with its name."""
+    for order in (carrier - offset, carrier + offset):
+        named = regression.belief.joint.name_order(order)
+        if named is not None and order in known_orders(regression.belief):
+            yield order, f"{named[0].replace('_', ' ')} order {named[1]}"
 
 
 def _is_one_line(extension: Extension) -> bool:

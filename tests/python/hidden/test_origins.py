@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import os
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 import trueangle as ta
-from trueangle.simulation import Joint, Simulation
+from trueangle.simulation import Harmonic, Joint, Simulation
 
 from .sweeps import ROUTES, measured, route
 
@@ -100,3 +101,47 @@ def test_a_ramp_of_runs_at_one_speed(kind, seed):
     assert "clock_drift" in said
     assert ("drift_within_run" in said) == (kind == "turn")
     assert left_of(result, runs) < 1.2 * SIGMA
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+@pytest.mark.parametrize("believed", [False, True])
+def test_a_sideband_at_the_order_of_another_shaft(believed, seed):
+    """Of order 202 of the wave generator the lower one is order 2 of the motor, too."""
+    print(f"seed {seed}")
+    rng = np.random.default_rng([seed, 4])
+    phases = rng.uniform(0.0, 360.0, 4)
+    sizes = {202: 30.0, 200: 35.0, 204: 20.0}
+    lines = [Harmonic("wave_generator", 2, 30.0, phases[0])]
+    # The lower sideband, of 20 arcsec as the upper one, and the motor's own line.
+    motor = sizes[200] * np.exp(1j * np.radians(phases[1]))
+    sum_of_both = motor + sizes[204] * np.exp(1j * np.radians(phases[2]))
+    if believed:
+        lines.append(Harmonic("motor", 2, sizes[200], phases[1]))
+    sim = replace(BELIEVED, harmonics=tuple(lines), sigma_arcsec=SIGMA)
+
+    def error(theta, time):
+        angle = np.radians(theta)
+        upper = sizes[204] * np.sin(204.0 * angle + np.radians(phases[3]))
+        own = sizes[202] * np.sin(202.0 * angle + np.radians(phases[0]))
+        return own + upper + np.imag(sum_of_both * np.exp(200j * angle))
+
+    result = ta.diagnose(runs_with(error, "there and back", rng, 3), sim)
+    (finding,) = result.findings
+    assert (finding.cause, finding.status) == ("sidebands", "confirmed")
+    amplitudes = finding.parameters["amplitudes"]
+    found = dict(
+        zip(
+            finding.parameters["orders"].value,
+            zip(amplitudes.value, amplitudes.std, strict=True),
+            strict=True,
+        )
+    )
+    assert abs(found[204.0][0] - sizes[204]) < WITHIN * found[204.0][1]
+    told = {belief.what: belief.measured["amplitude_arcsec"] for belief in result.beliefs}
+    lower = told["motor order 2"] if believed else found[200.0][0]
+    assert (200.0 in found) == (not believed)
+    assert abs(lower - abs(sum_of_both)) < WITHIN * 1.1 * found[204.0][1]
+    (spot,) = [spot for spot in result.not_identifiable if "sidebands" in spot.causes]
+    assert spot.supported
+    assert "order 200 is motor order 2" in spot.because
+    assert "motor order 2" in " ".join(finding.parameters["explanations"].value)
