@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -46,7 +47,7 @@ class Record:
     def __len__(self) -> int:
         return int(self.reference.size)
 
-    @property
+    @cached_property
     def unwrapped(self) -> tuple[Array, Array]:
         """Reference and indicated without jumps of a turn."""
         return np.unwrap(self.reference, period=360.0), np.unwrap(self.indicated, period=360.0)
