@@ -33,6 +33,7 @@ from .search import (
     Array,
     Fitted,
     golden_maximum,
+    tangent_covariance,
 )
 from .sidebands import Sidebands
 
@@ -265,9 +266,7 @@ class LocalDefect(Effect):
         shape = extension.shape
         # Place, width and height together.
         columns = cls._tangents(regression, shape, float(height))
-        others = [term for term in regression.terms if term is not extension]
-        x, _ = regression.with_terms(others).projected(columns)
-        std = np.sqrt(regression.variance * np.diag(np.linalg.pinv(x.T @ x)))
+        std = np.sqrt(np.diag(tangent_covariance(regression, terms[:1], columns)))
         place, width = shape["place_deg"], shape["width_deg"]
         parameters = {
             "place_deg": quantity(place, std[1]),

@@ -33,6 +33,7 @@ from .search import (
     Fitted,
     golden_maximum,
     of_one_sign,
+    tangent_covariance,
 )
 
 __all__ = ["PreslidingHysteresis", "PreslidingHysteresisTerm"]
@@ -178,7 +179,6 @@ class PreslidingHysteresis(Effect):
         cls, regression: Regression, terms: Sequence[Fitted]
     ) -> tuple[Parameters, list[Effect]]:
         total = sum(float(c[0]) for _, c, _ in terms)
-        std = float(np.sqrt(regression.sum_variance([t for t, _, _ in terms])))
         weights = np.array([abs(float(c[0])) for _, c, _ in terms])
         lengths = np.array([t.shape["length_deg"] for t, _, _ in terms])
         length = float(weights @ lengths / weights.sum())
@@ -188,12 +188,10 @@ class PreslidingHysteresis(Effect):
             else Backlash(float(c[0]))
             for t, c, _ in terms
         ]
+        std, length_std = cls._errors(regression, terms)
         parameters = {
             "amplitude_arcsec": quantity(total, std),
-            "length_deg": quantity(
-                length,
-                cls._length_std(regression, terms[int(np.argmax(weights))]),
-            ),
+            "length_deg": quantity(length, length_std),
         }
         if len(terms) > 1:
             parameters["element_lengths_deg"] = quantity(lengths)
@@ -201,28 +199,27 @@ class PreslidingHysteresis(Effect):
         return parameters, effects
 
     @classmethod
-    def _length_std(
-        cls, regression: Regression, term: tuple[Extension, Array, Array]
-    ) -> float | None:
-        """From the curvature: the column's derivative by ln L, all else projected out."""
-        extension, coefficients, _ = term
-        length = extension.shape["length_deg"]
-        if length == 0.0:
-            return None
-        start, signals, step = extension.shape["start_state"], regression.signals, 0.02
-        derivative = (
-            coefficients[0]
-            * (
-                signals.presliding(length * np.exp(step), start)
-                - signals.presliding(length * np.exp(-step), start)
-            )
-            / (2.0 * step)
-        )
-        x, _ = regression.projected(derivative[:, None])
-        information = float(x[:, 0] @ x[:, 0])
-        return (
-            length * float(np.sqrt(regression.variance / information)) if information > 0 else None
-        )
+    def _errors(cls, regression: Regression, terms: Sequence[Fitted]) -> tuple[float, float | None]:
+        """Of the whole amplitude, and of the length of the strongest element."""
+        signals, step = regression.signals, 0.02
+        columns, slopes, curved = [], [], []
+        for k, (extension, (amplitude,), _) in enumerate(terms):
+            length, start = extension.shape["length_deg"], extension.shape["start_state"]
+            columns.append(cls.columns(signals, regression.around, extension.shape))
+            if length > 0.0:
+                longer, shorter = (
+                    signals.presliding(length * (1.0 + s), start) for s in (step, -step)
+                )
+                slopes.append(amplitude * (longer - shorter)[:, None] / (2.0 * step * length))
+                curved.append(k)
+        covariance = tangent_covariance(regression, terms, np.hstack(columns + slopes))
+        n = len(terms)
+        strongest = int(np.argmax([abs(float(c[0])) for _, c, _ in terms]))
+        length_std = None
+        if strongest in curved:
+            at = n + curved.index(strongest)
+            length_std = float(np.sqrt(covariance[at, at]))
+        return float(np.sqrt(covariance[:n, :n].sum())), length_std
 
     @classmethod
     def blind_spots(cls, regression: Regression, found: Sequence[Blindness]) -> Iterator[Blindness]:

@@ -28,6 +28,7 @@ __all__ = [
     "known_orders",
     "line_parameters",
     "of_one_sign",
+    "tangent_covariance",
 ]
 
 Array: TypeAlias = NDArray[np.float64]
@@ -135,3 +136,21 @@ def grid_doubt(regression: Regression, spots: Sequence[Blindness]) -> Blindness 
     if uniform_grid(regression.signals.theta) is None:
         return None
     return next((spot for spot in spots if spot.factor == "grid"), None)
+
+
+def tangent_covariance(regression: Regression, terms: Sequence[Fitted], tangents: Array) -> Array:
+    """Covariance of coefficients and shape parameters that are estimated jointly.
+
+    ``tangents`` are the derivatives of the signal by the coefficients of the terms first, then
+    by the parameters of their shapes, at the estimate; everything else of the regression is
+    projected out. What widens the given covariance of the coefficients (runs that differ, form
+    errors) widens that of the shapes in the same measure.
+    """
+    own = [extension for extension, _, _ in terms]
+    others = [term for term in regression.terms if all(term is not one for one in own)]
+    x, _ = regression.with_terms(others).projected(tangents)
+    information = x.T @ x
+    count = sum(len(coefficients) for _, coefficients, _ in terms)
+    given = sum(float(np.trace(covariance)) for _, _, covariance in terms)
+    alone = float(np.trace(np.linalg.pinv(information[:count, :count])))
+    return np.asarray(given / alone * np.linalg.pinv(information), dtype=np.float64)

@@ -19,7 +19,7 @@ from .backlash import Backlash
 from .blindness import OWN_POWER, Blindness, share_left
 from .direction_dependent_pattern import DirectionalPattern
 from .effect import Effect
-from .search import Array, Fitted, golden_maximum, of_one_sign
+from .search import Array, Fitted, golden_maximum, of_one_sign, tangent_covariance
 from .torsional_compliance import TorsionalCompliance, torque_of, unloaded
 
 __all__ = ["TorqueHysteresis"]
@@ -30,6 +30,9 @@ SPANS = np.geomspace(0.02, 1.0, 8)
 #: Elements of different spans at most, and the ratio of spans that keeps them apart.
 MOST_ELEMENTS = 3
 APART = 2.5
+
+#: Of a span, for the derivative of a loop by it.
+STEP = 0.02
 
 #: Share of the largest torque by which it must come back to have turned: less is noise.
 TURNED = 0.06
@@ -132,10 +135,24 @@ class TorqueHysteresis(Effect):
     ) -> tuple[Parameters, list[Effect]]:
         widths = np.array([float(c[0]) for _, c, _ in terms])
         spans = np.array([t.shape["span_Nm"] for t, _, _ in terms])
-        std = float(np.sqrt(sum(v[0, 0] for _, _, v in terms)))
+        n, signals = len(terms), regression.signals
+        loops = [cls.loop(signals, float(s)) for s in spans]
+        slopes = [
+            w * (cls.loop(signals, s * (1.0 + STEP)) - cls.loop(signals, s * (1.0 - STEP)))
+            / (2.0 * STEP * s)
+            for w, s in zip(widths.tolist(), spans.tolist(), strict=True)
+        ]  # fmt: skip
+        # Widths and spans together: a longer loop that is wider looks much the same.
+        covariance = tangent_covariance(regression, terms, np.column_stack([*loops, *slopes]))
+        weights = np.abs(widths) / np.abs(widths).sum()
         parameters = {
-            "half_width_arcsec": quantity(float(widths.sum()), std),
-            "span_Nm": quantity(float(np.abs(widths) @ spans / np.abs(widths).sum())),
+            "half_width_arcsec": quantity(
+                float(widths.sum()), float(np.sqrt(covariance[:n, :n].sum()))
+            ),
+            "span_Nm": quantity(
+                float(weights @ spans),
+                float(np.sqrt(weights @ covariance[n:, n:] @ weights)),
+            ),
         }
         if len(terms) > 1:
             parameters["element_spans_Nm"] = quantity(spans)
