@@ -14,15 +14,12 @@ from ..joint.pattern import Surroundings
 from ..joint.signals import Signals
 from .effect import Effect
 from .outliers import Outliers
-from .scatter import ScatterFinding, standardised
+from .scatter import CLIPPED_VARIANCE, SQUARE_CLIP, ScatterFinding, clipped, standardised
 from .search import (
     Array,
 )
 
 __all__ = ["HeteroscedasticNoise"]
-
-#: Squared residuals are taken at most this many variances large.
-SQUARE_CLIP = 9.0
 
 #: Logarithm of the largest ratio of a reading's variance to the mean one: a thousand times the
 #: standard deviation is more than noise of one kind does.
@@ -94,7 +91,8 @@ class HeteroscedasticNoise(Effect):
         if regression.is_explained:
             return None
         signals, n = regression.signals, regression.n
-        square = np.minimum(standardised(regression) ** 2, SQUARE_CLIP)
+        whole = standardised(regression) ** 2
+        square = np.minimum(whole, SQUARE_CLIP)
         # A reading tells half as much of the logarithm of a variance as of a mean.
         log_n = regression.log_n - float(np.log(2.0))
         blocks: dict[str, Array] = {}
@@ -142,7 +140,7 @@ class HeteroscedasticNoise(Effect):
             rest = square - design @ np.linalg.lstsq(design, square, rcond=None)[0]
         if not chosen:
             return None
-        gamma, covariance = _log_variance(design, square)
+        gamma, covariance = _log_variance(design, whole)
         parameters: Parameters = {}
         cosine = sine = 0.0
         order, start = 1.0, 1
@@ -170,15 +168,15 @@ class HeteroscedasticNoise(Effect):
 
 
 def _log_variance(design: Array, square: Array) -> tuple[Array, Array]:
-    """Coefficients of the log variance by iterated weighted least squares."""
+    """Coefficients of the log variance by scoring, every square clipped by its own variance."""
     gamma = np.zeros(design.shape[1])
-    gamma[0] = mean = np.log(square.mean())
+    gamma[0] = mean = np.log(np.minimum(square, SQUARE_CLIP).mean())
     inverse = np.linalg.inv(design.T @ design)
     for _ in range(30):
-        step = inverse @ (design.T @ (square * np.exp(-(design @ gamma)) - 1.0))
+        step = inverse @ (design.T @ (clipped(square, np.exp(design @ gamma)) - 1.0))
         if np.abs(design @ (gamma + step) - mean).max() > WIDEST:
             break  # readings that do not scatter at all have no largest likelihood
         gamma += step
         if np.abs(step).max() < 1e-10:
             break
-    return gamma, np.asarray(2.0 * inverse, dtype=np.float64)
+    return gamma, np.asarray(CLIPPED_VARIANCE * inverse, dtype=np.float64)

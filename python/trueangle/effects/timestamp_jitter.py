@@ -14,8 +14,8 @@ from ..joint.pattern import Surroundings
 from ..joint.signals import Signals
 from ..support.angles import ARCSEC_PER_DEG
 from .effect import Effect
-from .heteroscedastic_noise import SQUARE_CLIP, HeteroscedasticNoise
-from .scatter import NEW_SCATTER, ScatterFinding, standardised
+from .heteroscedastic_noise import HeteroscedasticNoise
+from .scatter import CLIPPED_VARIANCE, NEW_SCATTER, ScatterFinding, clipped, standardised
 from .search import Array
 
 __all__ = ["TimestampJitter"]
@@ -77,8 +77,10 @@ class TimestampJitter(Effect):
         top = ARCSEC_PER_DEG * float(np.abs(velocity).max())
         sigma = float(np.sqrt(per_speed)) * unit / top
         variance = own + per_speed * speed**2
-        information = 0.5 * float(np.sum((speed**2 / variance) ** 2))
-        relative = 0.5 / (float(per_speed) * float(np.sqrt(information)))
+        # Jointly with the noise of its own that the readings have.
+        slopes = np.column_stack([np.ones(regression.n), speed**2]) / variance[:, None]
+        spread = CLIPPED_VARIANCE * np.linalg.inv(slopes.T @ slopes)
+        relative = 0.5 * float(np.sqrt(spread[1, 1])) / float(per_speed)
         weights = 1.0 / variance
         return ScatterFinding(
             cls.kind,
@@ -97,7 +99,7 @@ def _whitened(regression: Regression) -> Array:
 def _likelihood(e: Array, design: Array, logarithm: bool) -> tuple[float, Array]:
     """Normal log-likelihood of noise whose variance (or its logarithm) is ``design @ g``; g.
 
-    Fisher scoring; squares are clipped in units of their own variance.
+    Fisher scoring; squares are clipped by their own variance.
     """
     square = e**2
     g = np.zeros(design.shape[1])
@@ -105,10 +107,8 @@ def _likelihood(e: Array, design: Array, logarithm: bool) -> tuple[float, Array]
     for _ in range(STEPS):
         linear = design @ g
         variance = np.exp(np.clip(linear, -20.0, 20.0)) if logarithm else np.maximum(linear, FLOOR)
-        kept = np.minimum(square, SQUARE_CLIP * variance)
         slope = design if logarithm else design / variance[:, None]
-        g = g + np.linalg.lstsq(slope, kept / variance - 1.0, rcond=None)[0]
+        g = g + np.linalg.lstsq(slope, clipped(square, variance) - 1.0, rcond=None)[0]
     linear = design @ g
     variance = np.exp(np.clip(linear, -20.0, 20.0)) if logarithm else np.maximum(linear, FLOOR)
-    kept = np.minimum(square, SQUARE_CLIP * variance)
-    return -0.5 * float(np.sum(np.log(variance) + kept / variance)), g
+    return -0.5 * float(np.sum(np.log(variance) + clipped(square, variance))), g
