@@ -9,7 +9,7 @@ from ..effects import Effect
 from ..estimation.regression import Extension, Regression
 from ..support.deadline import pace
 from .forms import told_from_forms
-from .penalty import left_by_forms, misfit, penalty_of, total_penalty
+from .penalty import before_forms, left_by_forms, misfit, penalty_of, total_penalty
 from .unnamed import effect_of
 
 __all__ = ["Candidate", "Scores", "extensions", "propose"]
@@ -93,7 +93,9 @@ class Scores:
     def score(self, candidate: Candidate) -> float:
         """Net gain less what a cause costs beyond its parameters."""
         extension, start, gain = candidate
-        explained = start.start - start.deviance + extension.deviance
+        explained = before_forms(start) - start.deviance
+        if not effect_of(extension.cause).has_exact_form:
+            explained += extension.deviance
         after = penalty_of([*start.terms, extension], left_by_forms(explained, start.n))
         return gain - (after - penalty_of(start.terms, misfit(start)))
 

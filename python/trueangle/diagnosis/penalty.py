@@ -13,6 +13,7 @@ from .unnamed import effect_of
 
 __all__ = [
     "NEW_CAUSE",
+    "before_forms",
     "cause_terms",
     "finding_groups",
     "left_by_forms",
@@ -35,8 +36,25 @@ def total_penalty(regression: Regression) -> float:
 
 
 def misfit(regression: Regression) -> float:
-    """Deviance that the causes found may leave because their forms are not exact."""
-    return left_by_forms(regression.start - regression.deviance, regression.n)
+    """Deviance that the causes found may leave because their forms are not exact.
+
+    A step of the zero has no form that could be inexact, however far apart zeros are: what such
+    terms explain is not counted.
+    """
+    return left_by_forms(before_forms(regression) - regression.deviance, regression.n)
+
+
+def before_forms(regression: Regression) -> float:
+    """Deviance before any cause with a form was added."""
+    zeros = [term for term in regression.terms if effect_of(term.cause).draws_zeros]
+    if not zeros:
+        return float(regression.start)
+    return float(regression.asked("before forms", lambda: regression.with_terms(zeros).deviance))
+
+
+def exact_terms(regression: Regression) -> list[Extension]:
+    """Terms whose forms leave nothing of them."""
+    return [term for term in regression.terms if effect_of(term.cause).has_exact_form]
 
 
 def misfit_of_scatter(start: Regression, chosen: Regression) -> float:
@@ -44,8 +62,12 @@ def misfit_of_scatter(start: Regression, chosen: Regression) -> float:
 
     Correlated noise takes up a part of what is not yet explained, and hides it from a likelihood.
     """
-    left = chosen.left - chosen.whiten.run_part(chosen.left)
-    ratio = float(np.var(start.left)) / max(float(np.var(left)), 1e-300)
+    exact = exact_terms(chosen)
+    before, after = (
+        float(np.var(one.left - one.whiten.run_part(one.left)))
+        for one in (start.with_terms(exact) if exact else start, chosen)
+    )
+    ratio = before / max(after, 1e-300)
     return left_by_forms(chosen.n * float(np.log(max(ratio, 1.0))), chosen.n)
 
 

@@ -71,6 +71,8 @@ class Effect:
         Its every term is a finding of its own.
     draws_zeros : bool
         It leaves each run with a zero of its own, which held-out runs then get too.
+    has_exact_form : bool
+        Its form leaves nothing of it, however large it is: steps of a zero.
     changes_lines : bool
         It takes or gives a part of the pattern's own lines on average.
     is_doubted : bool
@@ -103,6 +105,7 @@ class Effect:
     flexible_below: ClassVar[float] = 0.0
     is_separate: ClassVar[bool] = False
     draws_zeros: ClassVar[bool] = False
+    has_exact_form: ClassVar[bool] = False
     changes_lines: ClassVar[bool] = False
     is_doubted: ClassVar[bool] = True
     weighs: ClassVar[bool] = False

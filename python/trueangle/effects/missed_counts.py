@@ -58,6 +58,7 @@ class MissedCounts(Effect):
     located: ClassVar[bool] = True
     flexible_below: ClassVar[float] = ALWAYS
     draws_zeros: ClassVar[bool] = True
+    has_exact_form: ClassVar[bool] = True
     not_at_run_time: ClassVar[str] = "a step is told from a motion only afterwards, in the log"
 
     def signal(self, signals: Signals, around: Surroundings, rng: np.random.Generator) -> Array:

@@ -62,6 +62,7 @@ class ZeroSlip(Effect):
     }
     flexible_below: ClassVar[float] = ALWAYS
     draws_zeros: ClassVar[bool] = True
+    has_exact_form: ClassVar[bool] = True
     not_at_run_time: ClassVar[str] = (
         "the zero of a run is not known before the run is referenced: set it anew"
     )
