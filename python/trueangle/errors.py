@@ -9,6 +9,7 @@ __all__ = [
     "EmptyCellsWarning",
     "FileError",
     "KindError",
+    "MessageLinesWarning",
     "MissingExtraError",
     "MissingSignalError",
     "ModelFileError",
@@ -151,6 +152,10 @@ class MissingExtraError(TrueAngleError, ImportError):
 
 class EmptyCellsWarning(UserWarning):
     """Rows of a file were left out since a cell of theirs is empty."""
+
+
+class MessageLinesWarning(UserWarning):
+    """Lines of words among the readings of a text file were left out."""
 
 
 class OutsideSpanWarning(UserWarning):

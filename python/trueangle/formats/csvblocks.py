@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from functools import cached_property
 from typing import Any
@@ -26,10 +27,17 @@ def plain_block(data: bytes, header: Header, line: int) -> PlainBlock | None:
     """The block, or None for text that needs the standard library: blank lines, notes."""
     if header.trailing:
         return None
+    columns = len(header.names)
+    if header.delimiter == " ":
+        parsed = _without_blanks(data)
+    elif data.count(header.delimiter.encode()) == (columns - 1) * _lines(data):
+        parsed = data
+    else:
+        return None
     width = len(header.ending)
     signs = np.frombuffer(data, dtype=np.uint8)
     is_end = signs == _NEWLINE
-    rows = int(np.count_nonzero(is_end)) + (not data.endswith(b"\n"))
+    rows = _lines(data)
     # Looking whether a sign is there at all takes a fraction of looking where.
     if (b"\r" in data) is (width == 1):
         return None
@@ -37,12 +45,23 @@ def plain_block(data: bytes, header: Header, line: int) -> PlainBlock | None:
         return None
     if is_end[width - 1] or (is_end[width:] & is_end[:-width]).any():
         return None
-    block = PlainBlock(data, header, line, rows)
+    block = PlainBlock(data, parsed, header, line, rows)
     if b"#" in data or b"F" in data:
         first = signs[block.starts]
         if (first == _NOTE).any() or ((first == _END).any() and _has_end(data)):
             return None
     return block
+
+
+def _lines(data: bytes) -> int:
+    return data.count(b"\n") + (not data.endswith(b"\n"))
+
+
+def _without_blanks(data: bytes) -> bytes:
+    """Columns that stand apart by blanks with one blank between them, exponents written with e."""
+    data = re.sub(rb"[ \t]+", b" ", data)
+    data = data.replace(b"\n ", b"\n").replace(b" \n", b"\n").replace(b" \r\n", b"\r\n").strip(b" ")
+    return re.sub(rb"(?<=[\d.])[dD](?=[+-]\d)", b"e", data) if b"D" in data else data
 
 
 def _has_end(data: bytes) -> bool:
@@ -52,8 +71,9 @@ def _has_end(data: bytes) -> bool:
 class PlainBlock:
     """Lines of text without quotes, every one a row."""
 
-    def __init__(self, data: bytes, header: Header, line: int, rows: int) -> None:
+    def __init__(self, data: bytes, parsed: bytes, header: Header, line: int, rows: int) -> None:
         self.data = data
+        self._parsed = parsed
         self.header = header
         self.line = line
         #: Number of lines.
@@ -82,7 +102,7 @@ class PlainBlock:
         """
         try:
             self._table = pa.csv.read_csv(
-                pa.BufferReader(_owned_by_arrow(self.data)),
+                pa.BufferReader(_owned_by_arrow(self._parsed)),
                 pa.csv.ReadOptions(column_names=self.header.names),
                 pa.csv.ParseOptions(delimiter=self.header.delimiter, quote_char=False),
                 pa.csv.ConvertOptions(
@@ -102,6 +122,11 @@ class PlainBlock:
             self._quoted = QuotedBlock.whole(self.data, self.header, self.line)
             return self._quoted.numbers(names, texts, strict)
         return {name: numbers(self.header.path, name, self._table[name]) for name in names}
+
+    @property
+    def messages(self) -> list[tuple[int, str]]:
+        """Lines that hold no readings, after `numbers`; see `QuotedBlock.messages`."""
+        return [] if self._quoted is None else self._quoted.messages
 
     def labels(self, name: str) -> Labels:
         """A column of texts after `numbers`; see `QuotedBlock.labels`."""

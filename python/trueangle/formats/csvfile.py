@@ -23,6 +23,7 @@ from .budget import Extent, text_extent
 from .csvheader import LONGEST_LINE, Header
 from .csvrows import BLOCK, QuotedBlock, quoted_blocks, too_long
 from .format import TEXTS, Addition, Batch, Choose, Contents, Watch, refuse_corrected
+from .messages import warn_of_messages
 
 if TYPE_CHECKING:
     from .csvblocks import PlainBlock
@@ -60,18 +61,22 @@ def read(
         header = Header(path, file)
         # The length of a pipe is told as 0.
         small = 0 < path.stat().st_size <= SMALL
+        messages: list[tuple[int, str]] = []
 
         def values(block: _Block) -> Batch:
             found: Batch = dict(block.numbers(numbers, labels, strict))
-            return found | {name: block.labels(name) for name in labels}
+            found |= {name: block.labels(name) for name in labels}
+            messages.extend(block.messages)
+            return found
 
         blocks = _blocks(file, header, small)
         if small:
             yield from map(values, blocks)
-            return
-        from .ahead import side_by_side  # and the threads of the standard library
+        else:
+            from .ahead import side_by_side  # and the threads of the standard library
 
-        yield from side_by_side(values, blocks, thread_count())
+            yield from side_by_side(values, blocks, thread_count())
+    warn_of_messages(path, messages)
 
 
 def extent(path: Path, names: Sequence[str] = (), topic: str | None = None) -> Extent:

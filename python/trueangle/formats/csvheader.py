@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import codecs
 import csv
+import itertools
 import re
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import IO, NamedTuple
 
 from ..errors import FileError
 
-__all__ = ["LONGEST_LINE", "Header", "is_comment", "number"]
+__all__ = ["LONGEST_LINE", "Header", "cut_rows", "is_comment", "number"]
 
 #: Bytes and lines within which the readings must begin.
 _HEAD = 1 << 18
@@ -21,8 +22,11 @@ LONGEST_LINE = 1 << 24
 #: Lines looked at to tell readings from a preamble.
 _LOOKED_AT = 4
 
-_POINT = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?", re.ASCII)
-_COMMA = re.compile(r"[+-]?(?:\d+[.,]?\d*|[.,]\d+)(?:[eE][+-]?\d+)?", re.ASCII)
+#: Fortran writes exponents with D, and those of three digits without a letter.
+_EXPONENT = r"(?:[eEdD][+-]?\d+|(?<=[\d.,])[+-]\d{3})?"
+_POINT = re.compile(rf"[+-]?(?:\d+\.?\d*|\.\d+){_EXPONENT}", re.ASCII)
+_COMMA = re.compile(rf"[+-]?(?:\d+[.,]?\d*|[.,]\d+){_EXPONENT}", re.ASCII)
+_LETTER = re.compile(r"[dD]|(?<=[\d.])(?=[+-])")
 _WORDS = frozenset({"nan", "inf", "infinity", "+inf", "-inf", "+infinity", "-infinity", "-nan"})
 #: A name at the head of a time column of TwinCAT's exports, before the names it is for.
 _SCOPE = "Name"
@@ -90,14 +94,25 @@ class Header:
         if first < 0:
             cells = [f"column{i + 1}" for i in range(len(cells))]
         self.names = self._named(cells, lines[first + 1 : data] if first >= 0 else [])
-        self._refuse_blanks(lines[data : data + 1])
         self.trailing = self._trailing(lines[data : data + 1])
+        self._all_numbers = data < len(lines) and all(
+            number(cell, self.decimal) is not None for cell in self._cells(lines[data].text)
+        )
         file.seek(sum(len(line) for line in self.head))
 
     @property
     def width(self) -> int:
         """Cells of a line of readings."""
         return len(self.names) + self.trailing
+
+    def is_message(self, cells: Sequence[str]) -> bool:
+        """Whether a line is words of a firmware among readings: of another width, no number.
+
+        Without names words as many as columns are such too: every column begins with a number.
+        """
+        if len(cells) == len(self.names) and (self.place >= 0 or not self._all_numbers):
+            return False
+        return all(number(cell.strip(), self.decimal) is None for cell in cells) and any(cells)
 
     def with_names(self, added: Sequence[str]) -> bytes:
         """The lines before the readings with further names."""
@@ -114,19 +129,6 @@ class Header:
             text = self.delimiter.join(["", *(added if i == self.place else [""] * len(added))])
             head[i] = body + text.encode(self.encoding, "replace") + ending
         return b"".join(head)
-
-    def _refuse_blanks(self, reading: list[_TextLine]) -> None:
-        """Of one cell in which several numbers stand apart by blanks."""
-        for line in reading:
-            words = line.text.split()
-            numbers = [number(word, ".") for word in words]
-            if len(self.names) == 1 < len(words) and None not in numbers:
-                raise FileError(
-                    self.path,
-                    "its columns stand apart by blanks alone: separate them by commas, semicolons "
-                    "or tabs",
-                    line=line.place,
-                )
 
     def _is_units(self, raw: bytes) -> bool:
         return self._units_of(raw.decode(self.encoding, "replace"), len(self.names)) is not None
@@ -163,13 +165,13 @@ class Header:
         solid = [i for i, line in enumerate(lines) if line.text.strip()]
         plain = [i for i in solid if not is_comment(lines[i].text)]
         first = plain[0] if plain else solid[0]
-        self.delimiter = max(",;\t", key=lines[first].text.count)
+        self.delimiter = _delimiter(lines[first].text)
         # Names of this package are taken at their word, wherever the readings begin.
         known = [i for i in plain if _STANDARD.search(lines[i].text)] or [-1]
         if known[-1] >= 0 and (known[-1] == first or self._is_names(lines, plain, known[-1])):
-            self.delimiter = max(",;\t", key=lines[known[-1]].text.count)
+            self.delimiter = _delimiter(lines[known[-1]].text)
             return known[-1], self._after_units(lines, known[-1])
-        for delimiter in (";", "\t", ","):
+        for delimiter in (";", "\t", ",", " "):
             begin = self._first_reading(lines, plain, delimiter)
             if begin is None:
                 continue
@@ -184,7 +186,8 @@ class Header:
                     if i != before[-1]:
                         continue
                 cells = self._cells(text)
-                if abs(len(cells) - width) > 1 or self._is_talk(cells, lines[begin]):
+                off = abs(len(cells) - width)  # blanks say nothing of an end of the line
+                if off > (delimiter != " ") or self._is_talk(cells, lines[begin]):
                     continue
                 if self._units_of(text, width) is None:
                     return self._scope(lines, before, width, i), begin
@@ -199,10 +202,12 @@ class Header:
 
     def _is_names(self, lines: list[_TextLine], plain: list[int], place: int) -> bool:
         """Whether a line has as many cells as each of those that follow it."""
-        delimiter = max(",;\t", key=lines[place].text.count)
+        delimiter = _delimiter(lines[place].text)
         below = [i for i in plain if i > place][:_LOOKED_AT]
-        width = lines[place].text.count(delimiter)
-        return bool(below) and all(lines[i].text.count(delimiter) == width for i in below)
+        width = len(self._split(lines[place].text, delimiter))
+        return bool(below) and all(
+            len(self._split(lines[i].text, delimiter)) == width for i in below
+        )
 
     def _is_talk(self, cells: list[str], reading: _TextLine) -> bool:
         """One cell above several that are filled: words of a firmware, no names."""
@@ -230,11 +235,19 @@ class Header:
     ) -> int | None:
         """The first of some lines in a row that are equally wide and hold numbers."""
         looked_at = [(i, self._split(lines[i].text, delimiter)) for i in plain]
-        decimal = "." if delimiter == "," else ","
+        decimal = "." if delimiter in ", " else ","
+
+        def is_words(cells: list[str], width: int) -> bool:
+            blanks = delimiter == " "  # which tell nothing of how many cells were meant
+            return (blanks or len(cells) != width) and not any(
+                number(cell, decimal) is not None for cell in cells
+            )
+
         good = [len(cells) > 1 and _are_readings(cells, decimal) for _i, cells in looked_at]
-        for k in range(len(looked_at)):
-            next_ones = range(k, min(k + _LOOKED_AT, len(looked_at)))
+        for k in (k for k in range(len(looked_at)) if good[k]):
             width = len(looked_at[k][1])
+            below = (j for j in range(k, len(looked_at)) if not is_words(looked_at[j][1], width))
+            next_ones = list(itertools.islice(below, _LOOKED_AT))
             if all(good[j] and len(looked_at[j][1]) == width for j in next_ones):
                 kinds = [[_kind(cell, decimal) for cell in looked_at[j][1]] for j in next_ones]
                 if all(len(set(column) - {None}) <= 1 for column in zip(*kinds, strict=True)):
@@ -302,12 +315,28 @@ class Header:
 
     def _split(self, text: str, delimiter: str) -> list[str]:
         try:
-            cells = next(csv.reader([text], delimiter=delimiter), [""])
+            cells = next(cut_rows([text], delimiter), [""])
         except csv.Error as cause:
             raise FileError(
                 self.path, f"is not readable as CSV: {cause}; save it with ends of lines", line=1
             ) from None
+        if delimiter == " " and len(cells) > 1 and not cells[-1]:
+            cells = cells[:-1]  # blanks at the end are none between cells
         return [cell.strip() for cell in cells] or [""]
+
+
+def cut_rows(lines: Iterable[str], delimiter: str, *, strict: bool = False) -> Iterator[list[str]]:
+    """Cells of lines; blanks between cells count as one, however many."""
+    blanks = delimiter == " "
+    if blanks:  # and tabs among them
+        lines = (line.replace("\t", " ") for line in lines)
+    return csv.reader(lines, delimiter=delimiter, skipinitialspace=blanks, strict=strict)
+
+
+def _delimiter(text: str) -> str:
+    """What stands between the names of a line: the most frequent sign, else blanks."""
+    found = max(",;\t", key=text.count)
+    return found if found in text or len(text.split()) < 2 else " "
 
 
 #: Names that this package gives its columns: a line with one is the line of names.
@@ -325,7 +354,11 @@ def number(cell: str, decimal: str) -> float | None:
     """The number that a cell holds, or None: no underscores, digits of ASCII only."""
     pattern = _POINT if decimal == "." else _COMMA
     if pattern.fullmatch(cell):
-        return float(cell.replace(",", ".") if decimal == "," else cell)
+        plain = cell.replace(",", ".") if decimal == "," else cell
+        try:
+            return float(plain)
+        except ValueError:
+            return float(_LETTER.sub("e", plain, 1))
     return float(cell) if cell.lower() in _WORDS else None
 
 

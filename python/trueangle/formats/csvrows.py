@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import FileError
-from .csvheader import LONGEST_LINE, Header, is_comment, number
+from .csvheader import LONGEST_LINE, Header, cut_rows, is_comment, number
 from .format import Labels, row_labels
 
 __all__ = ["BLOCK", "QuotedBlock", "quoted_blocks", "too_long"]
@@ -28,6 +28,8 @@ class QuotedBlock:
         self.texts: list[str] = []
         self.cells: list[list[str]] = []
         self.lines: list[int] = []
+        #: Lines that hold no readings: their numbers and words.
+        self.messages: list[tuple[int, str]] = []
 
     @classmethod
     def whole(cls, data: bytes, header: Header, line: int) -> QuotedBlock:
@@ -37,6 +39,7 @@ class QuotedBlock:
             block.texts += part.texts
             block.cells += part.cells
             block.lines += part.lines
+            block.messages += part.messages
         return block
 
     @property
@@ -101,7 +104,8 @@ class QuotedBlock:
                 end[row_number] if row[place].strip() else ""
                 for end, place in zip(ends, places, strict=True)
             ]
-            if len(row) > len(header.names):  # the line ends with a delimiter
+            # The line ends with a delimiter.
+            if len(row) > len(header.names) and header.delimiter != " ":
                 body = body.rstrip()[: -len(header.delimiter)]
             lines.append(header.delimiter.join([body, *values]) + ending)
             row_number += 1
@@ -138,15 +142,18 @@ def quoted_blocks(data: bytes, file: IO[bytes], header: Header, line: int) -> It
             read.append(text)
             yield text
 
-    reader = csv.reader(lines(), delimiter=header.delimiter, strict=True)
+    reader = cut_rows(lines(), header.delimiter, strict=True)
     try:
         for row in reader:
             first = reached + 1 - len(read)
             blank = not any(cell.strip() for cell in row) and len(row) <= 1
             cells = [] if blank else row
+            text = "".join(read)
+            if cells and header.is_message(cells):
+                block.messages.append((first, text.strip()))
+                cells = []
             if cells and not _fits(cells, header):
                 raise _wrong_width(header, len(cells), first)
-            text = "".join(read)
             read.clear()
             block.texts.append(text)
             block.cells.append(cells)

@@ -12,7 +12,12 @@ from .format import Format
 __all__ = ["FORMATS", "find_format", "format_of_content", "known_format"]
 
 #: A process variable and a date, as camonitor begins a line.
-_CAMONITOR = rb"\S+\s+\d{4}-\d\d-\d\d \d\d:\d\d:\d\d"
+_CAMONITOR = rb"\A\S+\s+\d{4}-\d\d-\d\d \d\d:\d\d:\d\d"
+#: A name and a number, and the same name again some lines later.
+_NAMED = rb"(?:[\d:.]+ *-> *)?[ \t]*([A-Za-z_]\w*)[ \t]*[:=][ \t]*[-+]?\.?\d"
+_SERIAL = (
+    rb"^" + _NAMED + rb"[^\n]*\n(?:[^\n]*\n){0,5}?" + _NAMED.replace(rb"([A-Za-z_]\w*)", rb"\1")
+)
 
 FORMATS = (
     Format("parquet", {"Parquet": (".parquet", ".pq")}, "arrow", magics=(b"PAR1",)),
@@ -40,6 +45,7 @@ FORMATS = (
     Format("npy", {"numpy": (".npy",)}, magics=(b"\x93NUMPY",)),
     Format("npz", {"numpy": (".npz",)}, magics=(b"PK\x03\x04",)),
     Format("camonitor", {"EPICS": (".camonitor",)}, pattern=_CAMONITOR),
+    Format("seriallog", {"a serial log": ()}, pattern=_SERIAL),
     Format("csvfile", {"CSV": (".csv",), "tab-separated text": (".tsv", ".tab"), "": (".txt",)}),
 )
 for _format in FORMATS:
@@ -97,5 +103,5 @@ def _head(path: Path) -> bytes:
 
 def _begins(entry: Format, head: bytes) -> bool:
     return head.startswith(entry.magics) or bool(
-        entry.pattern and re.match(entry.pattern, head, re.DOTALL)
+        entry.pattern and re.search(entry.pattern, head, re.MULTILINE)
     )

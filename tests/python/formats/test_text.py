@@ -1,12 +1,17 @@
 """Text files as loggers, scopes and spreadsheets write them."""
 
+import contextlib
+import io
 import math
+import re
+import warnings
 
 import numpy as np
 import pytest
 
 import trueangle as ta
-from trueangle.errors import FileError
+from trueangle.errors import FileError, MessageLinesWarning
+from trueangle.formats import csvheader
 
 ROWS = 24
 REFERENCE = np.arange(ROWS) * 15.0
@@ -20,7 +25,15 @@ def table(delimiter=",", decimal=".", end="", columns=(TIMES, REFERENCE, INDICAT
     return "".join(delimiter.join(row) + end + "\n" for row in zip(*cells, strict=True))
 
 
+def saved(form, comments, delimiter):
+    """What numpy.savetxt writes."""
+    text = io.StringIO()
+    np.savetxt(text, np.c_[TIMES, REFERENCE, INDICATED], form, delimiter, comments=comments)
+    return text.getvalue()
+
+
 NAMES = {"reference": "ref", "indicated": "enc", "time": "t"}
+COLUMNS = {"time": "column1", "reference": ("column2", "deg"), "indicated": "column3"}
 SCOPE = "\t".join(["Name", "Axis.Ref", "Name", "Axis.Enc"])
 TWINCAT = (
     "Name\trecord\nFile\tC:\\x.tcscopex\nStarttime of export\t132959733843760000\tMontag\n\n"
@@ -74,6 +87,30 @@ FILES = {
         "time_s , reference_deg , indicated_deg\n" + table(" , "),
         {},
     ),
+    "numpy.savetxt": (
+        "# time_s reference_deg indicated_deg\n" + saved("%.18e", "# ", " "),
+        {},
+    ),
+    "numpy.savetxt with tabs": (saved("%.18e", "", "\t"), COLUMNS),
+    "gnuplot": (
+        "# rig 7\n#t   ref   enc\n" + saved("%11.6f", "", "  ") + "\n\n",
+        {**NAMES, "reference": ("ref", "deg")},
+    ),
+    "Fortran": (
+        re.sub("(?m)^(?=.)", "  ", saved("%.16e", "", "   ").replace("e", "D")),
+        COLUMNS,
+    ),
+    "Fortran with names": (
+        "  time_s   reference_deg   indicated_deg\n" + saved("%10.5f", "", " "),
+        {},
+    ),
+    "tabs among blanks": ("time_s reference_deg  indicated_deg \n" + saved("%.9f", "", " \t"), {}),
+    "words of a firmware": (
+        "MOT: Monitor enabled!\nMOT: Init\n"
+        + table("\t").replace("\n", "\nMOT: PP check: OK!\n", 9).replace("OK!\n", "fail\n", 1),
+        COLUMNS,
+    ),
+    "words beside blanks": (table(" ").replace("\n", "\nMOT: phase lost\n", 2), COLUMNS),
     "blank lines": ("time_s,reference_deg,indicated_deg\n\n" + table().replace("\n", "\n\n"), {}),
 }
 
@@ -88,7 +125,9 @@ def test_columns_are_found_whatever_stands_around_them(case, way, tmp_path, monk
     text, signals = FILES[case]
     path = tmp_path / "rig.csv"
     path.write_text(text)
-    (run,) = ta.read_runs(path, signals=signals)
+    words = case.startswith("words")
+    with pytest.warns(MessageLinesWarning, match="line") if words else contextlib.nullcontext():
+        (run,) = ta.read_runs(path, signals=signals)
     assert run.period == 360.0
     np.testing.assert_allclose(run.reference, REFERENCE, rtol=1e-15)
     np.testing.assert_allclose(run.indicated, INDICATED, rtol=1e-15)
@@ -110,9 +149,12 @@ def test_a_correction_keeps_every_byte_that_it_does_not_change(case, tmp_path):
     for one, other in zip(before, after, strict=True):
         assert other.startswith((one, one[:-1]))
     names = {"reference": "corrected_deg", "indicated": "corrected_deg"}
-    if case == "no names":
+    if signals.get("time") == "column1":
         names = dict.fromkeys(names, "column4")
-    (run,) = ta.read_runs(tmp_path / "out.csv", signals={k: (v, "deg") for k, v in names.items()})
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", MessageLinesWarning)
+        found = {role: (name, "deg") for role, name in names.items()}
+        (run,) = ta.read_runs(tmp_path / "out.csv", signals=found)
     np.testing.assert_allclose(run.reference, model.correct(INDICATED), rtol=1e-14)
 
 
@@ -220,13 +262,27 @@ def test_bytes_that_are_no_text_are_refused_wherever_they_stand(way, column, tmp
 
 
 @pytest.mark.parametrize(
-    ("names", "line"),
-    # Without names the first line is taken for them.
-    [("   time_s   reference_deg   indicated_deg\n", 2), ("# rig 7\n", 3), ("", 2)],
+    ("cell", "number"),
+    [("1.5D+01", 15.0), ("-.5d0", -0.5), ("0.25-100", 0.25e-100), ("1.+002", 100.0), ("2E3", 2e3)],
 )
-def test_columns_that_stand_apart_by_blanks_are_told(names, line, tmp_path):
-    rows = "".join(f"{t:10.3f}{x:12.4f}{y:12.4f}\n" for t, x, y in [(0, 1, 2), (0.1, 3, 4)])
-    (tmp_path / "rig.dat").write_text(names + rows)
-    with pytest.raises(FileError, match=r"by blanks alone: separate them by commas") as found:
-        ta.read_runs(tmp_path / "rig.dat")
-    assert found.value.line == line
+def test_numbers_as_fortran_writes_them(cell, number):
+    assert csvheader.number(cell, ".") == number
+    assert csvheader.number(cell.replace(".", ","), ",") == number
+
+
+@pytest.mark.parametrize("cell", ["1D", "D+01", "1-2", "1+02", "1D+", "0x1D"])
+def test_what_looks_like_a_number_of_fortran(cell):
+    assert csvheader.number(cell, ".") is None
+
+
+def test_words_among_readings_are_counted_and_said(tmp_path):
+    lines = table("\t").splitlines()
+    lines[5:5] = ["MOT: PP check: OK!", "MOT: Ready."]
+    path = tmp_path / "serial.txt"
+    path.write_text("\n".join(lines))
+    with pytest.warns(MessageLinesWarning, match=r"2 lines of words.*line 6: 'MOT: PP check: OK!'"):
+        (run,) = ta.read_runs(path, signals=COLUMNS)
+    np.testing.assert_array_equal(run.reference, REFERENCE)
+    path.write_text("\n".join([*lines, "1.5"]))
+    with pytest.raises(FileError, match=r"line 27: 1 values where the header has 3 columns"):
+        ta.read_runs(path, signals=COLUMNS)
