@@ -14,10 +14,8 @@ __all__ = ["FORMATS", "find_format", "format_of_content", "known_format"]
 #: A process variable and a date, as camonitor begins a line.
 _CAMONITOR = rb"\A\S+\s+\d{4}-\d\d-\d\d \d\d:\d\d:\d\d"
 #: A name and a number, and the same name again some lines later.
-_NAMED = rb"(?:[\d:.]+ *-> *)?[ \t]*([A-Za-z_]\w*)[ \t]*[:=][ \t]*[-+]?\.?\d"
-_SERIAL = (
-    rb"^" + _NAMED + rb"[^\n]*\n(?:[^\n]*\n){0,5}?" + _NAMED.replace(rb"([A-Za-z_]\w*)", rb"\1")
-)
+_NAMED = rb"(?:[\d:.]+ *-> *)?[ \t]*%s[ \t]*[:=][ \t]*[-+]?\.?\d"
+_SERIAL = b"^%s[^\n]*\n(?:[^\n]*\n){0,5}?%s" % (_NAMED % rb"([A-Za-z_]\w*)", _NAMED % rb"\1")
 
 FORMATS = (
     Format("parquet", {"Parquet": (".parquet", ".pq")}, "arrow", magics=(b"PAR1",)),

@@ -205,11 +205,14 @@ def _lines(path: Path) -> Iterator[tuple[bytes, _Row | None]]:
                 values = {name.decode("utf-8", "replace"): float(x) for name, x in pairs}
                 row = _Row(values, _seconds(clock), number)
                 first = first or pairs[0][0]
-            elif first and re.match(rb"\s*%s\s*[:=]" % re.escape(first), text):
-                if raw.endswith(b"\n"):  # else the log was ended within a line
-                    got = text.decode("utf-8", "replace").strip()[:60]
-                    problem = f"names and numbers are needed, got {got!r}"
-                    raise FileError(path, problem, line=number)
+            elif (
+                first
+                and re.match(rb"\s*%s\s*[:=]" % re.escape(first), text)
+                and raw.endswith(b"\n")  # else the log was ended within a line
+            ):
+                got = text.decode("utf-8", "replace").strip()[:60]
+                problem = f"names and numbers are needed, got {got!r}"
+                raise FileError(path, problem, line=number)
             yield raw, row
 
 

@@ -196,7 +196,11 @@ def _numeric(kind: Format, path: Path, names: list[str], topic: str | None) -> s
     if not names or not hasattr(kind.module, "line_of"):
         return set()
     first = next(iter(kind.module.read(path, names, topic, texts=names)), {})
-    return {name for name, labels in first.items() if all(map(_is_number, labels.names))}
+    return {
+        name
+        for name, found in first.items()
+        if not isinstance(found, Labels) or all(map(_is_number, found.names))
+    }
 
 
 def _is_number(text: str | None) -> bool:

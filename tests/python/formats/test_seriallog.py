@@ -45,10 +45,9 @@ def test_rows_are_read_and_corrected_with_words_among_them(style, ending, tmp_pa
         assert other.startswith(one.rstrip(" ;"))
         assert other.endswith(one[len(one.rstrip(" ;")) :])
     assert (after[0], after[9]) == (lines[0], lines[9])
+    wanted = {**SIGNALS, "indicated": "corrected_rad"}
     with pytest.warns(MessageLinesWarning):
-        found = ta.read_runs(
-            tmp_path / "out.log", signals={**SIGNALS, "indicated": "corrected_rad"}
-        )
+        found = ta.read_runs(tmp_path / "out.log", signals=wanted)
     np.testing.assert_array_equal(found[0].indicated, MODEL.correct(run.indicated))
 
 
