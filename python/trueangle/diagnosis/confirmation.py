@@ -101,10 +101,11 @@ def _is_seen_without_a_name(regression: Regression | None, group: Sequence[int])
     if not is_line_in_time(regression.terms[group[0]]):
         return False
     left = remainder_of(regression, without=group)
-    line = time_test(left)
+    rho = regression.whiten.rho
+    line = time_test(left, rho)
     if line is None or line.p > SEEN or line.at is None:
         return False
-    other = order_test(left, float(regression.lines.orders.max()))
+    other = order_test(left, float(regression.lines.orders.max()), rho)
     if other is not None and other.p < SEEN and other.statistic > line.statistic:
         return False
     return is_line_of(regression.terms[group[0]], line.at)

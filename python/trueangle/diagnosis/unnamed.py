@@ -179,7 +179,8 @@ class UnnamedLine(Effect):
         signals = regression.signals
         left = regression.left - regression.whiten.run_part(regression.left)
         left = left * ~regression.outlying
-        found = periodogram(left, signals.clock, regression.bounds)
+        rho = regression.whiten.rho
+        found = periodogram(left, signals.clock, regression.bounds, correlation=rho)
         if found is None or found.p > LINE:
             return None
         if any(is_line_of(term, found.peak) for term in regression.terms):

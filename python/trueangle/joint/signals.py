@@ -14,6 +14,7 @@ from ..runs.run import CalibrationRun
 from ..support.angles import ARCSEC_PER_TURN
 from ..support.quantiles import median
 from .grid import lattice_step
+from .turning import direction_at_turns, velocity_at_turns
 
 __all__ = ["Signals", "join_runs"]
 
@@ -163,7 +164,10 @@ def join_runs(runs: Sequence[CalibrationRun]) -> Signals:
         segment_length=_joined([part[4] for part in parts]),
         segment_first=np.concatenate([np.arange(part[3].size) == 0 for part in parts]),
         clock=_joined([_clock(run) for run in runs]),
-        **{name: _all([read(run) for run in runs]) for name, read in RECORDED.items()},
+        **{
+            name: _all([read(run, part[0]) for run, part in zip(runs, parts, strict=True)])
+            for name, read in RECORDED.items()
+        },
         count=lattice_step(np.concatenate([run.indicated / run.period for run in runs]))
         * ARCSEC_PER_TURN,
         labels=tuple(run.label or str(j + 1) for j, run in enumerate(runs)),
@@ -185,23 +189,27 @@ def _clock(run: CalibrationRun) -> Array:
     return np.asarray(run.time - run.time[0])
 
 
-def _velocity(run: CalibrationRun) -> Array | None:
+def _velocity(run: CalibrationRun, direction: Array) -> Array | None:
     speed = run.speed
-    return None if speed is None else np.asarray(speed * (360.0 / run.period))
+    if speed is None:
+        return None
+    if run.velocity is None and run.time is not None:
+        speed = velocity_at_turns(run.unwrapped_reference, run.time, direction, speed)
+    return np.asarray(speed * (360.0 / run.period))
 
 
-def _mount(run: CalibrationRun) -> Array | None:
+def _mount(run: CalibrationRun, direction: Array) -> Array | None:
     return None if run.mount is None else run.mount * (2.0 * math.pi / run.period)
 
 
-#: How each signal that runs may record is read from one of them.
-RECORDED: dict[str, Callable[[CalibrationRun], Array | None]] = {
+#: How each signal that runs may record is read from one of them and its direction of travel.
+RECORDED: dict[str, Callable[[CalibrationRun, Array], Array | None]] = {
     "velocity": _velocity,
-    "time": lambda run: run.time,
-    "temperature": lambda run: run.temperature,
-    "torque": lambda run: run.torque,
+    "time": lambda run, _: run.time,
+    "temperature": lambda run, _: run.temperature,
+    "torque": lambda run, _: run.torque,
     "mount": _mount,
-    "current": lambda run: run.signals.get("current"),
+    "current": lambda run, _: run.signals.get("current"),
 }
 
 
@@ -219,6 +227,8 @@ def _travel(run: CalibrationRun) -> tuple[Array, Array, Index, Array, Array]:
         direction = sign[last]
     if np.count_nonzero(np.diff(direction)) > max(FLICKER * len(run), REVERSALS_TRUSTED):
         direction = _dead_zone_direction(angle)
+    elif run.velocity is None and "direction" not in run.signals:
+        direction = direction_at_turns(angle, _clock(run), direction)
     cuts = np.flatnonzero(np.diff(direction)) + 1
     edges = np.concatenate([[0], cuts, [len(run)]])
     segment = np.repeat(np.arange(edges.size - 1), np.diff(edges))

@@ -5,7 +5,10 @@ correlation and wander away), add up to
 
 .. math:: P(f) = \sum_j |z_j(f)|^2 / s_j^2(f) \sim \Gamma(R, 1)
 
-without asking for phases. The false-alarm probability counts the independent frequencies
+without asking for phases. Noise that neighbouring readings share comes back at every multiple
+of the rate of readings, whatever the axis: it is taken out reading by reading first, and beyond
+half of the rate of evenly taken readings the level is that of the frequency which they fold it
+to. The false-alarm probability counts the independent frequencies
 (Baluev 2008 bounds it alike). A line that is not quite steady is looked for in bands as well.
 """
 
@@ -92,7 +95,11 @@ class Periodogram:
 
 
 def periodogram(
-    values: Array, axis: Array, bounds: list[tuple[int, int]], top: float | None = None
+    values: Array,
+    axis: Array,
+    bounds: list[tuple[int, int]],
+    top: float | None = None,
+    correlation: float = 0.0,
 ) -> Periodogram | None:
     """Periodogram of ``values`` along ``axis``, phases of the runs left out.
 
@@ -105,6 +112,8 @@ def periodogram(
     top : float, optional
         Highest frequency; half of the sampling rate of even records, else what
         2^16 cells resolve, up to 60 times the mean rate.
+    correlation : float
+        Of the noise between readings that follow each other, which is taken out.
 
     Returns
     -------
@@ -120,7 +129,7 @@ def periodogram(
         return None
     spans = np.array([float(np.ptp(axis[a:b])) for a, b in kept])
     longest = float(spans.max())
-    even, rate = _sampling(axis, kept)
+    even, rate, folds = _sampling(axis, kept)
     highest = min(0.5 * MOST_BINS / (CELLS * longest), 0.5 * rate if even else 60.0 * rate)
     top = highest if top is None else min(top, highest)
     cell = 1.0 / (2.0 * rate) if even and top > 0.2 * rate else 1.0 / (CELLS * top)
@@ -137,22 +146,33 @@ def periodogram(
     freedom = np.zeros(len(WIDTHS))
     # The amplitude of a line beside the highest frequency is told by those beyond it, too.
     raw = np.zeros(min(last + boxes[-1], frequency.size))
-    for (a, b), span in zip(kept, spans, strict=True):
+    for (a, b), span, fold in zip(kept, spans, folds, strict=True):
         place = ((axis[a:b] - axis[a:b].min()) / cell + 0.5).astype(np.int64)
         e = values[a:b] - values[a:b].mean()
-        spectrum = np.fft.rfft(np.bincount(place, weights=e, minlength=size)[:size])
+        power = _power(place, _whitened(e, correlation), size)
+        whole = _power(place, e, size) if correlation else power
+        raw += whole[: raw.size] * (4.0 / ((b - a) ** 2 * len(kept)))
         cuts, cells = _blocks(frequency.size, over * longest / span)
+        held = [max(1.0, width * span / longest) for width in WIDTHS]
+        half = int(fold / (2.0 * frequency[1])) if fold else last
+        if half < last - over:
+            cuts = cuts[cuts <= half]
+            if cuts.size < 2 + SHARED_BLOCKS:
+                continue
+            place = _folded(np.arange(power.size), 2 * half)
+            total += _beyond(power, cuts, place, boxes, held, first, last)
+            known += cells[np.maximum(place[:last], first)]
+            freedom += held
+            continue
         # Levels are shared between blocks, and bands reach beyond their middle.
         needed = np.searchsorted(cuts, last + boxes[-1]) + SHARED_BLOCKS
         cuts = cuts[: needed + 1]
-        spectrum = spectrum[: cuts[-1]]
-        power = spectrum.real**2
-        power += spectrum.imag**2
-        raw += power[: raw.size] * (4.0 / ((b - a) ** 2 * len(kept)))
+        power = power[: cuts[-1]].copy()
         known += cells[:last]
-        held = [max(1.0, width * span / longest) for width in WIDTHS]
         freedom += held
         _core.add_relative_power(power, cuts, list(zip(boxes, held, strict=True)), total)
+    if not freedom[0]:
+        return None
     best: tuple[float, int, int] | None = None
     # Rounded down to a few values, each of which is one test of a maximum.
     blocks = 2.0 ** (np.floor(2.0 * np.log2(np.maximum(known[first:], 1.0))) / 2.0)
@@ -178,9 +198,63 @@ def periodogram(
     )
 
 
-def time_test(left: Leftover) -> Evidence | None:
-    """A line of one frequency in time (of one over readings where no time is known)."""
-    found = periodogram(left.residual, left.clock, left.bounds)
+def _power(place: NDArray[np.int64], values: Array, size: int) -> Array:
+    """Squares of the amplitudes of values in cells."""
+    spectrum = np.fft.rfft(np.bincount(place, weights=values, minlength=size)[:size])
+    power = spectrum.real**2
+    power += spectrum.imag**2
+    return np.asarray(power)
+
+
+def _whitened(e: Array, correlation: float) -> Array:
+    """Readings of a run less what the one before tells of each."""
+    if not correlation:
+        return e
+    out = e * np.sqrt(1.0 - correlation**2)
+    out[1:] = e[1:] - correlation * e[:-1]
+    return np.asarray(out - out.mean())
+
+
+def _folded(cells: NDArray[np.int64], rate: int) -> NDArray[np.int64]:
+    """Frequencies as evenly taken readings show them: between 0 and half of their rate."""
+    inside = np.mod(cells, rate)
+    return np.asarray(np.minimum(inside, rate - inside))
+
+
+def _beyond(
+    power: Array,
+    cuts: NDArray[np.int64],
+    place: NDArray[np.int64],
+    boxes: list[int],
+    held: list[float],
+    first: int,
+    last: int,
+) -> Array:
+    """Means of relative power over ``boxes``, the level that of the folded frequency.
+
+    Where that lies below the lowest frequency that is looked at the mean of noise stands.
+    """
+    told = power[: cuts[-1]].copy()
+    _core.add_relative_power(told, cuts, [(1, 1.0)], np.zeros((1, 1)))
+    level = power[: cuts[-1]] / np.where(told > 0.0, told, 1.0)
+    relative = power / np.maximum(level[np.minimum(place, cuts[-1] - 1)], 1e-300)
+    relative[place < first] = 1.0
+    total = np.concatenate([[0.0], np.cumsum(relative)])
+    found = np.empty((len(boxes), last))
+    k = np.arange(last)
+    for row, (box, weight) in enumerate(zip(boxes, held, strict=True)):
+        low = np.maximum(k - box // 2, 0)
+        high = np.minimum(k + box - box // 2, relative.size)
+        found[row] = (total[high] - total[low]) / (high - low) * weight
+    return found
+
+
+def time_test(left: Leftover, correlation: float = 0.0) -> Evidence | None:
+    """A line of one frequency in time (of one over readings where no time is known).
+
+    ``correlation`` of the noise between neighbouring readings is taken out first.
+    """
+    found = periodogram(left.residual, left.clock, left.bounds, correlation=correlation)
     if found is None:
         return None
     unit = "Hz" if left.timed else "cycles per reading"
@@ -196,9 +270,10 @@ def time_test(left: Leftover) -> Evidence | None:
     )
 
 
-def order_test(left: Leftover, top: float) -> Evidence | None:
-    """A line of one order in angle whose phase is new in every run."""
-    found = periodogram(left.residual, left.theta / (2.0 * np.pi), left.bounds, top)
+def order_test(left: Leftover, top: float, correlation: float = 0.0) -> Evidence | None:
+    """A line of one order in angle whose phase is new in every run; as `time_test`."""
+    turns = left.theta / (2.0 * np.pi)
+    found = periodogram(left.residual, turns, left.bounds, top, correlation)
     if found is None:
         return None
     return Evidence(
@@ -212,13 +287,20 @@ def order_test(left: Leftover, top: float) -> Evidence | None:
     )
 
 
-def _sampling(axis: Array, bounds: list[tuple[int, int]]) -> tuple[bool, float]:
-    """Whether all steps are alike, and the mean number of readings per unit."""
-    steps = np.concatenate([np.abs(np.diff(axis[a:b])) for a, b in bounds])
-    middle = float(np.median(steps))
-    even = middle > 0.0 and float(np.mean(np.abs(steps - middle) < EVEN * middle)) > 0.95
-    rates = [(b - a - 1) / float(np.ptp(axis[a:b])) for a, b in bounds]
-    return even, 1.0 / middle if even else float(np.max(rates))
+def _sampling(axis: Array, bounds: list[tuple[int, int]]) -> tuple[bool, float, list[float]]:
+    """Whether all steps are alike, readings per unit, and the rate of each even run (or 0)."""
+    steps = [np.abs(np.diff(axis[a:b])) for a, b in bounds]
+    joined = np.concatenate(steps)
+    middle = float(np.median(joined))
+    even = _are_alike(joined, middle)
+    own = [float(np.median(s)) for s in steps]
+    rates = [1.0 / m if _are_alike(s, m) else 0.0 for s, m in zip(steps, own, strict=True)]
+    mean = [(b - a - 1) / float(np.ptp(axis[a:b])) for a, b in bounds]
+    return even, 1.0 / middle if even else float(np.max(mean)), rates
+
+
+def _are_alike(steps: Array, middle: float) -> bool:
+    return middle > 0.0 and float(np.mean(np.abs(steps - middle) < EVEN * middle)) > 0.95
 
 
 def _blocks(size: int, over: float) -> tuple[NDArray[np.int64], Array]:

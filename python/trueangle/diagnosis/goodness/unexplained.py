@@ -115,7 +115,8 @@ def goodness_of_fit(
     """
     noise = estimate_noise(left)
     deciding = place_tests(left, top)
-    for item in (order_test(left, top), time_test(left), run_test(left, noise)):
+    rho = noise.correlation
+    for item in (order_test(left, top, rho), time_test(left, rho), run_test(left, noise)):
         if item is not None:
             deciding.append(item)
     describing = scatter_tests(left, noise, sigma, rounding)

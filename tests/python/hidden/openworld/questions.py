@@ -19,14 +19,25 @@ from ..designs import DESIGNS
 from ..joint import Joint, Line, random_joint
 from ..measurement import ARCSEC, Habit, measure, random_habit
 from ..reversal import Backlash
+from ..slow import Wander
 from ..source import Source
 from .inexact import INEXACT
 from .inexact import draw as draw_inexact
 from .structures import SHAPES, structure
+from .timebound import FORMS, SIGMA, there_and_back, timebound
 
 #: Noise of the exam beyond what the logger of the hidden exam knows, and bits of rounding.
 NOISES = ("normal", "heavy", "ar 0.5", "ar 0.9", "uniform", "wander")
 BITS = (12, 13, 14, 15, 16)
+
+#: Sizes of effects bound to time, in standard deviations of the noise: one is drawn.
+TIMEBOUND = (2.0, 4.0, 8.0)
+
+#: Correlations of the noise in runs there and back.
+CORRELATIONS = (0.5, 0.8, 0.9, 0.95, 0.97)
+
+#: Drifting zeros without any effect.
+DRIFTS = ("walk", "flicker")
 
 #: Wrong beliefs: how the simulation differs from the joint, and the verdict that is right.
 BELIEFS = {
@@ -73,7 +84,7 @@ SIGMAS = 8.0
 class Case:
     """One question: a group, what is hidden, how strongly, and a seed."""
 
-    group: str  # "outside", "nothing", "belief", "several", "high", "inexact"
+    group: str  # one of `JUDGES`
     kind: str
     scale: float = 1.0
     seed: int = 0
@@ -149,6 +160,35 @@ def outside(case: Case) -> Posed:
     hidden = replace(structure(case.kind, rng), size=case.scale * habit.sigma)
     question = _question(case, joint, habit, (hidden,), rng)
     return question, SHAPES[case.kind][1], None
+
+
+def bound_to_time(case: Case) -> Posed:
+    rng = case.rng()
+    joint, habit = random_joint(rng), random_habit(rng)
+    size = float(rng.choice(TIMEBOUND)) * habit.sigma
+    hidden = replace(timebound(case.kind, rng), size=case.scale * size)
+    question = _question(case, joint, habit, (hidden,), rng)
+    return question, FORMS[case.kind][1], None
+
+
+def turning(case: Case) -> Posed:
+    """Play, or nothing, in runs there and back under correlated noise."""
+    rng = case.rng()
+    joint, habit = random_joint(rng), Habit(sigma=SIGMA)
+    play, rho, *bend = case.kind.split()
+    acceleration = float(rng.uniform(60.0, 200.0)) if bend else np.inf
+    runs = there_and_back(joint, float(rho), float(play), rng, acceleration)
+    names = frozenset({"backlash"} if float(play) else ())
+    return Question(HiddenCase(()), joint, (), (), habit, runs), names, None
+
+
+def drifting(case: Case) -> Posed:
+    """A zero that drifts on a free path, of one to four times the noise at the end of a run."""
+    rng = case.rng()
+    joint, habit = random_joint(rng), random_habit(rng)
+    hidden = Wander(kind=case.kind, seed=int(rng.integers(2**31)))
+    size = float(rng.uniform(1.0, 4.0)) * habit.sigma * case.scale
+    return _question(case, joint, habit, (replace(hidden, size=size),), rng), None, None
 
 
 def nothing(case: Case) -> Posed:
@@ -251,6 +291,9 @@ def inexact(case: Case) -> Posed:
 
 POSERS: dict[str, Callable[[Case], Posed]] = {
     "outside": outside,
+    "timebound": bound_to_time,
+    "turning": turning,
+    "drifting": drifting,
     "nothing": nothing,
     "belief": belief,
     "several": several,
@@ -273,6 +316,20 @@ def _nothing_right(
     if case.kind == "wander":  # drift, or unexplained, and nothing else
         return set(confirmed) <= {"drift_within_run"}
     return set(confirmed) <= allowed and not unexplained
+
+
+def _named_or_nothing(
+    case: Case, report: Any, confirmed: tuple[str, ...], unexplained: bool, names: Any
+) -> bool:
+    """What is there, or nothing at all; nothing where nothing is."""
+    return set(confirmed) <= set(names) and not (unexplained and not names)
+
+
+def _no_false_companion(
+    case: Case, report: Any, confirmed: tuple[str, ...], unexplained: bool, names: Any
+) -> bool:
+    """A free path is no cause, and brings none."""
+    return not confirmed
 
 
 def _belief_right(
@@ -308,6 +365,9 @@ def _named(
 
 JUDGES = {
     "outside": _outside_right,
+    "timebound": _outside_right,
+    "turning": _named_or_nothing,
+    "drifting": _no_false_companion,
     "nothing": _nothing_right,
     "belief": _belief_right,
     "several": _all_and_only,
@@ -320,6 +380,9 @@ def cases(group: str, seeds: range, scale: float = 1.0) -> list[Case]:
     """All questions of a group."""
     kinds = {
         "outside": [*SHAPES],
+        "timebound": [*FORMS],
+        "turning": [f"{play} {rho}" for play in (2, 0) for rho in CORRELATIONS],
+        "drifting": [*DRIFTS],
         "nothing": [*NOISES, *(f"bits {b}" for b in BITS)],
         "belief": [*BELIEFS],
         "several": ["+".join(s) for s in SEVERAL],
