@@ -8,7 +8,9 @@ import numpy as np
 
 from ..support.files import Kind
 from .chain import Chain
+from .cstep import c_step
 from .portable import PortableTarget, identifier, self_test, table_lines
+from .runtimeterms import RunTimeTerms
 from .table import PER_RADIAN, Table
 from .target import CommentBlock
 
@@ -25,11 +27,13 @@ _MEMORY = """\
 #define TRUEANGLE_TABLE PROGMEM
 #define TRUEANGLE_I16(at) ((int16_t)pgm_read_word(at))
 #define TRUEANGLE_I32(at) ((int32_t)pgm_read_dword(at))
+#define TRUEANGLE_U32(at) ((uint32_t)pgm_read_dword(at))
 #define TRUEANGLE_F32(at) pgm_read_float(at)
 #else
 #define TRUEANGLE_TABLE
 #define TRUEANGLE_I16(at) (*(at))
 #define TRUEANGLE_I32(at) (*(at))
+#define TRUEANGLE_U32(at) (*(at))
 #define TRUEANGLE_F32(at) (*(at))
 #endif
 #endif
@@ -43,12 +47,12 @@ class CHeader(PortableTarget):
     what = "a C99 header with tables and one inline function per shaft"
     kind: ClassVar[Kind] = Kind("a C header", (".h", ".hpp"))
 
-    def write(self, chain: Chain, header: CommentBlock) -> str:
+    def write(self, chain: Chain, terms: RunTimeTerms | None, header: CommentBlock) -> str:
         """The header."""
         name = identifier(header.name)
         guard = f"TRUEANGLE_{name.upper()}_H"
         parts = [
-            _comment(name, chain, header),
+            _comment(name, chain, terms, header),
             f"#ifndef {guard}\n#define {guard}\n\n#include <stdint.h>\n\n{_MEMORY}",
             "/* Right shifts of negative numbers must keep the sign. */\n"
             f"typedef char {name}_shifts_arithmetically\n"
@@ -61,7 +65,11 @@ class CHeader(PortableTarget):
         ]
         if chain.whole:
             parts.append(_corrected(name, names, chain))
-        parts += [_unwrapped(name, names, chain), _self_test(name, chain)]
+        parts.append(_unwrapped(name, names, chain))
+        if terms is not None:
+            whole = chain.whole and terms.whole
+            parts.append(c_step(terms, chain.zero, chain.at_indicated, whole).replace("@n@", name))
+        parts.append(_self_test(name, chain))
         parts.append(f"#endif /* {guard} */\n")
         return "\n".join(parts)
 
@@ -70,7 +78,7 @@ def _table_names(chain: Chain) -> list[str]:
     return [identifier(table.shaft) for table in chain.tables]
 
 
-def _comment(name: str, chain: Chain, header: CommentBlock) -> str:
+def _comment(name: str, chain: Chain, terms: RunTimeTerms | None, header: CommentBlock) -> str:
     proof = header.proof
     bits = f"{(proof.inputs // chain.turns[0]).bit_length() - 1}" if proof.every_input else "32"
     own = [
@@ -91,6 +99,7 @@ def _comment(name: str, chain: Chain, header: CommentBlock) -> str:
         f"{'Or' if chain.whole else 'Use'}: int64_t corrected = {name}_correct_unwrapped(turns, "
         "indicated), in 2^-32 turns: the whole turns that the output has made since the model's "
         "zero, negative backwards, and the reading within the turn; (uint32_t) of it is the angle.",
+        *([] if terms is None else [terms.use(f"{name}_step", "&state", "{0}")]),
         f"The bound holds for every input of up to {bits} bits.",
         *table_lines(chain),
     ]

@@ -18,8 +18,8 @@ from ..support.display_units import error_unit
 from ..support.files import check_output, read_whole, written_atomically
 from ..support.kinds import told_kinds
 from .exported import HEADER_DIGITS, Exported
-from .leftout import left_out
-from .pattern import TurnPattern, of_direction
+from .leftout import run_time_bound, term_sizes
+from .pattern import TurnPattern
 from .proof import Proof, lost_orders, prove, upward
 from .target import CommentBlock, Made, Target
 from .targets import target_of
@@ -101,20 +101,25 @@ def export_model(
     if "name" in given and given["name"] is None:
         given["name"] = "angle"
     pattern = TurnPattern(loaded)
-    if pattern.is_empty and not (found.takes_direction and pattern.has_direction):
+    if pattern.is_empty and not any(map(found.holds, pattern.left_out)):
         raise ArgumentError(
             "the model has no harmonics and nothing else that follows the angle: there is nothing "
             "to put into a table"
         )
-    rows = left_out(pattern, found.takes_direction)
+    rows = term_sizes(pattern, [t for t in pattern.left_out if not found.holds(t)])
     beside = sum(row["size_arcsec"] for row in rows)
+    computed = found.at_run_time(pattern, given)
+    at_run_time = [] if computed is None else term_sizes(pattern, pattern.left_out)
+    steep, rounding = 1.0, 0.0
+    if computed is not None:
+        steep, rounding = run_time_bound(pattern, computed, at_run_time)
     if max_arcsec is None:
         made = found.make(pattern, given)
     else:
-        made = _smallest(found, pattern, given, _share(max_arcsec, beside, rows))
+        made = _smallest(found, pattern, given, _share(max_arcsec, beside, rows, steep, rounding))
     proof = _proven(made, given.get("bits", 24))
     largest = upward(proof.max_arcsec)
-    total = upward(largest + beside) if rows else largest
+    total = upward(steep * largest + rounding + beside) if rows or at_run_time else largest
     if max_arcsec is not None and total > max_arcsec:
         raise ArgumentError(
             f"{target} differs by up to {total:.4g} arcsec with these options, and at "
@@ -138,6 +143,7 @@ def export_model(
         else f"{proof.how} as its description has it, the device's own arithmetic is not known",
         zero_deg=made.zero_deg,
         left_out=rows,
+        at_run_time=at_run_time,
         notes=notes,
         tables=list(made.tables),
         sha256=sha256,
@@ -240,7 +246,9 @@ def _source(pattern: TurnPattern, sha256: str, path: str | None) -> tuple[str, .
 _MOST_FILES = 4
 
 
-def _share(max_arcsec: float, beside: float, rows: list[dict[str, Any]]) -> float:
+def _share(
+    max_arcsec: float, beside: float, rows: list[dict[str, Any]], steep: float, rounding: float
+) -> float:
     """What of the largest difference is left to the table."""
     if not (math.isfinite(max_arcsec) and max_arcsec > 0.0):
         raise ArgumentError(f"max_arcsec must be a positive number, got {max_arcsec!r}")
@@ -249,7 +257,13 @@ def _share(max_arcsec: float, beside: float, rows: list[dict[str, Any]]) -> floa
         raise ArgumentError(
             f"a table of the angle leaves out {names}, and at most {max_arcsec:g} is asked for"
         )
-    return max_arcsec - beside
+    left = (max_arcsec - beside - rounding) / steep
+    if left <= 0.0:
+        raise ArgumentError(
+            f"float arithmetic of the terms leaves {rounding:.4g} arcsec, and at most "
+            f"{max_arcsec:g} is asked for"
+        )
+    return left
 
 
 def _proven(made: Made, bits: int) -> Proof:
@@ -320,7 +334,7 @@ def _lost(made: Made, pattern: TurnPattern) -> list[dict[str, float]]:
 
 def _notes(target: Target, pattern: TurnPattern, made: Made) -> list[str]:
     notes = []
-    beside = [t.kind for t in pattern.left_out if not (target.takes_direction and of_direction(t))]
+    beside = [t.kind for t in pattern.left_out if not target.holds(t)]
     if beside:
         notes.append(
             f"the model's {', '.join(beside)} cannot be held by a table of the angle and "

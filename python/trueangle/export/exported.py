@@ -31,7 +31,7 @@ class Exported(PlainResult):
         Of the corrected angle at the joint from what the harmonics of the model give, over every
         input, in the target's own arithmetic; the maximum rounded up.
     max_difference_total_arcsec : float
-        With all that is left out.
+        With all that is left out, and with the rounding of what is computed at run time.
     floor_arcsec : float
         rms that the number format alone leaves.
     lost : list of dict
@@ -46,6 +46,8 @@ class Exported(PlainResult):
         ``{"term", "size_arcsec", "over"}``: terms of the model that the table cannot hold, and
         the largest change of the corrected angle that is left with each, over the range of the
         signals that the model records (one unit each way where it records none).
+    at_run_time : list of dict
+        Likewise of the terms that are computed at every reading.
     notes : list of str
         What to know before it is used.
     text : str
@@ -68,6 +70,7 @@ class Exported(PlainResult):
     proof: str
     zero_deg: float
     left_out: list[dict[str, Any]]
+    at_run_time: list[dict[str, Any]]
     notes: list[str]
     tables: list[dict[str, Any]]
     sha256: str
@@ -116,15 +119,21 @@ class Exported(PlainResult):
             f"{shown(self.max_difference_arcsec)} {unit.name}, "
             f"{unit.number(self.rms_difference_arcsec)} rms ({self.proof})"
         )
-        if not self.left_out:
+        if not (self.left_out or self.at_run_time):
             return f"differs from the model by at most {table}"
-        rows = [
-            f"{row['term']} {shown(row['size_arcsec'])} {unit.name}"
-            + (f" over {row['over']}" if row["over"] else "")
-            for row in self.left_out
+
+        def terms(rows: list[dict[str, Any]]) -> str:
+            return ", ".join(
+                f"{row['term']} {shown(row['size_arcsec'])} {unit.name}"
+                + (f" over {row['over']}" if row["over"] else "")
+                for row in rows
+            )
+
+        parts = [
+            f"differs from the model by at most {shown(self.max_difference_total_arcsec)} "
+            f"{unit.name}",
+            *([f"left out: {terms(self.left_out)}"] if self.left_out else []),
+            *([f"at run time: {terms(self.at_run_time)}"] if self.at_run_time else []),
+            f"the rest by at most {table}",
         ]
-        total = f"{shown(self.max_difference_total_arcsec)} {unit.name}"
-        return (
-            f"differs from the model by at most {total}; left out: {', '.join(rows)}; "
-            f"the rest by at most {table}"
-        )
+        return "; ".join(parts)

@@ -2,19 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import math
+import warnings
+from collections.abc import Mapping, Sequence
 from itertools import product
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..errors import ArgumentError, OutsideSpanWarning
 from ..model.model import HarmonicModel
 from ..model.term import Term
 from ..support.angles import ARCSEC_PER_TURN
-from .pattern import TurnPattern, of_direction
+from ..terms import LocalDefect
+from .pattern import TurnPattern
+from .runtimeterms import RunTimeTerms
 
-__all__ = ["left_out"]
+__all__ = ["ranges_of", "run_time_bound", "term_sizes"]
 
 Array = NDArray[np.float64]
 
@@ -27,18 +32,55 @@ _AHEAD = 2
 _UNITS = {"velocity": "deg/s", "temperature": "degC", "torque": "Nm", "current": "A"}
 
 
-def left_out(pattern: TurnPattern, takes_direction: bool) -> list[dict[str, Any]]:
-    """``{"term", "size_arcsec", "over"}`` of each term that a target cannot hold.
+def term_sizes(pattern: TurnPattern, terms: Sequence[Term]) -> list[dict[str, Any]]:
+    """``{"term", "size_arcsec", "over"}`` of terms: those that a target cannot hold, or computes.
 
     The size is the largest change of the corrected angle where the term is not corrected, over
     the signals that it was found over; ``over`` names them, and is None for a term without.
     """
-    terms = [t for t in pattern.left_out if not (takes_direction and of_direction(t))]
     return [_row(pattern, term) for term in terms]
 
 
+def run_time_bound(
+    pattern: TurnPattern, terms: RunTimeTerms, rows: Sequence[Mapping[str, Any]]
+) -> tuple[float, float]:
+    """How much more a table's difference is where terms are searched around it, and their rounding.
+
+    With slopes s of the pattern and q of the terms, and the rounding e of the terms, an angle is
+    off by ``(table + e / (1 - s)) / (1 - q / (1 - s))`` at most; the rounding is in arcsec.
+
+    Raises
+    ------
+    ArgumentError
+        The terms are too steep over the signals that the model records.
+    """
+    ranges: dict[str, tuple[float, float]] = {}
+    for term in pattern.source.terms:
+        for name, (low, high) in ranges_of(pattern, term).items():
+            scale = 1.0 / 360.0 if name == "velocity" else 1.0
+            ranges[name] = (low * scale, high * scale)
+    slope = 0.0
+    if pattern.model.argument == "reference":
+        slope = 2.0 * math.pi * sum(m * c for m, c in pattern.lines.items())
+        slope += sum(
+            abs(bump.height / bump.width * bump.cycles_per_turn) * math.exp(-0.5)
+            for bump in pattern.model.terms
+            if isinstance(bump, LocalDefect)
+        )
+    own = terms.steepness(ranges)
+    if slope + own >= 1.0:
+        raise ArgumentError(
+            f"the terms {', '.join(terms.kinds)} are as steep as {own:.3g} over the signals that "
+            f"the model records, beside {slope:.3g} of the pattern: below 1 in all, an angle is "
+            "found at every reading"
+        )
+    largest = sum(row["size_arcsec"] for row in rows) / ARCSEC_PER_TURN
+    steep = (1.0 - slope) / (1.0 - slope - own)
+    return steep, terms.rounding(largest) / (1.0 - slope - own) * ARCSEC_PER_TURN
+
+
 def _row(pattern: TurnPattern, term: Term) -> dict[str, Any]:
-    ranges = _ranges(pattern, term)
+    ranges = ranges_of(pattern, term)
     words = [f"{_range(*ranges[name])} {unit}" for name, unit in _UNITS.items() if name in ranges]
     return {
         "term": term.kind,
@@ -51,7 +93,7 @@ def _range(low: float, high: float) -> str:
     return f"+-{high:.4g}" if low == -high else f"{low:.4g} to {high:.4g}"
 
 
-def _ranges(pattern: TurnPattern, term: Term) -> dict[str, tuple[float, float]]:
+def ranges_of(pattern: TurnPattern, term: Term) -> dict[str, tuple[float, float]]:
     """Of the signals that a term needs: as recorded, or one unit each way; velocities in deg/s."""
     fit = pattern.source.fit
     known = {name: (low, high) for name, low, high in fit.signals} if fit else {}
@@ -81,7 +123,9 @@ def _size(pattern: TurnPattern, term: Term, ranges: Mapping[str, tuple[float, fl
         if "velocity" in signals:
             signals["velocity"] *= pattern.period / 360.0
         reading = direction * cells
-        given = np.asarray(model.correct(reading, direction=direction, **signals))  # type: ignore[call-overload]
+        with warnings.catch_warnings():  # a size is looked for beyond the travel as well
+            warnings.simplefilter("ignore", OutsideSpanWarning)
+            given = np.asarray(model.correct(reading, direction=direction, **signals))  # type: ignore[call-overload]
         change = (given - np.asarray(plain.correct(reading)))[_AHEAD * _GRID :]
         largest = max(largest, float(np.max(np.abs(change))))
     return largest / pattern.period

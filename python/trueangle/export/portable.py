@@ -12,10 +12,12 @@ from numpy.typing import NDArray
 
 from ..errors import ArgumentError
 from ..model.model import HarmonicModel
+from ..model.term import Term
 from ..support.angles import ARCSEC_PER_TURN
 from .chain import Chain, identifier, make_chain
 from .pattern import TurnPattern
 from .proof import lost_orders
+from .runtimeterms import DIRECTIONS, RunTimeTerms
 from .table import METHODS, NUMBERS, TURN, Table
 from .target import CommentBlock, Made, Option, TablePart, Target
 
@@ -48,6 +50,9 @@ class PortableTarget(Target):
         "method": Option(METHODS, None, "of interpolation"),
         "number": Option(NUMBERS, None, "int16, int32 or float (default: q15, else q31)"),
         "name": Option(str, None, "of the functions (default: the file's)"),
+        "direction": Option(
+            DIRECTIONS, "auto", "what tells the direction of travel, where a term follows it"
+        ),
     }
 
     def sizes(self, options: Mapping[str, Any]) -> Sequence[int]:
@@ -63,6 +68,7 @@ class PortableTarget(Target):
 
     def make(self, pattern: TurnPattern, options: Mapping[str, Any]) -> Made:
         chain = _chain(pattern, options)
+        terms = self.at_run_time(pattern, options)
         bits = options["bits"]
         if not 1 <= bits <= 32:
             raise ArgumentError(f"bits must be from 1 to 32, got {bits}")
@@ -80,7 +86,7 @@ class PortableTarget(Target):
                 "without it"
             )
         return Made(
-            text=lambda header: self.write(chain, header),
+            text=lambda header: self.write(chain, terms, header),
             entries=sum(table.entries for table in chain.tables),
             bytes=sum(table.bytes for table in chain.tables),
             part=_part(chain, pattern, floating),
@@ -101,9 +107,20 @@ class PortableTarget(Target):
             ),
         )
 
-    def write(self, chain: Chain, header: CommentBlock) -> str:
+    def write(self, chain: Chain, terms: RunTimeTerms | None, header: CommentBlock) -> str:
         """The file's text."""
         raise NotImplementedError
+
+    def holds(self, term: Term) -> bool:
+        return True
+
+    def at_run_time(self, pattern: TurnPattern, options: Mapping[str, Any]) -> RunTimeTerms | None:
+        terms = pattern.left_out
+        if not terms:
+            return None
+        if pattern.model.argument == "indicated":
+            terms = pattern.source.terms
+        return RunTimeTerms.of(pattern.source, terms, options["direction"])
 
     def read(self, text: str, path: str, options: Mapping[str, Any]) -> HarmonicModel:
         from .reading import portable_model
@@ -134,8 +151,8 @@ def self_test(chain: Chain) -> list[tuple[int, int, int]]:
 
 def _chain(pattern: TurnPattern, options: Mapping[str, Any]) -> Chain:
     shafts = pattern.shafts()
-    if not shafts:
-        raise ArgumentError("the model has no harmonics: there is nothing to put into a table")
+    if not shafts:  # all that there is follows travel, speed, heat or load
+        return make_chain(pattern, "linear", "q31", [])
     method, number, entries = (options[key] for key in ("method", "number", "entries"))
     if entries is not None:
         _check(shafts, entries)

@@ -12,6 +12,8 @@ import trueangle._core as _core
 from ..support.files import Kind
 from .chain import Chain
 from .portable import PortableTarget, identifier, self_test, table_lines
+from .runtimeterms import RunTimeTerms
+from .ruststep import rust_step
 from .table import PER_RADIAN, Table
 from .target import CommentBlock
 
@@ -28,18 +30,21 @@ class RustModule(PortableTarget):
     what = "a Rust module without std, tables and one function per shaft"
     kind: ClassVar[Kind] = Kind("a Rust module", (".rs",))
 
-    def write(self, chain: Chain, header: CommentBlock) -> str:
+    def write(self, chain: Chain, terms: RunTimeTerms | None, header: CommentBlock) -> str:
         """The module."""
-        parts = [_comment(chain, header)]
+        parts = [_comment(chain, terms, header)]
         parts += [_table(table) for table in chain.tables]
         if chain.whole:
             parts.append(_corrected(chain))
         parts += [_unwrapped(chain), _self_test(chain)]
+        if terms is not None:
+            whole = chain.whole and terms.whole
+            parts.append(rust_step(terms, chain.zero, chain.at_indicated, whole))
         parts += [_arithmetic(table) for table in _different(chain.tables)]
         return "\n".join(parts)
 
 
-def _comment(chain: Chain, header: CommentBlock) -> str:
+def _comment(chain: Chain, terms: RunTimeTerms | None, header: CommentBlock) -> str:
     own = [
         "Correction of an indicated angle; do not edit.",
         "",
@@ -47,6 +52,7 @@ def _comment(chain: Chain, header: CommentBlock) -> str:
         "shifted left by 32 - n. Corrected = indicated - correction, looked up at the indicated "
         "angle" + ("; all tables at the same one." if chain.at_indicated else "."),
         "`correct_unwrapped` takes and gives the whole turns of the output as well.",
+        *([] if terms is None else [terms.use("step", "&mut state", "State::default()")]),
         *table_lines(chain),
     ]
     return "\n".join(header.comment("//! ", *own)) + "\n"

@@ -12,10 +12,12 @@ from numpy.typing import NDArray
 
 from ..errors import ArgumentError
 from ..model.model import HarmonicModel
+from ..model.term import Term
 from ..support.files import Kind
 from ..support.suggestions import check_choice, did_you_mean
-from .pattern import TurnPattern
+from .pattern import TurnPattern, of_direction
 from .proof import Correction, Proof
+from .runtimeterms import RunTimeTerms
 
 __all__ = ["CommentBlock", "Made", "Option", "TablePart", "Target", "comment_lines"]
 
@@ -167,6 +169,14 @@ class Target(ABC):
 
     #: It takes what follows the direction of travel besides the pattern.
     takes_direction: ClassVar[bool] = False
+
+    def holds(self, term: Term) -> bool:
+        """Whether a term that is no function of the angle gets into what is written."""
+        return self.takes_direction and of_direction(term)
+
+    def at_run_time(self, pattern: TurnPattern, options: Mapping[str, Any]) -> RunTimeTerms | None:
+        """The terms that are computed at every reading, where there are any."""
+        return None
 
     @abstractmethod
     def make(self, pattern: TurnPattern, options: Mapping[str, Any]) -> Made:
