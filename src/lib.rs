@@ -28,6 +28,7 @@ pub mod band;
 pub mod banded;
 pub mod design;
 pub mod fit;
+pub mod linear;
 pub mod lstsq;
 pub mod moments;
 pub mod rank;

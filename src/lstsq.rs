@@ -3,7 +3,7 @@
 //! Rows `[columns | right-hand side]` are reduced block by block to the triangle of
 //! their QR factorisation, which is all that a solution needs: memory is that of the
 //! triangle, whatever the number of rows, and triangles merge like the rows they
-//! stand for. The design is never squared. This is the one module that knows nalgebra.
+//! stand for. The design is never squared. With `linear` this is all that knows nalgebra.
 
 mod blocked;
 mod householder;
@@ -13,7 +13,8 @@ use std::borrow::Cow;
 
 use nalgebra::DMatrix;
 
-use blocked::{cholesky, triangle};
+use blocked::triangle;
+pub(crate) use blocked::{cholesky, invert_upper, product};
 pub use system::{Estimate, Pivot, System};
 
 /// The upper triangle `R` of rows; the last column is the right-hand side.
@@ -110,7 +111,7 @@ impl Triangle {
     }
 
     /// The triangle with rows of zeros where there were too few.
-    fn square(&self) -> Cow<'_, DMatrix<f64>> {
+    pub(crate) fn square(&self) -> Cow<'_, DMatrix<f64>> {
         if self.factor.is_square() {
             return Cow::Borrowed(&self.factor);
         }

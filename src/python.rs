@@ -9,6 +9,7 @@ mod corrector;
 mod door;
 mod failure;
 mod fit;
+mod linear;
 mod lines;
 mod moments;
 mod motion;
@@ -48,6 +49,9 @@ mod _core {
     use super::fit::{
         Solution, band, fit, folds, median_magnitude, sample_residuals, scan_residuals, triangle,
     };
+
+    #[pymodule_export]
+    use super::linear::{PyLinearModel, cluster_covariance, left_out, ridge_path};
 
     #[pymodule_export]
     use super::lines::{line_columns, line_sum, line_sum_and_slope, unit_sums};

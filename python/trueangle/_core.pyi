@@ -161,6 +161,52 @@ class Banded:
     def solve(self, right: NDArray[np.float64]) -> None: ...
 
 @final
+class LinearModel:
+    @staticmethod
+    def of_rows(
+        design: NDArray[np.float64],
+        targets: NDArray[np.float64],
+        weights: NDArray[np.float64] | None = None,
+    ) -> LinearModel: ...
+    @staticmethod
+    def of_sums(
+        gram: NDArray[np.float64],
+        moments: NDArray[np.float64],
+        squares: Sequence[float],
+        lengths: Sequence[float] | None = None,
+        floor: float | None = None,
+    ) -> LinearModel: ...
+    @property
+    def rank(self) -> int: ...
+    @property
+    def log_determinant(self) -> float: ...
+    @property
+    def squares(self) -> _Array: ...
+    @property
+    def coefficients(self) -> _Array: ...
+    @property
+    def root(self) -> _Array: ...
+    @property
+    def unseen(self) -> _Array: ...
+    @property
+    def inverse(self) -> _Array: ...
+
+def left_out(
+    grams: NDArray[np.float64],
+    moments: NDArray[np.float64],
+    squares: Sequence[float],
+    ridge: float = 0.0,
+) -> tuple[_Array, _Array]: ...
+def cluster_covariance(
+    grams: NDArray[np.float64], scores: NDArray[np.float64], penalty: float = 0.0
+) -> tuple[_Array, _Array]: ...
+def ridge_path(
+    folds: Sequence[tuple[NDArray[np.float64], float]],
+    own_zeros: bool,
+    penalties: Sequence[float],
+) -> tuple[_Array, _Array]: ...
+
+@final
 class Solution:
     @property
     def offsets(self) -> _Array: ...

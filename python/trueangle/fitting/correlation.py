@@ -11,14 +11,25 @@ from numpy.typing import NDArray
 
 import trueangle._core as _core
 
+from ..estimation.linear import NormalEquations, scatter_statistic, total
 from ..support.distributions import chi_squared_tail
-from .clusters import scatter_statistic
-from .clustersums import clusters_of, runs_together
 from .problem import Fitted, Problem
 
-__all__ = ["FEWEST_RUNS", "FEWEST_STRETCHES", "SCATTER", "correlation_found", "memory_of"]
+__all__ = [
+    "FEWEST_RUNS",
+    "FEWEST_STRETCHES",
+    "SCATTER",
+    "clusters_of",
+    "correlation_found",
+    "memory_of",
+    "runs_together",
+    "weight_of",
+]
 
 Array = NDArray[np.float64]
+
+#: Most clusters: of more runs several are taken together.
+_MOST_CLUSTERS: Final = 128
 
 #: Runs from which whole runs are the clusters.
 FEWEST_RUNS: Final = 3
@@ -39,6 +50,35 @@ _LONG: Final = 8.0
 #: Stretches of a run, most and fewest.
 _MOST_STRETCHES: Final = 64
 FEWEST_STRETCHES: Final = 8
+
+
+def coefficients_of(fitted: Fitted) -> Array:
+    """``A, B`` of every order of every shaft in turn."""
+    solution = fitted.solution
+    a, b = (np.concatenate([np.zeros(0), *part]) for part in (solution.cosine, solution.sine))
+    return np.column_stack([a, b]).ravel()
+
+
+def weight_of(weights: Array | None, size: int) -> float:
+    """Sum of the weights of so many readings."""
+    return float(size) if weights is None else float(weights.sum())
+
+
+def clusters_of(
+    problem: Problem, fitted: Fitted, weights: Sequence[Array | None], index: int, count: int
+) -> list[NormalEquations]:
+    """Sums of a run in so many segments of readings in a row, about the run's mean and the fit."""
+    sums = problem.products(weights, index, count)
+    whole = np.sum(sums, axis=0)
+    mean, coefficients = whole[0] / whole[0, 0], coefficients_of(fitted)
+    return [NormalEquations.of_products(one, mean).about(coefficients) for one in sums]
+
+
+def runs_together(clusters: list[NormalEquations]) -> list[NormalEquations]:
+    """At most so many clusters: further runs are dealt to the first ones."""
+    if len(clusters) <= _MOST_CLUSTERS:
+        return clusters
+    return [total(clusters[i::_MOST_CLUSTERS]) for i in range(_MOST_CLUSTERS)]
 
 
 def _in_time(

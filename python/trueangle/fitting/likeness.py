@@ -3,19 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Final, NamedTuple
+from dataclasses import replace
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 import trueangle._core as _core
 
+from ..estimation.linear import NormalEquations, least_squares, total
 from ..runs.run import CalibrationRun
 from ..support.angles import circular_mean
 from ..support.quantiles import median
 from .problem import Fitted, Problem
 
-__all__ = ["RunSums", "far_runs", "names_of", "unlike_runs", "unlike_sentence"]
+__all__ = ["far_runs", "names_of", "unlike_runs", "unlike_sentence"]
 
 Array = NDArray[np.float64]
 
@@ -29,23 +31,12 @@ _SHARE: Final = 0.2
 #: ... and by so many times what its noise, correlated as it is, lets coefficients scatter.
 _SCATTER: Final = 25.0
 
-#: Directions of a run's design below this part of the longest are not seen by it.
-_SEEN: Final = 1e-6
-
-#: Above this part of the longest each coefficient of a run alone means something.
+#: Where no direction of a run's design is shorter than this part of the longest, each
+#: coefficient of the run alone means something.
 _SPEAKS: Final = 0.1
 
 #: Runs that a sentence names.
 _NAMED: Final = 8
-
-
-class RunSums(NamedTuple):
-    """Normal equations of a run about its own zero, and its readings."""
-
-    gram: Array
-    moment: Array
-    squares: float
-    readings: float
 
 
 def unlike_runs(problem: Problem, fitted: Fitted) -> list[int]:
@@ -62,7 +53,7 @@ def unlike_runs(problem: Problem, fitted: Fitted) -> list[int]:
     return [chosen[i] for i, times in far if times > _SCATTER * _correlated(problem, chosen[i])]
 
 
-def far_runs(runs: Sequence[RunSums]) -> list[tuple[int, float]]:
+def far_runs(runs: Sequence[NormalEquations]) -> list[tuple[int, float]]:
     r"""Places of runs that are unlike the others, and by how many times their noise.
 
     With :math:`S_r(b)` the sum of squares of run r about its own zero, the runs for which
@@ -75,13 +66,12 @@ def far_runs(runs: Sequence[RunSums]) -> list[tuple[int, float]]:
     """
     if len(runs) < 2:
         return []
-    alone = [_solved(run.gram, run.moment) for run in runs]
+    alone = [_solved(run) for run in runs]
     # Most runs decide where each can speak: one that is unlike moves the mean of all.
     if len(runs) > 2 and all(clear for _, _, clear in alone):
         common = median([solution for solution, _, _ in alone], axis=0)
     else:
-        grams = np.sum([run.gram for run in runs], axis=0)
-        common, _, _ = _solved(grams, np.sum([run.moment for run in runs], axis=0))
+        common, _, _ = _solved(total(runs))
     # The common pattern of two holds half of each.
     without = 4.0 if len(runs) == 2 else 1.0
     missed, own, noise, free, rank = np.zeros((5, len(runs)))
@@ -98,12 +88,12 @@ def far_runs(runs: Sequence[RunSums]) -> list[tuple[int, float]]:
     return [(i, float(missed[i] / max(noisy[i], 1e-300))) for i in far.tolist()]
 
 
-def _solved(gram: Array, moment: Array) -> tuple[Array, int, bool]:
+def _solved(sums: NormalEquations) -> tuple[Array, int, bool]:
     """Least squares from normal equations: directions seen, and whether all clearly."""
-    values, vectors = np.linalg.eigh(gram)
-    seen = values > _SEEN**2 * values[-1]
-    solution = vectors[:, seen] @ ((vectors[:, seen].T @ moment) / values[seen])
-    return solution, int(np.count_nonzero(seen)), bool(values[0] > _SPEAKS**2 * values[-1])
+    found = sums.solved()
+    values = np.linalg.eigvalsh(sums.gram)
+    clear = bool(values[0] > _SPEAKS**2 * values[-1])
+    return found.coefficients[:, 0], found.rank, clear
 
 
 def names_of(runs: Sequence[CalibrationRun]) -> list[str]:
@@ -130,17 +120,13 @@ def unlike_sentence(labels: Sequence[str], count: int) -> str:
     )
 
 
-def _sums(problem: Problem, index: int) -> RunSums:
+def _sums(problem: Problem, index: int) -> NormalEquations:
     if problem.summed is not None:
         (products,) = problem.products(problem.base, index, 1)
-        readings = float(products[0, 0])
-        share = min(1.0, _READINGS / readings)
-        about = share * (products - np.outer(products[0], products[0]) / readings)
-        moment = about[1:-1, -1]
-        return RunSums(about[1:-1, 1:-1], moment, float(about[-1, -1]), share * readings)
+        sums = NormalEquations.of_products(products)
+        return sums.share(min(1.0, _READINGS / sums.readings))
     rows, used = _rows(problem, index)
-    design, error = rows[:, :-1], rows[:, -1]
-    return RunSums(design.T @ design, design.T @ error, float(error @ error), used)
+    return replace(NormalEquations.of_rows(rows[:, :-1], rows[:, -1]), readings=used)
 
 
 def _rows(problem: Problem, index: int) -> tuple[Array, float]:
@@ -168,7 +154,7 @@ def _correlated(problem: Problem, index: int) -> float:
     """By how much correlated neighbours widen the scatter of a run's own coefficients."""
     run = problem.runs[index]
     rows, _ = _rows(problem, index)
-    own = np.linalg.lstsq(rows[:, :-1], rows[:, -1], rcond=_SEEN)[0]
+    own = least_squares(rows[:, :-1], rows[:, -1])
     left = run.centred_error - run.zero
     place = 2.0 * np.pi / problem.period * problem.angles[index]
     orders = [k * s.cycles_per_turn for s in problem.shafts for k in s.orders]

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import NoModelError
+from ..estimation.linear import NormalEquations, left_out
 from ..joint.shafts import ShaftOrders
 from ..runs.run import CalibrationRun
 from ..support.display_units import brief
@@ -125,60 +126,51 @@ def gains_of_runs(
         return None
     every = np.array([*orders, *(k for k in _SHOWN if k not in orders)])
     wanted = np.repeat([np.arange(every.size) < len(orders)], 2, axis=0).ravel()
-    grams, moments, lefts, shown, sizes = [], [], [], [], []
-    wholes: list[tuple[Array, Array]] = []
+    wholes: list[NormalEquations] = []
     parts = (
         _looked_at(runs, every, argument, share) if summed is None else summed.parts(every, share)
     )
-    for gram, moment, energy, size in parts:
-        if size < 2:
+    shown = []
+    for whole in parts:
+        if whole.readings < 2:
             return None
-        grams.append(gram[np.ix_(wanted, wanted)])
-        moments.append(moment[wanted])
-        lefts.append(max(0.0, energy - float(_solved(grams[-1], moments[-1]) @ moments[-1])))
-        sizes.append(size)
-        wholes.append((gram, moment))
-        by_chance = 2.0 * every.size / size
-        alone = float(_solved(gram, moment) @ moment)
-        shown.append(max(0.0, alone - by_chance * max(0.0, energy - alone)) / size)
-    gains, noise = np.empty(len(sizes)), 0.0
-    gram, moment = sum(grams), sum(moments)
-    for i, (own, mine) in enumerate(zip(grams, moments, strict=True)):
-        others = _solved(gram - own, moment - mine)
-        power = float(others @ own @ others)
-        gains[i] = (2.0 * float(others @ mine) - power) / sizes[i]
-        noise += 4.0 * lefts[i] * power / sizes[i] ** 3 / len(sizes)
-    gram = np.sum([whole for whole, _ in wholes], axis=0)
-    moment = np.sum([whole for _, whole in wholes], axis=0)
-    shared = 0.0
-    for (own, mine), size in zip(wholes, sizes, strict=True):
-        others = _solved(gram - own, moment - mine)
-        shared += float(2.0 * others @ mine - others @ own @ others) / size / len(sizes)
-    return RunGains(gains, noise, float(np.mean(shown)), shared)
+        wholes.append(whole)
+        by_chance = 2.0 * every.size / whole.readings
+        own = _explained(whole)
+        shown.append(max(0.0, own - by_chance * max(0.0, whole.squares - own)) / whole.readings)
+    sizes = np.array([whole.readings for whole in wholes])
+    squares = np.array([whole.squares for whole in wholes])
+    sums = [whole.among(wanted) for whole in wholes]
+    others, left = left_out(sums, _RIDGE)
+    power = np.array([float(b @ one.gram @ b) for b, one in zip(others, sums, strict=True)])
+    alone = np.array([max(0.0, one.squares - _explained(one)) for one in sums])
+    shared = float(np.mean((squares - left_out(wholes, _RIDGE)[1]) / sizes))
+    noise = float(np.mean(4.0 * alone * power / sizes**3))
+    return RunGains((squares - left) / sizes, noise, float(np.mean(shown)), shared)
 
 
 def _looked_at(
     runs: Sequence[CalibrationRun], orders: Array, argument: str, share: float
-) -> Iterator[tuple[Array, Array, float, float]]:
-    """Normal equations of a share of every run's readings about their mean, and how many."""
+) -> Iterator[NormalEquations]:
+    """Of a share of every run's readings about their mean."""
     rng = np.random.default_rng(0)
     for run in runs:
         keep: Any = slice(None) if share == 1.0 else np.flatnonzero(rng.random(len(run)) < share)
         x = (2.0 * np.pi / run.period * getattr(run, argument))[keep, None] * orders
         weight = np.ones(len(x)) if run.weights is None else run.weights[keep]
         if len(x) < 2 or not weight.any():
-            yield np.zeros((0, 0)), np.zeros(0), 0.0, 0
+            yield NormalEquations(np.zeros((0, 0)), np.zeros(0))
             return
         root = np.sqrt(weight / weight.mean())[:, None]
         design = root * _about(np.hstack([np.cos(x), np.sin(x)]), weight)
         error = root[:, 0] * _about(run.centred_error[keep, None], weight)[:, 0]
-        yield design.T @ design, design.T @ error, float(error @ error), len(x)
+        yield NormalEquations.of_rows(design, error)
 
 
 def _about(columns: Array, weight: Array) -> Array:
     return np.asarray(columns - (weight @ columns) / weight.sum())
 
 
-def _solved(gram: Array, moment: Array) -> Array:
-    ridge = _RIDGE * max(float(np.trace(gram)) / len(gram), 1e-300)
-    return np.asarray(np.linalg.solve(gram + ridge * np.eye(len(gram)), moment))
+def _explained(sums: NormalEquations) -> float:
+    """Sum of squares that the readings explain by themselves, as far as the penalty lets them."""
+    return float(sums.held(_RIDGE).solved().coefficients[:, 0] @ sums.moment)

@@ -8,6 +8,14 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ..estimation.linear import (
+    NormalEquations,
+    least_squares,
+    left_out,
+    pseudo_inverse,
+    unexplained,
+)
+
 __all__ = ["FOLDS", "FoldRows", "choose", "inflation", "solved", "stiffest", "turns"]
 
 Array = NDArray[np.float64]
@@ -25,9 +33,6 @@ _GROWN: Final = 5.0
 #: Of nuisances that leave nearly the same the simplest is taken.
 _ALIKE: Final = 0.02
 
-#: Part of the greatest eigenvalue below which a combination of columns is not seen.
-_SEEN: Final = 1e-9
-
 
 class FoldRows(NamedTuple):
     """Columns by name, each about its run's mean, the errors, and the fold of each reading."""
@@ -42,39 +47,17 @@ def _design(rows: FoldRows, chosen: Sequence[str]) -> Array:
     return np.hstack([rows.pattern, *(rows.groups[name] for name in chosen)])
 
 
-def _solution(gram: Array, moment: Array) -> Array:
-    if not gram.size:
-        return np.zeros(0)
-    scale = np.sqrt(np.maximum(np.diag(gram), 1e-300))
-    values, vectors = np.linalg.eigh(gram / np.outer(scale, scale))
-    seen = values > _SEEN * values[-1]
-    turned = vectors[:, seen].T @ (moment / scale)
-    return np.asarray(vectors[:, seen] @ (turned / values[seen]) / scale)
-
-
 def _held_out(rows: FoldRows, chosen: Sequence[str]) -> Array:
     """Sum of squares of each fold under the fit of the others."""
     design = _design(rows, chosen)
     masks = [rows.fold == f for f in range(FOLDS)]
-    grams = [design[m].T @ design[m] for m in masks]
-    moments = [design[m].T @ rows.error[m] for m in masks]
-    found = []
-    for f, mask in enumerate(masks):
-        others = [i for i in range(FOLDS) if i != f]
-        solution = _solution(sum(grams[i] for i in others), sum(moments[i] for i in others))
-        left = rows.error[mask] - design[mask] @ solution
-        found.append(float(left @ left))
-    return np.array(found)
+    return left_out([NormalEquations.of_rows(design[m], rows.error[m]) for m in masks])[1]
 
 
 def _told(rows: FoldRows, chosen: Sequence[str], name: str) -> float:
     """Part of a group's energy that the pattern and the chosen ones leave."""
-    design, columns = _design(rows, chosen), rows.groups[name]
-    gram, cross = design.T @ design, design.T @ columns
-    left = columns - design @ np.column_stack(
-        [_solution(gram, cross[:, j]) for j in range(cross.shape[1])]
-    )
-    return float((left**2).sum() / (columns**2).sum())
+    columns = rows.groups[name]
+    return float((unexplained(_design(rows, chosen), columns) ** 2).sum() / (columns**2).sum())
 
 
 def choose(
@@ -135,10 +118,7 @@ def inflation(rows: FoldRows, chosen: Sequence[str]) -> list[float]:
     size = pattern.shape[1]
     if not size:
         return []
-    alone, beside = (
-        np.diag(np.linalg.pinv(x.T @ x, rcond=_SEEN, hermitian=True))[:size]
-        for x in (pattern, design)
-    )
+    alone, beside = (pseudo_inverse(x.T @ x).diagonal()[:size] for x in (pattern, design))
     ratio = np.sqrt(np.maximum(beside / np.maximum(alone, 1e-300), 1.0))
     return [float(v) for v in ratio.reshape(2, -1).T.ravel()]
 
@@ -146,6 +126,6 @@ def inflation(rows: FoldRows, chosen: Sequence[str]) -> list[float]:
 def solved(rows: FoldRows, chosen: Sequence[str]) -> dict[str, Array]:
     """Coefficients of the chosen groups beside the pattern."""
     design = _design(rows, chosen)
-    solution = _solution(design.T @ design, design.T @ rows.error)
+    solution = least_squares(design, rows.error)
     ends = np.cumsum([rows.pattern.shape[1], *(rows.groups[n].shape[1] for n in chosen)])
     return dict(zip(chosen, np.split(solution, ends[:-1])[1:], strict=True))

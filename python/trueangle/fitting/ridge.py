@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,7 +18,7 @@ __all__ = ["REACH", "choose_ridge", "error_range"]
 Array = NDArray[np.float64]
 
 #: Penalties tried, relative to the sum of weights: from "none" to "hardly any harmonics".
-_PENALTIES = np.array([0.0, *np.logspace(-9.0, 0.0, 19).tolist()])
+_PENALTIES = [0.0, *np.logspace(-9.0, 0.0, 19).tolist()]
 
 #: Parts of the arc left out in turn when there is one run only.
 _BLOCKS = 10
@@ -34,16 +33,6 @@ REACH = 3.0
 
 #: Readings whose angles and errors are looked at for the ends of blocks and the range.
 _LOOKED_AT = 65_536
-
-#: Singular values below this part of the greatest carry nothing but rounding.
-_NOTHING = 1e-14
-
-
-class _Fold(NamedTuple):
-    """Readings left out together: the triangle of ``[1, harmonics | error]`` over them."""
-
-    triangle: Array
-    weight: float
 
 
 def choose_ridge(problem: Problem, weights: Sequence[Array | None]) -> float:
@@ -71,22 +60,18 @@ def choose_ridge(problem: Problem, weights: Sequence[Array | None]) -> float:
     Every reading is reduced once, to the triangle of its fold, which is all that the
     many fits and scores need: O(N) for N readings, whatever the number of penalties.
     """
-    folds = _folds(problem, weights)
-    own_zeros = len(problem.runs) > 1
-    scores = np.zeros(_PENALTIES.size)
-    for j, held in enumerate(folds):
-        kept = [fold for i, fold in enumerate(folds) if i != j]
-        if held.weight > 0.0 and any(fold.weight > 0.0 for fold in kept):
-            scores += _held_out(_solutions(kept, own_zeros), held, own_zeros)
+    amplitudes, scores = _core.ridge_path(
+        _folds(problem, weights), len(problem.runs) > 1, _PENALTIES
+    )
     best = int(np.argmin(scores))
-    amplitudes = _solutions(folds, own_zeros)[1:]
     sums = np.hypot(amplitudes[::2], amplitudes[1::2]).sum(axis=0)
     reach = REACH * error_range(problem, weights)
     tame = np.flatnonzero(sums[best:] <= reach)
     return float(_PENALTIES[best + tame[0]] if tame.size else _PENALTIES[-1])
 
 
-def _folds(problem: Problem, weights: Sequence[Array | None]) -> list[_Fold]:
+def _folds(problem: Problem, weights: Sequence[Array | None]) -> list[tuple[Array, float]]:
+    """Triangles of ``[1 | harmonics | error]`` over readings left out together, and weights."""
     several = len(problem.runs) > 1
     found: list[tuple[Array, float]] = []
     for run, weight, angles in zip(problem.runs, weights, problem.angles, strict=True):
@@ -100,7 +85,7 @@ def _folds(problem: Problem, weights: Sequence[Array | None]) -> list[_Fold]:
             _zero(run),
             problem.threads,
         )
-    return [_Fold(triangle, weight) for triangle, weight in found]
+    return found
 
 
 def _zero(run: CalibrationRun) -> float:
@@ -114,37 +99,6 @@ def _ends(angles: Array, count: int) -> list[float]:
     looked_at = angles[:: max(1, angles.size // _LOOKED_AT)]
     ends: list[float] = np.quantile(looked_at, np.arange(1, count) / count).tolist()
     return ends
-
-
-def _solutions(folds: Sequence[_Fold], own_zeros: bool) -> Array:
-    """``[zero, A, B, ...]``, a column per penalty; the zero is 0 where runs have their own."""
-    if own_zeros:
-        first = None
-        rows = np.vstack([fold.triangle[1:, 1:] for fold in folds])
-    else:
-        # The first row fixes the zero; the others are free of it.
-        triangle: Array = np.asarray(
-            np.linalg.qr(np.vstack([fold.triangle for fold in folds]), mode="r")
-        )
-        first, rows = triangle[0], triangle[1:, 1:]
-    u, s, vt = np.linalg.svd(rows[:, :-1], full_matrices=False)
-    moment = u.T @ rows[:, -1]
-    weight = sum(fold.weight for fold in folds)
-    s = np.where(s > _NOTHING * s.max(initial=0.0), s, 0.0)[:, None]
-    square = s**2 + weight * _PENALTIES
-    gain = np.divide(s, square, out=np.zeros_like(square), where=square > 0.0)
-    harmonics = vt.T @ (gain * moment[:, None])
-    zero = np.zeros((1, _PENALTIES.size))
-    if first is not None and first[0] != 0.0:
-        zero = ((first[-1] - first[1:-1] @ harmonics) / first[0])[None, :]
-    return np.vstack([zero, harmonics])
-
-
-def _held_out(solutions: Array, held: _Fold, own_zeros: bool) -> Array:
-    """Mean squared error of the held-out readings, a whole run around its own zero."""
-    triangle = held.triangle[1:] if own_zeros else held.triangle
-    unexplained = triangle[:, :-1] @ solutions - triangle[:, -1:]
-    return np.asarray(np.einsum("ij,ij->j", unexplained, unexplained) / held.weight)
 
 
 def error_range(problem: Problem, weights: Sequence[Array | None]) -> float:

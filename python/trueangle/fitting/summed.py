@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import ArgumentError
+from ..estimation.linear import NormalEquations
 from ..estimation.moments import Moments
 from ..joint.shafts import ShaftOrders
 from ..model.model import Argument
@@ -55,13 +56,12 @@ class Summed:
         """Normal equations of orders, run by run, from all readings."""
         return sums_of_moments(self.moments, orders)
 
-    def parts(self, orders: Array, share: float) -> Iterator[tuple[Array, Array, float, float]]:
+    def parts(self, orders: Array, share: float) -> Iterator[NormalEquations]:
         """Normal equations of every run as a share of its readings would have them."""
         sums = self.sums(orders.tolist())
         every = range(len(orders))
         for unit in range(sums.units):
-            gram, moment = share * sums.gram(unit, every), share * sums.rhs(unit, every)
-            yield gram, moment, share * float(sums.squares[unit]), share * float(sums.count[unit])
+            yield sums.equations(unit, every).share(share)
 
     @property
     def note(self) -> str:

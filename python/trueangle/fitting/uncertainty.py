@@ -9,15 +9,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import ArgumentError
+from ..estimation.linear import NormalEquations, cluster_covariance, total
 from ..support.quantiles import median
 from ..support.suggestions import check_choice
-from .clusters import robust_covariance
-from .clustersums import clusters_of, runs_together, weight_of
 from .correlation import (
     FEWEST_RUNS,
     FEWEST_STRETCHES,
+    clusters_of,
     correlation_found,
     memory_of,
+    runs_together,
+    weight_of,
 )
 from .penalty import bias_covariance, pattern_variances
 from .problem import Fitted, Problem
@@ -149,8 +151,8 @@ def _noise(
             f"{_ENOUGH_RUNS} runs and more"
         )
     try:
-        total = sum(weight_of(w, len(problem.runs[i])) for i, w in enumerate(weights) if i in used)
-        robust = robust_covariance(clusters, penalty * total)
+        weight = sum(weight_of(w, len(problem.runs[i])) for i, w in enumerate(weights) if i in used)
+        robust = cluster_covariance(clusters, penalty * weight)
     except np.linalg.LinAlgError:
         return Uncertainty("white", white, freedom, _CANCEL)
     return Uncertainty(kind, *_with_constant(white, *robust), note)
@@ -188,10 +190,7 @@ def _bias(
     used = [i for i in range(len(problem.runs)) if not np.isnan(fitted.offsets[i])]
     parts = [problem.products(weights, i, 1)[0] for i in used]
     means = [part[0] / part[0, 0] for part in parts]
-    about = np.sum(
-        [p - p[0, 0] * np.outer(m, m) for p, m in zip(parts, means, strict=True)], axis=0
-    )
-    gram, moment = about[1:-1, 1:-1], about[1:-1, -1]
+    sums = total([NormalEquations.of_products(part) for part in parts])
     lowest = [min(shaft.orders, default=1.0) for shaft in problem.shafts]
     steps = [
         order / low
@@ -199,14 +198,14 @@ def _bias(
         for order in shaft.orders
     ]
     variances = pattern_variances(
-        gram,
-        moment,
+        sums.gram,
+        sums.moment,
         fitted.solution.residual_variance,
         np.repeat(steps, 2),
         REACH * error_range(problem, weights),
     )
-    full = penalty * sum(float(part[0, 0]) for part in parts)
-    return bias_covariance(gram, np.mean(means, axis=0)[1:-1], full, variances)
+    full = penalty * sums.readings
+    return bias_covariance(sums.gram, np.mean(means, axis=0)[1:-1], full, variances)
 
 
 def _untold(problem: Problem, used: Sequence[int]) -> str:

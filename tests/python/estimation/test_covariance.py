@@ -9,7 +9,7 @@ import pytest
 import trueangle as ta
 from trueangle.cli import main
 from trueangle.errors import ArgumentError
-from trueangle.fitting.clusters import Cluster, robust_covariance
+from trueangle.estimation.linear import NormalEquations, cluster_covariance, scatter_statistic
 from trueangle.support.distributions import student_quantile
 
 #: Order, amplitude (deg), phase (deg).
@@ -121,7 +121,9 @@ def test_the_sandwich_is_that_of_the_readings_one_by_one():
         meat += np.outer(score, score)
         rows.append(np.zeros((3, len(x))))
         rows[-1][:, a:b] = inverse @ part.T @ adjust
-    found = robust_covariance([Cluster(p.T @ p, p.T @ e) for p, e in zip(parts, left, strict=True)])
+    found = cluster_covariance(
+        [NormalEquations(p.T @ p, p.T @ e) for p, e in zip(parts, left, strict=True)]
+    )
     np.testing.assert_allclose(found.covariance, inverse @ meat @ inverse, rtol=1e-9)
     for j in range(3):
         g = np.array([row[j] @ hat for row in rows])
@@ -187,7 +189,9 @@ def test_many_coefficients_have_the_covariance_of_the_scatter_of_their_scores():
     size, count = 260, 12
     parts = [rng.normal(size=(400, size)) for _ in range(count)]
     left = [rng.normal(size=400) for _ in range(count)]
-    found = robust_covariance([Cluster(p.T @ p, p.T @ e) for p, e in zip(parts, left, strict=True)])
+    found = cluster_covariance(
+        [NormalEquations(p.T @ p, p.T @ e) for p, e in zip(parts, left, strict=True)]
+    )
     bread = np.linalg.inv(sum(p.T @ p for p in parts))
     scores = np.array([p.T @ e for p, e in zip(parts, left, strict=True)])
     expected = bread @ (scores.T @ scores) @ bread * count / (count - 1.0)
@@ -197,7 +201,6 @@ def test_many_coefficients_have_the_covariance_of_the_scatter_of_their_scores():
 
 def test_the_scatter_between_runs_has_its_degrees_of_freedom():
     """White residuals: chi-squared about its mean, and each run's own coefficients by lstsq."""
-    from trueangle.fitting.clusters import scatter_statistic
 
     rng = np.random.default_rng(7)
     total = []
@@ -207,7 +210,7 @@ def test_the_scatter_between_runs_has_its_degrees_of_freedom():
         y = rng.normal(size=len(x))
         e = y - x @ np.linalg.lstsq(x, y, rcond=None)[0]
         left = np.split(e, 5)
-        clusters = [Cluster(p.T @ p, p.T @ r) for p, r in zip(parts, left, strict=True)]
+        clusters = [NormalEquations(p.T @ p, p.T @ r) for p, r in zip(parts, left, strict=True)]
         statistic, freedom = scatter_statistic(clusters, 1.0)
         assert freedom == 5 * 3 - 3
         total.append(statistic)

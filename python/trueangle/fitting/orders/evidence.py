@@ -15,6 +15,7 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ...estimation.linear import pseudo_inverse
 from .harmonicsums import HarmonicSums
 
 __all__ = [
@@ -35,9 +36,6 @@ Index = NDArray[np.intp]
 #: A candidate whose columns keep less than this of their energy beside those already
 #: chosen is an alias of them.
 COLLINEAR: Final = 1e-8
-
-#: Columns that keep this part of their length beside all others are inverted directly.
-_REGULAR: Final = 1e-4
 
 #: Least degrees of freedom that a residual must keep.
 _LEAST_DOF: Final = 3
@@ -152,29 +150,9 @@ def fit_subset(sums: HarmonicSums, chosen: Sequence[int]) -> tuple[Array, Array,
     columns = sums.columns(chosen)
     if columns.size == 0:
         return np.zeros(0), np.zeros((0, 0)), squares
-    inverse = _inverse(gram[columns[:, None], columns])
+    inverse = pseudo_inverse(gram[columns[:, None], columns])
     coefficients = inverse @ rhs[columns]
     return coefficients, inverse, max(0.0, squares - float(rhs[columns] @ coefficients))
-
-
-def _inverse(gram: Array) -> Array:
-    """Inverse of a normal matrix; directions that the readings do not see get zero."""
-    scale = np.sqrt(np.maximum(gram.diagonal(), 1e-300))
-    scales = scale[:, None] * scale
-    unit = gram / scales
-    try:
-        root = np.linalg.cholesky(unit)
-        if float(root.diagonal().min(initial=1.0)) > _REGULAR:
-            # By its factor: of columns that nearly cancel in many steps the inverse of the
-            # matrix itself has negative variances, however long each of them is.
-            half = np.linalg.inv(root)
-            return np.asarray(half.T @ half / scales)
-    except np.linalg.LinAlgError:
-        pass
-    values, vectors = np.linalg.eigh(unit)
-    keep = values > 1e-12 * values[-1]
-    inverse = (vectors[:, keep] / values[keep]) @ vectors[:, keep].T
-    return np.asarray(inverse / scales)
 
 
 class OrderTest(NamedTuple):
@@ -291,7 +269,7 @@ def held_out_gains(
     dropped, added = np.zeros(size), np.zeros(len(outside))
     for gram, mine, squares in zip(grams, rhs, sums.squares, strict=True):
         train, score = total - gram, whole - mine
-        inverse = _inverse(train[np.ix_(base, base)]) if size else np.zeros((0, 0))
+        inverse = pseudo_inverse(train[np.ix_(base, base)])
         fitted = inverse @ score[base]
         here = gram[np.ix_(base, base)]
         left = mine - gram[:, base] @ fitted

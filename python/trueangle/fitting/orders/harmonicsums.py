@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 import trueangle._core as _core
 
+from ...estimation.linear import NormalEquations
 from ...support.powersums import power_sums
 from .unitgroups import GROUPS, MOST_UNITS, columns_summed, dealt
 
@@ -102,6 +103,15 @@ class HarmonicSums:
     def rhs(self, unit: int, index: Sequence[int] | NDArray[np.intp]) -> Array:
         """``X' W y`` of a unit about its means, for the orders at ``index``."""
         return np.asarray(self._rhs[unit, self.columns(index)])
+
+    def equations(self, unit: int, index: Sequence[int] | NDArray[np.intp]) -> NormalEquations:
+        """Normal equations of a unit about its means, for the orders at ``index``."""
+        return NormalEquations(
+            self.gram(unit, index),
+            self.rhs(unit, index),
+            float(self.squares[unit]),
+            float(self.count[unit]),
+        )
 
     def gram(
         self,

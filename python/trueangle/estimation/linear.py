@@ -1,0 +1,263 @@
+r"""Linear models by the one solver of the core: least squares from rows, or from their sums.
+
+Columns are scaled to unit length. Directions of which less is left than rounding makes are left
+out, :math:`32\,n\,\varepsilon` of the greatest singular value (of rows) or eigenvalue (of sums) of
+n columns: every other limit here is a statement about the readings, and says which.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+import trueangle._core as _core
+
+__all__ = [
+    "NormalEquations",
+    "Robust",
+    "cluster_covariance",
+    "least_squares",
+    "left_out",
+    "pseudo_inverse",
+    "scatter_statistic",
+    "total",
+    "unexplained",
+]
+
+Array = NDArray[np.float64]
+
+
+def least_squares(design: Array, target: Array, weights: Array | None = None) -> Array:
+    r"""Coefficients :math:`b` that minimise :math:`\sum_i w_i (y_i - x_i' b)^2`.
+
+    Parameters
+    ----------
+    design : ndarray, shape (n, m)
+    target : ndarray, shape (n,) or (n, k)
+    weights : ndarray, shape (n,), optional
+
+    Returns
+    -------
+    ndarray, shape (m,) or (m, k)
+        Of least norm in scaled columns, where the rows do not tell all of them apart.
+
+    Raises
+    ------
+    numpy.linalg.LinAlgError
+        A number is not finite.
+
+    Examples
+    --------
+    >>> x = np.arange(4.0)
+    >>> least_squares(np.column_stack([np.ones(4), x]), 3.0 + 2.0 * x).round(12).tolist()
+    [3.0, 2.0]
+    """
+    found = _core.LinearModel.of_rows(design, target.reshape(len(target), -1), weights)
+    return found.coefficients.reshape(-1, *target.shape[1:])
+
+
+def unexplained(design: Array, target: Array, weights: Array | None = None) -> Array:
+    """What `least_squares` leaves of the target, reading by reading."""
+    return np.asarray(target - design @ least_squares(design, target, weights))
+
+
+def pseudo_inverse(gram: Array) -> Array:
+    """Pseudo-inverse of a symmetric matrix that is not negative, in scaled columns.
+
+    Examples
+    --------
+    >>> pseudo_inverse(np.diag([4.0, 0.0, 1e-30])).diagonal().tolist()
+    [0.25, 0.0, 1e+30]
+    """
+    return _core.LinearModel.of_sums(gram, np.empty((len(gram), 0)), []).inverse
+
+
+@dataclass(frozen=True)
+class NormalEquations:
+    r"""Sums over some readings: all that least squares needs of them.
+
+    Attributes
+    ----------
+    gram : ndarray, shape (m, m)
+        :math:`X^T W X`.
+    moment : ndarray, shape (m,)
+        :math:`X^T W y`; of clusters the scores, ``y`` being the residuals of a common fit.
+    squares : float
+        :math:`y^T W y`.
+    readings : float
+        How many, or their weight.
+
+    Examples
+    --------
+    >>> x = np.array([[1.0], [2.0]])
+    >>> one = NormalEquations.of_rows(x, np.array([2.0, 4.0]))
+    >>> one.solved().coefficients.tolist()
+    [[2.0]]
+    """
+
+    gram: Array
+    moment: Array
+    squares: float = 0.0
+    readings: float = 0.0
+
+    @classmethod
+    def of_rows(cls, design: Array, target: Array) -> NormalEquations:
+        """Of rows, whatever they are already multiplied by."""
+        return cls(design.T @ design, design.T @ target, float(target @ target), len(target))
+
+    @classmethod
+    def of_products(cls, products: Array, mean: Array | None = None) -> NormalEquations:
+        """From all products of ``[1 | X | y]``, about their own mean or that of a run."""
+        first = products[0]
+        mean = first / first[0] if mean is None else mean
+        about = products - np.outer(mean, first) - np.outer(first, mean)
+        about += first[0] * np.outer(mean, mean)
+        squares, readings = float(about[-1, -1]), float(first[0])
+        return cls(about[1:-1, 1:-1], about[1:-1, -1], squares, readings)
+
+    def share(self, part: float) -> NormalEquations:
+        """As a part of the readings would have them."""
+        return NormalEquations(
+            part * self.gram, part * self.moment, part * self.squares, part * self.readings
+        )
+
+    def among(self, columns: NDArray[np.bool_] | NDArray[np.intp]) -> NormalEquations:
+        """Of some columns."""
+        gram = self.gram[columns][:, columns]
+        return NormalEquations(gram, self.moment[columns], self.squares, self.readings)
+
+    def about(self, coefficients: Array) -> NormalEquations:
+        """Of the residuals of these coefficients."""
+        score = self.moment - self.gram @ coefficients
+        squares = self.squares - float(coefficients @ (self.moment + score))
+        return NormalEquations(self.gram, score, squares, self.readings)
+
+    def explained_by(self, coefficients: Array) -> float:
+        """By how much these coefficients lower the sum of squares."""
+        return float(2.0 * coefficients @ self.moment - coefficients @ self.gram @ coefficients)
+
+    def solved(self) -> _core.LinearModel:
+        """Least squares from these sums."""
+        return _core.LinearModel.of_sums(self.gram, self.moment[:, None], [self.squares])
+
+    def held(self, ridge: float) -> NormalEquations:
+        """With a penalty on every coefficient, relative to the mean of the diagonal."""
+        mean = max(float(np.trace(self.gram)) / len(self.gram), 1e-300)
+        gram = self.gram + ridge * mean * np.eye(len(self.gram))
+        return NormalEquations(gram, self.moment, self.squares, self.readings)
+
+
+def total(groups: Sequence[NormalEquations]) -> NormalEquations:
+    """The sums of all groups together."""
+    return NormalEquations(
+        np.sum([one.gram for one in groups], axis=0),
+        np.sum([one.moment for one in groups], axis=0),
+        sum(one.squares for one in groups),
+        sum(one.readings for one in groups),
+    )
+
+
+def left_out(groups: Sequence[NormalEquations], ridge: float = 0.0) -> tuple[Array, Array]:
+    r"""Each group as a fit of all others predicts it.
+
+    .. math:: b_{-r} = \Big(\sum_{s \ne r} G_s\Big)^{+} \sum_{s \ne r} m_s, \qquad
+              S_r(b_{-r}) = y_r' y_r - 2 b_{-r}' m_r + b_{-r}' G_r b_{-r}
+
+    Parameters
+    ----------
+    groups : sequence of NormalEquations
+        Two or more.
+    ridge : float
+        Added to the diagonal of the others' sums, relative to its mean.
+
+    Returns
+    -------
+    coefficients : ndarray, shape (groups, m)
+    squares : ndarray, shape (groups,)
+        Sums of squares left of each group.
+
+    Raises
+    ------
+    numpy.linalg.LinAlgError
+        A number is not finite, or there is one group only.
+
+    Notes
+    -----
+    Nothing is subtracted: m^3 for every group, and m^2 for its sums and the logarithm of their
+    number.
+
+    Examples
+    --------
+    >>> x = np.ones((2, 1))
+    >>> groups = [NormalEquations.of_rows(x, y * x[:, 0]) for y in (1.0, 2.0, 6.0)]
+    >>> left_out(groups)[0].ravel().round(12).tolist()
+    [4.0, 3.5, 1.5]
+    """
+    squares = [one.squares for one in groups]
+    return _core.left_out(*_stacked(groups), squares, ridge)
+
+
+class Robust(NamedTuple):
+    """Covariance of the coefficients and the degrees of freedom of each one's variance."""
+
+    covariance: Array
+    freedom: Array
+
+
+def cluster_covariance(clusters: Sequence[NormalEquations], penalty: float = 0.0) -> Robust:
+    r"""CR2 covariance with Bell and McCaffrey's degrees of freedom.
+
+    With :math:`\tilde X_r` the regressors of cluster r about their run's mean, ``e`` the
+    residuals and :math:`G = \sum_r \tilde X_r' W \tilde X_r`, the covariance is
+
+    .. math:: G^{-1} \Big[ \sum_r \tilde X_r' W^{1/2} A_r e_r e_r' A_r' W^{1/2} \tilde X_r \Big]
+              G^{-1}, \qquad A_r = (I - H_{rr})^{-1/2}
+
+    (CR2 of Bell and McCaffrey 2002): unbiased for white noise, and right for any correlation
+    within a cluster. A coefficient's degrees of freedom are those of Satterthwaite for that sum
+    of squares. The readings enter by their sums alone.
+
+    Parameters
+    ----------
+    clusters : sequence of NormalEquations
+        Two or more; their moments are the scores, see `NormalEquations.about`.
+    penalty : float
+        Added to the diagonal of the normal matrix by a ridge.
+
+    Raises
+    ------
+    numpy.linalg.LinAlgError
+        All clusters together do not tell the coefficients apart.
+
+    Examples
+    --------
+    >>> rng = np.random.default_rng(0)
+    >>> parts = [rng.normal(size=(50, 2)) for _ in range(10)]
+    >>> clusters = [NormalEquations.of_rows(x, rng.normal(size=50)) for x in parts]
+    >>> found = cluster_covariance(clusters)
+    >>> bool((found.freedom > 7.0).all() and (found.freedom < 9.5).all())
+    True
+    """
+    return Robust(*_core.cluster_covariance(*_stacked(clusters), penalty))
+
+
+def scatter_statistic(clusters: Sequence[NormalEquations], variance: float) -> tuple[float, float]:
+    """Chi-squared of the clusters' own coefficients about the common ones, and its freedom.
+
+    Near its degrees of freedom where the residuals are white with this variance.
+    """
+    models = [cluster.solved() for cluster in clusters]
+    explained = sum(
+        float(model.coefficients[:, 0] @ cluster.moment)
+        for model, cluster in zip(models, clusters, strict=True)
+    )
+    freedom = sum(model.rank for model in models) - clusters[0].moment.size
+    return explained / variance, max(float(freedom), 1.0)
+
+
+def _stacked(groups: Sequence[NormalEquations]) -> tuple[Array, Array]:
+    return np.array([one.gram for one in groups]), np.array([one.moment for one in groups])
