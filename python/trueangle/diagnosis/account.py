@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +16,7 @@ from ..simulation.simulation import Simulation
 from ..support.deadline import pace
 from .believed import corrected_effects
 from .commonform import in_common_form
+from .delay import Delay, error_before, find_delay
 from .gearedlines import GearedLines, Ratio
 from .gearratio import aligned, find_ratio, near_ratio
 from .identifiability import blind_spots
@@ -59,8 +60,10 @@ class Seen:
         As stated, but with the ratio of the readings.
     ratio : Ratio or None
         A gear ratio that is not the stated one.
+    delay : Delay or None
+        Where the readings are so old that their pattern moves with it.
     every, signals : Signals
-        All readings, and those that are used.
+        All readings, and those that are used: at the angle of that time before.
     error : ndarray
         Of those that are used, arcsec.
     rows : ndarray or None
@@ -69,21 +72,32 @@ class Seen:
 
     sim: Simulation
     ratio: Ratio | None
+    delay: Delay | None
     every: Signals
     signals: Signals
     error: Array
     rows: NDArray[np.int64] | None
 
     @classmethod
-    def of(cls, every: Signals, error: Array, sim: Simulation, ratio: Ratio | None) -> Seen:
-        """With another ratio, or as the simulation states it."""
+    def of(
+        cls,
+        every: Signals,
+        error: Array,
+        sim: Simulation,
+        ratio: Ratio | None = None,
+        delay: Delay | None = None,
+    ) -> Seen:
+        """With another ratio, or as the simulation states it; as they were a time before."""
         if ratio is not None:
             sim = ratio.simulation
             every = aligned(sim, every, error)
+        then = every
+        if delay is not None:
+            then, error = error_before(every, error, delay.seconds)
         rows = _subsample(len(every))
         if rows is None:
-            return cls(sim, ratio, every, every, error, None)
-        return cls(sim, ratio, every, every.take(rows), error[rows], rows)
+            return cls(sim, ratio, delay, every, then, error, None)
+        return cls(sim, ratio, delay, every, then.take(rows), error[rows], rows)
 
 
 @dataclass(frozen=True)
@@ -96,11 +110,14 @@ class Account:
     choice : Choice
     believed : Simulation
         The simulation with the effects it claims as the readings show them.
+    first : Regression
+        The readings as they are, without any cause.
     """
 
     seen: Seen
     choice: CauseSelection
     believed: Simulation
+    first: Regression
 
 
 def account_of(every: Signals, error: Array, sim: Simulation) -> Account:
@@ -122,15 +139,23 @@ def account_of(every: Signals, error: Array, sim: Simulation) -> Account:
     ratio = None if geared is None else find_ratio(geared)
     account = _believed(Seen.of(every, error, sim, ratio))
     near = None if geared is None or ratio else near_ratio(geared)
-    if near is None or pace().over:
+    if near is not None and not pace().over:
+        seen = Seen.of(every, error, sim, near)
+        if _helps(seen, account.choice.chosen):
+            account = _better(account, _believed(seen), NEW_CAUSE)
+    delay = None if pace().over else find_delay(account.seen.every, error, account.seen.sim)
+    if delay is None or pace().over:
         return account
-    seen = Seen.of(every, error, sim, near)
-    chosen = account.choice.chosen
-    if not _helps(seen, chosen):
-        return account
-    other = _believed(seen)
-    better = total_penalty(other.choice.chosen) < total_penalty(chosen) - NEW_CAUSE
-    return other if better else account
+    other = _believed(Seen.of(every, error, sim, account.seen.ratio, delay))
+    return _better(account, other, NEW_CAUSE + account.choice.chosen.log_n)
+
+
+def _better(account: Account, other: Account, price: float) -> Account:
+    """The other account where it is better by a ``price``."""
+    chosen, others = account.choice.chosen, other.choice.chosen
+    if total_penalty(others) < total_penalty(chosen) - price:
+        return replace(other, first=account.first)
+    return account
 
 
 def _helps(seen: Seen, chosen: Regression) -> bool:
@@ -152,7 +177,7 @@ def _believed(seen: Seen) -> Account:
         if total_penalty(tried.chosen) >= total_penalty(choice.chosen):
             break
         choice, believed = tried, other
-    return Account(seen, choice, believed)
+    return Account(seen, choice, believed, choice.start)
 
 
 def _start(seen: Seen, sim: Simulation) -> Regression:

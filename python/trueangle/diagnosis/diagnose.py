@@ -26,6 +26,7 @@ from ..support.kinds import told_kinds
 from ..support.oftype import of_type
 from .account import account_of
 from .believed import judged_beliefs
+from .delay import delay_finding
 from .discrepancy import compare, unfolded_error
 from .findings import Diagnosis, Finding
 from .gearedlines import Ratio
@@ -156,8 +157,9 @@ def _diagnosis(
         account = account_of(every, error, stated)
     seen = account.seen
     sim, every, signals, rows = seen.sim, seen.every, seen.signals, seen.rows
-    start, chosen = account.choice.start, account.choice.chosen
+    chosen = account.choice.chosen
     rest = unexplained_after(chosen, sim.sigma_arcsec or None)
+    first = account.first
     with at.part(FOR_FINDINGS):
         findings, spots, doubtful = findings_of(chosen, account.choice.spots, gain, rest.size)
     if doubtful and not rest.found and not at.cut:
@@ -174,6 +176,8 @@ def _diagnosis(
             findings.append(scatter_finding(item, rest.size))
     if seen.ratio is not None:
         findings.append(_ratio_finding(seen.ratio))
+    if seen.delay is not None:
+        findings.append(delay_finding(seen.delay, chosen, first, gain and not at.over))
     findings.sort(key=lambda finding: (not finding.confirmed, -finding.evidence["bic_gain"]))
     extended = corrected.with_effects(
         effect for finding in findings if finding.confirmed for effect in finding.effects
@@ -181,18 +185,18 @@ def _diagnosis(
     beliefs, findings = moved(beliefs, findings, sim)
     residual = error - stated.predict(every)
     before = goodness_of_fit(
-        leftover_of(signals, residual if rows is None else residual[rows], start.lines),
-        float(start.lines.orders.max()),
+        leftover_of(first.signals, residual if rows is None else residual[rows], first.lines),
+        float(first.lines.orders.max()),
         sim.sigma_arcsec or None,
     )
     return Diagnosis(
         compare(every, residual),
-        _structure(start),
+        _structure(first),
         rest.noise.sigma,
         findings,
         spots,
         extended,
-        _overall(start, chosen),
+        _overall(first, chosen),
         len(every),
         len(signals),
         rest.noise.correlation,

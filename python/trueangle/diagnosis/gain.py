@@ -17,7 +17,7 @@ from .holdout import Law, held_out, numbers, part, rebuilt, reducible_share, res
 from .levels import LevelGain, gains_by_level
 from .unnamed import effect_of
 
-__all__ = ["Gain", "measure_belief_gains", "measure_gain"]
+__all__ = ["Gain", "measure_belief_gains", "measure_delay_gain", "measure_gain"]
 
 Array = NDArray[np.float64]
 Rows = NDArray[np.bool_]
@@ -131,6 +131,29 @@ def measure_gain(
             )
         )
     return found
+
+
+def measure_delay_gain(without: Regression, delayed: Regression, seed: int = 0) -> Gain:
+    """Gain of an account at the angle of a time before, against the same one without that.
+
+    Both are fitted to the other runs alone; the last term of ``delayed`` is the change that these
+    make of the delay.
+    """
+    rng = np.random.default_rng(seed)
+    unit, what = _units(delayed)
+    folds = rng.permutation(int(unit.max()) + 1) % min(FOLDS, int(unit.max()) + 1)
+    parts = int(folds.max()) + 1
+    own_zero = any(effect_of(term.cause).draws_zeros for term in delayed.terms)
+    before, after = np.zeros(delayed.n), np.zeros(delayed.n)
+    for fold in range(parts):
+        test = folds[unit] == fold
+        for values, regression in ((before, without), (after, delayed)):
+            values[test] = held_out(regression, (), test, own_zero, search=False)[0]
+    clean = ~delayed.outlying
+    before, after = before[clean], after[clean]
+    share, interval = reducible_share(before, after, unit[clean], delayed.variance, rng)
+    holdout = f"{what} ({parts} parts)"
+    return Gain(holdout, numbers(before), numbers(after), share, interval, None, _note(share))
 
 
 def measure_belief_gains(

@@ -11,6 +11,7 @@ import numpy as np
 from ..estimation.estimate import Parameters, quantity
 from ..estimation.extension import Extension
 from ..estimation.regression import Regression
+from ..joint.earlier import earlier
 from ..joint.pattern import Surroundings
 from ..joint.signals import Signals
 from ..model import forms
@@ -67,12 +68,10 @@ class Latency(Effect):
     acts_on_runs: ClassVar[bool] = True
 
     def signal(self, signals: Signals, around: Surroundings, rng: np.random.Generator) -> Array:
-        moved = -self.delay_s * np.radians(signals.turns_per_s * 360.0)
+        then = earlier(signals, self.delay_s).theta
         pattern = around.pattern
-        ramp = np.degrees(moved) * ARCSEC_PER_DEG
-        return np.asarray(
-            ramp + pattern.value(signals.theta + moved) - pattern.value(signals.theta)
-        )
+        ramp = np.degrees(then - signals.theta) * ARCSEC_PER_DEG
+        return np.asarray(ramp + pattern.value(then) - pattern.value(signals.theta))
 
     @classmethod
     def propose(cls, regression: Regression) -> Extension | None:

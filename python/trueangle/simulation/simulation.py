@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ..effects import EFFECTS, Effect, ReferenceLines
+from ..effects import EFFECTS, Effect, MissingOrder, ReferenceLines
 from ..errors import ArgumentError
 from ..joint.joint import Joint
 from ..joint.pattern import Harmonic, Pattern, Surroundings
@@ -92,8 +92,15 @@ class Simulation(Shown):
 
     @property
     def surroundings(self) -> Surroundings:
-        """What effects are given beyond the readings."""
+        """What effects are given beyond the readings, of what is believed."""
         return Surroundings(self.joint, self.pattern)
+
+    @property
+    def whole_surroundings(self) -> Surroundings:
+        """The same with further lines in the pattern: a delay moves those as well."""
+        further = (e for e in self.effects if isinstance(e, MissingOrder))
+        lines = [Harmonic(e.shaft, e.order, e.amplitude_arcsec, e.phase_deg) for e in further]
+        return Surroundings(self.joint, Pattern.of([*self.harmonics, *lines], self.joint))
 
     def _brief(self) -> str:
         return (
@@ -126,8 +133,8 @@ class Simulation(Shown):
         Random effects (zeros, drifts, outliers) count as their mean, zero.
         """
         signals = runs if isinstance(runs, Signals) else join_runs(as_runs(runs))
-        around = self.surroundings
-        error = around.pattern.value(signals.theta)
+        around = self.whole_surroundings
+        error = self.pattern.value(signals.theta)
         for effect in self.effects:
             error = error + effect.expected(signals, around)
         return error
@@ -179,10 +186,10 @@ def simulate(
     designs = sim.runs if runs is None else all_of_type("runs", runs, RunDesign, DESIGN)
     if not designs:
         raise ArgumentError("the simulation designs no run: add a [[run]] table or pass `runs=`")
-    around = sim.surroundings
-    ideal = [design.measure(rng, str(j + 1), around.pattern) for j, design in enumerate(designs)]
+    around = sim.whole_surroundings
+    ideal = [design.measure(rng, str(j + 1), sim.pattern) for j, design in enumerate(designs)]
     signals = join_runs(ideal)
-    error = around.pattern.value(signals.theta)
+    error = sim.pattern.value(signals.theta)
     spread = np.full(len(signals), sim.sigma_arcsec)
     reference = np.zeros(len(signals))
     turned = np.repeat([d.shift_deg is not None for d in designs], [len(run) for run in ideal])

@@ -1,0 +1,164 @@
+r"""A reading that is old, jointly with the pattern that it is old of.
+
+A joint that answers :math:`\tau` late says
+
+.. math:: \varepsilon = \theta(t - \tau) - \theta(t) + p\bigl(\theta(t - \tau)\bigr)
+
+so that a delay moves the argument of the pattern itself. Beside a large pattern neither is known
+without the other: the delay is found with all low orders free (Gauss and Newton), and the whole
+account is given of the angle at which the joint was read.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..effects.latency import Latency
+from ..estimation.estimate import quantity
+from ..estimation.extension import Extension
+from ..estimation.factor import orthonormal_basis
+from ..estimation.regression import Regression
+from ..joint.earlier import earlier
+from ..joint.pattern import ARCSEC_PER_RAD, Pattern, lines_columns
+from ..joint.signals import Signals
+from ..simulation.simulation import Simulation
+from ..support.angles import ARCSEC_PER_TURN
+from .findings import Finding
+from .gain import measure_delay_gain
+from .penalty import NEW_CAUSE
+from .unnamed import effect_of
+
+__all__ = ["Delay", "delay_finding", "error_before", "find_delay"]
+
+Array = NDArray[np.float64]
+
+#: Orders of the output that are free beside the delay, where the travel resolves them.
+ORDERS = 32
+
+#: Readings used at most, every so many.
+MOST_READINGS = 4_000
+
+#: Steps at most, and the share of a standard error at which a step ends the search.
+STEPS, SETTLED = 20, 0.01
+
+#: Standard errors from which on a delay is tried at all.
+TRIED = 6.0
+
+#: Share of its run beyond which a delay is none.
+LONGEST = 0.05
+
+
+@dataclass(frozen=True)
+class Delay:
+    """A delay that moves the argument of the pattern.
+
+    Attributes
+    ----------
+    seconds, std : float
+        Of the joint's reading behind the reference.
+    """
+
+    seconds: float
+    std: float
+
+
+def error_before(signals: Signals, error: Array, delay_s: float) -> tuple[Signals, Array]:
+    """Signals and error (arcsec) at the angle of a time before each reading."""
+    then = earlier(signals, delay_s)
+    return then, error + (signals.theta - then.theta) * ARCSEC_PER_RAD
+
+
+def find_delay(signals: Signals, error: Array, sim: Simulation) -> Delay | None:
+    """The delay of readings whose pattern moves with it by more than a line can follow.
+
+    None where a delay beside an unmoved pattern explains as much (it is then one cause among
+    others), or where speed was not recorded or does not change.
+    """
+    if signals.velocity is None or signals.time is None or np.ptp(signals.velocity) == 0.0:
+        return None
+    rows = np.arange(0, len(signals), max(1, -(-len(signals) // MOST_READINGS)))
+    orders = _orders(signals, sim)
+    longest = LONGEST * min(float(np.ptp(signals.time[a:b])) for a, b in signals.run_bounds())
+    delay, linear = 0.0, np.inf
+    for step in range(STEPS):
+        then, moved = error_before(signals, error, delay)
+        y = (moved - sim.predict(then))[rows]
+        then = then.take(rows)
+        change, std, left, unmoved = _newton(then, y, orders, sim)
+        if not np.isfinite(std):
+            return None
+        if step == 0 and abs(change) < TRIED * std:
+            return None
+        linear = left if step == 0 else linear
+        if step > 0 and abs(change) < SETTLED * std:
+            told = rows.size * float(np.log(max(linear / max(unmoved, 1e-300), 1e-300)))
+            return Delay(delay, std) if abs(delay) > TRIED * std and told > NEW_CAUSE else None
+        delay += change
+        if abs(delay) > longest:
+            return None
+    return None
+
+
+def _orders(signals: Signals, sim: Simulation) -> Array:
+    travel = float(signals.run_turns().max())
+    low = [float(m) for m in range(1, ORDERS + 1) if m * travel >= 1.0]
+    return np.array(sorted({*low, *sim.pattern.orders.tolist()}), dtype=np.float64)
+
+
+def _newton(
+    then: Signals, y: Array, orders: Array, sim: Simulation
+) -> tuple[float, float, float, float]:
+    """Change of the delay with its standard error; sums of squares with it and without."""
+    runs = (then.run[:, None] == np.unique(then.run)).astype(np.float64)
+    lines = lines_columns(then.theta, orders)
+    known = orthonormal_basis(np.hstack([runs, then.direction[:, None], lines]))
+    rest = y - known @ (known.T @ y)
+    fitted = np.linalg.lstsq(np.hstack([runs, lines]), y, rcond=None)[0][runs.shape[1] :]
+    patterns = (sim.pattern, Pattern(orders, fitted[0::2], fitted[1::2]))
+    slope = sum(pattern.value_and_slope(then.theta)[1] for pattern in patterns)
+    column = -then.turns_per_s * ARCSEC_PER_TURN * (1.0 + slope)
+    column = column - known @ (known.T @ column)
+    power, freedom = float(column @ column), y.size - known.shape[1] - 1
+    left = float(rest @ rest)
+    if power <= 1e-9 * y.size or freedom <= 0:
+        return 0.0, np.inf, left, left
+    change = float(column @ rest) / power
+    with_it = left - change**2 * power
+    return change, float(np.sqrt(max(with_it, 1e-300) / freedom / power)), with_it, left
+
+
+def _at_the_time(regression: Regression, plain: Regression) -> Iterator[Extension]:
+    """The terms of a delayed account as they are without the delay."""
+    for term, coefficients in regression.fitted():
+        effect = effect_of(term.cause)
+        if coefficients.size and effect.transfers:
+            columns = effect.columns(plain.signals, regression.around, term.shape)
+            yield replace(term, columns=columns)
+        else:
+            yield term
+
+
+def delay_finding(delay: Delay, chosen: Regression, plain: Regression, with_gain: bool) -> Finding:
+    """The delay as a finding beside the ``chosen`` causes; ``plain`` is without the delay."""
+    column = Latency.columns(chosen.signals, chosen.around, {})
+    extension = chosen.propose(Latency.kind, {}, column)
+    beside = chosen.with_terms([*chosen.terms, extension], chosen.whiten.rho)
+    k = len(beside.terms) - 1
+    change = float(beside.fitted()[k][1][0])
+    std = float(np.sqrt(beside.robust_covariance(k)[0, 0]))
+    seconds = delay.seconds + change
+    without = plain.with_terms(_at_the_time(chosen, plain))
+    saved = without.deviance - chosen.deviance
+    weight = {
+        "bic_gain": float(saved - chosen.log_n),
+        "deviance": float(saved),
+        "parameters": 1.0,
+        "log_grid": 0.0,
+    }
+    gain = measure_delay_gain(without, beside) if with_gain else None
+    parameters = {"delay_s": quantity(seconds, std)}
+    return Finding(Latency.kind, parameters, weight, gain, [], [Latency(seconds)])

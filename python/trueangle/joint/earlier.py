@@ -1,0 +1,71 @@
+"""Signals as they were a time before: what a reading that is old was taken of."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .signals import Signals
+
+__all__ = ["earlier"]
+
+Array = NDArray[np.float64]
+
+
+def earlier(signals: Signals, delay_s: float) -> Signals:
+    r"""The signals with angle, direction and speed of a time :math:`\tau` before each reading.
+
+    .. math:: \theta(t - \tau) \approx \theta(t) - v\tau
+
+    Where the readings of a run stand closer than the delay, the angle is read off their own record
+    instead, so that the joint may gather speed meanwhile.
+
+    Parameters
+    ----------
+    signals : Signals
+        With velocity.
+    delay_s : float
+        :math:`\tau`, seconds; negative for a time after.
+
+    Returns
+    -------
+    Signals
+
+    Examples
+    --------
+    >>> from trueangle.joint.signals import join_runs
+    >>> from trueangle.simulation import RunDesign, Simulation, simulate
+    >>> design = RunDesign(samples=100, speed_deg_s=10.0)
+    >>> signals = join_runs(simulate(Simulation(runs=(design,))))
+    >>> moved = signals.degrees - earlier(signals, 0.02).degrees
+    >>> float(moved.min().round(6)), float(moved.max().round(6))
+    (0.2, 0.2)
+    """
+    theta = signals.theta - 2.0 * np.pi * signals.turns_per_s * delay_s
+    velocity = signals.velocity
+    held = np.arange(len(signals))
+    if signals.time is not None and velocity is not None:
+        velocity = velocity.copy()
+        for start, stop in signals.run_bounds():
+            time = signals.time[start:stop]
+            steps = np.diff(time)
+            if steps.size == 0 or not 0.0 < float(np.median(steps)) <= abs(delay_s):
+                continue
+            then = time - delay_s
+            known = (then >= time[0]) & (then <= time[-1])
+            for values, source in ((theta, signals.theta), (velocity, signals.velocity)):
+                assert source is not None
+                part = values[start:stop]
+                part[known] = np.interp(then[known], time, source[start:stop])
+            last = np.searchsorted(time, then, side="right") - 1
+            held[start:stop] = start + np.clip(last, 0, stop - start - 1)
+    return replace(
+        signals,
+        theta=theta,
+        velocity=velocity,
+        direction=signals.direction[held],
+        travel=signals.travel[held],
+        segment=signals.segment[held],
+    )
