@@ -8,15 +8,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..effects import EFFECTS
+from ..effects.drift_within_run import DriftWithinRun
 from ..effects.local_defect import LocalDefect
 from ..effects.non_integer_order import NonIntegerOrder
 from ..estimation.regression import Regression
 from ..joint.pattern import line_columns
 from ..support.display_units import brief
 from .gain import Gain
+from .goodness import FREE_PATH, Unexplained
 from .goodness.periodogram import order_test, time_test
 from .penalty import NEW_CAUSE, cause_terms
-from .remainder import remainder_of
+from .remainder import free_paths, remainder_of
 from .selection import is_flexible
 from .unnamed import is_line_in_time, is_line_of, is_named, modulator, modulators
 
@@ -47,25 +49,38 @@ def status_of(
     gain: Gain | None,
     regression: Regression | None,
     group: Sequence[int],
-    unexplained: float,
+    unexplained: Unexplained,
 ) -> tuple[str, str]:
     """Status of a finding and the reason where it is not confirmed.
 
     A cause that transfers is confirmed by a gain on held-out data whose interval excludes
     zero. One that every run draws anew has none: it must explain the noise of the runs one
     by one. Whatever takes up what is left (`is_flexible`, causes of the scatter) is not
-    confirmed while something is ``unexplained`` (arcsec rms; 0 where nothing is), but for a line
-    in time that a test which needs no name sees at the same frequency. Nor is a cause that is
-    smaller than what is unexplained: it may be a part of that.
+    confirmed while something is ``unexplained``, but for a line in time that a test which needs
+    no name sees at the same frequency. Nor is a cause that is smaller than what is unexplained: it
+    may be a part of that. A free path in time follows anything: it is noise to other causes, and
+    none itself; nor is what takes up anything confirmed beside a drift that is larger.
     """
     effect = EFFECTS[cause]
     takes_up = is_flexible(effect) or _of_scatter(cause)
-    if unexplained and takes_up and not _is_seen_without_a_name(regression, group):
+    if regression is not None and group and set(group) <= {*free_paths(regression)}:
+        return NOT_CONFIRMED, (
+            f"it is {FREE_PATH}, which follows anything: it says how the noise goes"
+        )
+    if unexplained.found and takes_up and not _is_seen_without_a_name(regression, group):
         return NOT_CONFIRMED, ("something is unexplained, and this cause takes up whatever is left")
-    if unexplained and regression is not None and group:
-        if not takes_up and _size(regression, group) < unexplained:
+    if regression is not None and group and takes_up and cause != DriftWithinRun.kind:
+        drift = _drift(regression)
+        is_seen = drift > 0.0 and _is_seen_without_a_name(regression, group)
+        if not is_seen and drift > _size(regression, group):
             return NOT_CONFIRMED, (
-                f"{brief(unexplained)} arcsec rms are unexplained, of which this may be a part"
+                f"the drift of {brief(drift)} arcsec rms, which is larger, may leave it"
+            )
+    beside = unexplained.beside_path
+    if beside and regression is not None and group:
+        if not takes_up and _size(regression, group) < beside:
+            return NOT_CONFIRMED, (
+                f"{brief(beside)} arcsec rms are unexplained, of which this may be a part"
             )
         follows = _follows(regression, group)
         if follows:
@@ -90,8 +105,17 @@ def status_of(
 def _size(regression: Regression, group: Sequence[int]) -> float:
     """Standard deviation of the error that a finding explains."""
     fitted = regression.fitted()
-    columns = [term.columns @ c for term, c in (fitted[k] for k in group) if c.size]
-    return float(np.std(np.sum(columns, axis=0))) if columns else np.inf
+    parts = [term.columns @ c for term, c in (fitted[k] for k in group) if c.size]
+    drawn = [k in group for k, term in enumerate(regression.terms) if term.run_effect is not None]
+    if any(drawn):
+        parts.append(regression.whiten.run_part(regression.left, drawn))
+    return float(np.std(np.sum(parts, axis=0)))
+
+
+def _drift(regression: Regression) -> float:
+    """Standard deviation of the drift that was chosen, or 0."""
+    drifts = [k for k, t in enumerate(regression.terms) if t.cause == DriftWithinRun.kind]
+    return _size(regression, drifts) if drifts else 0.0
 
 
 def _is_seen_without_a_name(regression: Regression | None, group: Sequence[int]) -> bool:

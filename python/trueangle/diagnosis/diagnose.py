@@ -161,19 +161,19 @@ def _diagnosis(
     rest = unexplained_after(chosen, sim.sigma_arcsec or None)
     first = account.first
     with at.part(FOR_FINDINGS):
-        findings, spots, doubtful = findings_of(chosen, account.choice.spots, gain, rest.size)
+        findings, spots, doubtful = findings_of(chosen, account.choice.spots, gain, rest)
     if doubtful and not rest.found and not at.cut:
         # What is not confirmed explains nothing.
         rest = unexplained_after(chosen, sim.sigma_arcsec or None, without=doubtful)
         if rest.found:
-            findings = reconsidered(chosen, findings, rest.size)
+            findings = reconsidered(chosen, findings, rest)
     beliefs, corrected = judged_beliefs(chosen, sim, account.believed, spots, gain)
     in_doubt = any(spot.supported and not spot.common for spot in spots)
     for item in account.choice.scatter:
         if in_doubt and item.size < OUTLYING_ANYWAY:
             spots.append(scatter_doubt(item))
         else:
-            findings.append(scatter_finding(item, rest.size))
+            findings.append(scatter_finding(item, rest))
     if seen.ratio is not None:
         findings.append(_ratio_finding(seen.ratio))
     if seen.delay is not None:

@@ -16,6 +16,7 @@ from .confirmation import CONFIRMED, NOT_CONFIRMED, status_of
 from .findings import Finding
 from .forms import with_form_errors
 from .gain import Gain, measure_gain
+from .goodness import Unexplained
 from .identifiability import doubts_about, open_origins, with_open_origins
 from .penalty import cause_terms, finding_groups
 from .selection import is_flexible
@@ -34,11 +35,11 @@ NOT_HELD_OUT = "the account was ended before its gain on the readings held out w
 
 
 def findings_of(
-    regression: Regression, spots: list[Blindness], with_gain: bool, unexplained: float
+    regression: Regression, spots: list[Blindness], with_gain: bool, unexplained: Unexplained
 ) -> tuple[list[Finding], list[Blindness], list[int]]:
     """Findings of the chosen terms; those in doubt become entries of what is not told.
 
-    ``unexplained`` are arcsec rms. Also given are the indices of the terms of findings that are
+    Also given are the indices of the terms of findings that are
     not confirmed.
     """
     spots = list(spots)
@@ -103,7 +104,7 @@ def findings_of(
 
 
 def reconsidered(
-    regression: Regression, findings: Sequence[Finding], unexplained: float
+    regression: Regression, findings: Sequence[Finding], unexplained: Unexplained
 ) -> list[Finding]:
     """Findings once it is known that something is unexplained."""
     found = []
@@ -169,7 +170,7 @@ def _rivals(regression: Regression, group: Sequence[int]) -> list[tuple[str, flo
     return [(name, float(gap)) for name, gap in gaps[:RIVALS]]
 
 
-def scatter_finding(item: ScatterFinding, unexplained: float) -> Finding:
+def scatter_finding(item: ScatterFinding, unexplained: Unexplained) -> Finding:
     """Finding of a cause of the scatter."""
     evidence = {"bic_gain": item.bic_gain}
     status, reason = status_of(item.cause, None, None, (), unexplained)

@@ -11,10 +11,12 @@ from ..estimation.lines import LineBasis
 from ..estimation.regression import Regression
 from ..estimation.whitening import Whitener
 from ..joint.signals import Signals
-from .goodness import Leftover, Unexplained, goodness_of_fit
-from .unnamed import is_named
+from ..support.display_units import brief
+from ..support.distributions import chi_squared_tail
+from .goodness import FREE_PATH, Evidence, Leftover, Unexplained, goodness_of_fit
+from .unnamed import effect_of, is_named
 
-__all__ = ["leftover_of", "remainder_of", "unexplained_after"]
+__all__ = ["free_paths", "leftover_of", "remainder_of", "unexplained_after"]
 
 Array = NDArray[np.float64]
 
@@ -26,8 +28,10 @@ def leftover_of(signals: Signals, residual: Array, lines: LineBasis) -> Leftover
         factors["speed"] = np.abs(signals.velocity)
     if signals.torque is not None and signals.torque.any():
         factors["torque"] = signals.torque
+        factors["sign of the torque"] = np.sign(signals.torque)
     if signals.temperature is not None:
         factors["temperature"] = signals.temperature
+    factors["time in the run"] = share_of_run(signals)
     return Leftover(
         residual,
         signals.theta,
@@ -40,11 +44,54 @@ def leftover_of(signals: Signals, residual: Array, lines: LineBasis) -> Leftover
     )
 
 
-def remainder_of(regression: Regression, without: Collection[int] = ()) -> Leftover:
+def share_of_run(signals: Signals) -> Array:
+    """Time since the start of the run, in shares of its length."""
+    found = signals.clock.astype(np.float64)
+    for start, stop in signals.run_bounds():
+        found[start:stop] -= found[start]
+        found[start:stop] /= max(float(found[stop - 1]), 1e-300)
+    return found
+
+
+def free_paths(regression: Regression) -> list[int]:
+    """Terms that are a free path in time: they describe noise and are no cause."""
+    return [
+        k
+        for k, term in enumerate(regression.terms)
+        if is_named(term) and effect_of(term.cause).describes_noise(term)
+    ]
+
+
+def path_evidence(regression: Regression) -> Evidence | None:
+    """That the account needs a free path in time, with its size."""
+    found = free_paths(regression)
+    if not found:
+        return None
+    chosen = [k in found for k, term in enumerate(regression.terms) if term.run_effect is not None]
+    path = regression.whiten.run_part(regression.left, chosen)
+    rms = float(np.std(path))
+    deviance = sum(max(regression.terms[k].deviance, 0.0) for k in found)
+    return Evidence(
+        "free path in time",
+        deviance,
+        0.5 * chi_squared_tail(deviance, 1.0),
+        f"what is left follows {FREE_PATH}, {brief(rms)} arcsec rms and new in every run: noise "
+        "that drifts, or something bound to time that has no name",
+        rms=rms,
+        looks_like=FREE_PATH,
+    )
+
+
+def remainder_of(
+    regression: Regression, without: Collection[int] = (), loose: bool = False
+) -> Leftover:
     """What a regression leaves: run effects taken off, outliers put to the limit.
 
-    Structure without a name is left in it, and so are the terms ``without``.
+    Structure without a name is left in it, and so are the terms ``without``; ``loose`` leaves free
+    paths in time in it, too.
     """
+    if loose:
+        without = {*without, *free_paths(regression)}
     kept_in = [is_named(t) and k not in without for k, t in enumerate(regression.terms)]
     left = regression.left
     for (term, coefficients), taken in zip(regression.fitted(), kept_in, strict=True):
@@ -74,6 +121,12 @@ def unexplained_after(
 
     Terms ``without`` count as left: those of findings that were not confirmed.
     """
+    path = path_evidence(regression)
     return goodness_of_fit(
-        remainder_of(regression, without), float(regression.lines.orders.max()), sigma, rounding
+        remainder_of(regression, without),
+        float(regression.lines.orders.max()),
+        sigma,
+        rounding,
+        None if path is None else remainder_of(regression, without, loose=True),
+        path,
     )

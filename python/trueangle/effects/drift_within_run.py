@@ -48,22 +48,31 @@ SEEN = 0.5
 #: of Kass and Raftery.
 TOLD = 10.0
 
-#: Time constant of settling, in shares of the run.
-SETTLING = 0.4
+#: Time constants of settling, in shares of the run.
+SETTLING = {"early settling": 0.12, "settling": 0.4}
+
+#: Half periods over a run of a bend.
+BENT = 3
 
 #: Forms of a drift: from the start of the run, or about its mean.
 FORMS = (
     "ramp",
     "settling",
+    "early settling",
+    "bend",
     "walk",
     "flicker",
     "centred ramp",
+    "centred bend",
     "centred walk",
     "centred flicker",
 )
 
-#: Of these as many are unlike each other: a slope, a bend, a finer wander.
-UNLIKE_FORMS = 3.0
+#: Forms of which every path is one: they describe the noise (Kennedy and O'Hagan 2001).
+FREE = ("walk", "flicker", "centred walk", "centred flicker")
+
+#: Of these as many are unlike each other: a slope, a relaxation, a bend, a free path.
+UNLIKE_FORMS = 4.0
 
 
 @dataclass(frozen=True)
@@ -82,10 +91,11 @@ class DriftWithinRun(Effect):
     wander_arcsec: float = 0.0
 
     kind: ClassVar[str] = "drift_within_run"
-    size_name: ClassVar[str] = "wander_arcsec"
+    size_name: ClassVar[str] = "arcsec_per_s"
     sentence: ClassVar[str] = (
         "The set-up settles, warms up or creeps while a run lasts: the error follows the clock "
-        "and not the angle, differently in every run."
+        "and not the angle, differently in every run. A ramp, one relaxation or a slow bend is "
+        "such a drift; a free path in time describes the noise."
     )
     factor: ClassVar[str] = "time"
     measure: ClassVar[str] = "sweep out and back, or several turns, in each run, with time stamps"
@@ -116,7 +126,8 @@ class DriftWithinRun(Effect):
     def drawn(
         cls, size: float, signals: Signals, around: Surroundings, rng: np.random.Generator
     ) -> Self | None:
-        return cls(wander_arcsec=size)
+        # A free path is no cause, and is not to be found as one.
+        return cls(arcsec_per_s=size)
 
     @classmethod
     def propose(cls, regression: Regression) -> Extension | None:
@@ -148,8 +159,7 @@ class DriftWithinRun(Effect):
         the noise found, for there a wander that is taken too fine takes the lines of the place.
         """
         form, terms = best.shape["form"], int(best.shape["terms"])
-        waves = "ramp" not in form and form != "settling"
-        if best.bic_gain <= 0.0 or not waves:
+        if best.bic_gain <= 0.0 or form not in FREE:
             return best
         one = regression.signals.runs < 2
         white = regression if one else regression.with_terms(regression.terms, 0.0)
@@ -187,8 +197,11 @@ class DriftWithinRun(Effect):
             return u[:, None]
         if form == "centred ramp":
             return u[:, None] - 0.5
-        if form == "settling":
-            return (1.0 - np.exp(-u / SETTLING))[:, None]
+        if form in SETTLING:
+            return (1.0 - np.exp(-u / SETTLING[form]))[:, None]
+        if form.endswith("bend"):
+            waves = _core.line_columns(np.pi * u, k[:BENT])[:, 0::2] / k[:BENT]
+            return np.asarray(waves if form.startswith("centred") else waves - 1.0 / k[:BENT])
         if form == "walk":
             sines = _core.line_columns(np.pi * u, k - 0.5)[:, 1::2]
             return np.asarray(sines * (np.sqrt(2.0) / (np.pi * (k - 0.5))))
@@ -230,6 +243,10 @@ class DriftWithinRun(Effect):
         if left < OWN_OF_VELOCITY and np.ptp(signals.direction) == 0.0:
             because = "one direction: a ramp in angle is a ramp in time"
             yield cls.blind(because, ScaleError, first=False, common=ScaleError)
+
+    @classmethod
+    def describes_noise(cls, extension: Extension) -> bool:
+        return extension.shape["form"] in FREE
 
     @classmethod
     def told(cls, extension: Extension, regression: Regression) -> bool:

@@ -205,6 +205,11 @@ class Effect:
         return None
 
     @classmethod
+    def describes_noise(cls, extension: Extension) -> bool:
+        """Whether a term in this form only says how the noise goes, and is no cause."""
+        return False
+
+    @classmethod
     def told(cls, extension: Extension, regression: Regression) -> bool:
         """Whether the readings show what the design alone does not promise to tell.
 

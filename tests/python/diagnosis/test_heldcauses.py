@@ -9,6 +9,7 @@ import trueangle as ta
 from trueangle.diagnosis.confirmation import status_of
 from trueangle.diagnosis.findings import Diagnosis
 from trueangle.diagnosis.gain import Gain, measure_gain
+from trueangle.diagnosis.goodness import Noise, Unexplained
 from trueangle.diagnosis.holdout import held_out, reducible_share
 from trueangle.effects import EFFECTS
 from trueangle.estimation.regression import Regression
@@ -107,7 +108,8 @@ def test_the_share_is_that_of_what_can_be_reduced_and_its_interval_holds_95_perc
 def test_a_cause_is_confirmed_where_the_interval_of_its_gain_excludes_zero(interval, status):
     zeros = (0.0, 0.0, 0.0)
     gain = Gain("runs", zeros, zeros, sum(interval) / 2.0, interval, None, "")
-    found, reason = status_of("backlash", gain, None, (), unexplained=False)
+    nothing = Unexplained(False, 0.0, 0.0, [], Noise(1.0, 0.0, 0.0, 0.0, 100.0))
+    found, reason = status_of("backlash", gain, None, (), nothing)
     assert found == status
     assert bool(reason) == (status == "not_confirmed")
 

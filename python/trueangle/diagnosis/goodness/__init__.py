@@ -10,9 +10,10 @@ from __future__ import annotations
 from .evidence import Evidence
 from .leftover import Leftover
 from .noise import Noise, estimate_noise
-from .unexplained import LEVEL, Unexplained, goodness_of_fit
+from .unexplained import FREE_PATH, LEVEL, Unexplained, goodness_of_fit
 
 __all__ = [
+    "FREE_PATH",
     "LEVEL",
     "Evidence",
     "Leftover",

@@ -32,6 +32,8 @@ class Evidence:
         Of the structure that it shows, in units of the residual.
     at : float or None
         Frequency (per s, or per turn) of the line that it shows, where it shows one.
+    looks_like : str
+        What such structure resembles.
     """
 
     test: str
@@ -41,6 +43,7 @@ class Evidence:
     decides: bool = True
     rms: float = 0.0
     at: float | None = None
+    looks_like: str = ""
 
     def to_dict(self) -> dict[str, Any]:
         """The entry of ``unexplained.evidence``."""
@@ -50,6 +53,7 @@ class Evidence:
             "p": self.p,
             "says": self.says,
             "decides": self.decides,
+            "looks_like": self.looks_like,
         }
 
 

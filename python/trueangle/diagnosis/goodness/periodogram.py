@@ -265,6 +265,7 @@ def time_test(left: Leftover, correlation: float = 0.0) -> Evidence | None:
         found.p,
         f"a line of {found.peak:.5g} {unit}{detail}, about {brief(found.amplitude)} arcsec, its "
         "phase new in every run",
+        looks_like="a line in time",
         rms=float(found.amplitude / np.sqrt(2.0)),
         at=found.peak,
     )
@@ -282,6 +283,7 @@ def order_test(left: Leftover, top: float, correlation: float = 0.0) -> Evidence
         found.p,
         f"a line of order {found.peak:.5g}, about {brief(found.amplitude)} arcsec, comes back at "
         "the same place within runs and not between them",
+        looks_like="a line whose size changes in time",
         rms=float(found.amplitude / np.sqrt(2.0)),
         at=found.peak,
     )

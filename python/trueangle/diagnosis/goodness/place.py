@@ -31,7 +31,7 @@ from ...support.distributions import incomplete_gamma_tail, student_tail
 from .evidence import Evidence, largest_of
 from .leftover import Leftover
 
-__all__ = ["place_tests"]
+__all__ = ["alike", "place_tests"]
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -51,6 +51,9 @@ ROUNDED = 1e-9
 #: Share of a modulator's power from which on it changes within runs.
 MOVES = 1e-3
 
+#: Factors that are not asked for by direction too.
+ALONE = ("time in the run", "sign of the torque")
+
 #: Spread of a factor, in shares of its size, from which on it counts as changing.
 CHANGES = 0.05
 
@@ -60,6 +63,7 @@ class _Modulator:
     name: str
     values: Array
     what: str
+    looks_like: str
 
 
 def place_tests(left: Leftover, top: float = LEAST_ORDERS) -> list[Evidence]:
@@ -102,22 +106,26 @@ def _step(left: Leftover) -> float:
 
 def _modulators(left: Leftover) -> list[_Modulator]:
     ones = np.ones(len(left))
-    found = [_Modulator("place", ones, "comes back at the same place in run after run")]
+    text = "comes back at the same place in run after run"
+    found = [_Modulator("place", ones, text, "depends on place")]
     moving = left.direction[left.direction != 0.0]
     both = moving.size > 0 and np.ptp(moving) > 0.0
     if both:
         text = "differs between the directions of travel at the same place"
-        found.append(_Modulator("place x direction", left.direction, text))
+        looks_like = "depends on place and direction"
+        found.append(_Modulator("place x direction", left.direction, text, looks_like))
     for name, values in left.factors.items():
         spread = float(np.std(values))
         if spread <= CHANGES * float(np.abs(values).max(initial=0.0)) or spread == 0.0:
             continue
         g = (values - values.mean()) / spread
         text = f"comes back at the same place and follows the {name}"
-        found.append(_Modulator(f"place x {name}", g, text))
-        if both:
+        found.append(_Modulator(f"place x {name}", g, text, f"follows the {name}"))
+        if both and name not in ALONE:
             text = f"differs between the directions of travel, the more so the {name} differs"
-            found.append(_Modulator(f"place x direction x {name}", g * left.direction, text))
+            looks_like = f"follows the {name} by direction"
+            by_both = g * left.direction
+            found.append(_Modulator(f"place x direction x {name}", by_both, text, looks_like))
     return found
 
 
@@ -168,7 +176,7 @@ def _judged(
             p = incomplete_gamma_tail(float(width), total)
             trials.append((p, total / width, float(width)))
     if modulator.name != "place":
-        chance, size = _alike(modulator.values, left, units)
+        chance, size = alike(modulator.values, left, units)
         trials.append((chance, 0.0, -1.0))
     p, statistic, band = min(trials)
     # Bands hold each other: as many as half of them are independent, about.
@@ -188,10 +196,11 @@ def _judged(
         detail = f"strongest at order {(k + 1) * step:.4g}, about {brief(amplitude)} arcsec"
         rms = float(np.sqrt(power[np.exp(-logs) * count < 0.01].sum()))
     says = f"what is left {modulator.what}: {detail}"
-    return Evidence(modulator.name, statistic, p, says, rms=rms)
+    looks_like = modulator.looks_like
+    return Evidence(modulator.name, statistic, p, says, rms=rms, looks_like=looks_like)
 
 
-def _alike(g: Array, left: Leftover, units: list[tuple[int, int]]) -> tuple[float, float]:
+def alike(g: Array, left: Leftover, units: list[tuple[int, int]]) -> tuple[float, float]:
     """Chance of the modulator itself, at no place in particular, by the scatter of units; size."""
     # Within runs, or between them where it does not change within any.
     inside = left.centred(left.bounds)

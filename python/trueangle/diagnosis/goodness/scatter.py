@@ -10,7 +10,7 @@ from .evidence import Evidence
 from .leftover import Leftover
 from .noise import Noise
 
-__all__ = ["AGAINST_STATED", "repeats", "scatter_tests", "whitened"]
+__all__ = ["AGAINST_STATED", "normal_kurtosis", "repeats", "scatter_tests", "whitened"]
 
 Array = NDArray[np.float64]
 
@@ -124,11 +124,14 @@ def _correlation(noise: Noise) -> Evidence:
     return Evidence("correlation", noise.correlation, p, said, decides=False)
 
 
-def _tails(e: Array) -> Evidence:
-    """Excess kurtosis, made normal by Anscombe and Glynn (1983)."""
-    n = float(e.size)
-    d = e - e.mean()
-    kurtosis = float(np.mean(d**4) / np.mean(d**2) ** 2)
+def normal_kurtosis(kurtosis: float, n: float) -> float:
+    """Kurtosis of n independent values made a standard normal: Anscombe and Glynn (1983).
+
+    Examples
+    --------
+    >>> round(normal_kurtosis(3.0, 1000.0), 2), round(normal_kurtosis(4.0, 1000.0), 1)
+    (0.11, 4.6)
+    """
     mean = 3.0 * (n - 1.0) / (n + 1.0)
     variance = 24.0 * n * (n - 2.0) * (n - 3.0) / ((n + 1.0) ** 2 * (n + 3.0) * (n + 5.0))
     x = (kurtosis - mean) / np.sqrt(variance)
@@ -139,9 +142,15 @@ def _tails(e: Array) -> Evidence:
     a = 6.0 + 8.0 / skew * (2.0 / skew + np.sqrt(1.0 + 4.0 / skew**2))
     denominator = 1.0 + x * np.sqrt(2.0 / (a - 4.0))
     third = np.sign(denominator) * (np.abs((1.0 - 2.0 / a) / denominator)) ** (1.0 / 3.0)
-    z = (1.0 - 2.0 / (9.0 * a) - third) / np.sqrt(2.0 / (9.0 * a))
-    p = 2.0 * normal_tail(abs(float(z)))
-    kind = "heavier" if kurtosis > mean else "lighter"
+    return float((1.0 - 2.0 / (9.0 * a) - third) / np.sqrt(2.0 / (9.0 * a)))
+
+
+def _tails(e: Array) -> Evidence:
+    d = e - e.mean()
+    kurtosis = float(np.mean(d**4) / np.mean(d**2) ** 2)
+    z = normal_kurtosis(kurtosis, float(e.size))
+    p = 2.0 * normal_tail(abs(z))
+    kind = "heavier" if z > 0.0 else "lighter"
     says = f"the tails are {kind} than a normal distribution's" if p < 0.01 else "normal tails"
     return Evidence("tails", kurtosis, p, says, decides=False)
 

@@ -11,12 +11,14 @@ from ...support.plainresult import Shown
 from .evidence import Evidence
 from .leftover import Leftover
 from .noise import Noise, estimate_noise
-from .periodogram import order_test, time_test
-from .place import LEAST_ORDERS, place_tests
+from .place import LEAST_ORDERS
+from .registry import Asked, ask
 from .scatter import scatter_tests
-from .zeros import run_test
 
-__all__ = ["LEVEL", "Unexplained", "goodness_of_fit"]
+__all__ = ["FREE_PATH", "LEVEL", "Unexplained", "goodness_of_fit"]
+
+#: What a path in time looks like that no law prescribes.
+FREE_PATH = "a free path in time"
 
 #: Chance with which noise alone may be called unexplained, all deciding tests together.
 LEVEL = 0.01
@@ -51,9 +53,14 @@ class Unexplained(Shown):
 
     @property
     def firing(self) -> list[Evidence]:
-        """The deciding tests that fire, the surest first."""
-        deciding = sum(item.decides for item in self.evidence)
-        return [item for item in self.evidence if item.decides and item.p * deciding < LEVEL]
+        """The deciding tests that fire, the surest first; a free path that was chosen, too."""
+        return _firing([item for item in self.evidence if item.decides])
+
+    @property
+    def beside_path(self) -> float:
+        """Rms of what fires beside a free path in time, arcsec: a path is noise to other causes."""
+        rest = [item.rms for item in self.firing if item.looks_like != FREE_PATH]
+        return max(max(rest), SMALLEST) if rest else 0.0
 
     @property
     def noise_firing(self) -> list[Evidence]:
@@ -81,6 +88,8 @@ def goodness_of_fit(
     top: float = LEAST_ORDERS,
     sigma: float | None = None,
     rounding: float = 0.0,
+    loose: Leftover | None = None,
+    path: Evidence | None = None,
 ) -> Unexplained:
     """Test a residual for everything that is no noise, without asking for a cause.
 
@@ -94,6 +103,10 @@ def goodness_of_fit(
         Noise of one reading that the simulation states, arcsec.
     rounding : float
         Step of the lattice on which the readings lie, arcsec; 0 for none.
+    loose : Leftover, optional
+        The same with free paths in time left in, for tests of what is bound to time.
+    path : Evidence, optional
+        Of a free path in time that the account needs.
 
     Returns
     -------
@@ -114,14 +127,10 @@ def goodness_of_fit(
     'place'
     """
     noise = estimate_noise(left)
-    deciding = place_tests(left, top)
-    rho = noise.correlation
-    for item in (order_test(left, top, rho), time_test(left, rho), run_test(left, noise)):
-        if item is not None:
-            deciding.append(item)
+    deciding = ask(Asked(left, left if loose is None else loose, noise, top))
+    deciding += [path] if path is not None else []
     describing = scatter_tests(left, noise, sigma, rounding)
-    count = len(deciding)
-    firing = [item for item in deciding if item.p * count < LEVEL]
+    firing = _firing(deciding)
     # Sure is sure: of those far beyond doubt the narrower account comes first, and of a line
     # in angle or in time the one that stands out more.
     rank = {id(item): float(k) for k, item in enumerate(deciding)}
@@ -138,3 +147,9 @@ def goodness_of_fit(
         deciding + describing,
         noise,
     )
+
+
+def _firing(deciding: list[Evidence]) -> list[Evidence]:
+    """Those at 1 % for all together."""
+    count = len(deciding)
+    return [item for item in deciding if item.p * count < LEVEL or item.looks_like == FREE_PATH]

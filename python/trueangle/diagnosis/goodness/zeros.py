@@ -73,4 +73,5 @@ def run_test(left: Leftover, noise: Noise) -> Evidence | None:
         p,
         f"the runs differ in their zeros by {brief(spread)} arcsec beyond what the noise explains",
         rms=spread,
+        looks_like="a new zero in every run",
     )

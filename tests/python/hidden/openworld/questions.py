@@ -328,8 +328,8 @@ def _named_or_nothing(
 def _no_false_companion(
     case: Case, report: Any, confirmed: tuple[str, ...], unexplained: bool, names: Any
 ) -> bool:
-    """A free path is no cause, and brings none."""
-    return not confirmed
+    """A free path brings no companions, and is no cause but where it looks smooth."""
+    return set(confirmed) <= {"drift_within_run"}
 
 
 def _belief_right(
@@ -352,7 +352,9 @@ def _all_and_only(
 def _no_companion(
     case: Case, report: Any, confirmed: tuple[str, ...], unexplained: bool, names: Any
 ) -> bool:
-    """The cause, and nothing else confirmed."""
+    """The cause, and nothing else confirmed; of a free path in time, nothing."""
+    if unexplained and set(names) == {"drift_within_run"}:
+        return not confirmed
     return set(confirmed) == set(names)
 
 

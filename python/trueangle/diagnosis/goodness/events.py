@@ -1,0 +1,92 @@
+r"""What follows the time since an event: since the last reversal, or since the start of the run.
+
+With :math:`s` seconds since the event and :math:`d` the direction, what is left is held against
+
+.. math:: g = e^{-s/\tau} \quad\text{and}\quad g = d\,e^{-s/\tau}
+
+about their means between two events, for a few :math:`\tau`. The sums over runs (or pieces of few
+runs) are compared with their own scatter by Student's t, whatever the noise within them is.
+"""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .evidence import Evidence, largest_of
+from .leftover import Leftover
+from .place import alike
+
+__all__ = ["AFTER_REVERSALS", "AFTER_START", "reversal_test", "start_test"]
+
+Array = NDArray[np.float64]
+
+#: What the tests say that something looks like.
+AFTER_REVERSALS = "relaxes after reversals"
+AFTER_START = "relaxes after the start of a run"
+
+#: Time constants, in shares of the time between two events.
+CONSTANTS = (0.05, 0.2, 0.6)
+
+#: Readings between two events that show how something relaxes.
+LEAST_READINGS = 12
+
+
+def reversal_test(left: Leftover) -> Evidence | None:
+    """What relaxes in time after each reversal, alike or by direction."""
+    cuts = np.flatnonzero((np.diff(left.direction) != 0.0) & (np.diff(left.run) == 0)) + 1
+    first = {start for start, _ in left.bounds}
+    edges = sorted({*first, len(left), *cuts.tolist()})
+    stretches = [
+        (a, b) for a, b in itertools.pairwise(edges) if a not in first and b - a >= LEAST_READINGS
+    ]
+    return _relaxing(left, stretches, "after reversals", AFTER_REVERSALS, both=True)
+
+
+def start_test(left: Leftover) -> Evidence | None:
+    """What relaxes in time from the start of every run, alike in all."""
+    long = [(a, b) for a, b in left.bounds if b - a >= LEAST_READINGS]
+    return _relaxing(left, long, "from the start of the runs", AFTER_START, both=False)
+
+
+def _relaxing(
+    left: Leftover, stretches: list[tuple[int, int]], when: str, looks_like: str, both: bool
+) -> Evidence | None:
+    units = left.units()
+    if len(units) < 3 or len(stretches) < 3:
+        return None
+    inside = np.zeros(len(left), dtype=bool)
+    for a, b in stretches:
+        inside[a:b] = True
+    about = replace(left, residual=left.centred(stretches) * inside)
+    span = float(np.median([left.clock[b - 1] - left.clock[a] for a, b in stretches]))
+    if span <= 0.0:
+        return None
+    best: tuple[float, float, float, float] | None = None
+    trials = 0
+    for constant in CONSTANTS:
+        since = np.zeros(len(left))
+        for a, b in stretches:
+            decay = np.exp(-(left.clock[a:b] - left.clock[a]) / (constant * span))
+            since[a:b] = decay - decay.mean()
+        for g in (since, since * left.direction) if both else (since,):
+            p, size = alike(g, about, units)
+            trials += 1
+            if best is None or p < best[0]:
+                rms = abs(size) * float(np.sqrt(np.mean(g**2)))
+                best = (p, size, rms, constant * span)
+    assert best is not None
+    p, size, rms, constant = best
+    unit = "s" if left.timed else "readings"
+    return Evidence(
+        f"time since {looks_like.rsplit(' ', 1)[-1]}",
+        abs(size),
+        # Time constants that differ by a factor of three are half alike.
+        largest_of(p, 0.6 * trials),
+        f"what is left relaxes in time {when}, within about {constant:.2g} {unit}",
+        rms=rms,
+        looks_like=looks_like,
+    )
