@@ -98,6 +98,7 @@ def function_model(
     terms: Iterable[Any] = (),
     turns: int = 1,
     note: str = "",
+    travel: tuple[float, float] | None = None,
 ) -> HarmonicModel:
     r"""Model, in degrees, whose correction is that of the tables.
 
@@ -108,17 +109,20 @@ def function_model(
     step; orders that do not exceed three of it are left out. What ``device``, the target's own
     arithmetic, does beside the harmonics is in the record of the fit.
 
+    ``travel``, in degrees, is what the table covers where that is less than a turn.
+
     Raises
     ------
     FileError
         A table that is not monotone: it gives one corrected angle for several readings.
     """
+    more = (tuple(terms), turns, note, travel)
     try:
-        return _model(tables, path, target, device, zero, at_indicated, tuple(terms), turns, note)
+        return _model(tables, path, target, device, zero, at_indicated, *more)
     except NotInvertibleError:
         if len(tables) > 1 or tables[0].forward or at_indicated:
             raise failed(path, "the tables are too steep to be corrected by") from None
-    return _model(tables, path, target, device, zero, True, tuple(terms), turns, note)
+    return _model(tables, path, target, device, zero, True, *more)
 
 
 def _model(
@@ -131,6 +135,7 @@ def _model(
     terms: tuple[Any, ...],
     turns: int,
     note: str,
+    travel: tuple[float, float] | None,
 ) -> HarmonicModel:
     shafts, variances, residual, samples = [], [0.0], 0.0, 0
     constant = zero
@@ -171,11 +176,11 @@ def _model(
         provenance=Provenance((Source(path, sha256_of(path)),)),
         terms=terms,
     )
-    rms, largest = _arithmetic(model.replace(terms=()), target, device, turns)
+    rms, largest = _arithmetic(model.replace(terms=()), target, device, turns, travel)
     record = FitRecord(
         samples=samples,
         runs=1,
-        span=(0.0, 360.0),
+        span=travel or (0.0, 360.0),
         residual=residual * 360.0,
         method="table",
         note=note or f"read from a table of {target.name}; the uncertainty is that of its numbers",
@@ -185,10 +190,17 @@ def _model(
 
 
 def _arithmetic(
-    model: HarmonicModel, target: Target, device: Correction, turns: int
+    model: HarmonicModel,
+    target: Target,
+    device: Correction,
+    turns: int,
+    travel: tuple[float, float] | None,
 ) -> tuple[float, float]:
     """Rms and maximum, in turns, of what a device does beside its model, their zeros apart."""
     places = np.arange(_PROBES, dtype=np.int64) * (turns * 2**32 // _PROBES)
+    if travel is not None:
+        start, stop = (round(end / 360.0 * TURN) for end in travel)
+        places = start + places * (stop - start) // 2**32
     x = places / TURN
     if target.argument == "indicated":
         difference = x - np.asarray(model.correct(x * 360.0)) / 360.0 - device(places)

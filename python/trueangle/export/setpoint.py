@@ -48,6 +48,8 @@ class Travel:
         Degrees.
     forward, reverse : ndarray
         Least-squares knots of the error.
+    function : callable
+        What ``forward`` is of, at angles in turns.
     """
 
     start: float
@@ -56,10 +58,20 @@ class Travel:
     nominal: Array
     forward: Array
     reverse: Array
+    function: Function
 
     @classmethod
-    def of(cls, pattern: TurnPattern, target: str, options: Mapping[str, Any], most: int) -> Travel:
+    def of(
+        cls,
+        pattern: TurnPattern,
+        target: str,
+        options: Mapping[str, Any],
+        most: int,
+        function: Function | None = None,
+    ) -> Travel:
         """Knots over the travel that is asked for, else over what the model was fitted on.
+
+        They are of the error at the true angle, for each direction, or of a ``function``.
 
         Raises
         ------
@@ -85,13 +97,14 @@ class Travel:
             )
         first = start / 360.0
         forward, reverse = (
-            linear_knots(_moved(_error(pattern, direction), first), entries)[
+            linear_knots(_moved(function or _error(pattern, direction), first), entries)[
                 np.arange(count) % entries
             ]
             for direction in (1, -1)
         )
         nominal = np.round(start + np.arange(count) * (360.0 / entries), NOMINAL_DECIMALS)
-        return cls(start, stop, entries, nominal, forward, reverse)
+        shown = function or _error(pattern, 1)
+        return cls(start, stop, entries, nominal, forward, reverse, shown)
 
     def part(self, pattern: TurnPattern, forward: Array, reverse: Array) -> TablePart:
         """Proof of printed values (turns of error) at set points over the travel.
@@ -116,9 +129,24 @@ class Travel:
             tuple(standing(values, d) for values, d in ways), np.zeros_like, continuous=True
         )
 
+    def at_readings(self, pattern: TurnPattern, values: Array) -> TablePart:
+        """Proof of printed values (turns to subtract) that are looked up at the reading."""
+
+        def reading(x: Array) -> Array:
+            # The inputs are spread over the travel.
+            return (self.start + x * (self.stop - self.start)) / 360.0
+
+        def looked_up(places: NDArray[np.int64]) -> Array:
+            return np.asarray(np.interp(reading(places / 2.0**32) * 360.0, self.nominal, values))
+
+        def exact(x: Array) -> Array:
+            return pattern.correction(reading(x))
+
+        return TablePart((looked_up,), exact, continuous=True)
+
     def lost(self, pattern: TurnPattern) -> list[dict[str, float]]:
         """What one turn of least-squares lines loses of each order."""
-        error = _error(pattern, 1)
+        error = self.function
         knots = linear_knots(error, self.entries)
         closed = np.append(knots, knots[0])
         places = np.arange(self.entries + 1) / self.entries

@@ -10,8 +10,11 @@ from .csvtable import CsvTable
 from .klipper import Klipper
 from .linuxcnc import LinuxCnc
 from .mechaduino import Mechaduino
+from .minicheetah import MiniCheetah
 from .moteus import Moteus
+from .pmac import Pmac
 from .rust import RustModule
+from .siemens840d import Siemens840d
 from .simplefoc import SimpleFoc
 from .target import Target
 from .tinymovr import Tinymovr
@@ -34,6 +37,9 @@ TARGETS: dict[str, Target] = {
         Admt4000(),
         Mechaduino(),
         Tinymovr(),
+        MiniCheetah(),
+        Siemens840d(),
+        Pmac(),
     )
 }
 

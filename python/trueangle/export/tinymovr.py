@@ -18,7 +18,7 @@ from .proof import Correction, Places
 from .reading import failed, sampled_model
 from .target import CommentBlock, Made, Option, TablePart, Target
 
-__all__ = ["Tinymovr", "rectified"]
+__all__ = ["Tinymovr", "Whole", "rectified"]
 
 Whole = NDArray[np.int64]
 
@@ -57,19 +57,8 @@ class Tinymovr(Target):
         ]
         table = tried[int(np.argmin(left))]
 
-        def text(header: CommentBlock) -> str:
-            own = [
-                f"rec_table for a sensor of {bits} bits and ECN_SIZE {entries}: ticks that are "
-                "added at the indicated angle.",
-            ]
-            lines = header.comment("// ", *own)
-            values = rows([str(int(value)) for value in table])
-            return "\n".join(
-                [*lines, ".rec_table = {", values, "},", ".rec_calibrated = true,", ""]
-            )
-
         return Made(
-            text=text,
+            text=lambda header: self.write(table, bits, header),
             entries=entries,
             bytes=4 * entries,
             part=TablePart.at_readings(pattern, _device(table, bits), zero=pattern.zero),
@@ -80,10 +69,28 @@ class Tinymovr(Target):
             bits=bits,
         )
 
+    def write(self, table: Whole, bits: int, header: CommentBlock) -> str:
+        """The file's text."""
+        own = (
+            f"rec_table for a sensor of {bits} bits and ECN_SIZE {len(table)}: ticks that are "
+            "added at the indicated angle."
+        )
+        values = rows([str(int(value)) for value in table])
+        return "\n".join(
+            [
+                *header.comment("// ", own),
+                ".rec_table = {",
+                values,
+                "},",
+                ".rec_calibrated = true,",
+                "",
+            ]
+        )
+
     def read(self, text: str, path: str, options: Mapping[str, Any]) -> HarmonicModel:
         table, line, _ = array_of(text, path, self.name)
         if len(table) & (len(table) - 1) or np.any(table != np.rint(table)):
-            raise failed(path, "rec_table holds whole ticks, a power of two of them", line)
+            raise failed(path, "the table holds whole ticks, a power of two of them", line)
         ticks = 1 << options["bits"]
         device = _device(table.astype(np.int64), options["bits"])
         return sampled_model(-table / ticks, path, self, device, step=1.0 / ticks)

@@ -14,7 +14,8 @@ from .test_golden import printer_config
 ENDINGS = {
     "c": ".h", "rust": ".rs", "csv": ".csv", "simplefoc": ".h", "moteus": ".cfg",
     "linuxcnc": ".comp", "twincat": ".lis", "klipper": ".cfg", "admt4000": ".txt",
-    "mechaduino": ".cpp", "tinymovr": ".h",
+    "mechaduino": ".cpp", "tinymovr": ".h", "minicheetah": ".h", "siemens840d": ".ini",
+    "pmac": ".txt",
 }  # fmt: skip
 CASES = [
     ("c", {}), ("rust", {}), ("csv", {}),
@@ -22,6 +23,7 @@ CASES = [
     ("simplefoc", {"variant": "plus-float"}), ("moteus", {}), ("linuxcnc", {"type": "0"}),
     ("linuxcnc", {"type": "1"}), ("twincat", {"variant": "cnc"}), ("twincat", {"variant": "nc"}),
     ("klipper", {}), ("mechaduino", {}), ("tinymovr", {"bits": 14, "entries": 256}),
+    ("minicheetah", {}), ("siemens840d", {}), ("pmac", {"counts_per_turn": 1 << 20}),
 ]  # fmt: skip
 
 
@@ -46,7 +48,9 @@ def made_of(model, target, options, folder):
 def test_a_table_comes_back_as_its_model(target, options, tmp_path):
     model = golden_model()
     made, path = made_of(model, target, options, tmp_path)
-    asked = {k: v for k, v in options.items() if k in ("variant", "type", "bits")}
+    asked = {
+        k: v for k, v in options.items() if k in ("variant", "type", "bits", "counts_per_turn")
+    }
     back = ta.import_model(path, target, tmp_path / "back.json", **asked)
     result = ta.compare(model, ta.load_model(tmp_path / "back.json"))
     assert result.max_abs_arcsec <= made.max_difference_arcsec
@@ -253,7 +257,6 @@ def test_max_arcsec_of_a_fixed_table_is_kept_or_refused(tmp_path):
         ("linuxcnc", "0 0 0\n1 1 1\n"),
         ("linuxcnc", "nominal forward reverse\n0 0 0\n90 0 0\n180 0 0\n270 0 0\n"),
         ("linuxcnc", "0 0 0\n90 0 0\n80 0 0\n270 0 0\n360 0 0\n"),
-        ("linuxcnc", "0 0 0\n9 0 0\n18 0 0\n27 0 0\n36 0 0\n"),
         ("twincat", "kw.ssfk.interval 10000\nkw.ssfk.kw_nr_max 5\nkw.ssfk.table[0].pos 1\n"),
         ("twincat", "kw.ssfk.table[0].pos x\n"),
         ("klipper", "[angle a]\ncalibrate = 1, x\n"),
@@ -261,6 +264,12 @@ def test_max_arcsec_of_a_fixed_table_is_kept_or_refused(tmp_path):
         ("mechaduino", "float lookup[4] = {0, 90, 180, 270};"),
         ("tinymovr", ".rec_table = {0.5, 1, 2, 3},"),
         ("tinymovr", ".rec_table = {1, 2, 3, 4, 5},"),
+        ("minicheetah", "int offset_lut[4] = {1, 2, 3, 4};"),
+        ("siemens840d", "$AA_ENC_COMP[0,0,AX1]=0\n$AA_ENC_COMP_STEP[0,AX1]=1\n"),
+        ("siemens840d", "$AA_ENC_COMP[0,x,AX1]=0\n"),
+        ("pmac", "#1 DEFINE COMP 8,4000\n1 2 3\n"),
+        ("pmac", "#1 DEFINE COMP 4,4000\n1 2 x 0\n"),
+        ("pmac", "DELETE COMP\n"),
     ],
 )
 def test_what_is_no_table_is_refused_in_one_line(target, text, tmp_path):

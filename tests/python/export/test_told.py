@@ -39,8 +39,8 @@ def model():
 def export(model, target, folder, **options):
     if target == "klipper":
         options["existing"] = existing(folder, model.replace(terms=()))
-    if target == "twincat" and "variant" in options:
-        return ta.export_model(model, target, **options)
+    if target == "pmac":
+        options["counts_per_turn"] = 1 << 20
     return ta.export_model(model, target, **options)
 
 
@@ -68,7 +68,7 @@ def test_what_is_left_out_is_named_with_its_size(target, model, tmp_path):
     assert float(re.search(r"at most (\S+)", first)[1]) >= total
     assert "latency" in made.to_dict()["left_out"][-1]["term"]
     if target not in NO_COMMENT:
-        flowing = re.sub(r"\n(?: \*|//!|//|#) ?", " ", made.text)
+        flowing = re.sub(r"\n(?: \*|//!|//|#|;) ?", " ", made.text)
         assert re.search(r"at most \S+ arcsec; left out: .*latency \S+ arcsec", flowing)
         assert made.sha256 in flowing
         assert "rig/axis_7.csv" in flowing
