@@ -18,6 +18,7 @@ import numpy as np
 mpl.use("Agg")
 
 from causes import causes_page
+from simulatorpictures import simulator_pictures
 
 import trueangle as ta
 from trueangle import plots
@@ -51,6 +52,7 @@ def everything(folder: Path) -> None:
     """Write all figures and tables into ``folder``."""
     folder.mkdir(exist_ok=True)
     figures(folder)
+    simulator_pictures(folder)
     (folder / "performance.md").write_text(performance(), encoding="utf-8")
     (folder / "scaling.md").write_text(scaling(folder / "scaling.svg"), encoding="utf-8")
     (folder / "gallery.md").write_text(gallery(), encoding="utf-8")

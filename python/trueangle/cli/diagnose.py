@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from ..errors import ArgumentError, TrueAngleError
 from ..support.deadline import STYLES, ending_early
-from ..support.files import MODEL, SIMULATION
+from ..support.files import MODEL, SENSOR, SIMULATION
 from .durations import seconds
 from .error_units import add_errors_in, errors_in
 from .fit import add_argument_choice, add_joint
@@ -51,6 +51,19 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=Output.of(SIMULATION),
         metavar="FILE",
         help="write the simulation extended by the findings",
+    )
+    add(
+        "--extend-into",
+        type=Output.of(SENSOR),
+        metavar="FILE",
+        help="write what the simulator lacks as the sensor of a joint: a fragment of MuJoCo's XML "
+        "(.xml) or a functional mock-up unit (.fmu)",
+    )
+    add(
+        "--into-joint",
+        default="joint",
+        metavar="NAME",
+        help="name of the joint in MuJoCo (default: joint)",
     )
     add(
         "--corrected-model",
@@ -172,8 +185,23 @@ def _written(result: Diagnosis, args: argparse.Namespace, model: HarmonicModel |
         result.correction(model, argument=args.argument).save(args.corrected_model)
         return "\n".join(_corrected(result, args.corrected_model, model is not None))
 
+    def sense() -> str:
+        from ..export import export_model
+
+        fmu = str(args.extend_into).lower().endswith(".fmu")
+        options = {"variant": "sensor"} if fmu else {"joint": args.into_joint}
+        made = export_model(
+            result.sensor(), "fmu" if fmu else "mujoco", args.extend_into, **options
+        )
+        return f"\nSensor of what is confirmed: {made.output}"
+
     failed: list[TrueAngleError | OSError] = []
-    for path, write in ((args.extend, extend), (args.corrected_model, correct)):
+    outputs = (
+        (args.extend, extend),
+        (args.extend_into, sense),
+        (args.corrected_model, correct),
+    )
+    for path, write in outputs:
         try:
             told = write() if path else ""
         except (TrueAngleError, OSError) as error:
@@ -189,7 +217,7 @@ def _written(result: Diagnosis, args: argparse.Namespace, model: HarmonicModel |
 
 def _unwritten(args: argparse.Namespace, complete: bool) -> str:
     """What an interruption left undone."""
-    files = [path for path in (args.extend, args.corrected_model) if path]
+    files = [path for path in (args.extend, args.extend_into, args.corrected_model) if path]
     told = "the account is complete" if complete else "the account so far is incomplete"
     return told + (f", and {' and '.join(map(str, files))} not written" if files else "")
 

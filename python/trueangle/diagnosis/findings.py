@@ -236,12 +236,36 @@ class Diagnosis(PlainResult):
         given = self.runs if runs is None else runs
         return extend_model(model, given, self.extended, argument)
 
+    def sensor(self) -> HarmonicModel:
+        """What was confirmed as the model of a sensor: what a simulator's encoder lacks.
+
+        Returns
+        -------
+        HarmonicModel
+            Its error stands on top of the log, where the diagnosis had one; else it is all of
+            the joint's.
+
+        Raises
+        ------
+        NoModelError
+            Nothing was confirmed that a sensor can have.
+        NotInvertibleError
+            The error is too steep for a model of the true angle.
+        """
+        self._check_confirmed()
+        runs = self.runs if self.simulated is None else self.simulated.runs
+        return extend_model(None, runs, self.extended)
+
     def _check_correctable(self) -> None:
         """Raise where there is nothing that a model could be made of."""
         if self.simulated is not None:
             raise ArgumentError(
                 "no correction model can hold what is known as a log only: give the model to extend"
             )
+        self._check_confirmed()
+
+    def _check_confirmed(self) -> None:
+        """Raise where nothing was confirmed that a model can hold."""
         effects = self.extended.effects
         if self.extended.harmonics or any(not effect.not_at_run_time for effect in effects):
             return

@@ -192,7 +192,7 @@ DOUBLE = Arithmetic(
     "double",
     "double",
     "",
-    "fabs(off) <= 1e-16 + 4e-16 * fabs(goal)",
+    "fabs(off) <= 4e-15 + 4e-16 * fabs(goal)",
     1.0,
     _DOUBLE_TURNS + "\n" + _DOUBLE_HELPERS,
     _DOUBLE_DECAY,

@@ -15,7 +15,7 @@ from .ctravel import advance_of, seen_of, springs_of
 from .runtimeterms import RunTimeTerms, Waves
 from .table import TURN, ratio_of
 
-__all__ = ["c_search", "c_state", "c_step"]
+__all__ = ["c_search", "c_state", "c_step", "wave_tables"]
 
 
 _UNITS = {
@@ -26,7 +26,7 @@ _UNITS = {
 }
 
 
-def c_state(terms: RunTimeTerms, arithmetic: Arithmetic = FIXED) -> str:
+def c_state(terms: RunTimeTerms) -> str:
     """Types of the state and of the signals."""
     parts = []
     if terms.springs:
@@ -61,8 +61,7 @@ def c_step(terms: RunTimeTerms, zero: int, at_indicated: bool, whole: bool) -> s
     """State, signals and step of a header; it has ``NAME_correct_unwrapped`` before."""
     parts = [
         c_state(terms),
-        _PATTERN,
-        c_search(terms, FIXED, zero / TURN, at_indicated),
+        c_search(terms, FIXED, zero / TURN, at_indicated, _PATTERN),
     ]
     start = "@n@_pattern(reading)" if at_indicated else "reading"
     bumps = [form for form in terms.smooth if isinstance(form, forms.Bump)]
@@ -108,22 +107,27 @@ static inline uint32_t @n@_step(@n@_state *state, uint32_t raw, const @n@_signal
 """
 
 
-def c_search(terms: RunTimeTerms, arithmetic: Arithmetic, zero: float, at_indicated: bool) -> str:
-    """Errors of the terms, the search of the angle behind a reading, and travel."""
-    parts = [arithmetic.helpers]
+def c_search(
+    terms: RunTimeTerms, arithmetic: Arithmetic, zero: float, at_indicated: bool, pattern: str
+) -> str:
+    """Errors of the terms, the search of the angle behind a reading, and travel.
+
+    ``pattern`` is the code of ``NAME_pattern``, the inverse of the series.
+    """
+    parts = [arithmetic.helpers, pattern]
     if terms.springs or any(isinstance(f, forms.Bump) for f in terms.smooth):
         parts.append(arithmetic.decay)
     tables, level, shape = [], [], []
     for i, (form, waves) in enumerate(zip(terms.smooth, terms.waves, strict=True)):
         name = f"@n@_lines{i}"
         if waves.orders:
-            tables.append(_wave_tables(name, waves, arithmetic, isinstance(form, forms.Filter)))
+            tables.append(wave_tables(name, waves, arithmetic, isinstance(form, forms.Filter)))
         one, other = _form(form, waves, name, arithmetic)
         level += one
         shape += other
     play = [arithmetic.number(terms.play)] if terms.play else []
     if terms.places.orders:
-        tables.append(_wave_tables("@n@_play", terms.places, arithmetic, False))
+        tables.append(wave_tables("@n@_play", terms.places, arithmetic, False))
         play.append(_waves_call("@n@_play", terms.places, arithmetic))
     if play:
         shape.append(f"sum += (@real@)direction * ({' + '.join(play)});")
@@ -178,7 +182,8 @@ def _function(name: str, arguments: tuple[str, ...], sums: list[str]) -> str:
     )
 
 
-def _wave_tables(name: str, waves: Waves, arithmetic: Arithmetic, rated: bool) -> str:
+def wave_tables(name: str, waves: Waves, arithmetic: Arithmetic, rated: bool) -> str:
+    """Orders, phases and sizes as constants; ``rated`` orders as floats as well."""
     count = len(waves.orders)
 
     def array(kind: str, ending: str, values: list[str], memory: str = " TRUEANGLE_TABLE") -> str:

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from os import PathLike, fspath
 from pathlib import Path
-from typing import Any
+from typing import Any, TextIO, cast
 
 from .._core import __version__
 from ..errors import ArgumentError, TrueAngleError
@@ -138,9 +138,7 @@ def export_model(
         floor_arcsec=made.floor_arcsec,
         lost=_lost(made, pattern),
         proven=found.arithmetic_known,
-        proof=proof.how
-        if found.arithmetic_known
-        else f"{proof.how} as its description has it, the device's own arithmetic is not known",
+        proof=found.how(proof),
         zero_deg=made.zero_deg,
         left_out=rows,
         at_run_time=at_run_time,
@@ -160,7 +158,10 @@ def export_model(
     text = made.text(header)
     if path is not None:
         with written_atomically(path, kind=found.kind, inputs=inputs, hashes=[sha256]) as file:
-            file.write(text)
+            if made.packed is None:
+                file.write(text)
+            else:
+                cast(TextIO, file).buffer.write(made.packed(text))
     return replace(result, text=text)
 
 
@@ -199,7 +200,7 @@ def import_model(
     given = found.checked(options)
     raw = read_whole(path, TABLE_BYTES, f"a table of {target}")
     try:
-        text = raw.decode("utf-8-sig")
+        text = found.decoded(raw)
     except UnicodeDecodeError:
         from ..errors import FileError
 

@@ -98,10 +98,13 @@ class Exported(PlainResult):
         where = f"{self.output}: " if self.output else ""
         lines = [
             where + self.difference(unit, _SUMMARY_DIGITS),
-            f"{self.entries} entries for {self.target}, {self.bytes} bytes; {self.sign}, looked up "
-            f"at the {self.argument} angle; the number format alone leaves "
-            f"{unit.text(self.floor_arcsec)} rms",
         ]
+        if self.entries:
+            lines.append(
+                f"{self.entries} entries for {self.target}, {self.bytes} bytes; {self.sign}, "
+                f"looked up at the {self.argument} angle; the number format alone leaves "
+                f"{unit.text(self.floor_arcsec)} rms"
+            )
         worst = max(self.lost, key=lambda row: row["arcsec"], default=None)
         if worst is not None:
             lines.append(

@@ -22,6 +22,8 @@ from .runtimeterms import RunTimeTerms
 __all__ = ["CommentBlock", "Made", "Option", "TablePart", "Target", "comment_lines"]
 
 Array = NDArray[np.float64]
+#: `Made` has a number of that name.
+Bytes = bytes
 
 
 class Option(NamedTuple):
@@ -119,6 +121,8 @@ class Made:
         One line on each table, where there are several.
     bits : int, optional
         Of a reading, where the target fixes them.
+    packed : callable, optional
+        Makes the file of the text, where it is no text itself.
     """
 
     text: Callable[[CommentBlock], str]
@@ -132,6 +136,7 @@ class Made:
     notes: tuple[str, ...] = ()
     tables: tuple[dict[str, Any], ...] = ()
     bits: int | None = None
+    packed: Callable[[str], Bytes] | None = None
 
 
 class Target(ABC):
@@ -185,6 +190,22 @@ class Target(ABC):
     @abstractmethod
     def read(self, text: str, path: str, options: Mapping[str, Any]) -> HarmonicModel:
         """A model of what a table that is there does."""
+
+    def how(self, proof: Proof) -> str:
+        """How the difference is known."""
+        if self.arithmetic_known:
+            return proof.how
+        return f"{proof.how} as its description has it, the device's own arithmetic is not known"
+
+    def decoded(self, raw: bytes) -> str:
+        """The text that `read` takes, of a file's bytes.
+
+        Raises
+        ------
+        UnicodeDecodeError
+            There is none.
+        """
+        return raw.decode("utf-8-sig")
 
     def sign_of(self, options: Mapping[str, Any]) -> str:
         """The sign, where it depends on an option."""

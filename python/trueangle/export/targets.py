@@ -7,11 +7,13 @@ from ..support.suggestions import did_you_mean
 from .admt4000 import Admt4000
 from .c import CHeader
 from .csvtable import CsvTable
+from .fmu import Fmu
 from .klipper import Klipper
 from .linuxcnc import LinuxCnc
 from .mechaduino import Mechaduino
 from .minicheetah import MiniCheetah
 from .moteus import Moteus
+from .mujoco import MuJoCo
 from .pmac import Pmac
 from .rust import RustModule
 from .siemens840d import Siemens840d
@@ -40,6 +42,8 @@ TARGETS: dict[str, Target] = {
         MiniCheetah(),
         Siemens840d(),
         Pmac(),
+        Fmu(),
+        MuJoCo(),
     )
 }
 

@@ -82,11 +82,29 @@ def load_model(path: str | PathLike[str]) -> HarmonicModel:
     return _Reader(Path(path), ModelFileError).model()
 
 
+def model_of(text: str, path: str | PathLike[str]) -> HarmonicModel:
+    """Model of the text of a model file that stands in another file.
+
+    Raises
+    ------
+    ModelFileError
+        As `load_model`.
+    """
+    reader = _Reader(Path(path), ModelFileError)
+    reader.given = text
+    return reader.model()
+
+
 class _Reader(Decoder):
     """Checks one file key by key; every refusal names file and key."""
 
+    #: The text, where it is not that of the file itself.
+    given: str | None = None
+
     def content(self) -> dict[str, Any]:
-        text = read_text(self.path, MODEL_BYTES, self.kind, "a model")
+        text = self.given
+        if text is None:
+            text = read_text(self.path, MODEL_BYTES, self.kind, "a model")
         value = json_text(self.path, text, self.kind, "a model file")
         if not isinstance(value, dict) or value.get("format") != FORMAT:
             raise self.error(f'is not a model file: "format" must be "{FORMAT}"')

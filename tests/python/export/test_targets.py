@@ -15,7 +15,7 @@ ENDINGS = {
     "c": ".h", "rust": ".rs", "csv": ".csv", "simplefoc": ".h", "moteus": ".cfg",
     "linuxcnc": ".comp", "twincat": ".lis", "klipper": ".cfg", "admt4000": ".txt",
     "mechaduino": ".cpp", "tinymovr": ".h", "minicheetah": ".h", "siemens840d": ".ini",
-    "pmac": ".txt",
+    "pmac": ".txt", "fmu": ".fmu", "mujoco": ".xml",
 }  # fmt: skip
 CASES = [
     ("c", {}), ("rust", {}), ("csv", {}),

@@ -47,6 +47,10 @@ def export(model, target, folder, **options):
 @pytest.mark.parametrize("target", list(TARGETS))
 def test_what_is_left_out_is_named_with_its_size(target, model, tmp_path):
     made = export(model, target, tmp_path)
+    if target in ("fmu", "mujoco"):
+        assert made.left_out == []
+        assert made.max_difference_total_arcsec < 1e-3
+        return
     if target in ("c", "rust"):
         assert made.left_out == []
         assert [row["term"] for row in made.at_run_time] == ["backlash", "latency"]

@@ -16,6 +16,7 @@ __all__ = [
     "PICTURE",
     "REPORT",
     "RUNS",
+    "SENSOR",
     "SIMULATION",
     "Kind",
     "declare_endings",
@@ -40,6 +41,7 @@ _FORMATS: Final[dict[str, tuple[str, ...]]] = {
     "Markdown": (".md",),
     "a compressed file": (".gz", ".zip", ".bz2", ".xz", ".zst", ".lz4", ".7z", ".tar", ".tgz"),
     "a database": (".db", ".sqlite", ".sqlite3"),
+    "a functional mock-up unit": (".fmu",),
     "a pickle": (".pkl", ".pickle"),
     "C": (".c", ".h", ".cpp", ".hpp"),
     "Rust": (".rs",),
@@ -125,6 +127,8 @@ def promised_format(path: str | PathLike[str]) -> str | None:
 
 MODEL: Final = Kind("a model (JSON)", (".json",))
 SIMULATION: Final = Kind("a simulation (TOML)", (".toml",))
+#: What a simulator takes, by the ending.
+SENSOR: Final = Kind("a sensor of a simulator (MJCF or FMU)", (".xml", ".fmu"))
 RUNS: Final = Kind("a table of runs (CSV)", (".csv",))
 PAGE: Final = Kind("a report (HTML)", (".html", ".htm"))
 PDF: Final = Kind("a report (PDF)", (".pdf",))

@@ -1,0 +1,1 @@
+"""Models of encoders in other people's simulators: what MuJoCo has no element for."""

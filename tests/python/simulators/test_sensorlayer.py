@@ -1,0 +1,196 @@
+"""Encoders in MuJoCo: readings against the model, of one environment and of many."""
+
+import mujoco
+import numpy as np
+import pytest
+
+import trueangle as ta
+from trueangle import terms as T
+from trueangle.errors import ArgumentError, MissingSignalError
+from trueangle.simulators.mujoco import SensorLayer
+
+A = np.pi / 648_000.0
+ROBOT = """
+<mujoco>
+  @include@
+  <worldbody>
+    <body>
+      <joint name="elbow"@class@/>
+      <geom size=".1" mass="1"/>
+      <body>
+        <joint name="wrist" axis="0 1 0"/>
+        <joint name="rail" type="slide"/>
+        <geom size=".1" mass="1"/>
+      </body>
+    </body>
+  </worldbody>
+  <sensor><jointpos name="encoder" joint="wrist"/><clock name="clock"/></sensor>
+</mujoco>
+"""
+#: With a state at the true angle, and in degrees at the indicated one.
+ELBOW = ta.HarmonicModel(
+    [ta.Shaft("output", 1, [1, 2], [0.002, 0.0], [0.0, 0.001])],
+    constant=0.01,
+    terms=[T.Backlash(20 * A), T.Latency(0.002), T.TorsionalCompliance(3 * A)],
+)
+WRIST = ta.HarmonicModel(
+    [ta.Shaft("output", 1, [1, 2], [0.002, 0.0], [0.0, 0.1])],
+    period=360.0,
+    argument="indicated",
+    terms=[T.PreslidingHysteresis(0.01, 0.5)],
+)
+PLAIN = ta.HarmonicModel([ta.Shaft("output", 1, [1], [0.0], [0.002])])
+
+
+def robot(include="", group=""):
+    return mujoco.MjModel.from_xml_string(
+        ROBOT.replace("@include@", include).replace("@class@", group)
+    )
+
+
+def poses(count=400):
+    t = np.arange(count)
+    angles = np.stack([2.0 * np.sin(t / 50.0), np.cos(t / 30.0), 0.0 * t], axis=1)
+    return angles, np.gradient(angles, 0.002, axis=0)
+
+
+def walked(layer, mj):
+    data, rows = mujoco.MjData(mj), []
+    for angle, velocity in zip(*poses(), strict=True):
+        data.qpos[:], data.qvel[:] = angle, velocity
+        mujoco.mj_forward(mj, data)
+        rows.append(layer.read(data, torque=2.0))
+    return np.array(rows)
+
+
+def test_readings_are_those_of_the_models_in_the_order_of_the_mapping():
+    mj = robot()
+    layer = SensorLayer(mj, {"encoder": WRIST, "elbow": ELBOW})
+    assert layer.names == ("encoder", "elbow")
+    readings = walked(layer, mj)
+    angles, velocities = poses()
+    error = ELBOW.error(angles[:, 0], velocity=velocities[:, 0], torque=2.0)
+    assert np.max(np.abs(readings[:, 1] - angles[:, 0] - error)) < 1e-14
+    back = WRIST.corrector()(np.degrees(readings[:, 0]), velocity=np.degrees(velocities[:, 1]))
+    assert np.max(np.abs(np.radians(back) - angles[:, 1])) < 1e-12
+    layer.reset()
+    assert np.array_equal(walked(layer, mj), readings)
+    # Without a reset the travel before is known, and the first reading is another.
+    assert walked(layer, mj)[0, 0] != readings[0, 0]
+
+
+def test_environments_are_read_at_once_and_each_has_its_own_travel():
+    mj = robot()
+    angles, velocities = poses()
+    worlds = [mujoco.MjData(mj) for _ in range(3)]
+    layer = SensorLayer(mj, {"elbow": ELBOW, "wrist": PLAIN})
+    shifts = np.array([0.0, 0.4, -0.3])
+    found = []
+    for angle, velocity in zip(angles, velocities, strict=True):
+        for world, shift, sign in zip(worlds, shifts, (1.0, -1.0, 1.0), strict=True):
+            world.qpos[:], world.qvel[:] = sign * angle + shift, sign * velocity
+        found.append(layer.read(worlds, torque=np.zeros((3, 2))))
+    found = np.array(found)
+    assert found.shape == (400, 3, 2)
+    for e, (shift, sign) in enumerate(zip(shifts, (1.0, -1.0, 1.0), strict=True)):
+        angle = sign * angles[:, 0] + shift
+        error = ELBOW.error(angle, velocity=sign * velocities[:, 0], torque=0.0)
+        assert np.max(np.abs(found[:, e, 0] - angle - error)) < 1e-14
+
+    # Arrays of a batch do as well, where a model has no state.
+    class Batch:
+        qpos = np.stack([world.qpos for world in worlds])
+        qvel = np.stack([world.qvel for world in worlds])
+
+    plain = SensorLayer(mj, {"wrist": PLAIN}).read(Batch())
+    assert np.array_equal(plain, found[-1][:, 1:])
+    with pytest.raises(ArgumentError, match="3 environments were read before, and 2 now"):
+        layer.read(worlds[:2], torque=0.0)
+    layer.reset([True, False, False])
+    layer.read(worlds, torque=0.0)
+
+
+def test_a_torque_is_that_of_the_actuators():
+    xml = (
+        ROBOT.replace("@include@", "")
+        .replace("@class@", "")
+        .replace("</mujoco>", "<actuator><motor joint='elbow'/></actuator></mujoco>")
+    )
+    mj = mujoco.MjModel.from_xml_string(xml)
+    data = mujoco.MjData(mj)
+    data.ctrl[0] = 4.0
+    mujoco.mj_forward(mj, data)
+    soft = ta.HarmonicModel([], terms=[T.TorsionalCompliance(3 * A)])
+    assert SensorLayer(mj, {"elbow": soft}).read(data)[0] == pytest.approx(12 * A, rel=1e-12)
+
+
+def test_a_fragment_is_included(tmp_path):
+    path = tmp_path / "sensor.xml"
+    made = ta.export_model(
+        ELBOW, "mujoco", path, joint="elbow", damping=2.0, frictionloss=0.1, armature=0.02,
+        stiffness=1.5, ripple="4:0.1:30,1:0.02:0",
+    )  # fmt: skip
+    assert made.left_out == []
+    (tmp_path / "robot.xml").write_text(
+        ROBOT.replace("@include@", '<include file="sensor.xml"/>').replace(
+            "@class@", ' class="trueangle_elbow"'
+        )
+    )
+    mj = mujoco.MjModel.from_xml_path(str(tmp_path / "robot.xml"))
+    assert list(mj.dof_damping) == [2.0, 0.0, 0.0]
+    assert list(mj.dof_frictionloss) == [0.1, 0.0, 0.0]
+    assert list(mj.dof_armature) == [0.02, 0.0, 0.0]
+    assert list(mj.jnt_stiffness) == [1.5, 0.0, 0.0]
+    data = mujoco.MjData(mj)
+    for angle in np.linspace(-4.0, 4.0, 17):
+        data.qpos[0] = angle
+        mujoco.mj_forward(mj, data)
+        ripple = 0.1 * np.sin(4.0 * angle + np.radians(30.0)) + 0.02 * np.sin(angle)
+        assert data.qfrc_actuator[0] == pytest.approx(ripple, abs=1e-15)
+    embedded = SensorLayer(mj)
+    assert embedded.names == ("elbow",)
+    given = SensorLayer(robot(), {"elbow": ELBOW})
+    assert np.array_equal(walked(embedded, mj), walked(given, robot()))
+    assert ta.import_model(path, "mujoco") == ELBOW
+    (tmp_path / "none.xml").write_text("<mujoco/>")
+    with pytest.raises(ta.errors.FileError, match="holds no model of joint"):
+        ta.import_model(tmp_path / "none.xml", "mujoco")
+
+
+def test_noise_is_white_and_of_the_stated_size():
+    mj = robot()
+    data = mujoco.MjData(mj)
+    layer = SensorLayer(mj, {"wrist": PLAIN}, noise_std=1e-4, seed=3)
+    noise = np.array([layer.read(data)[0] for _ in range(4000)])
+    assert np.std(noise) == pytest.approx(1e-4, rel=0.06)  # of four thousand, five deviations
+    again = SensorLayer(mj, {"wrist": PLAIN}, noise_std=1e-4, seed=3)
+    assert again.read(data)[0] == noise[0]
+
+
+@pytest.mark.parametrize(
+    ("models", "message"),
+    [
+        ({"elbw": PLAIN}, r"no joint 'elbw'; did you mean elbow\?; it has elbow, wrist, rail"),
+        ({"rail": PLAIN}, "is no hinge"),
+        ({"clock": PLAIN}, "is no jointpos"),
+        ({"elbow": 1.0}, "must be a HarmonicModel, got float"),
+        ({}, "must name a joint at least"),
+    ],
+)
+def test_what_is_no_joint_is_refused(models, message):
+    with pytest.raises(ArgumentError, match=message):
+        SensorLayer(robot(), models)
+
+
+def test_signals_that_mujoco_does_not_have_are_asked_for():
+    mj = robot()
+    data = mujoco.MjData(mj)
+    warm = ta.HarmonicModel([], terms=[T.ThermalDrift(2 * A)])
+    layer = SensorLayer(mj, {"elbow": warm})
+    with pytest.raises(MissingSignalError, match="needs temperature, which MuJoCo does not have"):
+        layer.read(data)
+    assert layer.read(data, temperature=25.0)[0] == pytest.approx(10 * A, rel=1e-12)
+    with pytest.raises(ArgumentError, match=r"no signal `temprature=`; did you mean"):
+        layer.read(data, temprature=25.0)
+    with pytest.raises(ArgumentError, match="noise_std must be 0 or more"):
+        SensorLayer(mj, {"elbow": PLAIN}, noise_std=-1.0)
