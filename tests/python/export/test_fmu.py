@@ -197,6 +197,16 @@ def test_a_state_is_kept_and_taken_back(tmp_path):
     unit.freeInstance()
 
 
+def test_without_a_compiler_the_sources_are_there(tmp_path, monkeypatch):
+    monkeypatch.setattr(shutil, "which", lambda name: None)
+    made = ta.export_model(ta.HarmonicModel((OUTPUT,)), "fmu", tmp_path / "joint.fmu")
+    assert any("holds no binary, as no C compiler" in note for note in made.notes)
+    with zipfile.ZipFile(tmp_path / "joint.fmu") as archive:
+        names = archive.namelist()
+    assert "sources/model.c" in names
+    assert not any(name.startswith("binaries/") for name in names)
+
+
 def test_another_archive_is_no_unit(tmp_path):
     path = tmp_path / "other.fmu"
     for content in (b"PK nothing", b""):

@@ -47,6 +47,7 @@ def test_the_offset_lut_in_the_firmwares_own_arithmetic(tmp_path):
     print(f"{worst} of {made.max_difference_arcsec}")
     assert worst <= made.max_difference_arcsec + ROUNDING
     assert worst > 0.9 * made.max_difference_arcsec
+    assert made.max_difference_arcsec < 30.0  # a tick is 19.8
     assert made.entries == 128
 
 
@@ -77,6 +78,7 @@ def test_what_the_value_is_added_to_is_the_true_angle(model):
     print(f"{worst} of {made.max_difference_arcsec}")
     assert worst <= made.max_difference_arcsec + ROUNDING
     assert worst > 0.9 * made.max_difference_arcsec
+    assert made.max_difference_arcsec < 2.0
     # The check for the operator: by how much the axis moves where the value is largest.
     flowing = made.text.replace("\n; ", " ")
     place = float(re.search(r"stand at (\S+) deg", flowing)[1])
@@ -104,6 +106,7 @@ def test_an_entry_is_added_to_the_commanded_position():
     print(f"{worst} of {made.max_difference_arcsec}")
     assert worst <= made.max_difference_arcsec + ROUNDING
     assert worst > 0.9 * made.max_difference_arcsec
+    assert made.max_difference_arcsec < 5.0
 
 
 def test_counts_are_asked_for():

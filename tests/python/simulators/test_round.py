@@ -98,9 +98,9 @@ def test_mujoco(first, tmp_path, capsys):
 
 
 def test_a_sensor_holds_what_the_simulators_own_encoder_lacks(first, tmp_path):
-    """An encoder of the simulator that has an error of its own, 60 arcsec once a turn."""
+    """An encoder of the simulator that has an error of its own, 60 arcsec twice a turn."""
     ideal, _, _ = first
-    own = [(t, x, y + 60.0 * ARCSEC * np.sin(x)) for t, x, y in ideal]
+    own = [(t, x, y + 60.0 * ARCSEC * np.sin(2.0 * x)) for t, x, y in ideal]
     both = [
         (t, x, y + said - x)
         for (t, x, y), (_, _, said) in zip(measured(ideal, SEED), own, strict=True)

@@ -110,6 +110,16 @@ def test_environments_are_read_at_once_and_each_has_its_own_travel():
     layer.read(worlds, torque=0.0)
 
 
+def test_a_model_in_degrees_gives_the_same_reading():
+    degrees = ta.HarmonicModel([], period=360.0, terms=[T.Latency(0.002)])
+    radians = ta.HarmonicModel([], terms=[T.Latency(0.002)])
+    mj = robot()
+    data = mujoco.MjData(mj)
+    data.qpos[0], data.qvel[0] = 0.3, 2.0
+    for model in (degrees, radians):
+        assert SensorLayer(mj, {"elbow": model}).read(data)[0] == pytest.approx(0.296, rel=1e-12)
+
+
 def test_a_torque_is_that_of_the_actuators():
     xml = (
         ROBOT.replace("@include@", "")
