@@ -49,7 +49,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="auto (default): least squares with wild readings set aside and reported",
     )
     parser.add_argument(
-        "--run", action="append", metavar="LABEL", help="use this run only (may be repeated)"
+        "--run",
+        action="append",
+        metavar="GLOB",
+        help="use the runs of this label only, or of those that match (fwd-*)",
     )
     add_one_pass(parser)
     parser.add_argument(

@@ -35,7 +35,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "range over the runs",
     )
     add_nuisance(parser)
-    add("--run", action="append", metavar="LABEL", help="use this run only (may be repeated)")
+    add(
+        "--run",
+        action="append",
+        metavar="GLOB",
+        help="use the runs of this label only, or of those that match (fwd-*)",
+    )
     add_one_pass(parser)
     add_errors_in(parser)
     add("--json", action="store_true", help="print the table as JSON")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import sys
+from fnmatch import fnmatchcase
 
 from ..errors import ArgumentError
 from ..runs.files import read_runs
@@ -15,7 +16,7 @@ __all__ = ["listed", "read_selected"]
 
 
 def read_selected(args: argparse.Namespace) -> list[CalibrationRun]:
-    """Runs of a command's files, those of ``--run`` only where labels are given.
+    """Runs of a command's files, those of ``--run`` only where labels or patterns are given.
 
     Raises
     ------
@@ -27,7 +28,8 @@ def read_selected(args: argparse.Namespace) -> list[CalibrationRun]:
     if not labels:
         return runs
     known = list(dict.fromkeys(run.label for run in runs if run.label is not None))
-    missing = [label for label in labels if label not in known]
+    found = {label: [name for name in known if _is_meant(name, label)] for label in labels}
+    missing = [label for label in labels if not found[label]]
     if missing and not known:
         raise ArgumentError(
             f"--run {missing[0]}: the files name no runs (there is no column 'run'): "
@@ -38,7 +40,13 @@ def read_selected(args: argparse.Namespace) -> list[CalibrationRun]:
             f"--run {missing[0]}: no such run{did_you_mean(missing[0], known)}; "
             f"the runs are {listed(known)}"
         )
-    return [run for run in runs if run.label in labels]
+    chosen = {name for names in found.values() for name in names}
+    return [run for run in runs if run.label in chosen]
+
+
+def _is_meant(name: str, label: str) -> bool:
+    """Whether ``label`` is a name or a pattern (``fwd-*``) that matches it."""
+    return name == label or fnmatchcase(name, label)
 
 
 def read_checked(args: argparse.Namespace) -> list[CalibrationRun]:

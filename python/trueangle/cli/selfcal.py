@@ -63,7 +63,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="0,119.2,203.7",
         help="where the heads stand, degrees, if their readings share one zero",
     )
-    add_signals(parser)
+    add_signals(parser, runs=False)
     add_errors_in(parser)
     add("--json", action="store_true", help="print the result as JSON")
 

@@ -21,6 +21,8 @@ class _Argument(NamedTuple):
     choices: tuple[str, ...]
     is_file: bool
     help: str
+    #: How values may begin; more is typed behind them.
+    words: tuple[str, ...] = ()
 
 
 def script(parser: Parser, shell: str) -> str:
@@ -48,7 +50,8 @@ def _arguments(parser: argparse.ArgumentParser) -> list[_Argument]:
 
 def _argument(action: argparse.Action) -> _Argument:
     choices = tuple(map(str, action.choices or ()))
-    named = action.type is not None and action.type not in (int, float)
+    words = tuple(getattr(action, "words", ()))
+    named = action.type is not None and action.type not in (int, float) and not words
     text = (action.help or "") % {"default": action.default, "prog": "trueangle"}
     return _Argument(
         tuple(action.option_strings),
@@ -56,6 +59,7 @@ def _argument(action: argparse.Action) -> _Argument:
         choices,
         not choices and named,
         _first_part(text),
+        words,
     )
 
 
@@ -78,7 +82,12 @@ def _bash(parser: Parser) -> Iterator[str]:
     yield "  case ${COMP_WORDS[1]}:$before in"
     for name, command in parser.commands.items():
         for argument in _arguments(command):
-            if argument.choices and argument.flags:
+            if argument.words:
+                cases = "|".join(f"{name}:{flag}" for flag in argument.flags)
+                words = shlex.quote(" ".join(argument.words))
+                yield f"    {cases}) compopt -o nospace"
+                yield f'      COMPREPLY=($(compgen -W {words} -- "$word")); return;;'
+            elif argument.choices and argument.flags:
                 cases = "|".join(f"{name}:{flag}" for flag in argument.flags)
                 words = shlex.quote(" ".join(argument.choices))
                 yield f'    {cases}) COMPREPLY=($(compgen -W {words} -- "$word")); return;;'
@@ -128,6 +137,8 @@ def _zsh(parser: Parser) -> Iterator[str]:
 def _zsh_argument(argument: _Argument) -> str:
     values = f":value:({' '.join(argument.choices)})" if argument.choices else ":value:"
     values = ":file:_files" if argument.is_file else values
+    if argument.words:  # without a blank behind what is completed
+        values = f':value:{{compadd -S "" {" ".join(argument.words)}}}'
     if not argument.flags:
         return f"'*{values}'"
     told = f"[{argument.help.replace('[', '(').replace(']', ')')}]"
@@ -153,7 +164,8 @@ def _fish(parser: Parser) -> Iterator[str]:
                 f"-l {f[2:]}" if f.startswith("--") else f"-s {f[1:]}" for f in argument.flags
             )
             value = " -r" if argument.takes_value else ""
-            value += f" -f -a {words}" if argument.choices else ""
+            words = _quoted(" ".join(argument.words)) if argument.words else words
+            value += f" -f -a {words}" if argument.choices or argument.words else ""
             yield f"complete -c trueangle {seen} {flags}{value} -d {_quoted(argument.help)}"
 
 

@@ -7,27 +7,32 @@ from collections.abc import Sequence
 from typing import Any
 
 from ..errors import ArgumentError
+from .paths import Input
 
 __all__ = ["ROLES", "add_signals", "reading", "signal_argument", "signals_by_joint"]
 
 #: The roles, as every help names them.
 ROLES = (
-    "reference, indicated, time, velocity, direction, temperature, torque, current, mount, "
-    "run, unit, motor, head1, head2 ..., shift"
+    "reference, indicated, error, reference_offset, time, velocity, direction, temperature, "
+    "torque, current, mount, run, unit, when, motor, head1, head2 ..., shift"
 )
 
 
-def add_signals(parser: argparse.ArgumentParser, counts: bool = True) -> None:
-    """Declare ``--signal`` and what belongs to it."""
+def add_signals(parser: argparse.ArgumentParser, counts: bool = True, runs: bool = True) -> None:
+    """Declare ``--signal`` and what belongs to it; of ``runs``, what their reference is made of."""
     add = parser.add_argument
-    add(
+    signal = add(
         "--signal",
         action="append",
         type=signal_argument,
         metavar="[JOINT.]ROLE=NAME[:UNIT]",
         help=f"column that holds a role, and its unit (deg, rad, turn, count, arcsec, arcmin; "
-        f"s, ms, us, ns; deg/s, rad/s, turn/s); may be repeated. Roles: {ROLES}. Without it "
+        f"s, ms, us, ns; deg/s, rad/s, turn/s); may be repeated; -NAME is a reversed sensor. "
+        f"Roles: {ROLES}. Without it "
         "columns are found by their names: reference_deg, time_s, 'pos act [rad]'",
+    )
+    signal.words = tuple(  # type: ignore[attr-defined]  # what a shell completes
+        f"{role.removesuffix(' ...')}=" for role in ROLES.split(", ")
     )
     if counts:
         add("--counts-per-turn", type=float, metavar="N", help="of an indicated angle in counts")
@@ -42,6 +47,20 @@ def add_signals(parser: argparse.ArgumentParser, counts: bool = True) -> None:
         metavar="NAME",
         help="JointState topic of a ROS bag (default: the only one); join takes two, A,B",
     )
+    if runs:
+        add(
+            "--facets",
+            type=Input,
+            metavar="FILE",
+            help="calibrated deviations of a polygon's facets, added to the reference at its "
+            "nominal angles: columns reference_deg and deviation_arcsec",
+        )
+        add(
+            "--unit-from",
+            metavar="REGEX",
+            help="what this finds in the path of a file (its first group) is the unit that its "
+            "runs belong to",
+        )
 
 
 class _Entry(tuple[str | None, str, str, str | None]):
@@ -91,6 +110,9 @@ def signals_by_joint(
             wanted = "ROLE=NAME" if single else "JOINT.ROLE=NAME"
             raise ArgumentError(f"--signal: {wanted} is needed, got {joint or ''}.{role}={name}")
         roles = found if joint is None else found.setdefault(joint, {})
+        if role == "reference_offset":
+            roles.setdefault(role, []).append((name, unit))
+            continue
         if role in roles:
             raise ArgumentError(f"--signal: {role} is named twice, {roles[role][0]!r} and {name!r}")
         roles[role] = (name, unit)
@@ -104,4 +126,5 @@ def reading(args: argparse.Namespace) -> dict[str, Any]:
         "counts_per_turn_reference": args.counts_per_turn_reference,
         "signals": signals_by_joint(args.signal),
         "topic": args.topic,
+        **({"facets": args.facets, "unit_from": args.unit_from} if "facets" in args else {}),
     }

@@ -21,14 +21,17 @@ from .signals import SIGNALS, find_signal
 
 __all__ = [
     "ANGLE_UNITS",
+    "LABELS",
     "Column",
     "Wanted",
     "count_turn",
     "find_columns",
     "listed",
     "matching",
+    "offsets_of",
     "role_kind",
     "signal_code",
+    "signed_name",
     "unit_in_name",
     "wanted_columns",
     "wanted_unit",
@@ -68,8 +71,11 @@ _SPELLINGS = {
     "ma": "mA",
 }
 _BRACKET = re.compile(r"^(.*?)\s*[\[(]\s*([^\])]*?)\s*[\])]\s*$")
-#: A role beside the angles and the signals.
-_LABELS = ("run", "unit")
+#: Roles beside the angles and the signals.
+LABELS: Final = ("run", "unit", "when")
+#: Angles that are no signals; a second thing that is added to the reference is reference_offset2.
+_ANGLES = ("reference", "indicated", "error")
+_OFFSET = re.compile(r"reference_offset[1-9]?[0-9]?")
 
 #: Columns asked for: by role, the name and the unit where it is told.
 Wanted: TypeAlias = Mapping[str, tuple[str, str | None]]
@@ -85,12 +91,15 @@ class Column(NamedTuple):
         None where nothing tells it.
     is_asked : bool
         It was named, not found by its name.
+    is_reversed : bool
+        Its sign is the other one.
     """
 
     role: str
     name: str
     unit: str | None
     is_asked: bool = False
+    is_reversed: bool = False
 
     def values(
         self, raw: NDArray[Any], period: float, counts_per_turn: float | None = None
@@ -104,14 +113,15 @@ class Column(NamedTuple):
 
     def scale(self, period: float, counts_per_turn: float | None = None) -> tuple[float, float]:
         """Factor and offset that lead to the unit of a run of ``period``."""
-        kind = role_kind(self.role)
+        kind, sign = role_kind(self.role), -1.0 if self.is_reversed else 1.0
         if kind == "time":
-            return TIME_UNITS[self.unit or "s"], 0.0
+            return sign * TIME_UNITS[self.unit or "s"], 0.0
         if kind in ("angle", "velocity"):
             unit = (self.unit or "").removesuffix("/s")
             turn = counts_per_turn if unit == "count" else ANGLE_UNITS.get(unit)
-            return (1.0 if turn is None else period / turn), 0.0
-        return PLAIN_UNITS.get(self.role, {}).get(self.unit or "", (1.0, 0.0))
+            return sign * (1.0 if turn is None else period / turn), 0.0
+        factor, offset = PLAIN_UNITS.get(self.role, {}).get(self.unit or "", (1.0, 0.0))
+        return sign * factor, sign * offset
 
 
 def signal_code(role: str, name: str = "NAME", unit: str | None = "UNIT") -> str:
@@ -134,14 +144,14 @@ def role_kind(role: str) -> str:
     ArgumentError
         There is no such role; says what may be meant.
     """
-    if role in ("reference", "indicated"):
+    if role in _ANGLES or _OFFSET.fullmatch(role):
         return "angle"
-    if role in _LABELS:
+    if role in LABELS:
         return "label"
     try:
         return find_signal(role).kind
     except ArgumentError:
-        known = ["reference", "indicated", *SIGNALS, *_LABELS, "head1"]
+        known = [*_ANGLES, "reference_offset", *SIGNALS, *LABELS, "head1"]
         raise ArgumentError(
             f"no column has the role {role!r}{did_you_mean(role, known)}; roles are "
             f"{', '.join(known)}"
@@ -189,13 +199,22 @@ def unit_in_name(name: str, role: str) -> str | None:
 def wanted_columns(signals: Mapping[str, Any] | None) -> dict[str, tuple[str, str | None]]:
     """Columns by role from ``{"torque": "tau", "reference": ("pos act", "rad")}``.
 
+    Several that are added to the reference come as a list.
+
     Raises
     ------
     ArgumentError
         A role or unit that there is not.
     """
     found: dict[str, tuple[str, str | None]] = {}
-    for role, given in (signals or {}).items():
+    several = {
+        f"{role}{i + 1 if i else ''}": entry
+        for role, given in (signals or {}).items()
+        for i, entry in enumerate(
+            given if role == "reference_offset" and isinstance(given, list) else [given]
+        )
+    }
+    for role, given in several.items():
         role_kind(role)
         name, unit = given if isinstance(given, tuple) and len(given) == 2 else (given, None)
         if not isinstance(name, str) or not (unit is None or isinstance(unit, str)):
@@ -236,6 +255,23 @@ def matching(path: object, header: Sequence[str], name: str) -> str:
     raise FileError(path, f"no such column; {hint}{listed(header)}", line=1, column=name)
 
 
+def signed_name(path: object, header: Sequence[str], name: str) -> tuple[str, bool]:
+    """The column that ``name`` means, and whether it is reversed: ``-pos`` is minus ``pos``.
+
+    Raises
+    ------
+    FileError
+        As `matching`.
+    """
+    is_reversed = name.startswith("-") and len(name) > 1 and name not in header
+    return matching(path, header, name[1:] if is_reversed else name), is_reversed
+
+
+def offsets_of(roles: Mapping[str, Column]) -> list[Column]:
+    """The columns that are added to the reference."""
+    return [column for role, column in roles.items() if _OFFSET.fullmatch(role)]
+
+
 def find_columns(path: object, header: Sequence[str], wanted: Wanted) -> dict[str, Column]:
     """The columns of every role that a table has: those asked for, the others by their names.
 
@@ -246,12 +282,13 @@ def find_columns(path: object, header: Sequence[str], wanted: Wanted) -> dict[st
     """
     found = {}
     for role, (name, unit) in wanted.items():
-        column = matching(path, header, name)
-        found[role] = Column(role, column, unit or unit_in_name(column, role), True)
+        column, is_reversed = signed_name(path, header, name)
+        found[role] = Column(role, column, unit or unit_in_name(column, role), True, is_reversed)
     taken = {column.name for column in found.values()}
     heads = {name.partition("_")[0].lower() for name in header if _HEAD.match(name.lower())}
-    for role in ("reference", "indicated", *_LABELS, *SIGNALS, *sorted(heads)):
-        if role in found:
+    for role in ("reference", "indicated", "error", *LABELS, *SIGNALS, *sorted(heads)):
+        # An error stands for one of the two angles.
+        if role in found or (role == "error" and ("reference" in found) == ("indicated" in found)):
             continue
         candidates = [c for c in _by_name(header, role) if c.name not in taken]
         if len(candidates) > 1:
@@ -271,7 +308,7 @@ _HEAD = re.compile(r"head[1-9][0-9]?(_| *[\[(])")
 
 def _by_name(header: Sequence[str], role: str) -> list[Column]:
     """Columns whose own name says that they have a role."""
-    if role in _LABELS:
+    if role in LABELS:
         return [Column(role, name, None) for name in header if name == role]
     names = dict(_standard(role))
     exact = [Column(role, name, names[name]) for name in header if name in names]
@@ -293,9 +330,9 @@ def _by_name(header: Sequence[str], role: str) -> list[Column]:
 def _standard(role: str) -> Iterator[tuple[str, str | None]]:
     """Names that columns of a role have, and the unit each states."""
     kind = role_kind(role)
-    pattern = f"{role}_{{}}" if role in ("reference", "indicated") else find_signal(role).column
+    pattern = f"{role}_{{}}" if role in _ANGLES else find_signal(role).column
     if kind == "angle":
-        for unit in (*UNIT_PERIODS, "count"):
+        for unit in ANGLE_UNITS if role == "error" else (*UNIT_PERIODS, "count"):
             yield pattern.format(unit), unit
     elif kind == "velocity":
         for unit in (*UNIT_PERIODS, "count"):

@@ -22,16 +22,19 @@ import trueangle._core as _core
 from ..errors import FileError
 from ..estimation.moments import Moments
 from ..formats.ahead import side_by_side
-from ..formats.columns import find_columns, signal_code
+from ..formats.columns import find_columns
 from ..formats.format import Format as LogFormat
-from ..formats.format import Labels
+from ..formats.format import Labels, row_labels
 from ..formats.formats import find_format
+from ..formats.times import day_of
 from ..model.model import Argument, HarmonicModel
+from ..runs.angles import Angles, find_angles
+from ..runs.facets import Facets
 from ..runs.follows import check_follows
 from ..runs.run import CalibrationRun
-from ..support.angles import UNIT_PERIODS, wrap
+from ..runs.source import unit_of_path
+from ..support.angles import wrap
 from ..support.files import partition_keys
-from .columns import find_angle_column, find_reference
 from .keeping import SAMPLE, Kept
 
 __all__ = [
@@ -77,6 +80,8 @@ class LogFitSettings:
     signals: Mapping[str, tuple[str, str | None]] = field(default_factory=dict)
     topic: str | None = None
     threads: int | None = None
+    facets: Facets | None = None
+    unit_from: str | None = None
     checksums: bool = False
     kept: int = SAMPLE
     part: float = 1.0
@@ -136,7 +141,7 @@ class Accumulated:
     Attributes
     ----------
     moments : Moments
-        Runs are labelled ``(file, unit, run)``.
+        Runs are labelled ``(file, unit, run)``, and with the day where there is a ``when``.
     files, sha256 : tuple of str
         Checksums are empty where they were not asked for, and of folders.
     rows, missing : int
@@ -174,11 +179,9 @@ class _LogPart(NamedTuple):
     part: Any
     number: int
     size: float
-    names: Sequence[str]
-    roles: Sequence[str]
-    period: float
-    reference_scale: float
-    scale: float
+    angles: Angles
+    labels: Mapping[str, str]
+    unit: str | None
 
 
 def accumulate(path: Path, settings: LogFitSettings) -> Accumulated:
@@ -225,46 +228,27 @@ def _found(path: Path, settings: LogFitSettings) -> list[_LogPart]:
 def _stretches(path: Path, settings: LogFitSettings) -> Iterator[_LogPart]:
     kind = find_format(path)
     header = kind.module.columns(path, settings.topic)
-    wanted = dict(settings.signals)
-    reference = find_reference(path, header, wanted)
-    reference = reference._replace(unit=reference.unit or kind.unit)
-    period = UNIT_PERIODS.get(reference.unit or "", 360.0)
-    if reference.unit is None or (
-        reference.unit == "count" and settings.counts_per_turn_reference is None
-    ):
-        raise FileError(
-            path,
-            f"its unit is not known: give it as {signal_code('reference')}, counts with "
-            "`counts_per_turn_reference=`",
-            line=1,
-            column=reference.name,
-        )
-    asked, unit = wanted.get("indicated", (None, None))
-    indicated = find_angle_column(
+    roles = find_columns(path, header, settings.signals)
+    angles = find_angles(
         path,
-        period,
         header,
-        column=asked,
-        unit=unit or kind.unit,
+        roles,
+        unit=kind.unit,
         counts_per_turn=settings.counts_per_turn,
-        fresh=False,
+        counts_per_turn_reference=settings.counts_per_turn_reference,
+        facets=settings.facets,
     )
-    roles = find_columns(path, header, wanted)
-    labels = {role: roles[role].name for role in LABELS if role in roles}
-    names = [reference.name, indicated.name, *labels.values()]
+    labels = {role: roles[role].name for role in (*LABELS, "when") if role in roles}
     parts = kind.stretches(path)
     size = path.stat().st_size / len(parts)
-    scales = (
-        reference.scale(period, settings.counts_per_turn_reference)[0],
-        period / indicated.period,
-    )
+    unit = unit_of_path(path, settings.unit_from)
     for i, part in enumerate(parts):
-        yield _LogPart(path, kind, part, i, size, names, [*labels], period, *scales)
+        yield _LogPart(path, kind, part, i, size, angles, labels, unit)
 
 
 def _accumulate(stretch: _LogPart, settings: LogFitSettings, advance: Advance) -> Accumulated:
     """Moments of one stretch of a log."""
-    path, period, argument = stretch.path, stretch.period, settings.argument
+    path, period, argument = stretch.path, stretch.angles.period, settings.argument
     is_first = stretch.number == 0
     found = Accumulated(
         Moments(settings.orders, period=period, shafts=settings.shafts),
@@ -272,25 +256,27 @@ def _accumulate(stretch: _LogPart, settings: LogFitSettings, advance: Advance) -
         (str(path),),
         (_sha256(path) if settings.checksums and is_first else "",),
     )
-    reference, indicated, *labels = stretch.names
+    labels = [*stretch.labels.values()]
+    names = [*dict.fromkeys([*stretch.angles.names, *labels])]
     left = stretch.size
-    folders = partition_keys(path)
+    folders = partition_keys(path) | ({} if stretch.unit is None else {"unit": stretch.unit})
     taken_of: Counter[Hashable] = Counter()
-    for batch in stretch.kind.read(path, stretch.names, settings.topic, stretch.part, texts=labels):
-        true, said = batch[reference], batch[indicated]
-        if stretch.reference_scale != 1.0:
-            true = true * stretch.reference_scale
+    for batch in stretch.kind.read(path, names, settings.topic, stretch.part, texts=labels):
+        true, said = stretch.angles.values(batch.__getitem__)
         if is_first and found.rows == 0:
-            _check_follows(path, true, said * stretch.scale, period)
-        columns = [batch[name] for name in labels]
+            _check_follows(path, true, said, period)
+        columns = [
+            _days(batch[name]) if role == "when" else batch[name]
+            for role, name in stretch.labels.items()
+        ]
         for start in range(0, true.size, _BLOCK):
             block = slice(start, start + _BLOCK)
             for label, rows in _runs(columns, block):
-                own = folders | dict(zip(stretch.roles, label, strict=True))
-                run = (found.files[0], *map(own.get, LABELS))
+                own = folders | dict(zip(stretch.labels, label, strict=True))
+                day = [own["when"]] if "when" in own else []
+                run = (found.files[0], *map(own.get, LABELS), *day)
                 x = np.ascontiguousarray(true[block][rows], dtype=np.float64)
                 y = np.ascontiguousarray(said[block][rows], dtype=np.float64)
-                y = y if stretch.scale == 1.0 else y * stretch.scale
                 found.rows += x.size
                 tally = found.tallies.setdefault(run, Tally())
                 if settings.outliers is not None and run in settings.outliers.zeros:
@@ -311,6 +297,14 @@ def _accumulate(stretch: _LogPart, settings: LogFitSettings, advance: Advance) -
     found.missing = found.rows - sum(tally.rows for tally in found.tallies.values())
     found.tallies = {run: tally for run, tally in found.tallies.items() if tally.rows}
     return found
+
+
+def _days(column: Any) -> Any:
+    """The days of dates and times."""
+    if not isinstance(column, Labels):
+        return column
+    days = row_labels([day_of(text) for text in column.names])
+    return Labels(days.codes[column.codes], days.names)
 
 
 def _without(

@@ -9,11 +9,9 @@ from ..errors import FileError
 from ..formats.columns import (
     ANGLE_UNITS,
     Column,
-    Wanted,
     find_columns,
     listed,
-    matching,
-    signal_code,
+    signed_name,
     unit_in_name,
 )
 from ..formats.signals import SIGNALS
@@ -25,8 +23,6 @@ __all__ = [
     "UNITS",
     "AngleColumn",
     "find_angle_column",
-    "find_reference",
-    "find_reference_column",
     "find_signal",
     "find_signal_column",
 ]
@@ -43,7 +39,10 @@ SIGNAL_COLUMNS = {
 
 
 class AngleColumn(NamedTuple):
-    """The column to correct, its unit, and the column that is added."""
+    """The column to correct, its unit, and the column that is added.
+
+    Of a reversed sensor the period is negative: what is added is reversed as the column is.
+    """
 
     name: str
     unit: str
@@ -62,7 +61,6 @@ def find_angle_column(
     column: str | None = None,
     unit: str | None = None,
     counts_per_turn: float | None = None,
-    fresh: bool = True,
 ) -> AngleColumn:
     """The indicated angle of ``joint`` among the columns of ``path``.
 
@@ -70,7 +68,7 @@ def find_angle_column(
     ``_count``; for a named joint ``JOINT_indicated_deg``, ``indicated_deg_JOINT``,
     ``JOINT_deg`` or ``JOINT``. Groups of a file are part of the name, with a slash:
     ``JOINT/indicated_deg``. The unit is ``unit``, else the ending of the name, else that of
-    the model. With ``fresh`` the log must not hold the corrected column yet.
+    the model.
 
     Raises
     ------
@@ -80,7 +78,11 @@ def find_angle_column(
     """
     if unit is not None:
         check_choice("unit", unit, (*ANGLE_UNITS, "count"))
-    column = _search(path, header, joint) if column is None else matching(path, header, column)
+    is_reversed = False
+    if column is None:
+        column = _search(path, header, joint)
+    else:
+        column, is_reversed = signed_name(path, header, column)
     stated = unit or _unit_of(column, joint)
     unit = stated or unit_name(model_period)
     period = ANGLE_UNITS.get(unit) or counts_per_turn
@@ -94,36 +96,12 @@ def find_angle_column(
             column=column,
         )
     corrected = _corrected_name(column, unit, joint)
-    if fresh and corrected in header:
+    if corrected in header:
         raise FileError(
             path, "is there already: this log was corrected before", line=1, column=corrected
         )
-    return AngleColumn(column, unit, float(period), corrected, stated is None)
-
-
-def find_reference(path: object, header: Sequence[str], wanted: Wanted) -> Column:
-    """The true angle of a calibration log: ``reference_deg`` and so on, or that asked for.
-
-    Raises
-    ------
-    FileError
-        None, or several; its unit is not known.
-    """
-    found = find_columns(path, header, {k: v for k, v in wanted.items() if k == "reference"})
-    column = found.get("reference")
-    if column is None:
-        raise FileError(
-            path,
-            "one column reference_deg, _rad or _turn is needed and there is none: name another "
-            f"with {signal_code('reference')}; {listed(header)}",
-            line=1,
-        )
-    return column
-
-
-def find_reference_column(path: object, header: Sequence[str]) -> str:
-    """The name of the true angle of a calibration log; see `find_reference`."""
-    return find_reference(path, header, {}).name
+    period = -period if is_reversed else period
+    return AngleColumn(column, unit, float(period), corrected, stated is None and not is_reversed)
 
 
 def find_signal_column(
@@ -147,8 +125,9 @@ def find_signal(
     ``velocity_deg_s`` and so on, those of the joint first.
     """
     if column is not None:
-        name = matching(path, header, column[0])
-        return Column(signal, name, column[1] or unit_in_name(name, signal), True)
+        name, is_reversed = signed_name(path, header, column[0])
+        unit = column[1] or unit_in_name(name, signal)
+        return Column(signal, name, unit, True, is_reversed)
     patterns = (
         ["{}"] if joint is None else [f"{joint}_{{}}", f"{{}}_{joint}", f"{joint}/{{}}", "{}"]
     )

@@ -51,6 +51,8 @@ def fit_logs(
     counts_per_turn_reference: float | None = None,
     signals: Mapping[str, Any] | None = None,
     topic: str | None = None,
+    unit_from: str | None = None,
+    facets: Any = None,
     scheduler: str | None = None,
     threads: int | None = None,
     checksums: bool = False,
@@ -83,6 +85,8 @@ def fit_logs(
         Columns with other names, as in `read_runs`.
     topic : str, optional
         JointState topic of ROS bags.
+    unit_from, facets : str, path, optional
+        As in `read_runs`.
     scheduler : str, optional
         Address of a Dask scheduler whose workers share the file system: a log on each, the
         sums merged in a tree; the numbers are the same, bit for bit.
@@ -137,6 +141,8 @@ def fit_logs(
         "counts_per_turn_reference": counts_per_turn_reference,
         "signals": signals,
         "topic": topic,
+        "unit_from": unit_from,
+        "facets": facets,
     }
     paths = [path for path, _name in find_logs(_listed(logs))]
     if hold_at_most(paths, KEPT, topic):

@@ -35,7 +35,9 @@ from ..formats.columns import wanted_columns
 from ..joint.gear import gear_orders
 from ..joint.shafts import Shaft, ShaftOrders, shaft_cycles
 from ..model.model import Argument, HarmonicModel
+from ..runs.files import Conversion
 from ..runs.run import CalibrationRun, Source
+from ..runs.source import checked_reading
 from ..support.angles import wrap
 from ..support.files import partition_name
 from .accumulation import Accumulated, LogFitSettings, OutlierLimits, accumulate_each, merged
@@ -88,6 +90,8 @@ class Passes:
             counts_per_turn_reference=files.get("counts_per_turn_reference"),
             signals=wanted_columns(files.get("signals")),
             topic=files.get("topic"),
+            unit_from=files.get("unit_from"),
+            facets=Conversion.of(checked_reading(files)).facets,
             threads=threads,
             checksums=checksums,
             kept=max(min(most, SAMPLE) // len(paths), 1),
@@ -228,11 +232,14 @@ def _summed(found: Accumulated, argument: Argument) -> Summed:
     runs, outliers, ends = [], [], []
     for i, run in enumerate(moments.runs):
         assert isinstance(run, tuple)
-        file, unit, label = run
+        file, unit, label, *days = run
         kept = found.kept.columns(run)
         unit, label = (None if name is None else str(name) for name in (unit, label))
+        day = next(iter(days), None)
         runs.append(
-            CalibrationRun(*kept, moments.period, label=label, unit=unit, source=sources[file])
+            CalibrationRun(
+                *kept, moments.period, label=label, unit=unit, when=day, source=sources[file]
+            )
         )
         outliers += [(label or str(i), row) for row in tallies[run].outliers]
         ends.append(moments.extremes(run)[:, :2].ravel())

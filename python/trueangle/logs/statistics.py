@@ -42,7 +42,7 @@ class CorrectionStatistics:
         period: float,
         span: tuple[float, float] | None,
     ) -> None:
-        """Take in a batch, both angles in the unit of ``period``."""
+        """Take in a batch, both angles in the unit of ``period``, negative where reversed."""
         change = np.subtract(corrected, indicated, dtype=np.float64)
         squares = _squares(change)
         if not math.isfinite(squares):
@@ -54,11 +54,11 @@ class CorrectionStatistics:
         self.squares += squares / period**2
         if change.size:
             largest = max(float(change.max()), -float(change.min()))
-            self.largest = max(self.largest, largest / period)
+            self.largest = max(self.largest, largest / abs(period))
         if span is not None:
             start, stop = span
             with np.errstate(invalid="ignore"):
-                beyond = np.mod(corrected - start, period) > stop - start
+                beyond = np.abs(np.mod(corrected - start, period)) > abs(stop - start)
             self.outside += int(np.count_nonzero(beyond))
 
     @property

@@ -10,12 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import EmptyCellsWarning, FileError
-from ..formats.columns import Column, count_turn, listed, signal_code, unit_in_name
+from ..formats.columns import LABELS, Column, count_turn, signal_code, unit_in_name
 from ..formats.signals import FIELDS
-from ..support.angles import UNIT_PERIODS
+from ..formats.times import day_of
 from ..support.caller import level_of_caller
 from ..support.kinds import told_kinds
-from ..support.suggestions import did_you_mean
+from .angles import find_angles
+from .facets import Facets, read_facets
 from .readings import Readings
 from .run import CalibrationRun, Source, as_runs, given_runs
 from .source import Reading, checked_reading, each_table
@@ -28,8 +29,17 @@ __all__ = [
     "runs_of_readings",
 ]
 
-#: Unit, label and rows of every run.
-Groups: TypeAlias = list[tuple[str | None, str | None, NDArray[np.intp]]]
+
+class RunLabels(NamedTuple):
+    """What tells a run from the others: its joint, when it was calibrated, and its label."""
+
+    unit: str | None = None
+    when: str | None = None
+    run: str | None = None
+
+
+#: Labels and rows of every run.
+Groups: TypeAlias = list[tuple[RunLabels, NDArray[np.intp]]]
 
 #: Unit of the run's angles where the reference has none that a run may be in.
 _PERIOD = 360.0
@@ -48,12 +58,17 @@ def read_runs(path: Any, **reading: Unpack[Reading]) -> list[CalibrationRun]:
         a mapping of names to arrays, a structured array, or one of pandas, polars (also lazy),
         pyarrow, DuckDB, xarray, Dask. Columns: ``reference_deg`` and ``indicated_deg`` (or
         ``_rad``, ``_turn``, ``_count``, or a unit in brackets), and optionally ``run``,
-        ``unit`` and those of `trueangle.formats.signals.SIGNALS`. Others are kept in
-        `CalibrationRun.columns`.
+        ``unit``, ``when`` (ISO 8601) and those of `trueangle.formats.signals.SIGNALS`; an
+        ``error_arcsec`` (or another unit) may stand beside one of the two angles. Others are
+        kept in `CalibrationRun.columns`.
     **reading
         ``counts_per_turn``, ``counts_per_turn_reference``: counts in one turn of the output,
         of an indicated angle or reference in counts. ``signals``: columns with other names,
-        ``{"torque": "tau", "reference": ("pos act", "rad")}``. ``period``: one turn in the unit
+        ``{"torque": "tau", "reference": ("pos act", "rad")}``; ``"-pos"`` is a reversed sensor,
+        and ``"reference_offset"`` (a list for several) is added to the reference. ``facets``: a
+        file of a polygon's facets (``reference_deg``, ``deviation_arcsec``), added at its
+        nominal angles. ``unit_from``: a regular expression; what it finds in the name of a file
+        is the unit of its runs. ``period``: one turn in the unit
         of angles whose columns name none; these may then be called ``reference`` and
         ``indicated``. ``by``: the column that tells the runs apart (default: ``run``).
         ``topic``: JointState topic of a ROS bag (default: the only one).
@@ -61,7 +76,8 @@ def read_runs(path: Any, **reading: Unpack[Reading]) -> list[CalibrationRun]:
     Returns
     -------
     list of CalibrationRun
-        One per unit, label of ``run`` and file or table; rows stay in their order. The period
+        One per unit, day of ``when``, label of ``run`` and file or table; rows stay in their
+        order. The period
         of a run is that of its reference column: 360, ``2*pi`` or 1; 360 for other units.
 
     Raises
@@ -116,8 +132,8 @@ def runs_of(
 
 
 def _read(data: Any, reading: Reading, name: str, table: str = "table") -> list[CalibrationRun]:
-    counts = _counts(reading)
-    found = each_table(data, lambda t: runs_of_readings(t, *counts), reading, name, table)
+    given = Conversion.of(reading)
+    found = each_table(data, lambda t: runs_of_readings(t, given), reading, name, table)
     runs = [run for part in found for run in part]
     units = {run.period: run for run in runs}
     if len(units) > 1:
@@ -131,11 +147,22 @@ def _read(data: Any, reading: Reading, name: str, table: str = "table") -> list[
     return runs
 
 
-def _counts(reading: Reading) -> tuple[float | None, float | None]:
-    return (
-        count_turn(reading["counts_per_turn"], "counts_per_turn"),
-        count_turn(reading["counts_per_turn_reference"], "counts_per_turn_reference"),
-    )
+class Conversion(NamedTuple):
+    """Counts in a turn of either angle, and the facets of a polygon."""
+
+    counts: float | None = None
+    reference_counts: float | None = None
+    facets: Facets | None = None
+
+    @classmethod
+    def of(cls, reading: Reading) -> Conversion:
+        """From the keywords of `read_runs`."""
+        facets = reading["facets"]
+        return cls(
+            count_turn(reading["counts_per_turn"], "counts_per_turn"),
+            count_turn(reading["counts_per_turn_reference"], "counts_per_turn_reference"),
+            facets if facets is None or isinstance(facets, Facets) else read_facets(facets),
+        )
 
 
 class RunColumns(NamedTuple):
@@ -157,26 +184,34 @@ class RunColumns(NamedTuple):
 
 def read_columns(data: Any, reading: Reading, name: str = "data") -> list[RunColumns]:
     """The columns of every file or table, grouped by run; time may run backwards."""
-    counts = _counts(reading)
-    return each_table(data, lambda table: _columns(table, *counts), reading, name)
+    given = Conversion.of(reading)
+    return each_table(data, lambda table: _columns(table, given), reading, name)
 
 
-def _columns(table: Readings, counts: float | None, reference_counts: float | None) -> RunColumns:
+def _columns(table: Readings, given: Conversion) -> RunColumns:
     asked = {role for role, column in table.roles.items() if column.is_asked}
     filled = any(len(column) for column in table.columns.values())
     # A log of an angle called indicated_deg is no table.
     if len(table.columns) == 1 and filled and table.roles.keys() <= asked & {"indicated"}:
-        return _entries(table, counts)
+        return _entries(table, given.counts)
     roles, path = table.roles, table.path
-    for role in ("reference", "indicated"):
-        if role not in roles:
-            _refuse_missing(table, role)
+    angles = find_angles(
+        path,
+        list(table.columns),
+        roles,
+        unit=table.format.unit,
+        counts_per_turn=given.counts,
+        counts_per_turn_reference=given.reference_counts,
+        facets=given.facets,
+    )
     if not len(next(iter(table.columns.values()))):
         raise FileError(path, "has a header but no readings", line=1)
-    period, reference, indicated = _angles(table, counts, reference_counts)
+    period = angles.period
+    raw = {column.name: column for column in roles.values()}
+    reference, indicated = angles.values(lambda name: table.raw(raw[name]))
     signals = {}
     for role, column in roles.items():
-        if role not in ("reference", "indicated", "run", "unit"):
+        if (role not in LABELS and column.name not in angles.names) or role == "mount":
             if (column.unit or "").startswith("count"):
                 raise table.error(
                     "counts of this signal have no known turn; give it in deg, rad or turn",
@@ -187,11 +222,11 @@ def _columns(table: Readings, counts: float | None, reference_counts: float | No
     for values in (reference, indicated, *signals.values()):
         missing |= np.isnan(values)
     groups, left_out = [], []
-    for unit, label, rows in _groups(table, reference.size):
+    for found, rows in _groups(table, reference.size):
         present = rows[~missing[rows]]
         if not present.size:
-            raise FileError(path, f"every row of run {label or path.name} has an empty cell")
-        groups.append((unit, label, present))
+            raise FileError(path, f"every row of run {found.run or path.name} has an empty cell")
+        groups.append((found, present))
         left_out.append(rows.size - present.size)
     _warn_of_empty(table, missing, {"reference": reference, "indicated": indicated, **signals})
     return RunColumns(table, period, reference, indicated, signals, groups, left_out, table.source)
@@ -216,20 +251,18 @@ def _entries(table: Readings, counts: float | None) -> RunColumns:
         raise FileError(table.path, "has a header but no readings", line=1)
     left_out = indicated.size - rows.size
     _warn_of_empty(table, np.isnan(indicated), {"indicated": indicated})
-    groups: Groups = [(None, None, rows)]
+    groups: Groups = [(RunLabels(), rows)]
     return RunColumns(table, _PERIOD, reference, indicated, {}, groups, [left_out], table.source)
 
 
-def runs_of_readings(
-    table: Readings, counts_per_turn: float | None, counts_per_turn_reference: float | None
-) -> list[CalibrationRun]:
+def runs_of_readings(table: Readings, given: Conversion) -> list[CalibrationRun]:
     """Runs of the rows of a table; raises as `read_runs`."""
-    found = _columns(table, counts_per_turn, counts_per_turn_reference)
+    found = _columns(table, given)
     signals = found.signals
     used = {c.name for role, c in table.roles.items() if c.is_asked or role in _USED}
     others = {name: values for name, values in table.columns.items() if name not in used}
     runs = []
-    for (unit, label, rows), left_out in zip(found.groups, found.left_out, strict=True):
+    for (labels, rows), left_out in zip(found.groups, found.left_out, strict=True):
         if "time" in signals:
             _check_time(table, signals["time"], rows)
         fields: dict[str, Any] = {k: v[rows] for k, v in signals.items() if k in FIELDS}
@@ -239,8 +272,9 @@ def runs_of_readings(
                 found.indicated[rows],
                 **fields,
                 period=found.period,
-                label=label,
-                unit=unit,
+                label=labels.run,
+                unit=labels.unit,
+                when=labels.when,
                 left_out=left_out,
                 signals={k: v[rows] for k, v in signals.items() if k not in FIELDS},
                 columns={name: values[rows] for name, values in others.items()},
@@ -251,7 +285,7 @@ def runs_of_readings(
 
 
 #: Roles whose columns are not repeated among the other columns of a run.
-_USED = ("time", "temperature", "torque", "run", "unit")
+_USED = ("time", "temperature", "torque", "error", *LABELS)
 
 
 def _warn_of_empty(
@@ -274,75 +308,29 @@ def _column_of(table: Readings, role: str) -> str:
     return table.roles[role].name if role in table.roles else next(iter(table.columns))
 
 
-def _refuse_missing(table: Readings, role: str) -> None:
-    units = (*UNIT_PERIODS, "count") if role == "indicated" else tuple(UNIT_PERIODS)
-    names = ", ".join(f"{role}_{unit}" for unit in units)
-    header = list(table.columns)
-    guess = next(filter(None, (did_you_mean(f"{role}_{unit}", header) for unit in units)), "")
-    raise FileError(
-        table.path,
-        f"no column {role}_deg (one of {names} is needed, or another named with "
-        f"{signal_code(role)}){guess}; {listed(header)}",
-        line=1,
-    )
-
-
-def _angles(
-    table: Readings, counts: float | None, reference_counts: float | None
-) -> tuple[float, NDArray[np.float64], NDArray[np.float64]]:
-    """Period of the file and its two angles in that unit."""
-    default = table.format.unit
-    reference, indicated = (
-        column._replace(unit=column.unit or default)
-        for column in (table.roles["reference"], table.roles["indicated"])
-    )
-    if reference.unit is None:
-        raise table.error(
-            f"its unit is not known; give it: {signal_code('reference', reference.name, 'deg')}",
-            reference.name,
-        )
-    if reference.unit == "count" and reference_counts is None:
-        raise table.error(
-            "a reference in counts needs their number per turn: give `counts_per_turn_reference=`",
-            reference.name,
-        )
-    indicated = indicated._replace(unit=indicated.unit or reference.unit)
-    if indicated.unit == "count" and counts is None:
-        raise table.error(
-            "counts need their number per output turn: give `counts_per_turn=`",
-            indicated.name,
-        )
-    by_name = not (reference.is_asked or indicated.is_asked)
-    suffixes = [c.name == f"{c.role}_{c.unit}" for c in (reference, indicated)]
-    differ = reference.unit != indicated.unit and "count" not in (reference.unit, indicated.unit)
-    if differ and by_name and all(suffixes):
-        raise table.error(
-            f"units are mixed: reference in {reference.unit}, indicated in {indicated.unit}; "
-            f"convert one, or name both with `signals=`",
-            indicated.name,
-        )
-    period = UNIT_PERIODS.get(reference.unit, _PERIOD)
-    return (
-        period,
-        reference.values(table.raw(reference), period, reference_counts),
-        indicated.values(table.raw(indicated), period, counts),
-    )
-
-
 def _groups(table: Readings, size: int) -> Groups:
-    """Unit, label and rows of every run, in the order of their first row."""
-    names = {role: table.roles[role].name for role in ("unit", "run") if role in table.roles}
-    if not names:
-        return [(None, None, np.arange(size))]
-    rows: dict[tuple[str, ...], list[int]] = {}
-    keys = zip(*(map(_label, table.columns[name].tolist()) for name in names.values()), strict=True)
-    for i, key in enumerate(keys):
+    """Labels and rows of every run, in the order of their first row: of one day each."""
+    columns = {
+        role: [*map(_label, table.columns[table.roles[role].name].tolist())]
+        for role in RunLabels._fields
+        if role in table.roles
+    }
+    if not columns:
+        return [(RunLabels(), np.arange(size))]
+    days = {text: day_of(text) for text in set(columns.get("when", ()))}
+    keys = dict(columns)
+    if days:
+        keys["when"] = [days[text] for text in columns["when"]]
+    rows: dict[tuple[str | None, ...], list[int]] = {}
+    for i, key in enumerate(zip(*keys.values(), strict=True)):
         rows.setdefault(key, []).append(i)
-    found = []
-    for key, places in rows.items():
-        labels = dict(zip(names, key, strict=True))
-        found.append((labels.get("unit"), labels.get("run"), np.array(places, dtype=np.intp)))
-    return found
+    return [
+        (
+            RunLabels(**{role: texts[places[0]] for role, texts in columns.items()}),
+            np.array(places, dtype=np.intp),
+        )
+        for places in rows.values()
+    ]
 
 
 def _label(value: Any) -> str:

@@ -17,10 +17,11 @@ from numpy.typing import NDArray
 
 from ..errors import FileError
 from ..formats.budget import DecodedSizeError, check_decoded
-from ..formats.columns import Column, find_columns, wanted_columns
+from ..formats.columns import LABELS, Column, find_columns, wanted_columns
 from ..formats.csvheader import number
 from ..formats.format import TEXTS, Batch, Format, Labels
 from ..formats.formats import format_of_content
+from ..formats.times import parsed_time, seconds_of
 from ..support.files import (
     RUNS_BYTES,
     check_input,
@@ -67,6 +68,13 @@ class Readings(NamedTuple):
     def raw(self, column: Column) -> NDArray[np.float64]:
         """A column as finite numbers, NaN where a cell is empty."""
         values = self.columns[column.name]
+        if values.dtype == object and column.role == "time":
+            seconds, bad = seconds_of(values.tolist())
+            if bad is None:
+                return seconds
+            got = repr(values[bad])[:60]
+            problem = f"seconds, or dates and times (ISO 8601, all with a zone or none), got {got}"
+            raise self.error(f"needs {problem}", column.name, bad)
         if values.dtype == object:
             row = next((i for i, value in enumerate(values) if value is not None), 0)
             got = repr(values[row])[:60]
@@ -148,7 +156,9 @@ def readings_of(path: Path, wanted: Mapping[str, Any], topic: str | None) -> Rea
             empty = dict.fromkeys(header, np.empty(0))
             return Readings(path, kind, roles, empty, _source(path))
         others = together(path, needed, others)
-    labels = {column.name for column in roles.values() if column.role in ("run", "unit")}
+    labels = {column.name for column in roles.values() if column.role in LABELS}
+    if "time" in roles and _is_dated(kind, path, roles["time"].name, topic):
+        labels.add(roles["time"].name)
     try:
         columns = _columns(kind, path, needed, others, labels, topic)
     except DecodedSizeError:
@@ -201,6 +211,15 @@ def _numeric(kind: Format, path: Path, names: list[str], topic: str | None) -> s
         for name, found in first.items()
         if not isinstance(found, Labels) or all(map(_is_number, found.names))
     }
+
+
+def _is_dated(kind: Format, path: Path, name: str, topic: str | None) -> bool:
+    """Whether a column of a text file begins with a date and time."""
+    if not hasattr(kind.module, "line_of"):
+        return False
+    found = next(iter(kind.module.read(path, [name], topic, texts=[name])), {}).get(name)
+    names = found.names if isinstance(found, Labels) else ()
+    return any(parsed_time(text) is not None for text in [t for t in names if t][:1])
 
 
 def _is_number(text: str | None) -> bool:

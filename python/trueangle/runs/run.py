@@ -60,6 +60,8 @@ class CalibrationRun:
         and the angles ``motor``, ``head1``, ``head2`` ... in the unit of ``reference``.
     unit : str, optional
         Label of the joint that the run is of, where runs of several are read together.
+    when : str, optional
+        Date and time of the calibration, ISO 8601.
     left_out : int
         Rows of the file that an empty cell kept out of the run.
     columns : mapping of str to array_like, optional
@@ -92,6 +94,7 @@ class CalibrationRun:
     weights: Array | None = field(default=None, kw_only=True)
     signals: Mapping[str, Any] = field(default_factory=dict, kw_only=True)
     unit: str | None = field(default=None, kw_only=True)
+    when: str | None = field(default=None, kw_only=True)
     left_out: int = field(default=0, kw_only=True)
     columns: Mapping[str, Any] = field(default_factory=dict, kw_only=True)
     source: Source | None = field(default=None, kw_only=True)

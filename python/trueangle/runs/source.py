@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 from os import PathLike
+from pathlib import Path
 from typing import Any, TypedDict, TypeVar
 
-from ..errors import ArgumentError, KindError
+import numpy as np
+
+from ..errors import ArgumentError, FileError, KindError
 from ..formats.columns import Column, wanted_columns
 from ..support.angles import check_period, unit_name
 from ..support.suggestions import did_you_mean
@@ -15,7 +19,7 @@ from .paths import find_logs
 from .readings import Readings, named, readings_of
 from .tables import table_readings
 
-__all__ = ["OtherReading", "Reading", "checked_reading", "each_table"]
+__all__ = ["OtherReading", "Reading", "checked_reading", "each_table", "unit_of_path"]
 
 T = TypeVar("T")
 
@@ -33,6 +37,11 @@ class OtherReading(TypedDict, total=False):
         Counts in one turn of the output, of an indicated angle or reference in counts.
     topic
         JointState topic of a ROS bag (default: the only one).
+    unit_from
+        Regular expression; what it finds in the path of a file (its first group) is the unit
+        of its runs.
+    facets
+        File of calibrated deviations of a polygon's facets.
     """
 
     signals: Mapping[str, Any] | None
@@ -40,6 +49,8 @@ class OtherReading(TypedDict, total=False):
     counts_per_turn: float | None
     counts_per_turn_reference: float | None
     topic: str | None
+    unit_from: str | None
+    facets: Any
 
 
 class Reading(OtherReading, total=False):
@@ -85,7 +96,14 @@ def checked_reading(given: Mapping[str, Any]) -> Reading:
         counts_per_turn=given.get("counts_per_turn"),
         counts_per_turn_reference=given.get("counts_per_turn_reference"),
         topic=given.get("topic"),
+        unit_from=given.get("unit_from"),
+        facets=given.get("facets"),
     )
+    if found["unit_from"] is not None:
+        try:
+            re.compile(found["unit_from"])
+        except (re.error, TypeError) as cause:
+            raise ArgumentError(f"unit_from must be a regular expression: {cause}") from None
     if found["period"] is not None:
         check_period(found["period"])
         if unit_name(found["period"]) == "count":
@@ -126,10 +144,15 @@ def each_table(
     wanted = wanted_columns(reading["signals"])
     period, topic = reading["period"], reading["topic"]
 
+    def of_file(unit: str | None) -> Callable[[Path], T]:
+        return lambda file: read(
+            _with_unit(_of_joint(readings_of(file, wanted, topic), unit), period)
+        )
+
     def of_one(entry: Any, called: str) -> list[T] | None:
         if isinstance(entry, str | PathLike):
             return [
-                named(path, lambda file: read(_with_unit(readings_of(file, wanted, topic), period)))
+                named(path, of_file(unit_of_path(path, reading["unit_from"])))
                 for path, _ in find_logs([entry], whole=False)
             ]
         held = table_readings(entry, called, wanted)
@@ -155,6 +178,43 @@ def each_table(
     if not found:
         raise ArgumentError(f"{name} is empty: at least one file, table or run is needed")
     return found
+
+
+def unit_of_path(path: Path, pattern: str | None) -> str | None:
+    r"""The unit that a path names: the first group of ``pattern`` in it, or all that it finds.
+
+    Raises
+    ------
+    FileError
+        The pattern finds nothing.
+
+    Examples
+    --------
+    >>> unit_of_path(Path("cell7/joint-A12.csv"), r"joint-(\w+)")
+    'A12'
+    """
+    if pattern is None:
+        return None
+    found = re.search(pattern, path.as_posix())
+    if found is None:
+        raise FileError(path, f"the pattern of `unit_from=` finds nothing in this path: {pattern}")
+    return found[1] if found.re.groups and found[1] is not None else found[0]
+
+
+def _of_joint(table: Readings, unit: str | None) -> Readings:
+    """All rows of one unit, that the name of the file tells."""
+    if unit is None:
+        return table
+    if "unit" in table.roles:
+        raise table.error(
+            "names the unit of every row, and so does `unit_from=`; leave one out",
+            table.roles["unit"].name,
+        )
+    rows = len(next(iter(table.columns.values()), ()))
+    roles = {**table.roles, "unit": Column("unit", "unit", None, True)}
+    return table._replace(
+        roles=roles, columns={**table.columns, "unit": np.full(rows, unit, dtype=object)}
+    )
 
 
 def _with_unit(table: Readings, period: float | None) -> Readings:

@@ -26,7 +26,7 @@ def write_runs(runs: CalibrationRun | Iterable[CalibrationRun], path: str | Path
 
     Columns: run, reference_deg, indicated_deg and those of the signals of
     `trueangle.formats.signals.SIGNALS` that every run has, such as time_s and current_A; ``unit``
-    where a run has one.
+    and ``when`` where a run has one.
 
     Parameters
     ----------
@@ -61,13 +61,14 @@ def write_runs(runs: CalibrationRun | Iterable[CalibrationRun], path: str | Path
             signal = find_signal(name)
             is_angle = signal.kind in ("angle", "velocity")
             kept.append((signal.column.format("deg"), name, scale if is_angle else 1.0))
-    has_units = any(run.unit is not None for run in found)
+    # Labels of all runs where one has them.
+    labelled = [role for role in ("unit", "when") if any(getattr(r, role) for r in found)]
     with written_atomically(path, kind=RUNS) as file:
         writer = csv.writer(file, lineterminator="\n")
-        writer.writerow([*(["unit"] if has_units else []), "run", *(name for name, _, _ in kept)])
+        writer.writerow([*labelled, "run", *(name for name, _, _ in kept)])
         for j, run in enumerate(found):
             label = run.label or str(j + 1)
-            texts = [run.unit or "", label] if has_units else [label]
+            texts = [*(getattr(run, role) or "" for role in labelled), label]
             columns = [(_values(run, name) * factor).tolist() for _, name, factor in kept]
             for values in zip(*columns, strict=True):
                 writer.writerow([*texts, *map(repr, values)])

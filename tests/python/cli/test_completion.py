@@ -20,6 +20,7 @@ TYPED = {
     "trueangle fit --lo": ({"--loss"}, {"--orders"}),
     "trueangle fit --loss ": ({"huber", "tukey"}, {"--loss", "cluster"}),
     "trueangle diagnose --ext": ({"--extend"}, {"--loss"}),
+    "trueangle check --signal ref": ({"reference=", "reference_offset="}, {"indicated="}),
     "trueangle completion ": ({"bash", "zsh", "fish"}, {"fit"}),
 }
 

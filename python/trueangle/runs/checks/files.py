@@ -24,12 +24,12 @@ def read_records(data: Any, reading: Mapping[str, Any]) -> list[Record]:
     for table in read_columns(data, checked_reading(reading)):
         scale = 360.0 / table.period
         columns = {role: (c.name, c.unit) for role, c in table.table.roles.items()}
-        for _, label, rows in table.groups:
+        for labels, rows in table.groups:
             signals = {name: values[rows] for name, values in table.signals.items()}
             velocity, mount = signals.get("velocity"), signals.get("mount")
             found.append(
                 Record(
-                    label or str(len(found) + 1),
+                    labels.run or str(len(found) + 1),
                     table.reference[rows] * scale,
                     table.indicated[rows] * scale,
                     rows + 1,

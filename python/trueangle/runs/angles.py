@@ -1,0 +1,217 @@
+"""What the two angles of a run are made of: columns, their units, and what is added to them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import NamedTuple, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import FileError
+from ..formats.columns import Column, listed, offsets_of, signal_code
+from ..support.angles import UNIT_PERIODS
+from ..support.suggestions import did_you_mean
+from .facets import Facets
+
+__all__ = ["Angles", "find_angles"]
+
+Array: TypeAlias = NDArray[np.float64]
+
+#: Unit of the run's angles where the reference has none that a run may be in.
+_PERIOD = 360.0
+
+
+class _Part(NamedTuple):
+    """A column and the factor that leads to the unit of the run."""
+
+    name: str
+    factor: float
+
+    def of(self, get: Callable[[str], Array]) -> Array:
+        values = get(self.name)
+        return values if self.factor == 1.0 else values * self.factor
+
+
+class Angles(NamedTuple):
+    r"""Columns of the reference with what is added to it, of the indicated angle, or of the error.
+
+    .. math:: r = r_0 + \delta(r_0 + m) + \sum_i o_i, \qquad y = r + e
+
+    with the offsets o, the deviation of the facet at the nominal angle and the mount m; where
+    there is an error e, either r or y is made of the other one.
+    """
+
+    path: object
+    period: float
+    reference: _Part | None
+    indicated: _Part | None
+    error: _Part | None
+    offsets: tuple[_Part, ...] = ()
+    mount: _Part | None = None
+    facets: Facets | None = None
+
+    @property
+    def names(self) -> list[str]:
+        """The columns, each once."""
+        parts = (self.reference, self.indicated, self.error, *self.offsets, self.mount)
+        return list(dict.fromkeys(part.name for part in parts if part is not None))
+
+    def values(self, get: Callable[[str], Array]) -> tuple[Array, Array]:
+        """Reference and indicated angle of rows, from their columns.
+
+        Raises
+        ------
+        FileError
+            A nominal angle is that of no facet.
+        """
+        indicated = None if self.indicated is None else self.indicated.of(get)
+        if self.reference is None:
+            assert indicated is not None
+            assert self.error is not None
+            return indicated - self.error.of(get), indicated
+        reference = nominal = self.reference.of(get)
+        if self.facets is not None:
+            place = nominal if self.mount is None else nominal + self.mount.of(get)
+            reference = reference + self.facets.deviation(
+                place, self.period, self.path, self.reference.name
+            )
+        for offset in self.offsets:
+            reference = reference + offset.of(get)
+        if indicated is None:
+            assert self.error is not None
+            indicated = reference + self.error.of(get)
+        return reference, indicated
+
+
+def find_angles(
+    path: object,
+    header: Sequence[str],
+    roles: Mapping[str, Column],
+    *,
+    unit: str | None = None,
+    counts_per_turn: float | None = None,
+    counts_per_turn_reference: float | None = None,
+    facets: Facets | None = None,
+) -> Angles:
+    """What the angles of a table are made of, and their period.
+
+    Parameters
+    ----------
+    path : object
+        For messages.
+    header : sequence of str
+    roles : mapping of role to Column
+    unit : str, optional
+        Of angles whose columns state none.
+    counts_per_turn, counts_per_turn_reference : float, optional
+    facets : Facets, optional
+
+    Raises
+    ------
+    FileError
+        A column is missing, or its unit is not known; units are mixed.
+    """
+
+    def error(problem: str, name: str) -> FileError:
+        return FileError(path, problem, line=1, column=name)
+
+    found = {
+        role: roles[role]._replace(unit=roles[role].unit or unit)
+        for role in ("reference", "indicated", "error")
+        if role in roles
+    }
+    for role in ("reference", "indicated"):
+        if role not in found and ("error" not in found or len(found) < 2):
+            _refuse_missing(path, header, role)
+    if len(found) == 3:
+        raise error(
+            "an error stands beside either of the two angles: leave one of the three out",
+            found["error"].name,
+        )
+    first = found.get("reference") or found["indicated"]
+    if first.unit is None:
+        raise error(
+            f"its unit is not known; give it: {signal_code(first.role, first.name, 'deg')}",
+            first.name,
+        )
+    if first.role == "reference" and "indicated" in found:
+        indicated = found["indicated"]
+        found["indicated"] = indicated._replace(unit=indicated.unit or first.unit)
+    counts = {"reference": counts_per_turn_reference}
+    for role, column in found.items():
+        if column.unit is None:
+            raise error(
+                f"its unit is not known; give it: {signal_code(role, column.name, 'arcsec')}",
+                column.name,
+            )
+        if column.unit == "count" and counts.get(role, counts_per_turn) is None:
+            raise error(
+                "a reference in counts needs their number per turn: give "
+                "`counts_per_turn_reference=`"
+                if role == "reference"
+                else "counts need their number per output turn: give `counts_per_turn=`",
+                column.name,
+            )
+    _check_alike(error, found)
+    if first.role != "reference" and (facets is not None or offsets_of(roles)):
+        name = facets.file if facets is not None else offsets_of(roles)[0].name
+        raise error(
+            f"{name} is added to a reference, and there is none beside the error", first.name
+        )
+    period = UNIT_PERIODS.get(first.unit, _PERIOD)
+
+    def part(column: Column | None) -> _Part | None:
+        if column is None:
+            return None
+        turn = counts.get(column.role, counts_per_turn)
+        return _Part(column.name, column.scale(period, turn)[0])
+
+    offsets = []
+    for column in offsets_of(roles):
+        if column.unit is None:
+            raise error(
+                "its unit is not known; give it: "
+                f"{signal_code('reference_offset', column.name, 'arcsec')}",
+                column.name,
+            )
+        offsets.append(_Part(column.name, column.scale(period, counts_per_turn_reference)[0]))
+    mount = part(roles.get("mount")) if facets is not None else None
+    return Angles(
+        path,
+        period,
+        part(found.get("reference")),
+        part(found.get("indicated")),
+        part(found.get("error")),
+        tuple(offsets),
+        mount,
+        facets,
+    )
+
+
+def _check_alike(error: Callable[[str, str], FileError], found: Mapping[str, Column]) -> None:
+    """Refuse two angles that were found by their names and have unlike units."""
+    if not {"reference", "indicated"} <= found.keys():
+        return
+    reference, indicated = found["reference"], found["indicated"]
+    by_name = not (reference.is_asked or indicated.is_asked)
+    suffixes = [c.name == f"{c.role}_{c.unit}" for c in (reference, indicated)]
+    differ = reference.unit != indicated.unit and "count" not in (reference.unit, indicated.unit)
+    if differ and by_name and all(suffixes):
+        raise error(
+            f"units are mixed: reference in {reference.unit}, indicated in {indicated.unit}; "
+            "convert one, or name both with `signals=`",
+            indicated.name,
+        )
+
+
+def _refuse_missing(path: object, header: Sequence[str], role: str) -> None:
+    units = (*UNIT_PERIODS, "count") if role == "indicated" else tuple(UNIT_PERIODS)
+    names = ", ".join(f"{role}_{unit}" for unit in units)
+    guess = next(filter(None, (did_you_mean(f"{role}_{unit}", header) for unit in units)), "")
+    raise FileError(
+        path,
+        f"no column {role}_deg (one of {names} is needed, or another named with "
+        f"{signal_code(role)}){guess}; {listed(header)}",
+        line=1,
+    )

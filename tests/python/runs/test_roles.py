@@ -1,0 +1,252 @@
+"""What the angles of a run are made of: reversed sensors, errors, offsets, facets; and when."""
+
+import numpy as np
+import pytest
+
+import trueangle as ta
+from trueangle.cli import main
+from trueangle.errors import ArgumentError, FileError
+
+ROWS = 36
+NOMINAL = np.arange(ROWS) * 10.0
+ERROR = 20.0 * np.sin(np.radians(NOMINAL)) + 7.0  # arcsec
+READ = NOMINAL + ERROR / 3600.0
+
+
+def saved(path, **columns):
+    """A CSV of columns, texts or numbers."""
+    rows = zip(*columns.values(), strict=True)
+    lines = [",".join(columns), *(",".join(map(str, row)) for row in rows)]
+    path.write_text("\n".join(lines) + "\n")
+    return path
+
+
+def each_door(path, tmp_path, **reading):
+    """First order in arcsec, in memory, in one pass, and of the table in memory."""
+    fits = [ta.fit(path, [1], **reading), ta.fit_logs(path, [1], loss="linear", **reading)]
+    import trueangle.logs.fitting as fitting
+
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(fitting, "hold_at_most", lambda *_args: False)
+        fits.append(ta.fit_logs(path, [1], loss="linear", **reading))
+    found = []
+    for fit in fits:
+        (shaft,) = fit.model.shafts
+        arcsec = 1_296_000.0 / fit.model.period
+        found.append((shaft.cosine[0] * arcsec, shaft.sine[0] * arcsec))
+    np.testing.assert_allclose(found[1:], found[:1] * 2, atol=1e-6)
+    return found[0]
+
+
+def test_a_reversed_sensor_by_every_door(tmp_path):
+    path = saved(tmp_path / "a.csv", reference_deg=NOMINAL, enc=-READ)
+    signals = {"indicated": ("-enc", "deg")}
+    assert np.allclose(each_door(path, tmp_path, signals=signals), (0.0, 20.0), atol=1e-6)
+    path = saved(tmp_path / "b.csv", ref=-NOMINAL, indicated_deg=READ)
+    signals = {"reference": ("-ref", "deg")}
+    assert np.allclose(each_door(path, tmp_path, signals=signals), (0.0, 20.0), atol=1e-6)
+
+
+def test_a_column_whose_name_begins_with_a_minus_is_itself(tmp_path):
+    columns = {"reference_deg": NOMINAL, "enc": READ + 90.0, "-enc": READ}
+    path = saved(tmp_path / "a.csv", **columns)
+    (run,) = ta.read_runs(path, signals={"indicated": ("-enc", "deg")})
+    np.testing.assert_array_equal(run.indicated, READ)
+    with pytest.raises(FileError, match=r"column 'encoder': no such column"):
+        ta.read_runs(path, signals={"indicated": ("-encoder", "deg")})
+
+
+@pytest.mark.parametrize("partial", [False, True])
+def test_a_reversed_sensor_is_corrected_in_its_own_sense(partial, tmp_path):
+    angles = np.arange(0.0, 180.0 if partial else 360.0, 2.5)
+    error = 0.5 * np.sin(np.radians(angles)) + 0.1
+    run = ta.CalibrationRun(angles, angles + error, 360.0)
+    model = ta.fit([run], [1]).model
+    path = saved(tmp_path / "log.csv", enc=-(angles + error), x=angles)
+    columns = {"indicated": ("-enc", "deg")}
+    report = ta.correct_logs(path, model, tmp_path / "out.csv", signals=columns)
+    assert report.is_done, report.logs[0].error
+    after = np.loadtxt(tmp_path / "out.csv", delimiter=",", skiprows=1)
+    np.testing.assert_allclose(after[:, -1], -model.correct(angles + error), atol=1e-12)
+    (joint,) = report.logs[0].result["joints"]
+    size = np.abs(model.correct(angles + error) - angles - error)
+    assert joint["max_abs_correction_arcsec"] == pytest.approx(3600.0 * size.max())
+    plain = saved(tmp_path / "plain.csv", enc=angles + error)
+    report = ta.correct_logs(plain, model, tmp_path / "other.csv", column="enc", unit="deg")
+    assert report.logs[0].result["joints"][0]["outside_span"] == joint["outside_span"]
+
+
+@pytest.mark.parametrize("beside", ["reference", "indicated"])
+def test_an_error_stands_for_one_of_the_angles(beside, tmp_path):
+    angle = NOMINAL if beside == "reference" else READ
+    path = saved(tmp_path / "a.csv", **{f"{beside}_deg": angle, "error_arcsec": ERROR})
+    assert np.allclose(each_door(path, tmp_path), (0.0, 20.0), atol=1e-6)
+    (run,) = ta.read_runs(path)
+    np.testing.assert_allclose(run.reference, NOMINAL, atol=1e-12)
+    np.testing.assert_allclose(run.indicated, READ, atol=1e-12)
+    assert "error_arcsec" not in run.columns
+
+
+def test_an_error_beside_both_angles(tmp_path):
+    path = saved(
+        tmp_path / "a.csv", reference_deg=NOMINAL, indicated_deg=READ, error_arcsec=0 * READ
+    )
+    (run,) = ta.read_runs(path)  # found by their names, the angles are enough
+    np.testing.assert_array_equal(run.indicated, READ)
+    np.testing.assert_array_equal(run.columns["error_arcsec"], 0.0)
+    with pytest.raises(FileError, match="an error stands beside either of the two angles"):
+        ta.read_runs(path, signals={"error": "error_arcsec"})
+    path = saved(tmp_path / "b.csv", reference_deg=NOMINAL, e=ERROR)
+    with pytest.raises(FileError, match=r"'e': its unit is not known.*'error': \('e', 'arcsec'\)"):
+        ta.read_runs(path, signals={"error": "e"})
+
+
+def test_what_is_added_to_the_reference(tmp_path):
+    first, second = 0.3 * np.cos(np.radians(NOMINAL)), np.linspace(-1.0, 2.0, ROWS)
+    columns = {"reference_deg": NOMINAL, "indicated_deg": READ + (first * 60.0 + second) / 3600.0}
+    path = saved(tmp_path / "a.csv", **columns, ac=first, level=-second)
+    offsets = [("ac", "arcmin"), ("-level", "arcsec")]
+    found = each_door(path, tmp_path, signals={"reference_offset": offsets})
+    assert np.allclose(found, (0.0, 20.0), atol=1e-3)  # the nominal angle stands in the sine
+    with pytest.raises(FileError, match=r"'ac': its unit is not known"):
+        ta.read_runs(path, signals={"reference_offset": "ac"})
+    path = saved(tmp_path / "b.csv", indicated_deg=READ, error_arcsec=ERROR, ac=first)
+    with pytest.raises(FileError, match="is added to a reference, and there is none"):
+        ta.read_runs(path, signals={"reference_offset": ("ac", "arcsec")})
+
+
+FACETS = np.arange(12) * 30.0
+DEVIATIONS = np.array([0.0, 3.1, -2.0, 1.0, 4.5, -0.5, 2.2, -3.3, 0.7, 1.9, -1.1, 0.4])
+
+
+def polygon(tmp_path, mounts=(0.0,), facets=FACETS, deviations=DEVIATIONS):
+    """Readings at the facets of a polygon, and the table of its calibration."""
+    saved(tmp_path / "facets.csv", reference_deg=facets, deviation_arcsec=deviations)
+    rows = []
+    for mount in mounts:
+        for place in FACETS:
+            facet = int(np.argmin(np.abs((FACETS - place - mount + 180.0) % 360.0 - 180.0)))
+            true = place + DEVIATIONS[facet] / 3600.0
+            error = (20.0 * np.sin(np.radians(true)) + 7.0) / 3600.0
+            rows.append((f"m{mount:g}", mount, place, true + error))
+    names = ("run", "mount_deg", "reference_deg", "indicated_deg")
+    columns = dict(zip(names, zip(*rows, strict=True), strict=True))
+    return saved(tmp_path / "runs.csv", **columns)
+
+
+@pytest.mark.parametrize("mounts", [(0.0,), (0.0, 90.0, 210.0)])
+def test_deviations_of_facets_are_added_where_they_lie(mounts, tmp_path):
+    path = polygon(tmp_path, mounts)
+    found = each_door(path, tmp_path, facets=tmp_path / "facets.csv")
+    assert np.allclose(found, (0.0, 20.0), atol=1e-4)
+    assert np.hypot(*np.subtract(each_door(path, tmp_path), (0.0, 20.0))) > 0.01
+    order = np.random.default_rng(3).permutation(12)  # in any order, by any turn
+    polygon(tmp_path, mounts, FACETS[order] - 360.0, DEVIATIONS[order])
+    again = each_door(path, tmp_path, facets=tmp_path / "facets.csv")
+    np.testing.assert_allclose(again, found, atol=1e-9)
+
+
+def test_facets_that_do_not_fit_are_told(tmp_path, capsys):
+    path = saved(tmp_path / "runs.csv", reference_deg=FACETS + 5.0, indicated_deg=FACETS + 5.0)
+    polygon(tmp_path)
+    runs, facets = str(tmp_path / "off.csv"), str(tmp_path / "facets.csv")
+    saved(tmp_path / "off.csv", reference_deg=FACETS + 5.0, indicated_deg=FACETS + 5.0)
+    assert main(["fit", runs, "--facets", facets, "-o", str(tmp_path / "m.json")]) == 1
+    assert "reading 1 is at 5 deg, which is no facet of facets.csv: the nearest is at 0 deg" in (
+        capsys.readouterr().err
+    )
+    saved(
+        tmp_path / "facets.csv", reference_deg=[0.0, 30.0, 360.0], deviation_arcsec=[1.0, 2.0, 3.0]
+    )
+    with pytest.raises(FileError, match=r"facets.csv, line \d.*listed once each"):
+        ta.read_runs(path, facets=facets)
+    saved(tmp_path / "facets.csv", angle=[0.0, 30.0], deviation_arcsec=[1.0, 2.0])
+    with pytest.raises(FileError, match="reference_deg and deviation_arcsec are needed"):
+        ta.read_runs(path, facets=facets)
+
+
+def test_calibrations_of_units_and_days(tmp_path):
+    days = ["2026-11-20T23:59:00+01:00"] * 6 + ["2026-11-21T08:00:00+01:00"] * 6
+    columns = {
+        "unit": ["A"] * 12 + ["B"] * 12,
+        "when": days * 2,
+        "run": (["fwd"] * 3 + ["rev"] * 3) * 4,
+        "reference_deg": NOMINAL[:24],
+        "indicated_deg": READ[:24],
+    }
+    path = saved(tmp_path / "a.csv", **columns)
+    runs = ta.read_runs(path)
+    assert [len(run) for run in runs] == [3] * 8
+    assert [(r.unit, r.when[:10], r.label) for r in runs[:3]] == [
+        ("A", "2026-11-20", "fwd"),
+        ("A", "2026-11-20", "rev"),
+        ("A", "2026-11-21", "fwd"),
+    ]
+    ta.write_runs(runs, tmp_path / "b.csv")
+    again = ta.read_runs(tmp_path / "b.csv")
+    assert [(r.unit, r.when, r.label) for r in again] == [(r.unit, r.when, r.label) for r in runs]
+
+
+@pytest.mark.parametrize("zone", ["", "Z", "+05:30"])
+def test_times_as_dates(zone, tmp_path):
+    start = np.datetime64("2026-12-31T23:59:50", "ms")
+    stamps = [f"{start + np.timedelta64(250 * i, 'ms')}{zone}" for i in range(ROWS)]
+    path = saved(tmp_path / "a.csv", stamp=stamps, reference_deg=NOMINAL, indicated_deg=READ)
+    (run,) = ta.read_runs(path, signals={"time": "stamp"})
+    np.testing.assert_allclose(run.time, 0.25 * np.arange(ROWS), atol=1e-9)
+    stamps[7] = "yesterday"
+    saved(path, stamp=stamps, reference_deg=NOMINAL, indicated_deg=READ)
+    with pytest.raises(FileError, match=r"line 9, column 'stamp'.*ISO 8601.*'yesterday'"):
+        ta.read_runs(path, signals={"time": "stamp"})
+
+
+def test_units_by_the_names_of_files(tmp_path, capsys):
+    for name in ("A12", "B07"):
+        saved(tmp_path / f"joint-{name}.csv", reference_deg=NOMINAL, indicated_deg=READ)
+    pattern = str(tmp_path / "joint-*.csv")
+    runs = ta.read_runs(pattern, unit_from=r"joint-(\w+)")
+    assert [run.unit for run in runs] == ["A12", "B07"]
+    assert [run.unit for run in ta.read_runs(pattern, unit_from="[AB]1?")] == ["A1", "B"]
+    with pytest.raises(
+        FileError, match=r"joint-A12.csv: the pattern of `unit_from=` finds nothing"
+    ):
+        ta.read_runs(pattern, unit_from="motor")
+    with pytest.raises(ArgumentError, match="unit_from must be a regular expression"):
+        ta.read_runs(pattern, unit_from="(")
+    command = ["fit", pattern, "--unit-from", "motor", "-o", str(tmp_path / "m.json")]
+    assert main(command) == 1
+    assert "--unit-from" in capsys.readouterr().err
+    assert main([*command[:3], r"joint-(\w+)", *command[4:], "--orders", "1"]) == 0
+
+
+def test_runs_by_a_pattern_of_their_labels(tmp_path, capsys):
+    labels = ["fwd-1", "fwd-2", "rev-1"]
+    path = saved(
+        tmp_path / "a.csv",
+        run=np.repeat(labels, 12),
+        reference_deg=NOMINAL,
+        indicated_deg=READ,
+    )
+    model = str(tmp_path / "m.json")
+    command = ["fit", str(path), "-o", model, "--orders", "1", "--json", "--run"]
+    assert main([*command, "fwd-*"]) == 0
+    assert ta.load_model(model).fit.runs == 2
+    assert main([*command, "side-*"]) == 1
+    assert "--run side-*: no such run; the runs are fwd-1, fwd-2, rev-1" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("command", ["check", "fit", "orders", "report", "correct"])
+def test_quoted_patterns_are_expanded_by_every_command(command, tmp_path, capsys, monkeypatch):
+    rng = np.random.default_rng(8)
+    for i in range(3):
+        read = READ + rng.normal(0.0, 1e-4, ROWS)
+        saved(tmp_path / f"log{i}.csv", reference_deg=NOMINAL, indicated_deg=read)
+    monkeypatch.chdir(tmp_path)
+    ta.fit("log*.csv", [1]).model.save("joint.json")
+    more = {"fit": ["-o", "m.json"], "report": ["-o", "r.html"]}.get(command, [])
+    more = ["-m", "joint.json", "-o", "out"] if command == "correct" else more
+    if command == "report":
+        pytest.importorskip("bokeh")
+    assert main([command, "log*.csv", *more]) == 0
+    assert main([command, "nothing*.csv", *more]) == 1
+    assert "nothing*.csv: no file matches this pattern" in capsys.readouterr().err
