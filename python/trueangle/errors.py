@@ -155,7 +155,7 @@ class EmptyCellsWarning(UserWarning):
 
 
 class MessageLinesWarning(UserWarning):
-    """Lines of words among the readings of a text file were left out."""
+    """Lines of a text file that hold no readings were left out."""
 
 
 class OutsideSpanWarning(UserWarning):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import importlib.util
 import json
 import random
@@ -15,6 +16,7 @@ import numpy as np
 
 import trueangle as ta
 from mutation import NASTY, mutated_bytes, mutated_document, mutated_table
+from trueangle.errors import TrueAngleError
 from trueangle.logs.manifest import Manifest
 
 #: Readings of the small files that are damaged.
@@ -421,6 +423,82 @@ def _make_bag(ending: str) -> Callable[[Path, random.Random], Path]:
     return make
 
 
+# -- formats of which one small file is damaged: a line each --------------------------
+
+
+def _numbered(form: str, **more: Any) -> bytes:
+    """Rows of a text, of the columns by name."""
+    columns = _columns() | more
+    rows = zip(*columns.values(), strict=True)
+    return "\n".join(form.format(**dict(zip(columns, row, strict=True))) for row in rows).encode()
+
+
+def _guided(folder: Path) -> bytes:
+    head = (
+        "PHD2 version 2.6.13, Log version 2.5. Log enabled at 2026-11-20 22:00:00\n\n"
+        "Guiding Begins at 2026-11-20 22:10:00\nPixel scale = 1.50 arc-sec/px\n"
+        "Mount = EQ, xAngle = 30.0, xRate = 3.750\nRA = 5.00 hr, Dec = 40.0 deg\n"
+        "Lock position = 500.000, 400.000\n"
+        "Frame,Time,mount,dx,dy,RARawDistance,DECRawDistance,RADuration,RADirection,SNR\n"
+    )
+    row = '1,{time_s},"Mount",0.1,0.2,{indicated_deg},0.1,120,W,45.6'
+    middle = b"\nINFO: DITHER by 1.0, 2.0, new lock pos = 501.000, 402.000\n"
+    settled = b"INFO: SETTLING STATE CHANGE, Settling complete\n"
+    return head.encode() + _numbered(row) + middle + settled + _numbered(row)
+
+
+def _matlab4(folder: Path) -> bytes:
+    from scipy.io import savemat
+
+    columns = {k: np.array(v) for k, v in _columns().items() if k not in ("run", "note")}
+    savemat(folder / "seed4.mat", columns, format="4")
+    return (folder / "seed4.mat").read_bytes()
+
+
+def _robot(folder: Path) -> bytes:
+    from trueangle.formats import wpilog
+
+    columns = _columns()
+    parts = [b"WPILOG\x00\x01\x00\x00\x00\x00"]
+    for number, name in enumerate(("reference_deg", "indicated_deg"), 1):
+        parts.append(wpilog._started(number, name, "{}", 0))
+        for i, value in enumerate(columns[name]):
+            parts.append(wpilog._record(number, 20_000 * i, np.float64(value).tobytes()))
+    return b"".join(parts)
+
+
+_BLANKS = "{time_s:12.6f} {reference_deg:12.6f}\t {indicated_deg:e}"
+_SERIAL = "reference_deg:{reference_deg},indicated_deg:{indicated_deg}\nok"
+_CAMONITOR = "indicated_deg 2026-11-20 22:10:0{time_s:.3f} {indicated_deg} HIHI"
+#: Ending, and the file.
+_SMALL: dict[str, tuple[str, Callable[[Path], bytes]]] = {
+    "blanks": (".dat", lambda folder: _numbered(_BLANKS)),
+    "serial": (".log", lambda folder: _numbered(_SERIAL)),
+    "camonitor": (".txt", lambda folder: _numbered(_CAMONITOR)),
+    "guidelog": (".txt", _guided),
+    "matlab4": (".mat", _matlab4),
+    "wpilog": (".wpilog", _robot),
+}
+
+
+def _make_small(name: str) -> Callable[[Path, random.Random], Path]:
+    ending, made = _SMALL[name]
+
+    def make(folder: Path, rng: random.Random) -> Path:
+        path = folder / f"log{ending}"
+        path.write_bytes(_seeds(name, made, folder))
+        return _damaged(path, rng, always=True)
+
+    return make
+
+
+def _use_small(path: Path) -> None:
+    """As runs, and corrected: an error of the one must not keep the other from being tried."""
+    with contextlib.suppress(TrueAngleError):
+        _use_runs(path)
+    _use_log(path)
+
+
 def _damaged(path: Path, rng: random.Random, always: bool = False) -> Path:
     if always or rng.random() < 0.7:
         path.write_bytes(mutated_bytes(path.read_bytes(), rng))
@@ -462,6 +540,11 @@ def loaders() -> dict[str, Loader]:
         Loader("runs-npz", _make_npz, _use_runs),
         Loader("log-npz", _make_npz, _use_log),
         Loader("log-npy", _make_npy, _use_log),
+    ]
+    found += [
+        Loader(f"small-{name}", _make_small(name), _use_small)
+        for name in _SMALL
+        if name != "matlab4" or _has("scipy")
     ]
     if _has("scipy"):
         found += [Loader("log-matlab", _make_matlab, _use_log)]

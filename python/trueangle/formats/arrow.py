@@ -20,6 +20,8 @@ from .arrowtables import (
     add_corrected,
     column_batches,
     corrected_schema,
+    element_names,
+    top_names,
 )
 from .budget import Extent, check_part
 from .damage import damage_told
@@ -39,9 +41,9 @@ _MOST_PARTS = 64
 
 
 def columns(path: Path, topic: str | None = None) -> list[str]:
-    """Names of the top columns."""
+    """Names of the top columns, elements of lists of one length as ``state[3]``."""
     with _opened(path) as (schema, _batches, _options):
-        return list(schema.names)
+        return element_names(schema, lambda name: 0)
 
 
 class BatchRange(NamedTuple):
@@ -97,25 +99,28 @@ def read(
     """Columns ``names`` in batches; see `format.FormatModule`."""
     if stretch is None:
         with _opened(path) as (_schema, batches, _options):
-            yield from ahead(column_batches(path, names, batches))
+            yield from ahead(column_batches(path, names, batches, texts))
         return
     with damage_told(path, "Arrow"), path.open("rb", buffering=0) as raw:
         packed = _compression(path, True) is not None
-        if not packed:
+        if not packed and not set(names) & set(texts):
             placed = _placed(path, names, stretch)
             if placed:
                 for found in placed:
                     yield from found.read(raw, stretch.part, stretch.parts)
                 return
         with _library(path, names, packed) as file:
-            batches = (stretch.of(file.get_batch(i).select(names)) for i in stretch.batches)
-            yield from column_batches(path, names, _cut(map(_valid, batches)))
+            tops = top_names(file.schema, names)
+            batches = (stretch.of(file.get_batch(i).select(tops)) for i in stretch.batches)
+            yield from column_batches(path, names, _cut(map(_valid, batches)), texts)
 
 
 def _placed(path: Path, names: Sequence[str], stretch: BatchRange) -> list[PlacedBatch]:
     """Where the columns of its batches lie; none where pyarrow has to look at one of them."""
     with pa.memory_map(str(path), "r") as mapped:
         file = pa.ipc.open_file(mapped)
+        if not set(names) <= set(file.schema.names):
+            return []
         found = [placed_batch(mapped, file.get_batch(i), names) for i in stretch.batches]
     return [] if None in found else [batch for batch in found if batch is not None]
 
@@ -129,7 +134,7 @@ def _library(path: Path, names: Sequence[str], packed: bool) -> Iterator[pa.Reco
         return
     with pa.OSFile(str(path)) as source:
         schema = pa.ipc.open_file(source).schema
-        wanted = [schema.get_field_index(name) for name in names]
+        wanted = [schema.get_field_index(name) for name in top_names(schema, names)]
         only = pa.ipc.IpcReadOptions(included_fields=wanted, use_threads=False)
         yield pa.ipc.open_file(source, options=only)
 
@@ -145,7 +150,8 @@ def copy(
     """Write ``target`` with the corrected columns; see `format.FormatModule`."""
     digest = ArrowDigest()
     with _opened(source) as (schema, batches, options):
-        channels = choose(schema.names)
+        elements = element_names(schema, lambda name: 0)
+        channels = choose(list(dict.fromkeys([*schema.names, *elements])))
         enlarged = corrected_schema(schema, channels, source)
         new = pa.ipc.new_file if _is_file(source) else pa.ipc.new_stream
         size = max(source.stat().st_size, 1)

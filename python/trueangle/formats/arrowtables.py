@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import re
 import zlib
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -22,13 +23,21 @@ __all__ = [
     "column_batches",
     "corrected_schema",
     "dtype_of",
+    "element_names",
     "labels",
     "numbers",
+    "taken",
+    "top_names",
     "values_of",
 ]
 
 #: Key of the schema's metadata under which the provenance is kept.
 METADATA_KEY = b"trueangle"
+#: Times count from 2000: a later start keeps more digits of a second.
+_STAMP, _EPOCH = pa.timestamp("us"), 946684800.0
+#: An element of a column of lists, and how many of them are columns, at most.
+_ELEMENT = re.compile(r"(.+)\[(\d+)\]", re.DOTALL)
+_MOST = 256
 
 
 def numbers(path: object, name: str, column: pa.Array | pa.ChunkedArray) -> NDArray[Any]:
@@ -37,7 +46,7 @@ def numbers(path: object, name: str, column: pa.Array | pa.ChunkedArray) -> NDAr
     Raises
     ------
     FileError
-        The column holds no numbers.
+        The column holds neither numbers nor times, which are seconds since 2000.
     """
     if isinstance(column, pa.ChunkedArray):
         column = column.chunk(0) if column.num_chunks == 1 else column.combine_chunks()
@@ -51,9 +60,52 @@ def numbers(path: object, name: str, column: pa.Array | pa.ChunkedArray) -> NDAr
         column = column.cast(pa.float32())
     elif pa.types.is_decimal(kind):
         column = column.cast(pa.float64())
+    elif pa.types.is_boolean(kind):
+        column = column.cast(pa.uint8())
+    elif pa.types.is_timestamp(kind) or pa.types.is_date(kind):
+        return values_of(column.cast(_STAMP).cast(pa.int64())) * 1e-6 - _EPOCH
     elif not (pa.types.is_integer(kind) or pa.types.is_floating(kind)):
         raise FileError(path, f"numbers are needed, the column holds {kind}", column=name)
     return values_of(column)
+
+
+def element_names(schema: pa.Schema, first: Callable[[str], int]) -> list[str]:
+    """Columns of numbers and texts, elements of columns of lists as ``state[3]``.
+
+    ``first`` tells the length of the first list of a column whose lists may differ in length.
+    """
+    found: list[str] = []
+    for field in schema:
+        kind = field.type
+        if not _is_list(kind) or pa.types.is_map(kind):
+            found.append(field.name)
+        elif pa.types.is_integer(kind.value_type) or pa.types.is_floating(kind.value_type):
+            fixed = pa.types.is_fixed_size_list(kind)
+            size = kind.list_size if fixed else first(field.name)
+            found += [f"{field.name}[{i}]" for i in range(min(size, _MOST))]
+    return found
+
+
+def top_names(schema: pa.Schema, names: Iterable[str]) -> list[str]:
+    """The columns that hold some columns and elements, each once."""
+    return list(dict.fromkeys(_top(schema, name)[0] for name in names))
+
+
+def taken(table: Any, name: str) -> Any:
+    """A column of a table or record batch, or an element of one of lists.
+
+    Raises
+    ------
+    pyarrow.ArrowInvalid
+        A list is too short.
+    """
+    top, element = _top(table.schema, name)
+    return table[top] if element is None else pc.list_element(table[top], element)
+
+
+def _top(schema: pa.Schema, name: str) -> tuple[str, int | None]:
+    found = None if name in schema.names else _ELEMENT.fullmatch(name)
+    return (name, None) if found is None else (found[1], int(found[2]))
 
 
 def dtype_of(kind: pa.DataType) -> np.dtype[Any]:
@@ -82,7 +134,10 @@ def values_of(column: pa.Array) -> NDArray[Any]:
 def corrected_schema(schema: pa.Schema, channels: Sequence[Addition], path: object) -> pa.Schema:
     """``schema`` with the corrected columns and the note of how they were made."""
     for channel in channels:
-        kind = schema.field(channel.column).type
+        top, element = _top(schema, channel.column)
+        kind = schema.field(top).type
+        if element is not None:
+            kind = kind.value_type
         if pa.types.is_dictionary(kind):
             kind = kind.value_type
         single = pa.types.is_float16(kind) or pa.types.is_float32(kind)
@@ -97,9 +152,10 @@ def add_corrected(path: object, table: Any, channels: Sequence[Addition], schema
     """
     columns = list(table.columns)
     for channel in channels:
-        column = table[channel.column]
+        column = taken(table, channel.column)
         signals = {
-            signal: numbers(path, name, table[name]) for signal, name in channel.signals.items()
+            signal: numbers(path, name, taken(table, name))
+            for signal, name in channel.signals.items()
         }
         corrected = channel.correct(numbers(path, channel.column, column), signals)
         missing = None
@@ -207,15 +263,18 @@ def _is_list(kind: pa.DataType) -> bool:
     )
 
 
-def column_batches(path: object, names: Sequence[str], batches: Iterable[Any]) -> Iterator[Batch]:
-    """Some columns of record batches: numbers as arrays, texts as labels."""
+def column_batches(
+    path: object, names: Sequence[str], batches: Iterable[Any], texts: Collection[str] = ()
+) -> Iterator[Batch]:
+    """Some columns of record batches: numbers as arrays, texts and times asked for as labels."""
     for batch in batches:
-        yield {
-            name: labels(batch[name])
-            if _is_label(batch[name].type)
-            else numbers(path, name, batch[name])
-            for name in names
-        }
+        yield {name: _values(path, name, taken(batch, name), name in texts) for name in names}
+
+
+def _values(path: object, name: str, column: Any, as_text: bool) -> Any:
+    if as_text and pa.types.is_timestamp(column.type):
+        column = column.cast(pa.string())
+    return labels(column) if _is_label(column.type) else numbers(path, name, column)
 
 
 def labels(column: pa.Array | pa.ChunkedArray) -> Labels:

@@ -1,6 +1,8 @@
 """EPICS logs as ``camonitor`` prints them: a process variable, its time stamp and its value a line.
 
 A row is one line: the time, the value of the variable that changed, and nothing of the others.
+Variables of texts (states, names) may stand between; waveforms and enumerations begin with their
+number.
 """
 
 from __future__ import annotations
@@ -13,6 +15,7 @@ import numpy as np
 
 from ..errors import FileError
 from .budget import Extent, text_extent
+from .csvheader import number as read_number
 from .format import TEXTS, Batch, Choose, Contents, Watch
 
 __all__ = ["LINE", "columns", "contents", "copy", "extent", "read"]
@@ -29,11 +32,11 @@ _EPOCH = np.datetime64("2000-01-01T00:00:00", "ns")
 
 
 def columns(path: Path, topic: str | None = None) -> list[str]:
-    """The time and the process variables, in the order in which they come."""
-    names: dict[str, None] = {}
-    for name, _stamp, _value in _lines(path):
-        names.setdefault(name)
-    return [_TIME, *names]
+    """The time and the variables that begin with a number, in the order in which they come."""
+    names: dict[str, bool] = {}
+    for name, _stamp, value, _line in _lines(path):
+        names.setdefault(name, isinstance(value, float))
+    return [_TIME, *(name for name, is_number in names.items() if is_number)]
 
 
 def read(
@@ -46,10 +49,14 @@ def read(
     strict: bool = False,
 ) -> Iterator[Batch]:
     """Columns in batches, NaN where another variable changed; see `format.FormatModule`."""
-    lines = _lines(path)
+    lines = (line for line in _lines(path) if line[0] in names or names == [_TIME])
     while block := [line for _, line in zip(range(_BLOCK), lines, strict=False)]:
-        found, stamps, values = zip(*block, strict=True)
-        number = np.array(values)
+        found, stamps, values, places = zip(*block, strict=True)
+        bad = next((i for i, value in enumerate(values) if isinstance(value, str)), None)
+        if bad is not None and found[bad] in names:
+            problem = f"a number is needed, got {values[bad][:60]!r}"
+            raise FileError(path, problem, line=places[bad], column=found[bad])
+        number = np.array([np.nan if isinstance(value, str) else value for value in values])
         name_of = np.array(found, dtype=object)
         times = (np.array(stamps, dtype="datetime64[ns]") - _EPOCH) / np.timedelta64(1, "s")
         yield {
@@ -84,8 +91,8 @@ def contents(path: Path, topic: str | None = None) -> Contents:
     return Contents(sum(1 for _ in _lines(path)), {})
 
 
-def _lines(path: Path) -> Iterator[tuple[str, str, float]]:
-    """Variable, time stamp and value of every reading; blank lines and those of a lost one pass."""
+def _lines(path: Path) -> Iterator[tuple[str, str, float | str, int]]:
+    """Variable, time stamp, value and number of every line; blank and lost ones pass."""
     with path.open("rb") as file:
         number = 0
         while line := file.readline(_LONGEST):
@@ -95,10 +102,11 @@ def _lines(path: Path) -> Iterator[tuple[str, str, float]]:
             found = LINE.match(line)
             try:
                 name, date, clock, text = (part.decode() for part in found.groups())  # type: ignore[union-attr]
-                value, stamp = float(text), f"{date}T{clock}"
+                stamp = f"{date}T{clock}"
                 np.datetime64(stamp)
             except (AttributeError, ValueError):
                 got = line.decode("utf-8", "replace").strip()[:60]
-                problem = f"a variable, date, time and number are needed, got {got!r}"
+                problem = f"a variable, date, time and value are needed, got {got!r}"
                 raise FileError(path, problem, line=number) from None
-            yield name, stamp, value
+            plain = read_number(text, ".")
+            yield name, stamp, text if plain is None else plain, number

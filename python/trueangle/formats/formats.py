@@ -13,6 +13,13 @@ __all__ = ["FORMATS", "find_format", "format_of_content", "known_format"]
 
 #: A process variable and a date, as camonitor begins a line.
 _CAMONITOR = rb"\A\S+\s+\d{4}-\d\d-\d\d \d\d:\d\d:\d\d"
+#: Type, rows, columns, imaginary part, length of the name, of either order of bytes.
+_MATLAB4 = (
+    rb"\A(?s:[\x00-\x33]\0\0\0.{8}[\0\1]\0\0\0.\0\0\0"
+    rb"|\0\0[\x03\x04].{9}\0\0\0[\0\1]\0\0\0.)"
+)
+#: The first line of PHD2, and of what writes its logs too.
+_GUIDING = rb"\A[^\n]*PHD2 (?:log )?version|^(?:Guiding|Calibration) Begins at \d{4}-"
 #: A name and a number, and the same name again some lines later.
 _NAMED = rb"(?:[\d:.]+ *-> *)?[ \t]*%s[ \t]*[:=][ \t]*[-+]?\.?\d"
 _SERIAL = b"^%s[^\n]*\n(?:[^\n]*\n){0,5}?%s" % (_NAMED % rb"([A-Za-z_]\w*)", _NAMED % rb"\1")
@@ -32,6 +39,7 @@ FORMATS = (
         magics=(b"\x89HDF\r\n\x1a\n", b"MATLAB 7.3"),
     ),
     Format("matlab", {"MATLAB": (".mat",)}, "matlab", magics=(b"MATLAB 5.0",)),
+    Format("matlab4", {"MATLAB": (".mat",)}, pattern=_MATLAB4),
     Format(
         "rosbag",
         {"a ROS bag": (".bag",), "a ROS 2 bag": (".db3",), "MCAP": (".mcap",)},
@@ -40,9 +48,11 @@ FORMATS = (
         magics=(b"#ROSBAG", b"SQLite format 3", b"\x89MCAP"),
     ),
     Format("mdf", {"MDF4": (".mf4", ".mdf")}, "mdf", magics=(b"MDF     ", b"UnFinMF ")),
+    Format("wpilog", {"a data log of WPILib": (".wpilog",)}, magics=(b"WPILOG",)),
     Format("npy", {"numpy": (".npy",)}, magics=(b"\x93NUMPY",)),
     Format("npz", {"numpy": (".npz",)}, magics=(b"PK\x03\x04",)),
     Format("camonitor", {"EPICS": (".camonitor",)}, pattern=_CAMONITOR),
+    Format("guidelog", {"a guide log": ()}, pattern=_GUIDING),
     Format("seriallog", {"a serial log": ()}, pattern=_SERIAL),
     Format("csvfile", {"CSV": (".csv",), "tab-separated text": (".tsv", ".tab"), "": (".txt",)}),
 )

@@ -19,6 +19,8 @@ from .arrowtables import (
     add_corrected,
     column_batches,
     corrected_schema,
+    element_names,
+    top_names,
 )
 from .budget import Extent
 from .damage import damage_told
@@ -46,9 +48,9 @@ class RowGroupRange(NamedTuple):
 
 
 def columns(path: Path, topic: str | None = None) -> list[str]:
-    """Names of the top columns."""
+    """Names of the top columns, elements of lists as ``state[3]``."""
     with _opened(path) as file:
-        return list(file.schema_arrow.names)
+        return element_names(file.schema_arrow, lambda name: _first_length(file, name))
 
 
 def extent(path: Path, names: Sequence[str] = (), topic: str | None = None) -> Extent:
@@ -86,22 +88,31 @@ def read(
 
     A stretch is read from mapped memory, by the calling thread alone.
     """
+    tops = [name for name in names if "[" not in name]  # elements of lists are no columns
     if stretch is None:
-        with _opened(path, read_dictionary=list(names)) as file:
-            yield from ahead(column_batches(path, names, _batches(file, names)))
+        with _opened(path, read_dictionary=tops) as file:
+            yield from ahead(column_batches(path, names, _batches(file, names), texts))
         return
-    mapped = {"metadata": stretch.footer, "memory_map": True, "read_dictionary": list(names)}
+    mapped = {"metadata": stretch.footer, "memory_map": True, "read_dictionary": tops}
     with _opened(path, **mapped) as file:
-        yield from column_batches(path, names, _batches(file, names, stretch.groups))
+        yield from column_batches(path, names, _batches(file, names, stretch.groups), texts)
 
 
 def _batches(
     file: pq.ParquetFile, names: Sequence[str], groups: list[int] | None = None
 ) -> Iterator[pa.RecordBatch]:
+    tops = top_names(file.schema_arrow, names)
     found: Iterator[pa.RecordBatch] = file.iter_batches(
-        _BATCH, row_groups=groups, columns=list(names), use_threads=False
+        _BATCH, row_groups=groups, columns=tops, use_threads=False
     )
     return found
+
+
+def _first_length(file: pq.ParquetFile, name: str) -> int:
+    """Elements of the first list of a column; 0 without."""
+    batch = next(file.iter_batches(1, columns=[name], use_threads=False), None)
+    length = None if not batch else pc.list_value_length(batch[name])[0].as_py()
+    return int(length or 0)
 
 
 def copy(
@@ -115,7 +126,8 @@ def copy(
     """Write ``target`` with the corrected columns; see `format.FormatModule`."""
     digest = ArrowDigest()
     with _whole(source) as (file, tables):
-        channels = choose(file.schema_arrow.names)
+        elements = element_names(file.schema_arrow, lambda name: _first_length(file, name))
+        channels = choose(list(dict.fromkeys([*file.schema_arrow.names, *elements])))
         schema = corrected_schema(file.schema_arrow, channels, source)
 
         def corrected() -> Iterator[pa.Table]:
@@ -239,9 +251,13 @@ def _chunks(
     """
     columns = None if name is None else [name]
     next(file.iter_batches(1, row_groups=[group], columns=columns, use_threads=False), None)
-    tops = [file.schema.column(i).path.partition(".")[0] for i in range(len(file.schema))]
+    paths = [file.schema.column(i).path for i in range(len(file.schema))]
     meta = file.metadata.row_group(group)
-    return [meta.column(i) for i, top in enumerate(tops) if name in (None, top)]
+    return [
+        meta.column(i)
+        for i, path in enumerate(paths)
+        if name is None or path == name or path.startswith(f"{name}.")
+    ]
 
 
 def _texts(schema: pa.Schema) -> list[str]:

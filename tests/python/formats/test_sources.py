@@ -107,13 +107,36 @@ def test_epics(together, tmp_path):
     assert abs(np.median(np.abs(off)) - 0.0125 * 9.0) < NOISE
 
 
+def test_epics_with_other_variables_between(tmp_path):
+    enc, ref = monitored("ENC", TIMES + 1e-3, READ), monitored("REF", TIMES, TRUE)
+    states = ("Idle", "Moving", "3 0.5 0.25 0.125", "")
+    start = datetime.datetime(2024, 11, 21, 23, 59, 30)
+    others = [
+        (start, f"IOC:m1.STAT {start:%Y-%m-%d %H:%M:%S.%f} {state} STATE MINOR\n")
+        for state in states
+    ]
+    lines = [line for _, line in sorted([*enc, *ref, *others])]
+    path = tmp_path / "both.txt"
+    path.write_text("".join(lines))
+    assert camonitor.columns(path) == ["time_s", "REF", "ENC"]
+    runs = tmp_path / "runs.csv"
+    wanted = pairs("a.indicated=ENC:deg", "b.reference=REF:deg")
+    command = ["join", str(path), str(path), "-o", str(runs), *wanted, "--offset", "0"]
+    assert main([*command, "--rate", "0"]) == 0
+    _, found = fitted(tmp_path, str(runs), "--orders", "1,2", "--nuisance", "velocity")
+    assert np.allclose(found, AMPLITUDES, atol=NOISE)
+
+
 def test_epics_that_is_damaged_or_to_be_corrected(tmp_path, capsys):
     path = tmp_path / "log.txt"
     good = next(monitored("PV", np.zeros(1), np.zeros(1)))[1]
-    for bad, told in ((" 0.00000", " open"), ("23:59:30", "25:61:30"), (" 2024-", " 2024")):
+    for bad, told in (("23:59:30", "25:61:30"), (" 2024-", " 2024")):
         path.write_text(good + good.replace(bad, told))
-        with pytest.raises(FileError, match=r"log.txt, line 2: a variable, date, time and number"):
+        with pytest.raises(FileError, match=r"log.txt, line 2: a variable, date, time and value"):
             list(camonitor.read(path, ["PV"]))
+    path.write_text(good + good.replace(" 0.00000", " open"))
+    with pytest.raises(FileError, match=r"line 2, column 'PV': a number is needed, got 'open'"):
+        list(camonitor.read(path, ["PV"]))
     path = tmp_path / "log.camonitor"
     path.write_text(good * 3)
     model = ta.HarmonicModel([ta.Shaft("output", 1, [1], [0.1], [0.0])], period=360.0)

@@ -1,0 +1,150 @@
+"""Guide logs of PHD2: a mount is simulated with its guiding, and its worm found again."""
+
+import numpy as np
+import pytest
+
+import trueangle as ta
+from trueangle.cli import main
+from trueangle.errors import FileError, MessageLinesWarning
+from trueangle.formats.guidelog import SIDEREAL
+
+SEED = 44
+WORMS, AMPLITUDES = 144, (9.0, 2.5)  # arcsec, once and twice a turn of the worm
+SCALE, DECLINATION, RATE, ANGLE = 1.5, 40.0, 3.75, 30.0
+NAMES = (
+    "Frame,Time,mount,dx,dy,RARawDistance,DECRawDistance,RAGuideDistance,DECGuideDistance,"
+    "RADuration,RADirection,DECDuration,DECDirection,XStep,YStep,StarMass,SNR,ErrorCode"
+)
+
+
+def error(seconds):
+    """Of the axis, in arcsec: commanded less true angle."""
+    turns = np.radians(WORMS * SIDEREAL * seconds)
+    return AMPLITUDES[0] * np.sin(turns) + AMPLITUDES[1] * np.cos(2.0 * turns)
+
+
+def header(clock, more=""):
+    return [
+        f"Guiding Begins at {clock}",
+        "Equipment Profile = Rig",
+        "Dither = both axes, Dither scale = 1.000",
+        f"Pixel scale = {SCALE:.2f} arc-sec/px, Binning = 1, Focal length = 500 mm",
+        "Camera = Test",
+        f"Mount = EQ, connected, guiding enabled, xAngle = {ANGLE}, xRate = {RATE:.3f}, "
+        "yAngle = 120.0, yRate = 4.900, parity = +/+",
+        "RA Guide Speed = 7.5 a-s/s, Dec Guide Speed = 7.5 a-s/s, Cal Dec = 20.0",
+        f"RA = 5.00 hr, Dec = {DECLINATION} deg, Hour angle = 1.00 hr, Pier side = East",
+        "Lock position = 500.000, 400.000, Star position = 500.1, 400.2, HFD = 2.5 px",
+        NAMES,
+    ]
+
+
+def guided(begin, clock, frames, rng, step=2.0, dithers=()):
+    """Lines of a section: what a camera sees while pulses keep the star in its place."""
+    lines, moved, lock = header(clock), 0.0, np.array([500.0, 400.0])
+    cosine, settling = np.cos(np.radians(DECLINATION)), 0
+    start = None
+    for k in range(1, frames + 1):
+        if k in dithers:
+            shift = np.array(dithers[k])
+            lock = lock + shift
+            a = np.radians(ANGLE)
+            moved -= shift @ (np.cos(a), np.sin(a))
+            lines += [
+                f"INFO: DITHER by {shift[0]:.3f}, {shift[1]:.3f}, "
+                f"new lock pos = {lock[0]:.3f}, {lock[1]:.3f}",
+                "INFO: SETTLING STATE CHANGE, Settling started",
+            ]
+            settling = 6
+        if k % 97 == 0:
+            lines.append(f'{k},{step * k:.3f},"DROP",,,,,,,,,,,,,11,1.20,2,"Star lost - low SNR"')
+            continue
+        lag = error(begin + step * k) * cosine / SCALE
+        start = lag if start is None else start
+        raw = lag - start + moved + rng.normal(0.0, 0.02)
+        pulse = round(0.7 * abs(raw) / RATE * 1000.0)
+        west = raw > 0.0
+        lines.append(
+            f'{k},{step * k:.3f},"Mount",0.1,0.2,{raw:.3f},0.010,{0.7 * raw:.3f},0.000,'
+            f"{pulse},{'W' if west else 'E'},0,,,,12345,45.67,0"
+        )
+        moved -= (1.0 if west else -1.0) * RATE * pulse / 1000.0
+        if settling:
+            settling -= 1
+            if not settling:
+                lines.append("INFO: SETTLING STATE CHANGE, Settling complete")
+    return [*lines, f"Guiding Ends at {clock}", ""]
+
+
+def night():
+    rng = np.random.default_rng(SEED)
+    return [
+        "PHD2 version 2.6.13 [Linux], Log version 2.5. Log enabled at 2026-11-20 22:00:00",
+        "",
+        "Calibration Begins at 2026-11-20 22:00:30",
+        "Pixel scale = 1.50 arc-sec/px, Binning = 1, Focal length = 500 mm",
+        "Direction,Step,dx,dy,x,y,Dist",
+        "West,0,0.000,0.000,500.0,400.0,0.000",
+        "Calibration complete, mount = EQ.",
+        "",
+        *guided(0.0, "2026-11-20 22:10:00", 700, rng, dithers={300: (1.2, -0.7), 500: (-2.0, 0.4)}),
+        *guided(1800.0, "2026-11-20 22:40:00", 800, rng, dithers={400: (0.5, 2.5)}),
+        "Log closed at 2026-11-20 23:10:00",
+    ]
+
+
+def written(folder, lines):
+    path = folder / "PHD2_GuideLog_2026-11-20_220000.txt"
+    path.write_text("\n".join(lines) + "\n")
+    return path
+
+
+@pytest.fixture
+def log(tmp_path):
+    return written(tmp_path, night())
+
+
+def test_guiding_dithers_and_lost_stars_are_taken_out(log):
+    with pytest.warns(MessageLinesWarning, match="15 frames without a star and 18 while the guid"):
+        first, second = ta.read_runs(log)
+    assert [len(first), len(second)] == [700 - 7 - 12, 800 - 8 - 6]
+    assert (first.label, first.when) == ("1", "2026-11-20T22:10:00")
+    assert second.time[0] == 1802.0
+    for run in (first, second):
+        np.testing.assert_allclose(run.indicated, SIDEREAL * run.time, rtol=1e-12)
+        off = 3600.0 * run.error - error(run.time)
+        # The noise of a frame, its rounding, and nothing that grows with the pulses.
+        assert np.std(off) < 1.3 * 0.02 * SCALE / np.cos(np.radians(DECLINATION))
+
+
+@pytest.mark.filterwarnings("ignore::trueangle.errors.MessageLinesWarning")
+def test_a_worm_is_found_by_one_command(log, tmp_path, capsys):
+    model = tmp_path / "mount.json"
+    command = ["fit", str(log), "-o", str(model), "--shaft", "worm=144", "--orders", "worm:1,2"]
+    assert main(command) == 0
+    (shaft,) = [s for s in ta.load_model(model).shafts if s.name == "worm"]
+    found = 3600.0 * np.hypot(shaft.cosine, shaft.sine)
+    np.testing.assert_allclose(found, AMPLITUDES, atol=0.02)
+    capsys.readouterr()
+    out = str(tmp_path / "out.txt")
+    assert main(["correct", str(log), "-m", str(model), "-o", out]) == 1
+    assert "trueangle export" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("line", "other", "told"),
+    [
+        ("Pixel scale = 1.50 arc-sec/px, B", "B", r"line 18: the guiding that begins at line 9 "),
+        (f"Dec = {DECLINATION} deg", "Dec = Unknown", "states no declination"),
+        ("xRate = 3.750", "xRate = none", "states no guide rate"),
+        ('"Mount",0.1', '"AO",0.1', "line 19, column 'mount': frames of .* are not read"),
+        ("RARawDistance,", "RawDistance,", "line 18: frames have no column RARawDistance"),
+        ("2026-11-20 22:10:00", "2026-13-20 22:10:00", "line 9: no date and time"),
+    ],
+)
+def test_what_is_missing_is_told_by_its_line(line, other, told, tmp_path):
+    lines = night()
+    text = "\n".join(lines[:8]) + "\n" + "\n".join(lines[8:]).replace(line, other)
+    path = written(tmp_path, text.split("\n"))
+    with pytest.raises(FileError, match=told):
+        ta.read_runs(path)

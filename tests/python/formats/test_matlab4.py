@@ -1,0 +1,86 @@
+"""MATLAB 4 files, written by scipy, of either order of bytes."""
+
+import struct
+
+import numpy as np
+import pytest
+
+import trueangle as ta
+from trueangle.errors import FileError
+from trueangle.formats.formats import find_format
+
+TRUE = np.linspace(0.0, 357.0, 120)
+READ = TRUE + 0.5 * np.sin(np.radians(TRUE))
+MODEL = ta.HarmonicModel([ta.Shaft("output", 1, [1], [0.0], [0.5])], 0.0, 360.0)
+
+
+def written(path, **more):
+    io = pytest.importorskip("scipy.io")
+    kept = {"reference_deg": TRUE, "indicated_deg": READ, **more}
+    io.savemat(path, kept, format="4", oned_as="column")
+    return path
+
+
+def swapped(path):
+    """The same file as a machine of the other order of bytes writes it."""
+    data, parts, place = path.read_bytes(), [], 0
+    while place < len(data):
+        code, rows, width, imaginary, length = struct.unpack_from("<5i", data, place)
+        size = rows * width * (1 + imaginary)
+        parts.append(struct.pack(">5i", code + 1000, rows, width, imaginary, length))
+        begin = place + 20 + length
+        parts.append(data[place + 20 : begin])
+        kind = np.dtype("<" + ("f8", "f4", "i4", "i2", "u2", "u1")[code // 10 % 10])
+        parts.append(np.frombuffer(data, kind, size, begin).astype(kind.newbyteorder()).tobytes())
+        place = begin + size * kind.itemsize
+    path.write_bytes(b"".join(parts))
+
+
+@pytest.mark.parametrize("other_order", [False, True])
+def test_vectors_are_read_and_corrected(other_order, tmp_path):
+    io = pytest.importorskip("scipy.io")
+    more = {
+        "x": np.arange(120, dtype=np.int16),
+        "note": "cold",
+        "square": np.eye(3),
+        "z": READ * 1j,
+        "f": READ.astype(np.float32),
+    }
+    path = written(tmp_path / "rig.mat", **more)
+    if other_order:
+        swapped(path)
+    assert find_format(path).module_name == "matlab4"
+    (run,) = ta.read_runs(path)
+    np.testing.assert_array_equal(run.indicated, READ)
+    np.testing.assert_array_equal(run.columns["x"], np.arange(120))
+    assert not {"note", "square", "z"} & run.columns.keys()
+    report = ta.correct_logs(path, MODEL, tmp_path / "out.mat")
+    assert report.is_done, report.logs[0].error
+    after = (tmp_path / "out.mat").read_bytes()
+    assert after.startswith(path.read_bytes())
+    if not other_order:  # scipy reads files of one order only
+        found = io.loadmat(tmp_path / "out.mat")
+        np.testing.assert_array_equal(found["corrected_deg"].ravel(), MODEL.correct(READ))
+        assert '"column": "corrected_deg"' in found["trueangle_note"][0]
+    report = ta.correct_logs(tmp_path / "out.mat", MODEL, tmp_path / "again.mat")
+    assert "corrected before" in str(report.logs[0].error)
+
+
+def test_what_is_damaged_or_not_read_is_told(tmp_path):
+    io = pytest.importorskip("scipy.io")
+    sparse = pytest.importorskip("scipy.sparse")
+    path = written(tmp_path / "rig.mat")
+    whole = path.read_bytes()
+    path.write_bytes(whole[:-100])
+    with pytest.raises(FileError, match=r"column 'indicated_deg': is shorter than its header"):
+        ta.read_runs(path)
+    path.write_bytes(whole + whole[:7])
+    with pytest.raises(FileError, match="has no header"):
+        ta.read_runs(path)
+    io.savemat(path, {"a": TRUE[:, None], "s": sparse.eye_array(3).tocoo()}, format="4")
+    with pytest.raises(FileError, match="no full one of numbers or text of MATLAB 4"):
+        ta.read_runs(path)
+    written(path)
+    io.savemat(path, {"reference_deg": TRUE, "indicated_deg": READ[:-1]}, format="4")
+    with pytest.raises(FileError, match="differ in length: reference_deg 120, indicated_deg 119"):
+        ta.read_runs(path)

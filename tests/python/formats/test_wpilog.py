@@ -1,0 +1,111 @@
+"""Data logs of FRC robots, byte by byte as the specification has them."""
+
+import struct
+
+import numpy as np
+import pytest
+
+import trueangle as ta
+from trueangle.cli import main
+from trueangle.errors import FileError
+from trueangle.formats import wpilog
+
+ROWS = 200
+TRUE = np.linspace(0.0, 2.0 * np.pi, ROWS)
+READ = TRUE + 0.01 * np.sin(TRUE)
+MODEL = ta.HarmonicModel([ta.Shaft("output", 1, [1], [0.0], [0.01])])
+SIGNALS = {"reference": ("/arm/laser", "rad"), "indicated": ("/arm/angles[1]", "rad")}
+#: What the specification shows: an entry `test` is started, is 3, and is finished, at 1 s.
+EXAMPLE = bytes.fromhex(
+    "5750494c4f47000100000000"
+    "20001a40420f0001000000040000007465737405000000696e74363400000000"
+    "20010840420f0300000000000000"
+    "20000540420f0101000000"
+)
+
+
+def started(number, name, kind):
+    texts = [text.encode() for text in (name, kind, "")]
+    return (
+        bytes([0])
+        + struct.pack("<I", number)
+        + b"".join(struct.pack("<I", len(text)) + text for text in texts)
+    )
+
+
+def record(number, time, payload):
+    """With fields of full length, as the format allows."""
+    return struct.pack("<BIIq", 0x7F, number, len(payload), time) + payload
+
+
+def written(path, apart=0):
+    parts = [b"WPILOG\x00\x01" + struct.pack("<I", 5) + b"hello"]
+    entries = [("/arm/laser", "double"), ("/arm/angles", "float[]"), ("say", "string")]
+    parts += [record(0, 0, started(i + 1, *entry)) for i, entry in enumerate(entries)]
+    for i, (true, read) in enumerate(zip(TRUE.tolist(), READ.tolist(), strict=True)):
+        time = 1_000_000 + 20_000 * i
+        parts.append(record(1, time, struct.pack("<d", true)))
+        parts.append(record(3, time, b"tick"))
+        parts.append(record(2, time + apart, struct.pack("<2f", 0.0, read)))
+    path.write_bytes(b"".join(parts))
+    return path
+
+
+def test_the_example_of_the_specification(tmp_path):
+    path = tmp_path / "a.wpilog"
+    path.write_bytes(EXAMPLE)
+    assert wpilog.columns(path) == ["time_s", "test"]
+    (batch,) = wpilog.read(path, ["time_s", "test"])
+    assert (batch["time_s"].tolist(), batch["test"].tolist()) == ([1.0], [3.0])
+    assert wpilog._record(1, 1_000_000, struct.pack("<q", 3)) == EXAMPLE[44:58]
+
+
+def test_entries_of_one_loop_are_runs(tmp_path):
+    path = written(tmp_path / "a.wpilog")
+    assert wpilog.columns(path) == ["time_s", "/arm/laser", "/arm/angles[0]", "/arm/angles[1]"]
+    (run,) = ta.read_runs(path, signals=SIGNALS)
+    np.testing.assert_array_equal(run.reference, TRUE)
+    np.testing.assert_array_equal(run.indicated, READ.astype(np.float32))
+    np.testing.assert_allclose(run.time, 1.0 + 0.02 * np.arange(ROWS))
+
+
+def test_entries_with_times_of_their_own_are_joined(tmp_path, capsys):
+    path = str(written(tmp_path / "a.wpilog", apart=37))
+    command = ["join", path, path, "-o", str(tmp_path / "runs.csv"), "--offset", "0", "--rate", "0"]
+    command += ["--signal", "a.indicated=/arm/angles[1]:rad"]
+    command += ["--signal", "b.reference=/arm/laser:rad"]
+    assert main(command) == 0
+    (run,) = ta.read_runs(tmp_path / "runs.csv")
+    assert len(run) >= ROWS - 2
+    assert np.abs(run.error).max() < 1.01 * np.degrees(0.01)
+
+
+def test_a_copy_gets_an_entry_and_keeps_its_bytes(tmp_path):
+    path = written(tmp_path / "a.wpilog")
+    wanted = {"indicated": SIGNALS["indicated"]}
+    report = ta.correct_logs(path, MODEL, tmp_path / "out.wpilog", signals=wanted)
+    assert report.is_done, report.logs[0].error
+    assert (tmp_path / "out.wpilog").read_bytes().startswith(path.read_bytes())
+    found = {**SIGNALS, "indicated": ("/arm/corrected_rad", "rad")}
+    (run,) = ta.read_runs(tmp_path / "out.wpilog", signals=found)
+    read = READ.astype(np.float32).astype(float)
+    np.testing.assert_array_equal(run.indicated, MODEL.correct(read))
+    again = ta.correct_logs(tmp_path / "out.wpilog", MODEL, tmp_path / "x.wpilog", signals=wanted)
+    assert "corrected before" in str(again.logs[0].error)
+
+
+@pytest.mark.parametrize(
+    ("data", "told"),
+    [
+        (EXAMPLE[:-1], "record at byte 58 goes beyond its end"),
+        (EXAMPLE[:6] + b"\x00\x02" + EXAMPLE[8:], "version 2.0; version 1 is read"),
+        (EXAMPLE[:44] + b"\x20\x02" + EXAMPLE[46:], "byte 44 is of an entry never started"),
+        (EXAMPLE[:10], "is no data log"),
+        (EXAMPLE.replace(b"\x04\x00\x00\x00test", b"\xff\x00\x00\x00test"), "byte 12 is cut short"),
+    ],
+)
+def test_damage_is_told_by_its_byte(data, told, tmp_path):
+    path = tmp_path / "a.wpilog"
+    path.write_bytes(data)
+    with pytest.raises(FileError, match=told):
+        ta.read_runs(path)
