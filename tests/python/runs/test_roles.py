@@ -250,3 +250,22 @@ def test_quoted_patterns_are_expanded_by_every_command(command, tmp_path, capsys
     assert main([command, "log*.csv", *more]) == 0
     assert main([command, "nothing*.csv", *more]) == 1
     assert "nothing*.csv: no file matches this pattern" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    "name", ["ac_arcsec", "Autocollimator", "deviation [arcmin]", "x (arcsec)"]
+)
+def test_check_sees_a_deviation_that_nobody_has_asked_for(name, tmp_path, capsys):
+    columns = {"reference_deg": NOMINAL, "indicated_deg": READ, name: ERROR, "speed": NOMINAL}
+    path = saved(tmp_path / "runs.csv", **columns)
+
+    def told(**reading):
+        found = ta.check(path, **reading)
+        return [e for e in found.cannot if "nominal" in e["what"]]
+
+    (entry,) = told()
+    assert name in entry["because"]
+    assert main(["check", str(path)]) == 0
+    assert "the role reference_offset" in " ".join(capsys.readouterr().out.split())
+    assert not told(signals={"reference_offset": (name, "arcsec")})
+    assert not told(signals={"torque": name})

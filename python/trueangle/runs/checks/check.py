@@ -78,6 +78,14 @@ def check(data: Any, **reading: Unpack[Reading]) -> Check:
     extent = extent_of(records)
     ratio = ratio_of(records)
     can, cannot = verdicts(extent)
+    unused = sorted({name for record in records for name in record.deviations})
+    if unused:
+        entry = {
+            "what": "the true angle where the reference is nominal (a polygon)",
+            "because": f"column '{unused[0]}' is not used",
+            "measure": "nothing anew: give it the role reference_offset",
+        }
+        cannot.append(entry)
     return Check(
         tuple(faults_of(records)),
         ratio,

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from typing import Any
 
+from ...formats.columns import offsets_of, unit_in_name
 from ..files import read_columns
+from ..readings import Readings
 from ..source import checked_reading
 from .record import Record
 
@@ -39,6 +42,24 @@ def read_records(data: Any, reading: Mapping[str, Any]) -> list[Record]:
                     signals.get("torque"),
                     None if mount is None else mount * scale,
                     columns,
+                    _deviations(table.table),
                 )
             )
     return found
+
+
+def _deviations(table: Readings) -> tuple[str, ...]:
+    """Columns of numbers in small units of angles, or called so, that nothing was asked of."""
+    if offsets_of(table.roles):
+        return ()
+    used = {column.name for column in table.roles.values()}
+    return tuple(
+        name
+        for name, values in table.columns.items()
+        if name not in used and values.dtype != object and _is_deviation(name)
+    )
+
+
+def _is_deviation(name: str) -> bool:
+    small = unit_in_name(name, "reference_offset") in ("arcsec", "arcmin")
+    return small or re.search("deviation|autocoll", name, re.IGNORECASE) is not None

@@ -31,6 +31,8 @@ class Record:
         s, deg/s, Celsius, Nm, degrees.
     columns : mapping of role to (name, unit)
         The columns of the file that were understood.
+    deviations : tuple of str
+        Columns of no role that look like deviations from a nominal angle.
     """
 
     label: str
@@ -43,6 +45,7 @@ class Record:
     torque: Array | None = None
     mount: Array | None = None
     columns: Mapping[str, tuple[str, str | None]] = field(default_factory=dict)
+    deviations: tuple[str, ...] = ()
 
     def __len__(self) -> int:
         return int(self.reference.size)
