@@ -85,7 +85,7 @@ def _bash(parser: Parser) -> Iterator[str]:
             if argument.words:
                 cases = "|".join(f"{name}:{flag}" for flag in argument.flags)
                 words = shlex.quote(" ".join(argument.words))
-                yield f"    {cases}) compopt -o nospace"
+                yield f"    {cases}) compopt -o nospace 2>/dev/null"
                 yield f'      COMPREPLY=($(compgen -W {words} -- "$word")); return;;'
             elif argument.choices and argument.flags:
                 cases = "|".join(f"{name}:{flag}" for flag in argument.flags)

@@ -29,15 +29,15 @@ def parsed_time(text: str | None) -> datetime | None:
 
 
 def day_of(text: str | None) -> str:
-    """The day of a date and time, as its own zone counts it; a text that is none as it is.
+    """The day of a date and time, as its own zone counts it; nothing of what is none.
 
     Examples
     --------
     >>> day_of("2026-11-21 23:30+01:00"), day_of("spring")
-    ('2026-11-21', 'spring')
+    ('2026-11-21', '')
     """
     found = parsed_time(text)
-    return (text or "") if found is None else found.date().isoformat()
+    return "" if found is None else found.date().isoformat()
 
 
 def seconds_of(texts: Sequence[str | None]) -> tuple[NDArray[np.float64], int | None]:

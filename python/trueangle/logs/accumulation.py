@@ -273,7 +273,7 @@ def _accumulate(stretch: _LogPart, settings: LogFitSettings, advance: Advance) -
             block = slice(start, start + _BLOCK)
             for label, rows in _runs(columns, block):
                 own = folders | dict(zip(stretch.labels, label, strict=True))
-                day = [own["when"]] if "when" in own else []
+                day = [own.pop("when")] if own.get("when") else []
                 run = (found.files[0], *map(own.get, LABELS), *day)
                 x = np.ascontiguousarray(true[block][rows], dtype=np.float64)
                 y = np.ascontiguousarray(said[block][rows], dtype=np.float64)
@@ -300,9 +300,9 @@ def _accumulate(stretch: _LogPart, settings: LogFitSettings, advance: Advance) -
 
 
 def _days(column: Any) -> Any:
-    """The days of dates and times."""
+    """The days of dates and times; nothing of what is none."""
     if not isinstance(column, Labels):
-        return column
+        return Labels(np.zeros(len(column), dtype=np.intp), [""])
     days = row_labels([day_of(text) for text in column.names])
     return Labels(days.codes[column.codes], days.names)
 

@@ -318,6 +318,16 @@ def _groups(table: Readings, size: int) -> Groups:
     if not columns:
         return [(RunLabels(), np.arange(size))]
     days = {text: day_of(text) for text in set(columns.get("when", ()))}
+    if not all(days.values()):
+        row = next(i for i, text in enumerate(columns["when"]) if not days[text])
+        if table.roles["when"].is_asked:
+            got = repr(columns["when"][row])[:60]
+            problem = f"a date and time (ISO 8601) is needed, got {got}"
+            raise table.error(problem, table.roles["when"].name, row)
+        del columns["when"]  # a column of this name that holds something else
+        days = {}
+    if not columns:
+        return [(RunLabels(), np.arange(size))]
     keys = dict(columns)
     if days:
         keys["when"] = [days[text] for text in columns["when"]]

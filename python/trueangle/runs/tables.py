@@ -56,9 +56,13 @@ def table_readings(data: Any, name: str, wanted: Wanted) -> Readings | None:
         return None
     if not all(isinstance(column, str) for column in held):
         raise KindError(f"{name}: columns must have text for names, got {list(held)!r:.60}")
-    columns = {column: _values(values) for column, values in held.items()}
     path = Path(name)
-    roles = find_columns(path, list(columns), wanted)
+    roles = find_columns(path, list(held), wanted)
+    dated = roles["when"].name if "when" in roles else None
+    columns = {
+        column: _dates(values) if column == dated else _values(values)
+        for column, values in held.items()
+    }
     for column, values in columns.items():
         if values.ndim != 1 or values.size != next(iter(columns.values())).size:
             raise ArgumentError(
@@ -124,6 +128,14 @@ def _values(column: Any) -> NDArray[Any]:
     if any(missing) and all(m or _is_number(v) for m, v in zip(missing, objects, strict=False)):
         return np.array([np.nan if m else v for m, v in zip(missing, objects, strict=True)], float)
     return objects
+
+
+def _dates(column: Any) -> NDArray[Any]:
+    """Dates and times as ISO 8601 writes them; texts as they are."""
+    values = np.asarray(take_apart(column)[0])
+    if values.dtype.kind == "M":
+        return np.datetime_as_string(values, "us").astype(object)
+    return values.astype(object)
 
 
 def _is_missing(value: Any) -> bool:

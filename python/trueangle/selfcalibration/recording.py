@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import ArgumentError, FileError
-from ..formats.columns import Column, role_kind, signal_code
+from ..formats.columns import LABELS, Column, role_kind, signal_code
 from ..runs.readings import Readings
 from ..runs.run import CalibrationRun, Source, given_runs
 from ..runs.source import Reading, checked_reading, each_table
@@ -105,7 +105,7 @@ def _of_table(table: Readings, reading: Reading) -> list[Recording]:
             reading,
         )
         for role, column in table.roles.items()
-        if role not in _LABELS
+        if role not in LABELS
     }
     if not any(role in channels for role in ("indicated", "motor", "head1")):
         raise FileError(

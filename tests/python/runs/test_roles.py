@@ -269,3 +269,27 @@ def test_check_sees_a_deviation_that_nobody_has_asked_for(name, tmp_path, capsys
     assert "the role reference_offset" in " ".join(capsys.readouterr().out.split())
     assert not told(signals={"reference_offset": (name, "arcsec")})
     assert not told(signals={"torque": name})
+
+
+@pytest.mark.parametrize("kind", ["texts", "dates", "pandas"])
+def test_days_of_tables_in_memory(kind):
+    start = np.datetime64("2026-11-21T23:59", "us")
+    when = start + np.arange(ROWS) * np.timedelta64(4, "s")
+    table = {"when": when, "reference_deg": NOMINAL, "indicated_deg": READ}
+    if kind == "texts":
+        table["when"] = [str(stamp) for stamp in when]
+    if kind == "pandas":
+        table = pytest.importorskip("pandas").DataFrame(table)
+    runs = ta.read_runs(table)
+    assert [(len(run), run.when[:10]) for run in runs] == [(15, "2026-11-21"), (21, "2026-11-22")]
+
+
+def test_a_column_called_when_that_holds_no_dates(tmp_path):
+    columns = {"reference_deg": NOMINAL, "indicated_deg": READ}
+    for when in (np.arange(ROWS), ["early", "late"] * (ROWS // 2)):
+        path = saved(tmp_path / "a.csv", when=when, **columns)
+        (run,) = ta.read_runs(path)
+        assert run.when is None
+        assert np.allclose(each_door(path, tmp_path), (0.0, 20.0), atol=1e-6)
+        with pytest.raises(FileError, match=r"line 2, column 'when': a date and time \(ISO 8601\)"):
+            ta.read_runs(path, signals={"when": "when"})
