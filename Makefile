@@ -3,11 +3,13 @@
 PYTHON ?= .venv/bin/python
 
 .PHONY: check format lint types stub rust python docs bench develop aarch64 fuzz mutants sample
-.PHONY: nightly exam asan kills pythons readings
+.PHONY: nightly exam asan kills pythons readings chance
 
 # Damaged files for each loader, and loaders at a time: `make fuzz CASES=1000000 JOBS=2`.
 CASES ?= 20000
 JOBS ?= 1
+# Faults drawn by chance: hours by the hundred.
+COUNT ?= 400
 # `SAMPLE=--trust` where the tests have just passed.
 SAMPLE ?=
 
@@ -68,6 +70,9 @@ sample:             ## some of the planted faults; minutes
 mutants:            ## planted faults: each must be noticed by its tests; an hour or two
 	$(PYTHON) tests/mutants
 
+chance:             ## faults that nobody chose, in lines that tests reach; needs '.[faults]'
+	$(PYTHON) tests/mutants/chance.py --count $(COUNT)
+
 pythons:            ## the wheel tried on every Python that is to be had here
 	rm -rf target/tried
 	$(PYTHON) -m pip wheel --quiet --no-deps --wheel-dir target/tried .
@@ -84,7 +89,7 @@ asan:               ## tests of the core under AddressSanitizer, by the compiler
 	RUSTC_BOOTSTRAP=1 RUSTFLAGS="-Zsanitizer=address" CARGO_TARGET_DIR=target/asan \
 	cargo test --locked --tests --target $$(rustc -vV | sed -n 's/^host: //p')
 
-NIGHTLY = aarch64 asan pythons readings kills fuzz mutants exam
+NIGHTLY = aarch64 asan pythons readings kills fuzz mutants chance exam
 nightly: $(NIGHTLY) ## what takes hours; each has a job of its own in .github/workflows/nightly.yml
 
 bench:              ## benchmarks against a reference, in one run

@@ -93,7 +93,7 @@ class Copy:
         root = self.folder / "src" / "lib.rs"
         root.write_text(root.read_text(encoding="utf-8") + "pub mod planted;\n", encoding="utf-8")
         command = ["cargo", "build", "--release", "--locked", "-q", "--features", "python", "--lib"]
-        status, told = self._done(command, self._environment() | QUICK, BUILD)
+        status, told = self._done(command, self.environment() | QUICK, BUILD)
         if status != 0:
             return told[-3000:] or "the core was not built in time"
         ending = {"win32": "dll", "darwin": "dylib"}.get(sys.platform, "so")
@@ -106,7 +106,7 @@ class Copy:
     def run(self, tests: tuple[str, ...], more: Mapping[str, str] | None = None) -> Verdict:
         """Run some tests in the copy."""
         command = [sys.executable, "-m", "pytest", "-x", "-q", "-p", "no:cacheprovider", *tests]
-        status, told = self._done(command, self._environment() | dict(more or {}), self.seconds)
+        status, told = self._done(command, self.environment() | dict(more or {}), self.seconds)
         if status is None:
             return Verdict("killed", "(time is up)")
         if status == FAILED:
@@ -118,7 +118,7 @@ class Copy:
             return Verdict("survived", told=told[-300:])
         return Verdict("broken", told=told[-1500:])
 
-    def _environment(self) -> dict[str, str]:
+    def environment(self) -> dict[str, str]:
         data = os.environ.get("TRUEANGLE_DATA", str(self.root.parent / "shared" / "data"))
         more = {
             "PYTHONPATH": str(self.folder / "python"),

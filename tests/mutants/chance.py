@@ -1,0 +1,234 @@
+"""Faults that nobody chose: ``python tests/mutants/chance.py --room planning --count 20``.
+
+The operators are cosmic-ray's: another sign, another comparison, a number one more or less, a
+condition turned round, ``and`` for ``or``, a loop that never runs. Faults are drawn with a seed
+that is printed from all that could be planted in the rooms asked for. Only tests that reach the
+changed line are run (coverage.py records which do, once); a line that none reaches is a survivor.
+What cannot be noticed stands with its reason in ``equivalent.toml``.
+"""
+
+from __future__ import annotations
+
+import argparse
+import ast
+import random
+import sqlite3
+import subprocess
+import sys
+import tempfile
+import time
+import tomllib
+from collections import Counter
+from collections.abc import Iterator
+from pathlib import Path
+from typing import NamedTuple
+
+from cosmic_ray.mutating import mutate_code
+from cosmic_ray.plugins import get_operator
+from coverage.numbits import numbits_to_nums
+
+from copies import Copy
+from faults import Fault
+
+ROOT = Path(__file__).resolve().parents[2]
+PACKAGE = ROOT / "python" / "trueangle"
+
+#: Rooms that compute; what is printed, drawn and parsed has tests of another kind.
+ROOMS = (
+    "certificate", "diagnosis", "effects", "estimation", "export", "fitting", "joint", "logs",
+    "model", "planning", "rehearsal", "runs", "selfcalibration", "simulation", "support",
+)  # fmt: skip
+
+OPERATORS = (
+    *(
+        f"ReplaceBinaryOperator_{a}"
+        for a in ("Add_Sub", "Sub_Add", "Mul_Div", "Div_Mul", "Pow_Mul")
+    ),
+    *(
+        f"ReplaceComparisonOperator_{a}"
+        for a in (
+            "Lt_LtE",
+            "Lt_GtE",
+            "LtE_Lt",
+            "Gt_GtE",
+            "Gt_LtE",
+            "GtE_Gt",
+            "Eq_NotEq",
+            "NotEq_Eq",
+        )
+    ),
+    "ReplaceUnaryOperator_Delete_USub",
+    "ReplaceUnaryOperator_Delete_Not",
+    "ReplaceAndWithOr",
+    "ReplaceOrWithAnd",
+    "ReplaceTrueWithFalse",
+    "ReplaceFalseWithTrue",
+    "NumberReplacer",
+    "AddNot",
+    "ZeroIterationForLoop",
+)
+
+#: Tests of one fault at most, the ones that reach least first: they are the narrowest.
+MOST_TESTS = 60
+
+
+class Drawn(NamedTuple):
+    """A fault by its place: what the operator makes of which line."""
+
+    file: str
+    operator: str
+    occurrence: int
+    line: int
+    before: str
+    after: str
+    text: str
+
+
+def drawn(count: int, seed: int, rooms: list[str]) -> list[Drawn]:
+    """So many faults of all that the operators could plant in ``rooms``."""
+    chance = random.Random(seed)
+    files = sorted(p for room in rooms for p in (PACKAGE / room).rglob("*.py"))
+    weights = [len(p.read_text("utf-8").splitlines()) for p in files]
+    found: dict[tuple[str, str, int], Drawn] = {}
+    for _ in range(200 * count):
+        if len(found) == count:
+            break
+        path = chance.choices(files, weights)[0]
+        operator = chance.choice(OPERATORS)
+        made = mutation(path, operator, chance.randrange(40))
+        if made is not None:
+            found[made.file, made.operator, made.occurrence] = made
+    return list(found.values())
+
+
+def mutation(path: Path, operator: str, occurrence: int) -> Drawn | None:
+    """The fault at one occurrence; None where there is none, or none that runs."""
+    code = path.read_text("utf-8")
+    changed = mutate_code(code, get_operator(f"core/{operator}")(), occurrence)
+    if changed is None or changed == code:
+        return None
+    old, new = code.splitlines(), changed.splitlines()
+    line = next((k for k, (a, b) in enumerate(zip(old, new, strict=False)) if a != b), None)
+    if line is None or old[line].lstrip().startswith(("from ", "import ", "@", "__all__", "*,")):
+        return None
+    try:
+        if ast.dump(ast.parse(code)) == ast.dump(ast.parse(changed)):
+            return None
+    except SyntaxError:
+        return None
+    file = path.relative_to(ROOT).as_posix()
+    return Drawn(
+        file, operator, occurrence, line + 1, old[line].strip(), new[line].strip(), changed
+    )
+
+
+def reached(copy: Copy, tests: list[str], data: Path) -> dict[str, dict[int, list[str]]]:
+    """Tests that reach each line of each file of the package, the narrowest first."""
+    if not data.exists():
+        command = [
+            sys.executable, "-m", "pytest", "-q", "-n", "2", "-p", "no:cacheprovider",
+            f"--cov={copy.folder / 'python' / 'trueangle'}", "--cov-context=test", "--cov-report=",
+            *tests,
+        ]  # fmt: skip
+        environment = copy.environment() | {"COVERAGE_FILE": str(data)}
+        subprocess.run(command, cwd=copy.folder, env=environment, check=False)
+    base = sqlite3.connect(data)
+    breadth: Counter[str] = Counter()
+    rows = base.execute(
+        "select file.path, context.context, numbits from line_bits"
+        " join file on file.id = file_id join context on context.id = context_id"
+    ).fetchall()
+    lines: dict[str, dict[int, list[str]]] = {}
+    for path, context, bits in rows:
+        test = context.partition("|")[0]
+        if not test:
+            continue
+        name = "python/trueangle/" + path.partition("python/trueangle/")[2]
+        for number in numbits_to_nums(bits):
+            lines.setdefault(name, {}).setdefault(number, []).append(test)
+            breadth[test] += 1
+    for places in lines.values():
+        for number, names in places.items():
+            places[number] = sorted(set(names), key=lambda t: (breadth[t], t))
+    return lines
+
+
+def reaching(places: dict[int, list[str]], line: int) -> list[str]:
+    """Tests that reach a line; of one that runs at import alone, those of the module."""
+    if line in places:
+        return places[line]
+    code = [number for number in places if number > line]
+    return places[min(code)] if code else []
+
+
+def excused(fault: Drawn) -> str:
+    """Why nobody can notice it, where `equivalent.toml` says so."""
+    path = Path(__file__).with_name("equivalent.toml")
+    for entry in tomllib.loads(path.read_text("utf-8"))["equivalent"]:
+        if (entry["file"], entry["before"], entry["after"]) == (
+            fault.file, fault.before, fault.after,
+        ):  # fmt: skip
+            return str(entry["because"])
+    return ""
+
+
+def judged(copy: Copy, fault: Drawn, tests: list[str]) -> Iterator[str]:
+    """``killed``, ``survived``, ``excused`` or ``unreached``, and what is said of it."""
+    why = excused(fault)
+    if why:
+        yield from ("excused", why)
+        return
+    if not tests:
+        yield from ("unreached", "")
+        return
+    whole = (ROOT / fault.file).read_text("utf-8")
+    planted = Fault("chance", fault.file, whole, fault.text, tuple(tests[:MOST_TESTS]))
+    verdict = copy.tried(planted, -1)
+    # Tests that cannot even be collected have noticed.
+    yield "survived" if verdict.outcome == "survived" else "killed"
+    yield verdict.by
+
+
+def main() -> int:
+    """Draw, plant, and tell the score of every room."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--count", type=int, default=20)
+    parser.add_argument("--seed", type=int, default=None, help="by default another every day")
+    parser.add_argument(
+        "--room", action="append", choices=ROOMS, help="by default all that compute"
+    )
+    parser.add_argument("--tests", action="append", help="folders of tests; by default all")
+    parser.add_argument("--least", type=float, default=0.0, help="share killed, else status 1")
+    parser.add_argument("--seconds", type=float, default=300.0, help="for the tests of a fault")
+    parser.add_argument("--coverage", type=Path, help="where it is kept for another time")
+    args = parser.parse_args()
+    seed = int(time.time()) // 86400 if args.seed is None else args.seed
+    rooms = args.room or list(ROOMS)
+    print(f"seed {seed}, {args.count} faults in {', '.join(rooms)}", flush=True)
+    faults = drawn(args.count, seed, rooms)
+    scores: dict[str, Counter[str]] = {}
+    with tempfile.TemporaryDirectory(prefix="mutants-") as folder:
+        copy = Copy(ROOT, Path(folder), args.seconds)
+        data = args.coverage or Path(folder) / "coverage"
+        lines = reached(copy, args.tests or ["tests/python"], data.resolve())
+        for fault in faults:
+            start = time.monotonic()
+            tests = reaching(lines.get(fault.file, {}), fault.line)
+            outcome, said = judged(copy, fault, tests)
+            scores.setdefault(fault.file.split("/")[2], Counter())[outcome] += 1
+            print(
+                f"{outcome:9} {fault.file}:{fault.line} {fault.operator} {fault.before!r} -> "
+                f"{fault.after!r} ({len(tests)} tests, {time.monotonic() - start:.0f} s) {said}",
+                flush=True,
+            )
+    whole = Counter[str]()
+    for room, counts in [*sorted(scores.items()), ("all", whole)]:
+        whole.update(counts if room != "all" else {})
+        noticed = counts["killed"] + counts["excused"]
+        print(f"{room}: {noticed} of {counts.total()} noticed ({dict(counts)})")
+    noticed = whole["killed"] + whole["excused"]
+    return 0 if noticed >= args.least * whole.total() else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())
