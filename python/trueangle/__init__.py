@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from .logs.frames import correct as correct
     from .model.file import load_model as load_model
     from .model.model import HarmonicModel as HarmonicModel
+    from .planning.arc import plan_arc as plan_arc
     from .planning.plan import plan_mounts as plan_mounts
     from .rehearsal import Rehearsal as Rehearsal
     from .rehearsal.rehearse import rehearse as rehearse
@@ -61,6 +62,7 @@ _PUBLIC = {
     "CalibrationRun": "runs.run",
     "Diagnosis": "diagnosis",
     "OrderSelection": "fitting.orders",
+    "plan_arc": "planning",
     "plan_mounts": "planning",
     "select_orders": "fitting.orders",
     "FitResult": "fitting.result",

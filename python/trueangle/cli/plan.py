@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import argparse
+import math
 
+from ..errors import ArgumentError
 from .selfplan import add_self_arguments, run_self
 
 HELP = "propose calibration positions that keep the wanted orders apart"
@@ -40,8 +42,96 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--orders", metavar="1-17,202", help="orders wanted (default: 1-17 and the gear's own)")
     add("--noise-arcsec", type=float, metavar="S", help="scatter of one reading")
     add("--std-arcsec", type=float, metavar="U", help="standard error wanted: gives the readings")
+    arc = parser.add_argument_group("a joint that cannot turn once")
+    arc.add_argument(
+        "--arc",
+        type=_arc,
+        metavar="START:STOP",
+        help="degrees; where to read on this arc (--arc=-135:135 where it starts below zero)",
+    )
+    arc.add_argument("--readings", type=int, metavar="N", help="readings to spend (default: 60)")
+    arc.add_argument(
+        "--runs", type=int, metavar="R", help="runs, each with a zero of its own (default: 1)"
+    )
+    arc.add_argument(
+        "--both-directions", action="store_true", help="read every place from either side"
+    )
+    arc.add_argument(
+        "--apart", type=float, metavar="DEG", help="least distance of two places (default: none)"
+    )
+    arc.add_argument(
+        "--uncertainty",
+        type=_angle,
+        metavar="U",
+        help="wanted at every place (k = 2), such as 2arcsec or 0.01deg: gives the readings",
+    )
     add("--json", action="store_true", help="print the plan as JSON")
     add_self_arguments(parser)
+
+
+def _arc(text: str) -> tuple[float, float]:
+    """``START:STOP`` in degrees."""
+    start, colon, stop = text.partition(":")
+    try:
+        if not colon:
+            raise ValueError
+        return float(start), float(stop)
+    except ValueError:
+        raise argparse.ArgumentTypeError(
+            f"{text!r} is no arc: START:STOP in degrees, such as 0:270"
+        ) from None
+
+
+def _angle(text: str) -> float:
+    """An angle in arcsec; ``arcsec``, ``arcmin``, ``deg`` or ``mrad`` may follow."""
+    for unit, arcsec in _ARCSEC.items():
+        if text.endswith(unit):
+            number, scale = text.removesuffix(unit), arcsec
+            break
+    else:
+        number, scale = text, 1.0
+    try:
+        return float(number) * scale
+    except ValueError:
+        raise argparse.ArgumentTypeError(
+            f"{text!r} is no angle: a number and {', '.join(_ARCSEC)}, such as 2arcsec"
+        ) from None
+
+
+_ARCSEC = {"arcsec": 1.0, "arcmin": 60.0, "mrad": 648.0 / math.pi, "deg": 3600.0}
+
+
+def _run_arc(args: argparse.Namespace, orders: tuple[float, ...] | None) -> int:
+    from ..planning.arc import plan_arc
+
+    start, stop = args.arc
+    plan = plan_arc(
+        start,
+        stop,
+        orders,
+        readings=args.readings,
+        runs=1 if args.runs is None else args.runs,
+        both_directions=args.both_directions,
+        apart=0.0 if args.apart is None else args.apart,
+        noise=args.noise_arcsec,
+        standard_error=args.std_arcsec,
+        uncertainty=args.uncertainty,
+    )
+    print(plan.to_json() if args.json else plan.summary())
+    return 0
+
+
+def _refuse_without_arc(args: argparse.Namespace) -> None:
+    given = {
+        "--readings": args.readings,
+        "--runs": args.runs,
+        "--both-directions": args.both_directions or None,
+        "--apart": args.apart,
+        "--uncertainty": args.uncertainty,
+    }
+    for option, value in given.items():
+        if value is not None:
+            raise ArgumentError(f"{option} is of plans for an arc: add --arc START:STOP")
 
 
 def run(args: argparse.Namespace) -> int:
@@ -52,6 +142,9 @@ def run(args: argparse.Namespace) -> int:
     orders = None if args.orders is None else parse_orders(args.orders)
     if args.self_method is not None:
         return run_self(args, orders)
+    if args.arc is not None:
+        return _run_arc(args, orders)
+    _refuse_without_arc(args)
     common = {
         "fixed_member": args.fixed_member,
         "orders": orders,

@@ -1,5 +1,6 @@
 """Where to measure so that the wanted orders can be told apart."""
 
+from .arc import ArcPlan, plan_arc
 from .plan import (
     HIGHEST_LOW_ORDER,
     CalibrationPlan,
@@ -13,8 +14,10 @@ from .selfplan import SelfPlan, plan_self
 
 __all__ = [
     "HIGHEST_LOW_ORDER",
+    "ArcPlan",
     "CalibrationPlan",
     "SelfPlan",
+    "plan_arc",
     "plan_encoder",
     "plan_mounts",
     "plan_self",

@@ -6,10 +6,11 @@ import math
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from .arc import ArcPlan
     from .plan import CalibrationPlan
     from .selfplan import SelfPlan
 
-__all__ = ["plan_summary", "self_plan_summary"]
+__all__ = ["arc_summary", "plan_summary", "self_plan_summary"]
 
 
 def plan_summary(plan: CalibrationPlan) -> str:
@@ -75,6 +76,33 @@ def self_plan_summary(plan: SelfPlan) -> str:
             names = ", ".join(f"{k:g}" for k in given["blind_orders"])
             lines.append(f"                         blind to {names}")
     lines += ["  noise factor per order", *_table(plan.noise_factors)]
+    lines += [f"  note: {note}" for note in plan.notes]
+    return "\n".join(lines)
+
+
+def arc_summary(plan: ArcPlan) -> str:
+    """A plan of places on an arc."""
+    runs = "" if plan.runs == 1 else f" in each of {plan.runs} runs"
+    way = ", half from either side" if plan.both_directions else ""
+    lines = [
+        f"{plan.readings} readings over {plan.start_deg:g} to {plan.stop_deg:g} deg: "
+        f"{sum(plan.counts)}{runs}{way}",
+        "  place/deg  readings",
+        *(
+            f"  {place:9.3f}  {count:8d}"
+            for place, count in zip(plan.places_deg, plan.counts, strict=True)
+        ),
+        f"  D-efficiency           {plan.d_efficiency:.3f} of the best possible",
+        f"  of even spacing        {plan.efficiency_of_even_spacing:.3f}",
+        "  order  noise factor  with even spacing",
+    ]
+    for order, factor in plan.noise_factors.items():
+        even = plan.even_noise_factors[order]
+        lines.append(f"  {order:5g}  {factor:12.3g}  {even:17.3g}")
+    if plan.uncertainty_arcsec is not None:
+        lines.append(
+            f"  uncertainty (k = 2)    {plan.uncertainty_arcsec:.3g} arcsec at the worst place"
+        )
     lines += [f"  note: {note}" for note in plan.notes]
     return "\n".join(lines)
 

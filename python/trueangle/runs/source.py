@@ -155,7 +155,10 @@ def each_table(
                 named(path, of_file(unit_of_path(path, reading["unit_from"])))
                 for path, _ in find_logs([entry], whole=False)
             ]
-        held = table_readings(entry, called, wanted)
+        try:
+            held = table_readings(entry, called, wanted)
+        except KindError as error:
+            raise KindError(f"{name}: {error}") from None
         return None if held is None else [read(_with_unit(held, period))]
 
     found = of_one(data, table)

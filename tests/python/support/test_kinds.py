@@ -57,6 +57,7 @@ CALLS = {
     ta.join: {"a": "r.csv", "b": "r.csv"},
     ta.load_model: {"path": "m.json"},
     ta.load_simulation: {"path": "s.toml"},
+    ta.plan_arc: {"start": 0.0, "stop": 180.0, "orders": [1], "readings": 6},
     ta.plan_mounts: {"gear_ratio": 10.0, "positions": 5, "orders": [1, 2]},
     ta.read_runs: {"path": "r.csv"},
     ta.rehearse: {"sim": SIMULATION, "causes": ["backlash"], "seeds": 1, "within": 0.1},

@@ -1,0 +1,239 @@
+"""D-optimal designs of Fourier series over an arc: where readings tell all coefficients best."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import ArgumentError
+
+__all__ = ["ArcDesign", "Columns", "d_optimal", "exchanged", "rounded"]
+
+Array = NDArray[np.float64]
+
+#: Places of the grid, to a cycle of the highest order and at least.
+_PER_CYCLE = 48
+_LEAST_PLACES = 801
+
+#: Multiplicative steps on the grid, and the excess that ends them: a design's efficiency is at
+#: least 1 / (1 + excess).
+_GRID_STEPS = 2000
+_GRID_EXCESS = 1e-4
+
+#: Sweeps over the places, each moved to its best, until none moves so far (turns) any more; looks
+#: at one place, each 16 times finer.
+_SWEEPS = 400
+_MOVES = 1e-9
+_LOOKS = 9
+
+#: Passes of exchanges of single readings.
+_PASSES = 20
+
+#: Relative gain of the determinant below which readings are not exchanged.
+_GAIN = 1e-9
+
+#: Share of the largest singular value of the columns below which an arc does not tell them: the
+#: variance of what it is lost in grows with the square of its inverse.
+_SINGULAR = 1e-7
+
+
+@dataclass(frozen=True)
+class ArcDesign:
+    r"""Places and weights over an arc, in turns.
+
+    Attributes
+    ----------
+    places, weights : ndarray, shape (s,)
+        Increasing places and the shares of the readings that belong there.
+    excess : float
+        :math:`\max_x d(x) / p - 1` over the arc, d the variance of the fitted curve times the
+        number of readings and p the number of coefficients: 0 for the optimum (Kiefer and
+        Wolfowitz).
+    log_det : float
+        :math:`\ln\det M` of the design, with columns as in `Columns.of`.
+    """
+
+    places: Array
+    weights: Array
+    excess: float
+    log_det: float
+
+
+class Columns:
+    """The constant and both parts of every order, made orthonormal over the arc.
+
+    D-optimality does not depend on the basis; an arc's own keeps rounding small.
+    """
+
+    def __init__(self, orders: Sequence[float], start: float, stop: float) -> None:
+        self.orders = np.asarray(orders, dtype=np.float64)
+        count = math.ceil(_PER_CYCLE * float(self.orders.max()) * (stop - start))
+        self.grid = np.linspace(start, stop, max(_LEAST_PLACES, count + 1))
+        self._turned: Array | None = None
+        raw = self.at(self.grid)
+        _, values, turned = np.linalg.svd(raw, full_matrices=False)
+        if values[-1] < _SINGULAR * values[0]:
+            raise ArgumentError(
+                f"orders {', '.join(f'{k:g}' for k in orders)} look alike over "
+                f"{(stop - start) * 360.0:g} deg: ask for fewer `orders`, or a longer arc"
+            )
+        self._turned = turned.T * (math.sqrt(self.grid.size) / values)
+        self.log_scale = 2.0 * float(np.sum(np.log(values / math.sqrt(self.grid.size))))
+
+    @property
+    def count(self) -> int:
+        """Coefficients, the constant among them."""
+        return 1 + 2 * int(self.orders.size)
+
+    def at(self, places: Array) -> Array:
+        """Rows of the design at places in turns."""
+        x = 2.0 * math.pi * np.outer(places, self.orders)
+        raw = np.hstack([np.ones((len(places), 1)), np.cos(x), np.sin(x)])
+        return raw if self._turned is None else np.asarray(raw @ self._turned)
+
+    def information(self, places: Array, weights: Array) -> Array:
+        """Information matrix of one reading, shared out by the weights."""
+        rows = self.at(places)
+        return np.asarray(rows.T @ (weights[:, None] * rows))
+
+    def log_det(self, places: Array, weights: Array) -> float:
+        """``ln det M`` with plain cosine and sine columns; minus infinity where it is singular."""
+        sign, value = np.linalg.slogdet(self.information(places, weights))
+        return float(value) + self.log_scale if sign > 0 else -math.inf
+
+
+def d_optimal(columns: Columns) -> ArcDesign:
+    r"""The design whose information has the largest determinant.
+
+    .. math:: \max_\xi \det \int f(x) f(x)^T \,\xi(dx), \quad
+              f = (1, \cos k x, \sin k x \ldots)
+
+    by multiplicative steps on a grid (Titterington 1976). Where as many places as coefficients
+    are left, each belongs to an equal share, and they are moved off the grid one by one until the
+    equivalence theorem holds to rounding.
+
+    Examples
+    --------
+    >>> found = d_optimal(Columns([1], 0.0, 0.5))
+    >>> (360.0 * found.places).round(3).tolist(), found.weights.round(6).tolist()
+    ([0.0, 90.0, 180.0], [0.333333, 0.333333, 0.333333])
+    """
+    grid, p = columns.grid, columns.count
+    rows = columns.at(grid)
+    weights = np.full(grid.size, 1.0 / grid.size)
+    excess = math.inf
+    for _ in range(_GRID_STEPS):
+        variances = _variances(rows, weights)
+        excess = float(variances.max()) / p - 1.0
+        if excess < _GRID_EXCESS:
+            break
+        weights *= variances / p
+    places, shares = _merged(grid, weights, p)
+    if places.size == p:
+        places, shares, settled = _settled(columns, places)
+        if settled < max(excess, _GRID_EXCESS):
+            return ArcDesign(places, shares, settled, columns.log_det(places, shares))
+    heavy = weights > 1e-3 / grid.size
+    places, shares = grid[heavy], weights[heavy] / weights[heavy].sum()
+    return ArcDesign(places, shares, excess, columns.log_det(places, shares))
+
+
+def exchanged(columns: Columns, places: Array) -> Array:
+    """Places of single readings, each exchanged for a better one of the grid while one is.
+
+    Fedorov's exchange: taking reading i out and x in multiplies the determinant by
+    :math:`(1 + d_{xx})(1 - d_{ii}) + d_{ix}^2`.
+    """
+    grid = columns.at(columns.grid)
+    places = places.copy()
+    for _ in range(_PASSES):
+        before = columns.log_det(places, np.ones(places.size))
+        for i in range(places.size):
+            rows = columns.at(places)
+            inverse = np.linalg.inv(rows.T @ rows)
+            mixed = grid @ (inverse @ rows[i])
+            own = float(rows[i] @ inverse @ rows[i])
+            gains = (1.0 + np.einsum("ij,ij->i", grid @ inverse, grid)) * (1.0 - own) + mixed**2
+            k = int(np.argmax(gains))
+            if gains[k] > 1.0 + _GAIN:
+                places[i] = columns.grid[k]
+        if columns.log_det(places, np.ones(places.size)) < before + 1e-4:
+            break
+    return np.sort(places)
+
+
+def rounded(weights: Array, readings: int) -> NDArray[np.int64]:
+    """Whole numbers of readings that lose the least (Pukelsheim and Rieder 1992).
+
+    Examples
+    --------
+    >>> rounded(np.array([0.5, 0.3, 0.2]), 7).tolist()
+    [3, 2, 2]
+    """
+    counts = np.ceil((readings - 0.5 * weights.size) * weights).astype(np.int64)
+    while counts.sum() < readings:
+        counts[np.argmin(counts / weights)] += 1
+    while counts.sum() > readings:
+        counts[np.argmax((counts - 1) / weights)] -= 1
+    return np.asarray(counts)
+
+
+def _variances(rows: Array, weights: Array) -> Array:
+    """Variance of the curve at every row, for one reading of variance 1."""
+    information = rows.T @ (weights[:, None] * rows)
+    return np.asarray(np.einsum("ij,ij->i", rows @ np.linalg.inv(information), rows))
+
+
+def _merged(grid: Array, weights: Array, least: int) -> tuple[Array, Array]:
+    """Groups of neighbouring places as one each; evenly spread weight as even places."""
+    heavy = np.flatnonzero(weights > 1e-2 * weights.max())
+    groups = np.split(heavy, np.flatnonzero(np.diff(heavy) > 1) + 1)
+    if len(groups) < least:
+        # The weight is spread: even places that hold as many coefficients serve as well.
+        step = min(1.0 / least, (grid[-1] - grid[0]) / (least - 1))
+        return grid[0] + step * np.arange(least), np.full(least, 1.0 / least)
+    places = np.array([np.average(grid[g], weights=weights[g]) for g in groups])
+    shares = np.array([weights[g].sum() for g in groups])
+    return places, shares / shares.sum()
+
+
+def _settled(columns: Columns, places: Array) -> tuple[Array, Array, float]:
+    """As many places as coefficients, each at its best beside the others; their excess."""
+    start, stop = float(columns.grid[0]), float(columns.grid[-1])
+    shares = np.full(places.size, 1.0 / places.size)
+    for _ in range(_SWEEPS):
+        before = places.copy()
+        for k in range(places.size):
+            # The determinant is that of the other rows times the distance of this row from them.
+            others = np.linalg.qr(columns.at(np.delete(places, k)).T, mode="complete")[0][:, -1]
+
+            def apart(x: Array, normal: Array = others) -> Array:
+                return np.asarray(np.abs(columns.at(x) @ normal))
+
+            below = places[k - 1] if k else start
+            above = places[k + 1] if k + 1 < places.size else stop
+            places[k] = _highest(apart, float(below), float(above))
+        if np.abs(places - before).max() < _MOVES:
+            break
+    return places, shares, _excess(columns, places, shares)
+
+
+def _highest(height: Callable[[Array], Array], low: float, high: float) -> float:
+    """Where a function of one peak between two places is highest, by ever finer looks."""
+    for _ in range(_LOOKS):
+        x = np.linspace(low, high, 33)
+        k = int(np.argmax(height(x)))
+        low, high = float(x[max(k - 1, 0)]), float(x[min(k + 1, 32)])
+        best = float(x[k])
+    return best
+
+
+def _excess(columns: Columns, places: Array, weights: Array) -> float:
+    information = columns.information(places, weights)
+    rows = columns.at(columns.grid)
+    variances = np.einsum("ij,ij->i", rows @ np.linalg.inv(information), rows)
+    return float(variances.max()) / columns.count - 1.0

@@ -1,0 +1,212 @@
+"""Places on an arc: optimal by the equivalence theorem, by explicit solutions, and as told."""
+
+import json
+import math
+
+import numpy as np
+import pytest
+
+import trueangle as ta
+from trueangle.cli import main
+from trueangle.errors import ArgumentError
+from trueangle.planning.doptimal import Columns, d_optimal, rounded
+from trueangle.planning.noisefactors import noise_factors
+
+SEED = 32_700
+
+#: The published figures have three digits, and dense spacing stood for a fine grid.
+PRINTED = 1.5e-3
+
+#: Places are found to this, in degrees: the determinant is flat where it is largest.
+PLACE = 1e-4
+
+
+def design(x, orders):
+    columns = [np.ones_like(x)]
+    for k in orders:
+        columns += [np.cos(k * x), np.sin(k * x)]
+    return np.column_stack(columns)
+
+
+def efficiency(places, counts, orders, optimum):
+    """By plain determinants of plain columns, to 1 over the coefficients."""
+
+    def information(degrees, shares):
+        rows = design(np.radians(degrees), orders)
+        return rows.T @ (np.asarray(shares)[:, None] * rows)
+
+    counts = np.asarray(counts, dtype=float)
+    own = np.linalg.slogdet(information(np.asarray(places), counts / counts.sum()))[1]
+    best = np.linalg.slogdet(information(*optimum))[1]
+    return math.exp((own - best) / (1 + 2 * len(orders)))
+
+
+@pytest.mark.parametrize(
+    ("orders", "arc"),
+    [([1], 170), ([1, 2], 180), ([1, 2, 3, 4], 270), (range(1, 9), 300), ([1, 2, 3], 60)],
+)
+def test_no_place_has_more_variance_than_the_equivalence_theorem_allows(orders, arc):
+    """Kiefer and Wolfowitz: at most p everywhere, p at every place of the design."""
+    orders = list(orders)
+    columns = Columns(orders, 0.1, 0.1 + arc / 360.0)
+    found = d_optimal(columns)
+    x = 2.0 * np.pi * (0.1 + np.linspace(0.0, arc / 360.0, 7001))
+    rows, own = design(x, orders), design(2.0 * np.pi * found.places, orders)
+    scale = np.linalg.qr(rows)[1]  # plain columns are hardly told apart over short arcs
+    rows, own = np.linalg.solve(scale.T, rows.T).T, np.linalg.solve(scale.T, own.T).T
+    inverse = np.linalg.inv(own.T @ (found.weights[:, None] * own))
+    p = 1 + 2 * len(orders)
+    assert np.einsum("ij,jk,ik->i", rows, inverse, rows).max() <= p * (1.0 + 1e-6)
+    np.testing.assert_allclose(np.einsum("ij,jk,ik->i", own, inverse, own), p, rtol=1e-6)
+
+
+@pytest.mark.parametrize("half", [30.0, 60.0, 90.0, 110.0])
+def test_explicit_solutions_on_a_partial_circle(half):
+    """Orders 1: ends and middle; 1 and 2: of 4c^2 + (1 - 2A)c - (A + 2) = 0, A = cos of the end.
+
+    The determinant of all orders up to m is a product of sines of half the distances (Dette,
+    Melas and Pepelyshev 2002).
+    """
+    one = d_optimal(Columns([1], -half / 360.0, half / 360.0))
+    np.testing.assert_allclose(360.0 * one.places, [-half, 0.0, half], atol=PLACE)
+    end = math.cos(math.radians(half))
+    b = 1.0 - 2.0 * end
+    inner = math.degrees(math.acos((-b + math.sqrt(b * b + 16.0 * (end + 2.0))) / 8.0))
+    two = d_optimal(Columns([1, 2], -half / 360.0, half / 360.0))
+    np.testing.assert_allclose(360.0 * two.places, [-half, -inner, 0.0, inner, half], atol=PLACE)
+    np.testing.assert_allclose(two.weights, 0.2, rtol=1e-9)
+
+
+def test_long_arcs_need_no_more_than_even_places():
+    """From 2m of 2m + 1 steps of a turn on, even places are as good as over the turn."""
+    orders, stop = [1, 2, 3, 4], 8.0 / 9.0
+    found = d_optimal(Columns(orders, 0.0, stop))
+    even = 40.0 * np.arange(9)
+    optimum = (even, np.full(9, 1.0 / 9.0))
+    assert efficiency(360.0 * found.places, found.weights, orders, optimum) == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize(
+    ("orders", "arc", "dense", "even", "least", "worse"),
+    [
+        ([1, 2, 3, 4], 270.0, 0.805, 0.848, 0.99, (1.99, 1.71)),
+        ([1, 2], 180.0, 0.684, 0.717, 0.99, (1.73, 1.62)),
+        (list(range(1, 9)), 300.0, None, None, 0.985, None),
+    ],
+)
+def test_published_efficiencies(orders, arc, dense, even, least, worse):
+    plan = ta.plan_arc(0.0, arc, orders, readings=60)
+    found = d_optimal(Columns(orders, 0.0, arc / 360.0))
+    optimum = (360.0 * found.places, found.weights)
+    assert plan.readings == 60
+    assert plan.d_efficiency >= least
+    own = efficiency(plan.places_deg, plan.counts, orders, optimum)
+    assert plan.d_efficiency == pytest.approx(own, rel=1e-6)
+    if dense is not None:
+        assert plan.efficiency_of_even_spacing == pytest.approx(even, abs=PRINTED)
+        x = np.linspace(0.0, arc, 200_001)
+        assert efficiency(x, np.ones(x.size), orders, optimum) == pytest.approx(dense, abs=PRINTED)
+    # The worst coefficient is hardly worse than with shares that need not be whole readings:
+    # three readings at a place that deserves three and a half cost 6 %.
+    shares = np.repeat(found.places, 1000)
+    continuous = noise_factors(shares, orders).max()
+    assert plan.worst_noise_factor <= (1.02 if len(orders) < 8 else 1.06) * continuous
+    if worse is not None:
+        ratio = max(plan.even_noise_factors.values()) / continuous
+        assert ratio == pytest.approx(worse[1], rel=0.02)
+
+
+def test_readings_are_shared_out_with_the_least_loss():
+    """By trying all: no other shares of 14 readings over 5 places have a larger determinant."""
+    found = d_optimal(Columns([1, 2], 0.0, 0.5))
+    counts = rounded(found.weights, 14)
+    assert sorted(counts.tolist()) == [2, 3, 3, 3, 3]
+    assert rounded(np.array([0.6, 0.3, 0.1]), 10).tolist() == [6, 3, 1]
+
+
+@pytest.mark.parametrize(("runs", "both"), [(1, False), (3, False), (2, True)])
+def test_the_uncertainty_is_the_one_that_fits_get(runs, both):
+    """The scatter of fitted curves over the arc, zeros of runs known to none."""
+    rng = np.random.default_rng(SEED + runs)
+    print(f"seed {SEED + runs}")
+    sigma, orders = 4.0, [1, 2, 3]
+    plan = ta.plan_arc(-100.0, 130.0, orders, noise=sigma, uncertainty=3.0, runs=runs,
+                       both_directions=both)  # fmt: skip
+    assert plan.uncertainty_arcsec <= 3.0
+    x = np.radians(np.repeat(plan.places_deg, plan.counts))
+    if both:
+        assert all(count % 2 == 0 for count in plan.counts)
+    rows = design(np.tile(x, runs), orders)
+    solve = np.linalg.pinv(rows)
+    arc = design(np.radians(np.linspace(-100.0, 130.0, 231)), orders)
+    curves = arc @ (solve @ (sigma * rng.standard_normal((x.size * runs, 400))))
+    got = 2.0 * np.sqrt(np.mean(curves**2, axis=1)).max()
+    # 400 deviations: 3.5 % each, and the largest of some thirty independent ones.
+    assert 0.95 < got / plan.uncertainty_arcsec < 1.1
+    # A reading less at every place would not do.
+    less = plan.readings - len(plan.places_deg) * runs * (2 if both else 1)
+    fewer = ta.plan_arc(-100.0, 130.0, orders, noise=sigma, readings=less, runs=runs,
+                        both_directions=both)  # fmt: skip
+    assert fewer.uncertainty_arcsec > 3.0
+
+
+def test_places_stand_apart():
+    plan = ta.plan_arc(0.0, 270.0, [1, 2], readings=40, apart=1.5)
+    assert set(plan.counts) == {1}
+    assert min(np.diff(plan.places_deg)) >= 1.5 - 1e-5
+    assert plan.places_deg[0] >= 0.0
+    assert plan.places_deg[-1] <= 270.0
+    assert 0.9 < plan.d_efficiency < 1.0
+    with pytest.raises(ArgumentError, match="cannot be 10 deg apart"):
+        ta.plan_arc(0.0, 270.0, [1, 2], readings=40, apart=10.0)
+
+
+def test_what_an_arc_does_not_tell_is_said_before():
+    usual = ta.plan_arc(0.0, 60.0)
+    assert usual.orders == (1.0,)
+    assert "orders up to 1" in usual.notes[0]
+    asked = ta.plan_arc(0.0, 60.0, [1, 2])
+    assert "no better than a thousandth" in asked.notes[0]
+    with pytest.raises(ArgumentError, match="look alike over 10 deg"):
+        ta.plan_arc(0.0, 10.0, range(1, 9))
+
+
+@pytest.mark.parametrize(
+    ("given", "told"),
+    [
+        ({"start": 10.0, "stop": 10.0}, "an arc runs from"),
+        ({"start": 0.0, "stop": 400.0}, "at most 360 deg"),
+        ({"start": 0.0, "stop": 90.0, "orders": [1, 1]}, "each named once"),
+        ({"start": 0.0, "stop": 270.0, "readings": 5}, "readings must be at least 9"),
+        ({"start": 0.0, "stop": 270.0, "uncertainty": 2.0}, "give `noise=`"),
+        (
+            {"start": 0.0, "stop": 270.0, "uncertainty": -2.0, "noise": 1.0},
+            "uncertainty must be positive",
+        ),
+        ({"start": 0.0, "stop": 270.0, "runs": 0}, "runs must be"),
+    ],
+)  # fmt: skip
+def test_what_cannot_be_planned(given, told):
+    with pytest.raises(ArgumentError, match=told):
+        ta.plan_arc(**given)
+
+
+def test_the_command(capsys):
+    assert main(["plan", "--arc=-135:135", "--orders", "1-4", "--readings", "60", "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    plan = ta.plan_arc(-135.0, 135.0, [1, 2, 3, 4], readings=60)
+    assert found["places_deg"] == pytest.approx(list(plan.places_deg))
+    assert found["counts"] == list(plan.counts)
+    assert found["d_efficiency"] == pytest.approx(plan.d_efficiency)
+    assert found["noise_factors"]["1"] == pytest.approx(plan.noise_factors[1.0])
+    text = ["plan", "--arc", "0:180", "--uncertainty", "0.001deg", "--noise-arcsec", "5"]
+    assert main(text) == 0
+    told = capsys.readouterr().out
+    assert "place/deg  readings" in told
+    assert "arcsec at the worst place" in told
+    for wrong, why in ((["--arc", "90"], "is no arc"), (["--uncertainty", "x"], "is no angle")):
+        with pytest.raises(SystemExit):
+            main(["plan", *wrong])
+        assert why in capsys.readouterr().err
+    assert main(["plan", "--readings", "60"]) == 1
+    assert "add --arc START:STOP" in capsys.readouterr().err
