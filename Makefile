@@ -2,7 +2,7 @@
 # PYTHON is the interpreter of an environment that has `pip install '.[test,lint]'`.
 PYTHON ?= .venv/bin/python
 
-.PHONY: check format lint types stub rust python docs bench develop aarch64 fuzz mutants sample
+.PHONY: check quick format lint types stub rust python docs bench develop aarch64 fuzz mutants sample
 .PHONY: nightly exam asan kills pythons readings chance
 
 # Damaged files for each loader, and loaders at a time: `make fuzz CASES=1000000 JOBS=2`.
@@ -50,6 +50,11 @@ aarch64:            ## tests of the core on an emulated aarch64; apart from `che
 	CARGO_TARGET_AARCH64_UNKNOWN_LINUX_GNU_LINKER=aarch64-linux-gnu-gcc \
 	CARGO_TARGET_AARCH64_UNKNOWN_LINUX_GNU_RUNNER="qemu-aarch64 -L /usr/aarch64-linux-gnu" \
 	cargo test --locked --target aarch64-unknown-linux-gnu --tests
+
+quick:              ## what to run while working: style and the quick tests, a minute
+	$(PYTHON) -m ruff check --quiet .
+	$(PYTHON) .ci/arrows
+	$(PYTHON) -m pytest -q -n auto --dist worksteal -m "not slow"
 
 python:             ## tests of the package
 	$(PYTHON) -m pytest -n auto --dist worksteal

@@ -46,6 +46,16 @@ def expected_skips(platform: str) -> re.Pattern[str]:
     return re.compile("|".join(f"(?:{reason})" for reason in found))
 
 
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Mark what `slow.txt` lists."""
+    here = Path(__file__).parent
+    lines = (here / "slow.txt").read_text(encoding="utf-8").splitlines()
+    slow = tuple(line for line in lines if line and not line.startswith("#"))
+    for item in items:
+        if os.path.relpath(item.path, here).replace(os.sep, "/").startswith(slow):
+            item.add_marker("slow")
+
+
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
     """Where nothing may be skipped silently (TRUEANGLE_CI=1), tell what was."""
     if os.environ.get("TRUEANGLE_CI") != "1":

@@ -37,3 +37,11 @@ def test_tests_mirror_rooms():
     folders = {path.parent.name for path in (ROOT / "tests" / "python").glob("*/__init__.py")}
     assert folders - apart <= set(rooms_of_the_table())
     assert not [path.name for path in (ROOT / "tests" / "python").glob("test_*.py")]
+
+
+def test_what_is_slow_is_there():
+    here = ROOT / "tests" / "python"
+    lines = (here / "slow.txt").read_text("utf-8").splitlines()
+    named = [line for line in lines if line and not line.startswith("#")]
+    assert [name for name in named if not (here / name).exists()] == []
+    assert len(named) == len(set(named))
