@@ -59,7 +59,7 @@ REFUSED: dict[str, tuple[Callable[[], object], str]] = {
     "diagnose against a path": (lambda: ta.diagnose(RUN, "joint.toml"), "load_simulation"),  # type: ignore[arg-type]
     "rehearse": (lambda: ta.rehearse("joint.toml"), "load_simulation"),  # type: ignore[arg-type]
     "report": (lambda: ta.report(RUN, simulation="joint.toml"), "load_simulation"),  # type: ignore[call-overload]
-    "no runs at all": (lambda: ta.fit(3), "runs must be a CalibrationRun"),  # type: ignore[arg-type]
+    "no runs at all": (lambda: ta.fit(3), "runs must be paths, runs, or tables"),  # type: ignore[arg-type]
 }
 
 
