@@ -94,6 +94,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     add_errors_in(parser)
     add("--json", action="store_true", help="print the diagnosis as JSON")
+    add(
+        "--verbose",
+        action="store_true",
+        help="say why each cause that is not seen could not be in such runs, and what to measure",
+    )
 
 
 def run(args: argparse.Namespace) -> int:
@@ -129,7 +134,8 @@ def run(args: argparse.Namespace) -> int:
         )
     extend = None if interruption.happened else args.extend
     # Whatever fails from here on, the diagnosis is told.
-    print(result.to_json(extend) if args.json else result.summary(errors_in(args)), flush=True)
+    told = "" if args.json else result.summary(errors_in(args), verbose=args.verbose)
+    print(result.to_json(extend) if args.json else told, flush=True)
     if interruption.happened:
         raise KeyboardInterrupt(_unwritten(args, result.complete))
     _written(result, args, model)

@@ -30,7 +30,7 @@ from .delay import delay_finding
 from .discrepancy import compare, unfolded_error
 from .findings import Diagnosis, Finding
 from .gearedlines import Ratio
-from .goodness import goodness_of_fit
+from .goodness import Unexplained, goodness_of_fit
 from .named import findings_of, reconsidered, scatter_doubt, scatter_finding
 from .remainder import leftover_of, unexplained_after
 from .wrongplace import moved
@@ -192,7 +192,7 @@ def _diagnosis(
     return Diagnosis(
         compare(every, residual),
         _structure(first),
-        rest.noise.sigma,
+        _noise(chosen, rest),
         findings,
         spots,
         extended,
@@ -231,20 +231,36 @@ def _ratio_finding(ratio: Ratio) -> Finding:
 
 
 def _structure(start: Regression) -> dict[str, float]:
-    """Share of the variance that each cause would explain alone, largest first."""
-    alone = {
-        cause: 1.0 - float(np.exp(-max(extension.deviance, 0.0) / start.n))
-        for cause in EFFECTS
-        if (extension := start.memory.get((cause,))) is not None and extension.bic_gain > 0.0
-    }
+    """Share of the readings' variance that each cause takes up alone, largest first."""
+    before = _left(start)
+    alone = {}
+    for cause in EFFECTS:
+        extension = start.memory.get((cause,))
+        if extension is not None and extension.bic_gain > 0.0:
+            after = _left(start.with_terms([extension], 0.0))
+            alone[cause] = 1.0 - float(np.sum(after**2) / max(float(np.sum(before**2)), 1e-300))
     return dict(sorted(alone.items(), key=lambda item: -item[1]))
+
+
+def _left(regression: Regression) -> Array:
+    """What a regression leaves of its readings, less what it takes for drawn in every run."""
+    return np.asarray(regression.left - regression.whiten.run_part(regression.left))
+
+
+def _noise(chosen: Regression, rest: Unexplained) -> float:
+    """Standard deviation of one reading: what is left, where all that is left is noise."""
+    clean = ~chosen.outlying
+    freedom = int(np.count_nonzero(clean)) - chosen.q.shape[1]
+    if rest.found or freedom <= 0:
+        return rest.noise.sigma
+    return float(np.sqrt(np.sum(_left(chosen)[clean] ** 2) / freedom))
 
 
 def _overall(before: Regression, after: Regression) -> dict[str, float]:
     """rms, peak-to-peak and max abs without and with all findings, fitted alike."""
     numbers = {}
     for name, regression in (("before", before), ("after", after)):
-        left = regression.left - regression.whiten.run_part(regression.left)
+        left = _left(regression)
         numbers[f"rms_{name}_arcsec"] = float(np.sqrt(np.mean(left**2)))
         numbers[f"peak_to_peak_{name}_arcsec"] = float(np.ptp(left))
         numbers[f"max_abs_{name}_arcsec"] = float(np.abs(left).max())

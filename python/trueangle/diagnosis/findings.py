@@ -351,7 +351,7 @@ class Diagnosis(PlainResult):
         axes: Axes = drawn(self, ax)
         return axes
 
-    def summary(self, errors_in: ErrorsIn = "auto") -> str:
+    def summary(self, errors_in: ErrorsIn = "auto", *, verbose: bool = False) -> str:
         """A readable account (`trueangle.diagnosis.summary.render`).
 
         Parameters
@@ -359,10 +359,12 @@ class Diagnosis(PlainResult):
         errors_in : {"auto", "arcsec", "deg", "mrad", "count"} or float
             Unit of the errors; by itself arcsec, or degrees where one reaches a degree. A
             number is the counts of a turn.
+        verbose : bool
+            Tell in full what the readings could not have shown and nobody asked.
         """
         from .summary import render
 
-        return render(self, errors_in)
+        return render(self, errors_in, verbose)
 
 
 def _is_number(quantity: Quantity) -> bool:

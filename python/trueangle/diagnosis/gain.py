@@ -206,7 +206,8 @@ def _note(share: float | None) -> str:
     """What is to be thought of a share on held-out readings."""
     if share is None:
         return (
-            "no transferable gain: a new run draws it anew; what is gained is an honest uncertainty"
+            "every run has another one, so that no correction can take it off; it is a part of the "
+            "uncertainty of a single run"
         )
     if share <= 0.0:
         return (

@@ -61,7 +61,9 @@ def open_origins(
 ) -> list[Blindness]:
     """What else may make an error of this form, in the order of `DOUBTS`."""
     cause = extension.cause
-    found = [spot for spot in spots if spot.common == cause and cause in spot.causes]
+    shared = (spot for spot in spots if spot.common == cause and cause in spot.causes)
+    # What is supported already is told of another finding.
+    found = [spot for spot in shared if not spot.supported]
     for doubt in _doubts(extension, regression, spots):
         if doubt.common == cause and doubt not in found:
             found.append(doubt)

@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 import textwrap
+from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
+from ..effects import EFFECTS
 from ..effects.blindness import Blindness
 from ..estimation.estimate import Quantity
 from ..support.display_units import ErrorsIn, ErrorUnit, error_unit
 from .beliefs import Belief
+from .brief import brief_of
 from .goodness.evidence import Evidence
 from .goodness.scatter import AGAINST_STATED
 from .levels import LevelGain
+from .untold import untold
 
 if TYPE_CHECKING:
     from .findings import Diagnosis, Finding
@@ -24,12 +28,27 @@ WIDTH = 88
 #: Share by which the noise must differ from what the simulation states to be told first.
 MATERIAL = 0.1
 
+#: Difference of BIC below which two fit equally well: nothing worth more than a bare mention.
+ALIKE = 2.0
+
+#: The negative control of a finding, by the factor that it follows.
+_SHUFFLED = {
+    "direction": "directions exchanged at random between runs",
+    "velocity": "speeds turned round at random",
+    "temperature": "temperatures exchanged between runs",
+    "torque": "loads exchanged between runs",
+    "mount": "mounts exchanged between runs",
+}
+
 #: Numbers that are no errors, which `ErrorUnit.pair` rounds as well.
 _PLAIN = ErrorUnit("", 1.0)
 
 
-def render(diagnosis: Diagnosis, errors_in: ErrorsIn = "auto") -> str:
-    """The account of a diagnosis: what is wrong, why, the evidence, the gain, what is open."""
+def render(diagnosis: Diagnosis, errors_in: ErrorsIn = "auto", verbose: bool = False) -> str:
+    """The account of a diagnosis: what is wrong, why, the evidence, the gain, what is open.
+
+    ``verbose`` tells in full what the readings could not have shown, and nobody asked.
+    """
     d = diagnosis.discrepancy
     unit = error_unit(errors_in, d.max_abs)
     n = unit.number
@@ -47,7 +66,7 @@ def render(diagnosis: Diagnosis, errors_in: ErrorsIn = "auto") -> str:
     ]
     if diagnosis.structure:
         shares = [f"{cause} {100.0 * s:.0f} %" for cause, s in diagnosis.structure.items()]
-        lines += _wrapped(f"Each alone would explain: {', '.join(shares[:6])}.", 0)
+        lines += _wrapped(f"Of the variance each alone takes up: {', '.join(shares[:6])}.", 0)
     if diagnosis.readings_used < diagnosis.readings:
         lines.append(f"{diagnosis.readings_used} of the readings, spread evenly, were used.")
     for k, finding in enumerate(diagnosis.findings, 1):
@@ -65,18 +84,19 @@ def render(diagnosis: Diagnosis, errors_in: ErrorsIn = "auto") -> str:
         f"{n(g['max_abs_after_arcsec'])} (in the readings that were fitted)."
     )
     lines += ["", *_wrapped(together, 2)]
-    if diagnosis.not_identifiable:
-        lines += ["", "What these readings cannot tell:"]
-        for spot in sorted(diagnosis.not_identifiable, key=lambda spot: not spot.supported):
-            head = ", ".join(spot.causes)
-            if spot.supported:
-                head += " (one of them is seen)" if len(spot.causes) > 1 else " (something is seen)"
-            lines += _wrapped(f"- {head}: {spot.because}. To tell: {spot.measure}.", 2)
-            for cause, parameters in spot.estimates.items():
-                known = {name: q for name, q in parameters.items() if q.value is not None}
-                shown = ", ".join(" ".join(_named(name, q, unit)) for name, q in known.items())
-                lines += _wrapped(f"If {cause}: {shown}.", 6, first=4)
+    open_still = [*untold(diagnosis, verbose, lambda spot: _if_it_is(spot, unit))]
+    lines += [""] if open_still else []
+    for text, indent, first in open_still:
+        lines += _wrapped(text, indent, first)
     return "\n".join(lines)
+
+
+def _if_it_is(spot: Blindness, unit: ErrorUnit) -> Iterator[str]:
+    """What each of the causes in question would amount to."""
+    for cause, parameters in spot.estimates.items():
+        known = {name: q for name, q in parameters.items() if q.value is not None}
+        shown = ", ".join(" ".join(_named(name, q, unit)) for name, q in known.items())
+        yield f"If {cause}: {shown}."
 
 
 def headline(diagnosis: Diagnosis, unit: ErrorUnit) -> list[str]:
@@ -94,9 +114,9 @@ def headline(diagnosis: Diagnosis, unit: ErrorUnit) -> list[str]:
             2,
         )
         for item in rest.firing[:3]:
-            lines += _wrapped(f"- {item.says} (p {_chance(item.p)})", 4, 2)
-    confirmed = [finding.cause for finding in diagnosis.findings if finding.confirmed]
-    doubtful = [finding.cause for finding in diagnosis.findings if not finding.confirmed]
+            lines += _wrapped(f"- {unit.spoken(item.says)} (p {_chance(item.p)})", 4, 2)
+    confirmed = [brief_of(f, unit) for f in diagnosis.findings if f.confirmed]
+    doubtful = [brief_of(f, unit) for f in diagnosis.findings if not f.confirmed]
     wrong = [belief for belief in diagnosis.beliefs if belief.verdict != "confirmed"]
     if confirmed:
         lines += _wrapped(f"Confirmed: {', '.join(confirmed)}.", 2)
@@ -116,7 +136,7 @@ def headline(diagnosis: Diagnosis, unit: ErrorUnit) -> list[str]:
     elif noise:
         lines = ["No pattern beyond the simulation, but its noise is another:"]
         for item in noise:
-            lines += _wrapped(f"- {item.says} (p {_chance(item.p)})", 4, 2)
+            lines += _wrapped(f"- {unit.spoken(item.says)} (p {_chance(item.p)})", 4, 2)
     else:
         lines = ["Nothing beyond the simulation: no test of the readings fires."]
     return [*lines, ""]
@@ -173,16 +193,14 @@ def _finding(number: str, finding: Finding, unit: ErrorUnit) -> list[str]:
     n = unit.number
     lines = [number + finding.cause]
     if not finding.confirmed:
-        lines[0] += f" (NOT CONFIRMED: {finding.reason})"
+        lines[0] += f" (NOT CONFIRMED: {unit.spoken(finding.reason)})"
         lines = _wrapped(lines[0], 3)
     lines += _wrapped(finding.sentence, 3, first=3)
     for name, entry in finding.parameters.items():
         lines += _wrapped(": ".join(_named(name, entry, unit)), 7, first=5)
-    text = f"Evidence: BIC better by {finding.evidence['bic_gain']:.1f}"
+    text = f"Evidence: BIC better by {finding.evidence['bic_gain']:.1f} than without it"
     if finding.rivals:
-        text += "; in its place " + ", ".join(
-            f"{cause} would explain {gap:.1f} less" for cause, gap in finding.rivals
-        )
+        text += "; in its place " + ", ".join(_rival(*rival) for rival in finding.rivals)
     lines += _wrapped(text + ".", 5, first=3)
     gain = finding.gain
     if gain is not None:
@@ -197,13 +215,21 @@ def _finding(number: str, finding: Finding, unit: ErrorUnit) -> list[str]:
                 f"({gain.interval[0]:.2f} to {gain.interval[1]:.2f})"
             )
         if gain.control_share is not None:
-            text += f"; with shuffled labels {gain.control_share:.2f}"
+            control = _SHUFFLED.get(EFFECTS[finding.cause].factor, "runs turned to other angles")
+            text += f" (control: {gain.control_share:.2f} with {control})"
         if gain.note:
             text += f"; {gain.note}"
         lines += _wrapped(text + ".", 5, first=3)
         if gain.by_level is not None:
             lines += _wrapped(_by_level(gain.by_level, unit), 5, first=3)
     return lines
+
+
+def _rival(cause: str, gap: float) -> str:
+    """Another cause in the place of a finding, by the difference of their BIC."""
+    if abs(gap) < ALIKE:
+        return f"{cause} fits as well"
+    return f"{cause} fits {'worse' if gap > 0.0 else 'better'} by {abs(gap):.1f}"
 
 
 def _by_level(gain: LevelGain, unit: ErrorUnit) -> str:

@@ -1,0 +1,60 @@
+"""What the readings cannot tell, as text: in full where it matters to this account."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from typing import TYPE_CHECKING
+
+from ..effects.blindness import Blindness
+
+if TYPE_CHECKING:
+    from .findings import Diagnosis
+
+__all__ = ["matters", "untold"]
+
+#: What adds an entry to a text: how far its further lines are set in, and the first one.
+Entry = tuple[str, int, int]
+
+
+def matters(spot: Blindness, diagnosis: Diagnosis) -> bool:
+    """Something is seen, or one of the causes is believed or found beside it."""
+    asked = {effect.kind for effect in diagnosis.extended.effects}
+    asked |= {belief.what for belief in diagnosis.beliefs}
+    asked |= {finding.cause for finding in diagnosis.findings}
+    # A line beside it is no reason to speak of all that may make one.
+    return spot.supported or bool(set(spot.causes) & (asked - {"missing_order"}))
+
+
+def untold(
+    diagnosis: Diagnosis, verbose: bool, sizes: Callable[[Blindness], Iterator[str]]
+) -> Iterator[Entry]:
+    """Entries on what cannot be told, what is seen first.
+
+    What was not asked, and is not seen either, is named in one line, but where ``verbose``.
+    ``sizes`` gives what each cause of a blind spot would amount to.
+    """
+    spots = sorted(diagnosis.not_identifiable, key=lambda spot: not spot.supported)
+    shown = [spot for spot in spots if verbose or matters(spot, diagnosis)]
+    if shown:
+        yield "What these readings cannot tell:", 0, 0
+    for spot in shown:
+        yield f"- {_head(spot)}: {spot.because}. To tell: {spot.measure}.", 2, 0
+        for text in sizes(spot):
+            yield text, 6, 4
+    named = {finding.cause for finding in diagnosis.findings}
+    others = (cause for spot in spots if spot not in shown for cause in spot.causes)
+    rest = [cause for cause in others if cause not in named]
+    if rest:
+        names = ", ".join(dict.fromkeys(rest))
+        again = " either" if shown else ""
+        yield f"Not seen, and could not be in such runs{again}: {names} (why: --verbose).", 2, 0
+
+
+def _head(spot: Blindness) -> str:
+    names = ", ".join(spot.causes)
+    if not spot.supported:
+        return names
+    if spot.common:
+        others = ", ".join(cause for cause in spot.causes if cause != spot.common)
+        return f"whether {spot.common} is due to {others}"
+    return f"{names} ({'one of them' if len(spot.causes) > 1 else 'something'} is seen)"
