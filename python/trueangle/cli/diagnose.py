@@ -84,7 +84,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=seconds,
         metavar="TIME",
         help="the best account in that time, as 10s, 2min or seconds; it says what is missing "
-        "(default: 30 s and 3 ms a reading of the processor, more on a slow machine)",
+        "(default: 5 s of the processor, or 0.5 ms a reading of many)",
     )
     add(
         "--progress",

@@ -75,8 +75,6 @@ def extensions(
             memory["gain", cause] = extension.bic_gain
             found.append((extension, start, extension.bic_gain - penalty))
             proposed_by.append(cause)
-    else:
-        at.first_round_done()
     # What is as good comes in the order of the causes.
     by_place = sorted(range(len(found)), key=lambda k: causes.index(proposed_by[k]))
     return [found[k] for k in by_place]

@@ -127,9 +127,13 @@ class LocalDefect(Effect):
         log_grid = float(np.log(len(joint.shafts) * 360.0))
         best: Extension | None = None
         for shaft, cycles in joint.shafts.items():
+            reached: list[tuple[float, float]] = []
             for score, place, width in cls._search(regression, cycles, e):
                 if pace().over:
                     return best
+                # From within a bump that was found the way leads there.
+                if any(abs((place - c + 180.0) % 360.0 - 180.0) < w for c, w in reached):
+                    continue
                 shape = {"shaft": shaft, "place_deg": place, "width_deg": width}
                 if not (
                     regression.hopeless(score / regression.variance, 3, log_grid)
@@ -137,6 +141,7 @@ class LocalDefect(Effect):
                 ):
                     shape = cls._refined(regression, shaft, place, width)
                     shape = cls._unclipped(regression, shape)
+                    reached.append((float(shape["place_deg"]), float(shape["width_deg"])))
                 columns = cls.columns(regression.signals, regression.around, shape)
                 power = columns[:, 0] ** 2
                 # One or two readings are outliers, not a place of the joint.

@@ -23,10 +23,9 @@ from .suggestions import check_choice
 
 __all__ = ["STYLES", "Interruption", "Pace", "ending_early", "entered", "pace", "paced"]
 
-#: What work may take where no time was given, in seconds of its thread's processor: so many times
-#: what its first round took, whatever the machine, and at least so much, and so much for each
-#: item. Work on ordinary readings takes 2 to 11 first rounds, and less than half of the rest.
-ROUNDS, LEAST, PER_ITEM = 60.0, 30.0, 3e-3
+#: What work may take where no time was given, in seconds of its thread's processor: so much, or
+#: so much for each item of many. Work on ordinary readings takes a third of that.
+LEAST, PER_ITEM = 5.0, 5e-4
 
 #: Ways of showing progress.
 STYLES: Final = ("auto", "text", "json", "none")
@@ -86,8 +85,8 @@ class Pace:
         self._stage, self._entered = "", self._begun
         self._width = 0
         self._cut = ""
-        #: Of `bounded` work: when it began, what it may take, and whether the first round is done.
-        self._started, self._bound, self._known = 0.0, math.inf, True
+        #: Of `bounded` work: when it began, and what it may take.
+        self._started, self._bound = 0.0, math.inf
         self.within = within
         self.stopped = False
 
@@ -129,19 +128,13 @@ class Pace:
 
         The processor's time is counted, of this thread alone: it is the same on a busy machine.
         """
-        before = self._started, self._bound, self._known, self._cut
-        self._started, self._bound = self._processor(), LEAST + PER_ITEM * items
-        self._known, self._cut = False, ""
+        before = self._started, self._bound, self._cut
+        self._started, self._bound = self._processor(), max(LEAST, PER_ITEM * items)
+        self._cut = ""
         try:
             yield
         finally:
-            self._started, self._bound, self._known, self._cut = before
-
-    def first_round_done(self) -> None:
-        """Everything was tried once: what follows may take so many times as long."""
-        if not self._known:
-            self._known = True
-            self._bound = max(self._bound, ROUNDS * self._spent)
+            self._started, self._bound, self._cut = before
 
     @property
     def cut(self) -> str:

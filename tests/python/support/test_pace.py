@@ -172,26 +172,35 @@ def test_a_step_that_was_not_finished_names_nothing():
     assert result.findings == []
 
 
-def test_work_without_a_time_given_is_bounded_by_its_readings_and_its_first_round():
+def test_work_without_a_time_given_is_bounded_by_its_readings():
     now = [0.0]
-    for items, round_took, allowed in ((0, 0.1, 30.0), (10_000, 0.5, 60.0), (10_000, 5.0, 300.0)):
+    for items, allowed in ((0, 5.0), (10_000, 5.0), (40_000, 20.0)):
         now[0] = 0.0
         work = Pace(processor=lambda: now[0])
         with work.bounded(items):
             work.at("rounds", 0, 9)
-            now[0] = round_took
-            work.first_round_done()
-            work.first_round_done()  # the first one only
             now[0] = allowed - 0.01
             assert not work.over
             with work.part(0.5):
                 assert work.over
-            now[0] = allowed
+            now[0] = allowed + 1e-9
             assert work.over
             assert work.cut == "rounds"
             assert f"the {allowed:.2g} s of the processor" in work.why
         assert not work.over
         assert work.cut == "", "what follows is no part of it"
+
+
+def test_readings_that_are_not_used_bring_no_time(monkeypatch):
+    from trueangle.diagnosis import account
+
+    bound = []
+    usual = Pace.bounded
+    monkeypatch.setattr(Pace, "bounded", lambda self, n: bound.append(n) or usual(self, n))
+    for many in (account.MOST_READINGS, sum(map(len, simulate(TRUE, seed=5))) - 1):
+        monkeypatch.setattr(sys.modules["trueangle.diagnosis.diagnose"], "MOST_READINGS", many)
+        ta.diagnose(simulate(TRUE, seed=5), BELIEVED, gain=False)
+    assert bound == [sum(map(len, simulate(TRUE, seed=5))), many]
 
 
 def test_a_time_that_is_given_is_the_only_one():
@@ -216,9 +225,6 @@ class Busy:
 @pytest.mark.parametrize("command", [False, True])
 def test_a_diagnosis_comes_to_an_end_by_itself_and_says_so(command, files, capsys, monkeypatch):
     """So slow a processor that the time is up after the first causes: what is there is told."""
-    import trueangle.support.deadline as module
-
-    monkeypatch.setattr(module, "ROUNDS", 3.0)
     monkeypatch.chdir(files)
     usual = Pace.__init__
 
