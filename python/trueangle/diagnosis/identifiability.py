@@ -48,8 +48,10 @@ def doubts_about(
     cause = extension.cause
     if EFFECTS[cause].is_doubted:
         for spot in spots:
+            # What is seen of a crossing is none of a delay.
+            may_be_told = spot.common or "turns_first" in extension.shape
             if spot.hides(cause) and not (
-                spot.common and EFFECTS[cause].told(extension, regression)
+                may_be_told and EFFECTS[cause].told(extension, regression)
             ):
                 return spot
     found = [doubt for doubt in _doubts(extension, regression, spots) if doubt.common != cause]

@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING
 
 from ..effects.blindness import Blindness
+from ..effects.missing_order import MissingOrder
 
 if TYPE_CHECKING:
     from .findings import Diagnosis
@@ -22,7 +23,7 @@ def matters(spot: Blindness, diagnosis: Diagnosis) -> bool:
     asked |= {belief.what for belief in diagnosis.beliefs}
     asked |= {finding.cause for finding in diagnosis.findings}
     # A line beside it is no reason to speak of all that may make one.
-    return spot.supported or bool(set(spot.causes) & (asked - {"missing_order"}))
+    return spot.supported or bool(set(spot.causes) & (asked - {MissingOrder.kind}))
 
 
 def untold(

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, ClassVar
 
 import numpy as np
@@ -17,6 +18,7 @@ from ..joint.signals import Signals
 from ..model import forms
 from ..model.forms import Form
 from ..model.term import Term, from_arcsec, line_values
+from ..support.angles import ARCSEC_PER_DEG
 from .blindness import (
     Blindness,
 )
@@ -27,6 +29,17 @@ from .search import (
 )
 
 __all__ = ["Backlash", "BacklashTerm"]
+
+#: Half width in standard deviations of the noise from which on the crossing of a play is looked
+#: for; steps until the half width and the travel over which it is crossed agree.
+SEEN, SETTLING = 0.5, 5
+
+#: Evidence of a crossing from which on it is told from a sharp step: "very strong" on the scale of
+#: Kass and Raftery.
+TOLD = 10.0
+
+#: Radians by which an angle that stands may change: rounding.
+STANDS = 1e-9
 
 ONE_WAY = "all runs go in one direction: a constant reversal error is part of the zero"
 
@@ -41,10 +54,19 @@ class Backlash(Effect):
         b: half of forward minus reverse, on average over a turn.
     lines : list of [output order, arcsec, phase_deg]
         How b varies with the place (as a cause of its own: a pattern of the direction).
+    turns_first : {"", "indicated", "reference"}
+        The side that crosses the play while the other one stands: the indicated angle (b > 0:
+        the reference stands, and the error changes meanwhile), or the reference (b < 0: the error
+        changes over a travel of 2 b). Neither: between two readings.
+    start_state : float
+        Where in the play a run starts, where the reference turns first: 0 in its middle, 1 at the
+        side of its direction.
     """
 
     half_width_arcsec: float
     lines: tuple[tuple[float, float, float], ...] = ()
+    turns_first: str = ""
+    start_state: float = 1.0
 
     kind: ClassVar[str] = "backlash"
     sentence: ClassVar[str] = (
@@ -57,26 +79,80 @@ class Backlash(Effect):
 
     def signal(self, signals: Signals, around: Surroundings, rng: np.random.Generator) -> Array:
         width = self.half_width_arcsec + line_sum(signals.theta, self.lines)
-        return np.asarray(width * signals.direction)
+        shape = {
+            "turns_first": self.turns_first,
+            "half_width_arcsec": abs(self.half_width_arcsec),
+            "start_state": self.start_state,
+        }
+        return np.asarray(width * self.columns(signals, around, shape)[:, 0])
 
     @classmethod
     def propose(cls, regression: Regression) -> Extension | None:
         if regression.has(cls.kind):
             return None
-        columns = cls.columns(regression.signals, regression.around, {})
-        return regression.propose(cls.kind, {}, columns)
+        signals, around = regression.signals, regression.around
+        sharp = regression.propose(cls.kind, {}, cls.columns(signals, around, {}))
+        # By the plain mean of either direction: whitened, the steps between neighbours count most,
+        # and a crossing has none.
+        about = signals.direction - signals.direction.mean()
+        power = float(about @ about)
+        mean = float(about @ regression.left) / power if power > 0.0 else 0.0
+        first = "reference" if mean < 0.0 else "indicated"
+        noise = np.sqrt(regression.variance)
+        if abs(mean) < SEEN * noise or not _shows_crossing(signals, first, mean):
+            return sharp
+        best = sharp
+        for start_state in (1.0, 0.0) if first == "reference" else (1.0,):
+            width = abs(mean)
+            # The play itself says over which travel it is crossed: no further parameter.
+            for _ in range(SETTLING if first == "reference" else 1):
+                shape = {
+                    "turns_first": first,
+                    "half_width_arcsec": width,
+                    "start_state": start_state,
+                }
+                found = regression.propose(cls.kind, shape, cls.columns(signals, around, shape))
+                if found.coefficients[0] * mean <= 0.0:
+                    break
+                best = found if found.deviance > best.deviance else best
+                width = abs(float(found.coefficients[0]))
+        # Of three forms one was chosen.
+        if best is sharp or best.deviance - sharp.deviance < 2.0 * np.log(3.0):
+            return sharp
+        return replace(best, log_grid=float(np.log(3.0)))
 
     @classmethod
     def columns(cls, signals: Signals, around: Surroundings, shape: dict[str, Any]) -> Array:
+        first, width = shape.get("turns_first", ""), shape.get("half_width_arcsec", 0.0)
+        if first == "reference" and width > 0.0:
+            return signals.play(width / ARCSEC_PER_DEG, shape.get("start_state", 1.0))[:, None]
+        if first == "indicated":
+            return _crossing_at_rest(signals)[:, None]
         return signals.direction[:, None]
+
+    @classmethod
+    def told(cls, extension: Extension, regression: Regression) -> bool:
+        """Whether the crossing itself is seen: a delay has none."""
+        if not extension.shape:
+            return False
+        rest = regression.with_terms(
+            [t for t in regression.terms if t.cause != cls.kind], regression.whiten.rho
+        )
+        sharp = rest.propose(cls.kind, {}, regression.signals.direction[:, None])
+        return rest.bic - sharp.bic_gain - regression.bic > TOLD
 
     @classmethod
     def report(
         cls, regression: Regression, terms: Sequence[Fitted]
     ) -> tuple[Parameters, list[Effect]]:
-        _, (width,), covariance = terms[0]
+        extension, (width,), covariance = terms[0]
         std = float(np.sqrt(covariance[0, 0]))
-        return {"half_width_arcsec": quantity(width, std)}, [Backlash(float(width))]
+        parameters = {"half_width_arcsec": quantity(width, std)}
+        first = extension.shape.get("turns_first", "")
+        if first:
+            parameters["turns_first"] = quantity(first)
+        start = float(extension.shape.get("start_state", 1.0))
+        return parameters, [Backlash(float(width), turns_first=first, start_state=start)]
 
     @classmethod
     def blind_spots(cls, regression: Regression, found: Sequence[Blindness]) -> Iterator[Blindness]:
@@ -128,6 +204,33 @@ class BacklashTerm(Term):
 
     def forms(self) -> tuple[Form, ...]:
         return (forms.Play(self.half_width, self.lines),)
+
+
+def _shows_crossing(signals: Signals, first: str, width: float) -> bool:
+    """Readings lie where one side has turned and the other still stands."""
+    if first == "indicated":
+        return bool((_crossing_at_rest(signals) != signals.direction).any())
+    play = signals.play(abs(float(width)) / ARCSEC_PER_DEG)
+    return bool((np.abs(play) < 1.0).any())
+
+
+def _crossing_at_rest(signals: Signals) -> Array:
+    """The direction, going evenly from one to the other where the reference stands between them."""
+    crossing = signals.direction.copy()
+    for start, stop in signals.run_bounds():
+        moved = np.abs(np.diff(signals.theta[start:stop])) > STANDS
+        moving = np.flatnonzero(np.concatenate([moved[:1], moved[1:] | moved[:-1], moved[-1:]]))
+        if moving.size == 0:
+            continue
+        clock, direction = signals.clock[start:stop], signals.direction[start:stop]
+        for last, following in itertools.pairwise(moving.tolist()):
+            # The last reading before, and the first one after, still stand where they turn.
+            ends = direction[[max(last - 1, 0), min(following + 1, stop - start - 1)]]
+            if following - last > 1 and ends[0] != ends[1]:
+                inside = slice(start + last, start + following + 1)
+                at = clock[[last, following]]
+                crossing[inside] = np.interp(signals.clock[inside], at, ends)
+    return crossing
 
 
 def goes_both_ways(signals: Signals) -> bool:

@@ -134,14 +134,15 @@ class LocalDefect(Effect):
                 # From within a bump that was found the way leads there.
                 if any(abs((place - c + 180.0) % 360.0 - 180.0) < w for c, w in reached):
                     continue
-                shape = {"shaft": shaft, "place_deg": place, "width_deg": width}
+                shape: dict[str, Any] = {"shaft": shaft, "place_deg": place, "width_deg": width}
                 if not (
                     regression.hopeless(score / regression.variance, 3, log_grid)
                     or cls._is_beaten(regression, shape, log_grid)
                 ):
                     shape = cls._refined(regression, shaft, place, width)
                     shape = cls._unclipped(regression, shape)
-                    reached.append((float(shape["place_deg"]), float(shape["width_deg"])))
+                    place, width = shape["place_deg"], shape["width_deg"]
+                    reached.append((place, width))
                 columns = cls.columns(regression.signals, regression.around, shape)
                 power = columns[:, 0] ** 2
                 # One or two readings are outliers, not a place of the joint.

@@ -142,7 +142,8 @@ class PreslidingHysteresis(Effect):
         columns = cls.columns(signals, regression.around, shape)
         extension = regression.propose(cls.kind, shape, columns, parameters=2, log_grid=np.log(2.0))
         if not regression.has(cls.kind):
-            return extension
+            # Friction winds up in the direction of travel; the other way the reference has play.
+            return extension if extension.coefficients[0] > 0.0 else None
         # What may follow: play, another element.
         further = [] if 0.0 in present else [cls._play(regression)]
         apart = all(

@@ -148,6 +148,26 @@ class Signals:
             d - (d - start[self.segment]) * np.exp(-np.minimum(self.travel / length_deg, 700.0))
         )
 
+    def play(self, half_width_deg: float, start_state: float = 1.0) -> Array:
+        """Where the angle stands in a play of that half width, in [-1, 1].
+
+        It goes from one side to the other over twice the half width after each reversal; a run
+        starts at ``start_state * d``: 0 in the middle, 1 at the side of its direction.
+        """
+        state, start = 0.0, np.zeros(self.segment_direction.size)
+        stretches = zip(
+            self.segment_direction.tolist(),
+            (self.segment_length / half_width_deg).tolist(),
+            self.segment_first.tolist(),
+            strict=True,
+        )
+        for k, (d, crossed, first) in enumerate(stretches):
+            start[k] = state = start_state * d if first else state
+            state = d * min(d * state + crossed, 1.0)
+        d = self.segment_direction[self.segment]
+        reached = d * start[self.segment] + self.travel / half_width_deg
+        return np.asarray(d * np.minimum(reached, 1.0))
+
 
 def join_runs(runs: Sequence[CalibrationRun]) -> Signals:
     """Signals of ``runs``; a quantity that some run lacks is None for all."""
