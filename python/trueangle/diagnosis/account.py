@@ -170,14 +170,25 @@ def _believed(seen: Seen) -> Account:
     choice, believed = _chosen(seen, seen.sim), seen.sim
     # Twice each: what one was taken for is only known once the others are right.
     for _ in range(2 * len(seen.sim.effects)):
-        other = None if pace().over else corrected_effects(choice.chosen, believed, seen.sim)
-        if other is None:
+        others = [] if pace().over else _corrections(choice, believed, seen.sim)
+        tried = [(_chosen(seen, other), other) for other in others]
+        best = min(tried, key=lambda each: total_penalty(each[0].chosen), default=None)
+        if best is None or total_penalty(best[0].chosen) >= total_penalty(choice.chosen):
             break
-        tried = _chosen(seen, other)
-        if total_penalty(tried.chosen) >= total_penalty(choice.chosen):
-            break
-        choice, believed = tried, other
+        choice, believed = best
     return Account(seen, choice, believed, choice.start)
+
+
+def _corrections(
+    choice: CauseSelection, believed: Simulation, stated: Simulation
+) -> list[Simulation]:
+    """With one refuted effect as the readings show it, beside the causes chosen or for them.
+
+    Another size of what is believed comes before further causes that make up for it.
+    """
+    settled = [choice.chosen, choice.start] if choice.chosen.terms else [choice.start]
+    found = (corrected_effects(each, believed, stated, choice.spots) for each in settled)
+    return [other for other in found if other is not None]
 
 
 def _start(seen: Seen, sim: Simulation) -> Regression:

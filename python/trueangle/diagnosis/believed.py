@@ -53,11 +53,15 @@ def scaled(effect: Effect, factor: float, signals: Signals, around: Surroundings
 
 
 def corrected_effects(
-    regression: Regression, believed: Simulation, sim: Simulation
+    regression: Regression,
+    believed: Simulation,
+    sim: Simulation,
+    spots: Sequence[Blindness] = (),
 ) -> Simulation | None:
     """The simulation with the strength of one refuted effect as measured; None where none is.
 
-    A term of the same cause counts with it: a correction of a belief is no further cause.
+    A term of the same cause counts with it, and so does one that these runs cannot tell from it
+    (``spots``): a correction of a belief is no further cause.
     """
     signals, around = regression.signals, sim.surroundings
     worst: tuple[float, Simulation] | None = None
@@ -65,9 +69,11 @@ def corrected_effects(
         if not EFFECTS[effect.kind].transfers:
             continue
         column = effect.expected(signals, around)
+        alike = {effect.kind}.union(*(s.causes for s in spots if effect.kind in s.causes))
+        kept_terms = [term for term in regression.terms if term.cause not in alike]
         rest = regression
-        if regression.has(effect.kind):
-            rest = regression.with_terms(t for t in regression.terms if t.cause != effect.kind)
+        if len(kept_terms) < len(regression.terms):
+            rest = regression.with_terms(kept_terms)
         found = _factor(rest, column)
         if found is None:
             continue

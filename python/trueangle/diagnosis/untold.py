@@ -48,7 +48,11 @@ def untold(
     if rest:
         names = ", ".join(dict.fromkeys(rest))
         again = " either" if shown else ""
-        yield f"Not seen, and could not be in such runs{again}: {names} (why: `verbose=True`).", 2, 0
+        yield (
+            f"Not seen, and could not be in such runs{again}: {names} (why: `verbose=True`).",
+            2,
+            0,
+        )
 
 
 def _head(spot: Blindness) -> str:
