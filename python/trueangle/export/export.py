@@ -55,7 +55,8 @@ def export_model(
     ----------
     model : HarmonicModel or path
     target : str
-        One of `trueangle.export.TARGETS`: "c", "rust", "csv", "simplefoc", "moteus", ...
+        One of `trueangle.export.TARGETS`: "c", "rust", "csv", "simplefoc", "moteus", ... "fmu",
+        "mujoco". "c" and "rust" compute terms at run time, "fmu" and "mujoco" hold the model.
     path : path, optional
         File to write; without, the text is in the result only.
     max_arcsec : float, optional

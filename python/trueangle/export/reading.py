@@ -280,6 +280,13 @@ def portable_model(text: str, path: str, target: Target) -> HarmonicModel:
         read.append(table)
         tables.append(ReadTable(shaft, cycles, _function(table, move), entries, table.step))
     chain = Chain(whole, tuple(read), at_indicated)
+    computed = re.search(r"With ([\w, ]+): \w*step\(", flowing)
+    note = (
+        f"read from the tables of {target.name}; {computed[1]}, which its step computes at run "
+        "time, is not in the model"
+        if computed
+        else ""
+    )
     return function_model(
         tables,
         path,
@@ -288,6 +295,7 @@ def portable_model(text: str, path: str, target: Target) -> HarmonicModel:
         zero=whole / TURN,
         at_indicated=at_indicated,
         turns=chain.turns[0],
+        note=note,
     )
 
 

@@ -61,9 +61,10 @@ class SensorLayer:
     -----
     Each call of `read` is one reading: what follows travel takes them in their order. A layer
     belongs to as many environments as the first `read` shows; `reset` forgets them. Models
-    without a state are evaluated over all environments at once (0.1 microseconds a reading),
-    those with one environment by environment (2 microseconds). Angles that turn further than
-    half a turn from one reading to the next are counted wrongly by models with a state.
+    without a state are evaluated over all environments at once (0.02 microseconds a reading of
+    1000), those with a state one by one (3.4 microseconds); one environment takes 10 to 16.
+    Angles that turn further than half a turn from one reading to the next are counted wrongly
+    by models with a state.
 
     Examples
     --------

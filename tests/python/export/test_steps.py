@@ -193,6 +193,16 @@ def test_direction_as_a_signal(tmp_path):
         ta.export_model(model, "c", bits=12, direction="angle")
 
 
+def test_what_is_read_back_names_the_terms_that_are_not(tmp_path):
+    model = model_of("all")
+    for target, ending in (("c", ".h"), ("rust", ".rs")):
+        exported(model, target, tmp_path / f"j{ending}")
+        back = ta.import_model(tmp_path / f"j{ending}", target)
+        assert back.terms == ()
+        assert "backlash, presliding_hysteresis, latency, filter_lag" in back.fit.note
+        assert "is not in the model" in back.fit.note
+
+
 def test_terms_too_steep_for_a_bound():
     fit = FitRecord(900, 1, (0.0, 360.0), 0.001, signals=(("torque", -1e6, 1e6),))
     steep = T.LoadDependentGearError((100.0,), (A,), (0.0,))
