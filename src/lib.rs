@@ -22,6 +22,7 @@ pub mod simd;
 pub mod kernel;
 
 pub mod compensator;
+pub mod robot;
 pub mod terms;
 
 pub mod band;

@@ -15,6 +15,7 @@ mod moments;
 mod motion;
 mod number;
 mod release;
+mod robot;
 mod series;
 mod spectrum;
 mod step;
@@ -61,6 +62,9 @@ mod _core {
 
     #[pymodule_export]
     use super::motion::{PyBanded, harmonic_rows, harmonic_sum};
+
+    #[pymodule_export]
+    use super::robot::PyRobotStep;
 
     #[pymodule_export]
     use super::spectrum::add_relative_power;

@@ -29,6 +29,8 @@ if TYPE_CHECKING:
     from .logs.frames import correct as correct
     from .model.file import load_model as load_model
     from .model.model import HarmonicModel as HarmonicModel
+    from .model.robot import Robot as Robot
+    from .model.robotfile import load_robot as load_robot
     from .planning.arc import plan_arc as plan_arc
     from .planning.plan import plan_mounts as plan_mounts
     from .rehearsal import Rehearsal as Rehearsal
@@ -79,10 +81,12 @@ _PUBLIC = {
     "fit": "fitting.fit",
     "fit_logs": "logs.fitting",
     "load_model": "model.file",
+    "load_robot": "model.robotfile",
     "Moments": "estimation.moments",
     "read_runs": "runs.files",
     "Rehearsal": "rehearsal",
     "rehearse": "rehearsal",
+    "Robot": "model.robot",
     "report": "reports",
     "selfcal": "selfcalibration",
     "Simulation": "simulation",

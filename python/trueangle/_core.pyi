@@ -5,7 +5,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .formats.signals import GivenSignals
-from .model.step import Step
+from .model.step import AllJoints, Step
 
 __version__: str
 
@@ -151,6 +151,23 @@ class Corrector:
         path: _Path | None = None,
         **signals: Unpack[GivenSignals[ArrayLike]],
     ) -> _Corrected: ...
+
+@final
+class RobotStep:
+    """Correction of one sample of every joint at a time."""
+
+    def __new__(cls, names: Sequence[str], parts: Sequence[Series | Corrector]) -> RobotStep: ...
+    @property
+    def step(self) -> AllJoints: ...
+    def _step(
+        self,
+        positions: ArrayLike,
+        /,
+        out: NDArray[np.float64] | None = None,
+        **signals: Unpack[GivenSignals[ArrayLike]],
+    ) -> NDArray[np.float64]: ...
+    def reset(self) -> None: ...
+    def __setstate__(self, past: Sequence[Sequence[float]]) -> None: ...
 
 @final
 class Banded:

@@ -176,6 +176,11 @@ impl Computation for Wish<'_> {
 }
 
 impl PyCorrector {
+    /// The series and its terms.
+    pub fn terms(&self) -> &Arc<Terms> {
+        self.inner.terms()
+    }
+
     fn compute<'py>(
         &mut self,
         quantity: Quantity,
@@ -252,7 +257,10 @@ fn taken<'py>(given: &Bound<'py, PyDict>, terms: &Terms) -> PyResult<Vec<Taken<'
 }
 
 /// A signal as doubles in the order they were taken; one value stays one.
-fn as_signal<'py>(given: &Bound<'py, PyAny>, name: &str) -> PyResult<Bound<'py, PyUntypedArray>> {
+pub fn as_signal<'py>(
+    given: &Bound<'py, PyAny>,
+    name: &str,
+) -> PyResult<Bound<'py, PyUntypedArray>> {
     let py = given.py();
     let (array, _) = as_array(given, name)?;
     let dtype = array.dtype();
@@ -264,7 +272,7 @@ fn as_signal<'py>(given: &Bound<'py, PyAny>, name: &str) -> PyResult<Bound<'py, 
 }
 
 /// Contiguous doubles in C order.
-fn in_order<'py>(array: &Bound<'py, PyUntypedArray>) -> PyResult<Bound<'py, PyUntypedArray>> {
+pub fn in_order<'py>(array: &Bound<'py, PyUntypedArray>) -> PyResult<Bound<'py, PyUntypedArray>> {
     let py = array.py();
     if let Ok(doubles) = array.cast::<PyArrayDyn<f64>>()
         && doubles.is_c_contiguous()

@@ -57,7 +57,7 @@ impl PyCompensator {
 }
 
 /// Definitions hold pointers, but nobody writes to this one.
-struct Definition(ffi::PyMethodDef);
+pub struct Definition(pub ffi::PyMethodDef);
 
 // SAFETY: read-only.
 unsafe impl Sync for Definition {}

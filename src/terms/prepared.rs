@@ -141,7 +141,8 @@ impl Terms {
             .find(|&signal| self.has_travel && given(signal))
     }
 
-    pub(super) fn check(&self, given: impl Fn(Signal) -> bool) -> Result<(), Error> {
+    /// Refuses to go on without a signal that a term needs.
+    pub fn check(&self, given: impl Fn(Signal) -> bool) -> Result<(), Error> {
         for &(signal, ref term) in &self.needs {
             let implied = signal == Signal::Direction && given(Signal::Velocity);
             if !implied && !given(signal) {

@@ -12,8 +12,9 @@ from typing import Any, TextIO, cast
 
 from .._core import __version__
 from ..errors import ArgumentError, TrueAngleError
-from ..model.file import load_model, model_text
+from ..model.file import load_model
 from ..model.model import HarmonicModel
+from ..model.text import model_text
 from ..support.display_units import error_unit
 from ..support.files import check_output, read_whole, written_atomically
 from ..support.kinds import told_kinds

@@ -52,7 +52,7 @@ def correct_logs(
     ----------
     logs : path or iterable of paths
         Files or folders of Parquet, Arrow, CSV, HDF5, MATLAB v7.3, ROS bags, MCAP, MDF4.
-    model : HarmonicModel, path, or mapping of joint names to them
+    model : HarmonicModel, Robot, path of either, or mapping of joint names to models
     output : path, optional
         A file for one log, a folder for several.
     in_place : bool

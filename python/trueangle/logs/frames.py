@@ -43,7 +43,8 @@ def correct(
         (``__arrow_c_stream__``), such as a relation of duckdb; an xarray Dataset; or a numpy
         or Dask array, a series of pandas or polars, or an xarray DataArray of angles in the
         model's unit, whose names, index and coordinates are kept.
-    model : HarmonicModel, path, or mapping of joint names to them
+    model : HarmonicModel, Robot, path of either, or mapping of joint names to models
+        A robot knows the columns that it was fitted to; ``column`` and ``signals`` name others.
     column : str or mapping of joint names to str, optional
         The indicated angle; by default ``indicated_deg`` (``_rad``, ``_turn``, ``_count``),
         of a named joint ``JOINT_indicated_deg`` and the like.

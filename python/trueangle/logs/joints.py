@@ -7,7 +7,7 @@ import json
 import tempfile
 import warnings
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from os import PathLike
 from pathlib import Path
@@ -20,6 +20,8 @@ from ..errors import ArgumentError, FileError, OutsideSpanWarning
 from ..formats.columns import Column, signal_code, wanted_columns
 from ..model.file import load_model
 from ..model.model import HarmonicModel
+from ..model.robot import Robot
+from ..model.robotfile import is_robot_file, load_robot
 from ..support.files import sha256_of
 from .columns import SIGNAL_COLUMNS, AngleColumn, find_angle_column, find_signal
 from .statistics import CorrectionStatistics
@@ -336,10 +338,19 @@ def joints_of(
     column: str | Mapping[str, str] | None = None,
     signals: Mapping[str, Any] | None = None,
 ) -> tuple[LogJoint, ...]:
-    """Joints from one model (or its file) or a mapping of joint names to models.
+    """Joints from one model (or its file), a robot (or its file), or a mapping of names to models.
 
     ``column`` and ``signals`` are those of the joint, or mappings by joint name.
     """
+    digest = file = ""
+    if isinstance(model, str | PathLike) and is_robot_file(model):
+        file, digest = Path(model).name, sha256_of(model)
+        model = load_robot(model)
+    if isinstance(model, Robot):
+        known = {**model.signals, **(signals or {})}
+        for joint in column if isinstance(column, Mapping) else ():  # stands for that of the fit
+            known[joint] = {k: v for k, v in known.get(joint, {}).items() if k != "indicated"}
+        signals = known
     by_name: Mapping[Any, Any] = model if isinstance(model, Mapping) else {None: model}
     if not by_name:
         raise ArgumentError("model is empty: at least one joint is needed")
@@ -351,10 +362,11 @@ def joints_of(
     if signals and not isinstance(model, Mapping):
         by_joint = {None: signals}
     _check_known(by_joint, by_name, "signals")
-    return tuple(
+    found = (
         _joint(entry, name, columns.get(name), wanted_columns(by_joint.get(name)))
         for name, entry in by_name.items()
     )
+    return tuple(replace(j, file=file, sha256=digest) if digest else j for j in found)
 
 
 def _check_known(names: Iterable[Any], known: Mapping[Any, Any], argument: str) -> None:

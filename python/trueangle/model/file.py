@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import warnings
+from collections.abc import Mapping
 from dataclasses import fields
 from os import PathLike
 from pathlib import Path
@@ -28,9 +29,9 @@ from ..support.kinds import told_kinds
 from .model import HarmonicModel
 from .records import FitRecord, Provenance, TableRecord
 from .term import Term, known_terms
-from .text import FORMAT, VERSION, model_text, save_model
+from .text import FORMAT, ROBOT_FORMAT, VERSION, save_model
 
-__all__ = ["FORMAT", "VERSION", "load_model", "model_text", "save_model"]
+__all__ = ["FORMAT", "VERSION", "content_of", "load_model", "model_of", "part_of", "save_model"]
 
 Array: TypeAlias = NDArray[np.float64]
 
@@ -95,23 +96,57 @@ def model_of(text: str, path: str | PathLike[str]) -> HarmonicModel:
     return reader.model()
 
 
-class _Reader(Decoder):
-    """Checks one file key by key; every refusal names file and key."""
+def content_of(path: Path, wanted: str) -> dict[str, Any]:
+    """The object of a file of the format that is wanted and of a version that is known."""
+    reader = _Reader(path, ModelFileError)
+    content = reader.content(wanted)
+    reader.version(content)
+    return content
 
-    #: The text, where it is not that of the file itself.
+
+def part_of(path: Path, value: Any, prefix: str) -> HarmonicModel:
+    """The model that a part of a file is; ``prefix`` stands before its keys in messages."""
+    reader = _Reader(path, ModelFileError)
+    reader.prefix = prefix
+    return reader.model_of(value)
+
+
+class _Reader(Decoder):
+    """Checks a model key by key; every refusal names file and key.
+
+    ``prefix`` stands before the keys of a model that is part of a file, ``given`` is the text
+    where it is not that of the file itself.
+    """
+
+    prefix = ""
     given: str | None = None
 
-    def content(self) -> dict[str, Any]:
+    def error(self, problem: str, key: str | None = None) -> FileError:
+        """The error that says ``problem`` of ``key``."""
+        return super().error(problem, ".".join(filter(None, (self.prefix, key))) or None)
+
+    def content(self, wanted: str) -> dict[str, Any]:
+        """The file's object, of the format that is wanted."""
         text = self.given
         if text is None:
             text = read_text(self.path, MODEL_BYTES, self.kind, "a model")
-        value = json_text(self.path, text, self.kind, "a model file")
-        if not isinstance(value, dict) or value.get("format") != FORMAT:
-            raise self.error(f'is not a model file: "format" must be "{FORMAT}"')
-        return value
+        return self.of_format(json_text(self.path, text, self.kind, "a model file"), wanted)
 
-    def model(self) -> HarmonicModel:
-        content = self.content()
+    def of_format(self, value: Any, wanted: str) -> dict[str, Any]:
+        """The object, where it is of the format that is wanted; names the other's reader."""
+        found = value.get("format") if isinstance(value, dict) else None
+        if found != wanted:
+            hint = ""
+            if found == ROBOT_FORMAT:
+                hint = "; it holds the joints of a robot: read it with `ta.load_robot(...)`"
+            elif found == FORMAT:
+                hint = "; it holds the model of one joint: read it with `ta.load_model(...)`"
+            what = "the file of a robot" if wanted == ROBOT_FORMAT else "a model file"
+            raise self.error(f'is not {what}: "format" must be "{wanted}"{hint}')
+        return dict(value)
+
+    def version(self, content: Mapping[str, Any]) -> None:
+        """Refuse a version that a later release wrote."""
         version = self.whole(content.get("version"), "version", 1)
         if version > VERSION:
             raise self.error(
@@ -119,6 +154,14 @@ class _Reader(Decoder):
                 "upgrade trueangle",
                 "version",
             )
+
+    def model(self) -> HarmonicModel:
+        return self.model_of(self.content(FORMAT))
+
+    def model_of(self, value: Any) -> HarmonicModel:
+        """The model of an object that has been read."""
+        content = self.of_format(value, FORMAT)
+        self.version(content)
         self.table(content, _KEYS)
         argument = content["argument"]
         if argument not in ("reference", "indicated"):

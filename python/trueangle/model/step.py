@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Protocol
+from typing import Protocol, Unpack
 
-__all__ = ["Step"]
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..formats.signals import GivenSignals
+
+__all__ = ["AllJoints", "Step"]
 
 
 class Step(Protocol):
@@ -21,3 +26,16 @@ class Step(Protocol):
         current: float | None = None,
     ) -> float:
         """The true angle of an indicated one."""
+
+
+class AllJoints(Protocol):
+    """The corrected angles of all joints of a robot for their indicated ones."""
+
+    def __call__(
+        self,
+        positions: ArrayLike,
+        /,
+        out: NDArray[np.float64] | None = None,
+        **signals: Unpack[GivenSignals[ArrayLike]],
+    ) -> NDArray[np.float64]:
+        """The true angles, in the order of the joints; in ``out`` where it is given."""

@@ -15,15 +15,29 @@ if TYPE_CHECKING:
     from .model import HarmonicModel
     from .records import FitRecord
 
-__all__ = ["FORMAT", "VERSION", "model_text", "save_model"]
+__all__ = [
+    "FORMAT",
+    "ROBOT_FORMAT",
+    "VERSION",
+    "model_content",
+    "model_text",
+    "pretty",
+    "save_model",
+]
 
 FORMAT = "trueangle-model"
+ROBOT_FORMAT = "trueangle-robot"
 VERSION = 1
 
 
 def model_text(model: HarmonicModel) -> str:
     """What the file of a model holds."""
-    content = {
+    return pretty(model_content(model)) + "\n"
+
+
+def model_content(model: HarmonicModel) -> dict[str, Any]:
+    """The object that the file of a model is."""
+    return {
         "format": FORMAT,
         "version": VERSION,
         "period": model.period,
@@ -39,7 +53,6 @@ def model_text(model: HarmonicModel) -> str:
             "package": model.provenance.package,
         },
     }
-    return _pretty(content) + "\n"
 
 
 def save_model(model: HarmonicModel, path: str | PathLike[str]) -> None:
@@ -66,14 +79,14 @@ def _record(record: FitRecord) -> dict[str, Any]:
     return table
 
 
-def _pretty(value: Any, indent: int = 0) -> str:
+def pretty(value: Any, indent: int = 0) -> str:
     """JSON with one line per key and per list of plain numbers."""
     pad = "  " * (indent + 1)
     end = "\n" + "  " * indent
     if isinstance(value, Mapping) and value:
-        items = [f"{pad}{json.dumps(key)}: {_pretty(v, indent + 1)}" for key, v in value.items()]
+        items = [f"{pad}{json.dumps(key)}: {pretty(v, indent + 1)}" for key, v in value.items()]
         return "{\n" + ",\n".join(items) + end + "}"
     nested = isinstance(value, (list, tuple)) and any(isinstance(v, (Mapping, list)) for v in value)
     if nested:
-        return "[\n" + ",\n".join(pad + _pretty(v, indent + 1) for v in value) + end + "]"
+        return "[\n" + ",\n".join(pad + pretty(v, indent + 1) for v in value) + end + "]"
     return json.dumps(value, allow_nan=False)

@@ -56,6 +56,8 @@ CALLS = {
     ta.import_model: {"path": "t.csv", "target": "csv"},
     ta.join: {"a": "r.csv", "b": "r.csv"},
     ta.load_model: {"path": "m.json"},
+    ta.load_robot: {"path": "robot.json"},
+    ta.Robot: {"models": {"a": MODEL}},
     ta.load_simulation: {"path": "s.toml"},
     ta.plan_arc: {"start": 0.0, "stop": 180.0, "orders": [1], "readings": 6},
     ta.plan_mounts: {"gear_ratio": 10.0, "positions": 5, "orders": [1, 2]},
@@ -107,6 +109,7 @@ def files(tmp_path_factory):
     with pytest.MonkeyPatch.context() as patch:
         patch.chdir(folder)
         MODEL.save("m.json")
+        ta.Robot({"a": MODEL}).save("robot.json")
         SIMULATION.save("s.toml")
         ta.write_runs(RUNS, "r.csv")
         ta.export_model(MODEL, "csv", "t.csv", entries=8)

@@ -53,6 +53,7 @@ def joined() -> object:
 MADE: dict[str, Callable[[], object]] = {
     "fit": lambda: FIT,
     "model": lambda: FIT.model,
+    "robot": lambda: ta.Robot({"a": FIT.model}),
     "model with terms": lambda: diagnosed().correction(),
     "selection": lambda: ta.select_orders(RUNS),
     "diagnosis": diagnosed,

@@ -1,0 +1,221 @@
+"""The joints of a robot: their models under their names, corrected together."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from os import PathLike
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any, TypeAlias, Unpack
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from .. import _core
+from ..errors import ArgumentError, KindError
+from ..formats.columns import wanted_columns
+from ..formats.signals import GivenSignals, check_names
+from ..support.angles import arcsec, unit_name
+from ..support.kinds import told_kinds
+from ..support.oftype import of_type
+from ..support.plainresult import Shown, counted
+from .model import HarmonicModel
+
+if TYPE_CHECKING:
+    from .step import AllJoints
+
+__all__ = ["Robot"]
+
+#: Columns of a log by role, each with its unit where its name does not tell it.
+Columns: TypeAlias = Mapping[str, tuple[str, str | None]]
+
+
+@told_kinds
+class Robot(Shown, Mapping[str, HarmonicModel]):
+    r"""The correction models of a robot's joints, by name, corrected in one call.
+
+    .. math:: \theta_j = \theta_{ind,j} - \varepsilon_j(\theta_j), \quad j = 1 \dots J
+
+    Parameters
+    ----------
+    models : mapping of str to HarmonicModel
+        In the order of the joints' angles; every model in its own unit.
+    name : str
+        Of the robot.
+    signals : mapping of str to mapping, optional
+        The columns of a log that belong to each joint, as ``signals=`` of `trueangle.correct`:
+        ``{"elbow": {"indicated": ("q3", "rad")}}``.
+
+    Raises
+    ------
+    ArgumentError
+        No joint, or signals of a joint that is not there.
+
+    Examples
+    --------
+    >>> from trueangle import Shaft
+    >>> model = HarmonicModel([Shaft("output", 1, [1], [0.0], [0.5])], period=360.0)
+    >>> robot = Robot({"shoulder": model, "elbow": model})
+    >>> robot.joints
+    ('shoulder', 'elbow')
+    >>> robot.correct([90.5, 0.0]).round(9)
+    array([90.,  0.])
+    """
+
+    def __init__(
+        self,
+        models: Mapping[str, HarmonicModel],
+        *,
+        name: str = "",
+        signals: Mapping[str, Any] | None = None,
+    ) -> None:
+        if not isinstance(models, Mapping):
+            raise KindError(f"models must be a mapping of joints to models, got {models!r:.60}")
+        if not models:
+            raise ArgumentError("models is empty: a robot has one joint at least")
+        for joint, model in models.items():
+            if not isinstance(joint, str) or not joint:
+                raise KindError(f"models: a joint's name must be a text, got {joint!r:.60}")
+            of_type(f"models[{joint!r}]", model, HarmonicModel, "a trueangle.HarmonicModel")
+        for joint in signals or {}:
+            if joint not in models:
+                raise ArgumentError(
+                    f"signals: no joint {joint!r}; the joints are {', '.join(models)}"
+                )
+        self._models = dict(models)
+        self.name = name
+        self.signals: Mapping[str, Columns] = MappingProxyType(
+            {joint: wanted_columns(columns) for joint, columns in (signals or {}).items()}
+        )
+
+    def __getitem__(self, joint: str) -> HarmonicModel:
+        return self._models[joint]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._models)
+
+    def __len__(self) -> int:
+        return len(self._models)
+
+    def __hash__(self) -> int:
+        return hash(tuple(self._models.items()))
+
+    def __reduce__(self) -> Any:
+        signals = {joint: dict(columns) for joint, columns in self.signals.items()}
+        return _rebuilt, (self._models, self.name, signals)
+
+    @property
+    def joints(self) -> tuple[str, ...]:
+        """Names of the joints, in the order of their angles."""
+        return tuple(self._models)
+
+    def correct(
+        self, positions: ArrayLike, **signals: Unpack[GivenSignals[ArrayLike]]
+    ) -> NDArray[np.floating[Any]]:
+        """True angles of all joints.
+
+        Parameters
+        ----------
+        positions : array_like, shape (J,) or (N, J)
+            Indicated angles in the order of `joints`, each in its model's unit; rows in the
+            order they were taken.
+        **signals : array_like
+            ``velocity``, ``torque`` ... where terms of a model need them: of the shape of the
+            positions or one that numpy spreads to it (a value per joint, ``(N, 1)`` for all).
+
+        Returns
+        -------
+        ndarray of the shape of ``positions``
+            float32 for float32, else float64; the columns of (N, J) lie one after the other.
+
+        Raises
+        ------
+        ArgumentError
+            Another shape; a signal that a model needs is missing.
+
+        Notes
+        -----
+        Costs what a call of `HarmonicModel.correct` for every column costs.
+        """
+        check_names(signals)
+        given = np.asarray(positions)
+        if given.ndim not in (1, 2) or given.shape[-1] != len(self):
+            raise ArgumentError(
+                f"positions must have the shape ({len(self)},) or (N, {len(self)}), the angles of "
+                f"{', '.join(self)}; got {given.shape}"
+            )
+        if given.dtype.kind not in "fiu":
+            raise KindError(f"positions must be real numbers, got an array of {given.dtype}")
+        spread: dict[str, NDArray[Any]] = {}
+        for name, values in signals.items():
+            if values is None:
+                continue
+            try:
+                spread[name] = np.broadcast_to(np.asarray(values), given.shape)
+            except ValueError:
+                raise ArgumentError(
+                    f"{name} must have the shape of positions {given.shape}, or one that numpy "
+                    f"spreads to it; got {np.asarray(values).shape}"
+                ) from None
+        kind = np.float32 if given.dtype == np.float32 else np.float64
+        corrected = np.empty(given.shape[::-1], dtype=kind)
+        rows = corrected.reshape(len(self), -1)
+        columns = given.reshape(-1, len(self)).T
+        for j, (joint, model) in enumerate(self.items()):
+            own: Any = {n: v.reshape(-1, len(self))[:, j] for n, v in spread.items()}
+            try:
+                model.correct(columns[j], out=rows[j], **own)
+            except ArgumentError as error:
+                raise type(error)(f"joint {joint}: {error}") from None
+        return corrected.T
+
+    def compensator(self) -> AllJoints:
+        """``step(positions) -> corrected`` for one sample of all joints at a time.
+
+        One call of the compiled core for all joints: of an array of float64 it allocates
+        nothing but the result, and nothing at all with ``step(positions, out=array)``. The
+        numbers are those of every model's own `HarmonicModel.compensator`, to the last bit.
+        With terms it is ``step(positions, velocity=, torque=, ...)``, a value per joint or one
+        for all, and keeps the state of travel; no joint moves where one lacks a signal.
+
+        Examples
+        --------
+        >>> from trueangle import Shaft
+        >>> model = HarmonicModel([Shaft("output", 1, [1], [0.0], [0.5])], period=360.0)
+        >>> step = Robot({"a": model, "b": model}).compensator()
+        >>> step(np.array([90.5, 0.0])).round(9)
+        array([90.,  0.])
+        """
+        parts = [m._core_corrector() if m.terms else m._series for m in self.values()]
+        return _core.RobotStep(list(self), parts).step
+
+    def save(self, path: str | PathLike[str]) -> None:
+        """Write all models to one file (JSON), complete or not at all.
+
+        Raises
+        ------
+        FileError
+            An ending of another format, a file that the models were fitted to.
+        """
+        from .robotfile import save_robot
+
+        save_robot(self, path)
+
+    def _brief(self) -> str:
+        return f"{self.name or 'unnamed'}, {counted(len(self), 'joint')}: {', '.join(self)}"
+
+    def summary(self) -> str:
+        """Every joint with its orders and the largest that its correction can be."""
+        lines = [f"robot {self.name}".rstrip() + f": {counted(len(self), 'joint')}"]
+        for joint, model in self.items():
+            most = arcsec(float(model.amplitudes.sum()), model.period)
+            orders = counted(len(model.orders), "order")
+            terms = "".join(f", {term.kind}" for term in model.terms)
+            lines.append(
+                f"  {joint}: {orders}{terms}, at most {most:.4g} arcsec, "
+                f"angles in {unit_name(model.period)}"
+            )
+        return "\n".join(lines)
+
+
+def _rebuilt(models: dict[str, HarmonicModel], name: str, signals: dict[str, Any]) -> Robot:
+    return Robot(models, name=name, signals=signals)
