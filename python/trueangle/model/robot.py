@@ -196,7 +196,7 @@ class Robot(Shown, Mapping[str, HarmonicModel]):
         FileError
             An ending of another format, a file that the models were fitted to.
         """
-        from .robotfile import save_robot
+        from .text import save_robot
 
         save_robot(self, path)
 

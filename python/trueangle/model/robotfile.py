@@ -8,13 +8,12 @@ from typing import Any, Final
 
 from ..errors import ArgumentError, ModelFileError
 from ..support.decoding import Decoder
-from ..support.files import MODEL, MODEL_BYTES, written_atomically
 from ..support.kinds import told_kinds
 from .file import content_of, part_of
 from .robot import Robot
-from .text import ROBOT_FORMAT, VERSION, model_content, pretty
+from .text import ROBOT_FORMAT
 
-__all__ = ["is_robot_file", "load_robot", "save_robot"]
+__all__ = ["is_robot_file", "load_robot"]
 
 #: Joints of one robot, at most.
 MAX_JOINTS: Final = 256
@@ -42,28 +41,6 @@ def is_robot_file(path: str | PathLike[str]) -> bool:
             return f'"{ROBOT_FORMAT}"'.encode() in file.read(256)
     except OSError:
         return False
-
-
-def save_robot(robot: Robot, path: str | PathLike[str]) -> None:
-    """Write ``robot``; see `Robot.save`."""
-    content: dict[str, Any] = {"format": ROBOT_FORMAT, "version": VERSION}
-    if robot.name:
-        content["name"] = robot.name
-    if robot.signals:
-        content["signals"] = {
-            joint: {role: [*column] for role, column in columns.items()}
-            for joint, columns in robot.signals.items()
-        }
-    content["joints"] = {joint: model_content(model) for joint, model in robot.items()}
-    text = pretty(content) + "\n"
-    if len(text) > MODEL_BYTES:
-        raise ArgumentError(
-            f"{path}: the models take {len(text)} bytes, and at most {MODEL_BYTES} are read back; "
-            "save them without their covariances"
-        )
-    hashes = [source.sha256 for model in robot.values() for source in model.provenance.inputs]
-    with written_atomically(path, kind=MODEL, hashes=hashes) as file:
-        file.write(text)
 
 
 class _RobotReader(Decoder):

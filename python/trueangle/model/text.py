@@ -14,6 +14,7 @@ from ..support.files import MODEL, MODEL_BYTES, written_atomically
 if TYPE_CHECKING:
     from .model import HarmonicModel
     from .records import FitRecord
+    from .robot import Robot
 
 __all__ = [
     "FORMAT",
@@ -23,6 +24,7 @@ __all__ = [
     "model_text",
     "pretty",
     "save_model",
+    "save_robot",
 ]
 
 FORMAT = "trueangle-model"
@@ -64,6 +66,28 @@ def save_model(model: HarmonicModel, path: str | PathLike[str]) -> None:
             "save it without its covariance"
         )
     hashes = [source.sha256 for source in model.provenance.inputs]
+    with written_atomically(path, kind=MODEL, hashes=hashes) as file:
+        file.write(text)
+
+
+def save_robot(robot: Robot, path: str | PathLike[str]) -> None:
+    """Write ``robot``; see `Robot.save`."""
+    content: dict[str, Any] = {"format": ROBOT_FORMAT, "version": VERSION}
+    if robot.name:
+        content["name"] = robot.name
+    if robot.signals:
+        content["signals"] = {
+            joint: {role: [*column] for role, column in columns.items()}
+            for joint, columns in robot.signals.items()
+        }
+    content["joints"] = {joint: model_content(model) for joint, model in robot.items()}
+    text = pretty(content) + "\n"
+    if len(text) > MODEL_BYTES:
+        raise ArgumentError(
+            f"{path}: the models take {len(text)} bytes, and at most {MODEL_BYTES} are read back; "
+            "save them without their covariances"
+        )
+    hashes = [source.sha256 for model in robot.values() for source in model.provenance.inputs]
     with written_atomically(path, kind=MODEL, hashes=hashes) as file:
         file.write(text)
 
