@@ -3,9 +3,16 @@
 from __future__ import annotations
 
 import argparse
+import json
+from typing import TYPE_CHECKING, Any
 
+from ..errors import FileError
 from .paths import Input
+from .robots import add_robot, each_joint, joints_asked, told
 from .signal_options import add_signals, reading
+
+if TYPE_CHECKING:
+    from .robots import JointAsked
 
 HELP = "say whether data are fit to be used, and what they can tell, before anything is fitted"
 EXAMPLE = "trueangle check runs.csv"
@@ -16,6 +23,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add = parser.add_argument
     add("files", nargs="+", type=Input, metavar="FILES", help="calibration runs of any format")
     add_signals(parser)
+    add_robot(parser)
     add("--json", action="store_true", help="print the result as JSON")
 
 
@@ -23,6 +31,35 @@ def run(args: argparse.Namespace) -> int:
     """Print the check; 1 where a fault makes the data unusable."""
     from ..runs.checks import check
 
+    asked = joints_asked(args)
+    if asked is not None:
+        return _robot(*asked, args)
     found = check(args.files, **reading(args))
     print(found.to_json() if args.json else found.summary())
     return 0 if found.usable else 1
+
+
+def _robot(name: str, joints: list[JointAsked], args: argparse.Namespace) -> int:
+    """Check every joint; 1 where the data of one are unusable."""
+    from ..reports.ranking import checked_rank, plain_ranking, ranked
+    from ..runs.checks import check
+    from ..runs.files import read_runs
+
+    def work(joint: JointAsked) -> Any:
+        found = check(joint.args.files, **reading(joint.args))
+        try:
+            runs = read_runs(joint.args.files, **reading(joint.args))
+        except FileError:  # the check says what is wrong
+            runs = None
+        return found, checked_rank(joint.name, found, runs)
+
+    found, _ = each_joint(joints, work)
+    ranking = ranked(rank for _, rank in found.values())
+    checks = {joint: result for joint, (result, _) in found.items()}
+    if args.json:
+        plain = {joint: result.to_dict() for joint, result in checks.items()}
+        print(json.dumps({"joints": plain, "ranking": plain_ranking(ranking)}, indent=2))
+    else:
+        texts = {row.joint: checks[row.joint].summary() for row in ranking}
+        print(told(f"Data of {name or 'the robot'}, the worst joint first:", ranking, texts))
+    return 0 if all(result.usable for result in checks.values()) else 1

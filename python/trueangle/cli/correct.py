@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING, Any
 
 from ..errors import ArgumentError, TrueAngleError
 from ..support.display_units import ErrorsIn, error_unit
-from ..support.suggestions import listed
+from ..support.suggestions import did_you_mean, listed
 from .error_units import add_errors_in, errors_in
 from .paths import Input, ModelInput
+from .robots import add_robot, joints_asked
 from .signal_options import add_signals, signals_by_joint
 from .terminal import own_interrupts
 
@@ -43,7 +44,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         required=True,
         type=ModelInput,
         metavar="[JOINT=]FILE",
-        help="model file written by trueangle fit; with several joints one of each",
+        help="model file written by trueangle fit, also of a whole robot; with several joints one "
+        "of each, or one of all",
     )
     add("-o", "--output", metavar="OUT", help="file to write; a folder for several")
     add(
@@ -83,6 +85,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     add_errors_in(parser)
     add("--json", action="store_true", help="print the result as JSON")
+    add_robot(parser)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -104,13 +107,14 @@ def run(args: argparse.Namespace) -> int:
         )
         return 2
     models: dict[Any, Any] = by_joint(args.model, "--model")
+    signals, single = _columns_of_joints(models, args)
     result = correct_logs(
         args.logs,
         models.get(None, models),
         args.output,
         in_place=args.in_place,
-        column=_columns(args.column, None in models),
-        signals=signals_by_joint(args.signal, None in models),
+        column=_columns(args.column, single),
+        signals=signals,
         unit=args.unit,
         counts_per_turn=args.counts_per_turn,
         topic=args.topic,
@@ -124,6 +128,42 @@ def run(args: argparse.Namespace) -> int:
     else:
         _total(result)
     return _status(result)
+
+
+def _columns_of_joints(
+    models: dict[Any, Any], args: argparse.Namespace
+) -> tuple[dict[str, Any] | None, bool]:
+    """Columns of the log's joints, and whether it has one; joints left out go from ``models``."""
+    from ..model.robotfile import is_robot_file, load_robot
+
+    single = None in models
+    whole = single and is_robot_file(models[None])
+    if not whole and args.robot is None and not args.joint:
+        return signals_by_joint(args.signal, single), single
+    if single and not whole:
+        raise ArgumentError(
+            f"--robot and --joint need models of several joints: {models[None]} is that of one; "
+            "give -m ROBOT.json, or -m JOINT=FILE of each"
+        )
+    known = list(load_robot(models[None]) if whole else models)
+    for joint in args.joint or ():
+        if joint not in known:
+            raise ArgumentError(
+                f"--joint {joint}: it has no model{did_you_mean(joint, known)}; the joints are "
+                f"{listed(known)}"
+            )
+    if args.joint and whole:
+        models.update(load_robot(models.pop(None)))
+    for joint in known if args.joint else ():
+        if joint not in args.joint:
+            del models[joint]
+    asked = joints_asked(args) if args.robot is not None or args.signal else None
+    named = {joint.name: joint.signals for joint in (asked[1] if asked is not None else ())}
+    if whole:
+        robot = load_robot(args.model[0])
+        named = {j: {**robot.signals.get(j, {}), **named.get(j, {})} for j in known}
+    kept = args.joint or known
+    return {joint: columns for joint, columns in named.items() if joint in kept} or None, False
 
 
 def by_joint(entries: Sequence[str], option: str) -> dict[str | None, str]:

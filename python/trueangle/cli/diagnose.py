@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import json
 import sys
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
@@ -15,12 +16,14 @@ from .error_units import add_errors_in, errors_in
 from .fit import add_argument_choice, add_joint
 from .order_lists import declared_shafts
 from .paths import Input, Output
+from .robots import add_robot, each_joint, joints_asked, told
 from .signal_options import reading, signals_by_joint
 
 if TYPE_CHECKING:
     from ..diagnosis import Diagnosis
     from ..model.model import HarmonicModel
     from ..simulation import Simulation
+    from .robots import JointAsked
 
 #: `trueangle.runs.joining.simulated.BY`, not imported for a help text.
 BY = ("time", "angle")
@@ -79,6 +82,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     add_argument_choice(parser)
     add_joint(parser)
+    add_robot(parser)
     add(
         "--within",
         type=seconds,
@@ -118,6 +122,9 @@ def run(args: argparse.Namespace) -> int:
             "--corrected-model with --simulated: no correction model can hold what is known as a "
             "log only; leave it out, or write what is found with --extend FILE"
         )
+    asked = joints_asked(args)
+    if asked is not None:
+        return _robot(*asked, args)
     simulation = _believed(args)
     model = None if args.model is None else load_model(args.model)
     own = [entry for entry in args.signal or () if entry[0] == "simulated"]
@@ -142,8 +149,52 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
-def _believed(args: argparse.Namespace) -> Simulation | None:
+def _robot(name: str, joints: list[JointAsked], args: argparse.Namespace) -> int:
+    """Diagnose every joint against its simulation, or an empty one of its gear."""
+    from ..diagnosis import diagnose
+    from ..model.robot import Robot
+    from ..reports.ranking import diagnosed_rank, plain_ranking, ranked
+    from .run_lists import read_checked
+
+    if args.simulated is not None or args.extend is not None or args.model is not None:
+        raise ArgumentError(
+            "--simulated, --extend and --model are of one joint: leave --robot out and name its "
+            "columns with --signal ROLE=NAME"
+        )
+
+    def work(joint: JointAsked) -> Diagnosis:
+        simulation = _believed(joint.args, empty=True)
+        runs = read_checked(joint.args)
+        return diagnose(runs, simulation, within=args.within, progress=args.progress)
+
+    found, _ = each_joint(joints, work)
+    ranking = ranked(diagnosed_rank(joint, result) for joint, result in found.items())
+    if args.json:
+        plain = {joint: result.to_dict() for joint, result in found.items()}
+        print(json.dumps({"joints": plain, "ranking": plain_ranking(ranking)}, allow_nan=False))
+    else:
+        texts = {row.joint: found[row.joint].summary(errors_in(args)) for row in ranking}
+        title = f"Diagnosis of {name or 'the robot'}, the worst joint first:"
+        print(told(title, ranking, texts, errors_in(args)), flush=True)
+    if args.corrected_model is not None:
+        models = {
+            joint: result.correction(argument=args.argument)
+            for joint, result in found.items()
+            if any(finding.confirmed for finding in result.findings)
+        }
+        if not models:
+            raise ArgumentError("no cause of any joint is confirmed: there is nothing to correct")
+        signals = {joint.name: joint.signals for joint in joints if joint.name in models}
+        Robot(models, name=name, signals=signals).save(args.corrected_model)
+        if not args.json:
+            print(f"\nCorrection models of {', '.join(models)}: {args.corrected_model}")
+    return 0
+
+
+def _believed(args: argparse.Namespace, empty: bool = False) -> Simulation | None:
     """The simulation: that of the file, or of a joint of which nothing else is believed.
+
+    ``empty`` where nothing need be stated of the joint.
 
     Raises
     ------
@@ -162,7 +213,7 @@ def _believed(args: argparse.Namespace) -> Simulation | None:
                 "leave them out"
             )
         return load_simulation(args.simulation)
-    if not stated:
+    if not stated and not empty:
         if args.simulated is not None:
             return None
         raise ArgumentError(

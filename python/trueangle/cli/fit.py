@@ -4,13 +4,21 @@ from __future__ import annotations
 
 import argparse
 import json
+from typing import TYPE_CHECKING, Any
 
+from ..errors import ArgumentError
 from ..support.files import MODEL
 from .error_units import add_errors_in, errors_in
 from .onepass import add_one_pass, log_options, wants_one_pass
 from .order_lists import declared_shafts, orders_by_shaft, parse_orders
 from .paths import Input, Output
+from .robots import add_robot, each_joint, joints_asked, told
 from .signal_options import add_signals
+
+if TYPE_CHECKING:
+    from ..fitting.result import FitResult
+    from ..runs.run import CalibrationRun
+    from .robots import JointAsked
 
 HELP = "fit a harmonic model to calibration runs and save it"
 EXAMPLE = "trueangle fit joint_a.csv -o joint_a.json --gear-ratio 100"
@@ -39,6 +47,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="auto (default: by evidence), 1-17, 1,4,8, or per shaft: output:1-3;motor:1,2",
     )
     add_joint(parser)
+    add_robot(parser)
     add_argument_choice(parser)
     add_covariance(parser)
     add_nuisance(parser)
@@ -126,31 +135,10 @@ def add_covariance(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Fit, save, print."""
-    orders = orders_by_shaft(args.orders, declared_shafts(args.shaft))
-    if wants_one_pass(args):
-        from ..logs.fitting import fit_logs
-
-        result = fit_logs(
-            args.runs, orders, loss=args.loss, checksums=args.checksums, **log_options(args)
-        )
-    else:
-        from ..fitting.fit import fit
-        from .run_lists import read_selected
-
-        result = fit(
-            read_selected(args),
-            orders=orders,
-            gear_ratio=args.gear_ratio,
-            fixed_member=args.fixed_member,
-            argument=args.argument,
-            loss=args.loss,
-            covariance=args.covariance,
-            nuisance=args.nuisance,
-            reference_orders=parse_orders(args.reference_orders, "--reference-orders")
-            if args.reference_orders
-            else (),
-            shafts=declared_shafts(args.shaft),
-        )
+    asked = joints_asked(args)
+    if asked is not None:
+        return _robot(*asked, args)
+    result = _fitted(args)
     result.model.save(args.output)
     if args.json:
         print(json.dumps({"model": args.output, **result.to_dict()}))
@@ -158,3 +146,69 @@ def run(args: argparse.Namespace) -> int:
         print(result.summary(errors_in(args)))
         print(f"\nsaved {args.output}")
     return 0
+
+
+def _robot(name: str, joints: list[JointAsked], args: argparse.Namespace) -> int:
+    """Fit every joint; one file of all models."""
+    from ..model.robot import Robot
+    from ..reports.ranking import fitted_rank, plain_ranking, ranked
+
+    if args.one_pass or args.scheduler:
+        raise ArgumentError("--one-pass and --scheduler go with one joint: leave --robot out")
+    runs: dict[str, Any] = {}
+
+    def work(joint: JointAsked) -> Any:
+        from .run_lists import read_selected
+
+        runs[joint.name] = read_selected(joint.args)
+        return _in_memory(joint.args, runs[joint.name])
+
+    fits, failed = each_joint(joints, work)
+    every = {**fits, **failed}
+    ranking = ranked(fitted_rank(joint, runs[joint], fit) for joint, fit in every.items())
+    signals = {joint.name: joint.signals for joint in joints if joint.name in fits}
+    robot = Robot({joint: fit.model for joint, fit in fits.items()}, name=name, signals=signals)
+    robot.save(args.output)
+    if args.json:
+        plain = {joint: fit.to_dict() for joint, fit in fits.items()}
+        rows = plain_ranking(ranking)
+        print(json.dumps({"model": args.output, "joints": plain, "ranking": rows}))
+    else:
+        told_of = [row.joint for row in ranking if row.joint in fits]
+        texts = {joint: fits[joint].summary(errors_in(args)) for joint in told_of}
+        title = f"Fit of {name or 'the robot'}, the worst joint first:"
+        print(told(title, ranking, texts, errors_in(args)))
+        print(f"\nsaved {args.output}")
+    return 0
+
+
+def _fitted(args: argparse.Namespace) -> FitResult:
+    if wants_one_pass(args):
+        from ..logs.fitting import fit_logs
+
+        orders = orders_by_shaft(args.orders, declared_shafts(args.shaft))
+        return fit_logs(
+            args.runs, orders, loss=args.loss, checksums=args.checksums, **log_options(args)
+        )
+    from .run_lists import read_selected
+
+    return _in_memory(args, read_selected(args))
+
+
+def _in_memory(args: argparse.Namespace, runs: list[CalibrationRun]) -> FitResult:
+    from ..fitting.fit import fit
+
+    return fit(
+        runs,
+        orders=orders_by_shaft(args.orders, declared_shafts(args.shaft)),
+        gear_ratio=args.gear_ratio,
+        fixed_member=args.fixed_member,
+        argument=args.argument,
+        loss=args.loss,
+        covariance=args.covariance,
+        nuisance=args.nuisance,
+        reference_orders=parse_orders(args.reference_orders, "--reference-orders")
+        if args.reference_orders
+        else (),
+        shafts=declared_shafts(args.shaft),
+    )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import json
 from typing import TYPE_CHECKING
 
 from ..errors import ArgumentError
@@ -11,9 +12,11 @@ from .fit import add_argument_choice, add_covariance, add_joint, add_nuisance
 from .onepass import add_one_pass, log_options, wants_one_pass
 from .order_lists import declared_shafts, parse_orders
 from .paths import Input
+from .robots import add_robot, each_joint, joints_asked
 
 if TYPE_CHECKING:
     from ..fitting.orders.table import OrderSelection
+    from .robots import JointAsked
 
 HELP = "say which orders of the angle error are real, and what they may be"
 EXAMPLE = "trueangle orders joint_a.csv --gear-ratio 100"
@@ -25,6 +28,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("runs", nargs="+", type=Input, metavar="RUNS", help="files of readings")
     add("--orders", metavar="1-17,202", help="candidates (default: low orders and the gear's own)")
     add_joint(parser)
+    add_robot(parser)
     add_argument_choice(parser)
     add_covariance(parser)
     add(
@@ -48,12 +52,25 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Print the table of orders."""
+    asked = joints_asked(args)
+    if asked is not None:
+        tables, _ = each_joint(asked[1], _of_joint)
+        if args.json:
+            print(json.dumps({"joints": {joint: t.to_dict() for joint, t in tables.items()}}))
+        else:
+            unit = errors_in(args)
+            print("\n\n".join(f"--- {j} ---\n{t.summary(unit)}" for j, t in tables.items()))
+        return 0
     selection = _in_one_pass(args) if wants_one_pass(args) else _in_memory(args)
     if args.json:
         print(selection.to_json())
     else:
         print(selection.summary(errors_in(args)))
     return 0
+
+
+def _of_joint(joint: JointAsked) -> OrderSelection:
+    return _in_memory(joint.args)
 
 
 def _in_memory(args: argparse.Namespace) -> OrderSelection:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import json
+from typing import TYPE_CHECKING, Any
 
 from ..errors import ArgumentError
 from ..support.deadline import STYLES, paced
@@ -12,6 +13,10 @@ from .error_units import add_errors_in, errors_in
 from .fit import add_joint
 from .order_lists import declared_shafts, orders_by_shaft
 from .paths import Input, Output
+from .robots import add_robot, each_joint, joints_asked
+
+if TYPE_CHECKING:
+    from .robots import JointAsked
 
 HELP = "write a report on calibration runs: one HTML page, or a PDF"
 EXAMPLE = "trueangle report joint_a.csv --simulation joint.toml -o report.html"
@@ -37,6 +42,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     add("--orders", default="auto", help="auto (default: by evidence), 1-17, output:1-3;motor:1,2")
     add_joint(parser)
+    add_robot(parser)
     add("--title", help="heading of the report")
     add(
         "--model",
@@ -70,11 +76,49 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Write the report."""
+    asked = joints_asked(args)
+    if asked is not None:
+        return _robot(*asked, args)
+    if args.certificate is not None and args.pdf is not None:
+        raise ArgumentError("--pdf prints a report; a certificate is a PDF itself: give it by -o")
+    made = _made(args, args.output)
+    if args.pdf is not None:
+        made.save_pdf(args.pdf)
+    if args.json:
+        print(json.dumps(made.content, indent=2, allow_nan=False))
+    else:
+        print(args.output)
+    return 0
+
+
+def _robot(name: str, joints: list[JointAsked], args: argparse.Namespace) -> int:
+    """A page of all joints: a table in front, and a section for each."""
+    from ..reports.robot import RobotReport
+
+    if args.certificate is not None or args.pdf is not None or args.model is not None:
+        raise ArgumentError(
+            "--certificate, --pdf and --model are of one joint: leave --robot out and name its "
+            "columns with --signal ROLE=NAME"
+        )
+
+    def work(joint: JointAsked) -> Any:
+        return _made(joint.args, None, title=joint.name)
+
+    found, _ = each_joint(joints, work)
+    made = RobotReport(args.title or f"Angle error of {name or 'a robot'}", found, errors_in(args))
+    made.save(args.output)
+    if args.json:
+        print(json.dumps(made.to_dict(), indent=2, allow_nan=False))
+    else:
+        print(f"{made.summary()}\n\n{args.output}")
+    return 0
+
+
+def _made(args: argparse.Namespace, path: str | None, title: str | None = None) -> Any:
+    """The report or certificate that is asked for, written to ``path``."""
     from ..reports import report
     from .run_lists import read_checked
 
-    if args.certificate is not None and args.pdf is not None:
-        raise ArgumentError("--pdf prints a report; a certificate is a PDF itself: give it by -o")
     runs = read_checked(args)
     simulation = None
     if args.simulation is not None:
@@ -83,24 +127,17 @@ def run(args: argparse.Namespace) -> int:
         simulation = load_simulation(args.simulation)
     known = declared_shafts(args.shaft) if simulation is None else simulation.joint.shafts
     with paced(style=args.progress):
-        made = report(
+        return report(
             runs,
-            args.output,
+            path,
             simulation=simulation,
             orders=orders_by_shaft(args.orders, known),
             gear_ratio=args.gear_ratio,
             fixed_member=args.fixed_member,
             shafts=declared_shafts(args.shaft),
-            title=args.title,
+            title=title or args.title,
             certificate=args.certificate,
             positions=args.positions,
             model=args.model,
             errors_in=errors_in(args),
         )
-    if args.pdf is not None:
-        made.save_pdf(args.pdf)
-    if args.json:
-        print(json.dumps(made.content, indent=2, allow_nan=False))
-    else:
-        print(args.output)
-    return 0

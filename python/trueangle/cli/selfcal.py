@@ -5,12 +5,18 @@ from __future__ import annotations
 import argparse
 import json
 import sys
+from typing import TYPE_CHECKING
 
 from ..errors import ArgumentError
 from .error_units import add_errors_in, errors_in
 from .order_lists import parse_orders
 from .paths import Input, Output
+from .robots import add_robot, each_joint, joints_asked
 from .signal_options import add_signals, reading
+
+if TYPE_CHECKING:
+    from ..selfcalibration import SelfCalibration
+    from .robots import JointAsked
 
 HELP = "calibrate without a reference: from time stamps, heads, shifts or the motor"
 EXAMPLE = "trueangle selfcal coast.csv -o joint.json --loop open"
@@ -66,25 +72,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_signals(parser, runs=False)
     add_errors_in(parser)
     add("--json", action="store_true", help="print the result as JSON")
+    add_robot(parser)
 
 
 def run(args: argparse.Namespace) -> int:
     """Calibrate, save, print."""
-    from ..selfcalibration import selfcal
-
-    ripple = args.ripple
-    result = selfcal(
-        args.logs,
-        method=args.method,
-        orders=args.orders if args.orders == "auto" else _whole(args.orders, "--orders"),
-        loop=args.loop,
-        loop_bandwidth=args.loop_bandwidth,
-        gear_ratio=args.gear_ratio,
-        fit_ratio=args.fit_ratio,
-        ripple=ripple if ripple in ("auto", "none") else _whole(ripple, "--ripple"),
-        head_angles=None if args.head_angles is None else _numbers(args.head_angles),
-        **reading(args),
-    )
+    asked = joints_asked(args)
+    if asked is not None:
+        return _robot(*asked, args)
+    result = _calibrated(args)
     result.model.save(args.output)
     if not result.model.shafts:
         print(
@@ -98,6 +94,45 @@ def run(args: argparse.Namespace) -> int:
         print(result.summary(errors_in(args)))
         print(f"\nsaved {args.output}")
     return 0
+
+
+def _robot(name: str, joints: list[JointAsked], args: argparse.Namespace) -> int:
+    """Calibrate every joint; one file of all models."""
+    from ..model.robot import Robot
+
+    def work(joint: JointAsked) -> SelfCalibration:
+        return _calibrated(joint.args)
+
+    found, _ = each_joint(joints, work)
+    signals = {joint.name: joint.signals for joint in joints if joint.name in found}
+    models = {joint: result.model for joint, result in found.items()}
+    Robot(models, name=name, signals=signals).save(args.output)
+    if args.json:
+        plain = {joint: result.to_dict() for joint, result in found.items()}
+        print(json.dumps({"model": args.output, "joints": plain}, allow_nan=False))
+    else:
+        for joint, result in found.items():
+            print(f"--- {joint} ---\n{result.summary(errors_in(args))}\n")
+        print(f"saved {args.output}")
+    return 0
+
+
+def _calibrated(args: argparse.Namespace) -> SelfCalibration:
+    from ..selfcalibration import selfcal
+
+    ripple = args.ripple
+    return selfcal(
+        args.logs,
+        method=args.method,
+        orders=args.orders if args.orders == "auto" else _whole(args.orders, "--orders"),
+        loop=args.loop,
+        loop_bandwidth=args.loop_bandwidth,
+        gear_ratio=args.gear_ratio,
+        fit_ratio=args.fit_ratio,
+        ripple=ripple if ripple in ("auto", "none") else _whole(ripple, "--ripple"),
+        head_angles=None if args.head_angles is None else _numbers(args.head_angles),
+        **reading(args),
+    )
 
 
 def _whole(text: str, option: str) -> tuple[float, ...]:

@@ -15,33 +15,24 @@ from . import charts, wording
 from .numbers import Numbers
 
 if TYPE_CHECKING:
+    from jinja2 import Environment
+
     from .composition import Report
 
-__all__ = ["render"]
+__all__ = ["environment", "render", "templates"]
 
 _TEMPLATES = Path(__file__).parent / "templates"
 
 
 def render(report: Report) -> str:
     """The report as HTML: style, scripts, plotting library, content and figures inside."""
-    try:
-        from jinja2 import Environment, FileSystemLoader, StrictUndefined
-        from markupsafe import Markup
-    except ModuleNotFoundError:
-        raise MissingExtraError(
-            "reports need bokeh and jinja2: pip install 'trueangle[report]'"
-        ) from None
+    made = environment()
+    from markupsafe import Markup
+
     numbers = Numbers(report.content)
-    environment = Environment(
-        loader=FileSystemLoader(_TEMPLATES),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    environment.globals |= {"show": numbers, "wording": wording, "swatch": charts.swatch}
+    made.globals |= {"show": numbers, "wording": wording, "swatch": charts.swatch}
     content = report.content
-    return environment.get_template("report.html.j2").render(
+    return made.get_template("report.html.j2").render(
         c=content,
         figures=report.figures,
         result_json=Markup(_embedded(content)),
@@ -50,6 +41,34 @@ def render(report: Report) -> str:
         script=Markup((_TEMPLATES / "report.js").read_text("utf-8")),
         library=Markup(_library()),
     )
+
+
+def environment() -> Environment:
+    """What sets contents into the templates.
+
+    Raises
+    ------
+    MissingExtraError
+        jinja2 is not installed.
+    """
+    try:
+        from jinja2 import Environment, FileSystemLoader, StrictUndefined
+    except ModuleNotFoundError:
+        raise MissingExtraError(
+            "reports need bokeh and jinja2: pip install 'trueangle[report]'"
+        ) from None
+    return Environment(
+        loader=FileSystemLoader(_TEMPLATES),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+
+
+def templates() -> Path:
+    """Where the templates lie, and what they include."""
+    return _TEMPLATES
 
 
 def _embedded(value: Any) -> str:

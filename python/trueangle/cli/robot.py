@@ -1,0 +1,54 @@
+"""``trueangle robot``: write the robot file from a URDF."""
+
+from __future__ import annotations
+
+import argparse
+import json
+
+from ..support.files import SIMULATION
+from .paths import Input, Output
+
+HELP = "write a robot file: names and gear ratios of the joints of a URDF"
+EXAMPLE = "trueangle robot --from-urdf arm.urdf -o robot.toml"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the command's arguments."""
+    add = parser.add_argument
+    add(
+        "--from-urdf",
+        type=Input,
+        required=True,
+        metavar="URDF",
+        help="robot description: its revolute and continuous joints, in their order, and the "
+        "mechanicalReduction of their transmissions",
+    )
+    add(
+        "-o",
+        "--output",
+        required=True,
+        type=Output.of(SIMULATION),
+        metavar="FILE",
+        help="robot file to write (TOML); add the columns of the reference there",
+    )
+    add("--json", action="store_true", help="print the joints as JSON")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Write the robot file."""
+    from ..joint.urdf import robot_of_urdf
+
+    robot = robot_of_urdf(args.from_urdf)
+    robot.save(args.output)
+    joints = [{"name": joint.name, "gear_ratio": joint.gear_ratio} for joint in robot.joints]
+    if args.json:
+        print(json.dumps({"robot": args.output, "name": robot.name, "joints": joints}))
+        return 0
+    for joint in joints:
+        ratio = joint["gear_ratio"]
+        print(f"{joint['name']}: " + ("no gear ratio" if ratio is None else f"ratio {ratio:g}"))
+    print(
+        f"\nsaved {args.output}; name the columns of every reference under [joint.signals], as "
+        'reference = "laser3:deg"'
+    )
+    return 0

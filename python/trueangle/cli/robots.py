@@ -1,0 +1,148 @@
+"""Commands about every joint of a robot: which joints are meant, and the table in front."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Callable
+from typing import Any, TypeVar
+
+from ..errors import ArgumentError, NoModelError
+from ..support.display_units import ErrorsIn
+from .signal_options import signal_argument, signals_by_joint
+
+__all__ = ["JointAsked", "add_robot", "each_joint", "joints_asked", "told"]
+
+T = TypeVar("T")
+
+#: The name before a role that stands for the log of a simulator, not for a joint.
+_SIMULATED = "simulated"
+
+
+class JointAsked:
+    """One joint of a command: its name, the command's arguments as for it alone.
+
+    ``signals`` are its columns by role.
+    """
+
+    def __init__(self, name: str, args: argparse.Namespace) -> None:
+        self.name = name
+        self.args = args
+
+    @property
+    def signals(self) -> dict[str, Any]:
+        """Columns by role, as a robot's file keeps them."""
+        own = [e for e in self.args.signal or () if e[0] != _SIMULATED]
+        return signals_by_joint(own) or {}
+
+
+def add_robot(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments that name joints."""
+    from .paths import Input
+
+    parser.add_argument(
+        "--robot",
+        type=Input,
+        metavar="FILE",
+        help="robot file (TOML) with the gear and the columns of every joint: the command is "
+        "about each of them; `trueangle robot` writes one. --signal JOINT.ROLE=NAME does as well",
+    )
+    parser.add_argument(
+        "--joint",
+        action="append",
+        metavar="NAME",
+        help="of the robot, this joint only (may be repeated)",
+    )
+
+
+def joints_asked(args: argparse.Namespace) -> tuple[str, list[JointAsked]] | None:
+    """The robot's name and the joints that were asked for; None where the log is of one joint.
+
+    Raises
+    ------
+    ArgumentError
+        A joint that there is not; an option beside the robot file that this states itself.
+    """
+    entries = list(args.signal or ())
+    named = list(dict.fromkeys(e[0] for e in entries if e[0] not in (None, _SIMULATED)))
+    if args.robot is None and not named:
+        if args.joint:
+            raise ArgumentError(
+                "--joint names one of several joints: give the robot file with --robot FILE, or "
+                "columns with --signal JOINT.ROLE=NAME"
+            )
+        return None
+    from ..joint.description import JointDescription, RobotDescription, load_description
+
+    if args.robot is None:
+        robot = RobotDescription("", tuple(JointDescription(name) for name in named))
+    else:
+        robot = load_description(args.robot)
+        for option in ("gear_ratio", "shaft", "simulation"):
+            if getattr(args, option, None):
+                raise ArgumentError(
+                    f"--{option.replace('_', '-')} with --robot: the robot file states it of every "
+                    "joint; leave it out"
+                )
+        RobotDescription("", robot.joints).only(named)  # columns of joints that are there
+    robot = robot.only(args.joint)
+    return robot.name, [_asked(joint, args, entries) for joint in robot.joints]
+
+
+def _asked(joint: Any, args: argparse.Namespace, entries: list[Any]) -> JointAsked:
+    """The arguments as for this joint alone: what was typed stands before what the file says."""
+    own = {e[1]: e for e in entries if e[0] == joint.name}
+    for role, column in joint.signals.items():
+        own.setdefault(role, signal_argument(f"{role}={column}"))
+    for entry in entries:
+        if entry[0] is None:
+            own.setdefault(entry[1], entry)
+    signals = [type(e)((None, *e[1:])) for e in own.values()]
+    signals += [e for e in entries if e[0] == _SIMULATED]
+    changed: dict[str, Any] = {"signal": signals, "robot": None, "joint": None}
+    if args.robot is not None:
+        changed |= {
+            "gear_ratio": joint.gear_ratio,
+            "fixed_member": joint.fixed_member,
+            "shaft": [f"{name}={cycles!r}" for name, cycles in joint.shafts.items()] or None,
+            "simulation": None if joint.simulation is None else str(joint.simulation),
+        }
+    return JointAsked(joint.name, argparse.Namespace(**{**vars(args), **changed}))
+
+
+def each_joint(
+    joints: list[JointAsked], work: Callable[[JointAsked], T]
+) -> tuple[dict[str, T], dict[str, NoModelError]]:
+    """What ``work`` makes of every joint, and of which joints the readings support nothing.
+
+    Raises
+    ------
+    ArgumentError
+        The one of a joint, with its name before it.
+    """
+    found: dict[str, T] = {}
+    failed: dict[str, NoModelError] = {}
+    for joint in joints:
+        try:
+            found[joint.name] = work(joint)
+        except NoModelError as error:
+            print(f"trueangle: warning: joint {joint.name}: {error}", file=sys.stderr)
+            failed[joint.name] = error
+        except ArgumentError as error:
+            if type(error) is not ArgumentError:
+                raise
+            raise ArgumentError(f"joint {joint.name}: {error}") from None
+    if not found:
+        raise NoModelError("; ".join(f"joint {joint}: {error}" for joint, error in failed.items()))
+    return found, failed
+
+
+def told(
+    title: str, ranking: list[Any], texts: dict[str, str], errors_in: ErrorsIn = "auto"
+) -> str:
+    """The ranking in front, and what is said of every joint after it."""
+    from ..reports.ranking import ranking_text
+
+    parts = [ranking_text(title, ranking, errors_in)]
+    parts += [f"--- {joint} ---\n{text}" for joint, text in texts.items()]
+    return "\n\n".join(parts)

@@ -1,0 +1,214 @@
+"""What a robot file says: the joints of a robot, their gears and the columns of their signals."""
+
+from __future__ import annotations
+
+import json
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from os import PathLike
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any, Final
+
+from ..errors import ArgumentError, FileError
+from ..formats.columns import role_kind
+from ..support.decoding import Decoder, read_text, shown
+from ..support.files import SIMULATION, SIMULATION_BYTES, written_atomically
+from ..support.suggestions import did_you_mean
+from .members import FIXED_MEMBERS
+
+__all__ = ["JointDescription", "RobotDescription", "load_description"]
+
+#: Joints of one robot, at most.
+MAX_JOINTS: Final = 256
+
+_ROBOT = {"robot": False, "joint": True}
+_NAMED = {"name": False}
+_JOINT = {
+    "name": True,
+    "gear_ratio": False,
+    "fixed_member": False,
+    "signals": False,
+    "shafts": False,
+    "simulation": False,
+}
+_NOTHING: Mapping[str, Any] = MappingProxyType({})
+
+
+@dataclass(frozen=True)
+class JointDescription:
+    """One joint of a robot file.
+
+    Attributes
+    ----------
+    name : str
+    gear_ratio : float or None
+        Motor turns per output turn; None where it is not known.
+    fixed_member : str
+    signals : mapping of role to "COLUMN" or "COLUMN:UNIT"
+    shafts : mapping of str to float
+        Further shafts and their cycles per output turn.
+    simulation : Path or None
+    """
+
+    name: str
+    gear_ratio: float | None = None
+    fixed_member: str = "circular_spline"
+    signals: Mapping[str, str] = field(default_factory=dict)
+    shafts: Mapping[str, float] = field(default_factory=dict)
+    simulation: Path | None = None
+
+
+@dataclass(frozen=True)
+class RobotDescription:
+    """A robot and its joints, in the order of their angles.
+
+    Attributes
+    ----------
+    name : str
+    joints : tuple of JointDescription
+    """
+
+    name: str
+    joints: tuple[JointDescription, ...]
+
+    def only(self, names: list[str] | None) -> RobotDescription:
+        """With these joints alone; all of them where none is named.
+
+        Raises
+        ------
+        ArgumentError
+            There is no such joint.
+        """
+        known = [joint.name for joint in self.joints]
+        for name in names or ():
+            if name not in known:
+                raise ArgumentError(
+                    f"no joint {name!r}{did_you_mean(name, known)}; the joints are "
+                    f"{', '.join(known)}"
+                )
+        kept = tuple(joint for joint in self.joints if not names or joint.name in names)
+        return RobotDescription(self.name, kept)
+
+    @property
+    def text(self) -> str:
+        """The robot file."""
+        lines = ["[robot]", f"name = {_quoted(self.name)}"]
+        for joint in self.joints:
+            lines += ["", "[[joint]]", f"name = {_quoted(joint.name)}"]
+            if joint.gear_ratio is not None:
+                lines.append(f"gear_ratio = {float(joint.gear_ratio)!r}")
+            lines.append(f"fixed_member = {_quoted(joint.fixed_member)}")
+            if joint.simulation is not None:
+                lines.append(f"simulation = {_quoted(str(joint.simulation))}")
+            for title, table in (("signals", joint.signals), ("shafts", joint.shafts)):
+                if table:
+                    lines.append(f"[joint.{title}]")
+                    lines += [
+                        f"{_key(key)} = {_quoted(v) if isinstance(v, str) else repr(float(v))}"
+                        for key, v in table.items()
+                    ]
+        return "\n".join(lines) + "\n"
+
+    def save(self, path: str | PathLike[str]) -> None:
+        """Write the robot file, complete or not at all."""
+        with written_atomically(path, kind=SIMULATION) as file:
+            file.write(self.text)
+
+
+def load_description(path: str | PathLike[str]) -> RobotDescription:
+    """Read and check a robot file (TOML).
+
+    Raises
+    ------
+    FileError
+        Names the line where the text is no TOML, or the joint and key at fault.
+    """
+    text = read_text(path, SIMULATION_BYTES, FileError, "a robot file")
+    try:
+        content = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as cause:
+        raise FileError(path, f"is no TOML: {cause}") from None
+    return _Reader(Path(path)).robot(content)
+
+
+class _Reader(Decoder):
+    """Checks the file key by key."""
+
+    def robot(self, content: Any) -> RobotDescription:
+        self.table(content, _ROBOT)
+        named = self.table(content.get("robot", {}), _NAMED, "robot")
+        entries = self.items(content["joint"], "joint", "[[joint]] tables", MAX_JOINTS)
+        joints = tuple(self.joint(entry, f"joint[{i}]") for i, entry in enumerate(entries))
+        names = [joint.name for joint in joints]
+        for i, name in enumerate(names):
+            if name in names[:i]:
+                raise self.error(f"two joints are called {name!r}", f"joint[{i}].name")
+        if not joints:
+            raise self.error("one [[joint]] at least is needed", "joint")
+        return RobotDescription(self.text(named.get("name", ""), "robot.name"), joints)
+
+    def joint(self, entry: Any, at: str) -> JointDescription:
+        table = self.table(entry, _JOINT, at)
+        name = self.text(table["name"], f"{at}.name")
+        if not name or "." in name or "=" in name:
+            raise self.error(f"a name without '.' and '=' is needed, got {name!r}", f"{at}.name")
+        ratio = None
+        if "gear_ratio" in table:
+            ratio = self.number(table["gear_ratio"], f"{at}.gear_ratio")
+            if not ratio > 0.0:
+                raise self.error(f"must be positive, got {ratio!r}", f"{at}.gear_ratio")
+        member = self.text(table.get("fixed_member", "circular_spline"), f"{at}.fixed_member")
+        if member not in FIXED_MEMBERS:
+            raise self.error(
+                f"must be one of {', '.join(FIXED_MEMBERS)}, got {member!r}"
+                f"{did_you_mean(member, FIXED_MEMBERS)}",
+                f"{at}.fixed_member",
+            )
+        simulation = table.get("simulation")
+        return JointDescription(
+            name,
+            ratio,
+            member,
+            self.signals(table.get("signals", _NOTHING), f"{at}.signals"),
+            self.shafts(table.get("shafts", _NOTHING), f"{at}.shafts"),
+            # Beside the robot file, wherever the command is called.
+            None
+            if simulation is None
+            else self.path.parent / self.text(simulation, f"{at}.simulation"),
+        )
+
+    def signals(self, value: Any, key: str) -> dict[str, str]:
+        found = {}
+        for role, column in self.named(value, key).items():
+            try:
+                role_kind(role)
+            except ArgumentError as cause:
+                raise self.error(str(cause), f"{key}.{role}") from None
+            found[role] = self.text(column, f"{key}.{role}")
+            if not found[role]:
+                raise self.error("the name of a column is needed, got ''", f"{key}.{role}")
+        return found
+
+    def shafts(self, value: Any, key: str) -> dict[str, float]:
+        found = {}
+        for name, cycles in self.named(value, key).items():
+            found[name] = self.number(cycles, f"{key}.{name}")
+            if not found[name] > 0.0:
+                raise self.error(f"must be positive, got {found[name]!r}", f"{key}.{name}")
+        return found
+
+    def named(self, value: Any, key: str) -> Mapping[str, Any]:
+        if not isinstance(value, Mapping):
+            raise self.error(f"a table is needed, got {shown(value)}", key)
+        return value
+
+
+def _quoted(text: str) -> str:
+    return json.dumps(text, ensure_ascii=False)
+
+
+def _key(name: str) -> str:
+    bare = name.isascii() and name.replace("_", "").replace("-", "").isalnum()
+    return name if bare else _quoted(name)

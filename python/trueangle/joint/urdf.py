@@ -1,0 +1,85 @@
+"""The joints that a URDF file names, with the ratios of their transmissions."""
+
+from __future__ import annotations
+
+import math
+import xml.parsers.expat
+from os import PathLike
+from typing import Any
+from xml.etree import ElementTree
+
+from ..errors import FileError
+from ..support.decoding import read_text
+from ..support.files import SIMULATION_BYTES
+from .description import JointDescription, RobotDescription
+
+__all__ = ["robot_of_urdf"]
+
+#: Joints that turn; others have no angle.
+_TURNING = ("revolute", "continuous")
+
+
+def robot_of_urdf(path: str | PathLike[str]) -> RobotDescription:
+    """The robot of a URDF file: its turning joints, in the order of the file.
+
+    ``mechanicalReduction`` of the joint's ``<transmission>`` is its gear ratio (its size: the
+    sign says which way the motor is mounted). The column of a JointState log is the joint's own
+    name, in radians.
+
+    Raises
+    ------
+    FileError
+        No XML, an entity or document type of its own, no ``<robot>``, no joint that turns, a
+        reduction that is no number.
+    """
+    root = _root(path)
+    ratios: dict[str, float | None] = {}
+    for transmission in root.iter("transmission"):
+        joint = transmission.find("joint")
+        if joint is None:
+            continue
+        name = joint.get("name") or (joint.text or "").strip()
+        for reduction in transmission.iter("mechanicalReduction"):
+            ratios[name] = _ratio(path, name, reduction.text or "")
+    joints = []
+    for element in root.findall("joint"):
+        name, kind = element.get("name", ""), element.get("type", "")
+        if kind in _TURNING and name and element.find("mimic") is None:
+            ratio = ratios.get(name)
+            member = "none" if ratio is None else "circular_spline"
+            joints.append(JointDescription(name, ratio, member, {"indicated": f"{name}:rad"}))
+    if not joints:
+        raise FileError(
+            path, f"names no joint that turns (type {' or '.join(_TURNING)}, without mimic)"
+        )
+    return RobotDescription(root.get("name", ""), tuple(joints))
+
+
+def _root(path: str | PathLike[str]) -> ElementTree.Element:
+    text = read_text(path, SIMULATION_BYTES, FileError, "a URDF file")
+
+    def refuse(*_: Any) -> None:
+        raise FileError(path, "declares a document type; a URDF needs none: take it out")
+
+    # Entities that grow without end are declared in one.
+    parser = xml.parsers.expat.ParserCreate()
+    parser.StartDoctypeDeclHandler = refuse
+    try:
+        parser.Parse(text, True)
+        root = ElementTree.fromstring(text)
+    except (xml.parsers.expat.ExpatError, ElementTree.ParseError) as cause:
+        hint = "; expand xacro first" if "xacro" in text else ""
+        raise FileError(path, f"is no XML: {cause}{hint}") from None
+    if root.tag != "robot":
+        raise FileError(path, f"is no URDF: it begins with <{root.tag}>, not with <robot>")
+    return root
+
+
+def _ratio(path: str | PathLike[str], name: str, text: str) -> float | None:
+    try:
+        ratio = abs(float(text))
+    except ValueError:
+        ratio = math.nan
+    if not 0.0 < ratio < math.inf:
+        raise FileError(path, f"joint {name!r}: mechanicalReduction must be a number, got {text!r}")
+    return ratio

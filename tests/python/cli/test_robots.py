@@ -1,0 +1,221 @@
+"""Commands about every joint of a robot: one log, one command each."""
+
+import json
+
+import numpy as np
+import pytest
+
+import trueangle as ta
+from trueangle.cli import main
+
+#: Order 1 of the error of each joint, arcsec.
+SIZES = {"shoulder": 40.0, "elbow": 90.0, "wrist": 5.0}
+NOISE = 1.0
+URDF = """<?xml version="1.0"?>
+<robot name="arm">
+  <joint name="base" type="fixed"/>
+  {joints}
+  <joint name="finger" type="revolute"><mimic joint="wrist"/></joint>
+</robot>
+"""
+TURNING = """<joint name="{0}" type="revolute"/>
+  <transmission name="t"><joint name="{0}"/><actuator name="m">
+    <mechanicalReduction>{1}</mechanicalReduction></actuator></transmission>"""
+
+
+@pytest.fixture(scope="module")
+def arm(tmp_path_factory):
+    """A folder with a log of three joints and the robot file of them."""
+    folder = tmp_path_factory.mktemp("arm")
+    rng = np.random.default_rng(71)
+    print("seed 71")
+    columns = {"time_s": np.arange(1200) * 0.01}
+    for j, (name, size) in enumerate(SIZES.items()):
+        true = np.linspace(0.0, 360.0 * (j + 2), 1200, endpoint=False)
+        error = size * np.sin(np.radians(true) + j) + rng.normal(0.0, NOISE, true.size)
+        columns[f"laser {name} [deg]"] = true
+        columns[f"q_{name}"] = np.radians(true + error / 3600.0)
+    columns["idle"] = np.radians(true + rng.normal(0.0, NOISE, true.size) / 3600.0)
+    rows = np.column_stack(list(columns.values()))
+    header = ",".join(columns)
+    np.savetxt(folder / "arm.csv", rows, "%.12f", ",", header=header, comments="")
+    joints = "\n  ".join(TURNING.format(name, -50 - i) for i, name in enumerate(SIZES))
+    (folder / "arm.urdf").write_text(URDF.format(joints=joints))
+    assert (
+        main(["robot", "--from-urdf", str(folder / "arm.urdf"), "-o", str(folder / "u.toml")]) == 0
+    )
+    text = (folder / "u.toml").read_text()
+    for name in SIZES:
+        column = f'indicated = "q_{name}:rad"\nreference = "laser {name} [deg]"'
+        text = text.replace(f'indicated = "{name}:rad"', column)
+    (folder / "robot.toml").write_text(text)
+    return folder
+
+
+def asked(arm, command, *options, capsys):
+    """Status and what the command printed as JSON."""
+    capsys.readouterr()
+    status = main([command, str(arm / "arm.csv"), "--robot", str(arm / "robot.toml"), *options])
+    out, err = capsys.readouterr()
+    return status, out, err
+
+
+def test_a_urdf_names_joints_and_ratios(arm):
+    text = (arm / "u.toml").read_text()
+    assert text.startswith('[robot]\nname = "arm"\n')
+    assert [line for line in text.splitlines() if line.startswith("name")][1:] == [
+        f'name = "{name}"' for name in SIZES
+    ]
+    assert [line for line in text.splitlines() if line.startswith("gear")] == [
+        f"gear_ratio = {50.0 + i}" for i in range(3)
+    ]
+    assert "finger" not in text
+    assert "base" not in text
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("<robot", "is no XML"),
+        ("<a/>", "begins with <a>, not with <robot>"),
+        ("<robot/>", "names no joint that turns"),
+        ('<!DOCTYPE robot [<!ENTITY a "b">]><robot/>', "declares a document type"),
+        (URDF.format(joints=TURNING.format("a", "x")), "mechanicalReduction must be a number"),
+    ],
+)
+def test_what_is_no_urdf_is_refused_in_words(text, says, tmp_path, capsys):
+    (tmp_path / "a.urdf").write_text(text)
+    out = tmp_path / "r.toml"
+    assert main(["robot", "--from-urdf", str(tmp_path / "a.urdf"), "-o", str(out)]) == 1
+    assert says in capsys.readouterr().err
+    assert not out.exists()
+
+
+@pytest.mark.parametrize("command", ["check", "diagnose"])
+def test_the_worst_joint_comes_first(command, arm, capsys):
+    options = ["--within", "20s"] if command == "diagnose" else []
+    status, out, _ = asked(arm, command, "--json", *options, capsys=capsys)
+    found = json.loads(out)
+    assert status == 0
+    assert list(found["joints"]) == list(SIZES)
+    ranking = found["ranking"]
+    assert [row["joint"] for row in ranking] == ["elbow", "shoulder", "wrist"]
+    for row in ranking:
+        size = SIZES[row["joint"]]
+        assert row["peak_to_peak_before_arcsec"] == pytest.approx(2.0 * size, abs=8.0 * NOISE)
+    if command == "diagnose":
+        assert [row["first_cause"] for row in ranking[:2]] == ["missing_order"] * 2
+        assert all(row["rms_left_arcsec"] < 1.2 * NOISE for row in ranking)
+
+
+def test_one_command_each_from_a_log_to_its_correction(arm, capsys):
+    model, out = arm / "robot.json", arm / "out.csv"
+    status, text, _ = asked(
+        arm, "fit", "--orders", "1,2", "-o", str(model), "--json", capsys=capsys
+    )
+    found = json.loads(text)
+    assert status == 0
+    assert [row["joint"] for row in found["ranking"]] == ["elbow", "shoulder", "wrist"]
+    robot = ta.load_robot(model)
+    assert (robot.name, robot.joints) == ("arm", tuple(SIZES))
+    for name, size in SIZES.items():
+        alone = ta.fit(
+            ta.read_runs(
+                arm / "arm.csv",
+                signals={"reference": f"laser {name} [deg]", "indicated": (f"q_{name}", "rad")},
+            ),
+            orders=[1, 2],
+            gear_ratio=50.0,
+        )
+        assert robot[name].shafts == alone.model.shafts
+        amplitude = found["joints"][name]["orders"][0]["amplitude_arcsec"]
+        assert amplitude == pytest.approx(size, abs=5.0 * NOISE / 600.0**0.5)
+    assert main(["correct", str(arm / "arm.csv"), "-m", str(model), "-o", str(out)]) == 0
+    runs = {
+        name: ta.read_runs(
+            out,
+            signals={
+                "reference": f"laser {name} [deg]",
+                "indicated": (f"{name}_corrected_rad", "rad"),
+            },
+        )[0]
+        for name in SIZES
+    }
+    for run in runs.values():
+        assert float(np.std(run.error)) * 3600.0 < 1.1 * NOISE
+
+
+def test_a_joint_alone_and_joints_by_signals(arm, capsys):
+    wanted = asked(arm, "orders", "--json", "--joint", "elbow", capsys=capsys)[1]
+    assert list(json.loads(wanted)["joints"]) == ["elbow"]
+    given = []
+    for name in ("elbow", "wrist"):
+        given += ["--signal", f"{name}.reference=laser {name} [deg]"]
+        given += ["--signal", f"{name}.indicated=q_{name}:rad"]
+    capsys.readouterr()
+    assert main(["check", str(arm / "arm.csv"), *given, "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert list(found["joints"]) == ["elbow", "wrist"]
+
+
+def test_a_report_has_a_page_in_front_and_a_section_for_every_joint(arm, capsys):
+    page = arm / "report.html"
+    status, out, _ = asked(arm, "report", "--orders", "1", "-o", str(page), "--json", capsys=capsys)
+    assert status == 0
+    ranking = json.loads(out)["ranking"]
+    text = page.read_text()
+    assert text.index(">elbow</a>") < text.index(">shoulder</a>") < text.index(">wrist</a>")
+    assert text.count("<iframe") == len(ranking) == 3
+    assert 'title="report on wrist"' in text
+
+
+def test_a_joint_whose_readings_support_nothing_does_not_stop_the_others(arm, tmp_path, capsys):
+    text = (arm / "robot.toml").read_text()
+    (tmp_path / "robot.toml").write_text(text.replace("q_wrist:rad", "idle:rad"))
+    out = tmp_path / "robot.json"
+    robot = ["--robot", str(tmp_path / "robot.toml"), "-o", str(out), "--json"]
+    assert main(["fit", str(arm / "arm.csv"), *robot]) == 0
+    printed = capsys.readouterr()
+    assert "joint wrist: no order is supported" in printed.err
+    assert json.loads(printed.out)["ranking"][0]["verdict"].startswith("no model: ")
+    assert ta.load_robot(out).joints == ("shoulder", "elbow")
+
+
+@pytest.mark.parametrize(
+    ("options", "says"),
+    [
+        (["--joint", "elbo"], "no joint 'elbo'; did you mean elbow?"),
+        (["--gear-ratio", "3"], "--gear-ratio with --robot: the robot file states it"),
+        (["--signal", "knee.torque=tau"], "no joint 'knee'; the joints are shoulder, elbow, wrist"),
+    ],
+)
+def test_wrong_options_beside_a_robot_are_named(options, says, arm, capsys):
+    status, _, err = asked(arm, "orders", *options, capsys=capsys)
+    assert status == 1
+    assert says in err
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "says"),
+    [
+        ("[robot]", "[robots]", "key 'robots': is unknown; the keys are robot, joint"),
+        ('name = "elbow"', 'name = "wrist"', "two joints are called 'wrist'"),
+        ("gear_ratio = 51.0", "gear_ratio = -1.0", "key 'joint[1].gear_ratio': must be positive"),
+        ("reference = ", "refrence = ", "no column has the role 'refrence'"),
+        ("fixed_member", "fixed_part", "'joint[0].fixed_part': is unknown"),
+        ('name = "arm"', "name = arm", "is no TOML"),
+    ],
+)
+def test_a_robot_file_that_is_wrong_says_where(old, new, says, arm, tmp_path, capsys):
+    text = (arm / "robot.toml").read_text()
+    (tmp_path / "r.toml").write_text(text.replace(old, new))
+    assert main(["check", str(arm / "arm.csv"), "--robot", str(tmp_path / "r.toml")]) == 1
+    assert says in capsys.readouterr().err
+
+
+def test_the_file_that_is_written_is_the_one_that_was_read(arm, tmp_path):
+    from trueangle.joint.description import load_description
+
+    robot = load_description(arm / "robot.toml")
+    robot.save(tmp_path / "again.toml")
+    assert load_description(tmp_path / "again.toml") == robot
