@@ -138,9 +138,9 @@ class _Reader(Decoder):
         if found != wanted:
             hint = ""
             if found == ROBOT_FORMAT:
-                hint = "; it holds the joints of a robot: read it with `ta.load_robot(...)`"
+                hint = "; it holds the joints of a robot: read it with ta.load_robot"
             elif found == FORMAT:
-                hint = "; it holds the model of one joint: read it with `ta.load_model(...)`"
+                hint = "; it holds the model of one joint: read it with ta.load_model"
             what = "the file of a robot" if wanted == ROBOT_FORMAT else "a model file"
             raise self.error(f'is not {what}: "format" must be "{wanted}"{hint}')
         return dict(value)
