@@ -31,8 +31,11 @@ class JointAsked:
 
     @property
     def signals(self) -> dict[str, Any]:
-        """Columns by role, as a robot's file keeps them."""
-        own = [e for e in self.args.signal or () if e[0] != _SIMULATED]
+        """Columns by role that a correction reads, as a robot's file keeps them."""
+        from ..formats.signals import AT_RUN_TIME
+
+        read = ("indicated", "time", *AT_RUN_TIME)
+        own = [e for e in self.args.signal or () if e[0] is None and e[1] in read]
         return signals_by_joint(own) or {}
 
 
@@ -91,12 +94,12 @@ def joints_asked(args: argparse.Namespace) -> tuple[str, list[JointAsked]] | Non
 
 def _asked(joint: Any, args: argparse.Namespace, entries: list[Any]) -> JointAsked:
     """The arguments as for this joint alone: what was typed stands before what the file says."""
-    own = {e[1]: e for e in entries if e[0] == joint.name}
+    own = {_key(e): e for e in entries if e[0] == joint.name}
     for role, column in joint.signals.items():
         own.setdefault(role, signal_argument(f"{role}={column}"))
     for entry in entries:
         if entry[0] is None:
-            own.setdefault(entry[1], entry)
+            own.setdefault(_key(entry), entry)
     signals = [type(e)((None, *e[1:])) for e in own.values()]
     signals += [e for e in entries if e[0] == _SIMULATED]
     changed: dict[str, Any] = {"signal": signals, "robot": None, "joint": None}
@@ -108,6 +111,12 @@ def _asked(joint: Any, args: argparse.Namespace, entries: list[Any]) -> JointAsk
             "simulation": None if joint.simulation is None else str(joint.simulation),
         }
     return JointAsked(joint.name, argparse.Namespace(**{**vars(args), **changed}))
+
+
+def _key(entry: Any) -> str:
+    """The role of a column; of offsets of the reference there may be several."""
+    role, name = entry[1], entry[2]
+    return f"{role} {name}" if role == "reference_offset" else str(role)
 
 
 def each_joint(
