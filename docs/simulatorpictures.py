@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import fmpy
-import matplotlib as mpl
+import matplotlib.pyplot as plt
 import mujoco
 import numpy as np
 
@@ -123,7 +123,7 @@ def with_fmu(
 
 def picture(before: ta.Diagnosis, after: ta.Diagnosis, path: Path) -> None:
     """Two charts, one above the other, on one scale."""
-    figure, axes = mpl.pyplot.subplots(2, 1, sharex=True, sharey=True, figsize=(6.4, 4.2))
+    figure, axes = plt.subplots(2, 1, sharex=True, sharey=True, figsize=(6.4, 4.2))
     for ax, diagnosis, colour, name in (
         (axes[0], before, palette.BEFORE, "as the simulator was"),
         (axes[1], after, palette.AFTER, "with the sensor written by --extend-into"),
@@ -138,4 +138,4 @@ def picture(before: ta.Diagnosis, after: ta.Diagnosis, path: Path) -> None:
     figure.supylabel("measured minus simulated", fontsize="medium")
     figure.tight_layout()
     figure.savefig(path)
-    mpl.pyplot.close(figure)
+    plt.close(figure)
