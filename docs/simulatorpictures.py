@@ -130,12 +130,14 @@ def picture(before: ta.Diagnosis, after: ta.Diagnosis, path: Path) -> None:
     ):
         for run in diagnosis.simulated.runs:
             error = (np.asarray(run.indicated) - np.asarray(run.reference)) / ARCSEC
-            ax.plot(np.degrees(run.reference), error, ".", color=colour, markersize=2)
+            ax.plot(
+                np.degrees(run.reference), error, ".", color=colour, markersize=2, rasterized=True
+            )
         rms = diagnosis.discrepancy.rms
         ax.set_title(f"{name}: {rms:.1f} arcsec rms", fontsize="medium", loc="left")
         ax.set_ylabel("arcsec")
     axes[1].set_xlabel("joint angle / deg")
     figure.supylabel("measured minus simulated", fontsize="medium")
     figure.tight_layout()
-    figure.savefig(path)
+    figure.savefig(path, dpi=150)
     plt.close(figure)
