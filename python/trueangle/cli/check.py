@@ -34,9 +34,27 @@ def run(args: argparse.Namespace) -> int:
     asked = joints_asked(args)
     if asked is not None:
         return _robot(*asked, args)
-    found = check(args.files, **reading(args))
+    try:
+        found = check(args.files, **reading(args))
+    except FileError as error:
+        _tell_columns(error, args)
+        raise
     print(found.to_json() if args.json else found.summary())
     return 0 if found.usable else 1
+
+
+def _tell_columns(error: FileError, args: argparse.Namespace) -> None:
+    """Print what a log seems to hold whose columns are not known."""
+    from ..runs.checks.columns import columns_of_log
+    from ..runs.paths import find_logs
+
+    if error.line != 1 or "no column" not in error.problem:
+        return
+    for path, _ in find_logs(args.files, whole=False):
+        held = columns_of_log(path, args.topic) if path.is_file() else None
+        if held is not None:
+            print(held.to_json() if args.json else f"{held.summary()}\n", flush=True)
+            return
 
 
 def _robot(name: str, joints: list[JointAsked], args: argparse.Namespace) -> int:

@@ -84,16 +84,9 @@ def load_model(path: str | PathLike[str]) -> HarmonicModel:
 
 
 def model_of(text: str, path: str | PathLike[str]) -> HarmonicModel:
-    """Model of the text of a model file that stands in another file.
-
-    Raises
-    ------
-    ModelFileError
-        As `load_model`.
-    """
-    reader = _Reader(Path(path), ModelFileError)
-    reader.given = text
-    return reader.model()
+    """Model of the text of a model file that stands in another file; raises as `load_model`."""
+    file = Path(path)
+    return part_of(file, json_text(file, text, ModelFileError, "a model file"), "")
 
 
 def content_of(path: Path, wanted: str) -> dict[str, Any]:
@@ -112,14 +105,9 @@ def part_of(path: Path, value: Any, prefix: str) -> HarmonicModel:
 
 
 class _Reader(Decoder):
-    """Checks a model key by key; every refusal names file and key.
-
-    ``prefix`` stands before the keys of a model that is part of a file, ``given`` is the text
-    where it is not that of the file itself.
-    """
+    """Checks a model key by key; refusals name file and key, behind the ``prefix`` of a part."""
 
     prefix = ""
-    given: str | None = None
 
     def error(self, problem: str, key: str | None = None) -> FileError:
         """The error that says ``problem`` of ``key``."""
@@ -127,9 +115,7 @@ class _Reader(Decoder):
 
     def content(self, wanted: str) -> dict[str, Any]:
         """The file's object, of the format that is wanted."""
-        text = self.given
-        if text is None:
-            text = read_text(self.path, MODEL_BYTES, self.kind, "a model")
+        text = read_text(self.path, MODEL_BYTES, self.kind, "a model")
         return self.of_format(json_text(self.path, text, self.kind, "a model file"), wanted)
 
     def of_format(self, value: Any, wanted: str) -> dict[str, Any]:

@@ -219,3 +219,42 @@ def test_the_file_that_is_written_is_the_one_that_was_read(arm, tmp_path):
     robot = load_description(arm / "robot.toml")
     robot.save(tmp_path / "again.toml")
     assert load_description(tmp_path / "again.toml") == robot
+
+
+@pytest.mark.parametrize(
+    ("header", "joints"),
+    [
+        ("t,laser1 [deg],q1,laser2 [deg],q2,tau2", {"joint1": 2, "joint2": 3}),
+        ("time_s,elbow_laser,elbow_position,wrist_ref,wrist_position", {"elbow": 2, "wrist": 2}),
+        ("stamp,ElbowPos,ElbowTrueAngle,elbow_effort", {"elbow": 3}),
+        ("joint1/position,joint1/reference,joint1/velocity", {"joint1": 3}),
+    ],
+)
+def test_a_log_of_unknown_columns_is_told_by_their_names(header, joints, tmp_path, capsys):
+    log = tmp_path / "arm.csv"
+    log.write_text(f"{header}\n" + ",".join("0" for _ in header.split(",")) + "\n")
+    assert main(["check", str(log), "--json"]) == 1
+    out, err = capsys.readouterr()
+    assert "no column reference_deg" in err
+    found = json.loads(out)
+    assert {joint: len(roles) for joint, roles in found["joints"].items()} == joints
+    assert main(["check", str(log)]) == 1
+    assert f"--signal {next(iter(joints))}." in capsys.readouterr().out.replace("'", "")
+
+
+def test_the_signals_that_are_printed_are_those_that_are_taken(arm, capsys):
+    log = arm / "arm.csv"
+    assert main(["check", str(log), "--json"]) == 1
+    found = json.loads(capsys.readouterr().out)
+    assert list(found["joints"]) == list(SIZES)
+    given = [text.replace(":UNIT", ":rad") for text in found["signal"]]
+    options = [part for text in given for part in ("--signal", text)]
+    assert main(["check", str(log), *options, "--json"]) == 0
+    assert list(json.loads(capsys.readouterr().out)["joints"]) == list(SIZES)
+
+
+def test_columns_that_tell_of_no_joint_are_left_to_the_error(tmp_path, capsys):
+    (tmp_path / "a.csv").write_text("foo,bar\n1,2\n")
+    assert main(["check", str(tmp_path / "a.csv")]) == 1
+    out, err = capsys.readouterr()
+    assert (out, "no column reference_deg" in err) == ("", True)
