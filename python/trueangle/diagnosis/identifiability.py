@@ -8,6 +8,7 @@ from dataclasses import replace
 from ..effects import EFFECTS
 from ..effects.blindness import Blindness
 from ..estimation.regression import Extension, Regression
+from .unnamed import effect_of
 
 __all__ = ["Blindness", "blind_spots", "doubts_about", "open_origins", "with_open_origins"]
 
@@ -46,12 +47,12 @@ def doubts_about(
     (`open_origins`): what is seen has a size, and is named.
     """
     cause = extension.cause
-    if EFFECTS[cause].is_doubted:
+    if effect_of(cause).is_doubted:
         for spot in spots:
             # What is seen of a crossing is none of a delay.
             may_be_told = spot.common or "turns_first" in extension.shape
             if spot.hides(cause) and not (
-                may_be_told and EFFECTS[cause].told(extension, regression)
+                may_be_told and effect_of(cause).told(extension, regression)
             ):
                 return spot
     found = [doubt for doubt in _doubts(extension, regression, spots) if doubt.common != cause]

@@ -161,7 +161,8 @@ class MissingOrder(Effect):
         for spot in spots:
             # The lowest order is meant, but where one that the gear has looks the same.
             if spot.factor == "grid" and grid is not None:
-                if all(m == order or grid.folded(m) != grid.folded(order) for m in gear):
+                alike = any(m != order and grid.folded(m) == grid.folded(order) for m in gear)
+                if order == grid.folded(order) and not alike:
                     continue
                 aliases = ", ".join(f"{m:g}" for m in grid.aliases(order, 3))
                 because = (

@@ -205,9 +205,10 @@ class PreslidingHysteresis(Effect):
         signals, step = regression.signals, 0.02
         columns, slopes, curved = [], [], []
         for k, (extension, (amplitude,), _) in enumerate(terms):
-            length, start = extension.shape["length_deg"], extension.shape["start_state"]
+            length = extension.shape["length_deg"]
             columns.append(cls.columns(signals, regression.around, extension.shape))
             if length > 0.0:
+                start = extension.shape["start_state"]
                 longer, shorter = (
                     signals.presliding(length * (1.0 + s), start) for s in (step, -step)
                 )

@@ -70,8 +70,9 @@ def pseudo_inverse(gram: Array) -> Array:
 
     Examples
     --------
-    >>> pseudo_inverse(np.diag([4.0, 0.0, 1e-30])).diagonal().tolist()
-    [0.25, 0.0, 1e+30]
+    >>> found = pseudo_inverse(np.diag([4.0, 0.0, 1e-30])).diagonal()
+    >>> (found * [1.0, 1.0, 1e-30]).round(12).tolist()
+    [0.25, 0.0, 1.0]
     """
     return _core.LinearModel.of_sums(gram, np.empty((len(gram), 0)), []).inverse
 
@@ -95,7 +96,7 @@ class NormalEquations:
     --------
     >>> x = np.array([[1.0], [2.0]])
     >>> one = NormalEquations.of_rows(x, np.array([2.0, 4.0]))
-    >>> one.solved().coefficients.tolist()
+    >>> one.solved().coefficients.round(12).tolist()
     [[2.0]]
     """
 

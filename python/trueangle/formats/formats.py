@@ -18,6 +18,8 @@ _MATLAB4 = (
     rb"\A(?s:[\x00-\x33]\0\0\0.{8}[\0\1]\0\0\0.\0\0\0"
     rb"|\0\0[\x03\x04].{9}\0\0\0[\0\1]\0\0\0.)"
 )
+#: The signature of HDF5 behind a user block, as MATLAB writes one.
+_HDF5 = rb"\A(?s:.{512}|.{1024}|.{2048})\x89HDF\r\n\x1a\n"
 #: The first line of PHD2, and of what writes its logs too.
 _GUIDING = rb"\A[^\n]*PHD2 (?:log )?version|^(?:Guiding|Calibration) Begins at \d{4}-"
 #: A name and a number, and the same name again some lines later.
@@ -37,6 +39,7 @@ FORMATS = (
         {"HDF5": (".h5", ".hdf5", ".hdf", ".he5"), "MATLAB": (".mat",), "NetCDF": (".nc",)},
         "hdf5",
         magics=(b"\x89HDF\r\n\x1a\n", b"MATLAB 7.3"),
+        pattern=_HDF5,
     ),
     Format("matlab", {"MATLAB": (".mat",)}, "matlab", magics=(b"MATLAB 5.0",)),
     Format("matlab4", {"MATLAB": (".mat",)}, pattern=_MATLAB4),

@@ -95,7 +95,7 @@ class ArcPlan(PlainResult):
         return max(self.noise_factors.values())
 
     def to_dict(self) -> dict[str, Any]:
-        """The object that ``trueangle plan --arc`` prints as JSON."""
+        """The object that ``trueangle plan`` prints as JSON for an arc."""
         plain = dict(vars(self))
         for name in ("noise_factors", "even_noise_factors"):
             plain[name] = {f"{order:g}": factor for order, factor in plain[name].items()}

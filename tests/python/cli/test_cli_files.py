@@ -50,6 +50,10 @@ def furnished(tmp_path_factory):
     model = str(folder / "m.json")
     assert main(["fit", str(folder / "r.csv"), "-o", model, "--orders", "1"]) == 0
     assert main(["export", model, "--to", "csv", "-o", str(folder / "e.csv")]) == 0
+    (folder / "u.urdf").write_text(
+        '<robot name="r"><link name="a"/><link name="b"/><joint name="j" type="revolute">'
+        '<parent link="a"/><child link="b"/></joint></robot>\n'
+    )
     return folder
 
 
@@ -108,6 +112,7 @@ WRITING = {
     "join": (["join", "r.csv", "t.csv", "-o", "OUT"], ["r.csv", "t.csv"]),
     "selfcal": (["selfcal", "r.csv", "-o", "OUT"], ["r.csv"]),
     "export": (["export", "m.json", "--to", "csv", "-o", "OUT"], ["m.json"]),
+    "robot": (["robot", "--from-urdf", "u.urdf", "-o", "OUT"], ["u.urdf"]),
     "export --existing": (
         ["export", "m.json", "--to", "klipper", "--existing", "p.cfg", "-o", "OUT"],
         ["m.json", "p.cfg"],

@@ -10,7 +10,6 @@ from conftest import ROOT
 from trueangle.cli import main
 from trueangle.errors import ArgumentError
 from trueangle.runs.joining import minus_simulated
-from trueangle.runs.tables import runs_of
 from trueangle.simulation import Backlash, Harmonic, RunDesign, Simulation
 
 ARCSEC = 3600.0
@@ -151,7 +150,7 @@ def test_tables_of_every_library_are_runs(library):
             {"time_s": columns["time_s"]},
         ),
     }[library]
-    (run,) = runs_of(make())
+    (run,) = ta.read_runs(make())
     assert run.label == "a"
     np.testing.assert_array_equal(run.time, columns["time_s"])
     np.testing.assert_array_equal(run.indicated, columns["indicated_rad"])
@@ -160,9 +159,9 @@ def test_tables_of_every_library_are_runs(library):
 def test_what_is_no_table_is_refused():
     for data in (3.0, [], [3.0]):
         with pytest.raises(ArgumentError, match="table"):
-            runs_of(data)
+            ta.read_runs(data)
     with pytest.raises(ArgumentError, match="equally long"):
-        runs_of({"reference_deg": [1.0, 2.0], "indicated_deg": [1.0]})
+        ta.read_runs({"reference_deg": [1.0, 2.0], "indicated_deg": [1.0]})
     with pytest.raises(ArgumentError, match="nothing is believed"):
         ta.diagnose(measured())
 

@@ -237,7 +237,9 @@ def _beyond(
     told = power[: cuts[-1]].copy()
     _core.add_relative_power(told, cuts, [(1, 1.0)], np.zeros((1, 1)))
     level = power[: cuts[-1]] / np.where(told > 0.0, told, 1.0)
-    relative = power / np.maximum(level[np.minimum(place, cuts[-1] - 1)], 1e-300)
+    level = level[np.minimum(place, cuts[-1] - 1)]
+    # Where no level can be told (readings without noise) there is nothing to stand out of it.
+    relative = np.divide(power, level, out=np.ones_like(power), where=level > 1e-300 * power)
     relative[place < first] = 1.0
     total = np.concatenate([[0.0], np.cumsum(relative)])
     found = np.empty((len(boxes), last))
