@@ -33,7 +33,7 @@ WANTED = {
 
 #: Questions beyond the share that may be wrong in the ordinary run, which asks every second kind
 #: of a group; groups without a number are asked in the large run only.
-SPARE = {"outside": 1, "nothing": 1, "belief": 1, "inexact": 1, "turning": 0}
+SPARE = {"outside": 1, "nothing": 1, "belief": 1, "inexact": 1, "turning": 1}
 
 #: Of these groups the ordinary run asks every so many.
 EVERY = {"turning": 4}
