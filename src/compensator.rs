@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use crate::error::Error;
-use crate::kernel::{Evaluator, Scalar, Table};
+use crate::kernel::{Evaluator, Scalar, Table, Together};
 
 /// A series made ready for single samples: no state, no allocation, no lock.
 ///
@@ -20,6 +20,12 @@ impl Compensator {
         evaluator.check_invertible()?;
         let table = evaluator.scalar();
         Ok(Self { evaluator, table })
+    }
+
+    /// Its table, and what corrects by several of them at once; None without one.
+    pub(crate) fn table(&self) -> Option<(&Arc<Table>, Together)> {
+        let (table, _) = self.table.as_ref()?;
+        Some((table, self.evaluator.together()))
     }
 
     /// The true angle of an indicated one.

@@ -30,7 +30,7 @@ pub use evaluator::{Evaluator, THREADED, TOLERANCE};
 pub(crate) use pass::{Pass, Wave};
 pub use route::{Path, Route};
 pub use stretch::Stretch;
-pub use table::{Scalar, Table};
+pub use table::{Scalar, Table, Together};
 
 /// What to compute from each sample.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

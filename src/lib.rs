@@ -32,6 +32,7 @@ pub mod fit;
 pub mod linear;
 pub mod lstsq;
 pub mod moments;
+pub mod monitor;
 pub mod rank;
 pub mod spectrum;
 pub mod waves;

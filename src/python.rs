@@ -12,6 +12,7 @@ mod fit;
 mod linear;
 mod lines;
 mod moments;
+mod monitor;
 mod motion;
 mod number;
 mod release;
@@ -44,7 +45,7 @@ mod _core {
     use super::circle::{covered_span, residuals, resultant};
 
     #[pymodule_export]
-    use super::corrector::PyCorrector;
+    use super::corrector::{PyAlike, PyCorrector};
 
     #[pymodule_export]
     use super::fit::{
@@ -59,6 +60,9 @@ mod _core {
 
     #[pymodule_export]
     use super::moments::{PyMoments, fit_moments};
+
+    #[pymodule_export]
+    use super::monitor::{PyClosedWindow, PyMonitor};
 
     #[pymodule_export]
     use super::motion::{PyBanded, harmonic_rows, harmonic_sum};

@@ -8,6 +8,7 @@
 // Passes index slices instead of chaining closures, as kernels do.
 #![allow(clippy::needless_range_loop)]
 
+mod alike;
 mod block;
 mod corrector;
 mod exponential;
@@ -22,6 +23,7 @@ mod smooth;
 mod still;
 mod travel;
 
+pub use alike::Alike;
 pub use corrector::Corrector;
 pub use form::{Form, Line, Term};
 pub use prepared::Terms;

@@ -9,7 +9,7 @@ use super::cubics::{self, Cubics};
 use super::exact::Exact;
 use super::route::{Path, Route};
 use super::stretch::Stretch;
-use super::table::{Scalar, Table};
+use super::table::{Scalar, Table, Together};
 use super::tables::Tables;
 use super::{Argument, Quantity, inverse};
 use crate::direct;
@@ -292,6 +292,11 @@ impl Evaluator {
     pub fn scalar(&self) -> Option<(Arc<Table>, Scalar)> {
         let table = self.table(Quantity::Correction)?;
         Some((Arc::clone(table), Table::scalar_subtract(self.best)))
+    }
+
+    /// The same of a sample of each of several tables, on the processor of this one.
+    pub fn together(&self) -> Together {
+        Table::each_subtract(self.best)
     }
 
     /// The correction of one sample without a table, as a batch has it to the last bit.

@@ -1,5 +1,7 @@
 //! Piecewise polynomials over one turn: the cost of a sample does not depend on the series.
 
+use std::sync::Arc;
+
 use super::segments::Segments;
 use super::sweep::{Map, Sweep};
 use super::{Batch, Real, Sample};
@@ -23,6 +25,9 @@ pub struct Table {
 
 /// One sample at a time, on the processor that [`Table::scalar_subtract`] found.
 pub type Scalar = unsafe fn(&Table, f64) -> f64;
+
+/// A sample of each of several tables, likewise.
+pub type Together = unsafe fn(&[Arc<Table>], &mut [f64]);
 
 impl Table {
     /// `constant` plus the Chebyshev expansion of each of a power of two of segments, which
@@ -79,15 +84,30 @@ impl Table {
         Self::scalar::<true>(set)
     }
 
-    fn scalar<const SUBTRACT: bool>(set: InstructionSet) -> Scalar {
+    /// Likewise of a sample of each of several tables, which do not wait for each other.
+    pub fn each_subtract(set: InstructionSet) -> Together {
         #[inline(always)]
-        fn one<const SUBTRACT: bool, const FUSED: bool>(table: &Table, x: f64) -> f64 {
-            let [lane] = Lookup::<SUBTRACT>(table).map([Portable::<1, FUSED>::splat(x)]);
-            let mut values = [0.0; MOST_LANES];
-            lane.to_array(&mut values);
-            values[0]
+        fn each<const FUSED: bool>(tables: &[Arc<Table>], samples: &mut [f64]) {
+            for (table, sample) in tables.iter().zip(samples) {
+                *sample = one::<true, FUSED>(table, *sample);
+            }
         }
 
+        #[cfg(target_arch = "x86_64")]
+        {
+            #[target_feature(enable = "fma")]
+            fn fused(tables: &[Arc<Table>], samples: &mut [f64]) {
+                each::<true>(tables, samples);
+            }
+            if set.is_available() && set.fuses() {
+                return fused;
+            }
+        }
+        let _ = set;
+        each::<TARGET_FUSES>
+    }
+
+    fn scalar<const SUBTRACT: bool>(set: InstructionSet) -> Scalar {
         #[cfg(target_arch = "x86_64")]
         {
             #[target_feature(enable = "fma")]
@@ -114,6 +134,14 @@ impl Table {
         }
         (value, slope * self.segments.per_half())
     }
+}
+
+#[inline(always)]
+fn one<const SUBTRACT: bool, const FUSED: bool>(table: &Table, x: f64) -> f64 {
+    let [lane] = Lookup::<SUBTRACT>(table).map([Portable::<1, FUSED>::splat(x)]);
+    let mut values = [0.0; MOST_LANES];
+    lane.to_array(&mut values);
+    values[0]
 }
 
 /// `constant` plus a Chebyshev expansion, by powers of `u`.

@@ -313,6 +313,25 @@ impl Accumulator {
         self.count = 0;
     }
 
+    /// Every reading so many times as heavy.
+    pub fn scale(&mut self, factor: f64) {
+        self.flush();
+        for table in [&mut self.total, &mut self.carry] {
+            let moments = table.iter_mut().flat_map(Segment::values_mut);
+            moments.for_each(|value| *value *= factor);
+        }
+        self.squares = (self.squares.0 * factor, self.squares.1 * factor);
+    }
+
+    /// Takes away readings that were added before; extremes stay as they are.
+    pub fn subtract(&mut self, other: &Self) {
+        let mut opposite = other.clone();
+        opposite.scale(-1.0);
+        let left = self.count.saturating_sub(other.count);
+        self.merge(&opposite);
+        self.count = left;
+    }
+
     /// Adds the moments of other readings of the same run, taken over the same segments.
     pub fn merge(&mut self, other: &Self) {
         let shift = self.period.wrap(other.centre - self.centre);

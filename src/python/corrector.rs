@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use numpy::{PyArrayDescrMethods, PyArrayDyn, PyUntypedArray, PyUntypedArrayMethods};
+use numpy::{PyArray1, PyArrayDescrMethods, PyArrayDyn, PyUntypedArray, PyUntypedArrayMethods};
 use pyo3::exceptions::PyTypeError;
 use pyo3::intern;
 use pyo3::prelude::*;
@@ -10,15 +10,15 @@ use pyo3::types::{PyDict, PyTuple};
 
 use super::array::{Angles, as_array, data, numpy_module, shown};
 use super::door::{self, Computation, Computed};
-use super::failure::{argument_error, kind_error};
+use super::failure::{argument_error, kind_error, missing_other};
 use super::number::{is_number, single};
 use super::release::{attached, detached};
 use super::series::PySeries;
-use super::terms::forms;
+use super::terms::{OTHER, forms, signal_of};
 use super::threads::{Asked, threads};
 use crate::error::Error;
 use crate::kernel::{Batch, Quantity, Real, Sample, Stretch};
-use crate::terms::{Columns, Corrector, Signal, Signals, Terms};
+use crate::terms::{Alike, Columns, Corrector, Signal, Signals, Terms};
 
 /// Correction by a series and its terms, in the order the samples were taken.
 #[pyclass(name = "Corrector", module = "trueangle._core")]
@@ -26,6 +26,8 @@ pub struct PyCorrector {
     inner: Corrector,
     /// What it was made of.
     parts: Py<PyTuple>,
+    /// Names of the other joints' angles that it takes, in the order of [`Signal::OTHERS`].
+    others: Vec<String>,
 }
 
 /// A signal as the caller gave it.
@@ -38,7 +40,7 @@ impl PyCorrector {
         let py = series.py();
         let parts = (series, terms.clone()).into_pyobject(py)?.unbind();
         let series = series.get();
-        let terms = forms(&terms)?;
+        let (terms, others) = forms(&terms)?;
         if !series.evaluator.is_ready(Quantity::Correction) {
             series.evaluator.room()?;
         }
@@ -48,6 +50,7 @@ impl PyCorrector {
         Ok(Self {
             inner: Corrector::new(Arc::new(terms)),
             parts,
+            others,
         })
     }
 
@@ -63,7 +66,7 @@ impl PyCorrector {
         self.restore(py, numbers)
     }
 
-    #[pyo3(signature = (indicated, /, velocity=None, temperature=None, torque=None, direction=None, current=None))]
+    #[pyo3(signature = (indicated, /, velocity=None, temperature=None, torque=None, direction=None, current=None, **others))]
     fn step(
         &mut self,
         indicated: &Bound<'_, PyAny>,
@@ -72,6 +75,7 @@ impl PyCorrector {
         torque: Given<'_, '_>,
         direction: Given<'_, '_>,
         current: Given<'_, '_>,
+        others: Option<&Bound<'_, PyDict>>,
     ) -> PyResult<f64> {
         let py = indicated.py();
         let angle = single(indicated, "the angle of a step")?;
@@ -90,6 +94,17 @@ impl PyCorrector {
                 signals = signals.with(signal, single(given, signal.name())?);
             }
         }
+        if others.is_some() || !self.others.is_empty() {
+            for (name, given) in others.into_iter().flatten() {
+                let name: String = name.extract()?;
+                if !given.is_none()
+                    && let Some(signal) = self.signal(&name)?
+                {
+                    signals = signals.with(signal, single(&given, &name)?);
+                }
+            }
+            self.check_others(py, |signal| signals.get(signal).is_some())?;
+        }
         Ok(attached(py, || self.inner.correct(angle, &signals))??)
     }
 
@@ -98,7 +113,17 @@ impl PyCorrector {
         Self {
             inner: Corrector::new(Arc::clone(self.inner.terms())),
             parts: self.parts.clone_ref(py),
+            others: self.others.clone(),
         }
+    }
+
+    /// Correct by another one's terms from the next step on; what is known of the past stays
+    /// where they can hold it.
+    fn swap(&mut self, other: &Bound<'_, Self>) -> PyResult<()> {
+        let mut next = other.try_borrow()?.fresh(other.py());
+        next.inner.restore(&self.inner.store());
+        *self = next;
+        Ok(())
     }
 
     fn reset(&mut self) {
@@ -115,6 +140,18 @@ impl PyCorrector {
         }
         let problem = "this is not the state of a corrector with such terms";
         Err(argument_error(py, problem.to_owned()))
+    }
+
+    /// So many joints of these terms, each with a past of its own.
+    fn alike(&self, py: Python<'_>, count: usize) -> PyAlike {
+        PyAlike {
+            inner: Alike::new(Arc::clone(self.inner.terms()), count),
+            corrector: Self {
+                inner: self.inner.clone(),
+                parts: self.parts.clone_ref(py),
+                others: self.others.clone(),
+            },
+        }
     }
 
     /// True angles, and how many of them lie outside a stretch.
@@ -146,6 +183,70 @@ impl PyCorrector {
         Ok(self
             .compute(quantity, theta, out, signals, threads, path, None)?
             .0)
+    }
+}
+
+/// Joints of the same terms, each with a past of its own.
+#[pyclass(name = "Alike", module = "trueangle._core")]
+pub struct PyAlike {
+    inner: Alike,
+    corrector: PyCorrector,
+}
+
+#[pymethods]
+impl PyAlike {
+    fn __len__(&self) -> usize {
+        self.inner.len()
+    }
+
+    /// Others with the same past.
+    fn copy(&self, py: Python<'_>) -> Self {
+        let mut made = self.corrector.alike(py, 0);
+        made.inner = self.inner.clone();
+        made
+    }
+
+    /// Forget the past of some.
+    fn reset(&mut self, py: Python<'_>, joints: Vec<usize>) -> PyResult<()> {
+        if let Some(joint) = joints.iter().find(|&&joint| joint >= self.inner.len()) {
+            let problem = format!("there is no joint {joint} among {}", self.inner.len());
+            return Err(argument_error(py, problem));
+        }
+        for joint in joints {
+            self.inner.reset(joint);
+        }
+        Ok(())
+    }
+
+    /// The error of every joint at its angle; signals are of the same shape or one value.
+    #[pyo3(signature = (angles, /, **signals))]
+    fn error<'py>(
+        &mut self,
+        angles: &Bound<'py, PyAny>,
+        signals: Option<&Bound<'py, PyDict>>,
+    ) -> PyResult<Bound<'py, PyArray1<f64>>> {
+        let py = angles.py();
+        let signals = match signals {
+            Some(given) => self.corrector.taken(given)?,
+            None => Vec::new(),
+        };
+        let given = |signal| signals.iter().any(|(known, _)| *known == signal);
+        self.corrector.check_others(py, given)?;
+        let angles = as_signal(angles, "angles")?;
+        let slices = |values: &Bound<'py, PyUntypedArray>| {
+            // SAFETY: a contiguous array of doubles that is kept while the slice is used.
+            unsafe { std::slice::from_raw_parts(data::<f64>(values), values.len()) }
+        };
+        let columns = signals
+            .iter()
+            .fold(Columns::default(), |columns, (signal, values)| {
+                columns.with(*signal, slices(values))
+            });
+        let mut errors = vec![0.0; angles.len()];
+        attached(py, || {
+            self.inner.errors(slices(&angles), &columns, &mut errors)
+        })??;
+        Ok(PyArray1::from_vec(py, errors))
     }
 }
 
@@ -181,6 +282,35 @@ impl PyCorrector {
         self.inner.terms()
     }
 
+    /// Names of the other joints' angles that it takes.
+    pub fn others(&self) -> &[String] {
+        &self.others
+    }
+
+    /// The signal of a keyword argument; None of the angle of a joint that no term is about.
+    ///
+    /// Signals that are not needed are ignored; what no correction knows is refused.
+    fn signal(&self, name: &str) -> PyResult<Option<Signal>> {
+        let found = signal_of(name, &self.others);
+        if found.is_none() && !name.starts_with(OTHER) {
+            let known: Vec<_> = Signal::NAMED.iter().map(|signal| signal.name()).collect();
+            return Err(PyTypeError::new_err(format!(
+                "got an unexpected keyword argument '{name}'; signals are {}",
+                known.join(", ")
+            )));
+        }
+        Ok(found)
+    }
+
+    /// Refuses to go on without the angle of another joint, by its name.
+    fn check_others(&self, py: Python<'_>, given: impl Fn(Signal) -> bool) -> PyResult<()> {
+        let mut named = self.others.iter().zip(Signal::OTHERS);
+        match named.find(|(_, signal)| !given(**signal)) {
+            Some((name, _)) => Err(missing_other(py, name)?),
+            None => Ok(()),
+        }
+    }
+
     fn compute<'py>(
         &mut self,
         quantity: Quantity,
@@ -198,9 +328,12 @@ impl PyCorrector {
         }
         let terms = self.inner.terms();
         let mut signals = match given {
-            Some(given) => taken(given, terms)?,
+            Some(given) => self.taken(given)?,
             None => Vec::new(),
         };
+        self.check_others(py, |signal| {
+            signals.iter().any(|(known, _)| *known == signal)
+        })?;
         let period = terms.evaluator().series().period().value();
         let stretch = door::stretch(period, stretch);
         let alone = signals.iter().all(|(_, values)| values.len() == 1);
@@ -238,22 +371,21 @@ impl PyCorrector {
 /// A signal and its values.
 type Taken<'py> = (Signal, Bound<'py, PyUntypedArray>);
 
-/// Those of the given signals that the terms take.
-fn taken<'py>(given: &Bound<'py, PyDict>, terms: &Terms) -> PyResult<Vec<Taken<'py>>> {
-    let mut taken = Vec::with_capacity(given.len());
-    for (name, values) in given {
-        let name: String = name.extract()?;
-        let signal = Signal::named(&name).ok_or_else(|| {
-            let known = Signal::ALL.map(Signal::name).join(", ");
-            PyTypeError::new_err(format!(
-                "got an unexpected keyword argument '{name}'; signals are {known}"
-            ))
-        })?;
-        if !values.is_none() && terms.takes(signal) {
-            taken.push((signal, as_signal(&values, signal.name())?));
+impl PyCorrector {
+    /// Those of the given signals that the terms take.
+    fn taken<'py>(&self, given: &Bound<'py, PyDict>) -> PyResult<Vec<Taken<'py>>> {
+        let mut taken = Vec::with_capacity(given.len());
+        for (name, values) in given {
+            let name: String = name.extract()?;
+            if let Some(signal) = self.signal(&name)?
+                && !values.is_none()
+                && self.inner.terms().takes(signal)
+            {
+                taken.push((signal, as_signal(&values, &name)?));
+            }
         }
+        Ok(taken)
     }
-    Ok(taken)
 }
 
 /// A signal as doubles in the order they were taken; one value stays one.

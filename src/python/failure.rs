@@ -64,3 +64,13 @@ fn raise(py: Python<'_>, error: &Error) -> PyResult<PyErr> {
     };
     Ok(PyErr::from_value(instance))
 }
+
+/// That the angle of another joint was not given.
+pub fn missing_other(py: Python<'_>, name: &str) -> PyResult<PyErr> {
+    let problem = format!(
+        "the model's term 'joint_coupling' needs {name}, the angle of another joint, which was \
+         not given: pass {name}=, in a log the column {name}_deg"
+    );
+    let class = errors(py)?.getattr("MissingSignalError")?;
+    Ok(PyErr::from_value(class.call1((problem,))?))
+}

@@ -148,6 +148,25 @@ impl PyMoments {
         })
     }
 
+    /// Every reading so far so many times as heavy.
+    fn scale(&mut self, factor: f64) {
+        if let Some(sums) = &mut self.sums {
+            sums.scale(factor);
+        }
+    }
+
+    /// Takes away readings that were added before.
+    fn subtract(&mut self, other: &Self) -> PyResult<()> {
+        if (self.period, self.cycles, self.highest) != (other.period, other.cycles, other.highest) {
+            return Err(Error::Merge("period or orders").into());
+        }
+        Accumulator::room(self.highest)?;
+        if let (Some(sums), Some(other)) = (&mut self.sums, &other.sums) {
+            sums.subtract(other);
+        }
+        Ok(())
+    }
+
     fn merge(&mut self, other: &Self) -> PyResult<()> {
         if (self.period, self.cycles, self.highest) != (other.period, other.cycles, other.highest) {
             return Err(Error::Merge("period or orders").into());

@@ -3,7 +3,9 @@
 use std::ffi::CStr;
 use std::sync::Arc;
 
-use numpy::npyffi::flags::{NPY_ARRAY_ALIGNED, NPY_ARRAY_C_CONTIGUOUS, NPY_ARRAY_WRITEABLE};
+use numpy::npyffi::flags::{
+    NPY_ARRAY_ALIGNED, NPY_ARRAY_C_CONTIGUOUS, NPY_ARRAY_OWNDATA, NPY_ARRAY_WRITEABLE,
+};
 use numpy::npyffi::{NpyTypes, PY_ARRAY_API, PyArrayObject, get_type_object, npy_intp};
 use numpy::{PyArrayDescr, PyArrayDescrMethods, PyUntypedArray, PyUntypedArrayMethods, dtype};
 use pyo3::exceptions::PyTypeError;
@@ -17,8 +19,9 @@ use super::failure::{argument_error, kind_error};
 use super::release::{attached, detached};
 use super::series::PySeries;
 use super::step::Definition;
+use super::terms::OTHER;
 use crate::compensator::Compensator;
-use crate::robot::{Joint, JointError, Robot};
+use crate::robot::{Coupling, Joint, JointError, Robot};
 use crate::terms::{Columns, Corrector, Signal};
 
 /// Correction of one sample of every joint at a time.
@@ -30,6 +33,10 @@ pub struct PyRobotStep {
     parts: Vec<Py<PyAny>>,
     /// The dtype of doubles, to know it at a glance.
     doubles: Py<PyArrayDescr>,
+    /// The last two results: who has let go of one gets it again.
+    results: [Option<Py<PyUntypedArray>>; 2],
+    /// References are counted under the interpreter's lock: a count of one is one.
+    has_lock: bool,
 }
 
 #[pymethods]
@@ -45,11 +52,29 @@ impl PyRobotStep {
             return Err(argument_error(py, problem.to_owned()));
         }
         Ok(Self {
-            inner: Robot::new(joints),
+            inner: Robot::coupled(joints, couplings(&names, &parts)?),
             names,
             parts: parts.into_iter().map(Bound::unbind).collect(),
             doubles: dtype::<f64>(py).unbind(),
+            results: [None, None],
+            has_lock: has_lock(py)?,
         })
+    }
+
+    /// Correct by the parts of another one of the same joints from the next step on; what is
+    /// known of the past stays where these can hold it.
+    fn swap(&mut self, other: &Bound<'_, Self>) -> PyResult<()> {
+        let py = other.py();
+        let other = other.try_borrow()?;
+        let parts = other
+            .parts
+            .iter()
+            .map(|part| part.bind(py).clone())
+            .collect();
+        let mut next = Self::new(other.names.clone(), parts, py)?;
+        next.inner.restore(&self.inner.store());
+        *self = next;
+        Ok(())
     }
 
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Reduced<'py>> {
@@ -134,9 +159,10 @@ impl PyRobotStep {
         for (name, values) in signals.into_iter().flatten() {
             let name: String = name.extract()?;
             let signal = Signal::named(&name).ok_or_else(|| {
-                let known = Signal::ALL.map(Signal::name).join(", ");
+                let known: Vec<_> = Signal::NAMED.iter().map(|signal| signal.name()).collect();
                 PyTypeError::new_err(format!(
-                    "got an unexpected keyword argument '{name}'; signals are {known}"
+                    "got an unexpected keyword argument '{name}'; signals are {}",
+                    known.join(", ")
                 ))
             })?;
             if !values.is_none() {
@@ -169,6 +195,45 @@ impl PyRobotStep {
 /// What pickle makes a robot's step of: its class, arguments and state.
 type Reduced<'py> = (Bound<'py, PyAny>, Bound<'py, PyTuple>, Vec<Vec<f64>>);
 
+/// The angles of other joints that correctors need, each in the unit of its joint.
+fn couplings(names: &[String], parts: &[Bound<'_, PyAny>]) -> PyResult<Vec<Coupling>> {
+    let mut found = Vec::new();
+    let mut periods = Vec::with_capacity(parts.len());
+    for part in parts {
+        periods.push(match part.cast::<PySeries>() {
+            Ok(series) => series.get().evaluator.series().period().value(),
+            Err(_) => {
+                let corrector: PyRef<'_, PyCorrector> = part.extract()?;
+                corrector.terms().evaluator().series().period().value()
+            }
+        });
+    }
+    for (joint, part) in parts.iter().enumerate() {
+        let Ok(corrector) = part.extract::<PyRef<'_, PyCorrector>>() else {
+            continue;
+        };
+        for (name, &signal) in corrector.others().iter().zip(Signal::OTHERS) {
+            let known = |own: &String| name.strip_prefix(OTHER) == Some(own);
+            let Some(other) = names.iter().position(known) else {
+                let problem = format!(
+                    "joint {}: its model needs {name}, and the robot has no such joint: correct \
+                     it by its own corrector",
+                    names[joint]
+                );
+                return Err(argument_error(part.py(), problem));
+            };
+            let scale = periods[joint] / periods[other];
+            found.push(Coupling {
+                joint,
+                signal,
+                other,
+                scale,
+            });
+        }
+    }
+    Ok(found)
+}
+
 /// The joint that a series, or a corrector without its past, is.
 fn joint(part: &Bound<'_, PyAny>) -> PyResult<Joint> {
     if let Ok(series) = part.cast::<PySeries>() {
@@ -179,6 +244,15 @@ fn joint(part: &Bound<'_, PyAny>) -> PyResult<Joint> {
     let corrector: PyRef<'_, PyCorrector> = part.extract()?;
     let terms = Arc::clone(corrector.terms());
     Ok(Joint::Moving(Box::new(Corrector::new(terms))))
+}
+
+/// Whether the interpreter runs one thread at a time.
+fn has_lock(py: Python<'_>) -> PyResult<bool> {
+    let sys = py.import("sys")?;
+    if !sys.hasattr("_is_gil_enabled")? {
+        return Ok(true);
+    }
+    sys.call_method0("_is_gil_enabled")?.extract()
 }
 
 /// A fresh array of so many doubles.
@@ -229,6 +303,25 @@ impl PyRobotStep {
             && fields.flags & flags == flags
     }
 
+    /// An array for a result: one that nobody but this holds any more, or a new one.
+    ///
+    /// A control loop lets go of a result when it takes the next but one, and allocates nothing.
+    #[inline]
+    fn result<'py>(&mut self, py: Python<'py>) -> PyResult<Bound<'py, PyUntypedArray>> {
+        for kept in self.results.iter().flatten() {
+            let array = kept.bind(py);
+            // SAFETY: an object that is there.
+            let is_free = self.has_lock && unsafe { ffi::Py_REFCNT(array.as_ptr()) } == 1;
+            if is_free && self.is_plain(array, PLAIN | NPY_ARRAY_WRITEABLE | NPY_ARRAY_OWNDATA) {
+                return Ok(array.clone());
+            }
+        }
+        let made = fresh(py, self.names.len())?;
+        self.results.swap(0, 1);
+        self.results[0] = Some(made.clone().unbind());
+        Ok(made)
+    }
+
     /// The step of a plain array into a plain array or a new one; `None` of anything else.
     #[inline]
     fn quick<'py>(
@@ -249,7 +342,7 @@ impl PyRobotStep {
                 }
                 out.clone()
             }
-            None => match fresh(x.py(), size) {
+            None => match self.result(x.py()) {
                 Ok(target) => target,
                 Err(error) => return Some(Err(error)),
             },

@@ -3,6 +3,7 @@
 use std::ffi::CStr;
 use std::sync::Arc;
 
+use arc_swap::ArcSwap;
 use pyo3::exceptions::PyTypeError;
 use pyo3::ffi;
 use pyo3::prelude::*;
@@ -10,24 +11,37 @@ use pyo3::prelude::*;
 use super::number::single;
 use super::release::detached;
 use super::series::PySeries;
+use super::terms::OTHER;
 use crate::compensator::Compensator;
 use crate::terms::Signal;
 
 /// Correction of one sample at a time.
 #[pyclass(name = "Compensator", module = "trueangle._core", frozen)]
 pub struct PyCompensator {
+    /// A step reads it without a lock, and ends with the series it began with.
+    held: ArcSwap<Held>,
+}
+
+struct Held {
     inner: Compensator,
     series: Py<PySeries>,
 }
 
-impl PyCompensator {
-    pub fn new(series: &Bound<'_, PySeries>) -> PyResult<Self> {
+impl Held {
+    fn new(series: &Bound<'_, PySeries>) -> PyResult<Self> {
         let evaluator = Arc::clone(&series.get().evaluator);
         let inner = detached(series.py(), || Compensator::new(evaluator))??;
         Ok(Self {
             inner,
             series: series.clone().unbind(),
         })
+    }
+}
+
+impl PyCompensator {
+    pub fn new(series: &Bound<'_, PySeries>) -> PyResult<Self> {
+        let held = ArcSwap::from_pointee(Held::new(series)?);
+        Ok(Self { held })
     }
 }
 
@@ -45,6 +59,13 @@ impl PyCompensator {
         }
     }
 
+    /// Correct by another series from the next step on.
+    fn swap(&self, series: &Bound<'_, PySeries>) -> PyResult<()> {
+        // Made whole before it takes the place of the other.
+        self.held.store(Arc::new(Held::new(series)?));
+        Ok(())
+    }
+
     /// What a call costs that does nothing: the limit that benchmarks compare `step` with.
     #[pyo3(signature = (indicated, /))]
     fn _empty_step(&self, indicated: f64) -> f64 {
@@ -52,7 +73,8 @@ impl PyCompensator {
     }
 
     fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, ())> {
-        Ok((self.series.bind(py).getattr("compensator")?, ()))
+        let held = self.held.load();
+        Ok((held.series.bind(py).getattr("compensator")?, ()))
     }
 }
 
@@ -112,6 +134,8 @@ unsafe extern "C" fn step(
         let corrected = compensator
             .cast_unchecked::<PyCompensator>()
             .get()
+            .held
+            .load()
             .inner
             .step(angle);
         ffi::PyFloat_FromDouble(corrected)
@@ -125,10 +149,10 @@ fn check_arguments(
     given: ffi::Py_ssize_t,
     keywords: *mut ffi::PyObject,
 ) -> PyResult<()> {
-    if !(1..=1 + Signal::COUNT as isize).contains(&given) {
+    if !(1..=1 + Signal::NAMED.len() as isize).contains(&given) {
         let problem = format!(
             "step takes an angle and up to {} signals, got {given} arguments",
-            Signal::COUNT
+            Signal::NAMED.len()
         );
         return Err(PyTypeError::new_err(problem));
     }
@@ -137,7 +161,8 @@ fn check_arguments(
     }
     // SAFETY: a tuple of names, as the calling convention has it.
     let names: Vec<String> = unsafe { Bound::from_borrowed_ptr(py, keywords) }.extract()?;
-    match names.iter().find(|name| Signal::named(name).is_none()) {
+    let is_known = |name: &str| Signal::named(name).is_some() || name.starts_with(OTHER);
+    match names.iter().find(|name| !is_known(name)) {
         Some(name) => {
             let problem = format!("step got an unexpected keyword argument '{name}'");
             Err(PyTypeError::new_err(problem))

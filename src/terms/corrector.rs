@@ -1,5 +1,6 @@
 //! Correction by a series and its terms, sample by sample, with the state it needs.
 
+use std::slice;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -179,7 +180,7 @@ impl Terms {
         if is_error && !self.is_indicated() {
             self.error_still(block, len);
             if self.has_travel {
-                self.error_moving(travel, block, len, way);
+                self.error_moving(slice::from_mut(travel), block, len, way);
             }
             return;
         }
@@ -209,7 +210,7 @@ impl Terms {
             let mut block = Block::one(x, signals);
             self.error_still(&mut block, 1);
             if self.has_travel {
-                self.error_moving(travel, &mut block, 1, way);
+                self.error_moving(slice::from_mut(travel), &mut block, 1, way);
             }
             return block.out[0];
         }

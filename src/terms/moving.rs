@@ -289,10 +289,11 @@ impl Terms {
         some
     }
 
-    /// Adds to the errors of the first `len` readings of a block what travel adds.
+    /// Adds to the errors of the first `len` readings of a block what travel adds: that of all, or
+    /// of each its own.
     pub(super) fn error_moving<const N: usize>(
         &self,
-        travel: &mut Travel,
+        travels: &mut [Travel],
         block: &mut Block<N>,
         len: usize,
         way: Option<Signal>,
@@ -306,7 +307,9 @@ impl Terms {
             work,
             ..
         } = block;
+        let is_one = travels.len() == 1;
         for i in 0..len {
+            let travel = &mut travels[if is_one { 0 } else { i }];
             (direction[i], friction[i]) = (0.0, 0.0);
             if !out[i].is_finite() {
                 continue;

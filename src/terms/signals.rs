@@ -15,11 +15,19 @@ pub enum Signal {
     Torque,
     /// Amperes of the motor.
     Current,
+    /// Angles of other joints, in the unit of this one: which they are is the caller's.
+    Other1,
+    /// Likewise.
+    Other2,
+    /// Likewise.
+    Other3,
+    /// Likewise.
+    Other4,
 }
 
 impl Signal {
     /// How many there are.
-    pub const COUNT: usize = 5;
+    pub const COUNT: usize = 9;
 
     /// All of them, in the order of [`BySignal`].
     pub const ALL: [Self; Self::COUNT] = [
@@ -28,7 +36,17 @@ impl Signal {
         Self::Temperature,
         Self::Torque,
         Self::Current,
+        Self::Other1,
+        Self::Other2,
+        Self::Other3,
+        Self::Other4,
     ];
+
+    /// Those with a keyword argument of their own.
+    pub const NAMED: &'static [Self] = Self::ALL.split_at(5).0;
+
+    /// Those whose names their terms bring.
+    pub const OTHERS: &'static [Self] = Self::ALL.split_at(5).1;
 
     /// The keyword argument of this signal.
     pub fn name(self) -> &'static str {
@@ -38,12 +56,16 @@ impl Signal {
             Self::Temperature => "temperature",
             Self::Torque => "torque",
             Self::Current => "current",
+            Self::Other1 | Self::Other2 | Self::Other3 | Self::Other4 => {
+                "the angle of another joint"
+            }
         }
     }
 
     /// The signal of a keyword argument.
     pub fn named(name: &str) -> Option<Self> {
-        Self::ALL.into_iter().find(|signal| signal.name() == name)
+        let named = Self::NAMED.iter().copied();
+        named.into_iter().find(|signal| signal.name() == name)
     }
 
     /// The column of a log that holds this signal.
@@ -54,6 +76,7 @@ impl Signal {
             Self::Temperature => "temperature_C",
             Self::Torque => "torque_Nm",
             Self::Current => "current_A",
+            Self::Other1 | Self::Other2 | Self::Other3 | Self::Other4 => "that holds it",
         }
     }
 }

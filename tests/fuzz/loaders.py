@@ -101,7 +101,8 @@ def _use_model(path: Path) -> None:
         "torque": 1.0,
         "direction": 1.0,
     }
-    signals = {name: given[name] for name in model.uses_signals}
+    quarter = 0.25 * model.period  # of another joint
+    signals = {name: given.get(name, quarter) for name in model.uses_signals}
     error = model.error(angles, **signals)
     assert np.isfinite(error).all(), "an accepted model whose error is not finite"
     try:

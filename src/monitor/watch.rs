@@ -1,0 +1,270 @@
+//! Windows one after the other, and a chart for every coefficient.
+
+use super::chart::{Cusum, Scale};
+use super::window::Window;
+
+/// Windows after which their mean is held against the model.
+const FIRST: f64 = 8.0;
+
+/// Turns beyond which a double has no place within one.
+const MANY_TURNS: f64 = (1u64 << 51) as f64;
+
+/// What a window said.
+#[derive(Clone, Debug)]
+pub struct Closed {
+    /// The reading of the batch that ended it.
+    pub reading: usize,
+    /// Windows so far.
+    pub window: u64,
+    /// Readings in it.
+    pub readings: f64,
+    /// Zero, cosine and sine of each order, less the model's.
+    pub coefficients: Vec<f64>,
+    /// The larger sum of every coefficient's chart; of the zero its last step, in deviations.
+    pub statistics: Vec<f64>,
+    /// Coefficients whose chart passed its limit.
+    pub alarms: Vec<usize>,
+    /// Shift of each of these since its sum was last zero, and since how many windows.
+    pub shifts: Vec<(f64, f64)>,
+    /// Coefficients whose mean is not the model's.
+    pub unlike: Vec<usize>,
+}
+
+/// Limits of the charts.
+#[derive(Clone, Copy, Debug)]
+pub struct Limits {
+    /// Half of the shift looked for, in standard deviations.
+    pub allowance: f64,
+    /// Of the sums.
+    pub sum: f64,
+    /// Of a step of the zero, in standard deviations.
+    pub step: f64,
+    /// Of the first windows' mean against the model, in standard deviations.
+    pub mean: f64,
+}
+
+/// A joint against its model.
+#[derive(Clone, Debug)]
+pub struct Monitor {
+    window: Window,
+    period: f64,
+    every: f64,
+    limits: Limits,
+    /// Variances of the model's own coefficients.
+    known: Vec<f64>,
+    charts: Vec<(Scale, Cusum)>,
+    /// Means and squares of plain coefficients of the first windows.
+    plain: Vec<Scale>,
+    steps: Scale,
+    zero: Option<f64>,
+    last_zero: Option<f64>,
+    anchor: Option<f64>,
+    travel: f64,
+    windows: u64,
+}
+
+impl Monitor {
+    /// Of a model by its orders of a turn; `known` are variances of cosine and sine of each.
+    pub fn new(period: f64, window: Window, known: Vec<f64>, every: f64, limits: Limits) -> Self {
+        let size = known.len();
+        Self {
+            window,
+            period,
+            every,
+            limits,
+            known,
+            charts: vec![Default::default(); size],
+            plain: vec![Scale::default(); size],
+            steps: Scale::default(),
+            zero: None,
+            last_zero: None,
+            anchor: None,
+            travel: 0.0,
+            windows: 0,
+        }
+    }
+
+    /// Windows so far.
+    pub fn windows(&self) -> u64 {
+        self.windows
+    }
+
+    /// Bytes of the state.
+    pub fn bytes(&self) -> usize {
+        let charts = size_of_val(&self.charts[..]) + size_of_val(&self.plain[..]);
+        size_of::<Self>() + self.window.bytes() + charts + size_of_val(&self.known[..])
+    }
+
+    /// Mean and standard deviation of each coefficient's windows, and its sums.
+    pub fn state(&self) -> Vec<[f64; 4]> {
+        let charts = self.plain.iter().zip(&self.charts);
+        charts
+            .map(|(plain, (_, sums))| [plain.mean(), plain.std(), sums.sums[0], sums.sums[1]])
+            .collect()
+    }
+
+    /// Takes readings in; the windows that they ended.
+    pub fn update(&mut self, angle: &[f64], error: &[f64]) -> Vec<Closed> {
+        let mut closed = Vec::new();
+        let per_turn = 1.0 / self.period;
+        let (width, half) = (self.window.width(), 0.5 * self.period);
+        let mut anchor = self.anchor;
+        let mut zero = self.zero;
+        for (reading, (&x, &e)) in angle.iter().zip(error).enumerate() {
+            if !(x.is_finite() && e.is_finite()) {
+                continue;
+            }
+            let turns = x * per_turn;
+            let start = *anchor.get_or_insert(turns);
+            let about = *zero.get_or_insert(e);
+            // Rounding is a call of a function on the oldest processors: only where it is needed.
+            let mut apart = e - about;
+            if apart.abs() > half {
+                apart -= self.period * (apart * per_turn).round();
+            }
+            self.window.add(part_of_turn(turns), apart);
+            // Trembling about a place is no travel: only steps of a bin count.
+            let mut moved = turns - start;
+            if moved.abs() > 0.5 {
+                moved -= moved.round();
+            }
+            if moved.abs() >= width {
+                anchor = Some(turns);
+                self.travel += moved.abs();
+                if self.travel >= self.every
+                    && let Some(found) = self.close(reading)
+                {
+                    closed.push(found);
+                }
+            }
+        }
+        (self.anchor, self.zero) = (anchor, zero);
+        closed
+    }
+
+    /// Ends a window, unless its places do not tell the orders apart: then it goes on.
+    fn close(&mut self, reading: usize) -> Option<Closed> {
+        let Some(solved) = self.window.solve() else {
+            // Looked at again after another part of the travel.
+            self.travel -= 0.25 * self.every;
+            return None;
+        };
+        let readings = self.window.readings();
+        self.window.clear();
+        self.travel = 0.0;
+        self.windows += 1;
+        let limits = self.limits;
+        let size = self.known.len();
+        let (mut alarms, mut shifts, mut unlike) = (Vec::new(), Vec::new(), Vec::new());
+        let mut statistics = vec![0.0; size + 1];
+        let values = solved.coefficients[1..].iter().zip(&solved.variances[1..]);
+        for (i, (&value, variance)) in values.enumerate() {
+            let (scale, chart) = &mut self.charts[i];
+            let standard = scale.add(value / variance.sqrt());
+            let sum = chart.add(standard, limits.allowance);
+            statistics[i + 1] = sum;
+            let plain = &mut self.plain[i];
+            plain.add(value);
+            if sum > limits.sum {
+                let side = usize::from(chart.sums[1] > chart.sums[0]);
+                let size = chart.shift(limits.allowance) * scale.std() * variance.sqrt();
+                alarms.push(i + 1);
+                shifts.push((size, chart.since[side]));
+                *chart = Cusum::default();
+            } else if plain.count() == FIRST {
+                let spread = self.known[i] + plain.std().powi(2) / FIRST;
+                let t = plain.mean() / spread.sqrt();
+                if super::chart::normal_of_student(t, FIRST - 1.0).abs() > limits.mean {
+                    unlike.push(i + 1);
+                }
+            }
+        }
+        let zero = solved.coefficients[0];
+        if let Some(before) = self.last_zero {
+            let count = self.steps.count();
+            statistics[0] = self.steps.add(zero - before).abs();
+            if count > FIRST && statistics[0] > limits.step {
+                alarms.push(0);
+                shifts.push((zero - before, 1.0));
+            }
+        }
+        self.last_zero = Some(zero);
+        Some(Closed {
+            reading,
+            window: self.windows,
+            readings,
+            coefficients: solved.coefficients,
+            statistics,
+            alarms,
+            shifts,
+            unlike,
+        })
+    }
+}
+
+/// What is left of turns without the whole ones, 0 to 1.
+#[inline(always)]
+fn part_of_turn(turns: f64) -> f64 {
+    if turns.abs() > MANY_TURNS {
+        return turns.rem_euclid(1.0);
+    }
+    let rest = turns - (turns as i64) as f64;
+    if rest < 0.0 { rest + 1.0 } else { rest }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn monitor() -> Monitor {
+        let limits = Limits {
+            allowance: 0.5,
+            sum: 6.0,
+            step: 6.0,
+            mean: 6.0,
+        };
+        let window = Window::new(&[1], &[0.0], &[0.0]);
+        Monitor::new(360.0, window, vec![0.0; 2], 1.0, limits)
+    }
+
+    /// A window ends after a turn of travel, in either direction and with angles within a turn.
+    #[test]
+    fn windows_are_turns_of_travel() {
+        for step in [1.0, -1.0] {
+            let mut watched = monitor();
+            let angle: Vec<f64> = (0..3601)
+                .map(|i| (step * f64::from(i)).rem_euclid(360.0))
+                .collect();
+            let closed = watched.update(&angle, &vec![0.0; angle.len()]);
+            assert_eq!(closed.len(), 10 - usize::from(closed[0].reading > 360));
+            assert_eq!(watched.windows(), closed.len() as u64);
+        }
+    }
+
+    /// Batches of any size say the same.
+    #[test]
+    fn batches_say_the_same() {
+        let angle: Vec<f64> = (0..5000).map(|i| 1.7 * f64::from(i)).collect();
+        let error: Vec<f64> = angle.iter().map(|x| (0.3 * x).sin() + 359.0).collect();
+        let (mut one, mut other) = (monitor(), monitor());
+        let whole = one.update(&angle, &error);
+        let parts = angle.chunks(7).zip(error.chunks(7));
+        let parts: Vec<Closed> = parts.flat_map(|(x, e)| other.update(x, e)).collect();
+        assert_eq!(whole.len(), parts.len());
+        for (a, b) in whole.iter().zip(&parts) {
+            assert_eq!(a.coefficients, b.coefficients);
+        }
+    }
+
+    /// A joint that trembles, or swings over a part of a turn, ends no window.
+    #[test]
+    fn trembling_ends_no_window() {
+        let mut watched = monitor();
+        let angle: Vec<f64> = (0..9000).map(|i| f64::from(i % 2)).collect();
+        assert!(watched.update(&angle, &vec![0.0; angle.len()]).is_empty());
+        let angle: Vec<f64> = (0..9000)
+            .map(|i| 10.0 * (0.1 * f64::from(i)).sin())
+            .collect();
+        assert!(watched.update(&angle, &vec![0.0; angle.len()]).is_empty());
+    }
+}
