@@ -70,6 +70,10 @@ class Moments(Shown):
         All orders that may ever be asked for.
     period : float
         One turn of ``theta`` and ``error``.
+    forgetting : float, optional
+        By which every reading counts less than the one after it in its run, above 0 and at most
+        1: the sums hold some ``1 / (1 - forgetting)`` readings. Uncertainties are those of the
+        effective number of readings, :math:`(\sum w)^2 / \sum w^2` less the unknowns.
     gear_ratio, fixed_member, shafts
         As in `fit`. Shafts that never come back to their start together have no moments.
 
@@ -99,7 +103,13 @@ class Moments(Shown):
         gear_ratio: float | None = None,
         fixed_member: str = "circular_spline",
         shafts: Mapping[str, float] | None = None,
+        forgetting: float | None = None,
     ) -> None:
+        if forgetting is not None and not 0.0 < forgetting <= 1.0:
+            raise ArgumentError(f"forgetting must lie above 0 and at most at 1, got {forgetting!r}")
+        self._forgetting = forgetting
+        #: Sums of weights and of their squares, where readings are forgotten.
+        self._weights: dict[Hashable, tuple[float, float]] = {}
         self._shafts = resolve_orders(orders, gear_ratio, fixed_member, shafts)
         self._period = float(period)
         self._runs: dict[Hashable, _core.Moments] = {}
@@ -172,15 +182,26 @@ class Moments(Shown):
                 raise ArgumentError(
                     f"{what} has shape {np.shape(values)}, theta has {shape}: they must agree"
                 )
-        columns = (
-            _flat(theta),
-            _flat(error),
-            None if weights is None else _flat(weights),
-            threads,
-        )
+        given = None if weights is None else _flat(weights)
+        if self._forgetting is not None:
+            faded = self._forgetting ** np.arange(np.size(theta) - 1.0, -1.0, -1.0)
+            given = faded if given is None else faded * given
         with self._turn:
             sums = self._of(run)
-            sums.update(*columns)
+            if self._forgetting is not None and given is not None:
+                # Checked first: readings that are refused leave the sums alone.
+                fresh = self._new()
+                fresh.update(_flat(theta), _flat(error), given, threads)
+                factor = self._forgetting**given.size
+                first, second = self._weights.get(run, (0.0, 0.0))
+                self._weights[run] = (
+                    factor * first + float(given.sum()),
+                    factor * factor * second + float(given @ given),
+                )
+                sums.scale(factor)
+                sums.merge(fresh)
+            else:
+                sums.update(_flat(theta), _flat(error), given, threads)
             if sums.count:
                 self._runs[run] = sums
         return self
@@ -227,6 +248,8 @@ class Moments(Shown):
             raise ArgumentError(f"other must be Moments, got {type(other).__name__}")
         if (self._shafts, self._period) != (other._shafts, other._period):
             raise ArgumentError("moments merge when their orders, shafts and period agree")
+        if self._forgetting is not None or other._forgetting is not None:
+            raise ArgumentError("other: moments that forget do not merge: order counts")
         theirs = other._copies()  # not both turns at once: the other may be merging this
         with self._turn:
             for label, sums in theirs.items():
@@ -235,6 +258,55 @@ class Moments(Shown):
                     self._runs[label] = sums
                 else:
                     mine.merge(sums)
+        return self
+
+    @told_kinds
+    def subtract(self, other: Moments) -> Moments:
+        """Take away the readings of another accumulator that were added to this one before.
+
+        What is left is that of the others to the rounding of the sums: a window that moves along
+        a log is the sum of its parts less the oldest.
+
+        Parameters
+        ----------
+        other : Moments
+            Over the same orders; its runs are among these by label.
+
+        Returns
+        -------
+        Moments
+            Itself.
+
+        Raises
+        ------
+        ArgumentError
+            Other orders, a run that is not here or has fewer readings, sums that forget.
+
+        Examples
+        --------
+        >>> theta = np.linspace(0.0, 360.0, 500, endpoint=False)
+        >>> first, both = Moments([1], period=360.0), Moments([1], period=360.0)
+        >>> _ = first.update(theta, 0.1 * np.cos(np.radians(theta)))
+        >>> _ = both.update(theta, 0.3 * np.cos(np.radians(theta))).merge(first)
+        >>> both.subtract(first).solve().cosine.round(9)
+        array([0.3])
+        """
+        if not isinstance(other, Moments):
+            raise ArgumentError(f"other must be Moments, got {type(other).__name__}")
+        if (self._shafts, self._period) != (other._shafts, other._period):
+            raise ArgumentError("moments subtract when their orders, shafts and period agree")
+        if self._forgetting is not None or other._forgetting is not None:
+            raise ArgumentError("other: sums that forget their readings cannot be taken apart")
+        theirs = other._copies()
+        with self._turn:
+            for label, sums in theirs.items():
+                mine = self._runs.get(label)
+                if mine is None or mine.count < sums.count:
+                    raise ArgumentError(f"other: run {label!r} was not added to these moments")
+            for label, sums in theirs.items():
+                self._runs[label].subtract(sums)
+                if not self._runs[label].count:
+                    del self._runs[label]
         return self
 
     def _copies(self) -> dict[Hashable, _core.Moments]:
@@ -254,6 +326,7 @@ class Moments(Shown):
         fresh = Moments.__new__(Moments)
         fresh._shafts, fresh._period = self._shafts, self._period
         fresh._runs, fresh._turn = self._copies(), _Turn()
+        fresh._forgetting, fresh._weights = self._forgetting, dict(self._weights)
         return fresh
 
     def extremes(self, run: Hashable = None) -> NDArray[np.float64]:
@@ -294,6 +367,16 @@ class Moments(Shown):
         wanted = self._shafts if orders is None else self._subset(orders)
         found = self.solution(wanted)
         labels = self.runs
+        variance, freedom = found.residual_variance, found.degrees_of_freedom
+        covariance, offset_std = found.covariance, np.asarray(found.offset_std)
+        if self._forgetting is not None:
+            first, second = np.sum([self._weights[label] for label in labels], axis=0)
+            unknowns = self.count - freedom
+            effective = max(first * first / second - unknowns, 1e-9)
+            covariance = covariance * (freedom / effective)
+            offset_std = offset_std * math.sqrt(freedom / effective)
+            variance *= freedom / (first * (1.0 - min(unknowns * second / first**2, 1.0 - 1e-9)))
+            freedom = effective
         pairs = zip(wanted, found.cosine, found.sine, strict=True)
         return MomentsFit(
             shafts=tuple(
@@ -301,10 +384,10 @@ class Moments(Shown):
             ),
             constant=found.constant,
             offsets=dict(zip(labels, found.offsets.tolist(), strict=True)),
-            offset_std=dict(zip(labels, found.offset_std.tolist(), strict=True)),
-            covariance=found.covariance,
-            residual_variance=found.residual_variance,
-            degrees_of_freedom=found.degrees_of_freedom,
+            offset_std=dict(zip(labels, offset_std.tolist(), strict=True)),
+            covariance=covariance,
+            residual_variance=variance,
+            degrees_of_freedom=freedom,
             condition_number=found.condition_number,
             period=self._period,
             method=found.method,
@@ -330,10 +413,17 @@ class Moments(Shown):
     def __getstate__(self) -> dict[str, Any]:
         with self._turn:
             runs = {label: sums.store() for label, sums in self._runs.items()}
-        return {"shafts": self._shafts, "period": self._period, "runs": runs}
+        return {
+            "shafts": self._shafts,
+            "period": self._period,
+            "runs": runs,
+            "forgetting": self._forgetting,
+            "weights": dict(self._weights),
+        }
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         self._shafts, self._period, self._runs = state["shafts"], state["period"], {}
+        self._forgetting, self._weights = state.get("forgetting"), state.get("weights", {})
         self._turn = _Turn()
         for label, numbers in state["runs"].items():
             self._runs[label] = self._new()

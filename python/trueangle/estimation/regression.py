@@ -1,22 +1,30 @@
-"""Scores of candidate columns beside what the regression already knows."""
+"""Readings, the terms chosen so far, and what candidates would add to them."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any, Self
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field, replace
+from typing import Any, Self, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .batch import Blocks
+from ..joint.pattern import Surroundings
+from ..joint.signals import Signals
+from .cache import Cache
 from .extension import Extension
-from .leastsquares import ROUNDING, LeastSquares
+from .lines import LineBasis
+from .projection import ROUNDING
+from .readings import Readings
+from .repeats import repeated_part
 from .runcolumns import RunEffectColumns
+from .solution import Solution, values_of
 from .whitening import RunEffect
 
-__all__ = ["BEYOND_SHOWN", "EXCITED", "ROUNDING", "Extension", "Regression"]
+__all__ = ["BEYOND_SHOWN", "ROUNDING", "Extension", "Regression"]
 
 Array = NDArray[np.float64]
+T = TypeVar("T")
 
 #: Times the standard deviation of the residual beyond which no cause is as large.
 BEYOND_SHOWN = 3.0
@@ -25,147 +33,105 @@ BEYOND_SHOWN = 3.0
 #: search that does not whiten has its peaks elsewhere: three times was seen.
 REFINED = 4.0
 
-#: Share of a column's power that must be left after projection for it to count at all.
-EXCITED = 1e-4
 
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Regression(Solution):
+    """A fit of readings, and proposals of causes beside its terms.
 
-class Regression(LeastSquares):
-    """Readings, what the simulation expects of them, the terms chosen so far, and scores.
-
-    What a candidate would save is computed for its columns projected beside the others
-    (Frisch and Waugh), all of a search at once. Parameters are those of `LeastSquares`.
+    Attributes
+    ----------
+    start : float
+        `deviance` without any term.
+    least : float
+        Evidence below which no candidate matters: searches that stay below it may end early.
+    cache : Cache
+        Of no consequence for any figure.
     """
 
-    def projected(self, columns: Array) -> tuple[Array, NDArray[np.bool_]]:
-        """Whitened columns with what is known taken out, and which are excited."""
-        x = self.whiten(columns)
-        before = np.einsum("ij,ij->j", x, x)
-        x = x - self.q @ (self.q.T @ x)
-        after = np.einsum("ij,ij->j", x, x)
-        return x, after > EXCITED * np.maximum(before, 1e-300)
+    start: float
+    least: float = 0.0
+    cache: Cache = field(default_factory=Cache)
 
-    def beside(self, columns: Array, spread: float = np.inf) -> Self:
-        r"""The same regression with ``columns`` fitted too, for scores of others beside them.
+    @classmethod
+    def of(
+        cls,
+        signals: Signals,
+        residual: Array,
+        belief: Surroundings,
+        weights: Array | None = None,
+        lines: LineBasis | None = None,
+        rho: float | None = None,
+    ) -> Self:
+        """The regression of readings without terms; see `Readings`."""
+        lines = LineBasis.of(signals.theta, belief.joint) if lines is None else lines
+        return cls.of_readings(Readings(signals, residual, belief, lines, weights), rho)
 
-        With a finite ``spread`` their coefficients are drawn from a normal distribution of that
-        standard deviation about zero: a column that the readings tell worse than that is fitted
-        in part. Scores stay those of generalised least squares: with the covariance
-        :math:`I + U S^2 U^T` of columns and noise, :math:`U S^2/(1 + S^2) U^T` is taken out.
-        """
-        x, excited = self.projected(columns)
-        u, s, _ = np.linalg.svd(x[:, excited], full_matrices=False)
-        kept = s > EXCITED * s.max(initial=0.0)
-        u, s = u[:, kept], s[kept]
-        share = np.ones_like(s)
-        if np.isfinite(spread):
-            power = (s * spread) ** 2 / self.variance
-            share = power / (1.0 + power)
-        other = object.__new__(type(self))
-        other.__dict__.update(self.__dict__)
-        other.memory, other._asked = {}, None
-        other.q = np.hstack([self.q, u * np.sqrt(share)])
-        moment = u.T @ self.r
-        other.r = self.r - u @ (share * moment)
-        other.rss = max(float(self.r @ other.r), 1e-300)
-        other._seen = None
-        return other
+    @classmethod
+    def of_readings(
+        cls, readings: Readings, rho: float | None = None, cache: Cache | None = None
+    ) -> Self:
+        """The regression of readings without terms, of noise of this correlation if given."""
+        solution = Solution.solve(readings, rho=rho)
+        cache = Cache() if cache is None else cache
+        return cls(**values_of(solution, Solution), start=solution.deviance, cache=cache)
 
-    def _beside(self, columns: Array) -> tuple[Array, Array, Array, Array]:
-        """Whitened columns, their powers before and after projection, their known shares."""
-        x = self.whiten(columns)
-        before = np.einsum("ij,ij->j", x, x)
-        known = self.q.T @ x
-        return x, before, before - np.einsum("ij,ij->j", known, known), known
+    # -- other regressions -------------------------------------------------------
 
-    def gain(self, columns: Array) -> tuple[float, Array]:
-        """Deviance that ``columns`` save together, and their coefficients."""
-        x, before, after, known = self._beside(columns)
-        coefficients = np.zeros(columns.shape[1])
-        if not (after > EXCITED * np.maximum(before, 1e-300)).all():
-            return 0.0, coefficients
-        gram = x.T @ x - known.T @ known
-        scale = np.sqrt(np.diag(gram))
-        values, vectors = np.linalg.eigh(gram / np.outer(scale, scale))
-        if values[0] < EXCITED * values[-1]:
-            return 0.0, coefficients
-        moment = vectors.T @ (x.T @ self.r / scale)
-        saved = float(np.sum(moment**2 / values))
-        coefficients = (vectors @ (moment / values)) / scale
-        return self.as_deviance(saved), coefficients
+    def with_terms(self, terms: Iterable[Extension], rho: float | None = None) -> Self:
+        """The same readings with other terms (and this correlation of the noise)."""
+        fixed = self.fixed_rho if rho is None else rho
+        solution = Solution.solve(self.readings, terms, fixed, self)
+        return self.with_solution(solution, least=0.0, cache=self.cache.for_other_terms())
 
-    def coefficients_with(self, extension: Extension) -> Array:
-        """Coefficients of all terms so far if a extension joined them."""
-        moved = self.back @ (self.q.T @ self.whiten(extension.columns))
-        return np.asarray(self.coefficients - moved @ extension.coefficients)
+    def with_evidence(self, terms: Iterable[Extension]) -> Self:
+        """The same terms with another deviance, say."""
+        terms = tuple(terms)
+        if sum(term.run_effect is not None for term in terms) > 1:
+            return self.with_terms(terms)  # ratios of variance settle among each other
+        return replace(self, terms=terms, cache=self.cache.for_other_terms())
 
-    def gains(self, columns: Array) -> Array:
-        """Deviance that each column saves alone."""
-        x, before, after, _ = self._beside(columns)
-        excited = after > EXCITED * np.maximum(before, 1e-300)
-        saved = (x.T @ self.r) ** 2 / np.where(excited, after, 1.0)
-        return np.where(excited, self.as_deviances(np.where(excited, saved, 0.0)), 0.0)
+    def with_least(self, least: float) -> Self:
+        """The same where only candidates of more evidence matter."""
+        return replace(self, least=least)
 
-    def block_gains(self, blocks: Blocks) -> Array:
-        """Deviance that each block of columns saves alone, as `gain` of each."""
-        found = np.zeros(blocks.count)
-        q, r = self.seen
-        for where, products in blocks.groups:
-            columns, width = products.columns, products.width
-            before = products.under(self.whiten)
-            known = (q.T @ columns).reshape(q.shape[1], -1, width)
-            moment = (r @ columns).reshape(-1, width)
-            after = before - np.einsum("kbi,kbj->bij", known, known)
-            power = np.einsum("bii->bi", after)
-            limit = EXCITED * np.maximum(np.einsum("bii->bi", before), 1e-300)
-            excited = (power > limit).all(axis=1)
-            scale = np.sqrt(np.where(excited[:, None], power, 1.0))
-            values, vectors = np.linalg.eigh(after / (scale[:, :, None] * scale[:, None, :]))
-            excited &= values[:, 0] > EXCITED * values[:, -1]
-            turned = np.einsum("bij,bi->bj", vectors, moment / scale)
-            saved = np.sum(turned**2 / np.where(excited[:, None], values, 1.0), axis=1)
-            found[where] = self.as_deviances(np.where(excited, saved, 0.0))
-        return found
+    def weighted(self, weights: Array) -> Self:
+        """The readings without terms under other weights."""
+        readings = replace(self.readings, weights=weights)
+        return self.of_readings(readings, cache=self.cache.for_other_errors())
 
-    def remembered(self, name: str, key: object, build: Callable[[], Any]) -> Any:
-        """`LineBasis.once` of what depends on the pattern, too."""
-        pattern = self.around.pattern
-        parts = (pattern.orders, pattern.cosine, pattern.sine)
-        return self.lines.once(name, (key, *(part.tobytes() for part in parts)), build)
+    def of_rows(self, rows: NDArray[np.bool_]) -> Self:
+        """Some of the readings without terms, under the correlation found in all."""
+        return self.of_readings(self.readings.take(rows), self.whiten.rho)
 
-    def asked(self, key: object, build: Callable[[], Any]) -> Any:
-        """What ``build`` makes of this regression and its terms, made once; itself perhaps."""
-        if self._asked is None or self._asked[0] is not self.r:
-            self._asked = self.r, {}
-        answers = self._asked[1]
-        if key not in answers:
-            made = build()
-            # Not itself: who holds itself is not let go of.
-            answers[key] = None if made is self else made
-        return self if answers[key] is None else answers[key]
+    def without_repeats(self, by_direction: bool = False) -> Self:
+        """The regression without what repeats at the same place; itself where nothing does."""
+        left = np.where(self.outlying, 0.0, self.left)
+        repeated = repeated_part(left, self.signals, by_direction)
+        if not repeated.any():
+            return self
+        solution = Solution.solve(self.readings.less(repeated), self.terms, self.fixed_rho, self)
+        start = self.start + solution.deviance - self.deviance
+        return self.with_solution(solution, start=start, cache=self.cache.for_other_errors())
 
-    def fixed_gains(self, columns: Array) -> Array:
-        """Deviance that each column saves with the coefficient 1."""
-        x, before, after, _ = self._beside(columns)
-        excited = after > EXCITED * np.maximum(before, 1e-300)
-        saved = 2.0 * (x.T @ self.r) - after
-        return np.where(excited, self.as_deviances(saved), 0.0)
+    def jointly_with(self, columns: Array, spread: float = np.inf) -> Self:  # noqa: D102
+        joint = super().jointly_with(columns, spread)
+        return replace(joint, cache=self.cache.for_other_errors())
+
+    def of_target(self, target: Array) -> Self:  # noqa: D102
+        return replace(super().of_target(target), cache=self.cache.for_other_errors())
+
+    # -- candidates --------------------------------------------------------------
 
     def line_gains(self) -> Array:
         """Deviance that a line of each order of `lines` saves (two coefficients)."""
-        before = self.lines.products.under(self.whiten)
-        cosines, sines, mixed = before[:, 0, 0], before[:, 1, 1], before[:, 0, 1]
-        # Cosines and sines side by side.
-        q, r = (columns.astype(np.float32) for columns in self.seen)
-        known = (q.T @ self.lines.values).astype(np.float64)
-        moment = (r @ self.lines.values).astype(np.float64)
-        aa = cosines - (known[:, 0::2] ** 2).sum(axis=0)
-        bb = sines - (known[:, 1::2] ** 2).sum(axis=0)
-        ab = mixed - (known[:, 0::2] * known[:, 1::2]).sum(axis=0)
-        determinant = aa * bb - ab**2
-        c, s = moment[0::2], moment[1::2]
-        excited = determinant > 1e-3 * (0.5 * (cosines + sines)) ** 2
-        saved = (bb * c * c - 2.0 * ab * c * s + aa * s * s) / np.where(excited, determinant, 1.0)
-        return np.where(excited, self.as_deviances(np.maximum(saved, 0.0)), 0.0)
+        return self.pair_gains(self.lines.products)
+
+    def of_pattern(self, name: str, key: object, build: Callable[[], T]) -> T:
+        """`Cache.of_motion` of what depends on the pattern, too."""
+        pattern = self.around.pattern
+        parts = (pattern.orders, pattern.cosine, pattern.sine)
+        key = (key, *(part.tobytes() for part in parts))
+        return self.cache.of_motion(name, key, build)
 
     def propose(
         self,
@@ -216,15 +182,15 @@ class Regression(LeastSquares):
             1,
             log_grid,
             deviance,
-            self.log_runs,
+            self.readings.log_runs,
             RunEffect(columns.columns, ratio),
         )
 
-    def hopeless(self, deviance: float, parameters: int, log_grid: float = 0.0) -> bool:
+    def is_pruned(self, deviance: float, parameters: int, log_grid: float = 0.0) -> bool:
         """A coarse search this far below its penalty gains nothing by refining."""
         return 1.5 * deviance + 10.0 < parameters * self.log_n + 2.0 * log_grid
 
-    def beaten(self, deviance: float, parameters: int, log_grid: float = 0.0) -> bool:
+    def is_dominated(self, deviance: float, parameters: int, log_grid: float = 0.0) -> bool:
         """A coarse search so far below `least` is not refined to what another one explains."""
-        price = parameters * self.log_n + 2.0 * log_grid + self.least
-        return self.least > 0.0 and REFINED * deviance + 10.0 < price
+        needed = parameters * self.log_n + 2.0 * log_grid + self.least
+        return self.least > 0.0 and REFINED * deviance + 10.0 < needed

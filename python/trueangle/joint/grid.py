@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["UniformGrid", "lattice_step", "uniform_grid"]
+__all__ = ["UniformGrid", "lattice_step", "table_move", "uniform_grid"]
 
 #: Departure from the grid, in shares of its step, up to which readings lie on it.
 ON_GRID = 0.02
@@ -19,6 +20,10 @@ LEAST_STEP = 1e-9
 
 #: Positions beyond which a grid is not looked for.
 MOST_POSITIONS = 10_000
+
+#: Share of the moves from reading to reading that stay where they are, as at turning points,
+#: up to which readings are a table: a sensor that rounds lingers at its counts.
+LINGERS = 0.05
 
 
 @dataclass(frozen=True)
@@ -89,3 +94,33 @@ def lattice_step(values: NDArray[np.float64]) -> float:
         if np.abs(away - np.round(away)).max() < ON_LATTICE:
             return step / parts
     return 0.0
+
+
+def table_move(runs: Sequence[NDArray[np.float64]], step: float) -> float:
+    """Move from each reading of a table of equal steps to the next, in turns; 0 for no table.
+
+    Where each reading stands one and the same number of steps from the one before, the design put
+    it there: such a lattice is no property of the sensor.
+
+    Parameters
+    ----------
+    runs : sequence of ndarray
+        Angles of each run, turns.
+    step : float
+        Of the lattice that they lie on (`lattice_step`), turns.
+
+    Examples
+    --------
+    >>> round(1.0 / table_move([np.arange(81) / 80.0], 1.0 / 80.0))
+    80
+    >>> table_move([np.array([0.0, 0.1, 0.4, 0.5])], 0.1)
+    0.0
+    """
+    if step <= 0.0:
+        return 0.0
+    moves = np.concatenate([np.diff(run) for run in runs])
+    counts = np.round(np.abs(moves - np.round(moves)) / step)
+    moved = counts[counts > 0.0]
+    if moved.size < max(3.0, (1.0 - LINGERS) * counts.size) or np.ptp(moved) > 0.0:
+        return 0.0
+    return float(moved[0] * step)

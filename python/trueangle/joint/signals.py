@@ -4,16 +4,18 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..formats.signals import coupled_with
 from ..runs.run import CalibrationRun
 from ..support.angles import ARCSEC_PER_TURN
 from ..support.quantiles import median
-from .grid import lattice_step
+from .grid import UniformGrid, lattice_step, table_move, uniform_grid
 from .turning import direction_at_turns, velocity_at_turns
 
 __all__ = ["Signals", "join_runs"]
@@ -53,8 +55,13 @@ class Signals:
         Seconds since the start of the run, or the row number without time.
     velocity, time, temperature, torque, mount, current : ndarray or None
         Degrees per second, s, Celsius, Nm, radians, A; None where not every run recorded it.
+    coupled : mapping of str to ndarray
+        Indicated angles of other joints by their names, degrees, unwrapped within each run; of
+        those that every run recorded.
     count : float
-        Arcsec of one count, where the indicated angles lie on a lattice; else 0.
+        Arcsec of one count, where the indicated angles lie on a lattice of the sensor's; else 0.
+    table : int
+        Positions of a turn, where the indicated angles are a table of equal steps; else 0.
     labels : tuple of str
         Names of the runs.
     """
@@ -76,7 +83,9 @@ class Signals:
     mount: Array | None
     labels: tuple[str, ...]
     current: Array | None = None
+    coupled: Mapping[str, Array] = field(default_factory=dict)
     count: float = 0.0
+    table: int = 0
 
     def __len__(self) -> int:
         return int(self.theta.size)
@@ -96,6 +105,11 @@ class Signals:
         """Signed output speed in turns per second (zeros where unknown)."""
         return np.zeros_like(self.theta) if self.velocity is None else self.velocity / 360.0
 
+    @property
+    def grid(self) -> UniformGrid | None:
+        """Equal steps of a turn on which the design put the readings, or None."""
+        return UniformGrid(self.table) if self.table else uniform_grid(self.theta)
+
     def take(self, rows: NDArray[np.bool_] | Index) -> Signals:
         """The readings ``rows``; runs keep their index and stretches their history."""
         changes = {
@@ -105,7 +119,31 @@ class Signals:
         for name in RECORDED:
             values = getattr(self, name)
             changes[name] = None if values is None else values[rows]
+        changes["coupled"] = {joint: angle[rows] for joint, angle in self.coupled.items()}
         return replace(self, **changes)
+
+    def followed_by(self, later: Signals) -> Signals:
+        """These readings and those of later runs; what one of both lacks is None."""
+        changes: dict[str, Any] = {
+            name: np.concatenate([getattr(self, name), getattr(later, name)])
+            for name in (
+                *("theta", "row", "direction", "travel", "clock"),
+                *("segment_direction", "segment_length", "segment_first"),
+            )
+        }
+        for name in RECORDED:
+            changes[name] = _all([getattr(self, name), getattr(later, name)])
+        both = self.coupled.keys() & later.coupled.keys()
+        changes["coupled"] = {
+            joint: np.concatenate([self.coupled[joint], later.coupled[joint]]) for joint in both
+        }
+        return replace(
+            self,
+            **changes,
+            run=np.concatenate([self.run, later.run + self.runs]),
+            segment=np.concatenate([self.segment, later.segment + self.segment_direction.size]),
+            labels=(*self.labels, *later.labels),
+        )
 
     def run_bounds(self) -> list[tuple[int, int]]:
         """First and one-past-last reading of every run that has readings, in order."""
@@ -172,6 +210,7 @@ class Signals:
 def join_runs(runs: Sequence[CalibrationRun]) -> Signals:
     """Signals of ``runs``; a quantity that some run lacks is None for all."""
     parts = [_travel(run) for run in runs]
+    count, table = _lattice(runs)
     offset = np.cumsum([0, *(part[3].size for part in parts[:-1])])
     return Signals(
         theta=_joined([run.unwrapped_reference * (2.0 * math.pi / run.period) for run in runs]),
@@ -188,10 +227,22 @@ def join_runs(runs: Sequence[CalibrationRun]) -> Signals:
             name: _all([read(run, part[0]) for run, part in zip(runs, parts, strict=True)])
             for name, read in RECORDED.items()
         },
-        count=lattice_step(np.concatenate([run.indicated / run.period for run in runs]))
-        * ARCSEC_PER_TURN,
+        coupled=_coupled(runs),
+        count=count,
+        table=table,
         labels=tuple(run.label or str(j + 1) for j, run in enumerate(runs)),
     )
+
+
+def _lattice(runs: Sequence[CalibrationRun]) -> tuple[float, int]:
+    """Count of the sensor in arcsec and positions of a table in a turn; of each 0 where none."""
+    turns = [run.indicated / run.period for run in runs]
+    step = lattice_step(np.concatenate(turns))
+    move = table_move(turns, step)
+    if not move:
+        return step * ARCSEC_PER_TURN, 0
+    positions = round(1.0 / move)
+    return 0.0, positions if abs(positions * move - 1.0) < 0.5 * move else 0
 
 
 def _joined(parts: list[Array]) -> Array:
@@ -216,6 +267,17 @@ def _velocity(run: CalibrationRun, direction: Array) -> Array | None:
     if run.velocity is None and run.time is not None:
         speed = velocity_at_turns(run.unwrapped_reference, run.time, direction, speed)
     return np.asarray(speed * (360.0 / run.period))
+
+
+def _coupled(runs: Sequence[CalibrationRun]) -> dict[str, Array]:
+    """Angles of the other joints that every run recorded, in degrees."""
+    return {
+        joint: _joined(
+            [np.unwrap(run.signals[name], period=run.period) * (360.0 / run.period) for run in runs]
+        )
+        for name in runs[0].signals
+        if (joint := coupled_with(name)) and all(name in run.signals for run in runs)
+    }
 
 
 def _mount(run: CalibrationRun, direction: Array) -> Array | None:

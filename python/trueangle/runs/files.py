@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple, TypeAlias, Unpack
 
 import numpy as np
@@ -23,6 +23,7 @@ from .source import Reading, checked_reading, each_table
 
 __all__ = [
     "RunColumns",
+    "each_runs",
     "read_columns",
     "read_runs",
     "runs_of",
@@ -129,6 +130,32 @@ def runs_of(
     if runs is not None:
         return as_runs(runs)
     return _read(data, asked, name, table)
+
+
+def each_runs(
+    data: Any, reading: Mapping[str, Any], take: Callable[[list[CalibrationRun]], None]
+) -> None:
+    """Hand over the runs of one file or table after the other, so that none need be kept.
+
+    Parameters
+    ----------
+    data, reading
+        As `runs_of`.
+    take : callable
+        Is called with the runs of each.
+
+    Raises
+    ------
+    ArgumentError, FileError
+        As `runs_of`; runs in different units are left to ``take``.
+    """
+    asked = checked_reading(reading)
+    runs, data = given_runs(data)
+    if runs is not None:
+        take(as_runs(runs))
+        return
+    given = Conversion.of(asked)
+    each_table(data, lambda table: take(runs_of_readings(table, given)), asked)
 
 
 def _read(data: Any, reading: Reading, name: str, table: str = "table") -> list[CalibrationRun]:

@@ -8,9 +8,10 @@ import stat
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
+from contextvars import ContextVar
 from os import PathLike
 from pathlib import Path
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, NamedTuple, TypeAlias, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,12 +33,30 @@ from ..support.files import (
 )
 from .run import Source
 
-__all__ = ["Readings", "named", "read_readings", "readings_of"]
+__all__ = ["Readings", "named", "read_once", "read_readings", "readings_of"]
 
 T = TypeVar("T")
 
 #: Columns that are kept although nothing is known of them, at most: a wide log has thousands.
 _KEPT = 256
+
+
+#: Columns of files by path, topic and the columns that are texts, where a file is read once.
+_Kept: TypeAlias = dict[tuple[str, str | None, frozenset[str]], dict[str, NDArray[Any]]]
+_ONCE: ContextVar[_Kept | None] = ContextVar("columns of files", default=None)
+
+
+@contextmanager
+def read_once() -> Iterator[None]:
+    """Files that are asked for their readings again, of another joint, are not read again.
+
+    The columns of as many as a table of runs may hold are kept meanwhile.
+    """
+    token = _ONCE.set({})
+    try:
+        yield
+    finally:
+        _ONCE.reset(token)
 
 
 class Readings(NamedTuple):
@@ -159,15 +178,37 @@ def readings_of(path: Path, wanted: Mapping[str, Any], topic: str | None) -> Rea
     labels = {column.name for column in roles.values() if column.role in LABELS}
     if "time" in roles and _is_dated(kind, path, roles["time"].name, topic):
         labels.add(roles["time"].name)
+    columns = _whole(kind, path, needed, others, labels, topic)
+    size = next((len(values) for values in columns.values()), 0)
+    columns |= {key: _repeated(value, size, key in TEXTS) for key, value in keys.items()}
+    return Readings(path, kind, roles, columns, _source(path))
+
+
+def _whole(
+    kind: Format,
+    path: Path,
+    needed: list[str],
+    others: list[str],
+    labels: set[str],
+    topic: str | None,
+) -> dict[str, NDArray[Any]]:
+    """`_columns`, those kept of an earlier read, or without the others where they are too large."""
+    kept, key = _ONCE.get(), (str(path), topic, frozenset(labels))
+    found = {} if kept is None else kept.get(key, {})
+    # What was text then may be needed as numbers now: reading says what is wrong.
+    if needed and all(n in found and (found[n].dtype != object or n in labels) for n in needed):
+        return {name: found[name] for name in (*needed, *others) if name in found}
     try:
         columns = _columns(kind, path, needed, others, labels, topic)
     except DecodedSizeError:
         if not needed or not others:
             raise
         columns = _columns(kind, path, needed, [], labels, topic)
-    size = next((len(values) for values in columns.values()), 0)
-    columns |= {key: _repeated(value, size, key in TEXTS) for key, value in keys.items()}
-    return Readings(path, kind, roles, columns, _source(path))
+    if kept is not None:
+        whole = (*kept.values(), columns)
+        if sum(values.nbytes for table in whole for values in table.values()) <= RUNS_BYTES:
+            kept[key] = columns
+    return columns
 
 
 def _source(path: Path) -> Source:

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from ..support.display_units import ErrorsIn, ErrorUnit, error_unit
+from ..support.layout import laid_out, wrapped
 
 if TYPE_CHECKING:
     from .result import OrderEstimate, SelfCalibration
@@ -34,8 +35,8 @@ def summary(result: SelfCalibration, errors_in: ErrorsIn = "auto") -> str:
         lines += ["", "not the encoder's alone:", *_table(result.sums, unit)]
     lines += ["", "blind to"]
     for blind in result.blind:
-        lines.append(f"  {listed(blind.orders)}: {blind.because}")
-        lines.append(f"    to see it: {blind.measure}")
+        lines += wrapped(f"{listed(blind.orders)}: {blind.because}", 4, 2)
+        lines += wrapped(f"to see it: {blind.measure}", 6, 4)
     if result.held_out:
         lines += ["", "held out"]
         for test in result.held_out.values():
@@ -46,7 +47,7 @@ def summary(result: SelfCalibration, errors_in: ErrorsIn = "auto") -> str:
                 f"{unit.number(test.rms_after)} {unit.name} rms, they {agree} (p = {test.p:.2g})"
             )
     lines += [f"note: {note}" for note in result.notes]
-    return "\n".join(lines)
+    return laid_out(lines)
 
 
 def _table(orders: tuple[OrderEstimate, ...], unit: ErrorUnit) -> list[str]:

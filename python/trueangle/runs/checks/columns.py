@@ -11,6 +11,7 @@ from typing import Any, Final, NamedTuple
 
 from ...formats.columns import unit_in_name
 from ...formats.formats import format_of_content
+from ...support.layout import laid_out
 from ...support.plainresult import PlainResult, counted
 
 __all__ = ["LikelyColumn", "LogColumns", "columns_of_log"]
@@ -128,7 +129,7 @@ class LogColumns(PlainResult):
         lines += [f"  --signal {shlex.quote(text)}" for text in self.signals]
         if any(text.endswith(":UNIT") for text in self.signals):
             lines.append("with deg, rad, turn or count in place of UNIT")
-        return "\n".join(lines)
+        return laid_out(lines)
 
 
 def columns_of_log(path: str | Path, topic: str | None = None) -> LogColumns | None:

@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-import textwrap
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+from ...support.layout import laid_out, wrapped
 from ...support.plainresult import PlainResult, counted
 from .extent import Extent
 from .fault import DataFault
 
 __all__ = ["Check"]
-
-WIDTH = 88
 
 
 @dataclass(frozen=True)
@@ -87,8 +85,8 @@ class Check(PlainResult):
         e = self.extent
         lines = []
         for fault in self.data_faults:
-            lines += _wrapped(f"{fault.fault}: {fault.says}.", 2)
-            lines += _wrapped(f"To mend: {fault.mend}.", 4, 2)
+            lines += wrapped(f"{fault.fault}: {fault.says}.", 2)
+            lines += wrapped(f"To mend: {fault.mend}.", 4, 2)
         if not self.data_faults:
             lines.append("No fault found in the data.")
         elif not self.usable:
@@ -98,7 +96,7 @@ class Check(PlainResult):
                 f"{role} is '{name}'" + (f" in {unit}" if unit else "")
                 for role, (name, unit) in self.columns.items()
             ]
-            lines += ["", *_wrapped(f"Understood: {'; '.join(told)}.", 2)]
+            lines += ["", *wrapped(f"Understood: {'; '.join(told)}.", 2)]
         ratio = "unknown" if self.ratio is None else f"{self.ratio:.6g}"
         lines += [
             "",
@@ -106,25 +104,21 @@ class Check(PlainResult):
             f"places, {e.turns:.4g} turns at most.",
             f"Indicated per reference: {ratio} ({self.suggests}).",
             f"Directions: {_levels(e.directions)}; speeds: {_levels(e.speeds, 'deg/s')}; "
-            f"loads: {_levels(e.loads, 'Nm')};",
+            f"loads: {_levels(e.loads, 'Nm')}; "
             f"temperatures: {_levels(e.temperatures, 'C')}; mounts: {_levels(e.mounts, 'deg')}.",
             "",
         ]
-        lines += _wrapped(f"Can be known: {'; '.join(self.can)}.", 2)
+        lines += wrapped(f"Can be known: {'; '.join(self.can)}.", 2)
         for entry in self.cannot:
-            lines += _wrapped(
+            lines += wrapped(
                 f"Cannot be known: {entry['what']} ({entry['because']}). To tell: "
                 f"{entry['measure']}.",
                 2,
             )
-        return "\n".join(lines)
+        return laid_out(lines)
 
 
 def _levels(values: tuple[float, ...] | tuple[int, ...], unit: str = "") -> str:
     if not values:
         return "not recorded"
     return f"{', '.join(f'{value:g}' for value in values)} {unit}".rstrip()
-
-
-def _wrapped(text: str, indent: int, first: int = 0) -> list[str]:
-    return textwrap.wrap(text, WIDTH, initial_indent=" " * first, subsequent_indent=" " * indent)

@@ -32,7 +32,7 @@ def duplicate_runs(records: list[Record]) -> Iterator[DataFault]:
                 "duplicate_runs",
                 labels,
                 (),
-                f"runs {_listed(labels)} are one run {len(labels)} times, to the last digit: "
+                f"runs {_listed(labels)} hold the same readings, to the last digit: "
                 "noise and repeatability would come out too good",
                 "keep one of them",
             )

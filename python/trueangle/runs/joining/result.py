@@ -7,6 +7,7 @@ from os import PathLike
 from typing import Any, NamedTuple
 
 from ...support.display_units import ErrorsIn, error_unit
+from ...support.layout import laid_out
 from ...support.plainresult import PlainResult, counted
 from ..run import CalibrationRun
 
@@ -84,7 +85,7 @@ class Joined(PlainResult):
         Parameters
         ----------
         errors_in : {"auto", "arcsec", "deg", "mrad", "count"} or float
-            Unit of the errors; by itself arcsec, or degrees where one reaches a degree. A
+            Unit of the errors; by itself arcsec, or degrees where errors are that large. A
             number is the counts of a turn.
         """
 
@@ -94,7 +95,7 @@ class Joined(PlainResult):
         unit = error_unit(errors_in, self.std_arcsec)
         found = self.to_dict()
         lines = [
-            f"{found['readings']} readings joined in {found['runs']} run(s), "
+            f"{found['readings']} readings joined in {counted(self.runs, 'run')}, "
             f"{self.left_out} without a reference left out",
             f"  offset    {told(self.offset_s, self.offset_std_s, 's')}",
             f"  rate      {told(self.rate_ppm, self.rate_std_ppm, 'ppm')}",
@@ -104,7 +105,7 @@ class Joined(PlainResult):
         if self.on_change:
             lines.append(f"  on change {', '.join(self.on_change)}: held over its pauses")
         lines += [f"  [{i}] {note}" for i, note in enumerate(self.notes, 1)]
-        return "\n".join(lines)
+        return laid_out(lines)
 
     def save(self, path: str | PathLike[str]) -> int:
         """Write the runs as CSV, complete or not at all; the number of readings."""

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from ...errors import ArgumentError
 from ...formats.signals import FIELDS
 from ...support.angles import ARCSEC_PER_TURN
+from ...support.layout import wrapped
 from ...support.plainresult import Shown
 from ..files import runs_of
 from ..run import CalibrationRun
@@ -84,7 +85,7 @@ class MeasuredMinusSimulated(Shown):
         )
         if self.left_out:
             text += f"; {self.left_out} readings at which it says nothing are left out"
-        return ". ".join([text, *self.notes]) + "."
+        return "\n".join(wrapped(". ".join([text, *self.notes]) + "."))
 
 
 class _Expected(NamedTuple):

@@ -1,0 +1,72 @@
+"""What searches have worked out, kept: thrown away, it is worked out again, to the same figures."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, NamedTuple, TypeAlias, TypeVar
+
+from .extension import Extension
+
+__all__ = ["Cache", "Proposal", "ProposalKey"]
+
+T = TypeVar("T")
+
+#: A cause, and the terms that it was asked beside.
+ProposalKey: TypeAlias = "tuple[str, tuple[tuple[str, str], ...]]"
+
+
+class Proposal(NamedTuple):
+    """What a cause proposed beside some terms, searched no further than ``least`` asked for."""
+
+    extension: Extension | None
+    least: float
+
+
+class Cache:
+    """Results by what they depend on: the motion, the readings, or one fit of them.
+
+    Regressions of the same readings share one for the motion and the proposals; each has answers
+    of its own.
+    """
+
+    def __init__(
+        self,
+        motion: dict[str, tuple[object, Any]] | None = None,
+        proposals: dict[ProposalKey, Proposal] | None = None,
+    ) -> None:
+        self._motion = {} if motion is None else motion
+        self._proposals = {} if proposals is None else proposals
+        self._answers: dict[object, Any] = {}
+
+    def of_motion(self, name: str, key: object, build: Callable[[], T]) -> T:
+        """What follows from the motion alone; of every name the one of the last key is kept."""
+        kept = self._motion.get(name)
+        if kept is None or kept[0] != key:
+            kept = self._motion[name] = (key, build())
+        made: T = kept[1]
+        return made
+
+    def of_fit(self, key: object, build: Callable[[], T]) -> T:
+        """What follows from one fit."""
+        if key not in self._answers:
+            self._answers[key] = build()
+        answer: T = self._answers[key]
+        return answer
+
+    def proposed(self, key: ProposalKey, least: float) -> Proposal | None:
+        """A proposal that was searched at least as far as ``least`` asks for."""
+        kept = self._proposals.get(key)
+        return kept if kept is not None and kept.least <= least else None
+
+    def propose(self, key: ProposalKey, proposal: Proposal) -> Proposal:
+        """Keep a proposal."""
+        self._proposals[key] = proposal
+        return proposal
+
+    def for_other_terms(self) -> Cache:
+        """That of the same readings with other terms."""
+        return Cache(self._motion, self._proposals)
+
+    def for_other_errors(self) -> Cache:
+        """That of other errors along the same motion."""
+        return Cache(self._motion)

@@ -1,0 +1,233 @@
+"""A target with fitted columns projected out, and what others would save beside them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .batch import Blocks, Products
+from .factor import Factor
+from .ratio import best_ratio
+from .runcolumns import RunEffectColumns
+from .whitening import Whitener
+
+__all__ = ["EXCITED", "ROUNDING", "Projection", "project"]
+
+Array = NDArray[np.float64]
+
+#: Arcsec below which what is left is the rounding of angles (1e-12 of a turn).
+ROUNDING = 1e-6
+
+#: Share of a column's power that must be left after projection for it to count at all.
+EXCITED = 1e-4
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Projection:
+    r"""A target y fitted by columns X under a noise that M makes white.
+
+    What candidates would save is computed for their columns projected beside the fitted ones
+    (Frisch and Waugh), all of a search at once.
+
+    Attributes
+    ----------
+    whiten : Whitener
+        M.
+    q : ndarray, shape (n, r)
+        Orthonormal columns that span M X.
+    back : ndarray, shape (p, r)
+        Coefficients of X are ``back @ (q.T @ M y)``.
+    r : ndarray, shape (n,)
+        The residual of M y.
+    rss : float
+        Its sum of squares.
+    coefficients : ndarray, shape (p,)
+    """
+
+    whiten: Whitener
+    q: Array
+    back: Array
+    r: Array
+    rss: float
+    coefficients: Array
+
+    # -- what is left ------------------------------------------------------------
+
+    @property
+    def n(self) -> int:
+        """Count of the readings."""
+        return int(self.r.size)
+
+    @property
+    def variance(self) -> float:
+        """Variance of one reading's noise, arcsec squared."""
+        return float(self.rss / max(self.n - self.q.shape[1], 1))
+
+    @property
+    def unscaled_covariance(self) -> Array:
+        """Covariance of all coefficients over the variance of one reading."""
+        return np.asarray(self.back @ self.back.T)
+
+    @property
+    def is_explained(self) -> bool:
+        """Nothing but rounding is left (of simulated runs without noise)."""
+        return self.variance < ROUNDING**2
+
+    @property
+    def deviance(self) -> float:
+        """-2 ln of the likelihood, up to a constant of the readings."""
+        return float(self.n * np.log(self.rss / self.n)) + float(self.whiten.log_determinant)
+
+    def as_deviance(self, saved: float) -> float:
+        """``n ln(RSS/(RSS - saved))``."""
+        return float(self.as_deviances(np.array([saved]))[0])
+
+    def as_deviances(self, saved: Array) -> Array:
+        """`as_deviance` of each."""
+        share = np.minimum(saved / self.rss, 1.0 - 1e-15)
+        return np.asarray(-self.n * np.log1p(-share))
+
+    # -- what others would save --------------------------------------------------
+
+    @cached_property
+    def _all_seen(self) -> Array:
+        """`seen`, the residual as the last column."""
+        return self.whiten.transposed(np.column_stack([self.q, self.r]))
+
+    @property
+    def seen(self) -> tuple[Array, Array]:
+        """The fitted columns and the residual as columns that are not whitened see them."""
+        return self._all_seen[:, :-1], self._all_seen[:, -1]
+
+    def projected(self, columns: Array) -> tuple[Array, NDArray[np.bool_]]:
+        """Whitened columns with what is fitted taken out, and which are excited."""
+        x = self.whiten(columns)
+        before = np.einsum("ij,ij->j", x, x)
+        x = x - self.q @ (self.q.T @ x)
+        after = np.einsum("ij,ij->j", x, x)
+        return x, after > EXCITED * np.maximum(before, 1e-300)
+
+    def jointly_with(self, columns: Array, spread: float = np.inf) -> Self:
+        r"""The same with ``columns`` fitted too, for scores of others.
+
+        With a finite ``spread`` their coefficients are drawn from a normal distribution of that
+        standard deviation about zero: a column that the readings tell worse than that is fitted
+        in part. Scores stay those of generalised least squares: with the covariance
+        :math:`I + U S^2 U^T` of columns and noise, :math:`U S^2/(1 + S^2) U^T` is taken out.
+        """
+        x, excited = self.projected(columns)
+        u, s, _ = np.linalg.svd(x[:, excited], full_matrices=False)
+        kept = s > EXCITED * s.max(initial=0.0)
+        u, s = u[:, kept], s[kept]
+        share = np.ones_like(s)
+        if np.isfinite(spread):
+            power = (s * spread) ** 2 / self.variance
+            share = power / (1.0 + power)
+        r = self.r - u @ (share * (u.T @ self.r))
+        q = np.hstack([self.q, u * np.sqrt(share)])
+        return replace(self, q=q, r=r, rss=max(float(self.r @ r), 1e-300))
+
+    def of_target(self, target: Array) -> Self:
+        """Another target fitted by the same columns."""
+        y = self.whiten(target)
+        inner = self.q.T @ y
+        r = y - self.q @ inner
+        return replace(self, r=r, rss=max(float(r @ r), 1e-300), coefficients=self.back @ inner)
+
+    def gain(self, columns: Array) -> tuple[float, Array]:
+        """Deviance that ``columns`` save together, and their coefficients."""
+        x, before, after, known = self._powers(columns)
+        coefficients = np.zeros(columns.shape[1])
+        if not (after > EXCITED * np.maximum(before, 1e-300)).all():
+            return 0.0, coefficients
+        gram = x.T @ x - known.T @ known
+        scale = np.sqrt(np.diag(gram))
+        values, vectors = np.linalg.eigh(gram / np.outer(scale, scale))
+        if values[0] < EXCITED * values[-1]:
+            return 0.0, coefficients
+        moment = vectors.T @ (x.T @ self.r / scale)
+        saved = float(np.sum(moment**2 / values))
+        coefficients = (vectors @ (moment / values)) / scale
+        return self.as_deviance(saved), coefficients
+
+    def gains(self, columns: Array) -> Array:
+        """Deviance that each column saves alone."""
+        x, before, after, _ = self._powers(columns)
+        excited = after > EXCITED * np.maximum(before, 1e-300)
+        saved = (x.T @ self.r) ** 2 / np.where(excited, after, 1.0)
+        return np.where(excited, self.as_deviances(np.where(excited, saved, 0.0)), 0.0)
+
+    def fixed_gains(self, columns: Array) -> Array:
+        """Deviance that each column saves with the coefficient 1."""
+        x, before, after, _ = self._powers(columns)
+        excited = after > EXCITED * np.maximum(before, 1e-300)
+        saved = 2.0 * (x.T @ self.r) - after
+        return np.where(excited, self.as_deviances(saved), 0.0)
+
+    def block_gains(self, blocks: Blocks) -> Array:
+        """Deviance that each block of columns saves alone, as `gain` of each."""
+        found = np.zeros(blocks.count)
+        q, r = self.seen
+        for where, products in blocks.groups:
+            columns, width = products.columns, products.width
+            before = products.under(self.whiten)
+            known = (q.T @ columns).reshape(q.shape[1], -1, width)
+            moment = (r @ columns).reshape(-1, width)
+            after = before - np.einsum("kbi,kbj->bij", known, known)
+            power = np.einsum("bii->bi", after)
+            limit = EXCITED * np.maximum(np.einsum("bii->bi", before), 1e-300)
+            excited = (power > limit).all(axis=1)
+            scale = np.sqrt(np.where(excited[:, None], power, 1.0))
+            values, vectors = np.linalg.eigh(after / (scale[:, :, None] * scale[:, None, :]))
+            excited &= values[:, 0] > EXCITED * values[:, -1]
+            turned = np.einsum("bij,bi->bj", vectors, moment / scale)
+            saved = np.sum(turned**2 / np.where(excited[:, None], values, 1.0), axis=1)
+            found[where] = self.as_deviances(np.where(excited, saved, 0.0))
+        return found
+
+    def pair_gains(self, pairs: Products) -> Array:
+        """`block_gains` of cosines and sines side by side, in single precision."""
+        before = pairs.under(self.whiten)
+        cosines, sines, mixed = before[:, 0, 0], before[:, 1, 1], before[:, 0, 1]
+        q, r = (columns.astype(np.float32) for columns in self.seen)
+        known = (q.T @ pairs.columns).astype(np.float64)
+        moment = (r @ pairs.columns).astype(np.float64)
+        aa = cosines - (known[:, 0::2] ** 2).sum(axis=0)
+        bb = sines - (known[:, 1::2] ** 2).sum(axis=0)
+        ab = mixed - (known[:, 0::2] * known[:, 1::2]).sum(axis=0)
+        determinant = aa * bb - ab**2
+        c, s = moment[0::2], moment[1::2]
+        excited = determinant > 1e-3 * (0.5 * (cosines + sines)) ** 2
+        saved = (bb * c * c - 2.0 * ab * c * s + aa * s * s) / np.where(excited, determinant, 1.0)
+        return np.where(excited, self.as_deviances(np.maximum(saved, 0.0)), 0.0)
+
+    def ratio_of(self, columns: RunEffectColumns) -> tuple[float, float]:
+        """Best ratio of variances of a run effect beside what is fitted, and what it saves."""
+        moments = columns.moments(self._all_seen)
+        return best_ratio(columns.grams(self.whiten), moments, self.as_deviances)
+
+    def _powers(self, columns: Array) -> tuple[Array, Array, Array, Array]:
+        """Whitened columns, their powers before and after projection, their fitted shares."""
+        x = self.whiten(columns)
+        before = np.einsum("ij,ij->j", x, x)
+        known = self.q.T @ x
+        return x, before, before - np.einsum("ij,ij->j", known, known), known
+
+
+def project(factor: Factor, target: Array) -> Projection:
+    """A target fitted by a factor's columns."""
+    y = factor.whiten(target)
+    inner = factor.q.T @ y
+    r = y - factor.q @ inner
+    return Projection(
+        whiten=factor.whiten,
+        q=factor.q,
+        back=factor.back,
+        r=r,
+        rss=max(float(r @ r), 1e-300),
+        coefficients=factor.back @ inner,
+    )

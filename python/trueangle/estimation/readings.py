@@ -1,0 +1,94 @@
+"""What is fitted: errors, the signals of their readings, and what is believed of the joint."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..joint.pattern import Surroundings, line_columns
+from ..joint.signals import Signals
+from .extension import penalty_of_parameter
+from .lines import LineBasis
+from .whitening import LagCorrelation
+
+__all__ = ["ENOUGH_RUNS", "Readings"]
+
+Array = NDArray[np.float64]
+
+#: Runs from which they, and not the readings, are what informs on a variance between runs.
+ENOUGH_RUNS = 8
+
+
+@dataclass(frozen=True, eq=False)
+class Readings:
+    """Readings and what the simulation expects of them.
+
+    Attributes
+    ----------
+    signals : Signals
+    residual : ndarray
+        Measured minus simulated error, arcsec, unfolded.
+    belief : Surroundings
+        The joint and the pattern that the simulation believes.
+    lines : LineBasis
+        Shared by readings of the same motion.
+    weights : ndarray or None
+    """
+
+    signals: Signals
+    residual: Array
+    belief: Surroundings
+    lines: LineBasis
+    weights: Array | None = None
+
+    def __len__(self) -> int:
+        return len(self.signals)
+
+    @cached_property
+    def bounds(self) -> list[tuple[int, int]]:
+        """The runs."""
+        return self.signals.run_bounds()
+
+    @cached_property
+    def base(self) -> Array:
+        """Columns of the simulation's own: a constant and its pattern's lines."""
+        lines = (line_columns(self.signals.theta, m) for m in self.belief.pattern.orders)
+        return np.column_stack([np.ones(len(self)), *lines])
+
+    @cached_property
+    def correlation(self) -> LagCorrelation:
+        """Correlation of neighbours among residuals of these readings."""
+        return LagCorrelation(self.signals.clock, self.bounds)
+
+    @cached_property
+    def root_weights(self) -> Array:
+        """Square roots of the weights."""
+        return np.ones(len(self)) if self.weights is None else np.sqrt(self.weights)
+
+    @cached_property
+    def log_n(self) -> float:
+        """What a coefficient costs, in units of BIC."""
+        return penalty_of_parameter(len(self))
+
+    @cached_property
+    def log_runs(self) -> float:
+        """What a variance between runs costs."""
+        runs = len(self.bounds)
+        return float(np.log(runs)) if runs >= ENOUGH_RUNS else self.log_n
+
+    def less(self, error: Array) -> Readings:
+        """The readings with a known error taken off."""
+        return replace(self, residual=self.residual - error)
+
+    def take(self, rows: NDArray[np.bool_]) -> Readings:
+        """Some of the readings."""
+        return Readings(
+            self.signals.take(rows),
+            self.residual[rows],
+            self.belief,
+            self.lines.take(rows),
+            None if self.weights is None else self.weights[rows],
+        )

@@ -1,0 +1,320 @@
+"""Readings fitted by terms: coefficients, their covariances, and the fit without some of them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, fields, replace
+from functools import cached_property
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..joint.pattern import Pattern, Surroundings
+from ..joint.signals import Signals
+from ..support.quantiles import median
+from .extension import Extension
+from .factor import Factor, in_common
+from .lines import LineBasis
+from .projection import Projection, project
+from .readings import ENOUGH_RUNS, Readings
+from .runcolumns import RunEffectColumns
+from .stretches import short_stretches
+from .whitening import RunEffect
+
+__all__ = ["Solution", "values_of"]
+
+Array = NDArray[np.float64]
+
+#: Residuals are taken at most this many robust standard deviations large: outliers
+#: must not make causes, and normal ones are not touched.
+CLIP = 4.0
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Solution(Projection):
+    """Readings fitted by the simulation's own columns and by terms.
+
+    Attributes
+    ----------
+    readings : Readings
+    terms : tuple of Extension
+    fixed_rho : float or None
+        Correlation of the noise where it is given; else that of what is left.
+    blocks : tuple of ndarray
+        What the design is made of: the readings' own columns, those of every term.
+    design : ndarray, shape (n, p)
+    factors : tuple of Factor
+        Of the noises that the fit passed through, its own first: the next fit begins there.
+    target : ndarray
+        The readings, outliers clipped.
+    outlying : ndarray of bool
+    form_errors : ndarray or None
+        Covariance of all coefficients by what the forms of the terms leave, where known.
+    """
+
+    readings: Readings
+    terms: tuple[Extension, ...]
+    fixed_rho: float | None
+    blocks: tuple[Array, ...]
+    design: Array
+    factors: tuple[Factor, ...]
+    target: Array
+    outlying: NDArray[np.bool_]
+    form_errors: Array | None = None
+
+    @classmethod
+    def solve(
+        cls,
+        readings: Readings,
+        terms: Iterable[Extension] = (),
+        rho: float | None = None,
+        before: Solution | None = None,
+    ) -> Solution:
+        """Fit the terms: run effects, correlation, clipping, projection.
+
+        What a fit ``before`` has made of the columns that both begin with is not made anew.
+        """
+        terms = tuple(terms)
+        blocks = (readings.base, *(term.columns for term in terms))
+        design = _grown(blocks, before)
+        factors = () if before is None else before.factors
+        effects = [term.run_effect for term in terms if term.run_effect is not None]
+
+        def projected(target: Array, rho: float, effects: list[RunEffect]) -> Projection:
+            nonlocal factors
+            weights = readings.weights
+            factor = Factor.of(blocks, readings.bounds, rho, effects, weights, factors, design)
+            # A fit passes through white noise and two correlations: all three are kept.
+            others = (f for f in factors if f.whiten is not factor.whiten)
+            factors = (factor, *others)[:3]
+            return project(factor, target)
+
+        target, correlation, settled = readings.residual, rho or 0.0, False
+        for _ in range(2):
+            found = projected(target, correlation, effects)
+            left = _left(readings, design, found)
+            kept, target, outlying = _clipped(readings, left)
+            if rho is None:
+                # What lasts over two readings or three is no noise that neighbours share.
+                if outlying.any():
+                    kept[short_stretches(outlying, readings.bounds)] = 0.0
+                correlation = readings.correlation(kept * readings.root_weights)
+            settled = not outlying.any() and correlation == found.whiten.rho
+            if settled:
+                break
+        if len(effects) > 1:
+            for k, effect in enumerate(effects):
+                others = [other for j, other in enumerate(effects) if j != k]
+                columns = RunEffectColumns(effect.columns, readings.bounds)
+                ratio, _ = projected(target, correlation, others).ratio_of(columns)
+                effects[k] = RunEffect(effect.columns, max(ratio, 1e-9))
+        if len(effects) > 1 or not settled:
+            found = projected(target, correlation, effects)
+        sizes = iter(effects)
+        terms = tuple(
+            term if term.run_effect is None else replace(term, run_effect=next(sizes))
+            for term in terms
+        )
+        return Solution(
+            **values_of(found, Projection),
+            readings=readings,
+            terms=terms,
+            fixed_rho=rho,
+            blocks=blocks,
+            design=design,
+            factors=factors,
+            target=target,
+            outlying=outlying,
+        )
+
+    def with_solution(self, solution: Solution, **changes: Any) -> Self:
+        """Another solution with what else this one holds."""
+        return replace(self, **values_of(solution, Solution), **changes)
+
+    # -- of the readings ---------------------------------------------------------
+
+    @property
+    def signals(self) -> Signals:
+        """Signals of the readings."""
+        return self.readings.signals
+
+    @property
+    def residual(self) -> Array:
+        """Measured minus simulated error, arcsec."""
+        return self.readings.residual
+
+    @property
+    def belief(self) -> Surroundings:
+        """What the simulation believes of the joint."""
+        return self.readings.belief
+
+    @property
+    def bounds(self) -> list[tuple[int, int]]:
+        """The runs."""
+        return self.readings.bounds
+
+    @property
+    def lines(self) -> LineBasis:
+        """Lines of every order that is searched for."""
+        return self.readings.lines
+
+    @property
+    def root_weights(self) -> Array:
+        """Square roots of the weights."""
+        return self.readings.root_weights
+
+    @property
+    def base(self) -> Array:
+        """Columns of the simulation's own."""
+        return self.readings.base
+
+    @property
+    def log_n(self) -> float:
+        """What a coefficient costs, in units of BIC."""
+        return self.readings.log_n
+
+    # -- of the fit --------------------------------------------------------------
+
+    @cached_property
+    def left(self) -> Array:
+        """What is left of the readings, arcsec."""
+        return np.asarray(self.residual - self.design @ self.coefficients)
+
+    @cached_property
+    def around(self) -> Surroundings:
+        """The joint, with the believed pattern and the missing orders among the terms."""
+        return self.surroundings(self.fitted())
+
+    @property
+    def bic(self) -> float:
+        """Deviance plus the penalty of the terms' parameters and searches."""
+        penalty = sum(t.parameters * t.log_n + 2.0 * t.log_grid for t in self.terms)
+        return self.deviance + penalty
+
+    def has(self, cause: str) -> bool:
+        """A term of this cause is among the terms."""
+        return any(term.cause == cause for term in self.terms)
+
+    def fitted(self) -> list[tuple[Extension, Array]]:
+        """Every term with its coefficients."""
+        return [(term, self.coefficients[self.place(k)]) for k, term in enumerate(self.terms)]
+
+    def place(self, k: int) -> NDArray[np.int64]:
+        """Columns of term ``k`` among those of the design."""
+        start = sum(block.shape[1] for block in self.blocks[: k + 1])
+        return np.arange(start, start + self.terms[k].columns.shape[1])
+
+    def covariance(self, k: int) -> Array:
+        """Covariance of the coefficients of term ``k``."""
+        where = self.place(k)
+        return np.asarray(self.unscaled_covariance[np.ix_(where, where)] * self.variance)
+
+    def robust_covariance(self, k: int) -> Array:
+        """Covariance of the coefficients of term ``k``, widened by what its form leaves."""
+        return self.robust(self.place(k))
+
+    def robust(self, where: NDArray[np.int64]) -> Array:
+        r"""Covariance of some coefficients, at least as wide as runs disagree on them.
+
+        .. math:: V_s = \frac{R}{R - 1}\sum_j s_j s_j^T, \quad s_j = X^+_j r_j
+
+        with the residuals r of run j: no form is exact, and what it leaves is alike within a
+        run. Coefficients whose variance is larger by this than by the noise alone are
+        widened to it; from `ENOUGH_RUNS` runs on. `form_errors`, where known, come on top.
+        """
+        among = np.ix_(where, where)
+        plain = np.asarray(self.unscaled_covariance[among] * self.variance)
+        beyond = 0.0 if self.form_errors is None else self.form_errors[among]
+        runs = len(self.bounds)
+        if runs < ENOUGH_RUNS or not plain.size:
+            return np.asarray(plain + beyond)
+        scores = np.array(
+            [self.back[where] @ (self.q[a:b].T @ self.r[a:b]) for a, b in self.bounds]
+        )
+        between = (scores**2).sum(axis=0) * runs / (runs - 1.0)
+        wider = np.sqrt(np.maximum(between / np.maximum(np.diag(plain), 1e-300), 1.0))
+        return np.asarray(plain * np.outer(wider, wider) + beyond)
+
+    def coefficients_with(self, extension: Extension) -> Array:
+        """Coefficients of all terms if an extension joined them."""
+        moved = self.back @ (self.q.T @ self.whiten(extension.columns))
+        return np.asarray(self.coefficients - moved @ extension.coefficients)
+
+    def coefficients_without(self, group: Sequence[int]) -> Array:
+        r"""Coefficients of all columns where those of the terms ``group`` are held at 0.
+
+        .. math:: \beta - C_{\cdot g} C_{gg}^{-1} \beta_g, \quad C = (X^T M^T M X)^{-1}
+
+        under the noise of this fit, which may have a fixed correlation and none of the terms
+        ``group`` a run effect of its own; outliers are clipped as in the fit of the others.
+        """
+        held = np.concatenate([self.place(k) for k in group])
+        spread = self.unscaled_covariance[:, held]
+        moved = spread @ np.linalg.pinv(spread[held])
+
+        def solved(target: Array) -> Array:
+            found = self.back @ (self.q.T @ self.whiten(target))
+            return np.asarray(found - moved @ found[held])
+
+        coefficients = solved(self.residual)
+        for _ in range(2):
+            left = self.residual - self.design @ coefficients
+            _, target, outlying = _clipped(self.readings, left - self.whiten.run_part(left))
+            if not outlying.any():
+                break
+            coefficients = solved(target)
+        return coefficients
+
+    def surroundings(self, fitted: Sequence[tuple[Extension, Array]]) -> Surroundings:
+        """The joint, with the believed pattern and the missing orders among the terms.
+
+        Not with the fitted corrections: an effect on the pattern (a filter) would be
+        taken for one in part, and then act on a pattern that it has already changed.
+        """
+        belief = self.belief.pattern
+        orders = [*belief.orders]
+        pairs = [*zip(belief.cosine, belief.sine, strict=True)]
+        for term, coefficients in fitted:
+            if term.line is not None:
+                orders.append(term.line)
+                pairs.append((coefficients[0], coefficients[1]))
+        array = np.array(pairs, dtype=np.float64).reshape(-1, 2)
+        pattern = Pattern(np.array(orders, dtype=np.float64), array[:, 0], array[:, 1])
+        return Surroundings(self.belief.joint, pattern)
+
+
+def values_of(solution: Projection, of: type[Projection]) -> dict[str, Any]:
+    """Fields of a class of results, as they stand in one."""
+    return {field.name: getattr(solution, field.name) for field in fields(of)}
+
+
+def _grown(blocks: tuple[Array, ...], before: Solution | None) -> Array:
+    """All columns side by side; those that a fit before has in common are not moved."""
+    if before is None:
+        return np.hstack(blocks)
+    same = in_common(before.blocks, blocks)
+    kept = before.design[:, : sum(block.shape[1] for block in blocks[:same])]
+    further = [block for block in blocks[same:] if block.shape[1]]
+    return np.hstack([kept, *further]) if further else kept
+
+
+def _left(readings: Readings, design: Array, fit: Projection) -> Array:
+    """What coefficients leave, less what the run effects take of it."""
+    left = readings.residual - design @ fit.coefficients
+    left -= fit.whiten.run_part(left)
+    return np.asarray(left)
+
+
+def _clipped(readings: Readings, left: Array) -> tuple[Array, Array, NDArray[np.bool_]]:
+    """What is left, outliers clipped; readings to match; which are outlying."""
+    scale = readings.root_weights * left
+    spread = 1.4826 * float(median(np.abs(scale - median(scale))))
+    limit = CLIP * max(spread, 1e-12) / readings.root_weights
+    outlying = np.abs(left) > limit
+    if 2 * np.count_nonzero(outlying) > outlying.size:
+        # More than half read alike, and away from the mean: no outlier is in the majority.
+        limit = CLIP * 1.4826 * float(median(np.abs(scale))) / readings.root_weights
+        outlying = np.abs(left) > limit
+    kept = np.clip(left, -limit, limit)
+    return kept, np.where(outlying, readings.residual - left + kept, readings.residual), outlying
