@@ -17,6 +17,7 @@ from ..support.deadline import pace
 from .believed import corrected_effects
 from .commonform import in_common_form
 from .delay import Delay, error_before, find_delay
+from .exchange import exchanged
 from .gearedlines import GearedLines, Ratio
 from .gearratio import aligned, find_ratio, near_ratio
 from .identifiability import blind_spots
@@ -31,6 +32,10 @@ Array = NDArray[np.float64]
 
 #: Readings used at most: beyond, one of every so many in a row is drawn at random.
 MOST_READINGS = 40_000
+
+
+#: Weight below which a reading is put aside as an outlier.
+ASIDE = 1e-3
 
 
 @dataclass(frozen=True)
@@ -94,8 +99,9 @@ class Seen:
         then = every
         if delay is not None:
             then, error = error_before(every, error, delay.seconds)
-        rows = _subsample(len(every))
-        if rows is None:
+        rows = _directed(every)
+        rows = rows[_subsample(rows.size)]
+        if rows.size == len(every):
             return cls(sim, ratio, delay, every, then, error, None)
         return cls(sim, ratio, delay, every, then.take(rows), error[rows], rows)
 
@@ -193,7 +199,7 @@ def _corrections(
 
 def _start(seen: Seen, sim: Simulation) -> Regression:
     """The readings against a simulation, without any cause."""
-    return Regression(seen.signals, seen.error - sim.predict(seen.signals), sim.surroundings)
+    return Regression.of(seen.signals, seen.error - sim.predict(seen.signals), sim.surroundings)
 
 
 def _chosen(seen: Seen, sim: Simulation) -> CauseSelection:
@@ -204,18 +210,30 @@ def _chosen(seen: Seen, sim: Simulation) -> CauseSelection:
     scatter: list[ScatterFinding] = []
     if pace().over:
         return CauseSelection(start, chosen, scatter, spots)  # what is left is no scatter yet
-    uneven = next(iter(_scatter(chosen, weighs=True)), None)
+    uneven = _uneven(start, chosen)
     if uneven is not None and uneven.bic_gain > NEW_SCATTER + misfit_of_scatter(start, chosen):
         scatter.append(uneven)
-        start = Regression(
-            seen.signals, start.residual, sim.surroundings, uneven.weights, start.lines
-        )
+        start = start.weighted(uneven.weights)
         chosen = select(start, chosen.terms)
     if not all(map(is_named, chosen.terms)) and not unexplained_after(chosen).found:
         chosen = select(start, unnamed=False)
-    chosen = in_common_form(chosen, spots)
+    chosen = in_common_form(exchanged(chosen), spots)
     scatter += [i for i in _scatter(chosen, weighs=False) if i.bic_gain > NEW_CAUSE]
     return CauseSelection(start, chosen, scatter, spots)
+
+
+def _uneven(start: Regression, chosen: Regression) -> ScatterFinding | None:
+    """The strongest cause of uneven noise, with outliers (bursts above all) put aside."""
+    found = next(iter(_scatter(chosen, weighs=True)), None)
+    if found is None:
+        return None
+    others = _scatter(chosen, weighs=False)
+    aside = [i.weights < ASIDE for i in others if i.bic_gain > max(found.bic_gain, NEW_CAUSE)]
+    rows = np.any(aside, axis=0)
+    if not rows.any():
+        return found
+    cleaned = start.of_readings(start.readings.less(np.where(rows, chosen.left, 0.0)))
+    return next(iter(_scatter(cleaned.with_terms(chosen.terms), weighs=True)), None)
 
 
 def _scatter(regression: Regression, weighs: bool) -> list[ScatterFinding]:
@@ -228,10 +246,19 @@ def _scatter(regression: Regression, weighs: bool) -> list[ScatterFinding]:
     return sorted(found, key=lambda item: -item.bic_gain)
 
 
-def _subsample(n: int) -> NDArray[np.int64] | None:
-    """One reading of every so many in a row, at random within each; None where all fit."""
+def _directed(signals: Signals) -> NDArray[np.int64]:
+    """Readings but those at a turning point: which way the joint went there is not known.
+
+    One that hardly moves has none to speak of, and all of its readings count.
+    """
+    turning = ~signals.segment_first[signals.segment] & (signals.travel == 0.0)
+    return np.arange(len(signals)) if 2 * turning.sum() > turning.size else np.flatnonzero(~turning)
+
+
+def _subsample(n: int) -> NDArray[np.int64]:
+    """One reading of every so many in a row, at random within each; all where they fit."""
     if n <= MOST_READINGS:
-        return None
+        return np.arange(n)
     edges = np.linspace(0, n, MOST_READINGS + 1).astype(np.int64)
     rng = np.random.default_rng(0)
     return edges[:-1] + (rng.random(MOST_READINGS) * np.diff(edges)).astype(np.int64)

@@ -6,13 +6,14 @@ from collections.abc import Callable, Sequence
 from typing import TypeAlias
 
 from ..effects import Effect
+from ..estimation.cache import Proposal
 from ..estimation.regression import Extension, Regression
 from ..support.deadline import pace
 from .forms import told_from_forms
 from .penalty import before_forms, left_by_forms, misfit, penalty_of, total_penalty
 from .unnamed import effect_of
 
-__all__ = ["Candidate", "Scores", "extensions", "propose"]
+__all__ = ["Candidate", "Scores", "extensions", "propose", "proposed"]
 
 #: An extension, what it extends, and its net BIC gain.
 Candidate: TypeAlias = tuple[Extension, Regression, float]
@@ -32,52 +33,57 @@ def extensions(
     regression: Regression,
     causes: Sequence[str],
     least: Callable[[list[Candidate]], float] | None = None,
+    before: Sequence[Candidate] = (),
 ) -> list[Candidate]:
     """What every cause proposes: the extension, what it extends, its net BIC gain.
 
     A cause that contains chosen ones as special cases takes their place. Those left when the
     time is up are not tried (`trueangle.support.deadline`). Of candidates that stay below
     ``least``, the gain that matters beside those found so far, only as much is searched as tells
-    that; the strongest beside other terms are therefore tried first.
+    that; the strongest ones ``before`` are therefore tried first.
     """
     found: list[Candidate] = []
-    proposed_by: list[str] = []
+    places: list[int] = []
     at = pace()
     beside = f" beside {len(regression.terms)}" if regression.terms else ""
-    memory = regression.memory
-    order = list(causes)
-    if regression.terms and least is not None:
-        order.sort(key=lambda cause: -memory.get(("gain", cause), 0.0))
-    for tried, cause in enumerate(order):
+    gains = {extension.cause: extension.bic_gain for extension, _, _ in before}
+    for tried, cause in enumerate(sorted(causes, key=lambda cause: -gains.get(cause, 0.0))):
         then = AFTER_CHOICE * at.seconds if beside else 0.0
         at.at(f"trying causes{beside}", tried, len(causes), then)
         if at.over:
             break
-        effect = effect_of(cause)
-        contained = {special.kind for special in effect.contains}
+        contained = {special.kind for special in effect_of(cause).contains}
         if any(term.cause in contained for term in regression.terms):
             start = regression.with_terms(t for t in regression.terms if t.cause not in contained)
             penalty = total_penalty(start) - total_penalty(regression)
         else:
             start, penalty = regression, 0.0
-        key = (cause, *((t.cause, repr(t.shape)) for t in start.terms))
-        # Alone every cause is told as well as it can be: that is reported.
+        # Alone every cause is searched as far as it can be: that is reported.
         wanted = max(least(found) + penalty, 0.0) if start.terms and least is not None else 0.0
-        if key not in memory or memory["least", key] > wanted:
-            start.least = wanted
-            found_now = propose(effect, start)
-            start.least = 0.0
-            if at.over:
-                break  # a search that was cut short says nothing of its cause
-            memory[key], memory["least", key] = found_now, wanted
-        extension = memory[key]
+        extension = proposed(start, cause, wanted)
+        if at.over:
+            break  # a search that was cut short says nothing of its cause
         if extension is not None:
-            memory["gain", cause] = extension.bic_gain
             found.append((extension, start, extension.bic_gain - penalty))
-            proposed_by.append(cause)
+            places.append(causes.index(cause))
     # What is as good comes in the order of the causes.
-    by_place = sorted(range(len(found)), key=lambda k: causes.index(proposed_by[k]))
-    return [found[k] for k in by_place]
+    return [found[k] for k in sorted(range(len(found)), key=places.__getitem__)]
+
+
+def proposed(regression: Regression, cause: str, least: float = 0.0) -> Extension | None:
+    """What a cause proposes, searched only as far as candidates above ``least`` ask for.
+
+    None where the time is up and it has not been searched yet.
+    """
+    key = (cause, tuple((term.cause, repr(term.shape)) for term in regression.terms))
+    kept = regression.cache.proposed(key, least)
+    if kept is None and pace().over:
+        return None
+    if kept is None:
+        kept = Proposal(propose(effect_of(cause), regression.with_least(least)), least)
+        if not pace().over:
+            regression.cache.propose(key, kept)
+    return kept.extension
 
 
 class Scores:

@@ -14,6 +14,7 @@ from ..effects.non_integer_order import NonIntegerOrder
 from ..estimation.regression import Regression
 from ..joint.pattern import line_columns
 from ..support.display_units import brief
+from .forms import FORM
 from .gain import Gain
 from .goodness import FREE_PATH, Unexplained
 from .goodness.periodogram import order_test, time_test
@@ -150,8 +151,11 @@ def _is_whole(regression: Regression, group: Sequence[int], order: float) -> boo
 
 
 def _follows(regression: Regression, group: Sequence[int]) -> str:
-    """What else a place-bound finding follows, where it is no fixed line or bump; or nothing."""
-    term = regression.terms[group[0]]
+    """What else a place-bound finding follows, where it is no fixed line or bump; or nothing.
+
+    One of which all but the share that a form may leave (`FORM`) stays where it is, is fixed.
+    """
+    term, coefficients = regression.fitted()[group[0]]
     named = regression.with_terms(t for t in regression.terms if is_named(t))
     if term.line is not None:
         columns = line_columns(regression.signals.theta, term.line)
@@ -162,7 +166,12 @@ def _follows(regression: Regression, group: Sequence[int]) -> str:
     signals = regression.signals
     for name, (mean, spread) in modulators(signals).items():
         g = modulator(signals, name, mean, spread)
-        if g is not None and named.gain(g[:, None] * columns)[0] > FOLLOWS:
+        if g is None:
+            continue
+        moved = g[:, None] * columns
+        gain, sizes = named.gain(moved)
+        slight = FORM * float(np.var(term.columns @ coefficients))
+        if gain > FOLLOWS and float(np.var(moved @ sizes)) > slight:
             return name.replace("direction ", "direction and ")
     return ""
 

@@ -11,6 +11,7 @@ import numpy as np
 from ..effects import EFFECTS, Effect
 from ..errors import ArgumentError
 from ..fitting.fit import fit
+from ..formats.signals import coupled_with
 from ..joint.signals import join_runs
 from ..model.model import HarmonicModel
 from ..model.term import Term
@@ -102,10 +103,20 @@ def without_terms(
             temperature=run.temperature,
             torque=run.torque,
             current=run.signal("current"),
+            **_coupled(run),
         )
         terms = error + late - plain.error(seen)
         cleaned.append(replace(run, reference=seen, indicated=run.indicated - terms))
     return cleaned
+
+
+def _coupled(run: CalibrationRun) -> dict[str, Any]:
+    """Angles of other joints as signals of a correction, unwrapped."""
+    return {
+        name: np.unwrap(values, period=run.period)
+        for name, values in run.signals.items()
+        if coupled_with(name)
+    }
 
 
 def extend_model(
@@ -173,7 +184,8 @@ def extend_model(
 def _ranges(runs: Sequence[CalibrationRun]) -> tuple[tuple[str, float, float], ...]:
     """Each signal of the runs with its lowest and highest value."""
     ranges = []
-    for name in ("velocity", "temperature", "torque", "current"):
+    others = dict.fromkeys(name for run in runs for name in run.signals if coupled_with(name))
+    for name in ("velocity", "temperature", "torque", "current", *others):
         columns = [run.speed if name == "velocity" else run.signal(name) for run in runs]
         values = [column[np.isfinite(column)] for column in columns if column is not None]
         if any(column.size for column in values):

@@ -27,8 +27,10 @@ from ..joint.pattern import ARCSEC_PER_RAD, Pattern, lines_columns
 from ..joint.signals import Signals
 from ..simulation.simulation import Simulation
 from ..support.angles import ARCSEC_PER_TURN
+from .confirmation import status_of
 from .findings import Finding
 from .gain import measure_delay_gain
+from .goodness import Unexplained
 from .penalty import NEW_CAUSE
 from .unnamed import effect_of
 
@@ -142,7 +144,9 @@ def _at_the_time(regression: Regression, plain: Regression) -> Iterator[Extensio
             yield term
 
 
-def delay_finding(delay: Delay, chosen: Regression, plain: Regression, with_gain: bool) -> Finding:
+def delay_finding(
+    delay: Delay, chosen: Regression, plain: Regression, with_gain: bool, unexplained: Unexplained
+) -> Finding:
     """The delay as a finding beside the ``chosen`` causes; ``plain`` is without the delay."""
     column = Latency.columns(chosen.signals, chosen.around, {})
     extension = chosen.propose(Latency.kind, {}, column)
@@ -161,4 +165,5 @@ def delay_finding(delay: Delay, chosen: Regression, plain: Regression, with_gain
     }
     gain = measure_delay_gain(without, beside) if with_gain else None
     parameters = {"delay_s": quantity(seconds, std)}
-    return Finding(Latency.kind, parameters, weight, gain, [], [Latency(seconds)])
+    told = status_of(Latency.kind, gain, None, (), unexplained)
+    return Finding(Latency.kind, parameters, weight, gain, [], [Latency(seconds)], *told)

@@ -26,12 +26,15 @@ from ..support.kinds import told_kinds
 from ..support.oftype import of_type
 from .account import MOST_READINGS, account_of
 from .believed import judged_beliefs
+from .candidates import proposed
 from .delay import delay_finding
 from .discrepancy import compare, unfolded_error
 from .findings import Diagnosis, Finding
+from .gates import many_causes
 from .gearedlines import Ratio
 from .goodness import Unexplained, goodness_of_fit
 from .named import findings_of, reconsidered, scatter_doubt, scatter_finding
+from .penalty import cause_terms
 from .remainder import leftover_of, unexplained_after
 from .wrongplace import moved
 
@@ -111,9 +114,10 @@ def diagnose(
 
     Notes
     -----
-    Up to 40 000 readings are used; of more, one of every so many in a row is drawn at
-    random (seed 0), which keeps the angles free of a grid. About 0.4 to 1.5 s for 10 000
-    readings, on one processor: numpy's own threads are stopped meanwhile.
+    Readings at a turning point, where the joint turned and has not moved, take no part: which way
+    they were reached is not known. Up to 40 000 readings are used; of more, one of every so many
+    in a row is drawn at random (seed 0), which keeps the angles free of a grid. About 0.4 to
+    1.5 s for 10 000 readings, on one processor: numpy's own threads are stopped meanwhile.
     Source: Frisch-Waugh projection; Schwarz (1978) and Kass and Wasserman (1995) for the
     penalty; Koenker (1981) for the variance.
 
@@ -163,8 +167,9 @@ def _diagnosis(
     with at.part(FOR_FINDINGS):
         findings, spots, doubtful = findings_of(chosen, account.choice.spots, gain, rest)
     if doubtful and not rest.found and not at.cut:
-        # What is not confirmed explains nothing.
-        rest = unexplained_after(chosen, sim.sigma_arcsec or None, without=doubtful)
+        # What is not confirmed explains nothing; the others may well without it.
+        others = cause_terms(chosen, doubtful, settled=True)
+        rest = unexplained_after(others, sim.sigma_arcsec or None)
         if rest.found:
             findings = reconsidered(chosen, findings, rest)
     beliefs, corrected = judged_beliefs(chosen, sim, account.believed, spots, gain)
@@ -177,15 +182,17 @@ def _diagnosis(
     if seen.ratio is not None:
         findings.append(_ratio_finding(seen.ratio))
     if seen.delay is not None:
-        findings.append(delay_finding(seen.delay, chosen, first, gain and not at.over))
+        findings.append(delay_finding(seen.delay, chosen, first, gain and not at.over, rest))
     findings.sort(key=lambda finding: (not finding.confirmed, -finding.evidence["bic_gain"]))
     extended = corrected.with_effects(
         effect for finding in findings if finding.confirmed for effect in finding.effects
     )
     beliefs, findings = moved(beliefs, findings, sim)
+    notes = [_incomplete(at, gain)] if at.cut else []
+    notes += [text] if (text := many_causes(findings)) else []
     residual = error - stated.predict(every)
     before = goodness_of_fit(
-        leftover_of(first.signals, residual if rows is None else residual[rows], first.lines),
+        leftover_of(first.signals, residual if rows is None else residual[rows], first.cache),
         float(first.lines.orders.max()),
         sim.sigma_arcsec or None,
     )
@@ -204,7 +211,7 @@ def _diagnosis(
         before,
         beliefs,
         faults_of(records_of(measured)),
-        [_incomplete(at, gain)] if at.cut else [],
+        notes,
         not at.cut,
         log,
         measured,
@@ -240,7 +247,7 @@ def _structure(start: Regression) -> dict[str, float]:
     before = _left(start)
     alone = {}
     for cause in EFFECTS:
-        extension = start.memory.get((cause,))
+        extension = proposed(start, cause)
         if extension is not None and extension.bic_gain > 0.0:
             after = _left(start.with_terms([extension], 0.0))
             alone[cause] = 1.0 - float(np.sum(after**2) / max(float(np.sum(before**2)), 1e-300))

@@ -3,17 +3,24 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 from ..effects import EFFECTS, Effect
 from ..effects.blindness import Blindness
 from ..errors import ArgumentError, NoModelError
 from ..estimation.estimate import Parameters, Quantity
+from ..estimation.regression import ROUNDING
+from ..joint.signals import join_runs
 from ..model.model import HarmonicModel
+from ..planning.evidence import Noise
+from ..planning.limits import Limits
+from ..planning.nextruns import NextRuns, next_runs
 from ..runs.checks import DataFault
 from ..runs.joining import MeasuredMinusSimulated
+from ..simulation.measured import design_of
 from ..simulation.simulation import Simulation
 from ..support.display_units import ErrorsIn
 from ..support.drawn import drawn
@@ -183,6 +190,97 @@ class Diagnosis(PlainResult):
             and not (self.unexplained is not None and self.unexplained.found)
             and all(belief.verdict == "confirmed" for belief in self.beliefs)
         )
+
+    def simulation(self) -> Simulation:
+        """`extended`, with the noise of the readings and designs of their runs.
+
+        Both stand where the simulation states none: `trueangle.simulate` repeats the
+        measurement then. What an extended simulation is written as.
+
+        Examples
+        --------
+        >>> import trueangle as ta
+        >>> from trueangle.simulation import RunDesign, Simulation
+        >>> measured = ta.simulate(Simulation(sigma_arcsec=2.0), runs=[RunDesign(samples=900)])
+        >>> found = ta.diagnose(measured, Simulation()).simulation()
+        >>> round(found.sigma_arcsec), len(ta.simulate(found)[0])
+        (2, 900)
+        """
+        extended = self.extended
+        return replace(
+            extended,
+            sigma_arcsec=extended.sigma_arcsec or self.noise,
+            runs=extended.runs or tuple(design_of(run) for run in self.runs),
+        )
+
+    def plan(
+        self, limits: Limits | None = None, *, between: Sequence[str] | None = None
+    ) -> NextRuns:
+        """The runs that would tell what is open (`trueangle.planning.nextruns.next_runs`).
+
+        Parameters
+        ----------
+        limits : Limits, optional
+            What a run may be; by default much as those there are.
+        between : sequence of str, optional
+            Causes to be told apart in place of what is open.
+
+        Returns
+        -------
+        NextRuns
+            Not rehearsed: `trueangle.plan_after` does that.
+
+        Examples
+        --------
+        >>> from trueangle import diagnose, simulate
+        >>> from trueangle.simulation import Backlash, RunDesign, Simulation
+        >>> sim = Simulation(sigma_arcsec=1.0, runs=(RunDesign(reversals=(0.5,)),))
+        >>> plan = diagnose(simulate(sim.with_effects([Backlash(3.0)])), sim).plan()
+        >>> plan.runs[0].speed_deg_s, plan.between[0].causes
+        (60.0, ('backlash', 'latency'))
+        """
+        noise = Noise(max(self.noise, ROUNDING), self.correlation)
+        signals = join_runs(self.runs if self.simulated is None else self.simulated.runs)
+        believed, spots = self._without_open(), self.not_identifiable
+        if between is not None:
+            believed, spots = self._between(tuple(between))
+        return next_runs(signals, believed, spots, noise, limits)
+
+    @cached_property
+    def next_runs(self) -> NextRuns | None:
+        """The runs that would tell what is seen and not told, as `plan` has them by default.
+
+        None where nothing is, or the account was ended early.
+        """
+        is_open = any(spot.supported and spot.hypotheses for spot in self.not_identifiable)
+        return self.plan() if is_open and self.complete and self.runs else None
+
+    def _without_open(self) -> Simulation:
+        """The extended simulation without what may be due to another cause."""
+        asked = [
+            (effect.kind, getattr(effect, "order", None))
+            for spot in self.not_identifiable
+            for effects in spot.hypotheses.values()
+            for effect in effects
+        ]
+        kept = (
+            effect
+            for effect in self.extended.effects
+            if (effect.kind, getattr(effect, "order", None)) not in asked
+        )
+        return replace(self.extended, effects=tuple(kept))
+
+    def _between(self, causes: tuple[str, ...]) -> tuple[Simulation, list[Blindness]]:
+        """What is believed without these causes, and the question which of them it is."""
+        for spot in self.not_identifiable:
+            if spot.supported and set(causes) <= set(spot.causes):
+                return self._without_open(), [replace(spot, causes=causes)]
+        known = {f.cause: tuple(f.effects) for f in self.findings if f.cause in causes}
+        known = {cause: effects for cause, effects in known.items() if effects}
+        taken = [effect for effects in known.values() for effect in effects]
+        kept = tuple(effect for effect in self.extended.effects if effect not in taken)
+        asked = Blindness(causes, "", "", bool(known), hypotheses=known)
+        return replace(self.extended, effects=kept), [asked]
 
     def correction(
         self,
@@ -357,7 +455,7 @@ class Diagnosis(PlainResult):
         Parameters
         ----------
         errors_in : {"auto", "arcsec", "deg", "mrad", "count"} or float
-            Unit of the errors; by itself arcsec, or degrees where one reaches a degree. A
+            Unit of the errors; by itself arcsec, or degrees where errors are that large. A
             number is the counts of a turn.
         verbose : bool
             Tell in full what the readings could not have shown and nobody asked.

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
-from copy import copy
 from dataclasses import replace
 
 import numpy as np
@@ -54,13 +53,13 @@ def bends(regression: Regression, exempt: Collection[str] = ()) -> Array:
 def beside_bends(regression: Regression, exempt: Collection[str] = ()) -> Regression:
     """The regression beside `bends`, for scores of what else there may be; itself without any."""
 
-    def build() -> Regression:
+    def build() -> Regression | None:
         columns = bends(regression, exempt)
-        return regression.beside(columns, 1.0) if columns.shape[1] else regression
+        return regression.jointly_with(columns, 1.0) if columns.shape[1] else None
 
     present = {term.cause for term in regression.terms}
-    made: Regression = regression.asked(("bends", *sorted(present & set(exempt))), build)
-    return made
+    made = regression.cache.of_fit(("bends", *sorted(present & set(exempt))), build)
+    return regression if made is None else made
 
 
 def told_from_forms(regression: Regression, extension: Extension) -> Extension:
@@ -120,6 +119,4 @@ def with_form_errors(regression: Regression) -> Regression:
     told = vt.T * (kappa * np.sqrt(variance / wider))
     untold = kappa * (np.eye(count) - vt.T @ vt)
     roots = regression.back @ known @ np.column_stack([mean, told, untold])
-    other = copy(regression)
-    other.form_errors = np.asarray(roots @ roots.T)
-    return other
+    return replace(regression, form_errors=np.asarray(roots @ roots.T))

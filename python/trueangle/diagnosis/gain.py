@@ -13,7 +13,7 @@ from ..estimation.regression import Regression
 from ..joint.signals import Signals
 from ..support.deadline import pace
 from ..support.plainresult import Shown
-from .holdout import Law, held_out, numbers, part, rebuilt, reducible_share, residual_at
+from .holdout import Law, held_out, numbers, rebuilt, reducible_share, residual_at
 from .levels import LevelGain, gains_by_level
 from .unnamed import effect_of
 
@@ -176,7 +176,7 @@ def measure_belief_gains(
     before, after = np.zeros((count, regression.n)), np.zeros((count, regression.n))
     for fold in range(int(folds.max()) + 1):
         test = folds[unit] == fold
-        fitted = part(regression, ~test).with_terms(rebuilt(t, ~test) for t in regression.terms)
+        fitted = regression.of_rows(~test).with_terms(rebuilt(t, ~test) for t in regression.terms)
         left = residual_at(
             Law.of(fitted),
             regression.signals.take(test),
@@ -283,6 +283,13 @@ def _shuffled(
         return replace(signals, torque=shape * scale[other][run])
     if factor == "mount" and signals.mount is not None:
         return replace(signals, mount=_level(signals.mount, run)[other][run])
+    if factor == "coupled":
+        moved = {joint: angle * sign for joint, angle in signals.coupled.items()}
+        for start, stop in signals.run_bounds():
+            by = int((stop - start) * rng.uniform(0.25, 0.75))
+            for angle in moved.values():
+                angle[start:stop] = np.roll(angle[start:stop], by)
+        return replace(signals, coupled=moved)
     turned = rng.uniform(0.0, 2.0 * np.pi, int(unit.max()) + 1)[unit]
     return replace(signals, theta=signals.theta + turned)
 

@@ -23,8 +23,8 @@ __all__ = ["aligned", "find_ratio", "near_ratio"]
 Array = NDArray[np.float64]
 
 #: Share of the believed power that must be missing at the believed ratio, and be found at
-#: another one, for that to be the ratio.
-MISSING, FOUND = 0.4, 0.6
+#: another one, for that to be the ratio: where less is found, further lines would make it up.
+MISSING, FOUND = 0.4, 0.9
 
 #: Ratios searched: within this share of the believed one.
 REACH = 0.25

@@ -15,7 +15,7 @@ from ..joint.signals import Signals
 from ..support.deadline import pace
 from .unnamed import effect_of
 
-__all__ = ["Law", "held_out", "numbers", "part", "rebuilt", "reducible_share", "residual_at"]
+__all__ = ["Law", "held_out", "numbers", "rebuilt", "reducible_share", "residual_at"]
 
 Array = NDArray[np.float64]
 Rows = NDArray[np.bool_]
@@ -38,7 +38,7 @@ def held_out(
 
     ``search`` repeats the searches (orders, lengths, places) without those readings.
     """
-    train = part(regression, ~test)
+    train = regression.of_rows(~test)
     terms = [rebuilt(term, ~test) for term in regression.terms]
     full = train.with_terms(terms)
     for group in groups[: SEARCHED if search else 0]:
@@ -90,18 +90,6 @@ def _law_without(full: Regression, group: Sequence[int]) -> Law:
     terms = [(full.terms[k], coefficients[full.place(k)]) for k in kept]
     base = coefficients[: full.base.shape[1]]
     return Law(base, terms, full.surroundings(terms))
-
-
-def part(regression: Regression, rows: Rows) -> Regression:
-    """The regression of some of the readings, without terms."""
-    return Regression(
-        regression.signals.take(rows),
-        regression.residual[rows],
-        regression.belief,
-        None if regression.weights is None else regression.weights[rows],
-        regression.lines.take(rows),
-        rho=regression.whiten.rho,
-    )
 
 
 def rebuilt(term: Extension, rows: Rows) -> Extension:

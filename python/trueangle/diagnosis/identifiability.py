@@ -7,35 +7,14 @@ from dataclasses import replace
 
 from ..effects import EFFECTS
 from ..effects.blindness import Blindness
+from ..effects.blindspots import blind_spots, place_among
 from ..estimation.regression import Extension, Regression
 from .unnamed import effect_of
 
 __all__ = ["Blindness", "blind_spots", "doubts_about", "open_origins", "with_open_origins"]
 
-#: Factors of a design in the order in which their blind spots are told.
-FACTORS = (
-    "direction",
-    "velocity",
-    "temperature",
-    "torque",
-    "mount",
-    "run",
-    "time",
-    "angle",
-    "none",
-    "grid",
-)
-
 #: Factors in the order in which they cast doubt on what another cause explains.
 DOUBTS = ("grid", "mount", "torque", "velocity")
-
-
-def blind_spots(regression: Regression) -> list[Blindness]:
-    """What the design of the runs cannot tell; the readings are not looked at."""
-    found: list[Blindness] = []
-    for effect in EFFECTS.values():
-        found += effect.blind_spots(regression, found)
-    return sorted(found, key=lambda spot: _place(spot, FACTORS))
 
 
 def doubts_about(
@@ -56,7 +35,7 @@ def doubts_about(
             ):
                 return spot
     found = [doubt for doubt in _doubts(extension, regression, spots) if doubt.common != cause]
-    return min(found, key=lambda spot: _place(spot, DOUBTS), default=None)
+    return min(found, key=lambda spot: place_among(DOUBTS, spot), default=None)
 
 
 def open_origins(
@@ -70,7 +49,7 @@ def open_origins(
     for doubt in _doubts(extension, regression, spots):
         if doubt.common == cause and doubt not in found:
             found.append(doubt)
-    return sorted(found, key=lambda spot: _place(spot, DOUBTS))
+    return sorted(found, key=lambda spot: place_among(DOUBTS, spot))
 
 
 def with_open_origins(
@@ -90,7 +69,3 @@ def _doubts(
 ) -> Iterator[Blindness]:
     doubts = (effect.doubt(extension, regression, spots) for effect in EFFECTS.values())
     yield from (doubt for doubt in doubts if doubt is not None)
-
-
-def _place(spot: Blindness, order: tuple[str, ...]) -> int:
-    return order.index(spot.factor) if spot.factor in order else len(order)

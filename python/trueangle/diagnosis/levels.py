@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from ..estimation.regression import Regression
 from ..joint.signals import Signals
 from ..support.deadline import pace
-from .holdout import held_out, numbers, part, rebuilt, reducible_share
+from .holdout import held_out, numbers, rebuilt, reducible_share
 from .unnamed import effect_of
 
 __all__ = ["UNITS", "LevelGain", "gains_by_level", "run_levels"]
@@ -43,6 +43,11 @@ NONE_TO_SPARE = "no level can be left out: the others alone do not tell this cau
 #: Share of its regressors' power by which a cause must differ from all else at the levels
 #: that are left, to be fitted there at all.
 LEAST_OWN = 0.05
+
+#: Power that a cause must have at a level, over that of the errors which the law fitted at the
+#: others has there; and over the variance of one reading, all readings together: the share that
+#: is gained is then known to about a fifth.
+LEAST_CARRIED, LEAST_SHOWN = 9.0, 100.0
 
 
 @dataclass(frozen=True)
@@ -167,7 +172,7 @@ def gains_by_level(
             if at.over:
                 return found
             test = level == j
-            able = [k for k in concerned if _can_do_without(regression, groups[k], test)]
+            able = [k for k in concerned if _is_tested_by(regression, groups[k], test)]
             if not able:
                 continue
             # Two mounts do not tell which way a mount counts: what all tell is kept.
@@ -213,9 +218,13 @@ def _reach(levels: list[float], held_out: list[float]) -> str:
     return reach
 
 
-def _can_do_without(regression: Regression, group: Sequence[int], test: Rows) -> bool:
-    """The other readings still tell the finding from all else."""
-    train = part(regression, ~test)
+def _is_tested_by(regression: Regression, group: Sequence[int], test: Rows) -> bool:
+    """Leaving some readings out tests the law of a finding.
+
+    The others tell it from all else, and well enough to say what it does in those left out; and
+    there it shows.
+    """
+    train = regression.of_rows(~test)
     terms = [rebuilt(term, ~test) for term in regression.terms]
     rest = train.with_terms(t for k, t in enumerate(terms) if k not in group)
     columns = np.hstack([terms[k].columns for k in group])
@@ -223,4 +232,10 @@ def _can_do_without(regression: Regression, group: Sequence[int], test: Rows) ->
     power = np.einsum("ij,ij->j", own, own)
     own = own - rest.q @ (rest.q.T @ own)
     left = np.einsum("ij,ij->j", own, own)
-    return bool((left > LEAST_OWN * np.maximum(power, 1e-300)).all())
+    if not (left > LEAST_OWN * np.maximum(power, 1e-300)).all():
+        return False
+    fitted = regression.fitted()
+    there = np.hstack([fitted[k][0].columns[test] for k in group])
+    size = float(np.sum((there @ np.concatenate([fitted[k][1] for k in group])) ** 2))
+    carried = np.einsum("ij,jk,ik->", there, np.linalg.pinv(own.T @ own), there)
+    return bool(size > max(LEAST_CARRIED * carried, LEAST_SHOWN) * regression.variance)

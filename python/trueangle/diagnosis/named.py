@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from ..effects import EFFECTS
+from ..effects import EFFECTS, Effect
 from ..effects.blindness import Blindness
 from ..effects.scatter import ScatterFinding
 from ..estimation.estimate import Parameters, Quantity, quantity
@@ -16,6 +16,7 @@ from .confirmation import CONFIRMED, NOT_CONFIRMED, status_of
 from .findings import Finding
 from .forms import with_form_errors
 from .gain import Gain, measure_gain
+from .gates import gated
 from .goodness import Unexplained
 from .identifiability import doubts_about, open_origins, with_open_origins
 from .penalty import cause_terms, finding_groups
@@ -56,19 +57,20 @@ def findings_of(
             # What sets it apart from the common form was seen after all.
             cause = regression.terms[group[0]].cause
             spots = [spot for spot in spots if not (spot.common and spot.hides(cause))]
-            origins[group[0]] = open_origins(regression.terms[group[0]], regression, spots)
+            origins[group[0]] = [
+                replace(_in_doubt(spot, regression, group), estimates={})
+                for spot in open_origins(regression.terms[group[0]], regression, spots)
+            ]
             spots = with_open_origins(spots, origins[group[0]], evidence)
             continue
         spots = [spot for spot in spots if spot != doubt]
-        estimates = _estimates(regression, group, doubt.causes)
-        spots.append(replace(doubt, supported=True, evidence=evidence, estimates=estimates))
+        spots.append(replace(_in_doubt(doubt, regression, group), evidence=evidence))
     gains: Sequence[Gain | None] = [None] * len(named)
     if with_gain and named:
         gains = measure_gain(regression, named) or gains
     fitted = regression.fitted()
     widened = with_form_errors(regression)
     findings: list[Finding] = []
-    doubtful: list[int] = []
     for group, gain in zip(named, gains, strict=True):
         terms = [(*fitted[k], widened.robust_covariance(k)) for k in group]
         cause = terms[0][0].cause
@@ -85,8 +87,6 @@ def findings_of(
         status, reason = status_of(cause, gain, regression, group, unexplained)
         if with_gain and gain is None and status == CONFIRMED:
             status, reason = NOT_CONFIRMED, NOT_HELD_OUT
-        if status != CONFIRMED:
-            doubtful += group
         findings.append(
             Finding(
                 cause,
@@ -100,7 +100,9 @@ def findings_of(
                 tuple(group),
             )
         )
-    return findings, spots, doubtful
+    findings, alike = gated(regression, findings)
+    doubtful = [k for finding in findings if not finding.confirmed for k in finding.group]
+    return findings, spots + alike, doubtful
 
 
 def reconsidered(
@@ -130,25 +132,35 @@ def _explanations(parameters: Parameters, cause: str, origins: Sequence[Blindnes
     return quantity([*(known if isinstance(known, list) else []), *others])
 
 
-def _estimates(
+def _alternatives(
     regression: Regression, group: Sequence[int], causes: Sequence[str]
-) -> dict[str, Parameters]:
-    """Parameters of every cause that may be the one, each alone in place of a finding."""
+) -> dict[str, tuple[Parameters, tuple[Effect, ...]]]:
+    """Every cause that may be the one, alone in place of a finding: parameters and effects."""
     rest = cause_terms(regression, group, settled=True)
     found = {}
-    # Not lines: one that another hides behind is no property of the joint.
     for cause in causes if not pace().over else ():
         effect = EFFECTS[cause]
-        if not (effect.acts_on_runs or is_flexible(effect)):
-            continue
         extension = propose(effect, rest)
         if extension is None or extension.bic_gain <= 0.0:
             continue
         fitted = rest.with_terms([*rest.terms, extension])
         k = len(fitted.terms) - 1
-        parameters, _ = effect.report(fitted, [(*fitted.fitted()[k], fitted.covariance(k))])
-        found[cause] = parameters
+        parameters, effects = effect.report(fitted, [(*fitted.fitted()[k], fitted.covariance(k))])
+        found[cause] = parameters, tuple(effects)
     return found
+
+
+def _in_doubt(doubt: Blindness, regression: Regression, group: Sequence[int]) -> Blindness:
+    """A doubt of what is seen, with what each of its causes would amount to."""
+    found = _alternatives(regression, group, doubt.causes)
+    # Not lines: one that another hides behind is no property of the joint.
+    told = (c for c in found if EFFECTS[c].acts_on_runs or is_flexible(EFFECTS[c]))
+    return replace(
+        doubt,
+        supported=True,
+        estimates={cause: found[cause][0] for cause in told},
+        hypotheses={cause: effects for cause, (_, effects) in found.items()},
+    )
 
 
 def _rivals(regression: Regression, group: Sequence[int]) -> list[tuple[str, float]]:

@@ -38,18 +38,21 @@ def total_penalty(regression: Regression) -> float:
 def misfit(regression: Regression) -> float:
     """Deviance that the causes found may leave because their forms are not exact.
 
-    A step of the zero has no form that could be inexact, however far apart zeros are: what such
-    terms explain is not counted.
+    A step of the zero has no form that could be inexact, however far apart zeros are, and neither
+    has a share that counts of teeth make: what such terms explain is not counted.
     """
     return left_by_forms(before_forms(regression) - regression.deviance, regression.n)
 
 
 def before_forms(regression: Regression) -> float:
     """Deviance before any cause with a form was added."""
-    zeros = [term for term in regression.terms if effect_of(term.cause).draws_zeros]
-    if not zeros:
+    effects = [(term, effect_of(term.cause)) for term in regression.terms]
+    formless = [term for term, e in effects if e.draws_zeros or e.has_exact_form]
+    if not formless:
         return float(regression.start)
-    return float(regression.asked("before forms", lambda: regression.with_terms(zeros).deviance))
+    return float(
+        regression.cache.of_fit("before forms", lambda: regression.with_terms(formless).deviance)
+    )
 
 
 def exact_terms(regression: Regression) -> list[Extension]:
@@ -122,7 +125,7 @@ def net_loss(regression: Regression, group: Sequence[int]) -> float:
 def lost(regression: Regression, group: Sequence[int]) -> float:
     """Deviance that the terms ``group`` save beside all the others (Wald, or without them)."""
     if any(regression.terms[k].run_effect is not None for k in group):
-        without: float = regression.asked(
+        without: float = regression.cache.of_fit(
             ("lost", *group), lambda: cause_terms(regression, group).deviance
         )
         return without - regression.deviance

@@ -7,8 +7,9 @@ from collections.abc import Collection
 import numpy as np
 from numpy.typing import NDArray
 
-from ..estimation.lines import LineBasis
+from ..estimation.cache import Cache
 from ..estimation.regression import Regression
+from ..estimation.stretches import about_level, short_stretches
 from ..estimation.whitening import Whitener
 from ..joint.signals import Signals
 from ..support.display_units import brief
@@ -21,7 +22,7 @@ __all__ = ["free_paths", "leftover_of", "remainder_of", "unexplained_after"]
 Array = NDArray[np.float64]
 
 
-def leftover_of(signals: Signals, residual: Array, lines: LineBasis) -> Leftover:
+def leftover_of(signals: Signals, residual: Array, cache: Cache) -> Leftover:
     """Residuals with the signals of their readings; speed, load and temperature as factors."""
     factors: dict[str, Array] = {}
     if signals.velocity is not None:
@@ -40,7 +41,7 @@ def leftover_of(signals: Signals, residual: Array, lines: LineBasis) -> Leftover
         signals.clock,
         signals.time is not None,
         factors,
-        lines.once("left over", None, dict),
+        cache.of_motion("left over", None, dict),
     )
 
 
@@ -85,7 +86,9 @@ def path_evidence(regression: Regression) -> Evidence | None:
 def remainder_of(
     regression: Regression, without: Collection[int] = (), loose: bool = False
 ) -> Leftover:
-    """What a regression leaves: run effects taken off, outliers put to the limit.
+    """What a regression leaves: run effects taken off, outliers put to the level about them.
+
+    Where they last, to the limit.
 
     Structure without a name is left in it, and so are the terms ``without``; ``loose`` leaves free
     paths in time in it, too.
@@ -103,30 +106,26 @@ def remainder_of(
         if taken and term.run_effect is not None
     ]
     # Those kept alone: beside ones that are left in, each would take what the other gives.
-    noise = Whitener(regression.bounds, regression.whiten.rho, effects, regression.weights)
+    noise = Whitener(regression.bounds, regression.whiten.rho, effects, regression.readings.weights)
     left = left - noise.run_part(left)
     kept = left[~regression.outlying]
     if regression.outlying.any() and kept.size:
+        glitches = short_stretches(regression.outlying, regression.bounds)
+        left[glitches] -= about_level(left, regression.bounds)[glitches]
         left = np.clip(left, float(kept.min()), float(kept.max()))
-    return leftover_of(regression.signals, left * regression.root_weights, regression.lines)
+    return leftover_of(regression.signals, left * regression.root_weights, regression.cache)
 
 
 def unexplained_after(
-    regression: Regression,
-    sigma: float | None = None,
-    rounding: float = 0.0,
-    without: Collection[int] = (),
+    regression: Regression, sigma: float | None = None, rounding: float = 0.0
 ) -> Unexplained:
-    """Goodness of fit of what a regression leaves, up to the orders that it looks for.
-
-    Terms ``without`` count as left: those of findings that were not confirmed.
-    """
+    """Goodness of fit of what a regression leaves, up to the orders that it looks for."""
     path = path_evidence(regression)
     return goodness_of_fit(
-        remainder_of(regression, without),
+        remainder_of(regression),
         float(regression.lines.orders.max()),
         sigma,
         rounding,
-        None if path is None else remainder_of(regression, without, loose=True),
+        None if path is None else remainder_of(regression, loose=True),
         path,
     )

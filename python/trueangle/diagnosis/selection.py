@@ -14,7 +14,7 @@ from ..effects.missing_order import MissingOrder
 from ..effects.zero_slip import ZeroSlip
 from ..estimation.regression import BEYOND_SHOWN, Extension, Regression
 from ..support.deadline import pace
-from .candidates import Scores, extensions
+from .candidates import Candidate, Scores, extensions, propose
 from .forms import beside_bends, share_beside
 from .goodness import estimate_noise
 from .penalty import (
@@ -74,7 +74,9 @@ def select(
     if known:
         known_too = _pruned(_forward(regression.with_terms(known), list(EFFECTS)))
         return _priced_with_noise(_made_specific(known_too))
+    ahead = _specific_first(regression)
     direct = _pruned(_forward(regression, list(EFFECTS)))
+    direct = min([*ahead, direct], key=total_penalty)
     if pace().over:
         return direct
     direct = _with_lines_for_bumps(direct)
@@ -84,12 +86,52 @@ def select(
     if all(map(is_named, opened.terms)):
         return _priced_with_noise(_by_other_paths(regression, direct))
     # The other paths take long: the first of them tells whether they stand a chance.
-    settled = _forward(regression, on_runs(), total_penalty(direct))
-    specific_first = _pruned(_forward(settled, list(EFFECTS)))
-    chosen = min(direct, specific_first, key=total_penalty)
+    chosen = direct
+    if not ahead:
+        settled = _forward(regression, on_runs(), total_penalty(direct))
+        specific_first = _pruned(_forward(settled, list(EFFECTS)))
+        chosen = min(direct, specific_first, key=total_penalty)
     if total_penalty(opened) > total_penalty(chosen) - DECISIVE:
         chosen = _by_other_paths(regression, chosen)
     return _priced_with_noise(min(chosen, opened, key=total_penalty))
+
+
+def _specific_first(regression: Regression) -> list[Regression]:
+    """Over a part of a turn: the choice by a path that takes flexible causes last; else none.
+
+    A bump stands for several lines there, and a wander, whose search takes longest, for most else.
+    """
+    if regression.signals.run_turns().max() >= LocalDefect.flexible_below:
+        return []
+    specific = [cause for cause, effect in EFFECTS.items() if not effect.flexible_below]
+    start = _beside_repeats(regression)
+    if start is regression:
+        start = _forward(regression, on_runs())
+    return [_in_form(_pruned(_forward(_forward(start, specific), list(EFFECTS))))]
+
+
+def _in_form(regression: Regression) -> Regression:
+    """With the forms that causes of whole runs have beside all that was chosen since."""
+    for term in regression.terms:
+        effect = effect_of(term.cause)
+        alone = sum(other.cause == term.cause for other in regression.terms) == 1
+        if not (effect.acts_on_runs and alone):
+            continue
+        rest = regression.with_terms(t for t in regression.terms if t.cause != term.cause)
+        again = propose(effect, rest)
+        if again is not None and again.shape != term.shape:
+            other = rest.with_terms([*rest.terms, again])
+            regression = min(regression, other, key=total_penalty)
+    return regression
+
+
+def _beside_repeats(regression: Regression) -> Regression:
+    """With what acts on whole runs, as it shows beside an unknown pattern that repeats."""
+    beyond = regression.without_repeats()
+    if beyond is regression:
+        return regression
+    settled = _forward(_forward(beyond, on_runs()), (ZeroSlip.kind,))
+    return regression.with_terms(settled.terms)
 
 
 def _doubtful(regression: Regression) -> bool:
@@ -141,11 +183,9 @@ def _by_other_paths(regression: Regression, direct: Regression) -> Regression:
     specific = [cause for cause, effect in EFFECTS.items() if not effect.flexible_below]
     goal = total_penalty(direct)
     starts = [_forward(regression, on_runs(), goal)]
-    beyond = regression.without_repeats()
-    if beyond is not regression:
-        # What acts on whole runs shows best beside an unknown pattern that repeats.
-        settled = _forward(_forward(beyond, on_runs()), (ZeroSlip.kind,))
-        starts.append(regression.with_terms(settled.terms))
+    settled = _beside_repeats(regression)
+    if settled is not regression:
+        starts.append(settled)
     elif any(is_flexible(effect_of(cause)) for cause in found):
         slip = ZeroSlip.propose(regression)
         if slip is not None and slip.bic_gain > NEW_CAUSE:
@@ -211,16 +251,22 @@ def _forward(regression: Regression, causes: Sequence[str], goal: float = np.inf
 
     Where these alone cannot come down to a penalty of ``goal``, the walk ends early.
     """
-    found: Regression = regression.asked(
-        ("forward", goal, *causes), lambda: _grown(regression, causes, goal)
-    )
-    return found
+
+    def build() -> Regression | None:
+        grown = _grown(regression, causes, goal)
+        # Not itself: what holds itself is not let go of.
+        return None if grown is regression else grown
+
+    grown = regression.cache.of_fit(("forward", goal, *causes), build)
+    return regression if grown is None else grown
 
 
 def _grown(regression: Regression, causes: Sequence[str], goal: float) -> Regression:
+    found: list[Candidate] = []
     while len(regression.terms) < MOST_TERMS and not regression.is_explained:
         scores = Scores()
-        best = scores.best(extensions(regression, causes, scores.least))
+        found = extensions(regression, causes, scores.least, found)
+        best = scores.best(found)
         # A step that was not finished chose among some only: it chose nothing.
         if best is None or pace().over:
             return regression

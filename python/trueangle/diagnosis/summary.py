@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-import textwrap
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
 from ..effects import EFFECTS
 from ..effects.blindness import Blindness
 from ..estimation.estimate import Quantity
-from ..support.display_units import ErrorsIn, ErrorUnit, error_unit
+from ..support.display_units import ErrorsIn, ErrorUnit, error_unit, sine_of_rms
+from ..support.layout import laid_out
+from ..support.layout import wrapped as _wrapped
 from .beliefs import Belief
 from .brief import brief_of
 from .goodness.evidence import Evidence
@@ -21,9 +22,6 @@ if TYPE_CHECKING:
     from .findings import Diagnosis, Finding
 
 __all__ = ["finding_text", "headline", "render"]
-
-WIDTH = 88
-
 
 #: Share by which the noise must differ from what the simulation states to be told first.
 MATERIAL = 0.1
@@ -38,6 +36,7 @@ _SHUFFLED = {
     "temperature": "temperatures exchanged between runs",
     "torque": "loads exchanged between runs",
     "mount": "mounts exchanged between runs",
+    "coupled": "motions of the other joint moved in time and turned round at random",
 }
 
 #: Numbers that are no errors, which `ErrorUnit.pair` rounds as well.
@@ -50,7 +49,7 @@ def render(diagnosis: Diagnosis, errors_in: ErrorsIn = "auto", verbose: bool = F
     ``verbose`` tells in full what the readings could not have shown, and nobody asked.
     """
     d = diagnosis.discrepancy
-    unit = error_unit(errors_in, d.max_abs)
+    unit = error_unit(errors_in, sine_of_rms(d.rms))
     n = unit.number
     lines = [
         *headline(diagnosis, unit),
@@ -66,9 +65,10 @@ def render(diagnosis: Diagnosis, errors_in: ErrorsIn = "auto", verbose: bool = F
     ]
     if diagnosis.structure:
         shares = [f"{cause} {100.0 * s:.0f} %" for cause, s in diagnosis.structure.items()]
-        lines += _wrapped(f"Of the variance each alone takes up: {', '.join(shares[:6])}.", 0)
+        lines += _wrapped(f"Of the variance each alone takes up: {', '.join(shares[:6])}.", 2)
     if diagnosis.readings_used < diagnosis.readings:
-        lines.append(f"{diagnosis.readings_used} of the readings, spread evenly, were used.")
+        used = f"{diagnosis.readings_used} of the readings were used: spread evenly, and none"
+        lines += _wrapped(f"{used} at a turning point, where the direction is not known.", 0)
     for k, finding in enumerate(diagnosis.findings, 1):
         lines += ["", *_finding(f"{k}. ", finding, unit)]
     wrong = [belief for belief in diagnosis.beliefs if belief.verdict != "confirmed"]
@@ -85,10 +85,12 @@ def render(diagnosis: Diagnosis, errors_in: ErrorsIn = "auto", verbose: bool = F
     )
     lines += ["", *_wrapped(together, 2)]
     open_still = [*untold(diagnosis, verbose, lambda spot: _if_it_is(spot, unit))]
+    if diagnosis.next_runs is not None and diagnosis.next_runs.runs:
+        lines += ["", *diagnosis.next_runs.summary().splitlines()]
     lines += [""] if open_still else []
     for text, indent, first in open_still:
         lines += _wrapped(text, indent, first)
-    return "\n".join(lines)
+    return laid_out(lines)
 
 
 def _if_it_is(spot: Blindness, unit: ErrorUnit) -> Iterator[str]:
@@ -185,8 +187,8 @@ def _chance(p: float) -> str:
 
 def finding_text(finding: Finding) -> str:
     """One finding by itself."""
-    largest = 0.0 if finding.gain is None else finding.gain.before[2]
-    return "\n".join(_finding("", finding, error_unit("auto", largest)))
+    rms = 0.0 if finding.gain is None else finding.gain.before[0]
+    return "\n".join(_finding("", finding, error_unit("auto", sine_of_rms(rms))))
 
 
 def _finding(number: str, finding: Finding, unit: ErrorUnit) -> list[str]:
@@ -274,7 +276,3 @@ def _number(value: Any, of: ErrorUnit) -> str:
     if isinstance(value, float) and not (of is _PLAIN and value.is_integer()):
         return of.number(value)
     return f"{value:.0f}" if isinstance(value, float) else str(value)
-
-
-def _wrapped(text: str, indent: int, first: int = 0) -> list[str]:
-    return textwrap.wrap(text, WIDTH, initial_indent=" " * first, subsequent_indent=" " * indent)

@@ -101,7 +101,7 @@ class UnnamedPattern(Effect):
     def propose(cls, regression: Regression) -> Extension | None:
         """The modulator and orders with the most evidence."""
         signals = regression.signals
-        known = regression.lines.once("modulators", None, lambda: modulators(signals))
+        known = regression.cache.of_motion("modulators", None, lambda: modulators(signals))
         if not known:
             return None
         orders = regression.lines.orders
@@ -169,7 +169,7 @@ class UnnamedLine(Effect):
         """Orders of the angle, beside those that all runs have in common: these have names."""
         theta = regression.signals.theta
         columns = np.hstack([line_columns(theta, m) for m in range(1, top + 1)])
-        return regression.beside(columns).propose_run_effect(
+        return regression.jointly_with(columns).propose_run_effect(
             UNNAMED_LINE, {"orders": top}, columns / np.sqrt(top), float(np.log(3.0))
         )
 

@@ -34,12 +34,15 @@ def untold(
     What was not asked, and is not seen either, is named in one line, but where ``verbose``.
     ``sizes`` gives what each cause of a blind spot would amount to.
     """
+    plan = diagnosis.next_runs
+    planned = {entry.causes for entry in (plan.between if plan and plan.runs else ()) if entry.told}
     spots = sorted(diagnosis.not_identifiable, key=lambda spot: not spot.supported)
     shown = [spot for spot in spots if verbose or matters(spot, diagnosis)]
     if shown:
         yield "What these readings cannot tell:", 0, 0
     for spot in shown:
-        yield f"- {_head(spot)}: {spot.because}. To tell: {spot.measure}.", 2, 0
+        how = "" if spot.causes in planned and not verbose else f" To tell: {spot.measure}."
+        yield f"- {_head(spot)}: {spot.because}.{how}", 2, 0
         for text in sizes(spot):
             yield text, 6, 4
     named = {finding.cause for finding in diagnosis.findings}

@@ -25,6 +25,7 @@ from .filter_lag import FilterLag as FilterLag
 from .channel_skew import ChannelSkew as ChannelSkew
 from .load_dependent_gear_error import LoadDependentGearError as LoadDependentGearError
 from .current_coupling import CurrentCoupling as CurrentCoupling
+from .joint_coupling import JointCoupling as JointCoupling
 from .stiffening_compliance import StiffeningCompliance as StiffeningCompliance
 from .presliding_hysteresis import PreslidingHysteresis as PreslidingHysteresis
 from .direction_dependent_pattern import DirectionalPattern as DirectionalPattern

@@ -75,7 +75,7 @@ class ArgumentShift(Effect):
         # paid for; c is fitted for the report only.
         if regression.around.pattern.orders.size == 0 or regression.has(cls.kind):
             return None
-        columns = regression.remembered(
+        columns = regression.of_pattern(
             cls.kind, None, lambda: cls.columns(regression.signals, regression.around, {})
         )
         deviance = float(regression.fixed_gains(-columns)[0])

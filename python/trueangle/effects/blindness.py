@@ -52,6 +52,8 @@ class Blindness(Shown):
         By how much BIC is better with it.
     estimates : dict of str to Parameters
         What each of the causes would be if it alone were the one; where something is seen.
+    hypotheses : dict of str to tuple of Effect
+        The same as effects of a simulation, lines too: what a plan of further runs assumes.
     factor : str
         What in the design of the runs is at fault: "grid", "mount", "torque", "velocity",
         "temperature", "direction", "run", "time".
@@ -69,6 +71,7 @@ class Blindness(Shown):
     estimates: dict[str, Parameters] = field(default_factory=dict)
     factor: str = "run"
     common: str = ""
+    hypotheses: dict[str, tuple[Any, ...]] = field(default_factory=dict, repr=False, compare=False)
 
     def _brief(self) -> str:
         seen = "one of them is seen" if self.supported else "not seen"

@@ -90,7 +90,7 @@ class ChannelSkew(Effect):
         signals, around = regression.signals, regression.around
         pair = cls.columns(signals, around, {})
         free, coefficients = regression.gain(pair)
-        if regression.hopeless(free, 2) or _is_part_of_a_line(regression):
+        if regression.is_pruned(free, 2) or _is_part_of_a_line(regression):
             return None
         # The constant part is as large as the line: which of the two signs, the data say.
         phase = float(np.arctan2(*coefficients))

@@ -133,9 +133,12 @@ class DriftWithinRun(Effect):
     def propose(cls, regression: Regression) -> Extension | None:
         if regression.has(cls.kind):
             return None
+        signals = regression.signals
+        if signals.time is None and signals.runs == 1 and np.ptp(signals.segment) == 0:
+            return None  # one pass without times: the order of the rows is that of the angles
         extensions = [cls._proposal(regression, form) for form in FORMS]
         best = max(extensions, key=lambda p: p.bic_gain)
-        if regression.beaten(best.deviance, 1, best.log_grid):
+        if regression.is_dominated(best.deviance, 1, best.log_grid):
             return best
         best = cls._finer(regression, best)
         if best.bic_gain <= regression.least:
@@ -176,7 +179,7 @@ class DriftWithinRun(Effect):
 
     @classmethod
     def _proposal(cls, regression: Regression, form: str, terms: int = WANDER_TERMS) -> Extension:
-        columns = regression.lines.once(
+        columns = regression.cache.of_motion(
             f"{form} {terms}",
             None,
             lambda: RunEffectColumns(cls._shapes(regression, form, terms), regression.bounds),

@@ -72,7 +72,7 @@ class Effect:
     draws_zeros : bool
         It leaves each run with a zero of its own, which held-out runs then get too.
     has_exact_form : bool
-        Its form leaves nothing of it, however large it is: steps of a zero.
+        Its form leaves nothing of it, however large it is: steps of a zero, ratios of teeth.
     changes_lines : bool
         It takes or gives a part of the pattern's own lines on average.
     is_doubted : bool
@@ -152,6 +152,11 @@ class Effect:
         and there is nothing else to draw.
         """
         return cls(size)  # type: ignore[call-arg]
+
+    @classmethod
+    def alike(cls, other: Effect, around: Surroundings) -> Self | None:
+        """The same error from this cause, where one design cannot tell it from ``other``."""
+        return None
 
     # -- diagnose ------------------------------------------------------------------
 

@@ -119,7 +119,7 @@ class FilterLag(Effect):
         top = float(pattern.orders.max() * np.abs(signals.turns_per_s).max())
         if top == 0.0:
             return None
-        waves, frequency = regression.remembered(
+        waves, frequency = regression.of_pattern(
             "waves",
             None,
             lambda: (
@@ -135,7 +135,7 @@ class FilterLag(Effect):
         cutoffs = top * CUTOFFS
 
         def grid(damping: float | None) -> Array:
-            columns = regression.remembered(
+            columns = regression.of_pattern(
                 f"lagged {damping}",
                 None,
                 lambda: np.column_stack(
@@ -146,8 +146,8 @@ class FilterLag(Effect):
 
         grids: dict[float | None, Array] = {None: grid(None)}
         coarse = float(grids[None].max())
-        unlikely = regression.hopeless(coarse, 1, REFINED_FROM)
-        if not (unlikely or regression.beaten(coarse, 1, REFINED_FROM)):
+        unlikely = regression.is_pruned(coarse, 1, REFINED_FROM)
+        if not (unlikely or regression.is_dominated(coarse, 1, REFINED_FROM)):
             grids |= {damping: grid(damping) for damping in DAMPING}
         step = float(np.log(CUTOFFS[1] / CUTOFFS[0]))
         best: Extension | None = None

@@ -9,7 +9,8 @@ from typing import ClassVar, Self
 import numpy as np
 
 from ..estimation.estimate import Parameters, quantity
-from ..estimation.regression import EXCITED, Regression
+from ..estimation.projection import EXCITED
+from ..estimation.regression import Regression
 from ..joint.pattern import Surroundings
 from ..joint.signals import Signals
 from .effect import Effect

@@ -77,7 +77,7 @@ class Latency(Effect):
     def propose(cls, regression: Regression) -> Extension | None:
         if regression.signals.velocity is None or regression.has(cls.kind):
             return None
-        columns = regression.remembered(
+        columns = regression.of_pattern(
             cls.kind, None, lambda: cls.columns(regression.signals, regression.around, {})
         )
         return regression.propose(cls.kind, {}, columns)

@@ -176,7 +176,7 @@ class LoadDependentGearError(FactorEffect):
             loaded = torque_of(signals)[:, None] * line_columns(signals.theta, m)
             return share_left(regression, loaded, beside) < OWN_POWER
 
-        return bool(regression.remembered(f"{cls.kind} as lines", None, build))
+        return bool(regression.of_pattern(f"{cls.kind} as lines", None, build))
 
     @classmethod
     def doubt(

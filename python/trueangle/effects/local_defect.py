@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from copy import copy
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any, ClassVar, Self
@@ -15,7 +14,6 @@ from ..errors import ArgumentError
 from ..estimation.estimate import Parameters, quantity
 from ..estimation.extension import Extension
 from ..estimation.regression import Regression
-from ..joint.grid import uniform_grid
 from ..joint.pattern import Surroundings
 from ..joint.signals import Signals
 from ..model import forms
@@ -126,7 +124,10 @@ class LocalDefect(Effect):
         joint = regression.around.joint
         log_grid = float(np.log(len(joint.shafts) * 360.0))
         best: Extension | None = None
+        grid = regression.signals.grid
         for shaft, cycles in joint.shafts.items():
+            if grid is not None and 2.0 * cycles > grid.positions:
+                continue  # the readings are too few a turn of it to show a place
             reached: list[tuple[float, float]] = []
             for score, place, width in cls._search(regression, cycles, e):
                 if pace().over:
@@ -136,7 +137,7 @@ class LocalDefect(Effect):
                     continue
                 shape: dict[str, Any] = {"shaft": shaft, "place_deg": place, "width_deg": width}
                 if not (
-                    regression.hopeless(score / regression.variance, 3, log_grid)
+                    regression.is_pruned(score / regression.variance, 3, log_grid)
                     or cls._is_beaten(regression, shape, log_grid)
                 ):
                     shape = cls._refined(regression, shaft, place, width)
@@ -159,7 +160,7 @@ class LocalDefect(Effect):
         if regression.least <= 0.0:
             return False
         columns = cls.columns(regression.signals, regression.around, shape)
-        return regression.beaten(float(regression.gains(columns)[0]), 3, log_grid)
+        return regression.is_dominated(float(regression.gains(columns)[0]), 3, log_grid)
 
     @staticmethod
     def _search(
@@ -234,10 +235,7 @@ class LocalDefect(Effect):
                 return shape
             bump = regression.propose(cls.kind, shape, columns)
             full = regression.with_terms([*regression.terms, bump], regression.whiten.rho)
-            seen = copy(regression)
-            y = regression.whiten(full.target)
-            seen.r = y - regression.q @ (regression.q.T @ y)
-            seen.rss = float(seen.r @ seen.r)
+            seen = regression.of_target(full.target)
             shape = cls._refined(seen, shape["shaft"], shape["place_deg"], shape["width_deg"])
         return shape
 
@@ -284,7 +282,7 @@ class LocalDefect(Effect):
 
     @classmethod
     def blind_spots(cls, regression: Regression, found: Sequence[Blindness]) -> Iterator[Blindness]:
-        grid = uniform_grid(regression.signals.theta)
+        grid = regression.signals.grid
         if grid is None or grid.positions > 2.0 * regression.lines.orders.max():
             return
         gear = _gear_lines(regression.belief)

@@ -11,7 +11,6 @@ import numpy as np
 from ..estimation.estimate import Parameters, quantity
 from ..estimation.extension import Extension
 from ..estimation.regression import Regression
-from ..joint.grid import uniform_grid
 from ..joint.pattern import Surroundings, line_columns, line_sum
 from ..joint.signals import Signals
 from .blindness import (
@@ -91,6 +90,11 @@ class MissingOrder(Effect):
         penalties = 2.0 * np.log(np.where(lines.plausible, 2 * expected, 2 * gains.size))
         # Less than half a period is a bend, and anything slow bends.
         gains = np.where(lines.orders * regression.signals.run_turns().max() < HALF, 0.0, gains)
+        # At equal steps higher orders are the same numbers as low ones, but for the error by
+        # which the angles miss the steps: what tells them apart there is the noise.
+        grid = regression.signals.grid
+        if grid is not None:
+            gains = np.where(2.0 * lines.orders > grid.positions, 0.0, gains)
         best = int(np.argmax(gains - penalties))
         if gains[best] <= 0.0:
             return None
@@ -156,7 +160,7 @@ class MissingOrder(Effect):
             return None
         order = float(extension.shape["output_order"])
         torque = regression.signals.torque
-        grid = uniform_grid(regression.signals.theta)
+        grid = regression.signals.grid
         gear = [] if grid is None else known_orders(regression.belief)
         for spot in spots:
             # The lowest order is meant, but where one that the gear has looks the same.

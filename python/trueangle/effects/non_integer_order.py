@@ -107,7 +107,7 @@ class NonIntegerOrder(Effect):
         penalty = cls._log_grid(regression, orders)
         net = power - 2.0 * penalty
         top = int(np.argmax(net))
-        if regression.beaten(float(power[top]), 1, float(penalty[top])):
+        if regression.is_dominated(float(power[top]), 1, float(penalty[top])):
             return None
         peaks = np.flatnonzero((net[1:-1] >= net[:-2]) & (net[1:-1] >= net[2:])) + 1
         for k in peaks[np.argsort(net[peaks])[::-1][:PEAKS]]:
@@ -118,7 +118,7 @@ class NonIntegerOrder(Effect):
                 best = extension
         if best is None or best.bic_gain < 0.0:
             return best
-        if regression.beaten(best.deviance, 1, best.log_grid):
+        if regression.is_dominated(best.deviance, 1, best.log_grid):
             return best
         middle, log_grid = best.shape["order"], best.log_grid
         order, _ = golden_maximum(
@@ -183,7 +183,7 @@ class NonIntegerOrder(Effect):
         orders = low + step * np.arange(count, dtype=np.float64)
         e = regression.left - regression.whiten.run_part(regression.left)
         e = np.where(regression.outlying, 0.0, e)
-        spectrum: OrderSpectrum = regression.lines.once(
+        spectrum: OrderSpectrum = regression.cache.of_motion(
             cls.kind,
             (low, step, count),
             lambda: OrderSpectrum(theta, starts.tolist(), low, step, count),

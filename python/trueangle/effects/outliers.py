@@ -1,4 +1,4 @@
-"""Isolated readings that are far off."""
+"""Isolated readings, or a few in a row, that are far off."""
 
 from __future__ import annotations
 
@@ -12,11 +12,12 @@ from numpy.typing import NDArray
 
 from ..estimation.estimate import Parameters, quantity
 from ..estimation.regression import Regression
+from ..estimation.stretches import MOST_IN_ROW, about_level, stretches, within
 from ..joint.pattern import Surroundings
 from ..joint.signals import Signals
 from .effect import Effect
 from .local_defect import LocalDefect
-from .scatter import ScatterFinding, standardised
+from .scatter import ScatterFinding
 from .search import (
     Array,
 )
@@ -27,8 +28,8 @@ __all__ = ["Outliers"]
 TAILS = (2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 12.0, 20.0, 40.0)
 SIZES = (3.0, 10.0, 100.0)
 
-#: An outlier's neighbours are smaller by this factor; of the stretches of
-#: outliers at least this share must be such single ones.
+#: What stands next to outliers is smaller by this factor; of the stretches of
+#: outliers at least this share must be such short ones.
 BESIDE = 0.5
 ISOLATED = 0.5
 
@@ -70,7 +71,7 @@ MOST_APART = 0.01
 
 @dataclass(frozen=True)
 class Outliers(Effect):
-    """Isolated outliers: a share of the readings gets a normal error of its own.
+    """Isolated outliers and bursts: a share of the readings gets a normal error of its own.
 
     Parameters
     ----------
@@ -86,8 +87,8 @@ class Outliers(Effect):
     kind: ClassVar[str] = "outliers"
     size_name: ClassVar[str] = "size_arcsec"
     sentence: ClassVar[str] = (
-        "Single readings are far off (bit flips, glitches, mistaken entries) and their neighbours "
-        "are not."
+        "Single readings, or a few in a row, are far off (bit flips, glitches, mistaken entries) "
+        "and their neighbours are not."
     )
     factor: ClassVar[str] = "none"
     measure: ClassVar[str] = "more readings, each taken twice"
@@ -132,15 +133,13 @@ class Outliers(Effect):
             if rows.size == 0:
                 return None
             share, size = rows.size / n, float(np.sqrt(np.mean(e[rows] ** 2))) / scale
-        alone = rows[_isolated(regression, rows)]
-        stretches = 1 + np.count_nonzero(np.diff(rows) > 1)
-        bursts = 0
+        kept = _glitches(_unfiltered(regression), rows, regression.bounds)
         if _is_scattered(regression, rows):
-            bursts = int(np.count_nonzero(_lengths(rows) > 1))
-        elif alone.size >= ISOLATED * stretches:
-            rows = alone
-        else:
+            kept = rows
+        elif len(_lengths(regression, kept)) < ISOLATED * len(_lengths(regression, rows)):
             return None
+        rows = kept
+        bursts = int(np.count_nonzero(_lengths(regression, rows) > 1))
         if _at_reversals(regression, rows):
             return None
         spread = size * scale * np.sqrt(regression.variance)
@@ -187,25 +186,25 @@ def _beside_neighbours(regression: Regression) -> Array:
     .. math:: e_k - \frac{\rho}{1 + \rho^2}(e_{k-1} + e_{k+1})
 
     is what a correlation leaves of one reading. Whitened residuals show a wild reading twice,
-    and what lasts over many readings as large as it is. White noise stays as it is.
+    and what lasts over many readings as large as it is. White noise stays as it is. Wild
+    readings are held against the level about them, and tell nothing of their neighbours.
     """
-    rho = regression.whiten.rho
-    if rho == 0.0:
-        return standardised(regression)
-    left = regression.left - regression.whiten.run_part(regression.left)
-    left = left * regression.root_weights
-    e = _interpolated(left, rho, regression.bounds)
-    spread = 1.4826 * float(np.median(np.abs(e)))
-    # Its neighbours are not wild where a reading that stands out alone makes them so.
-    wild = np.abs(e) > WILD * spread
-    alone = np.flatnonzero(wild)
-    alone = alone[_isolated(regression, alone)]
+    left = _unfiltered(regression)
+    away = about_level(left, regression.bounds)
+    wild = np.abs(away) > WILD * 1.4826 * float(np.median(np.abs(away)))
+    rows = _glitches(left, np.flatnonzero(wild), regression.bounds)
     known = left.copy()
-    known[alone] -= e[alone]
-    return np.asarray(
-        np.where(np.isin(np.arange(e.size), alone), e, _interpolated(known, rho, regression.bounds))
-        / max(spread, 1e-300)
-    )
+    known[rows] -= away[rows]
+    e = _interpolated(known, regression.whiten.rho, regression.bounds)
+    spread = 1.4826 * float(np.median(np.abs(e)))
+    e[rows] = away[rows]
+    return np.asarray(e / max(spread, 1e-300))
+
+
+def _unfiltered(regression: Regression) -> Array:
+    """What is left, weighed and not whitened."""
+    left = regression.left - regression.whiten.run_part(regression.left)
+    return np.asarray(left * regression.root_weights)
 
 
 def _interpolated(left: Array, rho: float, bounds: list[tuple[int, int]]) -> Array:
@@ -221,24 +220,36 @@ def _interpolated(left: Array, rho: float, bounds: list[tuple[int, int]]) -> Arr
     return out
 
 
-def _isolated(regression: Regression, rows: NDArray[np.int64]) -> NDArray[np.bool_]:
-    """Which of ``rows`` are far larger than the readings next to them in their run.
+def _glitches(
+    left: Array, rows: NDArray[np.int64], bounds: list[tuple[int, int]]
+) -> NDArray[np.int64]:
+    """Those of ``rows`` that stand in short stretches with an abrupt beginning and end.
 
-    A glitch is over with the next reading; what lasts (a transition at a reversal, a
-    manoeuvre) is an error of the mean.
+    A glitch is over within a few readings, and those next to it in its run are far smaller;
+    what lasts (a transition at a reversal, a manoeuvre) or fades is an error of the mean.
     """
-    size = np.abs(regression.left - regression.whiten.run_part(regression.left))
-    padded = np.concatenate([[0.0], size, [0.0]])
-    first = np.array([start for start, _ in regression.bounds])
-    before, after = padded[:-2].copy(), padded[2:].copy()
-    before[first] = after[first[1:] - 1] = 0.0
-    return np.asarray(np.maximum(before, after)[rows] < BESIDE * size[rows])
+    away = np.pad(np.abs(about_level(left, bounds)), 1)
+    ends = np.zeros(left.size + 1, dtype=bool)
+    ends[[0, *(stop for _, stop in bounds)]] = True
+    flags = _flags(rows, left.size)
+    starts, stops = stretches(flags, bounds)
+    before = np.where(ends[starts], 0.0, away[starts])
+    after = np.where(ends[stops], 0.0, away[stops + 1])
+    abrupt = (before < BESIDE * away[starts + 1]) & (after < BESIDE * away[stops])
+    abrupt &= stops - starts <= MOST_IN_ROW
+    return np.flatnonzero(within(starts[abrupt], stops[abrupt], left.size))
 
 
-def _lengths(rows: NDArray[np.int64]) -> NDArray[np.int64]:
+def _flags(rows: NDArray[np.int64], n: int) -> NDArray[np.bool_]:
+    found = np.zeros(n, dtype=bool)
+    found[rows] = True
+    return found
+
+
+def _lengths(regression: Regression, rows: NDArray[np.int64]) -> NDArray[np.int64]:
     """Lengths of the stretches of rows that follow each other."""
-    edges = np.flatnonzero(np.diff(rows) > 1) + 1
-    return np.diff(np.concatenate([[0], edges, [rows.size]]))
+    starts, stops = stretches(_flags(rows, regression.n), regression.bounds)
+    return stops - starts
 
 
 def _is_scattered(regression: Regression, rows: NDArray[np.int64]) -> bool:
@@ -258,7 +269,7 @@ def _at_reversals(regression: Regression, rows: NDArray[np.int64]) -> bool:
     near = np.zeros(regression.n, dtype=bool)
     for shift in range(-NEAR_REVERSAL, NEAR_REVERSAL):
         near[np.clip(cuts + shift, 0, regression.n - 1)] = True
-    share = float(near[rows].mean())
+    share = float(near[rows].mean()) if rows.size else 0.0
     return share > ISOLATED and share > 2.0 * float(near.mean())
 
 

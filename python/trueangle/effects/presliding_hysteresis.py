@@ -114,7 +114,7 @@ class PreslidingHysteresis(Effect):
             return None
         best: tuple[float, float, float] | None = None
         for start in (0.0, 1.0):
-            columns = regression.lines.once(
+            columns = regression.cache.of_motion(
                 f"presliding {start}",
                 None,
                 lambda start=start: np.column_stack(  # type: ignore[misc]
@@ -132,7 +132,7 @@ class PreslidingHysteresis(Effect):
             return None
         step = np.log(LENGTHS[1] / LENGTHS[0])
         log_length = float(np.log(length))
-        if not regression.beaten(gain, 2, float(np.log(2.0))):
+        if not regression.is_dominated(gain, 2, float(np.log(2.0))):
             log_length, _ = golden_maximum(
                 lambda x: float(regression.gains(signals.presliding(np.exp(x), start)[:, None])[0]),
                 log_length - step,

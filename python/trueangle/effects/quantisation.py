@@ -23,6 +23,9 @@ __all__ = ["Quantisation"]
 #: Share of the noise's variance from which on the rounding of the readings is its cause.
 LEAST_SHARE = 0.2
 
+#: Beyond it the lattice is no rounding of the sensor's: a rounding leaves its own variance.
+MOST_SHARE = 2.0
+
 
 @dataclass(frozen=True)
 class Quantisation(Effect):
@@ -61,7 +64,7 @@ class Quantisation(Effect):
     def find_scatter(cls, regression: Regression) -> ScatterFinding | None:
         step = regression.signals.count
         share = step**2 / 12.0 / max(regression.variance, 1e-300)
-        if regression.is_explained or share < LEAST_SHARE:
+        if regression.is_explained or not LEAST_SHARE < share < MOST_SHARE:
             return None
         # Of n readings each falls on the lattice by a chance of its tolerance.
         gain = 2.0 * regression.n * float(np.log(10.0)) - regression.log_n

@@ -95,6 +95,13 @@ class ReferenceLines(Effect):
         return cls((order,), (size,), (phase(rng),))
 
     @classmethod
+    def alike(cls, other: Effect, around: Surroundings) -> Self | None:
+        if not isinstance(other, MissingOrder):
+            return None
+        order = around.joint.output_order(other.shaft, other.order)
+        return cls((order,), (other.amplitude_arcsec,), (other.phase_deg,))
+
+    @classmethod
     def propose(cls, regression: Regression) -> Extension | None:
         mount = regression.signals.mount
         if mount is None or np.ptp(mount) == 0.0:

@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 from ..estimation.batch import Blocks
 from ..estimation.extension import Extension
 from ..estimation.regression import Regression
-from ..joint.grid import uniform_grid
 from ..joint.pattern import Surroundings
 from .blindness import Blindness
 
@@ -53,7 +52,7 @@ def best_shape(
     if not shapes:
         return None
     signals, around = regression.signals, regression.around
-    remembered = regression.lines.once if effect.of_motion else regression.remembered
+    remembered = regression.cache.of_motion if effect.of_motion else regression.of_pattern
     blocks: Blocks = remembered(
         effect.kind,
         repr(shapes),
@@ -133,7 +132,7 @@ def is_gear_order(around: Surroundings, order: float) -> bool:
 
 def grid_doubt(regression: Regression, spots: Sequence[Blindness]) -> Blindness | None:
     """On a grid of positions: lines behind aliases, which change from run to run as noise does."""
-    if uniform_grid(regression.signals.theta) is None:
+    if regression.signals.grid is None:
         return None
     return next((spot for spot in spots if spot.factor == "grid"), None)
 

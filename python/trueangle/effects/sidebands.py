@@ -100,8 +100,11 @@ class Sidebands(Effect):
         shapes: list[dict[str, Any]] = []
         # Over less than that the pair and the line between them are hardly told apart.
         offsets = [k for k in (1, 2) if k * travel > RESOLVED]
+        grid = regression.signals.grid
         for m in carriers:
             for k in offsets:
+                if grid is not None and 2.0 * (m + k) > grid.positions:
+                    continue  # the same numbers as low orders
                 forms = ["free"]
                 if not {m - k, m + k} & known:
                     forms = ["AM", "PM", "free"] if m in present else ["free"]

@@ -108,13 +108,13 @@ class TimePeriodic(Effect):
             return None
         frequencies, p, sizes = found
         # No frequency of its own in every run can bring more.
-        if regression.beaten(float(p.max(axis=0).sum()), 1, np.log(frequencies.size)):
+        if regression.is_dominated(float(p.max(axis=0).sum()), 1, np.log(frequencies.size)):
             return None
         tried = [_fixed(frequencies, p, sizes), _wandering(frequencies, p)]
         best: Extension | None = None
         for place, deviance, log_grid in tried:
-            unlikely = regression.hopeless(deviance, 1, log_grid)
-            if unlikely or regression.beaten(deviance, 1, log_grid):
+            unlikely = regression.is_pruned(deviance, 1, log_grid)
+            if unlikely or regression.is_dominated(deviance, 1, log_grid):
                 continue
             shape = {"frequency_hz": frequencies[place].tolist()}
             step = frequencies[1] - frequencies[0]

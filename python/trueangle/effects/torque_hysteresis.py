@@ -97,7 +97,7 @@ class TorqueHysteresis(Effect):
         if torque is None or not torque.any() or len(present) >= MOST_ELEMENTS:
             return None
         spans = SPANS * float(np.abs(torque).max())
-        loops = regression.lines.once(
+        loops = regression.cache.of_motion(
             cls.kind,
             None,
             lambda: np.column_stack([cls.loop(regression.signals, float(s)) for s in spans]),
@@ -109,7 +109,7 @@ class TorqueHysteresis(Effect):
             return None
         span = float(spans[k])
         gain = float(gains[k])
-        if not (regression.hopeless(gain, 2) or regression.beaten(gain, 2)):
+        if not (regression.is_pruned(gain, 2) or regression.is_dominated(gain, 2)):
             step = float(np.log(SPANS[1] / SPANS[0]))
             log_span, _ = golden_maximum(
                 lambda x: float(

@@ -111,7 +111,7 @@ class TorsionalCompliance(FactorEffect):
             first = line_columns(signals.theta, 1)
             return share_left(regression, torque, first) < OWN_POWER
 
-        return bool(regression.remembered(f"{cls.kind} as a line", None, build))
+        return bool(regression.of_pattern(f"{cls.kind} as a line", None, build))
 
     def to_terms(self, period: float, shafts: Mapping[str, float]) -> tuple[Term, ...]:
         lines = line_values(self.lines_per_Nm, period)

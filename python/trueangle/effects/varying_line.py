@@ -114,7 +114,7 @@ class VaryingLine(Effect):
         if best.bic_gain < regression.least:
             return best
         # What varies is told by what it leaves of the line as it is, which comes first.
-        steady = regression.beside(line_columns(signals.theta, best.shape["order"]))
+        steady = regression.jointly_with(line_columns(signals.theta, best.shape["order"]))
         beyond = steady.gain(best.columns)[0]
         return replace(best, deviance=min(best.deviance, beyond))
 

@@ -9,6 +9,7 @@ from trueangle.diagnosis.discrepancy import noise_from_repeats
 from trueangle.effects.bends import LAG, _late
 from trueangle.estimation.batch import Blocks
 from trueangle.estimation.factor import Factor
+from trueangle.estimation.projection import project
 from trueangle.estimation.ratio import best_ratio
 from trueangle.estimation.regression import Regression
 from trueangle.estimation.runcolumns import RunEffectColumns
@@ -40,7 +41,7 @@ def space():
     runs = simulate(sim, 11)
     residual = np.concatenate([run.error for run in runs]) * 3600.0
     signals = join_runs(runs)
-    return Regression(signals, residual - sim.predict(signals), sim.surroundings)
+    return Regression.of(signals, residual - sim.predict(signals), sim.surroundings)
 
 
 def dense_covariance(space, rho, effects, weights):
@@ -116,11 +117,9 @@ def test_products_under_a_noise_need_no_mapped_columns(space, noise):
 def test_gains_of_blocks_are_those_of_each(space, noise):
     rng = np.random.default_rng(4)
     columns = [rng.standard_normal((space.n, 1 + k % 2)) for k in range(7)]
-    space.weights = noise["weights"]
-    space = space.with_terms([], rho=noise["rho"])
-    space._project(space.target, noise["rho"], noise["effects"])
-    singly = [space.gain(block)[0] for block in columns]
-    assert space.block_gains(Blocks(columns)) == pytest.approx(singly, rel=1e-7)
+    known = project(Factor.of((space.base,), space.bounds, **noise), space.target)
+    singly = [known.gain(block)[0] for block in columns]
+    assert known.block_gains(Blocks(columns)) == pytest.approx(singly, rel=1e-7)
 
 
 def test_a_factor_that_grows_is_the_one_made_at_once(space, noise):
@@ -223,7 +222,7 @@ def test_scores_beside_further_columns_are_those_with_them_fitted(space):
     rng = np.random.default_rng(8)
     known, others = rng.standard_normal((space.n, 2)), rng.standard_normal((space.n, 4))
     space.line_gains()  # what it keeps for itself must not be kept for the other
-    beside = space.beside(known)
+    beside = space.jointly_with(known)
     pair = np.hstack([known, others[:, :1]])
     whole = space.gain(pair)[0] - space.gain(known)[0]
     assert beside.gain(others[:, :1])[0] == pytest.approx(whole, rel=1e-7)
@@ -231,8 +230,8 @@ def test_scores_beside_further_columns_are_those_with_them_fitted(space):
     blocks = Blocks([others[:, [k]] for k in range(4)])
     assert beside.block_gains(blocks) == pytest.approx(singly, rel=1e-7)
     # A run effect of the columns themselves finds nothing left of them.
-    space.r = space.r + 100.0 * space.projected(known[:, :1])[0][:, 0]
-    effect = space.beside(known).propose_run_effect("drift_within_run", {}, known[:, :1])
+    space = space.of_target(space.target + 100.0 * known[:, 0])
+    effect = space.jointly_with(known).propose_run_effect("drift_within_run", {}, known[:, :1])
     assert space.propose_run_effect("drift_within_run", {}, known[:, :1]).deviance > 0.0
     assert effect.deviance < 10.0
 
@@ -241,9 +240,9 @@ def test_scores_beside_further_columns_are_those_with_them_fitted(space):
 @pytest.mark.parametrize("effect", [False, True])
 def test_coefficients_without_some_terms_are_those_of_a_fit_of_the_others(space, effect, outliers):
     rng = np.random.default_rng(12)
-    space.residual = space.residual + 0.0
-    space.residual[rng.integers(space.n, size=outliers)] += 40.0
-    space.fixed_rho = 0.3
+    wild = np.zeros(space.n)
+    wild[rng.integers(space.n, size=outliers)] -= 40.0
+    space = Regression.of_readings(space.readings.less(wild), 0.3)
     terms = [
         space.propose("missing_order", {"order": m}, np.cos(m * space.signals.theta)[:, None])
         for m in (3.0, 3.1, 7.0)

@@ -52,7 +52,7 @@ def signals():
 
 def fitted(signals, error=0.0, seed=4, sigma=1.0):
     noise = sigma * np.random.default_rng(seed).standard_normal(len(signals))
-    return Regression(signals, noise + error, SIM.surroundings, rho=0.0)
+    return Regression.of(signals, noise + error, SIM.surroundings, rho=0.0)
 
 
 def reported(effect, regression, extension, coefficients):
@@ -191,7 +191,7 @@ def test_the_deviance_is_that_of_the_normal_likelihood(signals):
     """-2 ln of it up to a constant of the readings, by lstsq: n ln(RSS / n)."""
     few = signals.take(np.arange(200))
     noise = np.random.default_rng(12).normal(size=200)
-    regression = Regression(few, noise, SIM.surroundings, rho=0.0)
+    regression = Regression.of(few, noise, SIM.surroundings, rho=0.0)
     left = float(np.linalg.lstsq(regression.base, noise, rcond=None)[1][0])
     assert not regression.outlying.any()
     assert regression.deviance == pytest.approx(200 * np.log(left / 200), rel=1e-9)
@@ -220,7 +220,7 @@ def test_white_noise_is_called_white_and_correlated_noise_is_not():
 def test_the_variance_is_that_of_the_residual_degrees_of_freedom(signals):
     """Few readings, many columns: by lstsq on the same design."""
     few = signals.take(np.arange(40))
-    regression = Regression(few, np.random.default_rng(5).normal(size=40), SIM.surroundings)
+    regression = Regression.of(few, np.random.default_rng(5).normal(size=40), SIM.surroundings)
     columns = np.random.default_rng(6).normal(size=(40, 12))
     one = regression.with_terms([regression.propose("backlash", {}, columns)])
     design = np.hstack([one.base, columns])

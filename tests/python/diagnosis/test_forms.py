@@ -44,7 +44,9 @@ def loaded_runs(rng, loop=0.0, sigma=1.0, softness=8.0, readings=300):
 
 def space_of(runs):
     residual = np.concatenate([(run.indicated - run.reference) * 3600.0 for run in runs])
-    return Regression(join_runs(runs), residual, Simulation(sigma_arcsec=1.0).surroundings, rho=0.0)
+    return Regression.of(
+        join_runs(runs), residual, Simulation(sigma_arcsec=1.0).surroundings, rho=0.0
+    )
 
 
 def test_scores_beside_columns_of_a_known_spread_are_those_of_the_whole_covariance() -> None:
@@ -59,15 +61,17 @@ def test_scores_beside_columns_of_a_known_spread_are_those_of_the_whole_covarian
     inner = z.T @ inverse @ z
     moment = z.T @ inverse @ space.r
     saved = moment @ np.linalg.solve(inner, moment)
-    beside = space.beside(known, spread)
+    beside = space.jointly_with(known, spread)
     whole = float(space.r @ inverse @ space.r)
     assert beside.rss == pytest.approx(whole, rel=EXACT)
     assert beside.gain(candidate)[0] == pytest.approx(
         -space.n * np.log1p(-saved / whole), rel=EXACT
     )
     # Without a spread they are fitted, with next to none they are not there.
-    assert space.beside(known, 1e9).rss == pytest.approx(space.beside(known).rss, rel=EXACT)
-    assert space.beside(known, 1e-9).rss == pytest.approx(space.rss, rel=EXACT)
+    assert space.jointly_with(known, 1e9).rss == pytest.approx(
+        space.jointly_with(known).rss, rel=EXACT
+    )
+    assert space.jointly_with(known, 1e-9).rss == pytest.approx(space.rss, rel=EXACT)
 
 
 def test_a_bend_along_the_error_itself_is_no_bend() -> None:

@@ -35,7 +35,7 @@ def signals():
 
 def with_backlash(signals, size, seed=5):
     noise = np.random.default_rng(seed).standard_normal(len(signals))
-    fitted = Regression(signals, noise + size * signals.direction, SIM.surroundings, rho=0.0)
+    fitted = Regression.of(signals, noise + size * signals.direction, SIM.surroundings, rho=0.0)
     return fitted.with_terms([EFFECTS["backlash"].propose(fitted)])
 
 

@@ -37,7 +37,7 @@ def regression(designs, **changes):
     sim = Simulation(JOINT, LINES, sigma_arcsec=1.0, runs=tuple(designs))
     signals = replace(join_runs(simulate(sim, 1)), **changes)
     rng = np.random.default_rng(2)
-    return Regression(signals, rng.normal(size=len(signals)), sim.surroundings)
+    return Regression.of(signals, rng.normal(size=len(signals)), sim.surroundings)
 
 
 def spots(*args, **changes):

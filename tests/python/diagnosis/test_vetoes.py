@@ -29,7 +29,7 @@ def regression(extra=None, counts=0.0, sigma=1.0, seed=3):
         measured.append(ta.CalibrationRun(run.reference, indicated, 360.0, time=run.time))
     signals = join_runs(measured)
     residual = 3600.0 * np.concatenate([run.error for run in measured]) - sim.predict(signals)
-    return Regression(signals, residual, sim.surroundings)
+    return Regression.of(signals, residual, sim.surroundings)
 
 
 @pytest.mark.parametrize(("coefficient", "named"), [(-1.0, True), (-2.2, False), (-0.2, False)])
@@ -82,9 +82,8 @@ def test_no_cause_is_larger_than_what_the_readings_show():
     # Beside the line of order 100 its copy a hair away: only their difference is seen.
     angle = fitted.signals.theta
     columns = np.column_stack([np.cos(100.0 * angle), np.cos(100.02 * angle)])
-    with_residual = fitted.with_terms([])
-    with_residual.residual = fitted.residual + 300.0 * (columns[:, 0] - columns[:, 1])
-    with_residual.update()
+    copies = 300.0 * (columns[:, 1] - columns[:, 0])
+    with_residual = fitted.of_readings(fitted.readings.less(copies))
     free = with_residual.propose("latency", {}, columns[:, 1:])
     shown = float(np.std(columns[:, 1:] @ free.coefficients))
     assert shown > 3.0 * float(np.std(with_residual.residual))

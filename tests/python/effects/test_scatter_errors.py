@@ -47,7 +47,9 @@ def test_pulls_of_causes_of_the_scatter(case, signals):
         factor = hidden.noise_factor(signals, SIM.surroundings)
         noise = rng.standard_normal(len(signals)) * (1.0 if factor is None else factor)
         noise += hidden.signal(signals, SIM.surroundings, rng)
-        found = EFFECTS[cause].find_scatter(Regression(signals, noise, SIM.surroundings, rho=0.0))
+        found = EFFECTS[cause].find_scatter(
+            Regression.of(signals, noise, SIM.surroundings, rho=0.0)
+        )
         for name, values in pulls.items():
             told = found.parameters[name]
             values.append((told.value - getattr(hidden, name)) / told.std)

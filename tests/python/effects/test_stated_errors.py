@@ -95,7 +95,7 @@ def signal_of(effect, signals):
 def stated(cause, error, signals, seed):
     """Parameters of the one cause that is asked for."""
     noise = np.random.default_rng(seed).standard_normal(len(signals))
-    start = Regression(signals, noise + error, SIM.surroundings, rho=0.0)
+    start = Regression.of(signals, noise + error, SIM.surroundings, rho=0.0)
     found = EFFECTS[cause].propose(start)
     full = start.with_terms([found])
     parameters, effects = EFFECTS[cause].report(full, [(*full.fitted()[0], full.covariance(0))])

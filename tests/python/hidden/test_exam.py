@@ -89,13 +89,7 @@ def test_two_causes_are_both_named() -> None:
     assert share([a.exact for a in found]) >= BOTH_NAMED - 1.0 / len(found), told(found)
 
 
-#: At one speed a play is named with a length of transition that is none of it: not yet mended.
-GUESSED = pytest.mark.xfail(strict=False, reason="a play at one speed is named presliding")
-
-
-@pytest.mark.parametrize(
-    "design", [pytest.param(d, marks=GUESSED if d == "one_speed" else ()) for d in blind.BLIND]
-)
+@pytest.mark.parametrize("design", blind.BLIND)
 def test_a_blind_design_is_not_guessed_from(design: str) -> None:
     answer = ask(Case((blind.BLIND[design][0],), 1.0, FIXED, design))
     assert answer.honest, exam.describe(answer)

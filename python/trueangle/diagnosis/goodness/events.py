@@ -16,9 +16,9 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from .evidence import Evidence, largest_of
+from .evidence import Evidence, drawn_signs, largest_of, made_even
 from .leftover import Leftover
-from .place import alike
+from .place import UnitSums, unit_sums
 
 __all__ = ["AFTER_REVERSALS", "AFTER_START", "reversal_test", "start_test"]
 
@@ -65,28 +65,29 @@ def _relaxing(
     span = float(np.median([left.clock[b - 1] - left.clock[a] for a, b in stretches]))
     if span <= 0.0:
         return None
-    best: tuple[float, float, float, float] | None = None
-    trials = 0
+    found: list[tuple[UnitSums, float, float]] = []
     for constant in CONSTANTS:
         since = np.zeros(len(left))
         for a, b in stretches:
             decay = np.exp(-(left.clock[a:b] - left.clock[a]) / (constant * span))
             since[a:b] = decay - decay.mean()
         for g in (since, since * left.direction) if both else (since,):
-            p, size = alike(g, about, units)
-            trials += 1
-            if best is None or p < best[0]:
-                rms = abs(size) * float(np.sqrt(np.mean(g**2)))
-                best = (p, size, rms, constant * span)
-    assert best is not None
-    p, size, rms, constant = best
+            rms = float(np.sqrt(np.mean(g**2)))
+            found.append((unit_sums(g, about, units), rms, constant * span))
+
+    def smallest(signs: Array | float) -> float:
+        # Time constants that differ by a factor of three are half alike.
+        return largest_of(min(sums.chance(signs) for sums, *_ in found), 0.6 * len(found))
+
+    best, rms, constant = min(found, key=lambda item: item[0].chance())
+    size = best.size
+    p = made_even(smallest(1.0), [smallest(signs) for signs in drawn_signs(len(units))])
     unit = "s" if left.timed else "readings"
     return Evidence(
         f"time since {looks_like.rsplit(' ', 1)[-1]}",
         abs(size),
-        # Time constants that differ by a factor of three are half alike.
-        largest_of(p, 0.6 * trials),
+        p,
         f"what is left relaxes in time {when}, within about {constant:.2g} {unit}",
-        rms=rms,
+        rms=abs(size) * rms,
         looks_like=looks_like,
     )

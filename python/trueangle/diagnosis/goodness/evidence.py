@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...support.plainresult import finite
 
-__all__ = ["Evidence", "largest_of"]
+__all__ = ["Evidence", "drawn_signs", "largest_of", "made_even"]
+
+#: Times that a search is repeated with signs at random, and units from which on they differ enough.
+DRAWS, ENOUGH_UNITS = 32, 6
 
 
 @dataclass(frozen=True)
@@ -66,3 +71,34 @@ def largest_of(p: float, count: float) -> float:
     0.009955
     """
     return float(-np.expm1(count * np.log1p(-min(max(p, 0.0), 1.0 - 1e-16))))
+
+
+def drawn_signs(units: int) -> NDArray[np.float64]:
+    """Signs of units drawn at random, shape (draws, units); no draws for few units.
+
+    What noise gives a unit it might have given with the other sign; what they share is lost.
+    """
+    draws = DRAWS if units >= ENOUGH_UNITS else 0
+    return np.random.default_rng(units).choice([-1.0, 1.0], (draws, units))
+
+
+def made_even(p: float, drawn: Sequence[float]) -> float:
+    r"""A p value of a search, even under noise, by those of the same search with signs drawn.
+
+    Trials depend on each other: the smallest of them has :math:`x = -\ln(1 - p)` exponentially
+    distributed with a rate that B draws tell, so that the chance of less is
+
+    .. math:: 1 - \Bigl(1 + \frac{x}{\sum_b x_b}\Bigr)^{-B}.
+
+    Examples
+    --------
+    >>> round(made_even(0.01, [0.5] * 32), 4)
+    0.0144
+    >>> made_even(0.01, [])
+    0.01
+    """
+    if not len(drawn):
+        return p
+    x = -np.log1p(-np.clip([p, *drawn], 0.0, 1.0 - 1e-12))
+    total = max(float(x[1:].sum()), 1e-300)
+    return float(-np.expm1(-len(drawn) * np.log1p(x[0] / total)))

@@ -38,6 +38,9 @@ CLIP = 4.0
 #: Correlations that are tried first; the best is refined by parabolas.
 TRIALS = (0.0, 0.1, 0.2, 0.35, 0.5, 0.65, 0.8, 0.9, 0.95, 0.975, 0.99)
 
+#: Correlations below none are looked for down to minus this one.
+BELOW = 0.3
+
 #: Share of the power of the strongest combination of columns from which another one counts.
 DISTINCT = 1e-6
 
@@ -61,6 +64,9 @@ class Noise:
         2 ln of the restricted likelihood ratio against white noise.
     freedom : float
         Readings less coefficients.
+    root : float
+        Root of the likelihood ratio with the sign of the correlation: standard normal where
+        there is none.
     """
 
     sigma: float
@@ -68,6 +74,7 @@ class Noise:
     std: float
     deviance: float
     freedom: float
+    root: float = 0.0
 
 
 def estimate_noise(left: Leftover, orders: int | None = None) -> Noise:
@@ -100,10 +107,14 @@ def estimate_noise(left: Leftover, orders: int | None = None) -> Noise:
     trials = np.array(TRIALS)
     values = np.array([sums.deviance(r, means) for r in trials])
     k = int(np.argmin(values))
-    low, high = trials[max(k - 1, 0)], trials[min(k + 1, trials.size - 1)]
+    # Less than none, too: noise alone is as often below as above, and its p value even.
+    low, high = (trials[k - 1] if k else -BELOW), trials[min(k + 1, trials.size - 1)]
     rho, value = _refined(lambda r: sums.deviance(r, means), float(low), float(high))
     if value > values[k]:
         rho, value = float(trials[k]), float(values[k])
+    root = float(np.copysign(np.sqrt(max(float(values[0] - value), 0.0)), rho))
+    if rho < 0.0:
+        rho, value = 0.0, float(values[0])
     step = min(0.02, 0.5 * (1.0 - rho), max(rho, 0.004))
     bend = (
         sums.deviance(min(rho + step, 0.999), means)
@@ -117,7 +128,12 @@ def estimate_noise(left: Leftover, orders: int | None = None) -> Noise:
     rss, freedom = sums.fitted(rho, means)
     innovation = rss / max(freedom, 1.0)
     return Noise(
-        float(np.sqrt(innovation / (1.0 - rho**2))), rho, std, max(gained, 0.0), float(freedom)
+        float(np.sqrt(innovation / (1.0 - rho**2))),
+        rho,
+        std,
+        max(gained, 0.0),
+        float(freedom),
+        root,
     )
 
 

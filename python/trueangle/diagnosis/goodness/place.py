@@ -28,10 +28,10 @@ import trueangle._core as _core
 
 from ...support.display_units import brief
 from ...support.distributions import incomplete_gamma_tail, student_tail
-from .evidence import Evidence, largest_of
+from .evidence import Evidence, drawn_signs, largest_of, made_even
 from .leftover import Leftover
 
-__all__ = ["alike", "place_tests"]
+__all__ = ["UnitSums", "place_tests", "unit_sums"]
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -160,27 +160,12 @@ def _judged(
     count, n_units = z.shape
     half = max(HALF_WINDOW, -(-POOLED // (2 * n_units)))
     level = np.sqrt(np.maximum(_level(np.abs(z) ** 2, half), 1e-300))
-    weight = np.sqrt(sizes / sizes.mean())
-    w = weight * z / level
-    coherent = np.abs(w.sum(axis=1)) ** 2
-    own = np.sum(np.abs(w) ** 2, axis=1)
-    share = np.minimum(coherent / np.maximum(n_units * own, 1e-300), 1.0 - 1e-16)
-    logs = np.minimum(coherent / n_units, -(n_units - 1) * np.log1p(-share))
-    k = int(np.argmax(logs))
-    size = 0.0
-    trials: list[tuple[float, float, float]] = [(float(np.exp(-logs[k])), float(logs[k]), 0.0)]
-    trials[0] = (largest_of(trials[0][0], count), *trials[0][1:])
-    for width in BANDS:
-        if width < count:
-            total = float(logs[:width].sum())
-            p = incomplete_gamma_tail(float(width), total)
-            trials.append((p, total / width, float(width)))
-    if modulator.name != "place":
-        chance, size = alike(modulator.values, left, units)
-        trials.append((chance, 0.0, -1.0))
-    p, statistic, band = min(trials)
-    # Bands hold each other: as many as half of them are independent, about.
-    p = largest_of(p, 1.0 + 0.5 * (len(trials) - 1))
+    w = np.sqrt(sizes / sizes.mean()) * z / level
+    alone = None if modulator.name == "place" else unit_sums(modulator.values, left, units)
+    p, statistic, band, k, logs = _smallest(w, alone, np.ones(n_units))
+    # Trials depend on each other: how much, the same search with signs at random tells.
+    p = made_even(p, [_smallest(w, alone, signs)[0] for signs in drawn_signs(n_units)])
+    size = 0.0 if alone is None else alone.size
     # Power of a line beyond what its units add up to by chance.
     whole = max(float((modulator.values**2).sum()), 1e-300)
     excess = np.abs(z.sum(axis=1)) ** 2 - (np.abs(z) ** 2).sum(axis=1)
@@ -200,8 +185,53 @@ def _judged(
     return Evidence(modulator.name, statistic, p, says, rms=rms, looks_like=looks_like)
 
 
-def alike(g: Array, left: Leftover, units: list[tuple[int, int]]) -> tuple[float, float]:
-    """Chance of the modulator itself, at no place in particular, by the scatter of units; size."""
+def _smallest(
+    w: Complex, alone: UnitSums | None, signs: Array
+) -> tuple[float, float, float, int, Array]:
+    """Smallest p value of orders, bands of them and the modulator alone, and what has it.
+
+    The p value, its statistic, the band (0 for one order, -1 for none), the order that stands out
+    most, and the evidence of every order.
+    """
+    count, n_units = w.shape
+    coherent = np.abs(w @ signs) ** 2
+    own = np.sum(np.abs(w) ** 2, axis=1)
+    share = np.minimum(coherent / np.maximum(n_units * own, 1e-300), 1.0 - 1e-16)
+    logs = np.minimum(coherent / n_units, -(n_units - 1) * np.log1p(-share))
+    k = int(np.argmax(logs))
+    one = largest_of(float(np.exp(-logs[k])), count)
+    trials: list[tuple[float, float, float]] = [(one, float(logs[k]), 0.0)]
+    sums = np.cumsum(logs)
+    for width in BANDS:
+        if width < count:
+            total = float(sums[width - 1])
+            p = incomplete_gamma_tail(float(width), total)
+            trials.append((p, total / width, float(width)))
+    if alone is not None:
+        trials.append((alone.chance(signs), 0.0, -1.0))
+    p, statistic, band = min(trials)
+    # Bands hold each other: as many as half of them are independent, about.
+    return largest_of(p, 1.0 + 0.5 * (len(trials) - 1)), statistic, band, k, logs
+
+
+@dataclass(frozen=True)
+class UnitSums:
+    """Sums over units of a modulator times what is left, and the size that they stand for."""
+
+    sums: Array
+    size: float
+
+    def chance(self, signs: Array | float = 1.0) -> float:
+        """Chance of as large a sum of all, by the scatter of units; some may change their sign."""
+        n, power = self.sums.size, float(self.sums @ self.sums)
+        if self.size == 0.0:
+            return 1.0
+        square = min(float((self.sums * signs).sum()) ** 2 / power, n * (1.0 - 1e-12))
+        return 2.0 * student_tail(float(np.sqrt(square * (n - 1) / (n - square))), n - 1)
+
+
+def unit_sums(g: Array, left: Leftover, units: list[tuple[int, int]]) -> UnitSums:
+    """Of the modulator itself, at no place in particular."""
     # Within runs, or between them where it does not change within any.
     inside = left.centred(left.bounds)
     # What scatters about a level that a run keeps is the noise of its sensor: no change.
@@ -209,20 +239,16 @@ def alike(g: Array, left: Leftover, units: list[tuple[int, int]]) -> tuple[float
     moves = within > MOVES * float(np.sum((g - g.mean()) ** 2))
     e = inside if moves else left.residual - left.residual.mean()
     sums = np.array([float(g[a:b] @ e[a:b]) for a, b in units])
-    power = float(sums @ sums)
-    n = len(units)
     centre = g.mean()
     own = sum(
         float(np.sum((g[a:b] - (g[a:b].mean() if moves else centre)) ** 2))
         for a, b in (left.bounds if moves else units)
     )
-    if (
-        power == 0.0
-        or n < 3
-        or own == 0.0
-        or abs(float(g @ e)) <= ROUNDED * float(np.abs(g) @ np.abs(e))
-    ):
-        return 1.0, 0.0
-    square = min(float(sums.sum()) ** 2 / power, n * (1.0 - 1e-12))
-    p = 2.0 * student_tail(float(np.sqrt(square * (n - 1) / (n - square))), n - 1)
-    return p, float(g @ e) / own
+    product = float(g @ e)
+    told = (
+        len(units) >= 3
+        and own > 0.0
+        and float(sums @ sums) > 0.0
+        and abs(product) > ROUNDED * float(np.abs(g) @ np.abs(e))
+    )
+    return UnitSums(sums, product / own if told else 0.0)

@@ -120,7 +120,7 @@ def _correlation(noise: Noise) -> Evidence:
         if noise.correlation
         else "neighbouring readings are independent"
     )
-    p = 0.5 * chi_squared_tail(noise.deviance, 1.0)
+    p = normal_tail(noise.root)
     return Evidence("correlation", noise.correlation, p, said, decides=False)
 
 

@@ -21,8 +21,10 @@ from ..measurement import ARCSEC, Habit, measure, random_habit
 from ..reversal import Backlash
 from ..slow import Wander
 from ..source import Source
+from .episodes import EPISODES, episode
 from .inexact import INEXACT
 from .inexact import draw as draw_inexact
+from .logs import BURSTS, LINES, TABLE_SIGMA, TABLES, table, with_bursts
 from .structures import SHAPES, structure
 from .timebound import FORMS, SIGMA, there_and_back, timebound
 
@@ -171,6 +173,36 @@ def bound_to_time(case: Case) -> Posed:
     return question, FORMS[case.kind][1], None
 
 
+def episodes(case: Case) -> Posed:
+    rng = case.rng()
+    joint, habit = random_joint(rng), random_habit(rng)
+    size = float(rng.choice(TIMEBOUND)) * habit.sigma
+    hidden = replace(episode(case.kind, rng), size=case.scale * size)
+    question = _question(case, joint, habit, (hidden,), rng)
+    return question, EPISODES[case.kind][1], None
+
+
+def bursts(case: Case) -> Posed:
+    """Glitches of a few readings in a row, and nothing else."""
+    rng = case.rng()
+    joint, habit = random_joint(rng), random_habit(rng)
+    question = _question(case, joint, habit, (), rng)
+    length, size = case.kind.split(" of ")
+    runs, rows = with_bursts(question.runs, int(length), float(size) * habit.sigma, rng)
+    return replace(question, runs=runs), rows, None
+
+
+def tables(case: Case) -> Posed:
+    """Equal steps of a direct drive of which nothing is believed."""
+    rng = case.rng()
+    positions, runs = map(int, case.kind.split(" x "))
+    habit = Habit(sigma=TABLE_SIGMA)
+    joint = Joint(1.0, (), 0.0)
+    text = '[joint]\ngear_ratio = 1.0\nfixed_member = "none"\nencoder_side = "output"\n'
+    question = Question(HiddenCase(()), joint, (), (), habit, table(positions, runs, rng))
+    return question, [order for order, _ in LINES], text
+
+
 def turning(case: Case) -> Posed:
     """Play, or nothing, in runs there and back under correlated noise."""
     rng = case.rng()
@@ -292,6 +324,9 @@ def inexact(case: Case) -> Posed:
 POSERS: dict[str, Callable[[Case], Posed]] = {
     "outside": outside,
     "timebound": bound_to_time,
+    "episodes": episodes,
+    "bursts": bursts,
+    "tables": tables,
     "turning": turning,
     "drifting": drifting,
     "nothing": nothing,
@@ -316,6 +351,24 @@ def _nothing_right(
     if case.kind == "wander":  # drift, or unexplained, and nothing else
         return set(confirmed) <= {"drift_within_run"}
     return set(confirmed) <= allowed and not unexplained
+
+
+def _rows_named(
+    case: Case, report: Any, confirmed: tuple[str, ...], unexplained: bool, rows: Any
+) -> bool:
+    """Outliers and nothing else, at least 19 of 20 of their rows and hardly any other."""
+    if confirmed != ("outliers",) or unexplained:
+        return False
+    found = report["findings"][0]["parameters"]["rows"]["value"]
+    told = {(str(label), int(row)) for label, row in found}
+    return len(rows - told) <= 0.05 * len(rows) and len(told - rows) <= 1 + 0.05 * len(rows)
+
+
+def _low_orders(
+    case: Case, report: Any, confirmed: tuple[str, ...], unexplained: bool, orders: Any
+) -> bool:
+    found = [f["parameters"].get("order", {}).get("value") for f in report["findings"]]
+    return set(confirmed) == {"missing_order"} and sorted(found) == orders and not unexplained
 
 
 def _named_or_nothing(
@@ -368,6 +421,9 @@ def _named(
 JUDGES = {
     "outside": _outside_right,
     "timebound": _outside_right,
+    "episodes": _outside_right,
+    "bursts": _rows_named,
+    "tables": _low_orders,
     "turning": _named_or_nothing,
     "drifting": _no_false_companion,
     "nothing": _nothing_right,
@@ -383,6 +439,9 @@ def cases(group: str, seeds: range, scale: float = 1.0) -> list[Case]:
     kinds = {
         "outside": [*SHAPES],
         "timebound": [*FORMS],
+        "episodes": [*EPISODES],
+        "bursts": [f"{length} of {size:g}" for length, size in BURSTS],
+        "tables": [f"{positions} x {runs}" for positions, runs in TABLES],
         "turning": [f"{play} {rho}" for play in (2, 0) for rho in CORRELATIONS],
         "drifting": [*DRIFTS],
         "nothing": [*NOISES, *(f"bits {b}" for b in BITS)],

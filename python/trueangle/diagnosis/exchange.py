@@ -1,0 +1,71 @@
+"""Exchange causes of an account, one for another or for none, while that explains more.
+
+Forward and backward steps see one change at a time; what a cause is worth beside others, and which
+readings are outliers, may look otherwise once it is replaced.
+"""
+
+from __future__ import annotations
+
+from ..effects import EFFECTS
+from ..estimation.regression import Regression
+from ..support.deadline import pace
+from .candidates import Scores, extensions
+from .penalty import cause_terms, finding_groups, total_penalty
+from .selection import is_flexible
+from .unnamed import is_named
+
+__all__ = ["exchanged"]
+
+#: Exchanges at most, and findings up to which others are tried in the place of each: of more, which
+#: are implausible together, that would take as long as the whole choice.
+MOST_EXCHANGES, LOOKED_AT = 3, 2
+
+#: Criterion by which another account must be better: nothing worth more than a bare mention.
+BETTER = 2.0
+
+
+def exchanged(regression: Regression) -> Regression:
+    """The account of which no cause is better left out, or replaced by another one.
+
+    Parameters
+    ----------
+    regression : Regression
+
+    Returns
+    -------
+    Regression
+        The same where nothing is better. The cost is that of the rivals which are reported of
+        every finding, and these are kept for that.
+    """
+    for _ in range(MOST_EXCHANGES):
+        better = None if pace().over else _better(regression)
+        if better is None:
+            return regression
+        regression = better
+    return regression
+
+
+def _better(regression: Regression) -> Regression | None:
+    limit = total_penalty(regression) - BETTER
+    groups = [g for g in finding_groups(regression.terms) if is_named(regression.terms[g[0]])]
+    groups.sort(key=lambda group: sum(regression.terms[k].bic_gain for k in group))
+    for group in groups:
+        rest = cause_terms(regression, group)
+        if total_penalty(rest) < limit:
+            return rest
+        if len(groups) > LOOKED_AT:
+            continue
+        own = regression.terms[group[0]].cause
+        # What takes up anything explains more than any law, and is none.
+        others = [
+            name for name, effect in EFFECTS.items() if not (name == own or is_flexible(effect))
+        ]
+        scores = Scores()
+        best = scores.best(extensions(rest, others, scores.least))
+        if best is None or pace().over:
+            continue
+        extension, start, _ = best[1]
+        tried = start.with_terms([*start.terms, extension])
+        if total_penalty(tried) < limit:
+            return tried
+    return None

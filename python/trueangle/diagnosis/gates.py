@@ -1,0 +1,173 @@
+"""Gates that a finding passes before it is confirmed: what was computed of it decides.
+
+Each gate is a line of `GATES` and gives the reason why a finding is not confirmed, or nothing.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..effects import EFFECTS
+from ..effects.blindness import Blindness
+from ..effects.presliding_hysteresis import PreslidingHysteresis
+from ..estimation.regression import Regression
+from .confirmation import NOT_CONFIRMED
+from .findings import Finding
+from .levels import UNITS
+
+__all__ = ["GATES", "MANY", "alike_columns", "gated", "many_causes"]
+
+Array = NDArray[np.float64]
+
+#: Standard errors by which the size of a cause must differ from zero.
+TOLD = 2.0
+
+#: Share of what can be taken off at a level left out above which more is taken than left.
+MORE_THAN_LEFT = 0.5
+
+#: Correlation of what two causes add to all others from which on they are one column.
+ALIKE = 0.95
+
+#: Confirmed causes of one joint, lines counted once, beyond which they are implausible together.
+MANY = 3
+
+#: What causes that follow a factor have in common.
+FOLLOWED = {
+    "direction": "the direction of travel",
+    "velocity": "the speed",
+    "temperature": "the temperature",
+    "torque": "the torque",
+    "mount": "the reference's mount",
+    "time": "the time",
+    "run": "the run",
+}
+
+
+def not_carried(finding: Finding) -> str:
+    """A law that does not carry over to a level of its factor that was left out.
+
+    Nothing is gained there for certain, or more is left than taken: another law.
+    """
+    by_level = None if finding.gain is None else finding.gain.by_level
+    if by_level is None or by_level.interval is None or by_level.factor == "mount":
+        return ""
+    low, high = by_level.interval
+    if low > 0.0 and (by_level.reducible_share or 0.0) > MORE_THAN_LEFT:
+        return ""
+    return (
+        f"its law does not carry over to a {_NOUNS[by_level.factor]} that was left out (share "
+        f"{by_level.reducible_share:.2f}, {low:.2f} to {high:.2f})"
+    )
+
+
+def not_told_from_zero(finding: Finding) -> str:
+    """A size within two standard errors of zero."""
+    effect = EFFECTS[finding.cause]
+    name = effect.size_name
+    if name not in finding.parameters:
+        name = next(iter(finding.parameters), "")
+    size = finding.parameters.get(name)
+    if size is None:
+        return ""
+    values, stds = (
+        np.abs(np.atleast_1d(np.asarray(each, dtype=np.float64)))
+        if isinstance(each, int | float) or (isinstance(each, list) and each and _numeric(each))
+        else np.zeros(0)
+        for each in (size.value, size.std)
+    )
+    if values.size == 0 or values.size != stds.size or not (stds > 0.0).all():
+        return ""
+    z = float((values / stds).max())
+    if z >= TOLD:
+        return ""
+    return f"its {name} is {z:.1f} standard errors from zero"
+
+
+def against_friction(finding: Finding) -> str:
+    """A wind-up of friction that leads where friction holds back."""
+    size = finding.parameters.get(PreslidingHysteresis.size_name)
+    if finding.cause != PreslidingHysteresis.kind or size is None:
+        return ""
+    if isinstance(size.value, int | float) and size.value < 0.0:
+        return "friction holds back, and this leads: its amplitude is negative"
+    return ""
+
+
+#: Every gate, in the order in which reasons are given.
+GATES: tuple[Callable[[Finding], str], ...] = (not_carried, not_told_from_zero, against_friction)
+
+#: Levels of a factor, as one of them is called.
+_NOUNS = {"velocity": "speed", "temperature": "temperature", "torque": "load", "mount": "mount"}
+assert _NOUNS.keys() == UNITS.keys()
+
+
+def gated(
+    regression: Regression, findings: Sequence[Finding]
+) -> tuple[list[Finding], list[Blindness]]:
+    """Findings as the gates leave them, and the pairs that are not told apart."""
+    found = []
+    for finding in findings:
+        reason = (
+            next((r for gate in GATES if (r := gate(finding))), "") if finding.confirmed else ""
+        )
+        found.append(replace(finding, status=NOT_CONFIRMED, reason=reason) if reason else finding)
+    spots = []
+    for i, j, correlation in alike_columns(regression, found):
+        causes = (found[i].cause, found[j].cause)
+        because = f"in these runs they are one column (correlation {correlation:.3f})"
+        spots.append(Blindness(causes, because, EFFECTS[causes[0]].measure, supported=True))
+        for k, other in ((i, causes[1]), (j, causes[0])):
+            reason = f"{because.removeprefix('in these runs they are ')} with {other}"
+            found[k] = replace(found[k], status=NOT_CONFIRMED, reason=f"it is {reason}")
+    return found, spots
+
+
+def alike_columns(
+    regression: Regression, findings: Sequence[Finding]
+) -> Iterator[tuple[int, int, float]]:
+    """Pairs of confirmed findings that add nearly one column to all else; their correlation.
+
+    Of what each explains, beside the terms of neither.
+    """
+    fitted = regression.fitted()
+    parts = {
+        k: np.sum([fitted[t][0].columns @ fitted[t][1] for t in finding.group], axis=0)
+        for k, finding in enumerate(findings)
+        if finding.confirmed and any(fitted[t][1].size for t in finding.group)
+    }
+    for i, j in itertools.combinations(parts, 2):
+        pair = {*findings[i].group, *findings[j].group}
+        others = [term for k, term in enumerate(regression.terms) if k not in pair]
+        rest = regression.with_terms(others, regression.whiten.rho)
+        own, excited = rest.projected(np.column_stack([parts[i], parts[j]]))
+        sizes = np.linalg.norm(own, axis=0)
+        if excited.all() and sizes.all():
+            found = abs(float(own[:, 0] @ own[:, 1])) / float(sizes.prod())
+            if found > ALIKE:
+                yield i, j, found
+
+
+def many_causes(findings: Sequence[Finding]) -> str:
+    """What to think of more confirmed causes than one joint is likely to have; or nothing."""
+    causes = list(dict.fromkeys(f.cause for f in findings if f.confirmed))
+    if len(causes) <= MANY:
+        return ""
+    factors = [EFFECTS[cause].factor for cause in causes]
+    common = max(FOLLOWED, key=factors.count)
+    shared = [c for c, factor in zip(causes, factors, strict=True) if factor == common]
+    text = (
+        f"{len(causes)} causes confirmed in one joint are implausible together: one that has no "
+        "name may be behind several"
+    )
+    if len(shared) > 1:
+        text += f"; {', '.join(shared)} all follow {FOLLOWED[common]}"
+    return text
+
+
+def _numeric(values: list[object]) -> bool:
+    return all(isinstance(value, int | float) for value in values)

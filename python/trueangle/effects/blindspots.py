@@ -1,0 +1,37 @@
+"""Which causes a design of runs can tell apart; the readings are not looked at."""
+
+from __future__ import annotations
+
+from ..estimation.regression import Regression
+from .blindness import Blindness
+from .effect import EFFECTS
+
+__all__ = ["blind_spots", "place_among"]
+
+#: Factors of a design in the order in which their blind spots are told.
+FACTORS = (
+    "direction",
+    "velocity",
+    "temperature",
+    "torque",
+    "coupled",
+    "mount",
+    "run",
+    "time",
+    "angle",
+    "none",
+    "grid",
+)
+
+
+def blind_spots(regression: Regression) -> list[Blindness]:
+    """What the design of the runs cannot tell; the readings are not looked at."""
+    found: list[Blindness] = []
+    for effect in EFFECTS.values():
+        found += effect.blind_spots(regression, found)
+    return sorted(found, key=lambda spot: place_among(FACTORS, spot))
+
+
+def place_among(factors: tuple[str, ...], spot: Blindness) -> int:
+    """Where the factor of a blind spot stands among others; behind all where it does not."""
+    return factors.index(spot.factor) if spot.factor in factors else len(factors)

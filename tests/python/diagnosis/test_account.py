@@ -1,0 +1,65 @@
+"""Which readings an account is given of."""
+
+from __future__ import annotations
+
+import numpy as np
+
+import trueangle as ta
+from trueangle.diagnosis.account import Seen
+from trueangle.joint.signals import join_runs
+
+#: Half of the play, arcsec, and its noise.
+HALF, SIGMA = 3.0, 1.0
+
+
+def turned_early(seed: int, runs: int = 8) -> list[ta.CalibrationRun]:
+    """Sweeps whose recorded speed changes its sign one reading before the joint moves back."""
+    rng = np.random.default_rng(seed)
+    found = []
+    for k in range(runs):
+        steps = np.repeat([1.0, 0.0, -1.0, 0.0, 1.0], [80, 1, 70, 1, 60])
+        angle = rng.uniform(0.0, 360.0) + np.cumsum(steps * rng.uniform(0.5, 1.5, steps.size))
+        moving = np.repeat([1.0, -1.0, 1.0], [80, 71, 61])
+        side = np.repeat([1.0, -1.0, 1.0], [81, 71, 60])
+        error = HALF * side + rng.normal(0.0, SIGMA, steps.size)
+        speed = moving * (10.0 if k % 2 else 40.0)
+        found.append(
+            ta.CalibrationRun(
+                angle,
+                angle + error / 3600.0,
+                period=360.0,
+                time=np.arange(steps.size) / 40.0,
+                velocity=speed,
+                label=f"run {k}",
+            )
+        )
+    return found
+
+
+def test_readings_that_turned_and_have_not_moved_take_no_part() -> None:
+    every = join_runs(turned_early(6411))
+    seen = Seen.of(every, np.zeros(len(every)), ta.Simulation())
+    assert seen.rows is not None
+    left_out = np.setdiff1d(np.arange(len(every)), seen.rows)
+    np.testing.assert_array_equal(every.row[left_out], np.tile([80, 151], 8))
+
+
+def test_a_joint_that_hardly_moves_has_no_turning_points() -> None:
+    rng = np.random.default_rng(6412)
+    still = np.full(40, 17.0)
+    speed = np.where(np.arange(40) % 10 < 5, 1.0, -1.0)
+    run = ta.CalibrationRun(still, still + rng.normal(0.0, 1e-3, 40), period=360.0, velocity=speed)
+    every = join_runs([run])
+    assert Seen.of(every, np.zeros(len(every)), ta.Simulation()).rows is None
+
+
+def test_a_play_whose_turning_points_read_the_other_side_is_no_spring() -> None:
+    """One reading a reversal on the other side is a short transition, and tells of none."""
+    for seed in (6421, 6422, 6423):
+        print(f"seed {seed}")
+        result = ta.diagnose(turned_early(seed), ta.Simulation(), gain=False)
+        assert [finding.cause for finding in result.findings] == ["backlash"], result.summary()
+        width = result.findings[0].parameters["half_width_arcsec"]
+        assert abs(width.value - HALF) < 4.0 * width.std
+        assert result.readings_used == result.readings - 16
+        assert "none at a turning point" in " ".join(result.summary().split())

@@ -1,0 +1,145 @@
+"""What is computed of a finding decides whether it is confirmed."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+import trueangle as ta
+from trueangle.diagnosis.confirmation import CONFIRMED, NOT_CONFIRMED
+from trueangle.diagnosis.findings import Finding
+from trueangle.diagnosis.gain import Gain
+from trueangle.diagnosis.gates import GATES, MANY, alike_columns, gated, many_causes
+from trueangle.diagnosis.levels import LevelGain
+from trueangle.estimation.estimate import quantity
+from trueangle.estimation.regression import Regression
+from trueangle.joint.signals import join_runs
+from trueangle.simulation import Joint, RunDesign, Simulation
+
+SIM = Simulation(
+    Joint(50.0, "circular_spline", "motor"),
+    sigma_arcsec=1.0,
+    runs=tuple(
+        RunDesign(samples=200, start_deg=31.0 * k, speed_deg_s=v, reversals=(0.3, 0.6))
+        for k, v in enumerate((5.0, 30.0) * 4)
+    ),
+)
+
+
+def finding(cause: str, parameters: dict | None = None, gain: Gain | None = None) -> Finding:
+    return Finding(cause, parameters or {}, {"bic_gain": 50.0}, gain, [])
+
+
+def carried(share: float, low: float, high: float) -> Gain:
+    by_level = LevelGain(
+        "velocity", "deg/s", [5.0, 30.0], [5.0, 30.0], 2.0, 1.0, share, (low, high)
+    )
+    return Gain("", (2.0, 6.0, 3.0), (1.0, 4.0, 2.0), 1.0, (0.9, 1.0), 0.0, "", by_level)
+
+
+def reason(found: Finding) -> str:
+    return next((r for gate in GATES if (r := gate(found))), "")
+
+
+@pytest.mark.parametrize(
+    ("share", "low", "high", "passes"),
+    [
+        (0.98, 0.9, 1.0, True),
+        (0.6, 0.2, 0.9, True),
+        (0.3, 0.29, 0.32, False),
+        (0.6, -0.1, 0.9, False),
+    ],
+)
+def test_a_law_must_carry_to_a_level_left_out(share, low, high, passes):
+    told = reason(finding("latency", gain=carried(share, low, high)))
+    assert (told == "") == passes
+    assert passes or "speed that was left out" in told
+
+
+@pytest.mark.parametrize(
+    ("parameters", "passes"),
+    [
+        ({"amplitude_arcsec": quantity(4.0, 1.0), "length_deg": quantity(1.0, 2.0)}, True),
+        ({"amplitude_arcsec": quantity(1.9, 1.0), "length_deg": quantity(9.0, 2.0)}, False),
+        ({"amplitude_arcsec": quantity(4.0, None)}, True),
+        ({"amplitude_arcsec": quantity([1.0, 4.0], [1.0, 1.0])}, True),
+        ({"amplitude_arcsec": quantity([1.0, -1.0], [1.0, 1.0])}, False),
+    ],
+)
+def test_a_size_must_differ_from_zero(parameters, passes):
+    told = reason(finding("presliding_hysteresis", parameters))
+    assert (told == "") == passes
+    assert passes or "standard errors from zero" in told
+
+
+def test_friction_does_not_lead():
+    for amplitude, passes in ((4.0, True), (-4.0, False)):
+        parameters = {"amplitude_arcsec": quantity(amplitude, 0.1)}
+        assert (reason(finding("presliding_hysteresis", parameters)) == "") == passes
+
+
+@pytest.fixture(scope="module")
+def fitted():
+    """Direction, a column that is nearly it, and one of its own, each of three arcsec."""
+    signals = join_runs(ta.simulate(SIM, 11))
+    rng = np.random.default_rng(77)
+    n = len(signals)
+    columns = {
+        "backlash": signals.direction,
+        "latency": signals.direction + 0.1 * rng.standard_normal(n),
+        "thermal_drift": rng.standard_normal(n),
+    }
+    y = 3.0 * np.sum(list(columns.values()), axis=0) + rng.standard_normal(n)
+    start = Regression.of(signals, y, SIM.surroundings, rho=0.0)
+    terms = [start.propose(cause, {}, column[:, None]) for cause, column in columns.items()]
+    return start.with_terms(terms)
+
+
+def test_two_causes_that_are_one_column_are_not_told_apart(fitted):
+    findings = [
+        dataclasses.replace(finding(term.cause), group=(k,)) for k, term in enumerate(fitted.terms)
+    ]
+    pairs = [*alike_columns(fitted, findings)]
+    assert [(i, j) for i, j, _ in pairs] == [(0, 1)]
+    # By lstsq: what each adds to the zero and to the third.
+    beside = np.column_stack([fitted.base, fitted.terms[2].columns])
+    own = [
+        x - beside @ np.linalg.lstsq(beside, x, rcond=None)[0]
+        for x in (fitted.terms[0].columns[:, 0], fitted.terms[1].columns[:, 0])
+    ]
+    assert pairs[0][2] == pytest.approx(np.corrcoef(own)[0, 1], abs=1e-9)
+    told, spots = gated(fitted, findings)
+    assert [f.status for f in told] == [NOT_CONFIRMED, NOT_CONFIRMED, CONFIRMED]
+    assert "with latency" in told[0].reason
+    assert "with backlash" in told[1].reason
+    assert [(spot.causes, spot.supported) for spot in spots] == [(("backlash", "latency"), True)]
+
+
+def test_many_causes_are_said_to_be_implausible_with_what_they_share():
+    causes = ["backlash", "presliding_hysteresis", "missing_order", "thermal_drift"]
+    found = [finding(cause) for cause in causes]
+    assert many_causes(found[:MANY]) == ""
+    # Lines count once, and what is not confirmed does not count.
+    assert many_causes([*found[:MANY], finding("missing_order")]) == ""
+    doubtful = dataclasses.replace(found[3], status=NOT_CONFIRMED)
+    assert many_causes([*found[:MANY], doubtful]) == ""
+    told = many_causes(found)
+    assert told.startswith("4 causes confirmed in one joint are implausible together")
+    assert "backlash, presliding_hysteresis all follow the direction of travel" in told
+
+
+def test_drag_is_no_latency():
+    """An error that grows with the square of the speed is told as something without a name."""
+    rng = np.random.default_rng(31)
+    runs = []
+    for run in ta.simulate(SIM, 12):
+        speed = run.speed * 360.0 / run.period
+        error = 0.01 * speed * np.abs(speed) + rng.normal(0.0, 1.0, len(run))
+        indicated = run.reference + error / 3600.0 * run.period / 360.0
+        runs.append(dataclasses.replace(run, indicated=indicated))
+    result = ta.diagnose(runs, SIM)
+    assert "latency" not in [f.cause for f in result.findings if f.confirmed]
+    assert result.unexplained is not None
+    assert result.unexplained.found
