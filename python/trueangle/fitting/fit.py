@@ -51,6 +51,7 @@ def fit(
     reference_orders: Iterable[float] = (),
     method: str | None = None,
     threads: int | None = None,
+    prior: Any = None,
     **reading: Unpack[Reading],
 ) -> FitResult:
     r"""Fit a harmonic model to one run or several.
@@ -106,6 +107,12 @@ def fit(
         equations or with QR, or one mean error per count of an encoder that counts (whole
         numbers, at most 2^17 to a turn). By default the fastest that keeps QR's accuracy.
     threads : int, optional
+    prior : Fleet, optional
+        Units of the same design (`trueangle.fleet`): the coefficients are drawn to theirs as far
+        as the readings leave them open, so that ten readings may do. Without ``orders`` those of
+        the fleet are fitted. Standard errors and intervals hold what the prior may take, and a note
+        says how much is the unit's own. Goes with no ``ridge``, ``nuisance``, ``covariance`` or
+        loss but the usual ones.
     **reading
         ``signals``, ``period``, ``by`` ... of files and tables, as in `trueangle.read_runs`.
 
@@ -139,6 +146,21 @@ def fit(
     >>> result.model.shafts[0].sine[0].__round__(9)
     0.5
     """
+    if prior is not None:
+        from .unit import fitted_with_prior
+
+        asked = {"nuisance": nuisance, "covariance": covariance, "ridge": ridge, "method": method}
+        return fitted_with_prior(
+            runs_of(runs, reading),
+            prior,
+            None
+            if orders is None or isinstance(orders, str)
+            else resolve_orders(orders, gear_ratio, fixed_member, shafts),
+            argument,
+            loss,
+            (gear_ratio, fixed_member),
+            {**asked, "reference_orders": tuple(reference_orders) or ()},
+        )
     return fitted_to(
         runs_of(runs, reading),
         orders,

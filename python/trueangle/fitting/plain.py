@@ -29,7 +29,14 @@ def plain_fit(found: FitResult) -> dict[str, Any]:
         "ridge": found.ridge,
         "offset_spread_arcsec": arcsec(found.offset_spread, period),
         "covariance": found.uncertainty.kind,
-        "intervals_hold": ["noise", "ridge"] if found.ridge > 0.0 else ["noise"],
+        "intervals_hold": [
+            "noise",
+            *(["ridge"] if found.ridge > 0.0 else []),
+            *(["prior"] if found.posterior is not None else []),
+        ],
+        "prior": None
+        if found.posterior is None
+        else {"units": found.posterior.units, "own_share": found.posterior.share},
         "wild": [list(place) for place in found.wild],
         "orders": [
             {

@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from ..estimation.moments import Moments
     from .nuisance import Nuisance
     from .orders.select import OrderSelection
+    from .prior import Posterior
     from .summed import Summed
 
 __all__ = ["FitResult"]
@@ -67,6 +68,8 @@ class FitResult(FittedCoefficients):
         The covariance asked for; `uncertainty` has the one taken.
     nuisance : Nuisance or None
         What was taken out of the readings beside the pattern: `runs` are without it.
+    posterior : Posterior or None
+        What a prior did: the share of each order that is the unit's own (`fit`, ``prior=``).
     """
 
     problem: Problem
@@ -80,6 +83,7 @@ class FitResult(FittedCoefficients):
     remarks: tuple[str, ...] = ()
     covariance_asked: CovarianceKind = "auto"
     nuisance: Nuisance | None = None
+    posterior: Posterior | None = None
 
     @cached_property
     def model(self) -> HarmonicModel:
@@ -183,6 +187,11 @@ class FitResult(FittedCoefficients):
     @cached_property
     def uncertainty(self) -> Uncertainty:
         """Covariance, its kind and the degrees of freedom of each coefficient's variance."""
+        if self.posterior is not None:
+            covariance = np.asarray(self.fitted.solution.covariance)
+            return Uncertainty(
+                "white", covariance, np.full(len(covariance), self.posterior.freedom)
+            )
         weights = self.weights or self.problem.base
         found = uncertainty(self.problem, self.fitted, weights, self.ridge, self.covariance_asked)
         if self.nuisance is None or not self.nuisance.inflation:
@@ -238,7 +247,7 @@ class FitResult(FittedCoefficients):
         Parameters
         ----------
         errors_in : {"auto", "arcsec", "deg", "mrad", "count"} or float
-            Unit of the errors; by itself arcsec, or degrees where one reaches a degree. A
+            Unit of the errors; by itself arcsec, or degrees where errors are that large. A
             number is the counts of a turn.
         """
         from .summary import fit_summary

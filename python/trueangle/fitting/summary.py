@@ -8,13 +8,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..support.angles import arcsec, unit_name
-from ..support.display_units import ErrorsIn, ErrorUnit, error_unit
+from ..support.display_units import ErrorsIn, ErrorUnit, error_unit, phase_pair, sine_of_rms
 from ..support.distributions import student_quantile
+from ..support.layout import laid_out
 
 if TYPE_CHECKING:
     from .result import FitResult
 
-__all__ = ["fit_summary"]
+__all__ = ["fit_summary", "unit_of"]
 
 
 def fit_summary(fit: FitResult, errors_in: ErrorsIn = "auto") -> str:
@@ -22,7 +23,7 @@ def fit_summary(fit: FitResult, errors_in: ErrorsIn = "auto") -> str:
     model = fit.model
     period = model.period
     runs, unit = len(fit.problem.runs), unit_name(period)
-    shown = _unit(fit, errors_in)
+    shown = unit_of(fit, errors_in)
     head = [
         ("readings", f"{fit.readings} in {runs} run{'s' if runs > 1 else ''}"),
         ("argument", f"{model.argument} angle"),
@@ -41,15 +42,16 @@ def fit_summary(fit: FitResult, errors_in: ErrorsIn = "auto") -> str:
     lines += ["", *_table(fit, shown)]
     if fit.notes:
         lines += ["", *(f"  [{i}] {note}" for i, note in enumerate(fit.notes, 1))]
-    return "\n".join(lines)
+    return laid_out(lines)
 
 
-def _unit(fit: FitResult, errors_in: ErrorsIn) -> ErrorUnit:
-    """One unit for the amplitudes and the residual."""
+def unit_of(fit: FitResult, errors_in: ErrorsIn = "auto") -> ErrorUnit:
+    """One unit for all that is told and drawn of a fit, by the rms of pattern and residual."""
     period = fit.model.period
-    sizes = [float(c) for c in fit.model.amplitudes] + [float(fit.residual_std)]
-    largest = max((size for size in sizes if math.isfinite(size)), default=0.0)
-    return error_unit(errors_in, arcsec(largest, period), period)
+    pattern = 0.5 * float(fit.model.amplitudes @ fit.model.amplitudes)
+    left = fit.residual_std if math.isfinite(fit.residual_std) else 0.0
+    rms = arcsec(math.sqrt(pattern + left * left), period)
+    return error_unit(errors_in, sine_of_rms(rms), period)
 
 
 def _residual(fit: FitResult, shown: ErrorUnit) -> str:
@@ -85,10 +87,6 @@ _KINDS = {
 }
 
 
-#: Phases are angles as well.
-_DEGREES = error_unit("deg")
-
-
 def _table(fit: FitResult, shown: ErrorUnit) -> list[str]:
     model = fit.model
     with_std = model.covariance is not None
@@ -103,9 +101,8 @@ def _table(fit: FitResult, shown: ErrorUnit) -> list[str]:
             arcsec(float(model.amplitudes[n]), model.period),
             arcsec(float(amplitude_std[n]), model.period),
         )
-        phase, phase_std_text = _DEGREES.pair(
-            3600.0 * (math.degrees(model.phases[n]) % 360.0),
-            3600.0 * min(math.degrees(phase_std[n]), 180.0),
+        phase, phase_std_text = phase_pair(
+            math.degrees(model.phases[n]), math.degrees(phase_std[n])
         )
         lines.append(
             f"  {shaft.name:<{width}}  {shaft.orders[i]:5d}  "

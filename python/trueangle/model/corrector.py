@@ -55,7 +55,8 @@ class Corrector:
         """``step(indicated, velocity=, temperature=, torque=, direction=, current=) -> corrected``.
 
         One sample, in the state of this corrector: a bound method of the compiled core
-        without allocation but the result. A signal the model needs and does not get is a
+        without allocation but the result; ``coupled_JOINT`` is the indicated angle of another
+        joint that a term is about. A signal the model needs and does not get is a
         `MissingSignalError`; others are ignored.
         """
         return self._core.step

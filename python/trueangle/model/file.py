@@ -213,6 +213,9 @@ class _Reader(Decoder):
                 for name, value in signals.items()
                 if name in model.uses_signals
             }
+            # A quarter turn of other joints.
+            others = (name for name in model.uses_signals if name not in signals)
+            given |= dict.fromkeys(others, 0.25 * signals["direction"] * model.period)
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore", OutsideSpanWarning)
                 corrected = model.correct(start + angles, **given)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field, fields, replace
-from functools import cached_property
+from functools import cached_property, partial
 from os import PathLike
 from typing import TYPE_CHECKING, Any, Literal, TypeAlias, Unpack, overload
 
@@ -17,16 +17,19 @@ from ..errors import ArgumentError
 from ..formats.signals import AT_RUN_TIME, GivenSignals, check_names
 from ..joint.shafts import Shaft
 from ..support.angles import check_period
+from ..support.drawn import drawn
 from ..support.kinds import told_kinds
-from ..support.oftype import all_of_type
+from ..support.oftype import all_of_type, of_type
 from ..support.plainresult import Shown
 from . import summary as modelsummary
 from .records import FitRecord, Provenance
 from .spanguard import SpanGuard
-from .step import Step
+from .step import ExchangeableStep, Step, exchangeable
 from .validity import ROUNDING, check_fit, check_invertible, check_number, checked_covariance
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
     from .corrector import Corrector
     from .term import Term
 
@@ -299,7 +302,7 @@ class HarmonicModel(Shown):
 
         return Corrector(self)
 
-    def compensator(self) -> Step:
+    def compensator(self) -> ExchangeableStep:
         """``step(indicated) -> corrected`` for one sample at a time.
 
         The cheapest call there is: a bound method of the compiled core, no allocation
@@ -310,16 +313,29 @@ class HarmonicModel(Shown):
         and keeps the state of travel; `corrector` gives the same step and a ``reset``. Signals
         that the model does not need are ignored, as by `correct`. A step can be pickled.
 
+        ``step.swap(model)`` corrects by another model from the next step on, in every thread that
+        holds the step: a step in another thread ends with the model it began with. Both have the
+        same period, and terms or none. What is known of the travel stays where the terms of the
+        other model can hold it, else it begins anew. The new model is made ready first (some
+        tenths of a millisecond), by the thread that swaps.
+
         Examples
         --------
         >>> model = HarmonicModel([Shaft("output", 1, [1], [0.0], [0.5])], period=360.0)
         >>> step = model.compensator()
         >>> round(step(90.5), 9)
         90.0
+        >>> step.swap(model.replace(constant=0.25))
+        >>> round(step(90.75), 9)
+        90.0
         """
-        if self.terms:
-            return self._core_corrector().step
-        return self._series.compensator().step
+        core = self._prepared()
+        step: ExchangeableStep = exchangeable(core.step, partial(_swap, core, self))
+        return step
+
+    def _prepared(self) -> Any:
+        """What corrects one sample at a time, in the core."""
+        return self._core_corrector() if self.terms else self._series.compensator()
 
     # -- description --------------------------------------------------------------
 
@@ -329,6 +345,22 @@ class HarmonicModel(Shown):
     def summary(self) -> str:
         """The harmonics by shaft and order, in arcseconds, and what is known of the fit."""
         return modelsummary.summary(self)
+
+    def plot(self, ax: Axes | None = None, **options: Any) -> Axes:
+        """The error over the angle with its 95 % band (`trueangle.plots.model_error`).
+
+        Needs ``trueangle[plot]``.
+
+        Parameters
+        ----------
+        ax : matplotlib Axes, optional
+
+        Returns
+        -------
+        matplotlib Axes
+        """
+        axes: Axes = drawn(self, ax, **options)
+        return axes
 
     @property
     def orders(self) -> tuple[float, ...]:
@@ -354,18 +386,21 @@ class HarmonicModel(Shown):
     def signals(self) -> tuple[str, ...]:
         """Signals without which the model cannot correct: "velocity", "temperature" ...
 
-        Where "direction" is among them, a velocity will do as well.
+        Where "direction" is among them, a velocity will do as well; "coupled_JOINT" is the
+        indicated angle of another joint.
         """
-        needed = {name for term in self.terms for name in term.needs}
-        return tuple(name for name in AT_RUN_TIME if name in needed)
+        needed = dict.fromkeys(name for term in self.terms for name in term.needs)
+        further = (name for name in needed if name not in AT_RUN_TIME)
+        return (*(name for name in AT_RUN_TIME if name in needed), *further)
 
     @property
     def uses_signals(self) -> tuple[str, ...]:
         """`signals` and those it takes where given: direction and velocity for travel."""
-        used = set(self.signals)
+        used = dict.fromkeys(self.signals)
         if self.follows_travel:
-            used |= {"direction", "velocity"}
-        return tuple(name for name in AT_RUN_TIME if name in used)
+            used |= {"direction": None, "velocity": None}
+        further = (name for name in used if name not in AT_RUN_TIME)
+        return (*(name for name in AT_RUN_TIME if name in used), *further)
 
     @property
     def follows_travel(self) -> bool:
@@ -447,3 +482,16 @@ class HarmonicModel(Shown):
 
 def _rebuild(values: dict[str, Any]) -> HarmonicModel:
     return HarmonicModel(**values)
+
+
+def _swap(core: Any, first: HarmonicModel, model: HarmonicModel) -> None:
+    """Let ``core``, made for the ``first`` model, correct by another one."""
+    of_type("model", model, HarmonicModel, "a HarmonicModel")
+    if model.period != first.period:
+        raise ArgumentError(
+            f"swap: model has the period {model.period:g}, and the step {first.period:g}"
+        )
+    if bool(model.terms) != bool(first.terms):
+        has = "terms, and the step none" if model.terms else "no terms, and the step some"
+        raise ArgumentError(f"swap: model has {has}: take its own compensator()")
+    core.swap(model._core_corrector() if model.terms else model._series)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from functools import partial
 from os import PathLike
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, TypeAlias, Unpack
@@ -11,14 +12,16 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .. import _core
-from ..errors import ArgumentError, KindError
+from ..errors import ArgumentError, KindError, MissingSignalError
 from ..formats.columns import wanted_columns
-from ..formats.signals import GivenSignals, check_names
+from ..formats.signals import GivenSignals, check_names, coupled_with
 from ..support.angles import arcsec, unit_name
 from ..support.kinds import told_kinds
+from ..support.layout import laid_out
 from ..support.oftype import of_type
 from ..support.plainresult import Shown, counted
 from .model import HarmonicModel
+from .step import exchangeable
 
 if TYPE_CHECKING:
     from .step import AllJoints
@@ -121,6 +124,8 @@ class Robot(Shown, Mapping[str, HarmonicModel]):
         **signals : array_like
             ``velocity``, ``torque`` ... where terms of a model need them: of the shape of the
             positions or one that numpy spreads to it (a value per joint, ``(N, 1)`` for all).
+            What a joint is coupled to is taken from the positions; ``coupled_JOINT`` stands for
+            a joint that is not among them.
 
         Returns
         -------
@@ -162,9 +167,14 @@ class Robot(Shown, Mapping[str, HarmonicModel]):
         columns = given.reshape(-1, len(self)).T
         for j, (joint, model) in enumerate(self.items()):
             own: Any = {n: v.reshape(-1, len(self))[:, j] for n, v in spread.items()}
+            for signal in model.signals:
+                other = coupled_with(signal)
+                if other is not None and other in self:
+                    unit = model.period / self[other].period
+                    own[signal] = columns[self.joints.index(other)] * unit
             try:
                 model.correct(columns[j], out=rows[j], **own)
-            except ArgumentError as error:
+            except (ArgumentError, MissingSignalError) as error:
                 raise type(error)(f"joint {joint}: {error}") from None
         return corrected.T
 
@@ -172,10 +182,20 @@ class Robot(Shown, Mapping[str, HarmonicModel]):
         """``step(positions) -> corrected`` for one sample of all joints at a time.
 
         One call of the compiled core for all joints: of an array of float64 it allocates
-        nothing but the result, and nothing at all with ``step(positions, out=array)``. The
+        nothing but the result, and nothing at all with ``step(positions, out=array)``. A result
+        that nobody holds any more is the array of a later one. The
         numbers are those of every model's own `HarmonicModel.compensator`, to the last bit.
         With terms it is ``step(positions, velocity=, torque=, ...)``, a value per joint or one
-        for all, and keeps the state of travel; no joint moves where one lacks a signal.
+        for all, and keeps the state of travel; no joint moves where one lacks a signal. What a
+        joint is coupled to is taken from the positions.
+
+        ``step.swap(robot)`` corrects by the models of another robot of the same joints from the
+        next step on; what is known of the travel stays where all its models can hold it.
+
+        Raises
+        ------
+        ArgumentError
+            A joint is coupled to one that the robot does not have.
 
         Examples
         --------
@@ -185,8 +205,14 @@ class Robot(Shown, Mapping[str, HarmonicModel]):
         >>> step(np.array([90.5, 0.0])).round(9)
         array([90.,  0.])
         """
+        core = self._prepared()
+        step: AllJoints = exchangeable(core.step, partial(_swap, core, self))
+        return step
+
+    def _prepared(self) -> _core.RobotStep:
+        """What corrects one sample of all joints at a time, in the core."""
         parts = [m._core_corrector() if m.terms else m._series for m in self.values()]
-        return _core.RobotStep(list(self), parts).step
+        return _core.RobotStep(list(self), parts)
 
     def save(self, path: str | PathLike[str]) -> None:
         """Write all models to one file (JSON), complete or not at all.
@@ -214,8 +240,20 @@ class Robot(Shown, Mapping[str, HarmonicModel]):
                 f"  {joint}: {orders}{terms}, at most {most:.4g} arcsec, "
                 f"angles in {unit_name(model.period)}"
             )
-        return "\n".join(lines)
+        return laid_out(lines)
 
 
 def _rebuilt(models: dict[str, HarmonicModel], name: str, signals: dict[str, Any]) -> Robot:
     return Robot(models, name=name, signals=signals)
+
+
+def _swap(core: _core.RobotStep, first: Robot, robot: Robot) -> None:
+    """Let ``core``, made for the ``first`` robot, correct by another one's models."""
+    of_type("robot", robot, Robot, "a Robot")
+    joints = [(name, model.period) for name, model in first.items()]
+    if [(name, model.period) for name, model in robot.items()] != joints:
+        raise ArgumentError(
+            f"swap: robot has the joints {', '.join(robot)}; they must be {', '.join(first)}, with "
+            "the same periods"
+        )
+    core.swap(robot._prepared())

@@ -2,14 +2,20 @@
 
 from __future__ import annotations
 
-from typing import Protocol, Unpack
+from collections.abc import Callable
+from functools import partial
+from typing import TYPE_CHECKING, Any, Protocol, Unpack
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..formats.signals import GivenSignals
 
-__all__ = ["AllJoints", "Step"]
+if TYPE_CHECKING:
+    from .model import HarmonicModel
+    from .robot import Robot
+
+__all__ = ["AllJoints", "ExchangeableStep", "Step", "exchangeable"]
 
 
 class Step(Protocol):
@@ -24,8 +30,16 @@ class Step(Protocol):
         torque: float | None = None,
         direction: float | None = None,
         current: float | None = None,
+        **coupled: float | None,
     ) -> float:
         """The true angle of an indicated one."""
+
+
+class ExchangeableStep(Step, Protocol):
+    """A step that goes on with another model."""
+
+    def swap(self, model: HarmonicModel) -> None:
+        """Correct by another model from the next step on (`HarmonicModel.compensator`)."""
 
 
 class AllJoints(Protocol):
@@ -39,3 +53,17 @@ class AllJoints(Protocol):
         **signals: Unpack[GivenSignals[ArrayLike]],
     ) -> NDArray[np.float64]:
         """The true angles, in the order of the joints; in ``out`` where it is given."""
+
+    def swap(self, robot: Robot) -> None:
+        """Correct by another robot's models from the next step on (`Robot.compensator`)."""
+
+
+def exchangeable(step: Callable[..., Any], swap: Callable[[Any], None]) -> Any:
+    """A step that can ``swap`` what it corrects by.
+
+    A bound function of the core holds no attributes; a partial of it does, and passes calls on
+    at a few nanoseconds.
+    """
+    held = partial(step)
+    held.swap = swap  # type: ignore[attr-defined]
+    return held

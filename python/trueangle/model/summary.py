@@ -6,6 +6,8 @@ import math
 from typing import TYPE_CHECKING
 
 from ..support.angles import arcsec, unit_name
+from ..support.display_units import error_unit, sine_of_rms
+from ..support.layout import laid_out, wrapped
 
 if TYPE_CHECKING:
     from .model import HarmonicModel
@@ -36,13 +38,16 @@ def one_line(model: HarmonicModel) -> str:
 def summary(model: HarmonicModel) -> str:
     """The harmonics by shaft and order, in arcseconds, and what is known of the fit."""
     period, unit = model.period, unit_name(model.period)
+    rms = math.sqrt(0.5 * float(model.amplitudes @ model.amplitudes))
+    shown = error_unit("auto", sine_of_rms(arcsec(rms, period)))
     lines = [
-        one_line(model)[1:-1],
+        *wrapped(one_line(model)[1:-1], 2),
         f"constant {model.constant:.6g} {unit}, {arcsec(model.constant, period):.6g} arcsec",
-        f"{'shaft':16s} {'order':>10s} {'amplitude, arcsec':>18s} {'phase, deg':>11s}",
+        f"{'shaft':16s} {'order':>10s} {f'amplitude, {shown.name}':>18s} {'phase, deg':>11s}",
     ]
     rows = [
-        f"{shaft.name:16.16s} {k:10d} {arcsec(c, period):18.4f} {math.degrees(p):11.2f}"
+        f"{shaft.name:16.16s} {k:10d} {shown.number(arcsec(c, period)):>18} "
+        f"{math.degrees(p) % 360.0:11.2f}"
         for shaft in model.shafts
         for k, c, p in zip(shaft.orders, shaft.amplitudes, shaft.phases, strict=True)
     ]
@@ -55,7 +60,7 @@ def summary(model: HarmonicModel) -> str:
             f"fitted to {model.fit.samples} readings of {model.fit.runs} runs "
             f"between {start:.6g} and {stop:.6g} {unit}"
         )
-    return "\n".join(lines)
+    return laid_out(lines)
 
 
 def _listed(names: list[str]) -> str:

@@ -134,7 +134,7 @@ def test_a_step_goes_on_after_a_pickle_and_begins_anew_after_a_reset():
     back = {"velocity": -np.ones(6), **given}
     begun = [step(row, **back) for row in angles[20:]]
     np.testing.assert_array_equal([again(row, **back) for row in angles[20:]], begun)
-    step.__self__.reset()
+    step.func.__self__.reset()
     fresh = ta.Robot(made).compensator()
     np.testing.assert_array_equal(
         step(angles[0], direction=1.0, **given), fresh(angles[0], direction=1.0, **given)
@@ -228,3 +228,29 @@ def _frame(table):
     import pandas as pd
 
     return pd.DataFrame(table)
+
+
+def test_a_result_that_nobody_holds_is_used_again():
+    shaft = ta.Shaft("output", 1, [1], [0.0], [0.5])
+    robot = ta.Robot({name: ta.HarmonicModel([shaft], period=360.0) for name in "abc"})
+    step = robot.compensator()
+    x = np.array([90.5, 0.0, 180.0])
+    kept = [step(x + k) for k in range(5)]
+    assert len({id(array) for array in kept}) == 5
+    for k, array in enumerate(kept):
+        np.testing.assert_array_equal(array, robot.correct(x + k))
+    # Views and results taken as angles are held, too.
+    view = step(x)[1:]
+    held = view.copy()
+    later = step(step(step(x + 7.0)))
+    np.testing.assert_array_equal(view, held)
+    np.testing.assert_array_equal(later, robot.correct(robot.correct(robot.correct(x + 7.0))))
+    places = {id(step(x)) for _ in range(50)}
+    assert len(places) <= 2
+    frozen = step(x)
+    frozen.flags.writeable = False
+    was = frozen.copy()
+    del kept, later
+    for _ in range(4):
+        step(x + 1.0)
+    np.testing.assert_array_equal(frozen, was)

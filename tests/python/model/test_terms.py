@@ -15,6 +15,7 @@ from trueangle.terms import (
     ChannelSkew,
     CurrentCoupling,
     DirectionalPattern,
+    JointCoupling,
     ScaleError,
     VaryingLine,
 )
@@ -45,6 +46,7 @@ def any_terms(draw):
             draw(numbers), draw(numbers), draw(numbers), draw(st.floats(0.0, 9.0)), draw(numbers)
         ),
         CurrentCoupling(draw(numbers), **draw(lines)),
+        JointCoupling(draw(st.text(min_size=1, max_size=9)), draw(numbers)),
         ta.LoadDependentGearError(
             **draw(lines), torque=draw(st.sampled_from(["signed", "absolute"]))
         ),

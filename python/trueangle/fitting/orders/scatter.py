@@ -103,6 +103,8 @@ def pooled_scatter(scatter: Array, units: int) -> tuple[float, float] | None:
         return None
     # Median of chi-square over its mean (Wilson and Hilferty).
     middle = float(median(finite)) / (1.0 - 2.0 / (9.0 * each)) ** 3
+    if middle <= 0.0:  # copies of one run
+        return None
     usual = finite[log_chi2_tail(finite / middle * each, each) > math.log(OVERDISPERSED)]
     if usual.size * each < 20:
         return None

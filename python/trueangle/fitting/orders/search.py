@@ -28,6 +28,9 @@ Array = NDArray[np.float64]
 #: the 1 % promised: the rest covers what the noise estimate itself does not know.
 FALSE_ALARM: Final = 0.005
 
+#: Rounding of a sum.
+_EPSILON = float(np.finfo(np.float64).eps)
+
 #: Least degrees of freedom for which a noise estimate is used on its own.
 _ENOUGH_DOF: Final = 20
 
@@ -121,15 +124,21 @@ class EvidenceSearch:
         if self.barred:
             dof = max(1, self.free - 2 * len(chosen))
             return ReadingVariance(fit_subset(self.sums, chosen)[2] / dof, dof, "model")
-        if self.repeats is not None and self.repeats.degrees_of_freedom >= _ENOUGH_DOF:
-            return self.repeats
+        repeats = self.repeats
+        # Copies of the same readings repeat to the last digit, which says nothing of noise.
+        known = repeats is not None and repeats.degrees_of_freedom >= _ENOUGH_DOF
+        if repeats is not None and known and repeats.variance > 0.0:
+            return repeats
+        # Of readings without noise rounding is left, which sums of squares do not resolve.
+        rounding = _EPSILON * self.sums.total()[2]
         everything = len(self.orders)
         if self.free - 2 * everything >= max(_ENOUGH_DOF, 2 * everything):
             _, _, squares = fit_subset(self.sums, range(everything))
             dof = self.free - 2 * everything
-            return ReadingVariance(squares / dof, dof, "residual")
+            return ReadingVariance(max(squares, rounding) / dof, dof, "residual")
         dof = max(1, self.free - 2 * len(chosen))
-        return ReadingVariance(fit_subset(self.sums, chosen)[2] / dof, dof, "model")
+        squares = fit_subset(self.sums, chosen)[2]
+        return ReadingVariance(max(squares, rounding) / dof, dof, "model")
 
     def _level(self, chosen: Sequence[int]) -> _Level:
         """Noise of the coefficients: common to all orders, and each order's own."""

@@ -3,21 +3,20 @@
 from __future__ import annotations
 
 import math
-import textwrap
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from ...support.angles import arcsec
-from ...support.display_units import ErrorsIn, ErrorUnit, error_unit
+from ...support.display_units import ErrorsIn, ErrorUnit, error_unit, phase_pair, sine_of_rms
+from ...support.layout import laid_out, wrapped
 
 if TYPE_CHECKING:
     from .table import OrderRow, OrderSelection
 
-__all__ = ["summarise"]
+__all__ = ["summarise", "unit_of"]
 
 #: Rejected orders listed beside the retained ones, the strongest first.
 _REJECTED = 8
-_WIDTH = 96
 
 
 def summarise(selection: OrderSelection, errors_in: ErrorsIn = "auto") -> str:
@@ -25,8 +24,7 @@ def summarise(selection: OrderSelection, errors_in: ErrorsIn = "auto") -> str:
     period = selection.period
     noise = arcsec(selection.noise.standard_deviation, period)
     before, after = (arcsec(v, period) for v in selection.holdout_rms)
-    sizes = [before, *(arcsec(row.amplitude, period) for row in selection.table)]
-    unit = error_unit(errors_in, max(filter(math.isfinite, sizes), default=0.0), period)
+    unit = unit_of(selection, errors_in)
     noise_std = noise / math.sqrt(2.0 * max(1.0, selection.noise.degrees_of_freedom))
     runs = f"{selection.runs} run{'s' if selection.runs != 1 else ''}"
     lines = [
@@ -53,20 +51,24 @@ def summarise(selection: OrderSelection, errors_in: ErrorsIn = "auto") -> str:
     for row in selection.table:
         if row.doubtful or row.verdict == "reference":
             text = row.reason if row.doubtful else f"{row.order:g}: {row.reason}"
-            lines += textwrap.wrap(f"! {text}", _WIDTH, subsequent_indent="  ")
+            lines += wrapped(f"! {text}", 2)
     for note in selection.notes:
-        lines += textwrap.wrap(f"note: {note}", _WIDTH, subsequent_indent="  ")
-    return "\n".join(lines).rstrip()
+        lines += wrapped(f"note: {note}", 2)
+    return laid_out(lines).rstrip()
 
 
-_HEADER = (
-    "  order   amplitude        +-   phase     +-  spread  false alarm  held-out gain  verdict"
-)
+def unit_of(selection: OrderSelection, errors_in: ErrorsIn = "auto") -> ErrorUnit:
+    """One unit for all that is told and drawn of a selection, by the rms before it."""
+    before = arcsec(selection.holdout_rms[0], selection.period)
+    return error_unit(errors_in, sine_of_rms(before), selection.period)
+
+
+_HEADER = "  order amplitude      +-   phase    +- spread false alarm held out  verdict"
 
 
 def _units(unit: ErrorUnit) -> str:
     """Units of the first columns."""
-    return f"        {unit.name:>11} {unit.name:>9}     deg    deg     deg"
+    return f"        {unit.name:>9} {unit.name:>7}     deg   deg    deg                gain, %"
 
 
 def _line(row: OrderRow, period: float, unit: ErrorUnit) -> str:
@@ -74,11 +76,11 @@ def _line(row: OrderRow, period: float, unit: ErrorUnit) -> str:
     chance = f"{10.0**row.log10_false_alarm:.3g}"
     if -math.inf < row.log10_false_alarm < -3:
         chance = f"1e{math.floor(row.log10_false_alarm):d}"
-    spread = f"{row.phase_spread_deg:6.0f}" if math.isfinite(row.phase_spread_deg) else "     -"
+    spread = f"{row.phase_spread_deg:.0f}" if math.isfinite(row.phase_spread_deg) else "-"
+    phase, phase_std = phase_pair(row.phase_deg, row.phase_error_deg)
     return (
-        f"  {row.order:>5g} {size:>11} {std:>9} {row.phase_deg % 360.0:7.1f} "
-        f"{row.phase_error_deg:6.1f}  {spread} {chance:>12} {100.0 * row.holdout_gain:12.3g} %"
-        f"  {row.verdict}"
+        f"  {row.order:>5g} {size:>9} {std:>7} {phase:>7} {phase_std:>5} {spread:>6} "
+        f"{chance:>11} {100.0 * row.holdout_gain:8.3g}  {row.verdict}"
     )
 
 
@@ -89,7 +91,7 @@ def _explanations(rows: Sequence[OrderRow]) -> list[str]:
         names = [e.name for e in row.explanations if e.order == row.order and not e.assumed]
         if names:
             text = f"{row.order:g}: {'; or '.join(names)}"
-            lines += textwrap.wrap(text, _WIDTH, initial_indent="  ", subsequent_indent="     ")
+            lines += wrapped(text, 5, 2)
     return ["What they may be:", *lines, ""] if lines else []
 
 

@@ -206,7 +206,7 @@ class OrderSelection(PlainResult):
         Parameters
         ----------
         errors_in : {"auto", "arcsec", "deg", "mrad", "count"} or float
-            Unit of the errors; by itself arcsec, or degrees where one reaches a degree. A
+            Unit of the errors; by itself arcsec, or degrees where errors are that large. A
             number is the counts of a turn.
         """
         from .summary import summarise

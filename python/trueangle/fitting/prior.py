@@ -1,0 +1,236 @@
+r"""A prior for the coefficients of a unit: what others of its design are like.
+
+With :math:`b \sim N(\mu, T)` and readings of noise s the coefficients are normal about
+
+.. math:: \hat b = (X'X/s^2 + T^{-1})^{-1} (X'y/s^2 + T^{-1} \mu)
+
+with the covariance :math:`(X'X/s^2 + T^{-1})^{-1}`: few readings suffice for what the units
+differ in little.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import ArgumentError, KindError
+from ..estimation.linear import NormalEquations, total
+from ..joint.shafts import ShaftOrders
+from ..support.angles import circular_mean, unit_name, wrap
+from .problem import Fitted, Problem, Solution
+from .robust import WILD, Weighted
+
+__all__ = ["Posterior", "Prior", "posterior", "prior_of"]
+
+Array = NDArray[np.float64]
+
+#: Rounds in which the noise and what is set aside settle.
+_ROUNDS: Final = 20
+
+
+@dataclass(frozen=True, eq=False)
+class Prior:
+    """The coefficients of a further unit, before it is measured.
+
+    Attributes
+    ----------
+    period : float
+    shafts : tuple of ShaftOrders
+    mean, variance : ndarray, shape (2 K,)
+        Of cosine and sine of each order of each shaft in turn; the variance holds that of the mean.
+    freedom : float
+        Degrees of freedom of the variances.
+    noise_variance, noise_freedom : float
+        Of one reading, and the degrees of freedom that it is worth.
+    units : int
+        From which it is known.
+    """
+
+    period: float
+    shafts: tuple[ShaftOrders, ...]
+    mean: Array
+    variance: Array
+    freedom: float
+    noise_variance: float
+    noise_freedom: float
+    units: int
+
+    def among(self, shafts: Sequence[ShaftOrders]) -> Prior:
+        """For these orders, those that it does not know left free."""
+        known = {
+            (shaft.cycles_per_turn, order): i
+            for i, (shaft, order) in enumerate(
+                (shaft, order) for shaft in self.shafts for order in shaft.orders
+            )
+        }
+        mean: list[float] = []
+        variance: list[float] = []
+        for shaft in shafts:
+            for order in shaft.orders:
+                i = known.get((shaft.cycles_per_turn, order))
+                place = slice(0, 0) if i is None else slice(2 * i, 2 * i + 2)
+                mean += [0.0, 0.0] if i is None else self.mean[place].tolist()
+                variance += [math.inf] * 2 if i is None else self.variance[place].tolist()
+        values = {**vars(self), "mean": np.array(mean), "variance": np.array(variance)}
+        return Prior(**{**values, "shafts": tuple(shafts)})
+
+
+class Posterior(NamedTuple):
+    """What a prior and readings gave.
+
+    ``own`` is the share of each order's prior variance that the readings took away, ``freedom``
+    the degrees of freedom of the standard errors, ``units`` those that the prior is known from.
+    """
+
+    own: tuple[float, ...]
+    freedom: float
+    units: int
+    noise: float
+
+    @property
+    def share(self) -> float:
+        """Of all orders together, each counting alike."""
+        return float(np.mean(self.own)) if self.own else 1.0
+
+    def note(self) -> str:
+        """The share in words."""
+        return (
+            f"fitted with a prior from {self.units} units of its design: {100.0 * self.share:.0f} "
+            "% of the coefficients is the unit's own readings, on average over the orders; "
+            "standard errors and intervals hold what the prior may take, for units like those"
+        )
+
+
+def prior_of(given: Any, period: float) -> Prior:
+    """A prior, or that of a fleet, for readings of this period.
+
+    Raises
+    ------
+    KindError
+        Neither.
+    ArgumentError
+        Of another period.
+    """
+    found = given if isinstance(given, Prior) else getattr(given, "prior", None)
+    if not isinstance(found, Prior):
+        raise KindError(f"prior must be a trueangle.Fleet, got {given!r:.60}")
+    if found.period != period:
+        raise ArgumentError(
+            f"prior is in {unit_name(found.period)} and the runs are in {unit_name(period)}: "
+            "convert one of them"
+        )
+    return found
+
+
+def posterior(problem: Problem, prior: Prior, loss: str) -> tuple[Weighted, Posterior]:
+    """The fit under a prior; readings more than 8 deviations off set aside but with ``"linear"``.
+
+    Raises
+    ------
+    ArgumentError
+        Another loss than these two.
+    """
+    if loss not in ("auto", "linear"):
+        raise ArgumentError(f"loss must be 'auto' or 'linear' with prior=, got {loss!r}")
+    prior = prior.among(problem.shafts)
+    weights = list(problem.base)
+    found, taken = _solved(problem, prior, weights)
+    for _ in range(_ROUNDS if loss == "auto" else 0):
+        limit = max(WILD * taken.noise, 1e-12 * problem.period)
+        after = [
+            np.where(np.abs(left) > limit, 0.0, np.ones(left.size) if base is None else base)
+            for left, base in zip(problem.residuals(found), problem.base, strict=True)
+        ]
+        now = [np.ones(a.size) if w is None else w for w, a in zip(weights, after, strict=True)]
+        if all((a == w).all() for a, w in zip(after, now, strict=True)):
+            break
+        if any(not a.any() for a in after):  # a run that is all outliers is none
+            break
+        weights = list(after)
+        found, taken = _solved(problem, prior, weights)
+    given = [
+        np.ones(len(run)) if base is None else base
+        for run, base in zip(problem.runs, problem.base, strict=True)
+    ]
+    wild = sum(
+        int(np.count_nonzero((w == 0.0) & (b > 0.0)))
+        for w, b in zip(weights, given, strict=True)
+        if w is not None
+    )
+    every = [b if w is None else w for w, b in zip(weights, given, strict=True)]
+    return Weighted(found, every if wild else None, wild), taken
+
+
+def _solved(
+    problem: Problem, prior: Prior, weights: Sequence[Array | None]
+) -> tuple[Fitted, Posterior]:
+    products = [problem.products(weights, i, 1)[0] for i in range(len(problem.runs))]
+    means = np.array([part[0] / part[0, 0] for part in products])
+    sums = total([NormalEquations.of_products(part) for part in products])
+    size, runs = sums.moment.size, len(problem.runs)
+    precision = 1.0 / prior.variance  # of an order that no unit has: its mean, exactly
+    fixed = ~(prior.variance > 0.0)
+    precision[fixed] = 0.0
+    apart = sums.moment - sums.gram @ np.where(fixed, prior.mean, 0.0)
+    noise, freedom = prior.noise_variance, 1.0
+    free = ~fixed
+    for _ in range(_ROUNDS):
+        hessian = (sums.gram / noise + np.diag(precision))[np.ix_(free, free)]
+        target = (apart / noise + precision * prior.mean)[free]
+        model = NormalEquations(hessian, target).solved()
+        inverse = np.zeros((size, size))
+        inverse[np.ix_(free, free)] = model.inverse
+        found = prior.mean.copy()
+        found[free] = model.coefficients[:, 0]
+        left = max(sums.about(found).squares, 0.0)
+        spent = float(np.einsum("ij,ji->", sums.gram / noise, inverse))
+        freedom = max(sums.readings - runs - spent, 0.0)
+        if math.isinf(prior.noise_freedom):
+            break
+        before = noise
+        noise = (prior.noise_freedom * prior.noise_variance + left) / (
+            prior.noise_freedom + freedom
+        )
+        if abs(noise - before) <= 1e-12 * before:
+            break
+    zeros = np.array(
+        [circular_mean(r.indicated - r.reference, problem.period) for r in problem.runs]
+    )
+    offsets = wrap(zeros + means[:, -1] - means[:, 1:-1] @ found, problem.period)
+    across = means[:, 1:-1].mean(axis=0)
+    own = noise * sum(1.0 / float(part[0, 0]) for part in products) / runs**2
+    covariance = np.empty((size + 1, size + 1))
+    covariance[1:, 1:] = inverse
+    covariance[0, 1:] = covariance[1:, 0] = -inverse @ across
+    covariance[0, 0] = own + across @ inverse @ across
+    pairs = found.reshape(-1, 2)
+    edges = np.cumsum([len(shaft.orders) for shaft in problem.shafts])[:-1]
+    parts = np.split(pairs, edges)
+    solution = Solution(
+        offsets,
+        np.sqrt(
+            [
+                noise / float(p[0, 0]) + m @ inverse @ m
+                for p, m in zip(products, means[:, 1:-1], strict=True)
+            ]
+        ),
+        circular_mean(offsets, problem.period),
+        [part[:, 0].tolist() for part in parts],
+        [part[:, 1].tolist() for part in parts],
+        covariance,
+        left / freedom if freedom > 0.5 else noise,
+        freedom,
+        size + runs,
+        math.sqrt(float(np.linalg.cond(hessian))) if free.any() else 1.0,
+        "plain",
+    )
+    taken = np.where(np.isfinite(prior.variance) & free, np.diag(inverse) / prior.variance, fixed)
+    shares = 1.0 - np.clip(taken, 0.0, 1.0).reshape(-1, 2).mean(axis=1)
+    worth = min(prior.freedom, prior.noise_freedom + freedom)
+    known = Posterior(tuple(shares.tolist()), max(worth, 1.0), prior.units, math.sqrt(noise))
+    return Fitted(solution, offsets, problem.shafts, problem.period), known

@@ -1,0 +1,155 @@
+"""One calibration of one unit: its coefficients and their covariance, from sums of its runs."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..estimation.linear import NormalEquations, total
+from ..fitting.robust import without_spikes
+from ..joint.shafts import ShaftOrders
+from ..runs.run import CalibrationRun
+from ..runs.travel import over_turns
+from ..support.angles import circular_mean
+
+__all__ = ["Calibration", "UnitSums", "columns_of", "output_orders"]
+
+Array = NDArray[np.float64]
+
+
+def output_orders(shafts: Sequence[ShaftOrders]) -> Array:
+    """Output orders of all harmonics, shaft by shaft."""
+    return np.array([k * shaft.cycles_per_turn for shaft in shafts for k in shaft.orders])
+
+
+def columns_of(angles: Array, orders: Array, period: float) -> Array:
+    """Cosine and sine of each order in turn, a row an angle."""
+    phase = np.outer(angles, orders * (2.0 * math.pi / period))
+    found = np.empty((angles.size, 2 * orders.size))
+    np.cos(phase, out=found[:, ::2])
+    np.sin(phase, out=found[:, 1::2])
+    return found
+
+
+@dataclass
+class UnitSums:
+    """Sums over the runs of one unit on one day; each run has a zero of its own."""
+
+    runs: list[NormalEquations] = field(default_factory=list)
+    means: list[Array] = field(default_factory=list)
+    when: str | None = None
+
+    def add(self, run: CalibrationRun, orders: Array, periodic: bool) -> None:
+        """Take in a run, its isolated outliers left out."""
+        run = without_spikes(run if periodic else over_turns(run))
+        columns = columns_of(run.reference, orders, run.period)
+        error = run.centred_error
+        if run.weights is None:
+            weights, design = float(error.size), columns
+            mean = np.append(columns.mean(axis=0), error.mean())
+            centred = np.column_stack([columns, error]) - mean
+            count = weights
+        else:
+            share = run.weights
+            weights = float(share.sum())
+            design = np.column_stack([columns, error])
+            mean = share @ design / max(weights, 1e-300)
+            centred = (design - mean) * np.sqrt(share)[:, None]
+            count = float(np.count_nonzero(share))
+        products = centred.T @ centred
+        sums = NormalEquations(
+            products[:-1, :-1], products[:-1, -1], float(products[-1, -1]), count
+        )
+        self.runs.append(sums)
+        self.means.append(mean)
+        self.when = self.when or run.when
+
+    def repeats(self, every: Array) -> tuple[Array, float]:
+        """Squares of each order's coefficients of single runs about those of all, and freedom."""
+        models = [run.solved() for run in self.runs] if len(self.runs) > 1 else []
+        if not models or any(model.rank < every.size for model in models):
+            return np.zeros(every.size // 2), 0.0
+        apart = np.array([model.coefficients[:, 0] - every for model in models])
+        return (apart**2).sum(axis=0).reshape(-1, 2).sum(axis=1), 2.0 * (len(models) - 1.0)
+
+
+@dataclass(frozen=True, eq=False)
+class Calibration:
+    """What one day's readings tell of a unit.
+
+    Attributes
+    ----------
+    unit : str
+    when : str or None
+        ISO 8601.
+    coefficients : ndarray, shape (2 K,)
+        Cosine and sine of each order in turn.
+    inverse : ndarray, shape (2 K, 2 K)
+        Covariance for readings of unit variance.
+    zero : float
+        Circular mean of the runs' zeros.
+    zero_inverse : float
+        Variance of `zero` for readings of unit variance.
+    squares : float
+        Left of the errors' sum of squares.
+    freedom : float
+        Readings less unknowns.
+    readings, runs : int
+    repeat_squares : ndarray, shape (K,)
+        Squares of cosine and sine of single runs about `coefficients`, summed.
+    repeat_freedom : float
+        Of each of these sums; 0 of a single run.
+    """
+
+    unit: str
+    when: str | None
+    coefficients: Array
+    inverse: Array
+    zero: float
+    zero_inverse: float
+    squares: float
+    freedom: float
+    readings: int
+    runs: int
+    repeat_squares: Array
+    repeat_freedom: float
+
+    @classmethod
+    def of(cls, unit: str, sums: UnitSums, period: float) -> Calibration | None:
+        """Of one day's sums; None where they do not tell the orders apart."""
+        every = total(sums.runs)
+        model = every.solved()
+        size = every.moment.size
+        freedom = every.readings - len(sums.runs) - size
+        if model.rank < size or freedom < 1.0:
+            return None
+        found = model.coefficients[:, 0]
+        inverse = np.asarray(model.inverse)
+        means = np.array(sums.means)
+        zeros = means[:, -1] - means[:, :-1] @ found
+        across = means[:, :-1].mean(axis=0)
+        own = sum(1.0 / max(run.readings, 1.0) for run in sums.runs) / len(sums.runs) ** 2
+        return cls(
+            unit,
+            sums.when,
+            found,
+            inverse,
+            circular_mean(zeros, period),
+            own + float(across @ inverse @ across),
+            max(every.about(found).squares, 0.0),
+            freedom,
+            round(every.readings),
+            len(sums.runs),
+            *sums.repeats(found),
+        )
+
+    def blocks(self) -> Array:
+        """Covariance of each order's cosine and sine for readings of unit variance, (K, 2, 2)."""
+        k = 2 * np.arange(self.coefficients.size // 2)
+        rows = np.array([[k, k], [k + 1, k + 1]]).transpose(2, 0, 1)
+        columns = np.array([[k, k + 1], [k, k + 1]]).transpose(2, 0, 1)
+        return np.asarray(self.inverse[rows, columns])

@@ -1,0 +1,241 @@
+"""Units calibrated again: what moved, whether by a step or slowly, and when the next is due."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from datetime import datetime, timedelta
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..formats.times import parsed_time
+from ..support.angles import wrap
+from ..support.distributions import f_quantile
+from .calibration import Calibration, columns_of
+from .outliers import LEVEL, Deviates, deviates
+
+__all__ = ["Change", "HistoryRow", "changes_of", "next_calibration"]
+
+Array = NDArray[np.float64]
+
+#: Units with a second date from which their changes tell what an ordinary change is.
+_FEWEST: Final = 4
+
+#: Places of a turn at which a change of the pattern is looked at.
+_PLACES: Final = 360
+
+#: Quantile of the normal distribution for a one-sided bound of 95 %.
+_BOUND: Final = 1.6448536269514722
+
+
+class HistoryRow(NamedTuple):
+    """What one further calibration of a unit says.
+
+    ``order`` is the order that moved most (None: the zero); ``statistic`` its T^2 and ``limit``
+    what it stays below in 99 % of fleets in which nothing moved.
+    """
+
+    unit: str
+    when: str
+    order: float | None
+    statistic: float
+    limit: float
+    verdict: str
+    next_calibration: str | None
+    extrapolated: bool
+
+    def plain(self) -> dict[str, Any]:
+        """As plain values."""
+        return self._asdict()
+
+
+class Change(NamedTuple):
+    """A unit's last calibration against its first.
+
+    ``orders`` are places of the orders that moved, the first the most; ``grows`` whether a slow
+    drift explains the dates between better than a step (None with two dates); ``leaps`` whether
+    it moved farther than two units of the fleet are apart, in 99 % of fleets.
+    """
+
+    unit: str
+    moved: bool
+    zero_moved: bool
+    orders: tuple[int, ...]
+    chance: float
+    zero: float
+    pattern: Array
+    std: Array
+    grows: bool | None
+    leaps: bool
+    rows: tuple[HistoryRow, ...]
+
+
+def changes_of(
+    dated: Sequence[Sequence[tuple[Calibration, float]]],
+    orders: Array,
+    period: float,
+    between: Array,
+    permitted: float | None,
+) -> list[Change]:
+    r"""Every unit's last calibration against its first.
+
+    .. math:: T^2 = (b_t - b_0)' (W + S_t + S_0)^{-1} (b_t - b_0)
+
+    per order, with W the variance of an ordinary change, by the median over the fleet itself; the
+    zero apart, for ordinary remounting moves it. Extreme deviates as among units
+    (`trueangle.fleets.outliers`), at half of 1 % each.
+
+    Parameters
+    ----------
+    dated : sequence of sequences
+        Of every unit: its calibrations in the order of their dates, with the variance of a reading.
+    orders : ndarray
+    period : float
+    between : ndarray, shape (K,)
+        Variance between units of each order.
+    permitted : float or None
+        Error from which a calibration is due.
+    """
+    if len(dated) < _FEWEST:
+        return []
+    values, own, zeros, zero_own = _differences(dated, period)
+    pattern = deviates(values, own, aligned=False, level=0.5 * LEVEL)
+    # The zero has no mean of its own where every remounting is new: a common one is the fixture's.
+    zero = deviates([zeros], [zero_own], aligned=True, level=0.5 * LEVEL)
+    limit = f_quantile(1.0 - 0.5 * LEVEL / pattern.chance.size, 2.0, 2.0 * (len(dated) - 1.0)) * 2.0
+    zero_limit = f_quantile(1.0 - 0.5 * LEVEL / len(dated), 1.0, max(len(dated) - 2.0, 1.0))
+    found = []
+    for u, calibrations in enumerate(dated):
+        moved, zero_moved = bool(pattern.outlying[u]), bool(zero.outlying[u])
+        places = tuple(pattern.orders(u, 0.5 * LEVEL))
+        grows = _grows(calibrations, places[0], pattern) if moved else None
+        change = np.concatenate([value[u] for value in values])
+        squares = (change.reshape(-1, 2) ** 2).sum(axis=1)
+        rare = 4.0 * between * math.log(pattern.chance.size / LEVEL)
+        std = np.sqrt(np.concatenate([np.diag(s[u]) for s in own]))
+        verdict = "changed" if grows is False else "recalibrate"
+        verdict = verdict if moved else "zero_moved" if zero_moved else "fine"
+        rows = []
+        for later, _ in calibrations[1:]:
+            last = later is calibrations[-1][0]
+            square = _statistic(later, calibrations, places[0], pattern)
+            about_zero = zero_moved and not moved
+            due = next_calibration(change, std, calibrations, orders, period, permitted)
+            rows.append(
+                HistoryRow(
+                    calibrations[0][0].unit,
+                    later.when or "",
+                    None if about_zero else float(orders[places[0]]),
+                    float(zero.size[u, 0] ** 2) if about_zero and last else square,
+                    zero_limit if about_zero else limit,
+                    verdict if last else "recalibrate" if square > limit else "fine",
+                    due[0] if last else None,
+                    due[1] if last else False,
+                )
+            )
+        chance = min(float(pattern.unit[u]), float(zero.unit[u]))
+        found.append(
+            Change(
+                calibrations[0][0].unit,
+                moved,
+                zero_moved,
+                places,
+                chance,
+                float(zeros[u, 0]),
+                change,
+                std,
+                grows,
+                bool((squares > rare)[list(places)].any()),
+                tuple(rows),
+            )
+        )
+    return found
+
+
+def _differences(
+    dated: Sequence[Sequence[tuple[Calibration, float]]], period: float
+) -> tuple[list[Array], list[Array], Array, Array]:
+    """Change of every order and of the zero, and their covariances by the noise of readings."""
+    pairs = [(calibrations[0], calibrations[-1]) for calibrations in dated]
+    change = np.array([b.coefficients - a.coefficients for (a, _), (b, _) in pairs])
+    blocks = np.array([s * a.blocks() + t * b.blocks() for (a, s), (b, t) in pairs])
+    zero = wrap(np.array([b.zero - a.zero for (a, _), (b, _) in pairs]), period)
+    spread = [s * a.zero_inverse + t * b.zero_inverse for (a, s), (b, t) in pairs]
+    values = list(change.reshape(len(dated), -1, 2).transpose(1, 0, 2))
+    own = list(blocks.transpose(1, 0, 2, 3))
+    return values, own, zero[:, None], np.array(spread)[:, None, None]
+
+
+def _statistic(
+    later: Calibration,
+    calibrations: Sequence[tuple[Calibration, float]],
+    place: int,
+    pattern: Deviates,
+) -> float:
+    """T^2 of one order of a date against the first."""
+    first, noise = calibrations[0]
+    order = slice(2 * place, 2 * place + 2)
+    apart = later.coefficients[order] - first.coefficients[order]
+    spread = noise * (later.blocks()[place] + first.blocks()[place])
+    spread = spread + pattern.variances[place] * np.eye(2)
+    return float(apart @ np.linalg.solve(spread + 1e-300 * np.eye(2), apart))
+
+
+def _grows(
+    calibrations: Sequence[tuple[Calibration, float]], place: int, pattern: Deviates
+) -> bool | None:
+    """Whether a straight line in time leaves less than the best step; None with two dates."""
+    if len(calibrations) < 3:
+        return None
+    order = slice(2 * place, 2 * place + 2)
+    values = np.array([c.coefficients[order] for c, _ in calibrations])
+    times = _days([c.when for c, _ in calibrations])
+    line = times - times.mean()
+    slope = line @ (values - values.mean(axis=0)) / float(line @ line)
+    drift = float(((values - values.mean(axis=0) - np.outer(line, slope)) ** 2).sum())
+    steps = []
+    for i in range(1, len(values)):
+        parts = (values[:i], values[i:])
+        steps.append(sum(float(((p - p.mean(axis=0)) ** 2).sum()) for p in parts))
+    return drift <= min(steps)
+
+
+def _days(dates: Sequence[str | None]) -> Array:
+    """Days from the first date."""
+    times = [parsed_time(date) for date in dates]
+    naive = [None if t is None else t.replace(tzinfo=None) for t in times]
+    start = naive[0]
+    return np.array(
+        [math.nan if t is None or start is None else (t - start) / timedelta(days=1) for t in naive]
+    )
+
+
+def next_calibration(
+    change: Array,
+    std: Array,
+    calibrations: Sequence[tuple[Calibration, float]],
+    orders: Array,
+    period: float,
+    permitted: float | None,
+) -> tuple[str | None, bool]:
+    """The day at which the drift's bound reaches the permitted error, and whether that is far off.
+
+    Far off is beyond twice the time seen: extrapolated.
+
+    The bound is that of 95 % of the greatest change over a turn, growing straight in time.
+    """
+    if permitted is None:
+        return None, False
+    start, end = (parsed_time(c.when) for c in (calibrations[0][0], calibrations[-1][0]))
+    if start is None or end is None:
+        return None, False
+    days = (end.replace(tzinfo=None) - start.replace(tzinfo=None)) / timedelta(days=1)
+    places = columns_of(np.linspace(0.0, period, _PLACES, endpoint=False), orders, period)
+    bound = float((np.abs(places @ change) + _BOUND * np.sqrt(places**2 @ std**2)).max())
+    if not days > 0.0 or not bound > 0.0:
+        return None, False
+    until = permitted / bound * days
+    due: datetime = end if until <= days else start + timedelta(days=min(until, 36500.0))
+    return due.date().isoformat(), until > 2.0 * days

@@ -1,0 +1,177 @@
+"""Units that do not belong: extreme studentized deviates per order, at one level for the fleet."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Final, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .variance import robust_variance
+
+__all__ = ["LEVEL", "Deviates", "deviates"]
+
+Array = NDArray[np.float64]
+
+#: Chance that a fleet without an outlier is told of one.
+LEVEL: Final = 0.01
+
+#: Shares of that chance: of a unit by one of its orders, the rest by all together; and of outliers
+#: that hide behind others (a later step, where an earlier one told none), the rest by themselves.
+_BY_ORDER: Final = 0.9
+_HIDDEN: Final = 0.2
+
+#: Of this share of the units, at most, an outlier can be told: the others are what it is told by.
+_MOST: Final = 0.25
+
+#: Degrees of freedom of the scale that an order needs.
+_FEWEST: Final = 4.0
+
+
+class Deviates(NamedTuple):
+    """How far each unit is from the others.
+
+    Attributes
+    ----------
+    chance : ndarray, shape (n, K)
+        Of a deviate as large or larger, where nothing is the matter.
+    size : ndarray, shape (n, K)
+        Distance from the others' mean in standard deviations between units.
+    unit : ndarray, shape (n,)
+        Chance of the unit as a whole, its orders allowed for.
+    outlying : ndarray of bool, shape (n,)
+    variances : ndarray, shape (K,)
+        Between units, by the median.
+    """
+
+    chance: Array
+    size: Array
+    unit: Array
+    outlying: NDArray[np.bool_]
+    variances: Array
+
+    def orders(self, unit: int, level: float = LEVEL) -> list[int]:
+        """Orders in which a unit lies outside, the first the farthest."""
+        rows = self.chance[unit]
+        limit = level / max(self.chance.size, 1)
+        found = [int(k) for k in np.argsort(rows) if rows[k] <= limit]
+        return found or [int(np.argmin(rows))]
+
+
+def deviates(
+    values: Sequence[Array], own: Sequence[Array], aligned: bool, level: float = LEVEL
+) -> Deviates:
+    r"""Extreme studentized deviates (Rosner 1983), of several orders together.
+
+    With weights :math:`w_u = 1/(\tau + s_u)`, the mean :math:`\bar b` of the units that are left
+    and :math:`h_u = w_u / \sum w`,
+
+    .. math:: F_u = \frac{e_u / d}{(\sum_v w_v |b_v - \bar b|^2 - e_u) / (N - d)}, \qquad
+              e_u = \frac{w_u |b_u - \bar b|^2}{1 - h_u}, \qquad N = d (n - 1)
+
+    is Fisher's F with d and N - d degrees of freedom for normal units. A unit's chance is that of
+    the smallest of its orders' (Bonferroni) or of all together (Fisher's sum of logarithms). The
+    farthest unit is set aside again and again; as many are outliers as the last whose chance,
+    times the units then left, is below the level.
+
+    Parameters
+    ----------
+    values : sequence of ndarray, shape (n, d)
+        Of every order: cosine and sine (d = 2), or a zero (d = 1).
+    own : sequence of ndarray, shape (n, d, d)
+        Covariance of each.
+    aligned : bool
+        Whether the units share a mean; else it is 0.
+    level : float
+        Chance of naming a unit where none is outlying.
+
+    Notes
+    -----
+    n times orders for every unit set aside, a quarter of them at most.
+    """
+    n = len(values[0])
+    variances = np.array([_variance(v, s, aligned) for v, s in zip(values, own, strict=True)])
+    noise = [np.trace(s, axis1=1, axis2=2) / s.shape[1] for s in own]
+    weights = [
+        1.0 / np.maximum(t + s, 1e-300 + 1e-12 * float(np.mean(v**2)))
+        for v, s, t in zip(values, noise, variances, strict=True)
+    ]
+    inside = np.ones(n, dtype=bool)
+    aside: list[int] = []
+    last, first = 0, None
+    for step in range(1 + int(_MOST * n)):
+        chance, size = _chances(values, weights, inside, aligned)
+        unit = _combined(chance)
+        first = (chance, size, unit) if first is None else first
+        worst = int(np.argmin(np.where(inside, unit, np.inf)))
+        share = _HIDDEN if step > last else 1.0 - _HIDDEN
+        if unit[worst] * inside.sum() <= share * level:
+            last = step + 1
+        elif unit[worst] * inside.sum() >= 1.0 and step > last + 2:
+            break
+        aside.append(worst)
+        inside[worst] = False
+    outlying = np.zeros(n, dtype=bool)
+    outlying[aside[:last]] = True
+    chance, size = _chances(values, weights, ~outlying, aligned)
+    return Deviates(chance, size, _combined(chance), outlying, variances)
+
+
+def _variance(values: Array, own: Array, aligned: bool) -> float:
+    if values.shape[1] == 2:
+        return robust_variance(values, own, aligned)
+    # One dimension: the median square of a normal number is 0.455 of its variance.
+    centre = np.median(values, axis=0) if aligned else 0.0
+    square = float(np.median((values - centre) ** 2)) / 0.45493642311957283
+    return max(square - float(own.mean()), 0.0)
+
+
+def _chances(
+    values: Sequence[Array], weights: Sequence[Array], inside: NDArray[np.bool_], aligned: bool
+) -> tuple[Array, Array]:
+    """Of every unit and order, by the units inside."""
+    chances, sizes = [], []
+    for value, weight in zip(values, weights, strict=True):
+        d = value.shape[1]
+        share = weight * inside
+        every = float(share.sum())
+        mean = share @ value / every if aligned else np.zeros(d)
+        square = weight * ((value - mean) ** 2).sum(axis=1)
+        # Of a unit inside, what the mean took of it; one outside adds the mean's own error.
+        leverage = weight / every if aligned else np.zeros(len(weight))
+        apart = np.where(inside, square / np.maximum(1.0 - leverage, 1e-9), square / (1 + leverage))
+        freedom = d * (float(inside.sum()) - float(aligned))
+        rest = float((square * inside).sum()) - np.where(inside, apart, 0.0)
+        free = np.where(inside, freedom - d, freedom)
+        scale = np.maximum(rest, 0.0) / np.maximum(free, 1.0)
+        f = np.where(apart > 0.0, apart / d / np.maximum(scale, 1e-300), 0.0)
+        told = free >= _FEWEST
+        chances.append(np.where(told, _f_tail(f, d, np.maximum(free, 1.0)), 1.0))
+        sizes.append(np.sqrt(f * d))
+    return np.column_stack(chances), np.column_stack(sizes)
+
+
+def _f_tail(f: Array, d: int, free: Array) -> Array:
+    """Tail of F with d = 1 or 2 degrees of freedom above."""
+    if d == 2:
+        return np.asarray(np.exp(-0.5 * free * np.log1p(2.0 * f / free)))
+    from ..support.distributions import student_tail
+
+    pairs = zip(np.sqrt(f).tolist(), free.tolist(), strict=True)
+    return np.array([2.0 * student_tail(t, v) for t, v in pairs])
+
+
+def _combined(chance: Array) -> Array:
+    """Chance of a unit by the least of its orders' or by all together."""
+    orders = chance.shape[1]
+    least = orders * chance.min(axis=1)
+    if orders == 1:
+        return np.asarray(np.minimum(least, 1.0))
+    half = -np.log(np.maximum(chance, 1e-300)).sum(axis=1)  # half of a chi-squared of 2 K
+    term, total = np.zeros_like(half), np.zeros_like(half)
+    for j in range(orders):
+        term = j * np.log(np.maximum(half, 1e-300)) - math.lgamma(j + 1.0)
+        total += np.exp(term - half)
+    return np.asarray(np.minimum(least / _BY_ORDER, total / (1.0 - _BY_ORDER)).clip(max=1.0))

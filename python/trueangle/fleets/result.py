@@ -1,0 +1,189 @@
+"""The result of looking at a fleet: verdicts, the common pattern, and a prior for further units."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from os import PathLike
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from ..fitting.prior import Prior
+from ..support.angles import arcsec
+from ..support.display_units import ErrorsIn
+from ..support.drawn import drawn
+from ..support.plainresult import PlainResult, counted, finite
+from .history import HistoryRow
+from .tolerance import Tolerance
+from .unit import FleetUnit
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+__all__ = ["BetweenOrder", "CommonOrder", "Fleet"]
+
+
+class CommonOrder(NamedTuple):
+    """One order of the pattern that the units share, in the unit of the fleet's period."""
+
+    order: float
+    shaft: str
+    cosine: float
+    sine: float
+    std: float
+
+    @property
+    def amplitude(self) -> float:
+        """``hypot(cosine, sine)``."""
+        return math.hypot(self.cosine, self.sine)
+
+    @property
+    def phase_deg(self) -> float:
+        """``atan2(cosine, sine)`` in [0, 360)."""
+        return math.degrees(math.atan2(self.cosine, self.sine)) % 360.0
+
+
+class BetweenOrder(NamedTuple):
+    """Standard deviation of cosine and sine of one order.
+
+    ``std`` between units; ``repeatability`` of one run about its unit (None where no unit has
+    two runs).
+    """
+
+    order: float
+    std: float
+    repeatability: float | None
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Fleet(PlainResult):
+    r"""Many units of one design.
+
+    .. math:: b_u = \mu + d_u, \quad d_u \sim N(0, T), \qquad
+              T = \operatorname{diag}(\tau_k^2 I_2)
+
+    Angles, amplitudes and standard deviations are in the unit of the runs; ``to_dict`` has arcsec.
+
+    Attributes
+    ----------
+    units : tuple of FleetUnit
+        The most urgent first.
+    common : tuple of CommonOrder
+        :math:`\mu`; zero where the units share no direction.
+    between : tuple of BetweenOrder
+        :math:`\tau_k` and what repeated runs differ by.
+    tolerance : Tolerance
+        What bounds the peak-to-peak of a share of all units.
+    history : tuple of HistoryRow
+        Of units calibrated again.
+    aligned : bool
+        Whether the units share a mounting zero: held-out units are predicted better by the mean.
+    prior : Prior
+        For a further unit: ``trueangle.fit(runs, prior=fleet)``.
+    notes : tuple of str
+    """
+
+    units: tuple[FleetUnit, ...]
+    common: tuple[CommonOrder, ...]
+    between: tuple[BetweenOrder, ...]
+    tolerance: Tolerance
+    history: tuple[HistoryRow, ...]
+    aligned: bool
+    prior: Prior
+    notes: tuple[str, ...] = ()
+
+    @property
+    def period(self) -> float:
+        """One turn in the unit of the runs."""
+        return self.prior.period
+
+    @property
+    def orders(self) -> tuple[float, ...]:
+        """Output orders."""
+        return tuple(row.order for row in self.common)
+
+    def verdicts(self) -> dict[str, str]:
+        """Verdict by unit."""
+        return {unit.unit: unit.verdict for unit in self.units}
+
+    def to_dict(self) -> dict[str, Any]:
+        """The object that ``trueangle fleet`` prints as JSON; angles in arcsec."""
+        scale = arcsec(1.0, self.period)
+        tolerance = {
+            key: finite(value) if isinstance(value, float) else value
+            for key, value in self.tolerance.plain(scale).items()
+        }
+        return {
+            "units": [unit.plain(scale) for unit in self.units],
+            "common": {
+                "aligned": self.aligned,
+                "orders": [
+                    {
+                        "order": row.order,
+                        "shaft": row.shaft,
+                        "amplitude_arcsec": scale * row.amplitude,
+                        "phase_deg": row.phase_deg,
+                        "std_arcsec": scale * row.std,
+                    }
+                    for row in self.common
+                ],
+            },
+            "between": {
+                "orders": [
+                    {
+                        "order": row.order,
+                        "std_arcsec": scale * row.std,
+                        "repeatability_arcsec": None
+                        if row.repeatability is None
+                        else scale * row.repeatability,
+                    }
+                    for row in self.between
+                ]
+            },
+            "tolerance": tolerance,
+            "history": [row.plain() for row in self.history],
+            "notes": list(self.notes),
+        }
+
+    def summary(self, errors_in: ErrorsIn = "auto") -> str:
+        """The fleet as text: who needs what, the common pattern, the spread, tolerance limits.
+
+        Parameters
+        ----------
+        errors_in : {"auto", "arcsec", "deg", "mrad", "count"} or float
+            Unit of the errors.
+        """
+        from .summary import fleet_summary
+
+        return fleet_summary(self, errors_in)
+
+    def save(self, path: str | PathLike[str]) -> None:
+        """Write the fleet as JSON: a prior for further units (`trueangle.load_fleet`).
+
+        Raises
+        ------
+        FileError
+            The ending names another format.
+        """
+        from .text import save_fleet
+
+        save_fleet(self, path)
+
+    def plot(self, ax: Axes | None = None, **options: Any) -> Axes:
+        """Phasors of every unit per order, with the ellipse of the fleet (needs matplotlib).
+
+        Parameters
+        ----------
+        ax : matplotlib Axes, optional
+        **options
+            ``order``: the order that is drawn (default: that of the greatest spread).
+
+        Returns
+        -------
+        matplotlib Axes
+        """
+        axes: Axes = drawn(self, ax=ax, **options)
+        return axes
+
+    def _brief(self) -> str:
+        odd = sum(unit.verdict != "fine" for unit in self.units)
+        return f"{counted(self.units, 'unit')}, {odd} not fine, {counted(self.common, 'order')}"

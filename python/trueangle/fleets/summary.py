@@ -1,0 +1,89 @@
+"""A fleet as text: the units that need something, then what all share."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from ..support.angles import arcsec
+from ..support.display_units import ErrorsIn, ErrorUnit, error_unit
+from ..support.layout import laid_out
+from ..support.plainresult import counted
+
+if TYPE_CHECKING:
+    from .result import Fleet
+
+__all__ = ["fleet_summary"]
+
+#: Units that are fine of which the sizes are listed.
+_LISTED = 12
+
+
+def fleet_summary(fleet: Fleet, errors_in: ErrorsIn = "auto") -> str:
+    """See `Fleet.summary`."""
+    scale = arcsec(1.0, fleet.period)
+    largest = scale * max((unit.peak_to_peak for unit in fleet.units), default=0.0)
+    shown = error_unit(errors_in, largest, fleet.period)
+    odd = [unit for unit in fleet.units if unit.verdict != "fine"]
+    head = f"{counted(fleet.units, 'unit')}, {len(odd) or 'none'} that need{'s' * (len(odd) == 1)}"
+    lines = [f"{head} something", ""]
+    width = max([4, *(len(unit.unit) for unit in fleet.units)])
+    for unit in odd:
+        lines.append(f"  {unit.unit:<{width}}  {unit.verdict:<11}  {shown.spoken(unit.because)}")
+    if odd:
+        lines.append("")
+    lines += [
+        f"  {'unit':<{width}}  verdict      peak-to-peak      left       p",
+        f"  {'':<{width}}  {'':<11}  {shown.name:>12} {shown.name:>9}",
+    ]
+    listed = fleet.units[: len(odd) + _LISTED]
+    for unit in listed:
+        sizes = (shown.number(scale * v) for v in (unit.peak_to_peak, unit.left))
+        size, left = sizes
+        lines.append(
+            f"  {unit.unit:<{width}}  {unit.verdict:<11}  {size:>12} {left:>9}  {unit.p:7.2g}"
+        )
+    if len(listed) < len(fleet.units):
+        lines.append(f"  and {len(fleet.units) - len(listed)} that are fine")
+    lines += ["", *_orders(fleet, shown, scale), "", _tolerance(fleet, shown, scale)]
+    due = [row for row in fleet.history if row.next_calibration is not None]
+    if due:
+        lines += ["", "  next calibration", *(_due(row, width) for row in due)]
+    if fleet.notes:
+        lines += ["", *(f"  [{i}] {note}" for i, note in enumerate(fleet.notes, 1))]
+    return laid_out(lines)
+
+
+def _orders(fleet: Fleet, shown: ErrorUnit, scale: float) -> list[str]:
+    shared = "the mean of the units" if fleet.aligned else "none: the units share no direction"
+    lines = [f"  common pattern: {shared}", "   order      common  between units  repeatability"]
+    for common, between in zip(fleet.common, fleet.between, strict=True):
+        again = (
+            "-" if between.repeatability is None else shown.number(scale * between.repeatability)
+        )
+        lines.append(
+            f"  {common.order:6g}  {shown.number(scale * common.amplitude):>10}  "
+            f"{shown.number(scale * between.std):>13}  {again:>13}"
+        )
+    return [*lines, f"  (standard deviations of cosine and sine, {shown.name})"]
+
+
+def _tolerance(fleet: Fleet, shown: ErrorUnit, scale: float) -> str:
+    bound = fleet.tolerance
+    if bound.method == "none":
+        return "  tolerance limits need two units at least"
+    how = (
+        "by ranks, whatever the distribution"
+        if bound.method == "wilks"
+        else f"for normal logarithms, factor {bound.factor:.4g}"
+    )
+    return (
+        f"  {100 * bound.share:g} % of units stay below {shown.text(scale * bound.peak_to_peak)} "
+        f"peak-to-peak and {shown.text(scale * bound.left)} left after correction, with "
+        f"{100 * bound.confidence:g} % confidence ({how})"
+    )
+
+
+def _due(row: object, width: int) -> str:
+    values = row._asdict()  # type: ignore[attr-defined]
+    far = " (extrapolated beyond twice the time seen)" if values["extrapolated"] else ""
+    return f"  {values['unit']:<{width}}  {values['next_calibration']}{far}"

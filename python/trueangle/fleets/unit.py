@@ -1,0 +1,77 @@
+"""One unit of a fleet: its verdict, why, and its orders against the others'."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Final, Literal, NamedTuple, TypeAlias
+
+__all__ = ["VERDICTS", "FleetUnit", "UnitOrder", "Verdict"]
+
+Verdict: TypeAlias = Literal["fine", "outlier", "recalibrate", "changed", "zero_moved"]
+
+#: The most urgent first.
+VERDICTS: Final[tuple[Verdict, ...]] = ("changed", "outlier", "recalibrate", "zero_moved", "fine")
+
+
+class UnitOrder(NamedTuple):
+    """One order of a unit.
+
+    ``amplitude`` and ``std`` in the unit of the fleet's period; ``z`` is the distance from the
+    other units' mean in standard deviations between units, of cosine and sine together.
+    """
+
+    order: float
+    amplitude: float
+    phase_deg: float
+    std: float
+    z: float
+
+
+@dataclass(frozen=True)
+class FleetUnit:
+    """A unit against the fleet.
+
+    Attributes
+    ----------
+    unit : str
+    verdict : {"fine", "outlier", "recalibrate", "changed", "zero_moved"}
+    because : str
+        What stands out, and what it is likely to be; empty where nothing does.
+    orders : tuple of UnitOrder
+        Of the last calibration.
+    peak_to_peak : float
+        Of the pattern over a turn, in the unit of the fleet's period.
+    left : float
+        Standard deviation of the readings about the unit's own pattern.
+    p : float
+        Chance of as much where nothing is the matter, the unit's orders allowed for.
+    """
+
+    unit: str
+    verdict: Verdict
+    because: str
+    orders: tuple[UnitOrder, ...]
+    peak_to_peak: float
+    left: float
+    p: float
+
+    def plain(self, scale: float) -> dict[str, Any]:
+        """As plain values; angles times ``scale``."""
+        return {
+            "unit": self.unit,
+            "verdict": self.verdict,
+            "because": self.because,
+            "orders": [
+                {
+                    "order": row.order,
+                    "amplitude_arcsec": scale * row.amplitude,
+                    "phase_deg": row.phase_deg,
+                    "std_arcsec": scale * row.std,
+                    "z": row.z,
+                }
+                for row in self.orders
+            ],
+            "peak_to_peak_arcsec": scale * self.peak_to_peak,
+            "left_arcsec": scale * self.left,
+            "p": self.p,
+        }

@@ -1,0 +1,147 @@
+r"""The common pattern of units and the variance between them: REML on estimates of known error."""
+
+from __future__ import annotations
+
+from typing import Final, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..support.quantiles import median
+
+__all__ = ["Between", "held_out_score", "reml", "robust_variance"]
+
+Array = NDArray[np.float64]
+
+#: Relative change at which the iteration ends, and steps at most.
+_SETTLED: Final = 1e-12
+_STEPS: Final = 200
+
+#: Median of the chi-squared distribution of two degrees of freedom, by its half.
+_HALF_MEDIAN: Final = float(np.log(2.0))
+
+
+class Between(NamedTuple):
+    """Mean of the units, its covariance, and the variance between units of cosine and sine."""
+
+    mean: Array
+    covariance: Array
+    variance: float
+
+
+def robust_variance(values: Array, own: Array, aligned: bool) -> float:
+    """Variance between units by the median square, which a half of outliers does not move.
+
+    Parameters
+    ----------
+    values : ndarray, shape (n, 2)
+    own : ndarray, shape (n, 2, 2)
+        Covariance of each estimate.
+    aligned : bool
+        Whether the units share a mean; else it is 0.
+    """
+    centre = np.median(values, axis=0) if aligned else np.zeros(2)
+    squares = ((values - centre) ** 2).sum(axis=1)
+    noise = float(np.mean(np.trace(own, axis1=1, axis2=2))) / 2.0
+    return max(float(median(squares)) / (2.0 * _HALF_MEDIAN) - noise, 0.0)
+
+
+def reml(values: Array, own: Array, aligned: bool) -> Between:
+    r"""Mean and variance between units, by restricted maximum likelihood.
+
+    .. math:: b_u \sim N(\mu, \tau I + S_u), \qquad
+              \ell = -\tfrac12 \sum_u \left[\log|V_u| + r_u' V_u^{-1} r_u\right]
+                     - \tfrac12 \log\left|\sum_u V_u^{-1}\right|
+
+    by Fisher's scoring in :math:`\tau \ge 0`; without a mean of its own by maximum likelihood.
+
+    Parameters
+    ----------
+    values : ndarray, shape (n, 2)
+        Cosine and sine of one order of every unit.
+    own : ndarray, shape (n, 2, 2)
+        Covariance of each.
+    aligned : bool
+        Whether the mean is free; else it is 0.
+
+    Returns
+    -------
+    Between
+
+    Examples
+    --------
+    >>> rng = np.random.default_rng(3)
+    >>> found = reml(rng.normal(5.0, 2.0, (4000, 2)), np.zeros((4000, 2, 2)), aligned=True)
+    >>> found.mean.round(), round(found.variance)
+    (array([5., 5.]), 4)
+    """
+    tau = max(robust_variance(values, own, aligned), 1e-12 * float(np.mean(values**2)) + 1e-300)
+    best = _score(values, own, aligned, tau)
+    for _ in range(_STEPS):
+        step = best.score / best.information
+        # A step never crosses zero: half the way to it is taken.
+        further = tau + step if tau + step > 0.5 * tau else 0.5 * tau
+        if abs(further - tau) <= _SETTLED * tau:
+            break
+        tau = further
+        best = _score(values, own, aligned, tau)
+    edge = _score(values, own, aligned, 0.0) if np.linalg.det(own).min() > 0.0 else None
+    if edge is not None and edge.likelihood >= best.likelihood:
+        tau, best = 0.0, edge
+    return Between(best.mean, best.covariance, tau)
+
+
+class _Score(NamedTuple):
+    score: float
+    information: float
+    likelihood: float
+    mean: Array
+    covariance: Array
+
+
+def _score(values: Array, own: Array, aligned: bool, tau: float) -> _Score:
+    inverse = np.linalg.inv(own + tau * np.eye(2))
+    squared = inverse @ inverse
+    mean, covariance = np.zeros(2), np.zeros((2, 2))
+    if aligned:
+        covariance = np.linalg.inv(inverse.sum(axis=0))
+        mean = covariance @ np.einsum("uij,uj->i", inverse, values)
+    apart = np.einsum("uij,uj->ui", inverse, values - mean)
+    trace = float(np.einsum("uii->", inverse))
+    second = float(np.einsum("uij,uji->", inverse, inverse))
+    likelihood = 0.5 * float(np.linalg.slogdet(inverse)[1].sum())
+    likelihood -= 0.5 * float(np.einsum("ui,ui->", apart, values - mean))
+    if aligned:
+        both = covariance @ squared.sum(axis=0)
+        trace -= float(np.trace(both))
+        second -= 2.0 * float(np.trace(covariance @ (squared @ inverse).sum(axis=0)))
+        second += float(np.trace(both @ both))
+        likelihood += 0.5 * float(np.linalg.slogdet(covariance)[1])
+    score = 0.5 * (float((apart**2).sum()) - trace)
+    return _Score(score, max(0.5 * second, 1e-300), likelihood, mean, covariance)
+
+
+def held_out_score(values: Array, own: Array, variance: float, aligned: bool) -> Array:
+    """Logarithm of the density of every unit by the others', the variance taken from all.
+
+    Parameters
+    ----------
+    values, own
+        As `reml`.
+    variance : float
+        Between units.
+    aligned : bool
+        Whether the others' mean predicts a unit; else 0 does.
+    """
+    spread = own + variance * np.eye(2)
+    mean = np.zeros_like(values)
+    if aligned:
+        inverse = np.linalg.inv(spread)
+        every = inverse.sum(axis=0)
+        pulls = np.einsum("uij,uj->ui", inverse, values)
+        others = np.linalg.inv(every - inverse)
+        mean = np.einsum("uij,uj->ui", others, pulls.sum(axis=0) - pulls)
+        spread = spread + others
+    apart = values - mean
+    weighed = np.einsum("ui,uij,uj->u", apart, np.linalg.inv(spread), apart)
+    return np.asarray(-0.5 * (weighed + np.linalg.slogdet(spread)[1]))

@@ -1,0 +1,74 @@
+"""What a window of a watched joint said, and what an alarm is about."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from ..support.plainresult import Shown, finite
+
+__all__ = ["WatchedOrder", "WatchedWindow"]
+
+
+@dataclass(frozen=True)
+class WatchedOrder:
+    """One order of a window, less the model's: sizes in the unit of the model's period."""
+
+    order: float
+    amplitude: float
+    phase_deg: float
+    statistic: float
+
+
+@dataclass(frozen=True)
+class WatchedWindow(Shown):
+    """One window of readings.
+
+    Attributes
+    ----------
+    window : int
+        Counted from 1.
+    angle : float
+        Of the reading that ended it.
+    time : float or None
+        Of the same, in seconds.
+    readings : int
+    orders : tuple of WatchedOrder
+        What the window has beyond the model.
+    statistic, limit : float
+        The largest sum of all charts, and what it stays below.
+    alarm : bool
+    because : str
+        Which orders moved by how much and since when, and what makes such orders.
+    """
+
+    window: int
+    angle: float
+    time: float | None
+    readings: int
+    orders: tuple[WatchedOrder, ...]
+    statistic: float
+    limit: float
+    alarm: bool
+    because: str
+
+    def plain(self, scale: float) -> dict[str, Any]:
+        """As plain values; sizes times ``scale`` are arcsec."""
+        return {
+            "window": self.window,
+            "angle": self.angle,
+            "time_s": None if self.time is None else finite(self.time),
+            "orders": [
+                {
+                    "order": row.order,
+                    "amplitude_arcsec": scale * row.amplitude,
+                    "phase_deg": row.phase_deg,
+                    "statistic": row.statistic,
+                }
+                for row in self.orders
+            ],
+            "statistic": self.statistic,
+            "limit": self.limit,
+            "alarm": self.alarm,
+            "because": self.because,
+        }

@@ -1,0 +1,134 @@
+"""Readings of a log in the order they were taken, batch by batch: a file, or lines that arrive."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Iterator
+from pathlib import Path
+from typing import IO, Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import FileError
+from ..formats.columns import Column, find_columns, wanted_columns
+from ..formats.formats import find_format
+from ..model.model import HarmonicModel
+from ..runs.angles import Angles, find_angles
+from ..runs.files import Conversion
+from ..runs.source import Reading, checked_reading
+
+__all__ = ["ReadingBatch", "read_batches", "read_lines"]
+
+Array = NDArray[np.float64]
+
+
+class ReadingBatch(NamedTuple):
+    """Angle that the model's error is a function of, error in the model's unit, and seconds."""
+
+    angle: Array
+    error: Array
+    time: Array | None
+
+
+def read_batches(path: Path, model: HarmonicModel, reading: Reading) -> Iterator[ReadingBatch]:
+    """Batches of a log of any format, in constant memory.
+
+    Raises
+    ------
+    FileError
+        A column is missing or holds no numbers, or the file is damaged.
+    """
+    kind = find_format(path)
+    given = Conversion.of(checked_reading(reading))
+    topic = reading.get("topic")
+    with kind.at_header(path):
+        header = kind.module.columns(path, topic)
+        columns = _Columns.of(path, header, reading, given, kind.unit)
+    for stretch in kind.stretches(path):
+        for batch in kind.read(path, columns.names, topic, stretch):
+            yield columns.batch(lambda name, b=batch: np.asarray(b[name], dtype=float), model)
+
+
+def read_lines(
+    lines: IO[str], model: HarmonicModel, reading: Reading, most: int = 256
+) -> Iterator[ReadingBatch]:
+    """Batches of a table of text that arrives line by line, the first line naming its columns.
+
+    A batch is what has arrived, ``most`` lines at most; lines of other lengths are left out.
+
+    Raises
+    ------
+    FileError
+        There is no line, a column is missing, or a cell is no number.
+    """
+    path = Path("standard input")
+    first = lines.readline()
+    if not first.strip():
+        raise FileError(path, "has no lines: the first one names the columns")
+    delimiter = next((mark for mark in ",;\t" if mark in first), ",")
+    header = next(csv.reader([first], delimiter=delimiter))
+    columns = _Columns.of(path, header, reading, Conversion.of(checked_reading(reading)), None)
+    waiting: list[list[str]] = []
+    number = 1
+    for line in lines:
+        number += 1
+        cells = next(csv.reader([line], delimiter=delimiter), [])
+        if len(cells) == len(header):
+            waiting.append(cells)
+        if len(waiting) >= most:
+            yield columns.batch(_cells(path, header, waiting, number), model)
+            waiting = []
+    if waiting:
+        yield columns.batch(_cells(path, header, waiting, number), model)
+
+
+def _cells(path: Path, header: list[str], rows: list[list[str]], last: int) -> Any:
+    def get(name: str) -> Array:
+        place = header.index(name)
+        try:
+            return np.array([float(row[place] or "nan") for row in rows])
+        except ValueError as cause:
+            line = last - len(rows) + 1
+            raise FileError(path, f"a number is needed: {cause}", line=line, column=name) from None
+
+    return get
+
+
+class _Columns(NamedTuple):
+    """Where a log has its angles and times."""
+
+    angles: Angles
+    time: Column | None
+
+    @classmethod
+    def of(
+        cls, path: Path, header: list[str], reading: Reading, given: Conversion, unit: str | None
+    ) -> _Columns:
+        roles = find_columns(path, header, wanted_columns(reading.get("signals")))
+        angles = find_angles(
+            path,
+            header,
+            roles,
+            unit=unit,
+            counts_per_turn=given.counts,
+            counts_per_turn_reference=given.reference_counts,
+            facets=given.facets,
+        )
+        return cls(angles, roles.get("time"))
+
+    @property
+    def names(self) -> list[str]:
+        """Columns that are read."""
+        time = [] if self.time is None else [self.time.name]
+        return list(dict.fromkeys([*self.angles.names, *time]))
+
+    def batch(self, get: Any, model: HarmonicModel) -> ReadingBatch:
+        """The readings of some rows in the model's unit."""
+        reference, indicated = self.angles.values(get)
+        scale = model.period / self.angles.period
+        angle = reference if model.argument == "reference" else indicated
+        time = None
+        if self.time is not None:
+            time = self.time.values(np.asarray(get(self.time.name)), self.angles.period)
+        return ReadingBatch(scale * angle, scale * (indicated - reference), time)

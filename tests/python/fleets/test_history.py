@@ -1,0 +1,122 @@
+"""Units calibrated again: drifted, damaged, exchanged, shifted, and nothing at all."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import trueangle as ta
+
+from .made import units
+
+SEED = 52_030
+TWO = ("2026-01-10", "2026-07-10")
+FOUR = ("2026-01-10", "2026-03-10", "2026-05-10", "2026-07-10")
+
+
+def turned(rng, size):
+    angle = rng.uniform(0.0, 2.0 * np.pi)
+    return size * np.array([np.cos(angle), np.sin(angle)])
+
+
+def verdicts(found):
+    return {u: v for u, v in found.verdicts().items() if v != "fine"}
+
+
+@pytest.mark.parametrize("seed", range(SEED, SEED + 6))
+def test_three_drifted_units_of_forty_are_found_and_none_else(seed):
+    print("seed", seed)
+    rng = np.random.default_rng(seed)
+
+    def change(u, t, b):
+        if t and u in (3, 8, 21):
+            b[u % 4] += turned(rng, 25.0)
+        return b, 60.0 * (u == 30 and t)
+
+    found = ta.fleet(units(rng, dates=TWO, change=change), orders=range(1, 5))
+    drifted = dict.fromkeys(("u3", "u8", "u21"), "recalibrate")
+    assert verdicts(found) == {**drifted, "u30": "zero_moved"}
+
+
+def test_clean_fleets_are_silent():
+    print("seed", SEED)
+    rng = np.random.default_rng(SEED + 50)
+    told = [verdicts(ta.fleet(units(rng, 20, dates=TWO), orders=range(1, 5))) for _ in range(12)]
+    assert sum(map(bool, told)) <= 1
+
+
+def test_damage_an_exchange_and_a_new_part_are_changes():
+    print("seed", SEED)
+    rng = np.random.default_rng(SEED + 60)
+    kept = {}
+
+    def change(u, t, b):
+        kept.setdefault(u, b)
+        if not t:
+            return b, 0.0
+        if u == 2:
+            b[0] += [110.0, 0.0]
+        if u == 5:
+            return rng.normal(0.0, 10.0, (4, 2)), 0.0
+        return b, 0.0
+
+    runs = units(rng, dates=TWO, change=change)
+    swap = {"u10": "u11", "u11": "u10"}
+    runs = [replace(r, unit=swap.get(r.unit, r.unit)) if r.when == TWO[1] else r for r in runs]
+    found = ta.fleet(runs, orders=range(1, 5))
+    assert verdicts(found) == dict.fromkeys(("u2", "u5", "u10", "u11"), "changed")
+    because = {unit.unit: unit.because for unit in found.units}
+    assert "order 1" in because["u2"]
+    assert "replaced" in because["u5"]
+    assert "u11" in because["u10"]
+    assert "exchanged" in because["u10"]
+
+
+def test_several_dates_tell_a_drift_from_a_step():
+    print("seed", SEED)
+    rng = np.random.default_rng(SEED + 70)
+
+    def change(u, t, b):
+        b[0] += np.array([12.0 * t, 0.0]) * (u == 1)
+        b[1] += np.array([0.0, 30.0 * (t >= 2)]) * (u == 4)
+        return b, 0.0
+
+    found = ta.fleet(units(rng, 20, dates=FOUR, change=change), orders=[1, 2])
+    assert verdicts(found) == {"u1": "recalibrate", "u4": "changed"}
+    assert len(found.history) == 20 * 3
+    last = [row for row in found.history if row.unit == "u1"][-1]
+    assert last.order == 1.0
+    assert last.statistic > last.limit
+
+
+def test_the_next_calibration_is_when_the_bound_of_the_drift_reaches_the_permitted_error():
+    print("seed", SEED)
+    rng = np.random.default_rng(SEED + 80)
+
+    def change(u, t, b):
+        b[0] += np.array([20.0 * t, 0.0]) * (u == 1)
+        return b, 0.0
+
+    runs = units(rng, 20, dates=TWO, change=change, noise=0.1)
+    found = ta.fleet(runs, orders=range(1, 5), permitted_arcsec=40.0)
+    due = {row.unit: row for row in found.history}
+    # 20 arcsec in 181 days: 40 arcsec after twice as long, 2027-01-07, and the bound is earlier.
+    assert "2026-12-20" < due["u1"].next_calibration <= "2027-01-07"
+    assert due["u2"].extrapolated
+    none = ta.fleet(runs, orders=[1, 2])
+    assert all(row.next_calibration is None for row in none.history)
+
+
+def test_a_few_histories_tell_nothing_and_say_so():
+    print("seed", SEED)
+    rng = np.random.default_rng(SEED + 90)
+    runs = units(rng, 8) + units(rng, 2, dates=TWO[1:])
+    runs = [
+        r
+        if r.when
+        else ta.CalibrationRun(r.reference, r.indicated, 360.0, unit=r.unit, when=TWO[0])
+        for r in runs
+    ]
+    found = ta.fleet(runs, orders=[1, 2])
+    assert not found.history
+    assert any("4 are needed" in note for note in found.notes)

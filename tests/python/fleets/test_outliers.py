@@ -1,0 +1,74 @@
+"""Outliers among units: how often a clean fleet is told of one, and what is found."""
+
+import numpy as np
+import pytest
+
+import trueangle as ta
+from trueangle.fleets.outliers import deviates
+
+from .made import units
+
+SEED = 52_020
+
+
+def drawn(rng, count, orders):
+    return [rng.normal(size=(count, 2)) for _ in range(orders)]
+
+
+@pytest.mark.parametrize("count", [12, 40])
+def test_clean_fleets_are_told_of_one_in_a_hundred_at_most(count):
+    print("seed", SEED)
+    rng = np.random.default_rng(SEED + count)
+    fleets, own = 800, [np.zeros((count, 2, 2))] * 3
+    told = sum(deviates(drawn(rng, count, 3), own, True).outlying.any() for _ in range(fleets))
+    # 1 % and three standard deviations of the count.
+    assert told <= 0.01 * fleets + 3.0 * np.sqrt(0.01 * fleets)
+
+
+def test_an_eccentric_unit_is_found():
+    print("seed", SEED)
+    rng = np.random.default_rng(SEED)
+    own, found, others = [np.zeros((40, 2, 2))] * 3, 0, 0
+    for _ in range(200):
+        values = drawn(rng, 40, 3)
+        values[0][7] = [6.5, 0.0]
+        outlying = deviates(values, own, True).outlying
+        found += outlying[7]
+        others += outlying.sum() > 1 and outlying[7]
+    assert found >= 190
+    assert others <= 6
+
+
+def test_several_outliers_do_not_hide_each_other():
+    print("seed", SEED)
+    rng = np.random.default_rng(SEED + 1)
+    values = drawn(rng, 40, 3)
+    values[0][:4] = rng.normal([12.0, 3.0], 1.0, (4, 2))
+    outlying = deviates(values, [np.zeros((40, 2, 2))] * 3, True).outlying
+    assert np.flatnonzero(outlying).tolist() == [0, 1, 2, 3]
+
+
+def test_the_unit_its_order_and_the_likely_cause_are_named():
+    print("seed", SEED)
+    rng = np.random.default_rng(SEED + 2)
+
+    def eccentric(u, t, b):
+        if u == 11:
+            b[0] += [65.0, 0.0]
+        return b, 0.0
+
+    found = ta.fleet(units(rng, change=eccentric), orders=range(1, 5))
+    first = found.units[0]
+    assert (first.unit, first.verdict) == ("u11", "outlier")
+    assert "order 1" in first.because
+    assert "eccentricity" in first.because
+    assert all(unit.verdict == "fine" for unit in found.units[1:])
+    assert found.aligned
+
+
+def test_a_few_units_tell_no_outlier():
+    print("seed", SEED)
+    rng = np.random.default_rng(SEED + 3)
+    found = ta.fleet(units(rng, 4), orders=[1, 2])
+    assert all(unit.verdict == "fine" for unit in found.units)
+    assert any("5 are needed" in note for note in found.notes)

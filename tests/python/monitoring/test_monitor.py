@@ -1,0 +1,169 @@
+"""A watched joint: silence where nothing changes, alarms where something does, in little memory."""
+
+import numpy as np
+import pytest
+from scipy.signal import lfilter
+
+import trueangle as ta
+from trueangle.errors import ArgumentError
+from trueangle.monitoring.runlength import chart_limit, run_length
+
+SEED = 53_001
+
+#: Readings of a turn.
+PER = 120
+
+
+def model(orders=2):
+    sizes = [0.01 / k for k in range(1, orders + 1)]
+    shaft = ta.Shaft("output", 1, range(1, orders + 1), sizes, sizes[::-1])
+    return ta.HarmonicModel([shaft], period=360.0)
+
+
+def noise(kind, rng, count):
+    white = rng.normal(size=count)
+    if kind == "white":
+        return white
+    if kind == "ar":
+        return lfilter([1.0], [1.0, -0.9], white)
+    frequency = np.fft.rfftfreq(count)
+    frequency[0] = frequency[1]
+    return np.fft.irfft(np.fft.rfft(white) / np.sqrt(frequency), count)
+
+
+def readings(rng, turns, kind="white", orders=2):
+    angle = np.arange(PER * turns) * (360.0 / PER)
+    return angle, model(orders).error(angle) + 0.001 * noise(kind, rng, angle.size)
+
+
+def test_run_lengths_are_the_published_ones():
+    """Montgomery's table, and the exact figures of Page's integral equation."""
+    for shift, length in ((0.0, 465.44), (0.5, 38.0), (1.0, 10.38)):
+        assert run_length(0.5, 5.0, shift) == pytest.approx(length, rel=1e-3)
+    for shift, length in ((0.0, 168.0), (0.5, 26.6), (1.0, 8.38)):
+        assert run_length(0.5, 4.0, shift) == pytest.approx(length, rel=3e-3)
+    assert chart_limit(0.5, 4 * 465.44) == pytest.approx(6.37, abs=0.01)
+    with pytest.raises(ArgumentError, match="limit must be positive"):
+        run_length(0.5, 0.0)
+
+
+@pytest.mark.parametrize(("shift", "length"), [(0.0, 465.0), (0.5, 38.0), (1.0, 10.4)])
+def test_a_chart_of_known_noise_runs_as_long(shift, length):
+    """Tabular sums in plain numpy against the equation that the limit comes from."""
+    print("seed", SEED)
+    rng = np.random.default_rng(SEED)
+    runs = np.zeros(2000)
+    upper, lower = np.zeros(2000), np.zeros(2000)
+    going = np.ones(2000, dtype=bool)
+    while going.any():
+        value = rng.normal(shift, 1.0, 2000)
+        upper, lower = np.maximum(upper + value - 0.5, 0), np.maximum(lower - value - 0.5, 0)
+        runs += going
+        going &= np.maximum(upper, lower) <= 5.0
+    assert runs.mean() == pytest.approx(length, rel=0.05)
+
+
+@pytest.mark.parametrize("kind", ["white", "ar", "1/f"])
+def test_all_charts_together_are_silent_for_as_long_as_they_say(kind):
+    print("seed", SEED)
+    windows = alarms = 0
+    for i in range(12):
+        rng = np.random.default_rng(SEED + i)
+        watched = ta.Monitor(model())
+        alarms += len(watched.update(*readings(rng, 2000, kind)))
+        windows += watched.windows
+    print(windows, alarms)
+    # 465 windows or more to one, and two standard deviations of the count.
+    wanted = windows / 465.0
+    assert alarms <= wanted + 2.0 * np.sqrt(wanted)
+
+
+def test_a_change_is_told_with_its_order_its_size_and_its_time():
+    print("seed", SEED)
+    delays = []
+    for i in range(20):
+        rng = np.random.default_rng(SEED + 100 + i)
+        angle, error = readings(rng, 260)
+        sigma = 0.001 * np.sqrt(2.0 / PER)
+        after = PER * 200
+        error[after:] += 2.0 * sigma * np.sin(2.0 * np.radians(angle[after:]))
+        found = [a for a in ta.Monitor(model()).update(angle, error) if a.window > 200]
+        assert found
+        delays.append(found[0].window - 200)
+        assert "order 2 moved" in found[0].because
+        assert "windows ago" in found[0].because or "window ago" in found[0].because
+        assert found[0].statistic > found[0].limit
+    print(delays)
+    assert np.mean(delays) < 8.0
+
+
+def test_a_jump_of_the_zero_is_told():
+    rng = np.random.default_rng(SEED + 200)
+    angle, error = readings(rng, 100)
+    error[PER * 50 :] += 0.002
+    found = ta.Monitor(model()).update(angle, error, time=angle / 36.0)
+    assert [a.window for a in found] == [51]
+    assert "the zero moved" in found[0].because
+    assert found[0].time == pytest.approx(510.0, abs=10.0)
+
+
+def test_a_joint_that_is_not_the_models_from_the_start_is_told():
+    rng = np.random.default_rng(SEED + 201)
+    angle, error = readings(rng, 12)
+    found = ta.Monitor(model()).update(angle, error + 0.002 * np.cos(np.radians(angle)))
+    assert found[0].window == 8
+    assert "order 1 is not the model's since the start" in found[0].because
+
+
+def test_it_does_not_depend_on_how_readings_arrive():
+    rng = np.random.default_rng(SEED + 202)
+    angle, error = readings(rng, 40)
+    whole, single = ta.Monitor(model()), ta.Monitor(model())
+    windows = whole.windows_of(angle, error)
+    parts = [w for i in range(angle.size) for w in single.windows_of(angle[i], error[i])]
+    assert [w.orders for w in parts] == [w.orders for w in windows]
+    assert whole.state == single.state
+    # Angles within a turn, and errors that lie a turn off, are the same joint.
+    other = ta.Monitor(model()).windows_of(angle % 360.0, error + 360.0)
+    assert [w.orders[0].amplitude for w in other] == pytest.approx(
+        [w.orders[0].amplitude for w in windows], rel=1e-6, abs=1e-9
+    )
+
+
+def test_its_state_is_small_and_stays_so():
+    watched = ta.Monitor(model(32))
+    size = watched.nbytes
+    assert size < 64_000
+    watched.update(*readings(np.random.default_rng(SEED), 50, orders=32))
+    assert watched.nbytes == size
+    assert watched.state["windows"] == watched.windows == 49
+
+
+def test_what_is_not_finite_is_left_out():
+    rng = np.random.default_rng(SEED + 203)
+    angle, error = readings(rng, 20)
+    error[::7] = np.nan
+    assert not ta.Monitor(model()).update(angle, error)
+
+
+def test_an_arc_waits_for_the_rest_of_the_turn():
+    angle = 40.0 * np.sin(np.arange(20_000) * 0.01)
+    watched = ta.Monitor(model())
+    assert not watched.update(angle, model().error(angle))
+    assert watched.windows == 0
+
+
+def test_what_cannot_be_watched_is_refused():
+    for name, value in (("every", 0.0), ("shift", -1.0), ("run_length", 1.0)):
+        with pytest.raises(ArgumentError, match=f"{name} must be"):
+            ta.Monitor(model(), **{name: value})
+    with pytest.raises(ArgumentError, match="no orders to watch"):
+        ta.Monitor(ta.HarmonicModel([], period=360.0))
+    motor = ta.HarmonicModel([ta.Shaft("motor", 7.3, [1], [0.1], [0.0])], period=360.0)
+    with pytest.raises(ArgumentError, match="does not come back"):
+        ta.Monitor(motor)
+    high = ta.HarmonicModel([ta.Shaft("output", 1, [5000], [1e-6], [0.0])], period=360.0)
+    with pytest.raises(ArgumentError, match="above 4096"):
+        ta.Monitor(high)
+    with pytest.raises(ArgumentError, match="error has 2 values"):
+        ta.Monitor(model()).update([1.0, 2.0, 3.0], [1.0, 2.0])
