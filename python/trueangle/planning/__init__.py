@@ -1,6 +1,8 @@
 """Where to measure so that the wanted orders can be told apart."""
 
 from .arc import ArcPlan, plan_arc
+from .limits import Limits, load_limits
+from .nextruns import NextRuns
 from .plan import (
     HIGHEST_LOW_ORDER,
     CalibrationPlan,
@@ -16,7 +18,10 @@ __all__ = [
     "HIGHEST_LOW_ORDER",
     "ArcPlan",
     "CalibrationPlan",
+    "Limits",
+    "NextRuns",
     "SelfPlan",
+    "load_limits",
     "plan_arc",
     "plan_encoder",
     "plan_mounts",

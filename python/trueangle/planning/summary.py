@@ -5,12 +5,17 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any
 
+from ..support.layout import laid_out
+from ..support.plainresult import counted
+from .further import steps_of
+
 if TYPE_CHECKING:
     from .arc import ArcPlan
+    from .nextruns import NextRuns
     from .plan import CalibrationPlan
     from .selfplan import SelfPlan
 
-__all__ = ["arc_summary", "plan_summary", "self_plan_summary"]
+__all__ = ["arc_summary", "next_summary", "plan_summary", "self_plan_summary"]
 
 
 def plan_summary(plan: CalibrationPlan) -> str:
@@ -44,7 +49,7 @@ def plan_summary(plan: CalibrationPlan) -> str:
     if plan.readings is not None:
         lines.append(f"  readings needed        {plan.readings}")
     lines += [f"  note: {note}" for note in plan.notes]
-    return "\n".join(lines)
+    return laid_out(lines)
 
 
 def self_plan_summary(plan: SelfPlan) -> str:
@@ -77,7 +82,7 @@ def self_plan_summary(plan: SelfPlan) -> str:
             lines.append(f"                         blind to {names}")
     lines += ["  noise factor per order", *_table(plan.noise_factors)]
     lines += [f"  note: {note}" for note in plan.notes]
-    return "\n".join(lines)
+    return laid_out(lines)
 
 
 def arc_summary(plan: ArcPlan) -> str:
@@ -104,7 +109,43 @@ def arc_summary(plan: ArcPlan) -> str:
             f"  uncertainty (k = 2)    {plan.uncertainty_arcsec:.3g} arcsec at the worst place"
         )
     lines += [f"  note: {note}" for note in plan.notes]
-    return "\n".join(lines)
+    return laid_out(lines)
+
+
+def next_summary(plan: NextRuns) -> str:
+    """The next runs: a table to follow at the rig, and what they would tell."""
+    lines = []
+    if plan.runs:
+        lines.append(
+            f"Next: {counted(plan.runs, 'run')} of {plan.readings} readings in all, "
+            f"{spoken_time(plan.seconds)} of motion"
+            + ("; diagnose by themselves" if plan.alone else "; diagnose with those there are")
+        )
+        for design in plan.runs:
+            lines.append(f"  {design.label}")
+            lines += [f"    - {step}" for step in steps_of(design)]
+    for entry in plan.between:
+        names = " or ".join(entry.causes)
+        if not entry.told:
+            text = f"  not told: {names}"
+        elif len(entry.causes) > 1:
+            text = f"  tells {names}"
+        else:
+            text = f"  shows {names}"
+        if entry.seen and entry.expected_bic is not None and entry.chance_named is not None:
+            text += f": BIC better by {entry.expected_bic:.0f} expected for the true one"
+            by = f" ({entry.trials} simulated)" if entry.trials else ""
+            text += f", named in {100.0 * entry.chance_named:.0f} %{by}"
+        lines.append(text)
+    if plan.beyond:
+        lines.append(f"  beyond what was seen so far: {', '.join(plan.beyond)}")
+    lines += [f"  note: {note}" for note in plan.notes]
+    return laid_out(lines)
+
+
+def spoken_time(seconds: float) -> str:
+    """Seconds or minutes."""
+    return f"{seconds:.0f} s" if seconds < 120.0 else f"{seconds / 60.0:.0f} min"
 
 
 def _table(factors: dict[float, float]) -> list[str]:

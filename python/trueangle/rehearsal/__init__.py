@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
+from .after import plan_after
 from .rehearse import rehearse
 from .result import Rehearsal, RehearsedCause
 
-__all__ = ["Rehearsal", "RehearsedCause", "rehearse"]
+__all__ = ["Rehearsal", "RehearsedCause", "plan_after", "rehearse"]

@@ -58,7 +58,7 @@ def blind_causes(sim: Simulation) -> dict[str, Blindness]:
     signals = join_runs(simulate(replace(sim, effects=()), 0))
     noise = np.random.default_rng(0).standard_normal(len(signals)) * sim.sigma_arcsec
     found: dict[str, Blindness] = {}
-    for spot in blind_spots(Regression(signals, noise, sim.surroundings)):
+    for spot in blind_spots(Regression.of(signals, noise, sim.surroundings)):
         for cause in spot.causes:
             if EFFECTS[cause].is_doubted and spot.hides(cause):
                 found.setdefault(cause, spot)

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import textwrap
 from typing import TYPE_CHECKING
+
+from ..support.layout import laid_out, wrapped
 
 if TYPE_CHECKING:
     from .result import Rehearsal, RehearsedCause
 
 __all__ = ["render"]
-
-WIDTH = 100
 
 #: Names of causes listed of those it is confused with.
 MOST = 3
@@ -25,8 +24,8 @@ def render(rehearsal: Rehearsal) -> str:
     lines: list[str] = []
     for note in rehearsal.notes:
         if note.startswith("INCOMPLETE"):
-            lines += [*_wrapped(f"{note}.", 2), ""]
-    lines += _wrapped(
+            lines += [*wrapped(f"{note}.", 2), ""]
+    lines += wrapped(
         f"{rehearsal.runs} runs, {rehearsal.readings} readings, noise {rehearsal.noise:g} arcsec; "
         f"{rehearsal.trials} diagnoses, at most {rehearsal.seeds} of a cause, seed "
         f"{rehearsal.seed}.",
@@ -39,12 +38,12 @@ def render(rehearsal: Rehearsal) -> str:
     if never:
         lines += ["", "Not named in these runs:"]
         for cause in never:
-            lines += _wrapped(f"- {_never(cause)}", 2)
+            lines += wrapped(f"- {_never(cause)}", 2)
     lines += ["", *_next(rehearsal)]
     for note in rehearsal.notes:
         if not note.startswith("INCOMPLETE"):
-            lines += _wrapped(f"Note: {note}.", 2)
-    return "\n".join(lines)
+            lines += wrapped(f"Note: {note}.", 2)
+    return laid_out(lines)
 
 
 def _table(causes: list[RehearsedCause]) -> list[str]:
@@ -119,15 +118,11 @@ def _next(rehearsal: Rehearsal) -> list[str]:
         return ["No single further run was found that opens another cause."]
     table = ", ".join(f"{name} = {_toml(value)}" for name, value in run.to_dict()["run"].items())
     return [
-        *_wrapped(f"One further run, {'; '.join(run.changes)}, opens {', '.join(run.opens)}:", 2),
-        *_wrapped(f"[[run]] {table}", 4, 2),
+        *wrapped(f"One further run, {'; '.join(run.changes)}, opens {', '.join(run.opens)}:", 2),
+        *wrapped(f"[[run]] {table}", 4, 2),
         "",
     ]
 
 
 def _toml(value: object) -> str:
     return f'"{value}"' if isinstance(value, str) else str(value)
-
-
-def _wrapped(text: str, indent: int, first: int = 0) -> list[str]:
-    return textwrap.wrap(text, WIDTH, initial_indent=" " * first, subsequent_indent=" " * indent)

@@ -63,7 +63,7 @@ def size_range(sim: Simulation, signals: Signals, cause: str, seed: int) -> Rang
     """The sizes to try; None where these runs show nothing of the cause at any size."""
     effect = EFFECTS[cause]
     noise = np.random.default_rng(seed).standard_normal(len(signals)) * sim.sigma_arcsec
-    regression = Regression(signals, noise, sim.surroundings)
+    regression = Regression.of(signals, noise, sim.surroundings)
 
     def shown(log_size: float) -> float:
         size = 2.0 ** (log_size if effect.size_grows else -log_size)

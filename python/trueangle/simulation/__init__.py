@@ -14,6 +14,7 @@ from ..effects import (
     Effect,
     FilterLag,
     HeteroscedasticNoise,
+    JointCoupling,
     Latency,
     LoadDependentGearError,
     LocalDefect,
@@ -41,7 +42,7 @@ from ..joint.joint import Joint
 from ..joint.pattern import Harmonic, Pattern
 from ..joint.signals import Signals, join_runs
 from .designs import RunDesign
-from .simulation import Simulation, simulate
+from .simulation import Simulation, simulate, simulate_along
 from .simulationfile import load_simulation
 
 __all__ = [
@@ -59,6 +60,7 @@ __all__ = [
     "Head",
     "HeteroscedasticNoise",
     "Joint",
+    "JointCoupling",
     "Latency",
     "LoadDependentGearError",
     "LocalDefect",
@@ -87,4 +89,5 @@ __all__ = [
     "join_runs",
     "load_simulation",
     "simulate",
+    "simulate_along",
 ]

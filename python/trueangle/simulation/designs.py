@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import ArgumentError
+from ..formats.signals import COUPLED
 from ..joint.pattern import Pattern
 from ..runs.run import CalibrationRun
 from ..support.kinds import told_kinds
@@ -80,6 +81,9 @@ class RunDesign:
         Acceleration per ampere; the current that the loop asks for joins ``current_A``.
     motor_sigma_arcsec : float, optional
         The motor's own angle is recorded too, not reduced, with this noise.
+    coupled : mapping of str to list of float
+        Other joints of a robot: the angles (degrees) that each passes in straight lines, evenly
+        spaced over the travel of the run; one angle where it stands still.
     """
 
     label: str | None = None
@@ -109,6 +113,7 @@ class RunDesign:
     friction_memory_s: float = 2.0
     deg_s2_per_A: float | None = None
     motor_sigma_arcsec: float | None = None
+    coupled: tuple[tuple[str, tuple[float, ...]], ...] = ()
 
     def __post_init__(self) -> None:
         def refuse(name: str, wanted: str) -> ArgumentError:
@@ -135,6 +140,11 @@ class RunDesign:
         if any(b <= a for a, b in itertools.pairwise(edges)):
             raise refuse("reversals", "ascending shares of the travel between 0 and 1")
         self._check_rotor(refuse)
+        others = self.coupled.items() if isinstance(self.coupled, Mapping) else self.coupled
+        coupled = tuple((joint, tuple(map(float, angles))) for joint, angles in others)
+        if any(not joint or not angles for joint, angles in coupled):
+            raise refuse("coupled", "an angle or more of each other joint by its name")
+        object.__setattr__(self, "coupled", coupled)
 
     def _check_rotor(self, refuse: Callable[[str, str], ArgumentError]) -> None:
         """What moves the shaft beside the speed asked for needs one, in one direction."""
@@ -208,7 +218,7 @@ class RunDesign:
         motion = Motion(angle, np.asarray(signs * speed), np.zeros(n))
         if self.is_moved:
             motion = turned(self, time, pattern, rng)
-        temperature = np.full(n, self.temperature_C)
+        temperature = np.full(n, float(self.temperature_C))
         if self.temperature_end_C is not None:
             share = travel / (360.0 * self.turns)
             temperature += (self.temperature_end_C - self.temperature_C) * share
@@ -224,15 +234,19 @@ class RunDesign:
             mount=np.full(n, self.mount_deg + (self.shift_deg or 0.0)),
             label=self.label or label,
             velocity=motion.speed,
-            signals=self._signals(motion),
+            signals=self._signals(motion, travel / (360.0 * self.turns)),
         )
 
-    def _signals(self, motion: Motion) -> dict[str, NDArray[np.float64]]:
-        """Current and shift, where the run has them."""
+    def _signals(
+        self, motion: Motion, share: NDArray[np.float64]
+    ) -> dict[str, NDArray[np.float64]]:
+        """Current, shift and the angles of other joints, where the run has them."""
         found = {}
         if self.current_A is not None or self.deg_s2_per_A is not None:
             driven = motion.driven / (self.deg_s2_per_A or math.inf)
             found["current"] = (self.current_A or 0.0) + driven
         if self.shift_deg is not None:
             found["shift"] = np.full(self.samples, self.shift_deg)
+        for joint, angles in self.coupled:
+            found[COUPLED + joint] = np.interp(share, np.linspace(0.0, 1.0, len(angles)), angles)
         return found

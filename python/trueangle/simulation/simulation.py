@@ -22,7 +22,7 @@ from ..support.oftype import all_of_type, of_type
 from ..support.plainresult import Shown, counted
 from .designs import RunDesign
 
-__all__ = ["Simulation", "simulate"]
+__all__ = ["Simulation", "simulate", "simulate_along"]
 
 Array = NDArray[np.float64]
 
@@ -220,6 +220,62 @@ def simulate(
             )
         )
     return runs_made
+
+
+def simulate_along(
+    sim: Simulation,
+    runs: Iterable[CalibrationRun],
+    seed: int | np.random.Generator = 0,
+    correlation: float = 0.0,
+) -> list[CalibrationRun]:
+    r"""Measure a simulated joint along the motion of runs that there are.
+
+    Parameters
+    ----------
+    sim : Simulation
+        Its own runs are not looked at.
+    runs : iterable of CalibrationRun
+    seed : int or numpy.random.Generator
+    correlation : float
+        Of the noise, from one reading to the next: :math:`n_t = \rho n_{t-1} + e_t` within a run,
+        of the simulation's standard deviation.
+
+    Returns
+    -------
+    list of CalibrationRun
+        With the same references and signals, and other indicated angles.
+
+    Raises
+    ------
+    ArgumentError
+        No run, or a correlation that is none.
+
+    Examples
+    --------
+    >>> from trueangle.simulation import Harmonic, RunDesign, Simulation
+    >>> sim = Simulation(harmonics=(Harmonic("output", 1, 3600.0, 90.0),))
+    >>> ideal = simulate(Simulation(), runs=[RunDesign(samples=4, spacing="uniform")])
+    >>> simulate_along(sim, ideal)[0].error.round(6) + 0.0
+    array([ 1.,  0., -1.,  0.])
+    """
+    given = as_runs(runs)
+    if not 0.0 <= correlation < 1.0:
+        raise ArgumentError(f"correlation must be from 0 to below 1, got {correlation!r}")
+    rng = random_numbers(seed)
+    signals, around = join_runs(given), sim.whole_surroundings
+    error, noise = sim.pattern.value(signals.theta), rng.standard_normal(len(signals))
+    for start, stop in signals.run_bounds() if correlation else ():
+        for k in range(start + 1, stop):
+            noise[k] = correlation * noise[k - 1] + np.sqrt(1.0 - correlation**2) * noise[k]
+    for effect in sim.effects:
+        error = error + effect.signal(signals, around, rng)
+        noise = noise * (1.0 if (f := effect.noise_factor(signals, around)) is None else f)
+    own = signals.degrees + (error + sim.sigma_arcsec * noise) / ARCSEC_PER_DEG
+    read = _written(sim, own)
+    return [
+        replace(run, indicated=read[a:b] * (run.period / 360.0))
+        for run, (a, b) in zip(given, signals.run_bounds(), strict=True)
+    ]
 
 
 def _effects(effects: Iterable[Effect]) -> tuple[Effect, ...]:

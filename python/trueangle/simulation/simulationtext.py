@@ -175,6 +175,13 @@ def _value(path: str | Path, where: str, name: str, value: Any, wanted: str) -> 
         if not isinstance(value, str):
             raise refuse("a text")
         return value
+    if wanted.startswith("tuple[tuple"):
+        if not isinstance(value, dict):
+            raise refuse("a table of lists of numbers")
+        return tuple(
+            (key, _value(path, where, f"{name}.{key}", entry, "tuple"))
+            for key, entry in value.items()
+        )
     if wanted.startswith("tuple"):
         numbers = tuple(map(finite, value)) if isinstance(value, list) else (None,)
         if None in numbers:
@@ -235,7 +242,10 @@ def to_table(sim: Simulation | Decoded) -> dict[str, Any]:
     for design in sim.runs:
         values = {field.name: getattr(design, field.name) for field in fields(design)}
         plain = {field.name: field.default for field in fields(design)}
-        runs.append({k: v for k, v in values.items() if v is not None and v != plain[k]})
+        given = {k: v for k, v in values.items() if v is not None and v != plain[k]}
+        if "coupled" in given:
+            given["coupled"] = dict(given["coupled"])
+        runs.append(given)
     return {
         "joint": {name: getattr(sim.joint, name) for name in _JOINT_KEYS},
         **{
@@ -270,12 +280,15 @@ def dumps(sim: Simulation) -> str:
     """The text of a simulation file, as `write` writes it."""
     whole = to_table(sim)
     if sim.source is not None and Path(sim.source).is_file():
-        original = decoded(sim.source)
-        old = to_table(original)
-        appended = {name: whole[name][len(old[name]) :] for name in ("harmonic", "effect", "run")}
-        kept = {name: [*old[name], *appended[name]] for name in appended}
+        text = Path(sim.source).read_text(encoding="utf-8").rstrip("\n")
+        old = to_table(decoded(sim.source))
+        appended: dict[str, Any] = {
+            name: whole[name][len(old[name]) :] for name in ("harmonic", "effect", "run")
+        }
+        kept: dict[str, Any] = {name: [*old[name], *appended[name]] for name in appended}
+        if "noise" not in tomllib.loads(text) and whole["noise"] != old["noise"]:
+            appended["noise"] = kept["noise"] = whole["noise"]
         if {**old, **kept} == whole:
-            text = Path(sim.source).read_text(encoding="utf-8").rstrip("\n")
             return text + "\n" + "".join(_dump(name, appended[name]) for name in appended)
     return "".join(_dump(name, whole[name]) for name in _TABLES).lstrip("\n")
 
@@ -294,6 +307,9 @@ def _literal(value: Any) -> str:
     if isinstance(value, str):
         escaped = value.replace("\\", "\\\\").replace('"', '\\"')
         return '"' + "".join(c if c >= " " else f"\\u{ord(c):04x}" for c in escaped) + '"'
+    if isinstance(value, Mapping):
+        rows = (f"{_literal(name)} = {_literal(entry)}" for name, entry in value.items())
+        return "{ " + ", ".join(rows) + " }"
     if isinstance(value, list | tuple):
         return "[" + ", ".join(_literal(item) for item in value) + "]"
     if isinstance(value, int):

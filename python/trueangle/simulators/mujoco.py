@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..errors import ArgumentError, MissingSignalError
 from ..export.mujoco import TEXT_NAME
+from ..formats.signals import coupled_with
 from ..model.file import model_of
 from ..model.model import HarmonicModel
 from ..support.suggestions import did_you_mean
@@ -60,11 +61,10 @@ class SensorLayer:
     Notes
     -----
     Each call of `read` is one reading: what follows travel takes them in their order. A layer
-    belongs to as many environments as the first `read` shows; `reset` forgets them. Models
-    without a state are evaluated over all environments at once (0.02 microseconds a reading of
-    1000), those with a state one by one (3.4 microseconds); one environment takes 10 to 16.
-    Angles that turn further than half a turn from one reading to the next are counted wrongly
-    by models with a state.
+    belongs to as many environments as the first `read` shows; `reset` forgets them. All
+    environments are read at once, also by models with a state. Angles that turn further than
+    half a turn from one reading to the next are counted wrongly by models with a state. A joint
+    that is coupled to another one takes its reading, where that is in the layer; else its angle.
 
     Examples
     --------
@@ -99,8 +99,43 @@ class SensorLayer:
             raise ArgumentError(f"noise_std must be 0 or more radians, got {noise_std!r}")
         self.names = tuple(found)
         self._joints = [_Encoder(mjmodel, name, model) for name, model in found.items()]
+        self._order = self._couplings(mjmodel)
         self._noise_std = float(noise_std)
         self._random = np.random.default_rng(seed)
+
+    def _couplings(self, mjmodel: MjModel) -> list[tuple[int, dict[str, tuple[str | None, int]]]]:
+        """Joints in an order in which each has the readings that it is coupled to.
+
+        With each, where the other joints' angles are: among the readings, or in ``qpos`` by name.
+        """
+        wanted = {
+            j: {name: coupled_with(name) for name in joint.model.signals if coupled_with(name)}
+            for j, joint in enumerate(self._joints)
+        }
+        places = {joint.joint: j for j, joint in enumerate(self._joints)}
+        order: list[tuple[int, dict[str, tuple[str | None, int]]]] = []
+        while wanted:
+            done = {j for j, _ in order}
+            ready = [
+                j
+                for j, names in wanted.items()
+                if all(places.get(o or "", -1) in {*done, -1} for o in names.values())
+            ]
+            if not ready:
+                raise ArgumentError(
+                    f"joints {', '.join(self.names[j] for j in wanted)} are coupled in a circle: "
+                    "none of them can be read first"
+                )
+            for j in ready:
+                found: dict[str, tuple[str | None, int]] = {}
+                for name, other in wanted.pop(j).items():
+                    assert other is not None
+                    if other in places:
+                        found[name] = None, places[other]
+                    else:
+                        found[name] = other, _Encoder(mjmodel, other, self._joints[j].model).at
+                order.append((j, found))
+        return order
 
     def read(self, data: Any, **signals: ArrayLike) -> Array:
         """Readings of the joints, radians.
@@ -135,10 +170,12 @@ class SensorLayer:
         fields = {name: np.atleast_2d(values) for name, values in fields.items()}
         shape = (len(fields["qpos"]), len(self._joints))
         given = {name: np.broadcast_to(value, shape) for name, value in _known(signals).items()}
-        readings = np.empty(shape)
-        for j, joint in enumerate(self._joints):
+        readings = np.empty(shape[::-1]).T  # a joint's are side by side
+        for j, couplings in self._order:
             own = {name: values[:, j] for name, values in given.items()}
-            readings[:, j] = joint.read(fields, own)
+            for signal, (name, at) in couplings.items():
+                own[signal] = readings[:, at] if name is None else fields["qpos"][:, at]
+            readings[:, j] = self._joints[j].read(fields, own)
         if self._noise_std:
             readings += self._random.normal(0.0, self._noise_std, shape)
         return readings[0] if single else readings
@@ -163,12 +200,12 @@ class _Encoder:
         kinds = mujoco.mjtObj
         joint = mujoco.mj_name2id(mjmodel, kinds.mjOBJ_JOINT, name)
         sensor = mujoco.mj_name2id(mjmodel, kinds.mjOBJ_SENSOR, name)
-        self._field, self._at = "qpos", 0
+        self._field, self.at = "qpos", 0
         if joint < 0 and sensor >= 0:
             if mjmodel.sensor_type[sensor] != mujoco.mjtSensor.mjSENS_JOINTPOS:
                 raise ArgumentError(f"sensor {name!r} is no jointpos: it reads no joint's angle")
             joint = int(mjmodel.sensor_objid[sensor])
-            self._field, self._at = "sensordata", int(mjmodel.sensor_adr[sensor])
+            self._field, self.at = "sensordata", int(mjmodel.sensor_adr[sensor])
         if joint < 0:
             names = [mjmodel.joint(i).name for i in range(mjmodel.njnt)]
             raise ArgumentError(
@@ -178,58 +215,57 @@ class _Encoder:
         if mjmodel.jnt_type[joint] != mujoco.mjtJoint.mjJNT_HINGE:
             raise ArgumentError(f"joint {name!r} is no hinge: its position is no angle")
         if self._field == "qpos":
-            self._at = int(mjmodel.jnt_qposadr[joint])
+            self.at = int(mjmodel.jnt_qposadr[joint])
         self._dof = int(mjmodel.jnt_dofadr[joint])
-        self._name, self._model = name, model
+        #: The joint's own name, where a sensor was named.
+        self.joint = mjmodel.joint(joint).name
+        self._name, self.model = name, model
         self._unit = model.period / (2.0 * np.pi)
-        self._states: list[Any] = []
+        self._states: Any = None
 
     def read(self, fields: Mapping[str, Array], given: Mapping[str, Array]) -> Array:
-        angle = fields[self._field][:, self._at] * self._unit
+        angle = fields[self._field][:, self.at] * self._unit
+        if not self.model.terms and self.model.argument == "reference":
+            return np.asarray((angle + self.model.error(angle)) / self._unit)
         own = {"velocity": "qvel", "torque": "qfrc_actuator"}
         signals: dict[str, Array] = {}
-        for name in self._model.uses_signals:
+        for name in self.model.uses_signals:
             if name in given:
                 signals[name] = given[name]
             elif own.get(name) in fields:
                 signals[name] = fields[own[name]][:, self._dof]
-        if "velocity" in signals:
-            signals["velocity"] = signals["velocity"] * self._unit
-        missing = [name for name in self._model.signals if name not in {*signals, "direction"}]
+        for name in signals:
+            if name == "velocity" or coupled_with(name):
+                signals[name] = signals[name] * self._unit
+        missing = [name for name in self.model.signals if name not in {*signals, "direction"}]
         if missing:
             raise MissingSignalError(
                 f"the model of joint {self._name!r} needs {missing[0]}, which MuJoCo does not "
                 f"have: give read(data, {missing[0]}=...)"
             )
-        if not self._model.follows_travel:
-            core = self._model._core_corrector()
-            return np.asarray(self._reading(core, angle, signals) / self._unit)
-        if len(self._states) != len(angle):
-            if self._states:
-                raise ArgumentError(
-                    f"{len(self._states)} environments were read before, and {len(angle)} now: "
-                    "their travel is not known; call reset() before"
-                )
-            self._states = [self._model._core_corrector() for _ in angle]
-        readings = [
-            self._reading(core, angle[e : e + 1], {k: v[e : e + 1] for k, v in signals.items()})[0]
-            for e, core in enumerate(self._states)
-        ]
-        return np.array(readings) / self._unit
+        known = 0 if self._states is None else len(self._states)
+        if not known or (known != len(angle) and not self.model.follows_travel):
+            self._states = self.model._core_corrector().alike(len(angle))
+        elif known != len(angle):
+            raise ArgumentError(
+                f"{known} environments were read before, and {len(angle)} now: "
+                "their travel is not known; call reset() before"
+            )
+        return self._readings(angle, signals) / self._unit
 
-    def _reading(self, core: Any, angle: Array, signals: Mapping[str, Array]) -> Array:
-        if self._model.argument == "reference":
-            return np.asarray(angle + core.error(angle, **signals), np.float64)
+    def _readings(self, angle: Array, signals: Mapping[str, Array]) -> Array:
+        if self.model.argument == "reference":
+            return np.asarray(angle + self._states.error(angle, **signals))
         # The error is one of the reading, which is looked for from the same past.
-        past = core.store()
-        reading = angle.copy()
+        past, reading = self._states, angle
         for _ in range(_STEPS):
-            core.restore(past)
-            found: Array = np.asarray(angle + core.error(reading, **signals))
+            self._states = past.copy()
+            found = np.asarray(angle + self._states.error(reading, **signals))
             moved = float(np.max(np.abs(found - reading), initial=0.0))
             reading = found
             if moved <= _SOLVED * self._unit:
                 return reading
+        self._states = past
         raise ArgumentError(
             f"the model of joint {self._name!r} gives no reading of its true angle: its error at "
             'the indicated angle is too steep; fit it with `argument="reference"`'
@@ -237,11 +273,10 @@ class _Encoder:
 
     def reset(self, environments: ArrayLike | None) -> None:
         if environments is None:
-            self._states = []
-        elif self._states:
+            self._states = None
+        elif self._states is not None:
             chosen = np.arange(len(self._states))[np.asarray(environments)]
-            for e in np.atleast_1d(chosen):
-                self._states[e].reset()
+            self._states.reset(np.atleast_1d(chosen).tolist())
 
 
 def _known(signals: Mapping[str, ArrayLike]) -> dict[str, Array]:

@@ -112,7 +112,7 @@ def test_the_object_printed_keeps_the_contract(seen):
 
 
 def test_the_summary_says_it_all(seen):
-    text = seen.summary()
+    text = " ".join(seen.summary().split())
     assert "backlash, half_width_arcsec" in text
     assert "Not named in these runs:" in text
     assert "- thermal_drift: the temperature varies by less than 2 K. To tell: " in text
@@ -323,6 +323,7 @@ def test_every_cause_can_be_hidden_or_is_seen_to_be_impossible():
                 temperature_C=20.0 + 5.0 * k,
                 mount_deg=100.0 * k,
                 current_A=1.0 * (k % 3),
+                coupled={"wrist": (0.0, 40.0 * k, -25.0)},
             )
             for k in range(1, 5)
         ),

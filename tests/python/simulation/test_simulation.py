@@ -70,6 +70,7 @@ SAMPLES = {
     "missed_counts": {"step_arcsec": 12.0, "run": 0, "row": 100},
     "heteroscedastic_noise": {"cosine": 0.5},
     "current_coupling": {"arcsec_per_A": 1.0},
+    "joint_coupling": {"joint": "wrist 2", "factor": 0.1},
     "clock_drift": {"ppm": 50.0},
     "varying_line": {"order": 3.0, "follows": "speed", "amplitude_arcsec": 0.2},
     "wrong_gear_ratio": {"gear_ratio": 80.0},
@@ -110,6 +111,7 @@ def test_every_kind_round_trips_through_the_file_and_leaves_a_trace(tmp_path):
         temperature_C=30.0,
         mount_deg=130.0,
         current_A=3.0,
+        coupled={"wrist 2": [0.0, 30.0, -10.0]},
         label='a "b"\\',
     )
     sim = Simulation(JOINT, LINES, tuple(effects), 1.5, (design,))

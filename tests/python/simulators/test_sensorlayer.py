@@ -204,3 +204,61 @@ def test_signals_that_mujoco_does_not_have_are_asked_for():
         layer.read(data, temprature=25.0)
     with pytest.raises(ArgumentError, match="noise_std must be 0 or more"):
         SensorLayer(mj, {"elbow": PLAIN}, noise_std=-1.0)
+
+
+def arm(joints):
+    bodies = "".join(f"<body><joint name='q{j}'/><geom size='.1'/>" for j in range(joints))
+    return mujoco.MjModel.from_xml_string(
+        f"<mujoco><worldbody>{bodies}{'</body>' * joints}</worldbody></mujoco>"
+    )
+
+
+class Batch:
+    def __init__(self, qpos, qvel):
+        self.qpos, self.qvel = qpos, qvel
+
+
+def test_many_environments_each_have_the_state_that_one_alone_has():
+    rng = np.random.default_rng(91)
+    print("seed 91")
+    series = ta.Shaft("output", 1, [1, 2], [1e-4, 0.0], [0.0, 3e-5])
+    springs = (T.Backlash(5 * A), T.PreslidingHysteresis(30 * A, 0.01, 0.3), T.Latency(1e-3))
+    models = {
+        "q0": ta.HarmonicModel([series], terms=springs),
+        "q1": ta.HarmonicModel([series], argument="indicated", terms=springs[:1]),
+        "q2": ta.HarmonicModel([series]),
+    }
+    count, steps = 300, 40  # more than a block of the core
+    layer = SensorLayer(arm(3), models)
+    qpos = np.cumsum(rng.normal(0.0, 0.02, (steps, count, 3)), axis=0)
+    qvel = rng.normal(0.0, 1.0, (steps, count, 3))
+    found = np.array([layer.read(Batch(*both)) for both in zip(qpos, qvel, strict=True)])
+    for e in (0, 131, 299):
+        alone = SensorLayer(arm(3), models)
+        one = [alone.read(Batch(x[e], v[e])) for x, v in zip(qpos, qvel, strict=True)]
+        np.testing.assert_array_equal(found[:, e], np.array(one))
+        error = models["q0"].error(qpos[:, e, 0], velocity=qvel[:, e, 0])
+        np.testing.assert_array_equal(found[:, e, 0], qpos[:, e, 0] + error)
+    layer.reset([131])
+    before = layer.read(Batch(qpos[0], qvel[0]))
+    np.testing.assert_array_equal(before[131], found[0, 131])
+
+
+def test_a_coupled_joint_takes_the_reading_of_the_other():
+    series = ta.Shaft("output", 1, [1], [0.0], [1e-3])
+    eccentric = ta.HarmonicModel([series])
+    degrees = ta.HarmonicModel([], period=360.0, terms=[T.JointCoupling("q1", 0.1)])
+    mj = arm(3)
+    data = mujoco.MjData(mj)
+    data.qpos[:] = 0.3, 0.7, -0.2
+    layer = SensorLayer(mj, {"q0": degrees, "q1": eccentric})
+    reading = layer.read(data)
+    assert reading[0] == pytest.approx(0.3 + 0.1 * reading[1], abs=1e-14)
+    # Of a joint that the layer does not read, the angle itself.
+    assert SensorLayer(mj, {"q0": degrees}).read(data)[0] == pytest.approx(0.37, abs=1e-14)
+    circle = ta.HarmonicModel([], terms=[T.JointCoupling("q0", 0.1)])
+    with pytest.raises(ArgumentError, match="coupled in a circle"):
+        SensorLayer(mj, {"q0": degrees, "q1": circle})
+    nobody = ta.HarmonicModel([], terms=[T.JointCoupling("q9", 0.1)])
+    with pytest.raises(ArgumentError, match="no joint 'q9'"):
+        SensorLayer(mj, {"q0": nobody})

@@ -1,0 +1,225 @@
+"""Further runs within limits: what they are, what they are said to tell, and what is refused."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import trueangle as ta
+from trueangle.cli import main
+from trueangle.errors import ArgumentError, FileError
+from trueangle.joint.signals import join_runs
+from trueangle.planning import Limits, load_limits
+from trueangle.planning.further import base_of, choices, seconds_of, steps_of
+from trueangle.simulation import Backlash, Harmonic, RunDesign, Simulation, simulate
+
+#: An arm of 270 degrees, out and back at one speed.
+SIM = Simulation(
+    harmonics=(Harmonic("output", 1, 14.0, 240.0),),
+    sigma_arcsec=1.0,
+    runs=(
+        RunDesign("a", start_deg=-135.0, turns=1.5, reversals=(0.5,)),
+        RunDesign("b", start_deg=-135.0, turns=1.5, reversals=(0.5,)),
+    ),
+)
+RUNS = simulate(SIM.with_effects([Backlash(3.0)]), 11)
+
+
+@pytest.fixture(scope="module")
+def found():
+    return ta.diagnose(RUNS, SIM)
+
+
+@pytest.fixture(scope="module")
+def plan(found):
+    return found.plan()
+
+
+def test_limits_without_any_are_the_arc_and_the_levels_that_were_seen():
+    limits = Limits.of_runs(RUNS)
+    assert limits.arc_deg == pytest.approx((-135.0, 135.0), abs=2.0)
+    assert limits.speed_deg_s == (1.0, 60.0)
+    assert limits.temperature_C == (20.0, 20.0)
+    assert limits.torque_Nm == (0.0, 0.0)
+    assert limits.mount_deg == (0.0,)
+    assert not limits.turns_freely
+    whole = Limits.of_runs(simulate(Simulation(runs=(RunDesign(start_deg=77.0),))))
+    assert whole.arc_deg == (0.0, 360.0)
+    back = replace(RUNS[1], reference=RUNS[1].reference + 720.0)
+    assert Limits.of_runs([RUNS[0], back]).arc_deg == limits.arc_deg
+
+
+def test_a_little_beyond_is_warmer_loaded_and_remounted():
+    wider = Limits.of_runs(RUNS).wider()
+    assert wider.temperature_C == (20.0, 35.0)
+    assert wider.torque_Nm == (-10.0, 10.0)
+    assert set(wider.mount_deg) == {0.0, 130.0, 250.0}
+
+
+def test_play_and_a_delay_are_told_by_another_speed(plan):
+    assert not plan.beyond
+    assert not plan.alone
+    (design,) = plan.runs
+    assert design.speed_deg_s != 5.0
+    assert plan.readings == design.samples < 360
+    first = plan.between[0]
+    assert first.causes == ("backlash", "latency")
+    assert first.seen
+    assert first.told
+    assert first.chance_named >= 0.95
+
+
+def test_every_run_stays_within_limits(plan):
+    limits = Limits.of_runs(RUNS)
+    design = base_of(limits, "x")
+    options = [option for options in choices(limits) for option in options]
+    assert len(options) > 8
+    for run in (*plan.runs, *(replace(design, **option) for option in options)):
+        measured = simulate(Simulation(), 0, [run])[0]
+        low, high = measured.reference.min(), measured.reference.max()
+        assert limits.arc_deg[0] - 1e-6 <= low
+        assert high <= limits.arc_deg[1] + 1e-6
+        speed = np.abs(measured.velocity)
+        assert speed.min() >= 1.0 - 1e-9
+        assert speed.max() <= 60.0
+        # The time that is told is that of the simulated run, to one reading.
+        assert measured.time[-1] == pytest.approx(seconds_of(run), rel=0.05)
+        assert any(f"read {run.samples} times" in step for step in steps_of(run))
+
+
+def test_without_reversals_none_is_planned(found):
+    one_way = found.plan(replace(Limits.of_runs(RUNS), reversals=False))
+    assert all(not run.reversals for run in one_way.runs)
+
+
+def test_where_no_run_tells_there_is_none(found):
+    still = found.plan(
+        replace(Limits.of_runs(RUNS), speed_deg_s=(5.0, 5.0)), between=["thermal_drift"]
+    )
+    assert still.runs == ()
+    assert "no run within the limits" in still.notes[0]
+    assert "not told: thermal_drift" in still.summary()
+
+
+def test_what_was_not_seen_is_opened_a_little_beyond(found):
+    warm = found.plan(between=["thermal_drift"])
+    assert warm.between[0].told
+    assert any("C" in text for text in warm.beyond)
+
+
+def test_the_object_printed_keeps_the_contract(plan, tmp_path):
+    told = json.loads(plan.to_json())
+    assert {"runs", "between"} <= set(told)
+    assert {"label", "speed_deg_s"} <= set(told["runs"][0])
+    RunDesign(**{**told["runs"][0], "reversals": tuple(told["runs"][0].get("reversals", ()))})
+    assert {"causes", "expected_bic", "chance_named"} <= set(told["between"][0])
+    plan.save(tmp_path / "designs.toml")
+    again = ta.load_simulation(tmp_path / "designs.toml")
+    assert again.runs == plan.runs
+    assert len(simulate(again)[0]) == plan.readings
+
+
+def test_the_summary_is_a_table_for_the_rig(plan, found):
+    text = plan.summary()
+    assert "next-1" in text
+    assert "- move " in text
+    assert "tells backlash or latency" in text
+    assert "Next: 1 run of" in found.summary()
+
+
+def test_a_file_of_limits(tmp_path):
+    path = tmp_path / "limits.toml"
+    path.write_text(
+        "[limits]\narc_deg = [-90, 90]\nmount_deg = [0, 130]\nsamples = 100\nreversals = false\n"
+    )
+    limits = load_limits(path)
+    assert limits.arc_deg == (-90.0, 90.0)
+    assert limits.mount_deg == (0.0, 130.0)
+    assert (limits.samples, limits.reversals) == (100, False)
+
+
+WRONG = {
+    "a table": ("[limit]\n", "unknown table 'limit'"),
+    "none": ("", r"no table \[limits\]"),
+    "a key": ("[limits]\nspeed = 3\n", "unknown key 'speed'"),
+    "no TOML": ("[limits\n", "not a TOML file"),
+    "a text": ("[limits]\narc_deg = 'all'\n", "arc_deg must be a list of finite numbers"),
+    "three": ("[limits]\narc_deg = [0, 1, 2]\n", "arc_deg must be two finite numbers"),
+    "turned": ("[limits]\ntorque_Nm = [1, 0]\n", "the least before the most"),
+    "empty": ("[limits]\narc_deg = [1, 1]\n", "must have a length"),
+    "at rest": ("[limits]\nspeed_deg_s = [0, 1]\n", "speed_deg_s must be positive"),
+    "negative": ("[limits]\ngravity_Nm = -1\n", "gravity_Nm must not be negative"),
+    "no mount": ("[limits]\nmount_deg = []\n", "mount_deg must be finite numbers"),
+    "few": ("[limits]\nsamples = 3\n", "samples must be at least 20"),
+    "none at all": ("[limits]\nruns = 0\n", "runs must be at least 1"),
+    "a half": ("[limits]\nruns = 1.5\n", "runs must be a whole number"),
+    "perhaps": ("[limits]\nreversals = 1\n", "reversals must be true or false"),
+}
+
+
+@pytest.mark.parametrize("what", WRONG)
+def test_a_file_that_is_none_is_refused(what, tmp_path):
+    text, said = WRONG[what]
+    path = tmp_path / "limits.toml"
+    path.write_text(text)
+    with pytest.raises(FileError, match=said):
+        load_limits(path)
+
+
+def test_readings_that_lack_a_column_are_left_out_where_it_tells(found):
+    blind = [replace(run, temperature=None) for run in RUNS]
+    plan = ta.diagnose(blind, SIM).plan(between=["thermal_drift"])
+    assert plan.alone
+    assert "diagnose by themselves" in plan.summary()
+
+
+def test_signals_that_follow_are_those_of_all_runs_together():
+    whole, parts = join_runs(RUNS), [join_runs([run]) for run in RUNS]
+    joined = parts[0].followed_by(parts[1])
+    for name in ("theta", "run", "segment", "segment_length", "velocity", "temperature", "clock"):
+        np.testing.assert_array_equal(getattr(joined, name), getattr(whole, name))
+    assert joined.labels == whole.labels
+    lacking = replace(parts[1], temperature=None)
+    assert parts[0].followed_by(lacking).temperature is None
+
+
+@pytest.fixture
+def desk(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    SIM.save("joint.toml")
+    ta.write_runs(RUNS, "runs.csv")
+    return tmp_path
+
+
+def test_the_command_prints_and_writes(desk, capsys):
+    arguments = ["plan", "--after", "runs.csv", "--simulation", "joint.toml", "--seeds", "1"]
+    assert main([*arguments, "--json", "-o", "designs.toml"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert told["between"][0]["causes"] == ["backlash", "latency"]
+    assert main(["simulate", "designs.toml", "-o", "next.csv"]) == 0
+    assert main(["diagnose", "runs.csv", "--simulation", "joint.toml", "--plan", "next.toml"]) == 0
+    assert "Runs to measure next: next.toml" in capsys.readouterr().out
+    assert ta.load_simulation("next.toml").runs
+    capsys.readouterr()
+    assert main(["plan", "--after", "runs.csv"]) == 1
+    assert "add --simulation FILE" in capsys.readouterr().err
+    assert main(["plan", "--between", "backlash,latency"]) == 1
+    assert "add --after RUNS" in capsys.readouterr().err
+
+
+def test_a_diagnosis_with_nothing_open_writes_no_plan(desk, capsys):
+    ta.write_runs(simulate(SIM, 3), "fine.csv")
+    asked = ["diagnose", "fine.csv", "--simulation", "joint.toml", "--plan", "next.toml"]
+    assert main(asked) == 1
+    assert "nothing is seen that a further run" in capsys.readouterr().err
+    assert not (desk / "next.toml").exists()
+
+
+def test_what_cannot_be_planned_is_refused():
+    with pytest.raises(ArgumentError, match="did you mean backlash"):
+        ta.plan_after(RUNS, SIM, between=["backlas"])
+    with pytest.raises(ArgumentError, match="no cause to tell apart"):
+        ta.plan_after(RUNS, SIM, between=[])
+    with pytest.raises(ArgumentError, match="seeds must be a whole number from 0"):
+        ta.plan_after(RUNS, SIM, seeds=-1)

@@ -1,0 +1,89 @@
+"""Designs of measured runs: what they hold, and that a simulation repeats the measurement."""
+
+import numpy as np
+import pytest
+
+import trueangle as ta
+from trueangle.cli import main
+from trueangle.simulation import Backlash, RunDesign, Simulation
+from trueangle.simulation.measured import design_of
+
+FULL = RunDesign(
+    label="a",
+    samples=500,
+    direction=-1,
+    reversals=(0.3, 0.6),
+    speed_deg_s=7.0,
+    start_deg=33.0,
+    turns=2.3,
+    torque_Nm=2.0,
+    gravity_Nm=4.0,
+    gravity_deg=25.0,
+    temperature_C=20.0,
+    temperature_end_C=26.0,
+    mount_deg=40.0,
+    current_A=1.5,
+    coupled={"wrist": [0.0, 40.0, -20.0]},
+)
+#: A step of the readings, as a share of the travel.
+STEP = 1.0 / 500.0
+
+
+def test_a_design_is_found_again():
+    (run,) = ta.simulate(Simulation(runs=(FULL,)), 3)
+    found = design_of(run)
+    assert (found.label, found.samples, found.direction) == ("a", 500, -1)
+    assert found.speed_deg_s == pytest.approx(7.0)
+    assert found.turns == pytest.approx(2.3, rel=2.0 * STEP)
+    assert found.start_deg == pytest.approx(33.0, abs=360.0 * 2.3 * STEP)
+    assert found.reversals == pytest.approx((0.3, 0.6), abs=2.0 * STEP)
+    for name in ("torque_Nm", "gravity_Nm", "gravity_deg", "mount_deg", "current_A"):
+        assert getattr(found, name) == pytest.approx(getattr(FULL, name)), name
+    assert found.temperature_C == pytest.approx(20.0, abs=0.05)
+    assert found.temperature_end_C == pytest.approx(26.0, abs=0.05)
+    # The runs of both are alike, the other joint's way too.
+    (again,) = ta.simulate(Simulation(runs=(found,)), 4)
+    for mine, other in (
+        (again.reference, run.reference),
+        (again.signals["coupled_wrist"], run.signals["coupled_wrist"]),
+    ):
+        assert np.max(np.abs(mine - other)) < 3.0 * 360.0 * 2.3 * STEP
+
+
+def test_a_run_at_rest_and_one_without_anything():
+    (rest,) = ta.simulate(Simulation(runs=(RunDesign(speed_deg_s=0.0, spacing="uniform"),)))
+    found = design_of(rest)
+    assert (found.speed_deg_s, found.spacing) == (0.0, "uniform")
+    assert found.turns == pytest.approx(1.0)
+    bare = ta.CalibrationRun([0.0, 0.0], [0.0, 0.0], period=360.0)
+    assert design_of(bare).samples == 2
+    turned = ta.CalibrationRun(np.linspace(0.0, 6.0, 50), np.linspace(0.0, 6.0, 50))
+    assert design_of(turned).turns == pytest.approx(6.0 * 50 / 49 / (2.0 * np.pi))
+
+
+def test_what_extend_writes_repeats_the_measurement(tmp_path, capsys):
+    truth = Simulation(
+        sigma_arcsec=2.0,
+        effects=(Backlash(9.0),),
+        runs=tuple(RunDesign(reversals=(0.5,), speed_deg_s=v) for v in (5.0, 40.0, 5.0)),
+    )
+    runs = ta.simulate(truth, 20)
+    ta.write_runs(runs, tmp_path / "runs.csv")
+    believed = tmp_path / "joint.toml"
+    believed.write_text("# mine\n[joint]\ngear_ratio = 1.0\n")
+    better = tmp_path / "better.toml"
+    files = [str(tmp_path / "runs.csv"), "--simulation", str(believed), "--extend", str(better)]
+    assert main(["diagnose", *files]) == 0
+    capsys.readouterr()
+    # What was there stays as it was written.
+    assert better.read_text().startswith(believed.read_text())
+    extended = ta.load_simulation(better)
+    assert extended.sigma_arcsec == pytest.approx(2.0, rel=0.1)
+    assert [effect.kind for effect in extended.effects] == ["backlash"]
+    again = ta.simulate(extended, 21)
+    assert [len(run) for run in again] == [len(run) for run in runs]
+    assert ta.diagnose(again, extended).findings == []
+    # What the simulation states itself is kept.
+    stated = Simulation(sigma_arcsec=1.5, runs=(RunDesign(),))
+    found = ta.diagnose(runs, stated).simulation()
+    assert (found.sigma_arcsec, found.runs) == (1.5, stated.runs)
