@@ -2,12 +2,14 @@
 
 The budget (`budget`) and the propagation of uncertainty (`propagation`) follow JCGM 100
 (GUM); what a fit says of each position is in `values`; `identity` reads what only the
-laboratory knows; `typesetting` makes the PDF.
+laboratory knows, `conformity` states conformity after ILAC-G8 and JCGM 106; `language` holds the
+texts, `typesetting` makes the PDF.
 """
 
 from __future__ import annotations
 
 from .budget import Budget, Contribution
+from .conformity import Specification, conformance_probability, conformity
 from .document import Certificate, certify
 from .identity import Identity, load_identity
 from .propagation import Estimates, propagated
@@ -18,7 +20,10 @@ __all__ = [
     "Contribution",
     "Estimates",
     "Identity",
+    "Specification",
     "certify",
+    "conformance_probability",
+    "conformity",
     "load_identity",
     "propagated",
 ]

@@ -125,6 +125,27 @@ class Budget:
         """U, the half width of the interval that holds the value at `LEVEL`."""
         return self.coverage_factor * self.standard
 
+    def shares(self, decimals: int = 1) -> list[float]:
+        """Parts of the combined variance in percent, rounded so that they add up to 100.
+
+        Each is rounded down; the largest remainders are rounded up (Hamilton's method).
+
+        Examples
+        --------
+        >>> thirds = Budget(tuple(Contribution(name, 1.0) for name in "abc"))
+        >>> thirds.shares()
+        [33.4, 33.3, 33.3]
+        """
+        whole = 10**decimals * 100
+        exact = [whole * self.share(item) for item in self.contributions]
+        if not any(exact):
+            return exact
+        found = [math.floor(value) for value in exact]
+        least = sorted(range(len(exact)), key=lambda k: found[k] - exact[k])
+        for k in least[: whole - sum(found)]:
+            found[k] += 1
+        return [value / 10**decimals for value in found]
+
     def share(self, item: Contribution) -> float:
         """Part of the combined variance that a contribution brings."""
         return (item.effect / self.standard) ** 2 if self.standard > 0.0 else 0.0

@@ -10,20 +10,25 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..errors import ArgumentError
+from ..fitting.summary import unit_of
 from ..runs.provenance import provenance
 from ..runs.run import CalibrationRun, as_runs
 from ..support.angles import ARCSEC_PER_TURN
-from ..support.display_units import ErrorsIn, error_unit
+from ..support.display_units import ErrorsIn
 from ..support.kinds import told_kinds
 from ..support.plainresult import finite
+from .asleft import corrected_runs, is_of_these, model_of
 from .budget import LEVEL, Budget, Contribution
+from .conformity import conformity
 from .identity import ENTRIES, Identity, load_identity
 from .values import left_at_places, nominal_positions, reversal, values_at
 
 if TYPE_CHECKING:
     from ..fitting.result import FitResult
+    from ..model.model import HarmonicModel
 
 __all__ = ["Certificate", "certify"]
 
@@ -41,10 +46,14 @@ class Certificate:
         Every number and word of it, plain values: `save` adds nothing but the layout.
         Errors are in arcsec; ``errors_in`` says which unit the pages show.
         ``positions`` holds ``angle_deg, error_arcsec, standard_arcsec,
-        degrees_of_freedom, coverage_factor, expanded_arcsec`` of every position.
+        degrees_of_freedom, coverage_factor, expanded_arcsec`` of every position;
+        ``as_left`` the same as a model leaves it, ``conformity`` what `conformity` states.
+    logo : path or None
+        The picture in the head of the first page.
     """
 
     content: dict[str, Any]
+    logo: str | None = None
 
     def save(self, path: str | PathLike[str]) -> None:
         """Write it as PDF/A-2b, complete or not at all.
@@ -59,7 +68,7 @@ class Certificate:
         """
         from .typesetting import write_pdf
 
-        write_pdf(self.content, path)
+        write_pdf(self.content, path, self.logo)
 
 
 @told_kinds
@@ -73,6 +82,7 @@ def certify(
     shafts: Mapping[str, float] | None = None,
     positions: int | None = None,
     fit: FitResult | None = None,
+    model: HarmonicModel | str | PathLike[str] | None = None,
     errors_in: ErrorsIn = "auto",
 ) -> Certificate:
     r"""Value and expanded uncertainty of the error at every nominal position.
@@ -96,10 +106,13 @@ def certify(
         36, else 36.
     fit : FitResult, optional
         A fit of ``runs`` that is there already.
+    model : HarmonicModel or path, optional
+        What the joint is corrected by: beside the values as found stand those as left, of the
+        corrected readings, with a budget and a statement of their own.
     errors_in : str or float
         Unit of every value and uncertainty of the pages: ``"arcsec"``, ``"deg"``,
         ``"mrad"``, ``"count"``, or the counts of a turn; ``"auto"`` is arcsec, or degrees
-        where an error reaches a degree. The content stays in arcsec.
+        where they are that large. The content stays in arcsec.
 
     Returns
     -------
@@ -108,7 +121,8 @@ def certify(
     Raises
     ------
     ArgumentError
-        A fit without covariance has no uncertainty to state.
+        A fit without covariance has no uncertainty to state; ``model`` needs a signal that the
+        readings lack.
 
     Examples
     --------
@@ -124,22 +138,64 @@ def certify(
     """
     found = as_runs(runs)
     who = identity if isinstance(identity, Identity) else load_identity(identity)
+    gear: dict[str, Any] = {
+        "gear_ratio": gear_ratio,
+        "fixed_member": fixed_member,
+        "shafts": shafts,
+    }
     if fit is None:
-        from ..fitting.fit import fit as fit_runs
-
-        gear: dict[str, Any] = {
-            "gear_ratio": gear_ratio,
-            "fixed_member": fixed_member,
-            "shafts": shafts,
+        fit = _fitted(found, orders, gear)
+    angles = nominal_positions(fit, positions)
+    valued = _valued(fit, angles, who)
+    left = None
+    if model is not None:
+        by = model_of(model)
+        same = {shaft.name: shaft.orders for shaft in fit.model.shafts}
+        left = {
+            "model": Path(model).name if isinstance(model, str | PathLike) else repr(by),
+            "same_readings": is_of_these(by, found),
+            **_valued(_fitted(corrected_runs(by, found), same, gear), angles, who),
         }
-        fit = fit_runs(found, orders, **gear)
+    unit = unit_of(fit, errors_in)
+    source = None if isinstance(identity, Identity) else str(Path(identity))
+    content: dict[str, Any] = {
+        "format": FORMAT,
+        "version": VERSION,
+        "identity": {name: getattr(who, name) for name in ENTRIES},
+        "language": who.language,
+        "temperature_C": who.temperature_C,
+        "temperature_recorded_C": (recorded := _recorded(found)),
+        "not_stated": [
+            name for name in who.not_stated if name != "temperature_C" or recorded is None
+        ],
+        "errors_in": {"unit": unit.name, "per_arcsec": unit.per_arcsec},
+        "level_percent": 100.0 * LEVEL,
+        "argument": fit.model.argument,
+        **valued,
+        "as_left": left,
+        "harmonics": _harmonics(fit, _degrees_of_freedom(fit)),
+        "readings": _readings(fit),
+        "notes": list(fit.notes),
+        "aliases": _aliases(fit),
+        "provenance": provenance(found, source),
+    }
+    return Certificate(content, who.logo)
+
+
+def _fitted(runs: list[CalibrationRun], orders: Any, gear: dict[str, Any]) -> FitResult:
+    from ..fitting.fit import fit
+
+    return fit(runs, orders, **gear)
+
+
+def _valued(fit: FitResult, angles: NDArray[np.float64], who: Identity) -> dict[str, Any]:
+    """Values with their uncertainty, the widest budget, and what is stated of them."""
     if fit.model.covariance is None or not math.isfinite(fit.residual_std):
         raise ArgumentError(
             "as many unknowns as readings leave nothing to take an uncertainty from: "
             "read more positions, or fit fewer orders"
         )
-    values = values_at(fit, nominal_positions(fit, positions))
-    unit = error_unit(errors_in, float(np.abs(values.error_arcsec).max()), fit.model.period)
+    values = values_at(fit, angles)
     shared = [item for item in (left_at_places(fit), reversal(fit)) if item is not None]
     shared += list(who.contributions)
     freedom = _degrees_of_freedom(fit)
@@ -148,37 +204,36 @@ def certify(
         for u in values.standard
     ]
     widest = max(range(len(budgets)), key=lambda k: budgets[k].expanded)
-    source = None if isinstance(identity, Identity) else str(Path(identity))
-    content: dict[str, Any] = {
-        "format": FORMAT,
-        "version": VERSION,
-        "identity": {name: getattr(who, name) for name in ENTRIES},
-        "temperature_C": who.temperature_C,
-        "not_stated": list(who.not_stated),
-        "errors_in": {"unit": unit.name, "per_arcsec": unit.per_arcsec},
-        "level_percent": 100.0 * LEVEL,
-        "argument": fit.model.argument,
-        "positions": [
-            {
-                "angle_deg": float(angle),
-                "error_arcsec": float(error),
-                "standard_arcsec": budget.standard,
-                "degrees_of_freedom": finite(budget.degrees_of_freedom),
-                "coverage_factor": budget.coverage_factor,
-                "expanded_arcsec": budget.expanded,
-            }
-            for angle, error, budget in zip(
-                values.angle_deg, values.error_arcsec, budgets, strict=True
-            )
-        ],
+    rows = [
+        {
+            "angle_deg": float(angle),
+            "error_arcsec": float(error),
+            "standard_arcsec": budget.standard,
+            "degrees_of_freedom": finite(budget.degrees_of_freedom),
+            "coverage_factor": budget.coverage_factor,
+            "expanded_arcsec": budget.expanded,
+        }
+        for angle, error, budget in zip(values.angle_deg, values.error_arcsec, budgets, strict=True)
+    ]
+    return {
+        "positions": rows,
         "budget": _budget(budgets[widest], float(values.angle_deg[widest])),
-        "harmonics": _harmonics(fit, freedom),
-        "readings": _readings(fit),
-        "notes": list(fit.notes),
-        "aliases": _aliases(fit),
-        "provenance": provenance(found, source),
+        "conformity": None if who.specification is None else conformity(who.specification, rows),
     }
-    return Certificate(content)
+
+
+def _recorded(runs: list[CalibrationRun]) -> dict[str, float] | None:
+    """Mean, lowest and highest temperature of the readings; None where it was not recorded."""
+    known = [run.temperature for run in runs if run.temperature is not None]
+    values = np.concatenate(known) if known else np.zeros(0)
+    values = values[np.isfinite(values)]
+    if not values.size:
+        return None
+    return {
+        "mean": float(values.mean()),
+        "low": float(values.min()),
+        "high": float(values.max()),
+    }
 
 
 def _degrees_of_freedom(fit: FitResult) -> float:
@@ -198,9 +253,9 @@ def _budget(budget: Budget, angle_deg: float) -> dict[str, Any]:
                 "standard_arcsec": item.standard,
                 "sensitivity": item.sensitivity,
                 "degrees_of_freedom": finite(item.degrees_of_freedom),
-                "share_percent": 100.0 * budget.share(item),
+                "share_percent": share,
             }
-            for item in budget.contributions
+            for item, share in zip(budget.contributions, budget.shares(), strict=True)
         ],
         "standard_arcsec": budget.standard,
         "degrees_of_freedom": finite(budget.degrees_of_freedom),

@@ -6,15 +6,19 @@ import datetime
 import math
 import tomllib
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from os import PathLike
+from pathlib import Path
 from typing import Any, Final
 
 from ..errors import ArgumentError, FileError
+from ..support.angles import ARCSEC_PER_DEG
 from ..support.files import read_whole
 from ..support.kinds import told_kinds
 from ..support.suggestions import check_choice, did_you_mean
 from .budget import DISTRIBUTIONS, Contribution
+from .conformity import RULES, Specification
+from .language import LANGUAGES
 
 __all__ = ["ENTRIES", "Identity", "load_identity"]
 
@@ -38,8 +42,18 @@ ENTRIES: Final[Mapping[str, str]] = {
     "reference": "Reference",
     "reference_certificate": "Certificate of the reference",
     "place": "Place",
+    "address": "Address of the laboratory",
 }
 _REQUIRED: Final = ("number", "item")
+
+#: What a certificate is whole without.
+_OPTIONAL: Final = ("address", "specification", "logo")
+
+#: Names of a tolerance limit, and how many arcsec one of each is.
+_LIMITS: Final[Mapping[str, float]] = {"limit_arcsec": 1.0, "limit_deg": ARCSEC_PER_DEG}
+
+#: Kinds of pictures that the typesetter takes.
+_LOGOS: Final = (".png", ".jpg", ".jpeg", ".svg")
 
 _KEYS: Final = ("name", "type", "distribution", "half_width_arcsec", "standard_arcsec",
                 "degrees_of_freedom")  # fmt: skip
@@ -52,10 +66,19 @@ class Identity:
     Attributes
     ----------
     number, item, serial, manufacturer, customer, laboratory, operator, date, procedure,
-    reference, reference_certificate, place : str
+    reference, reference_certificate, place, address : str
+        The address may have several lines.
     temperature_C : float or None
+        Where it is not stated, that of the readings is, if it was recorded.
     contributions : tuple of Contribution
         Type B, in arcsec, each with sensitivity 1 at every position.
+    specification : Specification or None
+        What conformity is stated with.
+    language : str
+        Of the pages: one of `LANGUAGES`.
+    logo : path or None
+        Picture (PNG, JPEG or SVG) for the head of the first page; an identity file names it
+        relative to itself.
     """
 
     number: str
@@ -72,12 +95,21 @@ class Identity:
     place: str = ""
     temperature_C: float | None = None
     contributions: tuple[Contribution, ...] = ()
+    address: str = ""
+    specification: Specification | None = None
+    language: str = "en"
+    logo: str | None = None
+
+    def __post_init__(self) -> None:
+        check_choice("language", self.language, LANGUAGES)
 
     @property
     def not_stated(self) -> tuple[str, ...]:
         """Names of the entries without a value."""
         return tuple(
-            entry.name for entry in fields(self) if getattr(self, entry.name) in ("", None)
+            entry.name
+            for entry in fields(self)
+            if entry.name not in _OPTIONAL and getattr(self, entry.name) in ("", None)
         )
 
 
@@ -98,7 +130,16 @@ def load_identity(path: str | PathLike[str]) -> Identity:
     except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError) as reason:
         raise FileError(path, f"not valid TOML: {reason}") from None
     try:
-        return identity_from(table)
+        found = identity_from(table)
+        if found.logo is None:
+            return found
+        logo = Path(path).parent / found.logo
+        if logo.suffix.lower() not in _LOGOS or not logo.is_file():
+            raise ArgumentError(
+                f"[certificate] logo must name a picture beside this file "
+                f"({', '.join(_LOGOS)}), got {found.logo!r}"
+            )
+        return replace(found, logo=str(logo))
     except ArgumentError as reason:
         raise FileError(path, str(reason)) from None
 
@@ -111,15 +152,19 @@ def identity_from(table: Mapping[str, Any]) -> Identity:
     ArgumentError
         Names the entry at fault.
     """
-    _known(table, ("certificate", "contribution"), "the file")
+    _known(table, ("certificate", "contribution", "specification"), "the file")
     said = table.get("certificate")
     if not isinstance(said, Mapping):
         raise ArgumentError("needs a table [certificate] with at least number and item")
-    _known(said, (*ENTRIES, "temperature_C"), "[certificate]")
+    _known(said, (*ENTRIES, "temperature_C", "language", "logo"), "[certificate]")
     values: dict[str, Any] = {name: _text(name, said[name]) for name in ENTRIES if name in said}
     for name in _REQUIRED:
         if not values.get(name):
             raise ArgumentError(f"[certificate] needs {name}")
+    if "language" in said:
+        values["language"] = check_choice("[certificate] language", said["language"], LANGUAGES)
+    if "logo" in said:
+        values["logo"] = _text("logo", said["logo"])
     if "temperature_C" in said:
         values["temperature_C"] = _number("[certificate] temperature_C", said["temperature_C"])
     listed = table.get("contribution", [])
@@ -128,7 +173,29 @@ def identity_from(table: Mapping[str, Any]) -> Identity:
             f"contributions must be tables [[contribution]], at most {_MOST_CONTRIBUTIONS}"
         )
     contributions = tuple(_contribution(i, entry) for i, entry in enumerate(listed, start=1))
-    return Identity(**values, contributions=contributions)
+    specification = _specification(table.get("specification"))
+    return Identity(**values, contributions=contributions, specification=specification)
+
+
+def _specification(entry: object) -> Specification | None:
+    where = "[specification]"
+    if entry is None:
+        return None
+    if not isinstance(entry, Mapping):
+        raise ArgumentError(f"{where} must be a table")
+    _known(entry, (*_LIMITS, "decision_rule"), where)
+    named = [name for name in _LIMITS if name in entry]
+    if len(named) != 1:
+        raise ArgumentError(f"{where}: give either {' or '.join(_LIMITS)}")
+    if "decision_rule" not in entry:
+        raise ArgumentError(
+            f'{where} needs decision_rule, agreed with the customer: "simple" or "guard_band"'
+        )
+    limit = _number(f"{where} {named[0]}", entry[named[0]]) * _LIMITS[named[0]]
+    if not limit > 0.0:
+        raise ArgumentError(f"{where}: {named[0]} must be positive, got {entry[named[0]]!r}")
+    rule = check_choice(f"{where} decision_rule", entry["decision_rule"], RULES)
+    return Specification(limit, rule)
 
 
 def _contribution(position: int, entry: object) -> Contribution:

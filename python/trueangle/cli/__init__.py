@@ -15,6 +15,7 @@ from typing import NoReturn, Protocol
 
 from .._core import __version__
 from ..errors import ArgumentError, TrueAngleError, shortened
+from ..support.layout import wrapped
 from .parser import Parser
 from .paths import check_paths
 from .signals import Ending, ending_by_signals
@@ -36,6 +37,7 @@ COMMANDS: tuple[str, ...] = (
     "correct",
     "demo",
     "orders",
+    "plot",
     "plan",
     "simulate",
     "diagnose",
@@ -45,6 +47,8 @@ COMMANDS: tuple[str, ...] = (
     "import",
     "compare",
     "selfcal",
+    "fleet",
+    "watch",
     "bench",
     "completion",
 )
@@ -82,7 +86,7 @@ def build_parser(words: Container[str] = COMMANDS, commands: Iterable[str] = COM
         subparser = subparsers.add_parser(
             name,
             help=command.HELP,
-            description=command.HELP,
+            description="\n".join(wrapped(command.HELP)),
             epilog=f"example:\n  {command.EXAMPLE}",
             formatter_class=argparse.RawDescriptionHelpFormatter,
         )

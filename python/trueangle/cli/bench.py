@@ -8,6 +8,7 @@ from typing import Any
 
 from ..support.files import PICTURE
 from .paths import Output
+from .pictures import save_picture
 
 HELP = "measure evaluation, correction and fits here, beside copies and other libraries"
 EXAMPLE = "trueangle bench --json"
@@ -154,9 +155,7 @@ def _draw(path: str, points: list[Any], costs: list[Any]) -> None:
         label = _label(point.work, point.threads)
         measured.setdefault(label, []).append((point.readings, point.timing.median))
     models = {_label(cost.work, cost.threads): (cost.call, cost.reading) for cost in costs}
-    picture = cost_curves(measured, models).get_figure(root=True)
-    assert picture is not None
-    picture.savefig(path)
+    save_picture(cost_curves(measured, models), path)
 
 
 def _label(work: str, threads: int) -> str:

@@ -24,16 +24,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Show the three parts, each a few lines."""
-    print(_corrected(args.seed))
-    print()
-    print(_between(args.seed))
-    print()
-    print(_diagnosed(args.seed))
+    for number, part in enumerate((_corrected, _between, _diagnosed), 1):
+        print(f"{number}. {part(args.seed)}\n")
     if args.report:
         from ..reports.demo import demo_report
 
         demo_report(args.report, seed=args.seed)
-        print(f"\nreport written to {args.report}")
+        print(f"report written to {args.report}")
+    else:
+        print("The same with pictures: trueangle demo --report demo.html")
     return 0
 
 
@@ -42,22 +41,29 @@ def _corrected(seed: int) -> str:
     import numpy as np
 
     from ..fitting.fit import fit
+    from .chart import chart
     from .paperstudy.study import JOINT_A, PUBLISHED, simulated_groups
 
     *groups, unseen = simulated_groups(JOINT_A, seed=seed)
     model = fit(groups).model
-    before = 3600.0 * float(np.ptp(unseen.centred_error))
-    after = 3600.0 * float(np.ptp(model.correct(unseen.indicated) - unseen.reference))
+    left = model.correct(unseen.indicated) - unseen.reference
+    place = unseen.reference % 360.0
+    read, corrected = (3600.0 * e for e in (unseen.centred_error, left - left.mean()))
+    before, after = float(np.ptp(read)), float(np.ptp(corrected))
     published = PUBLISHED[JOINT_A.name]
     return "\n".join(
         [
-            "Joint a of the paper (Eq. 8), read at 36 positions in six groups with noise;",
-            "fitted on five groups, the sixth corrected:",
-            f"  orders kept   {', '.join(f'{order:g}' for order in model.orders)}",
-            f"  peak-to-peak  {before:6.2f} -> {after:5.2f} arcsec, "
-            f"{100.0 * (1.0 - after / before):.1f} % less",
-            f"  the paper     {published[0]:6.2f} -> {published[1]:5.2f} arcsec, "
-            f"{published[2]:.1f} % less",
+            "A joint's encoder is wrong by the same pattern in every turn. Measured once",
+            "   against a reference, the pattern can be taken off from then on:",
+            "",
+            *chart(place, {"o": read, "*": corrected}, "arcsec"),
+            "   o error as read, * error corrected, over one turn of the output in degrees",
+            "",
+            f"   peak-to-peak  {before:6.2f} -> {after:5.2f} arcsec, "
+            f"{100.0 * (1.0 - after / before):.1f} % less, in readings not fitted",
+            f"   the paper     {published[0]:6.2f} -> {published[1]:5.2f} arcsec, "
+            f"{published[2]:.1f} % less (simulated here)",
+            f"   orders kept   {', '.join(f'{order:g}' for order in model.orders)}",
         ]
     )
 
@@ -67,7 +73,11 @@ def _between(seed: int) -> str:
     from .paperstudy.report import short_report
     from .paperstudy.study import paper_study
 
-    return short_report(paper_study(seed))
+    return (
+        "What 36 positions cannot tell: orders 36 apart look the same there. A\n"
+        "   correction may then be right at the positions and wrong between them.\n\n"
+        f"{short_report(paper_study(seed))}"
+    )
 
 
 def _diagnosed(seed: int) -> str:
@@ -83,6 +93,6 @@ def _diagnosed(seed: int) -> str:
     true = replace(believed, effects=(Backlash(half_width_arcsec=8.0),))
     result = diagnose(simulate(true, seed=seed), believed)
     return (
-        "Another simulated joint has a backlash of +-8 arcsec that its simulation lacks.\n"
-        f"What the diagnosis makes of its runs:\n\n{result.summary()}"
+        "Why is a joint wrong? This one has a backlash of +-8 arcsec that its\n"
+        f"   simulation does not know. What the diagnosis says of its runs:\n\n{result.summary()}"
     )

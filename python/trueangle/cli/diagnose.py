@@ -53,7 +53,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--extend",
         type=Output.of(SIMULATION),
         metavar="FILE",
-        help="write the simulation extended by the findings",
+        help="write the simulation extended by the findings; where it states none, with the noise "
+        "found and designs of the runs, so that simulate repeats them",
     )
     add(
         "--extend-into",
@@ -67,6 +68,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         default="joint",
         metavar="NAME",
         help="name of the joint in MuJoCo (default: joint)",
+    )
+    add(
+        "--plan",
+        type=Output.of(SIMULATION),
+        metavar="FILE",
+        help="write the runs to measure next, which tell what is seen and was not told, as a "
+        "simulation file (trueangle plan --after has limits and rehearses them)",
     )
     add(
         "--corrected-model",
@@ -156,10 +164,10 @@ def _robot(name: str, joints: list[JointAsked], args: argparse.Namespace) -> int
     from ..reports.ranking import diagnosed_rank, plain_ranking, ranked
     from .run_lists import read_checked
 
-    if args.simulated is not None or args.extend is not None or args.model is not None:
+    if any(given is not None for given in (args.simulated, args.extend, args.model, args.plan)):
         raise ArgumentError(
-            "--simulated, --extend and --model are of one joint: leave --robot out and name its "
-            "columns with --signal ROLE=NAME"
+            "--simulated, --extend, --plan and --model are of one joint: leave --robot out and "
+            "name its columns with --signal ROLE=NAME"
         )
 
     def work(joint: JointAsked) -> Diagnosis:
@@ -235,7 +243,7 @@ def _written(result: Diagnosis, args: argparse.Namespace, model: HarmonicModel |
     """Write the files that were asked for, each whether or not another can be."""
 
     def extend() -> str:
-        result.extended.save(args.extend)
+        result.simulation().save(args.extend)
         return f"\nExtended simulation: {args.extend}"
 
     def correct() -> str:
@@ -252,9 +260,18 @@ def _written(result: Diagnosis, args: argparse.Namespace, model: HarmonicModel |
         )
         return f"\nSensor of what is confirmed: {made.output}"
 
+    def plan() -> str:
+        if result.next_runs is None or not result.next_runs.runs:
+            raise ArgumentError(
+                f"nothing is seen that a further run tells: {args.plan} not written"
+            )
+        result.next_runs.save(args.plan)
+        return f"\nRuns to measure next: {args.plan}"
+
     failed: list[TrueAngleError | OSError] = []
     outputs = (
         (args.extend, extend),
+        (args.plan, plan),
         (args.extend_into, sense),
         (args.corrected_model, correct),
     )
@@ -274,7 +291,8 @@ def _written(result: Diagnosis, args: argparse.Namespace, model: HarmonicModel |
 
 def _unwritten(args: argparse.Namespace, complete: bool) -> str:
     """What an interruption left undone."""
-    files = [path for path in (args.extend, args.extend_into, args.corrected_model) if path]
+    outputs = (args.extend, args.plan, args.extend_into, args.corrected_model)
+    files = [path for path in outputs if path]
     told = "the account is complete" if complete else "the account so far is incomplete"
     return told + (f", and {' and '.join(map(str, files))} not written" if files else "")
 

@@ -15,8 +15,8 @@ def add_errors_in(parser: argparse.ArgumentParser) -> None:
         "--errors-in",
         choices=ERROR_UNITS,
         default="auto",
-        help="unit of errors in what is printed for people (default: arcsec, or deg where an "
-        "error reaches a degree; JSON is in arcsec always)",
+        help="unit of errors in what is printed for people (default: arcsec, or deg where "
+        "errors are that large; JSON is in arcsec always)",
     )
 
 

@@ -17,6 +17,7 @@ from .signal_options import add_signals
 
 if TYPE_CHECKING:
     from ..fitting.result import FitResult
+    from ..fleets.result import Fleet
     from ..runs.run import CalibrationRun
     from .robots import JointAsked
 
@@ -62,6 +63,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         action="append",
         metavar="GLOB",
         help="use the runs of this label only, or of those that match (fwd-*)",
+    )
+    parser.add_argument(
+        "--prior",
+        type=Input,
+        metavar="FLEET",
+        help="fleet file (`trueangle fleet -o`): what units of the same design are like, so that "
+        "ten readings may do",
     )
     add_one_pass(parser)
     parser.add_argument(
@@ -183,7 +191,7 @@ def _robot(name: str, joints: list[JointAsked], args: argparse.Namespace) -> int
 
 
 def _fitted(args: argparse.Namespace) -> FitResult:
-    if wants_one_pass(args):
+    if args.prior is None and wants_one_pass(args):
         from ..logs.fitting import fit_logs
 
         orders = orders_by_shaft(args.orders, declared_shafts(args.shaft))
@@ -198,6 +206,8 @@ def _fitted(args: argparse.Namespace) -> FitResult:
 def _in_memory(args: argparse.Namespace, runs: list[CalibrationRun]) -> FitResult:
     from ..fitting.fit import fit
 
+    if args.prior is not None and (args.one_pass or args.scheduler):
+        raise ArgumentError("--prior goes with readings in memory: leave --one-pass out")
     return fit(
         runs,
         orders=orders_by_shaft(args.orders, declared_shafts(args.shaft)),
@@ -211,4 +221,11 @@ def _in_memory(args: argparse.Namespace, runs: list[CalibrationRun]) -> FitResul
         if args.reference_orders
         else (),
         shafts=declared_shafts(args.shaft),
+        prior=None if args.prior is None else _fleet(args.prior),
     )
+
+
+def _fleet(path: str) -> Fleet:
+    from ..fleets.file import load_fleet
+
+    return load_fleet(path)

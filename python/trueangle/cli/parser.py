@@ -17,7 +17,7 @@ __all__ = ["GROUPS", "Parser"]
 _MISSING: Final = "the following arguments are required"
 _OPTION: Final = r"-{1,2}[A-Za-z]"
 
-_CHOICE = r"invalid choice: '(?P<got>.*)' \(choose from (?P<known>.*)\)"
+_CHOICE = r"argument (?P<name>.*): invalid choice: '(?P<got>.*)' \(choose from (?P<known>.*)\)"
 
 #: Headings of a command's help, in this order.
 GROUPS: Final = ("input", "model", "output", "other")
@@ -93,14 +93,29 @@ class Parser(argparse.ArgumentParser):
         return ""
 
     def error(self, message: str) -> NoReturn:
-        """Print usage and ``message`` with a suggestion, exit with status 2."""
+        """Print a line of usage and ``message`` with a suggestion, exit with status 2."""
         if message.startswith(_MISSING):  # perhaps because it was mistyped
             message = self._mistyped() or message
         found = re.search(_CHOICE, message)
         if found is not None:
             known = re.findall(r"[\w-]+", found["known"])
-            message += did_you_mean(found["got"], known)
-        super().error(message)
+            near = did_you_mean(found["got"], known)
+            what = "command" if self.commands else found["name"]
+            message = (
+                f"there is no {what} {found['got']!r}{near or '; there are ' + ', '.join(known)}"
+            )
+        self.exit(2, f"usage: {self._in_short()}\n{self.prog}: error: {message}\n")
+
+    def _in_short(self) -> str:
+        """How the command is called: what it needs, and where the rest is told."""
+        if self.commands:
+            return f"{self.prog} COMMAND ...; {self.prog} --help lists the commands"
+        needed = [
+            f"{'/'.join(a.option_strings[:1])} {a.metavar or a.dest.upper()}".strip()
+            for a in self._actions
+            if a.required
+        ]
+        return f"{' '.join([self.prog, *needed])} [options]; {self.prog} --help lists them"
 
 
 def _group(names: Sequence[str], options: dict[str, Any]) -> str:

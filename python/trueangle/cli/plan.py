@@ -6,9 +6,13 @@ import argparse
 import math
 
 from ..errors import ArgumentError
+from .nextplan import add_after_arguments, refuse_without_after, run_after
 from .selfplan import add_self_arguments, run_self
 
 HELP = "propose calibration positions that keep the wanted orders apart"
+#: Degrees over which an uncertainty is wanted where no arc is stated.
+WHOLE_TURN = (0.0, 360.0)
+
 EXAMPLE = "trueangle plan --gear-ratio 100 --positions 36 --mounts 2"
 
 
@@ -63,9 +67,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--uncertainty",
         type=_angle,
         metavar="U",
-        help="wanted at every place (k = 2), such as 2arcsec or 0.01deg: gives the readings",
+        help="wanted at every place (k = 2), such as 2arcsec or 0.01deg: gives the readings "
+        "(without --arc, over the whole turn)",
     )
     add("--json", action="store_true", help="print the plan as JSON")
+    add_after_arguments(parser)
     add_self_arguments(parser)
 
 
@@ -104,7 +110,7 @@ _ARCSEC = {"arcsec": 1.0, "arcmin": 60.0, "mrad": 648.0 / math.pi, "deg": 3600.0
 def _run_arc(args: argparse.Namespace, orders: tuple[float, ...] | None) -> int:
     from ..planning.arc import plan_arc
 
-    start, stop = args.arc
+    start, stop = WHOLE_TURN if args.arc is None else args.arc
     plan = plan_arc(
         start,
         stop,
@@ -127,7 +133,6 @@ def _refuse_without_arc(args: argparse.Namespace) -> None:
         "--runs": args.runs,
         "--both-directions": args.both_directions or None,
         "--apart": args.apart,
-        "--uncertainty": args.uncertainty,
     }
     for option, value in given.items():
         if value is not None:
@@ -140,9 +145,12 @@ def run(args: argparse.Namespace) -> int:
     from .order_lists import parse_orders
 
     orders = None if args.orders is None else parse_orders(args.orders)
+    if args.after is not None:
+        return run_after(args)
+    refuse_without_after(args)
     if args.self_method is not None:
         return run_self(args, orders)
-    if args.arc is not None:
+    if args.arc is not None or args.uncertainty is not None:
         return _run_arc(args, orders)
     _refuse_without_arc(args)
     common = {

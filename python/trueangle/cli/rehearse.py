@@ -3,17 +3,12 @@
 from __future__ import annotations
 
 import argparse
-import io
-from pathlib import Path
-from typing import TYPE_CHECKING, TextIO, cast
 
 from ..support.deadline import STYLES, ending_early
-from ..support.files import PICTURE, written_atomically
+from ..support.files import PICTURE
 from .durations import seconds
 from .paths import Input, Output
-
-if TYPE_CHECKING:
-    from ..rehearsal import Rehearsal
+from .pictures import save_picture
 
 HELP = "say from which size on a diagnosis of planned runs would name each cause"
 EXAMPLE = "trueangle rehearse joint.toml --within 5min --plot detection.png"
@@ -70,19 +65,9 @@ def run(args: argparse.Namespace) -> int:
             progress=args.progress,
         )
     if args.plot and not interruption.happened:
-        _draw(result, args.plot)
+        save_picture(result.plot(), args.plot)
     print(result.to_json() if args.json else result.summary())
     if interruption.happened:
         told = "the account so far is incomplete"
         raise KeyboardInterrupt(told + (f", and {args.plot} not written" if args.plot else ""))
     return 0
-
-
-def _draw(result: Rehearsal, path: str) -> None:
-    """Write the picture, in the format that its ending says (PNG where it says none)."""
-    ending = Path(path).suffix.lower()
-    kind = ending[1:] if ending in PICTURE.endings else "png"
-    drawn = io.BytesIO()
-    result.plot().savefig(drawn, format=kind)
-    with written_atomically(path, kind=PICTURE) as file:
-        cast(TextIO, file).buffer.write(drawn.getvalue())

@@ -48,7 +48,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--model",
         type=Input,
         metavar="MODEL",
-        help="say of this model how it was made, what it is blind to and leaves of the runs",
+        help="say of this model how it was made, what it is blind to and leaves of the runs; in a "
+        "certificate the values as left, beside those as found",
     )
     add(
         "--certificate",
@@ -58,6 +59,17 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "the laboratory and the type B uncertainties",
     )
     add("--positions", type=int, metavar="N", help="nominal positions of a certificate (36)")
+    add(
+        "--fleet",
+        action="store_true",
+        help="of the units against each other, as the command fleet judges them: one page",
+    )
+    add(
+        "--by",
+        choices=("unit", "run"),
+        default="unit",
+        help="what tells the units of --fleet apart",
+    )
     add_errors_in(parser)
     add(
         "--pdf",
@@ -76,6 +88,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Write the report."""
+    if args.fleet:
+        return _fleet(args)
     asked = joints_asked(args)
     if asked is not None:
         return _robot(*asked, args)
@@ -111,6 +125,24 @@ def _robot(name: str, joints: list[JointAsked], args: argparse.Namespace) -> int
         print(json.dumps(made.to_dict(), indent=2, allow_nan=False))
     else:
         print(f"{made.summary()}\n\n{args.output}")
+    return 0
+
+
+def _fleet(args: argparse.Namespace) -> int:
+    """A page of all units: who needs what, patterns, spread, dates."""
+    from ..reports.fleet import FleetReport
+    from .fleet import judged
+
+    if not {args.certificate, args.pdf, args.model, args.simulation, args.robot} <= {None}:
+        raise ArgumentError(
+            "--fleet is a report on many units: --certificate, --pdf, --model, --simulation and "
+            "--robot are of one"
+        )
+    args.orders = None if args.orders == "auto" else args.orders
+    title = args.title or "Angle error of a fleet"
+    made = FleetReport(judged(args), title, errors_in(args))
+    made.save(args.output)
+    print(made.fleet.to_json() if args.json else f"{made.summary()}\n\n{args.output}")
     return 0
 
 

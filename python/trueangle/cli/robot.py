@@ -47,8 +47,7 @@ def run(args: argparse.Namespace) -> int:
     for joint in joints:
         ratio = joint["gear_ratio"]
         print(f"{joint['name']}: " + ("no gear ratio" if ratio is None else f"ratio {ratio:g}"))
-    print(
-        f"\nsaved {args.output}; name the columns of every reference under [joint.signals], as "
-        'reference = "laser3:deg"'
-    )
+    print(f"\nsaved {args.output}")
+    print("name the columns of every reference under [joint.signals], as")
+    print('reference = "laser3:deg"')
     return 0

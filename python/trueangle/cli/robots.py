@@ -32,10 +32,11 @@ class JointAsked:
     @property
     def signals(self) -> dict[str, Any]:
         """Columns by role that a correction reads, as a robot's file keeps them."""
-        from ..formats.signals import AT_RUN_TIME
+        from ..formats.signals import is_at_run_time
 
-        read = ("indicated", "time", *AT_RUN_TIME)
-        own = [e for e in self.args.signal or () if e[0] is None and e[1] in read]
+        read = ("indicated", "time")
+        entries = [e for e in self.args.signal or () if e[0] is None]
+        own = [e for e in entries if e[1] in read or is_at_run_time(e[1])]
         return signals_by_joint(own) or {}
 
 
@@ -88,18 +89,38 @@ def joints_asked(args: argparse.Namespace) -> tuple[str, list[JointAsked]] | Non
                     "joint; leave it out"
                 )
         RobotDescription("", robot.joints).only(named)  # columns of joints that are there
+    angles = _indicated(robot, entries)
     robot = robot.only(args.joint)
-    return robot.name, [_asked(joint, args, entries) for joint in robot.joints]
+    return robot.name, [_asked(joint, args, entries, angles) for joint in robot.joints]
 
 
-def _asked(joint: Any, args: argparse.Namespace, entries: list[Any]) -> JointAsked:
-    """The arguments as for this joint alone: what was typed stands before what the file says."""
+def _indicated(robot: Any, entries: list[Any]) -> dict[str, Any]:
+    """The column of every joint's indicated angle, where it is named."""
+    found = {}
+    for joint in robot.joints:
+        if "indicated" in joint.signals:
+            found[joint.name] = signal_argument(f"indicated={joint.signals['indicated']}")
+    return found | {e[0]: e for e in entries if e[0] is not None and e[1] == "indicated"}
+
+
+def _asked(
+    joint: Any, args: argparse.Namespace, entries: list[Any], angles: dict[str, Any]
+) -> JointAsked:
+    """The arguments as for this joint alone: what was typed stands before what the file says.
+
+    The angles of the others are signals that it may be coupled to.
+    """
+    from ..formats.signals import COUPLED
+
     own = {_key(e): e for e in entries if e[0] == joint.name}
     for role, column in joint.signals.items():
         own.setdefault(role, signal_argument(f"{role}={column}"))
     for entry in entries:
         if entry[0] is None:
             own.setdefault(_key(entry), entry)
+    for other, entry in angles.items():
+        if other != joint.name:
+            own.setdefault(COUPLED + other, type(entry)((None, COUPLED + other, *entry[2:])))
     signals = [type(e)((None, *e[1:])) for e in own.values()]
     signals += [e for e in entries if e[0] == _SIMULATED]
     changed: dict[str, Any] = {"signal": signals, "robot": None, "joint": None}
@@ -129,18 +150,21 @@ def each_joint(
     ArgumentError
         The one of a joint, with its name before it.
     """
+    from ..runs.readings import read_once
+
     found: dict[str, T] = {}
     failed: dict[str, NoModelError] = {}
-    for joint in joints:
-        try:
-            found[joint.name] = work(joint)
-        except NoModelError as error:
-            print(f"trueangle: warning: joint {joint.name}: {error}", file=sys.stderr)
-            failed[joint.name] = error
-        except ArgumentError as error:
-            if type(error) is not ArgumentError:
-                raise
-            raise ArgumentError(f"joint {joint.name}: {error}") from None
+    with read_once():
+        for joint in joints:
+            try:
+                found[joint.name] = work(joint)
+            except NoModelError as error:
+                print(f"trueangle: warning: joint {joint.name}: {error}", file=sys.stderr)
+                failed[joint.name] = error
+            except ArgumentError as error:
+                if type(error) is not ArgumentError:
+                    raise
+                raise ArgumentError(f"joint {joint.name}: {error}") from None
     if not found:
         raise NoModelError("; ".join(f"joint {joint}: {error}" for joint, error in failed.items()))
     return found, failed

@@ -14,7 +14,7 @@ __all__ = ["ROLES", "add_signals", "reading", "signal_argument", "signals_by_joi
 #: The roles, as every help names them.
 ROLES = (
     "reference, indicated, error, reference_offset, time, velocity, direction, temperature, "
-    "torque, current, mount, run, unit, when, motor, head1, head2 ..., shift"
+    "torque, current, mount, run, unit, when, motor, head1, head2 ..., shift, coupled_JOINT"
 )
 
 

@@ -9,6 +9,8 @@ import sys
 from collections.abc import Callable, Iterator
 from typing import Any, Final, TextIO
 
+from .colours import coloured, has_colours
+
 __all__ = ["STANDARD_OUTPUT", "Plain", "own_interrupts", "plain_streams", "printable", "silence"]
 
 STANDARD_OUTPUT: Final = "standard output"
@@ -69,10 +71,13 @@ class Plain:
         self.steering = stream
         self._name = name
         self._wording = wording
+        self._coloured = has_colours(stream)
 
     def write(self, text: str) -> int:
         """Write; signs that the stream's encoding lacks become escapes."""
         shown = printable(self._wording(text))
+        if self._coloured:
+            shown = coloured(shown)
         with self._named():
             try:
                 self.steering.write(shown)

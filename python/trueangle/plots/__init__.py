@@ -15,10 +15,12 @@ from .canvas import text_alternative
 from .detection import detection
 from .errorcurves import error_curves
 from .errorleft import error_left
+from .fleetphasors import fleet_phasors
 from .gains import gains
 from .kinds import drawn as drawn
 from .kinds import fit_plot
 from .measuredsimulated import measured_and_simulated
+from .modelerror import model_error
 from .phasesoverruns import phases_over_runs
 from .planpictures import plan_factors, plan_positions
 from .residualpictures import residuals
@@ -30,8 +32,10 @@ __all__ = [
     "error_curves",
     "error_left",
     "fit_plot",
+    "fleet_phasors",
     "gains",
     "measured_and_simulated",
+    "model_error",
     "phases_over_runs",
     "plan_factors",
     "plan_positions",

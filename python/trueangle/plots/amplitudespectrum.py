@@ -9,10 +9,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from ..fitting import summary as fitting_summary
+from ..fitting.orders import summary as orders_summary
 from ..fitting.orders.selection import FALSE_ALARM
 from ..fitting.orders.table import OrderRow, OrderSelection
 from ..support.angles import ARCSEC_PER_TURN
-from ..support.display_units import ErrorsIn, ErrorUnit, error_unit, significant
+from ..support.display_units import ErrorsIn, ErrorUnit, significant
 from . import palette
 from .canvas import described, grid, legend, new_axes
 from .curves import CONFIDENCE
@@ -56,8 +58,8 @@ def amplitude_spectrum(
         A fit that selected its orders shows that selection.
     ax : matplotlib Axes, optional
     errors_in : str or float
-        Unit of the errors, as for summaries: ``"auto"`` is arcsec, or degrees where one
-        reaches a degree.
+        Unit of the errors, as for summaries: ``"auto"`` is arcsec, or degrees where they
+        are that large.
 
     Returns
     -------
@@ -70,15 +72,9 @@ def amplitude_spectrum(
     return _of_selection(result.selection, ax, errors_in)
 
 
-def _unit(asked: ErrorsIn, amplitudes: Array, period: float) -> tuple[ErrorUnit, float]:
-    """The unit for amplitudes of that period, and how many of it one of theirs is."""
-    arcsec = ARCSEC_PER_TURN / period
-    unit = error_unit(asked, arcsec * float(np.max(amplitudes, initial=0.0)), period)
-    return unit, arcsec * unit.per_arcsec
-
-
 def _of_fit(fit: FitResult, ax: Axes | None, errors_in: ErrorsIn) -> Axes:
-    unit, factor = _unit(errors_in, fit.amplitudes, fit.model.period)
+    unit = fitting_summary.unit_of(fit, errors_in)
+    factor = unit.per_arcsec * (ARCSEC_PER_TURN / fit.model.period)
     ranks = np.argsort(fit.orders)
     orders = [float(fit.orders[i]) for i in ranks]
     amplitude = factor * fit.amplitudes[ranks]
@@ -105,7 +101,8 @@ def _of_fit(fit: FitResult, ax: Axes | None, errors_in: ErrorsIn) -> Axes:
 def _of_selection(selection: OrderSelection, ax: Axes | None, errors_in: ErrorsIn) -> Axes:
     rows = selection.table
     sizes = np.array([row.amplitude for row in rows])
-    unit, factor = _unit(errors_in, sizes, selection.period)
+    unit = orders_summary.unit_of(selection, errors_in)
+    factor = unit.per_arcsec * (ARCSEC_PER_TURN / selection.period)
     orders = [float(row.order) for row in rows]
     axis = OrderAxis.of(orders)
     ax = new_axes(ax)

@@ -11,7 +11,7 @@ from ..runs.run import CalibrationRun, as_runs
 from ..support.display_units import ErrorsIn, error_unit, significant
 from . import palette
 from .canvas import described, legend, new_axes, turn_axis
-from .curves import greatest, held_out_points, seen_span, thinned
+from .curves import held_out_points, seen_span, strength, thinned
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -41,15 +41,15 @@ def before_after(
         That took no part in the fit; runs that did make the picture too good.
     ax : matplotlib Axes, optional
     errors_in : str or float
-        Unit of the errors, as for summaries: ``"auto"`` is arcsec, or degrees where one
-        reaches a degree.
+        Unit of the errors, as for summaries: ``"auto"`` is arcsec, or degrees where they
+        are that large.
 
     Returns
     -------
     matplotlib Axes
     """
     pairs = held_out_points(model, as_runs(runs))
-    unit = error_unit(errors_in, greatest(p for pair in pairs for p in pair), model.period)
+    unit = error_unit(errors_in, strength(before for before, _ in pairs), model.period)
     ax = new_axes(ax)
     told: list[str] = []
     for points, colour, name, marker in (

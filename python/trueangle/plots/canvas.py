@@ -62,7 +62,9 @@ def grid(ax: Axes, axis: Literal["both", "x", "y"] = "both") -> None:
     ax.set_axisbelow(True)
 
 
-def new_figure(rows: int, columns: int, width: float, height: float) -> tuple[Figure, list[Axes]]:
+def new_figure(
+    rows: int, columns: int, width: float, height: float, *, sharey: bool = True
+) -> tuple[Figure, list[Axes]]:
     """A new figure with axes in rows and columns, listed row by row.
 
     Raises
@@ -71,7 +73,7 @@ def new_figure(rows: int, columns: int, width: float, height: float) -> tuple[Fi
         matplotlib is not installed.
     """
     figure, made = _pyplot().subplots(
-        rows, columns, figsize=(width, height), layout="constrained", squeeze=False, sharey=True
+        rows, columns, figsize=(width, height), layout="constrained", squeeze=False, sharey=sharey
     )
     return figure, list(made.ravel())
 

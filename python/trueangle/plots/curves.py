@@ -15,6 +15,7 @@ from ..fitting.heldout import correct_held_out
 from ..model.model import HarmonicModel
 from ..runs.run import CalibrationRun
 from ..support.angles import ARCSEC_PER_TURN, wrap
+from ..support.display_units import sine_of_rms
 from ..support.suggestions import check_choice
 
 if TYPE_CHECKING:
@@ -27,11 +28,11 @@ __all__ = [
     "Points",
     "envelope",
     "error_points",
-    "greatest",
     "held_out_points",
     "model_curve",
     "residual_points",
     "seen_span",
+    "strength",
     "strong_gear_order",
     "thinned",
     "travelled",
@@ -97,9 +98,10 @@ class Curve:
         return Curve(self.angle, factor * self.error, std)
 
 
-def greatest(parts: Iterable[Points]) -> float:
-    """Largest absolute error of some readings, arcsec: what a unit is chosen by."""
-    return max((float(np.abs(part.y).max(initial=0.0)) for part in parts), default=0.0)
+def strength(parts: Iterable[Points]) -> float:
+    """Amplitude of the sine that has the rms of some readings, arcsec: a unit is chosen by it."""
+    errors = np.concatenate([np.zeros(0), *(part.y for part in parts)])
+    return sine_of_rms(float(np.sqrt(np.mean(errors * errors)))) if errors.size else 0.0
 
 
 def thinned(points: Points, most: int, number: int = 0) -> Points:

@@ -6,19 +6,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..support.display_units import ErrorsIn, error_unit, significant
+from ..fitting.summary import unit_of
+from ..support.display_units import ErrorsIn, significant
 from . import palette
 from .canvas import described, legend, new_axes, turn_axis
-from .curves import (
-    CONFIDENCE,
-    envelope,
-    error_points,
-    greatest,
-    model_curve,
-    seen_span,
-    strong_gear_order,
-    thinned,
-)
+from .curves import error_points, model_curve, seen_span, thinned
+from .modelerror import draw_curve
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -42,8 +35,8 @@ def error_curves(fit: FitResult, ax: Axes | None = None, errors_in: ErrorsIn = "
     fit : FitResult
     ax : matplotlib Axes, optional
     errors_in : str or float
-        Unit of the errors, as for summaries: ``"auto"`` is arcsec, or degrees where one
-        reaches a degree.
+        Unit of the errors, as for summaries: ``"auto"`` is arcsec, or degrees where they
+        are that large.
 
     Returns
     -------
@@ -55,7 +48,7 @@ def error_curves(fit: FitResult, ax: Axes | None = None, errors_in: ErrorsIn = "
         matplotlib is not installed.
     """
     measured = error_points(fit)
-    unit = error_unit(errors_in, greatest(measured), fit.model.period)
+    unit = unit_of(fit, errors_in)
     ax = new_axes(ax)
     for number, points in enumerate(measured):
         part = thinned(points, _MOST).scaled(unit.per_arcsec)
@@ -73,30 +66,7 @@ def error_curves(fit: FitResult, ax: Axes | None = None, errors_in: ErrorsIn = "
     curve = model_curve(fit.model).scaled(unit.per_arcsec)
     # A gear's orders fill the picture: the readings stay on top of them.
     low, high = seen_span(fit.model)
-    dense = strong_gear_order(fit.orders, fit.amplitudes, high - low) is not None
-    if dense:
-        ax.fill_between(
-            *envelope(curve),
-            color=palette.MUTED,
-            alpha=0.35,
-            linewidth=0.0,
-            zorder=0.5,
-            label="envelope of the model",
-        )
-    else:
-        ax.plot(curve.angle, curve.error, color=palette.ink(ax), zorder=3.0, label="model")
-    if curve.std is not None and not dense:
-        half = CONFIDENCE * curve.std
-        ax.fill_between(
-            curve.angle,
-            curve.error - half,
-            curve.error + half,
-            color=palette.ink(ax),
-            alpha=0.2,
-            linewidth=0.0,
-            zorder=0.5,
-            label="95 % band",
-        )
+    draw_curve(ax, curve, fit.model, high - low)
     turn_axis(ax, low, high)
     ax.set_xlabel("reference angle / deg")
     ax.set_ylabel(f"error, zero of the run removed / {unit.name}")

@@ -28,8 +28,8 @@ def error_left(diagnosis: Diagnosis, ax: Axes | None = None, errors_in: ErrorsIn
     diagnosis : Diagnosis
     ax : matplotlib Axes, optional
     errors_in : str or float
-        Unit of the errors, as for summaries: ``"auto"`` is arcsec, or degrees where one
-        reaches a degree.
+        Unit of the errors, as for summaries: ``"auto"`` is arcsec, or degrees where they
+        are that large.
 
     Returns
     -------

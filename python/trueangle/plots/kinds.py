@@ -8,7 +8,9 @@ from ..support.suggestions import check_choice
 from .amplitudespectrum import amplitude_spectrum
 from .detection import detection
 from .errorcurves import error_curves
+from .fleetphasors import fleet_phasors
 from .gains import gains
+from .modelerror import model_error
 from .phasesoverruns import phases_over_runs
 from .residualpictures import residuals
 
@@ -37,9 +39,11 @@ def fit_plot(fit: FitResult, kind: str = "errors", ax: Axes | None = None, **opt
 #: Results by the names of their classes, which need not be imported to be drawn.
 _RESULTS: dict[str, Any] = {
     "FitResult": fit_plot,
+    "HarmonicModel": model_error,
     "OrderSelection": amplitude_spectrum,
     "Diagnosis": gains,
     "Rehearsal": detection,
+    "Fleet": fleet_phasors,
 }
 
 

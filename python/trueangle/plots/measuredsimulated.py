@@ -11,7 +11,7 @@ from ..runs.run import CalibrationRun, as_runs
 from ..support.display_units import ErrorsIn, error_unit, significant
 from . import palette
 from .canvas import described, legend, new_axes, turn_axis
-from .curves import greatest, thinned
+from .curves import strength, thinned
 from .simulatedcurves import simulated_points
 
 if TYPE_CHECKING:
@@ -38,8 +38,8 @@ def measured_and_simulated(
     sim : Simulation
     ax : matplotlib Axes, optional
     errors_in : str or float
-        Unit of the errors, as for summaries: ``"auto"`` is arcsec, or degrees where one
-        reaches a degree.
+        Unit of the errors, as for summaries: ``"auto"`` is arcsec, or degrees where they
+        are that large.
 
     Returns
     -------
@@ -48,7 +48,7 @@ def measured_and_simulated(
     found = as_runs(runs)
     ax = new_axes(ax)
     expected = simulated_points(found, sim)
-    largest = greatest(points for pair in expected for points in pair)
+    largest = strength(measured for measured, _ in expected)
     unit = error_unit(errors_in, largest, found[0].period)
     pairs = [(m.scaled(unit.per_arcsec), s.scaled(unit.per_arcsec)) for m, s in expected]
     # The difference stands below the two, on a line of its own: nothing hides another.

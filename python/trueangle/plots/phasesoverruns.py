@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..fitting.phases import run_phases
-from ..support.display_units import ErrorsIn, error_unit
+from ..fitting.summary import unit_of
+from ..support.display_units import ErrorsIn
 from . import palette
 from .canvas import described, grid, new_axes
 
@@ -40,8 +41,8 @@ def phases_over_runs(
     most : int
         Draw only so many orders, the largest.
     errors_in : str or float
-        Unit of the errors, as for summaries: ``"auto"`` is arcsec, or degrees where one
-        reaches a degree.
+        Unit of the errors, as for summaries: ``"auto"`` is arcsec, or degrees where they
+        are that large.
 
     Returns
     -------
@@ -54,7 +55,7 @@ def phases_over_runs(
     """
     found = sorted(run_phases(fit), key=lambda p: -float(p.amplitude.mean()))[:most]
     top = max((float(p.amplitude.max()) for p in found), default=1.0)
-    unit = error_unit(errors_in, top, fit.model.period)
+    unit = unit_of(fit, errors_in)
     polar: Any = new_axes(ax, polar=True)
     for i, order in enumerate(sorted(found, key=lambda p: p.order)):
         colour = palette.run_colour(i)

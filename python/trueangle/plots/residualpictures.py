@@ -6,10 +6,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..support.display_units import ErrorsIn, error_unit, significant
+from ..fitting.summary import unit_of
+from ..support.display_units import ErrorsIn, significant
 from . import palette
 from .canvas import described, grid, legend, new_axes, turn_axis
-from .curves import SIGNALS, Points, greatest, residual_points, seen_span, thinned
+from .curves import SIGNALS, Points, residual_points, seen_span, thinned
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -40,8 +41,8 @@ def residuals(
     against : {"angle", "time", "speed", "temperature", "direction", "torque"}
     ax : matplotlib Axes, optional
     errors_in : str or float
-        Unit of the errors, as for summaries: ``"auto"`` is arcsec, or degrees where one
-        reaches a degree.
+        Unit of the errors, as for summaries: ``"auto"`` is arcsec, or degrees where they
+        are that large.
 
     Returns
     -------
@@ -53,7 +54,7 @@ def residuals(
         An unknown signal, or one that no run has.
     """
     found = residual_points(fit, against)
-    unit = error_unit(errors_in, greatest(found), fit.model.period)
+    unit = unit_of(fit, errors_in)
     points = [part.scaled(unit.per_arcsec) for part in found]
     ax = new_axes(ax, height=3.4)
     if against == "direction":

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from .bokehmodels import Model, columns, field, model, reference, value
 from .chartaxes import ChartAxis
+from .stills import Mark, still
 
 __all__ = ["Chart", "Figure", "figure", "run_colour", "run_marker", "swatch"]
 
@@ -25,6 +26,9 @@ _EDGE: Final = 0.3
 
 #: Bits of a drawn number's mantissa: 1.5e-5 of it.
 _KEPT_BITS: Final = 15
+
+#: Part of the page's width that a chart takes where its neighbours do not decide.
+_SHARES: Final = {"stacked": 1.0, "above": 1.0, "multiples": 1.0 / 3.0}
 
 #: A figure of the report: its alternative text and the charts that it consists of.
 Figure = dict[str, Any]
@@ -56,7 +60,11 @@ def _shape(number: int) -> int:
 
 def figure(alt: str, charts: Sequence[Chart], arrangement: str = "row") -> Figure:
     """One figure: alternative text, and its charts in a row, stacked or as small multiples."""
-    drawn = [chart.drawn() for chart in charts]
+    grown = sum(chart.grow for chart in charts)
+    drawn = [
+        chart.drawn() | {"still": chart.still(_SHARES.get(arrangement, chart.grow / grown))}
+        for chart in charts
+    ]
     return {"alt": alt, "charts": drawn, "arrangement": arrangement}
 
 
@@ -104,6 +112,8 @@ class Chart:
         self._up = ChartAxis(y, y_range, log_y, categories, visible=not joined)
         self._renderers: list[Model] = []
         self._spans: list[Model] = []
+        self._marks: list[Mark] = []
+        self._uprights: list[float] = []
         #: Legend, set as text of the page: label -> colour and sign.
         self._legend: dict[str, tuple[str, str]] = {}
         #: Renderers by the line of text that is shown over them.
@@ -124,6 +134,7 @@ class Chart:
         hollow: bool = False,
     ) -> None:
         """Dots; ``hover`` is a line of text with ``@{column}`` of ``more`` columns in it."""
+        self._marks.append(Mark("dots", (x, y), colour, size))
         data = {"x": _short(x), "y": _short(y), **(more or {})}
         sign = "○" if hollow else _GLYPHS[_MARKERS.index(marker)]
         self._add(_marks(marker, size, hollow), columns(data), colour, label, run, hover, sign)
@@ -133,6 +144,7 @@ class Chart:
         dash: str = "solid", run: int | None = None, hover: str = "",
     ) -> None:  # fmt: skip
         """A line through the points."""
+        self._marks.append(Mark("line", (x, y), colour, width))
         glyph = model("Line", x=field("x"), y=field("y"), line_width=width, line_dash=dash)
         sign = "━" if dash == "solid" else "╍"
         self._add(glyph, _points(x, y), colour, label, run, hover, sign)
@@ -148,6 +160,7 @@ class Chart:
         alpha: float = 0.25,
     ) -> None:
         """The area between two curves."""
+        self._marks.append(Mark("band", (x, low, high), colour))
         glyph = model("VArea", x=field("x"), y1=field("low"), y2=field("y"), fill_alpha=alpha)
         source = columns({"x": _short(x), "low": _short(low), "y": _short(high)})
         self._add(glyph, source, colour, label, sign="▒")
@@ -158,39 +171,25 @@ class Chart:
     ) -> None:  # fmt: skip
         """Upright lines from ``low`` to ``high``."""
         feet = np.broadcast_to(np.asarray(low, dtype=np.float64), high.shape)
+        self._marks.append(Mark("segments", (x, feet, x, high), colour, width))
         source = columns({"x": _short(x), "y": _short(high), "low": _short(feet)})
         self._add(_segment("x", "low", "x", "y", width), source, colour, label, sign="┃")
 
     def ticks(self, x: Array, y: Array, half: float, *, colour: str, label: str = "") -> None:
         """Short level lines of half width ``half`` at every point."""
+        self._marks.append(Mark("segments", (x - half, y, x + half, y), colour, 2.0))
         source = columns({"x0": _short(x - half), "x1": _short(x + half), "y": _short(y)})
         self._add(_segment("x0", "y", "x1", "y", 2.0), source, colour, label, sign="━")
 
-    def bars(
-        self, names: Sequence[str], values: Array, *, colour: str, hover: str = "",
-        low: Array | None = None, high: Array | None = None,
-    ) -> None:  # fmt: skip
-        """Level bars of the categories, with intervals where given."""
-        bar = model(
-            "HBar", y=field("y"), right=field("x"), height=value(0.6), line_alpha=value(0.0)
-        )
+    def level_dots(self, names: Sequence[str], values: Array, *, colour: str, hover: str) -> None:
+        """A dot of each category at its value."""
+        self._marks.append(Mark("dots", (values, list(names)), colour, 11.0))
         source = columns({"y": names, "x": _short(values)})
-        self._add(bar, source, colour, hover=hover)
-        if low is not None and high is not None:
-            ends = columns({"y": names, "x0": _short(low), "x1": _short(high)})
-            self._add(_segment("x0", "y", "x1", "y", 2.0), ends, "fore")
-
-    def level_stems(
-        self, names: Sequence[str], low: float, values: Array, *, colour: str, hover: str = ""
-    ) -> None:
-        """Level lines of the categories from ``low`` to a dot at their value."""
-        feet = np.full(len(names), low)
-        source = columns({"y": names, "x": _short(values), "low": _short(feet)})
-        self._add(_segment("low", "y", "x", "y", 3.0), source, colour)
-        self._add(_marks("circle", 11.0), reference(source), colour, hover=hover)
+        self._add(_marks("circle", 11.0), source, colour, hover=hover)
 
     def upright(self, x: float, *, label: str) -> None:
         """A dashed line over the whole height."""
+        self._uprights.append(x)
         self._spans.append(
             model(
                 "Span",
@@ -243,6 +242,10 @@ class Chart:
             # The page's script adds the version of the library that it has.
             "document": {"root_id": root["id"], "doc": {"title": "", "roots": [root]}},
         }
+
+    def still(self, share: float) -> str:
+        """The chart as SVG that takes this part of the page's width."""
+        return still(self._marks, self._across, self._up, self.height_rem, share, self._uprights)
 
     def _root(self) -> Model:
         below, across = self._across.drawn(0)

@@ -201,11 +201,12 @@ def report(
     model : HarmonicModel or path, optional
         A model that is there already, such as one calibrated without a reference: the
         report says in its first lines how it was made, what it is blind to, and what it
-        leaves of these runs.
+        leaves of these runs. A certificate states the values as it leaves them beside those
+        as found.
     errors_in : str or float
         Unit of every error on the page or in the certificate: ``"arcsec"``, ``"deg"``,
         ``"mrad"``, ``"count"``, or the counts of a turn; ``"auto"`` is arcsec, or degrees
-        where an error reaches a degree. The content stays in arcsec.
+        where they are that large. The content stays in arcsec.
     **reading
         ``signals``, ``period``, ``by`` ... of files and tables, as in `trueangle.read_runs`.
 
@@ -250,6 +251,7 @@ def report(
             certificate,
             orders=orders,
             positions=positions,
+            model=model,
             errors_in=errors_in,
             **gear_of(joint),
         )
@@ -259,7 +261,9 @@ def report(
     if positions is not None:
         raise ArgumentError("positions are those of a certificate: give certificate too")
     sizes = measured(found)
-    scale = scale_of(errors_in, sizes["error"]["max_abs_arcsec"], found)
+    scale = scale_of(
+        errors_in, sizes["error"]["rms_arcsec"], sizes["error"]["max_abs_arcsec"], found
+    )
     at = pace()
     at.at("fitting", 0, _STAGES)
     fit, selection, why_not = fitted(found, orders, joint)

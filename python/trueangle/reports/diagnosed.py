@@ -32,7 +32,7 @@ _NAMED: Final = ("shaft", "order", "carrier")
 
 
 def diagnosed(diagnosis: Diagnosis) -> dict[str, Any]:
-    """`Diagnosis.to_dict` with the sentences of its findings.
+    """`Diagnosis.to_dict` with the sentences of its findings, and the next run.
 
     Parameters are listed; a value that is no single number is given as ``text``.
     """
@@ -48,9 +48,12 @@ def diagnosed(diagnosis: Diagnosis) -> dict[str, Any]:
             _parameter(i, parameter, entry, named=":" in name)
             for i, (parameter, entry) in enumerate(finding["parameters"].items())
         ]
-        finding["sized"] = any(
-            q["std"] is not None and q["unit"].startswith("arcsec") for q in finding["parameters"]
-        )
+        known = [q for q in finding["parameters"] if q["std"] is not None]
+        sizes = [q for q in known if q["unit"].startswith("arcsec")]
+        finding["sized"] = bool(sizes)
+        # The parameter that says how large it is: one that has a unit.
+        found = sizes or [q for q in known if q["unit"]]
+        finding["size"] = found[0]["index"] if found else None
         gain = finding["gain"]
         if gain is not None:
             share, interval = gain["reducible_share"], gain["reducible_share_interval"]
@@ -72,6 +75,8 @@ def diagnosed(diagnosis: Diagnosis) -> dict[str, Any]:
             for cause in spot["causes"]
         ]
     content["extended"] = _toml(diagnosis)
+    plan = diagnosis.next_runs
+    content["next"] = plan.summary() if plan is not None and plan.runs else ""
     return content
 
 

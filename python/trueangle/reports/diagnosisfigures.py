@@ -1,4 +1,4 @@
-"""Figures of the diagnosis: measured against simulated, what is left, gains."""
+"""Figures of the diagnosis: measured against simulated, and what is left without each cause."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ..plots import curves
 from ..plots.curves import Points, strong_gear_order
-from ..plots.simulatedcurves import gain_bars, left_without, simulated_points
+from ..plots.simulatedcurves import left_without, simulated_points
 from .charts import Chart, Figure, figure
 from .figures import dot_size, dots_of_run, run_dots, stretch_chart, within
 from .scale import Scale
@@ -28,6 +28,8 @@ Array = NDArray[np.float64]
 _MOST_OF_A_TURN = 300.0
 #: Readings drawn of what is measured and of what is simulated.
 _MOST_POINTS = 3_000
+#: Part of the measured error that a simulation must expect to be drawn beside it.
+_FLAT = 1e-3
 
 
 def figures_of(
@@ -36,27 +38,33 @@ def figures_of(
     sim: Simulation,
     scale: Scale,
 ) -> dict[str, Figure]:
-    """Measured against simulated; what is left without each cause, and gains, of several causes.
+    """Measured against simulated; what is left without each of several causes.
 
-    A chart of one bar says less than the sentence beside it: it is left out.
+    A chart of one dot says less than the sentence beside it: it is left out; so is a simulation
+    that expects no error, beside which the measured one would be drawn once more.
     """
-    found = {"measured-simulated": _compared(runs, sim, diagnosis.extended, scale)}
+    pairs = simulated_points(runs, sim)
+    expected = max(float(np.ptp(simulated.y)) for _, simulated in pairs)
+    found = {}
+    if expected > _FLAT * diagnosis.discrepancy.peak_to_peak:
+        found["measured-simulated"] = _compared(runs, pairs, diagnosis.extended, scale)
     left = left_without(diagnosis)
     if len(left) > 2:
         found["error-left"] = _left(diagnosis, left, scale)
-    if len(gain_bars(diagnosis)) > 1:
-        found["gains"] = _gains(diagnosis)
     return found
 
 
 def _compared(
-    runs: Sequence[CalibrationRun], sim: Simulation, known: Simulation, scale: Scale
+    runs: Sequence[CalibrationRun],
+    expected: Sequence[tuple[Points, Points]],
+    known: Simulation,
+    scale: Scale,
 ) -> Figure:
     """Both in one chart, the difference below: neither hides another.
 
     Gear orders fill the chart of a turn: a stretch of a few periods beside it shows both.
     """
-    pairs = [tuple(map(scale.points, pair)) for pair in simulated_points(runs, sim)]
+    pairs = [tuple(map(scale.points, pair)) for pair in expected]
     low, high = _span([measured.x for measured, _ in pairs])
     y = f"error / {scale.name}"
     both = Chart("", y, x_range=(low, high), height_rem=16.0, grow=2.0)
@@ -128,33 +136,13 @@ def _left(diagnosis: Diagnosis, left: Sequence[tuple[str, float]], scale: Scale)
         height_rem=7.0 + 2.0 * len(names),
     )
     hover = f"@y: @x{{{scale.finest}}} {scale.name} rms"
-    chart.level_stems(names[:1], low, sizes[:1], colour="after", hover=hover)
-    chart.level_stems(names[1:], low, sizes[1:], colour="before", hover=hover)
+    chart.level_dots(names[:1], sizes[:1], colour="after", hover=hover)
+    chart.level_dots(names[1:], sizes[1:], colour="before", hover=hover)
     told = scale.unit.text(diagnosis.noise)
     chart.upright(noise, label=f"noise of one reading, {told}")
     alt = (
         "Rms left of held-out readings with all causes in place and without each: "
         + ", ".join(f"{name} {scale.unit.text(rms)}" for name, rms in left)
         + f". Noise of one reading {told}."
-    )
-    return figure(alt, [chart])
-
-
-def _gains(diagnosis: Diagnosis) -> Figure:
-    bars = gain_bars(diagnosis)
-    names = [bar.cause for bar in bars]
-    share = np.array([bar.share for bar in bars])
-    low = np.array([min(bar.low, bar.share) for bar in bars])
-    high = np.array([max(bar.high, bar.share) for bar in bars])
-    chart = Chart(
-        "share taken away / %",
-        "",
-        x_range=(min(0.0, 1.05 * float(low.min())), max(100.0, 1.05 * float(high.max()))),
-        categories=names,
-        height_rem=7.0 + 2.0 * len(names),
-    )
-    chart.bars(names, share, colour="after", hover="@y: @x{0.0} %", low=low, high=high)
-    alt = "Share of the reducible error that each cause takes away on held-out runs: " + ", ".join(
-        f"{bar.cause} {bar.share:.0f} % ({bar.low:.0f} to {bar.high:.0f} %)" for bar in bars
     )
     return figure(alt, [chart])

@@ -24,7 +24,7 @@ __all__ = ["before_after", "errors_of_runs", "residuals", "signals_present", "tu
 Array = NDArray[np.float64]
 
 #: Readings drawn in one chart at most: more do not show, and make the page heavy and slow.
-_MOST_POINTS: Final = 4_000
+_MOST_POINTS: Final = 2_000
 #: Runs up to which as many are drawn; of more, whose tables are long, fewer: a page weighs 1 MB.
 _MOST_RUNS: Final = 12
 #: Readings drawn of each run at least.

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
+from ..plots.curves import seen_span
 from ..support.angles import ARCSEC_PER_TURN
 from ..support.plainresult import finite
 from .linenames import LineNames
@@ -49,6 +50,7 @@ def modelled(fit: FitResult, name: LineNames) -> dict[str, Any]:
         )
     return {
         "argument": model.argument,
+        "span_deg": list(seen_span(model)),
         "constant_deg": model.constant * 360.0 / model.period,
         "coefficients": coefficients,
         "residual_std_arcsec": finite(factor * fit.residual_std),

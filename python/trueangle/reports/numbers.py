@@ -8,10 +8,13 @@ from typing import Any, Final
 
 from ..support.display_units import ErrorUnit
 
-__all__ = ["NONE", "Numbers", "formatted", "lookup", "shortened"]
+__all__ = ["MINUS", "NONE", "Numbers", "formatted", "lookup", "shortened"]
 
 #: Stands where there is no number.
 NONE: Final = "\u2013"
+
+#: Stands before negative numbers.
+MINUS: Final = "\u2212"
 
 #: Digits of an error that stands alone, and of the smallest of a column of them.
 _DIGITS, _LEAST_DIGITS = 4, 3
@@ -47,7 +50,7 @@ def formatted(value: float | None, digits: int) -> str:
     if value is None:
         return NONE
     text = f"{value:.{digits}f}"
-    return text.lstrip("-") if float(text) == 0.0 else text
+    return text.lstrip("-") if float(text) == 0.0 else text.replace("-", MINUS)
 
 
 def shortened(lines: Sequence[str]) -> list[str]:
@@ -79,9 +82,7 @@ class Numbers:
         shown = content["errors_in"]
         #: Unit of the errors.
         self.unit = ErrorUnit(shown["unit"], shown["per_arcsec"])
-        self._mark = Markup(
-            '<span class="n" data-path="{}" data-per="{!r}" data-digits="{}">{}</span>'
-        )
+        self._mark = Markup('<span class="n" data-path="{}"{} data-digits="{}">{}</span>')
 
     def plain(self, path: str, digits: int = 2, unit: str = "") -> Any:
         """A number that is no error."""
@@ -117,7 +118,7 @@ class Numbers:
     def listed(
         self, values: Sequence[float], stds: Sequence[float] | None, of: int, error: bool = True
     ) -> str:
-        """Numbers of one parameter (``of`` 0) or their standard deviations (1), one a line."""
+        """Numbers of one parameter (``of`` 0) or their standard deviations (1)."""
         unit = self.unit if error else _PLAIN
         known = [None] * len(values) if stds is None else stds
         pairs = (
@@ -125,7 +126,11 @@ class Numbers:
             for v, std in zip(values, known, strict=True)
         )
         shown = [pair[of] for pair in pairs]
-        return NONE if set(shown) == {"-"} else "\n".join(shortened(shown))
+        if set(shown) == {"-"}:
+            return NONE
+        texts = shortened([text.replace("-", MINUS) for text in shown])
+        # A stack is read beside that of the deviations; without them it is a list.
+        return ("\n" if stds else ", ").join(texts)
 
     def named(self, unit: str) -> str:
         """A unit of the content as the page names it: arcsec/Nm becomes deg/Nm."""
@@ -134,5 +139,9 @@ class Numbers:
     def _span(self, path: str, of: ErrorUnit, digits: int, unit: str) -> Any:
         value = lookup(self._content, path)
         text = formatted(None if value is None else value * of.per_arcsec, digits)
-        span = self._mark.format(path, of.per_arcsec, digits, text)
+        from markupsafe import Markup
+
+        # Of most pages every number is as the content has it.
+        per = "" if of.per_arcsec == 1.0 else Markup(f' data-per="{of.per_arcsec!r}"')
+        span = self._mark.format(path, per, digits, text)
         return span + (f"\u00a0{unit}" if unit and text != NONE else "")

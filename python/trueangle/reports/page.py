@@ -7,10 +7,13 @@ import gzip
 import json
 from functools import lru_cache
 from importlib.util import find_spec
+from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..errors import MissingExtraError
+from ..support.files import PAGE, check_output, written_atomically
+from ..support.plainresult import Shown
 from . import charts, wording
 from .numbers import Numbers
 
@@ -19,13 +22,20 @@ if TYPE_CHECKING:
 
     from .composition import Report
 
-__all__ = ["environment", "render", "templates"]
+__all__ = ["Page", "environment", "filled", "library", "render", "templates"]
 
 _TEMPLATES = Path(__file__).parent / "templates"
 
 
-def render(report: Report) -> str:
-    """The report as HTML: style, scripts, plotting library, content and figures inside."""
+#: Signs of the code that end or escape something in HTML, and those that stand for them.
+_SIGNS = str.maketrans("<>&", "[]:")
+
+
+def render(report: Report, framed: bool = False) -> str:
+    """The report as HTML: style, scripts, plotting library, content and figures inside.
+
+    ``framed`` in a page that holds the library, it takes that one.
+    """
     made = environment()
     from markupsafe import Markup
 
@@ -36,11 +46,21 @@ def render(report: Report) -> str:
         c=content,
         figures=report.figures,
         result_json=Markup(_embedded(content)),
-        figures_packed=Markup(_packed(json.dumps(report.figures, separators=(",", ":")))),
+        figures_packed=Markup(_packed(json.dumps(_live(report.figures), separators=(",", ":")))),
+        still=Markup,
         style=Markup((_TEMPLATES / "report.css").read_text("utf-8")),
         script=Markup((_TEMPLATES / "report.js").read_text("utf-8")),
-        library=Markup(_library()),
+        library=Markup("" if framed else library()),
     )
+
+
+def _live(figures: dict[str, Any]) -> dict[str, Any]:
+    """What the script draws: all but the stills, which the page holds itself."""
+    return {
+        name: figure
+        | {"charts": [{k: v for k, v in c.items() if k != "still"} for c in figure["charts"]]}
+        for name, figure in figures.items()
+    }
 
 
 def environment() -> Environment:
@@ -66,6 +86,35 @@ def environment() -> Environment:
     )
 
 
+def filled(template: str, **values: Any) -> str:
+    """A template with its values and the report's style, as text that UTF-8 holds."""
+    style = (_TEMPLATES / "report.css").read_text("utf-8")
+    text = environment().get_template(template).render(style=style, **values)
+    return text.encode("utf-8", "replace").decode("utf-8")
+
+
+class Page(Shown):
+    """A result that is a page: one HTML file that needs no network."""
+
+    @property
+    def html(self) -> str:
+        """The page."""
+        raise NotImplementedError
+
+    def save(self, path: str | PathLike[str]) -> None:
+        """Write the page, complete or not at all.
+
+        Raises
+        ------
+        FileError
+            An ending of another format, a place that no file is written to.
+        """
+        check_output(path, PAGE)
+        html = self.html
+        with written_atomically(path, kind=PAGE) as file:
+            file.write(html)
+
+
 def templates() -> Path:
     """Where the templates lie, and what they include."""
     return _TEMPLATES
@@ -78,7 +127,7 @@ def _embedded(value: Any) -> str:
 
 
 @lru_cache(maxsize=1)
-def _library() -> str:
+def library() -> str:
     """The charting library, compressed; without its widgets, tables and typesetting."""
     found = find_spec("bokeh")  # Its Python takes half a second to import, and is not needed.
     if found is None or found.origin is None:
@@ -88,5 +137,7 @@ def _library() -> str:
 
 
 def _packed(text: str) -> str:
-    """Text as the page's script unpacks it: gzip in base64."""
-    return base64.b64encode(gzip.compress(text.encode("utf-8"), 9, mtime=0)).decode("ascii")
+    """Text as the page's script unpacks it: length and gzip, in base 85 without signs of HTML."""
+    packed = gzip.compress(text.encode("utf-8"), 9, mtime=0)
+    whole = len(packed).to_bytes(4, "big") + packed
+    return base64.b85encode(whole, pad=True).decode("ascii").translate(_SIGNS)

@@ -9,6 +9,7 @@ from ..runs.checks.result import Check
 from ..runs.run import CalibrationRun
 from ..support.angles import arcsec
 from ..support.display_units import ErrorsIn, error_unit
+from ..support.layout import laid_out
 from .measured import measured
 
 if TYPE_CHECKING:
@@ -91,14 +92,16 @@ def ranked(rows: Iterable[JointRank]) -> list[JointRank]:
 
 def ranking_text(title: str, rows: Sequence[JointRank], errors_in: ErrorsIn = "auto") -> str:
     """The table as text."""
-    sizes = [row.peak_to_peak_before_arcsec or 0.0 for row in rows]
+    sizes = [0.5 * (row.peak_to_peak_before_arcsec or 0.0) for row in rows]
     unit = error_unit(errors_in, max(sizes, default=0.0))
 
     def shown(value: float | None) -> str:
         return "-" if value is None else unit.number(value)
 
-    head = ["joint", f"peak-to-peak before [{unit.name}]", f"rms left [{unit.name}]", "verdict"]
-    cells: list[list[str]] = [[*head, "first cause"]]
+    cells = [
+        ["joint", "peak-to-peak", "rms left", "verdict", "first cause"],
+        ["", f"before, {unit.name}", unit.name, "", ""],
+    ]
     cells += [
         [
             row.joint,
@@ -117,7 +120,7 @@ def ranking_text(title: str, rows: Sequence[JointRank], errors_in: ErrorsIn = "a
         ).rstrip()
         for line in cells
     ]
-    return "\n".join([title, *lines])
+    return laid_out([title, *lines])
 
 
 def plain_ranking(rows: Sequence[JointRank]) -> list[dict[str, Any]]:

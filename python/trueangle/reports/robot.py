@@ -5,15 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from os import PathLike
 from typing import Any
 
 from ..support.display_units import ErrorsIn, error_unit
-from ..support.files import PAGE, check_output, written_atomically
-from ..support.plainresult import Shown, counted
+from ..support.plainresult import counted
 from . import wording
 from .composition import Report
-from .page import environment, templates
+from .page import Page, filled, library, render
 from .ranking import JointRank, plain_ranking, ranked, ranking_text
 
 __all__ = ["RobotReport"]
@@ -28,7 +26,7 @@ _VERDICTS = {
 
 
 @dataclass(frozen=True, eq=False)
-class RobotReport(Shown):
+class RobotReport(Page):
     """A report on all joints of a robot.
 
     Attributes
@@ -65,29 +63,15 @@ class RobotReport(Shown):
         MissingExtraError
             jinja2 or bokeh is not installed.
         """
-        largest = max(row.peak_to_peak_before_arcsec or 0.0 for row in self.ranking)
-        page = environment().get_template("robot.html.j2")
-        text = page.render(
+        largest = max(0.5 * (row.peak_to_peak_before_arcsec or 0.0) for row in self.ranking)
+        return filled(
+            "robot.html.j2",
             title=self.title,
             ranking=self.ranking,
-            pages={row.joint: self.reports[row.joint].html for row in self.ranking},
+            pages={row.joint: render(self.reports[row.joint], True) for row in self.ranking},
+            library=library(),
             unit=error_unit(self.errors_in, largest),
-            style=(templates() / "report.css").read_text("utf-8"),
         )
-        return text.encode("utf-8", "replace").decode("utf-8")
-
-    def save(self, path: str | PathLike[str]) -> None:
-        """Write the page, complete or not at all.
-
-        Raises
-        ------
-        FileError
-            An ending of another format, a place that no file is written to.
-        """
-        check_output(path, PAGE)
-        html = self.html
-        with written_atomically(path, kind=PAGE) as file:
-            file.write(html)
 
     def _brief(self) -> str:
         return f"{counted(len(self.reports), 'joint')}, the worst {self.ranking[0].joint}"

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ..plots.curves import Curve, Points
 from ..runs.run import CalibrationRun
-from ..support.display_units import ErrorsIn, ErrorUnit, error_unit
+from ..support.display_units import ErrorsIn, ErrorUnit, error_unit, sine_of_rms
 
 __all__ = ["Scale", "scale_of"]
 
@@ -84,7 +84,7 @@ class Scale:
         return {"unit": self.name, "per_arcsec": self.factor, "defined": self.defined}
 
 
-def scale_of(asked: ErrorsIn, largest: float, runs: Sequence[CalibrationRun]) -> Scale:
+def scale_of(asked: ErrorsIn, rms: float, largest: float, runs: Sequence[CalibrationRun]) -> Scale:
     """The scale asked for; counts are those of the runs where no number says otherwise.
 
     Raises
@@ -93,6 +93,6 @@ def scale_of(asked: ErrorsIn, largest: float, runs: Sequence[CalibrationRun]) ->
         Another word; counts where nothing says how many a turn has.
     """
     period = runs[0].period
-    unit = error_unit(asked, largest, period)
+    unit = error_unit(asked, sine_of_rms(rms), period)
     turn = None if unit.name != "count" else period if isinstance(asked, str) else float(asked)
     return Scale(unit, largest, turn)

@@ -41,7 +41,7 @@ def spectrum(
     seen = [row["limit"] for row in rows if row["limit"] > 0.0]
     seen += [row["amplitude"] for row in (kept or rows) if row["amplitude"] > 0.0]
     floor = _FLOOR * min(seen, default=1.0)
-    top = 3.0 * max([*(row["amplitude"] for row in rows), *seen], default=1.0)
+    top = 3.0 * max([*(row["amplitude"] for row in rows), *seen, floor])
     named = sorted(kept, key=lambda row: -row["amplitude"])[:_MOST_NAMED]
     charts: list[Chart] = []
     for group in order_groups([row["order"] for row in rows]):

@@ -17,14 +17,14 @@ __all__ = [
     "paths",
     "residual_signals",
     "sentence",
+    "told_orders",
     "verdict",
 ]
 
 FIGURE_TITLES: Final = {
     "errors": "Measured error of every run, and the model",
     "measured-simulated": "Measured error and what the simulation expects",
-    "error-left": "What is left of held-out runs without each cause",
-    "gains": "Share of the reducible error that each cause takes away on held-out runs",
+    "error-left": "What is left of held-out runs without each cause (log scale)",
     "spectrum": "Size of every order",
     "phases": "Phase and size of every order, run by run",
     "before-after": "Held-out runs before and after correction",
@@ -40,6 +40,9 @@ _CONDITIONS: Final = (
 #: Digits of the largest of a column.
 _CONDITION_DIGITS: Final = 3
 _PLAIN: Final = ErrorUnit("", 1.0)
+
+#: Orders that are not retained in the table of evidence.
+_OTHERS: Final = 20
 
 #: Reduction, in percent, from which a correction is worth having.
 _WORTH: Final = 1.0
@@ -145,6 +148,20 @@ def paths(pattern: str, entries: list[Any]) -> list[str]:
     ['runs.0.rms', 'runs.1.rms']
     """
     return [pattern.format(i) for i in range(len(entries))]
+
+
+def told_orders(rows: list[dict[str, Any]]) -> list[int]:
+    """Which orders a table lists: those retained, and of the others the largest.
+
+    Examples
+    --------
+    >>> rows = [{"retained": k == 3, "amplitude_arcsec": float(k)} for k in range(100)]
+    >>> told_orders(rows)[:3], len(told_orders(rows))
+    ([3, 80, 81], 21)
+    """
+    others = [i for i, row in enumerate(rows) if not row["retained"]]
+    others.sort(key=lambda i: -(rows[i]["amplitude_arcsec"] or 0.0))
+    return sorted({i for i, row in enumerate(rows) if row["retained"]} | set(others[:_OTHERS]))
 
 
 def gain_paths(findings: list[dict[str, Any]]) -> list[str]:

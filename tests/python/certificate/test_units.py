@@ -46,10 +46,8 @@ def texts(element: object) -> str:
 
 def tables(content: dict, folder: Path) -> list[list[str]]:
     """Cells of every table as they are printed."""
-    (folder / "c.typ").write_bytes(Path(typesetting._TEMPLATE).read_bytes())
-    (folder / "content.json").write_text(json.dumps(content))
-    (folder / "errors.svg").write_bytes(typesetting._picture(content))
-    found = json.loads(typst.query(str(folder / "c.typ"), "table", root=str(folder)))
+    file = typesetting.lay_out(content, folder)
+    found = json.loads(typst.query(str(file), "table", root=str(folder)))
     cells = []
     for table in found:
         parts = [

@@ -41,6 +41,7 @@ def furnished(tmp_path_factory):
     folder = tmp_path_factory.mktemp("furnished")
     (folder / "b.toml").write_text(SIMULATION)
     (folder / "p.cfg").write_text("[angle a]\n")
+    (folder / "l.toml").write_text("[limits]\nruns = 3\n")
     (folder / "i.toml").write_text("[item]\n")
     theta, noise = np.arange(0.0, 360.0, 3.0), np.random.default_rng(7)
     for name, zero in (("r.csv", 0.2), ("t.csv", 0.1)):
@@ -75,10 +76,19 @@ WRITING = {
         ["correct", "r.csv", "-m", "j=m.json", "--column", "j=indicated_deg", "-o", "OUT"],
         ["r.csv", "m.json"],
     ),
+    "plot": (["plot", "r.csv", "--orders", "1", "-o", "OUT"], ["r.csv"]),
+    "plot, model": (["plot", "m.json", "-o", "OUT"], ["m.json"]),
     "simulate": (["simulate", "b.toml", "-o", "OUT"], ["b.toml"]),
     "diagnose": (
         ["diagnose", "r.csv", "--simulation", "b.toml", "--extend", "OUT"],
         ["r.csv", "b.toml"],
+    ),
+    "plan --after": (
+        [
+            *("plan", "--after", "r.csv", "--simulation", "b.toml", "--limits", "l.toml"),
+            *("--between", "backlash", "--seeds", "0", "-o", "OUT"),
+        ],
+        ["r.csv", "b.toml", "l.toml"],
     ),
     "diagnose --corrected-model": (
         [
@@ -112,6 +122,7 @@ WRITING = {
     "join": (["join", "r.csv", "t.csv", "-o", "OUT"], ["r.csv", "t.csv"]),
     "selfcal": (["selfcal", "r.csv", "-o", "OUT"], ["r.csv"]),
     "export": (["export", "m.json", "--to", "csv", "-o", "OUT"], ["m.json"]),
+    "fleet": (["fleet", "r.csv", "t.csv", "--orders", "1", "-o", "OUT"], ["r.csv", "t.csv"]),
     "robot": (["robot", "--from-urdf", "u.urdf", "-o", "OUT"], ["u.urdf"]),
     "export --existing": (
         ["export", "m.json", "--to", "klipper", "--existing", "p.cfg", "-o", "OUT"],

@@ -258,3 +258,31 @@ def test_columns_that_tell_of_no_joint_are_left_to_the_error(tmp_path, capsys):
     assert main(["check", str(tmp_path / "a.csv")]) == 1
     out, err = capsys.readouterr()
     assert (out, "no column reference_deg" in err) == ("", True)
+
+
+def test_the_pages_of_all_joints_share_one_library(arm, tmp_path):
+    pytest.importorskip("bokeh")
+    page = tmp_path / "arm.html"
+    command = ["report", str(arm / "arm.csv"), "--robot", str(arm / "robot.toml")]
+    assert main([*command, "-o", str(page)]) == 0
+    one = tmp_path / "one.html"
+    assert main([*command, "--joint", "elbow", "-o", str(one)]) == 0
+    sizes = page.stat().st_size, one.stat().st_size
+    print(sizes)
+    # Two more joints are less than half of what one is, nearly all of which is the library.
+    assert sizes[0] < 1.5 * sizes[1]
+
+
+def test_a_log_is_read_once_for_all_joints(arm, capsys, monkeypatch):
+    from trueangle.runs import readings
+
+    read, calls = readings._joined, []
+    monkeypatch.setattr(readings, "_joined", lambda *given: calls.append(given) or read(*given))
+    assert asked(arm, "check", capsys=capsys)[0] == 0
+    assert len(calls) == 1
+    # One joint after the other gives the same.
+    _, together, _ = asked(arm, "check", "--json", capsys=capsys)
+    for name in SIZES:
+        _, alone, _ = asked(arm, "check", "--joint", name, "--json", capsys=capsys)
+        assert json.loads(alone)["joints"][name] == json.loads(together)["joints"][name]
+    assert len(calls) == 2 + len(SIZES)

@@ -11,8 +11,8 @@ LARGEST = 1_000_000
 
 
 def test_few_runs_are_drawn_whole_and_many_in_part():
-    assert dots_of_run(1) == 4000
-    assert dots_of_run(12) == 333
+    assert dots_of_run(1) == 2000
+    assert dots_of_run(12) == 166
     totals = [runs * dots_of_run(runs) for runs in (12, 24, 48, 79)]
     assert totals == sorted(totals, reverse=True)
     assert totals[-1] > 400

@@ -92,7 +92,9 @@
   /* Every figure is drawn once: those in sight at first, the others as time or sight allows. */
   const begun = new Map();
   const once = (plot) => begun.get(plot) || begun.set(plot, draw(plot)).get(plot);
-  const inSight = (plot) => paper || plot.getBoundingClientRect().top < innerHeight;
+  const inSight = (plot) => paper || (!hidden(plot) && plot.getBoundingClientRect().top < innerHeight);
+  /* What is folded has no size to be drawn at; it is drawn when it is unfolded. */
+  const hidden = (plot) => plot.closest("details:not([open])") !== null;
   const idle = () => new Promise((go) => (window.requestIdleCallback || setTimeout)(go));
 
   function repaint() {
@@ -119,12 +121,21 @@
     event.preventDefault();
   }
 
-  /* Text that was packed with gzip in base64. */
+  /* Text that was packed with gzip in base 85: five letters hold four bytes; a page
+     within another takes what that one holds. */
   async function unpacked(id) {
-    const text = atob(document.getElementById(id).textContent);
-    const bytes = new Uint8Array(text.length);  // by a loop: the iterator of a text takes ten times as long
-    for (let i = 0; i < text.length; i++) bytes[i] = text.charCodeAt(i);
-    return new Response(new Blob([bytes]).stream().pipeThrough(new DecompressionStream("gzip"))).text();
+    const text = document.getElementById(id).textContent || parent.document.getElementById(id).textContent;
+    const digit = new Uint8Array(128);
+    [..."0123456789ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz!#$%:()*+-;[=]?@^_`{|}~"]
+      .forEach((letter, i) => { digit[letter.charCodeAt(0)] = i; });
+    const bytes = new Uint8Array((text.length / 5) * 4), view = new DataView(bytes.buffer);
+    for (let i = 0, at = 0; i < text.length; i += 5, at += 4) {
+      let number = 0;
+      for (let k = 0; k < 5; k++) number = number * 85 + digit[text.charCodeAt(i + k)];
+      view.setUint32(at, number);
+    }
+    const packed = bytes.subarray(4, 4 + view.getUint32(0));
+    return new Response(new Blob([packed]).stream().pipeThrough(new DecompressionStream("gzip"))).text();
   }
 
   async function load() {
@@ -144,8 +155,18 @@
   async function start() {
     root.dataset.theme = theme();
     mark();
+    // Before anything is loaded: who prints at once has all of it, in the colours of paper.
+    let closed = [];
+    addEventListener("beforeprint", () => {
+      root.dataset.theme = "light";
+      closed = [...document.querySelectorAll("details:not([open])")];
+      closed.forEach((d) => { d.open = true; });
+    });
+    addEventListener("afterprint", () => { closed.forEach((d) => { d.open = false; }); repaint(); });
     addEventListener("resize", mark);
-    if (paper) document.querySelectorAll("details").forEach((d) => { d.open = true; });
+    const folded = [...document.querySelectorAll("details")];
+    if (paper) folded.forEach((d) => { d.open = true; });
+    if (paper) root.dataset.paper = "true";
     if (paper) document.body.style.width = "680px";
     await load();
     await Promise.all(plots.filter(inSight).map(once));
@@ -164,20 +185,27 @@
       const plot = document.getElementById("figure-residual");
       once(plot).then(() => { plot.dataset.figure = signal.value; draw(plot); });
     });
-    addEventListener("beforeprint", () => { root.dataset.theme = "light"; });
-    addEventListener("afterprint", repaint);
     root.dataset.ready = "true";
+    // A link to a section unfolds what answers it.
+    document.querySelectorAll("nav a").forEach((link) => link.addEventListener("click", () => {
+      const first = document.querySelector(link.hash).closest("section").querySelector("details");
+      if (first) first.open = true;
+    }));
+    folded.forEach((d) => d.addEventListener("toggle", () => {
+      mark();
+      if (d.open) d.querySelectorAll(".plot").forEach(once);
+    }));
     await drawTheRest();
     root.dataset.drawn = "true";
   }
 
   async function drawTheRest() {
     const coming = new IntersectionObserver((seen) => seen.filter((s) => s.isIntersecting)
-      .forEach((s) => { coming.unobserve(s.target); once(s.target); }), { rootMargin: "600px" });
+      .forEach((s) => { coming.unobserve(s.target); if (!hidden(s.target)) once(s.target); }), { rootMargin: "600px" });
     plots.forEach((plot) => coming.observe(plot));
     for (const plot of plots) {
       await idle();
-      await once(plot);
+      if (!hidden(plot)) await once(plot);
     }
   }
 

@@ -1,0 +1,103 @@
+"""``trueangle fleet``: units of one design against each other, and against months ago."""
+
+from __future__ import annotations
+
+import argparse
+from typing import TYPE_CHECKING, Any
+
+from ..support.files import FLEET
+from .error_units import add_errors_in, errors_in
+from .fit import add_joint
+from .order_lists import declared_shafts, orders_by_shaft
+from .paths import Input, Output
+from .signal_options import reading
+
+if TYPE_CHECKING:
+    from ..fleets.result import Fleet
+
+HELP = "say which units of a fleet stand out, what they share, and which moved since last time"
+EXAMPLE = "trueangle fleet spring/ autumn/ -o fleet.json"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the command's arguments."""
+    add = parser.add_argument
+    add("runs", nargs="+", type=Input, metavar="RUNS", help="files or folders of readings")
+    add(
+        "--by",
+        choices=("unit", "run"),
+        default="unit",
+        help="what tells the units apart (default: the column unit; without one, the runs)",
+    )
+    add("--orders", metavar="1-4", help="orders looked at (default: those above the noise)")
+    add(
+        "--share",
+        type=float,
+        default=0.95,
+        metavar="P",
+        help="of the units that the tolerance limits bound (default: %(default)s)",
+    )
+    add(
+        "--confidence",
+        type=float,
+        default=0.95,
+        metavar="G",
+        help="of the tolerance limits (default: %(default)s)",
+    )
+    add(
+        "--permitted-arcsec",
+        type=float,
+        metavar="E",
+        help="error from which a calibration is due: gives the day of the next",
+    )
+    add_joint(parser)
+    add(
+        "-o",
+        "--output",
+        type=Output.of(FLEET),
+        metavar="FLEET",
+        help="fleet file to write: a prior for further units (fit --prior)",
+    )
+    add_errors_in(parser)
+    add("--json", action="store_true", help="print the result as JSON")
+
+
+def _orders(text: str, shafts: dict[str, float]) -> Any:
+    orders = orders_by_shaft(text, shafts)
+    return None if isinstance(orders, str) else orders
+
+
+def judged(args: argparse.Namespace, **limits: Any) -> Fleet:
+    """The fleet of the runs that are asked for."""
+    from ..fleets.fleet import fleet
+
+    shafts = declared_shafts(args.shaft)
+    return fleet(
+        args.runs,
+        args.by,
+        orders=None if args.orders is None else _orders(args.orders, shafts),
+        gear_ratio=args.gear_ratio,
+        fixed_member=args.fixed_member,
+        shafts=shafts,
+        **limits,
+        **reading(args),
+    )
+
+
+def run(args: argparse.Namespace) -> int:
+    """Judge the units, save, print."""
+    found = judged(
+        args,
+        share=args.share,
+        confidence=args.confidence,
+        permitted_arcsec=args.permitted_arcsec,
+    )
+    if args.output is not None:
+        found.save(args.output)
+    if args.json:
+        print(found.to_json())
+    else:
+        print(found.summary(errors_in(args)))
+        if args.output is not None:
+            print(f"\nsaved {args.output}")
+    return 0

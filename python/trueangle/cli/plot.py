@@ -1,0 +1,97 @@
+"""``trueangle plot``: the picture of a model, or of runs with the model fitted to them."""
+
+from __future__ import annotations
+
+import argparse
+import json
+from typing import TYPE_CHECKING
+
+from ..errors import ArgumentError
+from ..support.files import PICTURE
+from ..support.layout import laid_out
+from .error_units import add_errors_in, errors_in
+from .fit import add_joint
+from .order_lists import declared_shafts, orders_by_shaft
+from .paths import Input, Output
+from .pictures import save_picture
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+HELP = "draw the error over the angle, of a model or of runs with their fit"
+EXAMPLE = "trueangle plot joint_a.csv -o joint_a.png"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the command's arguments."""
+    add = parser.add_argument
+    add(
+        "files",
+        nargs="+",
+        type=Input,
+        metavar="MODEL|RUNS",
+        help="a model file (.json), or files of readings",
+    )
+    add(
+        "-o",
+        "--output",
+        required=True,
+        type=Output.of(PICTURE),
+        metavar="FILE",
+        help="the picture to write: PNG, SVG or PDF, by its ending",
+    )
+    add(
+        "--kind",
+        choices=("errors", "spectrum", "phases", "residuals"),
+        default="errors",
+        help="of runs: errors over the angle (default), amplitudes of the orders, phases over the "
+        "runs, or what the fit leaves",
+    )
+    add("--orders", default="auto", help="auto (default: by evidence), 1-17, output:1-3;motor:1,2")
+    add_joint(parser)
+    add_errors_in(parser)
+    add("--json", action="store_true", help="print what was drawn as JSON")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Draw, write, say what is seen."""
+    import matplotlib as mpl
+
+    from ..plots.canvas import text_alternative
+
+    mpl.use("Agg")  # a file is written: no window is needed
+    axes = _of_model(args) if args.files[0].lower().endswith(".json") else _of_runs(args)
+    save_picture(axes, args.output)
+    shows = text_alternative(axes)
+    if args.json:
+        print(json.dumps({"output": args.output, "shows": shows}))
+    else:
+        print(laid_out([shows, f"saved {args.output}"]))
+    return 0
+
+
+def _of_model(args: argparse.Namespace) -> Axes:
+    from ..model.file import load_model
+    from ..plots.modelerror import model_error
+
+    if len(args.files) > 1 or args.kind != "errors":
+        raise ArgumentError(
+            "one model has one picture: give one file and leave --kind out, or give the runs"
+        )
+    return model_error(load_model(args.files[0]), errors_in=errors_in(args))
+
+
+def _of_runs(args: argparse.Namespace) -> Axes:
+    from ..fitting.fit import fit
+    from ..plots.kinds import fit_plot
+    from .run_lists import read_checked
+
+    args.runs = args.files
+    found = fit(
+        read_checked(args),
+        orders=orders_by_shaft(args.orders, declared_shafts(args.shaft)),
+        gear_ratio=args.gear_ratio,
+        fixed_member=args.fixed_member,
+        shafts=declared_shafts(args.shaft),
+    )
+    return fit_plot(found, args.kind, errors_in=errors_in(args))

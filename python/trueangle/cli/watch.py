@@ -1,0 +1,123 @@
+"""``trueangle watch``: a running joint against its model, window by window."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from .error_units import add_errors_in, errors_in
+from .paths import Input
+from .signal_options import add_signals, reading
+
+if TYPE_CHECKING:
+    from ..model.model import HarmonicModel
+    from ..monitoring.alarm import WatchedWindow
+    from ..monitoring.readings import ReadingBatch
+
+HELP = "watch a running joint against its model; status 3 where an alarm was raised"
+EXAMPLE = "trueangle watch joint.csv -m joint_a.json --every 1turn"
+
+#: Exit status where an alarm was raised.
+ALARMED = 3
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the command's arguments."""
+    add = parser.add_argument
+    add(
+        "log",
+        type=_log,
+        metavar="LOG",
+        help="log with a reference and an indicated angle, or with the error; - reads lines of a "
+        "table from standard input as they arrive",
+    )
+    add("-m", "--model", required=True, type=Input, metavar="MODEL", help="model file")
+    add(
+        "--every",
+        type=_turns,
+        default=1.0,
+        metavar="1turn",
+        help="travel of a window, in turns of the output (default: 1turn)",
+    )
+    add(
+        "--shift",
+        type=float,
+        default=1.0,
+        metavar="S",
+        help="shift looked for, in standard deviations of a window (default: %(default)g)",
+    )
+    add(
+        "--run-length",
+        type=float,
+        default=465.0,
+        metavar="N",
+        help="windows until a false alarm, on average (default: %(default)g)",
+    )
+    add_signals(parser)
+    add_errors_in(parser)
+    add("--json", action="store_true", help="print one object per window and line")
+
+
+def _log(text: str) -> str:
+    return text if text == "-" else Input(text)
+
+
+def _turns(text: str) -> float:
+    """``1turn``, ``5turns`` or ``0.5``."""
+    number = text.strip().removesuffix("s").removesuffix("turn").strip()
+    try:
+        value = float(number)
+    except ValueError:
+        value = math.nan
+    if not 0.0 < value < math.inf:
+        raise argparse.ArgumentTypeError(f"turns above zero, as 1turn, got {text!r}")
+    return value
+
+
+def run(args: argparse.Namespace) -> int:
+    """Feed the windows, print each."""
+    from ..model.file import load_model
+    from ..monitoring.monitor import Monitor
+
+    model = load_model(args.model)
+    watched = Monitor(model, every=args.every, shift=args.shift, run_length=args.run_length)
+    alarmed = False
+    for batch in _batches(args, model):
+        for window in watched.windows_of(*batch):
+            alarmed |= window.alarm
+            print(_line(window, model, args), flush=True)
+    if not watched.windows:
+        print("trueangle: warning: not one window ended", file=sys.stderr)
+    return ALARMED if alarmed else 0
+
+
+def _batches(args: argparse.Namespace, model: HarmonicModel) -> Iterator[ReadingBatch]:
+    from ..monitoring.readings import read_batches, read_lines
+
+    options: Any = reading(args)
+    if args.log == "-":
+        return read_lines(sys.stdin, model, options)
+    return read_batches(Path(args.log), model, options)
+
+
+def _line(window: WatchedWindow, model: HarmonicModel, args: argparse.Namespace) -> str:
+    """One window in one line."""
+    from ..support.angles import arcsec
+    from ..support.display_units import error_unit
+
+    scale = arcsec(1.0, model.period)
+    if args.json:
+        return json.dumps(window.plain(scale), allow_nan=False)
+    largest = max(window.orders, key=lambda row: row.amplitude)
+    size = scale * largest.amplitude
+    shown = error_unit(errors_in(args), size, model.period)
+    text = (
+        f"window {window.window:5d}  order {largest.order:g} is {shown.text(size)} off  "
+        f"chart {window.statistic:5.2f} of {window.limit:.2f}"
+    )
+    return f"{text}  ALARM {shown.spoken(window.because)}" if window.alarm else text

@@ -1,0 +1,99 @@
+"""The error that a model takes off, over the angle."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..support.display_units import ErrorsIn, error_unit, significant, sine_of_rms
+from ..support.plainresult import counted
+from . import palette
+from .canvas import described, legend, new_axes, turn_axis
+from .curves import CONFIDENCE, Curve, envelope, model_curve, seen_span, strong_gear_order
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+    from ..model.model import HarmonicModel
+
+__all__ = ["draw_curve", "model_error"]
+
+
+def model_error(model: HarmonicModel, ax: Axes | None = None, errors_in: ErrorsIn = "auto") -> Axes:
+    """Error of a model over the angle, less its constant, with its 95 % band.
+
+    What depends on more than the angle (backlash, lag and other terms) is named in the text
+    alternative and not drawn; gear orders, which would fill the picture, are drawn as envelope.
+
+    Parameters
+    ----------
+    model : HarmonicModel
+    ax : matplotlib Axes, optional
+    errors_in : str or float
+        Unit of the errors, as for summaries: ``"auto"`` is arcsec, or degrees where they
+        are that large.
+
+    Returns
+    -------
+    matplotlib Axes
+
+    Raises
+    ------
+    MissingExtraError
+        matplotlib is not installed.
+
+    Examples
+    --------
+    >>> import trueangle as ta
+    >>> model = ta.HarmonicModel((ta.Shaft("output", 1.0, (2,), (0.01,), (0.0,)),), period=360.0)
+    >>> ta.plots.text_alternative(model.plot())
+    'Error of the model over the angle: 72.0 arcsec peak-to-peak in 1 order.'
+    """
+    ax = new_axes(ax)
+    pattern = model.replace(terms=())
+    curve = model_curve(pattern)
+    unit = error_unit(errors_in, sine_of_rms(float(np.std(curve.error))), model.period)
+    curve = curve.scaled(unit.per_arcsec)
+    low, high = seen_span(model)
+    draw_curve(ax, curve, pattern, high - low)
+    turn_axis(ax, low, high)
+    ax.set_xlabel(f"{model.argument} angle / deg")
+    ax.set_ylabel(f"error / {unit.name}")
+    legend(ax)
+    terms = ", ".join(term.kind for term in model.terms)
+    return described(
+        ax,
+        f"Error of the model over the angle: {significant(float(np.ptp(curve.error)), 3)} "
+        f"{unit.name} peak-to-peak in {counted(len(model.orders), 'order')}"
+        + (f"; not drawn: {terms}" if terms else "")
+        + ".",
+    )
+
+
+def draw_curve(ax: Axes, curve: Curve, model: HarmonicModel, span: float) -> None:
+    """A model's curve with its band; as an envelope where gear orders fill ``span`` degrees."""
+    if strong_gear_order(model.orders, model.amplitudes, span) is not None:
+        ax.fill_between(
+            *envelope(curve),
+            color=palette.MUTED,
+            alpha=0.35,
+            linewidth=0.0,
+            zorder=0.5,
+            label="envelope of the model",
+        )
+        return
+    ax.plot(curve.angle, curve.error, color=palette.ink(ax), zorder=3.0, label="model")
+    if curve.std is None:
+        return
+    half = CONFIDENCE * curve.std
+    ax.fill_between(
+        curve.angle,
+        curve.error - half,
+        curve.error + half,
+        color=palette.ink(ax),
+        alpha=0.2,
+        linewidth=0.0,
+        zorder=0.5,
+        label="95 % band",
+    )

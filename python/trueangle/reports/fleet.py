@@ -1,0 +1,169 @@
+"""The report on a fleet: who needs what in front, then the units' patterns, spread and dates."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..fleets.result import BetweenOrder, CommonOrder, Fleet
+from ..fleets.unit import FleetUnit, UnitOrder
+from ..support.angles import arcsec
+from ..support.display_units import ErrorsIn, ErrorUnit, error_unit
+from .chartaxes import ChartAxis
+from .page import Page, filled
+from .stills import Mark, still
+
+__all__ = ["FleetReport"]
+
+Array = NDArray[np.float64]
+
+#: Units whose patterns are drawn at most, those that need something first.
+_DRAWN: Final = 24
+#: Orders whose phasors are drawn: those in which units differ most.
+_PHASORS: Final = 3
+#: Angles of a pattern at least, and to a period of its highest order.
+_ANGLES: Final = (361, 8)
+#: Height, rem, at which a picture of a third of the page is as wide as high between its axes.
+_SQUARE: Final = 14.6
+#: Radius that holds 95 % of a plane normal distribution, in standard deviations of a coordinate.
+_RADIUS: Final = math.sqrt(-2.0 * math.log(0.05))
+
+
+class _Picture(NamedTuple):
+    """A still picture with its caption and what it shows, in words."""
+
+    title: str
+    alt: str
+    svg: str
+
+
+@dataclass(frozen=True, eq=False)
+class FleetReport(Page):
+    """A page on the units of a fleet: verdicts, patterns, spread, limits and dates.
+
+    It holds no script: every picture is on paper what it is on the screen.
+
+    Attributes
+    ----------
+    fleet : Fleet
+    title : str
+    errors_in : str or float
+        Unit of the errors.
+    """
+
+    fleet: Fleet
+    title: str = "Angle error of a fleet"
+    errors_in: ErrorsIn = "auto"
+
+    @cached_property
+    def unit(self) -> ErrorUnit:
+        """The unit of the errors on the page."""
+        sizes = (unit.peak_to_peak for unit in self.fleet.units)
+        return error_unit(self.errors_in, self._scale * max(sizes, default=0.0), self.fleet.period)
+
+    @property
+    def _scale(self) -> float:
+        return arcsec(1.0, self.fleet.period)
+
+    @cached_property
+    def html(self) -> str:
+        """One file that needs no network.
+
+        Raises
+        ------
+        MissingExtraError
+            jinja2 is not installed.
+        """
+        from markupsafe import Markup
+
+        odd = [unit for unit in self.fleet.units if unit.verdict != "fine"]
+        drawn = self.fleet.units[:_DRAWN]
+        return filled(
+            "fleet.html.j2",
+            title=self.title,
+            fleet=self.fleet,
+            odd=odd,
+            scale=self._scale,
+            unit=self.unit,
+            patterns=[self._pattern(unit) for unit in drawn],
+            phasors=[self._phasor(at) for at in self._spread_most()],
+            orders=list(zip(self.fleet.common, self.fleet.between, strict=True)),
+            svg=Markup,
+        )
+
+    def to_dict(self) -> dict[str, Any]:
+        """Every number of the page: `Fleet.to_dict`."""
+        return self.fleet.to_dict()
+
+    def summary(self) -> str:
+        """That of the fleet."""
+        return self.fleet.summary(self.errors_in)
+
+    def _brief(self) -> str:
+        return self.fleet._brief()
+
+    def _spread_most(self) -> list[int]:
+        order = np.argsort([-row.std for row in self.fleet.between], kind="stable")
+        return [int(k) for k in order[:_PHASORS]]
+
+    def _pattern(self, unit: FleetUnit) -> _Picture:
+        """The error of a unit over a turn; the same axis for all, so that sizes compare."""
+        size = self._scale * self.unit.per_arcsec
+        highest = max((row.order for row in unit.orders), default=1.0)
+        angle = np.linspace(0.0, 360.0, max(_ANGLES[0], math.ceil(_ANGLES[1] * highest) + 1))
+        most = 0.5 * size * max(one.peak_to_peak for one in self.fleet.units[:_DRAWN]) * 1.1
+        across = ChartAxis("true angle / deg", (0.0, 360.0))
+        across.at_angles(0.0, 360.0, 4)
+        up = ChartAxis(f"error / {self.unit.name}", (-most or -1.0, most or 1.0))
+        colour = "after" if unit.verdict == "fine" else "warning"
+        marks = [Mark("line", (angle, size * _curve(unit.orders, angle)), colour)]
+        said = f"{unit.unit}: {unit.verdict.replace('_', ' ')}"
+        ptp = self.unit.text(self._scale * unit.peak_to_peak)
+        return _Picture(
+            said, f"error of {said}, {ptp} peak-to-peak", still(marks, across, up, 9.0, 1.0 / 3.0)
+        )
+
+    def _phasor(self, at: int) -> _Picture:
+        """Cosine and sine of one order of every unit, and the circle that holds 95 % of them."""
+        size = self._scale * self.unit.per_arcsec
+        common: CommonOrder = self.fleet.common[at]
+        between: BetweenOrder = self.fleet.between[at]
+        turn = np.linspace(0.0, 2.0 * math.pi, 91)
+        circle = _RADIUS * between.std
+        marks = [
+            Mark(
+                "line",
+                (
+                    size * (common.cosine + circle * np.cos(turn)),
+                    size * (common.sine + circle * np.sin(turn)),
+                ),
+                "muted",
+            )
+        ]
+        for fine, colour in ((True, "after"), (False, "warning")):
+            rows = [u.orders[at] for u in self.fleet.units if (u.verdict == "fine") == fine]
+            if rows:
+                phase = np.radians([row.phase_deg for row in rows])
+                amplitude = size * np.array([row.amplitude for row in rows])
+                places = (amplitude * np.sin(phase), amplitude * np.cos(phase))
+                marks.append(Mark("dots", places, colour, 8.0))
+        reach = 1.1 * max(np.abs(part).max() for mark in marks for part in mark.arrays) or 1.0
+        name = self.unit.name
+        across = ChartAxis(f"cosine / {name}", (-reach, reach))
+        up = ChartAxis(f"sine / {name}", (-reach, reach))
+        title = f"order {common.order:g} of the {common.shaft}"
+        alt = f"cosine and sine of {title} of every unit, and the circle that holds 95 % of them"
+        return _Picture(title, alt, still(marks, across, up, _SQUARE, 1.0 / 3.0))
+
+
+def _curve(orders: tuple[UnitOrder, ...], angle: Array) -> Array:
+    """The sum of a unit's orders over the angle, degrees."""
+    found = np.zeros_like(angle)
+    for row in orders:
+        found += row.amplitude * np.sin(np.radians(row.order * angle + row.phase_deg))
+    return found

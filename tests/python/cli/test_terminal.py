@@ -1,0 +1,122 @@
+"""What a terminal shows: no wider than it is, in colour where it has colours."""
+
+import io
+import sys
+from pathlib import Path
+
+import pytest
+
+from trueangle.cli import main
+from trueangle.cli.colours import coloured, has_colours
+from trueangle.cli.terminal import Plain
+from trueangle.support.layout import columns, laid_out, wrapped
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "looks"))
+
+from terminal import COLUMNS, furnish, scenes, shown
+
+#: Commands that take seconds, and what each of them prints is told by another here.
+LONG = ("bench", "rehearse")
+
+
+@pytest.fixture(scope="module")
+def desk(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("desk")
+    furnish(folder)
+    return folder
+
+
+def test_no_command_is_wider_than_its_terminal(desk):
+    for command, lines in scenes().items():
+        for line in lines if command not in LONG else ():
+            status, text = shown(line, desk)
+            assert status == 0, text
+            wide = [row for row in text.splitlines() if len(row) > COLUMNS]
+            assert not wide, f"{line}: {wide}"
+
+
+@pytest.mark.parametrize(("wanted", "found"), [("40", 60), ("72", 72), ("500", 100)])
+def test_lines_are_as_wide_as_the_terminal_within_bounds(wanted, found, monkeypatch):
+    monkeypatch.setenv("COLUMNS", wanted)
+    text = "of words " * 60
+    assert columns() == found
+    assert found - 9 < max(map(len, wrapped(text))) <= found
+    assert max(map(len, laid_out(["  label    " + text]).splitlines())) <= found
+
+
+def test_a_folded_line_loses_no_word_and_stands_under_its_text(monkeypatch):
+    monkeypatch.setenv("COLUMNS", "80")
+    line = "  noise     " + " ".join(f"word{k}" for k in range(40))
+    folded = laid_out([line])
+    assert folded.split() == line.split()
+    assert {len(row) - len(row.lstrip()) for row in folded.splitlines()[1:]} == {12}
+    option = "  --signal " + "'indicated=" + "x y " * 40 + "'"
+    assert laid_out([option]) == option  # there to be copied
+
+
+class Terminal(list):
+    encoding = "utf-8"
+    write = list.append
+
+    def isatty(self):
+        return True
+
+
+def test_a_terminal_has_colours_unless_it_is_told_otherwise(monkeypatch):
+    monkeypatch.setenv("TERM", "xterm")
+    monkeypatch.delenv("NO_COLOR", raising=False)
+    seen = Terminal()
+    Plain(seen).write("trueangle: error: no\x1b[31m file")
+    assert seen == ["trueangle: \x1b[1;31merror:\x1b[0m no\\x1b[31m file"]
+    for name, value in (("NO_COLOR", "1"), ("TERM", "dumb")):
+        with monkeypatch.context() as changed:
+            changed.setenv(name, value)
+            assert not has_colours(seen)
+            plain = Terminal()
+            Plain(plain).write("error: x")
+            assert plain == ["error: x"]
+    assert not has_colours(io.StringIO())
+    assert coloured('[{"says": "warning: x"}]') == '[{"says": "warning: x"}]'
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        ("fti", "there is no command 'fti'; did you mean fit?"),
+        ("diganose r.csv", "did you mean diagnose?"),
+        ("fit r.csv -o m.json --gaer-ratio 3", "did you mean --gear-ratio?"),
+        ("fit r.csv -o m.json --loss hubre", "did you mean huber?"),
+        ("fit r.csv -o m.json --signal refrence=a", "did you mean reference?"),
+        ("fit r.csv -o m.json --signal arm.torqe=a", "did you mean torque?"),
+    ],
+)
+def test_what_is_mistyped_is_answered_by_the_nearest(words, said, capsys):
+    with pytest.raises(SystemExit) as left:
+        main(words.split())
+    assert left.value.code == 2
+    told = capsys.readouterr().err.splitlines()
+    assert len(told) == 2, told  # how it is used, and what is wrong
+    assert said in told[1]
+
+
+def test_a_mistyped_cause_is_answered_by_the_nearest(desk, capsys):
+    assert main(["rehearse", str(desk / "believed.toml"), "--causes", "baclash"]) == 1
+    assert "did you mean backlash?" in capsys.readouterr().err
+
+
+def test_one_model_has_one_picture(desk, capsys):
+    shown("fit runs.csv -o joint.json --orders 1", desk)
+    for more in (["--kind", "residuals"], [str(desk / "runs.csv")]):
+        out = ["-o", str(desk / "x.png")]
+        assert main(["plot", str(desk / "joint.json"), *more, *out]) == 1
+        assert "one model has one picture" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("ending", ["png", "svg", "pdf"])
+def test_a_picture_is_of_the_format_that_its_ending_says(ending, desk):
+    begins = {"png": b"\x89PNG", "svg": b"<?xml", "pdf": b"%PDF"}
+    shown("fit runs.csv -o joint.json --orders 1", desk)
+    status, told = shown(f"plot joint.json -o drawn.{ending} --json", desk)
+    assert status == 0
+    assert '"shows": "Error of the model' in told
+    assert (desk / f"drawn.{ending}").read_bytes().startswith(begins[ending])

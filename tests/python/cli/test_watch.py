@@ -1,0 +1,73 @@
+"""`trueangle watch`: a log or lines that arrive, a line per window, the status of an alarm."""
+
+import io
+import json
+import sys
+
+import numpy as np
+import pytest
+
+import trueangle as ta
+from trueangle.cli import main
+
+SEED = 53_101
+
+
+@pytest.fixture
+def desk(tmp_path, monkeypatch):
+    print("seed", SEED)
+    monkeypatch.chdir(tmp_path)
+    shaft = ta.Shaft("output", 1, [1, 2], [0.01, 0.0], [0.0, 0.02])
+    model = ta.HarmonicModel([shaft], period=360.0)
+    model.save("m.json")
+    rng = np.random.default_rng(SEED)
+    angle = np.arange(60 * 90) * 4.0
+    error = model.error(angle) + rng.normal(0.0, 0.001, angle.size)
+    for name, more in (("fine", 0.0), ("moved", 0.002)):
+        shown = error + more * np.cos(np.radians(angle)) * (angle > 30 * 360.0)
+        rows = [
+            f"{0.1 * i:.1f},{x % 360.0},{(x + e) % 360.0}"
+            for i, (x, e) in enumerate(zip(angle.tolist(), shown.tolist(), strict=True))
+        ]
+        lines = ["time_s,reference_deg,indicated_deg", *rows]
+        (tmp_path / f"{name}.csv").write_text("\n".join(lines) + "\n")
+    return tmp_path
+
+
+def test_a_line_a_window_and_the_status(desk, capsys):
+    assert main(["watch", "fine.csv", "-m", "m.json"]) == 0
+    assert len(capsys.readouterr().out.splitlines()) == 59
+    assert main(["watch", "moved.csv", "-m", "m.json"]) == 3
+    assert "ALARM order 1 moved by about" in capsys.readouterr().out
+
+
+def test_lines_that_arrive_say_the_same(desk, capsys, monkeypatch):
+    assert main(["watch", "moved.csv", "-m", "m.json", "--json"]) == 3
+    whole = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
+    monkeypatch.setattr(sys, "stdin", io.StringIO((desk / "moved.csv").read_text()))
+    assert main(["watch", "-", "-m", "m.json", "--json"]) == 3
+    arrived = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
+    assert arrived == whole
+    keys = {"window", "angle", "time_s", "orders", "statistic", "limit", "alarm", "because"}
+    assert set(whole[0]) == keys
+    assert whole[0]["time_s"] == pytest.approx(9.0, abs=0.3)
+    assert [row["order"] for row in whole[0]["orders"]] == [1.0, 2.0]
+
+
+def test_longer_windows(desk, capsys):
+    assert main(["watch", "fine.csv", "-m", "m.json", "--every", "5turns"]) == 0
+    assert len(capsys.readouterr().out.splitlines()) == 11
+    with pytest.raises(SystemExit) as ended:
+        main(["watch", "fine.csv", "-m", "m.json", "--every", "often"])
+    assert ended.value.code == 2
+
+
+def test_what_cannot_be_read_is_told_with_its_line(desk, capsys, monkeypatch):
+    for text, told in (
+        ("", "has no lines"),
+        ("reference_deg,indicated_deg\n1,2\nx,3\n", "line 2"),
+        ("a,b\n1,2\n", "reference"),
+    ):
+        monkeypatch.setattr(sys, "stdin", io.StringIO(text))
+        assert main(["watch", "-", "-m", "m.json"]) == 1
+        assert told in capsys.readouterr().err
