@@ -3,7 +3,7 @@
 PYTHON ?= .venv/bin/python
 
 .PHONY: check quick format lint types stub rust python docs bench develop aarch64 fuzz mutants sample
-.PHONY: nightly exam asan kills pythons readings chance
+.PHONY: looks nightly exam asan kills pythons readings chance
 
 # Damaged files for each loader, and loaders at a time: `make fuzz CASES=1000000 JOBS=2`.
 CASES ?= 20000
@@ -61,7 +61,10 @@ python:             ## tests of the package
 
 exam:               ## the diagnosis' own exam at full size: an hour or more, figures asserted
 	TRUEANGLE_NIGHTLY=1 TRUEANGLE_EXAM_SEEDS=20 $(PYTHON) -m pytest -s \
-	  tests/python/hidden tests/python/diagnosis/test_diagnosis.py
+	  tests/python/hidden tests/python/diagnosis/test_diagnosis.py tests/python/rehearsal/test_followed.py
+
+looks:              ## what a reader sees, as pictures and texts in target/looks; needs Chromium
+	$(PYTHON) tests/looks
 
 docs:               ## documentation, warnings are errors
 	$(PYTHON) -m sphinx -W --keep-going -q docs docs/_build/html

@@ -21,6 +21,11 @@ MEASUREMENTS = {
     "temperature": ("Two temperatures", "a column `temperature_C`, ten kelvin apart"),
     "torque": ("Two loads", "a column `torque_Nm`, loads of both signs"),
     "current": ("The motor's current", "a column `current_A`, varied apart from the load"),
+    "coupled": (
+        "The other joints of a robot",
+        "columns of their angles (`coupled_NAME_deg`, or a robot file), each moved apart from this "
+        "one",
+    ),
     "mount": ("Two mounts", "the reference turned on its mount, and a column `mount_deg`"),
 }
 

@@ -23,6 +23,9 @@ if TYPE_CHECKING:
     from .fitting.orders.select import OrderSelection as OrderSelection
     from .fitting.orders.select import select_orders as select_orders
     from .fitting.result import FitResult as FitResult
+    from .fleets import Fleet as Fleet
+    from .fleets.file import load_fleet as load_fleet
+    from .fleets.fleet import fleet as fleet
     from .joint.shafts import Shaft as Shaft
     from .logs.batch import correct_logs as correct_logs
     from .logs.fitting import fit_logs as fit_logs
@@ -31,9 +34,11 @@ if TYPE_CHECKING:
     from .model.model import HarmonicModel as HarmonicModel
     from .model.robot import Robot as Robot
     from .model.robotfile import load_robot as load_robot
+    from .monitoring.monitor import Monitor as Monitor
     from .planning.arc import plan_arc as plan_arc
     from .planning.plan import plan_mounts as plan_mounts
     from .rehearsal import Rehearsal as Rehearsal
+    from .rehearsal.after import plan_after as plan_after
     from .rehearsal.rehearse import rehearse as rehearse
     from .reports import report as report
     from .runs.checks import check as check
@@ -64,6 +69,7 @@ _PUBLIC = {
     "CalibrationRun": "runs.run",
     "Diagnosis": "diagnosis",
     "OrderSelection": "fitting.orders",
+    "plan_after": "rehearsal",
     "plan_arc": "planning",
     "plan_mounts": "planning",
     "select_orders": "fitting.orders",
@@ -80,9 +86,13 @@ _PUBLIC = {
     "join": "runs.joining",
     "fit": "fitting.fit",
     "fit_logs": "logs.fitting",
+    "Fleet": "fleets",
+    "fleet": "fleets",
+    "load_fleet": "fleets",
     "load_model": "model.file",
     "load_robot": "model.robotfile",
     "Moments": "estimation.moments",
+    "Monitor": "monitoring",
     "read_runs": "runs.files",
     "Rehearsal": "rehearsal",
     "rehearse": "rehearsal",

@@ -18,6 +18,7 @@ from .effects.channel_skew import ChannelSkewTerm as ChannelSkew
 from .effects.current_coupling import CurrentCouplingTerm as CurrentCoupling
 from .effects.direction_dependent_pattern import DirectionalPatternTerm as DirectionalPattern
 from .effects.filter_lag import FilterLagTerm as FilterLag
+from .effects.joint_coupling import JointCouplingTerm as JointCoupling
 from .effects.latency import LatencyTerm as Latency
 from .effects.load_dependent_gear_error import LoadDependentGearErrorTerm as LoadDependentGearError
 from .effects.local_defect import LocalDefectTerm as LocalDefect
@@ -36,6 +37,7 @@ __all__ = [
     "CurrentCoupling",
     "DirectionalPattern",
     "FilterLag",
+    "JointCoupling",
     "Latency",
     "LoadDependentGearError",
     "LocalDefect",

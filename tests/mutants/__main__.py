@@ -15,6 +15,8 @@ import time
 from collections import Counter
 from pathlib import Path
 
+sys.path.insert(0, str(Path(__file__).parent))  # started as a module, too
+
 from copies import Copy
 from faults import Fault, chosen, read_faults
 

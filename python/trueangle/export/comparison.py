@@ -16,6 +16,7 @@ from ..model.model import HarmonicModel
 from ..support.angles import ARCSEC_PER_TURN
 from ..support.display_units import ErrorsIn, ErrorUnit, error_unit
 from ..support.kinds import told_kinds
+from ..support.layout import laid_out
 from ..support.plainresult import PlainResult, counted
 from .pattern import TurnPattern
 
@@ -81,7 +82,7 @@ class Comparison(PlainResult):
         Parameters
         ----------
         errors_in : {"auto", "arcsec", "deg", "mrad", "count"} or float
-            Unit of the errors; by itself arcsec, or degrees where one reaches a degree. A
+            Unit of the errors; by itself arcsec, or degrees where errors are that large. A
             number is the counts of a turn.
         """
         unit = error_unit(errors_in, self.max_abs_arcsec)
@@ -96,7 +97,7 @@ class Comparison(PlainResult):
             size, std = unit.pair(row["amplitude_arcsec"] or 0.0, row["std_arcsec"])
             lines.append(f"{row['order']:7g}  {size:>16}  {row['phase_deg']:9.1f}  {std:>10}")
         lines += [f"not compared: {kind}" for kind in self.differ_in]
-        return "\n".join(lines)
+        return laid_out(lines)
 
     def _arithmetic(self, unit: ErrorUnit) -> list[str]:
         if self.table_max_abs_arcsec is None or self.table_rms_arcsec is None:

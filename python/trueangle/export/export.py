@@ -111,7 +111,8 @@ def export_model(
     rows = term_sizes(pattern, [t for t in pattern.left_out if not found.holds(t)])
     beside = sum(row["size_arcsec"] for row in rows)
     computed = found.at_run_time(pattern, given)
-    at_run_time = [] if computed is None else term_sizes(pattern, pattern.left_out)
+    held = [] if computed is None else [t for t in pattern.left_out if found.holds(t)]
+    at_run_time = term_sizes(pattern, held)
     steep, rounding = 1.0, 0.0
     if computed is not None:
         steep, rounding = run_time_bound(pattern, computed, at_run_time)

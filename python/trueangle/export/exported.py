@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from ..support.display_units import ErrorsIn, ErrorUnit, error_unit
+from ..support.layout import laid_out
 from ..support.plainresult import PlainResult
 from .proof import upward
 
@@ -91,14 +92,16 @@ class Exported(PlainResult):
         Parameters
         ----------
         errors_in : {"auto", "arcsec", "deg", "mrad", "count"} or float
-            Unit of the errors; by itself arcsec, or degrees where one reaches a degree. A
+            Unit of the errors; by itself arcsec, or degrees where errors are that large. A
             number is the counts of a turn.
         """
         unit = error_unit(errors_in, self.max_difference_total_arcsec)
         where = f"{self.output}: " if self.output else ""
-        lines = [
-            where + self.difference(unit, _SUMMARY_DIGITS),
-        ]
+        first = where + self.difference(unit, _SUMMARY_DIGITS)
+        if not self.left_out:
+            first = laid_out([first])
+        # Else it stays one line, however wide: who reads one reads all that is left out.
+        lines: list[str] = []
         if self.entries:
             lines.append(
                 f"{self.entries} entries for {self.target}, {self.bytes} bytes; {self.sign}, "
@@ -110,7 +113,8 @@ class Exported(PlainResult):
             lines.append(
                 f"of the orders, {worst['order']:g} loses most: {unit.text(worst['arcsec'])}"
             )
-        return "\n".join([*lines, *(f"note: {note}" for note in self.notes)])
+        further = laid_out([*lines, *(f"note: {note}" for note in self.notes)])
+        return f"{first}\n{further}" if further else first
 
     def difference(self, unit: ErrorUnit, digits: int) -> str:
         """One line: how far the corrected angle is from the model's, with all that is left out."""

@@ -28,6 +28,7 @@ from .fmusource import fmu_source
 from .pattern import TurnPattern
 from .proof import Proof
 from .reading import failed
+from .runtimeterms import is_own
 from .target import CommentBlock, Made, Option, TablePart, Target
 
 __all__ = ["Fmu"]
@@ -67,13 +68,13 @@ class Fmu(Target):
         return "add" if options["variant"] == "sensor" else "subtract"
 
     def holds(self, term: Term) -> bool:
-        return True
+        return is_own(term)
 
     def how(self, proof: Proof) -> str:
         return "the model's own series and terms in double precision"
 
     def make(self, pattern: TurnPattern, options: Mapping[str, Any]) -> Made:
-        model = pattern.source
+        model = pattern.source.replace(terms=tuple(filter(is_own, pattern.source.terms)))
         sensor = options["variant"] == "sensor"
         notes = [
             "every step of a co-simulation is a reading: what follows travel takes the steps in "

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 from ..model.model import HarmonicModel
@@ -11,6 +12,9 @@ from .fmudescription import Variable
 from .runtimeterms import RunTimeTerms
 
 __all__ = ["fmu_source"]
+
+#: Turns that the last step of a search may leave.
+_LEFT = 1e-17
 
 _PATTERN = """\
 /* The series, its slope where asked for, and the x with x + sign (zero + series(x)) = y. */
@@ -42,7 +46,8 @@ static double m_solved(double y, double sign)
         if (!(next >= low && next <= high)) {
             next = 0.5 * (low + high);
         }
-        if (fabs(next - x) <= 2e-16 * (1.0 + fabs(x))) {
+        /* A step of Newton's leaves half the curvature times its square. */
+        if (fabs(next - x) <= @near@ + 2e-16 * (1.0 + fabs(x))) {
             return next;
         }
         x = next;
@@ -256,13 +261,17 @@ def _pattern(terms: RunTimeTerms, zero: str) -> str:
         loop = f"""\
     for (i = 0; i < {len(series.orders)}; i++) {{
         const double phase = m_place(x, m_series0_orders[i]) + m_series0_phases[i];
-        sum += m_series0_sizes[i] * m_sine(phase);
+        const double turned = 6.283185307179586 * (phase - floor(phase));
+        sum += m_series0_sizes[i] * sin(turned);
         if (slope) {{
-            rise += 6.283185307179586 * m_series0_orders[i] * m_series0_sizes[i]
-                * m_sine(phase + 0.25);
+            rise += 6.283185307179586 * m_series0_orders[i] * m_series0_sizes[i] * cos(turned);
         }}
     }}"""
     text = _PATTERN.replace("@sum@", loop).replace("@zero@", zero)
+    pairs = zip(series.orders, series.amplitudes, strict=True)
+    bend = sum((2.0 * math.pi * m) ** 2 * c for m, c in pairs)
+    near = math.sqrt(_LEFT * max(1.0 - series.slope, 0.0) / max(bend, 1.0))
+    text = text.replace("@near@", DOUBLE.number(near))
     return table + "\n" + text.replace("@size@", DOUBLE.number(size * (1.0 + 1e-9) + 1e-12))
 
 

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import ArgumentError, OutsideSpanWarning
+from ..formats.signals import coupled_with
 from ..model.model import HarmonicModel
 from ..model.term import Term
 from ..support.angles import ARCSEC_PER_TURN
@@ -81,7 +82,10 @@ def run_time_bound(
 
 def _row(pattern: TurnPattern, term: Term) -> dict[str, Any]:
     ranges = ranges_of(pattern, term)
-    words = [f"{_range(*ranges[name])} {unit}" for name, unit in _UNITS.items() if name in ranges]
+    words = [
+        f"{_range(*values)} " + (_UNITS.get(name) or f"deg of joint {coupled_with(name)}")
+        for name, values in ranges.items()
+    ]
     return {
         "term": term.kind,
         "size_arcsec": _size(pattern, term, ranges) * ARCSEC_PER_TURN,
@@ -99,10 +103,11 @@ def ranges_of(pattern: TurnPattern, term: Term) -> dict[str, tuple[float, float]
     known = {name: (low, high) for name, low, high in fit.signals} if fit else {}
     needed = set(term.needs) | ({"velocity"} & {getattr(term, "follows", "")})
     found = {}
-    for name in _UNITS:
+    for name in (*_UNITS, *sorted(filter(coupled_with, needed))):
         if name not in needed:
             continue
-        turn = 360.0 / pattern.period if name == "velocity" else 1.0
+        is_angle = name == "velocity" or coupled_with(name)
+        turn = 360.0 / pattern.period if is_angle else 1.0
         middle = float(getattr(term, "reference_C", 0.0)) if name == "temperature" else 0.0
         low, high = known.get(name, ((middle - 1.0) / turn, (middle + 1.0) / turn))
         found[name] = (low * turn, high * turn)
@@ -120,8 +125,9 @@ def _size(pattern: TurnPattern, term: Term, ranges: Mapping[str, tuple[float, fl
     largest = 0.0
     for direction, values in product((1.0, -1.0), product(*ends)):
         signals = dict(zip(ranges, values, strict=True))
-        if "velocity" in signals:
-            signals["velocity"] *= pattern.period / 360.0
+        for name in signals:
+            if name == "velocity" or coupled_with(name):
+                signals[name] *= pattern.period / 360.0
         reading = direction * cells
         with warnings.catch_warnings():  # a size is looked for beyond the travel as well
             warnings.simplefilter("ignore", OutsideSpanWarning)

@@ -17,7 +17,7 @@ from ..support.angles import ARCSEC_PER_TURN
 from .chain import Chain, identifier, make_chain
 from .pattern import TurnPattern
 from .proof import lost_orders
-from .runtimeterms import DIRECTIONS, RunTimeTerms
+from .runtimeterms import DIRECTIONS, RunTimeTerms, is_own
 from .table import METHODS, NUMBERS, TURN, Table
 from .target import CommentBlock, Made, Option, TablePart, Target
 
@@ -112,14 +112,14 @@ class PortableTarget(Target):
         raise NotImplementedError
 
     def holds(self, term: Term) -> bool:
-        return True
+        return is_own(term)
 
     def at_run_time(self, pattern: TurnPattern, options: Mapping[str, Any]) -> RunTimeTerms | None:
-        terms = pattern.left_out
+        terms = tuple(filter(is_own, pattern.left_out))
         if not terms:
             return None
         if pattern.model.argument == "indicated":
-            terms = pattern.source.terms
+            terms = tuple(filter(is_own, pattern.source.terms))
         return RunTimeTerms.of(pattern.source, terms, options["direction"])
 
     def read(self, text: str, path: str, options: Mapping[str, Any]) -> HarmonicModel:

@@ -16,13 +16,14 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from ..errors import ArgumentError
+from ..formats.signals import coupled_with
 from ..model import forms
 from ..model.forms import Form
 from ..model.model import HarmonicModel
 from ..model.term import Term
 from ..terms import LocalDefect
 
-__all__ = ["DIRECTIONS", "RunTimeTerms", "Waves"]
+__all__ = ["DIRECTIONS", "RunTimeTerms", "Waves", "is_own"]
 
 #: What tells the direction of travel.
 DIRECTIONS = ("auto", "angle", "velocity", "signal")
@@ -60,6 +61,11 @@ class Waves(NamedTuple):
         """Bound of the slope."""
         pairs = zip(self.orders, self.amplitudes, strict=True)
         return 2.0 * math.pi * sum(abs(m) * c for m, c in pairs)
+
+
+def is_own(term: Term) -> bool:
+    """Whether the joint's own signals tell it: a program of one has no angles of others."""
+    return not any(coupled_with(name) for name in term.needs)
 
 
 @dataclass(frozen=True)

@@ -18,6 +18,7 @@ from ..support.suggestions import did_you_mean
 
 __all__ = [
     "AT_RUN_TIME",
+    "COUPLED",
     "FIELDS",
     "SIGNALS",
     "GivenSignals",
@@ -25,7 +26,9 @@ __all__ = [
     "Signals",
     "check_names",
     "column",
+    "coupled_with",
     "find_signal",
+    "is_at_run_time",
     "signal_columns",
 ]
 
@@ -60,8 +63,27 @@ class GivenSignals(TypedDict, Generic[T], total=False):
     current: T | None
 
 
-#: Names of the signals that a correction may take.
+#: Names of the signals that a correction may take, beside angles of other joints.
 AT_RUN_TIME: tuple[str, ...] = tuple(GivenSignals.__annotations__)
+
+#: Before the name of another joint: the signal that is its angle.
+COUPLED = "coupled_"
+
+
+def coupled_with(name: str) -> str | None:
+    """The other joint whose indicated angle the signal ``name`` is; None of other signals.
+
+    Examples
+    --------
+    >>> coupled_with("coupled_wrist2"), coupled_with("torque")
+    ('wrist2', None)
+    """
+    return (name.startswith(COUPLED) and name.removeprefix(COUPLED)) or None
+
+
+def is_at_run_time(name: str) -> bool:
+    """Whether a correction may take a signal of this name."""
+    return name in AT_RUN_TIME or coupled_with(name) is not None
 
 
 def check_names(given: Iterable[str]) -> None:
@@ -72,10 +94,10 @@ def check_names(given: Iterable[str]) -> None:
     TypeError
     """
     for name in given:
-        if name not in AT_RUN_TIME:
+        if not is_at_run_time(name):
             raise TypeError(
                 f"got an unexpected keyword argument {name!r}{did_you_mean(name, AT_RUN_TIME)}; "
-                f"signals are {', '.join(AT_RUN_TIME)}"
+                f"signals are {', '.join(AT_RUN_TIME)} and {COUPLED}JOINT"
             )
 
 
@@ -124,6 +146,8 @@ _HEAD = re.compile(r"head[1-9][0-9]?")
 def find_signal(name: str) -> Signal:
     """The signal called ``name``; ``head1`` to ``head99`` are readings of several heads.
 
+    ``coupled_JOINT`` is the indicated angle of another joint of a robot, as it counts turns.
+
     Raises
     ------
     ArgumentError
@@ -136,10 +160,12 @@ def find_signal(name: str) -> Signal:
     """
     if _HEAD.fullmatch(name):
         return Signal(name, "angle", f"{name}_{{}}", "one of several heads on one disc")
+    if coupled_with(name) is not None:
+        return Signal(name, "angle", f"{name}_{{}}", "indicated angle of another joint")
     try:
         return SIGNALS[name]
     except KeyError:
-        known = [*SIGNALS, "head1", "head2"]
+        known = [*SIGNALS, "head1", "head2", f"{COUPLED}JOINT"]
         raise ArgumentError(
             f"no signal is called {name!r}{did_you_mean(name, known)}; signals are "
             f"{', '.join(known)}"

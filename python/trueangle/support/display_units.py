@@ -14,14 +14,23 @@ from ..errors import ArgumentError
 from .suggestions import check_choice
 from .unit_periods import ARCSEC_PER_TURN, UNIT_PERIODS
 
-__all__ = ["ERROR_UNITS", "ErrorUnit", "ErrorsIn", "brief", "error_unit", "significant"]
+__all__ = [
+    "ERROR_UNITS",
+    "ErrorUnit",
+    "ErrorsIn",
+    "brief",
+    "error_unit",
+    "phase_pair",
+    "significant",
+    "sine_of_rms",
+]
 
 #: What may be asked for by name; a number is the counts of a turn.
 ERROR_UNITS: Final = ("auto", "arcsec", "deg", "mrad", "count")
 
 ErrorsIn: TypeAlias = str | float
 
-#: Largest error in arcsec from which on a summary is in degrees: one of them.
+#: Size of errors in arcsec from which on a summary is in degrees: one of them.
 LARGE: Final = 3600.0
 
 #: Digits of an uncertainty (GUM 7.2.6), and of a number that has none.
@@ -100,14 +109,15 @@ class ErrorUnit(NamedTuple):
 def error_unit(
     asked: ErrorsIn = "auto", largest: float = 0.0, period: float | None = None
 ) -> ErrorUnit:
-    """The unit asked for; by itself arcsec, or degrees where an error reaches a degree.
+    """The unit asked for; by itself arcsec, or degrees where errors are that large.
 
     Parameters
     ----------
     asked : str or float
         One of `ERROR_UNITS`, or the counts of a turn.
     largest : float
-        Largest error that will be shown, arcsec; ``"auto"`` goes by it.
+        How large the errors are, arcsec; ``"auto"`` goes by it. Of readings it is `sine_of_rms`:
+        then all that is told of the same readings is in one unit, and no outlier decides.
     period : float, optional
         Of the readings: the counts of a turn where they are in counts.
 
@@ -138,6 +148,32 @@ def error_unit(
     if asked not in turns:
         check_choice("errors_in", asked, ERROR_UNITS)
     return ErrorUnit(asked, turns[asked] / ARCSEC_PER_TURN)
+
+
+def sine_of_rms(rms: float) -> float:
+    r"""Amplitude of the sine that has this rms, :math:`\sqrt 2\,\mathrm{rms}`; 0 if unknown.
+
+    Examples
+    --------
+    >>> round(sine_of_rms(100.0), 1), sine_of_rms(math.nan)
+    (141.4, 0.0)
+    """
+    return math.sqrt(2.0) * rms if math.isfinite(rms) else 0.0
+
+
+def phase_pair(phase_deg: float, std_deg: float | None) -> tuple[str, str]:
+    """A phase in [0, 360) deg and its standard deviation, to the digits that it leaves.
+
+    Examples
+    --------
+    >>> phase_pair(-0.001, 0.14), phase_pair(-95.72, 0.7514)
+    (('0.00', '0.14'), ('264.28', '0.75'))
+    """
+    spread = math.nan if std_deg is None else min(std_deg, 180.0)
+    if not spread > 0.0:
+        return f"{round(phase_deg % 360.0, 2) % 360.0:.2f}", "-"
+    decimals = _decimals(spread, _UNCERTAIN_DIGITS)
+    return _fixed(round(phase_deg % 360.0, decimals) % 360.0, decimals), _fixed(spread, decimals)
 
 
 def significant(value: float, digits: int = _DIGITS) -> str:

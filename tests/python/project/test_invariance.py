@@ -15,8 +15,9 @@ SEED = 83_110
 ABSOLUTE = 1e-6
 RELATIVE = 1e-9
 
-#: The variance that zeros are drawn from is found by a search that ends at a hundred-millionth.
-SEARCHED = 1e-7
+#: The variance that zeros are drawn from is found by a search that ends at a hundred-millionth,
+#: and so are the rivals' parameters; of a difference of deviances ten times that is left.
+SEARCHED = 1e-6
 
 PERIODS = {"degrees": 360.0, "radians": 2.0 * np.pi, "turns": 1.0, "counts": 16384.0}
 

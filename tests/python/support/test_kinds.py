@@ -23,6 +23,10 @@ RUNS = [
     ta.CalibrationRun(t, t + 0.1 * np.sin(np.radians(t)), period=360.0)
     for t in (THETA, THETA + 3.0)
 ]
+UNITS = [
+    ta.CalibrationRun(t, t + a * np.sin(np.radians(t)), period=360.0, unit=f"{a}")
+    for t, a in ((THETA, 0.1), (THETA, 0.2), (THETA, 0.15))
+]
 SIMULATION = ta.Simulation(
     Joint(gear_ratio=1.0, fixed_member="none"),
     runs=(RunDesign("a", 1, 5.0, 60),),
@@ -40,6 +44,7 @@ CALLS = {
     ta.LoadDependentGearError: LINES,
     ta.LocalDefect: {"place": 1.0, "width": 2.0, "height": 0.01},
     ta.Moments: {"orders": [1]},
+    ta.Monitor: {"model": MODEL},
     ta.PreslidingHysteresis: {"amplitude": 0.1, "length": 3.0},
     ta.Shaft: {"name": "a", "cycles_per_turn": 1.0, **LINES},
     ta.Simulation: {},
@@ -56,9 +61,19 @@ CALLS = {
     ta.import_model: {"path": "t.csv", "target": "csv"},
     ta.join: {"a": "r.csv", "b": "r.csv"},
     ta.load_model: {"path": "m.json"},
+    ta.fleet: {"runs": UNITS, "orders": [1]},
+    ta.load_fleet: {"path": "fleet.json"},
     ta.load_robot: {"path": "robot.json"},
     ta.Robot: {"models": {"a": MODEL}},
     ta.load_simulation: {"path": "s.toml"},
+    ta.plan_after: {
+        "runs": RUNS,
+        "sim": SIMULATION,
+        "seeds": 0,
+        "within": 1.0,
+        "between": ["backlash"],
+        "limits": planning.Limits(runs=1, reversals=False),
+    },
     ta.plan_arc: {"start": 0.0, "stop": 180.0, "orders": [1], "readings": 6},
     ta.plan_mounts: {"gear_ratio": 10.0, "positions": 5, "orders": [1, 2]},
     ta.read_runs: {"path": "r.csv"},
@@ -69,6 +84,8 @@ CALLS = {
     ta.simulate: {"sim": SIMULATION},
     ta.wrap: {"angle": 1.0},
     ta.write_runs: {"runs": RUNS, "path": "w.csv"},
+    planning.Limits: {},
+    planning.load_limits: {"path": "l.toml"},
     planning.plan_encoder: {"gear_ratio": 10.0, "orders": [1, 2]},
     planning.plan_tilts: {"gear_ratio": 10.0, "positions": 5, "orders": [1, 2]},
     planning.readings_needed: {"noise": 1.0, "standard_error": 1.0, "factor": 1.0},
@@ -79,7 +96,7 @@ CALLS = {
     RunDesign: {},
 }
 #: Results, which the library makes.
-RESULTS = {"Diagnosis", "FitResult", "OrderSelection", "Rehearsal", "SelfCalibration"}
+RESULTS = {"Fleet", "Diagnosis", "FitResult", "OrderSelection", "Rehearsal", "SelfCalibration"}
 #: The same fit in one pass.
 OTHER_DOORS = {"fit_logs"}
 
@@ -110,6 +127,7 @@ def files(tmp_path_factory):
         patch.chdir(folder)
         MODEL.save("m.json")
         ta.Robot({"a": MODEL}).save("robot.json")
+        ta.fleet(UNITS, orders=[1]).save("fleet.json")
         SIMULATION.save("s.toml")
         ta.write_runs(RUNS, "r.csv")
         ta.export_model(MODEL, "csv", "t.csv", entries=8)

@@ -254,18 +254,18 @@ def test_a_search_that_was_cut_short_is_not_remembered():
     runs = simulate(TRUE, seed=5)
     signals = join_runs(runs)
     error = 3600.0 * np.concatenate([run.error for run in runs])
-    start = Regression(signals, error, BELIEVED.surroundings)
+    start = Regression.of(signals, error, BELIEVED.surroundings)
     for within in range(4, 40, 3):
         with entered(Pace(float(within), clock=Ticks())) as at:
             found = extensions(start, ["local_defect", "backlash"])
             cut = at.over
         if cut:
             assert len(found) < 2
-        alone = Regression(signals, error, BELIEVED.surroundings)
+        alone = Regression.of(signals, error, BELIEVED.surroundings)
         for extension, _, gain in extensions(start, ["local_defect", "backlash"]):
             fresh = [g for e, _, g in extensions(alone, [extension.cause])]
             assert fresh == [gain]
-        start = Regression(signals, error, BELIEVED.surroundings)
+        start = Regression.of(signals, error, BELIEVED.surroundings)
 
 
 def test_it_ends_in_the_time_given():

@@ -66,11 +66,14 @@ MADE: dict[str, Callable[[], object]] = {
     "comparison": lambda: ta.compare(FIT.model, FIT.model),
     "check": lambda: ta.check(RUNS),
     "plan": plan_mounts,
+    "plan of next runs": lambda: diagnosed().plan(between=["thermal_drift"]),
     "plan without a reference": lambda: plan_self("heads", orders=range(1, 5)),
+    "fleet": lambda: ta.fleet(RUNS, orders=[1, 2]),
     "rehearsal": lambda: ta.rehearse(SIM, causes=["thermal_drift"], seeds=4, workers=1),
     "simulation": lambda: SIM,
     "export": lambda: ta.export_model(FIT.model, "csv"),
     "moments": moments,
+    "monitor": lambda: ta.Monitor(FIT.model),
     "solved moments": lambda: moments().solve(),
 }
 

@@ -10,6 +10,7 @@ from .inputs import (
 )
 from .kinds import (
     CERTIFICATE,
+    FLEET,
     MODEL,
     PAGE,
     PDF,
@@ -30,6 +31,7 @@ from .workplace import remove_leftovers, restore
 
 __all__ = [
     "CERTIFICATE",
+    "FLEET",
     "MODEL",
     "MODEL_BYTES",
     "PAGE",

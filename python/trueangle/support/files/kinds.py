@@ -10,6 +10,7 @@ from typing import Final, NamedTuple
 from ...errors import FileError
 
 __all__ = [
+    "FLEET",
     "MODEL",
     "PAGE",
     "PDF",
@@ -126,6 +127,7 @@ def promised_format(path: str | PathLike[str]) -> str | None:
 
 
 MODEL: Final = Kind("a model (JSON)", (".json",))
+FLEET: Final = Kind("a fleet (JSON)", (".json",))
 SIMULATION: Final = Kind("a simulation (TOML)", (".toml",))
 #: What a simulator takes, by the ending.
 SENSOR: Final = Kind("a sensor of a simulator (MJCF or FMU)", (".xml", ".fmu"))

@@ -1,0 +1,85 @@
+"""Text for people, laid out: lines no wider than the terminal, folded under their text."""
+
+from __future__ import annotations
+
+import re
+import shutil
+import textwrap
+from collections.abc import Iterable
+from typing import Final
+
+__all__ = ["columns", "laid_out", "wrapped"]
+
+#: Columns of a line at least and at most; without a terminal it is `_USUAL`.
+_NARROWEST, _WIDEST, _USUAL = 60, 100, 80
+
+#: How a line begins that is there to be copied, and stays whole.
+_COPIED: Final = ("--", "trueangle ")
+
+#: What further lines of an entry stand under: the text behind a mark, a number or a label.
+_LEAD: Final = re.compile(r"\s*(?:- |! |\[\d+\] |\d+\. |note: |\S.{0,28}? {2,}(?=\S))?")
+
+
+def columns() -> int:
+    """Columns that a text may have: the terminal's (``COLUMNS``), within readable bounds.
+
+    Examples
+    --------
+    >>> 60 <= columns() <= 100
+    True
+    """
+    found = shutil.get_terminal_size((_USUAL, 24)).columns
+    return min(max(found, _NARROWEST), _WIDEST)
+
+
+def wrapped(text: str, indent: int = 0, first: int = 0) -> list[str]:
+    """Lines of a paragraph; ``first`` and ``indent`` are how far the first and others stand in.
+
+    Words are never broken, so that options and paths can be copied.
+
+    Examples
+    --------
+    >>> wrapped("a word and " * 8 + "an end", indent=2)[1]
+    '  word and an end'
+    """
+    return textwrap.wrap(
+        text,
+        columns(),
+        initial_indent=" " * first,
+        subsequent_indent=" " * indent,
+        break_long_words=False,
+        break_on_hyphens=False,
+    )
+
+
+def laid_out(lines: Iterable[str]) -> str:
+    """Lines as one text; what is too long is folded under the text behind its label.
+
+    Examples
+    --------
+    >>> print(laid_out(["  noise    " + "of one reading, " * 5]))
+      noise    of one reading, of one reading, of one reading, of one reading, of
+               one reading,
+    """
+    width = columns()
+    found: list[str] = []
+    for line in lines:
+        if len(line) <= width or line.lstrip().startswith(_COPIED):
+            found.append(line)
+            continue
+        lead = _LEAD.match(line)
+        found += _folded(line, width, max(lead.end() if lead else 0, 2))
+    return "\n".join(found)
+
+
+def _folded(line: str, width: int, indent: int) -> list[str]:
+    """One line as several, cut at blanks."""
+    parts: list[str] = []
+    while len(line) > width:
+        cut = line.rfind(" ", indent + 1, width + 1)
+        cut = cut if cut > 0 else line.find(" ", width)
+        if cut < 0:
+            break
+        parts.append(line[:cut].rstrip())
+        line = " " * indent + line[cut:].lstrip()
+    return [*parts, line.rstrip()]
