@@ -172,6 +172,7 @@ def test_a_step_that_was_not_finished_names_nothing():
     assert result.findings == []
 
 
+@pytest.mark.usefixtures("default_time")
 def test_work_without_a_time_given_is_bounded_by_its_readings():
     now = [0.0]
     for items, allowed in ((0, 5.0), (10_000, 5.0), (40_000, 20.0)):
@@ -222,6 +223,7 @@ class Busy:
         return self.seconds
 
 
+@pytest.mark.usefixtures("default_time")
 @pytest.mark.parametrize("command", [False, True])
 def test_a_diagnosis_comes_to_an_end_by_itself_and_says_so(command, files, capsys, monkeypatch):
     """So slow a processor that the time is up after the first causes: what is there is told."""
