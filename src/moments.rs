@@ -8,6 +8,7 @@
 pub mod accumulate;
 pub mod accumulator;
 mod chunk;
+mod combined;
 pub mod expected;
 pub mod factor;
 pub mod normal;

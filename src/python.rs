@@ -3,6 +3,8 @@
 // Arguments of a Python function have names: many of them are no confusion.
 #![allow(clippy::too_many_arguments)]
 
+mod alike;
+mod angles;
 mod array;
 mod circle;
 mod corrector;
@@ -17,7 +19,9 @@ mod motion;
 mod number;
 mod release;
 mod robot;
+mod robotcall;
 mod series;
+mod signals;
 mod spectrum;
 mod step;
 mod table;
@@ -45,7 +49,10 @@ mod _core {
     use super::circle::{covered_span, residuals, resultant};
 
     #[pymodule_export]
-    use super::corrector::{PyAlike, PyCorrector};
+    use super::alike::PyAlike;
+
+    #[pymodule_export]
+    use super::corrector::PyCorrector;
 
     #[pymodule_export]
     use super::fit::{

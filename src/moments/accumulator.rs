@@ -3,9 +3,9 @@
 use super::accumulate::{Tally, accumulate, accumulate_stretches};
 use super::expected::Expected;
 use super::place::{Around, Frame};
-use super::segment::Segment;
+use super::segment::{Segment, compensate};
 use super::waiting::Waiting;
-use crate::angle::{Period, two_sum};
+use crate::angle::Period;
 use crate::error::Error;
 use crate::readings::Readings;
 use crate::{interrupt, memory, threads};
@@ -36,20 +36,20 @@ const FEWEST_SEGMENTS: usize = 32;
 /// Moments of one run of readings.
 #[derive(Clone, Debug)]
 pub struct Accumulator {
-    cycles: f64,
-    highest: u32,
+    pub(super) cycles: f64,
+    pub(super) highest: u32,
     /// Turn of the base shaft.
-    base: Period,
+    pub(super) base: Period,
     /// Turn of the errors.
-    period: Period,
-    centre: f64,
+    pub(super) period: Period,
+    pub(super) centre: f64,
     /// Sums of the block under way, of all blocks before it, and what rounding took.
-    block: Vec<Segment>,
-    pending: usize,
-    total: Vec<Segment>,
-    carry: Vec<Segment>,
-    squares: (f64, f64),
-    count: usize,
+    pub(super) block: Vec<Segment>,
+    pub(super) pending: usize,
+    pub(super) total: Vec<Segment>,
+    pub(super) carry: Vec<Segment>,
+    pub(super) squares: (f64, f64),
+    pub(super) count: usize,
 }
 
 /// Segments of the circle for orders up to `highest`, an even number.
@@ -288,7 +288,7 @@ impl Accumulator {
     }
 
     /// Adds the block under way to the total.
-    fn flush(&mut self) {
+    pub(super) fn flush(&mut self) {
         let mut block = std::mem::take(&mut self.block);
         self.add_to_total(&block);
         block.fill(Segment::EMPTY);
@@ -296,66 +296,11 @@ impl Accumulator {
         self.pending = 0;
     }
 
-    fn add_to_total(&mut self, moments: &[Segment]) {
+    pub(super) fn add_to_total(&mut self, moments: &[Segment]) {
         let sums = self.total.iter_mut().zip(&mut self.carry);
         for ((total, carry), moments) in sums.zip(moments) {
             total.add(carry, moments);
         }
-    }
-
-    /// Forgets all readings.
-    fn clear(&mut self) {
-        for table in [&mut self.block, &mut self.total, &mut self.carry] {
-            table.fill(Segment::EMPTY);
-        }
-        self.pending = 0;
-        self.squares = (0.0, 0.0);
-        self.count = 0;
-    }
-
-    /// Every reading so many times as heavy.
-    pub fn scale(&mut self, factor: f64) {
-        self.flush();
-        for table in [&mut self.total, &mut self.carry] {
-            let moments = table.iter_mut().flat_map(Segment::values_mut);
-            moments.for_each(|value| *value *= factor);
-        }
-        self.squares = (self.squares.0 * factor, self.squares.1 * factor);
-    }
-
-    /// Takes away readings that were added before; extremes stay as they are.
-    pub fn subtract(&mut self, other: &Self) {
-        let mut opposite = other.clone();
-        opposite.scale(-1.0);
-        let left = self.count.saturating_sub(other.count);
-        self.merge(&opposite);
-        self.count = left;
-    }
-
-    /// Adds the moments of other readings of the same run, taken over the same segments.
-    pub fn merge(&mut self, other: &Self) {
-        let shift = self.period.wrap(other.centre - self.centre);
-        let mut moved = other.clone();
-        moved.flush();
-        if shift != 0.0 {
-            let (weight, error) = moved.sums();
-            let squares = shift * (2.0 * error + shift * weight);
-            compensate(&mut moved.squares.0, &mut moved.squares.1, squares);
-            for table in [&mut moved.total, &mut moved.carry] {
-                table.iter_mut().for_each(|s| *s = s.shifted(shift));
-            }
-        }
-        self.absorb(moved);
-        self.count += other.count;
-    }
-
-    /// Adds another's sums, its centre being the same.
-    fn absorb(&mut self, mut other: Self) {
-        other.flush();
-        self.add_to_total(&other.total);
-        self.add_to_total(&other.carry);
-        compensate(&mut self.squares.0, &mut self.squares.1, other.squares.0);
-        compensate(&mut self.squares.0, &mut self.squares.1, other.squares.1);
     }
 
     /// Sum of the weights.
@@ -364,53 +309,11 @@ impl Accumulator {
     }
 
     /// Sums of the weights and of the weighted errors.
-    fn sums(&self) -> (f64, f64) {
+    pub(super) fn sums(&self) -> (f64, f64) {
         let moments = self.moments();
         let weight = moments.iter().map(|s| s.weight[0]).sum();
         let error = moments.iter().map(|s| s.error[0]).sum();
         (weight, error)
-    }
-
-    /// All sums as plain numbers, for storage; `restore` takes them back.
-    pub fn store(&self) -> Vec<f64> {
-        let mut sums = self.clone();
-        sums.flush();
-        let mut numbers = vec![
-            self.centre,
-            self.count as f64,
-            self.squares.0,
-            self.squares.1,
-        ];
-        for table in [&sums.total, &sums.carry] {
-            numbers.extend(table.iter().flat_map(Segment::values));
-        }
-        numbers.extend(sums.total.iter().flat_map(|segment| segment.extremes));
-        numbers
-    }
-
-    /// An accumulator over the same orders with the sums of another; None when the
-    /// numbers are not its own.
-    pub fn restore(&self, numbers: &[f64]) -> Option<Self> {
-        let (head, values) = numbers.split_first_chunk::<4>()?;
-        let mut sums = self.clone();
-        sums.clear();
-        sums.centre = head[0];
-        sums.count = head[1] as usize;
-        sums.squares = (head[2], head[3]);
-        let extremes = values.len().checked_sub(4 * sums.total.len())?;
-        let (values, extremes) = values.split_at(extremes);
-        let places = sums.total.iter_mut().chain(&mut sums.carry);
-        let mut places: Vec<_> = places.flat_map(Segment::values_mut).collect();
-        if places.len() != values.len() {
-            return None;
-        }
-        for (place, value) in places.iter_mut().zip(values) {
-            **place = *value;
-        }
-        for (segment, extremes) in sums.total.iter_mut().zip(extremes.as_chunks().0) {
-            segment.extremes = *extremes;
-        }
-        Some(sums)
     }
 
     /// The moments of every segment over Chebyshev polynomials.
@@ -424,32 +327,5 @@ impl Accumulator {
             moments.chebyshev()
         };
         sums.map(moments).collect()
-    }
-}
-
-/// Adds `value` to `sum`; what rounding takes goes to `carry`.
-fn compensate(sum: &mut f64, carry: &mut f64, value: f64) {
-    let (total, lost) = two_sum(*sum, value);
-    *sum = total;
-    *carry += lost;
-}
-
-impl Segment {
-    /// Adds moments; what rounding takes goes to `carry`.
-    fn add(&mut self, carry: &mut Self, moments: &Self) {
-        add_all(&mut self.weight, &mut carry.weight, &moments.weight);
-        add_all(&mut self.error, &mut carry.error, &moments.error);
-        self.widen(moments.extremes);
-    }
-}
-
-/// Arrays, not one iterator over both: the loop that fits vectors.
-fn add_all<const TERMS: usize>(
-    sums: &mut [f64; TERMS],
-    carries: &mut [f64; TERMS],
-    values: &[f64; TERMS],
-) {
-    for i in 0..TERMS {
-        compensate(&mut sums[i], &mut carries[i], values[i]);
     }
 }

@@ -1,5 +1,7 @@
 //! Moments of the readings in one segment of the circle.
 
+use crate::angle::two_sum;
+
 /// Elements of the widest vector register.
 pub const LANES: usize = 8;
 
@@ -101,6 +103,33 @@ pub(super) fn fold(coefficients: &mut [f64]) {
     }
     fold(low);
     fold(high);
+}
+
+/// Adds `value` to `sum`; what rounding takes goes to `carry`.
+pub fn compensate(sum: &mut f64, carry: &mut f64, value: f64) {
+    let (total, lost) = two_sum(*sum, value);
+    *sum = total;
+    *carry += lost;
+}
+
+impl Segment {
+    /// Adds moments; what rounding takes goes to `carry`.
+    pub fn add(&mut self, carry: &mut Self, moments: &Self) {
+        add_all(&mut self.weight, &mut carry.weight, &moments.weight);
+        add_all(&mut self.error, &mut carry.error, &moments.error);
+        self.widen(moments.extremes);
+    }
+}
+
+/// Arrays, not one iterator over both: the loop that fits vectors.
+fn add_all<const TERMS: usize>(
+    sums: &mut [f64; TERMS],
+    carries: &mut [f64; TERMS],
+    values: &[f64; TERMS],
+) {
+    for i in 0..TERMS {
+        compensate(&mut sums[i], &mut carries[i], values[i]);
+    }
 }
 
 #[cfg(test)]

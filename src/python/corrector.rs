@@ -2,18 +2,18 @@
 
 use std::sync::Arc;
 
-use numpy::{PyArray1, PyArrayDescrMethods, PyArrayDyn, PyUntypedArray, PyUntypedArrayMethods};
+use numpy::PyUntypedArrayMethods;
 use pyo3::exceptions::PyTypeError;
-use pyo3::intern;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyTuple};
 
-use super::array::{Angles, as_array, data, numpy_module, shown};
+use super::alike::PyAlike;
 use super::door::{self, Computation, Computed};
-use super::failure::{argument_error, kind_error, missing_other};
+use super::failure::{argument_error, missing_other};
 use super::number::{is_number, single};
 use super::release::{attached, detached};
 use super::series::PySeries;
+use super::signals::{Taken, as_signal, broadcast, columns};
 use super::terms::{OTHER, forms, signal_of};
 use super::threads::{Asked, threads};
 use crate::error::Error;
@@ -143,7 +143,7 @@ impl PyCorrector {
     }
 
     /// So many joints of these terms, each with a past of its own.
-    fn alike(&self, py: Python<'_>, count: usize) -> PyAlike {
+    pub(super) fn alike(&self, py: Python<'_>, count: usize) -> PyAlike {
         PyAlike {
             inner: Alike::new(Arc::clone(self.inner.terms()), count),
             corrector: Self {
@@ -183,70 +183,6 @@ impl PyCorrector {
         Ok(self
             .compute(quantity, theta, out, signals, threads, path, None)?
             .0)
-    }
-}
-
-/// Joints of the same terms, each with a past of its own.
-#[pyclass(name = "Alike", module = "trueangle._core")]
-pub struct PyAlike {
-    inner: Alike,
-    corrector: PyCorrector,
-}
-
-#[pymethods]
-impl PyAlike {
-    fn __len__(&self) -> usize {
-        self.inner.len()
-    }
-
-    /// Others with the same past.
-    fn copy(&self, py: Python<'_>) -> Self {
-        let mut made = self.corrector.alike(py, 0);
-        made.inner = self.inner.clone();
-        made
-    }
-
-    /// Forget the past of some.
-    fn reset(&mut self, py: Python<'_>, joints: Vec<usize>) -> PyResult<()> {
-        if let Some(joint) = joints.iter().find(|&&joint| joint >= self.inner.len()) {
-            let problem = format!("there is no joint {joint} among {}", self.inner.len());
-            return Err(argument_error(py, problem));
-        }
-        for joint in joints {
-            self.inner.reset(joint);
-        }
-        Ok(())
-    }
-
-    /// The error of every joint at its angle; signals are of the same shape or one value.
-    #[pyo3(signature = (angles, /, **signals))]
-    fn error<'py>(
-        &mut self,
-        angles: &Bound<'py, PyAny>,
-        signals: Option<&Bound<'py, PyDict>>,
-    ) -> PyResult<Bound<'py, PyArray1<f64>>> {
-        let py = angles.py();
-        let signals = match signals {
-            Some(given) => self.corrector.taken(given)?,
-            None => Vec::new(),
-        };
-        let given = |signal| signals.iter().any(|(known, _)| *known == signal);
-        self.corrector.check_others(py, given)?;
-        let angles = as_signal(angles, "angles")?;
-        let slices = |values: &Bound<'py, PyUntypedArray>| {
-            // SAFETY: a contiguous array of doubles that is kept while the slice is used.
-            unsafe { std::slice::from_raw_parts(data::<f64>(values), values.len()) }
-        };
-        let columns = signals
-            .iter()
-            .fold(Columns::default(), |columns, (signal, values)| {
-                columns.with(*signal, slices(values))
-            });
-        let mut errors = vec![0.0; angles.len()];
-        attached(py, || {
-            self.inner.errors(slices(&angles), &columns, &mut errors)
-        })??;
-        Ok(PyArray1::from_vec(py, errors))
     }
 }
 
@@ -303,7 +239,7 @@ impl PyCorrector {
     }
 
     /// Refuses to go on without the angle of another joint, by its name.
-    fn check_others(&self, py: Python<'_>, given: impl Fn(Signal) -> bool) -> PyResult<()> {
+    pub fn check_others(&self, py: Python<'_>, given: impl Fn(Signal) -> bool) -> PyResult<()> {
         let mut named = self.others.iter().zip(Signal::OTHERS);
         match named.find(|(_, signal)| !given(**signal)) {
             Some((name, _)) => Err(missing_other(py, name)?),
@@ -342,14 +278,7 @@ impl PyCorrector {
         } else {
             Some(broadcast(x, &mut signals)?)
         };
-        let columns = signals
-            .iter()
-            .fold(Columns::default(), |columns, (signal, values)| {
-                // SAFETY: a contiguous array of doubles that is kept while the slice is used.
-                let values =
-                    unsafe { std::slice::from_raw_parts(data::<f64>(values), values.len()) };
-                columns.with(*signal, values)
-            });
+        let columns = columns(&signals);
         let samples = angles.as_ref().map_or(1, |angles| angles.plain.len());
         let mut wish = Wish {
             quantity,
@@ -366,14 +295,9 @@ impl PyCorrector {
             }
         }
     }
-}
 
-/// A signal and its values.
-type Taken<'py> = (Signal, Bound<'py, PyUntypedArray>);
-
-impl PyCorrector {
     /// Those of the given signals that the terms take.
-    fn taken<'py>(&self, given: &Bound<'py, PyDict>) -> PyResult<Vec<Taken<'py>>> {
+    pub fn taken<'py>(&self, given: &Bound<'py, PyDict>) -> PyResult<Vec<Taken<'py>>> {
         let mut taken = Vec::with_capacity(given.len());
         for (name, values) in given {
             let name: String = name.extract()?;
@@ -386,80 +310,4 @@ impl PyCorrector {
         }
         Ok(taken)
     }
-}
-
-/// A signal as doubles in the order they were taken; one value stays one.
-pub fn as_signal<'py>(
-    given: &Bound<'py, PyAny>,
-    name: &str,
-) -> PyResult<Bound<'py, PyUntypedArray>> {
-    let py = given.py();
-    let (array, _) = as_array(given, name)?;
-    let dtype = array.dtype();
-    if !matches!(dtype.kind(), b'f' | b'i' | b'u') {
-        let problem = format!("{name} must be real numbers, got an array of dtype {dtype}");
-        return Err(kind_error(py, problem));
-    }
-    in_order(&array)
-}
-
-/// Contiguous doubles in C order.
-pub fn in_order<'py>(array: &Bound<'py, PyUntypedArray>) -> PyResult<Bound<'py, PyUntypedArray>> {
-    let py = array.py();
-    if let Ok(doubles) = array.cast::<PyArrayDyn<f64>>()
-        && doubles.is_c_contiguous()
-        && array.is_aligned()
-    {
-        return Ok(array.clone());
-    }
-    let made = numpy_module(py)?.call_method1(
-        intern!(py, "ascontiguousarray"),
-        (array, intern!(py, "float64")),
-    )?;
-    Ok(made.cast_into()?)
-}
-
-/// Angles and signals of one shape.
-fn broadcast<'py>(x: &Bound<'py, PyAny>, signals: &mut [Taken<'py>]) -> PyResult<Angles<'py>> {
-    let py = x.py();
-    let (given, labels) = match x.cast_exact::<PyUntypedArray>() {
-        Ok(array) => (array.clone(), None),
-        Err(_) => as_array(x, "angles")?,
-    };
-    let fits = |(_, values): &Taken<'py>| {
-        values.shape() == given.shape() || (values.len() == 1 && values.ndim() == 0)
-    };
-    if signals.iter().all(fits) {
-        return Angles::of_array(given, labels, true);
-    }
-    let numpy = numpy_module(py)?;
-    let shapes: Vec<_> = std::iter::once(&given)
-        .chain(signals.iter().map(|(_, values)| values))
-        .map(|array| PyTuple::new(py, array.shape()))
-        .collect::<PyResult<_>>()?;
-    let shape = numpy
-        .call_method1(intern!(py, "broadcast_shapes"), PyTuple::new(py, &shapes)?)
-        .map_err(|_| {
-            let others: Vec<_> = signals
-                .iter()
-                .map(|(signal, values)| format!("{} {}", signal.name(), shown(values.shape())))
-                .collect();
-            let (own, others) = (shown(given.shape()), others.join(", "));
-            let problem = format!(
-                "signals must have the shape of the angles {own} or one value, got {others}"
-            );
-            argument_error(py, problem)
-        })?;
-    let spread = |array: &Bound<'py, PyUntypedArray>| -> PyResult<Bound<'py, PyUntypedArray>> {
-        let spread = numpy.call_method1(intern!(py, "broadcast_to"), (array, &shape))?;
-        Ok(spread.cast_into()?)
-    };
-    for (_, values) in signals.iter_mut() {
-        if values.len() != 1 {
-            *values = in_order(&spread(values)?)?;
-        }
-    }
-    let wide = spread(&given)?;
-    let labels = labels.filter(|_| wide.shape() == given.shape());
-    Angles::of_array(wide, labels, true)
 }

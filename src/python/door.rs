@@ -8,7 +8,8 @@ use pyo3::intern;
 use pyo3::prelude::*;
 use pyo3::types::PyFloat;
 
-use super::array::{Angles, Kind, data, numpy_module};
+use super::angles::Angles;
+use super::array::{Kind, data, numpy_module};
 use super::failure::argument_error;
 use super::number::{is_number, value_of};
 use super::release::{attached, detached};
