@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property, partial
 from os import PathLike
-from typing import TYPE_CHECKING, Any, Literal, TypeAlias, Unpack, overload
+from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -14,14 +14,14 @@ from numpy.typing import ArrayLike, NDArray
 import trueangle._core as _core
 
 from ..errors import ArgumentError
-from ..formats.signals import AT_RUN_TIME, GivenSignals, check_names
+from ..formats.signals import AT_RUN_TIME
 from ..joint.shafts import Shaft
 from ..support.angles import check_period
 from ..support.drawn import drawn
 from ..support.kinds import told_kinds
 from ..support.oftype import all_of_type, of_type
-from ..support.plainresult import Shown
 from . import summary as modelsummary
+from .evaluation import Evaluation
 from .records import FitRecord, Provenance
 from .spanguard import SpanGuard
 from .step import ExchangeableStep, Step, exchangeable
@@ -36,13 +36,12 @@ if TYPE_CHECKING:
 __all__ = ["Argument", "HarmonicModel", "Step", "check_invertible"]
 
 Argument: TypeAlias = Literal["reference", "indicated"]
-Path: TypeAlias = Literal["table", "cubics", "exact", "direct", "counts"]
 Array: TypeAlias = NDArray[np.float64]
 
 
 @told_kinds
 @dataclass(frozen=True, eq=False, repr=False)
-class HarmonicModel(Shown):
+class HarmonicModel(Evaluation):
     r"""Angle error as a constant, harmonics of one or more shafts and terms; immutable.
 
     .. math:: \varepsilon(x) = C_0 + \sum_s \sum_k A_{sk} \cos(k f_s x) + B_{sk} \sin(k f_s x)
@@ -155,142 +154,7 @@ class HarmonicModel(Shown):
             self.argument,
         )
 
-    # -- evaluation ---------------------------------------------------------------
-
-    @overload
-    def error(
-        self,
-        theta: float,
-        out: None = None,
-        *,
-        threads: int | None = None,
-        path: Path | None = None,
-        **signals: Unpack[GivenSignals[float]],
-    ) -> float: ...
-    @overload
-    def error(
-        self,
-        theta: ArrayLike,
-        out: NDArray[Any] | None = None,
-        *,
-        threads: int | None = None,
-        path: Path | None = None,
-        **signals: Unpack[GivenSignals[ArrayLike]],
-    ) -> NDArray[Any]: ...
-    def error(
-        self,
-        theta: ArrayLike,
-        out: NDArray[Any] | None = None,
-        *,
-        threads: int | None = None,
-        path: Path | None = None,
-        **signals: Unpack[GivenSignals[ArrayLike]],
-    ) -> float | NDArray[Any]:
-        """Error of the joint at angle ``theta``, in the unit of ``period``.
-
-        Parameters
-        ----------
-        theta : float or array_like
-            The model's `argument`: any shape, any number of turns. float32 gives
-            float32, integers (counts) and everything else float64.
-        out : ndarray, optional
-            Where to put the result, of the result's shape and type; may be ``theta``.
-        threads : int, optional
-            At most so many; by default all allowed to the process for large arrays.
-        path : {"table", "cubics", "exact", "direct", "counts"}, optional
-            Forces a way of evaluation, of a model without terms ("cubics": float32 only).
-        direction, velocity, temperature, torque, current : float or array_like, optional
-            Signals at the samples, broadcast: sign of travel (0 keeps the last one),
-            angle units per second, degrees Celsius, newton metres, amperes. `signals` names
-            those the model needs; others are ignored.
-
-        Returns
-        -------
-        float or ndarray
-            A float for a float. NaN and infinite angles give NaN.
-
-        Raises
-        ------
-        ArgumentError
-            ``out`` of the wrong shape or type, or partly overlapping ``theta``.
-        MissingSignalError
-            Names a signal that was not given and the term that needs it.
-
-        Notes
-        -----
-        Backlash and hysteresis take the samples in the order given (C order), the first
-        one before any motion; without ``direction`` and ``velocity`` they follow the
-        angle itself. `corrector` carries that state over batches.
-
-        Within 3e-15 of the sum of amplitudes for angles up to a million radians and
-        orders up to 512; the cost does not depend on the number of orders when every
-        shaft turns a whole number of times per turn. float32 takes cubics in single
-        precision, within 2.4e-7 of the sum of amplitudes and the constant at any angle;
-        ``path="table"`` computes it in double precision and rounds once.
-        """
-        if signals:
-            check_names(signals)
-        if self.terms:
-            return self._core_corrector().error(theta, out, threads=threads, path=path, **signals)
-        return self._series.error(theta, out, threads, path)
-
-    @overload
-    def correct(
-        self,
-        indicated: float,
-        out: None = None,
-        *,
-        threads: int | None = None,
-        path: Path | None = None,
-        **signals: Unpack[GivenSignals[float]],
-    ) -> float: ...
-    @overload
-    def correct(
-        self,
-        indicated: ArrayLike,
-        out: NDArray[Any] | None = None,
-        *,
-        threads: int | None = None,
-        path: Path | None = None,
-        **signals: Unpack[GivenSignals[ArrayLike]],
-    ) -> NDArray[Any]: ...
-    def correct(
-        self,
-        indicated: ArrayLike,
-        out: NDArray[Any] | None = None,
-        *,
-        threads: int | None = None,
-        path: Path | None = None,
-        **signals: Unpack[GivenSignals[ArrayLike]],
-    ) -> float | NDArray[Any]:
-        """True angle behind an indicated one: ``indicated - error(true angle)``.
-
-        With ``argument="reference"`` this solves ``theta + error(theta) = indicated``
-        to below 1e-12 of a turn; with ``"indicated"`` it is ``indicated -
-        error(indicated)``. Turns are kept: the result is not wrapped.
-
-        Parameters and errors are those of `error`.
-
-        Warns
-        -----
-        OutsideSpanWarning
-            Once per model, when it was fitted on part of a turn only and a corrected
-            angle lies outside that part.
-        """
-        if signals:
-            check_names(signals)
-        stretch = self._warn.stretch
-        if self.terms:
-            corrected, outside = self._core_corrector().correct(
-                indicated, out, threads=threads, path=path, stretch=stretch, **signals
-            )
-        elif stretch is None:
-            return self._series.correct(indicated, out, threads, path)
-        else:
-            corrected, outside = self._series.correct_within(indicated, stretch, out, threads, path)
-        if outside:
-            self._warn(outside, np.size(corrected))
-        return corrected
+    # -- one sample after another --------------------------------------------------
 
     def corrector(self) -> Corrector:
         """`correct` that carries its state from batch to batch and step to step.
