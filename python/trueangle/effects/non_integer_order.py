@@ -18,6 +18,7 @@ from .blindness import (
     Blindness,
 )
 from .drift_within_run import DriftWithinRun
+from .drawnline import place_std
 from .effect import ALWAYS, Effect
 from .missing_order import MissingOrder
 from .orderspectrum import OrderSpectrum
@@ -212,10 +213,10 @@ class NonIntegerOrder(Effect):
         # Cosine and sine each of variance s^2: a mean square amplitude of 2 s^2.
         amplitude = float(np.sqrt(2.0 * extension.run_effect.ratio * regression.variance))
         noise = float(np.sqrt(2.0 * regression.variance / regression.n))
-        turns = float(np.median(regression.signals.run_turns()))
-        order_std = 0.780 * noise / np.sqrt(2.0) / max(amplitude, 1e-12) / turns
+        theta = regression.signals.theta
+        waves = line_columns(theta, extension.shape["order"])
         parameters = {
-            "order": quantity(extension.shape["order"], order_std),
+            "order": quantity(extension.shape["order"], place_std(regression, waves, theta)),
             "amplitude_arcsec": quantity(
                 amplitude, float(np.hypot(noise, amplitude / np.sqrt(4.0 * runs)))
             ),

@@ -20,6 +20,7 @@ from ..joint.signals import Signals
 from .blindness import Blindness
 from .drawing import reading_rate
 from .drift_within_run import DriftWithinRun
+from .drawnline import place_std
 from .effect import ALWAYS, Effect
 from .missing_order import MissingOrder
 from .non_integer_order import NonIntegerOrder
@@ -118,7 +119,9 @@ class TimePeriodic(Effect):
                 continue
             shape = {"frequency_hz": frequencies[place].tolist()}
             step = frequencies[1] - frequencies[0]
-            shape["frequency_hz"] = _refined(regression, shape["frequency_hz"], float(step))
+            shape["frequency_hz"] = _refined(
+                regression, shape["frequency_hz"], float(step), log_grid
+            )
             waves = cls.waves(regression.signals, shape["frequency_hz"])
             extension = regression.propose_run_effect(cls.kind, shape, waves, log_grid)
             if best is None or extension.bic_gain > best.bic_gain:
@@ -164,9 +167,8 @@ class TimePeriodic(Effect):
         frequency = float(np.median(frequencies))
         amplitude = float(np.sqrt(2.0 * extension.run_effect.ratio * regression.variance))
         noise = float(np.sqrt(2.0 * regression.variance / regression.n))
-        spans = [np.ptp(regression.signals.clock[a:b]) for a, b in regression.bounds]
-        span = max(float(np.median(spans)), 1e-300)
-        std = 0.780 * noise / np.sqrt(2.0) / max(amplitude, 1e-12) / span
+        waves = cls.waves(regression.signals, extension.shape["frequency_hz"])
+        std = place_std(regression, waves, 2.0 * np.pi * regression.signals.clock)
         runs = frequencies.size
         parameters = {
             "frequency_hz": quantity(frequency, max(std, float(frequencies.std()) / runs**0.5)),
@@ -271,27 +273,32 @@ def _wandering(frequencies: Array, p: Array) -> tuple[NDArray[np.int64], float, 
     return places, float(deviances[k]), float(log_grids[k])
 
 
-def _refined(regression: Regression, frequencies: list[float], step: float) -> list[float]:
-    """Frequencies between the trial ones: one for all runs, or one a run."""
+def _refined(
+    regression: Regression, frequencies: list[float], step: float, log_grid: float
+) -> list[float]:
+    """Frequencies between the trial ones: one for all runs, or one a run.
+
+    That of all runs by what it saves jointly with what is fitted, which has taken up a part of it.
+    """
+    if len({*frequencies}) == 1:
+        f, runs = frequencies[0], len(frequencies)
+
+        def saved(f: float) -> float:
+            waves = TimePeriodic.waves(regression.signals, [f] * runs)
+            shape = {"frequency_hz": [f] * runs}
+            kind = TimePeriodic.kind
+            return float(regression.propose_run_effect(kind, shape, waves, log_grid).deviance)
+
+        return [float(golden_maximum(saved, f - step, f + step)[0])] * runs
     e = regression.left - regression.whiten.run_part(regression.left)
     e = np.where(regression.outlying, 0.0, e)
-
     turn = 2.0 * np.pi * regression.signals.clock
 
-    def power(f: float, start: int, stop: int, starts: list[int]) -> float:
-        sums = _core.unit_sums(turn[start:stop], e[None, start:stop], starts, f, 1.0, 1)
+    def power(f: float, start: int, stop: int) -> float:
+        sums = _core.unit_sums(turn[start:stop], e[None, start:stop], [0], f, 1.0, 1)
         return float((sums**2).sum())
 
-    if len({*frequencies}) == 1:
-        f = frequencies[0]
-        starts = [start for start, _ in regression.bounds]
-        of_all = partial(power, start=0, stop=e.size, starts=starts)
-        return [float(golden_maximum(of_all, f - step, f + step, 12)[0])] * len(frequencies)
     return [
-        float(
-            golden_maximum(
-                partial(power, start=start, stop=stop, starts=[0]), f - step, f + step, 10
-            )[0]
-        )
-        for f, (start, stop) in zip(frequencies, regression.bounds, strict=True)
+        float(golden_maximum(partial(power, start=a, stop=b), f - step, f + step, 10)[0])
+        for f, (a, b) in zip(frequencies, regression.bounds, strict=True)
     ]
