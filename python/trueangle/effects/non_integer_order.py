@@ -17,8 +17,8 @@ from ..support.deadline import pace
 from .blindness import (
     Blindness,
 )
-from .drift_within_run import DriftWithinRun
 from .drawnline import place_std
+from .drift_within_run import DriftWithinRun
 from .effect import ALWAYS, Effect
 from .missing_order import MissingOrder
 from .orderspectrum import OrderSpectrum

@@ -19,8 +19,8 @@ from ..joint.pattern import Surroundings, line_columns
 from ..joint.signals import Signals
 from .blindness import Blindness
 from .drawing import reading_rate
-from .drift_within_run import DriftWithinRun
 from .drawnline import place_std
+from .drift_within_run import DriftWithinRun
 from .effect import ALWAYS, Effect
 from .missing_order import MissingOrder
 from .non_integer_order import NonIntegerOrder
