@@ -33,7 +33,7 @@ __all__ = ["columns", "contents", "copy", "extent", "header_line", "line_of", "r
 _Block: TypeAlias = "QuotedBlock | PlainBlock"
 
 #: Bytes of a file that the standard library reads in less time than pyarrow takes to start.
-SMALL = 1 << 17
+SMALL = 1 << 18
 
 
 def columns(path: Path, topic: str | None = None) -> list[str]:
