@@ -84,6 +84,57 @@ def test_units(name, unit, in_degrees):
     assert not list(differences(in_degrees[name], found, relative))
 
 
+#: Columns of a table in each unit, and how many make a turn.
+COLUMNS = {
+    "degrees": ("deg", 360.0, {}),
+    "radians": ("rad", 2.0 * np.pi, {}),
+    "turns": ("turn", 1.0, {}),
+    "counts": (
+        "count",
+        16384.0,
+        {"counts_per_turn": 16384.0, "counts_per_turn_reference": 16384.0},
+    ),
+}
+
+
+def coasting(unit):
+    """A spindle that coasts, its angle in a unit."""
+    suffix, period, given = COLUMNS[unit]
+    rng = np.random.default_rng(SEED)
+    t = np.arange(4000) / 500.0
+    x = 2.0 * np.pi * 60.0 * (1.0 - np.exp(-t / 12.0))
+    x = x + 1e-3 * np.sin(2.0 * x) + 4e-4 * np.cos(5.0 * x) + 1e-4 * rng.normal(size=t.size)
+    table = {"time_s": t, f"indicated_{suffix}": x / (2.0 * np.pi) * period}
+    counts = given.get("counts_per_turn")
+    return ta.selfcal(table, orders=[1, 2, 3, 5], loop="open", counts_per_turn=counts)
+
+
+def units_of_a_design(unit):
+    """Eight units measured once, one of them eccentric, angles in a unit."""
+    suffix, period, given = COLUMNS[unit]
+    rng = np.random.default_rng(SEED + 1)
+    x = np.tile(np.arange(0.0, 360.0, 4.0), 8)
+    unit_of = np.repeat(np.arange(8), 90)
+    size = (0.02 + 0.001 * rng.standard_normal(8))[unit_of]
+    error = size * np.cos(np.radians(x)) + 0.005 * np.cos(np.radians(2.0 * x) + unit_of)
+    error += 0.05 * (unit_of == 5) * np.sin(np.radians(x)) + 1e-4 * rng.standard_normal(x.size)
+    scale = period / 360.0
+    table = {
+        "run": [f"r{k}" for k in unit_of],
+        "unit": [f"u{k}" for k in unit_of],
+        f"reference_{suffix}": x * scale,
+        f"indicated_{suffix}": (x + error) * scale,
+    }
+    return ta.fleet(table, orders=[1, 2], **given)
+
+
+@pytest.mark.parametrize("ask", [coasting, units_of_a_design])
+def test_tables_in_other_units_say_the_same(ask):
+    found = {unit: ask(unit).to_dict() for unit in COLUMNS}
+    for unit in ("radians", "turns", "counts"):
+        assert not list(differences(found["degrees"], found[unit], RELATIVE)), unit
+
+
 def lines_of(fitted):
     return {
         row["order"]: (row["amplitude_arcsec"], row["phase_deg"], row["std_arcsec"])
