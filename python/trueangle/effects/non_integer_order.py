@@ -17,7 +17,7 @@ from ..support.deadline import pace
 from .blindness import (
     Blindness,
 )
-from .drawnline import place_std
+from .drawnline import drawn_amplitude, place_std
 from .drift_within_run import DriftWithinRun
 from .effect import ALWAYS, Effect
 from .missing_order import MissingOrder
@@ -208,18 +208,13 @@ class NonIntegerOrder(Effect):
         cls, regression: Regression, terms: Sequence[Fitted]
     ) -> tuple[Parameters, list[Effect]]:
         extension = terms[0][0]
-        assert extension.run_effect is not None
-        runs = regression.signals.runs
-        # Cosine and sine each of variance s^2: a mean square amplitude of 2 s^2.
-        amplitude = float(np.sqrt(2.0 * extension.run_effect.ratio * regression.variance))
-        noise = float(np.sqrt(2.0 * regression.variance / regression.n))
         theta = regression.signals.theta
         waves = line_columns(theta, extension.shape["order"])
+        amplitude, amplitude_std = drawn_amplitude(regression, cls.kind, waves)
+        order_std = place_std(regression, cls.kind, waves, theta)
         parameters = {
-            "order": quantity(extension.shape["order"], place_std(regression, waves, theta)),
-            "amplitude_arcsec": quantity(
-                amplitude, float(np.hypot(noise, amplitude / np.sqrt(4.0 * runs)))
-            ),
+            "order": quantity(extension.shape["order"], order_std),
+            "amplitude_arcsec": quantity(amplitude, amplitude_std),
         }
         known = regression.around.joint.bearing_lines(extension.shape["order"])
         if known:

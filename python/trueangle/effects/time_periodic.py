@@ -19,7 +19,7 @@ from ..joint.pattern import Surroundings, line_columns
 from ..joint.signals import Signals
 from .blindness import Blindness
 from .drawing import reading_rate
-from .drawnline import place_std
+from .drawnline import drawn_amplitude, place_std
 from .drift_within_run import DriftWithinRun
 from .effect import ALWAYS, Effect
 from .missing_order import MissingOrder
@@ -162,19 +162,16 @@ class TimePeriodic(Effect):
         cls, regression: Regression, terms: Sequence[Fitted]
     ) -> tuple[Parameters, list[Effect]]:
         extension = terms[0][0]
-        assert extension.run_effect is not None
         frequencies = np.array(extension.shape["frequency_hz"])
         frequency = float(np.median(frequencies))
-        amplitude = float(np.sqrt(2.0 * extension.run_effect.ratio * regression.variance))
-        noise = float(np.sqrt(2.0 * regression.variance / regression.n))
         waves = cls.waves(regression.signals, extension.shape["frequency_hz"])
-        std = place_std(regression, waves, 2.0 * np.pi * regression.signals.clock)
-        runs = frequencies.size
+        amplitude, amplitude_std = drawn_amplitude(regression, cls.kind, waves)
+        std = place_std(regression, cls.kind, waves, 2.0 * np.pi * regression.signals.clock)
+        if std is not None:
+            std = max(std, float(frequencies.std()) / frequencies.size**0.5)
         parameters = {
-            "frequency_hz": quantity(frequency, max(std, float(frequencies.std()) / runs**0.5)),
-            "amplitude_arcsec": quantity(
-                amplitude, float(np.hypot(noise, amplitude / np.sqrt(4.0 * runs)))
-            ),
+            "frequency_hz": quantity(frequency, std),
+            "amplitude_arcsec": quantity(amplitude, amplitude_std),
         }
         if np.ptp(frequencies) > 0.0:
             parameters["frequencies_hz"] = quantity(frequencies)

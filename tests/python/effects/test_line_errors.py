@@ -21,11 +21,11 @@ NEAR, CENTRED = (0.8, 1.2), 0.36
 HIDDEN = {
     "non_integer_order": (
         {"order": 7.3, "amplitude_arcsec": 3.0},
-        {"order": 7.3},
+        {"order": 7.3, "amplitude_arcsec": 3.0},
     ),
     "time_periodic": (
         {"frequency_hz": 1.7, "amplitude_arcsec": 3.0},
-        {"frequency_hz": 1.7},
+        {"frequency_hz": 1.7, "amplitude_arcsec": 3.0},
     ),
     "varying_line": (
         {"order": 7, "follows": "speed", "amplitude_arcsec": 0.05, "phase_deg": 40.0},
