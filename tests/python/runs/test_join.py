@@ -5,6 +5,7 @@ import math
 
 import numpy as np
 import pytest
+import scipy.signal
 
 import trueangle as ta
 from trueangle.cli import main
@@ -61,6 +62,37 @@ def test_offset_and_rate_are_found_within_their_errors(seed, tmp_path):
     # The noise's own standard deviation is known to a 1/sqrt(2 n) of it.
     assert added < 4.0 * found.std_arcsec + 3600.0 * NOISE * math.sqrt(4.0 / math.sqrt(12_000.0))
     assert found.std_arcsec < 2.0
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("memory", [0.0, 0.9])
+def test_pulls_of_offset_and_rate(memory, tmp_path):
+    """White noise and noise that remembers ten readings: the errors stated are what seeds scatter."""
+    pulls = []
+    seeds = range(8_200, 8_230)
+    print(f"seeds {seeds}")
+    for seed in seeds:
+        rng = np.random.default_rng(seed)
+        t = np.arange(0.0, 30.0, 0.01) + rng.uniform(0.0, 0.002, 3000)
+        drawn = rng.normal(0.0, NOISE * math.sqrt(1.0 - memory**2), t.size)
+        noise = scipy.signal.lfilter([1.0], [1.0, -memory], drawn)
+        s = np.arange(-1.0, 31.0, 0.004)
+        true = motion(s) + rng.normal(0.0, 0.001, s.size)
+        found = ta.join(
+            log(tmp_path / "a.csv", "indicated", t, motion(t) + pattern(motion(t)) + noise),
+            log(tmp_path / "b.csv", "reference", s + OFFSET + 1e-6 * RATE * (s - t[0]), true),
+        )
+        pulls.append(
+            (
+                (found.offset_s - OFFSET) / found.offset_std_s,
+                (found.rate_ppm - RATE) / found.rate_std_ppm,
+            )
+        )
+    spread, mean = np.std(pulls, axis=0), np.mean(pulls, axis=0)
+    print(spread, mean)
+    # Of thirty the deviation is known to 13 %, the mean to 0.18.
+    assert ((spread > 0.7) & (spread < 1.35)).all()
+    assert (np.abs(mean) < 0.7).all()
 
 
 def test_nothing_is_made_up_over_a_gap(tmp_path):
