@@ -67,7 +67,7 @@ def test_offset_and_rate_are_found_within_their_errors(seed, tmp_path):
 @pytest.mark.slow
 @pytest.mark.parametrize("memory", [0.0, 0.9])
 def test_pulls_of_offset_and_rate(memory, tmp_path):
-    """White noise and noise that remembers ten readings: the errors stated are what seeds scatter."""
+    """White noise and noise that remembers ten readings: errors are what seeds scatter."""
     pulls = []
     seeds = range(8_200, 8_230)
     print(f"seeds {seeds}")
