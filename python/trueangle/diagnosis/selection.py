@@ -31,6 +31,7 @@ from .unnamed import UNNAMED, effect_of, is_named
 __all__ = [
     "is_flexible",
     "on_runs",
+    "regrown",
     "select",
 ]
 
@@ -94,6 +95,11 @@ def select(
     if total_penalty(opened) > total_penalty(chosen) - DECISIVE:
         chosen = _by_other_paths(regression, chosen)
     return _priced_with_noise(min(chosen, opened, key=total_penalty))
+
+
+def regrown(regression: Regression, causes: Sequence[str]) -> Regression:
+    """With the best of some causes beside the terms, without what they make superfluous."""
+    return _pruned(_forward(regression, causes))
 
 
 def _specific_first(regression: Regression) -> list[Regression]:
