@@ -195,9 +195,12 @@ def _beside_neighbours(regression: Regression) -> Array:
     rows = _glitches(left, np.flatnonzero(wild), regression.bounds)
     known = left.copy()
     known[rows] -= away[rows]
-    e = _interpolated(known, regression.whiten.rho, regression.bounds)
+    rho = regression.whiten.rho
+    e = _interpolated(known, rho, regression.bounds)
     spread = 1.4826 * float(np.median(np.abs(e)))
-    e[rows] = away[rows]
+    ends = np.isin(rows, np.array(regression.bounds) - [0, 1])
+    beside = e[rows] + away[rows] / np.where(ends, np.sqrt(1.0 + rho**2), 1.0)
+    e[rows] = np.where(np.abs(beside) < np.abs(away[rows]), beside, away[rows])
     return np.asarray(e / max(spread, 1e-300))
 
 
@@ -208,15 +211,18 @@ def _unfiltered(regression: Regression) -> Array:
 
 
 def _interpolated(left: Array, rho: float, bounds: list[tuple[int, int]]) -> Array:
-    """What is left of every reading beside its neighbours in the run."""
+    """What is left of every reading beside its neighbours in the run, all of one deviation.
+
+    The first and the last one have one neighbour only, and scatter more about it.
+    """
     out = left.copy()
-    share = rho / (1.0 + rho**2)
+    share, wider = rho / (1.0 + rho**2), float(np.sqrt(1.0 + rho**2))
     for start, stop in bounds:
         run = left[start:stop]
         if run.size > 2:
             out[start + 1 : stop - 1] -= share * (run[:-2] + run[2:])
-            out[start] -= rho * run[1]
-            out[stop - 1] -= rho * run[-2]
+            out[start] = (run[0] - rho * run[1]) / wider
+            out[stop - 1] = (run[-1] - rho * run[-2]) / wider
     return out
 
 
