@@ -115,7 +115,7 @@ class Outliers(Effect):
             return None
         e = _beside_neighbours(regression)
         n = regression.n
-        normal = max(_normal(e, s) for s in np.append(SCALES, np.linspace(1.15, 3.0, 24)))
+        normal = _normal(e, max(float(np.sqrt(np.mean(e**2))), NARROWEST))
         tails = max(_student(e, nu, s) for nu in TAILS for s in SCALES)
         value, share, size, scale = max(_two_normals(e, start) for start in SIZES)
         value -= 0.5 * n * np.log(2.0 * np.pi)
@@ -130,9 +130,10 @@ class Outliers(Effect):
             rows = np.flatnonzero(chance > 0.5)
         else:
             rows = _apart(e)
-            if rows.size == 0:
-                return None
-            share, size = rows.size / n, float(np.sqrt(np.mean(e[rows] ** 2))) / scale
+            share = rows.size / n
+            size = float(np.sqrt(np.sum(e[rows] ** 2) / max(rows.size, 1))) / scale
+        if rows.size == 0:
+            return None  # the form of the noise, and no reading that stands out of it
         kept = _glitches(_unfiltered(regression), rows, regression.bounds)
         if _is_scattered(regression, rows):
             kept = rows

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import trueangle as ta
-from trueangle.effects.outliers import _beside_neighbours, _interpolated
+from trueangle.effects.outliers import Outliers, _beside_neighbours, _interpolated
 from trueangle.estimation.regression import Regression
 from trueangle.estimation.stretches import MOST_IN_ROW, about_level, short_stretches, stretches
 from trueangle.joint.signals import join_runs
@@ -108,3 +108,15 @@ def test_correlated_noise_that_runs_off_at_an_end_is_no_outlier():
     found = Regression.of(join_runs(runs), noise, SIM.surroundings, rho=0.95)
     # Against the level alone: 6.8.
     assert abs(_beside_neighbours(found)[-1]) < 4.0
+
+
+def test_noise_that_is_narrower_than_normal_has_no_outliers():
+    """Uniform noise: its median tells a deviation that is 1.28 times too large."""
+    rng = np.random.default_rng(31)
+    theta = rng.uniform(0.0, 360.0, 4_000)
+    signals = join_runs([ta.CalibrationRun(theta, theta, period=360.0)])
+    noise = rng.uniform(-1.7, 1.7, theta.size)
+    assert Outliers.find_scatter(Regression.of(signals, noise, SIM.surroundings, rho=0.0)) is None
+    noise[[40, 900]] += (15.0, -25.0)
+    found = Outliers.find_scatter(Regression.of(signals, noise, SIM.surroundings, rho=0.0))
+    assert [row for _, row in found.parameters["rows"].value] == [40, 900]
