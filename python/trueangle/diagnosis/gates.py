@@ -5,7 +5,6 @@ Each gate is a line of `GATES` and gives the reason why a finding is not confirm
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 
@@ -19,6 +18,7 @@ from ..estimation.regression import Regression
 from .confirmation import NOT_CONFIRMED
 from .findings import Finding
 from .levels import UNITS
+from .overlap import overlaps
 
 __all__ = ["GATES", "MANY", "alike_columns", "gated", "many_causes"]
 
@@ -108,23 +108,25 @@ assert _NOUNS.keys() == UNITS.keys()
 
 def gated(
     regression: Regression, findings: Sequence[Finding]
-) -> tuple[list[Finding], list[Blindness]]:
-    """Findings as the gates leave them, and the pairs that are not told apart."""
+) -> tuple[list[Finding], list[Blindness], set[int]]:
+    """Findings as the gates leave them, the pairs that are not told apart, and their terms."""
     found = []
     for finding in findings:
         reason = (
             next((r for gate in GATES if (r := gate(finding))), "") if finding.confirmed else ""
         )
         found.append(replace(finding, status=NOT_CONFIRMED, reason=reason) if reason else finding)
-    spots = []
+    spots: list[Blindness] = []
+    shared: set[int] = set()
     for i, j, correlation in alike_columns(regression, found):
+        shared.update(found[i].group, found[j].group)
         causes = (found[i].cause, found[j].cause)
         because = f"in these runs they are one column (correlation {correlation:.3f})"
         spots.append(Blindness(causes, because, EFFECTS[causes[0]].measure, supported=True))
         for k, other in ((i, causes[1]), (j, causes[0])):
             reason = f"{because.removeprefix('in these runs they are ')} with {other}"
             found[k] = replace(found[k], status=NOT_CONFIRMED, reason=f"it is {reason}")
-    return found, spots
+    return found, spots, shared
 
 
 def alike_columns(
@@ -132,24 +134,12 @@ def alike_columns(
 ) -> Iterator[tuple[int, int, float]]:
     """Pairs of confirmed findings that add nearly one column to all else; their correlation.
 
-    Of what each explains, beside the terms of neither.
+    Of what each explains, beside the terms of neither (`trueangle.diagnosis.overlap`).
     """
-    fitted = regression.fitted()
-    parts = {
-        k: np.sum([fitted[t][0].columns @ fitted[t][1] for t in finding.group], axis=0)
-        for k, finding in enumerate(findings)
-        if finding.confirmed and any(fitted[t][1].size for t in finding.group)
-    }
-    for i, j in itertools.combinations(parts, 2):
-        pair = {*findings[i].group, *findings[j].group}
-        others = [term for k, term in enumerate(regression.terms) if k not in pair]
-        rest = regression.with_terms(others, regression.whiten.rho)
-        own, excited = rest.projected(np.column_stack([parts[i], parts[j]]))
-        sizes = np.linalg.norm(own, axis=0)
-        if excited.all() and sizes.all():
-            found = abs(float(own[:, 0] @ own[:, 1])) / float(sizes.prod())
-            if found > ALIKE:
-                yield i, j, found
+    confirmed = [k for k, finding in enumerate(findings) if finding.confirmed]
+    for i, j, found in overlaps(regression, [findings[k].group for k in confirmed]):
+        if found > ALIKE:
+            yield confirmed[i], confirmed[j], found
 
 
 def many_causes(findings: Sequence[Finding]) -> str:

@@ -40,8 +40,8 @@ def findings_of(
 ) -> tuple[list[Finding], list[Blindness], list[int]]:
     """Findings of the chosen terms; those in doubt become entries of what is not told.
 
-    Also given are the indices of the terms of findings that are
-    not confirmed.
+    Also given are the indices of the terms of findings that are not confirmed, but for those
+    that are one column with another finding: together the two explain what they do.
     """
     spots = list(spots)
     groups = finding_groups(regression.terms)
@@ -100,8 +100,8 @@ def findings_of(
                 tuple(group),
             )
         )
-    findings, alike = gated(regression, findings)
-    doubtful = [k for finding in findings if not finding.confirmed for k in finding.group]
+    findings, alike, shared = gated(regression, findings)
+    doubtful = [k for f in findings if not f.confirmed for k in f.group if k not in shared]
     return findings, spots + alike, doubtful
 
 

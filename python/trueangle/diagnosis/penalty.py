@@ -50,9 +50,10 @@ def before_forms(regression: Regression) -> float:
     formless = [term for term, e in effects if e.draws_zeros or e.has_exact_form]
     if not formless:
         return float(regression.start)
-    return float(
-        regression.cache.of_fit("before forms", lambda: regression.with_terms(formless).deviance)
+    found: float = regression.cache.of_fit(
+        "before forms", lambda: regression.with_terms(formless).deviance
     )
+    return min(float(regression.start), found)
 
 
 def exact_terms(regression: Regression) -> list[Extension]:

@@ -31,6 +31,7 @@ from .unnamed import UNNAMED, effect_of, is_named
 __all__ = [
     "is_flexible",
     "on_runs",
+    "regrown",
     "select",
 ]
 
@@ -45,6 +46,9 @@ DECISIVE = 100.0
 
 #: Correlations of the noise that are one.
 SAME_CORRELATION = 0.02
+
+#: Standard errors within which a correlation is looked for, and below which it stays.
+WITHIN, MOST_CORRELATED = 2, 0.999
 
 #: Times the gain of a step that the further ones may bring on average. Gains fall but where
 #: causes show together only: of 240 walks 1 in 100 rose by more than 2.6, none of them to
@@ -77,6 +81,10 @@ def select(
     ahead = _specific_first(regression)
     direct = _pruned(_forward(regression, list(EFFECTS)))
     direct = min([*ahead, direct], key=total_penalty)
+    noisy = _under_its_noise(direct)
+    if noisy is not direct:
+        regression = regression.with_terms((), noisy.whiten.rho)
+        direct = min(noisy, _pruned(_forward(regression, list(EFFECTS))), key=total_penalty)
     if pace().over:
         return direct
     direct = _with_lines_for_bumps(direct)
@@ -94,6 +102,11 @@ def select(
     if total_penalty(opened) > total_penalty(chosen) - DECISIVE:
         chosen = _by_other_paths(regression, chosen)
     return _priced_with_noise(min(chosen, opened, key=total_penalty))
+
+
+def regrown(regression: Regression, causes: Sequence[str]) -> Regression:
+    """With the best of some causes beside the terms, without what they make superfluous."""
+    return _pruned(_forward(regression, causes))
 
 
 def _specific_first(regression: Regression) -> list[Regression]:
@@ -148,8 +161,15 @@ def _priced_with_noise(regression: Regression) -> Regression:
     out, is too low for noise that is correlated over many readings, and run means then look
     significant. A wander in time competes with correlation alone.
     """
-    if pace().over:
-        return regression
+    return _without_misfits(_under_its_noise(regression))
+
+
+def _under_its_noise(regression: Regression) -> Regression:
+    """Under the correlation by restricted likelihood, where that explains more; else itself.
+
+    What a path finds under too low a correlation, it finds in noise: this is asked at the end of
+    a first one, before others take long, and of an account that was ended early, too.
+    """
     noise = estimate_noise(remainder_of(regression))
     tried = [regression]
     if noise.correlation > regression.whiten.rho + SAME_CORRELATION:
@@ -158,9 +178,12 @@ def _priced_with_noise(regression: Regression) -> Regression:
     if len(plain) < len(regression.terms):
         rest = regression.with_terms(plain)
         noise = estimate_noise(remainder_of(rest))
-        if noise.correlation > 0.0:
-            tried.append(_pruned(rest.with_terms(plain, noise.correlation)))
-    return _without_misfits(min(tried, key=total_penalty))
+        # Beside a mean of each run of its own, which tell of the correlation too.
+        trials = [noise.correlation + k * noise.std for k in range(1 + WITHIN)]
+        tried += [
+            _pruned(rest.with_terms(plain, rho)) for rho in trials if 0.0 < rho < MOST_CORRELATED
+        ]
+    return min(tried, key=total_penalty)
 
 
 def _by_other_paths(regression: Regression, direct: Regression) -> Regression:

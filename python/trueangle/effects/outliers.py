@@ -115,7 +115,7 @@ class Outliers(Effect):
             return None
         e = _beside_neighbours(regression)
         n = regression.n
-        normal = max(_normal(e, s) for s in np.append(SCALES, np.linspace(1.15, 3.0, 24)))
+        normal = _normal(e, max(float(np.sqrt(np.mean(e**2))), NARROWEST))
         tails = max(_student(e, nu, s) for nu in TAILS for s in SCALES)
         value, share, size, scale = max(_two_normals(e, start) for start in SIZES)
         value -= 0.5 * n * np.log(2.0 * np.pi)
@@ -130,9 +130,10 @@ class Outliers(Effect):
             rows = np.flatnonzero(chance > 0.5)
         else:
             rows = _apart(e)
-            if rows.size == 0:
-                return None
-            share, size = rows.size / n, float(np.sqrt(np.mean(e[rows] ** 2))) / scale
+            share = rows.size / n
+            size = float(np.sqrt(np.sum(e[rows] ** 2) / max(rows.size, 1))) / scale
+        if rows.size == 0:
+            return None  # the form of the noise, and no reading that stands out of it
         kept = _glitches(_unfiltered(regression), rows, regression.bounds)
         if _is_scattered(regression, rows):
             kept = rows
@@ -195,9 +196,12 @@ def _beside_neighbours(regression: Regression) -> Array:
     rows = _glitches(left, np.flatnonzero(wild), regression.bounds)
     known = left.copy()
     known[rows] -= away[rows]
-    e = _interpolated(known, regression.whiten.rho, regression.bounds)
+    rho = regression.whiten.rho
+    e = _interpolated(known, rho, regression.bounds)
     spread = 1.4826 * float(np.median(np.abs(e)))
-    e[rows] = away[rows]
+    ends = np.isin(rows, np.array(regression.bounds) - [0, 1])
+    beside = e[rows] + away[rows] / np.where(ends, np.sqrt(1.0 + rho**2), 1.0)
+    e[rows] = np.where(np.abs(beside) < np.abs(away[rows]), beside, away[rows])
     return np.asarray(e / max(spread, 1e-300))
 
 
@@ -208,15 +212,18 @@ def _unfiltered(regression: Regression) -> Array:
 
 
 def _interpolated(left: Array, rho: float, bounds: list[tuple[int, int]]) -> Array:
-    """What is left of every reading beside its neighbours in the run."""
+    """What is left of every reading beside its neighbours in the run, all of one deviation.
+
+    The first and the last one have one neighbour only, and scatter more about it.
+    """
     out = left.copy()
-    share = rho / (1.0 + rho**2)
+    share, wider = rho / (1.0 + rho**2), float(np.sqrt(1.0 + rho**2))
     for start, stop in bounds:
         run = left[start:stop]
         if run.size > 2:
             out[start + 1 : stop - 1] -= share * (run[:-2] + run[2:])
-            out[start] -= rho * run[1]
-            out[stop - 1] -= rho * run[-2]
+            out[start] = (run[0] - rho * run[1]) / wider
+            out[stop - 1] = (run[-1] - rho * run[-2]) / wider
     return out
 
 

@@ -95,9 +95,14 @@ class Regression(Solution):
         return replace(self, least=least)
 
     def weighted(self, weights: Array) -> Self:
-        """The readings without terms under other weights."""
+        """The readings without terms under other weights.
+
+        What terms explain is counted from the likeliest noise without any, even or uneven: where
+        what they explain is still in the readings, a correlation may describe it by chance.
+        """
         readings = replace(self.readings, weights=weights)
-        return self.of_readings(readings, cache=self.cache.for_other_errors())
+        found = self.of_readings(readings, cache=self.cache.for_other_errors())
+        return replace(found, start=min(self.start, found.start))
 
     def of_rows(self, rows: NDArray[np.bool_]) -> Self:
         """Some of the readings without terms, under the correlation found in all."""

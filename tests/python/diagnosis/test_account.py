@@ -6,6 +6,7 @@ import numpy as np
 
 import trueangle as ta
 from trueangle.diagnosis.account import Seen
+from trueangle.estimation.regression import Regression
 from trueangle.joint.signals import join_runs
 
 #: Half of the play, arcsec, and its noise.
@@ -63,3 +64,34 @@ def test_a_play_whose_turning_points_read_the_other_side_is_no_spring() -> None:
         assert abs(width.value - HALF) < 4.0 * width.std
         assert result.readings_used == result.readings - 16
         assert "none at a turning point" in " ".join(result.summary().split())
+
+
+def test_weights_do_not_change_what_causes_are_counted_from() -> None:
+    """A pattern not yet explained is described by chance by one noise better than by another."""
+    rng = np.random.default_rng(29)
+    angle = np.linspace(0.0, 720.0, 900)
+    error = 900.0 * np.sin(np.radians(3.0 * angle)) + rng.normal(0.0, SIGMA, angle.size)
+    signals = join_runs([ta.CalibrationRun(angle, angle, period=360.0)])
+    start = Regression.of(signals, error, ta.Simulation().surroundings)
+    weights = np.where(np.sin(np.radians(angle)) > 0.0, 0.2, 1.8)
+    weighted = start.weighted(weights)
+    assert weighted.deviance > start.deviance + 300.0
+    assert weighted.start == start.start
+
+
+def test_noise_whose_neighbours_share_nearly_all_has_no_zeros_of_its_own() -> None:
+    """A correlation that is taken too low makes means of runs scatter too much."""
+    for seed in (4_100, 4_101):
+        print(f"seed {seed}")
+        rng = np.random.default_rng(seed)
+        runs = []
+        for k in range(9):
+            noise = rng.normal(0.0, SIGMA, 400)
+            for i in range(1, noise.size):
+                noise[i] = 0.97 * noise[i - 1] + np.sqrt(1.0 - 0.97**2) * noise[i]
+            angle = 30.0 * k + 175.0 - np.abs(np.linspace(-175.0, 175.0, noise.size))
+            time = np.arange(noise.size) / (20.0, 40.0, 80.0)[k % 3]
+            indicated = angle + noise / 3600.0
+            runs.append(ta.CalibrationRun(angle, indicated, period=360.0, time=time))
+        result = ta.diagnose(runs, ta.Simulation(), within=60)
+        assert [f.cause for f in result.findings if f.confirmed] == [], result.summary()

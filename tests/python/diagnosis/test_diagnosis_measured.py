@@ -238,9 +238,6 @@ def test_numpy_servo(servo) -> None:
     assert varying < 0.75 * constant
 
 
-@pytest.mark.xfail(
-    strict=False, reason="beside the gates its reversal error by place is told as bumps again"
-)
 def test_servo_has_a_reversal_error_and_an_offset_under_load(servo, tmp_path) -> None:
     time, indicated, motor, _, loaded = servo
     edges = np.r_[np.linspace(0, 60, 7), np.linspace(66, 126, 7)]

@@ -110,11 +110,12 @@ def test_two_causes_that_are_one_column_are_not_told_apart(fitted):
         for x in (fitted.terms[0].columns[:, 0], fitted.terms[1].columns[:, 0])
     ]
     assert pairs[0][2] == pytest.approx(np.corrcoef(own)[0, 1], abs=1e-9)
-    told, spots = gated(fitted, findings)
+    told, spots, shared = gated(fitted, findings)
     assert [f.status for f in told] == [NOT_CONFIRMED, NOT_CONFIRMED, CONFIRMED]
     assert "with latency" in told[0].reason
     assert "with backlash" in told[1].reason
     assert [(spot.causes, spot.supported) for spot in spots] == [(("backlash", "latency"), True)]
+    assert shared == {0, 1}
 
 
 def test_many_causes_are_said_to_be_implausible_with_what_they_share():

@@ -33,6 +33,7 @@ class Answer:
     reasons: str  # text of not_identifiable
     visible: float
     seconds: float
+    confirmed: tuple[str, ...] = ()
 
     @property
     def first(self) -> str:
@@ -53,6 +54,11 @@ class Answer:
     def extra(self) -> tuple[str, ...]:
         """Causes named that are not there."""
         return tuple(c for c in self.found if c not in self.case.causes)
+
+    @property
+    def false(self) -> tuple[str, ...]:
+        """Causes confirmed that are not there."""
+        return tuple(c for c in self.confirmed if c not in self.case.causes)
 
     @property
     def repeated(self) -> bool:
@@ -115,6 +121,7 @@ def judge(question: Question) -> Answer:
         reasons=" | ".join(f"{entry['because']} -> {entry['measure']}" for entry in blind),
         visible=question.visible(),
         seconds=seconds,
+        confirmed=tuple(f["cause"] for f in findings if f["status"] == "confirmed"),
     )
 
 

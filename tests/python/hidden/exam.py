@@ -119,7 +119,8 @@ def totals(found: list[Answer]) -> list[str]:
         lines.append(
             f"scale {scale:g}: named first {_percent(a.right_first for a in group)}, "
             f"exactly {_percent(a.exact for a in group)}, "
-            f"with an extra cause {_percent(bool(a.extra) for a in group)}, parameters within "
+            f"with an extra cause {_percent(bool(a.extra) for a in group)}, with a false confirmed "
+            f"one {_percent(bool(a.false) for a in group)}, parameters within "
             f"{STANDARD_ERRORS:g} se {_percent(abs(s) <= STANDARD_ERRORS for s in scores)}"
         )
     rest = {

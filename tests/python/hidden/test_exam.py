@@ -32,6 +32,9 @@ FALSE_ALARMS = 0.02
 #: Greatest share of cases with a cause that is not there.
 EXTRA_CAUSES = 0.03
 
+#: Greatest share of cases with a confirmed cause that is not there, at any scale.
+FALSE_CONFIRMED = 0.02
+
 #: Smallest share of pairs of which both are named and nothing else.
 BOTH_NAMED = 0.90
 
@@ -121,6 +124,11 @@ class TestNightly:
     def test_no_other_causes_are_named(self, singles: list[Answer]) -> None:
         group = [a for a in singles if a.case.scale == 1.0]
         assert share([bool(a.extra) for a in group]) < EXTRA_CAUSES, told(group)
+
+    @pytest.mark.parametrize("scale", NAMED_FIRST)
+    def test_no_other_causes_are_confirmed(self, singles: list[Answer], scale: float) -> None:
+        group = [a for a in singles if a.case.scale == scale]
+        assert share([bool(a.false) for a in group]) <= FALSE_CONFIRMED, told(group)
 
     def test_parameters_are_within_their_standard_errors(self, singles: list[Answer]) -> None:
         scores = [s for a in singles if a.case.scale == 1.0 for s in a.scores.values()]
