@@ -183,9 +183,10 @@ def _library(source: str) -> bytes | None:
     with tempfile.TemporaryDirectory() as folder:
         file, library = Path(folder, "model.c"), Path(folder, f"model{_ending()}")
         file.write_text(source, encoding="utf-8")
-        command = [compiler, "-std=c99", "-O2", "-fPIC", "-shared", "-fvisibility=hidden"]
+        fast = ["-O3", "-fno-math-errno", "-ffp-contract=off"]
+        command = [compiler, "-std=c99", *fast, "-fPIC", "-shared", "-fvisibility=hidden"]
         done = subprocess.run(
-            [*command, "-ffp-contract=off", str(file), "-o", str(library), "-lm"],
+            [*command, str(file), "-o", str(library), "-lm"],
             capture_output=True,
             timeout=120,
             check=False,
