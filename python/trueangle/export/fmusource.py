@@ -17,7 +17,7 @@ __all__ = ["fmu_source"]
 _LEFT = 1e-17
 
 _PATTERN = """\
-/* The series, its slope where asked for, and the x with x + sign (zero + series(x)) = y, from an x near. */
+/* The series, its slope where asked for, and the x with x + sign (zero + series(x)) = y. */
 static double m_series(double x, double *slope)
 {
     double sum = 0.0, rise = 0.0;
@@ -295,7 +295,9 @@ def _sense(terms: RunTimeTerms, zero: str, at_indicated: bool) -> str:
     if terms.springs:
         direction += ", 0, m_wound(&state->stretch, state->farthest)"
     early = f" - signals->velocity * {DOUBLE.number(terms.delay)}" if terms.delay else ""
-    reading = f"m_solved(y, -1.0, y + {zero})" if at_indicated else f"y + {zero} + m_series(seen, 0)"
+    reading = f"y + {zero} + m_series(seen, 0)"
+    if at_indicated:
+        reading = f"m_solved(y, -1.0, y + {zero})"
     return (
         _SENSE.replace("@early@", early)
         .replace("@travel@", travel)
