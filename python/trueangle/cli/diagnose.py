@@ -250,15 +250,21 @@ def _written(result: Diagnosis, args: argparse.Namespace, model: HarmonicModel |
         result.correction(model, argument=args.argument).save(args.corrected_model)
         return "\n".join(_corrected(result, args.corrected_model, model is not None))
 
+    ripple = None if result.torque is None else result.torque.ripple or None
+
     def sense() -> str:
         from ..export import export_model
 
         fmu = str(args.extend_into).lower().endswith(".fmu")
-        options = {"variant": "sensor"} if fmu else {"joint": args.into_joint}
         made = export_model(
-            result.sensor(), "fmu" if fmu else "mujoco", args.extend_into, **options
+            result.sensor(without_any=not fmu and bool(ripple)),
+            "fmu" if fmu else "mujoco",
+            args.extend_into,
+            noise_std=result.sensor_noise(),
+            **({"variant": "sensor"} if fmu else {"joint": args.into_joint, "ripple": ripple}),
         )
-        return f"\nSensor of what is confirmed: {made.output}"
+        left = "; the torque ripple is not in it: a file of MuJoCo (.xml) has a place for it"
+        return f"\nSensor of what is confirmed: {made.output}{left if fmu and ripple else ''}"
 
     def plan() -> str:
         if result.next_runs is None or not result.next_runs.runs:
