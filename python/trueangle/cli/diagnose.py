@@ -8,7 +8,7 @@ import sys
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
-from ..errors import ArgumentError, TrueAngleError
+from ..errors import ArgumentError, NoModelError, TrueAngleError
 from ..support.deadline import STYLES, ending_early
 from ..support.files import MODEL, SENSOR, SIMULATION
 from .durations import seconds
@@ -256,8 +256,16 @@ def _written(result: Diagnosis, args: argparse.Namespace, model: HarmonicModel |
         from ..export import export_model
 
         fmu = str(args.extend_into).lower().endswith(".fmu")
+        try:
+            sensor = result.sensor(without_any=not fmu and bool(ripple))
+        except NoModelError as error:
+            if not ripple:
+                raise
+            raise NoModelError(
+                f"{error}; a torque ripple is for MuJoCo: --extend-into sensor.xml"
+            ) from None
         made = export_model(
-            result.sensor(without_any=not fmu and bool(ripple)),
+            sensor,
             "fmu" if fmu else "mujoco",
             args.extend_into,
             noise_std=result.sensor_noise(),

@@ -17,6 +17,11 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from ..effects.backlash import Backlash
+from ..effects.direction_dependent_pattern import DirectionalPattern
+from ..effects.latency import Latency
+from ..effects.missing_order import MissingOrder
+from ..effects.presliding_hysteresis import PreslidingHysteresis
 from ..estimation.estimate import Parameters, Quantity, quantity
 from ..runs.joining import MeasuredMinusSimulated, minus_simulated
 from ..runs.run import CalibrationRun
@@ -38,11 +43,11 @@ _ROUNDING = 1e-9
 
 #: What the causes of an angle error are as a torque.
 _EFFECTS: Final = {
-    "missing_order": "torque_ripple",
-    "backlash": "dry_friction",
-    "latency": "damping",
-    "presliding_hysteresis": "presliding_friction",
-    "direction_dependent_pattern": "friction_ripple",
+    MissingOrder.kind: "torque_ripple",
+    Backlash.kind: "dry_friction",
+    Latency.kind: "damping",
+    PreslidingHysteresis.kind: "presliding_friction",
+    DirectionalPattern.kind: "friction_ripple",
 }
 
 #: What parameters are called, and their units.

@@ -33,8 +33,8 @@ SAME_MOTION = 0.05
 COVERED = 0.5
 #: Times by which another offset of the clocks must bring the motions nearer to be taken.
 NEARER = 2.0
-#: Standard deviation of white noise, of the median size of its second differences.
-_OF_SECOND = 1.4826 / math.sqrt(6.0)
+#: Times the median of second differences, six standard deviations, beyond which they are no noise.
+_USUAL = 6.0 / 0.6745
 #: Readings that a run is made of, at least.
 _LEAST = 4
 
@@ -75,13 +75,16 @@ class MeasuredMinusSimulated(Shown):
     def noise_arcsec(self) -> float:
         """Standard deviation of white noise that the log's own encoder has.
 
-        By the second differences of its error in the order of its readings, whose median is
-        no matter of patterns and play.
+        By the second differences of its error in the order of its readings, those apart at
+        which play turns over.
         """
         bends = [np.abs(np.diff(_error(log), 2)) for log in _each_once(self.logs)]
         if not bends:
             return 0.0
-        return float(np.median(np.concatenate(bends))) * _OF_SECOND * ARCSEC_PER_TURN / 360.0
+        every = np.concatenate(bends)
+        usual = every[every <= _USUAL * np.median(every)]
+        rms = math.sqrt(float(np.mean(usual**2)) / 6.0)
+        return rms * ARCSEC_PER_TURN / 360.0
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values."""
