@@ -3,7 +3,7 @@
 PYTHON ?= .venv/bin/python
 
 .PHONY: check quick format lint types stub rust python docs bench develop aarch64 fuzz mutants sample
-.PHONY: looks nightly exam asan kills pythons readings chance
+.PHONY: looks nightly exam walks asan kills pythons readings chance
 
 # Damaged files for each loader, and loaders at a time: `make fuzz CASES=1000000 JOBS=2`.
 CASES ?= 20000
@@ -66,6 +66,10 @@ exam:               ## the diagnosis' own exam at full size: an hour or more, fi
 looks:              ## what a reader sees, as pictures and texts in target/looks; needs Chromium
 	$(PYTHON) tests/looks
 
+walks:              ## exported steps over 10^7 random readings, units over 10^6: a quarter of an hour
+	TRUEANGLE_NIGHTLY=1 $(PYTHON) -m pytest -s tests/python/export/test_steps.py \
+	  tests/python/export/test_fmu.py
+
 docs:               ## documentation, warnings are errors
 	$(PYTHON) -m sphinx -W --keep-going -q docs docs/_build/html
 
@@ -97,7 +101,7 @@ asan:               ## tests of the core under AddressSanitizer, by the compiler
 	RUSTC_BOOTSTRAP=1 RUSTFLAGS="-Zsanitizer=address" CARGO_TARGET_DIR=target/asan \
 	cargo test --locked --tests --target $$(rustc -vV | sed -n 's/^host: //p')
 
-NIGHTLY = aarch64 asan pythons readings kills fuzz mutants chance exam
+NIGHTLY = aarch64 asan pythons readings kills fuzz mutants chance exam walks
 nightly: $(NIGHTLY) ## what takes hours; each has a job of its own in .github/workflows/nightly.yml
 
 bench:              ## benchmarks against a reference, in one run

@@ -8,7 +8,7 @@ import sys
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
-from ..errors import ArgumentError, TrueAngleError
+from ..errors import ArgumentError, NoModelError, TrueAngleError
 from ..support.deadline import STYLES, ending_early
 from ..support.files import MODEL, SENSOR, SIMULATION
 from .durations import seconds
@@ -250,15 +250,29 @@ def _written(result: Diagnosis, args: argparse.Namespace, model: HarmonicModel |
         result.correction(model, argument=args.argument).save(args.corrected_model)
         return "\n".join(_corrected(result, args.corrected_model, model is not None))
 
+    ripple = None if result.torque is None else result.torque.ripple or None
+
     def sense() -> str:
         from ..export import export_model
 
         fmu = str(args.extend_into).lower().endswith(".fmu")
-        options = {"variant": "sensor"} if fmu else {"joint": args.into_joint}
+        try:
+            sensor = result.sensor(without_any=not fmu and bool(ripple))
+        except NoModelError as error:
+            if not ripple:
+                raise
+            raise NoModelError(
+                f"{error}; a torque ripple is for MuJoCo: --extend-into sensor.xml"
+            ) from None
         made = export_model(
-            result.sensor(), "fmu" if fmu else "mujoco", args.extend_into, **options
+            sensor,
+            "fmu" if fmu else "mujoco",
+            args.extend_into,
+            noise_std=result.sensor_noise(),
+            **({"variant": "sensor"} if fmu else {"joint": args.into_joint, "ripple": ripple}),
         )
-        return f"\nSensor of what is confirmed: {made.output}"
+        left = "; the torque ripple is not in it: a file of MuJoCo (.xml) has a place for it"
+        return f"\nSensor of what is confirmed: {made.output}{left if fmu and ripple else ''}"
 
     def plan() -> str:
         if result.next_runs is None or not result.next_runs.runs:

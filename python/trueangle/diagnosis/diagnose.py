@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any, Unpack
 
 import numpy as np
@@ -36,6 +37,7 @@ from .goodness import Unexplained, goodness_of_fit
 from .named import findings_of, reconsidered, scatter_doubt, scatter_finding
 from .penalty import cause_terms
 from .remainder import leftover_of, unexplained_after
+from .torque import torque_account
 from .wrongplace import moved
 
 __all__ = ["diagnose"]
@@ -87,7 +89,8 @@ def diagnose(
         What is believed; may be left out where there is a log.
     simulated : path, table, iterable of CalibrationRun or MeasuredMinusSimulated, optional
         What any other simulator says of the same motion (`trueangle.runs.joining.minus_simulated`):
-        it is taken off the readings, and ``sim`` and its extension stand on top of it.
+        it is taken off the readings, and ``sim`` and its extension stand on top of it. Where
+        both have the torque of the drive, that is accounted for as well (`Diagnosis.torque`).
     gain : bool
         Measure the gain on held-out runs (about half of the time).
     within : float, optional
@@ -140,7 +143,15 @@ def diagnose(
     elif sim is None:
         raise ArgumentError("nothing is believed: give a simulation, or a log as `simulated=`")
     with paced(within, progress) as at, at.bounded(_used(measured)), one_blas_thread():
-        return _diagnosis(measured, log, Simulation() if sim is None else sim, gain)
+        stated = Simulation() if sim is None else sim
+        found = _diagnosis(measured, log, stated, gain)
+        if log is None or not found.complete:
+            return found
+        joint = Simulation(stated.joint)
+        torque = torque_account(
+            log, measured, lambda runs, drive: _diagnosis(runs, drive, joint, gain)
+        )
+        return replace(found, torque=torque)
 
 
 def _diagnosis(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -32,6 +33,7 @@ from .correction import extend_model
 from .discrepancy import Discrepancy
 from .gain import Gain
 from .goodness import Unexplained
+from .torque import TorqueAccount
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -157,6 +159,8 @@ class Diagnosis(PlainResult):
         The log of another simulator that the simulation stands on.
     runs : list of CalibrationRun
         The readings, as given.
+    torque : TorqueAccount or None
+        What the drive's torque lacks, where the readings and the simulator's log have one.
     """
 
     discrepancy: Discrepancy
@@ -177,6 +181,7 @@ class Diagnosis(PlainResult):
     complete: bool = True
     simulated: MeasuredMinusSimulated | None = None
     runs: list[CalibrationRun] = field(repr=False, compare=False, default_factory=list)
+    torque: TorqueAccount | None = None
 
     @property
     def is_enough(self) -> bool:
@@ -334,8 +339,13 @@ class Diagnosis(PlainResult):
         given = self.runs if runs is None else runs
         return extend_model(model, given, self.extended, argument)
 
-    def sensor(self) -> HarmonicModel:
+    def sensor(self, *, without_any: bool = False) -> HarmonicModel:
         """What was confirmed as the model of a sensor: what a simulator's encoder lacks.
+
+        Parameters
+        ----------
+        without_any : bool
+            Give an empty model where nothing was confirmed.
 
         Returns
         -------
@@ -350,9 +360,21 @@ class Diagnosis(PlainResult):
         NotInvertibleError
             The error is too steep for a model of the true angle.
         """
+        if without_any and not self._is_correctable:
+            return HarmonicModel(())
         self._check_confirmed()
         runs = self.runs if self.simulated is None else self.simulated.runs
         return extend_model(None, runs, self.extended)
+
+    def sensor_noise(self) -> float:
+        """Standard deviation of the noise that a simulator's encoder lacks, radians.
+
+        The noise of one reading, without what the log's own encoder has: that is in measured
+        minus simulated, and stays in the simulator.
+        """
+        own = 0.0 if self.simulated is None else self.simulated.noise_arcsec
+        lacking = math.sqrt(max(self.noise**2 - 2.0 * own**2, 0.0))
+        return lacking * math.pi / 648_000.0
 
     def _check_correctable(self) -> None:
         """Raise where there is nothing that a model could be made of."""
@@ -362,10 +384,15 @@ class Diagnosis(PlainResult):
             )
         self._check_confirmed()
 
+    @property
+    def _is_correctable(self) -> bool:
+        """Something was confirmed that a model can hold."""
+        effects = self.extended.effects
+        return bool(self.extended.harmonics) or any(not e.not_at_run_time for e in effects)
+
     def _check_confirmed(self) -> None:
         """Raise where nothing was confirmed that a model can hold."""
-        effects = self.extended.effects
-        if self.extended.harmonics or any(not effect.not_at_run_time for effect in effects):
+        if self._is_correctable:
             return
         raise NoModelError(
             "no correction can be given: nothing was confirmed that a corrector can take off"
@@ -416,6 +443,7 @@ class Diagnosis(PlainResult):
             "not_identifiable": [spot.to_dict() for spot in self.not_identifiable],
             "extended_simulation": extended_simulation,
             **({} if self.simulated is None else {"simulated": self.simulated.to_dict()}),
+            **({} if self.torque is None else {"torque": self.torque.to_dict()}),
         }
 
     def _unexplained(self) -> dict[str, Any]:

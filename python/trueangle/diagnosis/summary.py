@@ -84,6 +84,10 @@ def render(diagnosis: Diagnosis, errors_in: ErrorsIn = "auto", verbose: bool = F
         f"{n(g['max_abs_after_arcsec'])} (in the readings that were fitted)."
     )
     lines += ["", *_wrapped(together, 2)]
+    if diagnosis.torque is not None:
+        lines.append("")
+        for text in diagnosis.torque.lines():
+            lines += _wrapped(text, 2)
     open_still = [*untold(diagnosis, verbose, lambda spot: _if_it_is(spot, unit))]
     if diagnosis.next_runs is not None and diagnosis.next_runs.runs:
         lines += ["", *diagnosis.next_runs.summary().splitlines()]
@@ -122,6 +126,10 @@ def headline(diagnosis: Diagnosis, unit: ErrorUnit) -> list[str]:
     wrong = [belief for belief in diagnosis.beliefs if belief.verdict != "confirmed"]
     if confirmed:
         lines += _wrapped(f"Confirmed: {', '.join(confirmed)}.", 2)
+    if diagnosis.torque is not None:
+        lacking = [f.summary() for f in diagnosis.torque.findings if f.confirmed]
+        if lacking:
+            lines += _wrapped(f"Confirmed in the drive's torque: {'; '.join(lacking)}.", 2)
     if doubtful:
         lines += _wrapped(f"Listed and not confirmed: {', '.join(doubtful)}.", 2)
     if wrong:

@@ -25,6 +25,8 @@ class Arithmetic:
         A turn.
     helpers, decay, waves : str
         Functions of its own: turns and sines, exponentials, sums of lines.
+    from_near : str
+        Ending of the name of an inverse of the series that starts at an angle nearby.
     """
 
     angle: str
@@ -35,6 +37,7 @@ class Arithmetic:
     helpers: str
     decay: str
     waves: str
+    from_near: str = ""
 
     def number(self, value: float) -> str:
         """A constant of the type ``real``."""
@@ -192,9 +195,10 @@ DOUBLE = Arithmetic(
     "double",
     "double",
     "",
-    "fabs(off) <= 4e-15 + 4e-16 * fabs(goal)",
+    "fabs(off) <= 1e-13 + 4e-16 * fabs(goal)",
     1.0,
     _DOUBLE_TURNS + "\n" + _DOUBLE_HELPERS,
     _DOUBLE_DECAY,
     _DOUBLE_WAVES,
+    "_from",
 )

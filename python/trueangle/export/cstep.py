@@ -156,6 +156,8 @@ def c_search(
         .replace("@near@", arithmetic.near)
         .replace("@zero@", arithmetic.place(0.0 if at_indicated else zero))
         .replace("@inverse@", "" if at_indicated else "@n@_pattern")
+        .replace("@inverse_near@", "" if at_indicated else f"@n@_pattern{arithmetic.from_near}")
+        .replace("@x@", ", x" if arithmetic.from_near and not at_indicated else "")
     )
     if terms.travels:
         parts.append(advance_of(terms))
@@ -347,7 +349,7 @@ static inline @angle@ @n@_find(@angle@ goal, const @n@_signals *signals, int8_t 
     uint8_t i;
     for (i = 0; i < 20; i++) {
         const @angle@ off
-            = x - @inverse@(goal - @n@_angle(@n@_error(x, signals, direction@given@)));
+            = x - @inverse_near@(goal - @n@_angle(@n@_error(x, signals, direction@given@))@x@);
         const @angle@ moved = x - before;
         @real@ slope;
         if ((@near@) || moved == 0) {

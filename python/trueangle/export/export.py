@@ -103,7 +103,8 @@ def export_model(
     if "name" in given and given["name"] is None:
         given["name"] = "angle"
     pattern = TurnPattern(loaded)
-    if pattern.is_empty and not any(map(found.holds, pattern.left_out)):
+    holds_any = any(map(found.holds, pattern.left_out)) or found.may_be_empty(given)
+    if pattern.is_empty and not holds_any:
         raise ArgumentError(
             "the model has no harmonics and nothing else that follows the angle: there is nothing "
             "to put into a table"

@@ -12,18 +12,25 @@ import tempfile
 import uuid
 import zipfile
 import zlib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, ClassVar
 
 from .._core import __version__
+from ..errors import ArgumentError
 from ..model.file import model_of
 from ..model.model import HarmonicModel
 from ..model.term import Term
 from ..model.text import model_text
 from ..support.files import Kind
 from .fmifunctions import fmi_functions
-from .fmudescription import IDENTIFIER, build_description, model_description, variables_of
+from .fmudescription import (
+    IDENTIFIER,
+    Variable,
+    build_description,
+    model_description,
+    variables_of,
+)
 from .fmusource import fmu_source
 from .pattern import TurnPattern
 from .proof import Proof
@@ -61,6 +68,7 @@ class Fmu(Target):
             "correction",
             "correction: indicated in, true_angle out; sensor: true_angle in, indicated out",
         ),
+        "noise_std": Option(float, 0.0, "of a sensor: white noise, standard deviation in rad"),
         "fmi": Option(("3", "2"), "3", "version of the standard"),
     }
 
@@ -76,6 +84,12 @@ class Fmu(Target):
     def make(self, pattern: TurnPattern, options: Mapping[str, Any]) -> Made:
         model = pattern.source.replace(terms=tuple(filter(is_own, pattern.source.terms)))
         sensor = options["variant"] == "sensor"
+        noise_std = options["noise_std"]
+        if noise_std and not sensor:
+            raise ArgumentError("noise_std is of a sensor: give variant='sensor' as well")
+        if not noise_std >= 0.0:
+            raise ArgumentError(f"noise_std must be 0 or more radians, got {noise_std!r}")
+        variables = variables_of(model, sensor, noise_std)
         notes = [
             "every step of a co-simulation is a reading: what follows travel takes the steps in "
             "their order; its output is of the inputs at its begin"
@@ -87,7 +101,7 @@ class Fmu(Target):
                 "loads it, makes one of the sources"
             )
         return Made(
-            text=lambda header: _source(model, sensor, options["fmi"], header),
+            text=lambda header: _source(model, variables, sensor, options["fmi"], header),
             entries=0,
             bytes=0,
             part=TablePart.at_readings(
@@ -102,7 +116,7 @@ class Fmu(Target):
             lost=list,
             notes=tuple(notes),
             bits=12,
-            packed=lambda text: _packed(model, sensor, options["fmi"], text),
+            packed=lambda text: _packed(model, variables, sensor, options["fmi"], text),
         )
 
     def decoded(self, raw: bytes) -> str:
@@ -124,22 +138,28 @@ def _token(text: str) -> str:
     return f"{{{uuid.uuid5(uuid.NAMESPACE_OID, text)}}}"
 
 
-def _source(model: HarmonicModel, sensor: bool, fmi: str, header: CommentBlock) -> str:
+def _source(
+    model: HarmonicModel,
+    variables: Sequence[Variable],
+    sensor: bool,
+    fmi: str,
+    header: CommentBlock,
+) -> str:
     own = [
         f"{'Sensor' if sensor else 'Correction'} of a joint as a functional mock-up unit of FMI "
         f"{fmi}.0; angles in radians.",
     ]
     head = "/*\n" + "\n".join(header.comment(" * ", *own)) + "\n */\n"
-    variables = variables_of(model, sensor)
     bare = fmu_source(model, variables, sensor, "", head)
     return fmu_source(model, variables, sensor, fmi_functions(fmi, _token(bare + fmi)), head)
 
 
-def _packed(model: HarmonicModel, sensor: bool, fmi: str, source: str) -> bytes:
+def _packed(
+    model: HarmonicModel, variables: Sequence[Variable], sensor: bool, fmi: str, source: str
+) -> bytes:
     """The archive: description, source and, where there is a compiler, the library."""
     token = source[source.index('strcmp(token, "') + 15 :].partition('"')[0]
     about = " ".join(line[3:] for line in source.split("\n")[1:6])
-    variables = variables_of(model, sensor)
     files: dict[str, bytes] = {
         "modelDescription.xml": model_description(
             variables, fmi, sensor, token, about, f"trueangle {__version__}"
@@ -183,9 +203,10 @@ def _library(source: str) -> bytes | None:
     with tempfile.TemporaryDirectory() as folder:
         file, library = Path(folder, "model.c"), Path(folder, f"model{_ending()}")
         file.write_text(source, encoding="utf-8")
-        command = [compiler, "-std=c99", "-O2", "-fPIC", "-shared", "-fvisibility=hidden"]
+        fast = ["-O3", "-fno-math-errno", "-ffp-contract=off"]
+        command = [compiler, "-std=c99", *fast, "-fPIC", "-shared", "-fvisibility=hidden"]
         done = subprocess.run(
-            [*command, "-ffp-contract=off", str(file), "-o", str(library), "-lm"],
+            [*command, str(file), "-o", str(library), "-lm"],
             capture_output=True,
             timeout=120,
             check=False,

@@ -37,7 +37,7 @@ class Variable(NamedTuple):
     description: str
 
 
-def variables_of(model: HarmonicModel, sensor: bool) -> list[Variable]:
+def variables_of(model: HarmonicModel, sensor: bool, noise_std: float = 0.0) -> list[Variable]:
     """The time, inputs, parameters and the output last."""
     true = "true angle of the joint"
     said = "angle that its encoder indicates"
@@ -53,7 +53,14 @@ def variables_of(model: HarmonicModel, sensor: bool) -> list[Variable]:
         rows.append(("current", "input", "continuous", "A", 0.0, "current of the motor"))
     if sensor:
         rows += [
-            ("noise_std", "parameter", "tunable", "rad", 0.0, "standard deviation of white noise"),
+            (
+                "noise_std",
+                "parameter",
+                "tunable",
+                "rad",
+                noise_std,
+                "standard deviation of white noise",
+            ),
             ("seed", "parameter", "fixed", "", 1.0, "of the noise"),
         ]
     rows.append((last[0], "output", "continuous", "rad", 0.0, last[1]))

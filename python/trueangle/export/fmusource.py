@@ -29,10 +29,9 @@ static double m_series(double x, double *slope)
     return sum;
 }
 
-static double m_solved(double y, double sign)
+static double m_solved(double y, double sign, double x)
 {
     double low = y - sign * @zero@ - @size@, high = y - sign * @zero@ + @size@;
-    double x = y - sign * @zero@;
     int i;
     for (i = 0; i < 200; i++) {
         double slope, next;
@@ -57,7 +56,12 @@ static double m_solved(double y, double sign)
 
 static inline double m_pattern(double place)
 {
-    return m_solved(place, 1.0);
+    return m_solved(place, 1.0, place - @zero@);
+}
+
+static inline double m_pattern_from(double place, double near)
+{
+    return m_solved(place, 1.0, near);
 }
 """
 
@@ -291,7 +295,9 @@ def _sense(terms: RunTimeTerms, zero: str, at_indicated: bool) -> str:
     if terms.springs:
         direction += ", 0, m_wound(&state->stretch, state->farthest)"
     early = f" - signals->velocity * {DOUBLE.number(terms.delay)}" if terms.delay else ""
-    reading = "m_solved(y, -1.0)" if at_indicated else f"y + {zero} + m_series(seen, 0)"
+    reading = f"y + {zero} + m_series(seen, 0)"
+    if at_indicated:
+        reading = f"m_solved(y, -1.0, y + {zero})"
     return (
         _SENSE.replace("@early@", early)
         .replace("@travel@", travel)

@@ -20,10 +20,13 @@ from .proof import Proof
 from .reading import failed
 from .target import CommentBlock, Made, Option, TablePart, Target
 
-__all__ = ["TEXT_NAME", "MuJoCo"]
+__all__ = ["NOISE_NAME", "TEXT_NAME", "MuJoCo"]
 
 #: Of the text element that holds the model of a joint, before the joint's name.
 TEXT_NAME = "trueangle:"
+
+#: Of the number that is the noise of its encoder, radians, before the joint's name.
+NOISE_NAME = "trueangle_noise:"
 
 _OF_THE_JOINT = ("frictionloss", "damping", "stiffness", "armature")
 
@@ -43,11 +46,17 @@ class MuJoCo(Target):
         "damping": Option(float, None, "Nm s/rad"),
         "stiffness": Option(float, None, "of a spring to the zero, Nm/rad"),
         "armature": Option(float, None, "inertia of the rotor at the joint, kg m^2"),
+        "noise_std": Option(float, None, "white noise of the encoder, standard deviation in rad"),
         "ripple": Option(str, None, "torque ripple: ORDER:Nm:DEG,... of Nm sin(ORDER angle + DEG)"),
     }
 
     def holds(self, term: Term) -> bool:
         return True
+
+    def may_be_empty(self, options: Mapping[str, Any]) -> bool:
+        """A ripple, friction or noise alone."""
+        own = (*_OF_THE_JOINT, "ripple", "noise_std")
+        return any(options[key] is not None for key in own)
 
     def how(self, proof: Proof) -> str:
         return "the model itself is in the file, and SensorLayer evaluates it"
@@ -55,7 +64,7 @@ class MuJoCo(Target):
     def make(self, pattern: TurnPattern, options: Mapping[str, Any]) -> Made:
         model = pattern.source
         joint = options["joint"]
-        for key in _OF_THE_JOINT:
+        for key in (*_OF_THE_JOINT, "noise_std"):
             if options[key] is not None and options[key] < 0.0:
                 raise ArgumentError(f"{key} must be 0 or more, got {options[key]:g}")
         waves = _ripple(options["ripple"])
@@ -78,9 +87,15 @@ class MuJoCo(Target):
             comment = "\n".join(header.comment("    ", *own)).replace("--", "- -")
             parts = ["<mujoco>", f"  <!--\n{comment}\n  -->"]
             compact = json.dumps(json.loads(model_text(model)), separators=(",", ":"))
+            noise = ""
+            if options["noise_std"]:
+                noise = (
+                    f"    <numeric name={quoteattr(NOISE_NAME + joint)} "
+                    f'data="{options["noise_std"]!r}"/>\n'
+                )
             parts.append(
                 f"  <custom>\n    <text name={quoteattr(TEXT_NAME + joint)} "
-                f"data={quoteattr(compact)}/>\n  </custom>"
+                f"data={quoteattr(compact)}/>\n{noise}  </custom>"
             )
             if given:
                 values = " ".join(f'{key}="{options[key]!r}"' for key in given)

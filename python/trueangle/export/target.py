@@ -179,6 +179,10 @@ class Target(ABC):
         """Whether a term that is no function of the angle gets into what is written."""
         return self.takes_direction and of_direction(term)
 
+    def may_be_empty(self, options: Mapping[str, Any]) -> bool:
+        """Whether a file makes sense without any error of the angle in it."""
+        return False
+
     def at_run_time(self, pattern: TurnPattern, options: Mapping[str, Any]) -> RunTimeTerms | None:
         """The terms that are computed at every reading, where there are any."""
         return None

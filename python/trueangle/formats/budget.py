@@ -17,6 +17,8 @@ __all__ = [
     "Extent",
     "check_decoded",
     "check_part",
+    "shown",
+    "stored",
     "text_extent",
 ]
 
@@ -57,8 +59,8 @@ def check_decoded(path: Path, size: int, columns: int) -> None:
     if size > DECODED_BYTES:
         raise DecodedSizeError(
             path,
-            f"unpacks to {_shown(size)} or more in {columns} columns ({_stored(path)} on the "
-            f"disk), but a table of runs is held in memory up to {_shown(DECODED_BYTES)} only; "
+            f"unpacks to {shown(size)} or more in {columns} columns ({stored(path)} on the "
+            f"disk), but a table of runs is held in memory up to {shown(DECODED_BYTES)} only; "
             "`ta.fit_logs(...)` reads more, in constant memory",
         )
 
@@ -73,25 +75,26 @@ def check_part(path: Path, size: int, part: str, column: str | None = None) -> N
     if size > DECODED_BYTES:
         raise DecodedSizeError(
             path,
-            f"one {part} unpacks to {_shown(size)} ({_stored(path)} on the disk), but at most "
-            f"{_shown(DECODED_BYTES)} are unpacked at a time; write it in smaller ones",
+            f"one {part} unpacks to {shown(size)} ({stored(path)} on the disk), but at most "
+            f"{shown(DECODED_BYTES)} are unpacked at a time; write it in smaller ones",
             column=column,
         )
 
 
-def _stored(path: Path) -> str:
+def stored(path: Path) -> str:
+    """What a file takes on the disk, in the unit that fits."""
     try:
-        return _shown(path.stat().st_size)
+        return shown(path.stat().st_size)
     except OSError:
         return "an unknown size"
 
 
-def _shown(size: int) -> str:
+def shown(size: int) -> str:
     """Bytes in the unit that fits.
 
     Examples
     --------
-    >>> _shown(1023), _shown(5 << 20), _shown(3 << 29)
+    >>> shown(1023), shown(5 << 20), shown(3 << 29)
     ('1023 bytes', '5 MiB', '1.5 GiB')
     """
     for shift, unit in ((30, "GiB"), (20, "MiB"), (10, "KiB")):

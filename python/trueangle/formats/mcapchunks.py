@@ -12,6 +12,8 @@ from collections.abc import Callable, Collection, Iterator, Sequence
 from io import BytesIO
 from itertools import chain, pairwise
 from operator import itemgetter
+from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any, ClassVar, cast
 
 import numpy as np
@@ -21,6 +23,7 @@ from rosbags.rosbag2.storage_mcap import McapReader, McapWriter, PendingChunk, d
 
 from .budget import check_part
 from .mcaprows import RecordRows, interleaved
+from .packedfolder import unpacked_folder
 from .unpacking import unpacked
 
 __all__ = ["BagReader", "ChunkReader", "ChunkWriter", "ChunkedBagWriter"]
@@ -116,6 +119,30 @@ def _messages(data: bytes, wanted: dict[int, Any]) -> Iterator[tuple[Any, int, b
 class _Directory(DirectoryReader):  # type: ignore[misc]
     STORAGE_PLUGINS: ClassVar[Any] = {**DirectoryReader.STORAGE_PLUGINS, "mcap": ChunkReader}
     metadata: Any
+    path: Path
+    #: Where its files are unpacked.
+    _unpacked: TemporaryDirectory[str] | None = None
+
+    def open(self) -> None:
+        """As of rosbags; files that are packed as a whole, no farther than a limit."""
+        packed, self._unpacked = self.path, unpacked_folder(self.path)
+        if self._unpacked is None:
+            super().open()
+            return
+        self.path = Path(self._unpacked.name)
+        try:
+            super().open()
+        finally:
+            self.path = packed
+        self.metadata = self.metadata._replace(compression_mode="file", compression_format="zstd")
+
+    def close(self) -> None:
+        """Close the files, and remove what was unpacked."""
+        try:
+            super().close()
+        finally:
+            if self._unpacked is not None:
+                self._unpacked.cleanup()
 
     def messages(
         self, connections: Collection[Any], start: int | None = None, stop: int | None = None

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import ArgumentError, MissingSignalError
-from ..export.mujoco import TEXT_NAME
+from ..export.mujoco import NOISE_NAME, TEXT_NAME
 from ..formats.signals import coupled_with
 from ..model.file import model_of
 from ..model.model import HarmonicModel
@@ -44,7 +44,8 @@ class SensorLayer:
         `trueangle.Robot` is one. Without, those that ``ta.export_model(model, "mujoco")``
         has put into the file.
     noise_std : float, optional
-        Standard deviation of white noise of every reading, radians.
+        Standard deviation of white noise of every reading, radians; by default that of each
+        joint in the file, where the models are taken from it, else none.
     seed : int, optional
         Of the noise.
 
@@ -86,7 +87,7 @@ class SensorLayer:
         mjmodel: MjModel,
         models: Mapping[str, HarmonicModel] | None = None,
         *,
-        noise_std: float = 0.0,
+        noise_std: float | None = None,
         seed: int = 0,
     ) -> None:
         found = _embedded(mjmodel) if models is None else dict(models)
@@ -95,12 +96,14 @@ class SensorLayer:
                 "models must name a joint at least, or the file hold what `ta.export_model(model, "
                 '"mujoco")` writes'
             )
-        if not (np.isfinite(noise_std) and noise_std >= 0.0):
+        if noise_std is not None and not (np.isfinite(noise_std) and noise_std >= 0.0):
             raise ArgumentError(f"noise_std must be 0 or more radians, got {noise_std!r}")
         self.names = tuple(found)
         self._joints = [_Encoder(mjmodel, name, model) for name, model in found.items()]
         self._order = self._couplings(mjmodel)
-        self._noise_std = float(noise_std)
+        noise = _embedded_noise(mjmodel) if models is None else {}
+        each = [noise.get(name, 0.0) if noise_std is None else noise_std for name in self.names]
+        self._noise_std = np.array(each, np.float64)
         self._random = np.random.default_rng(seed)
 
     def _couplings(self, mjmodel: MjModel) -> list[tuple[int, dict[str, tuple[str | None, int]]]]:
@@ -176,7 +179,7 @@ class SensorLayer:
             for signal, (name, at) in couplings.items():
                 own[signal] = readings[:, at] if name is None else fields["qpos"][:, at]
             readings[:, j] = self._joints[j].read(fields, own)
-        if self._noise_std:
+        if self._noise_std.any():
             readings += self._random.normal(0.0, self._noise_std, shape)
         return readings[0] if single else readings
 
@@ -288,6 +291,16 @@ def _known(signals: Mapping[str, ArrayLike]) -> dict[str, Array]:
                 f"{', '.join(known)}"
             )
     return {name: np.asarray(value, np.float64) for name, value in signals.items()}
+
+
+def _embedded_noise(mjmodel: MjModel) -> dict[str, float]:
+    """Noise of encoders that the file holds, radians by joint."""
+    found = {}
+    for i in range(mjmodel.nnumeric):
+        numeric = mjmodel.numeric(i)
+        if numeric.name.startswith(NOISE_NAME) and numeric.data.size:
+            found[numeric.name[len(NOISE_NAME) :]] = float(numeric.data[0])
+    return found
 
 
 def _embedded(mjmodel: MjModel) -> dict[str, HarmonicModel]:

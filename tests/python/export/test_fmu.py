@@ -1,5 +1,6 @@
 """Functional mock-up units, validated and simulated by FMPy, against the model."""
 
+import os
 import shutil
 import xml.etree.ElementTree as ElementTree
 import zipfile
@@ -21,6 +22,8 @@ A = np.pi / 648_000.0
 R = np.pi / 180.0
 STEP = 0.002
 COUNT = 1500
+#: Random inputs of a unit that is stepped by hand.
+INPUTS = 1_000_000 if os.environ.get("TRUEANGLE_NIGHTLY") else 20_000
 OUTPUT = ta.Shaft("output", 1, (1, 2, 5), (0.3 * R, 0.0, 0.01 * R), (0.0, 0.1 * R, 0.02 * R))
 MOTOR = ta.Shaft("motor", 100.5, (1, 2), (0.008 * R, 0.0), (0.0, 0.003 * R))
 TERMS = {
@@ -35,17 +38,18 @@ TERMS = {
 }  # fmt: skip
 
 
-def motion(seed):
+def motion(seed, count=COUNT):
     """Angles of a joint that turns back and rests, and its signals in SI units."""
     rng = np.random.default_rng(seed)
-    velocity = np.repeat(rng.normal(0.0, 1.0, 30) * (rng.random(30) < 0.8), COUNT // 30)
+    legs = count // 50
+    velocity = np.repeat(rng.normal(0.0, 1.0, legs) * (rng.random(legs) < 0.8), 50)
     return {
-        "time": np.arange(COUNT) * STEP,
+        "time": np.arange(count) * STEP,
         "angle": np.cumsum(velocity * STEP) + 3.0,
         "velocity": velocity,
-        "torque": rng.normal(0.0, 5.0, COUNT),
-        "temperature": 293.15 + rng.normal(0.0, 5.0, COUNT),
-        "current": rng.normal(0.0, 1.0, COUNT),
+        "torque": rng.normal(0.0, 5.0, count),
+        "temperature": 293.15 + rng.normal(0.0, 5.0, count),
+        "current": rng.normal(0.0, 1.0, count),
     }
 
 
@@ -112,6 +116,39 @@ def test_a_sensor_says_what_the_model_does(name, fmi, tmp_path):
     found = simulated(path, "true_angle", "indicated", moved, "CoSimulation")
     worst = np.max(np.abs(found - want[: len(found)]))
     print(f"seed {seed}: {worst}")
+    assert worst <= WITHIN
+
+
+@pytest.mark.parametrize("variant", ["correction", "sensor"])
+@pytest.mark.parametrize("name", list(TERMS))
+def test_random_inputs(name, variant, tmp_path):
+    seed = int(np.random.SeedSequence().generate_state(1)[0])
+    model = ta.HarmonicModel((OUTPUT, MOTOR), 0.01, terms=TERMS[name])
+    path = tmp_path / "joint.fmu"
+    ta.export_model(model, "fmu", path, variant=variant)
+    description = fmpy.read_model_description(str(path))
+    unit = fmpy.instantiate_fmu(fmpy.extract(str(path)), description, "CoSimulation")
+    inputs = [v for v in description.modelVariables if v.causality == "input"]
+    (out,) = (v.valueReference for v in description.modelVariables if v.causality == "output")
+    moved = motion(seed, INPUTS)
+    columns = [moved[v.name if v.name in moved else "angle"].astype(np.float64) for v in inputs]
+    references = [v.valueReference for v in inputs]
+    unit.enterInitializationMode()
+    unit.exitInitializationMode()
+    found = np.empty(INPUTS)
+    for i, row in enumerate(np.column_stack(columns).tolist()):
+        unit.setFloat64(references, row)
+        unit.doStep(i * STEP, STEP)
+        (found[i],) = unit.getFloat64([out])
+    unit.terminate()
+    unit.freeInstance()
+    angle, signals = moved["angle"], signals_of(model, moved)
+    if variant == "correction":
+        want = model.corrector()(angle, **signals)
+    else:
+        want = angle + model.error(angle, **signals)
+    worst = np.max(np.abs(found - want))
+    print(f"seed {seed}: {worst} of {INPUTS} inputs")
     assert worst <= WITHIN
 
 

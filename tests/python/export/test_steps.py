@@ -1,5 +1,6 @@
 """Terms at run time in exported C and Rust: against the corrector, over random trajectories."""
 
+import os
 import subprocess
 
 import numpy as np
@@ -13,9 +14,11 @@ from trueangle.export.targets import TARGETS
 from trueangle.model.records import FitRecord
 
 from .test_machines import ARM, HERE, STRICT, figures, run, tool
+from .trajectories import UNIT, trajectories, trajectory
 
 A = 1.0 / 3600.0
-UNIT = 360.0 / 2.0**32
+#: Readings of a random trajectory against the corrector.
+SAMPLES = 10_000_000 if os.environ.get("TRUEANGLE_NIGHTLY") else 20_000
 LINES = {"orders": (1.0, 3.0), "cosine": (2 * A, 0.0), "sine": (A, 3 * A)}
 FIT = FitRecord(
     900, 1, (0.0, 360.0), 0.001,
@@ -60,32 +63,12 @@ def exported(model, target, path):
     return ta.export_model(model, target, path, bits=12, method="cubic", number="q31", entries=512)
 
 
-def trajectory(seed, count):
-    """A joint that moves, turns back, rests and trembles; signals as float32 holds them."""
-    rng = np.random.default_rng(seed)
-    legs = count // 50 + 1
-    velocity = np.repeat(rng.normal(0.0, 60.0, legs) * (rng.random(legs) < 0.8), 50)[:count]
-    velocity += rng.normal(0.0, 0.5, count) * (rng.random(count) < 0.2)
-    rows = np.zeros(count, dtype=[
-        ("place", "<i8"), ("velocity", "<f4"), ("temperature", "<f4"), ("torque", "<f4"),
-        ("current", "<f4"), ("direction", "<i8"),
-    ])  # fmt: skip
-    angle = np.cumsum(velocity * 0.002) + rng.uniform(0.0, 360.0)
-    rows["place"] = np.floor(angle / UNIT)
-    rows["velocity"] = velocity / 360.0
-    rows["temperature"] = 20.0 + 5.0 * np.sin(np.arange(count) / 3000.0)
-    rows["torque"] = rng.normal(0.0, 5.0, count)
-    rows["current"] = rng.normal(0.0, 1.0, count)
-    rows["direction"] = np.sign(velocity)
-    return rows
-
-
-def wanted(model, rows, fields):
+def wanted(corrector, rows, fields):
     """The corrector's angles, of the same readings and signals."""
     given = {name: rows[name].astype(np.float64) for name in fields}
     if "velocity" in given:
         given["velocity"] *= 360.0
-    return model.corrector()(rows["place"] * UNIT, **given)
+    return corrector(rows["place"] * UNIT, **given)
 
 
 def fields_of(model):
@@ -93,7 +76,8 @@ def fields_of(model):
     return TARGETS["c"].at_run_time(TurnPattern(model), options).signals
 
 
-def walked_in_c(model, rows, folder, flags=()):
+def walk_in_c(model, folder, flags=()):
+    """What was exported, and the program that walks through rows with it."""
     tool("gcc")
     made = exported(model, "c", folder / "j.h")
     setting = " ".join(f"signals.{name} = row.{name};" for name in fields_of(model))
@@ -101,6 +85,11 @@ def walked_in_c(model, rows, folder, flags=()):
     run(["gcc", *STRICT, *flags, f"-I{folder}", '-DHEADER="j.h"', "-DSTATE=j_state",
          "-DSIGNALS=j_signals", "-DSTEP=j_step_unwrapped",
          f"-DSET={setting or 'signals.none = 0;'}", HERE / "walk.c", "-o", program])  # fmt: skip
+    return made, program
+
+
+def walked_in_c(model, rows, folder, flags=()):
+    made, program = walk_in_c(model, folder, flags)
     done = subprocess.run([program], input=rows.tobytes(), capture_output=True, check=True)
     return made, np.frombuffer(done.stdout, "<i8") * UNIT
 
@@ -135,17 +124,29 @@ def walked_in_rust(model, rows, folder):
 @pytest.mark.parametrize("case", list(CASES))
 def test_c_against_the_corrector(case, tmp_path):
     seed = int(np.random.SeedSequence().generate_state(1)[0])
-    model, rows = model_of(case), trajectory(seed, 20_000)
-    made, found = walked_in_c(model, rows, tmp_path)
-    off = np.max(np.abs(found - wanted(model, rows, fields_of(model)))) * 3600.0
+    model = model_of(case)
+    made, program = walk_in_c(model, tmp_path)
+    readings, angles = tmp_path / "readings", tmp_path / "angles"
+    with readings.open("wb") as file:
+        for rows in trajectories(seed, SAMPLES):
+            file.write(rows.tobytes())
+    with readings.open("rb") as into, angles.open("wb") as out:
+        subprocess.run([program], stdin=into, stdout=out, check=True)
+    corrector, plain = model.corrector(), model.replace(terms=(), fit=None)
+    off = without = 0.0
+    with angles.open("rb") as file:
+        for rows in trajectories(seed, SAMPLES):
+            found = np.frombuffer(file.read(8 * len(rows)), "<i8") * UNIT
+            assert len(found) == len(rows)
+            away = found - wanted(corrector, rows, fields_of(model))
+            off = max(off, np.max(np.abs(away)) * 3600.0)
+            without = max(without, np.max(np.abs(plain.correct(rows["place"] * UNIT) - found)))
     print(f"{case}, seed {seed}: {off:.6f} of {made.max_difference_total_arcsec} arcsec")
     assert off <= made.max_difference_total_arcsec
     assert made.left_out == []
     if made.max_difference_arcsec < 1e-3:
         # Nothing but the terms: what their float arithmetic adds, in units of 2^-32 turns.
         assert off / 3600.0 / UNIT < 5.0
-    plain = model.replace(terms=(), fit=None).correct(rows["place"] * UNIT)
-    without = np.max(np.abs(plain - found))
     assert without * 3600.0 > 4.0 * off + 1.0  # the terms are there
 
 
@@ -188,7 +189,7 @@ def test_direction_as_a_signal(tmp_path):
          program])  # fmt: skip
     done = subprocess.run([program], input=rows.tobytes(), capture_output=True, check=True)
     found = np.frombuffer(done.stdout, "<i8") * UNIT
-    assert np.max(np.abs(found - wanted(model, rows, ["direction"]))) / UNIT < 5.0
+    assert np.max(np.abs(found - wanted(model.corrector(), rows, ["direction"]))) / UNIT < 5.0
     with pytest.raises(ArgumentError, match="does not show in the angle"):
         ta.export_model(model, "c", bits=12, direction="angle")
 

@@ -1,5 +1,6 @@
 """Every target: its sign, its argument, what it refuses, and that it comes back."""
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -59,6 +60,37 @@ def test_a_table_comes_back_as_its_model(target, options, tmp_path):
     assert back.fit.residual > 0.0
     # The wrong sign would leave twice the error.
     assert result.rms_arcsec < 100.0
+
+
+#: Tables of one grid, and a unit of the last digit that they are written with.
+DIGITS = [
+    ("minicheetah", {}, 1.0), ("siemens840d", {}, 1e-7),
+    ("pmac", {"counts_per_turn": 1 << 20}, 1.0),
+    ("tinymovr", {"bits": 14, "entries": 256}, 1.0), ("moteus", {}, 1.0),
+    ("simplefoc", {"variant": "minus-u16"}, 1.0), ("twincat", {"variant": "cnc"}, 1.0),
+    ("klipper", {}, 1.0), ("admt4000", {}, 0.0), ("mujoco", {"joint": "elbow"}, 0.0),
+    ("fmu", {}, 0.0),
+]  # fmt: skip
+
+
+def numbers_of(text):
+    """All numbers of a file but those of its comments."""
+    bare = re.sub(r"/\*.*?\*/|<!--.*?-->", "", text, flags=re.DOTALL)
+    bare = re.sub(r"^\s*(//|#|;).*$", "", bare, flags=re.MULTILINE)
+    return np.array([float(x) for x in re.findall(r"-?\d+\.?\d*(?:e[+-]?\d+)?", bare)])
+
+
+@pytest.mark.parametrize(("target", "options", "digit"), DIGITS)
+def test_what_was_read_is_written_again_to_its_digits(target, options, digit, tmp_path):
+    made, path = made_of(golden_model(), target, options, tmp_path)
+    known = {"variant", "bits", "counts_per_turn", "joint"} & set(options)
+    back = ta.import_model(path, target, **{k: options[k] for k in known})
+    (tmp_path / "again").mkdir()
+    again, _ = made_of(back, target, options, tmp_path / "again")
+    first, second = numbers_of(made.text), numbers_of(again.text)
+    assert first.size > 10
+    # A digit is rounded the other way where it stood between two.
+    np.testing.assert_allclose(second, first, rtol=0.0, atol=1.001 * digit)
 
 
 def test_registers_come_back(tmp_path):

@@ -1,6 +1,7 @@
 """ROS bags written by rosbags itself: joint states corrected, other topics untouched."""
 
 import bz2
+import tempfile
 import tracemalloc
 from pathlib import Path
 
@@ -262,6 +263,31 @@ def test_chunks_and_messages_are_unpacked_no_farther_than_the_budget(
     monkeypatch.setattr("trueangle.formats.budget.DECODED_BYTES", 100)
     with pytest.raises(FileError, match=f"one {part} unpacks to .* at most 100 bytes"):
         columns(path, None)
+
+
+def test_a_bag_of_packed_files_takes_no_more_of_the_disk_than_the_limit(
+    tmp_path, positions, monkeypatch
+):
+    path = write_ros2(tmp_path / "bag", positions, StoragePlugin.SQLITE3, CompressionMode.FILE)
+    (file,) = (p for p in path.iterdir() if p.suffix == ".zstd")
+    work = tmp_path / "work"
+    work.mkdir()
+    monkeypatch.setattr(tempfile, "tempdir", str(work))
+    columns = find_format(path).module.columns
+    before = columns(path, None)
+    assert before[:2] == JOINTS[:2]
+    size = len(unpacking.zstd.decompress(file.read_bytes()))
+    monkeypatch.setenv("TRUEANGLE_UNPACKED_BYTES", str(size))
+    assert columns(path, None) == before
+    # Whatever its header says, and however often it is packed one after the other.
+    file.write_bytes(file.read_bytes() + unpacking.zstd.compress(bytes(1 << 24)))
+    with pytest.raises(FileError, match="set the variable TRUEANGLE_UNPACKED_BYTES") as told:
+        columns(path, None)
+    assert file.name in str(told.value)
+    monkeypatch.setenv("TRUEANGLE_UNPACKED_BYTES", "1 GB")
+    with pytest.raises(ta.errors.ArgumentError, match=r"must be a number of bytes.*got '1 GB'"):
+        columns(path, None)
+    assert list(work.iterdir()) == []
 
 
 @pytest.mark.parametrize("codec", ["bz2", "lz4", "zstd"])

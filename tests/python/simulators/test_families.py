@@ -1,39 +1,28 @@
 """The round for every family of effects: found, written into the simulator, and nothing is beyond.
 
-A second MuJoCo with an encoder of its own stands for the real joint: the effect is hidden in its
-log, by code that is none of the package's.
+A second MuJoCo with an encoder and a ripple of its own stands for the real joint: the effect is
+hidden in its log, by code that is none of the package's.
 """
 
 from __future__ import annotations
 
-import json
-import shutil
-
-import mujoco
 import numpy as np
 import pytest
 
-from trueangle.cli import main
-from trueangle.simulators.mujoco import SensorLayer
+from .rig import (
+    ARCSEC,
+    INCLUDE,
+    NOISE,
+    TORQUE_NOISE,
+    by_fmpy,
+    confirmed,
+    diagnosed,
+    measured,
+    motions,
+    written,
+)
 
-ARCSEC = np.pi / 648_000.0
-ROBOT = """
-<mujoco>
-  @include@
-  <option timestep="0.002" gravity="0 0 0"/>
-  <worldbody>
-    <body>
-      <joint name="elbow" type="hinge" axis="0 0 1" damping="2" armature="0.5"/>
-      <geom type="box" size="0.3 0.02 0.02" pos="0.3 0 0" mass="2"/>
-    </body>
-  </worldbody>
-  <actuator><position joint="elbow" kp="2000" kv="40"/></actuator>
-</mujoco>
-"""
-NOISE = 3.0
-#: Speed (rad/s) and load (Nm) of every run, a turn there and back.
-RUNS = ((0.4, 12.0), (1.2, -12.0), (0.4, -4.0), (1.2, 4.0))
-COLUMNS = ("time_s", "reference_rad", "indicated_rad", "velocity_rad_s", "torque_Nm")
+SEED = 20261124
 
 
 def periodic(angle, velocity, torque):
@@ -61,6 +50,10 @@ def friction(angle, velocity, torque):
     return np.array(errors)
 
 
+def nothing(angle, velocity, torque):
+    return 0.0
+
+
 #: Of each family: the error in arcsec, 1 to 3 standard deviations of the noise; its cause and
 #: parameters.
 FAMILIES = {
@@ -72,91 +65,93 @@ FAMILIES = {
 }
 
 
-def motions(folder, include=""):
-    """Of each run: what `COLUMNS` name, with the encoder of MuJoCo."""
-    (folder / "robot.xml").write_text(ROBOT.replace("@include@", include))
-    model = mujoco.MjModel.from_xml_path(str(folder / "robot.xml"))
-    for speed, load in RUNS:
-        data = mujoco.MjData(model)
-        layer = SensorLayer(model) if include else None
-        half, rows = 2.0 * np.pi / speed, []
-        every = max(1, round(0.02 / speed / 0.002))
-        data.qfrc_applied[0] = load
-        while data.time < 2.0 * half:
-            data.ctrl[0] = speed * min(data.time, 2.0 * half - data.time)
-            mujoco.mj_forward(model, data)
-            if round(data.time / 0.002) % every == 0:
-                reading = data.qpos[0] if layer is None else layer.read(data)[0]
-                state = (data.qvel[0], data.qfrc_actuator[0])
-                rows.append((data.time, data.qpos[0], reading, *state))
-            mujoco.mj_step(model, data)
-        # The load is taken up within a moment.
-        yield np.array(rows)[20:].T
+def within_two(told, parameters):
+    """Whether parameters are within two of their standard errors."""
+    for name, value in parameters.items():
+        got = told[name]
+        print(f"{name}: {got['value']} +- {got['std']}")
+        assert abs(got["value"] - value) < 2.0 * got["std"]
 
 
-def written(path, runs):
-    lines = ["run," + ",".join(COLUMNS)]
-    for k, columns in enumerate(runs):
-        rows = zip(*(column.tolist() for column in columns), strict=True)
-        lines += [f"{k}," + ",".join(map(repr, row)) for row in rows]
-    path.write_text("\n".join(lines) + "\n")
-    return str(path)
-
-
-def diagnosed(capsys, *arguments):
-    capsys.readouterr()
-    assert main(["diagnose", *arguments, "--json"]) == 0
-    out = capsys.readouterr().out
-    return json.loads(out[out.index("{") :])
+def nothing_beyond(found):
+    """No cause, neither in the angle nor in the torque of the drive."""
+    print(confirmed(found), found["unexplained"]["found"], found["torque"])
+    assert confirmed(found) == {}
+    assert confirmed(found["torque"], "effect") == {}
+    assert found["simulation"]["rms_arcsec"] == pytest.approx(NOISE, rel=0.1)
+    assert found["torque"]["rms_Nm"] == pytest.approx(TORQUE_NOISE, rel=0.1)
 
 
 @pytest.mark.parametrize("into", ["mujoco", "fmu"])
 @pytest.mark.parametrize("family", list(FAMILIES))
 def test_the_round_closes(family, into, tmp_path, capsys):
     error, cause, parameters = FAMILIES[family]
-    rng = np.random.default_rng(20261124)
-    print("seed 20261124")
     ideal = list(motions(tmp_path))
-    real = []
-    for time, angle, _, velocity, torque in ideal:
-        noise = rng.normal(0.0, NOISE, angle.size)
-        said = angle + ARCSEC * (error(angle, velocity, torque) + noise)
-        real.append((time, angle, said, velocity, torque))
-    measured = written(tmp_path / "real.csv", real)
+    real = written(tmp_path / "real.csv", measured(ideal, error, SEED))
     sensor = tmp_path / f"sensor.{'fmu' if into == 'fmu' else 'xml'}"
     more = ("--extend-into", str(sensor), *(() if into == "fmu" else ("--into-joint", "elbow")))
     log = written(tmp_path / "model.csv", ideal)
-    found = diagnosed(capsys, measured, "--simulated", log, *more)
-    told = {f["cause"]: f["parameters"] for f in found["findings"] if f["status"] == "confirmed"}
+    found = diagnosed(capsys, real, "--simulated", log, *more)
+    told = confirmed(found)
     assert list(told) == [cause], told
-    for name, value in parameters.items():
-        got = told[cause][name]
-        print(f"{name}: {got['value']} +- {got['std']}")
-        assert abs(got["value"] - value) < 2.0 * got["std"]
+    within_two(told[cause], parameters)
+    assert confirmed(found["torque"], "effect") == {}
     if into == "mujoco":
-        again = list(motions(tmp_path, '<include file="sensor.xml"/>'))
+        again = motions(tmp_path, INCLUDE, noise_std=0.0)
     else:
-        again = list(simulated(sensor, ideal))
-    found = diagnosed(capsys, measured, "--simulated", written(tmp_path / "again.csv", again))
-    print([(f["cause"], f["status"]) for f in found["findings"]], found["unexplained"]["found"])
-    assert [f for f in found["findings"] if f["status"] == "confirmed"] == []
-    assert found["simulation"]["rms_arcsec"] == pytest.approx(NOISE, rel=0.1)
+        again = by_fmpy(sensor, ideal, noise_std=0.0)
+    again = written(tmp_path / "again.csv", again)
+    nothing_beyond(diagnosed(capsys, real, "--simulated", again))
 
 
-def simulated(sensor, runs):
-    """The runs with what the unit says of their true angles."""
-    fmpy = pytest.importorskip("fmpy")
-    if shutil.which("cc") is None:
-        pytest.skip("not installed: cc")
-    for time, angle, _, velocity, torque in runs:
-        names = ("time", "true_angle", "velocity", "torque", "temperature")
-        given = np.zeros(time.size, [(name, "f8") for name in names])
-        given["true_angle"], given["velocity"], given["torque"] = angle, velocity, torque
-        step = float(time[1] - time[0])
-        given["time"] = np.arange(time.size) * step
-        out = fmpy.simulate_fmu(
-            str(sensor), stop_time=time.size * step, output_interval=step, input=given,
-            output=["indicated"],
-        )  # fmt: skip
-        # A step's output is of the input at its begin.
-        yield time, angle, out["indicated"][1 : time.size + 1], velocity, torque
+#: Torque ripple of the real joint, Nm, of 1 to 3 standard deviations of the noise: slow against the
+#: drive, or what it accelerates is in the torque as well.
+RIPPLES = {
+    "one wave": ((4, 0.1, 0.5),),
+    "two waves": ((2, 0.12, -1.0), (5, 0.08, 2.0)),
+}
+
+
+@pytest.mark.parametrize("which", list(RIPPLES))
+def test_the_round_closes_for_a_friction_ripple(which, tmp_path, capsys):
+    waves = RIPPLES[which]
+
+    def ripple(angle):
+        return sum(size * np.sin(order * angle + phase) for order, size, phase in waves)
+
+    ideal = motions(tmp_path)
+    log = written(tmp_path / "model.csv", ideal)
+    real = list(motions(tmp_path, ripple=ripple))
+    real = written(tmp_path / "real.csv", measured(real, nothing, SEED))
+    sensor = tmp_path / "sensor.xml"
+    more = ("--extend-into", str(sensor), "--into-joint", "elbow")
+    found = diagnosed(capsys, real, "--simulated", log, *more)
+    assert confirmed(found) == {}
+    told = {
+        f["parameters"]["order"]["value"]: f["parameters"]
+        for f in found["torque"]["findings"]
+        if f["effect"] == "torque_ripple" and f["status"] == "confirmed"
+    }
+    assert sorted(told) == [order for order, _, _ in waves]
+    assert len(found["torque"]["findings"]) == len(waves)
+    for order, size, phase in waves:
+        degrees = np.degrees(phase) % 360.0
+        within_two(told[order], {"torque_Nm": size, "phase_deg": degrees})
+    again = written(tmp_path / "again.csv", motions(tmp_path, INCLUDE, noise_std=0.0))
+    nothing_beyond(diagnosed(capsys, real, "--simulated", again))
+
+
+def test_friction_and_damping_that_the_drive_feels(tmp_path, capsys):
+    """They have a place at the joint itself: their sizes are told."""
+    ideal = list(motions(tmp_path))
+    log = written(tmp_path / "model.csv", ideal)
+    real = [
+        (time, angle, said, velocity, torque + 0.1 * np.sign(velocity) + 0.05 * velocity)
+        for time, angle, said, velocity, torque in ideal
+    ]
+    real = written(tmp_path / "real.csv", measured(real, nothing, SEED))
+    found = diagnosed(capsys, real, "--simulated", log)
+    told = confirmed(found["torque"], "effect")
+    assert set(told) == {"dry_friction", "damping"}
+    within_two(told["dry_friction"], {"torque_Nm": 0.1})
+    within_two(told["damping"], {"Nm_s_per_rad": 0.05})

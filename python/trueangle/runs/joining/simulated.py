@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -33,6 +33,8 @@ SAME_MOTION = 0.05
 COVERED = 0.5
 #: Times by which another offset of the clocks must bring the motions nearer to be taken.
 NEARER = 2.0
+#: Times the median of second differences, six standard deviations, beyond which they are no noise.
+_USUAL = 6.0 / 0.6745
 #: Readings that a run is made of, at least.
 _LEAST = 4
 
@@ -56,6 +58,8 @@ class MeasuredMinusSimulated(Shown):
     std_arcsec : float
         Standard deviation that the joining adds to an error.
     notes : tuple of str
+    logs : list of CalibrationRun
+        What the log says of the motion of every run.
     """
 
     runs: list[CalibrationRun]
@@ -65,6 +69,22 @@ class MeasuredMinusSimulated(Shown):
     offsets_s: tuple[float, ...]
     std_arcsec: float
     notes: tuple[str, ...]
+    logs: list[CalibrationRun] = field(repr=False, compare=False, default_factory=list)
+
+    @property
+    def noise_arcsec(self) -> float:
+        """Standard deviation of white noise that the log's own encoder has.
+
+        By the second differences of its error in the order of its readings, those apart at
+        which play turns over.
+        """
+        bends = [np.abs(np.diff(_error(log), 2)) for log in _each_once(self.logs)]
+        if not bends:
+            return 0.0
+        every = np.concatenate(bends)
+        usual = every[every <= _USUAL * np.median(every)]
+        rms = math.sqrt(float(np.mean(usual**2)) / 6.0)
+        return rms * ARCSEC_PER_TURN / 360.0
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values."""
@@ -155,8 +175,9 @@ def minus_simulated(
     measured = runs_of(runs, {})
     logs = runs_of(simulated, reading, "simulated", "simulated")
     source = logs[0].source.file if logs and logs[0].source else "simulated runs"
+    logs = _counterparts(measured, logs, source)
     found, kept = [], []
-    for run, log in zip(measured, _counterparts(measured, logs, source), strict=True):
+    for run, log in zip(measured, logs, strict=True):
         expected = _expected(run, log, by, source)
         if np.count_nonzero(expected.known) < _LEAST:
             raise ArgumentError(
@@ -173,6 +194,7 @@ def minus_simulated(
         tuple(part.offset for part in found),
         math.sqrt(float(np.mean([part.std**2 for part in found]))) * ARCSEC_PER_TURN / 360.0,
         tuple(dict.fromkeys(part.note for part in found if part.note)),
+        logs,
     )
 
 
@@ -272,6 +294,10 @@ def _apart(own: Stream, other: Stream, offset: float) -> float:
         return math.inf
     difference = own.angle[inside] - other.at(there[inside])[0]
     return float(np.sqrt(np.mean((difference - np.median(difference)) ** 2)))
+
+
+def _each_once(logs: Sequence[CalibrationRun]) -> Iterable[CalibrationRun]:
+    return {id(log): log for log in logs if len(log) >= _LEAST}.values()
 
 
 def _each_time_once(time: Array, values: Array) -> tuple[Array, Array]:

@@ -1,0 +1,289 @@
+r"""Torque of the drive, measured minus simulated: ripple, dry friction, damping.
+
+.. math:: \tau_\text{measured} - \tau_\text{simulated} = F\,\operatorname{sgn}\dot\theta
+          + d\,\dot\theta - \sum_m T_m \sin(m\theta + \phi_m) + n
+
+It is diagnosed like an error of the angle: a line is a ripple, what follows the direction dry
+friction, what follows the velocity damping. A simulator has elements of its own for them.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..effects.backlash import Backlash
+from ..effects.direction_dependent_pattern import DirectionalPattern
+from ..effects.latency import Latency
+from ..effects.missing_order import MissingOrder
+from ..effects.presliding_hysteresis import PreslidingHysteresis
+from ..estimation.estimate import Parameters, Quantity, quantity
+from ..runs.joining import MeasuredMinusSimulated, minus_simulated
+from ..runs.run import CalibrationRun
+from ..support.plainresult import Shown
+
+if TYPE_CHECKING:
+    from .findings import Diagnosis, Finding
+
+__all__ = ["TorqueAccount", "TorqueFinding", "torque_account"]
+
+Array = NDArray[np.float64]
+
+#: Degrees that the largest torque is put into: so small that an angle stays what it is.
+_LARGEST = 0.01
+#: Arcseconds in them.
+_ARCSEC = 3600.0 * _LARGEST
+#: Share of the largest torque below which a difference is rounding.
+_ROUNDING = 1e-9
+
+#: What the causes of an angle error are as a torque.
+_EFFECTS: Final = {
+    MissingOrder.kind: "torque_ripple",
+    Backlash.kind: "dry_friction",
+    Latency.kind: "damping",
+    PreslidingHysteresis.kind: "presliding_friction",
+    DirectionalPattern.kind: "friction_ripple",
+}
+
+#: What parameters are called, and their units.
+_TOLD: Final = {
+    "torque_Nm": ("", " Nm"),
+    "phase_deg": ("at ", " deg"),
+    "Nm_s_per_rad": ("", " Nm s/rad"),
+}
+
+
+@dataclass(frozen=True)
+class TorqueFinding(Shown):
+    """What the drive's torque holds beyond the simulator's.
+
+    Attributes
+    ----------
+    effect : str
+        ``torque_ripple`` (order, torque_Nm, phase_deg of what acts on the joint, Nm sin(order
+        angle + phase)), ``dry_friction`` (torque_Nm), ``damping`` (Nm_s_per_rad), or another.
+    parameters : dict of str to Quantity
+    status, reason : str
+        As of a `Finding`.
+    """
+
+    effect: str
+    parameters: Parameters
+    status: str
+    reason: str = ""
+
+    @property
+    def confirmed(self) -> bool:
+        """Fit to be written into a simulator."""
+        return self.status == "confirmed"
+
+    def summary(self) -> str:
+        """One line."""
+        parts = []
+        for name, entry in self.parameters.items():
+            values = entry.value if isinstance(entry.value, list) else [entry.value]
+            text = ", ".join(f"{v:.4g}" if isinstance(v, float | int) else str(v) for v in values)
+            std = f" +- {entry.std:.2g}" if isinstance(entry.std, float) else ""
+            called, unit = _TOLD.get(name, (f"{name.replace('_', ' ')} ", ""))
+            parts.append(f"{called}{text}{std}{unit}")
+        doubt = "" if self.confirmed else f" (NOT CONFIRMED: {self.reason})"
+        return f"{self.effect.replace('_', ' ')}: {', '.join(parts)}{doubt}"
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain values."""
+        return {
+            "effect": self.effect,
+            "status": self.status,
+            "status_reason": self.reason,
+            "parameters": {name: q.to_dict() for name, q in self.parameters.items()},
+        }
+
+
+@dataclass(frozen=True)
+class TorqueAccount(Shown):
+    """What the torque of a simulated drive lacks.
+
+    Attributes
+    ----------
+    rms, noise : float
+        Measured minus simulated, and what of it is noise of one reading, Nm.
+    unexplained : bool
+        More is there than the findings and noise.
+    findings : tuple of TorqueFinding
+    complete : bool
+        False where the time was up.
+    """
+
+    rms: float
+    noise: float
+    unexplained: bool
+    findings: tuple[TorqueFinding, ...]
+    complete: bool = True
+
+    @property
+    def ripple(self) -> str:
+        """Confirmed waves of whole orders as ``ORDER:Nm:DEG,...``: option ``ripple`` of MuJoCo."""
+        waves = []
+        for finding in self.findings:
+            if finding.confirmed and finding.effect == "torque_ripple":
+                order, torque, phase = (
+                    _number(finding.parameters[name])
+                    for name in ("order", "torque_Nm", "phase_deg")
+                )
+                if order >= 1.0 and order.is_integer():
+                    waves.append(f"{order:.0f}:{torque!r}:{phase!r}")
+        return ",".join(waves)
+
+    @property
+    def advice(self) -> str:
+        """What the joint's own attributes in MuJoCo lack; empty where they lack nothing."""
+        parts = []
+        for effect, parameter, attribute in (
+            ("dry_friction", "torque_Nm", "frictionloss"),
+            ("damping", "Nm_s_per_rad", "damping"),
+        ):
+            for finding in self.findings:
+                if finding.confirmed and finding.effect == effect:
+                    value = _number(finding.parameters[parameter])
+                    parts.append(f"{value:+.4g} to its {attribute}")
+        return f"add {' and '.join(parts)}" if parts else ""
+
+    def lines(self) -> Iterator[str]:
+        """The account, a sentence or a finding each."""
+        yield (
+            f"Torque of the drive, measured minus simulated: rms {self.rms:.3g} Nm, of which "
+            f"{self.noise:.3g} Nm are noise of one reading."
+        )
+        for finding in self.findings:
+            yield f"- {finding.summary()}"
+        if not self.findings:
+            yield "- nothing is in it beyond the simulator's" + (
+                "" if not self.unexplained else " that has a name"
+            )
+        if self.unexplained:
+            yield "- NOT UNDERSTOOD: there is more in it than noise"
+        if self.advice:
+            yield f"- of MuJoCo's joint: {self.advice}"
+        if not self.complete:
+            yield "- INCOMPLETE: the time was up"
+
+    def summary(self) -> str:
+        """The account as readable text."""
+        return "\n".join(self.lines())
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain values."""
+        return {
+            "rms_Nm": self.rms,
+            "noise_Nm": self.noise,
+            "unexplained": self.unexplained,
+            "findings": [finding.to_dict() for finding in self.findings],
+            "complete": self.complete,
+        }
+
+
+def torque_account(
+    joined: MeasuredMinusSimulated,
+    measured: Sequence[CalibrationRun],
+    diagnosed: Callable[[list[CalibrationRun], MeasuredMinusSimulated], Diagnosis],
+) -> TorqueAccount | None:
+    """What the torque of the drive lacks; None where one of the two has no torque.
+
+    Parameters
+    ----------
+    joined : MeasuredMinusSimulated
+        Says how the log was joined to the readings.
+    measured : sequence of CalibrationRun
+    diagnosed : callable
+        Diagnoses runs whose error is the torque.
+    """
+    both = [*measured, *joined.logs]
+    if not joined.logs or any(run.torque is None for run in both):
+        return None
+    largest = max(float(np.max(np.abs(np.asarray(run.torque)), initial=0.0)) for run in both)
+    if not (largest > 0.0 and math.isfinite(largest)):
+        return None
+    runs, logs = (
+        [_as_angle(run, k, largest) for k, run in enumerate(given)]
+        for given in (measured, joined.logs)
+    )
+    by = joined.by[0] if len(set(joined.by)) == 1 else None
+    log = minus_simulated(runs, logs, by=by)
+    if all(float(np.max(np.abs(run.error))) < _ROUNDING * _LARGEST for run in log.runs):
+        return None
+    found = diagnosed(runs, log)
+    one = largest / _ARCSEC
+    return TorqueAccount(
+        found.discrepancy.rms * one,
+        found.noise * one,
+        found.unexplained is not None and found.unexplained.found,
+        tuple(_finding(finding, one) for finding in found.findings),
+        found.complete,
+    )
+
+
+def _as_angle(run: CalibrationRun, number: int, largest: float) -> CalibrationRun:
+    """A run whose error is its torque, and in which nothing else acts."""
+    reference = run.unwrapped_reference * (360.0 / run.period)
+    torque = np.asarray(run.torque, np.float64)
+    speed = run.velocity
+    return replace(
+        run,
+        reference=reference,
+        indicated=reference + torque * (_LARGEST / largest),
+        period=360.0,
+        velocity=None if speed is None else np.asarray(speed) * (360.0 / run.period),
+        torque=None,
+        temperature=None,
+        mount=None,
+        signals={},
+        columns={},
+        label=str(number),
+    )
+
+
+def _finding(finding: Finding, one: float) -> TorqueFinding:
+    """A finding in Nm, of which an arcsecond is ``one``."""
+    effect = _EFFECTS.get(finding.cause, finding.cause)
+    given = finding.parameters
+    if effect == "damping":
+        # The error is minus the delay times the velocity, arcsec per degree per second.
+        scale = -one * 3600.0 * 180.0 / math.pi
+        parameters = {"Nm_s_per_rad": _scaled(given["delay_s"], scale)}
+    elif effect == "torque_ripple":
+        # What acts on the joint is what its drive does not bring.
+        phase = given["phase_deg"]
+        parameters = {
+            "order": given["output_order"],
+            "torque_Nm": _scaled(given["amplitude_arcsec"], one),
+            "phase_deg": quantity((_number(phase) + 180.0) % 360.0, phase.std),
+        }
+    elif effect == "dry_friction":
+        parameters = {"torque_Nm": _scaled(given["half_width_arcsec"], one)}
+    else:
+        parameters = {
+            name.replace("_arcsec", "_Nm"): _scaled(q, one) if "_arcsec" in name else q
+            for name, q in given.items()
+        }
+    return TorqueFinding(effect, parameters, finding.status, finding.reason)
+
+
+def _scaled(given: Quantity, factor: float) -> Quantity:
+    """A quantity times a factor."""
+
+    def times(value: Any, by: float) -> Any:
+        if isinstance(value, list):
+            return [times(item, by) for item in value]
+        return value * by if isinstance(value, float | int) else value
+
+    return replace(given, value=times(given.value, factor), std=times(given.std, abs(factor)))
+
+
+def _number(given: Quantity) -> float:
+    assert isinstance(given.value, float | int)
+    return float(given.value)
