@@ -7,8 +7,8 @@ use super::window::Window;
 /// Windows after which their mean is held against the model.
 const FIRST: f64 = 8.0;
 
-/// Turns beyond which a double has no place within one.
-const MANY_TURNS: f64 = (1u64 << 51) as f64;
+/// Bins beyond which a double has no place within one.
+const MOST: f64 = (1u64 << 50) as f64;
 
 /// What a window said.
 #[derive(Clone, Debug)]
@@ -123,39 +123,46 @@ impl Monitor {
     pub fn update(&mut self, angle: &[f64], error: &[f64], alarms: bool) -> Vec<Closed> {
         let mut closed = Vec::new();
         let per_turn = 1.0 / self.period;
-        let (width, half) = (self.window.width(), 0.5 * self.period);
-        let mut anchor = self.anchor;
+        let (count, half) = (self.window.count(), 0.5 * self.period);
+        let mut held = self.window.held();
         let mut zero = self.zero;
         for (reading, (&x, &e)) in angle.iter().zip(error).enumerate() {
             if !(x.is_finite() && e.is_finite()) {
                 continue;
             }
-            let turns = x * per_turn;
-            let start = *anchor.get_or_insert(turns);
             let about = *zero.get_or_insert(e);
             // Rounding is a call of a function on the oldest processors: only where it is needed.
             let mut apart = e - about;
             if apart.abs() > half {
                 apart -= self.period * (apart * per_turn).round();
             }
-            self.window.add(part_of_turn(turns), apart);
-            // Trembling about a place is no travel: only steps of a bin count.
-            let mut moved = turns - start;
-            if moved.abs() > 0.5 {
-                moved -= moved.round();
+            let mut place = x * per_turn * count;
+            if place.abs() > MOST {
+                place = place.rem_euclid(count);
             }
-            if moved.abs() >= width {
-                anchor = Some(turns);
-                self.travel += moved.abs();
-                if self.travel >= self.every
-                    && let Some(found) = self.close(reading)
-                    && !(alarms && found.moved.is_empty() && found.unlike.is_empty())
-                {
-                    closed.push(found);
+            if !self.window.add(&mut held, place, apart) {
+                continue;
+            }
+            // Trembling about a place is no travel: only steps of a bin count.
+            let mut moved = (place - *self.anchor.get_or_insert(place)).abs();
+            if moved > 0.5 * count {
+                moved = (moved - count * (moved / count).round()).abs();
+            }
+            if moved >= 1.0 {
+                self.anchor = Some(place);
+                self.travel += moved / count;
+                if self.travel >= self.every {
+                    self.window.put(std::mem::take(&mut held));
+                    if let Some(found) = self.close(reading)
+                        && !(alarms && found.moved.is_empty() && found.unlike.is_empty())
+                    {
+                        closed.push(found);
+                    }
                 }
             }
         }
-        (self.anchor, self.zero) = (anchor, zero);
+        self.window.hold(held);
+        self.zero = zero;
         closed
     }
 
@@ -260,16 +267,6 @@ impl Monitor {
             since: FIRST,
         }
     }
-}
-
-/// What is left of turns without the whole ones, 0 to 1.
-#[inline(always)]
-fn part_of_turn(turns: f64) -> f64 {
-    if turns.abs() > MANY_TURNS {
-        return turns.rem_euclid(1.0);
-    }
-    let rest = turns - (turns as i64) as f64;
-    if rest < 0.0 { rest + 1.0 } else { rest }
 }
 
 #[cfg(test)]

@@ -18,6 +18,16 @@ const TOLD: f64 = 1e-3;
 /// Count, sum of places, of their squares, and of errors.
 type Bin = [f64; 4];
 
+/// Added to a double, it leaves a whole number in the last places.
+const WHOLE: f64 = 1.5 * (1u64 << 52) as f64;
+
+/// The sums of one bin, held beside the window while readings fall in it.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Held {
+    bin: usize,
+    sums: Bin,
+}
+
 /// Coefficients of the errors less the model's: the zero, then cosine and sine of each order.
 #[derive(Clone, Debug)]
 pub struct Solved {
@@ -32,6 +42,7 @@ pub struct Solved {
 pub struct Window {
     orders: Vec<u32>,
     bins: Vec<Bin>,
+    held: Held,
     /// Cosines at multiples of half a bin.
     cosines: Vec<f64>,
     /// Value, slope and curvature of the model at the middle of each bin, per radian.
@@ -62,6 +73,7 @@ impl Window {
         Self {
             orders: orders.to_vec(),
             bins: vec![[0.0; 4]; count],
+            held: Held::default(),
             cosines,
             model: model.collect(),
         }
@@ -82,16 +94,47 @@ impl Window {
         self.bins.iter().map(|sums| sums[0]).sum()
     }
 
-    /// Adds a reading at a part of a turn, 0 to 1.
+    /// Bins of a turn.
+    pub fn count(&self) -> f64 {
+        self.bins.len() as f64
+    }
+
+    /// The sums of the bin that readings fall in now, to be held beside the window.
+    pub fn held(&self) -> Held {
+        self.held
+    }
+
+    /// What was held goes on with the next readings.
+    pub fn hold(&mut self, held: Held) {
+        self.held = held;
+    }
+
+    /// Adds a reading at a place in bins, any number of turns on; whether it is in another bin
+    /// than the reading before.
     #[inline(always)]
-    pub fn add(&mut self, turn: f64, error: f64) {
-        let place = turn * self.bins.len() as f64;
-        let bin = place as u32;
-        let within = place - f64::from(bin) - 0.5;
-        // 1 itself is the end of the last bin.
-        let bin = (bin as usize).min(self.bins.len() - 1);
+    pub fn add(&mut self, held: &mut Held, place: f64, error: f64) -> bool {
+        // Rounded to a whole number in the last places of the double, whose bits are then the bin.
+        let shifted = (place - 0.5) + WHOLE;
+        let within = (place - 0.5) - (shifted - WHOLE);
+        let bin = shifted.to_bits() as usize & (self.bins.len() - 1);
+        let other = bin != held.bin;
+        if other {
+            self.put(*held);
+            *held = Held {
+                bin,
+                sums: [0.0; 4],
+            };
+        }
         let reading = [1.0, within, within * within, error];
-        for (sum, value) in self.bins[bin].iter_mut().zip(reading) {
+        for (sum, value) in held.sums.iter_mut().zip(reading) {
+            *sum += value;
+        }
+        other
+    }
+
+    /// Adds what was held to its bin.
+    pub fn put(&mut self, held: Held) {
+        for (sum, value) in self.bins[held.bin].iter_mut().zip(held.sums) {
             *sum += value;
         }
     }
@@ -355,6 +398,26 @@ mod tests {
         coefficients[0] + terms.sum::<f64>()
     }
 
+    fn add(window: &mut Window, turn: f64, error: f64) {
+        let mut held = Held::default();
+        window.add(&mut held, turn * window.count(), error);
+        window.put(held);
+    }
+
+    /// A place is in its bin on both sides of zero and turns away, its part of the bin with it.
+    #[test]
+    fn places_are_found_whatever_the_turn() {
+        for turns in [0.0, -1.0, 1.0, -4096.0, 1e9] {
+            let mut window = Window::new(&[1], &[0.0], &[0.0]);
+            for (i, part) in [(0, 0.25), (1, 0.75), (127, 0.5), (64, 0.125)] {
+                add(&mut window, turns + (f64::from(i) + part) / 128.0, 3.0);
+                let sums = window.bins[i as usize];
+                assert_eq!((sums[0], sums[3]), (1.0, 3.0));
+                assert!((sums[1] - part + 0.5).abs() < 2e-5, "{turns} {i}: {sums:?}");
+            }
+        }
+    }
+
     /// What the model lacks is found, whatever the places within the bins, and beside a model a
     /// hundred times as large.
     #[test]
@@ -364,7 +427,7 @@ mod tests {
             let mut window = Window::new(&[1, 2], &[100.0, -30.0], &[50.0, 80.0]);
             for i in 0..2000 {
                 let x = (f64::from(i) * step).fract();
-                window.add(x, series(x, &model) + series(x, &lacks));
+                add(&mut window, x, series(x, &model) + series(x, &lacks));
             }
             let found = window.solve().unwrap().coefficients;
             for (a, b) in found.iter().zip(lacks) {
@@ -377,7 +440,7 @@ mod tests {
     #[test]
     fn variances_are_those_of_even_places() {
         let mut window = Window::new(&[1, 3, 8], &[0.0; 3], &[0.0; 3]);
-        (0..1000).for_each(|i| window.add(f64::from(i) / 1000.0, 0.0));
+        (0..1000).for_each(|i| add(&mut window, f64::from(i) / 1000.0, 0.0));
         let variances = window.solve().unwrap().variances;
         assert!((variances[0] - 1e-3).abs() < 1e-6);
         assert!(variances[1..].iter().all(|v| (v - 2e-3).abs() < 2e-5));
@@ -387,7 +450,7 @@ mod tests {
     #[test]
     fn an_arc_tells_no_orders() {
         let mut window = Window::new(&[1, 2, 3], &[0.0; 3], &[0.0; 3]);
-        (0..1000).for_each(|i| window.add(f64::from(i) / 8000.0, 0.0));
+        (0..1000).for_each(|i| add(&mut window, f64::from(i) / 8000.0, 0.0));
         assert!(window.solve().is_none());
         window.clear();
         assert!(window.solve().is_none());
