@@ -14,29 +14,15 @@ const FOUND: f64 = 2.0;
 pub struct Cusum {
     /// Upper and lower sum.
     pub sums: [f64; 2],
-    /// Values since each was last zero.
-    pub since: [f64; 2],
 }
 
 impl Cusum {
     /// Takes a value in; the larger sum.
     pub fn add(&mut self, value: f64, allowance: f64) -> f64 {
-        for (i, signed) in [value, -value].into_iter().enumerate() {
-            self.sums[i] = (self.sums[i] + signed - allowance).max(0.0);
-            self.since[i] = if self.sums[i] > 0.0 {
-                self.since[i] + 1.0
-            } else {
-                0.0
-            };
+        for (sum, signed) in self.sums.iter_mut().zip([value, -value]) {
+            *sum = (*sum + signed - allowance).max(0.0);
         }
         self.sums[0].max(self.sums[1])
-    }
-
-    /// The shift since the sum was last zero, in standard deviations.
-    pub fn shift(&self, allowance: f64) -> f64 {
-        let side = usize::from(self.sums[1] > self.sums[0]);
-        let size = allowance + self.sums[side] / self.since[side].max(1.0);
-        if side == 0 { size } else { -size }
     }
 }
 
@@ -80,6 +66,12 @@ impl Scale {
         } else {
             0.0
         };
+        self.take(value);
+        standard
+    }
+
+    /// Takes a value in.
+    pub fn take(&mut self, value: f64) {
         let before = self.last - self.mean;
         let apart = value - self.mean;
         if self.count > 0.0 {
@@ -90,7 +82,21 @@ impl Scale {
         self.mean += apart / self.count;
         self.squares += apart * (value - self.mean);
         self.last = value;
-        standard
+    }
+
+    /// The part of these values without the last of them, which have this mean and these squares
+    /// about it: how many, their mean, and their squares about that.
+    pub fn without(&self, count: f64, mean: f64, squares: f64) -> (f64, f64, f64) {
+        let before = self.count - count;
+        let own = (self.count * self.mean - count * mean) / before;
+        let between = (own - mean).powi(2) * before * count / self.count;
+        (before, own, (self.squares - squares - between).max(0.0))
+    }
+
+    /// By which the variance of a mean is greater than that of independent values.
+    pub fn inflation(&self) -> f64 {
+        let correlation = self.correlation();
+        (1.0 + correlation) / (1.0 - correlation)
     }
 
     /// That of neighbours where it is found, else 0.
@@ -124,8 +130,6 @@ mod tests {
         let found: Vec<f64> = [1.0, 2.0, -3.0, 0.5].map(|z| chart.add(z, 0.5)).to_vec();
         assert_eq!(found, [0.5, 2.0, 2.5, 1.5]);
         assert_eq!(chart.sums, [0.0, 1.5]);
-        assert_eq!(chart.since, [0.0, 2.0]);
-        assert_eq!(chart.shift(0.5), -1.25);
     }
 
     /// Student's 97.5 % quantiles become the normal one.

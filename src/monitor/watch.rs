@@ -1,13 +1,14 @@
 //! Windows one after the other, and a chart for every coefficient.
 
 use super::chart::{Cusum, Scale};
+use super::recent::Recent;
 use super::window::Window;
 
 /// Windows after which their mean is held against the model.
 const FIRST: f64 = 8.0;
 
-/// Turns beyond which a double has no place within one.
-const MANY_TURNS: f64 = (1u64 << 51) as f64;
+/// Bins beyond which a double has no place within one.
+const MOST: f64 = (1u64 << 50) as f64;
 
 /// What a window said.
 #[derive(Clone, Debug)]
@@ -22,12 +23,23 @@ pub struct Closed {
     pub coefficients: Vec<f64>,
     /// The larger sum of every coefficient's chart; of the zero its last step, in deviations.
     pub statistics: Vec<f64>,
-    /// Coefficients whose chart passed its limit.
-    pub alarms: Vec<usize>,
-    /// Shift of each of these since its sum was last zero, and since how many windows.
-    pub shifts: Vec<(f64, f64)>,
-    /// Coefficients whose mean is not the model's.
-    pub unlike: Vec<usize>,
+    /// Orders a chart of which passed its limit.
+    pub moved: Vec<Moved>,
+    /// Orders whose mean is not the model's since the start.
+    pub unlike: Vec<Moved>,
+}
+
+/// By how much an order moved.
+#[derive(Clone, Copy, Debug)]
+pub struct Moved {
+    /// Counted from 1; 0 is the zero.
+    pub order: usize,
+    /// Of cosine and sine together; of the zero with its sign.
+    pub size: f64,
+    /// Standard error of each coefficient's shift.
+    pub std: f64,
+    /// Windows since then.
+    pub since: f64,
 }
 
 /// Limits of the charts.
@@ -55,6 +67,8 @@ pub struct Monitor {
     charts: Vec<(Scale, Cusum)>,
     /// Means and squares of plain coefficients of the first windows.
     plain: Vec<Scale>,
+    /// Plain coefficients of the last windows.
+    recent: Recent,
     steps: Scale,
     zero: Option<f64>,
     last_zero: Option<f64>,
@@ -75,6 +89,7 @@ impl Monitor {
             known,
             charts: vec![Default::default(); size],
             plain: vec![Scale::default(); size],
+            recent: Recent::new(size),
             steps: Scale::default(),
             zero: None,
             last_zero: None,
@@ -92,7 +107,8 @@ impl Monitor {
     /// Bytes of the state.
     pub fn bytes(&self) -> usize {
         let charts = size_of_val(&self.charts[..]) + size_of_val(&self.plain[..]);
-        size_of::<Self>() + self.window.bytes() + charts + size_of_val(&self.known[..])
+        let fixed = size_of::<Self>() + size_of_val(&self.known[..]);
+        fixed + self.window.bytes() + self.recent.bytes() + charts
     }
 
     /// Mean and standard deviation of each coefficient's windows, and its sums.
@@ -103,42 +119,50 @@ impl Monitor {
             .collect()
     }
 
-    /// Takes readings in; the windows that they ended.
-    pub fn update(&mut self, angle: &[f64], error: &[f64]) -> Vec<Closed> {
+    /// Takes readings in; the windows that they ended, or only those that alarm.
+    pub fn update(&mut self, angle: &[f64], error: &[f64], alarms: bool) -> Vec<Closed> {
         let mut closed = Vec::new();
         let per_turn = 1.0 / self.period;
-        let (width, half) = (self.window.width(), 0.5 * self.period);
-        let mut anchor = self.anchor;
+        let (count, half) = (self.window.count(), 0.5 * self.period);
+        let mut held = self.window.held();
         let mut zero = self.zero;
         for (reading, (&x, &e)) in angle.iter().zip(error).enumerate() {
             if !(x.is_finite() && e.is_finite()) {
                 continue;
             }
-            let turns = x * per_turn;
-            let start = *anchor.get_or_insert(turns);
             let about = *zero.get_or_insert(e);
             // Rounding is a call of a function on the oldest processors: only where it is needed.
             let mut apart = e - about;
             if apart.abs() > half {
                 apart -= self.period * (apart * per_turn).round();
             }
-            self.window.add(part_of_turn(turns), apart);
-            // Trembling about a place is no travel: only steps of a bin count.
-            let mut moved = turns - start;
-            if moved.abs() > 0.5 {
-                moved -= moved.round();
+            let mut place = x * per_turn * count;
+            if place.abs() > MOST {
+                place = place.rem_euclid(count);
             }
-            if moved.abs() >= width {
-                anchor = Some(turns);
-                self.travel += moved.abs();
-                if self.travel >= self.every
-                    && let Some(found) = self.close(reading)
-                {
-                    closed.push(found);
+            if !self.window.add(&mut held, place, apart) {
+                continue;
+            }
+            // Trembling about a place is no travel: only steps of a bin count.
+            let mut moved = (place - *self.anchor.get_or_insert(place)).abs();
+            if moved > 0.5 * count {
+                moved = (moved - count * (moved / count).round()).abs();
+            }
+            if moved >= 1.0 {
+                self.anchor = Some(place);
+                self.travel += moved / count;
+                if self.travel >= self.every {
+                    self.window.put(std::mem::take(&mut held));
+                    if let Some(found) = self.close(reading)
+                        && !(alarms && found.moved.is_empty() && found.unlike.is_empty())
+                    {
+                        closed.push(found);
+                    }
                 }
             }
         }
-        (self.anchor, self.zero) = (anchor, zero);
+        self.window.hold(held);
+        self.zero = zero;
         closed
     }
 
@@ -155,37 +179,38 @@ impl Monitor {
         self.windows += 1;
         let limits = self.limits;
         let size = self.known.len();
-        let (mut alarms, mut shifts, mut unlike) = (Vec::new(), Vec::new(), Vec::new());
+        let (mut moved, mut unlike) = (Vec::new(), Vec::new());
         let mut statistics = vec![0.0; size + 1];
-        let values = solved.coefficients[1..].iter().zip(&solved.variances[1..]);
-        for (i, (&value, variance)) in values.enumerate() {
+        self.recent.add(&solved.coefficients[1..]);
+        for i in 0..size {
+            let (value, variance) = (solved.coefficients[i + 1], solved.variances[i + 1]);
             let (scale, chart) = &mut self.charts[i];
             let standard = scale.add(value / variance.sqrt());
-            let sum = chart.add(standard, limits.allowance);
-            statistics[i + 1] = sum;
-            let plain = &mut self.plain[i];
-            plain.add(value);
-            if sum > limits.sum {
-                let side = usize::from(chart.sums[1] > chart.sums[0]);
-                let size = chart.shift(limits.allowance) * scale.std() * variance.sqrt();
-                alarms.push(i + 1);
-                shifts.push((size, chart.since[side]));
-                *chart = Cusum::default();
-            } else if plain.count() == FIRST {
-                let spread = self.known[i] + plain.std().powi(2) / FIRST;
-                let t = plain.mean() / spread.sqrt();
-                if super::chart::normal_of_student(t, FIRST - 1.0).abs() > limits.mean {
-                    unlike.push(i + 1);
+            statistics[i + 1] = chart.add(standard, limits.allowance);
+            self.plain[i].take(value);
+        }
+        for order in 0..size / 2 {
+            let pair = 2 * order..2 * order + 2;
+            if pair.clone().any(|i| statistics[i + 1] > limits.sum) {
+                moved.push(self.moved(order));
+                for i in pair.filter(|&i| statistics[i + 1] > limits.sum) {
+                    self.charts[i].1 = Cusum::default();
                 }
+            } else if self.windows as f64 == FIRST && pair.clone().any(|i| self.is_unlike(i)) {
+                unlike.push(self.unlike(order));
             }
         }
         let zero = solved.coefficients[0];
         if let Some(before) = self.last_zero {
-            let count = self.steps.count();
+            let (count, std) = (self.steps.count(), self.steps.std());
             statistics[0] = self.steps.add(zero - before).abs();
             if count > FIRST && statistics[0] > limits.step {
-                alarms.push(0);
-                shifts.push((zero - before, 1.0));
+                moved.push(Moved {
+                    order: 0,
+                    size: zero - before,
+                    std,
+                    since: 1.0,
+                });
             }
         }
         self.last_zero = Some(zero);
@@ -195,21 +220,53 @@ impl Monitor {
             readings,
             coefficients: solved.coefficients,
             statistics,
-            alarms,
-            shifts,
+            moved,
             unlike,
         })
     }
-}
 
-/// What is left of turns without the whole ones, 0 to 1.
-#[inline(always)]
-fn part_of_turn(turns: f64) -> f64 {
-    if turns.abs() > MANY_TURNS {
-        return turns.rem_euclid(1.0);
+    /// By how much an order moved in one of the last windows, against all before that.
+    fn moved(&self, order: usize) -> Moved {
+        let pair = [2 * order, 2 * order + 1];
+        let (since, means, squares) = self.recent.change(pair, pair.map(|i| &self.plain[i]));
+        let mut found = [0.0; 2];
+        let mut variance = 0.0;
+        for (k, i) in pair.into_iter().enumerate() {
+            let (before, mean, left) = self.plain[i].without(since, means[k], squares[k]);
+            found[k] = means[k] - mean;
+            // Of the windows before alone: those after are few, and may go on moving.
+            let own = left / (before - 1.0).max(1.0) * (1.0 / since + 1.0 / before);
+            variance += 0.5 * own * self.charts[i].0.inflation();
+        }
+        Moved {
+            order: order + 1,
+            size: found[0].hypot(found[1]),
+            std: variance.sqrt(),
+            since,
+        }
     }
-    let rest = turns - (turns as i64) as f64;
-    if rest < 0.0 { rest + 1.0 } else { rest }
+
+    /// Variance of the first windows' mean less the model's coefficient.
+    fn spread(&self, i: usize) -> f64 {
+        self.known[i] + self.plain[i].std().powi(2) / FIRST
+    }
+
+    /// Whether the first windows' mean is not the model's.
+    fn is_unlike(&self, i: usize) -> bool {
+        let t = self.plain[i].mean() / self.spread(i).sqrt();
+        super::chart::normal_of_student(t, FIRST - 1.0).abs() > self.limits.mean
+    }
+
+    /// How far the first windows' mean is from the model.
+    fn unlike(&self, order: usize) -> Moved {
+        let (a, b) = (2 * order, 2 * order + 1);
+        Moved {
+            order: order + 1,
+            size: self.plain[a].mean().hypot(self.plain[b].mean()),
+            std: (0.5 * (self.spread(a) + self.spread(b))).sqrt(),
+            since: FIRST,
+        }
+    }
 }
 
 #[cfg(test)]
@@ -235,7 +292,7 @@ mod tests {
             let angle: Vec<f64> = (0..3601)
                 .map(|i| (step * f64::from(i)).rem_euclid(360.0))
                 .collect();
-            let closed = watched.update(&angle, &vec![0.0; angle.len()]);
+            let closed = watched.update(&angle, &vec![0.0; angle.len()], false);
             assert_eq!(closed.len(), 10 - usize::from(closed[0].reading > 360));
             assert_eq!(watched.windows(), closed.len() as u64);
         }
@@ -247,9 +304,9 @@ mod tests {
         let angle: Vec<f64> = (0..5000).map(|i| 1.7 * f64::from(i)).collect();
         let error: Vec<f64> = angle.iter().map(|x| (0.3 * x).sin() + 359.0).collect();
         let (mut one, mut other) = (monitor(), monitor());
-        let whole = one.update(&angle, &error);
+        let whole = one.update(&angle, &error, false);
         let parts = angle.chunks(7).zip(error.chunks(7));
-        let parts: Vec<Closed> = parts.flat_map(|(x, e)| other.update(x, e)).collect();
+        let parts: Vec<Closed> = parts.flat_map(|(x, e)| other.update(x, e, false)).collect();
         assert_eq!(whole.len(), parts.len());
         for (a, b) in whole.iter().zip(&parts) {
             assert_eq!(a.coefficients, b.coefficients);
@@ -261,10 +318,18 @@ mod tests {
     fn trembling_ends_no_window() {
         let mut watched = monitor();
         let angle: Vec<f64> = (0..9000).map(|i| f64::from(i % 2)).collect();
-        assert!(watched.update(&angle, &vec![0.0; angle.len()]).is_empty());
+        assert!(
+            watched
+                .update(&angle, &vec![0.0; angle.len()], false)
+                .is_empty()
+        );
         let angle: Vec<f64> = (0..9000)
             .map(|i| 10.0 * (0.1 * f64::from(i)).sin())
             .collect();
-        assert!(watched.update(&angle, &vec![0.0; angle.len()]).is_empty());
+        assert!(
+            watched
+                .update(&angle, &vec![0.0; angle.len()], false)
+                .is_empty()
+        );
     }
 }

@@ -18,6 +18,16 @@ const TOLD: f64 = 1e-3;
 /// Count, sum of places, of their squares, and of errors.
 type Bin = [f64; 4];
 
+/// Added to a double, it leaves a whole number in the last places.
+const WHOLE: f64 = 1.5 * (1u64 << 52) as f64;
+
+/// The sums of one bin, held beside the window while readings fall in it.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Held {
+    bin: usize,
+    sums: Bin,
+}
+
 /// Coefficients of the errors less the model's: the zero, then cosine and sine of each order.
 #[derive(Clone, Debug)]
 pub struct Solved {
@@ -32,6 +42,7 @@ pub struct Solved {
 pub struct Window {
     orders: Vec<u32>,
     bins: Vec<Bin>,
+    held: Held,
     /// Cosines at multiples of half a bin.
     cosines: Vec<f64>,
     /// Value, slope and curvature of the model at the middle of each bin, per radian.
@@ -62,6 +73,7 @@ impl Window {
         Self {
             orders: orders.to_vec(),
             bins: vec![[0.0; 4]; count],
+            held: Held::default(),
             cosines,
             model: model.collect(),
         }
@@ -82,16 +94,47 @@ impl Window {
         self.bins.iter().map(|sums| sums[0]).sum()
     }
 
-    /// Adds a reading at a part of a turn, 0 to 1.
+    /// Bins of a turn.
+    pub fn count(&self) -> f64 {
+        self.bins.len() as f64
+    }
+
+    /// The sums of the bin that readings fall in now, to be held beside the window.
+    pub fn held(&self) -> Held {
+        self.held
+    }
+
+    /// What was held goes on with the next readings.
+    pub fn hold(&mut self, held: Held) {
+        self.held = held;
+    }
+
+    /// Adds a reading at a place in bins, any number of turns on; whether it is in another bin
+    /// than the reading before.
     #[inline(always)]
-    pub fn add(&mut self, turn: f64, error: f64) {
-        let place = turn * self.bins.len() as f64;
-        let bin = place as u32;
-        let within = place - f64::from(bin) - 0.5;
-        // 1 itself is the end of the last bin.
-        let bin = (bin as usize).min(self.bins.len() - 1);
+    pub fn add(&mut self, held: &mut Held, place: f64, error: f64) -> bool {
+        // Rounded to a whole number in the last places of the double, whose bits are then the bin.
+        let shifted = (place - 0.5) + WHOLE;
+        let within = (place - 0.5) - (shifted - WHOLE);
+        let bin = shifted.to_bits() as usize & (self.bins.len() - 1);
+        let other = bin != held.bin;
+        if other {
+            self.put(*held);
+            *held = Held {
+                bin,
+                sums: [0.0; 4],
+            };
+        }
         let reading = [1.0, within, within * within, error];
-        for (sum, value) in self.bins[bin].iter_mut().zip(reading) {
+        for (sum, value) in held.sums.iter_mut().zip(reading) {
+            *sum += value;
+        }
+        other
+    }
+
+    /// Adds what was held to its bin.
+    pub fn put(&mut self, held: Held) {
+        for (sum, value) in self.bins[held.bin].iter_mut().zip(held.sums) {
             *sum += value;
         }
     }
@@ -105,73 +148,67 @@ impl Window {
     /// orders apart.
     pub fn solve(&self) -> Option<Solved> {
         let size = 1 + 2 * self.orders.len();
-        if self.readings() < size as f64 + 1.0 {
+        let readings = self.readings();
+        if readings < size as f64 + 1.0 {
             return None;
         }
-        let mut gram = self.gram();
-        let mut right = self.moments();
-        let scales: Vec<f64> = (0..size).map(|i| gram[i * size + i].sqrt()).collect();
+        let (mut gram, mut right) = self.normal(readings);
+        let scales: Vec<f64> = (0..size).map(|i| 1.0 / gram[i * size + i].sqrt()).collect();
         for (i, scale) in scales.iter().enumerate() {
-            right[i] /= scale;
-            for (j, other) in scales.iter().enumerate() {
-                gram[i * size + j] /= scale * other;
+            right[i] *= scale;
+            let row = &mut gram[i * size..i * size + i + 1];
+            for (value, other) in row.iter_mut().zip(&scales) {
+                *value *= scale * other;
             }
         }
         if !factored(&mut gram, size) {
             return None;
         }
         let inverse = inverted(&gram, size);
-        // Rows of the inverse triangle: forward and back are products with it.
-        let forward: Vec<f64> = (0..size)
-            .map(|i| (0..=i).map(|j| inverse[i * size + j] * right[j]).sum())
-            .collect();
-        let back =
-            |i: usize| -> f64 { (i..size).map(|j| inverse[j * size + i] * forward[j]).sum() };
-        let spread = |i: usize| -> f64 { (i..size).map(|j| inverse[j * size + i].powi(2)).sum() };
+        // Rows of the inverse triangle: forward, back and the diagonal are products with it.
+        let mut coefficients = vec![0.0; size];
+        let mut variances = vec![0.0; size];
+        for i in 0..size {
+            let row = &inverse[i * size..i * size + i + 1];
+            let forward = dot(row, &right[..=i]);
+            for (j, &x) in row.iter().enumerate() {
+                coefficients[j] += x * forward;
+                variances[j] += x * x;
+            }
+        }
+        for (i, scale) in scales.iter().enumerate() {
+            coefficients[i] *= scale;
+            variances[i] *= scale * scale;
+        }
         Some(Solved {
-            coefficients: (0..size).map(|i| back(i) / scales[i]).collect(),
-            variances: (0..size).map(|i| spread(i) / scales[i].powi(2)).collect(),
+            coefficients,
+            variances,
         })
     }
 
-    /// Sum over the readings of cosine and sine of an order.
-    fn sums(&self, order: u32) -> (f64, f64) {
-        let count = self.bins.len();
-        let turn = f64::from(order) * 2.0 * PI / count as f64;
-        let (mut cosine, mut sine) = (0.0, 0.0);
-        for (bin, sums) in self.bins.iter().enumerate() {
-            let (c, s) = self.at(order, bin);
-            let (first, second) = (turn * sums[1], 0.5 * turn * turn * sums[2]);
-            cosine += c * (sums[0] - second) - s * first;
-            sine += s * (sums[0] - second) + c * first;
-        }
-        (cosine, sine)
-    }
-
-    /// Cosine and sine of an order at the middle of a bin.
-    fn at(&self, order: u32, bin: usize) -> (f64, f64) {
-        let (mask, count) = (self.cosines.len() - 1, self.bins.len());
-        let i = (order as usize).wrapping_mul(2 * bin + 1);
-        let quarter = count / 2;
-        (
-            self.cosines[i & mask],
-            self.cosines[i.wrapping_sub(quarter) & mask],
-        )
-    }
-
-    /// The normal matrix of zero, cosine and sine of each order in turn.
-    fn gram(&self) -> Vec<f64> {
+    /// The normal matrix of zero, cosine and sine of each order in turn, its lower triangle, and
+    /// the sums of the errors less the model's times these.
+    fn normal(&self, readings: f64) -> (Vec<f64>, Vec<f64>) {
         let size = 1 + 2 * self.orders.len();
-        let mut gram = vec![0.0; size * size];
-        let mut known: Vec<Option<(f64, f64)>> = Vec::new();
+        let (places, errors) = (self.places(), self.errors());
+        let mut right = vec![0.0; size];
+        right[0] = errors.total();
+        let highest = 2 * self.orders.iter().copied().max().unwrap_or(0) as usize;
+        let mut known = vec![None; highest + 1];
+        let mut rows = Rows::new(self.bins.len() / 4);
+        for (i, &k) in self.orders.iter().enumerate() {
+            rows.fill(&self.cosines, k);
+            (right[1 + 2 * i], right[2 + 2 * i]) = errors.sums(&rows, k);
+            known[k as usize] = Some(places.sums(&rows, k));
+        }
         let mut of = |order: u32| -> (f64, f64) {
-            let i = order as usize;
-            if known.len() <= i {
-                known.resize(i + 1, None);
-            }
-            *known[i].get_or_insert_with(|| self.sums(order))
+            *known[order as usize].get_or_insert_with(|| {
+                rows.fill(&self.cosines, order);
+                places.sums(&rows, order)
+            })
         };
-        gram[0] = self.readings();
+        let mut gram = vec![0.0; size * size];
+        gram[0] = readings;
         for (i, &k) in self.orders.iter().enumerate() {
             let (a, b) = (1 + 2 * i, 2 + 2 * i);
             let (cosine, sine) = of(k);
@@ -188,70 +225,162 @@ impl Window {
                 gram[b * size + c] = 0.5 * (more.1 + turned);
             }
         }
-        for i in 0..size {
-            for j in 0..i {
-                gram[j * size + i] = gram[i * size + j];
-            }
-        }
-        gram
+        (gram, right)
     }
 
-    /// Sums of errors less the model's, times 1, cosine and sine of each order.
-    fn moments(&self) -> Vec<f64> {
+    /// The readings of the bins: how many, and the first two powers of their places.
+    fn places(&self) -> Folded {
+        Folded::new(self.bins.len(), |bin| {
+            let sums = &self.bins[bin];
+            [sums[0], sums[1], sums[2]]
+        })
+    }
+
+    /// The errors of the bins less the model's, times the mean powers of their places.
+    fn errors(&self) -> Folded {
         let width = 2.0 * PI / self.bins.len() as f64;
-        let mut found = vec![0.0; 1 + 2 * self.orders.len()];
-        for (bin, (sums, model)) in self.bins.iter().zip(&self.model).enumerate() {
+        Folded::new(self.bins.len(), |bin| {
+            let (sums, model) = (&self.bins[bin], &self.model[bin]);
             if sums[0] == 0.0 {
-                continue;
+                return [0.0; 3];
             }
             let (first, second) = (width * sums[1], width * width * sums[2]);
             let left = sums[3] - model[0] * sums[0] - model[1] * first - 0.5 * model[2] * second;
-            found[0] += left;
-            let (mean, square) = (first / sums[0], second / sums[0]);
-            for (i, &k) in self.orders.iter().enumerate() {
-                let turn = f64::from(k);
-                let (c, s) = self.at(k, bin);
-                let (near, far) = (1.0 - 0.5 * turn * turn * square, turn * mean);
-                found[1 + 2 * i] += left * (c * near - s * far);
-                found[2 + 2 * i] += left * (s * near + c * far);
-            }
-        }
-        found
+            let each = left / sums[0];
+            [left, each * sums[1], each * sums[2]]
+        })
     }
 }
 
-/// The lower triangle of Cholesky, in place; false where a pivot is too small.
-fn factored(matrix: &mut [f64], size: usize) -> bool {
-    for j in 0..size {
-        for k in 0..j {
-            let factor = matrix[j * size + k];
-            for i in j..size {
-                matrix[i * size + j] -= factor * matrix[i * size + k];
+/// Values of the bins folded to a quarter of the turn: bins that mirror each other on an axis have
+/// cosines and sines of one size, so that a fourth of them do.
+struct Folded {
+    quarter: usize,
+    /// Of even orders for cosines and for sines, of odd ones likewise: three powers of each.
+    planes: Vec<f64>,
+}
+
+impl Folded {
+    fn new(count: usize, value: impl Fn(usize) -> [f64; 3]) -> Self {
+        let quarter = count / 4;
+        let mut planes = vec![0.0; 12 * quarter];
+        for bin in 0..quarter {
+            let here = value(bin);
+            let across = value(count / 2 - 1 - bin);
+            let opposite = value(count / 2 + bin);
+            let below = value(count - 1 - bin);
+            for power in 0..3 {
+                let (right, left) = (here[power] + below[power], across[power] + opposite[power]);
+                let (up, down) = (here[power] - below[power], across[power] - opposite[power]);
+                let folded = [right + left, up - down, right - left, up + down];
+                for (kind, sum) in folded.into_iter().enumerate() {
+                    planes[(3 * kind + power) * quarter + bin] = sum;
+                }
             }
         }
-        let pivot = matrix[j * size + j];
+        Self { quarter, planes }
+    }
+
+    /// The values of all bins together.
+    fn total(&self) -> f64 {
+        self.planes[..self.quarter].iter().sum()
+    }
+
+    fn plane(&self, kind: usize, power: usize) -> &[f64] {
+        let start = (3 * kind + power) * self.quarter;
+        &self.planes[start..start + self.quarter]
+    }
+
+    /// Sums of the values times cosine and sine of an order, to second order within a bin.
+    fn sums(&self, rows: &Rows, order: u32) -> (f64, f64) {
+        let turn = f64::from(order) * 0.5 * PI / self.quarter as f64;
+        let half = -0.5 * turn * turn;
+        let kind = 2 * (order as usize & 1);
+        let part = |trig: &[f64], kind: usize, power: usize| dot(trig, self.plane(kind, power));
+        let (cosine, sine) = (&rows.cosine, &rows.sine);
+        (
+            part(cosine, kind, 0) + half * part(cosine, kind, 2) - turn * part(sine, kind + 1, 1),
+            part(sine, kind + 1, 0) + half * part(sine, kind + 1, 2) + turn * part(cosine, kind, 1),
+        )
+    }
+}
+
+/// Cosine and sine of an order at the middles of the bins of the first quarter.
+struct Rows {
+    cosine: Vec<f64>,
+    sine: Vec<f64>,
+}
+
+impl Rows {
+    fn new(quarter: usize) -> Self {
+        Self {
+            cosine: vec![0.0; quarter],
+            sine: vec![0.0; quarter],
+        }
+    }
+
+    /// From the cosines at multiples of half a bin.
+    fn fill(&mut self, cosines: &[f64], order: u32) {
+        let (mask, order) = (cosines.len() - 1, order as usize);
+        let mut at = order;
+        for (cosine, sine) in self.cosine.iter_mut().zip(&mut self.sine) {
+            *cosine = cosines[at & mask];
+            *sine = cosines[at.wrapping_sub(cosines.len() / 4) & mask];
+            at += 2 * order;
+        }
+    }
+}
+
+/// Lanes in which products are summed: neighbours do not wait for each other.
+const LANES: usize = 4;
+
+/// The sum of products.
+#[inline]
+fn dot(one: &[f64], other: &[f64]) -> f64 {
+    let mut sums = [0.0; LANES];
+    let (ones, others) = (one.chunks_exact(LANES), other.chunks_exact(LANES));
+    let rest = ones.remainder().iter().zip(others.remainder());
+    let rest: f64 = rest.map(|(a, b)| a * b).sum();
+    for (a, b) in ones.zip(others) {
+        for lane in 0..LANES {
+            sums[lane] += a[lane] * b[lane];
+        }
+    }
+    (sums[0] + sums[1]) + (sums[2] + sums[3]) + rest
+}
+
+/// The lower triangle of Cholesky, in place, the diagonal inverted; false where a pivot is too
+/// small.
+fn factored(matrix: &mut [f64], size: usize) -> bool {
+    for i in 0..size {
+        let (above, row) = matrix.split_at_mut(i * size);
+        for j in 0..i {
+            let other = &above[j * size..j * size + j + 1];
+            row[j] = (row[j] - dot(&row[..j], &other[..j])) * other[j];
+        }
+        let pivot = row[i] - dot(&row[..i], &row[..i]);
         if pivot.is_nan() || pivot < TOLD {
             return false;
         }
-        let root = pivot.sqrt();
-        for i in j..size {
-            matrix[i * size + j] /= root;
-        }
+        row[i] = 1.0 / pivot.sqrt();
     }
     true
 }
 
-/// The inverse of a lower triangle.
+/// The inverse of a lower triangle whose diagonal is inverted.
 fn inverted(lower: &[f64], size: usize) -> Vec<f64> {
     let mut inverse = vec![0.0; size * size];
     for i in 0..size {
-        inverse[i * size + i] = 1.0 / lower[i * size + i];
-        for j in 0..i {
-            let sum: f64 = (j..i)
-                .map(|k| lower[i * size + k] * inverse[k * size + j])
-                .sum();
-            inverse[i * size + j] = -sum / lower[i * size + i];
+        let (above, row) = inverse.split_at_mut(i * size);
+        let scale = lower[i * size + i];
+        for k in 0..i {
+            let factor = -scale * lower[i * size + k];
+            let other = &above[k * size..k * size + k + 1];
+            for (sum, value) in row.iter_mut().zip(other) {
+                *sum += factor * value;
+            }
         }
+        row[i] = scale;
     }
     inverse
 }
@@ -269,6 +398,26 @@ mod tests {
         coefficients[0] + terms.sum::<f64>()
     }
 
+    fn add(window: &mut Window, turn: f64, error: f64) {
+        let mut held = Held::default();
+        window.add(&mut held, turn * window.count(), error);
+        window.put(held);
+    }
+
+    /// A place is in its bin on both sides of zero and turns away, its part of the bin with it.
+    #[test]
+    fn places_are_found_whatever_the_turn() {
+        for turns in [0.0, -1.0, 1.0, -4096.0, 1e9] {
+            let mut window = Window::new(&[1], &[0.0], &[0.0]);
+            for (i, part) in [(0, 0.25), (1, 0.75), (127, 0.5), (64, 0.125)] {
+                add(&mut window, turns + (f64::from(i) + part) / 128.0, 3.0);
+                let sums = window.bins[i as usize];
+                assert_eq!((sums[0], sums[3]), (1.0, 3.0));
+                assert!((sums[1] - part + 0.5).abs() < 2e-5, "{turns} {i}: {sums:?}");
+            }
+        }
+    }
+
     /// What the model lacks is found, whatever the places within the bins, and beside a model a
     /// hundred times as large.
     #[test]
@@ -278,7 +427,7 @@ mod tests {
             let mut window = Window::new(&[1, 2], &[100.0, -30.0], &[50.0, 80.0]);
             for i in 0..2000 {
                 let x = (f64::from(i) * step).fract();
-                window.add(x, series(x, &model) + series(x, &lacks));
+                add(&mut window, x, series(x, &model) + series(x, &lacks));
             }
             let found = window.solve().unwrap().coefficients;
             for (a, b) in found.iter().zip(lacks) {
@@ -291,7 +440,7 @@ mod tests {
     #[test]
     fn variances_are_those_of_even_places() {
         let mut window = Window::new(&[1, 3, 8], &[0.0; 3], &[0.0; 3]);
-        (0..1000).for_each(|i| window.add(f64::from(i) / 1000.0, 0.0));
+        (0..1000).for_each(|i| add(&mut window, f64::from(i) / 1000.0, 0.0));
         let variances = window.solve().unwrap().variances;
         assert!((variances[0] - 1e-3).abs() < 1e-6);
         assert!(variances[1..].iter().all(|v| (v - 2e-3).abs() < 2e-5));
@@ -301,7 +450,7 @@ mod tests {
     #[test]
     fn an_arc_tells_no_orders() {
         let mut window = Window::new(&[1, 2, 3], &[0.0; 3], &[0.0; 3]);
-        (0..1000).for_each(|i| window.add(f64::from(i) / 8000.0, 0.0));
+        (0..1000).for_each(|i| add(&mut window, f64::from(i) / 8000.0, 0.0));
         assert!(window.solve().is_none());
         window.clear();
         assert!(window.solve().is_none());

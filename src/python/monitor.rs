@@ -8,7 +8,7 @@ use crate::angle::Period;
 use crate::check::same_length;
 use crate::monitor::watch::Limits;
 use crate::monitor::window::Window;
-use crate::monitor::{Closed, Monitor};
+use crate::monitor::{Closed, Monitor, Moved};
 
 /// A joint against its model; see `trueangle.Monitor`.
 #[pyclass(module = "trueangle._core", name = "Monitor")]
@@ -22,9 +22,8 @@ pub struct PyClosedWindow {
     readings: f64,
     coefficients: Vec<f64>,
     statistics: Vec<f64>,
-    alarms: Vec<usize>,
-    shifts: Vec<(f64, f64)>,
-    unlike: Vec<usize>,
+    moved: Vec<(usize, f64, f64, f64)>,
+    unlike: Vec<(usize, f64, f64, f64)>,
 }
 
 impl From<Closed> for PyClosedWindow {
@@ -35,11 +34,14 @@ impl From<Closed> for PyClosedWindow {
             readings: closed.readings,
             coefficients: closed.coefficients,
             statistics: closed.statistics,
-            alarms: closed.alarms,
-            shifts: closed.shifts,
-            unlike: closed.unlike,
+            moved: closed.moved.into_iter().map(plain).collect(),
+            unlike: closed.unlike.into_iter().map(plain).collect(),
         }
     }
+}
+
+fn plain(moved: Moved) -> (usize, f64, f64, f64) {
+    (moved.order, moved.size, moved.std, moved.since)
 }
 
 #[pymethods]
@@ -75,11 +77,12 @@ impl PyMonitor {
         py: Python<'_>,
         angle: PyReadonlyArray1<'_, f64>,
         error: PyReadonlyArray1<'_, f64>,
+        alarms: bool,
     ) -> PyResult<Vec<PyClosedWindow>> {
         let (angle, error) = (angle.as_slice()?, error.as_slice()?);
         same_length("error", error.len(), "angle", angle.len())?;
         let monitor = &mut self.0;
-        let closed = detached(py, || monitor.update(angle, error))?;
+        let closed = detached(py, || monitor.update(angle, error, alarms))?;
         Ok(closed.into_iter().map(PyClosedWindow::from).collect())
     }
 

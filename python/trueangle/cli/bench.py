@@ -13,6 +13,9 @@ from .pictures import save_picture
 HELP = "measure evaluation, correction and fits here, beside copies and other libraries"
 EXAMPLE = "trueangle bench --json"
 
+#: A unit of a fleet takes as long as so many readings of a fit.
+_READINGS_TO_A_UNIT = 10_000
+
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command's arguments."""
@@ -21,14 +24,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--scaling",
         action="store_true",
-        help="how time grows with readings, orders and threads, beside a model of cost",
+        help="how time grows with readings, orders, threads, units and windows",
     )
     parser.add_argument(
         "--largest",
         type=float,
         default=1e7,
         metavar="N",
-        help="with --scaling: most readings (24 bytes of memory each), 1e7 by default",
+        help="with --scaling: most readings (24 bytes of memory each), 1e7 by default; fleets have "
+        "up to N / 10000 units",
     )
     parser.add_argument(
         "--workers",
@@ -93,7 +97,7 @@ def run(args: argparse.Namespace) -> int:
 
 def _scaling(args: argparse.Namespace) -> int:
     """Measure how time grows, print and draw it."""
-    from ..bench import scaling
+    from ..bench import scaling, units
     from ..errors import ArgumentError
 
     try:
@@ -111,6 +115,8 @@ def _scaling(args: argparse.Namespace) -> int:
     some = min(size, scaling.READINGS)
     orders = scaling.by_orders(args.rounds, some // 64, some)
     shared = scaling.by_workers(workers, size) if workers else []
+    shared += units.by_units(size // _READINGS_TO_A_UNIT)
+    shared += units.by_windows(some, args.rounds)
     costs = scaling.costs(grown)
     if args.plot is not None:
         _draw(args.plot, grown, costs)
@@ -118,12 +124,12 @@ def _scaling(args: argparse.Namespace) -> int:
         print(json.dumps(_scaling_values([*grown, *orders, *shared], costs), indent=2))
         return 0
     print(
-        f"{'work':14}{'readings':>12}{'orders':>8}{'threads':>8}{'seconds':>12}{'ns/reading':>12}"
+        f"{'work':16}{'readings':>12}{'orders':>8}{'threads':>8}{'seconds':>12}{'ns/reading':>12}"
     )
     for point in [*grown, *orders, *shared]:
         median = point.timing.median
         print(
-            f"{point.work:14}{point.readings:12d}{point.orders:8d}{point.threads:8d}"
+            f"{point.work:16}{point.readings:12d}{point.orders:8d}{point.threads:8d}"
             f"{median:12.4g}{1e9 * median / point.readings:12.3g}"
         )
     print(f"\nmodel of cost, {scaling.ORDERS} orders: seconds = call + readings x each")

@@ -70,6 +70,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         default="unit",
         help="what tells the units of --fleet apart",
     )
+    add(
+        "--permitted-arcsec",
+        type=float,
+        metavar="E",
+        help="with --fleet: error from which a calibration is due",
+    )
     add_errors_in(parser)
     add(
         "--pdf",
@@ -90,6 +96,8 @@ def run(args: argparse.Namespace) -> int:
     """Write the report."""
     if args.fleet:
         return _fleet(args)
+    if args.permitted_arcsec is not None:
+        raise ArgumentError("--permitted-arcsec is of a report on a fleet: add --fleet")
     asked = joints_asked(args)
     if asked is not None:
         return _robot(*asked, args)
@@ -140,7 +148,8 @@ def _fleet(args: argparse.Namespace) -> int:
         )
     args.orders = None if args.orders == "auto" else args.orders
     title = args.title or "Angle error of a fleet"
-    made = FleetReport(judged(args), title, errors_in(args))
+    found = judged(args, permitted_arcsec=args.permitted_arcsec)
+    made = FleetReport(found, title, errors_in(args))
     made.save(args.output)
     print(made.fleet.to_json() if args.json else f"{made.summary()}\n\n{args.output}")
     return 0

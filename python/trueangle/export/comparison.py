@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from os import PathLike
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +18,7 @@ from ..support.display_units import ErrorsIn, ErrorUnit, error_unit
 from ..support.kinds import told_kinds
 from ..support.layout import laid_out
 from ..support.plainresult import PlainResult, counted
+from .equality import FALSE_ALARMS, Equality, equality
 from .pattern import TurnPattern
 
 __all__ = ["Comparison", "compare"]
@@ -54,6 +55,14 @@ class Comparison(PlainResult):
         their whole numbers add at most so much; None where neither was read from one.
     differ_in : list of str
         Terms that only one of them has, or with other parameters: not compared.
+    verdict : {"same", "changed"} or None
+        Whether they differ by more than the noise of their readings, in the orders that both
+        have and without the zero; None where that cannot be told: a model without a covariance,
+        or with another argument.
+    p : float or None
+        Chance of as large a difference between two calibrations of one pattern.
+    false_alarms : float
+        Below which ``p`` is "changed": the share of unchanged patterns that are told to have.
     """
 
     orders: list[dict[str, float | None]]
@@ -65,6 +74,9 @@ class Comparison(PlainResult):
     differ_in: list[str]
     table_rms_arcsec: float | None = None
     table_max_abs_arcsec: float | None = None
+    verdict: Literal["same", "changed"] | None = None
+    p: float | None = None
+    false_alarms: float = FALSE_ALARMS
 
     def to_dict(self) -> dict[str, Any]:
         """All of it."""
@@ -90,6 +102,7 @@ class Comparison(PlainResult):
             f"difference: {unit.text(self.rms_arcsec)} rms, {unit.number(self.max_abs_arcsec)} "
             f"max abs, zero {self.zero_deg:.6g} deg"
             + ("" if self.std_arcsec is None else f"; known to {unit.text(self.std_arcsec)}"),
+            *self._verdict(),
             *self._arithmetic(unit),
             f"  order  {f'amplitude/{unit.name}':>16}  phase/deg  {f'std/{unit.name}':>10}",
         ]
@@ -98,6 +111,15 @@ class Comparison(PlainResult):
             lines.append(f"{row['order']:7g}  {size:>16}  {row['phase_deg']:9.1f}  {std:>10}")
         lines += [f"not compared: {kind}" for kind in self.differ_in]
         return laid_out(lines)
+
+    def _verdict(self) -> list[str]:
+        if self.verdict is None or self.p is None:
+            return []
+        told = "changed" if self.verdict == "changed" else "not told apart by their noise"
+        return [
+            f"{told}: p = {self.p:.2g}, and below {self.false_alarms:g} it is called changed "
+            "(the zero left out)"
+        ]
 
     def _arithmetic(self, unit: ErrorUnit) -> list[str]:
         if self.table_max_abs_arcsec is None or self.table_rms_arcsec is None:
@@ -193,6 +215,7 @@ def compare(
         for kind in dict.fromkeys(t.kind for t in (*first.terms, *second.terms))
         if _terms(first, kind) != _terms(second, kind)
     ]
+    told: Equality | None = equality(first, second) if same else None
     return Comparison(
         orders=rows,
         rms_arcsec=float(np.sqrt(np.mean(difference**2))) * ARCSEC_PER_TURN,
@@ -207,6 +230,8 @@ def compare(
         table_max_abs_arcsec=sum(t.max_abs * u for t, u in zip(tables, per_unit, strict=True))
         if tables
         else None,
+        verdict=None if told is None else told.verdict,
+        p=None if told is None else told.p,
     )
 
 

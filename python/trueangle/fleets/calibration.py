@@ -68,6 +68,12 @@ class UnitSums:
         self.means.append(mean)
         self.when = self.when or run.when
 
+    def merge(self, other: UnitSums) -> None:
+        """Take in the runs of the same unit and day under another name."""
+        self.runs += other.runs
+        self.means += other.means
+        self.when = self.when or other.when
+
     def repeats(self, every: Array) -> tuple[Array, float]:
         """Squares of each order's coefficients of single runs about those of all, and freedom."""
         models = [run.solved() for run in self.runs] if len(self.runs) > 1 else []

@@ -16,7 +16,7 @@ from ..support.angles import ARCSEC_PER_TURN
 from ..support.decoding import Decoder, json_text, read_text
 from ..support.files import RUNS_BYTES
 from ..support.kinds import told_kinds
-from .history import HistoryRow
+from .history import HistoryOrder, HistoryRow
 from .result import BetweenOrder, CommonOrder, Fleet
 from .text import FORMAT, VERSION
 from .tolerance import Tolerance
@@ -33,7 +33,17 @@ _PRIOR = dict.fromkeys(
     True,
 )
 _UNIT = dict.fromkeys(
-    ("unit", "verdict", "because", "orders", "peak_to_peak_arcsec", "left_arcsec", "p"), True
+    (
+        "unit",
+        "verdict",
+        "because",
+        "orders",
+        "peak_to_peak_arcsec",
+        "left_arcsec",
+        "p",
+        "limit",
+    ),
+    True,
 )
 _ROW = dict.fromkeys(("order", "amplitude_arcsec", "phase_deg", "std_arcsec", "z"), True)
 _COMMON = dict.fromkeys(("order", "shaft", "amplitude_arcsec", "phase_deg", "std_arcsec"), True)
@@ -42,7 +52,10 @@ _SHAFT = dict.fromkeys(("name", "cycles_per_turn", "orders"), True)
 _TOLERANCE = dict.fromkeys(
     ("share", "confidence", "factor", "method", "peak_to_peak_arcsec", "left_arcsec"), True
 )
-_HISTORY = dict.fromkeys(HistoryRow._fields, True)
+_HISTORY = dict.fromkeys(
+    (*(name for name in HistoryRow._fields if name != "bound"), "bound_arcsec"), True
+)
+_MOVED = dict.fromkeys(HistoryOrder._fields, True)
 
 #: Units, and orders of each, at most.
 _MOST_UNITS = 2_000_000
@@ -158,6 +171,7 @@ class _Reader(Decoder):
             self.angle(given["peak_to_peak_arcsec"], f"{key}.peak_to_peak_arcsec"),
             self.angle(given["left_arcsec"], f"{key}.left_arcsec"),
             self.number(given["p"], f"{key}.p"),
+            self.number(given["limit"], f"{key}.limit"),
         )
 
     def row(self, value: Any, key: str) -> UnitOrder:
@@ -208,6 +222,7 @@ class _Reader(Decoder):
     def history(self, value: Any, key: str) -> HistoryRow:
         given = self.table(value, _HISTORY, key)
         due = given["next_calibration"]
+        bound = self.maybe(given["bound_arcsec"], f"{key}.bound_arcsec")
         return HistoryRow(
             self.text(given["unit"], f"{key}.unit"),
             self.text(given["when"], f"{key}.when"),
@@ -217,4 +232,11 @@ class _Reader(Decoder):
             self.text(given["verdict"], f"{key}.verdict"),
             None if due is None else self.text(due, f"{key}.next_calibration"),
             given["extrapolated"] is True,
+            None if bound is None else bound * self.turn,
+            self.number(given["cusum_limit"], f"{key}.cusum_limit"),
+            tuple(self.each(given["orders"], f"{key}.orders", self.moved)),
         )
+
+    def moved(self, value: Any, key: str) -> HistoryOrder:
+        given = self.table(value, _MOVED, key)
+        return HistoryOrder(*(self.positive(given[name], f"{key}.{name}") for name in _MOVED))

@@ -50,7 +50,8 @@ def fleet(
         As `trueangle.read_runs`, with the columns ``unit`` and ``when`` (ISO 8601) where there
         are several dates. Files are summed one after the other and not kept.
     by : {"unit", "run"}
-        What tells the units apart; without units the runs are.
+        What tells the units apart. Where no column ``unit`` does, the files or the labels of
+        the runs, whichever are more.
     orders : iterable of int, or mapping, optional
         Default: those above the noise of the first 32 units together, 24 at most.
     share, confidence : float
@@ -113,7 +114,11 @@ def fleet(
         )
     notes = []
     if by == "unit" and not sums.named:
-        notes.append("No column names the units: every run is taken for a unit.")
+        kind = "file (its name without folders)" if sums.by_file else "run"
+        notes.append(
+            f"No column names the units: every {kind} is taken for a unit. A role 'unit', or a "
+            "pattern of the names (unit_from), says which are one."
+        )
     if untold:
         notes.append(f"The readings of {_listed(untold)} do not tell the orders apart; left out.")
     found = Units(dated, sums.shafts or [], sums.period or 1.0)

@@ -13,10 +13,12 @@ from numpy.typing import NDArray
 from ..formats.times import parsed_time
 from ..support.angles import wrap
 from ..support.distributions import f_quantile
+from ..support.runlength import chart_limit
 from .calibration import Calibration, columns_of
+from .charts import ALLOWANCE, LENGTH, charted
 from .outliers import LEVEL, Deviates, deviates
 
-__all__ = ["Change", "HistoryRow", "changes_of", "next_calibration"]
+__all__ = ["Change", "HistoryOrder", "HistoryRow", "changes_of"]
 
 Array = NDArray[np.float64]
 
@@ -30,11 +32,23 @@ _PLACES: Final = 360
 _BOUND: Final = 1.6448536269514722
 
 
+class HistoryOrder(NamedTuple):
+    """One order on one date: T^2 against the first date, and the larger cumulative sum."""
+
+    order: float
+    statistic: float
+    cusum: float
+
+
 class HistoryRow(NamedTuple):
     """What one further calibration of a unit says.
 
     ``order`` is the order that moved most (None: the zero); ``statistic`` its T^2 and ``limit``
-    what it stays below in 99 % of fleets in which nothing moved.
+    what it stays below in 99 % of fleets in which nothing moved. ``bound`` is that of 95 % of the
+    greatest change over a turn since the first date, in the unit of the period; the day at which
+    it reaches the permitted error, growing straight in time, is ``next_calibration``. ``orders``
+    has the charts of all orders (`trueangle.fleets.charts`), which pass ``cusum_limit`` once in
+    465 dates where nothing moves, those of a unit together.
     """
 
     unit: str
@@ -45,10 +59,19 @@ class HistoryRow(NamedTuple):
     verdict: str
     next_calibration: str | None
     extrapolated: bool
+    bound: float | None
+    cusum_limit: float
+    orders: tuple[HistoryOrder, ...]
 
-    def plain(self) -> dict[str, Any]:
-        """As plain values."""
-        return self._asdict()
+    def plain(self, scale: float) -> dict[str, Any]:
+        """As plain values; angles times ``scale``."""
+        values = self._asdict()
+        bound = values.pop("bound")
+        return {
+            **values,
+            "bound_arcsec": None if bound is None else scale * bound,
+            "orders": [row._asdict() for row in self.orders],
+        }
 
 
 class Change(NamedTuple):
@@ -56,7 +79,8 @@ class Change(NamedTuple):
 
     ``orders`` are places of the orders that moved, the first the most; ``grows`` whether a slow
     drift explains the dates between better than a step (None with two dates); ``leaps`` whether
-    it moved farther than two units of the fleet are apart, in 99 % of fleets.
+    it moved farther than two units of the fleet are apart, in 99 % of fleets. ``level`` is the
+    chance at or below which it is told.
     """
 
     unit: str
@@ -64,6 +88,7 @@ class Change(NamedTuple):
     zero_moved: bool
     orders: tuple[int, ...]
     chance: float
+    level: float
     zero: float
     pattern: Array
     std: Array
@@ -106,6 +131,7 @@ def changes_of(
     zero = deviates([zeros], [zero_own], aligned=True, level=0.5 * LEVEL)
     limit = f_quantile(1.0 - 0.5 * LEVEL / pattern.chance.size, 2.0, 2.0 * (len(dated) - 1.0)) * 2.0
     zero_limit = f_quantile(1.0 - 0.5 * LEVEL / len(dated), 1.0, max(len(dated) - 2.0, 1.0))
+    sum_limit = chart_limit(ALLOWANCE, LENGTH * 2 * orders.size)
     found = []
     for u, calibrations in enumerate(dated):
         moved, zero_moved = bool(pattern.outlying[u]), bool(zero.outlying[u])
@@ -117,12 +143,17 @@ def changes_of(
         std = np.sqrt(np.concatenate([np.diag(s[u]) for s in own]))
         verdict = "changed" if grows is False else "recalibrate"
         verdict = verdict if moved else "zero_moved" if zero_moved else "fine"
+        about_zero = zero_moved and not moved
+        bound = drift_bound(change, std, orders, period)
+        due = next_calibration(bound, calibrations, permitted)
+        sums = charted(calibrations, pattern.variances)
         rows = []
-        for later, _ in calibrations[1:]:
+        for at, (later, _) in enumerate(calibrations[1:]):
             last = later is calibrations[-1][0]
-            square = _statistic(later, calibrations, places[0], pattern)
-            about_zero = zero_moved and not moved
-            due = next_calibration(change, std, calibrations, orders, period, permitted)
+            squares_of = [
+                _statistic(later, calibrations, k, pattern.variances[k]) for k in range(orders.size)
+            ]
+            square = squares_of[places[0]]
             rows.append(
                 HistoryRow(
                     calibrations[0][0].unit,
@@ -133,6 +164,12 @@ def changes_of(
                     verdict if last else "recalibrate" if square > limit else "fine",
                     due[0] if last else None,
                     due[1] if last else False,
+                    bound if last else None,
+                    sum_limit,
+                    tuple(
+                        HistoryOrder(*row)
+                        for row in zip(orders.tolist(), squares_of, sums[at].tolist(), strict=True)
+                    ),
                 )
             )
         chance = min(float(pattern.unit[u]), float(zero.unit[u]))
@@ -143,6 +180,7 @@ def changes_of(
                 zero_moved,
                 places,
                 chance,
+                pattern.limit if moved else zero.limit,
                 float(zeros[u, 0]),
                 change,
                 std,
@@ -172,15 +210,15 @@ def _statistic(
     later: Calibration,
     calibrations: Sequence[tuple[Calibration, float]],
     place: int,
-    pattern: Deviates,
+    variance: float,
 ) -> float:
     """T^2 of one order of a date against the first."""
     first, noise = calibrations[0]
     order = slice(2 * place, 2 * place + 2)
     apart = later.coefficients[order] - first.coefficients[order]
     spread = noise * (later.blocks()[place] + first.blocks()[place])
-    spread = spread + pattern.variances[place] * np.eye(2)
-    return float(apart @ np.linalg.solve(spread + 1e-300 * np.eye(2), apart))
+    spread = spread + (variance + 1e-300) * np.eye(2)
+    return float(apart @ np.linalg.solve(spread, apart))
 
 
 def _grows(
@@ -212,19 +250,20 @@ def _days(dates: Sequence[str | None]) -> Array:
     )
 
 
+def drift_bound(change: Array, std: Array, orders: Array, period: float) -> float:
+    """That of 95 % of the greatest change over a turn."""
+    places = columns_of(np.linspace(0.0, period, _PLACES, endpoint=False), orders, period)
+    return float((np.abs(places @ change) + _BOUND * np.sqrt(places**2 @ std**2)).max())
+
+
 def next_calibration(
-    change: Array,
-    std: Array,
+    bound: float,
     calibrations: Sequence[tuple[Calibration, float]],
-    orders: Array,
-    period: float,
     permitted: float | None,
 ) -> tuple[str | None, bool]:
-    """The day at which the drift's bound reaches the permitted error, and whether that is far off.
+    """The day at which a drift of this bound reaches the permitted error, straight in time.
 
-    Far off is beyond twice the time seen: extrapolated.
-
-    The bound is that of 95 % of the greatest change over a turn, growing straight in time.
+    And whether that is extrapolated: beyond twice the time seen.
     """
     if permitted is None:
         return None, False
@@ -232,8 +271,6 @@ def next_calibration(
     if start is None or end is None:
         return None, False
     days = (end.replace(tzinfo=None) - start.replace(tzinfo=None)) / timedelta(days=1)
-    places = columns_of(np.linspace(0.0, period, _PLACES, endpoint=False), orders, period)
-    bound = float((np.abs(places @ change) + _BOUND * np.sqrt(places**2 @ std**2)).max())
     if not days > 0.0 or not bound > 0.0:
         return None, False
     until = permitted / bound * days

@@ -63,8 +63,8 @@ def judged(
         )
     elif chosen.deviates.outlying.any():
         notes.append(
-            f"{int(chosen.deviates.outlying.sum())} of {n} units stand out, too many for damage: "
-            "they are taken for the tails of the design, and are in its spread and limits."
+            f"{int(chosen.deviates.outlying.sum())} of {n} units are outliers, more than damage "
+            "explains: is the fleet of several designs? They are counted in its spread and limits."
         )
     names = [(shaft.name, k) for shaft in units.shafts for k in shaft.orders]
     repeats = _repeatability(units)

@@ -44,6 +44,8 @@ class Deviates(NamedTuple):
     outlying : ndarray of bool, shape (n,)
     variances : ndarray, shape (K,)
         Between units, by the median.
+    limit : float
+        Chance of a unit at or below which it is an outlier, unless a quarter of the units are.
     """
 
     chance: Array
@@ -51,6 +53,7 @@ class Deviates(NamedTuple):
     unit: Array
     outlying: NDArray[np.bool_]
     variances: Array
+    limit: float
 
     def orders(self, unit: int, level: float = LEVEL) -> list[int]:
         """Orders in which a unit lies outside, the first the farthest."""
@@ -116,7 +119,8 @@ def deviates(
     outlying = np.zeros(n, dtype=bool)
     outlying[aside[:last]] = True
     chance, size = _chances(values, weights, ~outlying, aligned)
-    return Deviates(chance, size, _combined(chance), outlying, variances)
+    limit = (1.0 - _HIDDEN) * level / float((~outlying).sum())
+    return Deviates(chance, size, _combined(chance), outlying, variances, limit)
 
 
 def _variance(values: Array, own: Array, aligned: bool) -> float:

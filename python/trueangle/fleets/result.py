@@ -140,7 +140,7 @@ class Fleet(PlainResult):
                 ]
             },
             "tolerance": tolerance,
-            "history": [row.plain() for row in self.history],
+            "history": [row.plain(scale) for row in self.history],
             "notes": list(self.notes),
         }
 
@@ -168,20 +168,24 @@ class Fleet(PlainResult):
 
         save_fleet(self, path)
 
-    def plot(self, ax: Axes | None = None, **options: Any) -> Axes:
-        """Phasors of every unit per order, with the ellipse of the fleet (needs matplotlib).
+    def plot(self, kind: str = "overview", **options: Any) -> Axes:
+        """A picture of the fleet (needs matplotlib).
 
         Parameters
         ----------
-        ax : matplotlib Axes, optional
+        kind : {"overview", "patterns", "phasors", "sizes", "history"}
+            Sizes with the tolerance band and phasors of the orders in which units differ most;
+            the error over a turn of each unit; phasors of one order (``order=``) with the circle
+            that holds 95 % of the units; sizes; control charts of one unit (``unit=``).
         **options
-            ``order``: the order that is drawn (default: that of the greatest spread).
+            Those of `trueangle.plots.fleet_overview` and its like; ``errors_in`` for all.
 
         Returns
         -------
         matplotlib Axes
+            The first, where a figure has several.
         """
-        axes: Axes = drawn(self, ax=ax, **options)
+        axes: Axes = drawn(self, kind, **options)
         return axes
 
     def _brief(self) -> str:

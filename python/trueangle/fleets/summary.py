@@ -14,6 +14,12 @@ if TYPE_CHECKING:
 
 __all__ = ["fleet_summary"]
 
+_TESTED = (
+    "  p: chance of as much in a unit with which nothing is the matter, of its distance from the "
+    "other units or, where it moved, of its change; told at the limit, which one fleet in a "
+    "hundred passes"
+)
+
 #: Units that are fine of which the sizes are listed.
 _LISTED = 12
 
@@ -27,12 +33,13 @@ def fleet_summary(fleet: Fleet, errors_in: ErrorsIn = "auto") -> str:
     head = f"{counted(fleet.units, 'unit')}, {len(odd) or 'none'} that need{'s' * (len(odd) == 1)}"
     lines = [f"{head} something", ""]
     width = max([4, *(len(unit.unit) for unit in fleet.units)])
-    for unit in odd:
+    told = [unit for unit in fleet.units if unit.because]
+    for unit in told:
         lines.append(f"  {unit.unit:<{width}}  {unit.verdict:<11}  {shown.spoken(unit.because)}")
-    if odd:
+    if told:
         lines.append("")
     lines += [
-        f"  {'unit':<{width}}  verdict      peak-to-peak      left       p",
+        f"  {'unit':<{width}}  verdict      peak-to-peak      left        p    limit",
         f"  {'':<{width}}  {'':<11}  {shown.name:>12} {shown.name:>9}",
     ]
     listed = fleet.units[: len(odd) + _LISTED]
@@ -40,14 +47,13 @@ def fleet_summary(fleet: Fleet, errors_in: ErrorsIn = "auto") -> str:
         sizes = (shown.number(scale * v) for v in (unit.peak_to_peak, unit.left))
         size, left = sizes
         lines.append(
-            f"  {unit.unit:<{width}}  {unit.verdict:<11}  {size:>12} {left:>9}  {unit.p:7.2g}"
+            f"  {unit.unit:<{width}}  {unit.verdict:<11}  {size:>12} {left:>9}  {unit.p:7.2g} "
+            f"{unit.limit:8.2g}"
         )
     if len(listed) < len(fleet.units):
         lines.append(f"  and {len(fleet.units) - len(listed)} that are fine")
-    lines += ["", *_orders(fleet, shown, scale), "", _tolerance(fleet, shown, scale)]
-    due = [row for row in fleet.history if row.next_calibration is not None]
-    if due:
-        lines += ["", "  next calibration", *(_due(row, width) for row in due)]
+    lines += ["", _TESTED, "", *_orders(fleet, shown, scale), "", _tolerance(fleet, shown, scale)]
+    lines += _calendar(fleet, shown, scale, width)
     if fleet.notes:
         lines += ["", *(f"  [{i}] {note}" for i, note in enumerate(fleet.notes, 1))]
     return laid_out(lines)
@@ -83,7 +89,26 @@ def _tolerance(fleet: Fleet, shown: ErrorUnit, scale: float) -> str:
     )
 
 
-def _due(row: object, width: int) -> str:
-    values = row._asdict()  # type: ignore[attr-defined]
-    far = " (extrapolated beyond twice the time seen)" if values["extrapolated"] else ""
-    return f"  {values['unit']:<{width}}  {values['next_calibration']}{far}"
+def _calendar(fleet: Fleet, shown: ErrorUnit, scale: float, width: int) -> list[str]:
+    """When the units are due, the first first; those far off in one line."""
+    due = sorted(
+        (row for row in fleet.history if row.next_calibration is not None),
+        key=lambda row: row.next_calibration or "",
+    )
+    if not due:
+        return []
+    lines = ["", "  next calibration (a drift at its 95 % bound reaches the permitted error)"]
+    for row in due:
+        if not row.extrapolated:
+            bound = shown.text(scale * (row.bound or 0.0))
+            lines.append(
+                f"  {row.unit:<{width}}  {row.next_calibration}  changed by {bound} at most until "
+                f"{row.when[:10]}"
+            )
+    far = [row for row in due if row.extrapolated]
+    if far:
+        lines.append(
+            f"  {counted(far, 'unit')} from {far[0].next_calibration} ({far[0].unit}) on: "
+            "extrapolated beyond twice the time seen"
+        )
+    return lines

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from pathlib import PurePath
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -19,8 +19,18 @@ from .orders import SAMPLE, candidates, worth_keeping
 __all__ = ["FleetSums"]
 
 
+class _Unnamed(NamedTuple):
+    """A run whose unit no column names: its label and its file."""
+
+    label: str
+    file: str
+
+
 class FleetSums:
     """Sums by unit and day.
+
+    Where no column names the units, the files do if there are more of them than labels of runs:
+    runs 1 to 3 of each of forty files are forty units, runs SN01 to SN40 of two files are too.
 
     Parameters
     ----------
@@ -40,9 +50,9 @@ class FleetSums:
     ) -> None:
         self.by, self.shafts, self.joint = by, shafts, joint
         self.period: float | None = None
-        self.named = False
-        self.sums: dict[tuple[str, str], UnitSums] = {}
-        self._waiting: dict[str, list[CalibrationRun]] = {}
+        self.named = self.by_file = False
+        self.sums: dict[tuple[str | _Unnamed, str], UnitSums] = {}
+        self._waiting: dict[str | _Unnamed, list[CalibrationRun]] = {}
 
     def add(self, runs: Iterable[CalibrationRun]) -> None:
         """Take in some runs.
@@ -69,17 +79,26 @@ class FleetSums:
             if len(self._waiting) > SAMPLE:
                 self._choose()
 
-    def _unit(self, run: CalibrationRun) -> str:
+    def _unit(self, run: CalibrationRun) -> str | _Unnamed:
         if self.by == "unit" and run.unit is not None:
             self.named = True
             return run.unit
-        if run.label is not None:
-            return run.label
-        if run.source is not None:
-            return PurePath(run.source.file).stem
-        return str(len(self.sums) + len(self._waiting) + 1)
+        file = None if run.source is None else PurePath(run.source.file).stem
+        label = run.label or file or str(len(self.sums) + len(self._waiting) + 1)
+        return label if self.by == "run" or file is None else _Unnamed(label, file)
 
-    def _take(self, unit: str, run: CalibrationRun) -> None:
+    def _names(self, units: Iterable[str | _Unnamed]) -> dict[str | _Unnamed, str]:
+        """The units' names: of those that no column names, files or labels, whichever are more."""
+        units = list(dict.fromkeys(units))
+        unnamed = [unit for unit in units if isinstance(unit, _Unnamed)]
+        files, labels = ({unit[i] for unit in unnamed} for i in (1, 0))
+        self.by_file = len(files) > len(labels)
+        return {
+            unit: unit if isinstance(unit, str) else unit.file if self.by_file else unit.label
+            for unit in units
+        }
+
+    def _take(self, unit: str | _Unnamed, run: CalibrationRun) -> None:
         key = (unit, day_of(run.when))
         self.sums.setdefault(key, UnitSums()).add(run, self.orders, self.periodic)
 
@@ -95,7 +114,11 @@ class FleetSums:
 
     def _choose(self) -> None:
         """The orders by the units seen so far, whose runs are then summed."""
-        units = list(self._waiting.values())[:SAMPLE]
+        names = self._names(self._waiting)
+        together: dict[str, list[CalibrationRun]] = {}
+        for unit, runs in self._waiting.items():
+            together.setdefault(names[unit], []).extend(runs)
+        units = list(together.values())[:SAMPLE]
         every = [run for runs in units for run in runs]
         self.shafts = worth_keeping(units, candidates(every, *self.joint))
         for unit, runs in self._waiting.items():
@@ -117,11 +140,15 @@ class FleetSums:
             self._choose()
         found: dict[str, list[Calibration]] = {}
         untold: list[str] = []
-        for (unit, _), sums in sorted(self.sums.items(), key=lambda entry: entry[0][1]):
+        names = self._names(unit for unit, _ in self.sums)
+        together: dict[tuple[str, str], UnitSums] = {}
+        for (unit, day), sums in self.sums.items():
+            together.setdefault((names[unit], day), UnitSums()).merge(sums)
+        for (unit, _), sums in sorted(together.items(), key=lambda entry: entry[0][1]):
             one = Calibration.of(unit, sums, self.period or 1.0)
             if one is None:
                 untold.append(unit)
             else:
                 found.setdefault(unit, []).append(one)
-        order = {unit: None for unit, _ in self.sums}
+        order = dict.fromkeys(names.values())
         return [found[unit] for unit in order if unit in found], list(dict.fromkeys(untold))

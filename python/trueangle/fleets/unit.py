@@ -44,7 +44,10 @@ class FleetUnit:
     left : float
         Standard deviation of the readings about the unit's own pattern.
     p : float
-        Chance of as much where nothing is the matter, the unit's orders allowed for.
+        Chance of as much where nothing is the matter, the unit's orders allowed for: of its
+        distance from the other units or, where it moved, of its change.
+    limit : float
+        At or below which ``p`` is told: 1 % of fleets for all units together.
     """
 
     unit: str
@@ -54,6 +57,7 @@ class FleetUnit:
     peak_to_peak: float
     left: float
     p: float
+    limit: float
 
     def plain(self, scale: float) -> dict[str, Any]:
         """As plain values; angles times ``scale``."""
@@ -74,4 +78,5 @@ class FleetUnit:
             "peak_to_peak_arcsec": scale * self.peak_to_peak,
             "left_arcsec": scale * self.left,
             "p": self.p,
+            "limit": self.limit,
         }

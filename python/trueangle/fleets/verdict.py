@@ -12,7 +12,7 @@ from ..support.angles import arcsec
 from .history import Change
 from .outliers import Deviates
 from .unit import FleetUnit, UnitOrder, Verdict
-from .units import Units
+from .units import FEWEST, Units
 
 __all__ = ["unit_row"]
 
@@ -27,12 +27,14 @@ def unit_row(
     change = changes.get(calibration.unit)
     outlying = bool(found.outlying[u])
     verdict: Verdict = "fine"
-    p, because = float(found.unit[u]), ""
+    p, limit, because = float(found.unit[u]), found.limit, ""
     if change is not None and (change.moved or change.zero_moved):
-        p = change.chance
+        p, limit = change.chance, change.level
         verdict, because = _moved(units, u, change, joint)
     elif outlying:
         verdict, because = "outlier", _outlying(units, u, found, joint)
+    elif p <= limit:
+        because = _among_tails(len(units.last))
     return FleetUnit(
         calibration.unit,
         verdict,
@@ -52,6 +54,17 @@ def unit_row(
         float(units.peak_to_peak[u]),
         float(units.left[u]),
         p,
+        limit,
+    )
+
+
+def _among_tails(count: int) -> str:
+    """Why a unit that is far from the others is no outlier."""
+    if count < FEWEST:
+        return f"far from the others, which are too few to tell damage by: {FEWEST} are needed"
+    return (
+        "far from the others, as a quarter of the units are before it: a wide design, or several "
+        "designs, and not damage of one"
     )
 
 
@@ -80,16 +93,16 @@ def _moved(units: Units, u: int, change: Change, joint: Joint) -> tuple[Verdict,
     told = ", ".join(
         f"order {units.orders[k]:g} by {scale * pairs[k]:.3g} arcsec" for k in change.orders[:3]
     )
-    beside = " (and the zero)" if change.zero_moved else ""
+    told = f"moved {since}: {told}{' and the zero' if change.zero_moved else ''}"
     cause = joint.explanations(float(units.orders[change.orders[0]]))[0]
     if change.grows is False:
-        return "changed", f"a step in {told}{beside} {since}: {cause}"
+        return "changed", f"{told}, in a step: {cause}"
     if change.grows is None and change.leaps:
-        return "changed", f"{told}{beside} moved {since}, by more than units differ: {cause}"
+        return "changed", f"{told}, more than units differ by: {cause}"
     if change.grows is None and 2 * len(change.orders) > max(units.orders.size, 2):
-        return "changed", f"{told}{beside} moved {since} together: was a part replaced or turned?"
-    slow = "grows slowly" if change.grows else "two dates do not tell a drift from a step"
-    return "recalibrate", f"{told}{beside} moved {since}; {slow}"
+        return "changed", f"{told}, all together: was a part replaced or turned?"
+    slow = "it grows slowly" if change.grows else "two dates do not tell a drift from a step"
+    return "recalibrate", f"{told}; {slow}"
 
 
 def _twin(units: Units, u: int, change: Change) -> str | None:

@@ -18,8 +18,8 @@ from ..support.angles import arcsec
 from ..support.kinds import told_kinds
 from ..support.oftype import of_type
 from ..support.plainresult import Shown, counted
+from ..support.runlength import chart_limit, rare
 from .alarm import WatchedOrder, WatchedWindow
-from .runlength import chart_limit, rare
 
 __all__ = ["Monitor"]
 
@@ -193,8 +193,7 @@ class Monitor(Shown):
                 float(x[closed.reading]),
                 None if seconds is None else float(seconds[closed.reading]),
             )
-            for closed in self._core.update(x, e)
-            if not alarms or closed.alarms or closed.unlike
+            for closed in self._core.update(x, e, alarms)
         ]
 
     def _window(self, closed: Any, angle: float, time: float | None) -> WatchedWindow:
@@ -215,29 +214,26 @@ class Monitor(Shown):
             ),
             max([zero, *sums]),
             self.limit,
-            bool(closed.alarms or closed.unlike),
+            bool(closed.moved or closed.unlike),
             self._because(closed),
         )
 
     def _because(self, closed: Any) -> str:
         """Orders that moved, by how much and since when, and what makes such orders."""
         scale = arcsec(1.0, self.model.period)
-        moved: dict[int, list[float]] = {}
-        told = []
-        for i, (size, since) in zip(closed.alarms, closed.shifts, strict=True):
-            if i == 0:
-                told.append(f"the zero moved by {scale * size:.3g} arcsec in one window")
-            else:
-                best = moved.setdefault(self._orders[(i - 1) // 2], [0.0, 0.0])
-                best[:] = [math.hypot(best[0], size), max(best[1], since)]
-        for order, (size, since) in moved.items():
-            told.append(
-                f"order {order} moved by about {scale * size:.3g} arcsec "
-                f"{counted(int(since), 'window')} ago"
-            )
-        unlike = dict.fromkeys(self._orders[(i - 1) // 2] for i in closed.unlike)
-        told += [f"order {order} is not the model's since the start" for order in unlike]
-        names = [*moved, *unlike]
+        told, names = [], []
+        for at, size, std, since in closed.moved:
+            error = f"{scale * size:.3g} arcsec (+- {scale * std:.2g} arcsec)"
+            if at == 0:
+                told.append(f"the zero moved by {error} from the window before")
+                continue
+            names.append(self._orders[at - 1])
+            when = f"for the last {int(since)} windows" if since > 1 else "in this window"
+            told.append(f"order {names[-1]} moved by {error} {when}")
+        for at, size, std, _ in closed.unlike:
+            names.append(self._orders[at - 1])
+            error = f"{scale * size:.3g} arcsec (+- {scale * std:.2g} arcsec)"
+            told.append(f"order {names[-1]} is not the model's since the start: {error} off")
         if names:
             told[-1] += f": {Joint().explanations(float(names[0]))[0]}"
         return "; ".join(told)

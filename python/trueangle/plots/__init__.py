@@ -1,7 +1,8 @@
 """Pictures of runs, fits, order selections, diagnoses and plans.
 
 One file a picture. Every function draws into ``ax`` (a new one when not given) and
-returns it, but `detection`, which makes a figure; `text_alternative` says in a sentence what
+returns it, but `detection`, `fleet_overview`, `fleet_patterns` and `fleet_history`, which make a
+figure; `text_alternative` says in a sentence what
 it shows. Angles are in degrees, errors in arcsec, or in degrees where one reaches a
 degree (``errors_in=`` asks for another unit). Needs ``pip install trueangle[plot]``;
 matplotlib is imported at the first picture.
@@ -15,7 +16,8 @@ from .canvas import text_alternative
 from .detection import detection
 from .errorcurves import error_curves
 from .errorleft import error_left
-from .fleetphasors import fleet_phasors
+from .fleetoverview import fleet_overview
+from .fleetpictures import fleet_history, fleet_patterns, fleet_phasors, fleet_sizes
 from .gains import gains
 from .kinds import drawn as drawn
 from .kinds import fit_plot
@@ -32,7 +34,11 @@ __all__ = [
     "error_curves",
     "error_left",
     "fit_plot",
+    "fleet_history",
+    "fleet_overview",
+    "fleet_patterns",
     "fleet_phasors",
+    "fleet_sizes",
     "gains",
     "measured_and_simulated",
     "model_error",

@@ -8,7 +8,7 @@ from ..support.suggestions import check_choice
 from .amplitudespectrum import amplitude_spectrum
 from .detection import detection
 from .errorcurves import error_curves
-from .fleetphasors import fleet_phasors
+from .fleetoverview import fleet_plot
 from .gains import gains
 from .modelerror import model_error
 from .phasesoverruns import phases_over_runs
@@ -43,7 +43,7 @@ _RESULTS: dict[str, Any] = {
     "OrderSelection": amplitude_spectrum,
     "Diagnosis": gains,
     "Rehearsal": detection,
-    "Fleet": fleet_phasors,
+    "Fleet": fleet_plot,
 }
 
 

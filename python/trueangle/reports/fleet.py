@@ -10,6 +10,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ..fleets.history import HistoryRow
 from ..fleets.result import BetweenOrder, CommonOrder, Fleet
 from ..fleets.unit import FleetUnit, UnitOrder
 from ..support.angles import arcsec
@@ -88,6 +89,9 @@ class FleetReport(Page):
             title=self.title,
             fleet=self.fleet,
             odd=odd,
+            told=[unit for unit in self.fleet.units if unit.because],
+            latest=self._latest(),
+            charts=[self._chart(unit.unit) for unit in odd if self._dates(unit.unit) > 1],
             scale=self._scale,
             unit=self.unit,
             patterns=[self._pattern(unit) for unit in drawn],
@@ -110,6 +114,32 @@ class FleetReport(Page):
     def _spread_most(self) -> list[int]:
         order = np.argsort([-row.std for row in self.fleet.between], kind="stable")
         return [int(k) for k in order[:_PHASORS]]
+
+    def _latest(self) -> list[HistoryRow]:
+        """The last date of each unit, the first due first."""
+        rows = {row.unit: row for row in self.fleet.history}
+        return sorted(rows.values(), key=lambda row: (row.next_calibration or "9", row.unit))
+
+    def _dates(self, unit: str) -> int:
+        return sum(row.unit == unit for row in self.fleet.history)
+
+    def _chart(self, unit: str) -> _Picture:
+        """The cumulative sums of a unit's orders over its dates, and their limit."""
+        rows = [row for row in self.fleet.history if row.unit == unit]
+        date = np.arange(2.0, len(rows) + 2.0)
+        limit = rows[-1].cusum_limit
+        sums = np.array([[one.cusum for one in row.orders] for row in rows])
+        most = 1.1 * max(limit, float(sums.max()))
+        across = ChartAxis("date", (1.5, len(rows) + 1.5))
+        across.at_whole(2.0, len(rows) + 1.0, 6)
+        up = ChartAxis("cumulative sum", (0.0, most))
+        marks = [Mark("line", (across.limits, (limit, limit)), "muted")]
+        for values in sums.T:
+            colour = "warning" if float(values[-1]) > limit else "after"
+            marks.append(Mark("line", (date, values), colour))
+        title = f"{unit}: cumulative sums of its orders"
+        alt = f"{title} on {len(rows)} further dates, limit {limit:.3g}"
+        return _Picture(title, alt, still(marks, across, up, 9.0, 1.0 / 3.0))
 
     def _pattern(self, unit: FleetUnit) -> _Picture:
         """The error of a unit over a turn; the same axis for all, so that sizes compare."""

@@ -7,7 +7,7 @@ import json
 import numpy as np
 import pytest
 
-from trueangle.bench import compiled, evaluation, latency, scaling
+from trueangle.bench import compiled, evaluation, latency, scaling, units
 from trueangle.bench.evaluationpeers import peers
 from trueangle.bench.interleaved import Timing
 from trueangle.cli import main
@@ -71,7 +71,11 @@ def test_scaling(arguments, tmp_path, capsys):
         found = json.loads(out)
         sizes = {m["readings"] for m in found["measured"]}
         assert sizes == {1000, 10_000}
-        assert {m["orders"] for m in found["measured"]} == {1, 4, 16, 17, 64}
+        assert {m["orders"] for m in found["measured"]} == {1, 4, 8, 16, 17, 64}
+        works = {m["work"] for m in found["measured"]}
+        assert works == {
+            "correct", "fit", "moments", "watch, 500", "watch, 2000", "watch, 20000",
+        }  # fmt: skip
         assert {(c["work"], c["threads"]) for c in found["costs"]} == {
             (work, n) for work in ("correct", "fit") for n in (1, 2)
         }
@@ -103,6 +107,14 @@ def test_the_model_of_cost_is_found():
         [m._replace(timing=Timing(*[1e-18 * m.readings**2] * 3)) for m in exact]
     )
     assert bare.call == 0.0
+
+
+def test_units_of_a_fleet_and_their_fits_are_timed():
+    found = units.by_units(100)
+    assert [(m.work, m.readings) for m in found] == [
+        ("fleet", 1800), ("fit of each", 1800), ("fleet", 18_000), ("fit of each", 18_000),
+    ]  # fmt: skip
+    assert all(m.timing.median > 0.0 for m in found)
 
 
 def test_workers_share_logs():

@@ -1,6 +1,7 @@
 """A fleet through every door: runs, files, folders, the command, its file and its picture."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -68,6 +69,33 @@ def test_without_units_the_runs_are_units(runs):
     assert len(found.units) == len(runs)
     assert any("every run is taken for a unit" in note for note in found.notes)
     assert len(ta.fleet(runs, by="run", orders=[1]).units) == 2
+
+
+def test_files_without_a_column_are_units_where_they_are_more_than_the_labels(runs, tmp_path):
+    """A file a unit with runs r0, r1 in each, and dates in folders; and a file a date."""
+    again = [replace(run, when="2026-07-10") for run in runs]
+    for folder, those in (("spring", runs), ("autumn", again)):
+        for run in those:
+            path = tmp_path / folder / f"{run.unit}.csv"
+            path.parent.mkdir(exist_ok=True)
+            lines = [] if path.exists() else ["run,when,reference_deg,indicated_deg"]
+            rows = zip(run.reference.tolist(), run.indicated.tolist(), strict=True)
+            lines += [f"{run.label},{run.when or '2026-01-10'},{x!r},{y!r}" for x, y in rows]
+            with path.open("a") as file:
+                file.write("\n".join(lines) + "\n")
+    found = ta.fleet([tmp_path / "spring", tmp_path / "autumn"], orders=[1, 2])
+    assert set(found.verdicts()) == {run.unit for run in runs}
+    assert any("every file" in note for note in found.notes)
+    assert len(found.history) == 12
+    for name, when in (("a", "2026-01-10"), ("b", "2026-07-10")):
+        lines = ["run,when,reference_deg,indicated_deg"]
+        for run in runs[::2]:
+            rows = zip(run.reference.tolist(), run.indicated.tolist(), strict=True)
+            lines += [f"{run.unit},{when},{x!r},{y!r}" for x, y in rows]
+        (tmp_path / f"{name}.csv").write_text("\n".join(lines) + "\n")
+    found = ta.fleet([tmp_path / "a.csv", tmp_path / "b.csv"], orders=[1, 2])
+    assert set(found.verdicts()) == {run.unit for run in runs}
+    assert any("every run" in note for note in found.notes)
 
 
 def test_it_is_saved_and_read_back(runs, tmp_path):
@@ -157,8 +185,19 @@ def test_the_picture_names_who_is_not_fine(runs):
     from trueangle.plots import text_alternative
 
     found = ta.fleet(runs, orders=[1, 2])
-    ax = found.plot(order=1)
-    assert "u3" in text_alternative(ax)
+    for options in (
+        {}, {"kind": "patterns"}, {"kind": "phasors", "order": 1}, {"kind": "sizes"},
+    ):  # fmt: skip
+        ax = found.plot(**options)
+        ax.figure.canvas.draw()
+        assert ax.figure.axes
+        texts = [t.get_text() for axes in ax.figure.axes for t in (*axes.texts, axes.title)]
+        assert any("u3" in text for text in texts)
+    assert "u3" in text_alternative(found.plot())
     pyplot.close("all")
     with pytest.raises(ArgumentError, match="order must be one of 1, 2"):
-        found.plot(order=7)
+        found.plot("phasors", order=7)
+    with pytest.raises(ArgumentError, match="kind must be"):
+        found.plot("pie")
+    with pytest.raises(ArgumentError, match="unit must be"):
+        found.plot("history", unit="u3")

@@ -1,11 +1,15 @@
 """Units calibrated again: drifted, damaged, exchanged, shifted, and nothing at all."""
 
+import json
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
 import trueangle as ta
+from trueangle.fleets.calibration import Calibration
+from trueangle.fleets.charts import charted
+from trueangle.support.runlength import chart_limit
 
 from .made import units
 
@@ -17,6 +21,13 @@ FOUR = ("2026-01-10", "2026-03-10", "2026-05-10", "2026-07-10")
 def turned(rng, size):
     angle = rng.uniform(0.0, 2.0 * np.pi)
     return size * np.array([np.cos(angle), np.sin(angle)])
+
+
+def calibration():
+    """Of one order, its coefficients known to a variance of 0.5 for readings of variance 1."""
+    return Calibration(
+        "u", None, np.zeros(2), 0.5 * np.eye(2), 0.0, 0.1, 1.0, 9.0, 12, 1, np.zeros(1), 0.0
+    )
 
 
 def verdicts(found):
@@ -87,6 +98,48 @@ def test_several_dates_tell_a_drift_from_a_step():
     last = [row for row in found.history if row.unit == "u1"][-1]
     assert last.order == 1.0
     assert last.statistic > last.limit
+
+
+def test_the_charts_are_sums_of_independent_normal_numbers_where_nothing_moves():
+    """Against a recursion written out, and the limit against how often it is passed."""
+    print("seed", SEED)
+    rng = np.random.default_rng(SEED + 75)
+    dates = [f"2026-{month:02}-10" for month in range(1, 13)]
+    found = ta.fleet(units(rng, 30, dates=dates, runs=1), orders=range(1, 5))
+    rows = [row for row in found.history if row.unit == "u0"]
+    assert [one.order for one in rows[0].orders] == [1.0, 2.0, 3.0, 4.0]
+    assert len(rows) == 11
+    assert rows[0].cusum_limit == pytest.approx(chart_limit(0.5, 465.44 * 8.0))
+    passed = sum(
+        one.cusum > row.cusum_limit for row in found.history for one in row.orders
+    )  # 330 dates of a unit: less than one alarm in 465
+    assert passed <= 4
+    text = json.loads(found.to_json())["history"][0]
+    assert set(text["orders"][0]) == {"order", "statistic", "cusum"}
+
+
+def test_the_sums_are_those_of_the_recursion():
+    values = np.array([[0.0, 0.0], [1.0, 0.0], [2.0, -1.0], [9.0, 0.0]])
+    dated = [(replace(calibration(), coefficients=v), 4.0) for v in values]
+    upper, expected = np.zeros(4), []
+    for t in range(1, 4):
+        # A date's variance: noise 4 times 0.5, and half of the 2 of an ordinary change.
+        z = (values[t] - values[:t].mean(axis=0)) / np.sqrt(3.0 * (1.0 + 1.0 / t))
+        upper = np.maximum(upper + np.concatenate([z, -z]) - 0.5, 0.0)
+        expected.append([upper.max()])
+    assert charted(dated, np.array([2.0])) == pytest.approx(np.array(expected))
+
+
+def test_the_picture_of_a_unit_over_months():
+    pytest.importorskip("matplotlib")
+    from matplotlib import pyplot
+
+    rng = np.random.default_rng(SEED + 76)
+    found = ta.fleet(units(rng, 8, dates=FOUR), orders=[1, 2])
+    ax = found.plot("history", unit="u2")
+    ax.figure.canvas.draw()
+    assert len(ax.figure.axes) == 2
+    pyplot.close("all")
 
 
 def test_the_next_calibration_is_when_the_bound_of_the_drift_reaches_the_permitted_error():

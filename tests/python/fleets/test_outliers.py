@@ -66,6 +66,22 @@ def test_the_unit_its_order_and_the_likely_cause_are_named():
     assert found.aligned
 
 
+def test_no_verdict_contradicts_its_p():
+    """Fine means above the limit, or says why not; all others are at it or below."""
+    print("seed", SEED)
+    rng = np.random.default_rng(SEED + 4)
+
+    def wide(u, t, b):
+        return b * (12.0 if u < 6 else 1.0), 0.0
+
+    for change in (wide, lambda u, t, b: (b, 0.0)):
+        found = ta.fleet(units(rng, 16, change=change), orders=[1, 2])
+        for unit in found.units:
+            assert (unit.p > unit.limit) == (not unit.because)
+            assert unit.p <= unit.limit or unit.verdict == "fine"
+    assert "limit" in found.summary()
+
+
 def test_a_few_units_tell_no_outlier():
     print("seed", SEED)
     rng = np.random.default_rng(SEED + 3)

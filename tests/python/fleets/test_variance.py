@@ -1,8 +1,10 @@
 """Variance between units against its closed form, and a slow likelihood of all readings."""
 
 import numpy as np
+import pandas as pd
 import pytest
 from scipy.optimize import minimize
+from statsmodels.regression.mixed_linear_model import MixedLM
 
 from trueangle.fleets.calibration import columns_of
 from trueangle.fleets.noise import noise_of
@@ -55,6 +57,42 @@ def test_of_readings_it_is_the_mixed_models_restricted_likelihood():
     found = reml(estimates, noise.units[:, None, None] * inverse, aligned=True)
     assert found.variance == pytest.approx(np.exp(slow.x[0]), rel=1e-4)
     assert noise.variance == pytest.approx(np.exp(slow.x[1]), rel=1e-4)
+
+
+@pytest.mark.parametrize("seed", [SEED + 10, SEED + 11])
+def test_of_readings_it_is_statsmodels_mixed_model(seed):
+    """Mean, variance between units and noise of balanced readings, by another implementation."""
+    print("seed", seed)
+    rng = np.random.default_rng(seed)
+    units, n = 15, 24
+    design = columns_of(np.arange(n) * 15.0, np.array([1.0]), 360.0)
+    own = rng.normal([4.0, -2.0], 1.5, (units, 2))
+    readings = own @ design.T + rng.normal(0.0, 0.8, (units, n))
+    table = pd.DataFrame(
+        {
+            "error": readings.ravel(),
+            "cosine": np.tile(design[:, 0], units),
+            "sine": np.tile(design[:, 1], units),
+            "unit": np.repeat(np.arange(units), n),
+        }
+    )
+    mixed = MixedLM.from_formula(
+        "error ~ 0 + cosine + sine",
+        groups="unit",
+        re_formula="0",
+        vc_formula={"pattern": "0 + cosine + sine"},
+        data=table,
+    ).fit(reml=True)
+    estimates = readings @ design / (n / 2.0)
+    squares = ((readings - estimates @ design.T) ** 2).sum(axis=1)
+    noise = noise_of(squares, np.full(units, n - 2.0))
+    inverse = np.broadcast_to(np.eye(2) / (n / 2.0), (units, 2, 2))
+    found = reml(estimates, noise.units[:, None, None] * inverse, aligned=True)
+    assert found.mean == pytest.approx(mixed.fe_params.to_numpy(), rel=1e-4)
+    assert found.variance == pytest.approx(float(mixed.vcomp[0]), rel=1e-4)
+    assert noise.variance == pytest.approx(float(mixed.scale), rel=1e-4)
+    spread = np.diag(mixed.cov_params().to_numpy())[:2]
+    assert np.diag(found.covariance) == pytest.approx(spread, rel=1e-4)
 
 
 def test_of_unbalanced_units_it_is_the_greatest_likelihood():

@@ -1,12 +1,14 @@
 """A watched joint: silence where nothing changes, alarms where something does, in little memory."""
 
+import re
+
 import numpy as np
 import pytest
 from scipy.signal import lfilter
 
 import trueangle as ta
 from trueangle.errors import ArgumentError
-from trueangle.monitoring.runlength import chart_limit, run_length
+from trueangle.support.runlength import chart_limit, run_length
 
 SEED = 53_001
 
@@ -91,10 +93,31 @@ def test_a_change_is_told_with_its_order_its_size_and_its_time():
         assert found
         delays.append(found[0].window - 200)
         assert "order 2 moved" in found[0].because
-        assert "windows ago" in found[0].because or "window ago" in found[0].because
+        assert "arcsec (+- " in found[0].because
         assert found[0].statistic > found[0].limit
     print(delays)
     assert np.mean(delays) < 8.0
+
+
+@pytest.mark.parametrize(("sigmas", "held"), [(2.0, 0.85), (30.0, 0.9)])
+def test_the_size_that_is_told_holds_the_truth(sigmas, held):
+    """Of two standard errors 95 %; of shifts that are small the larger ones alarm first."""
+    print("seed", SEED)
+    inside, sizes = 0, []
+    unit = 3600.0 * 0.001 * np.sqrt(2.0 / PER)
+    for i in range(60):
+        rng = np.random.default_rng(SEED + 300 + i)
+        angle, error = readings(rng, 130)
+        after, phase = PER * 100, rng.uniform(0.0, 2.0 * np.pi)
+        wave = np.sin(2.0 * np.radians(angle[after:]) + phase)
+        error[after:] += sigmas * unit / 3600.0 * wave
+        first = next(a for a in ta.Monitor(model()).update(angle, error) if a.window > 100)
+        size, std = re.search(r"moved by (\S+) arcsec \(\+- (\S+) arcsec", first.because).groups()
+        inside += abs(float(size) - sigmas * unit) <= 2.0 * float(std)
+        sizes.append(float(size) / (sigmas * unit))
+    print("held", inside / 60, "mean", np.mean(sizes))
+    assert inside >= held * 60
+    assert np.mean(sizes) == pytest.approx(1.0, abs=0.25)
 
 
 def test_a_jump_of_the_zero_is_told():

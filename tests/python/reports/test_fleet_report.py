@@ -85,3 +85,33 @@ def test_what_is_of_one_unit_is_refused(other, rows, tmp_path, capsys):
     assert main([*command, other, str(tmp_path / "x.toml")]) != 0
     assert "--fleet is a report on many units" in capsys.readouterr().err
     assert not (tmp_path / "f.html").exists()
+
+
+def test_the_page_says_when_each_unit_is_due(tmp_path, capsys):
+    """A unit whose order 1 grows over four dates is due first and has its chart drawn."""
+    print(f"seed {SEED}")
+    rng = np.random.default_rng(SEED + 1)
+    theta = np.linspace(0.0, 360.0, READINGS, endpoint=False)
+    lines = ["unit,when,reference_deg,indicated_deg"]
+    for unit in range(8):
+        size = rng.normal(100.0, 15.0)
+        for month in (1, 3, 5, 7):
+            size += 12.0 * (unit == 3)
+            error = size * np.sin(np.radians(theta)) + rng.normal(0.0, 2.0, theta.size)
+            lines += [
+                f"SN{unit},2026-{month:02d}-10,{x!r},{x + e / 3600.0!r}"
+                for x, e in zip(theta.tolist(), error.tolist(), strict=True)
+            ]
+    (tmp_path / "units.csv").write_text("\n".join(lines) + "\n")
+    page = str(tmp_path / "f.html")
+    command = ["report", str(tmp_path / "units.csv"), "-o", page]
+    assert main([*command, "--fleet", "--permitted-arcsec", "60", "--orders", "1-2"]) == 0
+    assert "SN3" in capsys.readouterr().out
+    text = text_of((tmp_path / "f.html").read_text("utf-8"))
+    history = text[text.index("next calibration") :]
+    assert re.findall(r"(SN\d) 2026-07-10", history)[0] == "SN3"
+    assert len(re.findall(r"SN\d 2026-07-10", history)) == 8
+    assert "SN3: cumulative sums of its orders" in history
+    assert "(extrapolated)" in history
+    assert main([*command, "--permitted-arcsec", "60"]) == 1
+    assert "add --fleet" in capsys.readouterr().err

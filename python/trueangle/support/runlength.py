@@ -9,8 +9,8 @@ from typing import Final
 import numpy as np
 
 from ..errors import ArgumentError
-from ..support.distributions import normal_quantile, normal_tail
-from ..support.kinds import told_kinds
+from .distributions import normal_quantile, normal_tail
+from .kinds import told_kinds
 
 __all__ = ["chart_limit", "run_length"]
 

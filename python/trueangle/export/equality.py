@@ -1,0 +1,121 @@
+"""Whether two models differ by more than their readings' noise: a test at a stated level."""
+
+from __future__ import annotations
+
+import math
+from typing import Final, Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..model.model import HarmonicModel
+from ..support.distributions import f_tail
+
+__all__ = ["FALSE_ALARMS", "Equality", "equality"]
+
+Array = NDArray[np.float64]
+
+#: Chance that two calibrations of one pattern are told to differ.
+FALSE_ALARMS: Final = 0.01
+
+#: Orders of which one stands out by chance: those that a selection looks at in two models.
+_LOOKED_AT: Final = 220
+
+#: Least pivot of the covariance, its rows scaled, with which it is inverted.
+_TOLD: Final = 1e-10
+
+
+class Equality(NamedTuple):
+    """``statistic`` is T^2 over the orders that were tested, ``p`` its chance by noise alone."""
+
+    verdict: Literal["same", "changed"]
+    p: float
+    statistic: float
+    orders: int
+
+
+def equality(first: HarmonicModel, second: HarmonicModel) -> Equality | None:
+    r"""Hotelling's statistic of the orders that both models have.
+
+    .. math:: T^2 = (b_2 - b_1)' (S_1 + S_2)^{-1} (b_2 - b_1), \qquad
+              T^2 / 2K \sim F(2K, \nu)
+
+    with the degrees of freedom of both residual variances together (Satterthwaite). An order that
+    one of them lacks was chosen by its size in the other: it is tested by itself, with twice its
+    covariance (the other's readings know it as well) and its chance multiplied by the orders that
+    a selection looks at. The zero, which mounting moves, is kept out.
+
+    Returns
+    -------
+    Equality or None
+        None where no order is common, or a covariance is missing.
+
+    Examples
+    --------
+    >>> import trueangle as ta
+    >>> shaft = lambda a: ta.Shaft("output", 1, [1], [a], [0.0])
+    >>> known = np.diag([0.0, 1e-4, 1e-4])
+    >>> one, other = (ta.HarmonicModel([shaft(a)], covariance=known) for a in (0.5, 0.52))
+    >>> found = equality(one, other)
+    >>> found.verdict, round(found.p, 3)
+    ('same', 0.135)
+    """
+    if first.covariance is None or second.covariance is None:
+        return None
+    sides = [_coefficients(model) for model in (first, second)]
+    common = [order for order in sides[0] if order in sides[1]]
+    if not common:
+        return None
+    values, spreads, weights = [], [], []
+    for model, places in zip((first, second), sides, strict=True):
+        at = [i for order in common for i in places[order][0]]
+        values.append(np.array([v for order in common for v in places[order][1]]) / model.period)
+        spread = np.asarray(model.covariance)[np.ix_(at, at)] / model.period**2
+        spreads.append(spread)
+        weights.append((float(np.trace(spread)), _freedom(model)))
+    whole = spreads[0] + spreads[1]
+    scale = np.sqrt(np.diag(whole))
+    if not (scale > 0.0).all():
+        return None
+    scaled = whole / np.outer(scale, scale)
+    if float(np.linalg.eigvalsh(scaled)[0]) < _TOLD:
+        return None
+    apart = (values[1] - values[0]) / scale
+    statistic = float(apart @ np.linalg.solve(scaled, apart))
+    every = sum(trace for trace, _ in weights) ** 2
+    doubt = sum(trace**2 / freedom for trace, freedom in weights)
+    freedom = every / doubt if doubt > 0.0 else math.inf
+    # Beyond this F is chi-squared to rounding.
+    freedom = min(freedom, 1e9)
+    p = f_tail(statistic / apart.size, float(apart.size), freedom)
+    for model, places in zip((first, second), sides, strict=True):
+        for order in places.keys() - set(common):
+            rows, pair = places[order]
+            spread = np.asarray(model.covariance)[np.ix_(rows, rows)]
+            if float(np.linalg.det(spread)) > 0.0:
+                alone = float(np.array(pair) @ np.linalg.solve(2.0 * spread, np.array(pair)))
+                p = min(p, _LOOKED_AT * f_tail(alone / 2.0, 2.0, freedom))
+    return Equality("changed" if p <= FALSE_ALARMS else "same", p, statistic, len(common))
+
+
+def _coefficients(model: HarmonicModel) -> dict[float, tuple[tuple[int, int], tuple[float, float]]]:
+    """Of each output order: rows of the covariance, cosine and sine. Twice told, it is left out."""
+    found: dict[float, tuple[tuple[int, int], tuple[float, float]]] = {}
+    twice = set()
+    at = 1
+    for shaft in model.shafts:
+        for k, a, b in zip(shaft.orders, shaft.cosine, shaft.sine, strict=True):
+            order = k * shaft.cycles_per_turn
+            if order in found:
+                twice.add(order)
+            found[order] = (at, at + 1), (a, b)
+            at += 2
+    return {order: rows for order, rows in found.items() if order not in twice}
+
+
+def _freedom(model: HarmonicModel) -> float:
+    """Readings less unknowns; infinite where the model does not say how it was fitted."""
+    if model.fit is None:
+        return math.inf
+    unknowns = np.asarray(model.covariance).shape[0] - 1
+    return max(float(model.fit.samples - model.fit.wild - model.fit.runs - unknowns), 1.0)

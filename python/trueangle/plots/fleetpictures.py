@@ -1,0 +1,266 @@
+"""A fleet in pictures: phasors of an order, patterns, sizes with their limit, a unit's months."""
+
+from __future__ import annotations
+
+import math
+from datetime import datetime
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import ArgumentError
+from ..support.angles import arcsec
+from ..support.display_units import ErrorsIn, ErrorUnit, error_unit
+from ..support.suggestions import check_choice
+from . import palette
+from .canvas import described, grid, legend, new_axes, new_figure, turn_axis
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+    from ..fleets.result import Fleet
+    from ..fleets.unit import FleetUnit
+
+__all__ = ["fleet_history", "fleet_patterns", "fleet_phasors", "fleet_sizes"]
+
+#: Radius that holds 95 % of a plane normal distribution, in standard deviations of a coordinate.
+_RADIUS: Final = math.sqrt(-2.0 * math.log(0.05))
+
+#: Units whose patterns are drawn at most, those that need something first, and in a row.
+_PATTERNS: Final = 20
+_IN_A_ROW: Final = 5
+
+#: Limits beyond which a chart has a scale of logarithms.
+_FAR: Final = 10.0
+
+#: Verdicts in two kinds: their names, colours and marks.
+_KINDS: Final = (("fine", palette.AFTER, "o"), ("not fine", palette.WARNING, "D"))
+
+
+def _of_kind(fleet: Fleet, kind: str) -> list[FleetUnit]:
+    return [unit for unit in fleet.units if (unit.verdict == "fine") == (kind == "fine")]
+
+
+def _shown(fleet: Fleet, largest: float, errors_in: ErrorsIn) -> tuple[ErrorUnit, float]:
+    """The unit of the errors, and what turns the fleet's unit into it."""
+    scale = arcsec(1.0, fleet.period)
+    shown = error_unit(errors_in, scale * largest, fleet.period)
+    return shown, scale * shown.per_arcsec
+
+
+def fleet_phasors(
+    fleet: Fleet, order: float | None = None, ax: Axes | None = None, errors_in: ErrorsIn = "auto"
+) -> Axes:
+    """Phase and amplitude of one order of every unit, and the circle that holds 95 % of a fleet.
+
+    Parameters
+    ----------
+    fleet : Fleet
+    order : float, optional
+        Default: the order in which the units differ most.
+    ax : matplotlib PolarAxes, optional
+    errors_in : {"auto", "arcsec", "deg", "mrad", "count"} or float
+
+    Returns
+    -------
+    matplotlib PolarAxes
+
+    Raises
+    ------
+    ArgumentError
+        An order that the fleet was not looked at for.
+    """
+    if order is None:
+        order = max(fleet.between, key=lambda row: row.std).order
+    if order not in fleet.orders:
+        named = ", ".join(f"{k:g}" for k in fleet.orders)
+        raise ArgumentError(f"order must be one of {named}, got {order!r}")
+    at = fleet.orders.index(order)
+    common, between = fleet.common[at], fleet.between[at]
+    largest = max(unit.orders[at].amplitude for unit in fleet.units)
+    shown, size = _shown(fleet, largest, errors_in)
+    polar: Any = new_axes(ax, polar=True)
+    turn = np.linspace(0.0, 2.0 * math.pi, 361)
+    circle = complex(common.sine, common.cosine) + _RADIUS * between.std * np.exp(1j * turn)
+    polar.plot(
+        np.angle(circle),
+        size * np.abs(circle),
+        color=palette.MUTED,
+        linestyle="--",
+        label="95 % of units",
+    )
+    for kind, colour, marker in _KINDS:
+        units = _of_kind(fleet, kind)
+        phase = np.radians([unit.orders[at].phase_deg for unit in units])
+        amplitude = size * np.array([unit.orders[at].amplitude for unit in units])
+        if units:
+            polar.plot(
+                phase, amplitude, linestyle="none", marker=marker, markersize=5.0, color=colour,
+                label=kind,
+            )  # fmt: skip
+        if kind != "fine":
+            for unit, a, b in zip(units, phase, amplitude, strict=True):
+                polar.annotate(unit.unit, (a, b), xytext=(5, 5), textcoords="offset points")
+    polar.set_rmin(0.0)
+    polar.set_rmax(1.1 * size * max(largest, float(np.abs(circle).max())))
+    polar.set_rlabel_position(112.5)
+    polar.set_title(f"order {order:g}: phase, amplitude / {shown.name}", fontsize="medium")
+    grid(polar)
+    if ax is None:
+        polar.legend(loc="upper left", bbox_to_anchor=(-0.18, 1.0), frameon=False, fontsize="small")
+    odd = [unit.unit for unit in _of_kind(fleet, "not fine")]
+    return described(
+        polar,
+        f"Order {order:g} of {len(fleet.units)} units as phasors, with the circle that holds 95 % "
+        "of them" + (f"; not fine: {', '.join(odd[:8])}." if odd else "; all are fine."),
+    )
+
+
+def fleet_sizes(fleet: Fleet, ax: Axes | None = None, errors_in: ErrorsIn = "auto") -> Axes:
+    """Peak-to-peak of every unit, sorted, and the band that holds a share of all further ones.
+
+    Parameters
+    ----------
+    fleet : Fleet
+    ax : matplotlib Axes, optional
+    errors_in : {"auto", "arcsec", "deg", "mrad", "count"} or float
+
+    Returns
+    -------
+    matplotlib Axes
+    """
+    shown, size = _shown(fleet, max(unit.peak_to_peak for unit in fleet.units), errors_in)
+    ax = new_axes(ax)
+    bound = fleet.tolerance
+    ranked = sorted(fleet.units, key=lambda unit: unit.peak_to_peak)
+    if math.isfinite(bound.peak_to_peak):
+        label = f"{100 * bound.share:g} % of units, {100 * bound.confidence:g} % confidence"
+        ax.axhspan(0.0, size * bound.peak_to_peak, color=palette.MUTED, alpha=0.18, label=label)
+    for kind, colour, marker in _KINDS:
+        rows = [
+            (i, u) for i, u in enumerate(ranked, 1) if (u.verdict == "fine") == (kind == "fine")
+        ]
+        if rows:
+            ax.plot(
+                [i for i, _ in rows], [size * u.peak_to_peak for _, u in rows], linestyle="none",
+                marker=marker, markersize=5.0, color=colour, label=kind,
+            )  # fmt: skip
+        for i, unit in rows if kind != "fine" else []:
+            ax.annotate(
+                unit.unit, (i, size * unit.peak_to_peak), xytext=(-6, 4),
+                textcoords="offset points", ha="right",
+            )  # fmt: skip
+    ax.set_ylim(bottom=0.0)
+    ax.set_xlabel("units by size")
+    ax.set_ylabel(f"peak-to-peak / {shown.name}")
+    grid(ax, "y")
+    legend(ax)
+    return described(ax, f"Peak-to-peak of {len(ranked)} units and the band that holds the fleet.")
+
+
+def fleet_patterns(fleet: Fleet, errors_in: ErrorsIn = "auto", most: int = _PATTERNS) -> Axes:
+    """The error over a turn of each unit in axes of its own, on one scale, the urgent first.
+
+    Parameters
+    ----------
+    fleet : Fleet
+    errors_in : {"auto", "arcsec", "deg", "mrad", "count"} or float
+    most : int
+        Units that are drawn.
+
+    Returns
+    -------
+    matplotlib Axes
+        The first of a new figure's.
+    """
+    units = fleet.units[: max(most, 1)]
+    shown, size = _shown(fleet, max(unit.peak_to_peak for unit in units), errors_in)
+    rows = -(-len(units) // _IN_A_ROW)
+    columns = min(len(units), _IN_A_ROW)
+    figure, axes = new_figure(rows, columns, 2.1 * columns + 0.6, 1.6 * rows + 0.6)
+    highest = max(fleet.orders, default=1.0)
+    angle = np.linspace(0.0, 360.0, max(361, math.ceil(8.0 * highest) + 1))
+    common = _curve([(row.order, row.amplitude, row.phase_deg) for row in fleet.common], angle)
+    for i, ax in enumerate(axes):
+        if i >= len(units):
+            ax.set_visible(False)
+            continue
+        unit = units[i]
+        own = _curve([(row.order, row.amplitude, row.phase_deg) for row in unit.orders], angle)
+        fine = unit.verdict == "fine"
+        ax.plot(angle, size * common, color=palette.MUTED, linewidth=0.9)
+        ax.plot(angle, size * own, color=palette.AFTER if fine else palette.WARNING)
+        turn_axis(ax)
+        ax.set_xticks([0.0, 180.0, 360.0], ["", "", ""])
+        if i + columns >= len(units):
+            ax.set_xticks([0.0, 180.0, 360.0], ["0", "180", "360"])
+        title = unit.unit if fine else f"{unit.unit}: {unit.verdict.replace('_', ' ')}"
+        ax.set_title(title, fontsize="small")
+    figure.supxlabel("true angle / deg", fontsize="medium")
+    figure.supylabel(f"error / {shown.name}", fontsize="medium")
+    return described(
+        axes[0],
+        f"Error over a turn of {len(units)} of {len(fleet.units)} units, those that need something "
+        "first, beside the pattern that all share.",
+    )
+
+
+def fleet_history(fleet: Fleet, unit: str, errors_in: ErrorsIn = "auto") -> Axes:
+    """One unit's control charts: T^2 and cumulative sum of every order on each further date.
+
+    Parameters
+    ----------
+    fleet : Fleet
+    unit : str
+    errors_in : {"auto", "arcsec", "deg", "mrad", "count"} or float
+        Unused: the charts have no unit.
+
+    Returns
+    -------
+    matplotlib Axes
+        The upper of a new figure's two.
+
+    Raises
+    ------
+    ArgumentError
+        A unit that was not calibrated again.
+    """
+    rows = [row for row in fleet.history if row.unit == unit]
+    again = list(dict.fromkeys(row.unit for row in fleet.history))
+    if not rows:
+        check_choice("unit", unit, again or ["(none was calibrated again)"])
+    figure, (upper, lower) = new_figure(2, 1, 7.5, 5.5, sharey=False)
+    when: list[Any] = [datetime.fromisoformat(row.when) for row in rows]
+    for ax, name, limit, values in (
+        (upper, "$T^2$ against the first date", rows[-1].limit, [
+            [one.statistic for one in row.orders] for row in rows
+        ]),
+        (lower, "cumulative sum", rows[-1].cusum_limit, [
+            [one.cusum for one in row.orders] for row in rows
+        ]),
+    ):  # fmt: skip
+        for k, one in enumerate(rows[0].orders):
+            ax.plot(
+                when, [row[k] for row in values], color=palette.run_colour(k),
+                marker=palette.run_marker(k), label=f"order {one.order:g}",
+            )  # fmt: skip
+        ax.axhline(limit, color=palette.ink(ax), linestyle="--", linewidth=1.0, label="limit")
+        if max(map(max, values)) > _FAR * limit:
+            ax.set_yscale("symlog", linthresh=limit)
+        ax.set_ylim(bottom=0.0)
+        ax.set_ylabel(name)
+        grid(ax)
+    legend(upper)
+    figure.autofmt_xdate()
+    return described(
+        upper, f"Control charts of {unit} on {len(rows)} dates: {rows[-1].verdict} at the last."
+    )
+
+
+def _curve(rows: list[tuple[float, float, float]], angle: NDArray[np.float64]) -> Any:
+    """The sum of orders, amplitudes and phases over the angle, degrees."""
+    return sum(
+        (a * np.sin(np.radians(order * angle + phase)) for order, a, phase in rows),
+        np.zeros_like(angle),
+    )

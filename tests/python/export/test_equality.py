@@ -1,0 +1,85 @@
+"""Whether two calibrations differ: told at the rate that is stated, whatever the readings."""
+
+import json
+
+import numpy as np
+import pytest
+
+import trueangle as ta
+from trueangle.cli import main
+
+SEED = 55_700
+
+#: Pairs of calibrations of one pattern.
+PAIRS = 200
+
+
+def calibrated(rng, runs=2, count=120, orders=range(1, 5), added=(0, 0.0)):
+    """A model of readings with a noise of 3 arcsec, every run with a zero of its own."""
+    angle = np.arange(count) * (360.0 / count)
+    found = []
+    for run in range(runs):
+        error = sum(10.0 / k * np.cos(k * np.radians(angle)) for k in range(1, 5))
+        error += added[1] * np.sin(added[0] * np.radians(angle))
+        error += rng.normal(0.0, 3.0, count) + 5.0 * rng.normal()
+        run = ta.CalibrationRun(angle, angle + error / 3600.0, 360.0, label=f"r{run}")
+        found.append(run)
+    return ta.fit(found, orders=orders).model
+
+
+@pytest.mark.parametrize(
+    "design",
+    [{}, {"runs": 1, "count": 40}, {"runs": 20, "count": 30}, {"orders": None}],
+    ids=["two runs", "few readings", "many runs", "orders selected"],
+)
+def test_of_one_pattern_p_is_uniform(design):
+    print("seed", SEED)
+    rng = np.random.default_rng(SEED)
+    pairs = [ta.compare(calibrated(rng, **design), calibrated(rng, **design)) for _ in range(PAIRS)]
+    p = np.sort([pair.p for pair in pairs])
+    told = sum(pair.verdict == "changed" for pair in pairs)
+    print(told, p[:5])
+    # Kolmogorov and Smirnov's limit at 1 %, and the count's at three standard deviations.
+    assert np.abs(p - (np.arange(PAIRS) + 0.5) / PAIRS).max() < 1.63 / np.sqrt(PAIRS)
+    assert told <= 0.01 * PAIRS + 3.0 * np.sqrt(0.01 * PAIRS)
+
+
+@pytest.mark.parametrize("orders", [range(1, 9), None])
+@pytest.mark.parametrize("added", [(2, 3.0), (7, 4.0)])
+def test_a_changed_order_is_told_also_where_one_model_lacks_it(orders, added):
+    print("seed", SEED)
+    rng = np.random.default_rng(SEED + 1)
+    found = ta.compare(
+        calibrated(rng, orders=orders, count=240),
+        calibrated(rng, orders=orders, count=240, added=added),
+    )
+    assert found.verdict == "changed"
+    assert found.p < found.false_alarms
+    assert "changed: p =" in found.summary()
+
+
+def test_what_cannot_be_told_has_no_verdict():
+    shaft = ta.Shaft("output", 1, [1], [0.5], [0.0])
+    plain = ta.HarmonicModel([shaft])
+    known = ta.HarmonicModel([shaft], covariance=np.diag([0.0, 1e-4, 1e-4]))
+    other = ta.HarmonicModel([ta.Shaft("output", 1, [2], [0.2], [0.0])], covariance=np.eye(3))
+    for pair in ((plain, known), (known, other), (known, known.replace(argument="indicated"))):
+        found = ta.compare(*pair)
+        assert found.verdict is None
+        assert found.p is None
+        assert "called changed" not in found.summary()
+    assert ta.compare(known, known).verdict == "same"
+
+
+def test_the_command_prints_the_verdict(tmp_path, capsys):
+    print("seed", SEED)
+    rng = np.random.default_rng(SEED + 2)
+    paths = [str(tmp_path / name) for name in ("a.json", "b.json")]
+    for path, size in zip(paths, (0.0, 3.0), strict=True):
+        calibrated(rng, added=(2, size)).save(path)
+    assert main(["compare", *paths]) == 0
+    assert "below 0.01 it is called changed" in capsys.readouterr().out.replace("\n", " ")
+    assert main(["compare", *paths, "--json"]) == 0
+    printed = json.loads(capsys.readouterr().out)
+    assert printed["verdict"] == "changed"
+    assert printed["false_alarms"] == 0.01
