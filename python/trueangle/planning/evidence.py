@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -140,9 +140,7 @@ def evidence_between(
                         beside = _left(regression.jointly_with(column), error, noise)
                         per_rival.setdefault(other.cause, []).append((beside, beside))
                 continue
-            alone = Regression.of(
-                signals, regression.residual + error, around, rho=noise.correlation
-            )
+            alone = _with_error(regression, error)
             price = _price(EFFECTS[one.cause].propose(alone))
             per_rival.setdefault("", []).append((left, left - price - STRONG))
             for imitator in _imitators(one.cause, rivals):
@@ -165,16 +163,20 @@ def is_doubted(regression: Regression, one: Hypothesis, spots: Sequence[Blindnes
     ``spots`` are what the design of the readings cannot tell.
     """
     error = one.errors(regression.signals, regression.belief)[0]
-    rho = regression.whiten.rho
-    shown = Regression.of(
-        regression.signals, regression.residual + error, regression.belief, rho=rho
-    )
+    shown = _with_error(regression, error)
     found = EFFECTS[one.cause].propose(shown)
     if found is None:
         # Causes of the scatter are looked for elsewhere; others could not be found.
         return EFFECTS[one.cause].find_scatter(shown) is None
     doubts = (effect.doubt(found, shown, spots) for effect in EFFECTS.values())
     return any(doubt is not None and doubt.common != one.cause for doubt in doubts)
+
+
+def _with_error(regression: Regression, error: Array) -> Regression:
+    """The same readings with a further error; what follows from the motion is worked out once."""
+    readings = replace(regression.readings, residual=regression.residual + error)
+    cache = regression.cache.for_other_errors()
+    return Regression.of_readings(readings, regression.whiten.rho, cache)
 
 
 def _imitators(cause: str, rivals: Sequence[Hypothesis]) -> list[str]:

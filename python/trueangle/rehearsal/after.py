@@ -14,7 +14,8 @@ from ..effects import EFFECTS
 from ..errors import ArgumentError
 from ..planning.evidence import Hypothesis, Noise
 from ..planning.limits import Limits
-from ..planning.nextruns import WANTED, NextRuns, RivalEvidence
+from ..planning.nextruns import NextRuns, RivalEvidence
+from ..planning.worth import WANTED
 from ..runs.run import CalibrationRun
 from ..runs.source import Reading
 from ..simulation.simulation import Simulation, simulate, simulate_along
