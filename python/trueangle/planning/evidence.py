@@ -27,7 +27,15 @@ from ..estimation.regression import Regression
 from ..joint.pattern import Surroundings
 from ..joint.signals import Signals
 
-__all__ = ["STRONG", "Evidence", "Hypothesis", "Noise", "evidence_between", "is_doubted"]
+__all__ = [
+    "STRONG",
+    "Evidence",
+    "Hypothesis",
+    "Noise",
+    "deviance_left",
+    "evidence_between",
+    "is_doubted",
+]
 
 Array = NDArray[np.float64]
 
@@ -131,13 +139,13 @@ def evidence_between(
     for one in rivals:
         per_rival: dict[str, list[tuple[float, float]]] = {}
         for k, error in enumerate(errors[one.cause]):
-            left = _left(regression, error, noise)
+            left = deviance_left(regression, error, noise)
             if not searched:
                 per_rival.setdefault("", []).append((left, left - regression.log_n - STRONG))
                 for other in rivals:
                     if other.cause != one.cause:
                         column = errors[other.cause][k % len(errors[other.cause])][:, None]
-                        beside = _left(regression.jointly_with(column), error, noise)
+                        beside = deviance_left(regression.jointly_with(column), error, noise)
                         per_rival.setdefault(other.cause, []).append((beside, beside))
                 continue
             alone = _with_error(regression, error)
@@ -147,7 +155,7 @@ def evidence_between(
                 imitation = EFFECTS[imitator].propose(alone)
                 left_by = left
                 if imitation is not None and imitation.deviance > 0.0:
-                    left_by = _left(alone.with_terms([imitation]), error, noise)
+                    left_by = deviance_left(alone.with_terms([imitation]), error, noise)
                 gap = left_by + _price(imitation) - price
                 per_rival.setdefault(imitator, []).append((left_by, gap))
         for rival, pairs in per_rival.items():
@@ -199,7 +207,7 @@ def _imitators(cause: str, rivals: Sequence[Hypothesis]) -> list[str]:
     return [*asked, *others]
 
 
-def _left(regression: Regression, error: Array, noise: Noise) -> float:
+def deviance_left(regression: Regression, error: Array, noise: Noise) -> float:
     """Deviance of an error beside all that a regression fits."""
     x, _ = regression.projected(error[:, None])
     return float(np.sum(x**2)) / (noise.sigma**2 * (1.0 - noise.correlation**2))

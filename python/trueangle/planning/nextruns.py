@@ -12,7 +12,6 @@ from ..joint.signals import Signals
 from ..simulation.designs import RunDesign
 from ..simulation.simulation import Simulation
 from ..support.blas import one_blas_thread
-from ..support.deadline import pace
 from ..support.plainresult import PlainResult, counted
 from .evidence import Hypothesis, Noise
 from .further import seconds_of
@@ -218,7 +217,7 @@ def _found(scales: Scales, limits: Limits, others: Sequence[Blindness], seen: Li
         tuple(_beyond(designs, seen)),
         sum(map(seconds_of, designs)),
         replace(scales.believed, runs=tuple(designs), source=None),
-        tuple(_notes(designs)),
+        tuple(_notes(designs, scales.over)),
         tuple(question.hypotheses for question in scales.questions),
     )
 
@@ -241,10 +240,10 @@ def _entries(
             yield RivalEvidence(spot.causes, False, True, None, None)
 
 
-def _notes(designs: Sequence[RunDesign]) -> Iterator[str]:
+def _notes(designs: Sequence[RunDesign], over: bool) -> Iterator[str]:
     if not designs:
         yield "no run within the limits tells any of these causes"
-    if pace().over:
+    if over:
         yield "the search was ended early"
 
 

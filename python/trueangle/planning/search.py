@@ -9,7 +9,6 @@ from typing import Any, TypeAlias
 
 from ..joint.signals import Signals
 from ..simulation.designs import RunDesign
-from ..support.deadline import pace
 from .further import base_of, changes_of, choices, levels
 from .limits import Limits
 from .worth import NOTHING, Scales, Worth
@@ -58,6 +57,8 @@ class Search:
         designs, worth = self._without_idle(designs, worth, start)
         if worth.told and self.scales.all_seen:
             designs, worth = self._lean(designs, worth, start)
+        if worth.told and not self.scales.repeated(designs, start):
+            designs, worth = self._shared_out(designs, worth, start)
         return designs, worth
 
     def repeated(self, designs: Designs, worth: Worth) -> tuple[Designs, Worth]:
@@ -74,7 +75,7 @@ class Search:
         designs: Designs = []
         kept: Designs = []
         best = NOTHING
-        while len(designs) < self.limits.runs and not pace().over:
+        while len(designs) < self.limits.runs and not self.scales.over:
             design = base_of(self.limits, _label(len(designs)))
             if self.scales.needs_current and (start is None or start.current is not None):
                 low, _ = self.limits.current_A
@@ -120,7 +121,7 @@ class Search:
         picked = designs
         for option in options:
             design = replace(designs[k], **option)
-            if design == designs[k] or pace().over:
+            if design == designs[k] or self.scales.over:
                 continue
             tried = [*designs[:k], design, *designs[k + 1 :]]
             worth = self.scales.weighed(tried, start, changes_of(design, kinds), best.opened)
@@ -143,7 +144,7 @@ class Search:
         """The runs with the fewest readings that tell as much, and others that need fewer still."""
         goal = worth.reached
         designs, worth = self._fewest(designs, worth, goal, start)
-        while not pace().over:
+        while not self.scales.over:
             tried = _with_readings(designs, FEWER)
             if tried == designs:
                 break
@@ -156,13 +157,27 @@ class Search:
             designs, worth = self._fewest(tried, found, goal, start)
         return designs, worth
 
+    def _shared_out(
+        self, designs: Designs, worth: Worth, start: Signals | None
+    ) -> tuple[Designs, Worth]:
+        """The same readings in more runs, so many that held-out ones confirm what they tell."""
+        for times in range(2, self.limits.runs // len(designs) + 1):
+            again = [one for one in _with_readings(designs, 1.0 / times) for _ in range(times)]
+            again = [replace(one, label=_label(k)) for k, one in enumerate(again)]
+            if not self.scales.repeated(again, start):
+                continue
+            found = self.scales.weighed(again, start, 0, worth.opened)
+            if found.reached >= worth.reached:
+                return again, found
+        return designs, worth
+
     def _fewest(
         self, designs: Designs, worth: Worth, goal: tuple[int, int, bool], start: Signals | None
     ) -> tuple[Designs, Worth]:
         """The same runs with the fewest readings that reach the goal."""
         least, most = LEAST / max(design.samples for design in designs), 1.0
         share = least
-        while most / least > NEAR and not pace().over:
+        while most / least > NEAR and not self.scales.over:
             fewer = _with_readings(designs, share)
             found = self.scales.weighed(fewer, start, 0, goal[0])
             if found.reached >= goal:

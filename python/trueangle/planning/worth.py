@@ -14,7 +14,8 @@ from ..estimation.regression import Regression
 from ..joint.signals import Signals, join_runs
 from ..simulation.designs import RunDesign
 from ..simulation.simulation import Simulation
-from .evidence import Evidence, Noise, evidence_between, is_doubted
+from ..support.deadline import pace
+from .evidence import Evidence, Noise, deviance_left, evidence_between, is_doubted
 from .further import base_of, choices, seconds_of
 from .hypotheses import Question, question_of
 from .limits import Limits
@@ -39,6 +40,13 @@ HARDLY = 0.01
 
 #: Factor of the evidence below which two designs are alike, and the plainer one is taken.
 ALIKE = 1.5
+
+#: Standard deviations from which on readings show a cause, and the parts of which a diagnosis
+#: holds out one at a time.
+SHOWN, PARTS = 3.0, 5
+
+#: Designs of which the evidence is worked out, at most: some ten seconds.
+MOST_WEIGHED = 250
 
 #: Earlier readings that are looked at, at most: of more, one of every so many.
 MOST_READINGS = 2000
@@ -106,6 +114,12 @@ class Scales:
         rich = self._signals([_rich(limits)], None)
         rms = UNSEEN * noise.sigma
         self.questions = [question_of(spot, rich, self.around, rms) for spot in asked]
+        self._left = MOST_WEIGHED
+
+    @property
+    def over(self) -> bool:
+        """As many designs were weighed as a search may take, or its time is up."""
+        return self._left <= 0 or pace().over
 
     @property
     def all_seen(self) -> bool:
@@ -145,6 +159,7 @@ class Scales:
         seconds = -sum(map(seconds_of, designs))
         if opened < least:
             return Worth(opened, 0, False, NOTHING.evidence, -changes, seconds)
+        self._left -= 1
         told, total = 0, 0.0
         for question, is_open in zip(self.questions, are_open, strict=True):
             evidence = self._evidence(question, regression)
@@ -168,6 +183,32 @@ class Scales:
     def blind(self, designs: Sequence[RunDesign], start: Signals | None) -> list[Blindness]:
         """What nobody can tell from these runs."""
         return self._at(designs, start)[1]
+
+    def repeated(self, designs: Sequence[RunDesign], start: Signals | None) -> bool:
+        """Whether runs that are held out will confirm every cause: the others tell it as well.
+
+        A diagnosis holds a fifth of the runs out at a time. Of a cause that only those show the
+        others say nothing, and what is held out denies it.
+        """
+        regression, _ = self._at(designs, start)
+        runs = len(regression.bounds)
+        if runs == 1:
+            return True  # stretches of it are held out
+        for question in self.questions:
+            for one in question.hypotheses:
+                if not EFFECTS[one.cause].transfers:
+                    continue
+                error = one.errors(regression.signals, self.around)[0]
+                x, _ = regression.projected(error[:, None])
+                powers = [float(np.sum(x[a:b] ** 2)) for a, b in regression.bounds]
+                first = np.argsort(powers)[::-1][: -(-runs // PARTS)]
+                kept = ~np.isin(
+                    regression.signals.run,
+                    regression.signals.run[[regression.bounds[k][0] for k in first]],
+                )
+                if deviance_left(regression.of_rows(kept), error[kept], self.noise) < SHOWN**2:
+                    return False
+        return True
 
     def _at(
         self, designs: Sequence[RunDesign], start: Signals | None

@@ -129,6 +129,18 @@ def test_the_summary_is_a_table_for_the_rig(plan, found):
     assert "Next: 1 run of" in found.summary()
 
 
+def test_what_one_run_shows_is_shared_out_over_as_many_as_hold_out_each_other():
+    """Of ten runs a diagnosis holds out two at a time: these must not be all that tell."""
+    sim = replace(SIM, runs=tuple(RunDesign(f"{k}", samples=60, torque_Nm=5.0) for k in range(10)))
+    limits = Limits(torque_Nm=(0.0, 10.0), gravity_Nm=10.0, samples=120)
+    plan = ta.diagnose(simulate(sim, 2), sim).plan(limits, between=["stiffening_compliance"])
+    assert plan.between[0].told
+    assert len(plan.runs) > 2
+    assert plan.readings <= 120 + len(plan.runs)
+    assert len({replace(run, label="") for run in plan.runs}) == 1
+    assert f"next-{len(plan.runs)}, {len(plan.runs)} times the same" in plan.summary()
+
+
 def test_a_file_of_limits(tmp_path):
     path = tmp_path / "limits.toml"
     path.write_text(
