@@ -44,6 +44,8 @@ def test_without_trials_the_chance_is_that_of_the_evidence():
 def test_the_time_given_is_kept(plan):
     short = ta.plan_after(RUNS, SIM, within=0.05)
     assert short.readings <= 360 * 4
+    if any(entry.told and entry.seen for entry in short.between):
+        assert any("--within 60s" in note for note in short.notes)
 
 
 def test_correlated_noise_leaves_less_evidence():
