@@ -136,8 +136,7 @@ def _run_arc(args: argparse.Namespace, orders: tuple[float, ...] | None) -> int:
 
 
 def _run_unit(args: argparse.Namespace, orders: tuple[float, ...] | None) -> int:
-    from ..fleets import load_fleet
-    from ..planning.unitplan import plan_unit
+    from ..fleets import load_fleet, plan_unit
 
     given = {
         "--runs": args.runs,

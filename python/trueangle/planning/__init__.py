@@ -13,7 +13,6 @@ from .plan import (
     wanted_orders,
 )
 from .selfplan import SelfPlan, plan_self
-from .unitplan import UnitPlan, plan_unit
 
 __all__ = [
     "HIGHEST_LOW_ORDER",
@@ -22,14 +21,12 @@ __all__ = [
     "Limits",
     "NextRuns",
     "SelfPlan",
-    "UnitPlan",
     "load_limits",
     "plan_arc",
     "plan_encoder",
     "plan_mounts",
     "plan_self",
     "plan_tilts",
-    "plan_unit",
     "readings_needed",
     "wanted_orders",
 ]

@@ -15,9 +15,8 @@ if TYPE_CHECKING:
     from .nextruns import NextRuns
     from .plan import CalibrationPlan
     from .selfplan import SelfPlan
-    from .unitplan import UnitPlan
 
-__all__ = ["arc_summary", "next_summary", "plan_summary", "self_plan_summary", "unit_summary"]
+__all__ = ["arc_summary", "next_summary", "plan_summary", "self_plan_summary"]
 
 
 def plan_summary(plan: CalibrationPlan) -> str:
@@ -110,28 +109,6 @@ def arc_summary(plan: ArcPlan) -> str:
         lines.append(
             f"  uncertainty (k = 2)    {plan.uncertainty_arcsec:.3g} arcsec at the worst place"
         )
-    lines += [f"  note: {note}" for note in plan.notes]
-    return laid_out(lines)
-
-
-def unit_summary(plan: UnitPlan) -> str:
-    """A plan of a unit of a fleet."""
-    without = plan.readings_without
-    lines = [
-        f"{plan.readings} readings over {plan.start_deg:g} to {plan.stop_deg:g} deg, of a unit "
-        f"like the {plan.units} of the fleet"
-        + (f" ({without} without it)" if without is not None else ""),
-        "  place/deg  readings",
-        *(
-            f"  {place:9.3f}  {count:8d}"
-            for place, count in zip(plan.places_deg, plan.counts, strict=True)
-        ),
-        f"  uncertainty (k = 2)    {plan.uncertainty_arcsec:.3g} arcsec at the worst place",
-        f"  noise of a reading     {plan.noise_arcsec:.3g} arcsec",
-        "  order  std/arcsec  the unit's own",
-    ]
-    for order, std in plan.std_arcsec.items():
-        lines.append(f"  {order:5g}  {std:10.3g}  {100.0 * plan.own[order]:13.0f}%")
     lines += [f"  note: {note}" for note in plan.notes]
     return laid_out(lines)
 

@@ -8,32 +8,15 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..errors import ArgumentError
-from ..fitting.prior import Prior, prior_of
-from ..joint.shafts import counted_orders
-from ..support.angles import ARCSEC_PER_TURN
+from ..planning.arc import check_arc, plan_arc
 from ..support.kinds import told_kinds
+from ..support.layout import laid_out
 from ..support.plainresult import PlainResult, counted
-from .arc import COVERAGE, check_arc, plan_arc
+from .spread import MOST, Spread
 
 __all__ = ["UnitPlan", "plan_unit"]
-
-Array = NDArray[np.float64]
-
-#: Places of the grid to a cycle of the highest order, and at least.
-PER_CYCLE, LEAST_PLACES = 48, 361
-
-#: Share of the precision of one reading that a zero and a free coefficient have beforehand: none,
-#: to rounding.
-FREE = 1e-9
-
-#: Share of the readings by which their number grows, and the most of them.
-GROWS, MOST = 0.01, 100_000
-
-#: Passes in which single readings are exchanged for better ones, and readings up to which they are.
-PASSES, EXCHANGED = 4, 400
 
 
 @dataclass(frozen=True)
@@ -95,9 +78,24 @@ class UnitPlan(PlainResult):
 
     def summary(self) -> str:
         """The plan as text: a table to follow at the rig."""
-        from .summary import unit_summary
-
-        return unit_summary(self)
+        without = self.readings_without
+        lines = [
+            f"{self.readings} readings over {self.start_deg:g} to {self.stop_deg:g} deg, of a unit "
+            f"like the {self.units} of the fleet"
+            + (f" ({without} without it)" if without is not None else ""),
+            "  place/deg  readings",
+            *(
+                f"  {place:9.3f}  {count:8d}"
+                for place, count in zip(self.places_deg, self.counts, strict=True)
+            ),
+            f"  uncertainty (k = 2)    {self.uncertainty_arcsec:.3g} arcsec at the worst place",
+            f"  noise of a reading     {self.noise_arcsec:.3g} arcsec",
+            "  order  std/arcsec  the unit's own",
+        ]
+        for order, std in self.std_arcsec.items():
+            lines.append(f"  {order:5g}  {std:10.3g}  {100.0 * self.own[order]:13.0f}%")
+        lines += [f"  note: {note}" for note in self.notes]
+        return laid_out(lines)
 
     def _brief(self) -> str:
         without = "" if self.readings_without is None else f" ({self.readings_without} without)"
@@ -181,12 +179,12 @@ def plan_unit(
             "give uncertainty= (how few readings are enough) or readings= (what they are enough "
             "for), one of them"
         )
-    known = _Known.of(prior, orders, noise, start / 360.0, stop / 360.0)
+    known = Spread.of(prior, orders, noise, start / 360.0, stop / 360.0)
     if uncertainty is not None and not (math.isfinite(uncertainty) and uncertainty > 0.0):
         raise ArgumentError(f"uncertainty must be positive and finite, got {uncertainty!r}")
     if readings is not None and (readings != int(readings) or not 1 <= readings <= MOST):
         raise ArgumentError(f"readings must be a whole number from 1 to {MOST}, got {readings!r}")
-    places = known.spread(readings, uncertainty)
+    places = known.found(readings, uncertainty)
     reached = known.uncertainty(places)
     without = _without(start, stop, known, reached)
     notes = []
@@ -211,130 +209,10 @@ def plan_unit(
     )
 
 
-def _without(start: float, stop: float, known: _Known, uncertainty: float) -> int | None:
+def _without(start: float, stop: float, known: Spread, uncertainty: float) -> int | None:
     """Readings that the same takes where nothing is known of the unit."""
     try:
         plan = plan_arc(start, stop, known.orders, noise=known.noise, uncertainty=uncertainty)
     except ArgumentError:
         return None
     return plan.readings
-
-
-@dataclass(frozen=True, eq=False)
-class _Known:
-    """What is known of a unit, and the columns of its coefficients over a grid; arcsec."""
-
-    orders: tuple[float, ...]
-    variance: Array
-    noise: float
-    units: int
-    grid: Array
-    rows: Array
-
-    @classmethod
-    def of(
-        cls, given: Any, orders: Iterable[float] | None, noise: float | None, a: float, b: float
-    ) -> _Known:
-        period = getattr(given, "period", 360.0)
-        prior: Prior = prior_of(given, period)
-        arcsec = ARCSEC_PER_TURN / prior.period
-        scale = math.sqrt(prior.noise_variance) * arcsec if noise is None else noise
-        if not (math.isfinite(scale) and scale > 0.0):
-            raise ArgumentError(f"noise must be positive and finite, got {scale!r}")
-        of_order = {
-            shaft.cycles_per_turn * order: prior.variance[2 * i : 2 * i + 2] * arcsec**2
-            for i, (shaft, order) in enumerate((s, k) for s in prior.shafts for k in s.orders)
-        }
-        wanted = tuple(of_order) if orders is None else counted_orders(orders)
-        wanted = tuple(float(order) for order in wanted)
-        if not wanted or len(set(wanted)) < len(wanted) or min(wanted) <= 0.0:
-            raise ArgumentError(f"orders must be positive and each named once, got {wanted!r}")
-        free = np.full(2, np.inf)
-        variance = np.array([of_order.get(order, free) for order in wanted])
-        count = max(LEAST_PLACES, math.ceil(PER_CYCLE * max(wanted) * (b - a)) + 1)
-        grid = np.linspace(a, b, count)
-        x = 2.0 * math.pi * np.outer(grid, wanted)
-        lines = np.stack([np.cos(x), np.sin(x)], axis=2).reshape(count, -1)
-        rows = np.hstack([np.ones((count, 1)), lines])
-        return cls(wanted, variance, float(scale), prior.units, grid, rows)
-
-    def spread(self, readings: int | None, uncertainty: float | None) -> NDArray[np.int64]:
-        """Places of the grid, each reading where the curve is known least, then exchanged."""
-        covariance = self.covariance(np.zeros(0, dtype=np.int64))
-        places: list[int] = []
-        while True:
-            if readings is not None and len(places) >= readings:
-                break
-            variances = self._variances(covariance)
-            if (
-                uncertainty is not None
-                and places
-                and COVERAGE**2 * float(variances.max()) <= uncertainty**2
-            ):
-                break
-            if len(places) >= MOST:
-                raise ArgumentError(
-                    f"uncertainty={uncertainty:g} takes more than {MOST} readings of "
-                    f"{self.noise:g} arcsec noise: ask for more"
-                )
-            # Not beyond a per cent at a time: each but shifts where the next belongs.
-            for _ in range(max(int(GROWS * len(places)), 1)):
-                k = int(np.argmax(variances))
-                places.append(k)
-                covariance = self._with(covariance, k, 1.0)
-                variances = self._variances(covariance)
-        found = self._best(np.array(places))
-        while uncertainty is not None and found.size > 1:
-            fewer = self._best(found[:-1])
-            if self.uncertainty(fewer) > uncertainty:
-                break
-            found = fewer
-        return found
-
-    def _best(self, places: NDArray[np.int64]) -> NDArray[np.int64]:
-        """These readings or even ones, whichever is better once exchanged."""
-        last = self.grid.size - 1
-        even = (np.linspace(0.0, last, places.size, endpoint=ends) for ends in (True, False))
-        starts = (places, *(np.asarray(np.rint(one), dtype=np.int64) for one in even))
-        return min((self._exchanged(one) for one in starts), key=self.uncertainty)
-
-    def uncertainty(self, places: NDArray[np.int64]) -> float:
-        """Expanded, of the curve at the worst place."""
-        return COVERAGE * math.sqrt(float(self._variances(self.covariance(places)).max()))
-
-    def covariance(self, places: NDArray[np.int64]) -> Array:
-        """Of the zero and all coefficients, after readings."""
-        with np.errstate(divide="ignore"):
-            precision = np.concatenate([[0.0], 1.0 / self.variance.ravel()])
-        one = 1.0 / self.noise**2
-        # A coefficient that all units share is known: so precisely that no reading changes it.
-        precision = np.clip(precision, FREE * one, one / FREE)
-        rows = self.rows[places]
-        return np.asarray(np.linalg.inv(np.diag(precision) + one * (rows.T @ rows)))
-
-    def _exchanged(self, places: NDArray[np.int64]) -> NDArray[np.int64]:
-        """Each reading moved to where the curve is known least without it, while that gains."""
-        if places.size > EXCHANGED:
-            return places
-        best, reached = places.copy(), self.uncertainty(places)
-        for _ in range(PASSES):
-            tried = best.copy()
-            covariance = self.covariance(tried)
-            for i, k in enumerate(tried):
-                covariance = self._with(covariance, int(k), -1.0)
-                tried[i] = int(np.argmax(self._variances(covariance)))
-                covariance = self._with(covariance, int(tried[i]), 1.0)
-            now = self.uncertainty(tried)
-            if now >= reached:
-                break
-            best, reached = tried, now
-        return best
-
-    def _variances(self, covariance: Array) -> Array:
-        return np.asarray(np.einsum("ij,ij->i", self.rows @ covariance, self.rows))
-
-    def _with(self, covariance: Array, k: int, sign: float) -> Array:
-        """After one reading more at place k, or one less."""
-        column = covariance @ self.rows[k]
-        taken = float(self.rows[k] @ column) + sign * self.noise**2
-        return np.asarray(covariance - np.outer(column, column) / taken)

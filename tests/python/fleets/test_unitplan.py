@@ -11,8 +11,9 @@ import trueangle as ta
 from trueangle.cli import main
 from trueangle.errors import ArgumentError, KindError
 from trueangle.fitting.prior import Prior
+from trueangle.fleets import plan_unit
 from trueangle.joint.shafts import ShaftOrders
-from trueangle.planning import plan_arc, plan_unit
+from trueangle.planning import plan_arc
 
 #: From unit to unit, arcsec: order 1 by 30, the higher ones by ever less.
 SPREAD = {1: 30.0, 2: 8.0, 3: 2.0, 4: 0.5}
