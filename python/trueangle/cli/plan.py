@@ -7,6 +7,7 @@ import math
 
 from ..errors import ArgumentError
 from .nextplan import add_after_arguments, refuse_without_after, run_after
+from .paths import Input
 from .selfplan import add_self_arguments, run_self
 
 HELP = "propose calibration positions that keep the wanted orders apart"
@@ -70,6 +71,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="wanted at every place (k = 2), such as 2arcsec or 0.01deg: gives the readings "
         "(without --arc, over the whole turn)",
     )
+    arc.add_argument(
+        "--prior",
+        type=Input,
+        metavar="FLEET.json",
+        help="a unit like those of this fleet: how few readings are enough for --uncertainty, or "
+        "what --readings are enough for",
+    )
     add("--json", action="store_true", help="print the plan as JSON")
     add_after_arguments(parser)
     add_self_arguments(parser)
@@ -127,6 +135,37 @@ def _run_arc(args: argparse.Namespace, orders: tuple[float, ...] | None) -> int:
     return 0
 
 
+def _run_unit(args: argparse.Namespace, orders: tuple[float, ...] | None) -> int:
+    from ..fleets import load_fleet, plan_unit
+
+    given = {
+        "--runs": args.runs,
+        "--both-directions": args.both_directions or None,
+        "--apart": args.apart,
+        "--std-arcsec": args.std_arcsec,
+    }
+    for option, value in given.items():
+        if value is not None:
+            raise ArgumentError(f"{option} does not go with --prior; leave one of them out")
+    if (args.uncertainty is None) == (args.readings is None):
+        raise ArgumentError(
+            "--prior needs what the readings are for, --uncertainty 2arcsec, or how many there "
+            "are, --readings N; one of them"
+        )
+    start, stop = WHOLE_TURN if args.arc is None else args.arc
+    plan = plan_unit(
+        load_fleet(args.prior),
+        start,
+        stop,
+        orders,
+        uncertainty=args.uncertainty,
+        readings=args.readings,
+        noise=args.noise_arcsec,
+    )
+    print(plan.to_json() if args.json else plan.summary())
+    return 0
+
+
 def _refuse_without_arc(args: argparse.Namespace) -> None:
     given = {
         "--readings": args.readings,
@@ -150,6 +189,8 @@ def run(args: argparse.Namespace) -> int:
     refuse_without_after(args)
     if args.self_method is not None:
         return run_self(args, orders)
+    if args.prior is not None:
+        return _run_unit(args, orders)
     if args.arc is not None or args.uncertainty is not None:
         return _run_arc(args, orders)
     _refuse_without_arc(args)

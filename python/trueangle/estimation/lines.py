@@ -61,8 +61,8 @@ class LineBasis:
         }
         further = sorted(multiples - whole)
         orders = np.array([*sorted(whole), *further], dtype=np.float64)
-        expected = plausible_orders(joint)
-        plausible = np.array([any(abs(m - p) < 1e-9 for p in expected) for m in orders])
+        apart = np.abs(orders[:, None] - np.array(plausible_orders(joint)))
+        plausible = np.asarray(apart.min(axis=1) < 1e-9)
         return cls(orders, plausible, lambda: _core.line_columns(theta, orders, True))
 
     @cached_property

@@ -3,5 +3,6 @@
 from .file import load_fleet
 from .fleet import fleet
 from .result import Fleet
+from .unitplan import UnitPlan, plan_unit
 
-__all__ = ["Fleet", "fleet", "load_fleet"]
+__all__ = ["Fleet", "UnitPlan", "fleet", "load_fleet", "plan_unit"]

@@ -18,7 +18,7 @@ from .doptimal import ArcDesign, Columns, d_optimal, exchanged, rounded
 from .noisefactors import noise_factors
 from .plan import readings_needed
 
-__all__ = ["ArcPlan", "plan_arc"]
+__all__ = ["COVERAGE", "ArcPlan", "check_arc", "plan_arc"]
 
 Array = NDArray[np.float64]
 
@@ -184,7 +184,7 @@ def plan_arc(
     >>> round(plan.d_efficiency, 6), round(plan.efficiency_of_even_spacing, 3)
     (1.0, 0.7)
     """
-    _check_arc(start, stop)
+    check_arc(start, stop)
     wanted = tuple(float(k) for k in counted_orders(USUAL if orders is None else orders))
     if not wanted or len(set(wanted)) < len(wanted) or min(wanted) <= 0.0:
         raise ArgumentError(f"orders must be positive and each named once, got {wanted!r}")
@@ -233,7 +233,8 @@ def plan_arc(
     )
 
 
-def _check_arc(start: float, stop: float) -> None:
+def check_arc(start: float, stop: float) -> None:
+    """Refuse an arc of no length or beyond a turn."""
     if not (math.isfinite(start) and math.isfinite(stop) and 0.0 < stop - start <= 360.0):
         raise ArgumentError(
             f"an arc runs from `start` to a greater `stop`, at most 360 deg on, got {start!r} to "

@@ -30,6 +30,9 @@ _SWEEPS = 400
 _MOVES = 1e-9
 _LOOKS = 9
 
+#: Logarithm of a determinant that is lost in rounding.
+_ROUNDING = 1e-10
+
 #: Passes of exchanges of single readings.
 _PASSES = 20
 
@@ -94,6 +97,18 @@ class Columns:
         x = 2.0 * math.pi * np.outer(places, self.orders)
         raw = np.hstack([np.ones((len(places), 1)), np.cos(x), np.sin(x)])
         return raw if self._turned is None else np.asarray(raw @ self._turned)
+
+    def slopes(self, places: Array) -> tuple[Array, Array]:
+        """First and second derivative of the rows by the place."""
+        x, w = 2.0 * math.pi * np.outer(places, self.orders), 2.0 * math.pi * self.orders
+        none = np.zeros((len(places), 1))
+        first = np.hstack([none, -w * np.sin(x), w * np.cos(x)])
+        second = np.hstack([none, -(w**2) * np.cos(x), -(w**2) * np.sin(x)])
+        return (
+            (first, second)
+            if self._turned is None
+            else (first @ self._turned, second @ self._turned)
+        )
 
     def information(self, places: Array, weights: Array) -> Array:
         """Information matrix of one reading, shared out by the weights."""
@@ -202,24 +217,56 @@ def _merged(grid: Array, weights: Array, least: int) -> tuple[Array, Array]:
 
 
 def _settled(columns: Columns, places: Array) -> tuple[Array, Array, float]:
-    """As many places as coefficients, each at its best beside the others; their excess."""
-    start, stop = float(columns.grid[0]), float(columns.grid[-1])
+    """As many places as coefficients, each at its best beside the others; their excess.
+
+    By Newton's method for all places together, by a sweep over them where that loses.
+    """
     shares = np.full(places.size, 1.0 / places.size)
     for _ in range(_SWEEPS):
-        before = places.copy()
-        for k in range(places.size):
-            # The determinant is that of the other rows times the distance of this row from them.
-            others = np.linalg.qr(columns.at(np.delete(places, k)).T, mode="complete")[0][:, -1]
-
-            def apart(x: Array, normal: Array = others) -> Array:
-                return np.asarray(np.abs(columns.at(x) @ normal))
-
-            below = places[k - 1] if k else start
-            above = places[k + 1] if k + 1 < places.size else stop
-            places[k] = _highest(apart, float(below), float(above))
-        if np.abs(places - before).max() < _MOVES:
+        tried = _newton(columns, places)
+        if columns.log_det(tried, shares) < columns.log_det(places, shares) - _ROUNDING:
+            tried = _swept(columns, places)
+        moved = float(np.abs(tried - places).max())
+        places = tried
+        if moved < _MOVES:
             break
     return places, shares, _excess(columns, places, shares)
+
+
+def _swept(columns: Columns, places: Array) -> Array:
+    """Every place in turn moved to its best between its neighbours."""
+    places = places.copy()
+    for k in range(places.size):
+        # The determinant is that of the other rows times the distance of this row from them.
+        others = np.linalg.qr(columns.at(np.delete(places, k)).T, mode="complete")[0][:, -1]
+
+        def apart(x: Array, normal: Array = others) -> Array:
+            return np.asarray(np.abs(columns.at(x) @ normal))
+
+        below = places[k - 1] if k else columns.grid[0]
+        above = places[k + 1] if k + 1 < places.size else columns.grid[-1]
+        places[k] = _highest(apart, float(below), float(above))
+    return places
+
+
+def _newton(columns: Columns, places: Array) -> Array:
+    r"""A step of Newton's method on :math:`\ln|\det F|`, F the rows at the places.
+
+    Its slope is the diagonal of :math:`A = F' F^{-1}`, its curvature
+    :math:`(F'' F^{-1})_{ii} - A_{ii}^2` and :math:`-A_{ij} A_{ji}`. Ends of the arc stay.
+    """
+    start, stop = float(columns.grid[0]), float(columns.grid[-1])
+    inverse = np.linalg.inv(columns.at(places))
+    first, second = (slope @ inverse for slope in columns.slopes(places))
+    inner = (places > start) & (places < stop)
+    curvature = -(first * first.T)
+    curvature[np.diag_indices(places.size)] += np.diag(second)
+    # A turn of all places together may change nothing.
+    step = np.linalg.lstsq(curvature[np.ix_(inner, inner)], np.diag(first)[inner], rcond=1e-9)[0]
+    found = places.copy()
+    found[inner] -= step
+    inside = found.min() >= start and found.max() <= stop and np.diff(found).min() > 0.0
+    return found if inside else _swept(columns, places)
 
 
 def _highest(height: Callable[[Array], Array], low: float, high: float) -> float:

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,7 +27,15 @@ from ..estimation.regression import Regression
 from ..joint.pattern import Surroundings
 from ..joint.signals import Signals
 
-__all__ = ["STRONG", "Evidence", "Hypothesis", "Noise", "evidence_between", "is_doubted"]
+__all__ = [
+    "STRONG",
+    "Evidence",
+    "Hypothesis",
+    "Noise",
+    "deviance_left",
+    "evidence_between",
+    "is_doubted",
+]
 
 Array = NDArray[np.float64]
 
@@ -131,25 +139,23 @@ def evidence_between(
     for one in rivals:
         per_rival: dict[str, list[tuple[float, float]]] = {}
         for k, error in enumerate(errors[one.cause]):
-            left = _left(regression, error, noise)
+            left = deviance_left(regression, error, noise)
             if not searched:
                 per_rival.setdefault("", []).append((left, left - regression.log_n - STRONG))
                 for other in rivals:
                     if other.cause != one.cause:
                         column = errors[other.cause][k % len(errors[other.cause])][:, None]
-                        beside = _left(regression.jointly_with(column), error, noise)
+                        beside = deviance_left(regression.jointly_with(column), error, noise)
                         per_rival.setdefault(other.cause, []).append((beside, beside))
                 continue
-            alone = Regression.of(
-                signals, regression.residual + error, around, rho=noise.correlation
-            )
+            alone = _with_error(regression, error)
             price = _price(EFFECTS[one.cause].propose(alone))
             per_rival.setdefault("", []).append((left, left - price - STRONG))
             for imitator in _imitators(one.cause, rivals):
                 imitation = EFFECTS[imitator].propose(alone)
                 left_by = left
                 if imitation is not None and imitation.deviance > 0.0:
-                    left_by = _left(alone.with_terms([imitation]), error, noise)
+                    left_by = deviance_left(alone.with_terms([imitation]), error, noise)
                 gap = left_by + _price(imitation) - price
                 per_rival.setdefault(imitator, []).append((left_by, gap))
         for rival, pairs in per_rival.items():
@@ -165,16 +171,20 @@ def is_doubted(regression: Regression, one: Hypothesis, spots: Sequence[Blindnes
     ``spots`` are what the design of the readings cannot tell.
     """
     error = one.errors(regression.signals, regression.belief)[0]
-    rho = regression.whiten.rho
-    shown = Regression.of(
-        regression.signals, regression.residual + error, regression.belief, rho=rho
-    )
+    shown = _with_error(regression, error)
     found = EFFECTS[one.cause].propose(shown)
     if found is None:
         # Causes of the scatter are looked for elsewhere; others could not be found.
         return EFFECTS[one.cause].find_scatter(shown) is None
     doubts = (effect.doubt(found, shown, spots) for effect in EFFECTS.values())
     return any(doubt is not None and doubt.common != one.cause for doubt in doubts)
+
+
+def _with_error(regression: Regression, error: Array) -> Regression:
+    """The same readings with a further error; what follows from the motion is worked out once."""
+    readings = replace(regression.readings, residual=regression.residual + error)
+    cache = regression.cache.for_other_errors()
+    return Regression.of_readings(readings, regression.whiten.rho, cache)
 
 
 def _imitators(cause: str, rivals: Sequence[Hypothesis]) -> list[str]:
@@ -197,7 +207,7 @@ def _imitators(cause: str, rivals: Sequence[Hypothesis]) -> list[str]:
     return [*asked, *others]
 
 
-def _left(regression: Regression, error: Array, noise: Noise) -> float:
+def deviance_left(regression: Regression, error: Array, noise: Noise) -> float:
     """Deviance of an error beside all that a regression fits."""
     x, _ = regression.projected(error[:, None])
     return float(np.sum(x**2)) / (noise.sigma**2 * (1.0 - noise.correlation**2))

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
+from functools import partial
 from itertools import pairwise
 from typing import Any
 
@@ -11,7 +12,7 @@ import numpy as np
 from ..simulation.designs import RunDesign
 from .limits import Limits
 
-__all__ = ["base_of", "choices", "seconds_of", "steps_of"]
+__all__ = ["base_of", "changes_of", "choices", "levels", "seconds_of", "steps_of"]
 
 #: Steps in which readings follow a reversal closely, deg.
 CLOSE = 0.25
@@ -35,9 +36,14 @@ def base_of(limits: Limits, label: str) -> RunDesign:
     )
 
 
-def choices(limits: Limits, with_current: bool = True) -> Iterator[list[dict[str, Any]]]:
-    """For each kind of choice all that limits allow, as fields of `RunDesign` that it changes."""
-    yield [*_motions(limits)]
+def choices(
+    limits: Limits, with_current: bool = True, samples: int | None = None
+) -> Iterator[list[dict[str, Any]]]:
+    """For each kind of choice all that limits allow, as fields of `RunDesign` that it changes.
+
+    ``samples`` are the readings of the run where they are fewer than limits allow.
+    """
+    yield [*_motions(limits, limits.samples if samples is None else samples)]
     slow, fast = limits.speed_deg_s
     middle = _plain(np.sqrt(slow * fast))
     speeds = dict.fromkeys((fast, middle, slow))
@@ -64,10 +70,51 @@ def choices(limits: Limits, with_current: bool = True) -> Iterator[list[dict[str
         yield [{"current_A": amperes} for amperes in limits.current_A]
 
 
-def _motions(limits: Limits) -> Iterator[dict[str, Any]]:
+def changes_of(design: RunDesign, kinds: Sequence[Sequence[dict[str, Any]]]) -> int:
+    """In how many of these kinds a run is not as plain as it could be."""
+    return sum(
+        any(getattr(design, name) != value for name, value in options[0].items())
+        for options in kinds
+    )
+
+
+def levels(design: RunDesign, limits: Limits) -> Iterator[tuple[str, Callable[[float], float]]]:
+    """What of a run is a matter of degree: its field, and what a step of it leads to.
+
+    A step of 1 leads over the whole range, of speeds in their logarithm, and never beyond limits.
+    """
+    low, high = limits.speed_deg_s
+    ranges = {
+        "speed_deg_s": (low, high),
+        "speed_end_deg_s": (low, high),
+        "temperature_C": limits.temperature_C,
+        "temperature_end_C": limits.temperature_C,
+        "torque_Nm": limits.torque_Nm,
+        "gravity_Nm": (0.0, limits.gravity_Nm),
+        "current_A": limits.current_A,
+    }
+    for name, (least, most) in ranges.items():
+        now = getattr(design, name)
+        if now is None or least == most or (name == "gravity_Nm" and design.torque_Nm):
+            continue
+        if name.startswith("speed"):
+            yield name, partial(_faster, now, least, most)
+        else:
+            yield name, partial(_higher, now, least, most)
+
+
+def _faster(now: float, least: float, most: float, step: float) -> float:
+    return min(max(_plain(now * (most / least) ** step), least), most)
+
+
+def _higher(now: float, least: float, most: float, step: float) -> float:
+    return min(max(_plain(now + (most - least) * step), least), most)
+
+
+def _motions(limits: Limits, samples: int) -> Iterator[dict[str, Any]]:
     """Ways over the arc: one way, out and back, back and forth, close to reversals."""
     span, (start, stop) = limits.span_deg, limits.arc_deg
-    plain = {"samples": limits.samples, "spacing": "jittered", "reversals": ()}
+    plain = {"spacing": "jittered", "reversals": ()}
     for direction, begin in ((1, start), (-1, stop)):
         over = {**plain, "direction": direction, "start_deg": begin}
         yield {**over, "turns": span / 360.0}
@@ -78,7 +125,7 @@ def _motions(limits: Limits) -> Iterator[dict[str, Any]]:
         # Three stretches of unlike length: two thirds out, a third back, two thirds out again.
         yield {**thirds, "turns": 5.0 / 3.0 * span / 360.0, "reversals": (0.4, 0.6)}
         yield {**thirds, "turns": 4.0 * span / 360.0, "reversals": (0.25, 0.5, 0.75)}
-        leg = min(CLOSE * limits.samples / 4.0, span)
+        leg = min(CLOSE * samples / 4.0, span)
         middle = round(0.5 * (start + stop) - leg / 2.0, 3)
         close = {"start_deg": middle, "turns": 4.0 * leg / 360.0, "reversals": (0.25, 0.5, 0.75)}
         yield {**thirds, **close}

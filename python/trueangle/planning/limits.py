@@ -128,7 +128,9 @@ class Limits:
                 limits, torque_Nm=_range(means, 0.01 + 0.2 * swing), gravity_Nm=round(swing, 3)
             )
         if signals.mount is not None:
-            limits = replace(limits, mount_deg=tuple(np.unique(np.degrees(signals.mount).round(3))))
+            limits = replace(
+                limits, mount_deg=tuple(np.unique(np.degrees(signals.mount).round(3)).tolist())
+            )
         if signals.current is not None:
             limits = replace(limits, current_A=_range(signals.current))
         return limits

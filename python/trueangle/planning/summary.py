@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from itertools import groupby
 from typing import TYPE_CHECKING, Any
 
 from ..support.layout import laid_out
@@ -121,9 +122,11 @@ def next_summary(plan: NextRuns) -> str:
             f"{spoken_time(plan.seconds)} of motion"
             + ("; diagnose by themselves" if plan.alone else "; diagnose with those there are")
         )
-        for design in plan.runs:
-            lines.append(f"  {design.label}")
-            lines += [f"    - {step}" for step in steps_of(design)]
+        for steps, same in groupby(plan.runs, lambda design: [*steps_of(design)]):
+            labels = [str(design.label) for design in same]
+            times = f" to {labels[-1]}, {len(labels)} times the same" if len(labels) > 1 else ""
+            lines.append(f"  {labels[0]}{times}")
+            lines += [f"    - {step}" for step in steps]
     for entry in plan.between:
         names = " or ".join(entry.causes)
         if not entry.told:

@@ -14,7 +14,8 @@ from ..effects import EFFECTS
 from ..errors import ArgumentError
 from ..planning.evidence import Hypothesis, Noise
 from ..planning.limits import Limits
-from ..planning.nextruns import WANTED, NextRuns, RivalEvidence
+from ..planning.nextruns import NextRuns, RivalEvidence
+from ..planning.worth import WANTED
 from ..runs.run import CalibrationRun
 from ..runs.source import Reading
 from ..simulation.simulation import Simulation, simulate, simulate_along
@@ -31,6 +32,10 @@ SEEDS = 10
 
 #: Seconds that a plan may take, where not given.
 WITHIN = 10.0
+
+#: What is said where there was no time for them.
+UNTRIED = "not rehearsed: the time given was up; with more of it (--within 60s) it is counted how "
+UNTRIED += "often the true cause is named"
 
 #: Factor of the readings where simulated diagnoses do not name the cause often enough.
 MORE = 1.5
@@ -140,7 +145,8 @@ def _rehearsed(
         plan = replace(plan, between=entries)
         failed = any(e.trials and (e.chance_named or 0.0) < WANTED for e in entries)
         if not failed or full or pace().over:
-            return plan
+            untried = any(e.seen and e.told and not e.trials for e in entries)
+            return replace(plan, notes=(*plan.notes, UNTRIED)) if untried else plan
         plan = plan.with_readings(
             [min(math.ceil(MORE * design.samples), most) for design in plan.runs]
         )

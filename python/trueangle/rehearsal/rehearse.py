@@ -2,21 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable
+from collections.abc import Collection, Iterable, Mapping
+from dataclasses import replace
 from typing import Any
 
 from ..effects import EFFECTS
+from ..effects.blindness import Blindness
 from ..errors import ArgumentError
+from ..joint.signals import Signals
+from ..planning.evidence import Noise
+from ..planning.nextruns import NextRuns, next_runs
 from ..simulation.simulation import SIMULATION, Simulation
 from ..support.deadline import Pace, paced
 from ..support.kinds import told_kinds
 from ..support.oftype import of_type
 from ..support.suggestions import check_choice
-from .nextrun import NextRun, blind_causes, next_run
 from .result import Rehearsal, RehearsedCause
 from .search import SizeSearch
 from .trial import FAILED, measured_signals
-from .visibility import size_range
+from .visibility import blind_causes, size_range
 from .workers import Here, Workers, cores
 
 __all__ = ["rehearse"]
@@ -24,8 +28,8 @@ __all__ = ["rehearse"]
 #: Trials of a cause where not given.
 SEEDS = 20
 
-#: Share of the time given for the search for a further run.
-FOR_NEXT_RUN = 0.2
+#: Share of the time given for the search for further runs.
+FOR_NEXT_RUNS = 0.2
 
 #: What must be known of every rehearsal.
 FORMS = (
@@ -107,15 +111,15 @@ def rehearse(
     names = _checked(sim, causes, seeds, seed, workers)
     with paced(within, progress) as at:
         signals = measured_signals(sim)
-        blind = blind_causes(sim)
+        blind = blind_causes(sim, signals)
         searches = {}
         for k, cause in enumerate(names):
             at.at("sizing effects", k, len(names))
             sizes = size_range(sim, signals, cause, seed)
             searches[cause] = SizeSearch.of(cause, sizes, blind.get(cause), seeds)
         closed = [cause for cause in names if searches[cause].is_blind]
-        with at.part(FOR_NEXT_RUN):
-            further = next_run(sim, closed, seed)
+        with at.part(FOR_NEXT_RUNS):
+            further = _opening(sim, signals, closed, blind)
         _ask(sim, signals, list(searches.values()), seed, workers or cores(), at)
         found = [search.result() for search in searches.values()]
         return Rehearsal(
@@ -183,13 +187,30 @@ def _checked(
     return names
 
 
-def _still(further: NextRun | None, found: Collection[RehearsedCause]) -> NextRun | None:
-    """The further run, without causes that were named after all."""
+def _opening(
+    sim: Simulation, signals: Signals, closed: Collection[str], blind: Mapping[str, Blindness]
+) -> NextRuns | None:
+    """The further runs that tell what these cannot; None where there are none."""
+    asked: dict[str, Blindness] = {}
+    for cause in closed:
+        spot = blind.get(cause) or Blindness((cause,), "", "")
+        causes = tuple(other for other in spot.causes if other in closed)
+        asked.setdefault(repr(causes), replace(spot, causes=causes))
+    if not asked:
+        return None
+    found = next_runs(signals, sim, [*asked.values()], Noise(sim.sigma_arcsec))
+    return found if found.runs else None
+
+
+def _still(further: NextRuns | None, found: Collection[RehearsedCause]) -> NextRuns | None:
+    """The further runs, without causes that were named after all."""
     if further is None:
         return None
     named = {cause.cause for cause in found if cause.ever_named}
-    opens = tuple(cause for cause in further.opens if cause not in named)
-    return NextRun(further.design, further.changes, opens) if opens else None
+    between = tuple(entry for entry in further.between if not named.issuperset(entry.causes))
+    if not any(entry.told for entry in between):
+        return None
+    return replace(further, between=between)
 
 
 def _notes(searches: Collection[SizeSearch], at: Pace) -> list[str]:

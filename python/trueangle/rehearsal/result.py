@@ -6,10 +6,10 @@ from collections import Counter
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
+from ..planning.nextruns import NextRuns
 from ..support.drawn import drawn
 from ..support.plainresult import PlainResult, Shown, counted
 from .detection import Chance, binomial_interval
-from .nextrun import NextRun
 from .visibility import Range
 
 if TYPE_CHECKING:
@@ -152,8 +152,8 @@ class Rehearsal(PlainResult):
     Attributes
     ----------
     causes : list of RehearsedCause
-    next_run : NextRun or None
-        The one further run that opens the most causes; None where none opens any.
+    next_runs : NextRuns or None
+        The further runs that tell most of what these cannot; None where none tell any.
     readings, runs : int
     noise : float
         Arcsec.
@@ -167,7 +167,7 @@ class Rehearsal(PlainResult):
     """
 
     causes: list[RehearsedCause]
-    next_run: NextRun | None
+    next_runs: NextRuns | None
     readings: int
     runs: int
     noise: float
@@ -188,7 +188,7 @@ class Rehearsal(PlainResult):
         """The object that ``trueangle rehearse`` prints as JSON."""
         return {
             "causes": [cause.to_dict() for cause in self.causes],
-            "next_run": None if self.next_run is None else self.next_run.to_dict(),
+            "next_run": None if self.next_runs is None else self.next_runs.to_dict(),
             "readings": self.readings,
             "runs": self.runs,
             "noise_arcsec": self.noise,

@@ -20,7 +20,7 @@ OPEN = "Sizes with their 95 % intervals; ? where the sizes tried do not bracket 
 
 
 def render(rehearsal: Rehearsal) -> str:
-    """The table of sizes, what is not seen and why, and the run that would help most."""
+    """The table of sizes, what is not seen and why, and the runs that would help most."""
     lines: list[str] = []
     for note in rehearsal.notes:
         if note.startswith("INCOMPLETE"):
@@ -111,18 +111,8 @@ def _never(cause: RehearsedCause) -> str:
 
 
 def _next(rehearsal: Rehearsal) -> list[str]:
-    run = rehearsal.next_run
-    if run is None:
-        if all(cause.ever_named for cause in rehearsal.causes):
-            return []
-        return ["No single further run was found that opens another cause."]
-    table = ", ".join(f"{name} = {_toml(value)}" for name, value in run.to_dict()["run"].items())
-    return [
-        *wrapped(f"One further run, {'; '.join(run.changes)}, opens {', '.join(run.opens)}:", 2),
-        *wrapped(f"[[run]] {table}", 4, 2),
-        "",
-    ]
-
-
-def _toml(value: object) -> str:
-    return f'"{value}"' if isinstance(value, str) else str(value)
+    if rehearsal.next_runs is not None:
+        return [*rehearsal.next_runs.summary().splitlines(), ""]
+    if all(cause.ever_named for cause in rehearsal.causes):
+        return []
+    return ["No further run was found that tells another cause."]

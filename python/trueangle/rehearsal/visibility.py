@@ -8,13 +8,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..effects import EFFECTS, Effect
+from ..effects.blindness import Blindness
+from ..effects.blindspots import blind_spots
 from ..estimation.regression import Regression
 from ..joint.signals import Signals
 from ..simulation.simulation import Simulation
 from ..support.angles import ARCSEC_PER_DEG
 from .trial import drawn_effect, rng_of
 
-__all__ = ["STEPS", "Range", "size_range"]
+__all__ = ["STEPS", "Range", "blind_causes", "size_range"]
 
 Array = NDArray[np.float64]
 
@@ -57,6 +59,17 @@ class Range:
     def size(self, step: float) -> float:
         """The size of a step."""
         return float(self.first * 2.0 ** ((step if self.grows else -step) / STEPS))
+
+
+def blind_causes(sim: Simulation, signals: Signals) -> dict[str, Blindness]:
+    """Causes that a diagnosis of such readings does not name, and why."""
+    noise = np.random.default_rng(0).standard_normal(len(signals)) * sim.sigma_arcsec
+    found: dict[str, Blindness] = {}
+    for spot in blind_spots(Regression.of(signals, noise, sim.surroundings)):
+        for cause in spot.causes:
+            if EFFECTS[cause].is_doubted and spot.hides(cause):
+                found.setdefault(cause, spot)
+    return found
 
 
 def size_range(sim: Simulation, signals: Signals, cause: str, seed: int) -> Range | None:

@@ -27,10 +27,9 @@ from trueangle.errors import ArgumentError
 from trueangle.rehearsal import rehearse
 from trueangle.rehearsal import trial as trials
 from trueangle.rehearsal.detection import Chance, binomial_interval
-from trueangle.rehearsal.nextrun import blind_causes, next_run
 from trueangle.rehearsal.search import next_steps
 from trueangle.rehearsal.trial import NOTHING, Trial, TrialOutcome, asked, measured_signals
-from trueangle.rehearsal.visibility import FIRST, NEAR, size_range
+from trueangle.rehearsal.visibility import FIRST, NEAR, blind_causes, size_range
 from trueangle.rehearsal.workers import THREADS, WorkerError, Workers
 from trueangle.simulation import Backlash, Harmonic, Joint, RunDesign, Simulation
 
@@ -104,7 +103,8 @@ def test_the_object_printed_keeps_the_contract(seen):
             "blind_because",
             "measure",
         } <= set(cause)
-    assert told["next_run"]["opens"] == ["thermal_drift"]
+    assert {"runs", "between"} <= set(told["next_run"])
+    assert [entry["causes"] for entry in told["next_run"]["between"]] == [["thermal_drift"]]
     assert told["seed"] == 0
     assert told["complete"] is True
     entry = told["causes"][0]["tried"][0]
@@ -116,7 +116,8 @@ def test_the_summary_says_it_all(seen):
     assert "backlash, half_width_arcsec" in text
     assert "Not named in these runs:" in text
     assert "- thermal_drift: the temperature varies by less than 2 K. To tell: " in text
-    assert "One further run, " in text
+    assert "Next: 1 run of " in text
+    assert "shows thermal_drift" in text
     assert "real ones are never exact" in text
 
 
@@ -136,17 +137,17 @@ def test_the_picture_shows_every_cause_that_was_hidden(seen):
     pyplot.close(figure)
 
 
-def test_a_run_that_is_recommended_opens_what_it_says():
+def test_a_run_that_is_recommended_opens_what_it_says(seen):
     """Not by the design alone: hidden in the design with that run, the cause is named."""
-    further = next_run(SIM, [*blind_causes(SIM)], 0)
-    assert "thermal_drift" in further.opens
-    more = replace(SIM, runs=(*SIM.runs, further.design))
-    assert not set(further.opens) & set(blind_causes(more))
+    plan = seen.next_runs
+    assert plan.between[0].told
+    more = replace(SIM, runs=(*SIM.runs, *plan.runs))
+    assert "thermal_drift" not in blind_causes(more, measured_signals(more))
     assert rehearse(more, causes=["thermal_drift"], seeds=6, workers=1)["thermal_drift"].ever_named
 
 
 def test_no_run_is_recommended_where_nothing_is_closed():
-    assert next_run(SIM, [], 0) is None
+    assert rehearse(SIM, causes=["backlash"], seeds=1, workers=1).next_runs is None
 
 
 def test_a_diagnosis_that_never_names_changes_the_result(monkeypatch):

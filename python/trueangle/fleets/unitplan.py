@@ -1,0 +1,218 @@
+"""How few readings are enough for one more unit of a fleet, and where."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ..errors import ArgumentError
+from ..planning.arc import check_arc, plan_arc
+from ..support.kinds import told_kinds
+from ..support.layout import laid_out
+from ..support.plainresult import PlainResult, counted
+from .spread import MOST, Spread
+
+__all__ = ["UnitPlan", "plan_unit"]
+
+
+@dataclass(frozen=True)
+class UnitPlan(PlainResult):
+    r"""Readings of a unit whose coefficients are drawn as those of its fleet.
+
+    Attributes
+    ----------
+    start_deg, stop_deg : float
+    orders : tuple of float
+        Output orders, fitted together with the zero.
+    places_deg : tuple of float
+        Increasing.
+    counts : tuple of int
+        Readings at each place.
+    noise_arcsec : float
+        Of one reading.
+    uncertainty_arcsec : float
+        Expanded uncertainty (k = 2) of the curve, with its zero, at the worst place of the arc,
+        over units that are like those of the fleet.
+    std_arcsec : dict of order to float
+        Standard error of a coefficient of each order, likewise.
+    own : dict of order to float
+        Share of each order's spread between units that the readings take away.
+    readings_without : int or None
+        Readings that the same uncertainty takes without the fleet; None where the arc tells the
+        orders by no number of them.
+    units : int
+        From which the prior is known.
+    notes : tuple of str
+    """
+
+    start_deg: float
+    stop_deg: float
+    orders: tuple[float, ...]
+    places_deg: tuple[float, ...]
+    counts: tuple[int, ...]
+    noise_arcsec: float
+    uncertainty_arcsec: float
+    std_arcsec: dict[float, float]
+    own: dict[float, float]
+    readings_without: int | None
+    units: int
+    notes: tuple[str, ...] = ()
+
+    @property
+    def readings(self) -> int:
+        """All of them."""
+        return sum(self.counts)
+
+    def to_dict(self) -> dict[str, Any]:
+        """The object that ``trueangle plan`` prints as JSON for a unit of a fleet."""
+        plain = dict(vars(self))
+        for name in ("std_arcsec", "own"):
+            plain[name] = {f"{order:g}": value for order, value in plain[name].items()}
+        for name in ("orders", "places_deg", "counts", "notes"):
+            plain[name] = list(plain[name])
+        return {"kind": "unit", **plain, "readings": self.readings}
+
+    def summary(self) -> str:
+        """The plan as text: a table to follow at the rig."""
+        without = self.readings_without
+        lines = [
+            f"{self.readings} readings over {self.start_deg:g} to {self.stop_deg:g} deg, of a unit "
+            f"like the {self.units} of the fleet"
+            + (f" ({without} without it)" if without is not None else ""),
+            "  place/deg  readings",
+            *(
+                f"  {place:9.3f}  {count:8d}"
+                for place, count in zip(self.places_deg, self.counts, strict=True)
+            ),
+            f"  uncertainty (k = 2)    {self.uncertainty_arcsec:.3g} arcsec at the worst place",
+            f"  noise of a reading     {self.noise_arcsec:.3g} arcsec",
+            "  order  std/arcsec  the unit's own",
+        ]
+        for order, std in self.std_arcsec.items():
+            lines.append(f"  {order:5g}  {std:10.3g}  {100.0 * self.own[order]:13.0f}%")
+        lines += [f"  note: {note}" for note in self.notes]
+        return laid_out(lines)
+
+    def _brief(self) -> str:
+        without = "" if self.readings_without is None else f" ({self.readings_without} without)"
+        return (
+            f"{self.readings} readings{without} at {counted(self.places_deg, 'place')}, "
+            f"{self.uncertainty_arcsec:.3g} arcsec at the worst"
+        )
+
+
+@told_kinds
+def plan_unit(
+    prior: Any,
+    start: float = 0.0,
+    stop: float = 360.0,
+    orders: Iterable[float] | None = None,
+    *,
+    uncertainty: float | None = None,
+    readings: int | None = None,
+    noise: float | None = None,
+) -> UnitPlan:
+    r"""The fewest readings of a further unit of a fleet that reach an uncertainty, and where.
+
+    The coefficients of such a unit are :math:`N(\mu, T)`; after readings X of noise s they scatter
+    by
+
+    .. math:: C = (X^T X / s^2 + T^{-1})^{-1}
+
+    and each further reading is taken where the curve is known least, :math:`f(x)^T C f(x)`, which
+    adds most to :math:`\det C^{-1}`. Single readings are then exchanged while that gains.
+
+    Parameters
+    ----------
+    prior : Fleet
+        Or the `trueangle.fitting.prior.Prior` of one.
+    start, stop : float
+        Ends of the arc, degrees; a whole turn by default.
+    orders : iterable of float, optional
+        Output orders to fit, by default those of the fleet. One that the fleet does not know is
+        free.
+    uncertainty : float, optional
+        Wanted expanded uncertainty (k = 2) of the curve at every place, arcsec.
+    readings : int, optional
+        Readings to spend, in place of that.
+    noise : float, optional
+        Standard deviation of one reading, arcsec; that of the fleet's by default.
+
+    Returns
+    -------
+    UnitPlan
+
+    Raises
+    ------
+    ArgumentError
+        Neither or both of ``uncertainty`` and ``readings``; an arc of no length or beyond a turn; a
+        number out of range; an uncertainty that takes more than a hundred thousand readings.
+    KindError
+        No fleet.
+
+    Notes
+    -----
+    Of `trueangle.fit` with the same ``prior``. The promise is one about units like those of the
+    fleet, on average: a unit that is damaged is none.
+    Source: Chaloner and Verdinelli (1995), Bayesian experimental design: a review.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from trueangle.fitting.prior import Prior
+    >>> from trueangle.joint.shafts import ShaftOrders
+    >>> known = Prior(  # order 1 scatters by 10 arcsec from unit to unit, order 2 by 1 arcsec
+    ...     360.0, (ShaftOrders("output", 1.0, (1, 2)),), np.zeros(4),
+    ...     (np.array([10.0, 10.0, 1.0, 1.0]) / 3600.0) ** 2, 60.0, (3.0 / 3600.0) ** 2, 600.0, 40,
+    ... )
+    >>> plan = plan_unit(known, uncertainty=4.0)
+    >>> plan.readings < plan.readings_without
+    True
+    """
+    check_arc(start, stop)
+    if (uncertainty is None) == (readings is None):
+        raise ArgumentError(
+            "give uncertainty= (how few readings are enough) or readings= (what they are enough "
+            "for), one of them"
+        )
+    known = Spread.of(prior, orders, noise, start / 360.0, stop / 360.0)
+    if uncertainty is not None and not (math.isfinite(uncertainty) and uncertainty > 0.0):
+        raise ArgumentError(f"uncertainty must be positive and finite, got {uncertainty!r}")
+    if readings is not None and (readings != int(readings) or not 1 <= readings <= MOST):
+        raise ArgumentError(f"readings must be a whole number from 1 to {MOST}, got {readings!r}")
+    places = known.found(readings, uncertainty)
+    reached = known.uncertainty(places)
+    without = _without(start, stop, known, reached)
+    notes = []
+    if without is not None and without <= places.size:
+        notes.append("the fleet spares no readings here: its units differ by more than is wanted")
+    turns, counts = np.unique(np.round(known.grid[places] * 360.0, 6), return_counts=True)
+    left = np.diag(known.covariance(places))[1:].reshape(-1, 2)
+    taken = np.divide(left, known.variance, out=np.ones_like(left), where=known.variance > 0.0)
+    return UnitPlan(
+        float(start),
+        float(stop),
+        known.orders,
+        tuple(turns.tolist()),
+        tuple(int(n) for n in counts),
+        known.noise,
+        reached,
+        dict(zip(known.orders, np.sqrt(left.mean(axis=1)).tolist(), strict=True)),
+        dict(zip(known.orders, np.clip(1.0 - taken, 0.0, 1.0).mean(axis=1).tolist(), strict=True)),
+        without,
+        known.units,
+        tuple(notes),
+    )
+
+
+def _without(start: float, stop: float, known: Spread, uncertainty: float) -> int | None:
+    """Readings that the same takes where nothing is known of the unit."""
+    try:
+        plan = plan_arc(start, stop, known.orders, noise=known.noise, uncertainty=uncertainty)
+    except ArgumentError:
+        return None
+    return plan.readings

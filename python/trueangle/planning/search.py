@@ -1,0 +1,199 @@
+"""The search for further runs: run after run, one choice after the other, then with less."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any, TypeAlias
+
+from ..joint.signals import Signals
+from ..simulation.designs import RunDesign
+from .further import base_of, changes_of, choices, levels
+from .limits import Limits
+from .worth import NOTHING, Scales, Worth
+
+__all__ = ["LEAST", "Search"]
+
+#: Runs in a row that open nothing, after which no further one is tried; by themselves the first
+#: open nothing, whatever they are.
+IN_VAIN = 3
+
+#: Passes over all choices of a run: the last one rarely changes anything.
+PASSES = 3
+
+#: Steps of a level (speed, temperature, load ...), as shares of its range.
+STEPS = (0.25, 0.1)
+
+#: Readings of a run at least.
+LEAST = 12
+
+#: Factor within which the fewest readings are found, and that by which they are lowered before
+#: other runs are tried.
+NEAR, FEWER = 1.1, 0.5
+
+Designs: TypeAlias = "list[RunDesign]"
+
+#: What a run may be of one kind, as fields that change.
+Options: TypeAlias = "list[dict[str, Any]]"
+
+
+@dataclass(frozen=True)
+class Search:
+    """Runs within limits that tell most, with as few readings as serve.
+
+    Attributes
+    ----------
+    scales : Scales
+    limits : Limits
+    """
+
+    scales: Scales
+    limits: Limits
+
+    def best(self, start: Signals | None) -> tuple[Designs, Worth]:
+        """The best runs beside earlier ones, or by themselves."""
+        designs, worth = self._built(start)
+        designs, worth = self._without_idle(designs, worth, start)
+        if worth.told and self.scales.all_seen:
+            designs, worth = self._lean(designs, worth, start)
+        if worth.told and not self.scales.repeated(designs, start):
+            designs, worth = self._shared_out(designs, worth, start)
+        return designs, worth
+
+    def repeated(self, designs: Designs, worth: Worth) -> tuple[Designs, Worth]:
+        """The first run several times: levels that need runs of their own are told so."""
+        for count in range(2, self.limits.runs + 1 if designs else 0):
+            again = [replace(designs[0], label=_label(k)) for k in range(count)]
+            found = self.scales.weighed(again, None)
+            if found.opened:
+                return again, found
+        return designs, worth
+
+    def _built(self, start: Signals | None) -> tuple[Designs, Worth]:
+        """Run after run, until all is told, nothing is gained, or there are enough."""
+        designs: Designs = []
+        kept: Designs = []
+        best = NOTHING
+        while len(designs) < self.limits.runs and not self.scales.over:
+            design = base_of(self.limits, _label(len(designs)))
+            if self.scales.needs_current and (start is None or start.current is not None):
+                low, _ = self.limits.current_A
+                design = replace(design, current_A=low)  # told where every run recorded it
+            designs, worth = self._improved([*designs, design], len(designs), start)
+            if worth.gained > best.gained or not kept:
+                best, kept = worth, [*designs]
+            # Zeros of the runs' own are told by several at once: one that opens nothing may help.
+            done = self._tells_all(best) and (best.foretold or start is not None)
+            if done or len(designs) - len(kept) == IN_VAIN:
+                break
+        return kept, best
+
+    def _tells_all(self, worth: Worth) -> bool:
+        return worth.told == len(self.scales.questions)
+
+    def _improved(self, designs: Designs, k: int, start: Signals | None) -> tuple[Designs, Worth]:
+        """Run k changed to the best there is: choices, and levels where these do not tell all."""
+        kinds = [*choices(self.limits, self.scales.needs_current, designs[k].samples)]
+        best = self.scales.weighed(designs, start, changes_of(designs[k], kinds))
+        for _ in range(PASSES):
+            before = best
+            for options in kinds:
+                designs, best = self._picked(designs, k, start, best, options, kinds)
+            if best == before:
+                break
+        for step in () if self._tells_all(best) else STEPS:
+            for name, at in [*levels(designs[k], self.limits)]:
+                options = [{name: at(step)}, {name: at(-step)}]
+                designs, best = self._picked(designs, k, start, best, options, kinds)
+        return designs, best
+
+    def _picked(
+        self,
+        designs: Designs,
+        k: int,
+        start: Signals | None,
+        best: Worth,
+        options: Options,
+        kinds: Sequence[Options],
+    ) -> tuple[Designs, Worth]:
+        """The best of some changes of run k, and of none."""
+        picked = designs
+        for option in options:
+            design = replace(designs[k], **option)
+            if design == designs[k] or self.scales.over:
+                continue
+            tried = [*designs[:k], design, *designs[k + 1 :]]
+            worth = self.scales.weighed(tried, start, changes_of(design, kinds), best.opened)
+            if worth > best:
+                best, picked = worth, tried
+        return picked, best
+
+    def _without_idle(
+        self, designs: Designs, worth: Worth, start: Signals | None
+    ) -> tuple[Designs, Worth]:
+        """The runs without those that tell nothing beside the later ones."""
+        for design in designs[:-1]:
+            fewer = [other for other in designs if other is not design]
+            found = self.scales.weighed(fewer, start, 0, worth.opened)
+            if found.reached >= worth.reached and worth.told:
+                designs, worth = fewer, found
+        return [replace(d, label=_label(k)) for k, d in enumerate(designs)], worth
+
+    def _lean(self, designs: Designs, worth: Worth, start: Signals | None) -> tuple[Designs, Worth]:
+        """The runs with the fewest readings that tell as much, and others that need fewer still."""
+        goal = worth.reached
+        designs, worth = self._fewest(designs, worth, goal, start)
+        while not self.scales.over:
+            tried = _with_readings(designs, FEWER)
+            if tried == designs:
+                break
+            found = NOTHING
+            for k in range(len(tried)):
+                tried, found = self._improved(tried, k, start)
+            if found.reached < goal:
+                break
+            tried, found = self._without_idle(tried, found, start)
+            designs, worth = self._fewest(tried, found, goal, start)
+        return designs, worth
+
+    def _shared_out(
+        self, designs: Designs, worth: Worth, start: Signals | None
+    ) -> tuple[Designs, Worth]:
+        """The same readings in more runs, so many that held-out ones confirm what they tell."""
+        for times in range(2, self.limits.runs // len(designs) + 1):
+            again = [one for one in _with_readings(designs, 1.0 / times) for _ in range(times)]
+            again = [replace(one, label=_label(k)) for k, one in enumerate(again)]
+            if not self.scales.repeated(again, start):
+                continue
+            found = self.scales.weighed(again, start, 0, worth.opened)
+            if found.reached >= worth.reached:
+                return again, found
+        return designs, worth
+
+    def _fewest(
+        self, designs: Designs, worth: Worth, goal: tuple[int, int, bool], start: Signals | None
+    ) -> tuple[Designs, Worth]:
+        """The same runs with the fewest readings that reach the goal."""
+        least, most = LEAST / max(design.samples for design in designs), 1.0
+        share = least
+        while most / least > NEAR and not self.scales.over:
+            fewer = _with_readings(designs, share)
+            found = self.scales.weighed(fewer, start, 0, goal[0])
+            if found.reached >= goal:
+                best, worth, most = fewer, found, share
+            else:
+                least = share
+            share = math.sqrt(least * most)
+        return (designs if most == 1.0 else best), worth
+
+
+def _with_readings(designs: Designs, share: float) -> Designs:
+    """Runs with this share of their readings."""
+    return [
+        replace(d, samples=min(max(round(share * d.samples), LEAST), d.samples)) for d in designs
+    ]
+
+
+def _label(k: int) -> str:
+    return f"next-{k + 1}"
