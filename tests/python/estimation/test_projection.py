@@ -76,7 +76,7 @@ def test_what_candidates_save_is_what_a_fit_with_them_saves(kind: tuple) -> None
         for k, fixed in enumerate(found.fixed_gains(block)):
             less = gls(x, y - block[:, k], v)[1]
             assert fixed == pytest.approx(N * np.log(found.rss / less), abs=1e-7)
-    assert found.gain(blocks[4]) [0] == gains[4] == 0.0
+    assert found.gain(blocks[4])[0] == gains[4] == 0.0
     assert not found.gain(blocks[4])[1].any()
     assert found.gains(x).tolist() == found.fixed_gains(x).tolist() == [0.0] * 4
     assert found.as_deviance(0.25 * found.rss) == pytest.approx(-N * np.log(0.75))
@@ -84,7 +84,9 @@ def test_what_candidates_save_is_what_a_fit_with_them_saves(kind: tuple) -> None
     np.testing.assert_allclose(found.pair_gains(Products(pairs, 2)), gains[1:3], rtol=2e-3,
                                atol=2e-3)  # fmt: skip
     seen, residual = found.seen
-    np.testing.assert_allclose(blocks[3].T @ residual, blocks[3].T @ found.whiten.transposed(found.r))
+    np.testing.assert_allclose(
+        blocks[3].T @ residual, blocks[3].T @ found.whiten.transposed(found.r)
+    )
     np.testing.assert_allclose(blocks[3].T @ seen, found.whiten(blocks[3]).T @ found.q, atol=1e-10)
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 import pytest
 
@@ -11,6 +13,7 @@ from trueangle.estimation.whitening import (
     LagCorrelation,
     RunEffect,
     Whitener,
+    _inverse_beside_one,
     principal,
     wander_basis,
 )
@@ -120,6 +123,26 @@ def test_effects_far_larger_than_the_noise_and_far_larger_than_each_other() -> N
     np.testing.assert_allclose(whiten.run_part(y), y, atol=1e-3)
 
 
+def test_powers_beside_which_the_unit_is_lost() -> None:
+    """Two columns that are one: their sum is known, their difference is as before."""
+    for power in (2.0**10, 2.0**60):
+        share = power / (1.0 + 2.0 * power)
+        grams = np.array([np.full((2, 2), power), np.zeros((2, 2))])
+        expected = [np.eye(2) - share, np.eye(2)]
+        np.testing.assert_allclose(_inverse_beside_one(grams), expected, atol=1e-9)
+
+
+@pytest.mark.parametrize("kind", CASES)
+def test_the_determinant_run_by_run(kind: tuple) -> None:
+    whiten = case(*kind)
+    v = covariance(whiten)
+    for run, (a, b) in enumerate(BOUNDS):
+        expected = np.linalg.slogdet(v[a:b, a:b])[1]
+        if whiten.weights is not None:
+            expected += np.log(whiten.weights[a:b]).sum()
+        assert whiten.log_determinant_of(run) == pytest.approx(expected, abs=1e-9)
+
+
 def test_columns_turned_to_right_angles_span_the_same() -> None:
     x = np.random.default_rng(9).normal(size=(N, 3))
     power, turned = principal(x, BOUNDS)
@@ -135,6 +158,7 @@ def test_wander_is_half_periods_over_the_record() -> None:
     for k in (1, 2, 3):
         np.testing.assert_allclose(found[:, k - 1], np.cos(np.pi * k * np.array([0.0, 0.25, 1.0])))
     assert wander_basis(clock).shape == (3, 8)
+    np.testing.assert_allclose(wander_basis(clock / 9.0, 3), found, atol=1e-12)
     np.testing.assert_array_equal(wander_basis(np.full(2, 5.0), 2), np.ones((2, 2)))
 
 
@@ -157,7 +181,7 @@ def slow_correlation(clock: np.ndarray, bounds: list, residual: np.ndarray) -> f
 def test_correlation_of_neighbours_after_wander(rho: float, lengths: tuple) -> None:
     rng = np.random.default_rng(10)
     edges = np.cumsum((0, *lengths))
-    bounds = [(int(a), int(b)) for a, b in zip(edges[:-1], edges[1:], strict=True)]
+    bounds = [(int(a), int(b)) for a, b in itertools.pairwise(edges)]
     e = rng.normal(size=edges[-1])
     for i in range(1, e.size):
         e[i] += rho * e[i - 1]

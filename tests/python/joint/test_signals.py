@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 
 import numpy as np
@@ -147,7 +148,7 @@ def loops(start: float, runs: int = 2) -> tuple[Signals, list[np.ndarray]]:
     """Signals without a jump at their turning points, and each run's angle in degrees."""
     turning = np.array([0.0, 20.0, 12.0, 30.0, 29.0, 33.0, -4.0])
     angle = np.concatenate(
-        [np.linspace(a, b, 200, endpoint=False) for a, b in zip(turning, turning[1:], strict=False)]
+        [np.linspace(a, b, 200, endpoint=False) for a, b in itertools.pairwise(turning)]
     )
     found = [angle + start, -0.4 * angle]
     return join_runs([CalibrationRun(a, a, 360.0) for a in found[:runs]]), found
