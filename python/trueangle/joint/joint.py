@@ -161,9 +161,10 @@ class Joint:
         ):
             if abs(order - k * self.pole_pairs * encoder) <= near:
                 found.append(f"interpolation error: {what}")
-        quadrants = order / (4.0 * self.pole_pairs * encoder)
-        if 1.5 < quadrants < 8.5 and abs(quadrants - round(quadrants)) * 4.0 * encoder <= near:
-            found.append(f"harmonic {round(quadrants)} of the interpolation error of order 4")
+        fourth = 4.0 * self.pole_pairs * encoder
+        multiple = round(order / fourth)
+        if 2 <= multiple <= 8 and abs(order - multiple * fourth) <= near:
+            found.append(f"harmonic {multiple} of the interpolation error of order 4")
         if generator is not None and motor is not None:
             if min(abs(order - motor), abs(order - generator)) <= near:
                 found.append("wave generator, once per turn: eccentricity, bearing")

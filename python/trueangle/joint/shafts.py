@@ -32,7 +32,7 @@ T = TypeVar("T")
 MOST_ORDERS: Final = 4096
 
 #: Turns of the wave generator against the output member, less those of the motor.
-_WAVE_GENERATOR = {"circular_spline": 1.0, "flexspline": -1.0, "none": 0.0}
+_WAVE_GENERATOR = {"circular_spline": 1.0, "flexspline": -1.0}
 
 
 @told_kinds
@@ -165,18 +165,13 @@ def resolve_orders(
                 f"how fast shaft {name!r} turns is not known: give `gear_ratio=`, or its "
                 f"cycles per output turn as `shafts={{{name!r}: CYCLES}}`"
             )
-        checked = {
-            k if type(k) is int and 0 < k < 2**31 else _order(k, name)
-            for k in counted_orders(asked, f"orders of shaft {name!r}")
-        }
+        checked = {_order(k, name) for k in counted_orders(asked, f"orders of shaft {name!r}")}
         if checked:
             wanted.append(ShaftOrders(name, float(cycles[name]), tuple(sorted(checked))))
     return wanted
 
 
 def _order(order: object, shaft: str) -> int:
-    if type(order) is int and 1 <= order < 2**31:
-        return order
     try:
         whole = int(order)  # type: ignore[call-overload]
         if whole == order and 1 <= whole < 2**31:

@@ -30,6 +30,9 @@ FLICKER = 0.05
 #: Sign changes that are taken as they are, however short the run.
 REVERSALS_TRUSTED = 10
 
+#: Share of a step by which the steps of a table may miss to fill a turn, as rounded angles do.
+CLOSES = 0.25
+
 
 @dataclass(frozen=True, eq=False)
 class Signals:
@@ -242,7 +245,7 @@ def _lattice(runs: Sequence[CalibrationRun]) -> tuple[float, int]:
     if not move:
         return step * ARCSEC_PER_TURN, 0
     positions = round(1.0 / move)
-    return 0.0, positions if abs(positions * move - 1.0) < 0.5 * move else 0
+    return 0.0, positions if abs(1.0 / move - positions) < CLOSES else 0
 
 
 def _joined(parts: list[Array]) -> Array:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import trueangle as ta
-from trueangle.joint.grid import lattice_step, table_move
+from trueangle.joint.grid import UniformGrid, lattice_step, table_move, uniform_grid
 from trueangle.joint.signals import join_runs
 from trueangle.simulation import Simulation
 
@@ -56,3 +56,83 @@ def test_tables_of_equal_steps_have_low_orders_and_no_counts(n, runs, back):
         size = found[order].parameters["amplitude_arcsec"]
         assert abs(size.value - amplitude) < 4.0 * size.std
     assert result.noise == pytest.approx(2.0, rel=0.4)
+
+
+@pytest.mark.parametrize("n", [3, 7, 36])
+def test_orders_that_look_alike_on_a_grid(n):
+    """Slow: two orders are alike where their cosines are so at every position."""
+    grid = UniformGrid(n)
+    angle = 2.0 * np.pi * np.arange(n) / n
+
+    def alike(a, b):
+        return np.allclose(np.cos(a * angle), np.cos(b * angle), atol=1e-9)
+
+    for order in range(1, 3 * n):
+        assert grid.folded(order) == next(m for m in range(n) if alike(m, order))
+        wanted = [m for m in range(9 * n) if alike(m, order) and m != order]
+        for count in (0, 1, 4):
+            assert grid.aliases(order, count) == wanted[:count]
+
+
+@pytest.mark.parametrize("shift", [0.0, 0.3, -2.0])
+@pytest.mark.parametrize(("n", "found"), [(2, None), (3, 3), (36, 36), (10_000, 10_000),
+                                          (10_001, None)])  # fmt: skip
+def test_a_uniform_grid_is_told_wherever_it_begins(n, found, shift):
+    rng = np.random.default_rng(n)
+    theta = rng.permutation(np.concatenate([np.arange(n), np.arange(n) + 2 * n]))
+    grid = uniform_grid((theta / n + shift) * 2.0 * np.pi)
+    assert (grid and grid.positions) == found
+
+
+def test_how_far_readings_may_stand_from_a_grid():
+    turns = np.arange(36.0) / 36.0
+    for away, told in ((0.019, True), (0.021, False), (-0.019, True), (-0.021, False)):
+        # Two, so that the others' mean stays where it was.
+        moved = turns.copy()
+        moved[[5, 20]] += np.array([away, -away]) / 36.0
+        assert (uniform_grid(2.0 * np.pi * moved) is not None) == told
+    # Two readings of one position are one; farther apart two.
+    for apart, positions in ((1e-5, 36), (3e-5, None)):
+        again = np.append(turns, turns[7] + apart)
+        grid = uniform_grid(2.0 * np.pi * again)
+        assert (grid and grid.positions) == positions
+    one_left_out = np.delete(turns, 3)
+    assert uniform_grid(2.0 * np.pi * one_left_out) is None
+
+
+@pytest.mark.parametrize("step", [1.0, 1.0 / 4096.0, 1e-6])
+@pytest.mark.parametrize("counts", [(1, 2, 4), (2, 3, 5), (3, 4, 8), (2, 4, 7), (6, 9, 15)])
+def test_the_step_is_the_largest_that_all_differences_share(step, counts):
+    values = step * np.concatenate([[0], np.cumsum(counts * 3)])
+    expected = step * np.gcd.reduce(counts)
+    for sign in (1.0, -1.0):
+        assert lattice_step(sign * values) == pytest.approx(expected, rel=1e-12)
+    # Differences below the rounding of sums do not count.
+    doubled = np.concatenate([values, values + 0.5e-9 * max(1.0, values.max())])
+    assert lattice_step(doubled) == pytest.approx(expected, rel=1e-3)
+    for away, told in ((0.04, True), (0.06, False)):
+        moved = values.copy()
+        moved[-1] += away * expected
+        assert (lattice_step(moved) > 0.0) == told
+
+
+def test_three_differences_make_a_lattice():
+    assert lattice_step(np.array([0.0, 1.0, 3.0, 4.0])) == 1.0
+    assert lattice_step(np.array([0.0, 1.0, 3.0])) == 0.0
+    assert lattice_step(np.zeros(0)) == 0.0
+    # A quarter would fit: a finest difference of four counts is not looked for.
+    assert lattice_step(np.array([0.0, 4.0, 9.0, 15.0])) == 0.0
+
+
+def test_how_many_readings_of_a_table_may_linger():
+    for lingering, told in ((4, True), (5, False)):
+        run = np.repeat(np.arange(77.0 + (4 - lingering)), 1)
+        run = np.sort(np.concatenate([run, run[5 : 5 + lingering]]))
+        assert run.size == 81
+        assert (table_move([run / 100.0], 0.01) > 0.0) == told
+    assert table_move([np.arange(4) / 10.0], 0.1) == pytest.approx(0.1)
+    assert table_move([np.arange(3) / 10.0], 0.1) == 0.0
+    assert table_move([np.array([0.0, 0.2, 0.4, 0.5, 0.6])], 0.1) == 0.0
+    # The step over the seam is as long as the others.
+    assert table_move([np.array([0.7, 0.8, 0.9, 0.0, 0.1])], 0.1) == pytest.approx(0.1)
+    assert table_move([np.arange(9) / 10.0], -0.1) == 0.0

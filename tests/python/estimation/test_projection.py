@@ -1,0 +1,220 @@
+"""Fits under any noise and what candidates save, against generalised least squares in full."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from trueangle.estimation.batch import Blocks, Products
+from trueangle.estimation.factor import Factor, in_common, orthonormal_basis
+from trueangle.estimation.projection import Projection, project
+from trueangle.estimation.ratio import RATIOS, _vertex
+from trueangle.estimation.runcolumns import RunEffectColumns
+from trueangle.estimation.whitening import RunEffect, Whitener
+
+from .dense import BOUNDS, CASES, N, case, covariance
+
+
+def gls(x: np.ndarray, y: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, float]:
+    """Coefficients, and squares left, by the inverse of the covariance."""
+    inverse = np.linalg.inv(v)
+    found = np.linalg.pinv(x.T @ inverse @ x) @ x.T @ inverse @ y
+    left = y - x @ found
+    return found, float(left @ inverse @ left)
+
+
+def fitted(kind: tuple, seed: int = 20) -> tuple[Projection, np.ndarray, np.ndarray, np.ndarray]:
+    whiten = case(*kind)
+    rng = np.random.default_rng(seed)
+    x = np.column_stack([np.ones(N), rng.normal(size=(N, 3))])
+    y = x @ [1.0, 2.0, -1.0, 0.5] + rng.normal(size=N)
+    blocks = [x[:, :1].copy(), x[:, 1:].copy()]
+    factor = Factor.of(blocks, BOUNDS, whiten.rho, whiten.effects, whiten.weights)
+    return project(factor, y), x, y, covariance(whiten)
+
+
+@pytest.mark.parametrize("kind", CASES)
+def test_a_fit_is_generalised_least_squares(kind: tuple) -> None:
+    found, x, y, v = fitted(kind)
+    coefficients, rss = gls(x, y, v)
+    np.testing.assert_allclose(found.coefficients, coefficients, atol=1e-9)
+    assert found.rss == pytest.approx(rss, rel=1e-9)
+    assert found.n == N
+    assert found.variance == pytest.approx(rss / (N - 4), rel=1e-9)
+    inverse = np.linalg.inv(x.T @ np.linalg.inv(v) @ x)
+    np.testing.assert_allclose(found.unscaled_covariance, inverse, atol=1e-9)
+    # Twice the likelihood's logarithm with its sigma put in, but for constants of n.
+    expected = N * np.log(rss / N) + np.linalg.slogdet(v)[1]
+    assert found.deviance == pytest.approx(expected, abs=1e-8)
+    assert not found.is_explained
+    assert found.of_target(x @ np.ones(4)).is_explained
+    other = np.random.default_rng(2).normal(size=N)
+    again = found.of_target(other)
+    np.testing.assert_allclose(again.coefficients, gls(x, other, v)[0], atol=1e-9)
+    assert again.rss == pytest.approx(gls(x, other, v)[1], rel=1e-9)
+
+
+@pytest.mark.parametrize("kind", CASES)
+def test_what_candidates_save_is_what_a_fit_with_them_saves(kind: tuple) -> None:
+    found, x, y, v = fitted(kind)
+    rng = np.random.default_rng(21)
+    blocks = [rng.normal(size=(N, width)) for width in (1, 2, 2, 3)]
+    blocks.append(np.column_stack([blocks[1], x[:, 1]]))  # one of them is fitted already
+
+    def saved(columns: np.ndarray) -> float:
+        return N * np.log(found.rss / gls(np.hstack([x, columns]), y, v)[1])
+
+    gains = found.block_gains(Blocks(blocks))
+    for block, gain in zip(blocks[:4], gains, strict=False):
+        alone, coefficients = found.gain(block)
+        assert alone == pytest.approx(saved(block), abs=1e-7)
+        assert gain == pytest.approx(alone, abs=1e-7)
+        wanted = gls(np.hstack([x, block]), y, v)[0][4:]
+        np.testing.assert_allclose(coefficients, wanted, atol=1e-8)
+        for k, single in enumerate(found.gains(block)):
+            assert single == pytest.approx(saved(block[:, [k]]), abs=1e-7)
+        for k, fixed in enumerate(found.fixed_gains(block)):
+            less = gls(x, y - block[:, k], v)[1]
+            assert fixed == pytest.approx(N * np.log(found.rss / less), abs=1e-7)
+    assert found.gain(blocks[4])[0] == gains[4] == 0.0
+    assert not found.gain(blocks[4])[1].any()
+    assert found.gains(x).tolist() == found.fixed_gains(x).tolist() == [0.0] * 4
+    assert found.as_deviance(0.25 * found.rss) == pytest.approx(-N * np.log(0.75))
+    pairs = np.hstack(blocks[1:3]).astype(np.float32)
+    np.testing.assert_allclose(found.pair_gains(Products(pairs, 2)), gains[1:3], rtol=2e-3,
+                               atol=2e-3)  # fmt: skip
+    seen, residual = found.seen
+    np.testing.assert_allclose(
+        blocks[3].T @ residual, blocks[3].T @ found.whiten.transposed(found.r)
+    )
+    np.testing.assert_allclose(blocks[3].T @ seen, found.whiten(blocks[3]).T @ found.q, atol=1e-10)
+
+
+@pytest.mark.parametrize("kind", CASES)
+def test_columns_fitted_too_leave_scores_of_the_whole_fit(kind: tuple) -> None:
+    found, x, y, v = fitted(kind)
+    further, candidate = np.random.default_rng(22).normal(size=(2, N, 2))
+    joint = found.jointly_with(further)
+    both = np.hstack([x, further])
+    assert joint.rss == pytest.approx(gls(both, y, v)[1], rel=1e-9)
+    saved = N * np.log(joint.rss / gls(np.hstack([both, candidate]), y, v)[1])
+    assert joint.gain(candidate)[0] == pytest.approx(saved, abs=1e-7)
+    projected, excited = found.projected(np.column_stack([further, x[:, 2]]))
+    assert excited.tolist() == [True, True, False]
+    np.testing.assert_allclose(found.q.T @ projected, 0.0, atol=1e-10)
+    # Believed to be small: the coefficients' own variance is part of the covariance.
+    spread = 0.4
+    partly = found.jointly_with(further, spread)
+    wide = v + spread**2 / found.variance * further @ further.T
+    one = candidate[:, :1]
+    a, b = gls(x, y, wide), gls(np.hstack([x, one]), y, wide)
+    _, coefficients = partly.gain(one)
+    assert coefficients[0] == pytest.approx(b[0][4], abs=1e-8)
+    assert a[1] > b[1]
+
+
+@pytest.mark.parametrize("kind", CASES)
+@pytest.mark.parametrize("size", [0.0, 0.5, 3.0])
+def test_the_best_ratio_of_a_run_effect_is_that_of_the_likelihood(kind: tuple, size: float) -> None:
+    found, x, y, v = fitted(kind)
+    rng = np.random.default_rng(23)
+    z = rng.normal(size=(N, 2))
+    shift = np.zeros(N)
+    for a, b in BOUNDS:
+        shift[a:b] = size * z[a:b] @ rng.normal(size=2)
+    found = found.of_target(y + shift)
+    effect = RunEffectColumns(z, BOUNDS)
+
+    def saved(ratio: float) -> float:
+        wide = v.copy()
+        for a, b in BOUNDS:
+            wide[a:b, a:b] += ratio * z[a:b] @ z[a:b].T
+        likelihood = N * np.log(gls(x, y + shift, wide)[1] / found.rss)
+        return -likelihood - np.linalg.slogdet(wide)[1] + np.linalg.slogdet(v)[1]
+
+    ratio, deviance = found.ratio_of(effect)
+    scan = max((saved(t), t) for t in np.geomspace(1e-4, 1e4, 400))
+    assert deviance == pytest.approx(max(scan[0], 0.0), abs=0.02)
+    if ratio > 0.0:
+        assert saved(ratio) == pytest.approx(deviance, abs=1e-6)
+        assert deviance > scan[0] - 0.02
+    else:
+        assert scan[0] < 0.02
+
+
+def test_many_columns_have_their_ratio_as_few_have() -> None:
+    """Fifty runs of one column each: more than one eigensystem is made for."""
+    rng = np.random.default_rng(24)
+    bounds = [(8 * k, 8 * k + 8) for k in range(50)]
+    y = rng.normal(size=400) + np.repeat(rng.normal(size=50), 8) * 0.7
+    factor = Factor.of([np.ones((400, 1))], bounds, 0.0, [], None)
+    ratio, _ = project(factor, y).ratio_of(RunEffectColumns(np.ones((400, 1)), bounds))
+    # Of equal runs the likelihood has a closed form: variance between over that within.
+    means = y.reshape(50, 8).mean(axis=1)
+    within = ((y - np.repeat(means, 8)) ** 2).sum() / 350.0
+    between = ((means - y.mean()) ** 2).sum() / 50.0
+    assert ratio == pytest.approx((between - within / 8.0) / within, rel=0.02)
+    assert RATIOS.size == 53
+    assert [_vertex(*p) for p in ((0.0, 1.0, 0.0), (0.0, 1.0, 1.0), (0.0, 0.0, 0.0))] == [0, 0.5, 0]
+
+
+def test_a_factor_grown_is_one_made_anew() -> None:
+    rng = np.random.default_rng(25)
+    whiten = case(0.5, (2.0,), False)
+    noise = (BOUNDS, whiten.rho, whiten.effects, whiten.weights)
+    blocks = [rng.normal(size=(N, 6)), rng.normal(size=(N, 2)) * 1e3, rng.normal(size=(N, 1))]
+    blocks.append(blocks[0][:, :1] + 1e-7 * rng.normal(size=(N, 1)))  # all but fitted already
+    blocks.append(np.zeros((N, 1)))
+    y = rng.normal(size=N)
+    for first, then in (((0,), (0, 1)), ((0, 1, 2), (0, 1)), ((0, 1, 2), (0, 2)), ((0, 1), (0, 3)),
+                        ((0, 1), (0, 1)), ((0, 1), (0, 1, 4)), ((0, 1), (1, 0))):  # fmt: skip
+        before = Factor.of([blocks[k] for k in first], *noise)
+        chosen = [blocks[k] for k in then]
+        grown = Factor.of(chosen, *noise, before=(before,))
+        anew = Factor.of(chosen, *noise)
+        assert grown.whiten is before.whiten
+        np.testing.assert_allclose(grown.q.T @ grown.q, np.eye(grown.q.shape[1]), atol=1e-10)
+        a, b = project(grown, y), project(anew, y)
+        scale = np.maximum(np.abs(b.coefficients), 1e-3)
+        np.testing.assert_allclose(a.coefficients / scale, b.coefficients / scale, atol=1e-6)
+        np.testing.assert_allclose(a.r, b.r, atol=1e-8)
+        # X B is Q.
+        x = whiten(np.hstack(chosen))
+        np.testing.assert_allclose(x @ grown.back, grown.q, atol=1e-6)
+    assert in_common(blocks, [*blocks[:2], blocks[0]]) == 2
+    assert in_common(blocks, blocks[:3]) == 3
+    assert in_common(blocks[1:], blocks) == 0
+
+
+def test_columns_that_are_alike_share_what_they_explain() -> None:
+    x = np.column_stack([np.ones(N), np.arange(N), np.arange(N), np.zeros(N)])
+    y = 2.0 + 3.0 * np.arange(N)
+    found = project(Factor.of([x], BOUNDS, 0.0, [], None), y)
+    np.testing.assert_allclose(found.coefficients, [2.0, 1.5, 1.5, 0.0], atol=1e-9)
+    assert found.q.shape == (N, 2)
+    for columns in (x[:, :3], x[:, :2]):
+        basis = orthonormal_basis(columns)
+        assert basis.shape == (N, 2)
+        np.testing.assert_allclose(basis.T @ basis, np.eye(2), atol=1e-12)
+        np.testing.assert_allclose(basis @ (basis.T @ y), y, atol=1e-9)
+
+
+@pytest.mark.parametrize(("apart", "rank"), [(1e-9, 1), (3e-7, 2), (1e-3, 2), (0.3, 2)])
+def test_columns_that_are_nearly_alike(apart: float, rank: int) -> None:
+    rng = np.random.default_rng(26)
+    one, other = np.linalg.qr(rng.normal(size=(N, 2)))[0].T
+    x = np.column_stack([one, one + apart * other])
+    found = project(Factor.of([x], BOUNDS, 0.0, [], None), 2.0 * one + 3.0 * other)
+    assert found.q.shape[1] == rank
+    np.testing.assert_allclose(found.q.T @ found.q, np.eye(rank), atol=1e-12)
+    if rank == 2:
+        np.testing.assert_allclose(found.coefficients[1] * apart, 3.0, rtol=1e-6)
+
+
+def test_scores_allow_for_a_run_effect_that_is_fitted() -> None:
+    effect = RunEffect(np.ones((N, 1)), 1e12)
+    factor = Factor.of([np.ones((N, 1))], BOUNDS, 0.0, [effect], None)
+    column = np.repeat([1.0, 2.0, 5.0], [20, 2, 18])[:, None]
+    # A step between runs is what the effect draws: it saves nothing.
+    assert project(factor, np.random.default_rng(1).normal(size=N)).gain(column)[0] < 1e-3
+    assert isinstance(factor.whiten, Whitener)

@@ -1,0 +1,270 @@
+"""Signals of a joint against a slow reading of their definitions."""
+
+from __future__ import annotations
+
+import itertools
+import math
+
+import numpy as np
+import pytest
+
+from trueangle import CalibrationRun
+from trueangle.joint.signals import Signals, join_runs
+
+UNITS = (360.0, 2.0 * math.pi, 1.0, 4096.0)
+SAMPLED = ("theta", "run", "row", "direction", "travel", "segment", "clock")
+STRETCHES = ("segment_direction", "segment_length", "segment_first")
+RECORDED = ("velocity", "time", "temperature", "torque", "mount", "current")
+
+
+def sweep(seed: int, size: int = 60, period: float = 360.0, **more) -> CalibrationRun:
+    """There and back twice at uneven speed, in any unit, with all that a run may record."""
+    rng = np.random.default_rng(seed)
+    steps = rng.uniform(3.0, 9.0, size) * np.where(np.arange(size) // 15 % 2, -1.0, 1.0)
+    angle = np.cumsum(steps) / 360.0
+    time = 5.0 + np.cumsum(rng.uniform(0.05, 0.15, size))
+    values = {
+        "time": time,
+        "temperature": rng.normal(25.0, 1.0, size),
+        "torque": rng.normal(0.0, 5.0, size),
+        "mount": np.full(size, period / 12.0),
+        "signals": {
+            "current": rng.normal(size=size),
+            "coupled_elbow": (np.mod(0.5 * angle, 1.0) * period),
+        },
+    }
+    reference = np.mod(angle, 1.0) * period
+    indicated = np.mod(angle + rng.normal(0.0, 1e-5, size), 1.0) * period
+    return CalibrationRun(reference, indicated, period, **(values | more))
+
+
+def assert_same(a: Signals, b: Signals, rtol: float = 1e-9) -> None:
+    for name in (*SAMPLED, *STRETCHES, *RECORDED):
+        left, right = getattr(a, name), getattr(b, name)
+        assert (left is None) == (right is None), name
+        if left is not None:
+            np.testing.assert_allclose(left, right, rtol=rtol, atol=1e-9, err_msg=name)
+    assert a.coupled.keys() == b.coupled.keys()
+    for joint in a.coupled:
+        np.testing.assert_allclose(a.coupled[joint], b.coupled[joint], rtol=rtol, atol=1e-9)
+
+
+@pytest.mark.parametrize("period", UNITS[1:])
+def test_every_unit_gives_the_same_signals(period: float) -> None:
+    given = join_runs([sweep(k) for k in range(3)])
+    assert_same(given, join_runs([sweep(k, period=period) for k in range(3)]))
+    assert given.coupled.keys() == {"elbow"}
+    assert given.velocity is not None
+    assert given.mount == pytest.approx(2.0 * math.pi / 12.0)
+    np.testing.assert_allclose(given.turns_per_s, given.velocity / 360.0)
+    np.testing.assert_allclose(given.degrees, given.theta * 180.0 / math.pi)
+    within = given.run[1:] == given.run[:-1]
+    np.testing.assert_allclose(
+        np.diff(given.coupled["elbow"])[within], 0.5 * np.diff(given.degrees)[within], atol=1e-9
+    )
+
+
+def test_travel_and_stretches_by_their_definition() -> None:
+    run = sweep(4)
+    found = join_runs([run])
+    angle = np.degrees(np.unwrap(np.radians(run.reference)))
+    origin, stretch, lengths = angle[0], 0, []
+    for k in range(1, angle.size):
+        if found.direction[k] != found.direction[k - 1]:
+            d = found.direction[k - 1]
+            # The turning point is the farther out of the readings beside it.
+            far = max((angle[k - 1], angle[k]), key=lambda x, d=d: d * x)
+            lengths.append(abs(far - origin))
+            origin, stretch = far, stretch + 1
+        assert found.segment[k] == stretch
+        assert found.travel[k] == pytest.approx(abs(angle[k] - origin), abs=1e-9)
+    lengths.append(abs(angle[-1] - origin))
+    np.testing.assert_allclose(found.segment_length, lengths, atol=1e-9)
+    assert found.segment_direction.tolist() == [1.0, -1.0, 1.0, -1.0]
+    assert found.segment_first.tolist() == [True, False, False, False]
+    assert found.travel[0] == 0.0
+
+
+def test_runs_stand_one_after_the_other() -> None:
+    runs = [sweep(0), sweep(1, 40), sweep(2, 50)]
+    whole = join_runs(runs)
+    assert (whole.runs, len(whole)) == (3, 150)
+    assert whole.run_bounds() == [(0, 60), (60, 100), (100, 150)]
+    assert whole.labels == ("1", "2", "3")
+    np.testing.assert_array_equal(whole.row, [*range(60), *range(40), *range(50)])
+    np.testing.assert_array_equal(whole.clock[[0, 60, 100]], 0.0)
+    np.testing.assert_allclose(
+        whole.run_turns(), [np.ptp(r.unwrapped_reference) / 360.0 for r in runs]
+    )
+    # One by one and put together is the same.
+    one = join_runs(runs[:1])
+    for run in runs[1:]:
+        one = one.followed_by(join_runs([run]))
+    assert_same(one, whole, 0.0)
+    assert one.labels == ("1", "1", "1")
+    # What one run lacks none has.
+    lacking = join_runs([runs[0], sweep(1, torque=None, signals={})])
+    assert lacking.torque is None
+    assert lacking.current is None
+    assert lacking.coupled == {}
+    assert lacking.time is not None
+    both = join_runs(runs[:1]).followed_by(join_runs([sweep(1, torque=None, signals={})]))
+    assert_same(both, lacking, 0.0)
+    assert join_runs([sweep(1, label="warm"), sweep(2)]).labels == ("warm", "2")
+
+
+def test_rows_are_taken_with_all_that_they_recorded() -> None:
+    whole = join_runs([sweep(0), sweep(1)])
+    rows = np.flatnonzero(np.arange(len(whole)) % 7 == 3)
+    for chosen in (rows, np.isin(np.arange(len(whole)), rows)):
+        part = whole.take(chosen)
+        for name in (*SAMPLED, *RECORDED):
+            np.testing.assert_array_equal(getattr(part, name), getattr(whole, name)[rows])
+        np.testing.assert_array_equal(part.coupled["elbow"], whole.coupled["elbow"][rows])
+        assert part.segment_length is whole.segment_length
+    assert whole.take(np.zeros(len(whole), bool)).run_bounds() == []
+    assert join_runs([sweep(0, time=None)]).take(rows[:3]).time is None
+
+
+def test_a_mirrored_joint_has_mirrored_signals() -> None:
+    runs = [sweep(k, velocity=None) for k in range(2)]
+    mirrored = [
+        CalibrationRun(-r.reference, -r.indicated, 360.0, r.time, r.temperature) for r in runs
+    ]
+    a, b = join_runs(runs), join_runs(mirrored)
+    assert a.velocity is not None
+    assert b.velocity is not None
+    np.testing.assert_array_equal(a.direction, -b.direction)
+    np.testing.assert_allclose(a.velocity, -b.velocity, atol=1e-9)
+    np.testing.assert_allclose(a.travel, b.travel, atol=1e-9)
+    np.testing.assert_array_equal(a.segment, b.segment)
+    np.testing.assert_allclose(a.segment_length, b.segment_length, atol=1e-9)
+    for start in (0.0, 1.0, -0.5):
+        np.testing.assert_allclose(a.presliding(7.0, start), -b.presliding(7.0, start), atol=1e-12)
+        np.testing.assert_allclose(a.play(7.0, start), -b.play(7.0, start), atol=1e-12)
+
+
+def loops(start: float, runs: int = 2) -> tuple[Signals, list[np.ndarray]]:
+    """Signals without a jump at their turning points, and each run's angle in degrees."""
+    turning = np.array([0.0, 20.0, 12.0, 30.0, 29.0, 33.0, -4.0])
+    angle = np.concatenate(
+        [np.linspace(a, b, 200, endpoint=False) for a, b in itertools.pairwise(turning)]
+    )
+    found = [angle + start, -0.4 * angle]
+    return join_runs([CalibrationRun(a, a, 360.0) for a in found[:runs]]), found
+
+
+@pytest.mark.parametrize("start", [0.0, 1.0, -0.7])
+def test_presliding_is_the_spring_of_its_equation(start: float) -> None:
+    """Slow: the state relaxes towards the direction, dz/ds = (d - z)/L, step by step."""
+    signals, angles = loops(0.0)
+    expected = []
+    for angle in angles:
+        steps = np.diff(angle)
+        z = start * np.sign(steps[0])
+        expected.append(z)
+        for step in steps:
+            d = np.sign(step)
+            z = d - (d - z) * math.exp(-abs(step) / 3.0)
+            expected.append(z)
+    np.testing.assert_allclose(signals.presliding(3.0, start), expected, atol=0.002)
+    # So short a length that the exponential would overflow leaves the direction.
+    tiny = signals.presliding(1e-300)
+    np.testing.assert_array_equal(tiny[signals.travel > 0], signals.direction[signals.travel > 0])
+
+
+@pytest.mark.parametrize("start", [1.0, 0.0, -0.7])
+def test_play_is_a_peg_between_two_sides(start: float) -> None:
+    signals, angles = loops(0.0)
+    expected = []
+    for angle in angles:
+        z = start * np.sign(angle[1] - angle[0])
+        expected.append(z)
+        for step in np.diff(angle):
+            z = float(np.clip(z + step / 2.5, -1.0, 1.0))
+            expected.append(z)
+    np.testing.assert_allclose(signals.play(2.5, start), expected, atol=1e-9)
+
+
+def test_a_reference_that_flickers_is_read_with_a_dead_zone() -> None:
+    """One step back in three, at the rate that a count does: still one way there and one back."""
+    base = np.concatenate([np.arange(0.0, 300.0), np.arange(300.0, 0.0, -1.0)])
+    angle = 0.1 * base
+    angle[1::3] -= 0.15
+    for sign in (1.0, -1.0):
+        found = join_runs([CalibrationRun(sign * angle, sign * angle, 360.0)])
+        turned = np.flatnonzero(np.diff(found.direction))
+        assert turned.size == 1
+        # Turned after the reading farthest out.
+        assert turned[0] == np.argmax(angle)
+        assert found.direction[0] == found.direction[1] == sign
+        assert found.direction[-1] == -sign
+    still = np.tile([0.0, 0.1], 100)
+    assert not join_runs([CalibrationRun(still, still, 360.0)]).direction.any()
+
+
+@pytest.mark.parametrize(("back", "turns"), [(2.9, 0), (3.1, 2)])
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_a_dead_zone_is_three_typical_steps(back: float, turns: int, sign: float) -> None:
+    flicker = np.where(np.arange(60) % 2, -0.2, 0.2)
+    steps = np.concatenate([np.full(200, 0.1), [-0.1 * back], np.full(200, 0.1), np.zeros(101)])
+    angle = sign * (np.cumsum(np.concatenate([steps, flicker])))
+    found = join_runs([CalibrationRun(angle, angle, 360.0)])
+    assert np.count_nonzero(np.diff(found.direction)) == turns
+
+
+@pytest.mark.parametrize(
+    ("size", "reversals", "trusted"),
+    [(60, 10, True), (60, 11, False), (220, 11, True), (219, 11, False), (400, 20, True)],
+)
+def test_so_many_reversals_are_trusted(size: int, reversals: int, trusted: bool) -> None:
+    """Ten are taken as they are, of more one in twenty readings; else steps back are flicker."""
+    edges = np.linspace(2, size - 2, reversals).astype(int)
+    direction = np.where(np.searchsorted(edges, np.arange(size), side="right") % 2, -1.0, 1.0)
+    angle = np.cumsum(direction * np.where(np.arange(size) % 7 == 3, 1.0, 0.01))
+    found = join_runs([CalibrationRun(angle, angle, 360.0)])
+    assert (np.count_nonzero(np.diff(found.direction)) == reversals) == trusted
+
+
+def test_without_a_clock_the_places_are_the_clock() -> None:
+    angle = np.array([0.0, 10.0, 25.0, 45.0])
+    still = join_runs([CalibrationRun(np.zeros(4), np.zeros(4), 360.0)])
+    assert not still.presliding(1.0, 1.0).any()
+    assert not still.play(1.0, 1.0).any()
+    for time in (None, np.full(4, 7.0)):
+        found = join_runs([CalibrationRun(angle, angle, 360.0, time)])
+        assert found.clock.tolist() == [0.0, 1.0, 2.0, 3.0]
+        assert found.velocity is None
+        assert not found.turns_per_s.any()
+    for clock, speed in (
+        ([0.0, 1.0, 2.0, 3.0], [10.0, 12.5, 17.5, 20.0]),
+        ([0.0, 0.0, 2.0, 3.0], None),
+    ):
+        timed = join_runs([CalibrationRun(angle, angle, 360.0, np.array(clock) + 3.0)])
+        assert timed.clock.tolist() == clock
+        assert speed is None or timed.velocity.tolist() == pytest.approx(speed)
+
+
+def test_at_rest_the_direction_is_that_of_the_approach() -> None:
+    angle = np.array([0.0, 10.0, 20.0, 20.0, 10.0, 0.0])
+    found = join_runs([CalibrationRun(angle, angle, 360.0, velocity=np.zeros(6))])
+    assert found.direction.tolist() == [1.0, 1.0, 1.0, 1.0, -1.0, -1.0]
+    still = np.array([0.0, 0.0, -5.0, -5.0])
+    found = join_runs([CalibrationRun(still, still, 360.0, velocity=np.zeros(4))])
+    assert found.direction.tolist() == [-1.0, -1.0, -1.0, -1.0]
+
+
+@pytest.mark.parametrize("period", UNITS)
+def test_counts_are_told_in_arcsec(period: float) -> None:
+    rng = np.random.default_rng(5)
+    turns = np.sort(rng.uniform(0.0, 0.9, 200))
+    rounded = np.round(turns * 4096.0) / 4096.0 * period
+    found = join_runs([CalibrationRun(turns * period, rounded, period)])
+    assert found.count == pytest.approx(1_296_000.0 / 4096.0, rel=1e-9)
+    assert found.table == 0
+    assert found.grid is None
+    # A table of 72 positions, and one whose steps do not fill a turn.
+    for move, table in ((1.0 / 72.0, 72), (1.0 / 72.4, 0)):
+        angle = np.arange(60) * move * period
+        found = join_runs([CalibrationRun(angle + 1e-3 * period, angle, period)])
+        assert (found.count, found.table) == (0.0, table)
