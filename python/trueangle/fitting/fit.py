@@ -90,8 +90,9 @@ def fit(
         ``"white"``: independent readings; ``"cluster"``: by the scatter between whole runs,
         right for any correlation within them; ``"hac"``: by stretches of readings, right
         where the correlation dies out. ``"auto"``: white unless the residuals correlate in
-        time or the runs scatter by more, then clusters (three runs and more) or stretches;
-        the notes say so. Intervals: `FitResult.interval`.
+        time or the runs scatter by more, then clusters (three runs and more) or stretches; eight
+        runs and more that scatter by less tell the noise by that. The notes say so. Intervals:
+        `FitResult.interval`.
     nuisance : {"none", "auto"} or iterable of str
         What is fitted beside the pattern and kept out of the model (`FitResult.nuisance`):
         ``"ramp"`` in the angle, ``"direction"``, ``"velocity"``, ``"drift"`` in time.
@@ -194,16 +195,22 @@ def fitted_to(
     method: str | None = None,
     threads: int | None = None,
     summed: Summed | None = None,
+    evidence: OrderSelection | None = None,
 ) -> FitResult:
-    """As `fit`; with ``summed`` of all readings of which the runs are some."""
+    """As `fit`; with ``summed`` of all readings of which the runs are some.
+
+    ``evidence`` stands for a selection of orders that was made before.
+    """
     check_choice("argument", argument, ARGUMENTS)
     check_covariance(covariance, len(found))
     for run in found:
         check_follows(run)
-    selection = None
+    selection = evidence
     beside = _beside(nuisance, reference_orders)
     given = found
-    if orders is None or isinstance(orders, str):
+    if evidence is not None:
+        orders = evidence.by_shaft
+    elif orders is None or isinstance(orders, str):
         if beside.wanted:
             from .nuisance import likely_orders, take_out
 

@@ -177,16 +177,21 @@ def _largest(orders: list[float], amplitude: Array, unit: ErrorUnit) -> str:
 def thresholds(selection: OrderSelection) -> Array:
     r"""Amplitude at which each order of the table would just be significant.
 
-    .. math:: C = u \sqrt{T}, \qquad (1 + T/v)^{-v/2} = \alpha / K
+    .. math:: C = C_k \sqrt{T / T_k}, \qquad (1 + T/v)^{-v/2} = \alpha / K
 
-    with the order's standard error u, v degrees of freedom of the noise and the chance
+    with the order's amplitude and statistic, v degrees of freedom of the noise and the chance
     alpha of a false alarm shared by the K orders of the table. Orders found by a wider scan
     had to pass more.
     """
     v = float(selection.noise.degrees_of_freedom)
     log_share = math.log(max(1, len(selection.table)) / FALSE_ALARM)
     needed = v * math.expm1(2.0 / v * log_share) if v > 0.0 else math.nan
-    return np.array([row.standard_error * math.sqrt(needed) for row in selection.table])
+    return np.array(
+        [
+            row.amplitude * math.sqrt(needed / row.statistic) if row.statistic > 0.0 else math.nan
+            for row in selection.table
+        ]
+    )
 
 
 def likely_aliases(row: OrderRow) -> tuple[float, ...]:

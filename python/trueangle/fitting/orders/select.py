@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Final, Literal, Unpack
@@ -9,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Final, Literal, Unpack
 import numpy as np
 from numpy.typing import NDArray
 
-from ...errors import ArgumentError
+from ...errors import ArgumentError, TrueAngleError, UnlikeRunsWarning
 from ...joint.shafts import counted_orders
 from ...runs.aliasing import distinct_positions
 from ...runs.files import runs_of
@@ -126,19 +127,34 @@ def select_orders(
     >>> select_orders(run).orders
     (3,)
     """
-    return selected_of(
-        runs_of(runs, reading),
-        candidates,
-        gear_ratio,
-        fixed_member,
-        method,
-        argument=argument,
-        covariance=covariance,
-        shafts=shafts,
-        nuisance=nuisance,
-        reference_orders=reference_orders,
-        tolerance=tolerance,
+    found = runs_of(runs, reading)
+    joint: dict[str, Any] = {"gear_ratio": gear_ratio, "fixed_member": fixed_member}
+    joint |= {"shafts": shafts, "covariance": covariance, "nuisance": nuisance}
+    joint |= {"reference_orders": tuple(counted_orders(reference_orders, "reference_orders"))}
+    selection = selected_of(
+        found, candidates, method=method, argument=argument, tolerance=tolerance, **joint
     )
+    return selection if method == "paper" else _as_fitted(selection, found, joint)
+
+
+def _as_fitted(
+    selection: OrderSelection, runs: Sequence[CalibrationRun], joint: Mapping[str, Any]
+) -> OrderSelection:
+    """With the figures of the fit of its orders; as it is where they cannot be fitted."""
+    from ..fit import fitted_to
+
+    if not selection.orders:
+        return selection
+    try:
+        with warnings.catch_warnings():
+            # What the fit would warn of is said by `trueangle.fit`.
+            warnings.simplefilter("ignore", UnlikeRunsWarning)
+            fit = fitted_to(
+                runs, None, argument=selection.argument, loss="auto", evidence=selection, **joint
+            )
+    except TrueAngleError:
+        return selection
+    return selection.as_fitted(fit)
 
 
 @one_blas_thread()
