@@ -19,6 +19,7 @@ from .fleetphasors import fleet_phasors
 from .gains import gains
 from .kinds import drawn as drawn
 from .kinds import fit_plot
+from .kinds import thumbnail as thumbnail
 from .measuredsimulated import measured_and_simulated
 from .modelerror import model_error
 from .phasesoverruns import phases_over_runs

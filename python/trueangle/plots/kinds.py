@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from ..errors import TrueAngleError
 from ..support.suggestions import check_choice
 from .amplitudespectrum import amplitude_spectrum
+from .canvas import as_image, small_pictures
 from .detection import detection
 from .errorcurves import error_curves
 from .fleetphasors import fleet_phasors
@@ -19,7 +21,7 @@ if TYPE_CHECKING:
 
     from ..fitting.result import FitResult
 
-__all__ = ["drawn", "fit_plot"]
+__all__ = ["drawn", "fit_plot", "thumbnail"]
 
 _FIT = {
     "errors": error_curves,
@@ -45,6 +47,16 @@ _RESULTS: dict[str, Any] = {
     "Rehearsal": detection,
     "Fleet": fleet_phasors,
 }
+
+
+def thumbnail(result: object) -> str:
+    """A small picture of a result as an element of a page; empty where there is none to draw."""
+    draw = _RESULTS.get(type(result).__name__)
+    try:
+        with small_pictures():
+            return "" if draw is None else as_image(draw(result))
+    except TrueAngleError:  # of no matplotlib too
+        return ""
 
 
 def drawn(result: object, *args: Any, **options: Any) -> Any:

@@ -105,7 +105,8 @@ def test_a_diagnosis_has_the_same_unit_convention_and_digits(runs, fit) -> None:
         n = at[values["output_order"].value]
         size, phase = values["amplitude_arcsec"], values["phase_deg"]
         assert size.value == pytest.approx(
-            ARCSEC * fit.amplitudes[n], abs=APART * np.hypot(size.std, ARCSEC * fit.amplitude_std[n])
+            ARCSEC * fit.amplitudes[n],
+            abs=APART * np.hypot(size.std, ARCSEC * fit.amplitude_std[n]),
         )
         assert 0.0 <= phase.value < 360.0
         for name, (value, std) in {
