@@ -25,7 +25,7 @@ from .robust import Loss, unsettled_sentence, weigh, weighed, without_spikes
 from .uncertainty import CovarianceKind, check_covariance
 
 if TYPE_CHECKING:
-    from .orders.select import OrderSelection
+    from .orders.table import OrderSelection
     from .summed import Summed
 
 __all__ = ["ROUNDING", "fit", "fitted_to"]
@@ -342,7 +342,7 @@ def _selected(
     """Orders with evidence, from readings without spikes."""
     if orders not in (None, "auto"):
         raise ArgumentError(f"orders must be whole numbers, a mapping or 'auto', got {orders!r}")
-    from .orders.select import selected_of
+    from .orders.choice import selected_of
 
     if loss != "linear":
         runs = [without_spikes(run) for run in runs]

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
     from ..estimation.moments import Moments
     from .nuisance import Nuisance
-    from .orders.select import OrderSelection
+    from .orders.table import OrderSelection
     from .prior import Posterior
     from .summed import Summed
 

@@ -99,10 +99,11 @@ def uncertainty(
     """Covariance of this kind; ``"auto"``: white unless correlation is found.
 
     Where eight runs and more repeat better than white noise of the residual lets expect, their
-    scatter pooled over the coefficients is the noise. Whole runs are the clusters where there are three or more. With fewer, stretches are,
-    eight times as long as the memory of the residuals: right where the correlation dies out
-    within a run, which one run cannot prove, so that a note says it. What a penalty takes
-    from the coefficients is added to either (`trueangle.fitting.penalty`).
+    scatter pooled over the coefficients is the noise. Whole runs are the clusters where there are
+    three or more. With fewer, stretches are, eight times as long as the memory of the residuals:
+    right where the correlation dies out within a run, which one run cannot prove, so that a note
+    says it. What a penalty takes from the coefficients is added to either
+    (`trueangle.fitting.penalty`).
     """
     noise = _noise(problem, fitted, weights, penalty, kind)
     if not penalty > 0.0 or not np.isfinite(noise.covariance).all():

@@ -98,7 +98,7 @@ def small_pictures() -> Iterator[None]:
 
 def as_image(drawn: Axes | Figure) -> str:
     """A figure as an element of a page, with its text alternative."""
-    figure = drawn if hasattr(drawn, "savefig") else drawn.get_figure(root=True)
+    figure: Any = drawn if hasattr(drawn, "savefig") else drawn.get_figure(root=True)
     buffer = io.BytesIO()
     figure.savefig(buffer, format="png", dpi=_DOTS_PER_INCH)
     data = base64.b64encode(buffer.getvalue()).decode("ascii")
