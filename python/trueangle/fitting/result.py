@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,6 +34,7 @@ if TYPE_CHECKING:
 __all__ = ["FitResult"]
 
 Array = NDArray[np.float64]
+Picture: TypeAlias = Literal["errors", "spectrum", "phases", "residuals"]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -222,7 +223,7 @@ class FitResult(FittedCoefficients):
             )
         )
 
-    def plot(self, kind: str = "errors", ax: Axes | None = None, **options: Any) -> Axes:
+    def plot(self, kind: Picture = "errors", ax: Axes | None = None, **options: Any) -> Axes:
         """A picture of the fit (needs ``trueangle[plot]``).
 
         Parameters

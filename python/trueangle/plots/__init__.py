@@ -43,3 +43,7 @@ __all__ = [
     "residuals",
     "text_alternative",
 ]
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)  # what completion shows: no module beside the function of its name

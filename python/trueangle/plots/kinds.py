@@ -19,7 +19,7 @@ from .residualpictures import residuals
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from ..fitting.result import FitResult
+    from ..fitting.result import FitResult, Picture
 
 __all__ = ["drawn", "fit_plot", "thumbnail"]
 
@@ -31,7 +31,7 @@ _FIT = {
 }
 
 
-def fit_plot(fit: FitResult, kind: str = "errors", ax: Axes | None = None, **options: Any) -> Axes:
+def fit_plot(fit: FitResult, kind: Picture = "errors", ax: Axes | None = None, **options: Any) -> Axes:
     """See `trueangle.FitResult.plot`."""
     draw: Any = _FIT[check_choice("kind", kind, _FIT)]
     axes: Axes = draw(fit, ax=ax, **options)

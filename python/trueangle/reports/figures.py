@@ -178,7 +178,7 @@ def before_after(held: HeldOut, runs: Sequence[CalibrationRun], scale: Scale) ->
     return figure(alt, [chart])
 
 
-def signals_present(fit: FitResult) -> list[str]:
+def signals_present(fit: FitResult) -> list[curves.Signal]:
     """Signals that the residual can be drawn against: those that any run has and that vary."""
     found = []
     for name in curves.SIGNALS:
@@ -193,7 +193,7 @@ def _signal(run: CalibrationRun, name: str) -> Array | None:
     return value
 
 
-def residuals(fit: FitResult, against: str, scale: Scale) -> Figure:
+def residuals(fit: FitResult, against: curves.Signal, scale: Scale) -> Figure:
     """What the model leaves, against one signal."""
     points = [scale.points(part) for part in curves.residual_points(fit, against)]
     by_label = {(run.label or str(i + 1)): i for i, run in enumerate(fit.runs)}

@@ -437,3 +437,20 @@ def test_ticks_of_orders_do_not_overlap(selection) -> None:
     ax.figure.canvas.draw()
     boxes = [label.get_window_extent() for label in ax.get_xticklabels() if label.get_text()]
     assert all(a.x1 < b.x0 for a, b in pairwise(boxes))
+
+
+def test_completion_shows_functions_and_no_modules() -> None:
+    import inspect
+
+    from trueangle import plots
+
+    assert dir(plots) == sorted(plots.__all__)
+    assert not any(inspect.ismodule(getattr(plots, name)) for name in dir(plots))
+
+
+def test_an_unknown_picture_is_refused_with_those_there_are() -> None:
+    # Lists are taken, by their types too.
+    run = ta.CalibrationRun([0.0, 90.0, 180.0, 270.0], [0.1, 90.0, 180.0, 270.0], 360.0)
+    fit = ta.fit([run], orders=[1])
+    with pytest.raises(ArgumentError, match="errors, spectrum, phases, residuals, got 'foo'"):
+        fit.plot("foo")  # type: ignore[arg-type]
