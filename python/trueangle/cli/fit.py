@@ -56,7 +56,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--loss",
         choices=("auto", "linear", "huber", "tukey"),
         default="auto",
-        help="auto (default): least squares with wild readings set aside and reported",
+        help="auto (default): least squares with outliers set aside and reported",
     )
     parser.add_argument(
         "--run",

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 __all__ = ["ROUNDING", "fit", "fitted_to"]
 
 #: Rounding of angles around a whole turn, in parts of a turn: smaller deviations are
-#: never taken for wild readings.
+#: never taken for outliers.
 ROUNDING = 1e-12
 
 

@@ -61,7 +61,7 @@ def fit_notes(fit: FitResult) -> Iterable[str]:
             "of the sizes that the readings show, on average over the travel."
         )
     if weighted.wild:
-        yield f"{weighted.wild} wild reading{'s' if weighted.wild > 1 else ''} set aside."
+        yield f"{weighted.wild} outlier{'s' if weighted.wild > 1 else ''} set aside."
     if fit.uncertainty.note:
         yield _sentence(fit.uncertainty.note)
     fractional = [s.name for s in fit.problem.shafts if s.cycles_per_turn % 1.0]

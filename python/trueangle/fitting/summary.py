@@ -83,7 +83,7 @@ def _intervals(fit: FitResult) -> str:
 _KINDS = {
     "white": "white noise",
     "cluster": "by the scatter between runs",
-    "hac": "by the scatter of stretches of the readings",
+    "hac": "by the scatter of segments of the readings",
 }
 
 

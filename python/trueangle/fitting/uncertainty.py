@@ -154,8 +154,8 @@ def _noise(
             for cluster in clusters_of(problem, fitted, weights, i, count)
         ]
         note = (
-            f"{said}standard errors by the scatter of {len(clusters)} stretches of the readings, "
-            f"which remember about {memory:.0f} readings. A slower wander cannot be known from "
+            f"{said}standard errors by the scatter of {len(clusters)} segments of the readings, "
+            f"which remember about {memory:.0f} readings. A slower drift cannot be known from "
             f"{'one run' if len(used) == 1 else f'{len(used)} runs'}: measure "
             f"{ENOUGH_RUNS} runs and more"
         )

@@ -31,7 +31,9 @@ _FIT = {
 }
 
 
-def fit_plot(fit: FitResult, kind: Picture = "errors", ax: Axes | None = None, **options: Any) -> Axes:
+def fit_plot(
+    fit: FitResult, kind: Picture = "errors", ax: Axes | None = None, **options: Any
+) -> Axes:
     """See `trueangle.FitResult.plot`."""
     draw: Any = _FIT[check_choice("kind", kind, _FIT)]
     axes: Axes = draw(fit, ax=ax, **options)

@@ -285,7 +285,7 @@ def _notes(
         )
     wild = int((~fit.valid).sum())
     if wild:
-        notes.append(f"{wild} wild reading{'s' if wild > 1 else ''} set aside")
+        notes.append(f"{wild} outlier{'s' if wild > 1 else ''} set aside")
     seconds = fit.motion.knots.spacing
     per_turn = 1.0 / (seconds * readings.mean_speed)
     notes.append(

@@ -192,7 +192,7 @@ def _solved(
         solution = vt.T @ ((u.T @ error) / s)
         rest = error - (design / scale) @ solution
         spread = 1.4826 * float(np.median(np.abs(rest)))
-        if spread > 0.0:  # wild readings do not move a clock
+        if spread > 0.0:  # outliers do not move a clock
             weight = np.minimum(1.0, 3.0 * spread / np.maximum(np.abs(rest), 1e-300))
             root = np.sqrt(weight)
             u, s, vt = np.linalg.svd(design / scale * root[:, None], full_matrices=False)
