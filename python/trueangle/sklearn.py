@@ -71,8 +71,9 @@ class AngleCorrector(OneToOneFeatureMixin, TransformerMixin, BaseEstimator):  # 
     Notes
     -----
     ``set_output(transform="pandas")`` and the like, pipelines, clones and searches over parameters
-    work as of any transformer; `score` is what a search or `cross_val_score` goes by. The checks of scikit-learn pass, but for those whose targets are no
-    angle that the columns follow. The cost is that of `trueangle.fit` and `HarmonicModel.correct`.
+    work as of any transformer; `score` is what a search or `cross_val_score` goes by. The checks
+    of scikit-learn pass, but for those whose targets are no angle that the columns follow. The
+    cost is that of `trueangle.fit` and `HarmonicModel.correct`.
 
     Examples
     --------

@@ -55,8 +55,11 @@ def _translated(note: str, language: str) -> str:
     for pattern, text in known:
         match = pattern.fullmatch(note)
         if match is not None:
-            parts = {name: _translated(part, language) for name, part in match.groupdict().items()}
-            return _PLACE.sub(lambda place: parts.get(place[1], place[0]), text)
+            values = {name: _translated(part, language) for name, part in match.groupdict().items()}
+            return "".join(
+                values.get(part, part) if i % 2 else part
+                for i, part in enumerate(_PLACE.split(text))
+            )
     if ", " in note:
         return ", ".join(_translated(part, language) for part in note.split(", "))
     return _DECIMAL.sub(rf"\1{texts(language)['decimal_mark']}\2", note)

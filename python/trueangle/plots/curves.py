@@ -24,9 +24,9 @@ if TYPE_CHECKING:
 __all__ = [
     "CONFIDENCE",
     "SIGNALS",
-    "Signal",
     "Curve",
     "Points",
+    "Signal",
     "envelope",
     "error_points",
     "held_out_points",
