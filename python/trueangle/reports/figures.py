@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from ..plots import curves
 from ..plots.curves import CONFIDENCE, Curve, Points
+from ..support.plainresult import counted
 from .charts import Chart, Figure, figure, run_colour, run_marker
 from .scale import Scale
 
@@ -105,7 +106,7 @@ def errors_of_runs(
     if fit is not None and strong is not None:
         charts.append(_stretch(fit, strong, everything, y, scale))
     what = "the fitted model with its 95 % band" if fit is not None else "no model"
-    alt = f"Measured error in {scale.name} over one turn for {len(runs)} run(s), with {what}"
+    alt = f"Measured error in {scale.name} over one turn for {counted(runs, 'run')}, with {what}"
     alt += "; a short stretch is shown larger beside it." if strong else "."
     return figure(alt, charts)
 
@@ -208,7 +209,7 @@ def residuals(fit: FitResult, against: curves.Signal, scale: Scale) -> Figure:
         number = by_label[part.label]
         drawn = _beside(part, number, len(points)) if against == "direction" else part
         run_dots(chart, number, drawn, len(points), scale, size=size)
-    alt = f"Residual of the fitted model in {scale.name} against {against}, {len(points)} run(s)."
+    alt = f"Residual of the fitted model in {scale.name} against {against}, {counted(points, 'run')}."
     return figure(alt, [chart])
 
 
