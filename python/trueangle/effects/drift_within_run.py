@@ -295,8 +295,8 @@ class DriftWithinRun(Effect):
             *([] if signals.velocity is not None else [Latency]),
         ]
         spot = cls.blind(
-            f"{counted(signals.runs, 'run')} that reverse about once: an error that changes with the "
-            "direction of travel and one that changes with time look alike",
+            f"{counted(signals.runs, 'run')} that reverse about once: an error that changes with "
+            "the direction of travel and one that changes with time look alike",
             *others,
         )
         return replace(

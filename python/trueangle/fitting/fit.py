@@ -94,7 +94,7 @@ def fit(
         runs and more that scatter by less tell the noise by that. The notes say so. Intervals:
         `FitResult.interval`.
     nuisance : {"none", "auto"} or iterable of str
-        What is fitted beside the pattern and kept out of the model (`FitResult.nuisance`):
+        What is fitted jointly with the pattern and kept out of the model (`FitResult.nuisance`):
         ``"ramp"`` in the angle, ``"direction"``, ``"velocity"``, ``"drift"`` in time.
         ``"auto"``: those that lower the error of stretches held out and can be told from the
         pattern; the notes say which.
@@ -311,7 +311,7 @@ class _Beside(NamedTuple):
 
     @property
     def wanted(self) -> bool:
-        """Whether anything is fitted beside the pattern."""
+        """Whether anything is fitted jointly with the pattern."""
         return self.kinds != () or bool(self.reference)
 
 

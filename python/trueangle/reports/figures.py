@@ -107,7 +107,7 @@ def errors_of_runs(
         charts.append(_stretch(fit, strong, everything, y, scale))
     what = "the fitted model with its 95 % band" if fit is not None else "no model"
     alt = f"Measured error in {scale.name} over one turn for {counted(runs, 'run')}, with {what}"
-    alt += "; a short stretch is shown larger beside it." if strong else "."
+    alt += "; a short segment is shown larger beside it." if strong else "."
     return figure(alt, charts)
 
 
@@ -124,7 +124,7 @@ def stretch_chart(order: float, low: float, high: float, y: str, **given: Any) -
     """An empty chart of a few periods of an order, in the middle: both ends may be thin."""
     width = min(_PERIODS * 360.0 / order, high - low)
     start = 0.5 * (low + high) - 0.5 * width
-    title = f"A stretch of {width:.3g}°: {_PERIODS:g} periods of order {order:g}"
+    title = f"A segment of {width:.3g}°: {_PERIODS:g} periods of order {order:g}"
     chart = Chart("reference angle / deg", y, x_range=(start, start + width), title=title, **given)
     chart.angle_axis(start, start + width, _STRETCH_TICKS)
     return chart
@@ -209,7 +209,9 @@ def residuals(fit: FitResult, against: curves.Signal, scale: Scale) -> Figure:
         number = by_label[part.label]
         drawn = _beside(part, number, len(points)) if against == "direction" else part
         run_dots(chart, number, drawn, len(points), scale, size=size)
-    alt = f"Residual of the fitted model in {scale.name} against {against}, {counted(points, 'run')}."
+    alt = (
+        f"Residual of the fitted model in {scale.name} against {against}, {counted(points, 'run')}."
+    )
     return figure(alt, [chart])
 
 

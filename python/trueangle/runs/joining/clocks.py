@@ -79,7 +79,7 @@ def estimated_clocks(
             )
         if others is None:
             notes.append(
-                "one speed only: the offset of the clocks cannot be told and is taken as "
+                "one speed only: the offset of the clocks cannot be determined and is taken as "
                 f"{coarse:g} s; declare it (`offset_s=`) or log a motion that stops or reverses"
             )
             return Clocks(start, coarse, rate or 0.0, notes=tuple(notes))
@@ -91,7 +91,7 @@ def estimated_clocks(
         return clocks
     clocks = _refined(indicated, reference, clocks, wanted)
     if clocks.rate_std is None and rate is None:
-        notes.append("the rate of the clocks cannot be told from this motion; taken as equal")
+        notes.append("the rate of the clocks cannot be determined from this motion; taken as equal")
     if offset is None:
         notes.append(
             "the offset holds any constant delay between the two channels: no log can tell them "
