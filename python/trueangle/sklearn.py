@@ -15,6 +15,7 @@ from .fitting.fit import fit
 from .model.model import HarmonicModel
 from .runs.follows import check_follows
 from .runs.run import CalibrationRun
+from .support.angles import circular_mean, wrap
 
 try:
     from sklearn.base import BaseEstimator, OneToOneFeatureMixin, TransformerMixin
@@ -70,8 +71,9 @@ class AngleCorrector(OneToOneFeatureMixin, TransformerMixin, BaseEstimator):  # 
     Notes
     -----
     ``set_output(transform="pandas")`` and the like, pipelines, clones and searches over parameters
-    work as of any transformer. The checks of scikit-learn pass, but for those whose targets are no
-    angle that the columns follow. The cost is that of `trueangle.fit` and `HarmonicModel.correct`.
+    work as of any transformer; `score` is what a search or `cross_val_score` goes by. The checks
+    of scikit-learn pass, but for those whose targets are no angle that the columns follow. The
+    cost is that of `trueangle.fit` and `HarmonicModel.correct`.
 
     Examples
     --------
@@ -133,6 +135,39 @@ class AngleCorrector(OneToOneFeatureMixin, TransformerMixin, BaseEstimator):  # 
             if model is not None:
                 corrected[:, j] = model.correct(indicated[:, j])
         return corrected
+
+    def score(self, X: ArrayLike, y: ArrayLike) -> float:
+        r"""Share of the squared errors that the correction takes off, on average over the columns.
+
+        .. math:: 1 - \frac{\sum_i (\hat\theta_i - \theta_i - z)^2}{\sum_i (r_i - \theta_i - z_0)^2}
+
+        with a zero of its own before and after: 1 leaves nothing, 0 gains nothing, less makes it
+        worse. A column without any error scores 1 where it stays as it is.
+
+        Parameters
+        ----------
+        X : array_like, shape (n, encoders)
+            Indicated angles.
+        y : array_like, shape (n,)
+            The true angle.
+        """
+        check_is_fitted(self)
+        indicated, true = validate_data(self, X, y, dtype=np.float64, y_numeric=True, reset=False)
+        before = self._squares(indicated, true)
+        after = self._squares(self.transform(X), true)
+        free = before == 0.0
+        gained = 1.0 - np.where(free, after, after / np.where(free, 1.0, before))
+        return float(gained.mean())
+
+    def _squares(self, angles: NDArray[np.float64], true: NDArray[np.float64]) -> Any:
+        """Sum of squared errors of every column about its own zero."""
+        errors = [column - true for column in angles.T]
+        return np.array(
+            [
+                np.square(wrap(error - circular_mean(error, self.period), self.period)).sum()
+                for error in errors
+            ]
+        )
 
     def __sklearn_tags__(self) -> Any:
         tags = super().__sklearn_tags__()

@@ -73,7 +73,7 @@ def _ours(
 
 
 def _whole(run: CalibrationRun, highest: int) -> NDArray[np.float64]:
-    """All that `trueangle.fit` does by default: checks, wild readings, travel."""
+    """All that `trueangle.fit` does by default: checks, outliers, travel."""
     found = fit(run, orders=range(1, highest + 1))
     return _coefficients(found.fitted.solution, run.period)
 

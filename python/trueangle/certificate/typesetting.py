@@ -13,7 +13,7 @@ from typing import Any, Final
 from ..errors import MissingExtraError
 from ..support.angles import ARCSEC_PER_TURN
 from ..support.files import CERTIFICATE, check_output, published, read_whole
-from .language import texts
+from .language import note_in, texts
 
 __all__ = ["lay_out", "pictures", "typeset", "write_pdf"]
 
@@ -56,6 +56,7 @@ def lay_out(content: dict[str, Any], folder: Path, logo: str | None = None) -> P
     if logo is not None and picture is not None:
         (folder / picture).write_bytes(read_whole(logo, _MOST_BYTES, "a logo"))
     shown = content | {"small_u": small, "logo": None if picture is None else str(picture)}
+    shown["notes"] = [note_in(content["language"], note) for note in content["notes"]]
     (folder / "certificate.typ").write_bytes(_TEMPLATE.read_bytes())
     (folder / "content.json").write_text(json.dumps(shown, allow_nan=False), "utf-8")
     (folder / "texts.json").write_text(json.dumps(said), "utf-8")

@@ -56,7 +56,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--loss",
         choices=("auto", "linear", "huber", "tukey"),
         default="auto",
-        help="auto (default): least squares with wild readings set aside and reported",
+        help="auto (default): least squares with outliers set aside and reported",
     )
     parser.add_argument(
         "--run",
@@ -113,19 +113,19 @@ def add_argument_choice(parser: argparse.ArgumentParser) -> None:
 
 
 def add_nuisance(parser: argparse.ArgumentParser) -> None:
-    """What is fitted beside the pattern; shared by several commands."""
+    """What is fitted jointly with the pattern; shared by several commands."""
     parser.add_argument(
         "--nuisance",
         default="none",
         metavar="auto|none|LIST",
-        help="fit beside the pattern, and keep out of the model: ramp, direction, velocity, drift "
-        "(a list with commas), or those that lower the held-out error (auto); default: none",
+        help="fit jointly with the pattern, and keep out of the model: ramp, direction, velocity, "
+        "drift (a list with commas), or those that lower the held-out error (auto); default: none",
     )
     parser.add_argument(
         "--reference-orders",
         metavar="50,100",
-        help="orders that the reference itself makes: fitted beside the pattern, not retained; "
-        "with a phase of their own in every run where it was mounted anew",
+        help="orders that the reference itself makes: fitted jointly with the pattern, not "
+        "retained; with a phase of their own in every run where it was mounted anew",
     )
 
 
@@ -136,7 +136,7 @@ def add_covariance(parser: argparse.ArgumentParser) -> None:
         choices=("auto", "white", "cluster", "hac"),
         default="auto",
         help="standard errors of independent readings (white), by the scatter between runs "
-        "(cluster) or between stretches of readings (hac); default: white unless correlation "
+        "(cluster) or between segments of readings (hac); default: white unless correlation "
         "is found",
     )
 

@@ -10,7 +10,7 @@ from .durations import seconds
 from .paths import Input, Output
 from .pictures import save_picture
 
-HELP = "say from which size on a diagnosis of planned runs would name each cause"
+HELP = "tell from which size on a diagnosis of planned runs would name each cause"
 EXAMPLE = "trueangle rehearse joint.toml --within 5min --plot detection.png"
 
 

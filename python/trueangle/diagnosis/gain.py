@@ -218,11 +218,11 @@ def _note(share: float | None) -> str:
 
 
 def _units(regression: Regression) -> tuple[NDArray[np.int64], str]:
-    """What is held out as a whole: the runs, or stretches of the one run there is."""
+    """What is held out as a whole: the runs, or segments of the one run there is."""
     present = np.unique(regression.signals.run)
     if present.size > 1:
         return np.searchsorted(present, regression.signals.run), "whole runs"
-    return (np.arange(regression.n) * 2 * FOLDS) // regression.n, "stretches of the one run"
+    return (np.arange(regression.n) * 2 * FOLDS) // regression.n, "segments of the one run"
 
 
 def _control(

@@ -208,11 +208,11 @@ def gains_by_level(
 def _reach(levels: list[float], held_out: list[float]) -> str:
     """How far the law of a cause was carried."""
     if len(levels) == 2:
-        reach = "the law fitted at one level was carried to the other"
+        reach = "the form fitted at one level was carried to the other"
     elif {levels[0], levels[-1]} & {*held_out}:
-        reach = "the law was carried to levels between and beyond those it was fitted at"
+        reach = "the form was carried to levels between and beyond those it was fitted at"
     else:
-        reach = "the law was carried to levels between those it was fitted at"
+        reach = "the form was carried to levels between those it was fitted at"
     if len(held_out) < len(levels):
         reach += "; without the levels not left out it cannot be fitted"
     return reach

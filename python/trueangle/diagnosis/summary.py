@@ -65,7 +65,7 @@ def render(diagnosis: Diagnosis, errors_in: ErrorsIn = "auto", verbose: bool = F
     ]
     if diagnosis.structure:
         shares = [f"{cause} {100.0 * s:.0f} %" for cause, s in diagnosis.structure.items()]
-        lines += _wrapped(f"Of the variance each alone takes up: {', '.join(shares[:6])}.", 2)
+        lines += _wrapped(f"Of the variance each alone would explain: {', '.join(shares[:6])}.", 2)
     if diagnosis.readings_used < diagnosis.readings:
         used = f"{diagnosis.readings_used} of the readings were used: spread evenly, and none"
         lines += _wrapped(f"{used} at a turning point, where the direction is not known.", 0)
@@ -137,7 +137,7 @@ def headline(diagnosis: Diagnosis, unit: ErrorUnit) -> list[str]:
         lines += _wrapped(f"Wrong in the simulation: {told}.", 2)
     for spot in diagnosis.not_identifiable:
         if spot.supported and not spot.common:
-            lines += _wrapped(f"Seen, and not told apart: {_seen(spot, unit)}.", 2)
+            lines += _wrapped(f"Seen, and not distinguished: {_seen(spot, unit)}.", 2)
     noise = [] if rest is None else [item for item in rest.noise_firing if _is_material(item)]
     if lines:
         for item in noise:

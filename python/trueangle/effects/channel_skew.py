@@ -63,7 +63,7 @@ class ChannelSkew(Effect):
     confused_with: ClassVar[Mapping[type[Effect], str]] = {
         Latency: "two speeds at angles dense enough for twice the sensor's order",
         MissingOrder: "both directions or two speeds",
-        FilterLag: "three speeds: a filter's lines bend with speed",
+        FilterLag: "three speeds: a filter's lines change with speed",
     }
     measure: ClassVar[str] = (
         "two speeds or both directions, at angles dense enough for twice the sensor's order"

@@ -17,6 +17,7 @@ from ..estimation.runcolumns import RunEffectColumns
 from ..estimation.whitening import wander_basis
 from ..joint.pattern import Surroundings
 from ..joint.signals import Signals
+from ..support.plainresult import counted
 from .backlash import Backlash
 from .blindness import (
     OWN_OF_VELOCITY,
@@ -294,8 +295,8 @@ class DriftWithinRun(Effect):
             *([] if signals.velocity is not None else [Latency]),
         ]
         spot = cls.blind(
-            f"{signals.runs} run(s) that reverse about once: an error that changes with the "
-            "direction of travel and one that changes with time look alike",
+            f"{counted(signals.runs, 'run')} that reverse about once: an error that changes with "
+            "the direction of travel and one that changes with time look alike",
             *others,
         )
         return replace(

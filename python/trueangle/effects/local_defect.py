@@ -223,7 +223,7 @@ class LocalDefect(Effect):
 
     @classmethod
     def _unclipped(cls, regression: Regression, shape: dict[str, Any]) -> dict[str, Any]:
-        """Refined again with a tall bump in the model: its top was taken for wild readings.
+        """Refined again with a tall bump in the model: its top was taken for outliers.
 
         Clipped at so many standard deviations it has a flat top, and looks wide.
         """

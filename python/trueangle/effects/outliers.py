@@ -186,7 +186,7 @@ def _beside_neighbours(regression: Regression) -> Array:
 
     .. math:: e_k - \frac{\rho}{1 + \rho^2}(e_{k-1} + e_{k+1})
 
-    is what a correlation leaves of one reading. Whitened residuals show a wild reading twice,
+    is what a correlation leaves of one reading. Whitened residuals show an outlier twice,
     and what lasts over many readings as large as it is. White noise stays as it is. Wild
     readings are held against the level about them, and tell nothing of their neighbours.
     """

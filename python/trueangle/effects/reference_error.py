@@ -62,7 +62,7 @@ class ReferenceLines(Effect):
     factor: ClassVar[str] = "mount"
     of_motion: ClassVar[bool] = True
     measure: ClassVar[str] = (
-        "turn the reference on its mount by unlike angles (0, 130, 250 deg) and repeat"
+        "turn the reference on its mount by different angles (0, 130, 250 deg) and repeat"
     )
     confused_with: ClassVar[Mapping[type[Effect], str]] = {
         TorsionalCompliance: "a second load and a turned reference",

@@ -99,7 +99,7 @@ class TorsionalCompliance(FactorEffect):
             yield cls.blind(because)
             return
         if cls._is_line(regression):
-            yield cls.blind("one load: what it bends is part of the zero or of order 1")
+            yield cls.blind("one load: its wind-up is part of the zero or of order 1")
 
     @classmethod
     def _is_line(cls, regression: Regression) -> bool:

@@ -63,7 +63,7 @@ class VaryingLine(Effect):
     )
     factor: ClassVar[str] = "velocity"
     confused_with: ClassVar[Mapping[type[Effect], str]] = {
-        FilterLag: "three speeds: a filter's lines bend with speed, and all of them",
+        FilterLag: "three speeds: a filter's lines change with speed, and all of them",
         ChannelSkew: "angles dense enough for twice the sensor's order",
         LoadDependentGearError: "three loads of both signs",
     }

@@ -16,13 +16,16 @@ from ..support.distributions import chi_squared_tail
 from .problem import Fitted, Problem
 
 __all__ = [
+    "ENOUGH_RUNS",
     "FEWEST_RUNS",
     "FEWEST_STRETCHES",
     "SCATTER",
+    "calmer",
     "clusters_of",
     "correlation_found",
     "memory_of",
     "runs_together",
+    "scatter_between",
     "weight_of",
 ]
 
@@ -33,6 +36,11 @@ _MOST_CLUSTERS: Final = 128
 
 #: Runs from which whole runs are the clusters.
 FEWEST_RUNS: Final = 3
+
+#: Runs from which they tell by themselves how coefficients scatter.
+ENOUGH_RUNS: Final = 8
+#: Share of white noise's variances below which runs are copies, or their residual a pattern.
+_COPIES: Final = 0.01
 
 #: Readings in a row whose correlation is looked at.
 _LOOKED_AT: Final = 65_536
@@ -97,9 +105,16 @@ def _in_time(
 
 
 def correlation_found(
-    problem: Problem, fitted: Fitted, weights: Sequence[Array | None], used: Sequence[int]
+    problem: Problem,
+    fitted: Fitted,
+    weights: Sequence[Array | None],
+    used: Sequence[int],
+    between: tuple[float, float] | None,
 ) -> str:
-    """What speaks against white noise, in words; empty where nothing does."""
+    """What speaks against white noise, in words; empty where nothing does.
+
+    ``between``: of `scatter_between`.
+    """
     solution = fitted.solution
     if not (solution.residual_variance > 0.0 and solution.degrees_of_freedom > problem.unknowns):
         return ""
@@ -123,13 +138,36 @@ def correlation_found(
             return (
                 f"means of {length} neighbours in time scatter {math.sqrt(ratio):.2g} times as much"
             )
-    if len(used) >= FEWEST_RUNS:
-        clusters = runs_together([clusters_of(problem, fitted, weights, i, 1)[0] for i in used])
-        statistic, freedom = scatter_statistic(clusters, solution.residual_variance)
-        if chi_squared_tail(statistic, freedom) < SCATTER:
-            times = math.sqrt(statistic / freedom)
-            return f"coefficients scatter {times:.2g} times as much between runs"
+    if between is not None and chi_squared_tail(*between) < SCATTER:
+        times = math.sqrt(between[0] / between[1])
+        return f"coefficients scatter {times:.2g} times as much between runs"
     return ""
+
+
+def scatter_between(
+    problem: Problem, fitted: Fitted, weights: Sequence[Array | None], used: Sequence[int]
+) -> tuple[float, float] | None:
+    """Chi-squared of the runs' own coefficients and its freedom; None for fewer than three."""
+    solution = fitted.solution
+    if len(used) < FEWEST_RUNS or not solution.residual_variance > 0.0:
+        return None
+    clusters = runs_together([clusters_of(problem, fitted, weights, i, 1)[0] for i in used])
+    return scatter_statistic(clusters, solution.residual_variance)
+
+
+def calmer(between: tuple[float, float] | None, runs: int) -> float:
+    """Part of white noise's variances that many runs show; 1 where they show no less.
+
+    The residual holds more than what moves the coefficients where it is no white noise but, say,
+    one fast line in the time: then the runs repeat better than their residual lets expect.
+    """
+    if between is None or runs < ENOUGH_RUNS:
+        return 1.0
+    statistic, freedom = between
+    share = statistic / freedom
+    if share < _COPIES or 1.0 - chi_squared_tail(statistic, freedom) >= SCATTER:
+        return 1.0
+    return share
 
 
 def memory_of(

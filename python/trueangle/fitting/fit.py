@@ -25,13 +25,13 @@ from .robust import Loss, unsettled_sentence, weigh, weighed, without_spikes
 from .uncertainty import CovarianceKind, check_covariance
 
 if TYPE_CHECKING:
-    from .orders.select import OrderSelection
+    from .orders.table import OrderSelection
     from .summed import Summed
 
 __all__ = ["ROUNDING", "fit", "fitted_to"]
 
 #: Rounding of angles around a whole turn, in parts of a turn: smaller deviations are
-#: never taken for wild readings.
+#: never taken for outliers.
 ROUNDING = 1e-12
 
 
@@ -90,10 +90,11 @@ def fit(
         ``"white"``: independent readings; ``"cluster"``: by the scatter between whole runs,
         right for any correlation within them; ``"hac"``: by stretches of readings, right
         where the correlation dies out. ``"auto"``: white unless the residuals correlate in
-        time or the runs scatter by more, then clusters (three runs and more) or stretches;
-        the notes say so. Intervals: `FitResult.interval`.
+        time or the runs scatter by more, then clusters (three runs and more) or stretches; eight
+        runs and more that scatter by less tell the noise by that. The notes say so. Intervals:
+        `FitResult.interval`.
     nuisance : {"none", "auto"} or iterable of str
-        What is fitted beside the pattern and kept out of the model (`FitResult.nuisance`):
+        What is fitted jointly with the pattern and kept out of the model (`FitResult.nuisance`):
         ``"ramp"`` in the angle, ``"direction"``, ``"velocity"``, ``"drift"`` in time.
         ``"auto"``: those that lower the error of stretches held out and can be told from the
         pattern; the notes say which.
@@ -194,16 +195,22 @@ def fitted_to(
     method: str | None = None,
     threads: int | None = None,
     summed: Summed | None = None,
+    evidence: OrderSelection | None = None,
 ) -> FitResult:
-    """As `fit`; with ``summed`` of all readings of which the runs are some."""
+    """As `fit`; with ``summed`` of all readings of which the runs are some.
+
+    ``evidence`` stands for a selection of orders that was made before.
+    """
     check_choice("argument", argument, ARGUMENTS)
     check_covariance(covariance, len(found))
     for run in found:
         check_follows(run)
-    selection = None
+    selection = evidence
     beside = _beside(nuisance, reference_orders)
     given = found
-    if orders is None or isinstance(orders, str):
+    if evidence is not None:
+        orders = evidence.by_shaft
+    elif orders is None or isinstance(orders, str):
         if beside.wanted:
             from .nuisance import likely_orders, take_out
 
@@ -304,7 +311,7 @@ class _Beside(NamedTuple):
 
     @property
     def wanted(self) -> bool:
-        """Whether anything is fitted beside the pattern."""
+        """Whether anything is fitted jointly with the pattern."""
         return self.kinds != () or bool(self.reference)
 
 
@@ -335,7 +342,7 @@ def _selected(
     """Orders with evidence, from readings without spikes."""
     if orders not in (None, "auto"):
         raise ArgumentError(f"orders must be whole numbers, a mapping or 'auto', got {orders!r}")
-    from .orders.select import selected_of
+    from .orders.choice import selected_of
 
     if loss != "linear":
         runs = [without_spikes(run) for run in runs]

@@ -131,7 +131,7 @@ def hold_out(fit: FitResult) -> HeldOut:
     if len(runs) < 2:
         raise ArgumentError("one run only: nothing can be held out; measure another run")
     found, left_in = [], []
-    most = _MOST_FOLDS if fit.selection is None else _MOST_SELECTIONS
+    most = _MOST_FOLDS if fit.evidence is None else _MOST_SELECTIONS
     for fold in folds(len(runs), most):
         train = [run for i, run in enumerate(runs) if i not in fold]
         labels = [runs[i].label or str(i + 1) for i in fold]
@@ -171,7 +171,7 @@ def _refit(fit: FitResult, train: Sequence[CalibrationRun]) -> HarmonicModel:
     loss = cast(Loss, fit.loss)
     argument = fit.model.argument
     shafts = {shaft.name: shaft.cycles_per_turn for shaft in fit.problem.shafts}
-    if fit.selection is None:
+    if fit.evidence is None:
         orders = {shaft.name: shaft.orders for shaft in fit.problem.shafts}
         return fit_runs(train, orders, shafts=shafts, argument=argument, loss=loss).model
     ratio, member = fit.joint
@@ -179,7 +179,7 @@ def _refit(fit: FitResult, train: Sequence[CalibrationRun]) -> HarmonicModel:
         train,
         gear_ratio=ratio,
         fixed_member=member,
-        shafts=fit.selection.shafts,
+        shafts=fit.evidence.shafts,
         argument=argument,
         loss=loss,
     ).model

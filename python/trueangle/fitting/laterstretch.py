@@ -50,8 +50,8 @@ def check_later_stretch(problem: Problem, weights: Sequence[Array | None]) -> No
     orders = [k * s.cycles_per_turn for s in problem.shafts for k in s.orders]
     listed = ", ".join(f"{order:g}" for order in orders[:6]) + (" ..." if orders[6:] else "")
     raise NoModelError(
-        f"no correction can be given: what the rest of the run says of order {listed} would make "
-        f"the error of {int(np.count_nonzero(gains <= 0.0))} of {gains.size} stretches of it "
+        f"no correction can be given: what the rest of the run indicates of order {listed} would "
+        f"make the error of {int(np.count_nonzero(gains <= 0.0))} of {gains.size} stretches of it "
         "larger, and that of the others unevenly smaller; the error is not one of the angle alone: "
         'run `ta.diagnose(...)`, take out what is beside the pattern (`nuisance="auto"`), or '
         "declare the `orders=` or the `shafts=`"

@@ -61,7 +61,7 @@ def fit_notes(fit: FitResult) -> Iterable[str]:
             "of the sizes that the readings show, on average over the travel."
         )
     if weighted.wild:
-        yield f"{weighted.wild} wild reading{'s' if weighted.wild > 1 else ''} set aside."
+        yield f"{weighted.wild} outlier{'s' if weighted.wild > 1 else ''} set aside."
     if fit.uncertainty.note:
         yield _sentence(fit.uncertainty.note)
     fractional = [s.name for s in fit.problem.shafts if s.cycles_per_turn % 1.0]
@@ -70,8 +70,8 @@ def fit_notes(fit: FitResult) -> Iterable[str]:
             f"Shaft {', '.join(fractional)} does not turn a whole number of times per output "
             "turn: the error does not repeat after one turn, angles must be unwrapped."
         )
-    if fit.selection is not None and fit.selection.notes:
-        yield from map(_sentence, fit.selection.notes)
+    if fit.evidence is not None and fit.evidence.notes:
+        yield from map(_sentence, fit.evidence.notes)
     elif (verified := _verified(fit)) is not None:
         yield _sentence(verified[1])
 

@@ -91,13 +91,13 @@ def check_new_run(
     gains, noise, shown, shared = found
     mean, scatter = float(gains.mean()), float(gains.std(ddof=1))
     listed = ", ".join(f"{order:g}" for order in orders[:6]) + (" ..." if orders[6:] else "")
-    mend = "they seem to be of unlike joints: fit each by itself, or declare the `orders=`"
+    remedy = "they seem to be of different joints: fit each by itself, or declare the `orders=`"
     if mean <= _SURE * np.sqrt(max(0.0, scatter**2 - noise)):
         worse = int(np.count_nonzero(gains < 0.0))
         raise NoModelError(
-            f"no correction can be given: what the other runs say of order {listed} would make the "
-            f"error of {worse} of {len(gains)} runs larger, and that of the rest unevenly smaller; "
-            f"{mend}"
+            f"no correction can be given: what the other runs indicate of order {listed} would "
+            f"make the error of {worse} of {len(gains)} runs larger, and that of the rest unevenly "
+            f"smaller; {remedy}"
         )
     bound = student_quantile(1.0 - _CHANCE / _SEARCHED, len(runs) - 1) / np.sqrt(len(runs))
     if max(mean, shared) < _ALIKE * shown and mean <= bound * scatter:
@@ -105,7 +105,7 @@ def check_new_run(
             "no correction can be given: of what the runs show they share "
             f"{brief(100 * mean / shown)} % (order {listed}), no more than {len(runs)} runs that "
             "share nothing may by chance; "
-            f"{mend}"
+            f"{remedy}"
         )
 
 

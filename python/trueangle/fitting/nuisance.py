@@ -4,8 +4,9 @@ r"""What is in the readings beside a pattern: ramp, drift, direction, velocity, 
           + g_r(t_{rj})
 
 with the unwrapped angle ``u``, the sense and the speed of travel, and a cubic spline ``g`` of
-the time of each run. They are fitted beside the pattern and taken out of the readings; what is
-left is fitted as ever, which gives the same pattern as one fit of all (Frisch and Waugh).
+the time of each run. They are fitted jointly with the pattern and taken out of the readings;
+what is left is fitted as ever, which gives the same pattern as one fit of all (Frisch and
+Waugh).
 """
 
 from __future__ import annotations
@@ -115,7 +116,7 @@ class Nuisance:
         shares = dict(self.shares)
         for kind in self.kinds:
             gain = f", {100.0 * shares[kind]:.2g} % of the held-out error" if kind in shares else ""
-            yield f"taken out beside the pattern, and not in the model: {words[kind]}{gain}"
+            yield f"fitted jointly with the pattern, and not in the model: {words[kind]}{gain}"
         for kind in self.unseparated:
             yield (
                 f"{words[kind].split(' of ')[0]} would lower the error too, but this design cannot "
@@ -275,7 +276,7 @@ def take_out_beside(
 _MISSING: Final = {
     "ramp": "nuisance 'ramp' needs travel",
     "direction": "nuisance 'direction' needs runs with reversals, or in both directions",
-    "velocity": "nuisance 'velocity' needs time or velocity in every run, and unlike speeds",
+    "velocity": "nuisance 'velocity' needs time or velocity in every run, and different speeds",
     "drift": "nuisance 'drift' needs time in every run (at most 24 runs)",
 }
 

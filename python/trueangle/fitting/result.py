@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,13 +27,14 @@ if TYPE_CHECKING:
 
     from ..estimation.moments import Moments
     from .nuisance import Nuisance
-    from .orders.select import OrderSelection
+    from .orders.table import OrderSelection
     from .prior import Posterior
     from .summed import Summed
 
 __all__ = ["FitResult"]
 
 Array = NDArray[np.float64]
+Picture: TypeAlias = Literal["errors", "spectrum", "phases", "residuals"]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -58,8 +59,8 @@ class FitResult(FittedCoefficients):
         Tikhonov penalty relative to the sum of weights; 0 on a full turn.
     span : Span
         Stretch of the turn that was travelled.
-    selection : OrderSelection or None
-        The evidence, when the orders were chosen by it.
+    evidence : OrderSelection or None
+        What was searched, when the orders were chosen by evidence; `selection` is what it found.
     joint : tuple
         Gear ratio (or None) and fixed member, as told.
     remarks : tuple of str
@@ -78,7 +79,7 @@ class FitResult(FittedCoefficients):
     loss: str
     ridge: float
     span: Span
-    selection: OrderSelection | None
+    evidence: OrderSelection | None
     joint: tuple[float | None, str]
     remarks: tuple[str, ...] = ()
     covariance_asked: CovarianceKind = "auto"
@@ -94,6 +95,11 @@ class FitResult(FittedCoefficients):
     def notes(self) -> tuple[str, ...]:
         """What not to trust and why."""
         return tuple(fit_notes(self))
+
+    @cached_property
+    def selection(self) -> OrderSelection | None:
+        """The evidence, when the orders were chosen by it; retained ones as they are fitted."""
+        return None if self.evidence is None else self.evidence.as_fitted(self)
 
     @property
     def weights(self) -> list[Array] | None:
@@ -217,7 +223,7 @@ class FitResult(FittedCoefficients):
             )
         )
 
-    def plot(self, kind: str = "errors", ax: Axes | None = None, **options: Any) -> Axes:
+    def plot(self, kind: Picture = "errors", ax: Axes | None = None, **options: Any) -> Axes:
         """A picture of the fit (needs ``trueangle[plot]``).
 
         Parameters
@@ -260,8 +266,3 @@ class FitResult(FittedCoefficients):
             f"{len(self.problem.runs)} runs, residual {self.residual_std:.3g}, "
             f"period={self.model.period:g})"
         )
-
-    def _repr_html_(self) -> str:
-        from html import escape
-
-        return f"<pre>{escape(self.summary())}</pre>"

@@ -196,7 +196,7 @@ def _set_aside(problem: Problem, floor: float) -> Weighted:
 
 
 def without_spikes(run: CalibrationRun) -> CalibrationRun:
-    """The run with isolated wild readings given weight 0, found without any model.
+    """The run with isolated outliers given weight 0, found without any model.
 
     A reading is a spike when it lies more than 8 robust standard deviations off the
     median of its neighbours in angle; an error that changes as much from neighbour to

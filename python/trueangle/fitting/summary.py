@@ -83,7 +83,7 @@ def _intervals(fit: FitResult) -> str:
 _KINDS = {
     "white": "white noise",
     "cluster": "by the scatter between runs",
-    "hac": "by the scatter of stretches of the readings",
+    "hac": "by the scatter of segments of the readings",
 }
 
 
@@ -93,8 +93,9 @@ def _table(fit: FitResult, shown: ErrorUnit) -> list[str]:
     amplitude_std = fit.amplitude_std if with_std else np.full(model.amplitudes.size, np.nan)
     phase_std = fit.phase_std if with_std else np.full(model.amplitudes.size, np.nan)
     width = max([5, *(len(shaft.name) for shaft in model.shafts)])
-    lines = [f"  {'shaft':<{width}}  order   amplitude     +-     phase     +-"]
-    lines += [f"  {'':<{width}}      {shown.name:>10} {shown.name:>7}       deg    deg"]
+    table = f"  {{:<{width}}}  {{:>5}}  {{:>10}} {{:>7}}  {{:>8}} {{:>6}}"
+    lines = [table.format("shaft", "order", "amplitude", "+-", "phase", "+-")]
+    lines += [table.format("", "", shown.name, shown.name, "deg", "deg")]
     rows = ((shaft, i) for shaft in model.shafts for i in range(len(shaft.orders)))
     for n, (shaft, i) in enumerate(rows):
         size, spread = shown.pair(
@@ -104,8 +105,5 @@ def _table(fit: FitResult, shown: ErrorUnit) -> list[str]:
         phase, phase_std_text = phase_pair(
             math.degrees(model.phases[n]), math.degrees(phase_std[n])
         )
-        lines.append(
-            f"  {shaft.name:<{width}}  {shaft.orders[i]:5d}  "
-            f"{size:>10} {spread:>7}  {phase:>8} {phase_std_text:>6}"
-        )
+        lines.append(table.format(shaft.name, shaft.orders[i], size, spread, phase, phase_std_text))
     return lines

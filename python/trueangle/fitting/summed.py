@@ -70,7 +70,7 @@ class Summed:
         return (
             f"the coefficients, their evidence and the span are of all {self.readings} readings, "
             "in one pass; what needs readings in their order (positions, repeats, correlation, "
-            f"the ridge) is told by {kept} of them, taken in blocks at random"
+            f"the ridge) is estimated from {kept} of them, taken in blocks at random"
         )
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import Final, Literal, NamedTuple, TypeAlias
 
@@ -13,12 +14,15 @@ from ..estimation.linear import NormalEquations, cluster_covariance, total
 from ..support.quantiles import median
 from ..support.suggestions import check_choice
 from .correlation import (
+    ENOUGH_RUNS,
     FEWEST_RUNS,
     FEWEST_STRETCHES,
+    calmer,
     clusters_of,
     correlation_found,
     memory_of,
     runs_together,
+    scatter_between,
     weight_of,
 )
 from .penalty import bias_covariance, pattern_variances
@@ -38,9 +42,6 @@ COVARIANCES: tuple[CovarianceKind, ...] = ("auto", "white", "cluster", "hac")
 
 #: Readings of one or two runs from which a correlation of 0.2 would be found.
 _TELLING: Final = 300
-
-#: Runs from which nothing need be said of their number.
-_ENOUGH_RUNS: Final = 8
 
 
 class Uncertainty(NamedTuple):
@@ -97,10 +98,12 @@ def uncertainty(
 ) -> Uncertainty:
     """Covariance of this kind; ``"auto"``: white unless correlation is found.
 
-    Whole runs are the clusters where there are three or more. With fewer, stretches are,
-    eight times as long as the memory of the residuals: right where the correlation dies out
-    within a run, which one run cannot prove, so that a note says it. What a penalty takes
-    from the coefficients is added to either (`trueangle.fitting.penalty`).
+    Where eight runs and more repeat better than white noise of the residual lets expect, their
+    scatter pooled over the coefficients is the noise. Whole runs are the clusters where there are
+    three or more. With fewer, stretches are, eight times as long as the memory of the residuals:
+    right where the correlation dies out within a run, which one run cannot prove, so that a note
+    says it. What a penalty takes from the coefficients is added to either
+    (`trueangle.fitting.penalty`).
     """
     noise = _noise(problem, fitted, weights, penalty, kind)
     if not penalty > 0.0 or not np.isfinite(noise.covariance).all():
@@ -123,9 +126,15 @@ def _noise(
         return Uncertainty("white", white, freedom)
     used = [i for i in range(len(problem.runs)) if not np.isnan(fitted.offsets[i])]
     if kind == "auto":
-        found = correlation_found(problem, fitted, weights, used)
+        between = scatter_between(problem, fitted, weights, used)
+        found = correlation_found(problem, fitted, weights, used, between)
         if not found:
-            return Uncertainty("white", white, freedom, _untold(problem, used))
+            share = calmer(between, len(used))
+            if between is None or share == 1.0:
+                return Uncertainty("white", white, freedom, _untold(problem, used))
+            told = np.full(len(white) - 1, between[1])
+            pooled = _with_constant(white, share * white[1:, 1:], told)
+            return Uncertainty("cluster", *pooled, _repeated(share, len(used)))
         kind = "cluster" if len(used) >= FEWEST_RUNS else "hac"
         said = _said(found)
     else:
@@ -145,10 +154,10 @@ def _noise(
             for cluster in clusters_of(problem, fitted, weights, i, count)
         ]
         note = (
-            f"{said}standard errors by the scatter of {len(clusters)} stretches of the readings, "
-            f"which remember about {memory:.0f} readings. A slower wander cannot be known from "
+            f"{said}standard errors by the scatter of {len(clusters)} segments of the readings, "
+            f"which remember about {memory:.0f} readings. A slower drift cannot be known from "
             f"{'one run' if len(used) == 1 else f'{len(used)} runs'}: measure "
-            f"{_ENOUGH_RUNS} runs and more"
+            f"{ENOUGH_RUNS} runs and more"
         )
     try:
         weight = sum(weight_of(w, len(problem.runs[i])) for i, w in enumerate(weights) if i in used)
@@ -173,7 +182,7 @@ def _thinned(
     note = (
         f"{said}standard errors as if one in {memory:.0f} readings, so many as the residuals "
         f"remember, stood for itself. {why}, and the covariance is not known: measure "
-        f"{_ENOUGH_RUNS} runs and more"
+        f"{ENOUGH_RUNS} runs and more"
     )
     # Of so many independent readings the fit takes its unknowns, and the residuals are smaller.
     left = max(independent - unknowns, 1.0)
@@ -216,7 +225,7 @@ def _untold(problem: Problem, used: Sequence[int]) -> str:
     return (
         f"{count} readings in {len(used)} run{'s' if len(used) > 1 else ''} do not tell whether "
         "neighbours correlate: the standard errors hold if they do not, else the covariance is not "
-        f"known; measure {_ENOUGH_RUNS} runs and more"
+        f"known; measure {ENOUGH_RUNS} runs and more"
     )
 
 
@@ -228,9 +237,18 @@ def _between(clusters: int, runs: int) -> str:
     """Standard errors by whole runs, in words."""
     note = f"standard errors by the scatter between {clusters} "
     note += "runs" if clusters == runs else f"groups of the {runs} runs"
-    if clusters < _ENOUGH_RUNS:
-        note += f"; so few tell them roughly: {_ENOUGH_RUNS} runs and more tell them well"
+    if clusters < ENOUGH_RUNS:
+        note += f"; so few tell them roughly: {ENOUGH_RUNS} runs and more tell them well"
     return note
+
+
+def _repeated(share: float, runs: int) -> str:
+    """Standard errors by runs that repeat better than their residual lets expect, in words."""
+    return (
+        f"coefficients scatter {math.sqrt(share):.2g} times as much between the {runs} runs as "
+        "white noise of this residual would make them: standard errors by that scatter, pooled "
+        "over the coefficients"
+    )
 
 
 _CANCEL: Final = "the covariance is that of white noise: orders nearly cancel"

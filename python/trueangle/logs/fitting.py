@@ -14,7 +14,8 @@ from ..errors import (
 )
 from ..fitting.argument import AnyArgument
 from ..fitting.fit import fit, fitted_to
-from ..fitting.orders.select import OrderSelection, select_orders, selected_of
+from ..fitting.orders.choice import selected_of
+from ..fitting.orders.select import OrderSelection, select_orders
 from ..fitting.result import FitResult
 from ..fitting.robust import (
     without_spikes,

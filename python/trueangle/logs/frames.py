@@ -5,9 +5,10 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from os import PathLike
-from typing import Any
+from typing import Any, TypeAlias, overload
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..errors import ArgumentError, MissingExtraError
 from ..model.model import HarmonicModel
@@ -20,10 +21,40 @@ __all__ = ["correct"]
 _DATA = "data"
 
 
+#: What says how a joint, or the joints of a robot, are corrected.
+_Models: TypeAlias = HarmonicModel | str | PathLike[str] | Mapping[str, Any]
+
+
+@overload
+def correct(
+    data: NDArray[Any],
+    model: _Models,
+    *,
+    column: str | Mapping[str, str] | None = None,
+    signals: Mapping[str, Any] | None = None,
+    unit: str | None = None,
+    counts_per_turn: float | None = None,
+    threads: int | None = None,
+) -> NDArray[Any]: ...
+
+
+@overload
+def correct(
+    data: Any,
+    model: _Models,
+    *,
+    column: str | Mapping[str, str] | None = None,
+    signals: Mapping[str, Any] | None = None,
+    unit: str | None = None,
+    counts_per_turn: float | None = None,
+    threads: int | None = None,
+) -> Any: ...
+
+
 @told_kinds
 def correct(
     data: Any,
-    model: HarmonicModel | str | PathLike[str] | Mapping[str, Any],
+    model: _Models,
     *,
     column: str | Mapping[str, str] | None = None,
     signals: Mapping[str, Any] | None = None,

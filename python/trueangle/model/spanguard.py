@@ -31,8 +31,8 @@ class SpanGuard:
         self.stretch = None
         warnings.warn(
             f"{outside} of {total} corrected angles lie outside the {start:.6g} to {stop:.6g} "
-            "the model was fitted on: there it is extrapolated and may be far off (said once "
-            "per model)",
+            "the model was fitted on: there it is extrapolated and may be far off (reported "
+            "once per model)",
             OutsideSpanWarning,
             stacklevel=3,
         )

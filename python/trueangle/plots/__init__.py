@@ -21,6 +21,7 @@ from .fleetpictures import fleet_history, fleet_patterns, fleet_phasors, fleet_s
 from .gains import gains
 from .kinds import drawn as drawn
 from .kinds import fit_plot
+from .kinds import thumbnail as thumbnail
 from .measuredsimulated import measured_and_simulated
 from .modelerror import model_error
 from .phasesoverruns import phases_over_runs
@@ -48,3 +49,7 @@ __all__ = [
     "residuals",
     "text_alternative",
 ]
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)  # what completion shows: no module beside the function of its name

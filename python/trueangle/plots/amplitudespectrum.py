@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
@@ -11,14 +10,12 @@ from numpy.typing import NDArray
 
 from ..fitting import summary as fitting_summary
 from ..fitting.orders import summary as orders_summary
-from ..fitting.orders.selection import FALSE_ALARM
-from ..fitting.orders.table import OrderRow, OrderSelection
-from ..support.angles import ARCSEC_PER_TURN
-from ..support.display_units import ErrorsIn, ErrorUnit, significant
+from ..fitting.orders.table import OrderSelection
+from ..support.display_units import ErrorsIn
 from . import palette
 from .canvas import described, grid, legend, new_axes
-from .curves import CONFIDENCE
 from .orderaxis import OrderAxis
+from .orderlines import order_lines, seen_sizes, told_orders
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -26,17 +23,13 @@ if TYPE_CHECKING:
     from ..fitting.result import FitResult
 
 
-__all__ = ["amplitude_spectrum", "likely_aliases", "thresholds"]
+__all__ = ["amplitude_spectrum"]
 
 Array = NDArray[np.float64]
 
-#: Orders told in words.
-_TOLD = 6
-#: Least amplitude of the logarithmic axis, as part of the smallest that has to be seen.
-_FLOOR = 0.2
-#: Aliases and explanations written at a bar; the table has them all.
+#: Aliases and explanations written at a dot; the table has them all.
 _MOST_ALIASES = 3
-#: Bars that get their aliases written, the largest first, and inches that each needs.
+#: Dots that get their aliases written, the largest first, and inches that each needs.
 _MOST_ANNOTATED = 12
 _LABEL_INCHES = 0.17
 
@@ -48,9 +41,10 @@ def amplitude_spectrum(
 
     The axis of orders is broken where none was looked at; that of amplitudes is logarithmic.
 
-    Retained orders are filled, others hollow. The dashed steps are the amplitude that an
-    order needs to be significant; aliases that the positions cannot tell from a retained
-    order stand above its bar. A fit's bars carry 95 % intervals.
+    Retained orders are filled dots, others hollow: on such an axis the length of a bar would
+    mean nothing. The steps are the amplitude that an order needs to be significant; aliases
+    that the positions cannot tell from a retained order stand above its dot. The orders of a
+    fit carry 95 % intervals.
 
     Parameters
     ----------
@@ -65,82 +59,64 @@ def amplitude_spectrum(
     -------
     matplotlib Axes
     """
-    if isinstance(result, OrderSelection):
-        return _of_selection(result, ax, errors_in)
-    if result.selection is None:
-        return _of_fit(result, ax, errors_in)
-    return _of_selection(result.selection, ax, errors_in)
-
-
-def _of_fit(fit: FitResult, ax: Axes | None, errors_in: ErrorsIn) -> Axes:
-    unit = fitting_summary.unit_of(fit, errors_in)
-    factor = unit.per_arcsec * (ARCSEC_PER_TURN / fit.model.period)
-    ranks = np.argsort(fit.orders)
-    orders = [float(fit.orders[i]) for i in ranks]
-    amplitude = factor * fit.amplitudes[ranks]
-    std = None
-    if fit.model.covariance is not None:
-        std = CONFIDENCE * factor * fit.amplitude_std[ranks]
-    ax = new_axes(ax)
-    axis = OrderAxis.of(orders)
-    ax.bar(
-        axis.places(orders),
-        amplitude,
-        width=axis.width(orders),
-        color=palette.AFTER,
-        yerr=None if std is None else [np.minimum(std, 0.999 * amplitude), std],
-        ecolor=palette.ink(ax),
-        capsize=2.0,
-        error_kw={"linewidth": 0.8},
-        label="fitted amplitude, 95 % interval",
+    selection = result if isinstance(result, OrderSelection) else result.selection
+    unit = (
+        orders_summary.unit_of(selection, errors_in)
+        if selection is not None
+        else fitting_summary.unit_of(result, errors_in)  # type: ignore[arg-type]
     )
-    described(ax, f"Amplitude of {len(orders)} fitted orders: {_largest(orders, amplitude, unit)}.")
-    return _finish(ax, axis, amplitude, unit)
-
-
-def _of_selection(selection: OrderSelection, ax: Axes | None, errors_in: ErrorsIn) -> Axes:
-    rows = selection.table
-    sizes = np.array([row.amplitude for row in rows])
-    unit = orders_summary.unit_of(selection, errors_in)
-    factor = unit.per_arcsec * (ARCSEC_PER_TURN / selection.period)
-    orders = [float(row.order) for row in rows]
+    lines = order_lines(result)
+    orders = [line.order for line in lines]
     axis = OrderAxis.of(orders)
     ax = new_axes(ax)
     place, width = axis.places(orders), axis.width(orders)
-    amplitude = factor * sizes
-    kept = np.array([row.retained for row in rows], dtype=bool)
-    limit = factor * thresholds(selection)
-    if kept.any():
-        ax.bar(place[kept], amplitude[kept], width[kept], color=palette.AFTER, label="retained")
-    if not kept.all():
-        ax.bar(
-            place[~kept],
-            amplitude[~kept],
-            width[~kept],
-            facecolor="none",
-            edgecolor=palette.MUTED,
-            linewidth=0.9,
-            label="not retained",
-        )
-    if np.isfinite(limit).any():
+    amplitude, half, limit = (
+        unit.per_arcsec * np.array([getattr(line, name) for line in lines])
+        for name in ("amplitude", "half", "limit")
+    )
+    kept = np.array([line.kept for line in lines], dtype=bool)
+    fitted = selection is None
+    for chosen, colour, face, label in (
+        (kept, palette.AFTER, palette.AFTER, "fitted, 95 % interval" if fitted else "retained"),
+        (~kept, palette.MUTED, "none", "not retained"),
+    ):
+        if chosen.any():
+            ax.errorbar(
+                place[chosen],
+                amplitude[chosen],
+                yerr=[np.minimum(half, 0.999 * amplitude)[chosen], half[chosen]]
+                if fitted
+                else None,
+                linestyle="none",
+                marker="o",
+                markersize=5.0,
+                markerfacecolor=face,
+                color=colour,
+                ecolor=palette.ink(ax),
+                elinewidth=0.8,
+                capsize=2.0,
+                label=label,
+            )
+    told = limit > 0.0
+    if told.any():
         ax.hlines(
-            limit,
-            place - 0.6 * width,
-            place + 0.6 * width,
+            limit[told],
+            (place - 0.6 * width)[told],
+            (place + 0.6 * width)[told],
             color=palette.WARNING,
             linewidth=1.6,
             label="needed to be significant",
         )
-    confused = [i for i in np.argsort(-amplitude) if kept[i] and rows[i].aliases]
+    confused = [i for i in np.argsort(-amplitude) if kept[i] and lines[i].aliases]
     tall = _apart(confused, place, axis.room(ax, _LABEL_INCHES))[:_MOST_ANNOTATED]
     for i in tall:
-        likely = likely_aliases(rows[i])
+        likely = lines[i].aliases
         aliases = [f"{m:g}" for m in likely[:_MOST_ALIASES]]
         more = ", …" if len(likely) > _MOST_ALIASES else ""
         ax.annotate(
             f"or {', '.join(aliases)}{more}",
             (place[i], amplitude[i]),
-            xytext=(0, 3),
+            xytext=(0, 5),
             textcoords="offset points",
             rotation=90,
             ha="center",
@@ -148,63 +124,26 @@ def _of_selection(selection: OrderSelection, ax: Axes | None, errors_in: ErrorsI
             fontsize="x-small",
             color=palette.WARNING,
         )
-    names = [order for order, keep in zip(orders, kept, strict=True) if keep]
-    told = _largest(names, amplitude[kept], unit) if names else "none"
-    described(ax, f"Amplitude of {len(rows)} candidate orders. Retained: {told}.")
-    shown = np.concatenate([amplitude[kept], limit[np.isfinite(limit)]])
-    return _finish(ax, axis, shown if shown.size else amplitude, unit, 1.0 if tall else 0.0)
-
-
-def _apart(ranked: Sequence[np.intp], place: Array, room: float) -> list[np.intp]:
-    """Of bars, the most important first, those that have room beside the ones before."""
-    kept: list[np.intp] = []
-    for i in ranked:
-        if all(abs(place[i] - place[k]) >= room for k in kept):
-            kept.append(i)
-    return kept
-
-
-def _largest(orders: list[float], amplitude: Array, unit: ErrorUnit) -> str:
-    """The largest orders with their amplitudes, and how many more there are."""
-    ranks = np.argsort(-amplitude)
-    told = [
-        f"{orders[i]:g} ({significant(float(amplitude[i]), 3)} {unit.name})" for i in ranks[:_TOLD]
-    ]
-    more = f" and {len(orders) - _TOLD} smaller ones" if len(orders) > _TOLD else ""
-    return ", ".join(told) + more
-
-
-def thresholds(selection: OrderSelection) -> Array:
-    r"""Amplitude at which each order of the table would just be significant.
-
-    .. math:: C = u \sqrt{T}, \qquad (1 + T/v)^{-v/2} = \alpha / K
-
-    with the order's standard error u, v degrees of freedom of the noise and the chance
-    alpha of a false alarm shared by the K orders of the table. Orders found by a wider scan
-    had to pass more.
-    """
-    v = float(selection.noise.degrees_of_freedom)
-    log_share = math.log(max(1, len(selection.table)) / FALSE_ALARM)
-    needed = v * math.expm1(2.0 / v * log_share) if v > 0.0 else math.nan
-    return np.array([row.standard_error * math.sqrt(needed) for row in selection.table])
-
-
-def likely_aliases(row: OrderRow) -> tuple[float, ...]:
-    """Aliases of an order, those that are known lines of the joint alone where there are any."""
-    known = tuple(e.order for e in row.explanations if e.order != row.order)
-    return known or row.aliases
-
-
-def _finish(ax: Axes, axis: OrderAxis, sizes: Array, unit: ErrorUnit, room: float = 0.0) -> Axes:
-    """Axes and legend; ``sizes`` have to be seen, ``room`` decades above them stay free."""
-    seen = sizes[np.isfinite(sizes) & (sizes > 0.0)]
-    low = _FLOOR * float(seen.min(initial=1.0)) if seen.size else 0.1
-    high = float(seen.max(initial=low)) if seen.size else 1.0
+    low, high = (unit.per_arcsec * size for size in seen_sizes(lines))
     ax.set_yscale("log")
-    ax.set_ylim(low, 1.5 * high * 10.0**room)
+    # A decade above for aliases that are written there.
+    ax.set_ylim(low, 1.5 * high * (10.0 if tall else 1.0))
     axis.draw(ax)
     ax.set_xlabel("order / cycles per output turn")
     ax.set_ylabel(f"amplitude / {unit.name}")
     grid(ax, "y")
     legend(ax)
-    return ax
+    named = told_orders(lines, unit)
+    what = f"{len(lines)} fitted orders: {named}" if fitted else (
+        f"{len(lines)} candidate orders. Retained: {named}"
+    )  # fmt: skip
+    return described(ax, f"Amplitude of {what}.")
+
+
+def _apart(ranked: Sequence[np.intp], place: Array, room: float) -> list[np.intp]:
+    """Of dots, the most important first, those that have room beside the ones before."""
+    kept: list[np.intp] = []
+    for i in ranked:
+        if all(abs(place[i] - place[k]) >= room for k in kept):
+            kept.append(i)
+    return kept

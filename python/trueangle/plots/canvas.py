@@ -2,6 +2,12 @@
 
 from __future__ import annotations
 
+import base64
+import io
+from collections.abc import Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
+from html import escape
 from typing import TYPE_CHECKING, Any, Literal
 
 from ..errors import MissingExtraError
@@ -13,14 +19,22 @@ if TYPE_CHECKING:
     from matplotlib.legend import Legend
 
 __all__ = [
+    "as_image",
     "described",
     "grid",
     "legend",
     "new_axes",
     "new_figure",
+    "small_pictures",
     "text_alternative",
     "turn_axis",
 ]
+
+#: A small picture as part of the usual one, its dots per inch, and those that a page shows.
+_SMALL: float = 0.8
+_DOTS_PER_INCH: float = 120.0
+_ON_PAGE: float = 80.0
+_SMALLER: ContextVar[bool] = ContextVar("smaller", default=False)
 
 #: Entries of a legend beyond which it stands beside the picture, not inside.
 _MANY: int = 5
@@ -45,15 +59,11 @@ def new_axes(ax: Axes | None, *, polar: bool = False, height: float = 4.0) -> Ax
     """
     if ax is not None:
         return ax
-    pyplot = _pyplot()
     kind: dict[str, Any] = {"projection": "polar"} if polar else {}
-    made: Axes
-    _, made = pyplot.subplots(
-        figsize=(5.0 if polar else 7.5, 5.0 if polar else height),
-        layout="constrained",
-        subplot_kw=kind,
-    )
-    return made
+    width, height = (5.0, 5.0) if polar else (7.5, height)
+    _, made = _subplots(1, 1, width, height, subplot_kw=kind)
+    only: Axes = made[0, 0]
+    return only
 
 
 def grid(ax: Axes, axis: Literal["both", "x", "y"] = "both") -> None:
@@ -72,18 +82,46 @@ def new_figure(
     MissingExtraError
         matplotlib is not installed.
     """
-    figure, made = _pyplot().subplots(
-        rows, columns, figsize=(width, height), layout="constrained", squeeze=False, sharey=sharey
-    )
+    figure, made = _subplots(rows, columns, width, height, sharey=sharey)
     return figure, list(made.ravel())
 
 
-def _pyplot() -> Any:
+@contextmanager
+def small_pictures() -> Iterator[None]:
+    """Within it new figures are small, and no window and no notebook knows them."""
+    before = _SMALLER.set(True)
+    try:
+        yield
+    finally:
+        _SMALLER.reset(before)
+
+
+def as_image(drawn: Axes | Figure) -> str:
+    """A figure as an element of a page, with its text alternative."""
+    figure: Any = drawn if hasattr(drawn, "savefig") else drawn.get_figure(root=True)
+    buffer = io.BytesIO()
+    figure.savefig(buffer, format="png", dpi=_DOTS_PER_INCH)
+    data = base64.b64encode(buffer.getvalue()).decode("ascii")
+    told = " ".join(text_alternative(ax) for ax in figure.axes)
+    return (
+        f'<img alt="{escape(told)}" style="max-width:100%" '
+        f'width="{figure.get_figwidth() * _ON_PAGE:.0f}" src="data:image/png;base64,{data}">'
+    )
+
+
+def _subplots(rows: int, columns: int, width: float, height: float, **how: Any) -> Any:
+    """A figure of so many inches and an array of its axes."""
     try:
         from matplotlib import pyplot
+        from matplotlib.figure import Figure
     except ModuleNotFoundError:
         raise MissingExtraError("pictures need matplotlib: pip install 'trueangle[plot]'") from None
-    return pyplot
+    if not _SMALLER.get():
+        return pyplot.subplots(
+            rows, columns, figsize=(width, height), layout="constrained", squeeze=False, **how
+        )
+    figure = Figure(figsize=(_SMALL * width, _SMALL * height), layout="constrained")
+    return figure, figure.subplots(rows, columns, squeeze=False, **how)
 
 
 def turn_axis(ax: Axes, low: float = 0.0, high: float = 360.0) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, Literal, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,6 +26,7 @@ __all__ = [
     "SIGNALS",
     "Curve",
     "Points",
+    "Signal",
     "envelope",
     "error_points",
     "held_out_points",
@@ -60,8 +61,10 @@ _NOTABLE: Final = 0.1
 #: Places of an envelope.
 _PLACES: Final = 180
 
-#: What residuals can be drawn against: axis label by name.
-SIGNALS: Final = {
+#: What residuals can be drawn against ...
+Signal: TypeAlias = Literal["angle", "time", "speed", "temperature", "direction", "torque"]
+#: ... and axis label by name.
+SIGNALS: Final[dict[Signal, str]] = {
     "angle": "reference angle / deg",
     "time": "time / s",
     "speed": "output speed / (deg/s)",
@@ -222,7 +225,7 @@ def held_out_points(
     return found
 
 
-def residual_points(fit: FitResult, against: str = "angle") -> list[Points]:
+def residual_points(fit: FitResult, against: Signal = "angle") -> list[Points]:
     """Residuals of every run that has the signal ``against`` (see `SIGNALS`).
 
     Raises

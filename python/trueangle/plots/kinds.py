@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from ..errors import TrueAngleError
 from ..support.suggestions import check_choice
 from .amplitudespectrum import amplitude_spectrum
+from .canvas import as_image, small_pictures
 from .detection import detection
 from .errorcurves import error_curves
 from .fleetoverview import fleet_plot
@@ -17,9 +19,9 @@ from .residualpictures import residuals
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from ..fitting.result import FitResult
+    from ..fitting.result import FitResult, Picture
 
-__all__ = ["drawn", "fit_plot"]
+__all__ = ["drawn", "fit_plot", "thumbnail"]
 
 _FIT = {
     "errors": error_curves,
@@ -29,7 +31,9 @@ _FIT = {
 }
 
 
-def fit_plot(fit: FitResult, kind: str = "errors", ax: Axes | None = None, **options: Any) -> Axes:
+def fit_plot(
+    fit: FitResult, kind: Picture = "errors", ax: Axes | None = None, **options: Any
+) -> Axes:
     """See `trueangle.FitResult.plot`."""
     draw: Any = _FIT[check_choice("kind", kind, _FIT)]
     axes: Axes = draw(fit, ax=ax, **options)
@@ -45,6 +49,16 @@ _RESULTS: dict[str, Any] = {
     "Rehearsal": detection,
     "Fleet": fleet_plot,
 }
+
+
+def thumbnail(result: object) -> str:
+    """A small picture of a result as an element of a page; empty where there is none to draw."""
+    draw = _RESULTS.get(type(result).__name__)
+    try:
+        with small_pictures():
+            return "" if draw is None else as_image(draw(result))
+    except TrueAngleError:  # of no matplotlib too
+        return ""
 
 
 def drawn(result: object, *args: Any, **options: Any) -> Any:

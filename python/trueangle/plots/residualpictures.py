@@ -10,7 +10,7 @@ from ..fitting.summary import unit_of
 from ..support.display_units import ErrorsIn, significant
 from . import palette
 from .canvas import described, grid, legend, new_axes, turn_axis
-from .curves import SIGNALS, Points, residual_points, seen_span, thinned
+from .curves import SIGNALS, Points, Signal, residual_points, seen_span, thinned
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -26,7 +26,7 @@ _BINS, _ENOUGH = 36, 360
 
 def residuals(
     fit: FitResult,
-    against: str = "angle",
+    against: Signal = "angle",
     ax: Axes | None = None,
     errors_in: ErrorsIn = "auto",
 ) -> Axes:

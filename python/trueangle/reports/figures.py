@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from ..plots import curves
 from ..plots.curves import CONFIDENCE, Curve, Points
+from ..support.plainresult import counted
 from .charts import Chart, Figure, figure, run_colour, run_marker
 from .scale import Scale
 
@@ -105,8 +106,8 @@ def errors_of_runs(
     if fit is not None and strong is not None:
         charts.append(_stretch(fit, strong, everything, y, scale))
     what = "the fitted model with its 95 % band" if fit is not None else "no model"
-    alt = f"Measured error in {scale.name} over one turn for {len(runs)} run(s), with {what}"
-    alt += "; a short stretch is shown larger beside it." if strong else "."
+    alt = f"Measured error in {scale.name} over one turn for {counted(runs, 'run')}, with {what}"
+    alt += "; a short segment is shown larger beside it." if strong else "."
     return figure(alt, charts)
 
 
@@ -123,7 +124,7 @@ def stretch_chart(order: float, low: float, high: float, y: str, **given: Any) -
     """An empty chart of a few periods of an order, in the middle: both ends may be thin."""
     width = min(_PERIODS * 360.0 / order, high - low)
     start = 0.5 * (low + high) - 0.5 * width
-    title = f"A stretch of {width:.3g}°: {_PERIODS:g} periods of order {order:g}"
+    title = f"A segment of {width:.3g}°: {_PERIODS:g} periods of order {order:g}"
     chart = Chart("reference angle / deg", y, x_range=(start, start + width), title=title, **given)
     chart.angle_axis(start, start + width, _STRETCH_TICKS)
     return chart
@@ -178,7 +179,7 @@ def before_after(held: HeldOut, runs: Sequence[CalibrationRun], scale: Scale) ->
     return figure(alt, [chart])
 
 
-def signals_present(fit: FitResult) -> list[str]:
+def signals_present(fit: FitResult) -> list[curves.Signal]:
     """Signals that the residual can be drawn against: those that any run has and that vary."""
     found = []
     for name in curves.SIGNALS:
@@ -193,7 +194,7 @@ def _signal(run: CalibrationRun, name: str) -> Array | None:
     return value
 
 
-def residuals(fit: FitResult, against: str, scale: Scale) -> Figure:
+def residuals(fit: FitResult, against: curves.Signal, scale: Scale) -> Figure:
     """What the model leaves, against one signal."""
     points = [scale.points(part) for part in curves.residual_points(fit, against)]
     by_label = {(run.label or str(i + 1)): i for i, run in enumerate(fit.runs)}
@@ -208,7 +209,9 @@ def residuals(fit: FitResult, against: str, scale: Scale) -> Figure:
         number = by_label[part.label]
         drawn = _beside(part, number, len(points)) if against == "direction" else part
         run_dots(chart, number, drawn, len(points), scale, size=size)
-    alt = f"Residual of the fitted model in {scale.name} against {against}, {len(points)} run(s)."
+    alt = (
+        f"Residual of the fitted model in {scale.name} against {against}, {counted(points, 'run')}."
+    )
     return figure(alt, [chart])
 
 

@@ -108,6 +108,7 @@ def selected(selection: OrderSelection, name: LineNames) -> dict[str, Any]:
                 "amplitude_arcsec": finite(factor * row.amplitude),
                 "std_arcsec": finite(factor * row.standard_error),
                 "phase_deg": finite(row.phase_deg % 360.0),
+                "phase_std_deg": finite(row.phase_error_deg),
                 "phase_spread_deg": finite(row.phase_spread_deg),
                 "holdout_gain_percent": finite(100.0 * row.holdout_gain),
                 "aliases": [float(m) for m in row.aliases],

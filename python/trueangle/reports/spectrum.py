@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Final
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
+from numpy.typing import NDArray
 
-from ..plots.amplitudespectrum import likely_aliases, thresholds
-from ..plots.curves import CONFIDENCE
 from ..plots.orderaxis import order_groups
-from ..support.angles import ARCSEC_PER_TURN
+from ..plots.orderlines import OrderLine, order_lines, seen_sizes
 from .charts import Chart, Figure, figure
 from .linenames import LineNames
 from .scale import Scale
@@ -22,46 +22,42 @@ __all__ = ["spectrum"]
 
 #: Half a letter of a name as part of a chart's width, and what parts names above each other.
 _LETTER, _HIGHER = 0.012, 2.0
-#: Orders written at their lines, the largest first.
+#: Orders written at their dots, the largest first.
 _MOST_NAMED: Final = 8
-#: Least amplitude of the logarithmic axis, as part of the smallest threshold or amplitude kept.
-_FLOOR: Final = 0.2
+#: Aliases and explanations that are shown over a dot.
+_MOST_ALIASES, _MOST_EXPLANATIONS = 4, 3
 
 
 def spectrum(
     fit: FitResult | None, selection: OrderSelection | None, name: LineNames, scale: Scale
 ) -> Figure:
     """Amplitude of every order: candidates of a selection, or the orders of a fit."""
-    rows = _of_fit(fit, name) if selection is None else _of_selection(selection, name)
-    # Orders that the travel does not tell apart have no size.
-    rows = [row for row in rows if np.isfinite(row["amplitude"])]
-    for row in rows:
-        row |= {size: scale.factor * row[size] for size in ("amplitude", "half", "limit")}
-    kept = [row for row in rows if row["kept"]]
-    seen = [row["limit"] for row in rows if row["limit"] > 0.0]
-    seen += [row["amplitude"] for row in (kept or rows) if row["amplitude"] > 0.0]
-    floor = _FLOOR * min(seen, default=1.0)
-    top = 3.0 * max([*(row["amplitude"] for row in rows), *seen, floor])
-    named = sorted(kept, key=lambda row: -row["amplitude"])[:_MOST_NAMED]
+    result = fit if selection is None else selection
+    assert result is not None
+    lines = order_lines(result)
+    low, high = (scale.factor * size for size in seen_sizes(lines))
+    kept = [line for line in lines if line.kept]
+    named = sorted(kept, key=lambda line: -line.amplitude)[:_MOST_NAMED]
     charts: list[Chart] = []
-    for group in order_groups([row["order"] for row in rows]):
-        inside = [row for row in rows if group[0] <= row["order"] <= group[1]]
-        here = [row for row in named if row in inside]
-        charts.append(_group(inside, group, (floor, top), here, scale, joined=bool(charts)))
-    names = ", ".join(f"{row['order']:g}" for row in kept) or "none"
+    for group in order_groups([line.order for line in lines]):
+        inside = [line for line in lines if group[0] <= line.order <= group[1]]
+        here = [line for line in named if line in inside]
+        charts.append(_group(inside, group, (low, 3.0 * high), here, scale, name, bool(charts)))
+    names = ", ".join(f"{line.order:g}" for line in kept) or "none"
     what = "fitted orders with 95 % intervals" if selection is None else (
         "candidate orders with the threshold of significance"
     )  # fmt: skip
-    alt = f"Amplitude in {scale.name} of {len(rows)} {what}. Retained: {names}."
+    alt = f"Amplitude in {scale.name} of {len(lines)} {what}. Retained: {names}."
     return figure(alt, charts, "joined")
 
 
 def _group(
-    rows: list[dict[str, Any]],
+    lines: Sequence[OrderLine],
     group: tuple[float, float],
     y_range: tuple[float, float],
-    named: list[dict[str, Any]],
+    named: Sequence[OrderLine],
     scale: Scale,
+    name: LineNames,
     joined: bool,
 ) -> Chart:
     low, high = group
@@ -77,48 +73,61 @@ def _group(
         joined=joined,
     )
     chart.whole_axis(low, high, 3 if width < 8.0 else 8)
-    half = min(0.35, 0.02 * (width + 2.0 * margin))
     for kept, colour, label in ((True, "after", "retained"), (False, "muted", "not retained")):
-        some = [row for row in rows if row["kept"] is kept]
-        if not some:
-            continue
-        x = np.array([row["order"] for row in some])
-        size = np.maximum([row["amplitude"] for row in some], y_range[0])
-        told = {"order": [f"{row['order']:g}" for row in some], "told": [r["told"] for r in some]}
-        hover = f"order @order: {scale.read} @told"
-        chart.stems(x, y_range[0], size, colour=colour, label=_once(label, joined))
-        chart.dots(x, size, colour=colour, size=7.0, hover=hover, more=told, hollow=not kept)
-    limited = [row for row in rows if row["limit"] > 0.0]
+        some = [line for line in lines if line.kept is kept]
+        if some:
+            # No stems: on a logarithmic axis their lengths would mean nothing.
+            chart.dots(
+                _orders(some),
+                np.maximum(_sizes(some, "amplitude", scale), y_range[0]),
+                colour=colour,
+                size=7.0,
+                label=_once(label, joined),
+                hover=f"order @order: {scale.read} @told",
+                more={
+                    "order": [f"{line.order:g}" for line in some],
+                    "told": [_told(line, name) for line in some],
+                },
+                hollow=not kept,
+            )
+    limited = [line for line in lines if line.limit > 0.0]
     if limited:
         chart.ticks(
-            np.array([row["order"] for row in limited]),
-            np.array([row["limit"] for row in limited]),
-            half,
+            _orders(limited),
+            _sizes(limited, "limit", scale),
+            min(0.35, 0.02 * (width + 2.0 * margin)),
             colour="warning",
             label=_once("needed to be significant", joined),
         )
-    ranged = [row for row in rows if row["half"] > 0.0]
+    ranged = [line for line in lines if line.half > 0.0]
     if ranged:
-        x = np.array([row["order"] for row in ranged])
-        middle = np.array([row["amplitude"] for row in ranged])
-        spread = np.array([row["half"] for row in ranged])
-        least = np.maximum(middle - spread, y_range[0])
+        middle, spread = (_sizes(ranged, size, scale) for size in ("amplitude", "half"))
         chart.stems(
-            x,
-            least,
+            _orders(ranged),
+            np.maximum(middle - spread, y_range[0]),
             middle + spread,
             colour="fore",
             width=1.2,
-            label="" if joined else "95 % interval",
+            label=_once("95 % interval", joined),
         )
-    written = _apart(named, low - margin, high + margin)
+    borders = (low - margin, high + margin)
+    written = _apart(named, *borders, name)
     chart.labels(
-        np.array([row["order"] for row in written]),
-        np.array([row["amplitude"] for row in written]),
-        [row["name"] for row in written],
-        (low - margin, high + margin),
+        _orders(written),
+        _sizes(written, "amplitude", scale),
+        [_short(line.order, name) for line in written],
+        borders,
     )
     return chart
+
+
+def _orders(lines: Sequence[OrderLine]) -> NDArray[np.float64]:
+    return np.array([line.order for line in lines])
+
+
+def _sizes(lines: Sequence[OrderLine], size: str, scale: Scale) -> NDArray[np.float64]:
+    """A size of every line in the unit of the page."""
+    return scale.factor * np.array([getattr(line, size) for line in lines])
 
 
 def _once(label: str, joined: bool) -> str:
@@ -126,64 +135,36 @@ def _once(label: str, joined: bool) -> str:
     return "" if joined else label
 
 
-def _apart(named: list[dict[str, Any]], low: float, high: float) -> list[dict[str, Any]]:
+def _apart(named: Sequence[OrderLine], low: float, high: float, name: LineNames) -> list[OrderLine]:
     """Lines whose texts do not run into each other, the largest first."""
-    taken: list[dict[str, Any]] = []
-    for row in named:
+    taken: list[OrderLine] = []
+    for line in named:
         near = [
-            t
-            for t in taken
-            if abs(t["order"] - row["order"])
-            < _LETTER * (len(t["name"]) + len(row["name"])) * (high - low)
+            other
+            for other in taken
+            if abs(other.order - line.order)
+            < _LETTER
+            * (len(_short(other.order, name)) + len(_short(line.order, name)))
+            * (high - low)
         ]
-        if all(max(t["amplitude"], row["amplitude"]) > _HIGHER * min(t["amplitude"],
-               row["amplitude"]) for t in near):  # fmt: skip
-            taken.append(row)
+        sizes = [sorted((other.amplitude, line.amplitude)) for other in near]
+        if all(large > _HIGHER * small for small, large in sizes):
+            taken.append(line)
     return taken
 
 
 def _short(order: float, name: LineNames) -> str:
-    """The name at a line: orders of the output have none but their number."""
+    """The name at a dot: orders of the output have none but their number."""
     return name(order).removeprefix("output ")
 
 
-def _of_fit(fit: FitResult | None, name: LineNames) -> list[dict[str, Any]]:
-    assert fit is not None
-    factor = ARCSEC_PER_TURN / fit.model.period
-    known = fit.model.covariance is not None
-    rows = [
-        {
-            "order": float(order),
-            "amplitude": factor * float(fit.amplitudes[i]),
-            "half": CONFIDENCE * factor * float(fit.amplitude_std[i]) if known else 0.0,
-            "limit": 0.0,
-            "kept": True,
-            "told": f"({name(float(order))})",
-            "name": _short(float(order), name),
-        }
-        for i, order in enumerate(fit.orders)
-    ]
-    return sorted(rows, key=lambda row: row["order"])
-
-
-def _of_selection(selection: OrderSelection, name: LineNames) -> list[dict[str, Any]]:
-    factor = ARCSEC_PER_TURN / selection.period
-    limits = np.nan_to_num(factor * thresholds(selection), posinf=0.0)
-    found = []
-    for row, limit in zip(selection.table, limits, strict=True):
-        told = [name(float(row.order)), row.verdict]
-        if row.aliases:
-            told.append("looks like order " + ", ".join(f"{m:g}" for m in likely_aliases(row)[:4]))
-        told += [str(e) for e in row.explanations[:3]]
-        found.append(
-            {
-                "order": float(row.order),
-                "amplitude": factor * row.amplitude,
-                "half": 0.0,
-                "limit": float(limit),
-                "kept": row.retained,
-                "told": "(" + "; ".join(told) + ")",
-                "name": _short(float(row.order), name),
-            }
-        )
-    return found
+def _told(line: OrderLine, name: LineNames) -> str:
+    """What is shown over a dot beside its size."""
+    told = [name(line.order)]
+    if line.row is not None:
+        told.append(line.row.verdict)
+        if line.aliases:
+            aliases = ", ".join(f"{m:g}" for m in line.aliases[:_MOST_ALIASES])
+            told.append(f"looks like order {aliases}")
+        told += [str(e) for e in line.row.explanations[:_MOST_EXPLANATIONS]]
+    return f"({'; '.join(told)})"

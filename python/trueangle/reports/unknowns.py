@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from ..plots.amplitudespectrum import likely_aliases
+from ..plots.orderlines import likely_aliases
 from ..runs.run import CalibrationRun
 from ..support.display_units import ErrorUnit
 

@@ -6,10 +6,10 @@ import math
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, fields
 from types import MappingProxyType
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from ..errors import ArgumentError, KindError
 from ..formats.signals import FIELDS, column, find_signal, signal_columns
@@ -98,6 +98,29 @@ class CalibrationRun:
     left_out: int = field(default=0, kw_only=True)
     columns: Mapping[str, Any] = field(default_factory=dict, kw_only=True)
     source: Source | None = field(default=None, kw_only=True)
+
+    if TYPE_CHECKING:  # what is taken is more than what is kept
+
+        def __init__(
+            self,
+            reference: ArrayLike,
+            indicated: ArrayLike,
+            period: float = 2.0 * math.pi,
+            time: ArrayLike | None = None,
+            temperature: ArrayLike | None = None,
+            torque: ArrayLike | None = None,
+            mount: ArrayLike | None = None,
+            label: str | None = None,
+            *,
+            velocity: ArrayLike | None = None,
+            weights: ArrayLike | None = None,
+            signals: Mapping[str, Any] = ...,
+            unit: str | None = None,
+            when: str | None = None,
+            left_out: int = 0,
+            columns: Mapping[str, Any] = ...,
+            source: Source | None = None,
+        ) -> None: ...
 
     def __post_init__(self) -> None:
         put = object.__setattr__

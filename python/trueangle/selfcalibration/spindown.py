@@ -213,7 +213,7 @@ def _sorted_out(
             blind.append(why)
     lost = tuple(o.order for o in table if o.retained < LEAST_RETAINED and o.order not in followed)
     if lost:
-        what = "the motion that the current explains" if with_current else "the shaft's own wander"
+        what = "the motion that the current explains" if with_current else "the shaft's own drift"
         blind.append(
             Blind(
                 lost,
@@ -243,7 +243,7 @@ def _sorted_out(
                 tuple(o.order for o in may_ripple),
                 f"encoder or ripple: at one speed (ratio {high / low:.2f}) order k of {ENCODER} "
                 "together with order k of the speed ripple is all that is seen",
-                "let it coast from this speed to a third of it or below, or add a stretch at "
+                "let it coast from this speed to a third of it or below, or add a segment at "
                 "another speed (ratio 3 or more)",
             )
         )
@@ -285,12 +285,12 @@ def _notes(
         )
     wild = int((~fit.valid).sum())
     if wild:
-        notes.append(f"{wild} wild reading{'s' if wild > 1 else ''} set aside")
+        notes.append(f"{wild} outlier{'s' if wild > 1 else ''} set aside")
     seconds = fit.motion.knots.spacing
     per_turn = 1.0 / (seconds * readings.mean_speed)
     notes.append(
         f"motion: {len(readings.stretches)} stretch{'es' if len(readings.stretches) > 1 else ''}, "
-        f"{per_turn:.2g} knots per turn, stiffness by evidence"
+        f"{per_turn:.2g} knots per turn, smoothing by evidence"
     )
     if not separable and ripple != "none" and given:
         first = max((o.amplitude for o in (*given, *sums) if o.order == 1.0), default=math.nan)

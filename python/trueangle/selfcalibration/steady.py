@@ -34,7 +34,7 @@ _SEARCHES: Final = 3
 #: Turns between knots of a motion that leaves order 1 alone (to 1 %).
 _TURNS_PER_KNOT: Final = 2.0
 
-#: A residual beyond so many standard deviations (by the median) is a wild reading.
+#: A residual beyond so many standard deviations (by the median) is an outlier.
 _WILD: Final = 7.0
 
 
@@ -92,7 +92,7 @@ def fit_steady(
     smooth : bool
         Allow motion no knots that are closer than two turns.
     like : MotionFit, optional
-        Motion of the knots and the stiffness of this one: no search, and wild readings
+        Motion of the knots and the stiffness of this one: no search, and outliers
         are those of ``start``.
     """
     orders, ripple = tuple(orders), tuple(ripple)

@@ -205,7 +205,7 @@ def _unwrapped(recording: Recording, time: Array, angle: Array) -> Array:
     steps = np.diff(angle) / turn
     steps -= np.round(steps)
     usual = float(np.median(np.abs(steps)))
-    # A wild reading steps out and back; motion that is too fast does so all the time.
+    # An outlier steps out and back; motion that is too fast does so all the time.
     often = float(np.mean(np.abs(steps) > _LARGEST_STEP))
     if usual > 0.25 or often > 0.002:
         rate = 1.0 / float(np.median(np.diff(time)[np.diff(time) > 0.0]))

@@ -5,19 +5,42 @@ from __future__ import annotations
 import re
 import shutil
 import textwrap
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
 from typing import Final
 
-__all__ = ["columns", "laid_out", "wrapped"]
+__all__ = ["columns", "laid_out", "unfolded", "wrapped"]
 
 #: Columns of a line at least and at most; without a terminal it is `_USUAL`.
 _NARROWEST, _WIDEST, _USUAL = 60, 100, 80
+
+#: Columns where nothing is to be folded.
+_ENDLESS: Final = 1_000_000
+_UNFOLDED: Final = ContextVar("unfolded", default=False)
 
 #: How a line begins that is there to be copied, and stays whole.
 _COPIED: Final = ("--", "trueangle ")
 
 #: What further lines of an entry stand under: the text behind a mark, a number or a label.
 _LEAD: Final = re.compile(r"\s*(?:- |! |\[\d+\] |\d+\. |note: |\S.{0,28}? {2,}(?=\S))?")
+
+
+@contextmanager
+def unfolded() -> Iterator[None]:
+    """Within it every line of a text is as long as it is: who shows it folds it.
+
+    Examples
+    --------
+    >>> with unfolded():
+    ...     len(wrapped("a word and " * 50))
+    1
+    """
+    before = _UNFOLDED.set(True)
+    try:
+        yield
+    finally:
+        _UNFOLDED.reset(before)
 
 
 def columns() -> int:
@@ -28,6 +51,8 @@ def columns() -> int:
     >>> 60 <= columns() <= 100
     True
     """
+    if _UNFOLDED.get():
+        return _ENDLESS
     found = shutil.get_terminal_size((_USUAL, 24)).columns
     return min(max(found, _NARROWEST), _WIDEST)
 

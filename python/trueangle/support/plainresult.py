@@ -56,9 +56,9 @@ class Shown:
         return repr(self) if summary is None else str(summary())
 
     def _repr_html_(self) -> str:
-        from html import escape
+        from .notebook import as_html
 
-        return f"<pre>{escape(str(self))}</pre>"
+        return as_html(self)
 
 
 class PlainResult(Shown):

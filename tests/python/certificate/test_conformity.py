@@ -1,5 +1,6 @@
 """Statements of conformity, languages, as left beside as found; read back from the PDF."""
 
+import ast
 import math
 import re
 import tomllib
@@ -346,3 +347,72 @@ def test_the_pdf_says_it_in_its_language(name, tmp_path):
     k, u, total = (float(x.replace(",", ".")) for x in (k, u, total))
     last = 10.0 ** -len(str(total).partition(".")[2])
     assert abs(k * u - total) <= 0.5 * last * (1.0 + k) + 0.005 * u
+
+
+def constants(folder):
+    """Literal parts of all strings below a folder, those within f-strings too, as one text."""
+    found = []
+    for path in folder.rglob("*.py"):
+        for node in ast.walk(ast.parse(path.read_text("utf-8"))):
+            if isinstance(node, ast.JoinedStr):
+                parts = [
+                    part.value if isinstance(part, ast.Constant) else "#" for part in node.values
+                ]
+                found.append("".join(map(str, parts)))
+            elif isinstance(node, ast.Constant) and isinstance(node.value, str):
+                found.append(node.value)
+    return "\n".join(found).lower()
+
+
+def test_notes_are_found_by_words_that_fits_write():
+    """Whoever changes a sentence of a fit changes the one that its translation is found by."""
+    package = Path(ta.__file__).parent
+    written = constants(package / "fitting") + constants(package / "runs")
+    for name, text in language.texts("en")["notes"].items():
+        # Plurals and numbers are put in where the sentence is made.
+        for part in re.split(
+            r"#\w+|\b1\b|\b(?:rows?|outliers?|runs?|intervals?|positions?)\b|[.,;:()]", text
+        ):
+            words = part.strip()
+            assert len(words) < 4 or words.lower() in written, (name, words)
+
+
+#: Words of English that are no German ones.
+ENGLISH = re.compile(r"\b(the|of|and|is|are|not|by|for|runs?|readings?|with|between)\b")
+
+
+def noted(period=360.0):
+    """Fits that have something to say, each another thing."""
+    rng = np.random.default_rng(33)
+    theta = np.arange(0.0, 360.0, 5.0)
+
+    def run(angle, slow=0.0, size=0.1, wrong=0.0):
+        walk = slow * np.cumsum(rng.normal(size=angle.size))
+        error = size * np.sin(np.radians(angle)) + walk + rng.normal(0.0, 0.002, angle.size)
+        error[7] += wrong
+        return ta.CalibrationRun(angle, angle + error, period, time=np.arange(angle.size) * 0.1)
+
+    grid = np.arange(0.0, 360.0, 10.0)
+    yield ta.fit([run(theta)], orders=[1])
+    yield ta.fit([run(grid) for _ in range(4)], gear_ratio=100)
+    yield ta.fit([run(theta[:40])], orders=[1, 2, 3])
+    yield ta.fit([run(theta, wrong=5.0), run(theta)], orders=[1])
+    yield ta.fit([run(theta, 0.01) for _ in range(4)], orders=[1])
+    yield ta.fit([run(theta, 0.01) for _ in range(9)], orders=[1])
+    yield ta.fit([run(np.arange(0.0, 360.0, 0.5), 0.01)], orders=[1], covariance="hac")
+    yield ta.fit([run(theta, 0.003) for _ in range(2)], orders=[1], nuisance="drift")
+    yield ta.fit(
+        [run(theta) for _ in range(2)], orders={"output": [1], "motor": [1]}, gear_ratio=1.5
+    )
+    with pytest.warns(ta.errors.UnlikeRunsWarning):
+        yield ta.fit([*(run(theta) for _ in range(5)), run(theta, size=0.3)], orders=[1])
+
+
+def test_all_notes_of_a_german_certificate_are_german():
+    notes = {note for fit in noted() for note in fit.notes}
+    assert len(notes) >= 9
+    for note in notes:
+        said = language.note_in("de", note)
+        assert not ENGLISH.search(said), (note, said)
+        assert said.endswith(".")
+        assert language.note_in("en", note) == note

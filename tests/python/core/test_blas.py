@@ -71,7 +71,7 @@ def test_products_are_those_of_two_threads(count):
 @pytest.mark.parametrize(
     ("what", "within"),
     [
-        (ta.select_orders, "trueangle.fitting.orders.select.choose_argument"),
+        (ta.select_orders, "trueangle.fitting.orders.choice.choose_argument"),
         (ta.report, "trueangle.reports.composition.check_output"),
     ],
 )

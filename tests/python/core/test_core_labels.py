@@ -170,7 +170,7 @@ def test_models_are_shown_in_one_line_and_summarised():
     for model in (*MODELS.values(), wide):
         assert len(repr(model)) <= 160
         assert "\n" not in repr(model)
-        assert model._repr_html_().startswith("<pre>")
+        assert model._repr_html_().startswith('<div class="trueangle">')
         assert len(model.summary().splitlines()) < 60
     assert "1080 " in MODELS["plain"].summary()  # 0.3 deg of order 1
     assert "&lt;" in wide.replace(shafts=[ta.Shaft("<b>", 1, [1], [0.0], [0.0])])._repr_html_()

@@ -151,7 +151,7 @@ def test_numpy_arm_joint(data_dir) -> None:
     assert solution[-2] == pytest.approx(2.77, abs=0.1)
     assert solution[-1] == pytest.approx(0.16, abs=0.02)
     assert left == pytest.approx(0.31, abs=0.02)
-    # The wild reading is in joint 2: one row, 18 deg off.
+    # The outlier is in joint 2: one row, 18 deg off.
     other = runs["joint2_2021-06-06"]
     rest = np.abs(other.centred_error - np.median(other.centred_error))
     assert np.flatnonzero(rest > 5.0).tolist() == [178]

@@ -273,7 +273,7 @@ def test_a_lattice_is_found_whatever_the_noise():
 
 @pytest.mark.parametrize("seed", [31, 32, 33])
 def test_a_reading_that_no_tail_reaches_is_wild(seed: int) -> None:
-    """Student's t of 3 degrees of freedom, whose tails hide a few wild readings otherwise."""
+    """Student's t of 3 degrees of freedom, whose tails hide a few outliers otherwise."""
     print(f"seed {seed}")
     rng = np.random.default_rng(seed)
     runs = []

@@ -150,7 +150,7 @@ def test_a_wander_that_reaches_far_leaves_no_line_where_its_waves_end() -> None:
 
 @pytest.mark.parametrize("height", [3.0, 12.0, 40.0])
 def test_a_tall_bump_is_as_wide_as_a_low_one(height: float) -> None:
-    """Its top must not be clipped as wild readings are: then it would look wide."""
+    """Its top must not be clipped as outliers are: then it would look wide."""
     rng = np.random.default_rng([46, int(height)])
     runs = []
     for run in loaded_runs(rng, softness=0.0, readings=900):

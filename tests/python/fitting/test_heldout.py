@@ -14,7 +14,7 @@ ARCSEC, ROUNDING = 3600.0, 1e-6
 
 
 def some_runs(count=4, seed=1, zeros=0.0, wild=0.0, n=240):
-    """Order 1 of 0.2 deg and noise, zeros of the encoder, wild readings."""
+    """Order 1 of 0.2 deg and noise, zeros of the encoder, outliers."""
     rng = np.random.default_rng(seed)
     runs = []
     for i in range(count):

@@ -38,7 +38,7 @@ def test_auto_names_the_rows_it_sets_aside():
     result = ta.fit(run, orders=range(1, 6))
     assert [row for _, row in result.wild] == hit.tolist()
     assert {label for label, _ in result.wild} == {"r"}
-    assert "8 wild readings set aside" in result.summary()
+    assert "8 outliers set aside" in result.summary()
     assert result.model.fit.wild == 8
 
 

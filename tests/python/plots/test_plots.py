@@ -129,8 +129,8 @@ def test_spectrum_of_a_fit_shows_amplitudes_in_order(fit: ta.FitResult) -> None:
     ax = plots.amplitude_spectrum(fit)
     check_labels(ax)
     nothing_clipped(ax)
-    bars = [patch.get_height() for patch in ax.patches]
-    np.testing.assert_allclose(bars, 3600.0 * fit.amplitudes[np.argsort(fit.orders)])
+    dots = ax.containers[0].lines[0].get_ydata()
+    np.testing.assert_allclose(dots, 3600.0 * fit.amplitudes[np.argsort(fit.orders)])
     assert [t.get_text() for t in ax.get_xticklabels()] == ["1", "2", "100"]
     assert ax.get_yscale() == "log"
 
@@ -297,7 +297,7 @@ def selection(runs: list[ta.CalibrationRun]) -> ta.OrderSelection:
 
 def test_threshold_parts_significant_orders_from_the_others(selection) -> None:
     from trueangle.fitting.orders import FALSE_ALARM
-    from trueangle.plots.amplitudespectrum import thresholds
+    from trueangle.plots.orderlines import thresholds
 
     limit = thresholds(selection)
     assert np.isfinite(limit).all()
@@ -314,8 +314,9 @@ def test_spectrum_of_a_selection_marks_the_retained(selection) -> None:
     check_labels(ax)
     nothing_clipped(ax)
     kept = [row for row in selection.table if row.retained]
-    heights = [patch.get_height() for patch in ax.patches[: len(kept)]]
-    np.testing.assert_allclose(heights, [3600.0 * row.amplitude for row in kept])
+    np.testing.assert_allclose(
+        ax.containers[0].lines[0].get_ydata(), [3600.0 * row.amplitude for row in kept]
+    )
     assert "retained" in legend_texts(ax)
     assert "needed to be significant" in legend_texts(ax)
 
@@ -425,8 +426,8 @@ def test_the_axis_of_orders_is_broken_between_the_groups(selection) -> None:
     place = axis.places([1, 2, 17, 100, 101])
     assert place[1] - place[0] == pytest.approx((place[2] - place[0]) / 16)
     assert place[3] > place[2]
-    # Bars use the width: the last group ends near the right border.
-    last = max(patch.get_x() + patch.get_width() for patch in ax.patches)
+    # Dots use the width: the last group ends near the right border.
+    last = max(max(drawn.lines[0].get_xdata()) for drawn in ax.containers)
     low, high = ax.get_xlim()
     assert (last - low) / (high - low) > 0.9
     assert sum(line.get_label() == "_break" for line in ax.lines) == 2 * (len(axis.groups) - 1)
@@ -437,3 +438,20 @@ def test_ticks_of_orders_do_not_overlap(selection) -> None:
     ax.figure.canvas.draw()
     boxes = [label.get_window_extent() for label in ax.get_xticklabels() if label.get_text()]
     assert all(a.x1 < b.x0 for a, b in pairwise(boxes))
+
+
+def test_completion_shows_functions_and_no_modules() -> None:
+    import inspect
+
+    from trueangle import plots
+
+    assert dir(plots) == sorted(plots.__all__)
+    assert not any(inspect.ismodule(getattr(plots, name)) for name in dir(plots))
+
+
+def test_an_unknown_picture_is_refused_with_those_there_are() -> None:
+    # Lists are taken, by their types too.
+    run = ta.CalibrationRun([0.0, 90.0, 180.0, 270.0], [0.1, 90.0, 180.0, 270.0], 360.0)
+    fit = ta.fit([run], orders=[1])
+    with pytest.raises(ArgumentError, match="errors, spectrum, phases, residuals, got 'foo'"):
+        fit.plot("foo")  # type: ignore[arg-type]

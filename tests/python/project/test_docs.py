@@ -1,11 +1,14 @@
 """Every block of the documentation runs and shows what it says."""
 
+import re
+import shlex
 import sys
 
 import pytest
 
 from conftest import ROOT
 from markdown_blocks import run_page
+from trueangle.cli import COMMANDS, build_parser
 
 PAGES = sorted((ROOT / "docs").rglob("*.md"))
 PAGES = [page for page in PAGES if "_build" not in page.parts and "_generated" not in page.parts]
@@ -21,6 +24,33 @@ def test_every_block_runs(page, tmp_path):
 
 def test_there_are_pages():
     assert len(PAGES) >= 10
+
+
+HOWTO = [page for page in PAGES if page.parent.name == "howto"]
+
+
+@pytest.mark.parametrize("page", HOWTO, ids=lambda page: page.stem)
+def test_a_how_to_begins_with_what_one_has_and_ends_with_what_one_got(page):
+    parts = page.read_text(encoding="utf-8").strip().split("\n\n")
+    assert parts[0].startswith("# ")
+    assert parts[1].startswith("*You have* ")
+    assert parts[-1].startswith("*You got* ")
+    # And it is found.
+    index = (ROOT / "docs" / "index.md").read_text(encoding="utf-8")
+    assert f"\nhowto/{page.stem}\n" in index
+
+
+def test_every_question_has_a_command_that_there_is_and_a_page():
+    page = ROOT / "docs" / "howto" / "which-command.md"
+    rows = re.findall(r"^\| (.+\?) \| (.+) \| \[.*\]\((.+)\) \|$", page.read_text("utf-8"), re.M)
+    named = set()
+    for question, cell, link in rows:
+        assert (page.parent / link).is_file(), question
+        for command in re.findall(r"`trueangle (.+?)`", cell):
+            # Options and their arguments are those that the command has.
+            build_parser().parse_args(shlex.split(command))
+            named.add(command.split()[0])
+    assert named == set(COMMANDS), "a command answers no question"
 
 
 def test_attributes_that_share_a_line_are_listed_each():

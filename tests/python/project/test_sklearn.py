@@ -115,6 +115,19 @@ def test_pipelines_and_cross_validation():
     assert with_it > 0.01 * without  # both negative: a hundredth of the square error
 
 
+def test_the_score_is_what_the_correction_takes_off():
+    x, true = data()
+    score = AngleCorrector(orders=[1, 2, 3]).fit(x, true).score(x, true)
+    assert 0.99 < score <= 1.0
+    # Of a model without the orders there are, on both columns: their share of the squares.
+    first = AngleCorrector(orders=[1]).fit(x, true).score(x, true)
+    assert first == pytest.approx(0.5 * 0.02**2 / (0.02**2 + 0.01**2), abs=0.05)
+    assert (cross_val_score(AngleCorrector(orders=[1, 2, 3]), x, true) > 0.99).all()
+    # What has no error keeps none, whatever the zero.
+    plain = AngleCorrector(orders=[1]).fit(true[:, None] + 2.0, true)
+    assert plain.score(true[:, None] + 2.0, true) == pytest.approx(1.0)
+
+
 def test_what_is_no_angle_is_refused_and_nothing_is_made_of_noise():
     x, true = data()
     with pytest.raises(ArgumentError, match="does not follow"):

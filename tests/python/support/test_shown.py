@@ -6,6 +6,8 @@ import html
 import importlib
 import pickle
 import pkgutil
+import re
+import sys
 from collections.abc import Callable
 
 import numpy as np
@@ -18,6 +20,9 @@ from trueangle.support.plainresult import Shown
 
 #: Characters of one line of a screen.
 LINE = 120
+
+#: Characters of what a notebook keeps of a result, its picture included.
+MOST = 150_000
 
 #: Lines that a person reads of a result; the readings themselves are in none.
 SCREENS = 400
@@ -90,8 +95,45 @@ def test_a_result_is_one_line_and_a_summary(what: str) -> None:
     summary = getattr(made, "summary", None)
     if summary is not None:
         assert text == summary()
+    # In a notebook stand the same words and figures, in tables where the text has columns.
     shown = made._repr_html_()  # type: ignore[attr-defined]
-    assert html.unescape(shown.removeprefix("<pre>").removesuffix("</pre>")) == text
+    assert html.unescape(re.sub(r"<[^>]+>", " ", shown)).split() == text.split()
+    assert len(shown) < MOST
+
+
+#: Results that have tables, and those that have a picture, where matplotlib is installed.
+TABLES = ("fit", "model", "selection", "comparison", "plan", "fleet")
+PICTURES = ("fit", "model", "selection", "diagnosis", "fleet")
+
+
+@pytest.mark.parametrize("what", TABLES)
+def test_a_notebook_shows_columns_as_a_table(what: str) -> None:
+    shown = MADE[what]()._repr_html_()  # type: ignore[attr-defined]
+    rows = [re.findall(r"<t[dh]", row) for row in re.findall(r"<tr>.*?</tr>", shown)]
+    assert max(map(len, rows)) >= 4
+
+
+@pytest.mark.parametrize("what", PICTURES)
+def test_a_notebook_shows_one_small_picture(what: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    pyplot = pytest.importorskip("matplotlib.pyplot")
+    before = pyplot.get_fignums()
+    made = MADE[what]()
+    assert len(re.findall(r'<img alt="[^"]{20,}"', made._repr_html_())) == 1  # type: ignore[attr-defined]
+    # The notebook would show an open figure once more.
+    assert pyplot.get_fignums() == before
+    monkeypatch.setitem(sys.modules, "matplotlib", None)
+    for loaded in [name for name in sys.modules if name.startswith("matplotlib.")]:
+        monkeypatch.setitem(sys.modules, loaded, None)
+    assert "<img" not in made._repr_html_()  # type: ignore[attr-defined]
+
+
+def test_a_head_stands_over_its_columns() -> None:
+    shown = re.sub(r' style="[^"]*"', "", FIT._repr_html_())
+    assert "<th>amplitude</th><th>+-</th><th>phase</th><th>+-</th>" in shown
+    assert "<th>arcsec</th><th>arcsec</th><th>deg</th><th>deg</th>" in shown
+    shown = re.sub(r' style="[^"]*"', "", ta.select_orders(RUNS)._repr_html_())
+    assert "<th>false alarm</th><th>held out</th><th>verdict</th>" in shown
+    assert "<th></th><th>gain, %</th><th></th>" in shown
 
 
 def test_the_line_tells_what_matters() -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 from ...support.angles import arcsec
 from ...support.display_units import ErrorsIn, ErrorUnit, error_unit, phase_pair, sine_of_rms
@@ -63,12 +63,16 @@ def unit_of(selection: OrderSelection, errors_in: ErrorsIn = "auto") -> ErrorUni
     return error_unit(errors_in, sine_of_rms(before), selection.period)
 
 
-_HEADER = "  order amplitude      +-   phase    +- spread false alarm held out  verdict"
+_COLUMNS: Final = "  {:>5} {:>9} {:>7} {:>7} {:>5} {:>6} {:>11} {:>8}  {}"
+_HEADER: Final = _COLUMNS.format(
+    "order", "amplitude", "+-", "phase", "+-", "spread", "false alarm", "held out", "verdict"
+)
 
 
 def _units(unit: ErrorUnit) -> str:
     """Units of the first columns."""
-    return f"        {unit.name:>9} {unit.name:>7}     deg   deg    deg                gain, %"
+    named = ("", unit.name, unit.name, "deg", "deg", "deg", "", "gain, %", "")
+    return _COLUMNS.format(*named).rstrip()
 
 
 def _line(row: OrderRow, period: float, unit: ErrorUnit) -> str:
@@ -78,10 +82,9 @@ def _line(row: OrderRow, period: float, unit: ErrorUnit) -> str:
         chance = f"1e{math.floor(row.log10_false_alarm):d}"
     spread = f"{row.phase_spread_deg:.0f}" if math.isfinite(row.phase_spread_deg) else "-"
     phase, phase_std = phase_pair(row.phase_deg, row.phase_error_deg)
-    return (
-        f"  {row.order:>5g} {size:>9} {std:>7} {phase:>7} {phase_std:>5} {spread:>6} "
-        f"{chance:>11} {100.0 * row.holdout_gain:8.3g}  {row.verdict}"
-    )
+    gain = f"{100.0 * row.holdout_gain:.3g}"
+    order = f"{row.order:g}"
+    return _COLUMNS.format(order, size, std, phase, phase_std, spread, chance, gain, row.verdict)
 
 
 def _explanations(rows: Sequence[OrderRow]) -> list[str]:

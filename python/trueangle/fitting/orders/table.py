@@ -18,6 +18,8 @@ from .repeats import ReadingVariance
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
+    from ..result import FitResult
+
 __all__ = ["OrderRow", "OrderSelection"]
 
 #: Orders that the one line of a selection lists.
@@ -42,7 +44,8 @@ class OrderRow:
     cosine, sine : float
         Coefficients A and B beside all retained orders.
     standard_error : float
-        Of each of A and B, and of the amplitude where it is well above zero.
+        Of each of A and B, and of the amplitude where it is well above zero; of a retained
+        order that of the fit (`FitResult.amplitude_std`).
     statistic : float
         Reduction of the sum of squares over the noise variance; about 2 for noise.
     log10_false_alarm : float
@@ -60,6 +63,8 @@ class OrderRow:
     doubtful : bool
         True when an alias of a retained order is a known line of the joint or was a
         candidate too.
+    phase_std : float
+        Standard error of the phase in radians where a fit tells it, else NaN.
     """
 
     order: float
@@ -76,6 +81,7 @@ class OrderRow:
     explanations: tuple[Explanation, ...] = ()
     reason: str = ""
     doubtful: bool = False
+    phase_std: float = math.nan
 
     @property
     def amplitude(self) -> float:
@@ -90,6 +96,8 @@ class OrderRow:
     @property
     def phase_error_deg(self) -> float:
         """Standard error of the phase; 180 at most."""
+        if math.isfinite(self.phase_std):
+            return min(180.0, math.degrees(self.phase_std))
         ratio = self.standard_error / self.amplitude if self.amplitude > 0.0 else math.inf
         return min(180.0, math.degrees(ratio))
 
@@ -170,6 +178,30 @@ class OrderSelection(PlainResult):
     def with_notes(self, notes: tuple[str, ...]) -> OrderSelection:
         """The same selection with these notes."""
         return replace(self, notes=notes)
+
+    def as_fitted(self, fit: FitResult) -> OrderSelection:
+        """The same with coefficients and standard errors of retained orders as a fit has them.
+
+        One order has one amplitude and one standard error, wherever they are shown.
+        """
+        known = fit.model.covariance is not None
+        lines = {
+            order * shaft.cycles_per_turn: (shaft.cosine[i], shaft.sine[i])
+            for shaft in fit.model.shafts
+            for i, order in enumerate(shaft.orders)
+        }
+        found = list(lines)
+        rows = []
+        for row in self.table:
+            n = next((n for n, m in enumerate(found) if math.isclose(m, row.order)), None)
+            if row.retained and n is not None:
+                cosine, sine = lines[found[n]]
+                row = replace(row, cosine=float(cosine), sine=float(sine))
+                if known:
+                    errors = float(fit.amplitude_std[n]), float(fit.phase_std[n])
+                    row = replace(row, standard_error=errors[0], phase_std=errors[1])
+            rows.append(row)
+        return replace(self, table=tuple(rows))
 
     def row(self, order: float) -> OrderRow:
         """The row of one order.

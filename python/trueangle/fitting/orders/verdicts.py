@@ -45,9 +45,9 @@ _VERDICTS: Final = {
     "it can be corrected with argument='indicated' only",
     "small": "has no prominent amplitude",
     "phase varies": "its phase varies from run to run",
-    "too long": "over so short a travel, passed once, it is not told from drift in time (fitted "
-    "jointly, not kept): run it there and back, or declare the orders",
-    "alias": "cannot be told from retained orders at these positions",
+    "too long": "over so short a travel, passed once, it cannot be distinguished from drift in "
+    "time (fitted jointly, not kept): run it there and back, or declare the orders",
+    "alias": "cannot be distinguished from retained orders at these positions",
 }
 
 

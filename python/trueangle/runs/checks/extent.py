@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ...support.plainresult import counted
 from ...support.quantiles import median, quantile
 from .record import Record
 
@@ -134,7 +135,7 @@ def verdicts(extent: Extent) -> tuple[list[str], list[dict[str, str]]]:
     if extent.runs > 2:
         can.append("how far the zero and the pattern repeat from run to run")
     else:
-        no("what changes from run to run", f"{extent.runs} run(s)", "more runs")
+        no("what changes from run to run", counted(extent.runs, "run"), "more runs")
     return can, cannot
 
 

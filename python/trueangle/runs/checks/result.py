@@ -86,7 +86,7 @@ class Check(PlainResult):
         lines = []
         for fault in self.data_faults:
             lines += wrapped(f"{fault.fault}: {fault.says}.", 2)
-            lines += wrapped(f"To mend: {fault.mend}.", 4, 2)
+            lines += wrapped(f"Remedy: {fault.mend}.", 4, 2)
         if not self.data_faults:
             lines.append("No fault found in the data.")
         elif not self.usable:

@@ -79,7 +79,7 @@ def estimated_clocks(
             )
         if others is None:
             notes.append(
-                "one speed only: the offset of the clocks cannot be told and is taken as "
+                "one speed only: the offset of the clocks cannot be determined and is taken as "
                 f"{coarse:g} s; declare it (`offset_s=`) or log a motion that stops or reverses"
             )
             return Clocks(start, coarse, rate or 0.0, notes=tuple(notes))
@@ -91,7 +91,7 @@ def estimated_clocks(
         return clocks
     clocks = _refined(indicated, reference, clocks, wanted)
     if clocks.rate_std is None and rate is None:
-        notes.append("the rate of the clocks cannot be told from this motion; taken as equal")
+        notes.append("the rate of the clocks cannot be determined from this motion; taken as equal")
     if offset is None:
         notes.append(
             "the offset holds any constant delay between the two channels: no log can tell them "
@@ -192,7 +192,7 @@ def _solved(
         solution = vt.T @ ((u.T @ error) / s)
         rest = error - (design / scale) @ solution
         spread = 1.4826 * float(np.median(np.abs(rest)))
-        if spread > 0.0:  # wild readings do not move a clock
+        if spread > 0.0:  # outliers do not move a clock
             weight = np.minimum(1.0, 3.0 * spread / np.maximum(np.abs(rest), 1e-300))
             root = np.sqrt(weight)
             u, s, vt = np.linalg.svd(design / scale * root[:, None], full_matrices=False)

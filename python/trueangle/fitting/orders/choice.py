@@ -1,0 +1,137 @@
+"""The choice of orders itself: candidates, evidence, and what is known of the joint."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING, Final, Literal, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...errors import ArgumentError
+from ...joint.shafts import counted_orders
+from ...runs.aliasing import distinct_positions
+from ...runs.run import CalibrationRun
+from ...runs.travel import held_orders, over_turns
+from ...support.blas import one_blas_thread
+from ...support.suggestions import check_choice
+from ..argument import AnyArgument, at_indicated, choose_argument
+from ..uncertainty import CovarianceKind, check_covariance
+from .candidates import choose_candidates
+from .selection import EvidenceSelection
+from .table import OrderSelection
+
+if TYPE_CHECKING:
+    from ..summed import Summed
+
+__all__ = ["Method", "declared_cycles", "selected_of"]
+
+Array = NDArray[np.float64]
+Method: TypeAlias = Literal["evidence", "paper"]
+
+#: Angles looked at to tell whether a gear's orders are resolved over the travel.
+_LOOKED_AT: Final = 4096
+
+
+@one_blas_thread()
+def selected_of(
+    found: Sequence[CalibrationRun],
+    candidates: Iterable[float] | None = None,
+    gear_ratio: float | None = None,
+    fixed_member: str = "circular_spline",
+    method: Method = "evidence",
+    *,
+    argument: AnyArgument = "auto",
+    covariance: CovarianceKind = "auto",
+    shafts: Mapping[str, float] | None = None,
+    nuisance: str | Iterable[str] = "none",
+    reference_orders: Iterable[float] = (),
+    tolerance: float | None = None,
+    summed: Summed | None = None,
+) -> OrderSelection:
+    """As `trueangle.select_orders`; with ``summed`` of all readings of which the runs are some."""
+    check_choice("method", method, ("evidence", "paper"))
+    check_covariance(covariance, len(found))
+    kept = [run for run in map(_without_zero_weights, found) if run is not None]
+    if not kept:
+        raise ArgumentError("all readings have weight 0: nothing is left to select orders from")
+    said: tuple[str, ...] = ()
+    lines = tuple(map(float, counted_orders(reference_orders, "reference_orders")))
+    kinds: tuple[str, ...] | None = ()
+    if nuisance != "none":
+        from ..nuisance import asked_nuisance
+
+        kinds = asked_nuisance(nuisance)
+    if kinds != () or (lines and len(kept) > 1):
+        from ..nuisance import likely_orders, take_out
+
+        likely = likely_orders(kept, gear_ratio, fixed_member, shafts)
+        angle = "indicated" if argument == "indicated" else "reference"
+        cleaned, taken = take_out(kept, kinds, likely, angle, lines if len(kept) > 1 else ())
+        if lines and not taken.turned:
+            # Lines that are the same in every run stay, to be fitted and named.
+            cleaned, taken = take_out(kept, kinds, likely, angle)
+        kept, said = cleaned, tuple(taken.sentences(kept[0].period))
+    choice = choose_argument(kept, argument)
+    if choice.argument == "indicated":
+        kept = [at_indicated(run) for run in kept]
+    # The ends of the travel are known of all readings.
+    ends = [] if summed is None else [CalibrationRun(summed.ends, summed.ends, kept[0].period)]
+    positions = distinct_positions([*kept, *ends], tolerance)
+    held_from, agree = held_orders(kept, declared_cycles(gear_ratio, shafts))
+    if agree and covariance == "auto":
+        covariance = "hac"
+    chosen = choose_candidates(
+        positions,
+        candidates,
+        gear_ratio,
+        fixed_member,
+        lines,
+        _travelled(kept, gear_ratio, shafts),
+        shafts,
+        held_from,
+    )
+    if method == "paper":
+        from .paper import select_by_paper
+
+        selection = select_by_paper(kept, positions, chosen)
+    else:
+        selection = EvidenceSelection(kept, positions, chosen, covariance, summed).result()
+    notes = (*filter(None, (choice.note,)), *said, *selection.notes)
+    return replace(selection, argument=choice.argument, notes=notes, shafts=dict(shafts or {}))
+
+
+def _without_zero_weights(run: CalibrationRun) -> CalibrationRun | None:
+    if run.weights is None or (run.weights > 0.0).all():
+        return run
+    keep = run.weights > 0.0
+    if not keep.any():
+        return None
+    mount = None if run.mount is None else run.mount[keep]
+    return CalibrationRun(
+        run.reference[keep],
+        run.indicated[keep],
+        period=run.period,
+        mount=mount,
+        label=run.label,
+        weights=run.weights[keep],
+    )
+
+
+def declared_cycles(gear_ratio: float | None, shafts: Mapping[str, float] | None) -> list[float]:
+    """Cycles per output turn of all shafts that were declared."""
+    return [*(shafts or {}).values(), *(() if gear_ratio is None else (gear_ratio,))]
+
+
+def _travelled(
+    runs: Sequence[CalibrationRun],
+    gear_ratio: float | None,
+    shafts: Mapping[str, float] | None,
+) -> Array | None:
+    """Angles of the readings in turns, whole turns kept; None where every order is whole."""
+    cycles = declared_cycles(gear_ratio, shafts)
+    if all(float(f).is_integer() for f in cycles):
+        return None
+    turns = np.concatenate([over_turns(run).reference for run in runs]) / runs[0].period
+    return np.asarray(turns[:: max(1, turns.size // _LOOKED_AT)])

@@ -1,0 +1,122 @@
+"""What pictures of a spectrum show: size, interval and threshold of every order; draws nothing."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..fitting.orders.selection import FALSE_ALARM
+from ..fitting.orders.table import OrderRow, OrderSelection
+from ..support.angles import ARCSEC_PER_TURN
+from ..support.display_units import ErrorUnit, significant
+from .curves import CONFIDENCE
+
+if TYPE_CHECKING:
+    from ..fitting.result import FitResult
+
+__all__ = ["OrderLine", "likely_aliases", "order_lines", "seen_sizes", "thresholds", "told_orders"]
+
+Array = NDArray[np.float64]
+
+#: Orders told in words.
+_TOLD: Final = 6
+#: Least amplitude of the logarithmic axis, as part of the smallest that has to be seen.
+_FLOOR: Final = 0.2
+
+
+@dataclass(frozen=True)
+class OrderLine:
+    """One order: amplitude, half width of its 95 % interval and threshold in arcsec; 0 for none.
+
+    ``row`` is its evidence, where the orders were selected.
+    """
+
+    order: float
+    amplitude: float
+    half: float = 0.0
+    limit: float = 0.0
+    kept: bool = True
+    row: OrderRow | None = None
+
+    @property
+    def aliases(self) -> tuple[float, ...]:
+        """Orders that it may be as well (`likely_aliases`)."""
+        return () if self.row is None or not self.row.aliases else likely_aliases(self.row)
+
+
+def order_lines(result: OrderSelection | FitResult) -> list[OrderLine]:
+    """All candidates of a selection, that of a fit too, or the orders of a fit; ascending.
+
+    Orders that the travel does not tell apart have no size and are left out.
+    """
+    selection = result if isinstance(result, OrderSelection) else result.selection
+    if selection is not None:
+        factor = ARCSEC_PER_TURN / selection.period
+        limits = np.nan_to_num(factor * thresholds(selection), posinf=0.0)
+        return [
+            OrderLine(
+                float(row.order), factor * row.amplitude, 0.0, float(limit), row.retained, row
+            )
+            for row, limit in zip(selection.table, limits, strict=True)
+            if math.isfinite(row.amplitude)
+        ]
+    assert not isinstance(result, OrderSelection)
+    factor = ARCSEC_PER_TURN / result.model.period
+    half = np.zeros(len(result.orders))
+    if result.model.covariance is not None:
+        half = CONFIDENCE * factor * result.amplitude_std
+    return [
+        OrderLine(float(result.orders[i]), factor * float(result.amplitudes[i]), float(half[i]))
+        for i in np.argsort(result.orders)
+    ]
+
+
+def seen_sizes(lines: Sequence[OrderLine]) -> tuple[float, float]:
+    """Least amplitude of a logarithmic axis and the greatest of what it has to show, arcsec."""
+    kept = [line for line in lines if line.kept] or list(lines)
+    seen = [size for line in lines if (size := line.limit) > 0.0]
+    seen += [line.amplitude for line in kept if line.amplitude > 0.0]
+    low = _FLOOR * min(seen, default=1.0)
+    return low, max([*(line.amplitude + line.half for line in lines), *seen, low])
+
+
+def told_orders(lines: Sequence[OrderLine], unit: ErrorUnit) -> str:
+    """The largest orders kept with their amplitudes, and how many more there are."""
+    kept = sorted((line for line in lines if line.kept), key=lambda line: -line.amplitude)
+    told = [
+        f"{line.order:g} ({significant(unit.per_arcsec * line.amplitude, 3)} {unit.name})"
+        for line in kept[:_TOLD]
+    ]
+    more = f" and {len(kept) - _TOLD} smaller ones" if len(kept) > _TOLD else ""
+    return (", ".join(told) or "none") + more
+
+
+def thresholds(selection: OrderSelection) -> Array:
+    r"""Amplitude at which each order of the table would just be significant.
+
+    .. math:: C = C_k \sqrt{T / T_k}, \qquad (1 + T/v)^{-v/2} = \alpha / K
+
+    with the order's amplitude and statistic, v degrees of freedom of the noise and the chance
+    alpha of a false alarm shared by the K orders of the table. Orders found by a wider scan
+    had to pass more.
+    """
+    v = float(selection.noise.degrees_of_freedom)
+    log_share = math.log(max(1, len(selection.table)) / FALSE_ALARM)
+    needed = v * math.expm1(2.0 / v * log_share) if v > 0.0 else math.nan
+    return np.array(
+        [
+            row.amplitude * math.sqrt(needed / row.statistic) if row.statistic > 0.0 else math.nan
+            for row in selection.table
+        ]
+    )
+
+
+def likely_aliases(row: OrderRow) -> tuple[float, ...]:
+    """Aliases of an order, those that are known lines of the joint alone where there are any."""
+    known = tuple(e.order for e in row.explanations if e.order != row.order)
+    return known or row.aliases
