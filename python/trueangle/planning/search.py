@@ -11,7 +11,8 @@ from ..joint.signals import Signals
 from ..simulation.designs import RunDesign
 from .further import base_of, changes_of, choices, levels
 from .limits import Limits
-from .worth import NOTHING, Scales, Worth
+from .scales import Scales
+from .worth import NOTHING, Worth
 
 __all__ = ["LEAST", "Search"]
 
