@@ -10,6 +10,7 @@ import numpy as np
 from ..effects import EFFECTS
 from ..effects.blindness import Blindness
 from ..effects.blindspots import blind_spots
+from ..effects.effect import telling_apart
 from ..estimation.regression import Regression
 from ..joint.signals import Signals, join_runs
 from ..simulation.designs import RunDesign
@@ -128,7 +129,7 @@ class Scales:
         opened = sum(are_open)
         seconds = -sum(map(seconds_of, designs))
         if opened < least:
-            return Worth(opened, 0, False, NOTHING.evidence, -changes, seconds)
+            return replace(NOTHING, opened=opened, plain=-changes, seconds=seconds)
         self._left -= 1
         told, total = 0, 0.0
         for question, is_open in zip(self.questions, are_open, strict=True):
@@ -136,7 +137,8 @@ class Scales:
             total += weight(evidence, question)
             told += is_open and is_strong(evidence)
         halves = round(total / (np.log(ALIKE) * len(self.questions)))
-        return Worth(opened, told, foretold(regression), halves, -changes, seconds)
+        clear = -sum(len(self._unclear(question, spots)) for question in self.questions)
+        return Worth(opened, told, foretold(regression), clear, halves, -changes, seconds)
 
     def answers(self, designs: Sequence[RunDesign], start: Signals | None) -> Iterator[Answer]:
         """What designs say of each question."""
@@ -218,6 +220,16 @@ class Scales:
                 for one in (*question.hypotheses, *question.draws)
             )
         )
+
+    def _unclear(self, question: Question, spots: Sequence[Blindness]) -> set[str]:
+        """What acts on whole runs, is hidden by these, and may be taken for a cause in question."""
+        hidden = {cause for spot in spots for cause in spot.causes if spot.hides(cause)}
+        return {
+            other
+            for cause in question.causes
+            for other in hidden - {*question.causes}
+            if EFFECTS[other].acts_on_runs and telling_apart(EFFECTS[cause], EFFECTS[other])
+        }
 
     def _evidence(self, question: Question, regression: Regression) -> list[Evidence]:
         return evidence_between(regression, question.hypotheses, self.noise, self._searches)

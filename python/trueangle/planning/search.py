@@ -173,7 +173,11 @@ class Search:
         return designs, worth
 
     def _fewest(
-        self, designs: Designs, worth: Worth, goal: tuple[int, int, bool], start: Signals | None
+        self,
+        designs: Designs,
+        worth: Worth,
+        goal: tuple[int, int, bool, int],
+        start: Signals | None,
     ) -> tuple[Designs, Worth]:
         """The same runs with the fewest readings that reach the goal."""
         least, most = LEAST / max(design.samples for design in designs), 1.0

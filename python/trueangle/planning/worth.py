@@ -29,28 +29,33 @@ ALIKE = 1.5
 
 @dataclass(frozen=True, order=True)
 class Worth:
-    """What runs tell, the most important first."""
+    """What runs tell, the most important first.
+
+    ``clear`` counts, below zero, what could not be named though it may be taken for a cause in
+    question: then neither is.
+    """
 
     opened: int
     told: int
     foretold: bool
+    clear: int
     evidence: int
     plain: int
     seconds: float
 
     @property
-    def gained(self) -> tuple[int, int, bool, int]:
+    def gained(self) -> tuple[int, int, bool, int, int]:
         """What a further run must add to."""
-        return self.opened, self.told, self.foretold, self.evidence
+        return self.opened, self.told, self.foretold, self.clear, self.evidence
 
     @property
-    def reached(self) -> tuple[int, int, bool]:
+    def reached(self) -> tuple[int, int, bool, int]:
         """What fewer readings must not lose."""
-        return self.opened, self.told, self.foretold
+        return self.opened, self.told, self.foretold, self.clear
 
 
 #: What is told before anything is tried.
-NOTHING = Worth(0, 0, False, -1_000, 0, 0.0)
+NOTHING = Worth(0, 0, False, -1_000, -1_000, 0, 0.0)
 
 
 @dataclass(frozen=True)
