@@ -72,6 +72,10 @@ class Scales:
             self._possible(question, spot.hypotheses)
             for question, spot in zip(questions, asked, strict=True)
         ]
+        self.afresh()
+
+    def afresh(self) -> None:
+        """Begin a search of its own: as many designs may be weighed again."""
         self._left = MOST_WEIGHED
 
     @property

@@ -54,6 +54,7 @@ class Search:
 
     def best(self, start: Signals | None) -> tuple[Designs, Worth]:
         """The best runs beside earlier ones, or by themselves."""
+        self.scales.afresh()
         designs, worth = self._built(start)
         designs, worth = self._without_idle(designs, worth, start)
         if worth.told and self.scales.all_seen:
