@@ -226,8 +226,12 @@ class Scales:
         )
 
     def _unclear(self, question: Question, spots: Sequence[Blindness]) -> set[str]:
-        """What acts on whole runs, is hidden by these, and may be taken for a cause in question."""
-        hidden = {cause for spot in spots for cause in spot.causes if spot.hides(cause)}
+        """What acts on whole runs, may be taken for a cause in question, and is not told by these.
+
+        What cannot act at all, as a spring without a load, takes the place of nothing.
+        """
+        shared = [spot for spot in spots if len(spot.causes) > 1]
+        hidden = {cause for spot in shared for cause in spot.causes if spot.hides(cause)}
         return {
             other
             for cause in question.causes
