@@ -18,7 +18,8 @@ from ..joint.signals import join_runs
 from ..model.model import HarmonicModel
 from ..planning.evidence import Noise
 from ..planning.limits import Limits
-from ..planning.nextruns import NextRuns, next_runs
+from ..planning.nextruns import NextRuns
+from ..planning.planner import next_runs
 from ..runs.checks import DataFault
 from ..runs.joining import MeasuredMinusSimulated
 from ..simulation.measured import design_of
@@ -221,7 +222,7 @@ class Diagnosis(PlainResult):
     def plan(
         self, limits: Limits | None = None, *, between: Sequence[str] | None = None
     ) -> NextRuns:
-        """The runs that would tell what is open (`trueangle.planning.nextruns.next_runs`).
+        """The runs that would tell what is open (`trueangle.planning.planner.next_runs`).
 
         Parameters
         ----------

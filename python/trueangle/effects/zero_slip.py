@@ -31,6 +31,9 @@ from .torsional_compliance import TorsionalCompliance
 
 __all__ = ["ZeroSlip"]
 
+#: Kelvin from the coldest run of a level on from which a run is at the next one.
+LEVEL_KELVIN = 1.0
+
 
 @dataclass(frozen=True)
 class ZeroSlip(Effect):
@@ -102,7 +105,10 @@ class ZeroSlip(Effect):
                 )
         temperature = signals.temperature
         if temperature is not None and not any(ThermalDrift.kind in s.causes for s in found):
-            levels = {round(float(temperature[a:b].mean())) for a, b in bounds}
+            levels: list[float] = []
+            for mean in sorted(float(temperature[a:b].mean()) for a, b in bounds):
+                if not levels or mean >= levels[-1] + LEVEL_KELVIN:
+                    levels.append(mean)
             if signals.runs < len(levels) + RUNS_PER_LEVEL - 1:
                 yield cls.blind(
                     "too few runs per temperature: the difference may be the runs' own zeros",

@@ -14,7 +14,8 @@ from ..errors import ArgumentError
 from ..joint.shafts import counted_orders
 from ..support.kinds import told_kinds
 from ..support.plainresult import PlainResult, counted
-from .doptimal import ArcDesign, Columns, d_optimal, exchanged, rounded
+from .counts import exchanged, rounded
+from .doptimal import ArcDesign, Columns, d_optimal
 from .noisefactors import noise_factors
 from .plan import readings_needed
 

@@ -11,7 +11,8 @@ from ..joint.signals import Signals
 from ..simulation.designs import RunDesign
 from .further import base_of, changes_of, choices, levels
 from .limits import Limits
-from .worth import NOTHING, Scales, Worth
+from .scales import Scales
+from .worth import NOTHING, Worth
 
 __all__ = ["LEAST", "Search"]
 
@@ -53,6 +54,7 @@ class Search:
 
     def best(self, start: Signals | None) -> tuple[Designs, Worth]:
         """The best runs beside earlier ones, or by themselves."""
+        self.scales.afresh()
         designs, worth = self._built(start)
         designs, worth = self._without_idle(designs, worth, start)
         if worth.told and self.scales.all_seen:
@@ -172,7 +174,11 @@ class Search:
         return designs, worth
 
     def _fewest(
-        self, designs: Designs, worth: Worth, goal: tuple[int, int, bool], start: Signals | None
+        self,
+        designs: Designs,
+        worth: Worth,
+        goal: tuple[int, int, bool, int],
+        start: Signals | None,
     ) -> tuple[Designs, Worth]:
         """The same runs with the fewest readings that reach the goal."""
         least, most = LEAST / max(design.samples for design in designs), 1.0

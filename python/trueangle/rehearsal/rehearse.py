@@ -11,7 +11,8 @@ from ..effects.blindness import Blindness
 from ..errors import ArgumentError
 from ..joint.signals import Signals
 from ..planning.evidence import Noise
-from ..planning.nextruns import NextRuns, next_runs
+from ..planning.nextruns import NextRuns
+from ..planning.planner import next_runs
 from ..simulation.simulation import SIMULATION, Simulation
 from ..support.deadline import Pace, paced
 from ..support.kinds import told_kinds

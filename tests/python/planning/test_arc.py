@@ -9,7 +9,8 @@ import pytest
 import trueangle as ta
 from trueangle.cli import main
 from trueangle.errors import ArgumentError
-from trueangle.planning.doptimal import Columns, d_optimal, rounded
+from trueangle.planning.counts import rounded
+from trueangle.planning.doptimal import Columns, d_optimal
 from trueangle.planning.noisefactors import noise_factors
 
 SEED = 32_700

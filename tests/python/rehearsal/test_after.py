@@ -6,7 +6,7 @@ import trueangle as ta
 from trueangle.joint.signals import join_runs
 from trueangle.planning import Limits
 from trueangle.planning.evidence import Noise
-from trueangle.planning.worth import Scales
+from trueangle.planning.scales import Scales
 from trueangle.simulation import Harmonic, Latency, RunDesign, Simulation, simulate
 
 SIM = Simulation(

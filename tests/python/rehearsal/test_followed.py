@@ -198,7 +198,11 @@ def followed(entry, cause, seeds, seed):
 
 
 ASKED = [(entry, cause) for entry, (_, _, causes) in ENTRIES.items() for cause in causes]
-FEW = [("one speed", "latency"), ("one temperature", "thermal_drift")]
+FEW = [
+    ("one speed", "latency"),
+    ("one temperature", "thermal_drift"),
+    ("no current", "current_coupling"),
+]
 
 
 @pytest.mark.parametrize(("entry", "cause"), ASKED if NIGHTLY else FEW)

@@ -1,0 +1,265 @@
+"""Designs of further runs weighed, beside earlier runs or by themselves."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from ..effects import EFFECTS
+from ..effects.blindness import Blindness
+from ..effects.blindspots import blind_spots
+from ..effects.effect import telling_apart
+from ..estimation.regression import Regression
+from ..joint.signals import Signals, join_runs
+from ..simulation.designs import RunDesign
+from ..simulation.simulation import Simulation
+from ..support.deadline import pace
+from .evidence import Evidence, Hypothesis, Noise, deviance_left, evidence_between, is_doubted
+from .further import base_of, choices, seconds_of
+from .hypotheses import Question, question_of
+from .limits import Limits
+from .worth import ALIKE, NOTHING, Answer, Worth, foretold, is_strong, weight
+
+__all__ = ["Scales"]
+
+#: Error of a cause of which nothing is seen, in standard deviations of a reading.
+UNSEEN = 3.0
+
+#: Questions up to which rivals are searched for though nothing is seen of them.
+SEARCHED = 3
+
+#: Standard deviations from which on readings show a cause, and the parts of which a diagnosis
+#: holds out one at a time.
+SHOWN, PARTS = 3.0, 5
+
+#: Designs of which the evidence is worked out, at most: some ten seconds.
+MOST_WEIGHED = 250
+
+#: Earlier readings that are looked at, at most: of more, one of every so many.
+MOST_READINGS = 2000
+
+
+class Scales:
+    """Weighs designs for a set of questions, beside earlier runs or by themselves.
+
+    Parameters
+    ----------
+    earlier : Signals or None
+    believed : Simulation
+    asked : sequence of Blindness
+    noise : Noise
+    limits : Limits
+        Within which the causes are to show.
+    """
+
+    def __init__(
+        self,
+        earlier: Signals | None,
+        believed: Simulation,
+        asked: Sequence[Blindness],
+        noise: Noise,
+        limits: Limits,
+    ) -> None:
+        self.earlier = None if earlier is None else _thinned(earlier)
+        self.believed, self.noise = believed, noise
+        self.around = believed.whole_surroundings
+        rich = self._signals([_rich(limits)], None)
+        rms = UNSEEN * noise.sigma
+        questions = [question_of(spot, rich, self.around, rms) for spot in asked]
+        self.questions = [
+            self._possible(question, spot.hypotheses)
+            for question, spot in zip(questions, asked, strict=True)
+        ]
+        self.afresh()
+
+    def afresh(self) -> None:
+        """Begin a search of its own: as many designs may be weighed again."""
+        self._left = MOST_WEIGHED
+
+    @property
+    def over(self) -> bool:
+        """As many designs were weighed as a search may take, or its time is up."""
+        return self._left <= 0 or pace().over
+
+    @property
+    def all_seen(self) -> bool:
+        """Every question is about something that the earlier readings show."""
+        return all(question.seen for question in self.questions)
+
+    @property
+    def needs_current(self) -> bool:
+        """A cause in question follows the motor's current."""
+        return any("current" in EFFECTS[c].needs for q in self.questions for c in q.causes)
+
+    @property
+    def lack(self) -> bool:
+        """The earlier runs did not all record a column that these causes need."""
+        if self.earlier is None:
+            return False
+        causes = [cause for question in self.questions for cause in question.causes]
+        needs = {"velocity", "time"}.union(*(EFFECTS[cause].needs for cause in causes))
+        return any(getattr(self.earlier, name) is None for name in needs)
+
+    def _possible(self, question: Question, estimated: Collection[str]) -> Question:
+        """Without causes whose own estimate nobody would see: they are not what is seen."""
+        if self.earlier is None or not estimated:
+            return question
+        regression = self._readings(self.earlier)
+
+        def is_seen(one: Hypothesis) -> bool:
+            error = one.errors(regression.signals, self.around)[0]
+            return deviance_left(regression, error, self.noise) >= SHOWN**2
+
+        kept = tuple(h for h in question.hypotheses if h.cause not in estimated or is_seen(h))
+        return replace(question, hypotheses=kept) if kept else question
+
+    def weighed(
+        self,
+        designs: Sequence[RunDesign],
+        start: Signals | None,
+        changes: int = 0,
+        least: int = 0,
+    ) -> Worth:
+        """What designs tell beside earlier runs.
+
+        ``changes`` are those from the plainest run. The evidence of designs that open fewer than
+        ``least`` of the questions is not worked out: they are worth less whatever it is.
+        """
+        regression = self._readings(self._signals(designs, start))
+        spots = blind_spots(regression)
+        are_open = [self._open(question, regression, spots) for question in self.questions]
+        opened = sum(are_open)
+        seconds = -sum(map(seconds_of, designs))
+        if opened < least:
+            return replace(NOTHING, opened=opened, plain=-changes, seconds=seconds)
+        self._left -= 1
+        told, total = 0, 0.0
+        for question, is_open in zip(self.questions, are_open, strict=True):
+            evidence = self._evidence(question, regression)
+            total += weight(evidence, question)
+            told += is_open and is_strong(evidence)
+        halves = round(total / (np.log(ALIKE) * len(self.questions)))
+        clear = -sum(len(self._unclear(question, spots)) for question in self.questions)
+        return Worth(opened, told, foretold(regression), clear, halves, -changes, seconds)
+
+    def answers(self, designs: Sequence[RunDesign], start: Signals | None) -> Iterator[Answer]:
+        """What designs say of each question."""
+        regression, spots = self._at(designs, start)
+        for question in self.questions:
+            evidence = self._evidence(question, regression)
+            is_open = self._open(question, regression, spots)
+            chance = min((e.chance for e in evidence), default=None)
+            if chance is not None and not is_open:
+                chance = 0.0
+            bic = min((e.bic for e in evidence), default=None)
+            yield Answer(is_open and is_strong(evidence), bic, chance)
+
+    def blind(self, designs: Sequence[RunDesign], start: Signals | None) -> list[Blindness]:
+        """What nobody can tell from these runs."""
+        return self._at(designs, start)[1]
+
+    def repeated(self, designs: Sequence[RunDesign], start: Signals | None) -> bool:
+        """Whether runs that are held out will confirm every cause: the others tell it as well.
+
+        A diagnosis holds a fifth of the runs out at a time. Of a cause that only those show the
+        others say nothing, and what is held out denies it.
+        """
+        regression, _ = self._at(designs, start)
+        runs = len(regression.bounds)
+        if runs == 1:
+            return True  # stretches of it are held out
+        for question in self.questions:
+            for one in question.hypotheses:
+                if not EFFECTS[one.cause].transfers:
+                    continue
+                error = one.errors(regression.signals, self.around)[0]
+                x, _ = regression.projected(error[:, None])
+                powers = [float(np.sum(x[a:b] ** 2)) for a, b in regression.bounds]
+                first = np.argsort(powers)[::-1][: -(-runs // PARTS)]
+                kept = ~np.isin(
+                    regression.signals.run,
+                    regression.signals.run[[regression.bounds[k][0] for k in first]],
+                )
+                if deviance_left(regression.of_rows(kept), error[kept], self.noise) < SHOWN**2:
+                    return False
+        return True
+
+    def _at(
+        self, designs: Sequence[RunDesign], start: Signals | None
+    ) -> tuple[Regression, list[Blindness]]:
+        regression = self._readings(self._signals(designs, start))
+        return regression, blind_spots(regression)
+
+    def _signals(self, designs: Sequence[RunDesign], start: Signals | None) -> Signals:
+        rng = np.random.default_rng(0)
+        runs = [
+            design.measure(rng, design.label or "", self.believed.pattern) for design in designs
+        ]
+        if not runs:
+            assert start is not None
+            return start
+        signals = join_runs(runs)
+        return signals if start is None else start.followed_by(signals)
+
+    def _readings(self, signals: Signals) -> Regression:
+        """Noise at these readings, beside what is believed."""
+        whites = np.random.default_rng(0).standard_normal(len(signals)) * self.noise.sigma
+        return Regression.of(signals, whites, self.around, rho=self.noise.correlation)
+
+    @property
+    def _searches(self) -> bool:
+        """Whether rivals take the form that imitates best: of many questions that is too slow."""
+        return len(self.questions) <= SEARCHED or any(q.seen for q in self.questions)
+
+    def _open(self, question: Question, regression: Regression, spots: Sequence[Blindness]) -> bool:
+        """Whether nothing in the design of the readings hides one of the causes."""
+        if any(spot.hides(cause) for spot in spots for cause in question.causes):
+            return False
+        return not (
+            self._searches
+            and any(
+                is_doubted(regression, one, spots)
+                for one in (*question.hypotheses, *question.draws)
+            )
+        )
+
+    def _unclear(self, question: Question, spots: Sequence[Blindness]) -> set[str]:
+        """What acts on whole runs, may be taken for a cause in question, and is not told by these.
+
+        What cannot act at all, as a spring without a load, takes the place of nothing.
+        """
+        shared = [spot for spot in spots if len(spot.causes) > 1]
+        hidden = {cause for spot in shared for cause in spot.causes if spot.hides(cause)}
+        return {
+            other
+            for cause in question.causes
+            for other in hidden - {*question.causes}
+            if EFFECTS[other].acts_on_runs and telling_apart(EFFECTS[cause], EFFECTS[other])
+        }
+
+    def _evidence(self, question: Question, regression: Regression) -> list[Evidence]:
+        return evidence_between(regression, question.hypotheses, self.noise, self._searches)
+
+
+def _thinned(signals: Signals) -> Signals:
+    if len(signals) <= MOST_READINGS:
+        return signals
+    return signals.take(np.arange(0, len(signals), -(-len(signals) // MOST_READINGS)))
+
+
+def _rich(limits: Limits) -> RunDesign:
+    """A run in which all varies that limits allow."""
+    design = base_of(limits, "rich")
+    for options in choices(limits):
+        design = replace(design, **options[-1])
+    return replace(
+        design,
+        turns=2.0 * limits.span_deg / 360.0,
+        start_deg=limits.arc_deg[0],
+        reversals=(0.4, 0.6),
+        speed_deg_s=limits.speed_deg_s[1],
+        speed_end_deg_s=None,
+        samples=max(limits.samples, 200),
+    )
