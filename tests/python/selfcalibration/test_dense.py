@@ -5,7 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from trueangle.selfcalibration.dense import DenseRows, fit_dense, low_frequency_inflation
+from trueangle.selfcalibration.dense import (
+    DenseRows,
+    _solve,
+    _triangle,
+    fit_dense,
+    low_frequency_inflation,
+)
 from trueangle.selfcalibration.projected import Projected, Unknown, names_in_words, pairs
 from trueangle.selfcalibration.significance import chosen_orders
 
@@ -134,6 +140,31 @@ def test_a_random_term_has_the_variance_that_the_likelihood_says(size: float) ->
         assert found.projected.freedom == runs * n - 5
     else:
         assert found.random_variance < 0.1
+
+
+def test_the_evidence_is_the_restricted_likelihood() -> None:
+    """Up to a constant; three runs whose offsets are nearly what a pattern is."""
+    rng = np.random.default_rng(8)
+    runs, n = 3, 15
+    patterns, _, y = rows(9, runs * n)
+    patterns = patterns[:, :2]
+    nuisances = np.column_stack([np.ones(runs * n), np.kron(np.eye(runs), np.ones((n, 1)))])
+    y = y + np.repeat(rng.normal(size=runs), n)
+    fixed = np.column_stack([np.ones(runs * n), patterns])
+    found, expected = [], []
+    for variance in (0.05, 0.5, 5.0, 500.0):
+        v = np.eye(runs * n) + variance * nuisances[:, 1:] @ nuisances[:, 1:].T
+        inverse = np.linalg.inv(v)
+        info = fixed.T @ inverse @ fixed
+        left = y - fixed @ np.linalg.solve(info, fixed.T @ inverse @ y)
+        freedom = runs * n - 3
+        twice = freedom * np.log(left @ inverse @ left / freedom)
+        expected.append(-0.5 * (twice + np.linalg.slogdet(v)[1] + np.linalg.slogdet(info)[1]))
+        solved = _solve(_triangle(parts(patterns, nuisances, y, [20])), 4, 2, [1, 2, 3], variance, 45)
+        assert solved.freedom == freedom
+        assert solved.noise * freedom == pytest.approx(left @ inverse @ left, rel=1e-9)
+        found.append(solved.evidence)
+    np.testing.assert_allclose(np.diff(found), np.diff(expected), atol=1e-8)
 
 
 def test_combinations_that_nothing_shows_are_named() -> None:
