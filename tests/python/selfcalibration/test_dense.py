@@ -160,7 +160,9 @@ def test_the_evidence_is_the_restricted_likelihood() -> None:
         freedom = runs * n - 3
         twice = freedom * np.log(left @ inverse @ left / freedom)
         expected.append(-0.5 * (twice + np.linalg.slogdet(v)[1] + np.linalg.slogdet(info)[1]))
-        solved = _solve(_triangle(parts(patterns, nuisances, y, [20])), 4, 2, [1, 2, 3], variance, 45)
+        solved = _solve(
+            _triangle(parts(patterns, nuisances, y, [20])), 4, 2, [1, 2, 3], variance, 45
+        )
         assert solved.freedom == freedom
         assert solved.noise * freedom == pytest.approx(left @ inverse @ left, rel=1e-9)
         found.append(solved.evidence)

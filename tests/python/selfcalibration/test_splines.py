@@ -127,7 +127,9 @@ def test_the_prior_is_that_of_its_differences(memory: float) -> None:
 def test_trends_are_polynomials_that_no_straight_line_is() -> None:
     found = smooth_trends(KNOTS, (2, 1))
     assert found.shape == (30, 3)
-    for column, (first, n, degree) in zip(found.T, ((0, 16, 2), (0, 16, 3), (19, 8, 2)), strict=True):
+    for column, (first, n, degree) in zip(
+        found.T, ((0, 16, 2), (0, 16, 3), (19, 8, 2)), strict=True
+    ):
         x = 2.0 / n * (np.arange(n + 3) - 0.5 * (n + 2))
         shape = {2: (3 * x**2 - 1) / 2, 3: (5 * x**3 - 3 * x) / 2}[degree]
         np.testing.assert_allclose(column[first : first + n + 3], shape, atol=1e-12)
@@ -207,7 +209,9 @@ def test_a_fit_of_motion_is_penalised_least_squares(level: int, trends: tuple) -
     assert found.projected.variance == pytest.approx(variance, rel=1e-8)
     assert found.projected.freedom == freedom
     inverse = np.linalg.inv(normal)[m : m + 2, m : m + 2]
-    np.testing.assert_allclose(found.projected.covariance, variance * inverse, rtol=1e-6, atol=1e-12)
+    np.testing.assert_allclose(
+        found.projected.covariance, variance * inverse, rtol=1e-6, atol=1e-12
+    )
     assert found.evidence == pytest.approx(
         -0.5
         * (
