@@ -189,7 +189,7 @@ def test_a_whole_turn_closes_over_its_seam() -> None:
         (4, [True, True, True, True]),
         (7, [False, False, True, True]),
         (8, [False, False, True, True]),
-        (9, [False, False, True, False]),
+        (9, [False, True, True, False]),
     ):
         error, known = travelled(0.0, 360.0 - missing).at(asked, np.ones(4))
         assert known.tolist() == expected
