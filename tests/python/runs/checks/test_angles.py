@@ -129,7 +129,8 @@ def test_a_reference_much_noisier_than_the_joint() -> None:
         assert bool(found) == told
     assert found == []
     many = steps + 0.1 * rng.normal(size=SWEEP.size)
-    assert list(swapped([record(many, steps + fine, time=time)]))[0].fault == "swapped_channels"
+    (found,) = swapped([record(many, steps + fine, time=time)])
+    assert found.fault == "swapped_channels"
     assert not list(swapped([record(many[:29], (steps + fine)[:29], time=time[:29])]))
     assert list(swapped([record(many[:30], (steps + fine)[:30], time=time[:30])]))
     # At even counts of the joint nothing is told of its noise.
