@@ -50,6 +50,7 @@ def test_a_fit_is_least_squares_however_it_is_cut(cuts: list[int], lost: float) 
     assert found.projected.variance == pytest.approx(variance)
     assert found.projected.freedom == N - 7 - lost
     assert not found.correlated
+    assert found.random_variance == 0.0
     np.testing.assert_allclose(found.covariance, covariance[3:, 3:], rtol=1e-7, atol=1e-14)
     np.testing.assert_allclose(found.nuisance_std, np.sqrt(np.diag(covariance)[:3]), rtol=1e-7)
     retained = 1.0 / (np.diag(np.linalg.inv(z.T @ z))[3:] * (patterns**2).sum(axis=0))
