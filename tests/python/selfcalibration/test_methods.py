@@ -112,7 +112,7 @@ def test_heads_that_are_wrong_are_named() -> None:
     for angles in ([0.0, 119.2], [0.0, 119.2, np.nan]):
         with pytest.raises(ArgumentError, match="one angle for each of 3 heads"):
             ta.selfcal(log, head_angles=angles)
-    with pytest.raises(NoModelError, match="two heads or more .* got head1"):
+    with pytest.raises(NoModelError, match=r"two heads or more .* got head1"):
         ta.selfcal({"head1_rad": log["head1_rad"]}, method="heads")
     noise = {n: v * 0.0 + np.radians(120.0 * k) for k, (n, v) in enumerate(log.items())}
     rng = np.random.default_rng(6)

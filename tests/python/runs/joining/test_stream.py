@@ -201,3 +201,16 @@ def test_a_whole_turn_closes_over_its_seam() -> None:
         assert log.at(np.array([101.0]), np.ones(1))[1][0] == known
     scattered = Travelled(np.repeat(np.arange(50.0), 2), np.tile([1.0, -1.0], 50), np.ones(100))
     assert scattered.std == pytest.approx(1.0)
+
+
+def test_a_rate_is_taken_from_five_standard_errors_on(monkeypatch: pytest.MonkeyPatch) -> None:
+    for share, taken in ((4.9, False), (5.1, True)):
+
+        def solved(indicated, reference, clocks, wanted, share=share):
+            if "rate" in wanted:
+                return Clocks(0.0, 1.0, -2.0 * share, 0.1, 2.0)
+            return Clocks(0.0, 3.0, 0.0, 0.1)
+
+        monkeypatch.setattr("trueangle.runs.joining.clocks._solved", solved)
+        found = estimated_clocks(sampled(), sampled(), 0.0, None)
+        assert found.rate == (-2.0 * share if taken else 0.0)
