@@ -290,11 +290,12 @@ def test_the_share_of_energy_near_the_end():
 
 
 def test_a_turn_that_closes_from_both_sides_of_its_tolerance():
+    slip = np.array([0.0, 0.0, 0.0, 0.25])
     for off, closes in ((0.009, True), (0.011, False)):
         reference = np.array([0.0, 120.0, 240.0, 360.0 + off])
-        run = ta.CalibrationRun(reference, reference + [0.0, 0.0, 0.0, 0.25], 360.0)
+        run = ta.CalibrationRun(reference, reference + slip, 360.0)
         assert closure_errors(run).tolist() == (pytest.approx([0.25]) if closes else [])
-        back = ta.CalibrationRun(-reference, -reference + [0.0, 0.0, 0.0, 0.25], 360.0)
+        back = ta.CalibrationRun(-reference, -reference + slip, 360.0)
         assert closure_errors(back).tolist() == (pytest.approx([0.25]) if closes else [])
     wide = closure_errors(run, tolerance=0.02)
     assert wide == pytest.approx([0.25])

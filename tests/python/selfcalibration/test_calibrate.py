@@ -43,7 +43,7 @@ def test_orders_are_whole_numbers_from_one_to_the_limit() -> None:
     assert _orders("auto") == "auto"
     assert _orders([3, 1.0, np.int64(3)]) == (1.0, 3.0)
     assert _orders([4096]) == (4096.0,)
-    for wrong in ("all", [], [0], [0.5], [1, 2.5], [4097], [np.nan], 3, ["one"], [None]):
+    for wrong in ("all", [], [0], [0.5], [1, 2.5], [4097], [np.nan], [np.inf], 3, ["one"], [None]):
         with pytest.raises(ArgumentError, match="orders must be 'auto' or whole numbers from 1"):
             _orders(wrong)
     with pytest.raises(ArgumentError, match="too many"):
