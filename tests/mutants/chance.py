@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import argparse
 import ast
+import itertools
 import random
 import sqlite3
 import subprocess
@@ -163,8 +164,9 @@ def reaching(places: dict[int, list[str]], line: int) -> list[str]:
     """Tests that reach a line; of one that runs at import alone, those of the module."""
     if line in places:
         return places[line]
-    code = [number for number in places if number > line]
-    return places[min(code)] if code else []
+    # The narrowest of every line first: a constant may matter to any of them.
+    turns = itertools.zip_longest(*(places[number] for number in sorted(places)))
+    return list(dict.fromkeys(name for turn in turns for name in turn if name is not None))
 
 
 def excused(fault: Drawn) -> str:

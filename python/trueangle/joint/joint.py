@@ -162,9 +162,9 @@ class Joint:
             if abs(order - k * self.pole_pairs * encoder) <= near:
                 found.append(f"interpolation error: {what}")
         fourth = 4.0 * self.pole_pairs * encoder
-        multiple = round(order / fourth)
-        if 2 <= multiple <= 8 and abs(order - multiple * fourth) <= near:
-            found.append(f"harmonic {multiple} of the interpolation error of order 4")
+        times = round(order / fourth)
+        if 2 <= times <= 8 and abs(order - times * fourth) <= near:
+            found.append(f"harmonic {times} of the interpolation error of order 4")
         if generator is not None and motor is not None:
             if min(abs(order - motor), abs(order - generator)) <= near:
                 found.append("wave generator, once per turn: eccentricity, bearing")

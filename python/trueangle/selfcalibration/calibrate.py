@@ -160,7 +160,7 @@ def _orders(orders: Any) -> str | tuple[float, ...]:
         raise
     except (TypeError, ValueError):
         found = []
-    if not found or any(k < 1.0 or k != int(k) or k > MOST_ORDERS for k in found):
+    if not found or not all(1.0 <= k <= MOST_ORDERS and k.is_integer() for k in found):
         raise ArgumentError(f"orders must be 'auto' or whole numbers from 1, got {orders!r}")
     return tuple(found)
 

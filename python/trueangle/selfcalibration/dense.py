@@ -237,13 +237,11 @@ def _from_blocks(
     """Covariance of the patterns from scores summed over blocks of neighbours."""
     through = inverse @ beside  # what the nuisances take of the patterns
     scores = []
-    at = 0
     for chunk, values in _blocks(parts, residuals):
         x = chunk.patterns - chunk.nuisances @ through
         scores.append(x.T @ values)
-        at += values.size
     stacked = np.array(scores)
-    middle = stacked.T @ stacked * (len(scores) / max(len(scores) - 1.0, 1.0))
+    middle = stacked.T @ stacked * (len(scores) / (len(scores) - 1.0))
     return np.asarray(projected.inverse @ middle @ projected.inverse)
 
 

@@ -63,7 +63,7 @@ def heads(
     readings = [np.stack([r.heads[i] for i in numbers]) + s[:, None] for r, s in places]
     wanted = tuple(float(k) for k in range(1, _HIGHEST + 1)) if isinstance(orders, str) else orders
     fit = _fit(readings, wanted)
-    blind = _blind(fit, wanted, numbers, places[0][1], readings)
+    blind = _blind(fit, wanted, numbers, readings)
     lost = {k for b in blind for k in b.orders}
     kept = tuple(k for k in wanted if k not in lost)
     if isinstance(orders, str):
@@ -212,7 +212,6 @@ def _blind(
     fit: DenseFit,
     orders: Sequence[float],
     numbers: Sequence[int],
-    offsets: Array,
     readings: Sequence[Array],
 ) -> list[Blind]:
     retained = fit.projected.retained()
@@ -222,7 +221,6 @@ def _blind(
     if not lost:
         return []
     angle = np.degrees(_angles(readings)) % 360.0
-    del offsets
     where = ", ".join(f"{a:.4g}" for a in angle)
     names = names_in_words([(f"order {k:g} at head {numbers[0]}", 1.0) for k in lost[:1]])
     return [

@@ -170,7 +170,7 @@ def _cut(recording: Recording) -> list[Segment]:
         return []
     slow = SLOWEST * float(np.median(speeds))
     found = []
-    for (a, b), (starts, speed) in zip(pieces, moving, strict=True):
+    for (_, b), (starts, speed) in zip(pieces, moving, strict=True):
         state = np.where(np.abs(speed) > slow, np.sign(speed), 0.0)
         change = np.concatenate([[0], np.flatnonzero(np.diff(state)) + 1, [state.size]])
         for i, j in itertools.pairwise(change):
@@ -180,7 +180,6 @@ def _cut(recording: Recording) -> list[Segment]:
             stretch = Segment(time[rows], angle[rows], recording, rows)
             if rows.stop - rows.start >= _SHORTEST[1] and stretch.turns >= _SHORTEST[0]:
                 found.append(stretch)
-        del a
     return found
 
 

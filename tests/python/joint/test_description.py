@@ -78,7 +78,7 @@ def test_defaults_and_the_simulation_beside_the_file(tmp_path: Path) -> None:
     ("old", "new", "says"),
     [
         ('name = "base"', "", r"joint\[0\].*name"),
-        ('name = "base"', 'name = ""', r"joint\[0\].name': .*without '.' and '=' is needed, got ''"),
+        ('name = "base"', 'name = ""', r"joint\[0\].name': .*without '.' and '=' is needed"),
         ('name = "base"', 'name = "a.b"', r"joint\[0\].name"),
         ('name = "base"', 'name = "a=b"', r"joint\[0\].name"),
         ("= 100", "= 0", r"joint\[0\].gear_ratio': must be positive, got 0.0"),
@@ -89,8 +89,8 @@ def test_defaults_and_the_simulation_beside_the_file(tmp_path: Path) -> None:
         ('indicated = "q"', 'indicated = ""', r"signals.indicated': the name of a column"),
         ("worm = 144", "worm = 0", r"joint\[0\].shafts.worm': must be positive, got 0.0"),
         ("[joint.shafts]\nworm = 144", "", None),
-        ("[joint.signals]\nindicated = \"q\"", "signals = 1", r"signals': a table is needed, got 1"),
-        ("worm = 144", '[[joint]]\nname = "base"', r"joint\[1\].name': two joints are called 'base'"),
+        ("[joint.signals]\nindicated = \"q\"", "signals = 1", r"signals': a table is needed"),
+        ("worm = 144", '[[joint]]\nname = "base"', r"joint\[1\].name': two joints are called"),
         ("[robot]", "[robots]", "robots"),
         ("[[joint]]", "[[joint]", "is no TOML"),
     ],
@@ -110,12 +110,12 @@ def test_so_many_joints_and_not_one_more(tmp_path: Path) -> None:
     assert len(load_description(_file(tmp_path, text)).joints) == MAX_JOINTS
     with pytest.raises(FileError, match="joint"):
         load_description(_file(tmp_path, text + '[[joint]]\nname = "last"\n'))
-    with pytest.raises(FileError, match="one .*joint.* at least is needed"):
+    with pytest.raises(FileError, match=r"one .*joint.* at least is needed"):
         load_description(_file(tmp_path, "joint = []\n"))
 
 
 def test_only_some_joints_in_the_order_of_the_file() -> None:
     assert WHOLE.only(None) == WHOLE.only([]) == WHOLE
     assert [j.name for j in WHOLE.only(["wrist", "base"]).joints] == ["base", "wrist"]
-    with pytest.raises(ArgumentError, match="no joint 'wirst'.*wrist.*; the joints are base, "):
+    with pytest.raises(ArgumentError, match=r"no joint 'wirst'.*wrist.*; the joints are base, "):
         WHOLE.only(["wirst"])

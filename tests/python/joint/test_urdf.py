@@ -60,7 +60,7 @@ def test_joints_that_turn_and_their_ratios(tmp_path: Path) -> None:
 def test_what_is_wrong_is_named(tmp_path: Path, old: str, new: str, says: str | None) -> None:
     if says is None:
         none = FILE.replace(old, new).replace("continuous", new)
-        with pytest.raises(FileError, match="no joint that turns .*revolute or continuous"):
+        with pytest.raises(FileError, match=r"no joint that turns .*revolute or continuous"):
             _load(tmp_path, none)
         with pytest.raises(FileError, match="begins with <sdf>, not with <robot>"):
             _load(tmp_path, "<sdf></sdf>")

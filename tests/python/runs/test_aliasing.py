@@ -237,3 +237,68 @@ def test_one_grid_and_few_places_leave_aliases():
     few = np.random.default_rng(3).uniform(0.0, 360.0, 9)
     for theta in (grid, few):
         assert not verified_positions(ta.CalibrationRun(theta, theta, 360.0)).between
+
+
+@pytest.mark.parametrize("n", [5, 36, 37])
+@pytest.mark.parametrize("shift", [0.0, 0.3])
+def test_orders_are_alike_where_their_cosines_are(n, shift):
+    """Slow: columns of both phases at the positions, one against the other."""
+    turns = (np.arange(n) + shift) / n
+    found = distinct_positions(ta.CalibrationRun(turns, turns, period=1.0))
+    assert (len(found), found.divisions, found.highest_order) == (n, n, (n - 1) // 2)
+    others = np.arange(0.0, 3.0 * n)
+    for order in (1.0, 3.0, n + 2.0, 2.5):
+        wave = np.exp(2j * np.pi * order * found.turns)
+        slow = [
+            max(
+                abs(np.mean(wave * np.exp(-2j * np.pi * m * found.turns))),
+                abs(np.mean(wave * np.exp(2j * np.pi * m * found.turns))),
+            )
+            for m in others
+        ]
+        np.testing.assert_allclose(position_coherence(found, order, others), slow, atol=1e-9)
+    spectrum = [abs(np.exp(2j * np.pi * m * found.turns).mean()) for m in range(2 * n + 1)]
+    np.testing.assert_allclose(found.spectrum(2 * n), spectrum, atol=1e-9)
+    rows = np.array([3, 0, 3])
+    np.testing.assert_array_equal(found.of_rows(rows).index, found.index[rows])
+
+
+def test_positions_in_words_and_their_span():
+    def described(turns):
+        turns = np.asarray(turns)
+        found = distinct_positions(ta.CalibrationRun(turns, turns, period=1.0))
+        return found.describe(), found.span
+
+    assert described([0.25]) == ("1 distinct position", 1.0)
+    assert described(np.arange(36) / 36.0) == ("36 distinct positions, 10 deg apart", 1.0)
+    two = np.concatenate([np.arange(12) / 12.0, np.arange(12) / 12.0 + 0.01])
+    assert described(two)[0] == "24 distinct positions: 2 grids of 30 deg, shifted by 0, 3.6 deg"
+    arc, span = described(np.linspace(0.0, 0.5, 40))
+    assert arc == "40 distinct positions over 180 deg"
+    assert span == pytest.approx(0.5)
+    # A gap of 20 degrees, or of three usual ones, is no missing travel.
+    for gap, whole in ((19.9, True), (20.1, False)):
+        assert (described(np.linspace(0.0, 1.0 - gap / 360.0, 200))[1] == 1.0) == whole
+    for gaps, whole in ((2.99, True), (3.01, False)):
+        assert (described(np.linspace(0.0, 9.0, 10) / (9.0 + gaps))[1] == 1.0) == whole
+
+
+def test_the_share_of_energy_near_the_end():
+    assert energy_near_nyquist([1, 2, 3, 4], [1.0, 2.0, 3.0, 4.0], 4) == pytest.approx(25 / 30)
+    assert energy_near_nyquist([1, 2, 3], [1.0, 2.0, 3.0], 3) == pytest.approx(13 / 14)
+    assert energy_near_nyquist([1], [0.0], 3) == 0.0
+
+
+def test_a_turn_that_closes_from_both_sides_of_its_tolerance():
+    slip = np.array([0.0, 0.0, 0.0, 0.25])
+    for off, closes in ((0.009, True), (0.011, False)):
+        reference = np.array([0.0, 120.0, 240.0, 360.0 + off])
+        run = ta.CalibrationRun(reference, reference + slip, 360.0)
+        assert closure_errors(run).tolist() == (pytest.approx([0.25]) if closes else [])
+        back = ta.CalibrationRun(-reference, -reference + slip, 360.0)
+        assert closure_errors(back).tolist() == (pytest.approx([0.25]) if closes else [])
+    wide = closure_errors(run, tolerance=0.02)
+    assert wide == pytest.approx([0.25])
+    assert closure_errors(ta.CalibrationRun([0.0, 360.0], [0.0, 360.0], 360.0)).size == 0
+    half = np.array([0.0, 90.0, 180.0])
+    assert closure_errors(ta.CalibrationRun(half, half, 360.0)).size == 0

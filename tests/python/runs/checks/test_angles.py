@@ -1,0 +1,238 @@
+"""Faults of the two angles, of rows and of extent: each from both sides of its bound."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from trueangle.runs.checks.angles import (
+    mixed_units,
+    ratio_of,
+    suggestion,
+    swapped,
+    wrapped,
+    wrong_ratio,
+)
+from trueangle.runs.checks.extent import Extent, extent_of, verdicts
+from trueangle.runs.checks.fault import DataFault
+from trueangle.runs.checks.record import Record
+from trueangle.runs.checks.rows import duplicate_rows, duplicate_runs, unsorted_time
+
+SWEEP = np.linspace(3.0, 303.0, 160)
+
+
+def record(reference: np.ndarray, indicated: np.ndarray | None = None, label: str = "1", **more):
+    indicated = reference + 0.5 if indicated is None else indicated
+    return Record(label, reference, indicated, np.arange(11, 11 + reference.size), **more)
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+@pytest.mark.parametrize(
+    ("size", "says"),
+    [
+        (1.149, "the indicated angle {}"),
+        (0.851, "the indicated angle {}"),
+        (np.pi / 180.0, "indicated: radians in a column of degrees"),
+        (180.0 / np.pi, "reference: radians in a column of degrees"),
+        (1.0 / 360.0, "indicated: turns in a column of degrees"),
+        (360.0 * 1.009, "reference: turns in a column of degrees"),
+        (2.0 * np.pi * 0.991, "reference: turns in a column of radians"),
+        (2.0 * np.pi * 1.011, "a gear of ratio 70/11"),
+        (100.0, "a gear of ratio 100 between"),
+        (50.5, "a gear of ratio 101/2 between"),
+        (7.3, "a gear of ratio 73/10 between"),
+        (1.16, "the indicated angle moves 1.16 times as far"),
+        (2.0 * 1.0019, "a gear of ratio 2 between"),
+        (0.0123, "the indicated angle moves 0.0123 times as far"),
+    ],
+)
+def test_what_a_ratio_suggests(size: float, says: str, sign: float) -> None:
+    found = suggestion(sign * size)
+    near = says.endswith("{}")
+    way = "is reduced to the output" if sign > 0 else "counts the other way"
+    assert found.startswith("a gear of ratio" if "70/11" in says else says.format(way))
+    assert near or ("other way" in found) == (sign < 0)
+    assert suggestion(None) == "the joint hardly moved"
+
+
+def test_the_ratio_is_the_median_of_the_runs() -> None:
+    runs = [record(SWEEP, k * SWEEP) for k in (1.0, 3.0, 2.0)]
+    assert ratio_of(runs) == pytest.approx(2.0)
+    for travel, told in ((5.01, True), (4.99, False)):
+        assert (ratio_of([record(np.linspace(0.0, travel, 20))]) is not None) == told
+    for step, told in ((89.0, True), (91.0, False)):
+        assert (ratio_of([record(np.arange(12) * step)]) is not None) == told
+    assert ratio_of([record(np.array([0.0, 5.0, 10.0]))]) is None
+    assert ratio_of([record(np.array([0.0, 5.0, 10.0, 15.0]))]) == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize(
+    ("slope", "kind"),
+    [(1.149, None), (0.851, None), (1.151, "wrong_gear_ratio"), (0.849, "wrong_gear_ratio"),
+     (-1.149, "wrong_sign"), (-0.851, "wrong_sign"), (-1.151, "wrong_gear_ratio")],
+)  # fmt: skip
+def test_signs_and_ratios_that_are_wrong(slope: float, kind: str | None) -> None:
+    runs = [record(SWEEP, slope * SWEEP, "a"), record(SWEEP, SWEEP, "b")]
+    found = list(wrong_ratio(runs))
+    assert [(f.fault, f.runs, f.rows) for f in found] == ([(kind, ("a",), ())] if kind else [])
+    if kind:
+        assert found[0].unusable
+        assert "run a" in found[0].says
+        assert "all runs" in next(iter(wrong_ratio(runs[:1]))).says
+    if kind == "wrong_gear_ratio":
+        assert f"{slope:.6g} times" in found[0].says
+
+
+def test_radians_among_degrees() -> None:
+    other = record(np.radians(SWEEP), label="r")
+    (found,) = mixed_units([record(SWEEP), other, record(SWEEP, label="3")])
+    assert (found.fault, found.runs, found.rows) == ("mixed_units", ("r",), ())
+    for factor, told in ((1.3, True), (1.4, False), (0.7, True), (0.6, False)):
+        scaled = record(np.radians(SWEEP) * factor, label="r")
+        assert bool(list(mixed_units([record(SWEEP), scaled]))) == told
+    short = SWEEP[:30] * 0.1
+    assert not list(mixed_units([record(short), record(np.radians(short), label="r")]))
+    part = SWEEP.copy()
+    part[80:120] = np.radians(part[80:120])
+    (found,) = mixed_units([record(part)])
+    assert found.rows == tuple(range(11 + 80, 11 + 120))
+    assert "from about row 91" in found.says
+    assert not list(mixed_units([record(part[:31])]))
+    assert not list(mixed_units([record(np.zeros(64))]))
+
+
+def test_a_reference_that_wraps_at_no_turn() -> None:
+    angle = np.linspace(0.0, 700.0, 400)
+    for period, told in ((180.0, True), (300.0, True), (360.0, False)):
+        (found,) = list(wrapped([record(np.mod(angle, period), angle)])) or (None,)
+        assert (found is not None) == told
+        if found:
+            jumps = np.flatnonzero(np.diff(np.floor(angle / period))) + 1
+            assert found.rows == tuple(11 + jumps)
+            assert f"wraps after {period:.4g} deg" in found.says or "wraps after" in found.says
+    wraps = np.mod(angle, 180.0)
+    assert not list(wrapped([record(wraps[:7], angle[:7])]))
+    # A slip in the middle of the range, and one that closes up again, are no wraps.
+    slip = angle + np.where(angle > 200.0, -90.0, 0.0)
+    assert not list(wrapped([record(slip, angle)]))
+    assert not list(wrapped([record(np.mod(angle, 180.0), np.mod(angle, 180.0))]))
+
+
+def test_a_reference_much_noisier_than_the_joint() -> None:
+    rng = np.random.default_rng(1)
+    steps = SWEEP + rng.uniform(-0.5, 0.5, SWEEP.size)
+    fine = 0.002 * rng.normal(size=SWEEP.size)
+    time = np.interp(steps, SWEEP, np.arange(SWEEP.size) * 0.1)
+    for factor, told in ((14.0, True), (7.0, False)):
+        rough = steps + factor * 0.002 * rng.normal(size=SWEEP.size)
+        found = list(swapped([record(rough, steps + fine, time=time)]))
+        assert bool(found) == told
+    assert found == []
+    many = steps + 0.1 * rng.normal(size=SWEEP.size)
+    (found,) = swapped([record(many, steps + fine, time=time)])
+    assert found.fault == "swapped_channels"
+    assert not list(swapped([record(many[:29], (steps + fine)[:29], time=time[:29])]))
+    assert list(swapped([record(many[:30], (steps + fine)[:30], time=time[:30])]))
+    # At even counts of the joint nothing is told of its noise.
+    assert not list(swapped([record(SWEEP + 0.1 * rng.normal(size=160), SWEEP)]))
+
+
+def test_rows_and_runs_that_are_there_twice() -> None:
+    time = np.arange(160.0)
+    (found,) = duplicate_runs([record(SWEEP, label=k) for k in "abc"])
+    assert found.runs == ("a", "b", "c")
+    assert "runs a, b and c hold" in found.says
+    assert not list(duplicate_runs([record(SWEEP), record(SWEEP[::-1], label="b")]))
+    assert not list(duplicate_runs([record(SWEEP)]))
+    assert not list(duplicate_runs([record(SWEEP[:2], label=k) for k in "ab"]))
+    assert list(duplicate_runs([record(SWEEP[:3], label=k) for k in "ab"]))
+    assert not list(duplicate_runs([record(SWEEP, np.zeros(160), label=k) for k in "ab"]))
+    twice = np.insert(np.arange(160), [20, 50], [19, 3])
+    (found,) = duplicate_rows([record(SWEEP[twice], time=time[twice])])
+    assert found.rows == (11 + 20, 11 + 51)
+    assert found.says.startswith("2 rows of run 1 (first: row 31)")
+    one = np.insert(np.arange(160), 20, 19)
+    assert next(iter(duplicate_rows([record(SWEEP[one], time=time[one])]))).says.startswith(
+        "1 row "
+    )
+    assert not list(duplicate_rows([record(SWEEP[twice])]))
+    assert not list(duplicate_rows([record(SWEEP, time=time)]))
+    assert not list(duplicate_rows([record(SWEEP[one], time=np.arange(161.0))]))
+    back = time.copy()
+    back[[30, 90]] = 5.5
+    (found,) = unsorted_time([record(SWEEP, time=back)])
+    assert found.rows == (41, 101)
+    assert "2 times (first in row 41: 5.5 s after 29 s)" in found.says
+    assert not list(unsorted_time([record(SWEEP, time=np.minimum(time, 90.0)), record(SWEEP)]))
+
+
+def test_a_fault_lists_a_hundred_rows_and_counts_all() -> None:
+    for size in (100, 101):
+        found = DataFault.of("stale_samples", ["a", "a", "b"], range(size), "x", "y")
+        told = found.to_dict()
+        assert (len(told["rows"]), told["rows_total"], told["runs"]) == (100, size, ["a", "b"])
+        assert not told["unusable"]
+        assert str(found) == "stale_samples: x; y"
+
+
+@pytest.mark.parametrize("shift", [0.0, 200.0, -170.0])
+def test_the_span_is_the_turn_less_its_widest_gap(shift: float) -> None:
+    for span in (90.0, 350.0):
+        places = np.mod(np.linspace(0.0, span, 200) + shift, 360.0)
+        assert extent_of([record(places)]).span_deg == pytest.approx(span)
+    grid = np.arange(36) * 10.0 + shift
+    assert extent_of([record(grid)]).span_deg == 360.0
+    for left_out, span in ((1, 360.0), (2, 330.0)):
+        assert extent_of([record(grid[left_out:])]).span_deg == pytest.approx(span)
+
+
+def test_levels_directions_and_speeds_of_the_runs() -> None:
+    time = np.arange(160) * 0.1
+    runs = [
+        record(SWEEP, time=time, torque=np.full(160, 3.0), temperature=np.full(160, 20.0)),
+        record(SWEEP[::-1], time=time, torque=np.full(160, 3.04), temperature=np.full(160, 21.1)),
+        record(SWEEP, time=0.5 * time, torque=np.full(160, -2.0), mount=np.full(160, 30.0)),
+    ]
+    found = extent_of(runs)
+    assert (found.readings, found.runs, found.timed) == (480, 3, True)
+    assert found.turns == pytest.approx(300.0 / 360.0)
+    assert found.directions == (-1, 1)
+    speed = 300.0 / 15.9
+    assert found.speeds == (float(f"{speed:.4g}"), float(f"{2 * speed:.4g}"))
+    assert found.loads == (-2.0, 3.02)
+    assert found.temperatures == (20.0, 21.1)
+    assert found.mounts == (30.0,)
+    assert extent_of(runs[:1]).directions == (1,)
+    assert extent_of(runs[1:2]).directions == (-1,)
+    assert not extent_of([runs[0], record(SWEEP)]).timed
+    given = extent_of([record(SWEEP, time=time, velocity=np.full(160, -7.0))])
+    assert given.speeds == (7.0,)
+    for gap, levels in ((1.01, 2), (0.99, 1)):
+        some = [record(SWEEP, temperature=np.full(160, t)) for t in (20.0, 20.0 + gap)]
+        assert len(extent_of(some).temperatures) == levels
+
+
+def test_what_can_and_cannot_be_known() -> None:
+    def told(**changes) -> tuple[list[str], list[str]]:
+        whole = {"readings": 900, "runs": 3, "span_deg": 350.0, "turns": 2.0,
+                 "directions": (-1, 1), "speeds": (1.0, 2.0), "loads": (1.0, 2.0),
+                 "temperatures": (1.0, 2.0), "mounts": (1.0, 2.0), "timed": True}  # fmt: skip
+        can, cannot = verdicts(Extent(**(whole | changes)))
+        return can, [f"{c['what']}: {c['because']}" for c in cannot]
+
+    can, cannot = told()
+    assert (len(can), cannot) == (8, [])
+    for changes, lost in (
+        ({"span_deg": 349.9}, "over a whole turn: 350 deg of travel"),
+        ({"directions": (1,)}, "reversal error: one direction"),
+        ({"timed": False}, "delay, drift and lines in time: no time stamps"),
+        ({"speeds": (1.0,)}, "delay apart from reversal error or zero: one speed"),
+        ({"loads": (1.0,)}, "compliance: one torque"),
+        ({"temperatures": ()}, "thermal drift: no temperature"),
+        ({"mounts": (1.0,)}, "the reference's own error apart from the joint's: one mount"),
+        ({"runs": 2}, "what changes from run to run: 2 run(s)"),
+    ):
+        fewer, cannot = told(**changes)
+        assert len(fewer) == 7
+        assert len(cannot) == 1
+        assert lost in cannot[0]

@@ -1,0 +1,209 @@
+"""Patterns beside nuisances against plain least squares, and their stated errors."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from trueangle.selfcalibration.dense import (
+    DenseRows,
+    _solve,
+    _triangle,
+    fit_dense,
+    low_frequency_inflation,
+)
+from trueangle.selfcalibration.projected import Projected, Unknown, names_in_words, pairs
+from trueangle.selfcalibration.significance import chosen_orders
+
+N = 300
+COLUMNS = pairs("the encoder", [1, 2])
+
+
+def rows(seed: int, n: int = N) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    rng = np.random.default_rng(seed)
+    x = np.linspace(0.0, 5.0, n)
+    patterns = np.column_stack([f(k * x) for k in (1, 2) for f in (np.cos, np.sin)])
+    nuisances = np.column_stack([np.ones(n), x, rng.normal(size=n)])
+    return patterns, nuisances, rng.normal(size=n)
+
+
+def parts(patterns: np.ndarray, nuisances: np.ndarray, y: np.ndarray, cuts: list[int]) -> list:
+    return [
+        DenseRows(p, q, t)
+        for p, q, t in zip(*(np.split(a, cuts) for a in (patterns, nuisances, y)), strict=True)
+    ]
+
+
+@pytest.mark.parametrize("cuts", [[], [50, 51, 200]])
+@pytest.mark.parametrize("lost", [0.0, 30.0])
+def test_a_fit_is_least_squares_however_it_is_cut(cuts: list[int], lost: float) -> None:
+    patterns, nuisances, y = rows(1)
+    found = fit_dense(parts(patterns, nuisances, y, cuts), COLUMNS, freedom_lost=lost)
+    z = np.hstack([nuisances, patterns])
+    b = np.linalg.lstsq(z, y, rcond=None)[0]
+    left = y - z @ b
+    variance = left @ left / (N - 7 - lost)
+    covariance = variance * np.linalg.inv(z.T @ z)
+    np.testing.assert_allclose(found.nuisances, b[:3], atol=1e-9)
+    np.testing.assert_allclose(found.patterns, b[3:], atol=1e-9)
+    np.testing.assert_allclose(found.residuals, left, atol=1e-9)
+    assert found.projected.variance == pytest.approx(variance)
+    assert found.projected.freedom == N - 7 - lost
+    assert not found.correlated
+    assert found.random_variance == 0.0
+    np.testing.assert_allclose(found.covariance, covariance[3:, 3:], rtol=1e-7, atol=1e-14)
+    np.testing.assert_allclose(found.nuisance_std, np.sqrt(np.diag(covariance)[:3]), rtol=1e-7)
+    retained = 1.0 / (np.diag(np.linalg.inv(z.T @ z))[3:] * (patterns**2).sum(axis=0))
+    np.testing.assert_allclose(found.projected.retained(), retained, rtol=1e-7)
+    np.testing.assert_allclose(found.projected.retained([2]), retained[2:3], rtol=1e-7)
+    assert found.projected.rank == 4
+    assert found.projected.seen.all()
+    assert found.projected.null_vectors() == []
+    assert low_frequency_inflation(found) == 1.0
+
+
+def test_stated_errors_hold_with_correlated_noise_too() -> None:
+    for memory in (0.0, 0.7):
+        pulls, slow, correlated = [], [], 0
+        for seed in range(120):
+            patterns, nuisances, e = rows(seed, 1200)
+            fast = np.column_stack([f(k * np.linspace(0, 5, 1200)) for k in (60, 90)
+                                    for f in (np.cos, np.sin)])  # fmt: skip
+            for k in range(1, e.size):
+                e[k] += memory * e[k - 1]
+            found = fit_dense(parts(fast, nuisances, e, [600]), COLUMNS)
+            pulls.append(found.patterns / np.sqrt(np.diag(found.covariance)))
+            found = fit_dense(parts(patterns, nuisances, e, [600]), COLUMNS)
+            wide = low_frequency_inflation(found)
+            slow.append(found.patterns / np.sqrt(np.diag(found.projected.covariance) * wide))
+            correlated += found.correlated
+        assert correlated == (120 if memory else 0)
+        assert abs(np.mean(pulls)) < 0.15
+        assert 0.85 < np.std(pulls) < 1.15
+        assert 0.8 < np.std(slow) < 1.15
+
+
+def test_blocks_of_neighbours_by_their_definition() -> None:
+    patterns, nuisances, e = rows(3, 800)
+    for k in range(1, 800):
+        e[k] += 0.8 * e[k - 1]
+    found = fit_dense(parts(patterns, nuisances, e, [410]), COLUMNS)
+    assert found.correlated
+    through = np.linalg.lstsq(nuisances, patterns, rcond=None)[0]
+    x = patterns - nuisances @ through
+    starts = [*range(0, 410, 20), *range(410, 800, 20)]
+    stops = [*starts[1:], 800]
+    scores = np.array([x[a:b].T @ found.residuals[a:b] for a, b in zip(starts, stops, strict=True)])
+    bread = np.linalg.inv(x.T @ x)
+    n = len(scores)
+    np.testing.assert_allclose(
+        found.covariance, bread @ scores.T @ scores @ bread * n / (n - 1.0), rtol=1e-6, atol=1e-12
+    )
+    left = found.residuals
+    means = left.reshape(40, 20).mean(axis=1)
+    blocks = 20.0 * means @ means / 36.0 / found.projected.variance
+    r = left[1:] @ left[:-1] / (left @ left)
+    assert low_frequency_inflation(found) == pytest.approx(max(blocks, (1 + r) / (1 - r)))
+
+
+@pytest.mark.parametrize("size", [0.0, 3.0])
+def test_a_random_term_has_the_variance_that_the_likelihood_says(size: float) -> None:
+    """Runs with a slope of their own: by the evidence of the dense covariance."""
+    rng = np.random.default_rng(4)
+    runs, n = 12, 10
+    patterns, _, y = rows(5, runs * n)
+    ramp = np.tile(np.linspace(-1.0, 1.0, n), runs)
+    nuisances = np.zeros((runs * n, 1 + runs))
+    nuisances[:, 0] = 1.0
+    for j in range(runs):
+        part = slice(j * n, (j + 1) * n)
+        nuisances[part, 1 + j] = ramp[part]
+        y[part] += size * rng.normal() * ramp[part]
+    found = fit_dense(parts(patterns, nuisances, y, [50]), COLUMNS, random=range(1, 1 + runs))
+    fixed = np.column_stack([np.ones(runs * n), patterns])
+
+    def restricted(variance: float) -> float:
+        v = np.eye(runs * n) + variance * nuisances[:, 1:] @ nuisances[:, 1:].T
+        inverse = np.linalg.inv(v)
+        info = fixed.T @ inverse @ fixed
+        left = y - fixed @ np.linalg.solve(info, fixed.T @ inverse @ y)
+        freedom = runs * n - 5
+        twice = freedom * np.log(left @ inverse @ left / freedom)
+        return -0.5 * (twice + np.linalg.slogdet(v)[1] + np.linalg.slogdet(info)[1])
+
+    best = max(np.geomspace(0.1, 100.0, 13), key=restricted)
+    if size:
+        assert 0.5 < found.random_variance / best < 2.0
+        v = np.eye(runs * n) + found.random_variance * nuisances[:, 1:] @ nuisances[:, 1:].T
+        inverse = np.linalg.inv(v)
+        gls = np.linalg.solve(fixed.T @ inverse @ fixed, fixed.T @ inverse @ y)
+        np.testing.assert_allclose(found.patterns, gls[1:], atol=1e-7)
+        assert found.projected.freedom == runs * n - 5
+    else:
+        assert found.random_variance < 0.1
+
+
+def test_the_evidence_is_the_restricted_likelihood() -> None:
+    """Up to a constant; three runs whose offsets are nearly what a pattern is."""
+    rng = np.random.default_rng(8)
+    runs, n = 3, 15
+    patterns, _, y = rows(9, runs * n)
+    patterns = patterns[:, :2]
+    nuisances = np.column_stack([np.ones(runs * n), np.kron(np.eye(runs), np.ones((n, 1)))])
+    y = y + np.repeat(rng.normal(size=runs), n)
+    fixed = np.column_stack([np.ones(runs * n), patterns])
+    found, expected = [], []
+    for variance in (0.05, 0.5, 5.0, 500.0):
+        v = np.eye(runs * n) + variance * nuisances[:, 1:] @ nuisances[:, 1:].T
+        inverse = np.linalg.inv(v)
+        info = fixed.T @ inverse @ fixed
+        left = y - fixed @ np.linalg.solve(info, fixed.T @ inverse @ y)
+        freedom = runs * n - 3
+        twice = freedom * np.log(left @ inverse @ left / freedom)
+        expected.append(-0.5 * (twice + np.linalg.slogdet(v)[1] + np.linalg.slogdet(info)[1]))
+        solved = _solve(
+            _triangle(parts(patterns, nuisances, y, [20])), 4, 2, [1, 2, 3], variance, 45
+        )
+        assert solved.freedom == freedom
+        assert solved.noise * freedom == pytest.approx(left @ inverse @ left, rel=1e-9)
+        found.append(solved.evidence)
+    np.testing.assert_allclose(np.diff(found), np.diff(expected), atol=1e-8)
+
+
+def test_combinations_that_nothing_shows_are_named() -> None:
+    patterns, nuisances, y = rows(6)
+    twice = np.column_stack([patterns, patterns[:, :1] * 2.0, nuisances[:, 1:2]])
+    columns = [*COLUMNS, Unknown("the motor", 1.0, "cos"), Unknown("the ratio", 0.0, "")]
+    found = fit_dense(parts(twice, nuisances, y, []), columns)
+    projected = found.projected
+    assert projected.seen.tolist() == [False, True, True, True, False, False]
+    assert projected.rank == 4
+    assert projected.retained()[[0, 4, 5]].tolist() == [0.0, 0.0, 0.0]
+    names = [sorted(name for name, _ in shares) for shares in projected.null_vectors()]
+    assert sorted(names) == [["order 1 of the encoder", "order 1 of the motor"], ["the ratio"]]
+    alone = fit_dense(parts(patterns, nuisances, y, []), COLUMNS)
+    np.testing.assert_allclose(found.residuals, alone.residuals, atol=1e-8)
+    assert projected.index("the encoder", 2) == (2, 3)
+    assert names_in_words(projected.null_vectors()[0]).count(" together with ") <= 1
+    assert names_in_words([(str(k), 1.0) for k in range(6)]) == " together with ".join("0123")
+
+
+def test_orders_stand_out_of_their_errors_as_often_as_chance_says() -> None:
+    """One in a hundred of noise, of as many orders as are tried."""
+    rng = np.random.default_rng(7)
+    orders = list(range(1, 11))
+    columns = tuple(pairs("a", orders) + pairs("b", orders))
+    nothing = Projected(columns, np.eye(40), np.zeros(40), np.ones(40), 1.0, 1.0)
+    half = rng.normal(size=(40, 40)) * 0.3 + np.eye(40)
+    covariance = half @ half.T
+    told = [
+        bool(chosen_orders(nothing, half @ rng.normal(size=40), covariance, orders, "b"))
+        for _ in range(600)
+    ]
+    assert 1 <= sum(told) <= 16  # of 6, four deviations
+    limit = 2.0 * np.log(10 / 0.01)
+    for size, kept in ((limit * 0.999, ()), (limit * 1.001, (3,))):
+        at = np.zeros(40)
+        at[columns.index(Unknown("b", 3.0, "sin"))] = np.sqrt(size)
+        assert chosen_orders(nothing, at, np.eye(40), orders, "b") == kept
+        assert chosen_orders(nothing, at, np.eye(40), orders, "a") == ()
