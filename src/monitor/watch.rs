@@ -7,6 +7,9 @@ use super::window::Window;
 /// Windows after which their mean is held against the model.
 const FIRST: f64 = 8.0;
 
+/// Turns that the sum of a window's steps may lack of whole turns.
+const ROUNDING: f64 = 1e-9;
+
 /// Bins beyond which a double has no place within one.
 const MOST: f64 = (1u64 << 50) as f64;
 
@@ -151,7 +154,7 @@ impl Monitor {
             if moved >= 1.0 {
                 self.anchor = Some(place);
                 self.travel += moved / count;
-                if self.travel >= self.every {
+                if self.travel + ROUNDING >= self.every {
                     self.window.put(std::mem::take(&mut held));
                     if let Some(found) = self.close(reading)
                         && !(alarms && found.moved.is_empty() && found.unlike.is_empty())
@@ -295,6 +298,24 @@ mod tests {
             let closed = watched.update(&angle, &vec![0.0; angle.len()], false);
             assert_eq!(closed.len(), 10 - usize::from(closed[0].reading > 360));
             assert_eq!(watched.windows(), closed.len() as u64);
+        }
+    }
+
+    /// Angles within a turn, and errors a turn off, say the same as those that go on.
+    #[test]
+    fn turns_do_not_matter() {
+        let angle: Vec<f64> = (0..40 * 120).map(|i| 3.0 * f64::from(i)).collect();
+        let error: Vec<f64> = angle.iter().map(|x| (0.31 * x).sin()).collect();
+        let within: Vec<f64> = angle.iter().map(|x| x % 360.0).collect();
+        let off: Vec<f64> = error.iter().map(|e| e + 360.0).collect();
+        let whole = monitor().update(&angle, &error, false);
+        let other = monitor().update(&within, &off, false);
+        assert_eq!(whole.len(), other.len());
+        for (a, b) in whole.iter().zip(&other) {
+            assert_eq!((a.reading, a.readings), (b.reading, b.readings));
+            for (p, q) in a.coefficients.iter().zip(&b.coefficients) {
+                assert!((p - q).abs() < 1e-6, "{p} {q}");
+            }
         }
     }
 

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Iterator
 from functools import partial
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..estimation.moments import Moments
 from ..fitting.fit import fit
 from ..fleets.fleet import fleet
+from ..model.model import HarmonicModel
 from ..monitoring.monitor import Monitor
 from ..runs.run import CalibrationRun
 from .evaluation import harmonics
@@ -19,6 +22,8 @@ from .interleaved import Timing, interleave
 from .scaling import Measured
 
 __all__ = ["READINGS_EACH", "WINDOWS", "by_units", "by_windows"]
+
+Array = NDArray[np.float64]
 
 #: Readings and orders of each unit.
 READINGS_EACH: Final = 180
@@ -58,14 +63,12 @@ def by_windows(readings: int, rounds: int = 5) -> list[Measured]:
     noise = 1e-5 * rng.normal(size=readings)
     found = []
     for window in WINDOWS:
-        angle = np.arange(readings) * (2.0 * np.pi / window)
+        angle: Array = np.linspace(0.0, 2.0 * math.pi * readings / window, readings, endpoint=False)
         error = np.asarray(model.error(angle)) + noise
         timings = interleave(
             {
-                "moments": lambda a=angle, e=error: Moments(range(1, WATCHED + 1)).update(
-                    a, e, threads=1
-                ),
-                f"watch, {window}": lambda a=angle, e=error: Monitor(model).update(a, e),
+                "moments": partial(_summed, angle, error),
+                f"watch, {window}": partial(_watched, model, angle, error),
             },
             rounds,
         )
@@ -73,10 +76,18 @@ def by_windows(readings: int, rounds: int = 5) -> list[Measured]:
     return found
 
 
+def _summed(angle: Array, error: Array) -> None:
+    Moments(range(1, WATCHED + 1)).update(angle, error, threads=1)
+
+
+def _watched(model: HarmonicModel, angle: Array, error: Array) -> None:
+    Monitor(model).update(angle, error)
+
+
 def _units(count: int) -> Iterator[CalibrationRun]:
     """Units of one pattern and a spread, one after the other; seed 0."""
     rng = np.random.default_rng(0)
-    angle = np.arange(READINGS_EACH) * (2.0 * np.pi / READINGS_EACH)
+    angle: Array = np.linspace(0.0, 2.0 * math.pi, READINGS_EACH, endpoint=False)
     orders = np.arange(1, ORDERS + 1)[:, None]
     columns = np.concatenate([np.cos(orders * angle), np.sin(orders * angle)])
     for unit in range(count):

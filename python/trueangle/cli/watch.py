@@ -10,8 +10,10 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ..support.files import PICTURE
 from .error_units import add_errors_in, errors_in
-from .paths import Input
+from .paths import Input, Output
+from .pictures import save_picture
 from .signal_options import add_signals, reading
 
 if TYPE_CHECKING:
@@ -60,6 +62,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     add_signals(parser)
     add_errors_in(parser)
+    add(
+        "--plot",
+        type=Output.of(PICTURE),
+        metavar="FILE",
+        help="draw the charts of all windows, at the end (needs trueangle[plot])",
+    )
     add("--json", action="store_true", help="print one object per window and line")
 
 
@@ -86,13 +94,19 @@ def run(args: argparse.Namespace) -> int:
 
     model = load_model(args.model)
     watched = Monitor(model, every=args.every, shift=args.shift, run_length=args.run_length)
-    alarmed = False
+    alarmed, kept = False, []
     for batch in _batches(args, model):
         for window in watched.windows_of(*batch):
             alarmed |= window.alarm
+            if args.plot is not None:
+                kept.append(window)
             print(_line(window, model, args), flush=True)
     if not watched.windows:
         print("trueangle: warning: not one window ended", file=sys.stderr)
+    if kept:
+        from ..plots.watchedwindows import watched_windows
+
+        save_picture(watched_windows(kept, model.period, errors_in(args)), args.plot)
     return ALARMED if alarmed else 0
 
 

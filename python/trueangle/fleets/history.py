@@ -16,7 +16,7 @@ from ..support.distributions import f_quantile
 from ..support.runlength import chart_limit
 from .calibration import Calibration, columns_of
 from .charts import ALLOWANCE, LENGTH, charted
-from .outliers import LEVEL, Deviates, deviates
+from .outliers import LEVEL, Deviates, deviates, weights_of
 
 __all__ = ["Change", "HistoryOrder", "HistoryRow", "changes_of"]
 
@@ -126,7 +126,7 @@ def changes_of(
     if len(dated) < _FEWEST:
         return []
     values, own, zeros, zero_own = _differences(dated, period)
-    pattern = deviates(values, own, aligned=False, level=0.5 * LEVEL)
+    pattern = deviates(values, own, False, 0.5 * LEVEL, weights_of(orders))
     # The zero has no mean of its own where every remounting is new: a common one is the fixture's.
     zero = deviates([zeros], [zero_own], aligned=True, level=0.5 * LEVEL)
     limit = f_quantile(1.0 - 0.5 * LEVEL / pattern.chance.size, 2.0, 2.0 * (len(dated) - 1.0)) * 2.0

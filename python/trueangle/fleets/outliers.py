@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from .variance import robust_variance
 
-__all__ = ["LEVEL", "Deviates", "deviates"]
+__all__ = ["LEVEL", "Deviates", "deviates", "weights_of"]
 
 Array = NDArray[np.float64]
 
@@ -22,6 +22,9 @@ LEVEL: Final = 0.01
 #: that hide behind others (a later step, where an earlier one told none), the rest by themselves.
 _BY_ORDER: Final = 0.9
 _HIDDEN: Final = 0.2
+
+#: Shares of the level of those orders of the output in which damage shows: eccentricity and tilt.
+_DAMAGE: Final = {1.0: 0.4, 2.0: 0.2}
 
 #: Of this share of the units, at most, an outlier can be told: the others are what it is told by.
 _MOST: Final = 0.25
@@ -63,8 +66,26 @@ class Deviates(NamedTuple):
         return found or [int(np.argmin(rows))]
 
 
+def weights_of(orders: Array) -> Array:
+    """Shares of the level by order: of damage the most shows in eccentricity, then in tilt.
+
+    Examples
+    --------
+    >>> weights_of(np.array([1.0, 2.0, 5.0, 8.0])).round(3).tolist()
+    [0.4, 0.2, 0.2, 0.2]
+    """
+    given = np.array([_DAMAGE.get(float(order), 0.0) for order in orders])
+    others = given == 0.0
+    given[others] = (1.0 - sum(_DAMAGE.values())) / max(int(others.sum()), 1)
+    return np.asarray(given / given.sum())
+
+
 def deviates(
-    values: Sequence[Array], own: Sequence[Array], aligned: bool, level: float = LEVEL
+    values: Sequence[Array],
+    own: Sequence[Array],
+    aligned: bool,
+    level: float = LEVEL,
+    shares: Array | None = None,
 ) -> Deviates:
     r"""Extreme studentized deviates (Rosner 1983), of several orders together.
 
@@ -75,7 +96,8 @@ def deviates(
               e_u = \frac{w_u |b_u - \bar b|^2}{1 - h_u}, \qquad N = d (n - 1)
 
     is Fisher's F with d and N - d degrees of freedom for normal units. A unit's chance is that of
-    the smallest of its orders' (Bonferroni) or of all together (Fisher's sum of logarithms). The
+    the smallest of its orders', each over its share of the level (weighted Bonferroni), or of all
+    together (Fisher's sum of logarithms). The
     farthest unit is set aside again and again; as many are outliers as the last whose chance,
     times the units then left, is below the level.
 
@@ -89,6 +111,8 @@ def deviates(
         Whether the units share a mean; else it is 0.
     level : float
         Chance of naming a unit where none is outlying.
+    shares : ndarray, shape (K,), optional
+        Of the level, by order; they sum to 1. Default: all alike.
 
     Notes
     -----
@@ -101,12 +125,13 @@ def deviates(
         1.0 / np.maximum(t + s, 1e-300 + 1e-12 * float(np.mean(v**2)))
         for v, s, t in zip(values, noise, variances, strict=True)
     ]
+    share_of = np.full(len(values), 1.0 / len(values)) if shares is None else shares
     inside = np.ones(n, dtype=bool)
     aside: list[int] = []
     last, first = 0, None
     for step in range(1 + int(_MOST * n)):
         chance, size = _chances(values, weights, inside, aligned)
-        unit = _combined(chance)
+        unit = _combined(chance, share_of)
         first = (chance, size, unit) if first is None else first
         worst = int(np.argmin(np.where(inside, unit, np.inf)))
         share = _HIDDEN if step > last else 1.0 - _HIDDEN
@@ -120,7 +145,7 @@ def deviates(
     outlying[aside[:last]] = True
     chance, size = _chances(values, weights, ~outlying, aligned)
     limit = (1.0 - _HIDDEN) * level / float((~outlying).sum())
-    return Deviates(chance, size, _combined(chance), outlying, variances, limit)
+    return Deviates(chance, size, _combined(chance, share_of), outlying, variances, limit)
 
 
 def _variance(values: Array, own: Array, aligned: bool) -> float:
@@ -167,10 +192,10 @@ def _f_tail(f: Array, d: int, free: Array) -> Array:
     return np.array([2.0 * student_tail(t, v) for t, v in pairs])
 
 
-def _combined(chance: Array) -> Array:
+def _combined(chance: Array, shares: Array) -> Array:
     """Chance of a unit by the least of its orders' or by all together."""
     orders = chance.shape[1]
-    least = orders * chance.min(axis=1)
+    least = (chance / shares).min(axis=1)
     if orders == 1:
         return np.asarray(np.minimum(least, 1.0))
     half = -np.log(np.maximum(chance, 1e-300)).sum(axis=1)  # half of a chi-squared of 2 K

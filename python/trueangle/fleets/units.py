@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from ..joint.shafts import ShaftOrders
 from .calibration import Calibration, columns_of, output_orders
 from .noise import Noise, noise_of
-from .outliers import Deviates, deviates
+from .outliers import Deviates, deviates, weights_of
 from .variance import Between, held_out_score, reml
 
 __all__ = ["FEWEST", "Pattern", "Units", "pattern_of"]
@@ -71,7 +71,7 @@ class Pattern(NamedTuple):
 
 def pattern_of(units: Units, aligned: bool) -> Pattern:
     """Outliers, and mean and variance of the others."""
-    found = deviates(units.values, units.own, aligned)
+    found = deviates(units.values, units.own, aligned, shares=weights_of(units.orders))
     if len(units.last) < FEWEST:
         found = found._replace(outlying=np.zeros(len(units.last), dtype=bool))
     few = found.outlying.sum() <= max(1.0, FEW * len(units.last))

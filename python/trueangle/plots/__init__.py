@@ -1,8 +1,8 @@
 """Pictures of runs, fits, order selections, diagnoses and plans.
 
 One file a picture. Every function draws into ``ax`` (a new one when not given) and
-returns it, but `detection`, `fleet_overview`, `fleet_patterns` and `fleet_history`, which make a
-figure; `text_alternative` says in a sentence what
+returns it, but `detection`, `fleet_overview`, `fleet_patterns`, `fleet_history` and
+`watched_windows`, which make a figure; `text_alternative` says in a sentence what
 it shows. Angles are in degrees, errors in arcsec, or in degrees where one reaches a
 degree (``errors_in=`` asks for another unit). Needs ``pip install trueangle[plot]``;
 matplotlib is imported at the first picture.
@@ -27,6 +27,7 @@ from .modelerror import model_error
 from .phasesoverruns import phases_over_runs
 from .planpictures import plan_factors, plan_positions
 from .residualpictures import residuals
+from .watchedwindows import watched_windows
 
 __all__ = [
     "amplitude_spectrum",
@@ -48,6 +49,7 @@ __all__ = [
     "plan_positions",
     "residuals",
     "text_alternative",
+    "watched_windows",
 ]
 
 

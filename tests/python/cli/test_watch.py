@@ -2,6 +2,7 @@
 
 import io
 import json
+import re
 import sys
 
 import numpy as np
@@ -9,6 +10,7 @@ import pytest
 
 import trueangle as ta
 from trueangle.cli import main
+from trueangle.errors import ArgumentError
 
 SEED = 53_101
 
@@ -38,7 +40,7 @@ def test_a_line_a_window_and_the_status(desk, capsys):
     assert main(["watch", "fine.csv", "-m", "m.json"]) == 0
     assert len(capsys.readouterr().out.splitlines()) == 59
     assert main(["watch", "moved.csv", "-m", "m.json"]) == 3
-    assert "ALARM order 1 moved by about" in capsys.readouterr().out
+    assert re.search(r"ALARM order 1 moved by 7\.\d+ arcsec \(\+- ", capsys.readouterr().out)
 
 
 def test_lines_that_arrive_say_the_same(desk, capsys, monkeypatch):
@@ -52,6 +54,22 @@ def test_lines_that_arrive_say_the_same(desk, capsys, monkeypatch):
     assert set(whole[0]) == keys
     assert whole[0]["time_s"] == pytest.approx(9.0, abs=0.3)
     assert [row["order"] for row in whole[0]["orders"]] == [1.0, 2.0]
+
+
+def test_the_charts_are_drawn(desk, capsys):
+    pytest.importorskip("matplotlib")
+    assert main(["watch", "moved.csv", "-m", "m.json", "--plot", "w.svg"]) == 3
+    assert (desk / "w.svg").read_text().count("<path") > 20
+    model = ta.load_model("m.json")
+    angle = np.arange(40 * 90) * 4.0
+    error = model.error(angle) + np.random.default_rng(SEED).normal(0.0, 0.001, angle.size)
+    error += 0.002 * np.cos(np.radians(angle)) * (angle > 30 * 360.0)
+    windows = ta.Monitor(model).windows_of(angle, error)
+    alt = ta.plots.text_alternative(ta.plots.watched_windows(windows, model.period))
+    assert f"{len(windows)} windows" in alt
+    assert "order 1 moved by" in alt
+    with pytest.raises(ArgumentError, match="windows is empty"):
+        ta.plots.watched_windows([], 360.0)
 
 
 def test_longer_windows(desk, capsys):

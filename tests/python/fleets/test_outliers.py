@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import trueangle as ta
-from trueangle.fleets.outliers import deviates
+from trueangle.fleets.outliers import deviates, weights_of
 
 from .made import units
 
@@ -15,27 +15,36 @@ def drawn(rng, count, orders):
     return [rng.normal(size=(count, 2)) for _ in range(orders)]
 
 
-@pytest.mark.parametrize("count", [12, 40])
-def test_clean_fleets_are_told_of_one_in_a_hundred_at_most(count):
+@pytest.mark.parametrize(("count", "orders"), [(12, 3), (40, 3), (40, 17)])
+def test_clean_fleets_are_told_of_one_in_a_hundred_at_most(count, orders):
     print("seed", SEED)
     rng = np.random.default_rng(SEED + count)
-    fleets, own = 800, [np.zeros((count, 2, 2))] * 3
-    told = sum(deviates(drawn(rng, count, 3), own, True).outlying.any() for _ in range(fleets))
+    fleets, own = 800, [np.zeros((count, 2, 2))] * orders
+    shares = weights_of(np.arange(1.0, orders + 1.0))
+    told = sum(
+        deviates(drawn(rng, count, orders), own, True, shares=shares).outlying.any()
+        for _ in range(fleets)
+    )
     # 1 % and three standard deviations of the count.
     assert told <= 0.01 * fleets + 3.0 * np.sqrt(0.01 * fleets)
 
 
-def test_an_eccentric_unit_is_found():
+@pytest.mark.parametrize("orders", [3, 17])
+def test_an_eccentric_unit_is_found(orders):
+    """However many orders are looked at beside that of eccentricity."""
     print("seed", SEED)
     rng = np.random.default_rng(SEED)
-    own, found, others = [np.zeros((40, 2, 2))] * 3, 0, 0
+    own, found, others = [np.zeros((40, 2, 2))] * orders, 0, 0
+    shares = weights_of(np.arange(1.0, orders + 1.0))
     for _ in range(200):
-        values = drawn(rng, 40, 3)
-        values[0][7] = [6.5, 0.0]
-        outlying = deviates(values, own, True).outlying
+        values = drawn(rng, 40, orders)
+        values[0][7] += [6.5, 0.0]
+        outlying = deviates(values, own, True, shares=shares).outlying
         found += outlying[7]
         others += outlying.sum() > 1 and outlying[7]
-    assert found >= 190
+    # 95 %, and three standard deviations of the count.
+    print("found", found)
+    assert found >= 181
     assert others <= 6
 
 
