@@ -74,12 +74,17 @@ def _group(
     )
     chart.whole_axis(low, high, 3 if width < 8.0 else 8)
     for kept, colour, label in ((True, "after", "retained"), (False, "muted", "not retained")):
-        some = [line for line in lines if line.kept is kept]
+        # What is far below every threshold would be half a dot at the border.
+        some = [
+            line
+            for line in lines
+            if line.kept is kept and scale.factor * line.amplitude >= y_range[0]
+        ]
         if some:
             # No stems: on a logarithmic axis their lengths would mean nothing.
             chart.dots(
                 _orders(some),
-                np.maximum(_sizes(some, "amplitude", scale), y_range[0]),
+                _sizes(some, "amplitude", scale),
                 colour=colour,
                 size=7.0,
                 label=_once(label, joined),

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import NoModelError
+from ..support.plainresult import counted
 from .choice import choose_orders, highest_order
 from .colour import noise_beside
 from .loop import followed_orders, followed_share, widened
@@ -285,11 +286,11 @@ def _notes(
         )
     wild = int((~fit.valid).sum())
     if wild:
-        notes.append(f"{wild} outlier{'s' if wild > 1 else ''} set aside")
+        notes.append(f"{counted(wild, 'outlier')} set aside")
     seconds = fit.motion.knots.spacing
     per_turn = 1.0 / (seconds * readings.mean_speed)
     notes.append(
-        f"motion: {len(readings.stretches)} stretch{'es' if len(readings.stretches) > 1 else ''}, "
+        f"motion: {counted(readings.stretches, 'segment')}, "
         f"{per_turn:.2g} knots per turn, smoothing by evidence"
     )
     if not separable and ripple != "none" and given:

@@ -225,7 +225,7 @@ def test_a_line_of_the_reference_or_of_the_joint_is_a_line():
     (spot,) = [spot for spot in result.not_identifiable if "reference_error" in spot.causes]
     assert spot.supported
     assert "turn the reference" in spot.measure
-    assert "Seen, and not told apart" not in result.summary()
+    assert "Seen, and not distinguished" not in result.summary()
 
 
 def test_units_order_of_runs_and_zero_do_not_matter():

@@ -37,9 +37,9 @@ def wide() -> list[ta.CalibrationRun]:
 def _drawn_values(ax) -> np.ndarray:
     """Greatest extents of what is drawn along the axis of errors."""
     lines = [np.asarray(line.get_ydata(), dtype=float) for line in ax.lines]
-    bars = [bar.get_height() for bar in ax.patches]
+    dots = [np.max(drawn.lines[0].get_ydata()) for drawn in ax.containers]
     largest = [np.abs(y).max() for y in lines if y.size > 2 and np.isfinite(y).all()]
-    return np.array([*largest, *bars])
+    return np.array([*largest, *dots])
 
 
 @pytest.mark.parametrize(

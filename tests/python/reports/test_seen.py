@@ -62,5 +62,5 @@ def test_it_stands_in_the_first_lines_of_the_report(at_one_speed):
     body = page[page.index("<body") :]
     first = body[: body.index('aria-labelledby="measured"')]
     text = " ".join(html.unescape(re.sub(r"<[^>]*>", "", first)).split())
-    assert "Seen, and not told apart:" in text
+    assert "Seen, and not distinguished:" in text
     assert any(abs(value - HALF) < 5.0 * std < 1.0 for value, std in sizes(text))

@@ -70,9 +70,9 @@
     const view = Array.isArray(views) ? views[0] : [...views][0];
     const figure = view.model;
     if (!paper) thin(figure, place.clientWidth);
-    // On a phone charts that go on with the axis of another stand below it.
+    // On a tablet or phone charts that go on with the axis of another stand below it.
+    if (innerWidth <= 992 && !paper) for (const axis of figure.left) axis.visible = true;
     if (innerWidth < 640 && !paper) {
-      for (const axis of figure.left) axis.visible = true;
       for (const r of figure.renderers) if (r.glyph && r.glyph.type === "Text") r.glyph.text_font_size = "9px";
     }
     const made = { models: [...figure.references()], figure };
