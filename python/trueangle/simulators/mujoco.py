@@ -178,7 +178,7 @@ class SensorLayer:
             own = {name: values[:, j] for name, values in given.items()}
             for signal, (name, at) in couplings.items():
                 own[signal] = readings[:, at] if name is None else fields["qpos"][:, at]
-            readings[:, j] = self._joints[j].read(fields, own)
+            self._joints[j].read(fields, own, readings[:, j])
         if self._noise_std.any():
             readings += self._random.normal(0.0, self._noise_std, shape)
         return readings[0] if single else readings
@@ -226,10 +226,16 @@ class _Encoder:
         self._unit = model.period / (2.0 * np.pi)
         self._states: Any = None
 
-    def read(self, fields: Mapping[str, Array], given: Mapping[str, Array]) -> Array:
-        angle = fields[self._field][:, self.at] * self._unit
+    def read(self, fields: Mapping[str, Array], given: Mapping[str, Array], out: Array) -> None:
+        angle = fields[self._field][:, self.at]
         if not self.model.terms and self.model.argument == "reference":
-            return np.asarray((angle + self.model.error(angle)) / self._unit)
+            # Many environments are read as fast as memory is: no pass more than is needed.
+            if self._unit == 1.0:
+                np.add(angle, self.model.error(angle), out=out)
+            else:
+                np.add(angle, self.model.error(angle * self._unit) / self._unit, out=out)
+            return
+        angle = angle * self._unit
         own = {"velocity": "qvel", "torque": "qfrc_actuator"}
         signals: dict[str, Array] = {}
         for name in self.model.uses_signals:
@@ -254,7 +260,7 @@ class _Encoder:
                 f"{known} environments were read before, and {len(angle)} now: "
                 "their travel is not known; call reset() before"
             )
-        return self._readings(angle, signals) / self._unit
+        np.divide(self._readings(angle, signals), self._unit, out=out)
 
     def _readings(self, angle: Array, signals: Mapping[str, Array]) -> Array:
         if self.model.argument == "reference":

@@ -125,7 +125,12 @@ def test_a_worm_is_found_by_one_command(log, tmp_path, capsys):
     (shaft,) = [s for s in ta.load_model(model).shafts if s.name == "worm"]
     found = 3600.0 * np.hypot(shaft.cosine, shaft.sine)
     np.testing.assert_allclose(found, AMPLITUDES, atol=0.02)
+    table = ["export", str(model), "--to", "csv", "--entries", "1728", "-o"]
+    assert main([*table, str(tmp_path / "table.csv")]) == 0
     capsys.readouterr()
+    # What a star does is no joint that was exchanged for its reference.
+    assert main(["check", str(log)]) == 0
+    assert "No fault found in the data" in capsys.readouterr().out
     out = str(tmp_path / "out.txt")
     assert main(["correct", str(log), "-m", str(model), "-o", out]) == 1
     assert "trueangle export" in capsys.readouterr().err

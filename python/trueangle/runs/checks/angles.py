@@ -224,7 +224,8 @@ def swapped(records: list[Record]) -> Iterator[DataFault]:
     """A reference that is much noisier than the joint it is to judge."""
     ratios = []
     for record in records:
-        if len(record) < 30:
+        # One angle and an error are no two columns that could be exchanged.
+        if len(record) < 30 or "error" in record.columns:
             continue
         reference, indicated = record.unwrapped
         own, other = (_roughness(x, record.time) for x in (reference, indicated))

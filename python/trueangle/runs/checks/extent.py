@@ -19,6 +19,9 @@ Array = NDArray[np.float64]
 GAP = 0.1
 LEAST_GAP = {"speed": 0.5, "load": 0.05, "temperature": 1.0, "mount": 0.5}
 
+#: Share of the widest gap within which readings are of one place, and of a turn that all such
+#: gaps together may have.
+_WITHIN_PLACE = 0.01
 #: Degrees of step beyond which an angle is not followed from reading to reading.
 FOLLOWED = 90.0
 
@@ -161,5 +164,9 @@ def _span(places: Array) -> float:
         return 0.0
     gaps = np.diff(np.append(ordered, ordered[0] + 360.0))
     widest = float(gaps.max())
+    # A place is left by a little from one reading to the next: that is no step.
+    within = gaps < _WITHIN_PLACE * widest
+    if gaps[within].sum() < _WITHIN_PLACE * 360.0:
+        gaps = gaps[~within]
     # Evenly spaced places leave no gap but their step.
     return 360.0 if widest < 3.0 * float(median(gaps[gaps > 0.0])) else 360.0 - widest

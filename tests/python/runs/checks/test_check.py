@@ -115,6 +115,18 @@ def test_rows_are_named(tmp_path: Path) -> None:
     assert fault.runs == ("b",)
 
 
+@pytest.mark.parametrize(("places", "span"), [(36, 360.0), (27, 260.0)])
+def test_facets_of_a_polygon_are_a_whole_turn_wherever_the_joint_stopped(places, span):
+    rng = np.random.default_rng(2)
+    nominal = np.tile(10.0 * np.arange(places), 3)
+    off = rng.normal(0.0, 15.0, nominal.size)
+    found = ta.check(
+        {"nominal_deg": nominal, "seen_arcsec": off, "indicated_deg": nominal + off / 3600.0},
+        signals={"reference": "nominal_deg", "reference_offset": "seen_arcsec"},
+    )
+    assert found.extent.span_deg == pytest.approx(span, abs=0.1)
+
+
 def test_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     rng = np.random.default_rng(1)
     path = written(tmp_path, *faulty("wrong_gear_ratio", rng))
