@@ -16,7 +16,7 @@ from ..estimation.estimate import Parameters, Quantity
 from ..estimation.regression import ROUNDING
 from ..joint.signals import join_runs
 from ..model.model import HarmonicModel
-from ..planning.evidence import Noise
+from ..planning.evidence import ReadingNoise
 from ..planning.limits import Limits
 from ..planning.nextruns import NextRuns
 from ..planning.planner import next_runs
@@ -245,7 +245,7 @@ class Diagnosis(PlainResult):
         >>> plan.runs[0].speed_deg_s, plan.between[0].causes
         (60.0, ('backlash', 'latency'))
         """
-        noise = Noise(max(self.noise, ROUNDING), self.correlation)
+        noise = ReadingNoise(max(self.noise, ROUNDING), self.correlation)
         signals = join_runs(self.runs if self.simulated is None else self.simulated.runs)
         believed, spots = self._without_open(), self.not_identifiable
         if between is not None:

@@ -22,7 +22,7 @@ from ..errors import ArgumentError, KindError
 from ..estimation.linear import NormalEquations, total
 from ..joint.shafts import ShaftOrders
 from ..support.angles import circular_mean, unit_name, wrap
-from .problem import Fitted, Problem, Solution
+from .problem import Fitted, PlainSolution, Problem
 from .robust import WILD, Weighted
 
 __all__ = ["Posterior", "Prior", "posterior", "prior_of"]
@@ -211,7 +211,7 @@ def _solved(
     pairs = found.reshape(-1, 2)
     edges = np.cumsum([len(shaft.orders) for shaft in problem.shafts])[:-1]
     parts = np.split(pairs, edges)
-    solution = Solution(
+    solution = PlainSolution(
         offsets,
         np.sqrt(
             [

@@ -34,7 +34,7 @@ METHODS = (None, "plain", "moments", "qr", "counts")
 _BLOCK = 16384
 
 
-class Solution(NamedTuple):
+class PlainSolution(NamedTuple):
     """The core's solution as plain values, for pickles and copies."""
 
     offsets: Array
@@ -56,7 +56,7 @@ class Fitted:
 
     def __init__(
         self,
-        solution: _core.Solution | Solution,
+        solution: _core.Solution | PlainSolution,
         offsets: Array,
         shafts: Sequence[ShaftOrders],
         period: float,
@@ -68,7 +68,7 @@ class Fitted:
         try:
             self.series = (
                 _series(solution, shafts, period)
-                if isinstance(solution, Solution)
+                if isinstance(solution, PlainSolution)
                 else solution.series()
             )
         except ArgumentError:
@@ -90,7 +90,7 @@ class Fitted:
         )
 
     def __reduce__(self) -> tuple[Any, ...]:
-        values = Solution(*(getattr(self.solution, name) for name in Solution._fields))
+        values = PlainSolution(*(getattr(self.solution, name) for name in PlainSolution._fields))
         return Fitted, (values, self.offsets, self.shafts, self.period)
 
     @property
@@ -103,7 +103,7 @@ class Fitted:
         return np.asarray(self.series.error(angles))
 
 
-def _series(solution: Solution, shafts: Sequence[ShaftOrders], period: float) -> _core.Series:
+def _series(solution: PlainSolution, shafts: Sequence[ShaftOrders], period: float) -> _core.Series:
     """The series of plain values."""
     return _core.Series(
         period,

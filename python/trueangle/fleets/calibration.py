@@ -16,7 +16,7 @@ from ..runs.run import CalibrationRun
 from ..runs.travel import over_turns
 from ..support.angles import circular_mean
 
-__all__ = ["Calibration", "UnitSums", "columns_of", "output_orders"]
+__all__ = ["Calibration", "CalibrationSums", "columns_of", "output_orders"]
 
 Array = NDArray[np.float64]
 
@@ -36,7 +36,7 @@ def columns_of(angles: Array, orders: Array, period: float) -> Array:
 
 
 @dataclass
-class UnitSums:
+class CalibrationSums:
     """Sums over the runs of one unit on one day; each run has a zero of its own."""
 
     runs: list[NormalEquations] = field(default_factory=list)
@@ -68,7 +68,7 @@ class UnitSums:
         self.means.append(mean)
         self.when = self.when or run.when
 
-    def merge(self, other: UnitSums) -> None:
+    def merge(self, other: CalibrationSums) -> None:
         """Take in the runs of the same unit and day under another name."""
         self.runs += other.runs
         self.means += other.means
@@ -125,7 +125,7 @@ class Calibration:
     repeat_freedom: float
 
     @classmethod
-    def of(cls, unit: str, sums: UnitSums, period: float) -> Calibration | None:
+    def of(cls, unit: str, sums: CalibrationSums, period: float) -> Calibration | None:
         """Of one day's sums; None where they do not tell the orders apart."""
         every = total(sums.runs)
         model = every.solved()

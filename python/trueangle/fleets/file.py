@@ -72,10 +72,10 @@ def load_fleet(path: str | PathLike[str]) -> Fleet:
         Not JSON, truncated, of a later version, unknown or missing keys, numbers that are not
         finite: names the key and what to do.
     """
-    return _Reader(Path(path), FileError).fleet()
+    return _FleetReader(Path(path), FileError).fleet()
 
 
-class _Reader(Decoder):
+class _FleetReader(Decoder):
     """Checks a fleet key by key."""
 
     def fleet(self) -> Fleet:

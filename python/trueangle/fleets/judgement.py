@@ -16,7 +16,7 @@ from .history import Change, changes_of
 from .result import BetweenOrder, CommonOrder, Fleet
 from .tolerance import tolerance_of
 from .unit import VERDICTS
-from .units import FEWEST, Pattern, Units, pattern_of
+from .units import FEWEST, SharedPattern, Units, pattern_of
 from .verdict import unit_row
 
 __all__ = ["judged"]
@@ -104,7 +104,7 @@ def _rows(dates: Sequence[tuple[Calibration, float]], changes: Mapping[str, Chan
     return () if change is None else change.rows
 
 
-def _prior(units: Units, chosen: Pattern) -> Prior:
+def _prior(units: Units, chosen: SharedPattern) -> Prior:
     """The predictive distribution of a further unit."""
     kept = int(chosen.belong.sum())
     mean = np.concatenate([one.mean for one in chosen.between])

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ..support.distributions import chi_squared_tail
 
-__all__ = ["Noise", "noise_of"]
+__all__ = ["UnitNoise", "noise_of"]
 
 Array = NDArray[np.float64]
 
@@ -18,7 +18,7 @@ Array = NDArray[np.float64]
 _LEVEL: Final = 0.01
 
 
-class Noise(NamedTuple):
+class UnitNoise(NamedTuple):
     """Variance of a reading, of every unit, and what a further unit's is like.
 
     ``variance`` is that of all units together, ``freedom`` the degrees of freedom that it is worth
@@ -30,7 +30,7 @@ class Noise(NamedTuple):
     freedom: float
 
 
-def noise_of(squares: Array, freedom: Array) -> Noise:
+def noise_of(squares: Array, freedom: Array) -> UnitNoise:
     r"""One variance for all units where Bartlett's test finds no difference at 1 %.
 
     Else each unit's own, held to the common one by :math:`d_0` degrees of freedom,
@@ -53,19 +53,19 @@ def noise_of(squares: Array, freedom: Array) -> Noise:
     pooled = float(squares.sum() / freedom.sum())
     own = squares / freedom
     if len(own) < 2 or not (own > 0.0).all():
-        return Noise(np.full(len(own), pooled), pooled, math.inf)
+        return UnitNoise(np.full(len(own), pooled), pooled, math.inf)
     statistic = float(freedom.sum() * math.log(pooled) - (freedom * np.log(own)).sum())
     few = (float((1.0 / freedom).sum()) - 1.0 / float(freedom.sum())) / (3.0 * (len(own) - 1.0))
     if chi_squared_tail(max(statistic / (1.0 + few), 0.0), len(own) - 1.0) >= _LEVEL:
-        return Noise(np.full(len(own), pooled), pooled, math.inf)
+        return UnitNoise(np.full(len(own), pooled), pooled, math.inf)
     logs = np.log(own) - np.array([_digamma(0.5 * v) - math.log(0.5 * v) for v in freedom])
     spread = float(logs.var(ddof=1)) - float(np.mean([_trigamma(0.5 * v) for v in freedom]))
     prior = 2.0 * _trigamma_inverse(spread) if spread > 0.0 else math.inf
     if math.isinf(prior):
-        return Noise(np.full(len(own), pooled), pooled, math.inf)
+        return UnitNoise(np.full(len(own), pooled), pooled, math.inf)
     common = math.exp(float(logs.mean()) + _digamma(0.5 * prior) - math.log(0.5 * prior))
     held = (prior * common + freedom * own) / (prior + freedom)
-    return Noise(np.asarray(held), common, prior)
+    return UnitNoise(np.asarray(held), common, prior)
 
 
 def _digamma(x: float) -> float:

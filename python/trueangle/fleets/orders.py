@@ -14,7 +14,7 @@ from ..joint.joint import Joint
 from ..joint.shafts import ShaftOrders, resolve_orders
 from ..runs.run import CalibrationRun
 from ..support.distributions import chi_squared_tail
-from .calibration import Calibration, UnitSums, columns_of, output_orders
+from .calibration import Calibration, CalibrationSums, columns_of, output_orders
 
 __all__ = ["MOST_KEPT", "SAMPLE", "candidates", "worth_keeping"]
 
@@ -88,7 +88,7 @@ def worth_keeping(
     periodic = bool((orders == np.round(orders)).all())
     statistic, freedom = np.zeros(orders.size), 0.0
     for runs in units:
-        sums = UnitSums()
+        sums = CalibrationSums()
         for run in runs:
             sums.add(run, orders, periodic)
         found = Calibration.of("", sums, period)

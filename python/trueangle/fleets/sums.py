@@ -13,7 +13,7 @@ from ..formats.times import day_of
 from ..joint.shafts import ShaftOrders
 from ..runs.follows import check_follows
 from ..runs.run import CalibrationRun
-from .calibration import Calibration, UnitSums, output_orders
+from .calibration import Calibration, CalibrationSums, output_orders
 from .orders import SAMPLE, candidates, worth_keeping
 
 __all__ = ["FleetSums"]
@@ -51,7 +51,7 @@ class FleetSums:
         self.by, self.shafts, self.joint = by, shafts, joint
         self.period: float | None = None
         self.named = self.by_file = False
-        self.sums: dict[tuple[str | _Unnamed, str], UnitSums] = {}
+        self.sums: dict[tuple[str | _Unnamed, str], CalibrationSums] = {}
         self._waiting: dict[str | _Unnamed, list[CalibrationRun]] = {}
 
     def add(self, runs: Iterable[CalibrationRun]) -> None:
@@ -100,7 +100,7 @@ class FleetSums:
 
     def _take(self, unit: str | _Unnamed, run: CalibrationRun) -> None:
         key = (unit, day_of(run.when))
-        self.sums.setdefault(key, UnitSums()).add(run, self.orders, self.periodic)
+        self.sums.setdefault(key, CalibrationSums()).add(run, self.orders, self.periodic)
 
     @property
     def orders(self) -> np.ndarray[Any, np.dtype[np.float64]]:
@@ -141,9 +141,9 @@ class FleetSums:
         found: dict[str, list[Calibration]] = {}
         untold: list[str] = []
         names = self._names(unit for unit, _ in self.sums)
-        together: dict[tuple[str, str], UnitSums] = {}
+        together: dict[tuple[str, str], CalibrationSums] = {}
         for (unit, day), sums in self.sums.items():
-            together.setdefault((names[unit], day), UnitSums()).merge(sums)
+            together.setdefault((names[unit], day), CalibrationSums()).merge(sums)
         for (unit, _), sums in sorted(together.items(), key=lambda entry: entry[0][1]):
             one = Calibration.of(unit, sums, self.period or 1.0)
             if one is None:

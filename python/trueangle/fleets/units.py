@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 
 from ..joint.shafts import ShaftOrders
 from .calibration import Calibration, columns_of, output_orders
-from .noise import Noise, noise_of
+from .noise import UnitNoise, noise_of
 from .outliers import Deviates, deviates, weights_of
 from .variance import Between, held_out_score, reml
 
-__all__ = ["FEWEST", "Pattern", "Units", "pattern_of"]
+__all__ = ["FEWEST", "SharedPattern", "Units", "pattern_of"]
 
 Array = NDArray[np.float64]
 
@@ -37,7 +37,7 @@ class Units:
         self.shafts, self.period = shafts, period
         self.orders = output_orders(shafts)
         every = [one for dates in dated for one in dates]
-        self.noise: Noise = noise_of(
+        self.noise: UnitNoise = noise_of(
             np.array([one.squares for one in every]), np.array([one.freedom for one in every])
         )
         spread = dict(zip(map(id, every), self.noise.units.tolist(), strict=True))
@@ -55,7 +55,7 @@ class Units:
         self.left = np.sqrt([max(one.squares / one.freedom, 0.0) for one, _ in self.last])
 
 
-class Pattern(NamedTuple):
+class SharedPattern(NamedTuple):
     """What the units that belong share, with or without a mean.
 
     ``belong`` are the units that are no outliers; all of them where more stand out than
@@ -69,7 +69,7 @@ class Pattern(NamedTuple):
     scores: Array
 
 
-def pattern_of(units: Units, aligned: bool) -> Pattern:
+def pattern_of(units: Units, aligned: bool) -> SharedPattern:
     """Outliers, and mean and variance of the others."""
     found = deviates(units.values, units.own, aligned, shares=weights_of(units.orders))
     if len(units.last) < FEWEST:
@@ -82,4 +82,4 @@ def pattern_of(units: Units, aligned: bool) -> Pattern:
         one = reml(values[kept], own[kept], aligned)
         between.append(one)
         scores[kept] += held_out_score(values[kept], own[kept], one.variance, aligned)
-    return Pattern(aligned, found, kept, between, scores)
+    return SharedPattern(aligned, found, kept, between, scores)

@@ -91,7 +91,7 @@ def reml(values: Array, own: Array, aligned: bool) -> Between:
     return Between(best.mean, best.covariance, tau)
 
 
-class _Score(NamedTuple):
+class _Likelihood(NamedTuple):
     score: float
     information: float
     likelihood: float
@@ -99,7 +99,7 @@ class _Score(NamedTuple):
     covariance: Array
 
 
-def _score(values: Array, own: Array, aligned: bool, tau: float) -> _Score:
+def _score(values: Array, own: Array, aligned: bool, tau: float) -> _Likelihood:
     inverse = np.linalg.inv(own + tau * np.eye(2))
     squared = inverse @ inverse
     mean, covariance = np.zeros(2), np.zeros((2, 2))
@@ -118,7 +118,7 @@ def _score(values: Array, own: Array, aligned: bool, tau: float) -> _Score:
         second += float(np.trace(both @ both))
         likelihood += 0.5 * float(np.linalg.slogdet(covariance)[1])
     score = 0.5 * (float((apart**2).sum()) - trace)
-    return _Score(score, max(0.5 * second, 1e-300), likelihood, mean, covariance)
+    return _Likelihood(score, max(0.5 * second, 1e-300), likelihood, mean, covariance)
 
 
 def held_out_score(values: Array, own: Array, variance: float, aligned: bool) -> Array:

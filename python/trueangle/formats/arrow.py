@@ -23,7 +23,7 @@ from .arrowtables import (
     element_names,
     top_names,
 )
-from .budget import Extent, check_part
+from .budget import FileExtent, check_part
 from .damage import damage_told
 from .format import TEXTS, Batch, Choose, Contents, Watch
 
@@ -59,11 +59,11 @@ class BatchRange(NamedTuple):
         return batch.slice(start, stop - start)
 
 
-def extent(path: Path, names: Sequence[str] = (), topic: str | None = None) -> Extent:
+def extent(path: Path, names: Sequence[str] = (), topic: str | None = None) -> FileExtent:
     """Rows and bytes of columns; see `format.FormatModule`."""
     with damage_told(path, "Arrow"):
         rows = sum(max(batch.rows, 0) for batch in _packed(path, _is_file(path)))
-    return Extent(rows, 8 * rows * len(names))
+    return FileExtent(rows, 8 * rows * len(names))
 
 
 def stretches(path: Path) -> list[BatchRange | None]:

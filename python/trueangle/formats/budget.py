@@ -14,7 +14,7 @@ from ..errors import FileError
 __all__ = [
     "DECODED_BYTES",
     "DecodedSizeError",
-    "Extent",
+    "FileExtent",
     "check_decoded",
     "check_part",
     "shown",
@@ -30,18 +30,18 @@ DECODED_BYTES: Final = 1 << 30
 _HEAD: Final = 1 << 16
 
 
-class Extent(NamedTuple):
+class FileExtent(NamedTuple):
     """What a file holds: its rows, about, and the bytes of columns in memory (0: not known)."""
 
     rows: int
     size: int
 
 
-def text_extent(path: Path) -> Extent:
+def text_extent(path: Path) -> FileExtent:
     """Rows of a text, as its first lines tell; their numbers are counted while it is read."""
     with path.open("rb") as file:
         head = file.read(_HEAD)
-    return Extent(path.stat().st_size * (head.count(b"\n") + 1) // max(len(head), 1), 0)
+    return FileExtent(path.stat().st_size * (head.count(b"\n") + 1) // max(len(head), 1), 0)
 
 
 class DecodedSizeError(FileError):

@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import FileError
-from .budget import Extent, text_extent
+from .budget import FileExtent, text_extent
 from .csvheader import number as read_number
 from .format import TEXTS, Batch, Choose, Contents, Watch
 
@@ -65,7 +65,7 @@ def read(
         }
 
 
-def extent(path: Path, names: Sequence[str] = (), topic: str | None = None) -> Extent:
+def extent(path: Path, names: Sequence[str] = (), topic: str | None = None) -> FileExtent:
     """Lines as the first ones tell; see `format.FormatModule`."""
     return text_extent(path)
 

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from .._core import thread_count
 from ..errors import FileError
-from .budget import Extent, text_extent
+from .budget import FileExtent, text_extent
 from .csvheader import LONGEST_LINE, Header
 from .csvrows import BLOCK, QuotedBlock, quoted_blocks, too_long
 from .format import TEXTS, Addition, Batch, Choose, Contents, Watch, refuse_corrected
@@ -79,7 +79,7 @@ def read(
     warn_of_messages(path, messages)
 
 
-def extent(path: Path, names: Sequence[str] = (), topic: str | None = None) -> Extent:
+def extent(path: Path, names: Sequence[str] = (), topic: str | None = None) -> FileExtent:
     """Rows as the first lines tell, bytes once it is read; see `format.FormatModule`."""
     return text_extent(path)
 

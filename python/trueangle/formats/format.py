@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from .._core import __version__
 from ..errors import FileError, MissingExtraError
-from .budget import Extent
+from .budget import FileExtent
 
 __all__ = [
     "TEXTS",
@@ -140,7 +140,7 @@ class FormatModule(Protocol):
         are not finite.
         """
 
-    def extent(self, path: Path, names: Sequence[str] = (), topic: str | None = None) -> Extent:
+    def extent(self, path: Path, names: Sequence[str] = (), topic: str | None = None) -> FileExtent:
         """Rows of a file and bytes of columns in memory, by what the file says of itself."""
 
     def copy(

@@ -24,7 +24,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from ..errors import FileError, MessageLinesWarning
-from .budget import Extent, text_extent
+from .budget import FileExtent, text_extent
 from .csvheader import number
 from .format import TEXTS, Batch, Choose, Contents, Watch, row_labels
 
@@ -112,7 +112,7 @@ def line_of(path: Path, row: int) -> int:
     return _frames(path)[0][row].line
 
 
-def extent(path: Path, names: Sequence[str] = (), topic: str | None = None) -> Extent:
+def extent(path: Path, names: Sequence[str] = (), topic: str | None = None) -> FileExtent:
     """Rows as the first lines tell; see `format.FormatModule`."""
     return text_extent(path)
 

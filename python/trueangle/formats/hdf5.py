@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from ..errors import FileError
 from . import budget
-from .budget import Extent
+from .budget import FileExtent
 from .checksum import Checksum
 from .damage import damage_told
 from .format import TEXTS, Addition, Batch, Choose, Contents, Watch, note
@@ -62,12 +62,12 @@ def columns(path: Path, topic: str | None = None) -> list[str]:
         return _names(file)
 
 
-def extent(path: Path, names: Sequence[str] = (), topic: str | None = None) -> Extent:
+def extent(path: Path, names: Sequence[str] = (), topic: str | None = None) -> FileExtent:
     """Rows and bytes of data sets; see `format.FormatModule`."""
     with _opened(path) as file:
         rows = [int(file[name].size) for name in names or _names(file)]
         size = sum(int(file[name].size) * max(file[name].dtype.itemsize, 8) for name in names)
-    return Extent(max(rows, default=0), size)
+    return FileExtent(max(rows, default=0), size)
 
 
 def stretches(path: Path) -> list[RowRange | None]:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from scipy.io import loadmat, savemat
 
 from ..errors import FileError
-from .budget import Extent
+from .budget import FileExtent
 from .damage import damage_told
 from .format import TEXTS, Batch, Choose, Contents, Watch, note, row_labels
 from .matlabelements import check_elements
@@ -31,11 +31,11 @@ def columns(path: Path, topic: str | None = None) -> list[str]:
     return list(_vectors(path))
 
 
-def extent(path: Path, names: Sequence[str] = (), topic: str | None = None) -> Extent:
+def extent(path: Path, names: Sequence[str] = (), topic: str | None = None) -> FileExtent:
     """Rows and bytes of variables; see `format.FormatModule`."""
     found = _vectors(path)
     rows = [len(found[name]) for name in names or found]
-    return Extent(max(rows, default=0), 8 * sum(rows) if names else 0)
+    return FileExtent(max(rows, default=0), 8 * sum(rows) if names else 0)
 
 
 def together(path: Path, needed: Sequence[str], others: Sequence[str]) -> list[str]:

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import FileError
-from .budget import Extent, check_part
+from .budget import FileExtent, check_part
 from .format import TEXTS, Batch, Choose, Contents, Watch, note
 
 __all__ = ["columns", "contents", "copy", "extent", "read", "together"]
@@ -52,11 +52,11 @@ def together(path: Path, needed: Sequence[str], others: Sequence[str]) -> list[s
     return [name for name in others if found[name].size in sizes]
 
 
-def extent(path: Path, names: Sequence[str] = (), topic: str | None = None) -> Extent:
+def extent(path: Path, names: Sequence[str] = (), topic: str | None = None) -> FileExtent:
     """Rows and bytes of vectors; see `format.FormatModule`."""
     found = _vectors(path)
     rows = [found[name].size for name in names or found]
-    return Extent(max(rows, default=0), 8 * sum(rows) if names else 0)
+    return FileExtent(max(rows, default=0), 8 * sum(rows) if names else 0)
 
 
 def read(

@@ -17,7 +17,7 @@ from asammdf.blocks.v4_blocks import FileHistory
 from numpy.typing import NDArray
 
 from ..errors import FileError
-from .budget import Extent
+from .budget import FileExtent
 from .checksum import Checksum
 from .damage import damage_told
 from .format import TEXTS, Addition, Batch, Choose, Contents, Watch, note
@@ -126,12 +126,12 @@ def contents(path: Path, topic: str | None = None) -> Contents:
         return Contents(max(rows, default=0), _kept(path, mdf))
 
 
-def extent(path: Path, names: Sequence[str] = (), topic: str | None = None) -> Extent:
+def extent(path: Path, names: Sequence[str] = (), topic: str | None = None) -> FileExtent:
     """Rows and bytes of channels; see `format.FormatModule`."""
     with _opened(path) as mdf:
         groups = [_place(mdf, name)[0] for name in names] or range(len(mdf.groups))
         rows = [_cycles(mdf, group) for group in groups]
-    return Extent(max(rows, default=0), 8 * sum(rows) if names else 0)
+    return FileExtent(max(rows, default=0), 8 * sum(rows) if names else 0)
 
 
 def together(path: Path, needed: Sequence[str], others: Sequence[str]) -> list[str]:

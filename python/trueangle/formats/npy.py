@@ -13,7 +13,7 @@ from numpy.lib import format as npy
 from numpy.typing import NDArray
 
 from ..errors import FileError
-from .budget import Extent
+from .budget import FileExtent
 from .damage import damage_told
 from .format import TEXTS, Addition, Batch, Choose, Contents, Watch, refuse_corrected, row_labels
 
@@ -29,10 +29,10 @@ def columns(path: Path, topic: str | None = None) -> list[str]:
         return _names(array)
 
 
-def extent(path: Path, names: Sequence[str] = (), topic: str | None = None) -> Extent:
+def extent(path: Path, names: Sequence[str] = (), topic: str | None = None) -> FileExtent:
     """Rows and bytes of columns; see `format.FormatModule`."""
     with _opened(path) as array:
-        return Extent(len(array), 8 * len(array) * len(names))
+        return FileExtent(len(array), 8 * len(array) * len(names))
 
 
 def read(

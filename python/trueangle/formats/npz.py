@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import FileError
-from .budget import Extent, check_part
+from .budget import FileExtent, check_part
 from .damage import damage_told
 from .format import TEXTS, Addition, Batch, Choose, Contents, Watch, note, row_labels
 from .npy import read_header, write_header
@@ -42,12 +42,14 @@ def columns(path: Path, topic: str | None = None) -> list[str]:
         return list(_columns(archive))
 
 
-def extent(path: Path, names: Sequence[str] = (), topic: str | None = None) -> Extent:
+def extent(path: Path, names: Sequence[str] = (), topic: str | None = None) -> FileExtent:
     """Rows and bytes of arrays; see `format.FormatModule`."""
     with _opened(path) as archive:
         found = _columns(archive)
     rows = max((found[name].size for name in names or found), default=0)
-    return Extent(rows, sum(found[name].size * max(found[name].kind.itemsize, 8) for name in names))
+    return FileExtent(
+        rows, sum(found[name].size * max(found[name].kind.itemsize, 8) for name in names)
+    )
 
 
 def together(path: Path, needed: Sequence[str], others: Sequence[str]) -> list[str]:

@@ -22,7 +22,7 @@ from .arrowtables import (
     element_names,
     top_names,
 )
-from .budget import Extent
+from .budget import FileExtent
 from .damage import damage_told
 from .format import TEXTS, Addition, Batch, Choose, Contents, Watch
 
@@ -53,11 +53,11 @@ def columns(path: Path, topic: str | None = None) -> list[str]:
         return element_names(file.schema_arrow, lambda name: _first_length(file, name))
 
 
-def extent(path: Path, names: Sequence[str] = (), topic: str | None = None) -> Extent:
+def extent(path: Path, names: Sequence[str] = (), topic: str | None = None) -> FileExtent:
     """Rows and bytes of columns, by the footer; see `format.FormatModule`."""
     with _opened(path) as file:
         rows = int(file.metadata.num_rows)
-    return Extent(rows, 8 * rows * len(names))
+    return FileExtent(rows, 8 * rows * len(names))
 
 
 def stretches(path: Path) -> list[RowGroupRange | None]:

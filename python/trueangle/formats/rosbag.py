@@ -18,7 +18,7 @@ from rosbags.rosbag1.reader import decompressors
 from rosbags.typesys import Stores, get_typestore
 
 from ..errors import FileError
-from .budget import Extent
+from .budget import FileExtent
 from .damage import damage_told
 from .format import TEXTS, Addition, Batch, Choose, Contents, Watch
 from .jointstates import Block
@@ -46,11 +46,11 @@ def columns(path: Path, topic: str | None = None) -> list[str]:
         return bag.columns(bag.topic(topic))
 
 
-def extent(path: Path, names: Sequence[str] = (), topic: str | None = None) -> Extent:
+def extent(path: Path, names: Sequence[str] = (), topic: str | None = None) -> FileExtent:
     """Messages and bytes of their values; see `format.FormatModule`."""
     with _opened(path) as bag:
         rows = sum(int(c.msgcount) for c in bag.topic(topic))
-    return Extent(rows, 8 * rows * len(names))
+    return FileExtent(rows, 8 * rows * len(names))
 
 
 def read(

@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..errors import FileError
-from .budget import Extent, text_extent
+from .budget import FileExtent, text_extent
 from .format import TEXTS, Batch, Choose, Contents, Watch
 from .messages import warn_of_messages
 
@@ -86,7 +86,7 @@ def line_of(path: Path, row: int) -> int:
     return next((line for i, line in enumerate(rows) if i == row), row)
 
 
-def extent(path: Path, names: Sequence[str] = (), topic: str | None = None) -> Extent:
+def extent(path: Path, names: Sequence[str] = (), topic: str | None = None) -> FileExtent:
     """Rows as the first lines tell; see `format.FormatModule`."""
     return text_extent(path)
 

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import FileError
-from .budget import Extent, check_part
+from .budget import FileExtent, check_part
 from .format import TEXTS, Batch, Choose, Contents, Watch, note
 
 __all__ = ["columns", "contents", "copy", "extent", "read"]
@@ -37,7 +37,7 @@ _START, _FINISH = 0, 1
 
 
 @dataclass
-class _Entry:
+class _Channel:
     """A channel: its type, and where its records are."""
 
     name: str
@@ -46,11 +46,11 @@ class _Entry:
     places: list[tuple[int, int]] = field(default_factory=list)
 
 
-class _Log(NamedTuple):
+class _Records(NamedTuple):
     """A file taken apart."""
 
     data: bytes
-    entries: dict[str, _Entry]
+    entries: dict[str, _Channel]
     numbers: set[int]
 
 
@@ -59,12 +59,12 @@ def columns(path: Path, topic: str | None = None) -> list[str]:
     return [_TIME, *_names(_opened(path))]
 
 
-def extent(path: Path, names: Sequence[str] = (), topic: str | None = None) -> Extent:
+def extent(path: Path, names: Sequence[str] = (), topic: str | None = None) -> FileExtent:
     """Records of numbers and bytes of columns; see `format.FormatModule`."""
     log = _opened(path)
     asked = {_entry_of(log, name)[0].name for name in names if name != _TIME} or log.entries
     rows = sum(len(log.entries[name].times) for name in asked)
-    return Extent(rows, 8 * rows * len(names))
+    return FileExtent(rows, 8 * rows * len(names))
 
 
 def read(
@@ -130,7 +130,7 @@ def contents(path: Path, topic: str | None = None) -> Contents:
     return Contents(rows, {"bytes": f"{zlib.crc32(log.data):08x}"})
 
 
-def _opened(path: Path) -> _Log:
+def _opened(path: Path) -> _Records:
     """Entries of numbers and where their records are.
 
     Raises
@@ -145,8 +145,8 @@ def _opened(path: Path) -> _Log:
     if data[7] != 1:
         raise FileError(path, f"is a data log of version {data[7]}.{data[6]}; version 1 is read")
     place = 12 + int.from_bytes(data[8:12], "little")
-    entries: dict[str, _Entry] = {}
-    started: dict[int, _Entry | None] = {}
+    entries: dict[str, _Channel] = {}
+    started: dict[int, _Channel | None] = {}
     numbers: set[int] = set()
     size = len(data)
     while place < size:
@@ -170,14 +170,14 @@ def _opened(path: Path) -> _Log:
                 entry.times.append(int.from_bytes(data[size_end:begin], "little", signed=False))
                 entry.places.append((begin, end))
         place = end
-    return _Log(data, entries, numbers)
+    return _Records(data, entries, numbers)
 
 
 def _control(
     path: Path,
     data: bytes,
-    started: dict[int, _Entry | None],
-    entries: dict[str, _Entry],
+    started: dict[int, _Channel | None],
+    entries: dict[str, _Channel],
     numbers: set[int],
     place: int,
 ) -> None:
@@ -201,7 +201,7 @@ def _control(
     if kind.removesuffix("[]") not in _KINDS:
         started[number] = None
         return
-    entry = entries.setdefault(name, _Entry(name, kind))
+    entry = entries.setdefault(name, _Channel(name, kind))
     if entry.kind != kind:
         raise FileError(
             path, f"is started as {entry.kind} and as {kind} again at byte {place}", column=name
@@ -209,7 +209,7 @@ def _control(
     started[number] = entry
 
 
-def _names(log: _Log) -> list[str]:
+def _names(log: _Records) -> list[str]:
     """Columns of the entries with records; arrays by the length of their first."""
     found: list[str] = []
     for name, entry in log.entries.items():
@@ -222,7 +222,7 @@ def _names(log: _Log) -> list[str]:
     return found
 
 
-def _entry_of(log: _Log, name: str) -> tuple[_Entry, int]:
+def _entry_of(log: _Records, name: str) -> tuple[_Channel, int]:
     """The entry of a column, and the place in its array."""
     if name in log.entries and not log.entries[name].kind.endswith("[]"):
         return log.entries[name], 0
@@ -231,7 +231,7 @@ def _entry_of(log: _Log, name: str) -> tuple[_Entry, int]:
     return log.entries[found[1]], int(found[2])
 
 
-def _series(path: Path, log: _Log, name: str) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+def _series(path: Path, log: _Records, name: str) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
     """Times in microseconds and values of a column, in the order of time."""
     entry, element = _entry_of(log, name)
     kind = np.dtype(_KINDS[entry.kind.removesuffix("[]")])
@@ -251,7 +251,7 @@ def _series(path: Path, log: _Log, name: str) -> tuple[NDArray[np.int64], NDArra
     return times[order][kept], values[order][kept]
 
 
-def _at(path: Path, log: _Log, name: str, times: NDArray[np.int64]) -> NDArray[np.float64]:
+def _at(path: Path, log: _Records, name: str, times: NDArray[np.int64]) -> NDArray[np.float64]:
     """Values of a column that hold at some times: the last before each."""
     if name == _TIME:
         return np.asarray(times * 1e-6, dtype=np.float64)

@@ -130,10 +130,10 @@ def load_description(path: str | PathLike[str]) -> RobotDescription:
         content = tomllib.loads(text)
     except tomllib.TOMLDecodeError as cause:
         raise FileError(path, f"is no TOML: {cause}") from None
-    return _Reader(Path(path)).robot(content)
+    return _DescriptionReader(Path(path)).robot(content)
 
 
-class _Reader(Decoder):
+class _DescriptionReader(Decoder):
     """Checks the file key by key."""
 
     def robot(self, content: Any) -> RobotDescription:

@@ -80,7 +80,7 @@ def load_model(path: str | PathLike[str]) -> HarmonicModel:
         Not JSON, truncated, of a later version, unknown or missing keys, numbers that
         are not finite, a model that cannot be inverted: names the key and what to do.
     """
-    return _Reader(Path(path), ModelFileError).model()
+    return _ModelReader(Path(path), ModelFileError).model()
 
 
 def model_of(text: str, path: str | PathLike[str]) -> HarmonicModel:
@@ -91,7 +91,7 @@ def model_of(text: str, path: str | PathLike[str]) -> HarmonicModel:
 
 def content_of(path: Path, wanted: str) -> dict[str, Any]:
     """The object of a file of the format that is wanted and of a version that is known."""
-    reader = _Reader(path, ModelFileError)
+    reader = _ModelReader(path, ModelFileError)
     content = reader.content(wanted)
     reader.version(content)
     return content
@@ -99,12 +99,12 @@ def content_of(path: Path, wanted: str) -> dict[str, Any]:
 
 def part_of(path: Path, value: Any, prefix: str) -> HarmonicModel:
     """The model that a part of a file is; ``prefix`` stands before its keys in messages."""
-    reader = _Reader(path, ModelFileError)
+    reader = _ModelReader(path, ModelFileError)
     reader.prefix = prefix
     return reader.model_of(value)
 
 
-class _Reader(Decoder):
+class _ModelReader(Decoder):
     """Checks a model key by key; refusals name file and key, behind the ``prefix`` of a part."""
 
     prefix = ""

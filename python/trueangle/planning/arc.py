@@ -15,7 +15,7 @@ from ..joint.shafts import counted_orders
 from ..support.kinds import told_kinds
 from ..support.plainresult import PlainResult, counted
 from .counts import exchanged, rounded
-from .doptimal import ArcDesign, Columns, d_optimal
+from .doptimal import ArcDesign, OrthonormalColumns, d_optimal
 from .noisefactors import noise_factors
 from .plan import readings_needed
 
@@ -245,11 +245,11 @@ def check_arc(start: float, stop: float) -> None:
 
 def _columns(
     wanted: tuple[float, ...], start: float, stop: float, usual: bool, notes: list[str]
-) -> tuple[Columns, tuple[float, ...]]:
+) -> tuple[OrthonormalColumns, tuple[float, ...]]:
     """Columns of the orders; of the usual ones those that the arc tells."""
     while True:
         try:
-            columns = Columns(wanted, start / 360.0, stop / 360.0)
+            columns = OrthonormalColumns(wanted, start / 360.0, stop / 360.0)
         except ArgumentError:
             if not usual or len(wanted) == 1:
                 raise
@@ -267,7 +267,7 @@ def _columns(
 
 
 def _readings(
-    columns: Columns,
+    columns: OrthonormalColumns,
     best: ArcDesign,
     readings: int | None,
     noise: float | None,
@@ -297,7 +297,7 @@ def _readings(
     return max(needed)
 
 
-def _places(columns: Columns, best: ArcDesign, readings: int) -> Array:
+def _places(columns: OrthonormalColumns, best: ArcDesign, readings: int) -> Array:
     """Places of single readings, the better of the rounded optimum and of exchanges."""
     if best.places.size <= readings:
         found = np.repeat(best.places, rounded(best.weights, readings))
@@ -316,7 +316,7 @@ def _places(columns: Columns, best: ArcDesign, readings: int) -> Array:
 _GOOD = 0.99
 
 
-def _spread(turns: Array, apart: float, columns: Columns) -> Array:
+def _spread(turns: Array, apart: float, columns: OrthonormalColumns) -> Array:
     """Readings that stand at least so far apart, as near their places as the arc allows."""
     if not (math.isfinite(apart) and apart >= 0.0):
         raise ArgumentError(f"apart must be a distance in degrees, got {apart * 360.0!r}")
@@ -340,14 +340,14 @@ def _spread(turns: Array, apart: float, columns: Columns) -> Array:
     return np.asarray(np.minimum(ordered, last))
 
 
-def _efficiency(columns: Columns, best: ArcDesign, turns: Array) -> float:
+def _efficiency(columns: OrthonormalColumns, best: ArcDesign, turns: Array) -> float:
     shares = np.full(turns.size, 1.0 / turns.size)
     value = (columns.log_det(turns, shares) - best.log_det) / columns.count
     return min(math.exp(value), 1.0)
 
 
 def _uncertainty(
-    columns: Columns, turns: Array, per_step: int, noise: float | None
+    columns: OrthonormalColumns, turns: Array, per_step: int, noise: float | None
 ) -> float | None:
     """Expanded, of the curve at the worst place."""
     if noise is None:

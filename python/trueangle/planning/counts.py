@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from .doptimal import Columns
+from .doptimal import OrthonormalColumns
 
 __all__ = ["exchanged", "rounded"]
 
@@ -18,7 +18,7 @@ _PASSES = 20
 _GAIN = 1e-9
 
 
-def exchanged(columns: Columns, places: Array) -> Array:
+def exchanged(columns: OrthonormalColumns, places: Array) -> Array:
     """Places of single readings, each exchanged for a better one of the grid while one is.
 
     Fedorov's exchange: taking reading i out and x in multiplies the determinant by

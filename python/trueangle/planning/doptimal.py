@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ..errors import ArgumentError
 
-__all__ = ["ArcDesign", "Columns", "d_optimal"]
+__all__ = ["ArcDesign", "OrthonormalColumns", "d_optimal"]
 
 Array = NDArray[np.float64]
 
@@ -60,7 +60,7 @@ class ArcDesign:
     log_det: float
 
 
-class Columns:
+class OrthonormalColumns:
     """The constant and both parts of every order, made orthonormal over the arc.
 
     D-optimality does not depend on the basis; an arc's own keeps rounding small.
@@ -115,7 +115,7 @@ class Columns:
         return float(value) + self.log_scale if sign > 0 else -math.inf
 
 
-def d_optimal(columns: Columns) -> ArcDesign:
+def d_optimal(columns: OrthonormalColumns) -> ArcDesign:
     r"""The design whose information has the largest determinant.
 
     .. math:: \max_\xi \det \int f(x) f(x)^T \,\xi(dx), \quad
@@ -127,7 +127,7 @@ def d_optimal(columns: Columns) -> ArcDesign:
 
     Examples
     --------
-    >>> found = d_optimal(Columns([1], 0.0, 0.5))
+    >>> found = d_optimal(OrthonormalColumns([1], 0.0, 0.5))
     >>> (360.0 * found.places).round(3).tolist(), found.weights.round(6).tolist()
     ([0.0, 90.0, 180.0], [0.333333, 0.333333, 0.333333])
     """
@@ -170,7 +170,7 @@ def _merged(grid: Array, weights: Array, least: int) -> tuple[Array, Array]:
     return places, shares / shares.sum()
 
 
-def _settled(columns: Columns, places: Array) -> tuple[Array, Array, float]:
+def _settled(columns: OrthonormalColumns, places: Array) -> tuple[Array, Array, float]:
     """As many places as coefficients, each at its best beside the others; their excess.
 
     By Newton's method for all places together, by a sweep over them where that loses.
@@ -187,7 +187,7 @@ def _settled(columns: Columns, places: Array) -> tuple[Array, Array, float]:
     return places, shares, _excess(columns, places, shares)
 
 
-def _swept(columns: Columns, places: Array) -> Array:
+def _swept(columns: OrthonormalColumns, places: Array) -> Array:
     """Every place in turn moved to its best between its neighbours."""
     places = places.copy()
     for k in range(places.size):
@@ -203,7 +203,7 @@ def _swept(columns: Columns, places: Array) -> Array:
     return places
 
 
-def _newton(columns: Columns, places: Array) -> Array:
+def _newton(columns: OrthonormalColumns, places: Array) -> Array:
     r"""A step of Newton's method on :math:`\ln|\det F|`, F the rows at the places.
 
     Its slope is the diagonal of :math:`A = F' F^{-1}`, its curvature
@@ -233,7 +233,7 @@ def _highest(height: Callable[[Array], Array], low: float, high: float) -> float
     return best
 
 
-def _excess(columns: Columns, places: Array, weights: Array) -> float:
+def _excess(columns: OrthonormalColumns, places: Array, weights: Array) -> float:
     information = columns.information(places, weights)
     rows = columns.at(columns.grid)
     variances = np.einsum("ij,ij->i", rows @ np.linalg.inv(information), rows)

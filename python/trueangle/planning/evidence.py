@@ -29,9 +29,9 @@ from ..joint.signals import Signals
 
 __all__ = [
     "STRONG",
-    "Evidence",
+    "ExpectedEvidence",
     "Hypothesis",
-    "Noise",
+    "ReadingNoise",
     "deviance_left",
     "evidence_between",
     "is_doubted",
@@ -69,7 +69,7 @@ class Hypothesis:
 
 
 @dataclass(frozen=True)
-class Noise:
+class ReadingNoise:
     """Of one reading: standard deviation, arcsec, and correlation from one to the next."""
 
     sigma: float
@@ -77,7 +77,7 @@ class Noise:
 
 
 @dataclass(frozen=True)
-class Evidence:
+class ExpectedEvidence:
     """Expected evidence of one cause against another, were it the one.
 
     Attributes
@@ -110,8 +110,8 @@ class Evidence:
 
 
 def evidence_between(
-    regression: Regression, rivals: Sequence[Hypothesis], noise: Noise, searched: bool = True
-) -> list[Evidence]:
+    regression: Regression, rivals: Sequence[Hypothesis], noise: ReadingNoise, searched: bool = True
+) -> list[ExpectedEvidence]:
     """Every cause against every other that may be taken for it, and against none.
 
     Parameters
@@ -120,13 +120,13 @@ def evidence_between(
         Noise at all readings, earlier ones and those that are planned, and what is fitted with
         everything.
     rivals : sequence of Hypothesis
-    noise : Noise
+    noise : ReadingNoise
     searched : bool
         A rival takes the form that imitates best; else the one that it has, of any size.
 
     Returns
     -------
-    list of Evidence
+    list of ExpectedEvidence
         The imitation by a rival is the best that its own search finds.
 
     Notes
@@ -161,7 +161,7 @@ def evidence_between(
         for rival, pairs in per_rival.items():
             deviance, bic = np.mean(pairs, axis=0)
             margin = STRONG if rival in ("", *errors) else 0.0
-            found.append(Evidence(one.cause, rival, float(deviance), float(bic), margin))
+            found.append(ExpectedEvidence(one.cause, rival, float(deviance), float(bic), margin))
     return found
 
 
@@ -207,7 +207,7 @@ def _imitators(cause: str, rivals: Sequence[Hypothesis]) -> list[str]:
     return [*asked, *others]
 
 
-def deviance_left(regression: Regression, error: Array, noise: Noise) -> float:
+def deviance_left(regression: Regression, error: Array, noise: ReadingNoise) -> float:
     """Deviance of an error beside all that a regression fits."""
     x, _ = regression.projected(error[:, None])
     return float(np.sum(x**2)) / (noise.sigma**2 * (1.0 - noise.correlation**2))

@@ -10,7 +10,7 @@ from ..joint.signals import Signals
 from ..simulation.designs import RunDesign
 from ..simulation.simulation import Simulation
 from ..support.blas import one_blas_thread
-from .evidence import Noise
+from .evidence import ReadingNoise
 from .further import seconds_of
 from .limits import Limits
 from .nextruns import NextRuns, RivalEvidence
@@ -24,7 +24,7 @@ def next_runs(
     earlier: Signals | None,
     believed: Simulation,
     spots: Sequence[Blindness],
-    noise: Noise,
+    noise: ReadingNoise,
     limits: Limits | None = None,
 ) -> NextRuns:
     """The runs within limits that are expected to tell most of what is open.
@@ -37,7 +37,7 @@ def next_runs(
         With all that is confirmed.
     spots : sequence of Blindness
         What to tell: where something is seen in some of them, those; else all.
-    noise : Noise
+    noise : ReadingNoise
     limits : Limits, optional
         Without them those of the earlier runs (`Limits.of`), and where these tell nothing a
         little beyond (`Limits.wider`).
@@ -57,7 +57,7 @@ def _next_runs(
     earlier: Signals | None,
     believed: Simulation,
     spots: Sequence[Blindness],
-    noise: Noise,
+    noise: ReadingNoise,
     limits: Limits | None,
 ) -> NextRuns:
     seen = [spot for spot in spots if spot.supported]

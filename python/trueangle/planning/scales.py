@@ -16,7 +16,14 @@ from ..joint.signals import Signals, join_runs
 from ..simulation.designs import RunDesign
 from ..simulation.simulation import Simulation
 from ..support.deadline import pace
-from .evidence import Evidence, Hypothesis, Noise, deviance_left, evidence_between, is_doubted
+from .evidence import (
+    ExpectedEvidence,
+    Hypothesis,
+    ReadingNoise,
+    deviance_left,
+    evidence_between,
+    is_doubted,
+)
 from .further import base_of, choices, seconds_of
 from .hypotheses import Question, question_of
 from .limits import Limits
@@ -49,7 +56,7 @@ class Scales:
     earlier : Signals or None
     believed : Simulation
     asked : sequence of Blindness
-    noise : Noise
+    noise : ReadingNoise
     limits : Limits
         Within which the causes are to show.
     """
@@ -59,7 +66,7 @@ class Scales:
         earlier: Signals | None,
         believed: Simulation,
         asked: Sequence[Blindness],
-        noise: Noise,
+        noise: ReadingNoise,
         limits: Limits,
     ) -> None:
         self.earlier = None if earlier is None else _thinned(earlier)
@@ -239,7 +246,7 @@ class Scales:
             if EFFECTS[other].acts_on_runs and telling_apart(EFFECTS[cause], EFFECTS[other])
         }
 
-    def _evidence(self, question: Question, regression: Regression) -> list[Evidence]:
+    def _evidence(self, question: Question, regression: Regression) -> list[ExpectedEvidence]:
         return evidence_between(regression, question.hypotheses, self.noise, self._searches)
 
 

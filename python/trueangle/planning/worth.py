@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..estimation.regression import Regression
-from .evidence import Evidence
+from .evidence import ExpectedEvidence
 from .hypotheses import Question
 
 __all__ = ["ALIKE", "NOTHING", "WANTED", "Answer", "Worth", "foretold", "is_strong", "weight"]
@@ -67,7 +67,7 @@ class Answer:
     chance: float | None
 
 
-def is_strong(evidence: Sequence[Evidence]) -> bool:
+def is_strong(evidence: Sequence[ExpectedEvidence]) -> bool:
     """Whether every cause is expected to win; of one without a form the design decides."""
     return min((e.chance for e in evidence), default=1.0) >= WANTED
 
@@ -87,14 +87,14 @@ def foretold(regression: Regression) -> bool:
     return True
 
 
-def weight(evidence: Sequence[Evidence], question: Question) -> float:
+def weight(evidence: Sequence[ExpectedEvidence], question: Question) -> float:
     """What grows with the evidence: of the causes in question, and of the least of all."""
     logs = {(e.cause, e.rival): _log(e) for e in evidence}
     asked = [log for (_, rival), log in logs.items() if rival in ("", *question.causes)]
     return float(np.mean(asked)) + min(logs.values()) if logs else 0.0
 
 
-def _log(evidence: Evidence) -> float:
+def _log(evidence: ExpectedEvidence) -> float:
     """Logarithm of the deviations; below none, of what the deviance is of the first of them."""
     first = HARDLY * min(max(evidence.deviance, HARDLY**2), 1.0) ** 0.5
     return float(np.log(min(max(evidence.deviations, first), ENOUGH)))

@@ -12,7 +12,7 @@ import numpy as np
 from ..diagnosis import Diagnosis, diagnose
 from ..effects import EFFECTS
 from ..errors import ArgumentError
-from ..planning.evidence import Hypothesis, Noise
+from ..planning.evidence import Hypothesis, ReadingNoise
 from ..planning.limits import Limits
 from ..planning.nextruns import NextRuns, RivalEvidence
 from ..planning.worth import WANTED
@@ -136,7 +136,9 @@ def _rehearsed(
     plan: NextRuns, found: Diagnosis, stated: Simulation, most: int, seeds: int, seed: int
 ) -> NextRuns:
     """The plan with as many readings as name the causes in simulated diagnoses."""
-    trial = _Trial(found.runs, stated, Noise(found.noise, found.correlation), seeds, seed)
+    trial = _FurtherTrials(
+        found.runs, stated, ReadingNoise(found.noise, found.correlation), seeds, seed
+    )
     while True:
         full = all(design.samples >= most for design in plan.runs)
         entries = tuple(
@@ -153,12 +155,12 @@ def _rehearsed(
 
 
 @dataclass(frozen=True)
-class _Trial:
+class _FurtherTrials:
     """Simulated diagnoses of earlier runs and planned ones together."""
 
     earlier: Sequence[CalibrationRun]
     stated: Simulation
-    noise: Noise
+    noise: ReadingNoise
     seeds: int
     seed: int
 

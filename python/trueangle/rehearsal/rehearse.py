@@ -10,7 +10,7 @@ from ..effects import EFFECTS
 from ..effects.blindness import Blindness
 from ..errors import ArgumentError
 from ..joint.signals import Signals
-from ..planning.evidence import Noise
+from ..planning.evidence import ReadingNoise
 from ..planning.nextruns import NextRuns
 from ..planning.planner import next_runs
 from ..simulation.simulation import SIMULATION, Simulation
@@ -199,7 +199,7 @@ def _opening(
         asked.setdefault(repr(causes), replace(spot, causes=causes))
     if not asked:
         return None
-    found = next_runs(signals, sim, [*asked.values()], Noise(sim.sigma_arcsec))
+    found = next_runs(signals, sim, [*asked.values()], ReadingNoise(sim.sigma_arcsec))
     return found if found.runs else None
 
 

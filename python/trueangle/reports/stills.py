@@ -51,7 +51,7 @@ def still(
     width, height = max(_WIDTH * share, 150.0), _REM * height_rem
     names = list(up.categories or ())
     left = max(_LEFT, _LETTER * max(map(len, names), default=0) + 8.0) if up.visible else 8.0
-    place = _Places(marks, across, up, (left, width - _RIGHT), (height - _BOTTOM, _TOP))
+    place = _Placement(marks, across, up, (left, width - _RIGHT), (height - _BOTTOM, _TOP))
     parts = [_axes(place, across, up, width, height)]
     parts += [_drawn(mark, place) for mark in marks]
     foot, head = place.ends[1]
@@ -65,7 +65,7 @@ def still(
     )
 
 
-class _Places:
+class _Placement:
     """Numbers to places of the picture, as its axes have them."""
 
     def __init__(
@@ -112,7 +112,7 @@ def _covered(parts: list[Any]) -> tuple[float, float]:
     return low - margin, high + margin
 
 
-def _drawn(mark: Mark, place: _Places) -> str:
+def _drawn(mark: Mark, place: _Placement) -> str:
     style = f'style="color:var(--{mark.colour})"'
     if mark.kind == "segments":
         x0, y0, x1, y1 = mark.arrays
@@ -149,7 +149,7 @@ def _line(x: Array, y: Array, decimals: int) -> str:
     return "L".join(f"{a:.0f} {b:.{decimals}f}" for a, b in zip(x, y, strict=True))
 
 
-def _axes(place: _Places, across: ChartAxis, up: ChartAxis, width: float, height: float) -> str:
+def _axes(place: _Placement, across: ChartAxis, up: ChartAxis, width: float, height: float) -> str:
     (left, right), (foot, head) = place.ends
     parts = [f'<path d="M{left:.0f} {head:.0f}H{right:.0f}V{foot:.0f}H{left:.0f}Z" fill="none"/>']
     for tick in _ticks(across, place.limits[0]):

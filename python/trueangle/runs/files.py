@@ -17,7 +17,7 @@ from ..support.caller import level_of_caller
 from ..support.kinds import told_kinds
 from .angles import find_angles
 from .facets import Facets, read_facets
-from .readings import Readings
+from .readings import FileReadings
 from .run import CalibrationRun, Source, as_runs, given_runs
 from .source import Reading, checked_reading, each_table
 
@@ -199,7 +199,7 @@ class RunColumns(NamedTuple):
     rows without an empty cell of every run, in the order of their first row.
     """
 
-    table: Readings
+    table: FileReadings
     period: float
     reference: NDArray[np.float64]
     indicated: NDArray[np.float64]
@@ -215,7 +215,7 @@ def read_columns(data: Any, reading: Reading, name: str = "data") -> list[RunCol
     return each_table(data, lambda table: _columns(table, given), reading, name)
 
 
-def _columns(table: Readings, given: Conversion) -> RunColumns:
+def _columns(table: FileReadings, given: Conversion) -> RunColumns:
     asked = {role for role, column in table.roles.items() if column.is_asked}
     filled = any(len(column) for column in table.columns.values())
     # A log of an angle called indicated_deg is no table.
@@ -259,7 +259,7 @@ def _columns(table: Readings, given: Conversion) -> RunColumns:
     return RunColumns(table, period, reference, indicated, signals, groups, left_out, table.source)
 
 
-def _entries(table: Readings, counts: float | None) -> RunColumns:
+def _entries(table: FileReadings, counts: float | None) -> RunColumns:
     """A table of a turn as firmware holds it: entry i of n is the reading at i/n of a turn."""
     (name,) = table.columns
     column = table.roles.get("indicated", Column("indicated", name, None))
@@ -282,7 +282,7 @@ def _entries(table: Readings, counts: float | None) -> RunColumns:
     return RunColumns(table, _PERIOD, reference, indicated, {}, groups, [left_out], table.source)
 
 
-def runs_of_readings(table: Readings, given: Conversion) -> list[CalibrationRun]:
+def runs_of_readings(table: FileReadings, given: Conversion) -> list[CalibrationRun]:
     """Runs of the rows of a table; raises as `read_runs`."""
     found = _columns(table, given)
     signals = found.signals
@@ -316,7 +316,7 @@ _USED = ("time", "temperature", "torque", "error", *LABELS)
 
 
 def _warn_of_empty(
-    table: Readings, missing: NDArray[np.bool_], values: Mapping[str, NDArray[np.float64]]
+    table: FileReadings, missing: NDArray[np.bool_], values: Mapping[str, NDArray[np.float64]]
 ) -> None:
     count = int(np.count_nonzero(missing))
     if count:
@@ -331,11 +331,11 @@ def _warn_of_empty(
         )
 
 
-def _column_of(table: Readings, role: str) -> str:
+def _column_of(table: FileReadings, role: str) -> str:
     return table.roles[role].name if role in table.roles else next(iter(table.columns))
 
 
-def _groups(table: Readings, size: int) -> Groups:
+def _groups(table: FileReadings, size: int) -> Groups:
     """Labels and rows of every run, in the order of their first row: of one day each."""
     columns = {
         role: [*map(_label, table.columns[table.roles[role].name].tolist())]
@@ -374,7 +374,7 @@ def _label(value: Any) -> str:
     return "" if value is None else str(value)
 
 
-def _check_time(table: Readings, time: NDArray[np.float64], rows: NDArray[np.intp]) -> None:
+def _check_time(table: FileReadings, time: NDArray[np.float64], rows: NDArray[np.intp]) -> None:
     back = np.flatnonzero(np.diff(time[rows]) < 0.0)
     if back.size:
         row = int(rows[back[0] + 1])

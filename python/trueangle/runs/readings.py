@@ -33,7 +33,7 @@ from ..support.files import (
 )
 from .run import Source
 
-__all__ = ["Readings", "named", "read_once", "read_readings", "readings_of"]
+__all__ = ["FileReadings", "named", "read_once", "read_readings", "readings_of"]
 
 T = TypeVar("T")
 
@@ -59,7 +59,7 @@ def read_once() -> Iterator[None]:
         _ONCE.reset(token)
 
 
-class Readings(NamedTuple):
+class FileReadings(NamedTuple):
     """Rows of one file as they are, before they are runs.
 
     Attributes
@@ -109,7 +109,7 @@ class Readings(NamedTuple):
 
 def read_readings(
     path: str | PathLike[str], signals: Mapping[str, Any] | None = None, topic: str | None = None
-) -> Readings:
+) -> FileReadings:
     """All rows of one file with the columns that are known, needed or not.
 
     For logs without a reference, such as those that a self-calibration starts from.
@@ -155,7 +155,7 @@ def _spooled(path: Path) -> Iterator[Path]:
         yield file
 
 
-def readings_of(path: Path, wanted: Mapping[str, Any], topic: str | None) -> Readings:
+def readings_of(path: Path, wanted: Mapping[str, Any], topic: str | None) -> FileReadings:
     """All rows of a regular file; ``wanted`` as `columns.wanted_columns` makes it."""
     kind = format_of_content(path)
     header = kind.module.columns(path, topic)
@@ -173,7 +173,7 @@ def readings_of(path: Path, wanted: Mapping[str, Any], topic: str | None) -> Rea
     if together is not None:  # formats whose columns need not be equally long
         if not needed and len(header) > 1:  # which belong together nobody said
             empty = dict.fromkeys(header, np.empty(0))
-            return Readings(path, kind, roles, empty, _source(path))
+            return FileReadings(path, kind, roles, empty, _source(path))
         others = together(path, needed, others)
     labels = {column.name for column in roles.values() if column.role in LABELS}
     if "time" in roles and _is_dated(kind, path, roles["time"].name, topic):
@@ -181,7 +181,7 @@ def readings_of(path: Path, wanted: Mapping[str, Any], topic: str | None) -> Rea
     columns = _whole(kind, path, needed, others, labels, topic)
     size = next((len(values) for values in columns.values()), 0)
     columns |= {key: _repeated(value, size, key in TEXTS) for key, value in keys.items()}
-    return Readings(path, kind, roles, columns, _source(path))
+    return FileReadings(path, kind, roles, columns, _source(path))
 
 
 def _whole(

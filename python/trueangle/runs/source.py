@@ -16,7 +16,7 @@ from ..formats.columns import Column, wanted_columns
 from ..support.angles import check_period, unit_name
 from ..support.suggestions import did_you_mean
 from .paths import find_logs
-from .readings import Readings, named, readings_of
+from .readings import FileReadings, named, readings_of
 from .tables import table_readings
 
 __all__ = ["OtherReading", "Reading", "checked_reading", "each_table", "unit_of_path"]
@@ -116,7 +116,7 @@ def checked_reading(given: Mapping[str, Any]) -> Reading:
 
 def each_table(
     data: Any,
-    read: Callable[[Readings], T],
+    read: Callable[[FileReadings], T],
     reading: Reading,
     name: str = "runs",
     table: str = "table",
@@ -204,7 +204,7 @@ def unit_of_path(path: Path, pattern: str | None) -> str | None:
     return found[1] if found.re.groups and found[1] is not None else found[0]
 
 
-def _of_joint(table: Readings, unit: str | None) -> Readings:
+def _of_joint(table: FileReadings, unit: str | None) -> FileReadings:
     """All rows of one unit, that the name of the file tells."""
     if unit is None:
         return table
@@ -220,7 +220,7 @@ def _of_joint(table: Readings, unit: str | None) -> Readings:
     )
 
 
-def _with_unit(table: Readings, period: float | None) -> Readings:
+def _with_unit(table: FileReadings, period: float | None) -> FileReadings:
     """Angles without a unit of their own are in that of ``period``."""
     if period is None:
         return table

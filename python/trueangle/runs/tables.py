@@ -14,7 +14,7 @@ from ..errors import ArgumentError, KindError, MissingExtraError
 from ..formats.columns import Wanted, find_columns
 from ..formats.format import Format
 from ..support.labelled import take_apart
-from .readings import Readings
+from .readings import FileReadings
 from .run import Source
 
 __all__ = ["table_readings"]
@@ -30,7 +30,7 @@ class _Memory(Format):
 _MEMORY = _Memory("", {"a table in memory": ()})
 
 
-def table_readings(data: Any, name: str, wanted: Wanted) -> Readings | None:
+def table_readings(data: Any, name: str, wanted: Wanted) -> FileReadings | None:
     """The readings of a table; None of what is none.
 
     Parameters
@@ -69,7 +69,7 @@ def table_readings(data: Any, name: str, wanted: Wanted) -> Readings | None:
                 f"{name}: column {column!r} has the shape {values.shape}; columns must be "
                 "one-dimensional and equally long"
             )
-    return Readings(path, _MEMORY, roles, columns, Source(name, ""))
+    return FileReadings(path, _MEMORY, roles, columns, Source(name, ""))
 
 
 def _columns(data: Any) -> dict[Any, Any] | None:

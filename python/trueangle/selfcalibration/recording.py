@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from ..errors import ArgumentError, FileError
 from ..formats.columns import LABELS, Column, role_kind, signal_code
-from ..runs.readings import Readings
+from ..runs.readings import FileReadings
 from ..runs.run import CalibrationRun, Source, given_runs
 from ..runs.source import Reading, checked_reading, each_table
 
@@ -95,7 +95,7 @@ def _of_run(run: CalibrationRun) -> Recording:
     )
 
 
-def _of_table(table: Readings, reading: Reading) -> list[Recording]:
+def _of_table(table: FileReadings, reading: Reading) -> list[Recording]:
     channels = {
         role: _in_radians(
             column._replace(unit=column.unit or table.format.unit)
@@ -119,7 +119,7 @@ def _of_table(table: Readings, reading: Reading) -> list[Recording]:
     return _split(channels, labels, file, table.source)
 
 
-def _in_radians(column: Column, table: Readings, reading: Reading) -> Array:
+def _in_radians(column: Column, table: FileReadings, reading: Reading) -> Array:
     """A channel in radians, seconds or the unit of its only column."""
     beside = "_reference" if column.role == "reference" else ""
     turn = reading["counts_per_turn_reference" if beside else "counts_per_turn"]

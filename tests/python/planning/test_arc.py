@@ -10,7 +10,7 @@ import trueangle as ta
 from trueangle.cli import main
 from trueangle.errors import ArgumentError
 from trueangle.planning.counts import rounded
-from trueangle.planning.doptimal import Columns, d_optimal
+from trueangle.planning.doptimal import OrthonormalColumns, d_optimal
 from trueangle.planning.noisefactors import noise_factors
 
 SEED = 32_700
@@ -49,7 +49,7 @@ def efficiency(places, counts, orders, optimum):
 def test_no_place_has_more_variance_than_the_equivalence_theorem_allows(orders, arc):
     """Kiefer and Wolfowitz: at most p everywhere, p at every place of the design."""
     orders = list(orders)
-    columns = Columns(orders, 0.1, 0.1 + arc / 360.0)
+    columns = OrthonormalColumns(orders, 0.1, 0.1 + arc / 360.0)
     found = d_optimal(columns)
     x = 2.0 * np.pi * (0.1 + np.linspace(0.0, arc / 360.0, 7001))
     rows, own = design(x, orders), design(2.0 * np.pi * found.places, orders)
@@ -68,12 +68,12 @@ def test_explicit_solutions_on_a_partial_circle(half):
     The determinant of all orders up to m is a product of sines of half the distances (Dette,
     Melas and Pepelyshev 2002).
     """
-    one = d_optimal(Columns([1], -half / 360.0, half / 360.0))
+    one = d_optimal(OrthonormalColumns([1], -half / 360.0, half / 360.0))
     np.testing.assert_allclose(360.0 * one.places, [-half, 0.0, half], atol=PLACE)
     end = math.cos(math.radians(half))
     b = 1.0 - 2.0 * end
     inner = math.degrees(math.acos((-b + math.sqrt(b * b + 16.0 * (end + 2.0))) / 8.0))
-    two = d_optimal(Columns([1, 2], -half / 360.0, half / 360.0))
+    two = d_optimal(OrthonormalColumns([1, 2], -half / 360.0, half / 360.0))
     np.testing.assert_allclose(360.0 * two.places, [-half, -inner, 0.0, inner, half], atol=PLACE)
     np.testing.assert_allclose(two.weights, 0.2, rtol=1e-9)
 
@@ -81,7 +81,7 @@ def test_explicit_solutions_on_a_partial_circle(half):
 def test_long_arcs_need_no_more_than_even_places():
     """From 2m of 2m + 1 steps of a turn on, even places are as good as over the turn."""
     orders, stop = [1, 2, 3, 4], 8.0 / 9.0
-    found = d_optimal(Columns(orders, 0.0, stop))
+    found = d_optimal(OrthonormalColumns(orders, 0.0, stop))
     even = 40.0 * np.arange(9)
     optimum = (even, np.full(9, 1.0 / 9.0))
     assert efficiency(360.0 * found.places, found.weights, orders, optimum) == pytest.approx(1.0)
@@ -97,7 +97,7 @@ def test_long_arcs_need_no_more_than_even_places():
 )
 def test_published_efficiencies(orders, arc, dense, even, least, worse):
     plan = ta.plan_arc(0.0, arc, orders, readings=60)
-    found = d_optimal(Columns(orders, 0.0, arc / 360.0))
+    found = d_optimal(OrthonormalColumns(orders, 0.0, arc / 360.0))
     optimum = (360.0 * found.places, found.weights)
     assert plan.readings == 60
     assert plan.d_efficiency >= least
@@ -119,7 +119,7 @@ def test_published_efficiencies(orders, arc, dense, even, least, worse):
 
 def test_readings_are_shared_out_with_the_least_loss():
     """By trying all: no other shares of 14 readings over 5 places have a larger determinant."""
-    found = d_optimal(Columns([1, 2], 0.0, 0.5))
+    found = d_optimal(OrthonormalColumns([1, 2], 0.0, 0.5))
     counts = rounded(found.weights, 14)
     assert sorted(counts.tolist()) == [2, 3, 3, 3, 3]
     assert rounded(np.array([0.6, 0.3, 0.1]), 10).tolist() == [6, 3, 1]

@@ -8,7 +8,7 @@ import pytest
 from trueangle.effects import EFFECTS
 from trueangle.estimation.regression import Regression
 from trueangle.joint.signals import join_runs
-from trueangle.planning.evidence import Evidence, Hypothesis, Noise, evidence_between
+from trueangle.planning.evidence import ExpectedEvidence, Hypothesis, ReadingNoise, evidence_between
 from trueangle.planning.hypotheses import of_size
 from trueangle.simulation import Backlash, Harmonic, Latency, RunDesign, Simulation, simulate
 
@@ -46,7 +46,7 @@ def test_what_a_rival_leaves_is_that_of_dense_generalised_least_squares(rho):
     signals = fitted.signals
     found = {
         (e.cause, e.rival): e.deviance
-        for e in evidence_between(fitted, RIVALS, Noise(1.0, rho), searched=True)
+        for e in evidence_between(fitted, RIVALS, ReadingNoise(1.0, rho), searched=True)
     }
     theta = signals.theta
     base = np.column_stack([np.ones_like(theta), np.cos(theta), np.sin(theta)])
@@ -64,11 +64,11 @@ def test_what_a_rival_leaves_is_that_of_dense_generalised_least_squares(rho):
 def test_evidence_grows_with_the_square_of_the_size_and_falls_with_the_variance():
     fitted = regression(0.0)
     one, two = (
-        evidence_between(fitted, [Hypothesis("backlash", (Backlash(b),))], Noise(1.0), False)
+        evidence_between(fitted, [Hypothesis("backlash", (Backlash(b),))], ReadingNoise(1.0), False)
         for b in (1.0, 2.0)
     )
     (noisy,) = evidence_between(
-        fitted, [Hypothesis("backlash", (Backlash(1.0),))], Noise(3.0), False
+        fitted, [Hypothesis("backlash", (Backlash(1.0),))], ReadingNoise(3.0), False
     )
     assert two[0].deviance == pytest.approx(4.0 * one[0].deviance, rel=1e-9)
     assert noisy.deviance == pytest.approx(one[0].deviance / 9.0, rel=1e-9)
@@ -77,7 +77,7 @@ def test_evidence_grows_with_the_square_of_the_size_and_falls_with_the_variance(
 def test_one_speed_leaves_nothing_between_play_and_a_delay():
     # No line, that a delay would move.
     sim = Simulation(runs=(RunDesign(samples=90, reversals=(0.5,)),))
-    found = evidence_between(regression(0.0, sim), RIVALS, Noise(1.0), searched=False)
+    found = evidence_between(regression(0.0, sim), RIVALS, ReadingNoise(1.0), searched=False)
     between = [e for e in found if e.rival]
     assert max(e.deviance for e in between) < 1e-6 * max(e.deviance for e in found)
     assert max(e.chance for e in between) < 0.05
@@ -92,7 +92,7 @@ def test_the_chance_is_that_of_simulated_differences():
     deviance = float(shape @ shape)
     noise = rng.standard_normal((40_000, 60))
     gaps = np.sum((noise + shape) ** 2, axis=1) - np.sum(noise**2, axis=1)
-    said = Evidence("a", "b", deviance, deviance).chance
+    said = ExpectedEvidence("a", "b", deviance, deviance).chance
     assert np.mean(gaps > 6.0) == pytest.approx(said, abs=4.0 * (0.25 / 40_000) ** 0.5)
 
 

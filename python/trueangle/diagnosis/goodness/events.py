@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from .evidence import Evidence, drawn_signs, largest_of, made_even
 from .leftover import Leftover
-from .place import UnitSums, unit_sums
+from .place import ModulatedSums, unit_sums
 
 __all__ = ["AFTER_REVERSALS", "AFTER_START", "reversal_test", "start_test"]
 
@@ -65,7 +65,7 @@ def _relaxing(
     span = float(np.median([left.clock[b - 1] - left.clock[a] for a, b in stretches]))
     if span <= 0.0:
         return None
-    found: list[tuple[UnitSums, float, float]] = []
+    found: list[tuple[ModulatedSums, float, float]] = []
     for constant in CONSTANTS:
         since = np.zeros(len(left))
         for a, b in stretches:

@@ -101,7 +101,7 @@ def estimate_noise(left: Leftover, orders: int | None = None) -> Noise:
     columns = left.kept.get("pattern")
     if columns is None or columns.orders != orders:
         pattern = _centred(_pattern(left, stop, len(bounds), orders), bounds)
-        columns = left.kept["pattern"] = _Columns(pattern, bounds, orders)
+        columns = left.kept["pattern"] = _PatternProducts(pattern, bounds, orders)
     means = len(bounds)
     sums = _Sums(columns, _centred(e[:, None], bounds)[:, 0])
     trials = np.array(TRIALS)
@@ -181,7 +181,7 @@ def _centred(x: Array, bounds: list[tuple[int, int]]) -> Array:
     return out
 
 
-class _Columns:
+class _PatternProducts:
     """The flexible pattern with its products: of readings, of inner ones, of neighbours."""
 
     def __init__(self, pattern: Array, bounds: list[tuple[int, int]], orders: int | None) -> None:
@@ -205,7 +205,7 @@ class _Sums:
     is not quite the best estimate of the run's zero, by an amount that ends matter for only.
     """
 
-    def __init__(self, columns: _Columns, e: Array) -> None:
+    def __init__(self, columns: _PatternProducts, e: Array) -> None:
         x, ends, closing = columns.x, columns.ends, columns.closing
         self.runs, self.n = columns.runs, e.size
         inner = e.copy()

@@ -31,7 +31,7 @@ from ...support.distributions import incomplete_gamma_tail, student_tail
 from .evidence import Evidence, drawn_signs, largest_of, made_even
 from .leftover import Leftover
 
-__all__ = ["UnitSums", "place_tests", "unit_sums"]
+__all__ = ["ModulatedSums", "place_tests", "unit_sums"]
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -186,7 +186,7 @@ def _judged(
 
 
 def _smallest(
-    w: Complex, alone: UnitSums | None, signs: Array
+    w: Complex, alone: ModulatedSums | None, signs: Array
 ) -> tuple[float, float, float, int, Array]:
     """Smallest p value of orders, bands of them and the modulator alone, and what has it.
 
@@ -215,7 +215,7 @@ def _smallest(
 
 
 @dataclass(frozen=True)
-class UnitSums:
+class ModulatedSums:
     """Sums over units of a modulator times what is left, and the size that they stand for."""
 
     sums: Array
@@ -230,7 +230,7 @@ class UnitSums:
         return 2.0 * student_tail(float(np.sqrt(square * (n - 1) / (n - square))), n - 1)
 
 
-def unit_sums(g: Array, left: Leftover, units: list[tuple[int, int]]) -> UnitSums:
+def unit_sums(g: Array, left: Leftover, units: list[tuple[int, int]]) -> ModulatedSums:
     """Of the modulator itself, at no place in particular."""
     # Within runs, or between them where it does not change within any.
     inside = left.centred(left.bounds)
@@ -251,4 +251,4 @@ def unit_sums(g: Array, left: Leftover, units: list[tuple[int, int]]) -> UnitSum
         and float(sums @ sums) > 0.0
         and abs(product) > ROUNDED * float(np.abs(g) @ np.abs(e))
     )
-    return UnitSums(sums, product / own if told else 0.0)
+    return ModulatedSums(sums, product / own if told else 0.0)

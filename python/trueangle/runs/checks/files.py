@@ -8,7 +8,7 @@ from typing import Any
 
 from ...formats.columns import offsets_of, unit_in_name
 from ..files import read_columns
-from ..readings import Readings
+from ..readings import FileReadings
 from ..source import checked_reading
 from .record import Record
 
@@ -48,7 +48,7 @@ def read_records(data: Any, reading: Mapping[str, Any]) -> list[Record]:
     return found
 
 
-def _deviations(table: Readings) -> tuple[str, ...]:
+def _deviations(table: FileReadings) -> tuple[str, ...]:
     """Columns of numbers in small units of angles, or called so, that nothing was asked of."""
     if offsets_of(table.roles):
         return ()

@@ -15,7 +15,7 @@ from ...formats.columns import count_turn, matching, signal_code, wanted_columns
 from ...formats.signals import FIELDS
 from ...support.angles import ARCSEC_PER_TURN
 from ...support.kinds import told_kinds
-from ..readings import Readings, read_readings
+from ..readings import FileReadings, read_readings
 from ..run import CalibrationRun
 from .clocks import Clocks, estimated_clocks
 from .result import Gap, Joined
@@ -25,7 +25,7 @@ __all__ = ["join"]
 
 Array = NDArray[np.float64]
 
-#: Readings that a run is made of, at least.
+#: FileReadings that a run is made of, at least.
 _LEAST = 4
 
 
@@ -116,14 +116,14 @@ def join(
 class _Log(NamedTuple):
     """Readings of one log: times, angles in degrees, and what else stands in it."""
 
-    table: Readings
+    table: FileReadings
     time: Array
     angle: Array
     signals: dict[str, Array]
     labels: NDArray[Any] | None
 
     @classmethod
-    def read(cls, table: Readings, role: str, counts: float | None) -> _Log:
+    def read(cls, table: FileReadings, role: str, counts: float | None) -> _Log:
         roles = table.roles
         if "time" not in roles:
             raise table.error(
@@ -159,7 +159,7 @@ _EXTRA = ("temperature", "torque", "current", "velocity", "mount", "shift", "mot
 
 def _assigned(
     paths: tuple[Any, Any], signals: Mapping[str, Any] | None, topic: str | None
-) -> tuple[Readings, Readings]:
+) -> tuple[FileReadings, FileReadings]:
     """The log that holds the indicated angle, and the one that holds the reference."""
     shared = dict(signals or {})
     own = [dict(shared.pop(name, None) or {}) for name in ("a", "b")]
@@ -194,7 +194,7 @@ def _name(wanted: Any) -> str:
     return wanted if isinstance(wanted, str) else str(wanted[0])
 
 
-def _has(table: Readings, wanted: Any) -> bool:
+def _has(table: FileReadings, wanted: Any) -> bool:
     try:
         matching(table.path, list(table.columns), _name(wanted))
     except FileError:
