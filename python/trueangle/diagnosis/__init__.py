@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from .diagnose import diagnose
-from .findings import Diagnosis, Finding
+from .finding import Finding
+from .findings import Diagnosis
 
 __all__ = ["Diagnosis", "Finding", "diagnose"]

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from ..support.display_units import ErrorUnit, significant
 
 if TYPE_CHECKING:
-    from .findings import Finding
+    from .finding import Finding
 
 __all__ = ["brief_of"]
 

@@ -28,7 +28,7 @@ from ..joint.signals import Signals
 from ..simulation.simulation import Simulation
 from ..support.angles import ARCSEC_PER_TURN
 from .confirmation import status_of
-from .findings import Finding
+from .finding import Finding
 from .gain import measure_delay_gain
 from .goodness import Unexplained
 from .penalty import NEW_CAUSE

@@ -30,7 +30,8 @@ from .believed import judged_beliefs
 from .candidates import proposed
 from .delay import delay_finding
 from .discrepancy import compare, unfolded_error
-from .findings import Diagnosis, Finding
+from .finding import Finding
+from .findings import Diagnosis
 from .gates import many_causes
 from .gearedlines import Ratio
 from .goodness import Unexplained, goodness_of_fit

@@ -1,21 +1,16 @@
-"""Findings, and the diagnosis that holds them."""
+"""The diagnosis: what was found, what is left, what could not be seen."""
 
 from __future__ import annotations
 
 import json
-import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
-from ..effects import EFFECTS, Effect
 from ..effects.blindness import Blindness
-from ..errors import ArgumentError, NoModelError
-from ..estimation.estimate import Parameters, Quantity
 from ..estimation.regression import ROUNDING
 from ..joint.signals import join_runs
-from ..model.model import HarmonicModel
 from ..planning.evidence import ReadingNoise
 from ..planning.limits import Limits
 from ..planning.nextruns import NextRuns
@@ -26,101 +21,24 @@ from ..simulation.measured import design_of
 from ..simulation.simulation import Simulation
 from ..support.display_units import ErrorsIn
 from ..support.drawn import drawn
-from ..support.oftype import of_type
-from ..support.plainresult import PlainResult, Shown, counted
+from ..support.plainresult import counted
 from .beliefs import Belief
-from .confirmation import CONFIRMED
-from .correction import extend_model
+from .correctable import Correctable
 from .discrepancy import Discrepancy
-from .gain import Gain
+from .finding import Finding
 from .goodness import Unexplained
 from .torque import TorqueAccount
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from ..fitting.argument import AnyArgument
     from ..runs.run import CalibrationRun
 
-__all__ = ["Diagnosis", "Finding"]
+__all__ = ["Diagnosis"]
 
 
 @dataclass(frozen=True)
-class Finding(Shown):
-    """One cause that the readings support.
-
-    Attributes
-    ----------
-    cause : str
-        Of the vocabulary of causes.
-    parameters : dict of str to Quantity
-        ``.value`` and ``.std`` by the names of the contract.
-    evidence : dict
-        ``bic_gain``, ``deviance`` (2 ln of the likelihood ratio), ``parameters``,
-        ``log_grid``.
-    gain : Gain or None
-        On held-out runs; None for causes of the scatter.
-    rivals : list of (str, float)
-        Other causes and how much less each explains in its place (BIC); tried for the
-        first four findings.
-    effects : list of Effect
-        What extends the simulation, where it is confirmed.
-    status : str
-        "confirmed", or "not_confirmed" where its gain on held-out data does not exclude
-        zero: listed, and kept out of the extended simulation and of corrections.
-    reason : str
-        Why it is not confirmed.
-    group : tuple of int
-        Its terms in the regression.
-    """
-
-    cause: str
-    parameters: Parameters
-    evidence: dict[str, float]
-    gain: Gain | None
-    rivals: list[tuple[str, float]]
-    effects: list[Effect] = field(repr=False, default_factory=list)
-    status: str = CONFIRMED
-    reason: str = ""
-    group: tuple[int, ...] = field(repr=False, default=())
-
-    @property
-    def confirmed(self) -> bool:
-        """Fit to extend the simulation and to correct."""
-        return self.status == CONFIRMED
-
-    def _brief(self) -> str:
-        sizes = [f"{name} {q.value:.4g}" for name, q in self.parameters.items() if _is_number(q)]
-        return ", ".join([self.cause, *sizes[:2], self.status])
-
-    def summary(self) -> str:
-        """The finding as readable text."""
-        from .summary import finding_text
-
-        return finding_text(self)
-
-    @property
-    def sentence(self) -> str:
-        """The physics in one sentence."""
-        return EFFECTS[self.cause].sentence
-
-    def to_dict(self) -> dict[str, Any]:
-        """The entry of ``findings``."""
-        return {
-            "cause": self.cause,
-            "status": self.status,
-            "status_reason": self.reason,
-            "parameters": {name: q.to_dict() for name, q in self.parameters.items()},
-            "evidence": self.evidence,
-            "gain": None if self.gain is None else self.gain.to_dict(),
-            "rivals": [{"cause": cause, "bic_gap": gap} for cause, gap in self.rivals],
-            "physics": self.sentence,
-            "correctable": self.cause not in EFFECTS or not EFFECTS[self.cause].not_at_run_time,
-        }
-
-
-@dataclass(frozen=True)
-class Diagnosis(PlainResult):
+class Diagnosis(Correctable):
     """What `trueangle.diagnose` found.
 
     Attributes
@@ -288,137 +206,6 @@ class Diagnosis(PlainResult):
         asked = Blindness(causes, "", "", bool(known), hypotheses=known)
         return replace(self.extended, effects=kept), [asked]
 
-    def correction(
-        self,
-        model: HarmonicModel | None = None,
-        runs: CalibrationRun | Iterable[CalibrationRun] | None = None,
-        *,
-        argument: AnyArgument = "auto",
-    ) -> HarmonicModel:
-        """The correction model of what was confirmed, fitted to the runs.
-
-        Parameters
-        ----------
-        model : HarmonicModel, optional
-            One to extend. Without it the lines that the simulation believes, as measured, and
-            those of the findings are its orders, and other findings its terms.
-        runs : CalibrationRun or iterable of them, optional
-            In place of those that were diagnosed.
-        argument : {"auto", "reference", "indicated"}
-            As of `trueangle.fit`; by itself that of the model.
-
-        Returns
-        -------
-        HarmonicModel
-            See `trueangle.diagnosis.correction.extend_model`.
-
-        Raises
-        ------
-        NoModelError
-            Nothing was confirmed that a corrector can take off; says why and what to measure.
-        NotInvertibleError
-            The error is too steep for a model of the true angle.
-        KindError
-            What is given as model is none.
-        ArgumentError
-            Nothing to extend, and the diagnosis stands on the log of another simulator.
-
-        Examples
-        --------
-        >>> from trueangle import diagnose, simulate
-        >>> from trueangle.simulation import Backlash, RunDesign, Simulation
-        >>> sim = Simulation(sigma_arcsec=1.0, runs=(RunDesign(reversals=(0.5,)),
-        ...                                          RunDesign(reversals=(0.5,), speed_deg_s=30)))
-        >>> model = diagnose(simulate(sim.with_effects([Backlash(36.0)])), sim).correction()
-        >>> round(model.terms[0].half_width, 3)
-        0.01
-        """
-        if model is None:
-            self._check_correctable()
-        else:
-            of_type("model", model, HarmonicModel, "a trueangle.HarmonicModel, or left out")
-        given = self.runs if runs is None else runs
-        return extend_model(model, given, self.extended, argument)
-
-    def sensor(self, *, without_any: bool = False) -> HarmonicModel:
-        """What was confirmed as the model of a sensor: what a simulator's encoder lacks.
-
-        Parameters
-        ----------
-        without_any : bool
-            Give an empty model where nothing was confirmed.
-
-        Returns
-        -------
-        HarmonicModel
-            Its error stands on top of the log, where the diagnosis had one; else it is all of
-            the joint's.
-
-        Raises
-        ------
-        NoModelError
-            Nothing was confirmed that a sensor can have.
-        NotInvertibleError
-            The error is too steep for a model of the true angle.
-        """
-        if without_any and not self._is_correctable:
-            return HarmonicModel(())
-        self._check_confirmed()
-        runs = self.runs if self.simulated is None else self.simulated.runs
-        return extend_model(None, runs, self.extended)
-
-    def sensor_noise(self) -> float:
-        """Standard deviation of the noise that a simulator's encoder lacks, radians.
-
-        The noise of one reading, without what the log's own encoder has: that is in measured
-        minus simulated, and stays in the simulator.
-        """
-        own = 0.0 if self.simulated is None else self.simulated.noise_arcsec
-        lacking = math.sqrt(max(self.noise**2 - 2.0 * own**2, 0.0))
-        return lacking * math.pi / 648_000.0
-
-    def _check_correctable(self) -> None:
-        """Raise where there is nothing that a model could be made of."""
-        if self.simulated is not None:
-            raise ArgumentError(
-                "no correction model can hold what is known as a log only: give the model to extend"
-            )
-        self._check_confirmed()
-
-    @property
-    def _is_correctable(self) -> bool:
-        """Something was confirmed that a model can hold."""
-        effects = self.extended.effects
-        return bool(self.extended.harmonics) or any(not e.not_at_run_time for e in effects)
-
-    def _check_confirmed(self) -> None:
-        """Raise where nothing was confirmed that a model can hold."""
-        if self._is_correctable:
-            return
-        raise NoModelError(
-            "no correction can be given: nothing was confirmed that a corrector can take off"
-            + "".join(f"; {reason}" for reason in self._uncorrected())
-        )
-
-    def _uncorrected(self) -> Iterator[str]:
-        """Why nothing can be taken off, and what to measure."""
-        sure = [f for f in self.findings if f.confirmed]
-        if sure:
-            why = (f"{f.cause} ({EFFECTS[f.cause].not_at_run_time or 'no term'})" for f in sure)
-            yield f"confirmed: {', '.join(why)}"
-        if len(sure) < len(self.findings):
-            why = (f"{f.cause} ({f.reason})" for f in self.findings if not f.confirmed)
-            yield f"not confirmed: {', '.join(why)}"
-        seen = [spot for spot in self.not_identifiable if spot.supported]
-        told = {spot.measure: ", ".join(spot.causes) for spot in reversed(seen)}
-        if told:
-            yield from (f"to tell {causes} apart: {measure}" for measure, causes in told.items())
-        else:
-            yield (
-                "measure more runs, in both directions and at two speeds, before it is diagnosed "
-                "again"
-            )
-
     def to_dict(self, extended_simulation: str | None = None) -> dict[str, Any]:
         """The object that ``trueangle diagnose`` prints as JSON."""
         return {
@@ -492,7 +279,3 @@ class Diagnosis(PlainResult):
         from .summary import render
 
         return render(self, errors_in, verbose)
-
-
-def _is_number(quantity: Quantity) -> bool:
-    return isinstance(quantity.value, int | float)

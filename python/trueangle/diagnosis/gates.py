@@ -16,7 +16,7 @@ from ..effects.blindness import Blindness
 from ..effects.presliding_hysteresis import PreslidingHysteresis
 from ..estimation.regression import Regression
 from .confirmation import NOT_CONFIRMED
-from .findings import Finding
+from .finding import Finding
 from .levels import UNITS
 from .overlap import overlaps
 

@@ -13,7 +13,7 @@ from ..estimation.regression import Regression
 from ..support.deadline import pace
 from .candidates import Candidate, extensions, propose
 from .confirmation import CONFIRMED, NOT_CONFIRMED, status_of
-from .findings import Finding
+from .finding import Finding
 from .forms import with_form_errors
 from .gain import Gain, measure_gain
 from .gates import gated

@@ -19,7 +19,8 @@ from .levels import LevelGain
 from .untold import untold
 
 if TYPE_CHECKING:
-    from .findings import Diagnosis, Finding
+    from .finding import Finding
+    from .findings import Diagnosis
 
 __all__ = ["finding_text", "headline", "render"]
 

@@ -28,7 +28,8 @@ from ..runs.run import CalibrationRun
 from ..support.plainresult import Shown
 
 if TYPE_CHECKING:
-    from .findings import Diagnosis, Finding
+    from .finding import Finding
+    from .findings import Diagnosis
 
 __all__ = ["TorqueAccount", "TorqueFinding", "torque_account"]
 

@@ -8,7 +8,7 @@ from ..effects import EFFECTS
 from ..effects.missing_order import MissingOrder
 from ..simulation.simulation import Simulation
 from .beliefs import Belief
-from .findings import Finding
+from .finding import Finding
 
 __all__ = ["moved"]
 

@@ -9,7 +9,7 @@ import pytest
 
 import trueangle as ta
 from trueangle.diagnosis.confirmation import CONFIRMED, NOT_CONFIRMED
-from trueangle.diagnosis.findings import Finding
+from trueangle.diagnosis.finding import Finding
 from trueangle.diagnosis.gain import Gain
 from trueangle.diagnosis.gates import GATES, MANY, alike_columns, gated, many_causes
 from trueangle.diagnosis.levels import LevelGain

@@ -1,0 +1,168 @@
+"""What a diagnosis confirmed, as the model of a correction or of a simulator's sensor."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator, Sequence
+from typing import TYPE_CHECKING
+
+from ..effects import EFFECTS
+from ..effects.blindness import Blindness
+from ..errors import ArgumentError, NoModelError
+from ..model.model import HarmonicModel
+from ..runs.joining import MeasuredMinusSimulated
+from ..simulation.simulation import Simulation
+from ..support.oftype import of_type
+from ..support.plainresult import PlainResult
+from .correction import extend_model
+from .finding import Finding
+
+if TYPE_CHECKING:
+    from ..fitting.argument import AnyArgument
+    from ..runs.run import CalibrationRun
+
+__all__ = ["Correctable"]
+
+
+class Correctable(PlainResult):
+    """A diagnosis that a model can be made of."""
+
+    if TYPE_CHECKING:
+        # What the diagnosis holds.
+        findings: list[Finding]
+        extended: Simulation
+        noise: float
+        not_identifiable: list[Blindness]
+        runs: Sequence[CalibrationRun]
+        simulated: MeasuredMinusSimulated | None
+
+    def correction(
+        self,
+        model: HarmonicModel | None = None,
+        runs: CalibrationRun | Iterable[CalibrationRun] | None = None,
+        *,
+        argument: AnyArgument = "auto",
+    ) -> HarmonicModel:
+        """The correction model of what was confirmed, fitted to the runs.
+
+        Parameters
+        ----------
+        model : HarmonicModel, optional
+            One to extend. Without it the lines that the simulation believes, as measured, and
+            those of the findings are its orders, and other findings its terms.
+        runs : CalibrationRun or iterable of them, optional
+            In place of those that were diagnosed.
+        argument : {"auto", "reference", "indicated"}
+            As of `trueangle.fit`; by itself that of the model.
+
+        Returns
+        -------
+        HarmonicModel
+            See `trueangle.diagnosis.correction.extend_model`.
+
+        Raises
+        ------
+        NoModelError
+            Nothing was confirmed that a corrector can take off; says why and what to measure.
+        NotInvertibleError
+            The error is too steep for a model of the true angle.
+        KindError
+            What is given as model is none.
+        ArgumentError
+            Nothing to extend, and the diagnosis stands on the log of another simulator.
+
+        Examples
+        --------
+        >>> from trueangle import diagnose, simulate
+        >>> from trueangle.simulation import Backlash, RunDesign, Simulation
+        >>> sim = Simulation(sigma_arcsec=1.0, runs=(RunDesign(reversals=(0.5,)),
+        ...                                          RunDesign(reversals=(0.5,), speed_deg_s=30)))
+        >>> model = diagnose(simulate(sim.with_effects([Backlash(36.0)])), sim).correction()
+        >>> round(model.terms[0].half_width, 3)
+        0.01
+        """
+        if model is None:
+            self._check_correctable()
+        else:
+            of_type("model", model, HarmonicModel, "a trueangle.HarmonicModel, or left out")
+        given = self.runs if runs is None else runs
+        return extend_model(model, given, self.extended, argument)
+
+    def sensor(self, *, without_any: bool = False) -> HarmonicModel:
+        """What was confirmed as the model of a sensor: what a simulator's encoder lacks.
+
+        Parameters
+        ----------
+        without_any : bool
+            Give an empty model where nothing was confirmed.
+
+        Returns
+        -------
+        HarmonicModel
+            Its error stands on top of the log, where the diagnosis had one; else it is all of
+            the joint's.
+
+        Raises
+        ------
+        NoModelError
+            Nothing was confirmed that a sensor can have.
+        NotInvertibleError
+            The error is too steep for a model of the true angle.
+        """
+        if without_any and not self._is_correctable:
+            return HarmonicModel(())
+        self._check_confirmed()
+        runs = self.runs if self.simulated is None else self.simulated.runs
+        return extend_model(None, runs, self.extended)
+
+    def sensor_noise(self) -> float:
+        """Standard deviation of the noise that a simulator's encoder lacks, radians.
+
+        The noise of one reading, without what the log's own encoder has: that is in measured
+        minus simulated, and stays in the simulator.
+        """
+        own = 0.0 if self.simulated is None else self.simulated.noise_arcsec
+        lacking = math.sqrt(max(self.noise**2 - 2.0 * own**2, 0.0))
+        return lacking * math.pi / 648_000.0
+
+    def _check_correctable(self) -> None:
+        """Raise where there is nothing that a model could be made of."""
+        if self.simulated is not None:
+            raise ArgumentError(
+                "no correction model can hold what is known as a log only: give the model to extend"
+            )
+        self._check_confirmed()
+
+    @property
+    def _is_correctable(self) -> bool:
+        """Something was confirmed that a model can hold."""
+        effects = self.extended.effects
+        return bool(self.extended.harmonics) or any(not e.not_at_run_time for e in effects)
+
+    def _check_confirmed(self) -> None:
+        """Raise where nothing was confirmed that a model can hold."""
+        if self._is_correctable:
+            return
+        raise NoModelError(
+            "no correction can be given: nothing was confirmed that a corrector can take off"
+            + "".join(f"; {reason}" for reason in self._uncorrected())
+        )
+
+    def _uncorrected(self) -> Iterator[str]:
+        """Why nothing can be taken off, and what to measure."""
+        sure = [f for f in self.findings if f.confirmed]
+        if sure:
+            why = (f"{f.cause} ({EFFECTS[f.cause].not_at_run_time or 'no term'})" for f in sure)
+            yield f"confirmed: {', '.join(why)}"
+        if len(sure) < len(self.findings):
+            why = (f"{f.cause} ({f.reason})" for f in self.findings if not f.confirmed)
+            yield f"not confirmed: {', '.join(why)}"
+        seen = [spot for spot in self.not_identifiable if spot.supported]
+        told = {spot.measure: ", ".join(spot.causes) for spot in reversed(seen)}
+        if told:
+            yield from (f"to tell {causes} apart: {measure}" for measure, causes in told.items())
+        else:
+            yield (
+                "measure more runs, in both directions and at two speeds, before it is diagnosed "
+                "again"
+            )
