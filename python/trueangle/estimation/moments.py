@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import math
-import os
-import threading
 from collections.abc import Hashable, Iterable, Mapping, Sequence
 from typing import Any
 
@@ -16,6 +14,7 @@ import trueangle._core as _core
 from ..errors import ArgumentError
 from ..joint.shafts import Shaft, ShaftOrders, resolve_orders
 from ..model.model import Argument
+from ..support.exclusive import Exclusive
 from ..support.kinds import told_kinds
 from ..support.plainresult import Shown
 from .momentsfit import MomentsFit, Spectrum
@@ -23,33 +22,6 @@ from .momentsfit import MomentsFit, Spectrum
 __all__ = ["Moments", "MomentsFit", "Spectrum"]
 
 _Orders = Iterable[float] | Mapping[str, Iterable[float]]
-
-
-class _Turn:
-    """One thread at a time; the others wait, unless nobody can ever be done.
-
-    A process that is forked while another of its threads is at it inherits sums that are
-    half added: there it is told so.
-    """
-
-    #: Seconds between two looks at whose turn it is.
-    _PATIENCE = 0.05
-
-    def __init__(self) -> None:
-        self._lock = threading.Lock()
-        self._process = os.getpid()
-
-    def __enter__(self) -> None:
-        while not self._lock.acquire(timeout=self._PATIENCE):
-            if self._process != os.getpid():
-                raise ArgumentError(
-                    "this process was forked while another thread updated these moments: "
-                    "make new ones here"
-                )
-        self._process = os.getpid()
-
-    def __exit__(self, *_: object) -> None:
-        self._lock.release()
 
 
 @told_kinds
@@ -113,7 +85,7 @@ class Moments(Shown):
         self._shafts = resolve_orders(orders, gear_ratio, fixed_member, shafts)
         self._period = float(period)
         self._runs: dict[Hashable, _core.Moments] = {}
-        self._turn = _Turn()
+        self._turn = Exclusive()
         self._new()  # a wrong period or shaft is named here, not at the first update
 
     def _new(self) -> _core.Moments:
@@ -325,7 +297,7 @@ class Moments(Shown):
         """An accumulator of its own with the same readings."""
         fresh = Moments.__new__(Moments)
         fresh._shafts, fresh._period = self._shafts, self._period
-        fresh._runs, fresh._turn = self._copies(), _Turn()
+        fresh._runs, fresh._turn = self._copies(), Exclusive()
         fresh._forgetting, fresh._weights = self._forgetting, dict(self._weights)
         return fresh
 
@@ -424,7 +396,7 @@ class Moments(Shown):
     def __setstate__(self, state: dict[str, Any]) -> None:
         self._shafts, self._period, self._runs = state["shafts"], state["period"], {}
         self._forgetting, self._weights = state.get("forgetting"), state.get("weights", {})
-        self._turn = _Turn()
+        self._turn = Exclusive()
         for label, numbers in state["runs"].items():
             self._runs[label] = self._new()
             # Buffers that come over a network need not be aligned.

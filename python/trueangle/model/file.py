@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Mapping
-from dataclasses import fields
 from os import PathLike
 from pathlib import Path
 from typing import Any, TypeAlias
@@ -14,12 +13,10 @@ from numpy.typing import NDArray
 
 from ..errors import ArgumentError, FileError, ModelFileError, OutsideSpanWarning
 from ..joint.shafts import Shaft
-from ..runs.run import Source
 from ..support.decoding import (
     MAX_LINE_ORDERS,
     MAX_LINES,
     MAX_ORDER,
-    Decoder,
     json_text,
     read_text,
     shown,
@@ -27,9 +24,10 @@ from ..support.decoding import (
 from ..support.files import MODEL_BYTES
 from ..support.kinds import told_kinds
 from .model import HarmonicModel
-from .records import FitRecord, Provenance, TableRecord
+from .recordfile import MAX_TERMS, RecordReader
 from .term import Term, known_terms
 from .text import FORMAT, ROBOT_FORMAT, VERSION, save_model
+from .validity import MOST_TURNS
 
 __all__ = ["FORMAT", "VERSION", "content_of", "load_model", "model_of", "part_of", "save_model"]
 
@@ -49,16 +47,10 @@ _KEYS = {
     "fit": False,
     "provenance": False,
 }
-#: Terms of a model, lines of one term, and runs or files that a record lists, at most.
-MAX_TERMS = 64
+#: Lines of one term, at most.
 MAX_TERM_LINES = 4096
-MAX_OFFSETS = 1_000_000
-#: Turns, at most, of angles and amplitudes: beyond, angles have no digits left.
-_MOST_TURNS = 1e9
 #: Smallest turn in the unit of angles, and the inverse of the largest.
 _LEAST_PERIOD = 1e-12
-#: Sentences that a record says of what its model is blind to.
-_MOST_SENTENCES = 1000
 #: Highest order times number of harmonics up to which the greatest slope of a steep model is
 #: looked for: a second of work.
 _STEEP_LINE_ORDERS = 3e5
@@ -104,7 +96,7 @@ def part_of(path: Path, value: Any, prefix: str) -> HarmonicModel:
     return reader.model_of(value)
 
 
-class _ModelReader(Decoder):
+class _ModelReader(RecordReader):
     """Checks a model key by key; refusals name file and key, behind the ``prefix`` of a part."""
 
     prefix = ""
@@ -161,7 +153,7 @@ class _ModelReader(Decoder):
                 f"one turn in the unit of the angles (360 for degrees) is needed, got {period!r}",
                 "period",
             )
-        shafts = self.shafts(content["shafts"], _MOST_TURNS * period)
+        shafts = self.shafts(content["shafts"], MOST_TURNS * period)
         if argument == "reference":
             self.check_steepness(shafts, period)
         try:
@@ -287,7 +279,7 @@ class _ModelReader(Decoder):
         found = self.numbers(value, key)
         for i, amplitude in enumerate(found):
             if abs(amplitude) > most:
-                raise self.error(f"more than {_MOST_TURNS:.0g} turns: {amplitude!r}", f"{key}[{i}]")
+                raise self.error(f"more than {MOST_TURNS:.0g} turns: {amplitude!r}", f"{key}[{i}]")
         return found
 
     def terms(self, value: Any) -> tuple[Term, ...]:
@@ -330,70 +322,6 @@ class _ModelReader(Decoder):
             elif self.number(entry, f"{key}[{i}]") > MAX_ORDER and key.endswith("orders"):
                 raise self.error(f"more than {MAX_ORDER:.0f} cycles per turn", f"{key}[{i}]")
         return found
-
-    def fit(self, value: Any, period: float) -> FitRecord | None:
-        if value is None:
-            return None
-        needed = ("samples", "runs", "span", "residual")
-        table = self.table(value, {f.name: f.name in needed for f in fields(FitRecord)}, "fit")
-        checked: dict[str, Any] = {}
-        for key, entry in table.items():
-            name = f"fit.{key}"
-            if key in ("method", "loss", "note"):
-                checked[key] = self.text(entry, name)
-            elif key == "calibrated_without_reference":
-                if not isinstance(entry, bool):
-                    raise self.error(f"true or false is needed, got {shown(entry)}", name)
-                checked[key] = entry
-            elif key == "blind":
-                texts = self.items(entry, name, "texts", _MOST_SENTENCES)
-                checked[key] = tuple(self.text(t, f"{name}[{i}]") for i, t in enumerate(texts))
-            elif key == "signals":
-                ranges = self.items(entry, name, "ranges", MAX_TERMS)
-                checked[key] = tuple(self.range(r, f"{name}[{i}]") for i, r in enumerate(ranges))
-            elif key == "table":
-                read = self.table(entry, {f.name: True for f in fields(TableRecord)}, name)
-                checked[key] = TableRecord(
-                    self.text(read["target"], f"{name}.target"),
-                    self.text(read["argument"], f"{name}.argument"),
-                    self.number(read["rms"], f"{name}.rms"),
-                    self.number(read["max_abs"], f"{name}.max_abs"),
-                )
-            elif key in ("span", "offsets"):
-                checked[key] = self.numbers(entry, name, MAX_OFFSETS)
-            elif key in ("samples", "runs", "wild", "positions"):
-                unknown = entry is None and key == "positions"
-                checked[key] = None if unknown else self.whole(entry, name)
-            elif entry is None and key == "residual":
-                checked[key] = None
-            else:
-                checked[key] = self.number(entry, name)
-        span = checked["span"]
-        if len(span) != 2 or span[0] > span[1] or max(map(abs, span)) > _MOST_TURNS * period:
-            raise self.error(
-                f"two angles, the first the smaller, are needed, got {span}", "fit.span"
-            )
-        return FitRecord(**checked)
-
-    def range(self, value: Any, key: str) -> tuple[str, float, float]:
-        found = self.items(value, key, "a name and two numbers", 3)
-        if len(found) != 3:
-            raise self.error(f"a name and two numbers are needed, got {shown(found)}", key)
-        low, high = (self.number(end, key) for end in found[1:])
-        return self.text(found[0], key), low, high
-
-    def provenance(self, value: Any) -> Provenance:
-        if value is None:
-            return Provenance()
-        table = self.table(value, {"inputs": True, "package": True}, "provenance")
-        inputs = []
-        listed = self.items(table["inputs"], "provenance.inputs", "files", MAX_OFFSETS)
-        for i, entry in enumerate(listed):
-            where = f"provenance.inputs[{i}]"
-            source = self.table(entry, {"file": True, "sha256": True}, where)
-            texts = (self.text(source[key], f"{where}.{key}") for key in ("file", "sha256"))
-            inputs.append(Source(*texts))
-        return Provenance(tuple(inputs), self.text(table["package"], "provenance.package"))
 
 
 def _sizes(shaft: Shaft) -> Array:

@@ -13,7 +13,7 @@ from .records import FitRecord
 __all__ = ["check_fit", "check_invertible", "check_number", "checked_covariance"]
 
 #: Ends of a span are within so many turns.
-_MOST_TURNS = 1e9
+MOST_TURNS = 1e9
 
 #: What a condition number may be below 1 by rounding.
 ROUNDING = 1e-6
@@ -40,7 +40,7 @@ def check_invertible(slope: float) -> None:
 
 def check_fit(fit: FitRecord, period: float) -> None:
     """Raise `ArgumentError` for numbers that no fit of angles of this period has."""
-    far = _MOST_TURNS * period
+    far = MOST_TURNS * period
     for what, value in zip(("start", "stop"), fit.span, strict=True):
         check_number(f"fit.span's {what}", value, -far, far)
     if fit.span[0] > fit.span[1]:
