@@ -37,7 +37,7 @@ _START, _FINISH = 0, 1
 
 
 @dataclass
-class _Channel:
+class _WpiChannel:
     """A channel: its type, and where its records are."""
 
     name: str
@@ -50,7 +50,7 @@ class _Records(NamedTuple):
     """A file taken apart."""
 
     data: bytes
-    entries: dict[str, _Channel]
+    entries: dict[str, _WpiChannel]
     numbers: set[int]
 
 
@@ -145,8 +145,8 @@ def _opened(path: Path) -> _Records:
     if data[7] != 1:
         raise FileError(path, f"is a data log of version {data[7]}.{data[6]}; version 1 is read")
     place = 12 + int.from_bytes(data[8:12], "little")
-    entries: dict[str, _Channel] = {}
-    started: dict[int, _Channel | None] = {}
+    entries: dict[str, _WpiChannel] = {}
+    started: dict[int, _WpiChannel | None] = {}
     numbers: set[int] = set()
     size = len(data)
     while place < size:
@@ -176,8 +176,8 @@ def _opened(path: Path) -> _Records:
 def _control(
     path: Path,
     data: bytes,
-    started: dict[int, _Channel | None],
-    entries: dict[str, _Channel],
+    started: dict[int, _WpiChannel | None],
+    entries: dict[str, _WpiChannel],
     numbers: set[int],
     place: int,
 ) -> None:
@@ -201,7 +201,7 @@ def _control(
     if kind.removesuffix("[]") not in _KINDS:
         started[number] = None
         return
-    entry = entries.setdefault(name, _Channel(name, kind))
+    entry = entries.setdefault(name, _WpiChannel(name, kind))
     if entry.kind != kind:
         raise FileError(
             path, f"is started as {entry.kind} and as {kind} again at byte {place}", column=name
@@ -222,7 +222,7 @@ def _names(log: _Records) -> list[str]:
     return found
 
 
-def _entry_of(log: _Records, name: str) -> tuple[_Channel, int]:
+def _entry_of(log: _Records, name: str) -> tuple[_WpiChannel, int]:
     """The entry of a column, and the place in its array."""
     if name in log.entries and not log.entries[name].kind.endswith("[]"):
         return log.entries[name], 0

@@ -44,7 +44,7 @@ def read_batches(path: Path, model: HarmonicModel, reading: Reading) -> Iterator
     topic = reading.get("topic")
     with kind.at_header(path):
         header = kind.module.columns(path, topic)
-        columns = _LogColumns.of(path, header, reading, given, kind.unit)
+        columns = _WatchedColumns.of(path, header, reading, given, kind.unit)
     for stretch in kind.stretches(path):
         for batch in kind.read(path, columns.names, topic, stretch):
             yield columns.batch(lambda name, b=batch: np.asarray(b[name], dtype=float), model)
@@ -68,7 +68,9 @@ def read_lines(
         raise FileError(path, "has no lines: the first one names the columns")
     delimiter = next((mark for mark in ",;\t" if mark in first), ",")
     header = next(csv.reader([first], delimiter=delimiter))
-    columns = _LogColumns.of(path, header, reading, Conversion.of(checked_reading(reading)), None)
+    columns = _WatchedColumns.of(
+        path, header, reading, Conversion.of(checked_reading(reading)), None
+    )
     waiting: list[list[str]] = []
     number = 1
     for line in lines:
@@ -95,7 +97,7 @@ def _cells(path: Path, header: list[str], rows: list[list[str]], last: int) -> A
     return get
 
 
-class _LogColumns(NamedTuple):
+class _WatchedColumns(NamedTuple):
     """Where a log has its angles and times."""
 
     angles: Angles
@@ -104,7 +106,7 @@ class _LogColumns(NamedTuple):
     @classmethod
     def of(
         cls, path: Path, header: list[str], reading: Reading, given: Conversion, unit: str | None
-    ) -> _LogColumns:
+    ) -> _WatchedColumns:
         roles = find_columns(path, header, wanted_columns(reading.get("signals")))
         angles = find_angles(
             path,
