@@ -66,7 +66,7 @@ def render(diagnosis: Diagnosis, errors_in: ErrorsIn = "auto", verbose: bool = F
     ]
     if diagnosis.structure:
         shares = [f"{cause} {100.0 * s:.0f} %" for cause, s in diagnosis.structure.items()]
-        lines += _wrapped(f"Of the variance each alone would explain: {', '.join(shares[:6])}.", 2)
+        lines += _wrapped(f"Of the variance each alone accounts for: {', '.join(shares[:6])}.", 2)
     if diagnosis.readings_used < diagnosis.readings:
         used = f"{diagnosis.readings_used} of the readings were used: spread evenly, and none"
         lines += _wrapped(f"{used} at a turning point, where the direction is not known.", 0)

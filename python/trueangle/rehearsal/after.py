@@ -34,7 +34,7 @@ SEEDS = 10
 WITHIN = 10.0
 
 #: What is said where there was no time for them.
-UNTRIED = "not rehearsed: the time given was up; with more of it (--within 60s) it is counted how "
+UNTRIED = "not rehearsed: the time given was up; with more of it (as within) it is counted how "
 UNTRIED += "often the true cause is named"
 
 #: Factor of the readings where simulated diagnoses do not name the cause often enough.

@@ -123,6 +123,7 @@ WRITING = {
     "selfcal": (["selfcal", "r.csv", "-o", "OUT"], ["r.csv"]),
     "export": (["export", "m.json", "--to", "csv", "-o", "OUT"], ["m.json"]),
     "fleet": (["fleet", "r.csv", "t.csv", "--orders", "1", "-o", "OUT"], ["r.csv", "t.csv"]),
+    "watch --plot": (["watch", "r.csv", "-m", "m.json", "--plot", "OUT"], ["r.csv", "m.json"]),
     "robot": (["robot", "--from-urdf", "u.urdf", "-o", "OUT"], ["u.urdf"]),
     "export --existing": (
         ["export", "m.json", "--to", "klipper", "--existing", "p.cfg", "-o", "OUT"],

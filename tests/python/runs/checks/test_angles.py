@@ -230,7 +230,7 @@ def test_what_can_and_cannot_be_known() -> None:
         ({"loads": (1.0,)}, "compliance: one torque"),
         ({"temperatures": ()}, "thermal drift: no temperature"),
         ({"mounts": (1.0,)}, "the reference's own error apart from the joint's: one mount"),
-        ({"runs": 2}, "what changes from run to run: 2 run(s)"),
+        ({"runs": 2}, "what changes from run to run: 2 runs"),
     ):
         fewer, cannot = told(**changes)
         assert len(fewer) == 7
