@@ -1,7 +1,6 @@
 """A geared joint over part of a turn: the count of teeth stays, low orders are told."""
 
 import json
-import os
 
 import numpy as np
 import pytest
@@ -14,8 +13,8 @@ from trueangle.errors import ArgumentError
 #: Standard errors beyond which none of the few dozen estimates of this file comes by chance.
 FAR = 4.0
 
-#: Sweeps of a joint drawn at random; two hundred at night.
-SWEEPS = 200 if os.environ.get("TRUEANGLE_NIGHTLY") else 24
+#: Sweeps of a joint drawn at random.
+SWEEPS = 200
 
 #: What the estimate of a noise of 3 arcsec from 800 readings may be off by: four standard
 #: errors, 10 %.
@@ -86,11 +85,15 @@ def test_random_sweeps_claim_no_other_ratio():
         # Over a short arc any of several counts of teeth explains them: that is said.
         if alone.beside["gear_ratio"] != teeth:
             assert any("give the count of teeth" in note for note in alone.notes), seed
-        off = asked.beside["gear_ratio_measured"] - teeth
-        pulls.append(off / asked.beside["gear_ratio_std"])
+        std = asked.beside["gear_ratio_std"]
+        if std is None:  # a third of a turn may not tell it from orders of the output
+            assert any("do not tell the gear ratio" in note for note in asked.notes), seed
+        else:
+            pulls.append((asked.beside["gear_ratio_measured"] - teeth) / std)
+    assert len(pulls) >= 0.95 * SWEEPS
     assert max(map(abs, pulls)) < FAR
-    # Of 24 pulls or more; four standard errors of their spread are 0.6.
-    assert 0.4 < np.std(pulls) < 1.6
+    # Of 190 pulls or more; four standard errors of their spread are 0.2.
+    assert 0.8 < np.std(pulls) < 1.2
 
 
 def test_correlated_noise_widens_the_interval_of_the_ratio():
