@@ -66,9 +66,9 @@ exam:               ## the diagnosis' own exam at full size: an hour or more, fi
 looks:              ## what a reader sees, as pictures and texts in target/looks; needs Chromium
 	$(PYTHON) tests/looks
 
-walks:              ## exported steps over 10^7 random readings, units over 10^6, 200 sweeps: half an hour
+walks:              ## exported steps over 10^7 random readings, units over 10^6: half an hour
 	TRUEANGLE_NIGHTLY=1 $(PYTHON) -m pytest -s tests/python/export/test_steps.py \
-	  tests/python/export/test_fmu.py tests/python/selfcalibration/test_dual.py
+	  tests/python/export/test_fmu.py
 
 docs:               ## documentation, warnings are errors
 	$(PYTHON) -m sphinx -W --keep-going -q docs docs/_build/html
