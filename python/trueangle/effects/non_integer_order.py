@@ -17,7 +17,7 @@ from ..support.deadline import pace
 from .blindness import (
     Blindness,
 )
-from .drawnline import drawn_amplitude, place_std
+from .drawnline import DrawnLine
 from .drift_within_run import DriftWithinRun
 from .effect import ALWAYS, Effect
 from .missing_order import MissingOrder
@@ -210,8 +210,9 @@ class NonIntegerOrder(Effect):
         extension = terms[0][0]
         theta = regression.signals.theta
         waves = line_columns(theta, extension.shape["order"])
-        amplitude, amplitude_std = drawn_amplitude(regression, cls.kind, waves)
-        order_std = place_std(regression, cls.kind, waves, theta)
+        line = DrawnLine(regression, cls.kind, waves)
+        amplitude, amplitude_std = line.amplitude()
+        order_std = line.place_std(theta)
         parameters = {
             "order": quantity(extension.shape["order"], order_std),
             "amplitude_arcsec": quantity(amplitude, amplitude_std),

@@ -19,7 +19,7 @@ from ..joint.pattern import Surroundings, line_columns
 from ..joint.signals import Signals
 from .blindness import Blindness
 from .drawing import reading_rate
-from .drawnline import drawn_amplitude, place_std
+from .drawnline import DrawnLine
 from .drift_within_run import DriftWithinRun
 from .effect import ALWAYS, Effect
 from .missing_order import MissingOrder
@@ -165,8 +165,9 @@ class TimePeriodic(Effect):
         frequencies = np.array(extension.shape["frequency_hz"])
         frequency = float(np.median(frequencies))
         waves = cls.waves(regression.signals, extension.shape["frequency_hz"])
-        amplitude, amplitude_std = drawn_amplitude(regression, cls.kind, waves)
-        std = place_std(regression, cls.kind, waves, 2.0 * np.pi * regression.signals.clock)
+        line = DrawnLine(regression, cls.kind, waves)
+        amplitude, amplitude_std = line.amplitude()
+        std = line.place_std(2.0 * np.pi * regression.signals.clock)
         if std is not None:
             std = max(std, float(frequencies.std()) / frequencies.size**0.5)
         parameters = {
