@@ -11,6 +11,7 @@ import numpy as np
 
 from ..errors import ArgumentError
 from ..planning.arc import check_arc, plan_arc
+from ..planning.summary import place_table
 from ..support.kinds import told_kinds
 from ..support.layout import laid_out
 from ..support.plainresult import PlainResult, counted
@@ -83,11 +84,7 @@ class UnitPlan(PlainResult):
             f"{self.readings} readings over {self.start_deg:g} to {self.stop_deg:g} deg, of a unit "
             f"like the {self.units} of the fleet"
             + (f" ({without} without it)" if without is not None else ""),
-            "  place/deg  readings",
-            *(
-                f"  {place:9.3f}  {count:8d}"
-                for place, count in zip(self.places_deg, self.counts, strict=True)
-            ),
+            *place_table(self.places_deg, self.counts),
             f"  uncertainty (k = 2)    {self.uncertainty_arcsec:.3g} arcsec at the worst place",
             f"  noise of a reading     {self.noise_arcsec:.3g} arcsec",
             "  order  std/arcsec  the unit's own",

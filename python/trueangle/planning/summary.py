@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from itertools import groupby
 from typing import TYPE_CHECKING, Any
 
@@ -16,7 +17,7 @@ if TYPE_CHECKING:
     from .plan import CalibrationPlan
     from .selfplan import SelfPlan
 
-__all__ = ["arc_summary", "next_summary", "plan_summary", "self_plan_summary"]
+__all__ = ["arc_summary", "next_summary", "place_table", "plan_summary", "self_plan_summary"]
 
 
 def plan_summary(plan: CalibrationPlan) -> str:
@@ -93,11 +94,7 @@ def arc_summary(plan: ArcPlan) -> str:
     lines = [
         f"{plan.readings} readings over {plan.start_deg:g} to {plan.stop_deg:g} deg: "
         f"{sum(plan.counts)}{runs}{way}",
-        "  place/deg  readings",
-        *(
-            f"  {place:9.3f}  {count:8d}"
-            for place, count in zip(plan.places_deg, plan.counts, strict=True)
-        ),
+        *place_table(plan.places_deg, plan.counts),
         f"  D-efficiency           {plan.d_efficiency:.3f} of the best possible",
         f"  of even spacing        {plan.efficiency_of_even_spacing:.3f}",
         "  order  noise factor  with even spacing",
@@ -111,6 +108,12 @@ def arc_summary(plan: ArcPlan) -> str:
         )
     lines += [f"  note: {note}" for note in plan.notes]
     return laid_out(lines)
+
+
+def place_table(places_deg: Sequence[float], counts: Sequence[int]) -> list[str]:
+    """Readings at each place, a line a place under their heads."""
+    rows = zip(places_deg, counts, strict=True)
+    return ["  place/deg  readings", *(f"  {place:9.3f}  {count:8d}" for place, count in rows)]
 
 
 def next_summary(plan: NextRuns) -> str:
