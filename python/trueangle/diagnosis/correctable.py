@@ -12,6 +12,7 @@ from ..errors import ArgumentError, NoModelError
 from ..model.model import HarmonicModel
 from ..runs.joining import MeasuredMinusSimulated
 from ..simulation.simulation import Simulation
+from ..support.angles import ARCSEC_PER_TURN
 from ..support.oftype import of_type
 from ..support.plainresult import PlainResult
 from .correction import extend_model
@@ -123,7 +124,7 @@ class Correctable(PlainResult):
         """
         own = 0.0 if self.simulated is None else self.simulated.noise_arcsec
         lacking = math.sqrt(max(self.noise**2 - 2.0 * own**2, 0.0))
-        return lacking * math.pi / 648_000.0
+        return lacking * 2.0 * math.pi / ARCSEC_PER_TURN
 
     def _check_correctable(self) -> None:
         """Raise where there is nothing that a model could be made of."""
