@@ -93,5 +93,5 @@ def test_noise_whose_neighbours_share_nearly_all_has_no_zeros_of_its_own() -> No
             time = np.arange(noise.size) / (20.0, 40.0, 80.0)[k % 3]
             indicated = angle + noise / 3600.0
             runs.append(ta.CalibrationRun(angle, indicated, period=360.0, time=time))
-        result = ta.diagnose(runs, ta.Simulation(), within=60)
+        result = ta.diagnose(runs, ta.Simulation())
         assert [f.cause for f in result.findings if f.confirmed] == [], result.summary()

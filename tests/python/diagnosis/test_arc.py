@@ -39,7 +39,7 @@ LINES_TOLD = (6512, 6522)
 @pytest.mark.parametrize("seed", [6511, 6512, 6522])
 def test_a_play_by_place_is_told_by_its_direction_and_not_as_bumps(seed: int) -> None:
     print(f"seed {seed}")
-    result = ta.diagnose(sweeps(seed), ta.Simulation(), within=60)
+    result = ta.diagnose(sweeps(seed), ta.Simulation())
     found = {finding.cause: finding for finding in result.findings}
     assert found["direction_dependent_pattern"].confirmed
     assert "local_defect" not in found, result.summary()

@@ -33,10 +33,6 @@ pole_pairs = 1
 """
 
 
-#: Seconds of the processor: real motion asks for more than what is given by default.
-LONG = 120.0
-
-
 def simulation(folder: Path, ratio: float = 1.0, side: str = "output", lines: str = ""):
     path = folder / "joint.toml"
     path.write_text(DIRECT.format(ratio=ratio, side=side) + lines, encoding="utf-8")
@@ -61,7 +57,7 @@ def lines(angle: Array, orders) -> list[Array]:
 
 def findings(runs, simulation) -> list[dict]:
     """The findings as they are printed."""
-    return ta.diagnose(runs, simulation, within=LONG).to_dict()["findings"]
+    return ta.diagnose(runs, simulation).to_dict()["findings"]
 
 
 def named(found: list[dict]) -> set[str]:
@@ -256,7 +252,7 @@ def test_servo_has_a_reversal_error_and_an_offset_under_load(servo, tmp_path) ->
                     label=f"from {start:.0f} s",
                 )
             )
-    result = ta.diagnose(runs, simulation(tmp_path), within=LONG)
+    result = ta.diagnose(runs, simulation(tmp_path))
     found = {f.cause: f.parameters for f in result.findings}
     assert {"torsional_compliance", "stiffening_compliance"} & set(found)
     (reversal,) = {"backlash", "presliding_hysteresis"} & set(found)

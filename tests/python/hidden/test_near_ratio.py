@@ -106,6 +106,5 @@ def test_a_reference_that_was_wrapped_hides_the_turn(turns):
         shift = 360.0 * turns * (5 * k % 7)
         there = {"indicated": run.indicated - shift, "reference": run.reference - shift}
         runs.append(replace(run, **there))
-    # What it costs is asked elsewhere: some 4 s of the processor, near its own bound.
-    diagnosis = ta.diagnose(runs, believed, gain=False, within=60.0)
+    diagnosis = ta.diagnose(runs, believed, gain=False)
     assert [finding.cause for finding in diagnosis.findings] == ["wrong_gear_ratio"]

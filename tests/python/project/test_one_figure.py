@@ -94,7 +94,7 @@ def test_the_certificate_expands_the_same(runs, fit) -> None:
 
 def test_a_diagnosis_has_the_same_unit_convention_and_digits(runs, fit) -> None:
     sim = replace(JOINT, harmonics=())
-    found = ta.diagnose(runs, sim, within=60.0)
+    found = ta.diagnose(runs, sim)
     text = found.summary("arcsec")
     at = {float(order): n for n, order in enumerate(fit.orders)}
     told = 0

@@ -64,7 +64,7 @@ def test_the_noise_that_is_written_is_what_the_simulator_lacks(first, tmp_path):
             (t, x, y + rng.normal(0.0, own * ARCSEC, y.size), *more) for t, x, y, *more in ideal
         ]
         log = written(tmp_path / "noisy.csv", noisy)
-        found = ta.diagnose(real, simulated=ta.read_runs(log), within=60)
+        found = ta.diagnose(real, simulated=ta.read_runs(log))
         assert found.simulated.noise_arcsec == pytest.approx(own, abs=0.15)
         # Two variances of 2500 readings each differ by 0.7 arcsec^2 by chance, and their root
         # is taken: twice that.
@@ -86,7 +86,7 @@ def test_a_sensor_holds_what_the_simulators_own_encoder_lacks(first, tmp_path):
         ta.read_runs(written(tmp_path / f"{name}.csv", runs))
         for name, runs in (("both", both), ("own", own))
     )
-    sensor = ta.diagnose(real, simulated=log, within=60).sensor()
+    sensor = ta.diagnose(real, simulated=log).sensor()
     assert sensor.orders == (2.0,)
     turn = 1_296_000.0 / sensor.period
     assert sensor.amplitudes[0] * turn == pytest.approx(40.0, abs=0.5)
