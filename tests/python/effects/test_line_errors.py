@@ -7,6 +7,7 @@ import pytest
 
 import trueangle as ta
 from trueangle.effects import EFFECTS
+from trueangle.effects.drawnline import DrawnLine
 from trueangle.estimation.regression import Regression
 from trueangle.joint.signals import join_runs
 
@@ -99,6 +100,26 @@ def test_pulls_of_lines(cause, signals):
         print(name, np.mean(values), np.std(values))
         assert NEAR[0] < np.std(values) < NEAR[1], name
         assert abs(np.mean(values)) < CENTRED, name
+
+
+def test_noise_adds_nothing_to_a_faint_line(signals):
+    """Its mean square is that of the line alone, where noise would add a fifth to it."""
+    cause, size, frequency = "time_periodic", 0.3, 1.7
+    hidden = EFFECTS[cause](frequency, size)
+    shape = {"frequency_hz": [frequency] * signals.runs}
+    waves = EFFECTS[cause].waves(signals, shape["frequency_hz"])
+    print(f"seeds {SEEDS}")
+    squares = []
+    for seed in SEEDS:
+        rng = np.random.default_rng(seed)
+        error = hidden.signal(signals, SIM.surroundings, rng) + rng.standard_normal(len(signals))
+        start = Regression.of(signals, error, SIM.surroundings, rho=0.0)
+        full = start.with_terms([start.propose_run_effect(cause, shape, waves)])
+        squares.append(DrawnLine(full, cause, waves).amplitude()[0] ** 2)
+    # Four standard errors of their mean.
+    near = 4.0 * np.std(squares) / np.sqrt(len(squares))
+    print(np.mean(squares), near)
+    assert abs(np.mean(squares) - size**2) < near < 0.1 * size**2
 
 
 #: Causes of which no parameter has a bound or pulls of its own here, and where they are asked.
