@@ -38,7 +38,7 @@ class Unexplained(Shown):
     rms : float
         Of the structure that the firing tests show, arcsec: at least so much is no noise.
     share : float
-        Of the variance that is left.
+        Of the variance that is left, free paths in time among it.
     evidence : list of Evidence
         Every test, the firing ones first.
     noise : Noise
@@ -138,7 +138,8 @@ def goodness_of_fit(
     if len(lines) == 2 and lines[1].statistic > lines[0].statistic:
         rank[id(lines[1])] = rank[id(lines[0])] - 0.5
     deciding.sort(key=lambda item: (max(item.p, 1e-9), rank[id(item)]))
-    variance = float(np.var(left.residual))
+    # A free path has no name either: what it follows is a part of what is left.
+    variance = float(np.var((left if loose is None else loose).residual))
     power = min(max((item.rms**2 for item in firing), default=0.0), variance)
     return Unexplained(
         bool(firing),

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from trueangle.diagnosis.goodness import goodness_of_fit
+from trueangle.diagnosis.goodness.evidence import Evidence
+from trueangle.diagnosis.goodness.unexplained import FREE_PATH
 
 from .readings import Array, Motion, leftover
 
@@ -75,3 +79,17 @@ def test_small_structure_is_no_structure() -> None:
     fit = goodness_of_fit(leftover("few", "gauss", 4, by_direction, 0.02), 150)
     assert not fit.found
     assert fit.rms == 0.0
+
+
+@pytest.mark.parametrize("size", [0.3, 4.0])
+def test_a_free_path_is_a_share_of_what_is_left_with_it(size: float) -> None:
+    """It is taken out of what other tests are asked about, and has no name all the same."""
+    left = leftover("rich", "gauss", 41)
+    path = size * np.sin(2.0 * np.pi * left.clock / np.ptp(left.clock))
+    with_path = replace(left, residual=left.residual + path)
+    told = Evidence("free path in time", 99.0, 1e-9, "", rms=np.std(path), looks_like=FREE_PATH)
+    found = goodness_of_fit(left, loose=with_path, path=told)
+    assert found.rms == pytest.approx(np.std(path))
+    wanted = np.var(path) / (np.var(path) + np.var(left.residual))
+    assert found.share == pytest.approx(wanted, rel=0.05)
+    assert found.share < 0.97
