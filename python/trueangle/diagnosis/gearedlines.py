@@ -142,6 +142,19 @@ class GearedLines:
             wanted += float(sizes.sum()) * believed
         return total / wanted
 
+    def together(self, ratio: float) -> float:
+        """`share` of lines fitted jointly to each run: a sum over few turns holds neighbours."""
+        columns = self._centred(
+            np.hstack([line_columns(self.theta, m) for m in self.orders(ratio)])
+        )
+        believed = np.array([line.amplitude_arcsec**2 for line in self.lines])
+        total = 0.0
+        for start, stop in self.bounds:
+            fit = np.linalg.lstsq(columns[start:stop], self._error[start:stop], rcond=None)[0]
+            power = fit[0::2] ** 2 + fit[1::2] ** 2
+            total += (stop - start) * float(np.minimum(power, believed).sum())
+        return total / (self.y.size * float(believed.sum()))
+
     def out_of_step(self, common: bool) -> float:
         """Standard errors by which the lines fall out of step at the believed ratio."""
         departure, std = self._departure(self.sim.joint.gear_ratio, common)
@@ -226,7 +239,7 @@ class GearedLines:
         believed = self.sim.joint.gear_ratio
         sim = replace(self.sim, joint=replace(self.sim.joint, gear_ratio=ratio))
         _, std = self._departure(ratio, common)
-        return Ratio(ratio, std, believed, self.share(ratio), self.share(believed), sim)
+        return Ratio(ratio, std, believed, self.together(ratio), self.together(believed), sim)
 
     def _parts(self, common: bool) -> tuple[tuple[int, int], ...]:
         return ((0, self.y.size),) if common else self.bounds

@@ -22,7 +22,9 @@ from .penalty import (
     cause_terms,
     finding_groups,
     lost,
+    misfit,
     net_loss,
+    penalty_of,
     total_penalty,
 )
 from .remainder import remainder_of
@@ -255,16 +257,25 @@ def _with_declared_lines(regression: Regression) -> Regression:
 
 
 def _made_specific(regression: Regression) -> Regression:
-    """With a specific cause in place of a flexible one where that explains more."""
+    """With a specific cause in place of a flexible one where that explains more.
+
+    What the form of a law leaves, the flexible one takes up in its place: this counts in the
+    evidence, and no allowance for it is charged beside.
+    """
     for term in [t for t in regression.terms if is_flexible(effect_of(t.cause))]:
+        left = misfit(regression)
+
+        def price(account: Regression, left: float = left) -> float:
+            return account.bic + penalty_of(account.terms, left)
+
         rest = regression.with_terms(t for t in regression.terms if t.cause != term.cause)
         tried = [
             start.with_terms([*start.terms, extension])
             for extension, start, gain in extensions(rest, on_runs())
-            if total_penalty(rest) - gain < total_penalty(regression)
+            if price(rest) - gain < price(regression)
         ]
-        best = min(tried, key=total_penalty, default=regression)
-        if total_penalty(best) < total_penalty(regression):
+        best = min(tried, key=price, default=regression)
+        if price(best) < price(regression):
             regression = _pruned(_forward(best, list(EFFECTS)))
     return regression
 

@@ -8,7 +8,7 @@ import pytest
 import trueangle as ta
 from trueangle.diagnosis.discrepancy import unfolded_error
 from trueangle.diagnosis.gearedlines import GearedLines
-from trueangle.diagnosis.gearratio import near_ratio
+from trueangle.diagnosis.gearratio import find_ratio, near_ratio
 from trueangle.joint.signals import join_runs
 from trueangle.simulation import Harmonic, Joint, RunDesign, Simulation
 
@@ -108,3 +108,24 @@ def test_a_reference_that_was_wrapped_hides_the_turn(turns):
         runs.append(replace(run, **there))
     diagnosis = ta.diagnose(runs, believed, gain=False)
     assert [finding.cause for finding in diagnosis.findings] == ["wrong_gear_ratio"]
+
+
+@pytest.mark.parametrize("seed", range(62_000, 62_006))
+def test_lines_a_tooth_away_stand_where_others_are_believed(seed):
+    """At one tooth less the wave generator's line is where the motor's second is believed."""
+    rng = np.random.default_rng(seed)
+    print(f"seed {seed}")
+    true, believed = joint_pair(rng, 101.0, -1.0, float(rng.uniform(0.7, 1.8)), 12, 300, (0.6,))
+    sizes = rng.uniform([2.0, 3.0, 15.0, 15.0], [12.0, 9.0, 30.0, 30.0])
+    lines = tuple(
+        replace(line, amplitude_arcsec=float(size))
+        for line, size in zip(believed.harmonics, sizes, strict=True)
+    )
+    joint = replace(true, harmonics=lines)
+    measured = ta.simulate(joint, seed=seed)
+    found = find_ratio(seen(replace(believed, harmonics=lines), measured))
+    assert found is not None
+    assert found.gear_ratio == 100.0
+    assert found.found > 0.97 > 0.8 > found.left
+    # Where they stand as believed there is nothing to look for.
+    assert find_ratio(seen(joint, measured)) is None
