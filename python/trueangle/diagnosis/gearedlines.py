@@ -142,18 +142,20 @@ class GearedLines:
             wanted += float(sizes.sum()) * believed
         return total / wanted
 
-    def together(self, ratio: float) -> float:
-        """`share` of lines fitted jointly to each run: a sum over few turns holds neighbours."""
-        columns = self._centred(
-            np.hstack([line_columns(self.theta, m) for m in self.orders(ratio)])
-        )
-        believed = np.array([line.amplitude_arcsec**2 for line in self.lines])
-        total = 0.0
+    def shares(self, ratio: float) -> Array:
+        """`share` of each line, fitted jointly to each run: over few turns a sum holds others."""
+        lines = [line_columns(self.theta, order) for order in self.orders(ratio)]
+        columns = self._centred(np.hstack(lines))
+        found = np.zeros(len(lines))
         for start, stop in self.bounds:
             fit = np.linalg.lstsq(columns[start:stop], self._error[start:stop], rcond=None)[0]
             power = fit[0::2] ** 2 + fit[1::2] ** 2
-            total += (stop - start) * float(np.minimum(power, believed).sum())
-        return total / (self.y.size * float(believed.sum()))
+            found += (stop - start) * np.minimum(power / self._believed, 1.0)
+        return found / self.y.size
+
+    def together(self, ratio: float) -> float:
+        """`share` of all lines fitted jointly."""
+        return float(self.shares(ratio) @ self._believed / self._believed.sum())
 
     def out_of_step(self, common: bool) -> float:
         """Standard errors by which the lines fall out of step at the believed ratio."""
@@ -243,6 +245,10 @@ class GearedLines:
 
     def _parts(self, common: bool) -> tuple[tuple[int, int], ...]:
         return ((0, self.y.size),) if common else self.bounds
+
+    @property
+    def _believed(self) -> Array:
+        return np.array([line.amplitude_arcsec**2 for line in self.lines])
 
     @cached_property
     def _error(self) -> Array:

@@ -22,14 +22,10 @@ __all__ = ["aligned", "find_ratio", "near_ratio"]
 
 Array = NDArray[np.float64]
 
-#: Share of the believed power that must be found at another ratio, and is not at the believed one,
-#: for that to be the ratio: where less is found, further lines would make it up.
-FOUND = 0.9
-
-#: Share at the believed ratio up to which ratios of any step are tried. Above, lines may stand
-#: where others are believed: of a wave generator those of the motor a tooth away. Only whole and
-#: half ratios are tried then.
-MISSING = 0.4
+#: Share of the believed lines up to which they are missing at the believed ratio, and share of
+#: their power that must be found at another one for that to be the ratio: where less is found,
+#: further lines would make it up.
+MISSING, FOUND = 0.5, 0.9
 
 #: Ratios searched: within this share of the believed one.
 REACH = 0.25
@@ -51,12 +47,11 @@ def find_ratio(geared: GearedLines) -> Ratio | None:
     None where the believed lines are where they should be, or nowhere.
     """
     believed = geared.sim.joint.gear_ratio
-    share = geared.together(believed)
-    if share >= FOUND:
+    # Each line counts alike: where one is believed another may stand, of the wave generator where
+    # the motor's is believed if the ratio is a tooth less.
+    if np.mean(geared.shares(believed)) > MISSING:
         return None
-    low, high = believed * (1.0 - REACH), believed * (1.0 + REACH)
-    step = geared.step if share <= MISSING else 0.5
-    trials = step * np.arange(np.ceil(low / step), np.ceil(high / step))
+    trials = np.arange(believed * (1.0 - REACH), believed * (1.0 + REACH), geared.step)
     best = max(trials.tolist(), key=geared.share)
     found = geared.at(geared.refined(best, common=False), common=False)
     return found if found.found >= FOUND else None

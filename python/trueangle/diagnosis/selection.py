@@ -85,6 +85,9 @@ def select(
     direct = min([*ahead, direct], key=total_penalty)
     noisy = _under_its_noise(direct)
     if noisy is not direct:
+        # A correlation stands for all that a law would explain, once something else was taken.
+        direct = _by_other_paths(regression, direct)
+        noisy = _under_its_noise(direct)
         regression = regression.with_terms((), noisy.whiten.rho)
         direct = min(noisy, _pruned(_forward(regression, list(EFFECTS))), key=total_penalty)
     if pace().over:

@@ -115,7 +115,7 @@ def test_lines_a_tooth_away_stand_where_others_are_believed(seed):
     """At one tooth less the wave generator's line is where the motor's second is believed."""
     rng = np.random.default_rng(seed)
     print(f"seed {seed}")
-    true, believed = joint_pair(rng, 101.0, -1.0, float(rng.uniform(0.7, 1.8)), 12, 300, (0.6,))
+    true, believed = joint_pair(rng, 101.0, -1.0, float(rng.uniform(1.0, 1.8)), 12, 300, (0.6,))
     sizes = rng.uniform([2.0, 3.0, 15.0, 15.0], [12.0, 9.0, 30.0, 30.0])
     lines = tuple(
         replace(line, amplitude_arcsec=float(size))
