@@ -171,12 +171,12 @@ class RunSums:
         with self._turn:
             return _core.fit_moments(list(self._runs.values()), self.period, *_lists(wanted))
 
-    def stored(self) -> dict[Hashable, Array]:
+    def stored(self) -> dict[Hashable, Array | None]:
         """All sums of every run as numbers."""
         with self._turn:
             return {label: sums.store() for label, sums in self._runs.items()}
 
-    def restore(self, runs: Mapping[Hashable, Array]) -> None:
+    def restore(self, runs: Mapping[Hashable, Array | None]) -> None:
         """Take what was `stored`."""
         for label, numbers in runs.items():
             self._runs[label] = self._new()
