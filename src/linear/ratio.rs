@@ -1,6 +1,6 @@
 //! How large an error that every run draws anew is: the best ratio of its variance.
 
-use nalgebra::{DMatrix, DVector, SymmetricEigen};
+use nalgebra::{DMatrix, DVector, Dyn, SymmetricEigen};
 
 use super::LinearModel;
 use crate::interrupt;
@@ -23,6 +23,9 @@ const FEW_COLUMNS: usize = 40;
 
 /// Most of the sum of squares that counts as saved: a logarithm is asked of what is left.
 const ALL: f64 = 1.0 - 1e-15;
+
+/// Steps for each eigenvalue: a handful are usual.
+const STEPS: usize = 100;
 
 /// What is added to the diagonal of a matrix of at most 1 that rounding may make negative.
 const ROUNDING: f64 = 1e-12;
@@ -53,22 +56,22 @@ impl Left {
 }
 
 /// The best ratio of variances beside what is fitted and the deviance that it saves; zeros where
-/// none saves anything.
+/// none saves anything. None where a number is not finite.
 ///
 /// With the columns of all runs turned to right angles, of power `D`, and `B` their share in the
 /// fitted ones, a ratio `t` saves `b' (I / t + D - D^1/2 B B' D^1/2)^-1 b` of the squares, `b` their
 /// products with the residual.
-pub fn best_ratio(runs: &[RunProducts], left: Left) -> (f64, f64) {
-    let turned = Turned::of(runs);
+pub fn best_ratio(runs: &[RunProducts], left: Left) -> Option<(f64, f64)> {
+    let turned = Turned::of(runs)?;
     if turned.power.is_empty() {
-        return (0.0, 0.0);
+        return Some((0.0, 0.0));
     }
     let top = turned.power.iter().fold(0.0, |most: f64, &p| most.max(p));
     let unit = top.max(1e-300);
     let trials: Vec<f64> = (0..=PER_DECADE * DECADES)
         .map(|k| 10.0_f64.powf(f64::from(LEAST) + f64::from(k) / f64::from(PER_DECADE)) / unit)
         .collect();
-    let saved = turned.saving();
+    let saved = turned.saving()?;
     let deviance = |ratio: f64| {
         interrupt::point();
         let paid: f64 = turned.power.iter().map(|p| (ratio * p).ln_1p()).sum();
@@ -86,7 +89,7 @@ pub fn best_ratio(runs: &[RunProducts], left: Left) -> (f64, f64) {
     let k = greatest(&found);
     let mut best = (near[k], found[k]);
     if best.1 <= 0.0 {
-        return (0.0, 0.0);
+        return Some((0.0, 0.0));
     }
     if 0 < k && k + 1 < near.len() {
         let steps = vertex(found[k - 1], found[k], found[k + 1]);
@@ -96,7 +99,7 @@ pub fn best_ratio(runs: &[RunProducts], left: Left) -> (f64, f64) {
             best = (between, there);
         }
     }
-    best
+    Some(best)
 }
 
 /// Where the first of the greatest values stands.
@@ -123,11 +126,11 @@ struct Turned {
 }
 
 impl Turned {
-    fn of(runs: &[RunProducts]) -> Self {
+    fn of(runs: &[RunProducts]) -> Option<Self> {
         // A matrix without columns has no eigensystem.
         let runs: Vec<_> = runs.iter().filter(|run| !run.gram.is_empty()).collect();
-        let eigen = |run: &&RunProducts| SymmetricEigen::new(run.gram.clone());
-        let found: Vec<_> = runs.iter().map(eigen).collect();
+        let eigen = |run: &&RunProducts| eigensystem(run.gram.clone());
+        let found = runs.iter().map(eigen).collect::<Option<Vec<_>>>()?;
         let values = found.iter().flat_map(|one| one.eigenvalues.iter());
         let limit = COUNTS * values.fold(1e-300, |most: f64, &value| most.max(value));
         let (mut power, mut rows) = (Vec::new(), Vec::new());
@@ -143,36 +146,36 @@ impl Turned {
         let columns = runs.first().map_or(1, |run| run.moments.ncols());
         let fitted = DMatrix::from_fn(rows.len(), columns - 1, |i, j| rows[i][j]);
         let residual = DVector::from_fn(rows.len(), |i, _| rows[i][columns - 1]);
-        Self {
+        Some(Self {
             power,
             fitted,
             residual,
-        }
+        })
     }
 
     /// Squares saved at a ratio.
-    fn saving(&self) -> Box<dyn Fn(f64) -> f64 + '_> {
+    fn saving(&self) -> Option<Box<dyn Fn(f64) -> f64 + '_>> {
         if self.power.len() <= FEW_COLUMNS {
             self.of_few()
         } else {
-            Box::new(|ratio| self.of_many(ratio))
+            Some(Box::new(|ratio| self.of_many(ratio)))
         }
     }
 
     /// By the eigensystem of the columns beside the fitted ones.
-    fn of_few(&self) -> Box<dyn Fn(f64) -> f64> {
+    fn of_few(&self) -> Option<Box<dyn Fn(f64) -> f64>> {
         let root = DVector::from_iterator(self.power.len(), self.power.iter().map(|p| p.sqrt()));
         let mut beside = -(&self.fitted * self.fitted.transpose());
         add_to_diagonal(&mut beside, 1.0);
         beside.component_mul_assign(&(&root * root.transpose()));
-        let found = SymmetricEigen::new(beside);
+        let found = eigensystem(beside)?;
         let moments = root.component_mul(&self.residual);
         let squares = found.eigenvectors.tr_mul(&moments).map(|m| m * m);
         let values = found.eigenvalues.map(|value| value.max(0.0));
-        Box::new(move |ratio| {
+        Some(Box::new(move |ratio| {
             let pairs = values.iter().zip(squares.iter());
             pairs.map(|(v, s)| s * ratio / (1.0 + ratio * v)).sum()
-        })
+        }))
     }
 
     /// By a system of the size of the fitted columns.
@@ -195,6 +198,13 @@ impl Turned {
         let found = LinearModel::of_sums(&inner, &right, &[0.0], None, None);
         own + found.map_or(f64::NAN, |model| cross.dot(&model.coefficients().column(0)))
     }
+}
+
+/// Values and vectors of a symmetric matrix; None where a number is not finite.
+fn eigensystem(matrix: DMatrix<f64>) -> Option<SymmetricEigen<f64, Dyn>> {
+    let steps = STEPS * (matrix.nrows() + 1);
+    let finite = matrix.iter().all(|value| value.is_finite());
+    finite.then(|| SymmetricEigen::try_new(matrix, f64::EPSILON, steps))?
 }
 
 fn add_to_diagonal(matrix: &mut DMatrix<f64>, value: f64) {
@@ -243,13 +253,13 @@ mod tests {
         for (runs, k) in [(3, 2), (4, 1), (25, 2)] {
             let (parts, beside, r, own) = case(runs, k);
             let moment = own.tr_mul(&r);
-            let turned = Turned::of(&parts);
+            let turned = Turned::of(&parts).unwrap();
             assert_eq!(turned.power.len(), runs * k);
             for ratio in [1e-3, 0.4, 50.0] {
                 let mut inner = beside.tr_mul(&own);
                 add_to_diagonal(&mut inner, 1.0 / ratio);
                 let expected = moment.dot(&inner.lu().solve(&moment).unwrap());
-                for found in [turned.saving()(ratio), turned.of_many(ratio)] {
+                for found in [turned.saving().unwrap()(ratio), turned.of_many(ratio)] {
                     assert!(
                         (found - expected).abs() < 1e-9 * expected,
                         "{runs} {k} {ratio}"
@@ -264,13 +274,13 @@ mod tests {
         let (parts, _, r, _) = case(6, 2);
         let (readings, squares) = (r.len() as f64, r.norm_squared());
         let left = Left { readings, squares };
-        let (ratio, deviance) = best_ratio(&parts, left);
+        let (ratio, deviance) = best_ratio(&parts, left).unwrap();
         assert!(ratio > 0.0 && deviance > 0.0);
-        let turned = Turned::of(&parts);
+        let turned = Turned::of(&parts).unwrap();
         for factor in [0.8, 0.95, 1.05, 1.25] {
             let near = factor * ratio;
             let paid: f64 = turned.power.iter().map(|p| (near * p).ln_1p()).sum();
-            assert!(left.deviance(turned.saving()(near)) - paid < deviance + NEAR);
+            assert!(left.deviance(turned.saving().unwrap()(near)) - paid < deviance + NEAR);
         }
     }
 
@@ -285,11 +295,22 @@ mod tests {
             readings: 40.0,
             squares: r.norm_squared(),
         };
-        assert_eq!(best_ratio(&parts, left), (0.0, 0.0));
+        assert_eq!(best_ratio(&parts, left), Some((0.0, 0.0)));
         for part in &mut parts {
             part.gram = DMatrix::zeros(0, 0);
             part.moments = DMatrix::zeros(0, 4);
         }
-        assert_eq!(best_ratio(&parts, left), (0.0, 0.0));
+        assert_eq!(best_ratio(&parts, left), Some((0.0, 0.0)));
+    }
+
+    #[test]
+    fn what_is_not_finite_has_no_ratio() {
+        let (mut parts, _, r, _) = case(4, 1);
+        parts[2].gram[(0, 0)] = f64::NAN;
+        let left = Left {
+            readings: 40.0,
+            squares: r.norm_squared(),
+        };
+        assert_eq!(best_ratio(&parts, left), None);
     }
 }

@@ -9,6 +9,7 @@ use pyo3::prelude::*;
 
 use super::array::{data, empty};
 use super::failure::argument_error;
+use super::linear::{NOT_FINITE, told};
 use super::release::detached;
 use crate::check::same_length;
 use crate::linear::{self, Correlated, Left, RunProducts};
@@ -111,7 +112,7 @@ pub fn best_ratio<'py>(
             moments: DMatrix::from_fn(k, fitted, |i, j| moments[(r, i, j)]),
         })
         .collect();
-    detached(py, || {
-        linear::best_ratio(&parts, Left { readings, squares })
-    })
+    let left = Left { readings, squares };
+    let found = detached(py, || linear::best_ratio(&parts, left))?;
+    told(py, found, NOT_FINITE)
 }
