@@ -7,12 +7,16 @@
 mod clusters;
 mod groups;
 mod model;
+mod ratio;
 mod ridge;
+mod whitening;
 
 pub use clusters::{Robust, cluster_covariance};
 pub use groups::{Sums, left_out, others};
 pub use model::LinearModel;
+pub use ratio::{Left, RunProducts, best_ratio};
 pub use ridge::{Fold, RidgePath, ridge_path};
+pub use whitening::Correlated;
 
 /// Rounding of an element of a triangle or normal matrix of unit columns, in units of epsilon:
 /// sums run a thousand terms in a row at most, blocks are added in pairs, and so many errors of

@@ -16,6 +16,7 @@ mod lines;
 mod moments;
 mod monitor;
 mod motion;
+mod noise;
 mod number;
 mod release;
 mod robot;
@@ -73,6 +74,9 @@ mod _core {
 
     #[pymodule_export]
     use super::motion::{PyBanded, harmonic_rows, harmonic_sum};
+
+    #[pymodule_export]
+    use super::noise::{best_ratio, whitened};
 
     #[pymodule_export]
     use super::robot::PyRobotStep;

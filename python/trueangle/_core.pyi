@@ -223,6 +223,16 @@ class LinearModel:
     @property
     def inverse(self) -> _Array: ...
 
+def whitened(
+    rows: NDArray[Any],
+    bounds: Sequence[tuple[int, int]],
+    rho: float,
+    roots: NDArray[np.float64] | None = None,
+    transposed: bool = False,
+) -> NDArray[Any]: ...
+def best_ratio(
+    grams: NDArray[np.float64], moments: NDArray[np.float64], readings: float, squares: float
+) -> tuple[float, float]: ...
 def left_out(
     grams: NDArray[np.float64],
     moments: NDArray[np.float64],

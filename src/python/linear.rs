@@ -183,10 +183,10 @@ pub fn ridge_path<'py>(
     Ok((rows(py, &found.coefficients)?, vector(py, &found.scores)?))
 }
 
-const NOT_FINITE: &str = "least squares of numbers that are not finite, or of nothing";
+pub const NOT_FINITE: &str = "least squares of numbers that are not finite, or of nothing";
 
 /// What was found, or numpy's error of linear algebra.
-fn told<T>(py: Python<'_>, found: Option<T>, problem: &'static str) -> PyResult<T> {
+pub fn told<T>(py: Python<'_>, found: Option<T>, problem: &'static str) -> PyResult<T> {
     if let Some(found) = found {
         return Ok(found);
     }

@@ -156,7 +156,8 @@ def _follows(regression: Regression, group: Sequence[int]) -> str:
     One of which all but the share that a form may leave (`FORM`) stays where it is, is fixed.
     """
     term, coefficients = regression.fitted()[group[0]]
-    named = regression.with_terms(t for t in regression.terms if is_named(t))
+    terms = [t for t in regression.terms if is_named(t)]
+    named = regression if len(terms) == len(regression.terms) else regression.with_terms(terms)
     if term.line is not None:
         columns = line_columns(regression.signals.theta, term.line)
     elif term.cause == LocalDefect.kind:

@@ -104,16 +104,16 @@ def _searched_again(full: Regression, group: Sequence[int]) -> Regression:
     """The finding's searched terms chosen anew in this part of the runs."""
     terms = list(full.terms)
     kept = [term for k, term in enumerate(terms) if k not in group]
-    current = full.with_terms(kept)
+    cause = terms[group[0]].cause
     found: list[Extension] = []
-    for k in group:
-        extension = effect_of(terms[k].cause).propose(current)
-        if extension is None or extension.cause != terms[k].cause:
-            break
+    for _ in group:
+        extension = effect_of(cause).propose(full.with_terms([*kept, *found]))
+        if extension is None or extension.cause != cause:
+            return full
         found.append(extension)
-        current = full.with_terms([*kept, *found])
-    if len(found) < len(group):
-        return full
+    pairs = zip(group, found, strict=True)
+    if effect_of(cause).of_motion and all(terms[k].shape == one.shape for k, one in pairs):
+        return full  # the same columns again
     for k, extension in zip(group, found, strict=True):
         terms[k] = extension
     return full.with_terms(terms)

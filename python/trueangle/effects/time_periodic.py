@@ -15,6 +15,7 @@ import trueangle._core as _core
 from ..estimation.estimate import Parameters, quantity
 from ..estimation.extension import Extension
 from ..estimation.regression import Regression
+from ..estimation.runcolumns import RunEffectColumns
 from ..joint.pattern import Surroundings, line_columns
 from ..joint.signals import Signals
 from .blindness import Blindness
@@ -112,16 +113,17 @@ class TimePeriodic(Effect):
         if regression.is_dominated(float(p.max(axis=0).sum()), 1, np.log(frequencies.size)):
             return None
         tried = [_fixed(frequencies, p, sizes), _wandering(frequencies, p)]
+        step = float(frequencies[1] - frequencies[0])
         best: Extension | None = None
+        refined: dict[tuple[float, ...], list[float]] = {}
         for place, deviance, log_grid in tried:
             unlikely = regression.is_pruned(deviance, 1, log_grid)
             if unlikely or regression.is_dominated(deviance, 1, log_grid):
                 continue
-            shape = {"frequency_hz": frequencies[place].tolist()}
-            step = frequencies[1] - frequencies[0]
-            shape["frequency_hz"] = _refined(
-                regression, shape["frequency_hz"], float(step), log_grid
-            )
+            start = frequencies[place].tolist()
+            if (*start,) not in refined:  # both may begin at one frequency for all runs
+                refined[(*start,)] = _refined(regression, start, step)
+            shape = {"frequency_hz": refined[(*start,)]}
             waves = cls.waves(regression.signals, shape["frequency_hz"])
             extension = regression.propose_run_effect(cls.kind, shape, waves, log_grid)
             if best is None or extension.bic_gain > best.bic_gain:
@@ -133,9 +135,11 @@ class TimePeriodic(Effect):
     @staticmethod
     def waves(signals: Signals, frequencies: Sequence[float]) -> Array:
         """Cosine and sine of the line in every run, shape (n, 2)."""
+        if len({*frequencies}) == 1:
+            return line_columns(2.0 * np.pi * signals.clock, frequencies[0])
         _, run = np.unique(signals.run, return_inverse=True)
         turn = 2.0 * np.pi * np.asarray(frequencies)[run] * signals.clock
-        return np.column_stack([np.cos(turn), np.sin(turn)])
+        return line_columns(turn, 1.0)
 
     @staticmethod
     def _keeps_phase(regression: Regression, found: Extension) -> bool:
@@ -271,9 +275,7 @@ def _wandering(frequencies: Array, p: Array) -> tuple[NDArray[np.int64], float, 
     return places, float(deviances[k]), float(log_grids[k])
 
 
-def _refined(
-    regression: Regression, frequencies: list[float], step: float, log_grid: float
-) -> list[float]:
+def _refined(regression: Regression, frequencies: list[float], step: float) -> list[float]:
     """Frequencies between the trial ones: one for all runs, or one a run.
 
     That of all runs by what it saves jointly with what is fitted, which has taken up a part of it.
@@ -283,9 +285,7 @@ def _refined(
 
         def saved(f: float) -> float:
             waves = TimePeriodic.waves(regression.signals, [f] * runs)
-            shape = {"frequency_hz": [f] * runs}
-            kind = TimePeriodic.kind
-            return float(regression.propose_run_effect(kind, shape, waves, log_grid).deviance)
+            return regression.ratio_of(RunEffectColumns(waves, regression.bounds))[1]
 
         return [float(golden_maximum(saved, f - step, f + step)[0])] * runs
     e = regression.left - regression.whiten.run_part(regression.left)

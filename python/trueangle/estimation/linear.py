@@ -137,10 +137,6 @@ class NormalEquations:
         squares = self.squares - float(coefficients @ (self.moment + score))
         return NormalEquations(self.gram, score, squares, self.readings)
 
-    def explained_by(self, coefficients: Array) -> float:
-        """By how much these coefficients lower the sum of squares."""
-        return float(2.0 * coefficients @ self.moment - coefficients @ self.gram @ coefficients)
-
     def solved(self) -> _core.LinearModel:
         """Least squares from these sums."""
         return _core.LinearModel.of_sums(self.gram, self.moment[:, None], [self.squares])

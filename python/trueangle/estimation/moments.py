@@ -12,12 +12,13 @@ from numpy.typing import ArrayLike, NDArray
 import trueangle._core as _core
 
 from ..errors import ArgumentError
-from ..joint.shafts import Shaft, ShaftOrders, resolve_orders
+from ..joint.shafts import ShaftOrders, resolve_orders
 from ..model.model import Argument
-from ..support.exclusive import Exclusive
 from ..support.kinds import told_kinds
 from ..support.plainresult import Shown
+from .forgetting import Forgetting
 from .momentsfit import MomentsFit, Spectrum
+from .runsums import RunSums
 
 __all__ = ["Moments", "MomentsFit", "Spectrum"]
 
@@ -77,41 +78,29 @@ class Moments(Shown):
         shafts: Mapping[str, float] | None = None,
         forgetting: float | None = None,
     ) -> None:
-        if forgetting is not None and not 0.0 < forgetting <= 1.0:
-            raise ArgumentError(f"forgetting must lie above 0 and at most at 1, got {forgetting!r}")
-        self._forgetting = forgetting
-        #: Sums of weights and of their squares, where readings are forgotten.
-        self._weights: dict[Hashable, tuple[float, float]] = {}
+        self._forgetting = None if forgetting is None else Forgetting(forgetting)
         self._shafts = resolve_orders(orders, gear_ratio, fixed_member, shafts)
-        self._period = float(period)
-        self._runs: dict[Hashable, _core.Moments] = {}
-        self._turn = Exclusive()
-        self._new()  # a wrong period or shaft is named here, not at the first update
-
-    def _new(self) -> _core.Moments:
-        cycles, orders = _lists(self._shafts)
-        return _core.Moments(self._period, cycles, orders)
+        self._sums = RunSums(float(period), self._shafts)
 
     @property
     def period(self) -> float:
         """One turn of angles and errors."""
-        return self._period
+        return self._sums.period
 
     @property
     def runs(self) -> tuple[Hashable, ...]:
         """Labels of the runs, in the order of their first update."""
-        return tuple(self._runs)
+        return self._sums.labels
 
     @property
     def cycles(self) -> float:
         """Turns per output turn of the base shaft, of which all orders are whole multiples."""
-        return self._new().cycles
+        return self._sums.cycles
 
     @property
     def count(self) -> int:
         """Readings of positive weight."""
-        with self._turn:
-            return sum(run.count for run in self._runs.values())
+        return self._sums.count
 
     @told_kinds
     def update(
@@ -154,33 +143,12 @@ class Moments(Shown):
                 raise ArgumentError(
                     f"{what} has shape {np.shape(values)}, theta has {shape}: they must agree"
                 )
-        given = None if weights is None else _flat(weights)
-        if self._forgetting is not None:
-            faded = self._forgetting ** np.arange(np.size(theta) - 1.0, -1.0, -1.0)
-            given = faded if given is None else faded * given
-        with self._turn:
-            sums = self._of(run)
-            if self._forgetting is not None and given is not None:
-                # Checked first: readings that are refused leave the sums alone.
-                fresh = self._new()
-                fresh.update(_flat(theta), _flat(error), given, threads)
-                factor = self._forgetting**given.size
-                first, second = self._weights.get(run, (0.0, 0.0))
-                self._weights[run] = (
-                    factor * first + float(given.sum()),
-                    factor * factor * second + float(given @ given),
-                )
-                sums.scale(factor)
-                sums.merge(fresh)
-            else:
-                sums.update(_flat(theta), _flat(error), given, threads)
-            if sums.count:
-                self._runs[run] = sums
+        readings = _flat(theta), _flat(error), None if weights is None else _flat(weights)
+        if self._forgetting is None:
+            self._sums.update(run, readings, threads)
+        else:
+            self._sums.update_fading(run, readings, threads, self._forgetting)
         return self
-
-    def _of(self, run: Hashable) -> _core.Moments:
-        sums = self._runs.get(run)
-        return self._new() if sums is None else sums
 
     def update_known(
         self,
@@ -206,30 +174,13 @@ class Moments(Shown):
         int
             Readings that are known.
         """
-        with self._turn:
-            sums = self._of(run)
-            known = sums.update_known(reference, indicated, argument == "indicated")
-            if known:
-                self._runs[run] = sums
-        return known
+        return self._sums.update_known(run, reference, indicated, argument == "indicated")
 
     @told_kinds
     def merge(self, other: Moments) -> Moments:
         """Add the readings of another accumulator over the same orders; runs go by label."""
-        if not isinstance(other, Moments):
-            raise ArgumentError(f"other must be Moments, got {type(other).__name__}")
-        if (self._shafts, self._period) != (other._shafts, other._period):
-            raise ArgumentError("moments merge when their orders, shafts and period agree")
-        if self._forgetting is not None or other._forgetting is not None:
-            raise ArgumentError("other: moments that forget do not merge: order counts")
-        theirs = other._copies()  # not both turns at once: the other may be merging this
-        with self._turn:
-            for label, sums in theirs.items():
-                mine = self._runs.get(label)
-                if mine is None:
-                    self._runs[label] = sums
-                else:
-                    mine.merge(sums)
+        self._of_a_kind(other, "merge", "other: moments that forget do not merge: order counts")
+        self._sums.merge(other._sums)
         return self
 
     @told_kinds
@@ -263,27 +214,19 @@ class Moments(Shown):
         >>> both.subtract(first).solve().cosine.round(9)
         array([0.3])
         """
-        if not isinstance(other, Moments):
-            raise ArgumentError(f"other must be Moments, got {type(other).__name__}")
-        if (self._shafts, self._period) != (other._shafts, other._period):
-            raise ArgumentError("moments subtract when their orders, shafts and period agree")
-        if self._forgetting is not None or other._forgetting is not None:
-            raise ArgumentError("other: sums that forget their readings cannot be taken apart")
-        theirs = other._copies()
-        with self._turn:
-            for label, sums in theirs.items():
-                mine = self._runs.get(label)
-                if mine is None or mine.count < sums.count:
-                    raise ArgumentError(f"other: run {label!r} was not added to these moments")
-            for label, sums in theirs.items():
-                self._runs[label].subtract(sums)
-                if not self._runs[label].count:
-                    del self._runs[label]
+        forgets = "other: sums that forget their readings cannot be taken apart"
+        self._of_a_kind(other, "subtract", forgets)
+        self._sums.subtract(other._sums)
         return self
 
-    def _copies(self) -> dict[Hashable, _core.Moments]:
-        with self._turn:
-            return {label: sums.copy() for label, sums in self._runs.items()}
+    def _of_a_kind(self, other: Moments, verb: str, forgets: str) -> None:
+        """Refuse sums that do not go with these."""
+        if not isinstance(other, Moments):
+            raise ArgumentError(f"other must be Moments, got {type(other).__name__}")
+        if (self._shafts, self.period) != (other._shafts, other.period):
+            raise ArgumentError(f"moments {verb} when their orders, shafts and period agree")
+        if self._forgetting is not None or other._forgetting is not None:
+            raise ArgumentError(forgets)
 
     def __add__(self, other: Moments) -> Moments:
         if not isinstance(other, Moments):
@@ -296,9 +239,8 @@ class Moments(Shown):
     def copy(self) -> Moments:
         """An accumulator of its own with the same readings."""
         fresh = Moments.__new__(Moments)
-        fresh._shafts, fresh._period = self._shafts, self._period
-        fresh._runs, fresh._turn = self._copies(), Exclusive()
-        fresh._forgetting, fresh._weights = self._forgetting, dict(self._weights)
+        fresh._shafts, fresh._sums = self._shafts, self._sums.copy()
+        fresh._forgetting = None if self._forgetting is None else self._forgetting.copy()
         return fresh
 
     def extremes(self, run: Hashable = None) -> NDArray[np.float64]:
@@ -310,8 +252,7 @@ class Moments(Shown):
             Exact, of the readings that `update_known` added; angles within one turn of the
             base shaft, errors modulo a turn.
         """
-        with self._turn:
-            return self._runs[run].extremes().reshape(-1, 4)
+        return self._sums.extremes(run)
 
     def spectrum(self, run: Hashable = None, highest: int | None = None) -> Spectrum:
         """All sums of one run: the input of order selection and of transforms.
@@ -319,11 +260,7 @@ class Moments(Shown):
         Of orders up to ``highest`` of the base shaft; those that were not accumulated are known
         to a part in 1e10 of the errors up to 2.8 times the highest that was.
         """
-        with self._turn:
-            if run not in self._runs:
-                raise ArgumentError(f"there is no run {run!r}; the runs are {list(self._runs)!r}")
-            sums = self._runs[run]
-            return Spectrum(*sums.spectrum(highest), cycles=sums.cycles)
+        return self._sums.spectrum(run, highest)
 
     @told_kinds
     def solve(self, orders: _Orders | None = None) -> MomentsFit:
@@ -337,38 +274,14 @@ class Moments(Shown):
             Orders that were not accumulated.
         """
         wanted = self._shafts if orders is None else self._subset(orders)
-        found = self.solution(wanted)
-        labels = self.runs
-        variance, freedom = found.residual_variance, found.degrees_of_freedom
-        covariance, offset_std = found.covariance, np.asarray(found.offset_std)
-        if self._forgetting is not None:
-            first, second = np.sum([self._weights[label] for label in labels], axis=0)
-            unknowns = self.count - freedom
-            effective = max(first * first / second - unknowns, 1e-9)
-            covariance = covariance * (freedom / effective)
-            offset_std = offset_std * math.sqrt(freedom / effective)
-            variance *= freedom / (first * (1.0 - min(unknowns * second / first**2, 1.0 - 1e-9)))
-            freedom = effective
-        pairs = zip(wanted, found.cosine, found.sine, strict=True)
-        return MomentsFit(
-            shafts=tuple(
-                Shaft(s.name, s.cycles_per_turn, s.orders, tuple(a), tuple(b)) for s, a, b in pairs
-            ),
-            constant=found.constant,
-            offsets=dict(zip(labels, found.offsets.tolist(), strict=True)),
-            offset_std=dict(zip(labels, offset_std.tolist(), strict=True)),
-            covariance=covariance,
-            residual_variance=variance,
-            degrees_of_freedom=freedom,
-            condition_number=found.condition_number,
-            period=self._period,
-            method=found.method,
-        )
+        found = MomentsFit.of(self.solution(wanted), wanted, self.runs, self.period)
+        if self._forgetting is None:
+            return found
+        return self._forgetting.widened(found, self.count)
 
     def solution(self, wanted: Sequence[ShaftOrders]) -> _core.Solution:
         """As `solve`, as the core gives it, and also of higher orders (see `spectrum`)."""
-        with self._turn:
-            return _core.fit_moments(list(self._runs.values()), self._period, *_lists(wanted))
+        return self._sums.solution(wanted)
 
     def _subset(self, orders: _Orders) -> list[ShaftOrders]:
         known = {shaft.name: shaft.cycles_per_turn for shaft in self._shafts}
@@ -383,32 +296,23 @@ class Moments(Shown):
         return wanted
 
     def __getstate__(self) -> dict[str, Any]:
-        with self._turn:
-            runs = {label: sums.store() for label, sums in self._runs.items()}
         return {
             "shafts": self._shafts,
-            "period": self._period,
-            "runs": runs,
-            "forgetting": self._forgetting,
-            "weights": dict(self._weights),
+            "period": self.period,
+            "runs": self._sums.stored(),
+            "forgetting": None if self._forgetting is None else self._forgetting.factor,
+            "weights": {} if self._forgetting is None else self._forgetting.weights,
         }
 
     def __setstate__(self, state: dict[str, Any]) -> None:
-        self._shafts, self._period, self._runs = state["shafts"], state["period"], {}
-        self._forgetting, self._weights = state.get("forgetting"), state.get("weights", {})
-        self._turn = Exclusive()
-        for label, numbers in state["runs"].items():
-            self._runs[label] = self._new()
-            # Buffers that come over a network need not be aligned.
-            self._runs[label].restore(np.require(numbers, requirements=["C", "A"]))
+        factor, self._shafts = state.get("forgetting"), state["shafts"]
+        self._forgetting = None if factor is None else Forgetting(factor, state.get("weights"))
+        self._sums = RunSums(state["period"], self._shafts)
+        self._sums.restore(state["runs"])
 
     def __repr__(self) -> str:
         orders = sum(len(shaft.orders) for shaft in self._shafts)
-        return f"<Moments of {orders} orders, {len(self._runs)} runs, {self.count} readings>"
-
-
-def _lists(shafts: Sequence[ShaftOrders]) -> tuple[list[float], list[list[int]]]:
-    return [s.cycles_per_turn for s in shafts], [list(s.orders) for s in shafts]
+        return f"<Moments of {orders} orders, {len(self.runs)} runs, {self.count} readings>"
 
 
 def _flat(values: ArrayLike) -> NDArray[np.float64]:

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable
+from collections.abc import Hashable, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..joint.shafts import Shaft
+import trueangle._core as _core
+
+from ..joint.shafts import Shaft, ShaftOrders
 from ..model.model import Argument, HarmonicModel
 from ..support.plainresult import Shown
 
@@ -55,6 +57,31 @@ class MomentsFit(Shown):
     period: float
     method: str
     """``"moments"`` (normal equations) or ``"qr"`` (factors of segments)."""
+
+    @classmethod
+    def of(
+        cls,
+        found: _core.Solution,
+        wanted: Sequence[ShaftOrders],
+        runs: Sequence[Hashable],
+        period: float,
+    ) -> MomentsFit:
+        """What the core found, by shafts and runs."""
+        pairs = zip(wanted, found.cosine, found.sine, strict=True)
+        return cls(
+            shafts=tuple(
+                Shaft(s.name, s.cycles_per_turn, s.orders, tuple(a), tuple(b)) for s, a, b in pairs
+            ),
+            constant=found.constant,
+            offsets=dict(zip(runs, found.offsets.tolist(), strict=True)),
+            offset_std=dict(zip(runs, np.asarray(found.offset_std).tolist(), strict=True)),
+            covariance=found.covariance,
+            residual_variance=found.residual_variance,
+            degrees_of_freedom=found.degrees_of_freedom,
+            condition_number=found.condition_number,
+            period=period,
+            method=found.method,
+        )
 
     @property
     def orders(self) -> tuple[int, ...]:

@@ -9,9 +9,10 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
+import trueangle._core as _core
+
 from .batch import Blocks, Products
 from .factor import Factor
-from .ratio import best_ratio
 from .runcolumns import RunEffectColumns
 from .whitening import Whitener
 
@@ -208,7 +209,7 @@ class Projection:
     def ratio_of(self, columns: RunEffectColumns) -> tuple[float, float]:
         """Best ratio of variances of a run effect beside what is fitted, and what it saves."""
         moments = columns.moments(self._all_seen)
-        return best_ratio(columns.grams(self.whiten), moments, self.as_deviances)
+        return _core.best_ratio(columns.grams(self.whiten), moments, self.n, self.rss)
 
     def _powers(self, columns: Array) -> tuple[Array, Array, Array, Array]:
         """Whitened columns, their powers before and after projection, their fitted shares."""

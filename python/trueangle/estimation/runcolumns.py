@@ -29,14 +29,20 @@ class RunEffectColumns:
         self.columns = columns
         self.bounds = bounds
         self._weights: Array | None = None
-        self._sums: tuple[Array, Array, Array] | None = None
+        self._same: Array | None = None
+        self._sums: tuple[Array, Array] | None = None
 
     def grams(self, whiten: Whitener) -> Array:
         """Products of the columns in every run, shape (runs, k, k)."""
-        if self._sums is None or self._weights is not whiten.weights:
-            self._weights, self._sums = whiten.weights, self._neighbours(whiten)
-        same, inner, cross = self._sums
-        found = same if whiten.rho == 0.0 else same + whiten.rho**2 * inner - whiten.rho * cross
+        if self._same is None or self._weights is not whiten.weights:
+            x, self._weights, self._sums = self._weighted(whiten), whiten.weights, None
+            self._same = np.array([x[a:b].T @ x[a:b] for a, b in self.bounds])
+        found = self._same
+        if whiten.rho != 0.0:
+            if self._sums is None:
+                self._sums = self._neighbours(self._weighted(whiten), found)
+            inner, cross = self._sums
+            found = found + whiten.rho**2 * inner - whiten.rho * cross
         if whiten.effects:
             w, c = whiten.taken()
             parts = [self.columns[a:b].T @ w[a:b] for a, b in self.bounds]
@@ -48,14 +54,14 @@ class RunEffectColumns:
         """Products with columns that were mapped twice, in every run: shape (runs, k, m)."""
         return np.array([self.columns[a:b].T @ seen[a:b] for a, b in self.bounds])
 
-    def _neighbours(self, whiten: Whitener) -> tuple[Array, Array, Array]:
-        """Products at one reading, at those that end no run, and with the reading before."""
-        x = self.columns
-        if whiten.root_weights is not None:
-            x = x * whiten.root_weights[:, None]
-        same = np.array([x[a:b].T @ x[a:b] for a, b in self.bounds])
+    def _weighted(self, whiten: Whitener) -> Array:
+        roots = whiten.root_weights
+        return self.columns if roots is None else self.columns * roots[:, None]
+
+    def _neighbours(self, x: Array, same: Array) -> tuple[Array, Array]:
+        """Products at readings that end no run, and with the reading before."""
         ends = np.array([[a, b - 1] for a, b in self.bounds])
         first, last = x[ends[:, 0]], x[ends[:, 1]]
         inner = same - first[:, :, None] * first[:, None, :] - last[:, :, None] * last[:, None, :]
         cross = np.array([x[a : b - 1].T @ x[a + 1 : b] for a, b in self.bounds])
-        return same, inner, cross + np.swapaxes(cross, 1, 2)
+        return inner, cross + np.swapaxes(cross, 1, 2)

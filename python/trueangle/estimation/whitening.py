@@ -9,6 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+import trueangle._core as _core
+
 __all__ = ["LagCorrelation", "RunEffect", "Whitener", "principal", "wander_basis"]
 
 Array = NDArray[np.float64]
@@ -125,7 +127,6 @@ class Whitener:
         self.effects = list(effects or ())
         self.weights = weights
         self.root_weights = None if weights is None else np.sqrt(weights)
-        self._first = [start for start, _ in bounds]
         self._rotations: list[tuple[Array, Array]] = []
         self._log_determinants: list[float] = []
         self._shares: tuple[Array, Array] | None = None
@@ -166,30 +167,13 @@ class Whitener:
             and self.weights is weights
         )
 
-    def _filtered(self, x: NDArray[Any]) -> NDArray[Any]:
-        if self.root_weights is not None:
-            scale = self.root_weights.astype(x.real.dtype)
-            x = x * (scale if x.ndim == 1 else scale[:, None])
-        if self.rho == 0.0:
+    def _filtered(self, x: NDArray[Any], transposed: bool = False) -> NDArray[Any]:
+        """Under the weights and the filter alone, or their transpose."""
+        if self.rho == 0.0 and self.root_weights is None:
             return x
-        out = np.empty_like(x)
-        np.multiply(x[:-1], x.dtype.type(-self.rho), out=out[1:])
-        out[1:] += x[1:]
-        out[self._first] = x[self._first] * x.dtype.type(np.sqrt(1.0 - self.rho**2))
-        return out
-
-    def _filtered_back(self, y: Array) -> Array:
-        """The transpose of `_filtered` applied to columns."""
-        if self.rho != 0.0:
-            out = y.copy()
-            out[self._first] *= np.sqrt(1.0 - self.rho**2)
-            follows = self.rho * y[1:]
-            follows[[start - 1 for start in self._first[1:]]] = 0.0
-            out[:-1] -= follows
-            y = out
-        if self.root_weights is not None:
-            y = y * (self.root_weights if y.ndim == 1 else self.root_weights[:, None])
-        return y
+        rows = np.ascontiguousarray(x if x.ndim == 2 else x[:, None])
+        found = _core.whitened(rows, self.bounds, self.rho, self.root_weights, transposed)
+        return found.reshape(x.shape)
 
     def transposed(self, y: Array) -> Array:
         """The transpose of the map applied to a column or to columns.
@@ -200,7 +184,7 @@ class Whitener:
         if self.effects:
             y = y.copy()
             self._shrink(y)
-        return self._filtered_back(y)
+        return self._filtered(y, transposed=True)
 
     def taken(self) -> tuple[Array, Array]:
         """What run effects take from products of columns, as columns w and shares c.
@@ -216,7 +200,7 @@ class Whitener:
         ):
             w[start:stop, : u.shape[1]] = u
             c[j, : u.shape[1]] = shrink * (2.0 - shrink)
-        return self._filtered_back(w), c
+        return self._filtered(w, transposed=True), c
 
     def _shrink(self, out: NDArray[Any]) -> None:
         for (start, stop), (u, shrink) in zip(self.bounds, self._rotations, strict=True):

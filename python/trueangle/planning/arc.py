@@ -19,7 +19,7 @@ from .doptimal import ArcDesign, OrthonormalColumns, d_optimal
 from .noisefactors import noise_factors
 from .plan import readings_needed
 
-__all__ = ["COVERAGE", "ArcPlan", "check_arc", "plan_arc"]
+__all__ = ["COVERAGE", "ArcPlan", "check_arc", "plain_plan", "plan_arc"]
 
 Array = NDArray[np.float64]
 
@@ -97,12 +97,7 @@ class ArcPlan(PlainResult):
 
     def to_dict(self) -> dict[str, Any]:
         """The object that ``trueangle plan`` prints as JSON for an arc."""
-        plain = dict(vars(self))
-        for name in ("noise_factors", "even_noise_factors"):
-            plain[name] = {f"{order:g}": factor for order, factor in plain[name].items()}
-        for name in ("orders", "places_deg", "counts", "notes"):
-            plain[name] = list(plain[name])
-        return {"kind": "arc", **plain, "readings": self.readings}
+        return plain_plan(self, "arc")
 
     def summary(self) -> str:
         """The plan as text: a table to follow at the rig."""
@@ -115,6 +110,18 @@ class ArcPlan(PlainResult):
             f"{self.readings} readings at {counted(self.places_deg, 'place')}, "
             f"worst factor {self.worst_noise_factor:.3g}"
         )
+
+
+def plain_plan(plan: Any, kind: str) -> dict[str, Any]:
+    """The JSON object of a plan of readings at places: lists, and orders as the keys of objects."""
+
+    def plain(value: Any) -> Any:
+        if isinstance(value, dict):
+            return {f"{order:g}": one for order, one in value.items()}
+        return list(value) if isinstance(value, tuple) else value
+
+    fields = {name: plain(value) for name, value in vars(plan).items()}
+    return {"kind": kind, **fields, "readings": plan.readings}
 
 
 @told_kinds

@@ -8,7 +8,6 @@ import pytest
 from trueangle.estimation.batch import Blocks, Products
 from trueangle.estimation.factor import Factor, in_common, orthonormal_basis
 from trueangle.estimation.projection import Projection, project
-from trueangle.estimation.ratio import RATIOS, _vertex
 from trueangle.estimation.runcolumns import RunEffectColumns
 from trueangle.estimation.whitening import RunEffect, Whitener
 
@@ -154,8 +153,6 @@ def test_many_columns_have_their_ratio_as_few_have() -> None:
     within = ((y - np.repeat(means, 8)) ** 2).sum() / 350.0
     between = ((means - y.mean()) ** 2).sum() / 50.0
     assert ratio == pytest.approx((between - within / 8.0) / within, rel=0.02)
-    assert RATIOS.size == 53
-    assert [_vertex(*p) for p in ((0.0, 1.0, 0.0), (0.0, 1.0, 1.0), (0.0, 0.0, 0.0))] == [0, 0.5, 0]
 
 
 def test_a_factor_grown_is_one_made_anew() -> None:
