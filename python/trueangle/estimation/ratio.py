@@ -26,12 +26,14 @@ FEW_COLUMNS = 40
 def best_ratio(
     grams: Array, moments: Array, deviances: Callable[[Array], Array]
 ) -> tuple[float, float]:
-    r"""Best ratio of variances of a run effect beside what is fitted, and what it saves.
+    """Best ratio of variances of a run effect beside what is fitted, and what it saves.
 
     With the columns of all runs turned to right angles, of power D, and B their share in
     the fitted ones, a ratio t saves
 
-    .. math:: b^T \Bigl(\frac{I}{t} + D - D^{1/2} B B^T D^{1/2}\Bigr)^{-1} b
+    ::
+
+        bᵀ (I / t + D - D^(1/2) B Bᵀ D^(1/2))⁻¹ b
 
     of the squares, b their products with the residual.
 

@@ -134,14 +134,18 @@ class Comparison(PlainResult):
 def compare(
     a: HarmonicModel | str | PathLike[str], b: HarmonicModel | str | PathLike[str]
 ) -> Comparison:
-    r"""Difference of two models per order and over the turn, with its uncertainty.
+    """Difference of two models per order and over the turn, with its uncertainty.
 
-    .. math:: \Delta(\theta) = \varepsilon_b(\theta) - \varepsilon_a(\theta)
+    ::
+
+        Δ(θ) = ε_b(θ) - ε_a(θ)
 
     at the true angle, also of a model whose argument is the indicated one. Where one of them was
     read from a table that is looked up at the reading r, whose true angle has an unknown zero,
 
-    .. math:: \Delta(r) = \theta_a(r) - \theta_b(r)
+    ::
+
+        Δ(r) = θ_a(r) - θ_b(r)
 
     with its mean taken out: two corrections of one device, whatever their zeros.
 

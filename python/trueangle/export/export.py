@@ -43,11 +43,13 @@ def export_model(
     max_arcsec: float | None = None,
     **options: Any,
 ) -> Exported:
-    r"""Write a model's correction as a table that firmware reads, and prove how far it is off.
+    """Write a model's correction as a table that firmware reads, and prove how far it is off.
 
     A device looks its table up at the indicated angle r, so what is tabulated is
 
-    .. math:: g(r) = r - C_0 - \theta(r), \qquad r = \theta + \varepsilon(\theta)
+    ::
+
+        g(r) = r - C₀ - θ(r),    r = θ + ε(θ)
 
     by least-squares knots, rounded; a target that looks up at the true angle gets the error
     itself. Every reading of up to 24 bits is then evaluated in the target's arithmetic.

@@ -1,9 +1,11 @@
-r"""Guide logs of PHD2: the periodic error of a mount's right ascension axis, guiding taken out.
+"""Guide logs of PHD2: the periodic error of a mount's right ascension axis, guiding taken out.
 
 While a mount tracks, its motor turns the axis by the sidereal angle; how far the star lags behind
 it, with all guide pulses so far undone, is the error of the axis:
 
-.. math:: e_n = \frac{s}{\cos\delta} (x_n + \sum_{k < n} r p_k + d_n)
+::
+
+    e_n = (s / cos δ) (x_n + Σ_{k<n} r p_k + d_n)
 
 with the pixel scale s, the declination, the RA distance x in pixels, the guide rate r, the pulses p
 (west positive) and the dithers d. Frames without a star, and those while the guiding settles, are

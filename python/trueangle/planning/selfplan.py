@@ -104,9 +104,11 @@ class SelfPlan(PlainResult):
 
 
 def angle_factors(angles_deg: ArrayLike, orders: Sequence[float]) -> Array:
-    r"""Noise factor of each order for heads or shifts at ``angles_deg``.
+    """Noise factor of each order for heads or shifts at ``angles_deg``.
 
-    .. math:: f_k = (1 - |S_k/n|^2)^{-1/2},\quad S_k = \sum_i e^{ik\alpha_i}
+    ::
+
+        f_k = (1 - |S_k/n|²)^(-1/2),    S_k = Σ_i e^(ikα_i)
 
     Parameters
     ----------

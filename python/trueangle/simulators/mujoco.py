@@ -28,9 +28,11 @@ _STEPS = 100
 
 
 class SensorLayer:
-    r"""What the encoders of joints would say: true angles of MuJoCo with their errors.
+    """What the encoders of joints would say: true angles of MuJoCo with their errors.
 
-    .. math:: r_j = \theta_j + \varepsilon_j(\theta_j, \dot\theta_j, \tau_j, \ldots)
+    ::
+
+        r_j = θ_j + ε_j(θ_j, θ̇_j, τ_j, ...)
 
     MuJoCo has no harmonic error of a sensor, and no play that leaves the joint alone; models
     of trueangle have both, with the state that play and hysteresis need. A joint's velocity is

@@ -52,9 +52,11 @@ def arcsec(angle: float, period: float) -> float:
 
 @told_kinds
 def wrap(angle: ArrayLike, period: float = 2.0 * math.pi) -> NDArray[np.float64]:
-    r"""Angle moved by whole turns into ``(-period/2, period/2]``.
+    """Angle moved by whole turns into ``(-period/2, period/2]``.
 
-    .. math:: \mathrm{wrap}(x) = x - p\,\lceil x/p - 1/2 \rceil
+    ::
+
+        wrap(x) = x - p ceil(x/p - 1/2)
 
     Parameters
     ----------
