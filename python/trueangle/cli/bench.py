@@ -10,7 +10,7 @@ from ..support.files import PICTURE
 from .paths import Output
 from .pictures import save_picture
 
-HELP = "measure evaluation, correction and fits here, beside copies and other libraries"
+HELP = "measure evaluation, correction and fits here, and those of other libraries"
 EXAMPLE = "trueangle bench --json"
 
 #: A unit of a fleet takes as long as so many readings of a fit.

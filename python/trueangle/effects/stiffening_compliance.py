@@ -201,8 +201,8 @@ class StiffeningCompliance(Effect):
             < OWN_POWER
         ):
             yield cls.blind(
-                "too few loads: the cube of the torque is not told from the torque and "
-                "the low orders"
+                "too few loads: the cube of the torque cannot be distinguished from "
+                "the torque and the low orders"
             )
 
     def to_terms(self, period: float, shafts: Mapping[str, float]) -> tuple[Term, ...]:

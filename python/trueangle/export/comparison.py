@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from ..errors import ArgumentError
 from ..model.file import load_model
 from ..model.model import HarmonicModel
-from ..support.angles import ARCSEC_PER_TURN
+from ..support.angles import ARCSEC_PER_TURN, zero_text
 from ..support.display_units import ErrorsIn, ErrorUnit, error_unit
 from ..support.kinds import told_kinds
 from ..support.layout import laid_out
@@ -28,6 +28,8 @@ Array = NDArray[np.float64]
 #: Points per cycle of the fastest order over which the difference is taken.
 _POINTS = 32
 _MOST_POINTS = 1 << 22
+#: Orders that a summary lists.
+_LISTED = 12
 
 
 @dataclass(frozen=True)
@@ -100,22 +102,26 @@ class Comparison(PlainResult):
         unit = error_unit(errors_in, self.max_abs_arcsec)
         lines = [
             f"difference: {unit.text(self.rms_arcsec)} rms, {unit.number(self.max_abs_arcsec)} "
-            f"max abs, zero {self.zero_deg:.6g} deg"
+            f"max abs, zero {zero_text(self.zero_deg, 360.0)}"
             + ("" if self.std_arcsec is None else f"; known to {unit.text(self.std_arcsec)}"),
             *self._verdict(),
             *self._arithmetic(unit),
-            f"  order  {f'amplitude/{unit.name}':>16}  phase/deg  {f'std/{unit.name}':>10}",
+            f"  order  {f'amplitude/{unit.name}':>16}  phase/deg  {f'+-/{unit.name}':>10}",
         ]
-        for row in self.orders:
+        # The largest first, and as many as a screen holds: of a table read back there are hundreds.
+        largest = sorted(self.orders, key=lambda row: -(row["amplitude_arcsec"] or 0.0))
+        for row in largest[:_LISTED]:
             size, std = unit.pair(row["amplitude_arcsec"] or 0.0, row["std_arcsec"])
             lines.append(f"{row['order']:7g}  {size:>16}  {row['phase_deg']:9.1f}  {std:>10}")
+        if len(largest) > _LISTED:
+            lines.append(f"  ... and {len(largest) - _LISTED} smaller ones")
         lines += [f"not compared: {kind}" for kind in self.differ_in]
         return laid_out(lines)
 
     def _verdict(self) -> list[str]:
         if self.verdict is None or self.p is None:
             return []
-        told = "changed" if self.verdict == "changed" else "not told apart by their noise"
+        told = "changed" if self.verdict == "changed" else "not distinguishable in their noise"
         return [
             f"{told}: p = {self.p:.2g}, and below {self.false_alarms:g} it is called changed "
             "(the zero left out)"

@@ -355,7 +355,7 @@ def _notes(target: Target, pattern: TurnPattern, made: Made) -> list[str]:
         )
     if made.zero_deg:
         notes.append(
-            f"a constant of {made.zero_deg:.9g} deg is not in the table: the corrected angle is "
+            f"a constant of {made.zero_deg:.9f} deg is not in the table: the corrected angle is "
             "larger by it, so take it off where the target sets its zero"
             + (
                 ""

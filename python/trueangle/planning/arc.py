@@ -262,8 +262,8 @@ def _columns(
         wanted = wanted[:-1]
     if usual and len(wanted) < len(USUAL):
         notes.append(
-            f"orders up to {wanted[-1]:g}: over {stop - start:g} deg higher ones are not told from "
-            "them but by a thousand times the readings"
+            f"orders up to {wanted[-1]:g}: over {stop - start:g} deg higher ones are "
+            "distinguished from them only by a thousand times the readings"
         )
     return columns, wanted
 

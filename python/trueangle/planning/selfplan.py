@@ -255,7 +255,7 @@ def plan_self(
         }
     what = "heads" if method == "heads" else "shifts"
     notes = [
-        f"{count} equispaced {what} are blind to multiples of {count}",
+        f"{count} equispaced {what} do not show multiples of {count}",
         "the zero is never seen",
     ]
     if method == "shifts":
@@ -333,7 +333,7 @@ def _dual(
         elif gap > 0.0:
             # Two lines part when they differ by a whole wave over the travel.
             turns = max(turns, math.ceil(1.0 / gap))
-    notes.append("travel both ways: reversal error and delay stand beside the orders")
+    notes.append("travel both ways: reversal error and delay are fitted jointly with the orders")
     return SelfPlan(
         "dual",
         orders,

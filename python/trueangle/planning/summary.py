@@ -81,7 +81,7 @@ def self_plan_summary(plan: SelfPlan) -> str:
         )
         if given["blind_orders"]:
             names = ", ".join(f"{k:g}" for k in given["blind_orders"])
-            lines.append(f"                         blind to {names}")
+            lines.append(f"                         cannot see {names}")
     lines += ["  noise factor per order", *_table(plan.noise_factors)]
     lines += [f"  note: {note}" for note in plan.notes]
     return laid_out(lines)
@@ -133,9 +133,9 @@ def next_summary(plan: NextRuns) -> str:
     for entry in plan.between:
         names = " or ".join(entry.causes)
         if not entry.told:
-            text = f"  not told: {names}"
+            text = f"  not distinguished: {names}"
         elif len(entry.causes) > 1:
-            text = f"  tells {names}"
+            text = f"  distinguishes {names}"
         else:
             text = f"  shows {names}"
         if entry.seen and entry.expected_bic is not None and entry.chance_named is not None:

@@ -128,7 +128,7 @@ def find_angles(
             _refuse_missing(path, header, role)
     if len(found) == 3:
         raise error(
-            "an error stands beside either of the two angles: leave one of the three out",
+            "an error is given with one of the two angles: leave one of the three out",
             found["error"].name,
         )
     first = found.get("reference") or found["indicated"]

@@ -210,9 +210,9 @@ def _unwrapped(recording: Recording, time: Array, angle: Array) -> Array:
         rate = 1.0 / float(np.median(np.diff(time)[np.diff(time) > 0.0]))
         raise _fault(
             recording,
-            f"steps of {max(usual, 0.4):.2g} turn between readings at {rate:.3g} Hz cannot be told "
-            f"from motion the other way: read at least {4.0 * rate:.3g} times a second or turn "
-            "slower",
+            f"steps of {max(usual, 0.4):.2g} turn between readings at {rate:.3g} Hz cannot be "
+            f"distinguished from motion the other way: read at least {4.0 * rate:.3g} times a "
+            "second or turn slower",
         )
     return np.asarray(np.unwrap(angle, period=turn))
 

@@ -20,6 +20,7 @@ __all__ = [
     "circular_mean",
     "unit_name",
     "wrap",
+    "zero_text",
 ]
 
 
@@ -35,6 +36,19 @@ def check_period(period: float) -> float:
             f"(2*pi, 360, 1 or the counts per turn; 1e-30 to 1e30), got {period!r}"
         )
     return value
+
+
+def zero_text(value: float, period: float) -> str:
+    """A zero in the unit of ``period``, to a hundredth of an arcsecond at least.
+
+    Examples
+    --------
+    >>> zero_text(3.59802e-05, 360.0)
+    '0.000036 deg'
+    """
+    decimals = max(0, math.ceil(-math.log10(0.01 / arcsec(1.0, period))))
+    # Adding zero takes the sign off what is rounded to nothing.
+    return f"{round(value, decimals) + 0.0:.{decimals}f} {unit_name(period)}"
 
 
 def unit_name(period: float) -> str:
