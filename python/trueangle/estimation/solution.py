@@ -96,7 +96,7 @@ class Solution(Projection):
             left = _left(readings, design, found)
             kept, target, outlying = _clipped(readings, left)
             if rho is None:
-                # What lasts over two readings or three is no noise that neighbours share.
+                # What lasts over two readings or three is not noise that neighbours share.
                 if outlying.any():
                     kept[short_stretches(outlying, readings.bounds)] = 0.0
                 correlation = readings.correlation(kept * readings.root_weights)

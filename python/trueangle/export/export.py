@@ -210,7 +210,7 @@ def import_model(
     except UnicodeDecodeError:
         from ..errors import FileError
 
-        raise FileError(path, f"is no text: a table of {target} is") from None
+        raise FileError(path, f"is not text: a table of {target} is") from None
     model = found.read(text.replace("\r\n", "\n"), fspath(path), given)
     if output is not None:
         model.save(output)

@@ -143,7 +143,7 @@ def _model(
         try:
             cosine, sine, mean = _harmonics(table, at_indicated)
         except NotInvertibleError as error:
-            raise failed(path, f"is no correction: {error}") from None
+            raise failed(path, f"is not a correction: {error}") from None
         constant += mean
         sigma = table.step / math.sqrt(12.0)
         std = sigma * math.sqrt(2.0 / table.entries)

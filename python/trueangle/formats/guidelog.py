@@ -127,7 +127,7 @@ def copy(
     topic: str | None = None,
     output_topic: str | None = None,
 ) -> Contents:
-    """Refused: a star's distance is no angle of the axis."""
+    """Refused: a star's distance is not an angle of the axis."""
     raise FileError(
         source,
         "a guide log holds distances of a star, no angles that could be corrected: give the model "

@@ -79,7 +79,7 @@ def fit_logs(
     orders : iterable of int, mapping of shaft to orders, "auto" or None
     gear_ratio, fixed_member, shafts, argument, covariance
         As in `fit`. ``"hac"`` takes whole runs apart, which sums do not: as if one in so many
-        readings as the noise remembers stood for itself.
+        readings as the noise remembers were independent.
     loss : {"auto", "linear"}
         As in `fit`: ``"auto"`` sets outliers aside, which takes a second pass where there are
         some.

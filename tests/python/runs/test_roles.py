@@ -152,7 +152,7 @@ def test_facets_that_do_not_fit_are_told(tmp_path, capsys):
     runs, facets = str(tmp_path / "off.csv"), str(tmp_path / "facets.csv")
     saved(tmp_path / "off.csv", reference_deg=FACETS + 5.0, indicated_deg=FACETS + 5.0)
     assert main(["fit", runs, "--facets", facets, "-o", str(tmp_path / "m.json")]) == 1
-    assert "reading 1 is at 5 deg, which is no facet of facets.csv: the nearest is at 0 deg" in (
+    assert "reading 1 is at 5 deg, which is not a facet of facets.csv: the nearest is at 0 deg" in (
         capsys.readouterr().err
     )
     saved(
