@@ -230,7 +230,7 @@ def _untold(problem: Problem, used: Sequence[int]) -> str:
 
 
 def _said(found: str) -> str:
-    return f"the residuals are no white noise ({found}): "
+    return f"the residuals are not white noise ({found}): "
 
 
 def _between(clusters: int, runs: int) -> str:

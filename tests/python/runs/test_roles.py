@@ -94,7 +94,7 @@ def test_an_error_beside_both_angles(tmp_path):
     (run,) = ta.read_runs(path)  # found by their names, the angles are enough
     np.testing.assert_array_equal(run.indicated, READ)
     np.testing.assert_array_equal(run.columns["error_arcsec"], 0.0)
-    with pytest.raises(FileError, match="an error stands beside either of the two angles"):
+    with pytest.raises(FileError, match="an error is given with one of the two angles"):
         ta.read_runs(path, signals={"error": "error_arcsec"})
     path = saved(tmp_path / "b.csv", reference_deg=NOMINAL, e=ERROR)
     with pytest.raises(FileError, match=r"'e': its unit is not known.*'error': \('e', 'arcsec'\)"):
