@@ -30,6 +30,8 @@ _POINTS = 32
 _MOST_POINTS = 1 << 22
 #: Orders that a summary lists.
 _LISTED = 12
+#: Part of an amplitude below which its standard error is that of rounded numbers.
+_ROUNDING = 1e-4
 
 
 @dataclass(frozen=True)
@@ -111,7 +113,11 @@ class Comparison(PlainResult):
         # The largest first, and as many as a screen holds: of a table read back there are hundreds.
         largest = sorted(self.orders, key=lambda row: -(row["amplitude_arcsec"] or 0.0))
         for row in largest[:_LISTED]:
-            size, std = unit.pair(row["amplitude_arcsec"] or 0.0, row["std_arcsec"])
+            amplitude, spread = row["amplitude_arcsec"] or 0.0, row["std_arcsec"]
+            size, std = unit.pair(amplitude, spread)
+            if spread is not None and 0.0 < spread < _ROUNDING * amplitude:
+                # What rounding alone leaves open is no reason to print nine digits.
+                size, std = unit.number(amplitude), f"{spread * unit.per_arcsec:.1g}"
             lines.append(f"{row['order']:7g}  {size:>16}  {row['phase_deg']:9.1f}  {std:>10}")
         if len(largest) > _LISTED:
             lines.append(f"  ... and {len(largest) - _LISTED} smaller ones")

@@ -112,7 +112,7 @@ class Exported(PlainResult):
                 + (
                     f"{unit.text(self.floor_arcsec)} rms"
                     if self.floor_arcsec >= _NOTABLE_ARCSEC
-                    else f"less than {unit.text(_NOTABLE_ARCSEC)} rms"
+                    else f"less than {_NOTABLE_ARCSEC:g} arcsec rms"
                 )
             )
         worst = max(self.lost, key=lambda row: row["arcsec"], default=None)
