@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Final
 from . import palette
 from .canvas import described, grid, legend, turn_axis
 from .curves import CONFIDENCE, Curve, envelope, thinned
-from .panel import Cloud, Panel, Picture
+from .panel import Cloud, Panel, PanelPicture
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -39,7 +39,7 @@ def draw_panel(ax: Axes, panel: Panel) -> None:
     ax.set_ylabel(panel.y)
 
 
-def finish(ax: Axes, picture: Picture) -> Axes:
+def finish(ax: Axes, picture: PanelPicture) -> Axes:
     """The legend and the sentence of a picture."""
     legend(ax)
     return described(ax, picture.told)

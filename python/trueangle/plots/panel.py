@@ -19,7 +19,7 @@ __all__ = [
     "ANGLE",
     "Cloud",
     "Panel",
-    "Picture",
+    "PanelPicture",
     "Role",
     "medians",
     "segment",
@@ -99,7 +99,7 @@ class Panel:
 
 
 @dataclass(frozen=True)
-class Picture:
+class PanelPicture:
     """Panels, the main one first, and a sentence for who does not see them."""
 
     panels: tuple[Panel, ...]

@@ -13,7 +13,7 @@ from ..support.display_units import ErrorUnit, significant
 from ..support.plainresult import counted
 from . import curves
 from .curves import Points, Signal
-from .panel import ANGLE, Cloud, Panel, Picture, medians, segment, segment_span
+from .panel import ANGLE, Cloud, Panel, PanelPicture, medians, segment, segment_span
 
 if TYPE_CHECKING:
     from ..fitting.result import FitResult
@@ -34,7 +34,7 @@ _BESIDE: Final = 0.8
 
 def errors_picture(
     runs: Sequence[CalibrationRun], fit: FitResult | None, unit: ErrorUnit
-) -> Picture:
+) -> PanelPicture:
     """Error of every run less that run's zero, with the fitted model where there is one.
 
     A model with gear orders would be a black surface: its envelope is drawn, and a segment
@@ -47,7 +47,7 @@ def errors_picture(
     if fit is None:
         size = significant(max(float(np.ptp(cloud.points.y)) for cloud in clouds), 3)
         told = f"{about}, without a model: up to {size} {unit.name} peak-to-peak."
-        return Picture((Panel(ANGLE, y, clouds, curves.travelled(runs)),), told)
+        return PanelPicture((Panel(ANGLE, y, clouds, curves.travelled(runs)),), told)
     low, high = span = curves.seen_span(fit.model)
     strong = curves.strong_gear_order(fit.orders, fit.amplitudes, high - low)
     model = curves.model_curve(fit.model).scaled(unit.per_arcsec)
@@ -57,9 +57,9 @@ def errors_picture(
         f"{unit.name} peak-to-peak in {counted(len(fit.orders), 'order')}."
     )
     if strong is None:
-        return Picture((whole,), told)
+        return PanelPicture((whole,), told)
     near = curves.model_curve(fit.model, segment_span(whole, strong)).scaled(unit.per_arcsec)
-    return Picture((whole, segment(whole, strong, near)), told)
+    return PanelPicture((whole, segment(whole, strong, near)), told)
 
 
 def _measured(runs: Sequence[CalibrationRun]) -> list[Points]:
@@ -81,7 +81,7 @@ def _of_runs(parts: Iterable[Points], unit: ErrorUnit) -> Iterable[Cloud]:
 
 def before_after_picture(
     pairs: Sequence[tuple[int, Points, Points]], span: tuple[float, float], unit: ErrorUnit
-) -> Picture:
+) -> PanelPicture:
     """Held-out readings before and after correction: number of the run and both, in arcsec."""
     clouds: list[Cloud] = []
     told = []
@@ -93,10 +93,10 @@ def before_after_picture(
         clouds += [Cloud(part, number, role, name) for number, part in parts]  # type: ignore[arg-type]
         told.append(f"{role} correction rms {rms}, peak-to-peak {ptp} {unit.name}")
     panel = Panel(ANGLE, f"error of held-out runs / {unit.name}", tuple(clouds), span)
-    return Picture((panel,), f"Error of {counted(pairs, 'held-out run')}: {'; '.join(told)}.")
+    return PanelPicture((panel,), f"Error of {counted(pairs, 'held-out run')}: {'; '.join(told)}.")
 
 
-def residual_picture(fit: FitResult, against: Signal, unit: ErrorUnit) -> Picture:
+def residual_picture(fit: FitResult, against: Signal, unit: ErrorUnit) -> PanelPicture:
     """What the model leaves of every reading, against a signal that it may depend on.
 
     Raises
@@ -125,14 +125,14 @@ def residual_picture(fit: FitResult, against: Signal, unit: ErrorUnit) -> Pictur
         f"What the model leaves of {rest.size} readings against {against}: "
         f"{significant(float(rest.std()), 3)} {unit.name} standard deviation."
     )
-    return Picture((panel,), told)
+    return PanelPicture((panel,), told)
 
 
 def comparison_picture(
     expected: Sequence[tuple[Points, Points]],
     unit: ErrorUnit,
     known: Simulation | None = None,
-) -> Picture:
+) -> PanelPicture:
     """Measured and simulated error of every run, and last their difference.
 
     Where the gear orders of a simulation ``known`` fill the picture, a segment of a few periods
@@ -159,7 +159,7 @@ def comparison_picture(
         f"Measured and simulated error of {counted(expected, 'run')} over the angle; they differ "
         f"by {significant(deviation, 3)} {unit.name} rms."
     )
-    return Picture(tuple(panels), told)
+    return PanelPicture(tuple(panels), told)
 
 
 def _gear_order(known: Simulation, span: float) -> float | None:

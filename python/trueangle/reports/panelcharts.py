@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Final
 
 from ..plots.curves import CONFIDENCE, Curve, envelope, thinned
-from ..plots.panel import ANGLE, Cloud, Panel, Picture
+from ..plots.panel import ANGLE, Cloud, Panel, PanelPicture
 from .charts import Chart, Figure, figure, run_colour, run_marker
 from .scale import Scale
 
@@ -27,7 +27,9 @@ _FEW: Final = 600
 _TICKS = {True: 4.0, False: 9.0}
 
 
-def figure_of(picture: Picture, scale: Scale, arrangement: str = "row", **given: float) -> Figure:
+def figure_of(
+    picture: PanelPicture, scale: Scale, arrangement: str = "row", **given: float
+) -> Figure:
     """All panels of a picture; the main one is twice as wide as its segment."""
     grows = [2.0 if number == 0 else 1.0 for number in range(len(picture.panels))]
     charts = [
