@@ -59,7 +59,7 @@ def _entry(effect: type[Effect]) -> Iterator[str]:
     if effect.measure:
         told.append(f"*To see it:* {_sentence(effect.measure)}")
     for other, how in effect.confused_with.items():
-        told.append(f"*To tell it from* `{other.kind}`: {_sentence(how)}")
+        told.append(f"*To distinguish it from* `{other.kind}`: {_sentence(how)}")
     if effect.not_at_run_time:
         told.append(f"*Not corrected:* {_sentence(effect.not_at_run_time)}")
     for text in told:

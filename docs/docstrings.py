@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-__all__ = ["connect", "one_attribute_each"]
+__all__ = ["connect", "formulas_as_text", "one_attribute_each"]
 
 
 def connect(app):
@@ -45,8 +45,19 @@ def one_attribute_each(lines: list[str]) -> list[str]:
     return made
 
 
+def formulas_as_text(lines: list[str]) -> list[str]:
+    """Blocks that begin with ``::`` on a line of its own, which are formulas, not Python.
+
+    Examples
+    --------
+    >>> formulas_as_text(["::", "", "    ε = s θ"])
+    ['.. code-block:: text', '', '    ε = s θ']
+    """
+    return [".. code-block:: text" if line.strip() == "::" else line for line in lines]
+
+
 def _process(app, what, name, obj, options, lines):
-    lines[:] = one_attribute_each(lines)
+    lines[:] = formulas_as_text(one_attribute_each(lines))
 
 
 def _skip(app, what, name, obj, skip, options):

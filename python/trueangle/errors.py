@@ -55,7 +55,7 @@ class ArgumentError(TrueAngleError):
 
 
 class KindError(ArgumentError, TypeError):
-    """An argument is of a kind that is no number, or not the one that is wanted."""
+    """An argument is of a kind that is not a number, or not the one that is wanted."""
 
 
 class RankError(TrueAngleError):

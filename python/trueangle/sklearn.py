@@ -29,10 +29,11 @@ __all__ = ["AngleCorrector"]
 
 
 class AngleCorrector(OneToOneFeatureMixin, TransformerMixin, BaseEstimator):  # type: ignore[misc]
-    r"""Correct columns of indicated angles by models of their errors.
+    """Correct columns of indicated angles by models of their errors.
 
-    .. math:: \theta = r - \varepsilon(\theta), \qquad
-              \varepsilon(\theta) = C_0 + \sum_k A_k \cos k\theta + B_k \sin k\theta
+    ::
+
+        θ = r - ε(θ),    ε(θ) = C₀ + Σ_k A_k cos kθ + B_k sin kθ
 
     Every column is one encoder's reading of the same true angle, which is ``y`` of `fit`. Rows may
     come in any order, as folds and shuffles leave them: nothing here follows time or direction.
@@ -137,9 +138,11 @@ class AngleCorrector(OneToOneFeatureMixin, TransformerMixin, BaseEstimator):  # 
         return corrected
 
     def score(self, X: ArrayLike, y: ArrayLike) -> float:
-        r"""Share of the squared errors that the correction takes off, on average over the columns.
+        """Share of the squared errors that the correction takes off, on average over the columns.
 
-        .. math:: 1 - \frac{\sum_i (\hat\theta_i - \theta_i - z)^2}{\sum_i (r_i - \theta_i - z_0)^2}
+        ::
+
+            1 - Σ_i (θ̂_i - θ_i - z)² / Σ_i (r_i - θ_i - z₀)²
 
         with a zero of its own before and after: 1 leaves nothing, 0 gains nothing, less makes it
         worse. A column without any error scores 1 where it stays as it is.

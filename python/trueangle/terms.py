@@ -1,9 +1,10 @@
-r"""Terms of the correction beyond harmonics: what follows travel, speed, heat, load and current.
+"""Terms of the correction beyond harmonics: what follows travel, speed, heat, load and current.
 
-A `HarmonicModel` with ``terms`` corrects, with :math:`\varphi = \theta - v\tau`,
+A `HarmonicModel` with ``terms`` corrects, with ``φ = θ - vτ``,
 
-.. math:: \mathrm{indicated} = \varphi + \varepsilon_h(\varphi)
-          + \sum_i \varepsilon_i(\varphi, \text{signals})
+::
+
+    indicated = φ + ε_h(φ) + Σ_i ε_i(φ, signals)
 
 A term stands in the file of its effect (`trueangle.effects`) and says which forms of the
 compiled core it takes. Missing orders, sidebands and the argument of the pattern need no

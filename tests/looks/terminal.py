@@ -40,6 +40,7 @@ SCENES = {
     "join": ["join runs.csv again.csv -o joined.csv"],
     "robot": ["robot --from-urdf arm.urdf -o robot.toml"],
     "fleet": ["fleet runs.csv again.csv --by run"],
+    "watch": ["watch runs.csv -m joint.json"],
     "selfcal": ["selfcal coast.csv -o coast.json --loop open"],
     "demo": ["demo"],
     "bench": ["bench --samples 1000 --rounds 1"],

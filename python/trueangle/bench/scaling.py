@@ -45,7 +45,7 @@ class Measured(NamedTuple):
 
 
 class Cost(NamedTuple):
-    r"""The model of cost :math:`t(n) = t_0 + n\,t_1` of one work with so many threads, in seconds.
+    """The model of cost ``t(n) = t₀ + n t₁`` of one work with so many threads, in seconds.
 
     ``spread`` is the largest relative departure of what was measured from it.
     """

@@ -76,12 +76,15 @@ class Contribution:
 
 @dataclass(frozen=True)
 class Budget:
-    r"""Independent contributions to one value.
+    """Independent contributions to one value.
 
-    .. math:: u_c^2 = \sum_i c_i^2 u_i^2,\qquad
-              \nu_\text{eff} = \frac{u_c^4}{\sum_i (c_i u_i)^4/\nu_i},\qquad U = k\,u_c
+    ::
 
-    with k the quantile of Student's distribution for `LEVEL` and :math:`\nu_\text{eff}`
+        u_c² = Σ_i c_i² u_i²,
+        ν_eff = u_c⁴ / (Σ_i (c_i u_i)⁴/ν_i),
+        U = k u_c
+
+    with k the quantile of Student's distribution for `LEVEL` and ``ν_eff``
     cut to a whole number (JCGM 100, 5.1.2, G.4.1 and G.6.4); 2 where it is infinite.
 
     Examples

@@ -74,9 +74,11 @@ def conformance_probability(
     upper: float,
     degrees_of_freedom: float = math.inf,
 ) -> float:
-    r"""Probability that a quantity lies within its tolerance limits (JCGM 106:2012, 7.2).
+    """Probability that a quantity lies within its tolerance limits (JCGM 106:2012, 7.2).
 
-    .. math:: p_c = F\left(\frac{T_U - y}{u}\right) - F\left(\frac{T_L - y}{u}\right)
+    ::
+
+        p_c = F((T_U - y) / u) - F((T_L - y) / u)
 
     with F Student's distribution of the degrees of freedom, the normal one where they are
     infinite; a limit that is not there is infinite.

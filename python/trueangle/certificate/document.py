@@ -85,13 +85,15 @@ def certify(
     model: HarmonicModel | str | PathLike[str] | None = None,
     errors_in: ErrorsIn = "auto",
 ) -> Certificate:
-    r"""Value and expanded uncertainty of the error at every nominal position.
+    """Value and expanded uncertainty of the error at every nominal position.
 
-    .. math:: U(\theta) = k\,\sqrt{u_A(\theta)^2 + u_p^2 + u_h^2 + \textstyle\sum_i u_{B,i}^2}
+    ::
 
-    with :math:`u_A` from the whole covariance of the fit, :math:`u_p` the error at single
-    places that the series does not hold, :math:`u_h` half of the reversal error where both
-    directions were read, :math:`u_B` as the identity file gives them, and k the quantile
+        U(θ) = k √(u_A(θ)² + u_p² + u_h² + Σ_i u_{B,i}²)
+
+    with ``u_A`` from the whole covariance of the fit, ``u_p`` the error at single
+    places that the series does not hold, ``u_h`` half of the reversal error where both
+    directions were read, ``u_B`` as the identity file gives them, and k the quantile
     of Student's distribution for 95.45 % and the effective degrees of freedom (JCGM 100).
 
     Parameters

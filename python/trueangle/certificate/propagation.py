@@ -38,9 +38,11 @@ class Estimates:
 
     @classmethod
     def from_observations(cls, observations: ArrayLike) -> Self:
-        r"""Means of simultaneous observations (Type A, JCGM 100, 4.2 and 5.2.3).
+        """Means of simultaneous observations (Type A, JCGM 100, 4.2 and 5.2.3).
 
-        .. math:: u(\bar q, \bar r) = \frac{\sum_k (q_k - \bar q)(r_k - \bar r)}{n(n-1)}
+        ::
+
+            u(q̄, r̄) = Σ_k (q_k - q̄)(r_k - r̄) / (n (n - 1))
 
         Parameters
         ----------
@@ -69,9 +71,11 @@ class Estimates:
         return np.asarray(self.covariance / np.outer(scale, scale))
 
     def through(self, model: Callable[[Array], ArrayLike]) -> Estimates:
-        r"""What a measurement model makes of the values (JCGM 100, 5.2.2).
+        """What a measurement model makes of the values (JCGM 100, 5.2.2).
 
-        .. math:: V_y = J V_x J^T,\quad J_{ij} = \partial f_i / \partial x_j
+        ::
+
+            V_y = J V_x Jᵀ,    J_ij = ∂ f_i / ∂ x_j
 
         The sensitivities are central differences over a thousandth of the standard
         uncertainty.
@@ -96,7 +100,7 @@ class Estimates:
 
 
 def propagated(jacobian: ArrayLike, covariance: ArrayLike) -> Array:
-    r"""Covariance :math:`J V J^T` of linear functions, shape (m, m), exactly symmetric."""
+    """Covariance ``J V Jᵀ`` of linear functions, shape (m, m), exactly symmetric."""
     rows = np.asarray(jacobian, dtype=np.float64)
     result = rows @ np.asarray(covariance, dtype=np.float64) @ rows.T
     return np.asarray(0.5 * (result + result.T))

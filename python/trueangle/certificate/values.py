@@ -95,9 +95,11 @@ def nominal_positions(fit: FitResult, count: int | None = None) -> Array:
 
 
 def values_at(fit: FitResult, angles_deg: Array) -> Values:
-    r"""Error of the fitted series at ``angles_deg``, its mean over them taken away.
+    """Error of the fitted series at ``angles_deg``, its mean over them taken away.
 
-    .. math:: e = (I - \tfrac1n 1 1^T)\,G\beta,\qquad V = (\cdot)\,\mathrm{cov}(\beta)\,(\cdot)^T
+    ::
+
+        e = (I - 1 1ᵀ / n) Gβ,    V = (·) cov(β) (·)ᵀ
 
     with a row of regressors G for every position. The zero of the joint is set at the
     machine; taking the mean away leaves what a setting of the zero cannot remove.
@@ -113,12 +115,14 @@ def values_at(fit: FitResult, angles_deg: Array) -> Values:
 
 
 def left_at_places(fit: FitResult) -> Contribution:
-    r"""Standard deviation over the places of the turn of what the series does not hold.
+    """Standard deviation over the places of the turn of what the series does not hold.
 
-    With :math:`m_{pr}` the mean residual of run r at place p, noise is independent from
+    With ``m_pr`` the mean residual of run r at place p, noise is independent from
     run to run and the error left at a place is not:
 
-    .. math:: s^2 = \mathrm{mean}_p \frac{(\sum_r m_{pr})^2 - \sum_r m_{pr}^2}{R_p(R_p - 1)}
+    ::
+
+        s² = mean_p [((Σ_r m_pr)² - Σ_r m_pr²) / (R_p (R_p - 1))]
 
     It counts where it exceeds three of its standard errors; one run alone cannot show it.
     """
@@ -144,9 +148,11 @@ def left_at_places(fit: FitResult) -> Contribution:
 
 
 def reversal(fit: FitResult) -> Contribution | None:
-    r"""Half of the reversal error, where both directions were read and it is seen.
+    """Half of the reversal error, where both directions were read and it is seen.
 
-    .. math:: h = \sum d\,r / \sum d^2
+    ::
+
+        h = Σ d r / Σ d²
 
     per run, its standard error from the scatter over the runs (over the readings for one
     run). The values then hold for the mean of both directions, and a reading is off by

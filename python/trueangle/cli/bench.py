@@ -10,7 +10,7 @@ from ..support.files import PICTURE
 from .paths import Output
 from .pictures import save_picture
 
-HELP = "measure evaluation, correction and fits here, beside copies and other libraries"
+HELP = "measure evaluation, correction and fits here, and those of other libraries"
 EXAMPLE = "trueangle bench --json"
 
 #: A unit of a fleet takes as long as so many readings of a fit.
@@ -84,14 +84,14 @@ def run(args: argparse.Namespace) -> int:
         for row in rows:
             scale = 1e9 / row.samples
             least, most = row.timing.least * scale, row.timing.most * scale
-            print(f"  {row.name:38s} {row.nanoseconds:10.2f} ({least:.2f} .. {most:.2f})")
+            print(f"  {row.name:42s} {row.nanoseconds:10.2f} ({least:.2f} .. {most:.2f})")
     print("\nfits of all readings: median (least .. greatest) microseconds")
     for fitted in fits:
         name = f"{fitted.name}, {fitted.case.samples} x {fitted.case.highest} orders"
         median, least, most = (1e6 * seconds for seconds in fitted.timing)
-        print(f"  {name:38s} {median:10.1f} ({least:.1f} .. {most:.1f})")
+        print(f"  {name:42s} {median:10.1f} ({least:.1f} .. {most:.1f})")
     for name in missing:
-        print(f"  {name:38s} not installed")
+        print(f"  {name:42s} not installed")
     return 0
 
 

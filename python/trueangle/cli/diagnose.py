@@ -73,7 +73,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--plan",
         type=Output.of(SIMULATION),
         metavar="FILE",
-        help="write the runs to measure next, which tell what is seen and was not told, as a "
+        help="write the runs to measure next, which distinguish what these cannot, as a "
         "simulation file (trueangle plan --after has limits and rehearses them)",
     )
     add(

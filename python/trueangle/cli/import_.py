@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import json
 
+from ..support.angles import zero_text
 from ..support.display_units import error_unit
 from ..support.files import MODEL
 from .error_units import add_errors_in, errors_in
@@ -66,7 +67,8 @@ def run(args: argparse.Namespace) -> int:
         print(json.dumps(content, allow_nan=False))
         return 0
     print(
-        f"{args.output}: {len(rows)} orders, zero {model.constant / model.period * 360.0:.6g} deg"
+        f"{args.output}: {len(rows)} orders, "
+        f"zero {zero_text(model.constant * 360.0 / model.period, 360.0)}"
     )
     largest = max((row["amplitude_arcsec"] for row in rows), default=0.0)
     shown = error_unit(errors_in(args), largest, model.period)

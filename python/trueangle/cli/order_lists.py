@@ -42,8 +42,9 @@ def parse_orders(text: str, option: str = "--orders") -> tuple[float, ...]:
         except ArgumentError:
             raise
         except ValueError:
+            where = f" in {text!r}" if part.strip() != text else ""
             raise ArgumentError(
-                f"{option} must look like 1-17 or 1,4,8, got {part.strip()!r} in {text!r}"
+                f"{option} must look like 1-17 or 1,4,8, got {part.strip()!r}{where}"
             ) from None
     if not all(0.0 < k < 1e6 for k in found):
         raise ArgumentError(f"{option} must be positive and below a million, got {text!r}")

@@ -92,7 +92,7 @@ def _arc(text: str) -> tuple[float, float]:
         return float(start), float(stop)
     except ValueError:
         raise argparse.ArgumentTypeError(
-            f"{text!r} is no arc: START:STOP in degrees, such as 0:270"
+            f"{text!r} is not an arc: START:STOP in degrees, such as 0:270"
         ) from None
 
 
@@ -108,7 +108,7 @@ def _angle(text: str) -> float:
         return float(number) * scale
     except ValueError:
         raise argparse.ArgumentTypeError(
-            f"{text!r} is no angle: a number and {', '.join(_ARCSEC)}, such as 2arcsec"
+            f"{text!r} is not an angle: a number and {', '.join(_ARCSEC)}, such as 2arcsec"
         ) from None
 
 

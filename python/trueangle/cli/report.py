@@ -48,8 +48,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--model",
         type=Input,
         metavar="MODEL",
-        help="say of this model how it was made, what it is blind to and leaves of the runs; in a "
-        "certificate the values as left, beside those as found",
+        help="say of this model how it was made, what it cannot see and what it leaves of the "
+        "runs; in a certificate the values as left, after those as found",
     )
     add(
         "--certificate",

@@ -1,9 +1,11 @@
-r"""Verdicts on what a simulation already claims: its lines and its effects.
+"""Verdicts on what a simulation already claims: its lines and its effects.
 
 Every believed line stands in the regression with two free coefficients, every believed effect
 that can be predicted with a factor; what the readings say of them is
 
-.. math:: \hat p = p_\text{believed} + \delta, \qquad \delta \pm s.
+::
+
+    p̂ = p_believed + δ,    δ ± s.
 """
 
 from __future__ import annotations

@@ -74,9 +74,9 @@ def terms_from_effects(
 def without_terms(
     runs: CalibrationRun | Iterable[CalibrationRun], model: HarmonicModel
 ) -> list[CalibrationRun]:
-    r"""The runs as a joint without the model's terms would have given them.
+    """The runs as a joint without the model's terms would have given them.
 
-    With :math:`\varphi = \theta - v\tau` the reference becomes :math:`\varphi` and the
+    With ``φ = θ - vτ`` the reference becomes ``φ`` and the
     indicated angle loses the terms' error there: what is left is for the harmonics.
 
     Raises

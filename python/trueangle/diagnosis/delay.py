@@ -1,8 +1,10 @@
-r"""A reading that is old, jointly with the pattern that it is old of.
+"""A reading that is old, jointly with the pattern that it is old of.
 
-A joint that answers :math:`\tau` late says
+A joint that answers ``τ`` late says
 
-.. math:: \varepsilon = \theta(t - \tau) - \theta(t) + p\bigl(\theta(t - \tau)\bigr)
+::
+
+    ε = θ(t - τ) - θ(t) + p(θ(t - τ))
 
 so that a delay moves the argument of the pattern itself. Beside a large pattern neither is known
 without the other: the delay is found with all low orders free (Gauss and Newton), and the whole

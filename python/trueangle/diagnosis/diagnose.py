@@ -66,15 +66,16 @@ def diagnose(
     progress: str = "none",
     **reading: Unpack[Reading],
 ) -> Diagnosis:
-    r"""Name the physical causes that a simulation of the joint lacks.
+    """Name the physical causes that a simulation of the joint lacks.
 
     Every cause of the vocabulary is a nested extension of
 
-    .. math:: y = \varepsilon_\text{measured} - \varepsilon_\text{simulated}
-              = X\beta + \sum_j Z_j u_j + n
+    ::
+
+        y = ε_measured - ε_simulated = Xβ + Σ_j Z_j u_j + n
 
     with the zero and the lines of the simulation always free in X. It is chosen by the
-    likelihood with a penalty of :math:`k\ln n_e + 2\ln(\text{grid})`, :math:`n_e` the readings
+    likelihood with a penalty of ``k ln n_e + 2 ln(grid)``, ``n_e`` the readings
     or runs that inform on a parameter, and 6 for a new cause, forward and then backward;
     a further cause must also bring 0.1 % of what the others explain, as no form is exact;
     correlated noise is whitened, outliers are clipped at four standard deviations,

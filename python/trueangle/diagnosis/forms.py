@@ -86,11 +86,11 @@ def share_beside(
 
 
 def with_form_errors(regression: Regression) -> Regression:
-    r"""The regression with the errors that the forms make in its coefficients.
+    """The regression with the errors that the forms make in its coefficients.
 
-    Bends B with coefficients :math:`\xi \sim N(0, \kappa^2)` shift what is fitted without
-    them by :math:`X^+ B\xi`. :math:`\kappa` is the one that makes the residual most likely (0
-    where it is hardly better than none), and :math:`\xi` has its mean and covariance given
+    Bends B with coefficients ``ξ ~ N(0, κ²)`` shift what is fitted without
+    them by ``X⁺ Bξ``. ``κ`` is the one that makes the residual most likely (0
+    where it is hardly better than none), and ``ξ`` has its mean and covariance given
     the residual.
     """
     columns = regression.whiten(bends(regression))

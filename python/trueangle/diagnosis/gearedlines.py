@@ -1,10 +1,11 @@
-r"""The lines of geared shafts in readings, at any ratio.
+"""The lines of geared shafts in readings, at any ratio.
 
-With orders :math:`m_k(r)` and the sums of each run
-:math:`Z_{jk}(r) = \sum_t y_t \exp(-i\,m_k(r)\,\theta_t)`,
+With orders ``m_k(r)`` and the sums of each run
+``Z_jk(r) = Σ_t y_t exp(-i m_k(r) θ_t)``,
 
-.. math:: S(r) = \sum_k |a_k|^2 \sum_j \frac{4 |Z_{jk}(r)|^2}{n_j} \Bigm/
-          \sum_k |a_k|^2 \sum_j n_j |a_k|^2
+::
+
+    S(r) = [Σ_k |a_k|² Σ_j 4 |Z_jk(r)|² / n_j] / [Σ_k |a_k|² Σ_j n_j |a_k|²]
 
 is about 1 at the right ratio and 0 elsewhere. Phases are free, as a ratio that is no whole
 number gives each run its own.
@@ -163,12 +164,14 @@ class GearedLines:
         return departure / std if std else 0.0
 
     def _departure(self, ratio: float, common: bool) -> tuple[float, float]:
-        r"""By how much a ratio seems to be wrong, from its column, and the standard error.
+        """By how much a ratio seems to be wrong, from its column, and the standard error.
 
-        With :math:`a_k \cos + b_k \sin` fitted to each run, or to all of them, a ratio that is
-        wrong by :math:`\delta r` leaves
+        With ``a_k cos + b_k sin`` fitted to each run, or to all of them, a ratio that is
+        wrong by ``δr`` leaves
 
-        .. math:: \delta r\,\theta \sum_k k\,(b_k \cos m_k\theta - a_k \sin m_k\theta)
+        ::
+
+            δr θ Σ_k k (b_k cos m_kθ - a_k sin m_kθ)
         """
         cycles = np.array([float(line.order) for line in self.lines])
         lines = np.hstack([line_columns(self.theta, order) for order in self.orders(ratio)])

@@ -78,7 +78,7 @@ def near_ratio(geared: GearedLines) -> Ratio | None:
 def aligned(sim: Simulation, signals: Signals, error: Array) -> Signals:
     """Signals whose runs start in the turn in which the geared lines have the believed phase.
 
-    Where the ratio is no whole number the lines come back after several turns of the output
+    Where the ratio is not a whole number the lines come back after several turns of the output
     only, and a reference that was wrapped does not say in which of them a run began.
     """
     turns = _turns_until_back(sim.joint.gear_ratio)

@@ -19,9 +19,11 @@ Array = NDArray[np.float64]
 def overlaps(
     regression: Regression, groups: Sequence[Sequence[int]]
 ) -> Iterator[tuple[int, int, float]]:
-    r"""Correlation of what two findings explain, beside the terms of neither.
+    """Correlation of what two findings explain, beside the terms of neither.
 
-    .. math:: \rho = \frac{|p_i^T p_j|}{|p_i||p_j|}, \quad p_i = (I - P)\,M X_i \beta_i
+    ::
+
+        ρ = |p_iᵀ p_j| / (|p_i| |p_j|),    p_i = (I - P) M X_i β_i
 
     with M the whitening of the fit and P the projection onto its other columns.
 

@@ -76,10 +76,10 @@ def misfit_of_scatter(start: Regression, chosen: Regression) -> float:
 
 
 def left_by_forms(deviance: float, readings: int) -> float:
-    r"""Deviance of a share of the energy that a deviance stands for.
+    """Deviance of a share of the energy that a deviance stands for.
 
     n readings of noise 1 with an error of energy n E give a deviance of
-    :math:`n\ln(1 + E)`; `FORM` of that energy one of :math:`n\ln(1 + \mathrm{FORM}\,E)`.
+    ``n ln(1 + E)``; `FORM` of that energy one of ``n ln(1 + FORM E)``.
     """
     energy = np.expm1(min(max(deviance, 0.0) / readings, 500.0))
     return float(readings * np.log1p(FORM * energy))

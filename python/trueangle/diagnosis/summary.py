@@ -117,7 +117,7 @@ def headline(diagnosis: Diagnosis, unit: ErrorUnit) -> list[str]:
     if rest is not None and rest.found:
         lines += _wrapped(
             f"NOT UNDERSTOOD: at least {unit.text(rest.rms)} rms ({100.0 * rest.share:.0f} % of "
-            "the variance that is left) is no noise and has no name.",
+            "the variance that is left) is not noise and has no name.",
             2,
         )
         for item in rest.firing[:3]:

@@ -1,7 +1,8 @@
-r"""Torque of the drive, measured minus simulated: ripple, dry friction, damping.
+"""Torque of the drive, measured minus simulated: ripple, dry friction, damping.
 
-.. math:: \tau_\text{measured} - \tau_\text{simulated} = F\,\operatorname{sgn}\dot\theta
-          + d\,\dot\theta - \sum_m T_m \sin(m\theta + \phi_m) + n
+::
+
+    τ_measured - τ_simulated = F sgn θ̇ + d θ̇ - Σ_m T_m sin(mθ + φ_m) + n
 
 It is diagnosed like an error of the angle: a line is a ripple, what follows the direction dry
 friction, what follows the velocity damping. A simulator has elements of its own for them.

@@ -41,7 +41,7 @@ def untold(
     if shown:
         yield "What these readings cannot tell:", 0, 0
     for spot in shown:
-        how = "" if spot.causes in planned and not verbose else f" To tell: {spot.measure}."
+        how = "" if spot.causes in planned and not verbose else f" To find out: {spot.measure}."
         yield f"- {_head(spot)}: {spot.because}.{how}", 2, 0
         for text in sizes(spot):
             yield text, 6, 4

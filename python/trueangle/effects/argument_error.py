@@ -29,10 +29,11 @@ ALLOWED = 0.5
 
 @dataclass(frozen=True)
 class ArgumentShift(Effect):
-    r"""The pattern is a function of the indicated, not of the true angle.
+    """The pattern is a function of the indicated, not of the true angle.
 
-    .. math:: \varepsilon = -c\,[e - p(\theta)],\quad e = p(\theta + e)
-              \approx p + p\,p'
+    ::
+
+        ε = -c [e - p(θ)],    e = p(θ + e) ≈ p + p p'
 
     Parameters
     ----------

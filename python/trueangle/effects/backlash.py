@@ -46,7 +46,7 @@ ONE_WAY = "all runs go in one direction: a constant reversal error is part of th
 
 @dataclass(frozen=True)
 class Backlash(Effect):
-    r"""Constant reversal error: :math:`\varepsilon = b\,d`, d = direction of travel.
+    """Constant reversal error: ``ε = b d``, d = direction of travel.
 
     Parameters
     ----------
@@ -166,14 +166,16 @@ class Backlash(Effect):
 
 @dataclass(frozen=True, repr=False)
 class BacklashTerm(Term):
-    r"""Play of the gear, b in the direction of travel d, and how it varies with the place.
+    """Play of the gear, b in the direction of travel d, and how it varies with the place.
 
-    .. math:: \varepsilon = d\,\bigl[b + \sum_m A_m \cos m\varphi + B_m \sin m\varphi\bigr]
+    ::
+
+        ε = d [b + Σ_m A_m cos mφ + B_m sin mφ]
 
     The direction d is the sign of ``direction`` or ``velocity`` where one is given (0 keeps
     the last one). Otherwise it is that of the indicated angle, through the play operator:
     the joint is taken to stand until the indicated angle has crossed the whole play 2b.
-    Before the first motion :math:`d = 0`, the middle of the play.
+    Before the first motion ``d = 0``, the middle of the play.
 
     Parameters
     ----------

@@ -22,10 +22,11 @@ FORGOTTEN = 1e-18
 
 
 def bent(signals: Signals, factor: str, signal: Array) -> Array:
-    r"""Columns by which an error ``signal`` may depart from its law in a factor x.
+    """Columns by which an error ``signal`` may depart from its law in a factor x.
 
-    .. math:: s\,x,\quad s\,|x|,\quad s\,x^2,\quad
-              \langle s\rangle_\text{late} - s,\quad |s|\,\mathrm{sign}(\dot s)
+    ::
+
+        s x,    s |x|,    s x²,    <s>_late - s,    |s| sign(ṡ)
 
     curvature, saturation, lag and a loop; for an error of reversal transitions of other
     lengths. None where the factor was not recorded or bends nothing.

@@ -32,16 +32,18 @@ __all__ = ["ChannelSkew", "ChannelSkewTerm"]
 
 @dataclass(frozen=True)
 class ChannelSkew(Effect):
-    r"""The cosine is read a time :math:`\Delta t` before the sine.
+    """The cosine is read a time ``Δt`` before the sine.
 
-    .. math:: \varepsilon = \frac{v\,\Delta t}{2}\,[1 + \sin(m\theta + \varphi)]
+    ::
+
+        ε = (v Δt / 2) [1 + sin(mθ + φ)]
 
     with m twice the sensor's electrical periods in one turn of the output.
 
     Parameters
     ----------
     delay_s : float
-        :math:`\Delta t`; negative where the sine is read first.
+        ``Δt``; negative where the sine is read first.
     order : float
         m.
     phase_deg : float
@@ -148,18 +150,20 @@ class ChannelSkew(Effect):
 
 @dataclass(frozen=True, repr=False)
 class ChannelSkewTerm(Term):
-    r"""Half of the way during the delay, and the line at twice the sensor's order.
+    """Half of the way during the delay, and the line at twice the sensor's order.
 
-    .. math:: \varepsilon = \frac{v\,\Delta t}{2}\,[1 + \sin(m\varphi + \varphi_0)]
+    ::
+
+        ε = (v Δt / 2) [1 + sin(mφ + φ₀)]
 
     Parameters
     ----------
     delay_s : float
-        :math:`\Delta t`.
+        ``Δt``.
     order : float
         m > 0, of the output.
     phase_deg : float
-        :math:`\varphi_0`, degrees.
+        ``φ₀``, degrees.
     """
 
     delay_s: float

@@ -32,7 +32,7 @@ TOLD = 10.0
 
 @dataclass(frozen=True)
 class ClockDrift(Effect):
-    r"""Clocks that differ by a share: :math:`\varepsilon = v\,t\,r`.
+    """Clocks that differ by a share: ``ε = v t r``.
 
     Parameters
     ----------

@@ -28,7 +28,7 @@ __all__ = ["CurrentCoupling", "CurrentCouplingTerm"]
 
 @dataclass(frozen=True)
 class CurrentCoupling(FactorEffect):
-    r"""Error in proportion to the motor's current: :math:`\varepsilon = i\,[a_0 + g(\theta)]`.
+    """Error in proportion to the motor's current: ``ε = i [a₀ + g(θ)]``.
 
     Parameters
     ----------
@@ -121,14 +121,16 @@ class CurrentCoupling(FactorEffect):
 
 @dataclass(frozen=True, repr=False)
 class CurrentCouplingTerm(Term):
-    r"""An error in proportion to the motor's current.
+    """An error in proportion to the motor's current.
 
-    .. math:: \varepsilon = i\,\Big(a_0 + \sum_m A_m \cos m\varphi + B_m \sin m\varphi\Big)
+    ::
+
+        ε = i (a₀ + Σ_m A_m cos mφ + B_m sin mφ)
 
     Parameters
     ----------
     per_A : float
-        :math:`a_0`, angle per ampere.
+        ``a₀``, angle per ampere.
     orders, cosine, sine : sequence of float
         Output orders (positive) and coefficients per ampere.
     """

@@ -39,9 +39,11 @@ TOLD_APART = 0.5
 
 @dataclass(frozen=True)
 class DirectionalPattern(Effect):
-    r"""Forward and backward curves of different shape.
+    """Forward and backward curves of different shape.
 
-    .. math:: \varepsilon = d\,\sum_m C_m \sin(m\theta + \varphi_m)
+    ::
+
+        ε = d Σ_m C_m sin(mθ + φ_m)
 
     with the direction of travel d. Its mean over the turn is `Backlash`, a cause of its own.
 
@@ -132,9 +134,11 @@ class DirectionalPattern(Effect):
 
 @dataclass(frozen=True, repr=False)
 class DirectionalPatternTerm(Term):
-    r"""Play that differs from place to place, without its mean.
+    """Play that differs from place to place, without its mean.
 
-    .. math:: \varepsilon = d\,\sum_m A_m \cos m\varphi + B_m \sin m\varphi
+    ::
+
+        ε = d Σ_m A_m cos mφ + B_m sin mφ
 
     It needs the direction of travel d (or the velocity), which the angle alone does not tell
     where the play is negative.

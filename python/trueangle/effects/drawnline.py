@@ -15,7 +15,7 @@ Array = NDArray[np.float64]
 
 
 class DrawnLine:
-    r"""A line :math:`a_r \cos f x + b_r \sin f x` in every run r.
+    """A line ``a_r cos f x + b_r sin f x`` in every run r.
 
     Parameters
     ----------
@@ -39,12 +39,14 @@ class DrawnLine:
         self._drawn = np.array(found)
 
     def place_std(self, along: Array) -> float | None:
-        r"""Standard deviation of f, with x the angles ``along`` in radians of f = 1.
+        """Standard deviation of f, with x the angles ``along`` in radians of f = 1.
 
-        .. math:: \sigma_f^{-2} = \Bigl\| P M x (b_r \cos f x - a_r \sin f x) \Bigr\|^2 / \sigma^2
+        ::
+
+            σ_f⁻² = |P M x (b_r cos f x - a_r sin f x) |² / σ²
 
         M makes the noise and the drawn phases white, and P takes out what is fitted: the bound
-        of Cramer and Rao with the phases unknown, :math:`\sqrt 6\,\sigma/(\pi A T \sqrt n)` for
+        of Cramer and Rao with the phases unknown, ``√6 σ/(π A T √n)`` for
         places evenly over a span T of one run. None where the readings do not tell f.
         """
         slope = np.empty_like(along)
@@ -59,11 +61,12 @@ class DrawnLine:
         return math.sqrt(self._regression.variance / power) if known else None
 
     def amplitude(self) -> tuple[float, float]:
-        r"""Root of the mean square amplitude over the R runs, and its standard deviation.
+        """Root of the mean square amplitude over the R runs, and its standard deviation.
 
-        .. math:: A^2 = \overline{a_r^2 + b_r^2} - \frac{4 R \sigma^2}{n}, \qquad
-                  \sigma_A^2 = \max\Bigl(\frac{\mathrm{var}_r(a_r^2 + b_r^2)}{4 A^2 R},
-                  \frac{2 \sigma^2}{n}\Bigr)
+        ::
+
+            A² = mean(a_r² + b_r²) - 4 R σ² / n,
+            σ_A² = max(var_r(a_r² + b_r²) / (4 A² R), 2 σ² / n)
 
         What the noise of n readings adds is taken off; the error is by how much the runs differ,
         and no less than what the noise makes them.

@@ -78,7 +78,7 @@ UNLIKE_FORMS = 4.0
 
 @dataclass(frozen=True)
 class DriftWithinRun(Effect):
-    r"""Ramp and random walk in time, new in every run.
+    """Ramp and random walk in time, new in every run.
 
     Parameters
     ----------

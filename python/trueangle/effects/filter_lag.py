@@ -58,15 +58,16 @@ ENOUGH_DEVIANCE = 0.01
 
 @dataclass(frozen=True)
 class FilterLag(Effect):
-    r"""Low-pass on the pattern without a ramp error (type-2 tracking loop).
+    """Low-pass on the pattern without a ramp error (type-2 tracking loop).
 
     A line of order m at v turns per second is multiplied by
-    :math:`1/(1 + j\,m v/f_c)` or, with a damping ratio :math:`\zeta`, by
+    ``1/(1 + j m v/f_c)`` or, with a damping ratio ``ζ``, by
 
-    .. math:: \frac{1}{1 - w^2 + 2 j \zeta w},\qquad w = \frac{m v}{f_n},\quad
-              f_n = 2 \zeta f_c
+    ::
 
-    so that far below the cutoff both delay by :math:`1/(2\pi f_c)`.
+        1 / (1 - w² + 2 j ζ w),    w = m v / f_n,    f_n = 2 ζ f_c
+
+    so that far below the cutoff both delay by ``1/(2π f_c)``.
 
     Parameters
     ----------
@@ -254,20 +255,20 @@ class FilterLag(Effect):
 
 @dataclass(frozen=True, repr=False)
 class FilterLagTerm(Term):
-    r"""The harmonics behind a low-pass that has no ramp error.
+    """The harmonics behind a low-pass that has no ramp error.
 
     At v turns per second a line of output order m is multiplied by
-    :math:`1/(1 + j\,m v/f_c)` or, with damping :math:`\zeta`, by
-    :math:`1/(1 - w^2 + 2 j \zeta w)` with :math:`w = m v/(2 \zeta f_c)`. Exact at constant
+    ``1/(1 + j m v/f_c)`` or, with damping ``ζ``, by
+    ``1/(1 - w² + 2 j ζ w)`` with ``w = m v/(2 ζ f_c)``. Exact at constant
     velocity; after a change of velocity the filter itself needs about
-    :math:`1/(2\pi f_c)` to follow.
+    ``1/(2π f_c)`` to follow.
 
     Parameters
     ----------
     cutoff_hz : float
-        :math:`f_c > 0`.
+        ``f_c > 0``.
     damping : float, optional
-        :math:`\zeta > 0` of a filter of second order.
+        ``ζ > 0`` of a filter of second order.
     """
 
     cutoff_hz: float

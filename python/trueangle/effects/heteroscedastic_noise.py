@@ -29,9 +29,11 @@ WIDEST = 2.0 * float(np.log(1e3))
 
 @dataclass(frozen=True)
 class HeteroscedasticNoise(Effect):
-    r"""Noise that depends on angle, speed or load.
+    """Noise that depends on angle, speed or load.
 
-    .. math:: \ln\sigma^2 = a + b\cos k\theta + c\sin k\theta + e\,|v| + f\,|\tau|
+    ::
+
+        ln σ² = a + b cos kθ + c sin kθ + e |v| + f |τ|
 
     Parameters
     ----------

@@ -35,7 +35,7 @@ class _OfOthers(Effect):
 
 @dataclass(frozen=True)
 class JointCoupling(_OfOthers):
-    r"""Share of another joint's indicated angle: :math:`\varepsilon = c\,\theta_j`.
+    """Share of another joint's indicated angle: ``ε = c θ_j``.
 
     Parameters
     ----------
@@ -162,11 +162,13 @@ def _about_means(signals: Signals, angle: Array) -> Array:
 
 @dataclass(frozen=True, repr=False)
 class JointCouplingTerm(Term):
-    r"""A share of another joint's indicated angle.
+    """A share of another joint's indicated angle.
 
-    .. math:: \varepsilon = c\,\theta_j
+    ::
 
-    with :math:`\theta_j` as that joint counts its turns, in the unit of the model: the signal
+        ε = c θ_j
+
+    with ``θ_j`` as that joint counts its turns, in the unit of the model: the signal
     ``coupled_JOINT``, which `trueangle.Robot` takes from its own angles.
 
     Parameters

@@ -41,9 +41,11 @@ UNTIMED = "no time stamps and no velocity were recorded"
 
 @dataclass(frozen=True)
 class Latency(Effect):
-    r"""Pure delay: the reading is that of a time tau earlier.
+    """Pure delay: the reading is that of a time tau earlier.
 
-    .. math:: \varepsilon = -v\tau + p(\theta - v\tau) - p(\theta)
+    ::
+
+        ε = -vτ + p(θ - vτ) - p(θ)
 
     Parameters
     ----------
@@ -123,17 +125,19 @@ class Latency(Effect):
 
 @dataclass(frozen=True, repr=False)
 class LatencyTerm(Term):
-    r"""The indicated angle is a time :math:`\tau` old.
+    """The indicated angle is a time ``τ`` old.
 
-    .. math:: \mathrm{indicated}(t) = \theta(t - \tau) + \varepsilon(\theta(t - \tau))
+    ::
 
-    so :math:`\varphi = \theta - v\tau` is solved for and :math:`v\tau` added. Exact at
-    constant velocity; an acceleration a leaves :math:`a\tau^2/2`.
+        indicated(t) = θ(t - τ) + ε(θ(t - τ))
+
+    so ``φ = θ - vτ`` is solved for and ``vτ`` added. Exact at
+    constant velocity; an acceleration a leaves ``aτ²/2``.
 
     Parameters
     ----------
     delay_s : float
-        :math:`\tau` in seconds; negative where the reference is the later one.
+        ``τ`` in seconds; negative where the reference is the later one.
     """
 
     delay_s: float

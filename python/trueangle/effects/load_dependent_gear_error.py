@@ -41,9 +41,11 @@ __all__ = ["LoadDependentGearError", "LoadDependentGearErrorTerm"]
 
 @dataclass(frozen=True)
 class LoadDependentGearError(FactorEffect):
-    r"""Gear lines that grow with torque l (signed or absolute).
+    """Gear lines that grow with torque l (signed or absolute).
 
-    .. math:: \varepsilon = \ell\,\sum_m C_m \sin(m\theta + \varphi_m)
+    ::
+
+        ε = l Σ_m C_m sin(mθ + φ_m)
 
     Parameters
     ----------
@@ -197,10 +199,11 @@ class LoadDependentGearError(FactorEffect):
 
 @dataclass(frozen=True, repr=False)
 class LoadDependentGearErrorTerm(Term):
-    r"""Gear lines that grow with the torque.
+    """Gear lines that grow with the torque.
 
-    .. math:: \varepsilon = \ell\,\sum_m A_m \cos m\varphi + B_m \sin m\varphi,
-              \qquad \ell = \tau \text{ or } |\tau|
+    ::
+
+        ε = l Σ_m A_m cos mφ + B_m sin mφ,    l = τ or |τ|
 
     Parameters
     ----------

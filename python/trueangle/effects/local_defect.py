@@ -66,7 +66,7 @@ WHOLE_TURN = 0.9
 
 @dataclass(frozen=True)
 class LocalDefect(Effect):
-    r"""A bump at one place of a shaft: :math:`a\,e^{-(\varphi - c)^2/2w^2}`.
+    """A bump at one place of a shaft: ``a e^(-(φ - c)²/2w²)``.
 
     Parameters
     ----------
@@ -318,9 +318,11 @@ class LocalDefect(Effect):
 
 @dataclass(frozen=True, repr=False)
 class LocalDefectTerm(Term):
-    r"""A damaged tooth, pole or graduation line, the same in every pass.
+    """A damaged tooth, pole or graduation line, the same in every pass.
 
-    .. math:: \varepsilon = h\,e^{-(a - c)^2/2w^2},\qquad a = f\varphi
+    ::
+
+        ε = h e^(-(a - c)²/2w²),    a = fφ
 
     with a the angle of a shaft that turns f times per output turn, wrapped around the
     place.

@@ -59,7 +59,9 @@ class MissedCounts(Effect):
     flexible_below: ClassVar[float] = ALWAYS
     draws_zeros: ClassVar[bool] = True
     has_exact_form: ClassVar[bool] = True
-    not_at_run_time: ClassVar[str] = "a step is told from a motion only afterwards, in the log"
+    not_at_run_time: ClassVar[str] = (
+        "a step is distinguished from a motion only afterwards, in the log"
+    )
 
     def signal(self, signals: Signals, around: Surroundings, rng: np.random.Generator) -> Array:
         after = (signals.run == self.run) & (signals.row >= self.row)

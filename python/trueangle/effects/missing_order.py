@@ -44,7 +44,7 @@ UNRESOLVED, ALIKE = 0.5, 0.9
 
 @dataclass(frozen=True)
 class MissingOrder(Effect):
-    r"""A periodic line: :math:`C \sin(k f \theta + \varphi)` of a shaft that turns f times.
+    """A periodic line: ``C sin(k f θ + φ)`` of a shaft that turns f times.
 
     Parameters
     ----------

@@ -57,7 +57,7 @@ PEAKS = 4
 
 @dataclass(frozen=True)
 class NonIntegerOrder(Effect):
-    r"""A line whose phase is new in every run: :math:`C\sin(f\theta + \varphi_j)`.
+    """A line whose phase is new in every run: ``C sin(fθ + φ_j)``.
 
     Parameters
     ----------

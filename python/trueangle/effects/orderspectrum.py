@@ -23,9 +23,11 @@ DENSE = 128
 
 
 class OrderSpectrum:
-    r"""Sums over the readings of each run at equally spaced orders.
+    """Sums over the readings of each run at equally spaced orders.
 
-    .. math:: F_k = \sum_j y_j e^{-i (m_0 + k\,\Delta)\,\theta_j},\quad 0 \le k < K
+    ::
+
+        F_k = Σ_j y_j e^(-i (m₀ + k Δ) θ_j),    0 ≤ k < K
 
     Of y only a transform depends: what the angles ask for is kept.
 

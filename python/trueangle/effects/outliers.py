@@ -61,8 +61,8 @@ SCALES = np.linspace(0.85, 1.1, 11)
 BEYOND_TAILS = 2.0
 
 
-#: Ratio of the largest of readings with a tail :math:`x^{-nu}` to the next that is passed by a
-#: chance of :math:`8^{-nu}`: 0.2 % for nu = 3, 3e-5 for nu = 5. Such a reading is of another kind.
+#: Ratio of the largest of readings with a tail ``x^(-nu)`` to the next that is passed by a
+#: chance of ``8^(-nu)``: 0.2 % for nu = 3, 3e-5 for nu = 5. Such a reading is of another kind.
 APART = 8.0
 
 #: Share of the readings that may stand apart so.
@@ -182,9 +182,11 @@ def _apart(e: Array) -> NDArray[np.int64]:
 
 
 def _beside_neighbours(regression: Regression) -> Array:
-    r"""Residuals less what both neighbours tell of them, in robust standard deviations.
+    """Residuals less what both neighbours tell of them, in robust standard deviations.
 
-    .. math:: e_k - \frac{\rho}{1 + \rho^2}(e_{k-1} + e_{k+1})
+    ::
+
+        e_k - (ρ / (1 + ρ²))(e_{k-1} + e_{k+1})
 
     is what a correlation leaves of one reading. Whitened residuals show an outlier twice,
     and what lasts over many readings as large as it is. White noise stays as it is. Wild

@@ -61,9 +61,11 @@ LENGTHS = np.geomspace(0.15, 60.0, 15)
 
 @dataclass(frozen=True)
 class PreslidingHysteresis(Effect):
-    r"""Reversal error with a transition length L (Dahl): :math:`\varepsilon = h\,z(s)`.
+    """Reversal error with a transition length L (Dahl): ``ε = h z(s)``.
 
-    .. math:: z(s) = d - (d - z_0)\,e^{-s/L}
+    ::
+
+        z(s) = d - (d - z₀) e^(-s/L)
 
     for travel s since the reversal, z_0 being the state there.
 
@@ -266,12 +268,14 @@ class PreslidingHysteresis(Effect):
 
 @dataclass(frozen=True, repr=False)
 class PreslidingHysteresisTerm(Term):
-    r"""Friction that winds the gear up over a length: :math:`\varepsilon = h\,z(s)`.
+    """Friction that winds the gear up over a length: ``ε = h z(s)``.
 
-    .. math:: \frac{dz}{ds} = \frac{d - z}{L},\qquad z(s) = d - (d - z_0)\,e^{-s/L}
+    ::
 
-    for travel s since the last reversal, where the state was :math:`z_0` (Dahl); after a
-    long stretch :math:`z_0 = -d` and :math:`z = d\,(1 - 2e^{-s/L})`. Several elements of
+        dz / ds = (d - z) / L,    z(s) = d - (d - z₀) e^(-s/L)
+
+    for travel s since the last reversal, where the state was ``z₀`` (Dahl); after a
+    long stretch ``z₀ = -d`` and ``z = d (1 - 2e^(-s/L))``. Several elements of
     different lengths add up to a Maxwell-slip model.
 
     Parameters

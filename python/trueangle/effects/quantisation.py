@@ -29,7 +29,7 @@ MOST_SHARE = 2.0
 
 @dataclass(frozen=True)
 class Quantisation(Effect):
-    r"""The reading, its noise included, is rounded to whole steps: :math:`q/\sqrt{12}`.
+    """The reading, its noise included, is rounded to whole steps: ``q/√12``.
 
     Parameters
     ----------

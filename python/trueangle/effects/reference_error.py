@@ -37,7 +37,7 @@ REFERENCE_ORDERS = range(1, 37)
 
 @dataclass(frozen=True)
 class ReferenceLines(Effect):
-    r"""Error of the reference, which turns with its mount: lines in :math:`\theta + \psi`.
+    """Error of the reference, which turns with its mount: lines in ``θ + ψ``.
 
     Parameters
     ----------

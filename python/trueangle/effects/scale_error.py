@@ -28,7 +28,7 @@ __all__ = ["ScaleError", "ScaleErrorTerm"]
 
 @dataclass(frozen=True)
 class ScaleError(Effect):
-    r"""Ramp in angle: :math:`\varepsilon = s\,\theta` with the unwrapped angle.
+    """Ramp in angle: ``ε = s θ`` with the unwrapped angle.
 
     Parameters
     ----------
@@ -108,11 +108,13 @@ class ScaleError(Effect):
 
 @dataclass(frozen=True, repr=False)
 class ScaleErrorTerm(Term):
-    r"""A wrong ratio, over the travel on which it was measured.
+    """A wrong ratio, over the travel on which it was measured.
 
-    .. math:: \varepsilon = s\,[\min(\max(\varphi, a), b) - (a + b)/2]
+    ::
 
-    with :math:`\varphi` over the turns, not modulo one. Beyond the travel it keeps the value of
+        ε = s [min(max(φ, a), b) - (a + b)/2]
+
+    with ``φ`` over the turns, not modulo one. Beyond the travel it keeps the value of
     its end: where the ratio is wrong there too, put it right where counts are turned into angles.
 
     Parameters

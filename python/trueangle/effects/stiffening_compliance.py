@@ -39,9 +39,9 @@ KNEES = (0.2, 0.35, 0.5, 0.65, 0.8)
 
 @dataclass(frozen=True)
 class StiffeningCompliance(Effect):
-    r"""A spring that stiffens: :math:`\varepsilon = c_1\tau + c_3\tau^3 + c_k\,h(\tau)`.
+    """A spring that stiffens: ``ε = c₁τ + c₃τ³ + c_k h(τ)``.
 
-    h is the torque beyond a knee, :math:`h = \mathrm{sign}(\tau)\max(|\tau| - \tau_k, 0)`
+    h is the torque beyond a knee, ``h = sign(τ) max(|τ| - τ_k, 0)``
     (the catalogue's K1, K2).
 
     Parameters
@@ -51,7 +51,7 @@ class StiffeningCompliance(Effect):
     beyond_knee_arcsec_per_Nm, knee_Nm : float
         c_k and the knee.
     gravity_deg : float or NaN
-        Where finite, the moment is :math:`\tau\sin(\theta - \theta_g)` of the load in
+        Where finite, the moment is ``τ sin(θ - θ_g)`` of the load in
         the torque column.
     """
 
@@ -201,8 +201,8 @@ class StiffeningCompliance(Effect):
             < OWN_POWER
         ):
             yield cls.blind(
-                "too few loads: the cube of the torque is not told from the torque and "
-                "the low orders"
+                "too few loads: the cube of the torque cannot be distinguished from "
+                "the torque and the low orders"
             )
 
     def to_terms(self, period: float, shafts: Mapping[str, float]) -> tuple[Term, ...]:
@@ -220,20 +220,22 @@ class StiffeningCompliance(Effect):
 
 @dataclass(frozen=True, repr=False)
 class StiffeningComplianceTerm(Term):
-    r"""A spring that stiffens under the moment m.
+    """A spring that stiffens under the moment m.
 
-    .. math:: \varepsilon = c_1 m + c_3 m^3 + c_k\,\mathrm{sign}(m)\max(|m| - m_k, 0)
+    ::
 
-    where m is the torque or, with ``gravity``, :math:`\tau\sin(\varphi - \varphi_g)`.
+        ε = c₁ m + c₃ m³ + c_k sign(m) max(|m| - m_k, 0)
+
+    where m is the torque or, with ``gravity``, ``τ sin(φ - φ_g)``.
 
     Parameters
     ----------
     per_Nm, per_Nm3 : float
-        :math:`c_1` and :math:`c_3`.
+        ``c₁`` and ``c₃``.
     beyond_knee_per_Nm, knee_Nm : float
-        :math:`c_k` and the knee :math:`m_k \ge 0`.
+        ``c_k`` and the knee ``m_k ≥ 0``.
     gravity : float, optional
-        :math:`\varphi_g`, the angle at which the load has no moment.
+        ``φ_g``, the angle at which the load has no moment.
     """
 
     per_Nm: float = 0.0

@@ -37,10 +37,11 @@ REFERENCE_C = 20.0
 
 @dataclass(frozen=True)
 class ThermalDrift(FactorEffect):
-    r"""Error that grows with :math:`\Delta T = T - T_0`.
+    """Error that grows with ``ΔT = T - T₀``.
 
-    .. math:: \varepsilon = \Delta T\,[k_0 + k_p\,p(\theta)
-              + \sum_m C_m \sin(m\theta + \varphi_m)]
+    ::
+
+        ε = ΔT [k₀ + k_p p(θ) + Σ_m C_m sin(mθ + φ_m)]
 
     Parameters
     ----------
@@ -145,25 +146,26 @@ class ThermalDrift(FactorEffect):
 
 @dataclass(frozen=True, repr=False)
 class ThermalDriftTerm(Term):
-    r"""Error in proportion to :math:`\Delta T = T - T_0`.
+    """Error in proportion to ``ΔT = T - T₀``.
 
-    .. math:: \varepsilon = \Delta T\,\bigl[k_0 + k_p\,p(\varphi)
-              + \sum_m A_m \cos m\varphi + B_m \sin m\varphi\bigr]
+    ::
+
+        ε = ΔT [k₀ + k_p p(φ) + Σ_m A_m cos mφ + B_m sin mφ]
 
     with p the harmonics of the model without their constant.
 
     Parameters
     ----------
     zero_per_K : float
-        :math:`k_0`, angle per kelvin.
+        ``k₀``, angle per kelvin.
     pattern_per_K : float
-        :math:`k_p`, relative growth of the harmonics per kelvin.
+        ``k_p``, relative growth of the harmonics per kelvin.
     orders : sequence of float
         Output orders m of the lines, positive.
     cosine, sine : sequence of float
-        :math:`A_m, B_m`, angle per kelvin.
+        ``A_m, B_m``, angle per kelvin.
     reference_C : float
-        :math:`T_0`, where the harmonics hold, degrees Celsius.
+        ``T₀``, where the harmonics hold, degrees Celsius.
     """
 
     zero_per_K: float = 0.0

@@ -58,7 +58,7 @@ UNRESOLVED = 0.5
 
 @dataclass(frozen=True)
 class TimePeriodic(Effect):
-    r"""A disturbance of fixed frequency: :math:`\varepsilon = C \sin(2\pi f t + \varphi_j)`.
+    """A disturbance of fixed frequency: ``ε = C sin(2π f t + φ_j)``.
 
     Parameters
     ----------

@@ -27,12 +27,12 @@ FLOOR = 1e-4
 
 @dataclass(frozen=True)
 class TimestampJitter(Effect):
-    r"""The moment of a reading scatters: noise of :math:`|v|\,\sigma_t` beside its own.
+    """The moment of a reading scatters: noise of ``|v| σ_t`` beside its own.
 
     Parameters
     ----------
     sigma_s : float
-        :math:`\sigma_t`, seconds.
+        ``σ_t``, seconds.
     """
 
     sigma_s: float

@@ -40,12 +40,14 @@ TURNED = 0.06
 
 @dataclass(frozen=True)
 class TorqueHysteresis(Effect):
-    r"""Friction in the teeth beside the compliance: :math:`\varepsilon = h\,z(\tau)`.
+    """Friction in the teeth beside the compliance: ``ε = h z(τ)``.
 
-    .. math:: z = \sigma - (\sigma - z_0)\,e^{-|\tau - \tau_0|/T}
+    ::
 
-    with :math:`\sigma` the sign in which the torque changes and :math:`z_0` the state at the
-    torque :math:`\tau_0` where it last turned round (the loop of a gear's catalogue; Dahl).
+        z = σ - (σ - z₀) e^(-|τ - τ₀|/T)
+
+    with ``σ`` the sign in which the torque changes and ``z₀`` the state at the
+    torque ``τ₀`` where it last turned round (the loop of a gear's catalogue; Dahl).
 
     Parameters
     ----------

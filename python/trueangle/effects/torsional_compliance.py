@@ -32,7 +32,7 @@ __all__ = ["TorsionalCompliance", "TorsionalComplianceTerm"]
 
 @dataclass(frozen=True)
 class TorsionalCompliance(FactorEffect):
-    r"""Wind-up in proportion to torque: :math:`\varepsilon = \tau\,[c + g(\theta)]`.
+    """Wind-up in proportion to torque: ``ε = τ [c + g(θ)]``.
 
     Parameters
     ----------
@@ -120,9 +120,11 @@ class TorsionalCompliance(FactorEffect):
 
 @dataclass(frozen=True, repr=False)
 class TorsionalComplianceTerm(Term):
-    r"""Wind-up in proportion to the torque.
+    """Wind-up in proportion to the torque.
 
-    .. math:: \varepsilon = \tau\,\bigl[c + \sum_m A_m \cos m\varphi + B_m \sin m\varphi\bigr]
+    ::
+
+        ε = τ [c + Σ_m A_m cos mφ + B_m sin mφ]
 
     Parameters
     ----------

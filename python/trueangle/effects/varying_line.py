@@ -37,7 +37,7 @@ WHOLE_TURN, RESOLVED, UNRESOLVED = 0.9, 1.0, 0.5
 
 @dataclass(frozen=True)
 class VaryingLine(Effect):
-    r"""A line times a factor: :math:`\varepsilon = x\,C \sin(m\theta + \varphi)`.
+    """A line times a factor: ``ε = x C sin(mθ + φ)``.
 
     Parameters
     ----------
@@ -152,9 +152,11 @@ class VaryingLine(Effect):
 
 @dataclass(frozen=True, repr=False)
 class VaryingLineTerm(Term):
-    r"""A line times a signal.
+    """A line times a signal.
 
-    .. math:: \varepsilon = x\,\sum_m A_m \cos m\varphi + B_m \sin m\varphi
+    ::
+
+        ε = x Σ_m A_m cos mφ + B_m sin mφ
 
     Parameters
     ----------

@@ -32,11 +32,13 @@ ABSENT = 0.3
 
 @dataclass(frozen=True)
 class WrongGearRatio(Effect):
-    r"""The geared lines stand at the orders of another ratio.
+    """The geared lines stand at the orders of another ratio.
 
-    .. math:: \varepsilon = p_{r}(\theta) - p(\theta)
+    ::
 
-    with :math:`p_r` the simulation's pattern on a joint of ratio r.
+        ε = p_r(θ) - p(θ)
+
+    with ``p_r`` the simulation's pattern on a joint of ratio r.
 
     Parameters
     ----------

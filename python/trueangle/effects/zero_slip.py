@@ -37,7 +37,7 @@ LEVEL_KELVIN = 1.0
 
 @dataclass(frozen=True)
 class ZeroSlip(Effect):
-    r"""A new zero in every run: :math:`\varepsilon = u_j,\ u_j \sim N(0, s^2)`.
+    """A new zero in every run: ``ε = u_j, u_j ~ N(0, s²)``.
 
     Parameters
     ----------

@@ -36,9 +36,9 @@ class Blocks:
 
 
 class Products:
-    r"""Products of the columns within blocks of one width, under any noise.
+    """Products of the columns within blocks of one width, under any noise.
 
-    With X a block and M the map that makes the noise white, :math:`X^T M^T M X`. Correlated
+    With X a block and M the map that makes the noise white, ``Xᵀ Mᵀ M X``. Correlated
     noise asks for the products of neighbouring readings as well: these are kept, so that
     another correlation costs no pass over the readings.
 

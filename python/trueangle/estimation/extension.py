@@ -24,11 +24,13 @@ FEW_READINGS = 900
 
 @dataclass(frozen=True, eq=False)
 class Extension:
-    r"""A candidate extension with its evidence.
+    """A candidate extension with its evidence.
 
-    .. math:: \text{bic gain} = 2\Delta\ln L - k \ln n_e - 2 \ln(\text{grid})
+    ::
 
-    with :math:`n_e` the readings, or the runs for the variance of a run effect, that
+        bic gain = 2 Δ ln L - k ln n_e - 2 ln(grid)
+
+    with ``n_e`` the readings, or the runs for the variance of a run effect, that
     inform on a parameter.
 
     Attributes

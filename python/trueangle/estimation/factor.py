@@ -27,7 +27,7 @@ GROWN = 4
 
 @dataclass(frozen=True, eq=False)
 class Factor:
-    r"""Blocks of columns X under a noise: :math:`Q = M X B` with orthonormal columns.
+    """Blocks of columns X under a noise: ``Q = M X B`` with orthonormal columns.
 
     Attributes
     ----------

@@ -1,7 +1,7 @@
-r"""Linear models by the one solver of the core: least squares from rows, or from their sums.
+"""Linear models by the one solver of the core: least squares from rows, or from their sums.
 
 Columns are scaled to unit length. Directions of which less is left than rounding makes are left
-out, :math:`32\,n\,\varepsilon` of the greatest singular value (of rows) or eigenvalue (of sums) of
+out, ``32 n ε`` of the greatest singular value (of rows) or eigenvalue (of sums) of
 n columns: every other limit here is a statement about the readings, and says which.
 """
 
@@ -32,7 +32,7 @@ Array = NDArray[np.float64]
 
 
 def least_squares(design: Array, target: Array, weights: Array | None = None) -> Array:
-    r"""Coefficients :math:`b` that minimise :math:`\sum_i w_i (y_i - x_i' b)^2`.
+    """Coefficients ``b`` that minimise ``Σ_i w_i (y_i - x_i' b)²``.
 
     Parameters
     ----------
@@ -79,16 +79,16 @@ def pseudo_inverse(gram: Array) -> Array:
 
 @dataclass(frozen=True)
 class NormalEquations:
-    r"""Sums over some readings: all that least squares needs of them.
+    """Sums over some readings: all that least squares needs of them.
 
     Attributes
     ----------
     gram : ndarray, shape (m, m)
-        :math:`X^T W X`.
+        ``Xᵀ W X``.
     moment : ndarray, shape (m,)
-        :math:`X^T W y`; of clusters the scores, ``y`` being the residuals of a common fit.
+        ``Xᵀ W y``; of clusters the scores, ``y`` being the residuals of a common fit.
     squares : float
-        :math:`y^T W y`.
+        ``yᵀ W y``.
     readings : float
         How many, or their weight.
 
@@ -159,10 +159,12 @@ def total(groups: Sequence[NormalEquations]) -> NormalEquations:
 
 
 def left_out(groups: Sequence[NormalEquations], ridge: float = 0.0) -> tuple[Array, Array]:
-    r"""Each group as a fit of all others predicts it.
+    """Each group as a fit of all others predicts it.
 
-    .. math:: b_{-r} = \Big(\sum_{s \ne r} G_s\Big)^{+} \sum_{s \ne r} m_s, \qquad
-              S_r(b_{-r}) = y_r' y_r - 2 b_{-r}' m_r + b_{-r}' G_r b_{-r}
+    ::
+
+        b_{-r} = (Σ_{s≠r} G_s)⁺ Σ_{s≠r} m_s,
+        S_r(b_{-r}) = y_r' y_r - 2 b_{-r}' m_r + b_{-r}' G_r b_{-r}
 
     Parameters
     ----------
@@ -206,13 +208,15 @@ class Robust(NamedTuple):
 
 
 def cluster_covariance(clusters: Sequence[NormalEquations], penalty: float = 0.0) -> Robust:
-    r"""CR2 covariance with Bell and McCaffrey's degrees of freedom.
+    """CR2 covariance with Bell and McCaffrey's degrees of freedom.
 
-    With :math:`\tilde X_r` the regressors of cluster r about their run's mean, ``e`` the
-    residuals and :math:`G = \sum_r \tilde X_r' W \tilde X_r`, the covariance is
+    With ``X̃_r`` the regressors of cluster r about their run's mean, ``e`` the
+    residuals and ``G = Σ_r X̃_r' W X̃_r``, the covariance is
 
-    .. math:: G^{-1} \Big[ \sum_r \tilde X_r' W^{1/2} A_r e_r e_r' A_r' W^{1/2} \tilde X_r \Big]
-              G^{-1}, \qquad A_r = (I - H_{rr})^{-1/2}
+    ::
+
+        G⁻¹ [Σ_r X̃_r' W^(1/2) A_r e_r e_r' A_r' W^(1/2) X̃_r] G⁻¹,
+        A_r = (I - H_rr)^(-1/2)
 
     (CR2 of Bell and McCaffrey 2002): unbiased for white noise, and right for any correlation
     within a cluster. A coefficient's degrees of freedom are those of Satterthwaite for that sum

@@ -27,13 +27,15 @@ _Orders = Iterable[float] | Mapping[str, Iterable[float]]
 
 @told_kinds
 class Moments(Shown):
-    r"""Sums over readings, taken in one pass, from which any of the orders can be fitted.
+    """Sums over readings, taken in one pass, from which any of the orders can be fitted.
 
     The normal equations of
 
-    .. math:: e_{rj} = z_r + \sum_k A_k \cos k x_{rj} + B_k \sin k x_{rj}
+    ::
 
-    need only :math:`\sum w e^{ikx}` and :math:`\sum w e\, e^{ikx}`. They are assembled from
+        e_rj = z_r + Σ_k A_k cos k x_rj + B_k sin k x_rj
+
+    need only ``Σ w e^(ikx)`` and ``Σ w e e^(ikx)``. They are assembled from
     Chebyshev moments of some 6.5 segments of the circle per order, which also hold what
     ill-conditioned problems need to be solved without squaring their condition number.
 
@@ -46,7 +48,7 @@ class Moments(Shown):
     forgetting : float, optional
         By which every reading counts less than the one after it in its run, above 0 and at most
         1: the sums hold some ``1 / (1 - forgetting)`` readings. Uncertainties are those of the
-        effective number of readings, :math:`(\sum w)^2 / \sum w^2` less the unknowns.
+        effective number of readings, ``(Σ w)² / Σ w²`` less the unknowns.
     gear_ratio, fixed_member, shafts
         As in `fit`. Shafts that never come back to their start together have no moments.
 

@@ -19,18 +19,18 @@ __all__ = ["MomentsFit", "Spectrum"]
 
 
 class Spectrum(NamedTuple):
-    r"""Sums over the readings of one run from which any orders can be fitted.
+    """Sums over the readings of one run from which any orders can be fitted.
 
     Order ``k`` counts cycles of the base shaft, ``cycles`` per output turn; ``y`` is the
     error counted from ``centre``.
     """
 
     weight: NDArray[np.complex128]
-    r""":math:`\sum w e^{ikx}` for ``k`` from 0 to twice the highest order."""
+    """``Σ w e^(ikx)`` for ``k`` from 0 to twice the highest order."""
     error: NDArray[np.complex128]
-    r""":math:`\sum w y e^{ikx}` for ``k`` from 0 to the highest order."""
+    """``Σ w y e^(ikx)`` for ``k`` from 0 to the highest order."""
     squares: float
-    r""":math:`\sum w y^2`."""
+    """``Σ w y²``."""
     samples: int
     """Readings of positive weight."""
     centre: float

@@ -29,7 +29,7 @@ EXCITED = 1e-4
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Projection:
-    r"""A target y fitted by columns X under a noise that M makes white.
+    """A target y fitted by columns X under a noise that M makes white.
 
     What candidates would save is computed for their columns projected beside the fitted ones
     (Frisch and Waugh), all of a search at once.
@@ -113,12 +113,12 @@ class Projection:
         return x, after > EXCITED * np.maximum(before, 1e-300)
 
     def jointly_with(self, columns: Array, spread: float = np.inf) -> Self:
-        r"""The same with ``columns`` fitted too, for scores of others.
+        """The same with ``columns`` fitted too, for scores of others.
 
         With a finite ``spread`` their coefficients are drawn from a normal distribution of that
         standard deviation about zero: a column that the readings tell worse than that is fitted
         in part. Scores stay those of generalised least squares: with the covariance
-        :math:`I + U S^2 U^T` of columns and noise, :math:`U S^2/(1 + S^2) U^T` is taken out.
+        ``I + U S² Uᵀ`` of columns and noise, ``U S²/(1 + S²) Uᵀ`` is taken out.
         """
         x, excited = self.projected(columns)
         u, s, _ = np.linalg.svd(x[:, excited], full_matrices=False)

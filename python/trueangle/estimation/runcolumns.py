@@ -13,9 +13,9 @@ Array = NDArray[np.float64]
 
 
 class RunEffectColumns:
-    r"""Shapes of a run effect, and their products in every run under any noise.
+    """Shapes of a run effect, and their products in every run under any noise.
 
-    With X the columns in a run and M the map that makes the noise white, :math:`X^T M^T M X`
+    With X the columns in a run and M the map that makes the noise white, ``Xᵀ Mᵀ M X``
     follows from sums over equal and neighbouring readings, which are made once.
 
     Parameters

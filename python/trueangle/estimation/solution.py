@@ -96,7 +96,7 @@ class Solution(Projection):
             left = _left(readings, design, found)
             kept, target, outlying = _clipped(readings, left)
             if rho is None:
-                # What lasts over two readings or three is no noise that neighbours share.
+                # What lasts over two readings or three is not noise that neighbours share.
                 if outlying.any():
                     kept[short_stretches(outlying, readings.bounds)] = 0.0
                 correlation = readings.correlation(kept * readings.root_weights)
@@ -215,9 +215,11 @@ class Solution(Projection):
         return self.robust(self.place(k))
 
     def robust(self, where: NDArray[np.int64]) -> Array:
-        r"""Covariance of some coefficients, at least as wide as runs disagree on them.
+        """Covariance of some coefficients, at least as wide as runs disagree on them.
 
-        .. math:: V_s = \frac{R}{R - 1}\sum_j s_j s_j^T, \quad s_j = X^+_j r_j
+        ::
+
+            V_s = (R / (R - 1))Σ_j s_j s_jᵀ,    s_j = X⁺_j r_j
 
         with the residuals r of run j: no form is exact, and what it leaves is alike within a
         run. Coefficients whose variance is larger by this than by the noise alone are
@@ -242,9 +244,11 @@ class Solution(Projection):
         return np.asarray(self.coefficients - moved @ extension.coefficients)
 
     def coefficients_without(self, group: Sequence[int]) -> Array:
-        r"""Coefficients of all columns where those of the terms ``group`` are held at 0.
+        """Coefficients of all columns where those of the terms ``group`` are held at 0.
 
-        .. math:: \beta - C_{\cdot g} C_{gg}^{-1} \beta_g, \quad C = (X^T M^T M X)^{-1}
+        ::
+
+            β - C_{·g} C_gg⁻¹ β_g,    C = (Xᵀ Mᵀ M X)⁻¹
 
         under the noise of this fit, which may have a fixed correlation and none of the terms
         ``group`` a run effect of its own; outliers are clipped as in the fit of the others.

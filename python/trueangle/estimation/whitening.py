@@ -102,12 +102,12 @@ class LagCorrelation:
 
 
 class Whitener:
-    r"""Linear map that makes the noise of every reading independent and equal.
+    """Linear map that makes the noise of every reading independent and equal.
 
-    Within a run the noise is :math:`n + \sum_k Z_k u_k` with n of first-order
+    Within a run the noise is ``n + Σ_k Z_k u_k`` with n of first-order
     correlation rho and run effects u: the map is
-    :math:`(I + A A^T)^{-1/2} F`, F the filter :math:`x_t - \rho x_{t-1}` and
-    :math:`A = F Z \sqrt{\mathrm{ratio}}`.
+    ``(I + A Aᵀ)^(-1/2) F``, F the filter ``x_t - ρ x_{t-1}`` and
+    ``A = F Z √(ratio)``.
 
     Attributes
     ----------

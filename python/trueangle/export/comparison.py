@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from ..errors import ArgumentError
 from ..model.file import load_model
 from ..model.model import HarmonicModel
-from ..support.angles import ARCSEC_PER_TURN
+from ..support.angles import ARCSEC_PER_TURN, zero_text
 from ..support.display_units import ErrorsIn, ErrorUnit, error_unit
 from ..support.kinds import told_kinds
 from ..support.layout import laid_out
@@ -28,6 +28,10 @@ Array = NDArray[np.float64]
 #: Points per cycle of the fastest order over which the difference is taken.
 _POINTS = 32
 _MOST_POINTS = 1 << 22
+#: Orders that a summary lists.
+_LISTED = 12
+#: Part of an amplitude below which its standard error is that of rounded numbers.
+_ROUNDING = 1e-4
 
 
 @dataclass(frozen=True)
@@ -100,22 +104,30 @@ class Comparison(PlainResult):
         unit = error_unit(errors_in, self.max_abs_arcsec)
         lines = [
             f"difference: {unit.text(self.rms_arcsec)} rms, {unit.number(self.max_abs_arcsec)} "
-            f"max abs, zero {self.zero_deg:.6g} deg"
+            f"max abs, zero {zero_text(self.zero_deg, 360.0)}"
             + ("" if self.std_arcsec is None else f"; known to {unit.text(self.std_arcsec)}"),
             *self._verdict(),
             *self._arithmetic(unit),
-            f"  order  {f'amplitude/{unit.name}':>16}  phase/deg  {f'std/{unit.name}':>10}",
+            f"  order  {f'amplitude/{unit.name}':>16}  phase/deg  {f'+-/{unit.name}':>10}",
         ]
-        for row in self.orders:
-            size, std = unit.pair(row["amplitude_arcsec"] or 0.0, row["std_arcsec"])
+        # The largest first, and as many as a screen holds: of a table read back there are hundreds.
+        largest = sorted(self.orders, key=lambda row: -(row["amplitude_arcsec"] or 0.0))
+        for row in largest[:_LISTED]:
+            amplitude, spread = row["amplitude_arcsec"] or 0.0, row["std_arcsec"]
+            size, std = unit.pair(amplitude, spread)
+            if spread is not None and 0.0 < spread < _ROUNDING * amplitude:
+                # What rounding alone leaves open is no reason to print nine digits.
+                size, std = unit.number(amplitude), f"{spread * unit.per_arcsec:.1g}"
             lines.append(f"{row['order']:7g}  {size:>16}  {row['phase_deg']:9.1f}  {std:>10}")
+        if len(largest) > _LISTED:
+            lines.append(f"  ... and {len(largest) - _LISTED} smaller ones")
         lines += [f"not compared: {kind}" for kind in self.differ_in]
         return laid_out(lines)
 
     def _verdict(self) -> list[str]:
         if self.verdict is None or self.p is None:
             return []
-        told = "changed" if self.verdict == "changed" else "not told apart by their noise"
+        told = "changed" if self.verdict == "changed" else "not distinguishable in their noise"
         return [
             f"{told}: p = {self.p:.2g}, and below {self.false_alarms:g} it is called changed "
             "(the zero left out)"
@@ -134,14 +146,18 @@ class Comparison(PlainResult):
 def compare(
     a: HarmonicModel | str | PathLike[str], b: HarmonicModel | str | PathLike[str]
 ) -> Comparison:
-    r"""Difference of two models per order and over the turn, with its uncertainty.
+    """Difference of two models per order and over the turn, with its uncertainty.
 
-    .. math:: \Delta(\theta) = \varepsilon_b(\theta) - \varepsilon_a(\theta)
+    ::
+
+        Δ(θ) = ε_b(θ) - ε_a(θ)
 
     at the true angle, also of a model whose argument is the indicated one. Where one of them was
     read from a table that is looked up at the reading r, whose true angle has an unknown zero,
 
-    .. math:: \Delta(r) = \theta_a(r) - \theta_b(r)
+    ::
+
+        Δ(r) = θ_a(r) - θ_b(r)
 
     with its mean taken out: two corrections of one device, whatever their zeros.
 

@@ -77,7 +77,7 @@ class CsvTable(Target):
     def read(self, text: str, path: str, options: Mapping[str, Any]) -> HarmonicModel:
         rows = list(csv.reader(io.StringIO(text)))
         if not rows or [cell.strip() for cell in rows[0]] != ["indicated_deg", "correction_deg"]:
-            raise failed(path, "no table of indicated_deg,correction_deg: it is the header", 1)
+            raise failed(path, "the header of such a table is indicated_deg,correction_deg", 1)
         numbers = []
         for i, row in enumerate(rows[1:], 2):
             try:

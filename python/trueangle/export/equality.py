@@ -35,10 +35,11 @@ class Equality(NamedTuple):
 
 
 def equality(first: HarmonicModel, second: HarmonicModel) -> Equality | None:
-    r"""Hotelling's statistic of the orders that both models have.
+    """Hotelling's statistic of the orders that both models have.
 
-    .. math:: T^2 = (b_2 - b_1)' (S_1 + S_2)^{-1} (b_2 - b_1), \qquad
-              T^2 / 2K \sim F(2K, \nu)
+    ::
+
+        T² = (b₂ - b₁)' (S₁ + S₂)⁻¹ (b₂ - b₁),    T² / 2K ~ F(2K, ν)
 
     with the degrees of freedom of both residual variances together (Satterthwaite). An order that
     one of them lacks was chosen by its size in the other: it is tested by itself, with twice its

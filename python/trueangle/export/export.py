@@ -43,11 +43,13 @@ def export_model(
     max_arcsec: float | None = None,
     **options: Any,
 ) -> Exported:
-    r"""Write a model's correction as a table that firmware reads, and prove how far it is off.
+    """Write a model's correction as a table that firmware reads, and prove how far it is off.
 
     A device looks its table up at the indicated angle r, so what is tabulated is
 
-    .. math:: g(r) = r - C_0 - \theta(r), \qquad r = \theta + \varepsilon(\theta)
+    ::
+
+        g(r) = r - C₀ - θ(r),    r = θ + ε(θ)
 
     by least-squares knots, rounded; a target that looks up at the true angle gets the error
     itself. Every reading of up to 24 bits is then evaluated in the target's arithmetic.
@@ -208,7 +210,7 @@ def import_model(
     except UnicodeDecodeError:
         from ..errors import FileError
 
-        raise FileError(path, f"is no text: a table of {target} is") from None
+        raise FileError(path, f"is not text: a table of {target} is") from None
     model = found.read(text.replace("\r\n", "\n"), fspath(path), given)
     if output is not None:
         model.save(output)
@@ -353,7 +355,7 @@ def _notes(target: Target, pattern: TurnPattern, made: Made) -> list[str]:
         )
     if made.zero_deg:
         notes.append(
-            f"a constant of {made.zero_deg:.9g} deg is not in the table: the corrected angle is "
+            f"a constant of {made.zero_deg:.9f} deg is not in the table: the corrected angle is "
             "larger by it, so take it off where the target sets its zero"
             + (
                 ""

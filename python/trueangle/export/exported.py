@@ -12,6 +12,9 @@ from .proof import upward
 
 __all__ = ["HEADER_DIGITS", "Exported"]
 
+#: Size below which what the number format leaves is not written out.
+_NOTABLE_ARCSEC = 0.001
+
 #: Digits of a bound in a file, and in a summary.
 HEADER_DIGITS = 6
 _SUMMARY_DIGITS = 4
@@ -106,7 +109,11 @@ class Exported(PlainResult):
             lines.append(
                 f"{self.entries} entries for {self.target}, {self.bytes} bytes; {self.sign}, "
                 f"looked up at the {self.argument} angle; the number format alone leaves "
-                f"{unit.text(self.floor_arcsec)} rms"
+                + (
+                    f"{unit.text(self.floor_arcsec)} rms"
+                    if self.floor_arcsec >= _NOTABLE_ARCSEC
+                    else f"less than {_NOTABLE_ARCSEC:g} arcsec rms"
+                )
             )
         worst = max(self.lost, key=lambda row: row["arcsec"], default=None)
         if worst is not None:

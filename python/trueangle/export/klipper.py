@@ -202,7 +202,7 @@ def _list_of(text: str, path: str, section: str | None) -> tuple[str, Array]:
     try:
         readings = np.array([float(cell) for cell in cells.split(",") if cell.strip()])
     except ValueError:
-        raise failed(path, "calibrate holds something that is no number", at) from None
+        raise failed(path, "calibrate holds something that is not a number", at) from None
     if len(readings) < KNOTS or not np.all((readings >= 0.0) & (readings < TURN)):
         raise failed(
             path, f"calibrate must hold one reading from 0 to 65536 per full step, got "

@@ -1,7 +1,7 @@
-r"""Least-squares knots of tables: the best continuous line or cubic through a function.
+"""Least-squares knots of tables: the best continuous line or cubic through a function.
 
-Linear interpolation of exact samples leaves :math:`h^2|g''|/\sqrt{120}` rms; the continuous
-piecewise line that is nearest in the mean square leaves :math:`h^2|g''|/\sqrt{720}`, a factor
+Linear interpolation of exact samples leaves ``h²|g''|/√120`` rms; the continuous
+piecewise line that is nearest in the mean square leaves ``h²|g''|/√720``, a factor
 2.45 less from a table of the same size. The basis functions of one knot are those of its
 neighbour shifted, so the normal equations are block-circulant and one FFT solves them.
 """
@@ -55,9 +55,9 @@ def cubic_knots(g: Function, entries: int) -> Array:
 
 
 def rounded_knots(knots: Array) -> Array:
-    r"""Whole numbers whose lines are nearest to the lines between ``knots``.
+    """Whole numbers whose lines are nearest to the lines between ``knots``.
 
-    Errors :math:`e_i` of the knots leave :math:`\sum \tfrac23 e_i^2 + \tfrac13 e_i e_{i+1}`
+    Errors ``e_i`` of the knots leave ``Σ 2/3 e_i² + 1/3 e_i e_{i+1}``
     between them, so neighbours that err to opposite sides leave less: each knot is rounded for
     what its neighbours have left, until none changes. Never worse than rounding each alone.
 

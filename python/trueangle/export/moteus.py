@@ -94,11 +94,11 @@ class Moteus(Target):
                 if not np.isfinite(value):
                     raise ValueError
             except ValueError:
-                raise failed(path, f"{found[4]!r} is no number", number) from None
+                raise failed(path, f"{found[4]!r} is not a number", number) from None
             if found[3]:
                 scale = value
             elif int(found[2]) >= ENTRIES or abs(value) > 128 or value != int(value):
-                raise failed(path, f"{line.strip()!r} is no entry of a table of int8", number)
+                raise failed(path, f"{line.strip()!r} is not an entry of a table of int8", number)
             else:
                 table[int(found[2])] = value
                 seen += 1

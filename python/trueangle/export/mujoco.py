@@ -130,7 +130,7 @@ class MuJoCo(Target):
         try:
             root = ElementTree.fromstring(text)
         except ElementTree.ParseError as error:
-            raise failed(path, f"is no XML: {error}", error.position[0]) from None
+            raise failed(path, f"is not XML: {error}", error.position[0]) from None
         found = {
             str(element.get("name"))[len(TEXT_NAME) :]: str(element.get("data"))
             for element in root.iter("text")

@@ -58,7 +58,7 @@ def array_of(text: str, path: str, name: str) -> tuple[Array, int, int]:
     Raises
     ------
     FileError
-        There is none, or something in it is no number.
+        There is none, or something in it is not a number.
     """
     plain = re.sub(r"//[^\n]*|/\*.*?\*/", lambda m: "\n" * m[0].count("\n"), text, flags=re.S)
     found = max(re.finditer(r"\{([^{}]*)\}", plain), key=lambda m: len(m[1]), default=None)
@@ -71,7 +71,7 @@ def array_of(text: str, path: str, name: str) -> tuple[Array, int, int]:
         if cell != "," and word:
             if not _NUMBER.fullmatch(word) or not math.isfinite(float(word)):
                 at += cell.count("\n", 0, len(cell) - len(cell.lstrip()))
-                raise failed(path, f"{word[:30]!r} is no number of a table", at)
+                raise failed(path, f"{word[:30]!r} is not a number of a table", at)
             numbers.append(float(word))
             decimals = max(decimals, len(re.split(r"[eE]", word)[0].partition(".")[2]))
         at += cell.count("\n")

@@ -21,11 +21,13 @@ Array = NDArray[np.float64]
 
 
 class TurnPattern:
-    r"""The part of a model that follows the angle alone, with every angle in turns.
+    """The part of a model that follows the angle alone, with every angle in turns.
 
-    .. math:: g(r) = r - C_0 - \theta(r), \qquad r = \theta + \varepsilon(\theta)
+    ::
 
-    is what a device subtracts from its reading r. The constant :math:`C_0` is kept out:
+        g(r) = r - C₀ - θ(r),    r = θ + ε(θ)
+
+    is what a device subtracts from its reading r. The constant ``C₀`` is kept out:
     it is the zero, which a device sets by other means.
 
     Parameters

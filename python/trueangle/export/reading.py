@@ -100,10 +100,10 @@ def function_model(
     note: str = "",
     travel: tuple[float, float] | None = None,
 ) -> HarmonicModel:
-    r"""Model, in degrees, whose correction is that of the tables.
+    """Model, in degrees, whose correction is that of the tables.
 
     The correction T of a reading becomes the error at the true angle by solving
-    :math:`r = \theta + T(r)`, and that becomes harmonics up to the table's Nyquist order.
+    ``r = θ + T(r)``, and that becomes harmonics up to the table's Nyquist order.
     Where those are too steep to be corrected by, they are of T itself, at the indicated angle.
     The standard deviation of their coefficients is that of numbers rounded to the table's
     step; orders that do not exceed three of it are left out. What ``device``, the target's own
@@ -143,7 +143,7 @@ def _model(
         try:
             cosine, sine, mean = _harmonics(table, at_indicated)
         except NotInvertibleError as error:
-            raise failed(path, f"is no correction: {error}") from None
+            raise failed(path, f"is not a correction: {error}") from None
         constant += mean
         sigma = table.step / math.sqrt(12.0)
         std = sigma * math.sqrt(2.0 / table.entries)

@@ -1,9 +1,11 @@
-r"""Terms that a program computes at run time: the forms of a model, in turns.
+"""Terms that a program computes at run time: the forms of a model, in turns.
 
 A table holds what follows the angle; what follows travel, speed, heat and load is added up at
 every reading, by the same forms as in the compiled core. With the table's inverse G of the series,
 
-.. math:: x = G(\mathrm{goal} - e(x)), \qquad \mathrm{goal} = \mathrm{raw} - e_0
+::
+
+    x = G(goal - e(x)),    goal = raw - e₀
 
 is solved by secants for the angle x that the encoder saw.
 """

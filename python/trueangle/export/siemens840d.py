@@ -123,7 +123,7 @@ class Siemens840d(Target):
                 if setting[3] == (axis or setting[3]):
                     settings[setting[1]] = float(setting[4])
             elif plain.startswith("$AA_ENC_COMP"):
-                raise failed(path, f"{line.strip()[:50]!r} is no value of $AA_ENC_COMP", number)
+                raise failed(path, f"{line.strip()[:50]!r} is not a value of $AA_ENC_COMP", number)
         missing = [key for key in ("STEP", "MIN", "MAX") if key not in settings]
         if not points or missing:
             what = f"$AA_ENC_COMP_{missing[0]}" if missing else "$AA_ENC_COMP"

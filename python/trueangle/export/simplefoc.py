@@ -104,7 +104,7 @@ class SimpleFoc(Target):
             notes=(
                 f"variant {variant}: {VARIANTS[variant]}"
                 + (
-                    "; its arithmetic is restated from what is told of that change, while that of "
+                    "; its arithmetic is restated from what is known of that change, while that of "
                     "the float tables was run"
                     if variant == "minus-u16"
                     else ""

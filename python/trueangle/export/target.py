@@ -122,7 +122,7 @@ class Made:
     bits : int, optional
         Of a reading, where the target fixes them.
     packed : callable, optional
-        Makes the file of the text, where it is no text itself.
+        Makes the file of the text, where it is not text itself.
     """
 
     text: Callable[[CommentBlock], str]

@@ -150,7 +150,7 @@ def _cnc_table(text: str, path: str) -> np.ndarray[Any, np.dtype[np.float64]]:
         found = _LINE.match(line)
         if found is None:
             if line.strip().startswith("kw.ssfk."):
-                raise failed(path, f"{line.strip()[:50]!r} is no whole number of a key", number)
+                raise failed(path, f"{line.strip()[:50]!r} is not a whole number of a key", number)
             continue
         if found[2] is None:
             settings[found[1]] = int(found[4])

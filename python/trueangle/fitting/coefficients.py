@@ -46,9 +46,11 @@ class FittedCoefficients(PlainResult):
         return self.model.covariance
 
     def interval(self, level: float = 0.95) -> Array:
-        r"""Intervals that hold the true coefficients at this level.
+        """Intervals that hold the true coefficients at this level.
 
-        .. math:: b_i \pm t_{(1 + p) / 2,\, \nu_i} \, u(b_i)
+        ::
+
+            b_i ± t_{(1+p)/2,ν_i} u(b_i)
 
         with Student's quantile for the effective degrees of freedom of each standard error:
         few runs tell a standard error roughly.
@@ -115,9 +117,11 @@ class FittedCoefficients(PlainResult):
 
     @cached_property
     def amplitude_std(self) -> Array:
-        r"""Standard error of every amplitude, to first order from the covariance.
+        """Standard error of every amplitude, to first order from the covariance.
 
-        .. math:: u(C)^2 = (A^2 u_A^2 + B^2 u_B^2 + 2 A B u_{AB}) / C^2
+        ::
+
+            u(C)² = (A² u_A² + B² u_B² + 2 A B u_AB) / C²
 
         Where ``C`` is not well above it the amplitude is Rice distributed and this is a
         lower bound: judge such orders by (A, B) and their covariance (JCGM 102).
@@ -126,9 +130,11 @@ class FittedCoefficients(PlainResult):
 
     @cached_property
     def phase_std(self) -> Array:
-        r"""Standard error of every phase in radians.
+        """Standard error of every phase in radians.
 
-        .. math:: u(\varphi)^2 = (B^2 u_A^2 + A^2 u_B^2 - 2 A B u_{AB}) / C^4
+        ::
+
+            u(φ)² = (B² u_A² + A² u_B² - 2 A B u_AB) / C⁴
         """
         with np.errstate(divide="ignore", invalid="ignore"):
             return self._polar_std(along=False) / self.amplitudes

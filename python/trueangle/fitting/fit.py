@@ -54,11 +54,13 @@ def fit(
     prior: Any = None,
     **reading: Unpack[Reading],
 ) -> FitResult:
-    r"""Fit a harmonic model to one run or several.
+    """Fit a harmonic model to one run or several.
 
-    .. math:: e_{rj} = z_r + \sum_s \sum_k A_{sk} \cos(k f_s x_{rj}) + B_{sk} \sin(k f_s x_{rj})
+    ::
 
-    with one zero :math:`z_r` per run, by (weighted) linear least squares (paper Eq. 1).
+        e_rj = z_r + Σ_s Σ_k A_sk cos(k f_s x_rj) + B_sk sin(k f_s x_rj)
+
+    with one zero ``z_r`` per run, by (weighted) linear least squares (paper Eq. 1).
 
     Parameters
     ----------

@@ -51,9 +51,9 @@ def check_later_stretch(problem: Problem, weights: Sequence[Array | None]) -> No
     listed = ", ".join(f"{order:g}" for order in orders[:6]) + (" ..." if orders[6:] else "")
     raise NoModelError(
         f"no correction can be given: what the rest of the run indicates of order {listed} would "
-        f"make the error of {int(np.count_nonzero(gains <= 0.0))} of {gains.size} stretches of it "
+        f"make the error of {int(np.count_nonzero(gains <= 0.0))} of {gains.size} segments of it "
         "larger, and that of the others unevenly smaller; the error is not one of the angle alone: "
-        'run `ta.diagnose(...)`, take out what is beside the pattern (`nuisance="auto"`), or '
+        'run `ta.diagnose(...)`, take out what is not the pattern (`nuisance="auto"`), or '
         "declare the `orders=` or the `shafts=`"
     )
 

@@ -54,11 +54,13 @@ def unlike_runs(problem: Problem, fitted: Fitted) -> list[int]:
 
 
 def far_runs(runs: Sequence[NormalEquations]) -> list[tuple[int, float]]:
-    r"""Places of runs that are unlike the others, and by how many times their noise.
+    """Places of runs that are unlike the others, and by how many times their noise.
 
-    With :math:`S_r(b)` the sum of squares of run r about its own zero, the runs for which
+    With ``S_r(b)`` the sum of squares of run r about its own zero, the runs for which
 
-    .. math:: S_r(b) - S_r(b_r) > 0.2 \, [S_r(0) - S_r(b_r)]
+    ::
+
+        S_r(b) - S_r(b_r) > 0.2 [S_r(0) - S_r(b_r)]
 
     and 25 times what noise alone would make of it, where ``b`` are the common coefficients,
     ``b_r`` those of the run alone; with three runs and more that each hold all orders ``b`` is

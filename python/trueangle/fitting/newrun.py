@@ -68,12 +68,13 @@ def check_new_run(
     argument: str,
     summed: Summed | None = None,
 ) -> None:
-    r"""Raise where orders selected by evidence would not help a further run.
+    """Raise where orders selected by evidence would not help a further run.
 
-    With :math:`g_r` the decrease of the mean square of run r by what the others say, it asks for
+    With ``g_r`` the decrease of the mean square of run r by what the others say, it asks for
 
-    .. math:: \bar g > 2\sqrt{\max(0,\;
-              \operatorname{var} g - \overline{4\sigma_r^2 c^T G_r c/n_r^2})}
+    ::
+
+        ḡ > 2√(max(0, var g - mean(4σ_r² cᵀ G_r c/n_r²)))
 
     the scatter between runs beyond that of the noise. Where the runs share less than half of what
     each shows by itself in low orders, the mean gain must also exceed what chance makes of the

@@ -1,7 +1,8 @@
-r"""What is in the readings beside a pattern: ramp, drift, direction, velocity, the reference.
+"""What is in the readings beside a pattern: ramp, drift, direction, velocity, the reference.
 
-.. math:: e_{rj} = z_r + \text{pattern}(x_{rj}) + s\,u_{rj} + d\,\mathrm{sign}_{rj} + \tau v_{rj}
-          + g_r(t_{rj})
+::
+
+    e_rj = z_r + pattern(x_rj) + s u_rj + d sign_rj + τ v_rj + g_r(t_rj)
 
 with the unwrapped angle ``u``, the sense and the speed of travel, and a cubic spline ``g`` of
 the time of each run. They are fitted jointly with the pattern and taken out of the readings;

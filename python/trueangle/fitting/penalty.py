@@ -1,16 +1,20 @@
-r"""What a penalty takes from the coefficients: its mean square over patterns like the one seen.
+"""What a penalty takes from the coefficients: its mean square over patterns like the one seen.
 
-A ridge answers :math:`\hat b = (G + \lambda)^{-1} X'Wy` and is off by
+A ridge answers ``b̂ = (G + λ)⁻¹ X'Wy`` and is off by
 
-.. math:: \hat b - b = (G + \lambda)^{-1} X'W e - \lambda (G + \lambda)^{-1} b
+::
+
+    b̂ - b = (G + λ)⁻¹ X'W e - λ (G + λ)⁻¹ b
 
 The first part is noise. The second depends on the pattern itself, and just where readings say
-little of it. Patterns are taken as drawn with variances :math:`\tau^2 (k / k_0)^{-2q}` of both
-coefficients of order k, :math:`k_0` the lowest of its shaft; how probable each size
-:math:`\tau` and steepness q is, the readings tell by their marginal likelihood. With
-:math:`D` the mean of these variances the covariance of the second part is
+little of it. Patterns are taken as drawn with variances ``τ² (k / k₀)^(-2q)`` of both
+coefficients of order k, ``k₀`` the lowest of its shaft; how probable each size
+``τ`` and steepness q is, the readings tell by their marginal likelihood. With
+``D`` the mean of these variances the covariance of the second part is
 
-.. math:: \lambda^2 (G + \lambda)^{-1} D \, (G + \lambda)^{-1}
+::
+
+    λ² (G + λ)⁻¹ D (G + λ)⁻¹
 
 Intervals from the sum of both hold the truth as often as they say on average over the travel,
 and over patterns (Wahba 1983, Nychka 1988): not for each angle by itself, and not for a
@@ -41,10 +45,12 @@ _LEAST_NOISE: Final = 1e-9
 def pattern_variances(
     gram: Array, moment: Array, variance: float, steps: Array, greatest: float
 ) -> Array:
-    r"""Mean variance of every coefficient, over the sizes and slopes that the readings allow.
+    """Mean variance of every coefficient, over the sizes and slopes that the readings allow.
 
-    .. math:: D_i = \sum_{q, \tau} p(q, \tau \mid y) \, \tau^2 s_i^{-2q}, \qquad
-              y \sim N(0, \sigma^2 + \tau^2 X S^{-2q} X')
+    ::
+
+        D_i = Σ_{q,τ} p(q, τ | y) τ² s_i^(-2q),
+        y ~ N(0, σ² + τ² X S^(-2q) X')
 
     with every slope, and every decade of sizes below the greatest, equally probable beforehand.
 
@@ -94,10 +100,11 @@ def pattern_variances(
 
 
 def bias_covariance(gram: Array, means: Array, penalty: float, variances: Array) -> Array:
-    r"""Covariance of what a penalty takes from ``[constant, A, B, ...]``.
+    """Covariance of what a penalty takes from ``[constant, A, B, ...]``.
 
-    .. math:: M \, \lambda^2 (G + \lambda)^{-1} D (G + \lambda)^{-1} M',
-              \qquad M = \begin{pmatrix} -\bar x' \\ I \end{pmatrix}
+    ::
+
+        M λ² (G + λ)⁻¹ D (G + λ)⁻¹ M',    M = [-x̄'; I]
 
     for the constant makes good on the readings what the coefficients are off by there.
 

@@ -1,10 +1,12 @@
-r"""A prior for the coefficients of a unit: what others of its design are like.
+"""A prior for the coefficients of a unit: what others of its design are like.
 
-With :math:`b \sim N(\mu, T)` and readings of noise s the coefficients are normal about
+With ``b ~ N(μ, T)`` and readings of noise s the coefficients are normal about
 
-.. math:: \hat b = (X'X/s^2 + T^{-1})^{-1} (X'y/s^2 + T^{-1} \mu)
+::
 
-with the covariance :math:`(X'X/s^2 + T^{-1})^{-1}`: few readings suffice for what the units
+    b̂ = (X'X/s² + T⁻¹)⁻¹ (X'y/s² + T⁻¹ μ)
+
+with the covariance ``(X'X/s² + T⁻¹)⁻¹``: few readings suffice for what the units
 differ in little.
 """
 

@@ -36,9 +36,9 @@ _LOOKED_AT = 65_536
 
 
 def choose_ridge(problem: Problem, weights: Sequence[Array | None]) -> float:
-    r"""Tikhonov penalty for partial travel, chosen by held-out error.
+    """Tikhonov penalty for partial travel, chosen by held-out error.
 
-    The fit minimises :math:`\sum w (y - \varepsilon)^2 + \lambda \sum w \sum_k (A_k^2 + B_k^2)`.
+    The fit minimises ``Σ w (y - ε)² + λ Σ w Σ_k (A_k² + B_k²)``.
     Every penalty is scored on readings left out of its fit: whole runs where there are
     several, else tenths of the arc, or quarters of the travel where the error does not repeat
     after a turn. The best is taken, and raised until the amplitudes add

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..support.angles import arcsec, unit_name
+from ..support.angles import arcsec, zero_text
 from ..support.display_units import ErrorsIn, ErrorUnit, error_unit, phase_pair, sine_of_rms
 from ..support.distributions import student_quantile
 from ..support.layout import laid_out
@@ -21,13 +21,12 @@ __all__ = ["fit_summary", "unit_of"]
 def fit_summary(fit: FitResult, errors_in: ErrorsIn = "auto") -> str:
     """See `FitResult.summary`."""
     model = fit.model
-    period = model.period
-    runs, unit = len(fit.problem.runs), unit_name(period)
+    runs = len(fit.problem.runs)
     shown = unit_of(fit, errors_in)
     head = [
         ("readings", f"{fit.readings} in {runs} run{'s' if runs > 1 else ''}"),
         ("argument", f"{model.argument} angle"),
-        ("zero", f"{model.constant:.6g} {unit}" + _spread(fit, shown)),
+        ("zero", zero_text(model.constant, model.period) + _spread(fit, shown)),
         ("residual", f"{_residual(fit, shown)} standard deviation, ")
         if math.isfinite(fit.residual_variance)
         else ("residual", "none left: as many unknowns as readings, "),

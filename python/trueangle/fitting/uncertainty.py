@@ -180,8 +180,8 @@ def _thinned(
     standard errors may come out as small as they like.
     """
     note = (
-        f"{said}standard errors as if one in {memory:.0f} readings, so many as the residuals "
-        f"remember, stood for itself. {why}, and the covariance is not known: measure "
+        f"{said}standard errors as if one in {memory:.0f} readings were independent (the memory "
+        f"of the residuals). {why}, and the covariance is not known: measure "
         f"{ENOUGH_RUNS} runs and more"
     )
     # Of so many independent readings the fit takes its unknowns, and the residuals are smaller.
@@ -230,7 +230,7 @@ def _untold(problem: Problem, used: Sequence[int]) -> str:
 
 
 def _said(found: str) -> str:
-    return f"the residuals are no white noise ({found}): "
+    return f"the residuals are not white noise ({found}): "
 
 
 def _between(clusters: int, runs: int) -> str:

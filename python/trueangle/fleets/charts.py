@@ -22,10 +22,12 @@ LENGTH: Final = 465.44
 
 
 def charted(calibrations: Sequence[tuple[Calibration, float]], changes: Array) -> Array:
-    r"""The larger sum of every order on every further date, shape (dates - 1, K).
+    """The larger sum of every order on every further date, shape (dates - 1, K).
 
-    .. math:: z_t = \frac{b_t - \bar b_{t-1}}{\sqrt{V_t + \bar V_{t-1} / t}}, \qquad
-              C^\pm_t = \max(0, C^\pm_{t-1} \pm z_t - \tfrac12)
+    ::
+
+        z_t = (b_t - b̄_{t-1}) / √(V_t + V̄_{t-1} / t),
+        C±_t = max(0, C±_{t-1} ± z_t - 1/2)
 
     against the mean of the t dates before, so that the z are independent where nothing moves;
     V is the noise of a date and half of the variance of an ordinary change between two.

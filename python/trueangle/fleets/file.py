@@ -82,7 +82,7 @@ class _FleetReader(Decoder):
         text = read_text(self.path, RUNS_BYTES, self.kind, "a fleet")
         content = json_text(self.path, text, self.kind, "a fleet file")
         if not isinstance(content, dict) or content.get("format") != FORMAT:
-            raise self.error(f"'format' must be {FORMAT!r}: this is no fleet file")
+            raise self.error(f"'format' must be {FORMAT!r}: this is not a fleet file")
         if content.get("version") != VERSION:
             raise self.error(f"version {VERSION} is known; install a later trueangle", "version")
         self.table(content, _KEYS)

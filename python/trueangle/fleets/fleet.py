@@ -35,11 +35,13 @@ def fleet(
     shafts: Mapping[str, float] | None = None,
     **reading: Any,
 ) -> Fleet:
-    r"""Units of one design: who stands out, what all share, what moved since the last time.
+    """Units of one design: who stands out, what all share, what moved since the last time.
 
-    .. math:: b_u = \mu + d_u, \quad d_u \sim N(0, T), \qquad \hat b_u \sim N(b_u, S_u)
+    ::
 
-    with :math:`\hat b_u` each unit's own least squares, T diagonal by order and isotropic in
+        b_u = μ + d_u,    d_u ~ N(0, T),    b̂_u ~ N(b_u, S_u)
+
+    with ``b̂_u`` each unit's own least squares, T diagonal by order and isotropic in
     cosine and sine, both by restricted maximum likelihood on the units that are no outliers.
     Whether the units share a mean (shafts that are keyed) or none (magnets pressed on at any
     angle) is what predicts held-out units better.

@@ -104,9 +104,11 @@ def changes_of(
     between: Array,
     permitted: float | None,
 ) -> list[Change]:
-    r"""Every unit's last calibration against its first.
+    """Every unit's last calibration against its first.
 
-    .. math:: T^2 = (b_t - b_0)' (W + S_t + S_0)^{-1} (b_t - b_0)
+    ::
+
+        T² = (b_t - b₀)' (W + S_t + S₀)⁻¹ (b_t - b₀)
 
     per order, with W the variance of an ordinary change, by the median over the fleet itself; the
     zero apart, for ordinary remounting moves it. Extreme deviates as among units

@@ -31,13 +31,15 @@ class UnitNoise(NamedTuple):
 
 
 def noise_of(squares: Array, freedom: Array) -> UnitNoise:
-    r"""One variance for all units where Bartlett's test finds no difference at 1 %.
+    """One variance for all units where Bartlett's test finds no difference at 1 %.
 
-    Else each unit's own, held to the common one by :math:`d_0` degrees of freedom,
+    Else each unit's own, held to the common one by ``d₀`` degrees of freedom,
 
-    .. math:: \tilde s_u^2 = \frac{d_0 s_0^2 + \nu_u s_u^2}{d_0 + \nu_u},
+    ::
 
-    with :math:`d_0, s_0` from the mean and variance of :math:`\log s_u^2` (Smyth 2004).
+        s̃_u² = (d₀ s₀² + ν_u s_u²) / (d₀ + ν_u),
+
+    with ``d₀, s₀`` from the mean and variance of ``log s_u²`` (Smyth 2004).
 
     Parameters
     ----------

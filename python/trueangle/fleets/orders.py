@@ -71,9 +71,11 @@ def _distinct(run: CalibrationRun) -> int:
 def worth_keeping(
     units: Sequence[Sequence[CalibrationRun]], shafts: Sequence[ShaftOrders]
 ) -> list[ShaftOrders]:
-    r"""The candidates whose coefficients are more than the noise of all units together makes them.
+    """The candidates whose coefficients are more than the noise of all units together makes them.
 
-    .. math:: \sum_u b_u' S_u^{-1} b_u \sim \chi^2_{2n}
+    ::
+
+        Σ_u b_u' S_u⁻¹ b_u ~ χ²_2n
 
     for an order that no unit has; 1 % for all candidates together (Bonferroni), the strongest 24.
 

@@ -87,13 +87,16 @@ def deviates(
     level: float = LEVEL,
     shares: Array | None = None,
 ) -> Deviates:
-    r"""Extreme studentized deviates (Rosner 1983), of several orders together.
+    """Extreme studentized deviates (Rosner 1983), of several orders together.
 
-    With weights :math:`w_u = 1/(\tau + s_u)`, the mean :math:`\bar b` of the units that are left
-    and :math:`h_u = w_u / \sum w`,
+    With weights ``w_u = 1/(τ + s_u)``, the mean ``b̄`` of the units that are left
+    and ``h_u = w_u / Σ w``,
 
-    .. math:: F_u = \frac{e_u / d}{(\sum_v w_v |b_v - \bar b|^2 - e_u) / (N - d)}, \qquad
-              e_u = \frac{w_u |b_u - \bar b|^2}{1 - h_u}, \qquad N = d (n - 1)
+    ::
+
+        F_u = (e_u / d) / [(Σ_v w_v |b_v - b̄|² - e_u) / (N - d)],
+        e_u = w_u |b_u - b̄|² / (1 - h_u),
+        N = d (n - 1)
 
     is Fisher's F with d and N - d degrees of freedom for normal units. A unit's chance is that of
     the smallest of its orders', each over its share of the level (weighted Bonferroni), or of all

@@ -56,10 +56,11 @@ class BetweenOrder(NamedTuple):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Fleet(PlainResult):
-    r"""Many units of one design.
+    """Many units of one design.
 
-    .. math:: b_u = \mu + d_u, \quad d_u \sim N(0, T), \qquad
-              T = \operatorname{diag}(\tau_k^2 I_2)
+    ::
+
+        b_u = μ + d_u,    d_u ~ N(0, T),    T = diag(τ_k² I₂)
 
     Angles, amplitudes and standard deviations are in the unit of the runs; ``to_dict`` has arcsec.
 
@@ -68,9 +69,9 @@ class Fleet(PlainResult):
     units : tuple of FleetUnit
         The most urgent first.
     common : tuple of CommonOrder
-        :math:`\mu`; zero where the units share no direction.
+        ``μ``; zero where the units share no direction.
     between : tuple of BetweenOrder
-        :math:`\tau_k` and what repeated runs differ by.
+        ``τ_k`` and what repeated runs differ by.
     tolerance : Tolerance
         What bounds the peak-to-peak of a share of all units.
     history : tuple of HistoryRow

@@ -1,4 +1,4 @@
-"""A fleet as text: the units that need something, then what all share."""
+"""A fleet as text: the units that need attention, then what all share."""
 
 from __future__ import annotations
 
@@ -15,9 +15,8 @@ if TYPE_CHECKING:
 __all__ = ["fleet_summary"]
 
 _TESTED = (
-    "  p: chance of as much in a unit with which nothing is the matter, of its distance from the "
-    "other units or, where it moved, of its change; told at the limit, which one fleet in a "
-    "hundred passes"
+    "  p: chance that a sound unit is as far from the other units or, where it moved, has changed "
+    "as much; reported below the limit, which one fleet of sound units in a hundred passes"
 )
 
 #: Units that are fine of which the sizes are listed.
@@ -30,8 +29,8 @@ def fleet_summary(fleet: Fleet, errors_in: ErrorsIn = "auto") -> str:
     largest = scale * max((unit.peak_to_peak for unit in fleet.units), default=0.0)
     shown = error_unit(errors_in, largest, fleet.period)
     odd = [unit for unit in fleet.units if unit.verdict != "fine"]
-    head = f"{counted(fleet.units, 'unit')}, {len(odd) or 'none'} that need{'s' * (len(odd) == 1)}"
-    lines = [f"{head} something", ""]
+    verb = "needs" if len(odd) <= 1 else "need"
+    lines = [f"{counted(fleet.units, 'unit')}; {len(odd) or 'none'} {verb} attention", ""]
     width = max([4, *(len(unit.unit) for unit in fleet.units)])
     told = [unit for unit in fleet.units if unit.because]
     for unit in told:

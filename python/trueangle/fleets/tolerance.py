@@ -1,4 +1,4 @@
-r"""Tolerance limits: what bounds a share of all units, with a confidence."""
+"""Tolerance limits: what bounds a share of all units, with a confidence."""
 
 from __future__ import annotations
 
@@ -52,16 +52,17 @@ class Tolerance(NamedTuple):
 
 @told_kinds
 def tolerance_factor(n: int, share: float, confidence: float, sides: int = 2) -> float:
-    r"""Exact factor k of normal tolerance limits :math:`\bar x \pm k s` (or one of them).
+    """Exact factor k of normal tolerance limits ``x̄ ± k s`` (or one of them).
 
     Two-sided, with Z the deviation of the mean and R(z) the half width that holds the share
     about it,
 
-    .. math:: \int \Pr\!\left(\chi^2_{n-1} > \frac{(n-1) R(z)^2}{k^2}\right)
-              \varphi(z)\, dz = \gamma, \qquad
-              \Phi(z/\sqrt n + R) - \Phi(z/\sqrt n - R) = p;
+    ::
 
-    one-sided :math:`k = t'_{n-1,\gamma}(\sqrt n\, z_p) / \sqrt n` of the noncentral t distribution.
+        ∫ P(χ²_{n-1} > (n-1) R(z)² / k²) φ(z) dz = γ,
+        Φ(z/√n + R) - Φ(z/√n - R) = p;
+
+    one-sided ``k = t'_{n-1,γ}(√n z_p) / √n`` of the noncentral t distribution.
 
     Parameters
     ----------
@@ -153,9 +154,9 @@ def _one_sided(k: float, n: int, share: float, places: Array, weights: Array) ->
 
 @told_kinds
 def wilks_units(share: float, confidence: float, sides: int = 2) -> int:
-    r"""Fewest units whose extremes bound a share of all, whatever the distribution.
+    """Fewest units whose extremes bound a share of all, whatever the distribution.
 
-    One-sided :math:`1 - p^n \ge \gamma`, two-sided :math:`1 - n p^{n-1} + (n-1) p^n \ge \gamma`
+    One-sided ``1 - pⁿ ≥ γ``, two-sided ``1 - n pⁿ⁻¹ + (n-1) pⁿ ≥ γ``
     (Wilks 1941).
 
     Raises

@@ -22,7 +22,7 @@ __all__ = ["UnitPlan", "plan_unit"]
 
 @dataclass(frozen=True)
 class UnitPlan(PlainResult):
-    r"""Readings of a unit whose coefficients are drawn as those of its fleet.
+    """Readings of a unit whose coefficients are drawn as those of its fleet.
 
     Attributes
     ----------
@@ -108,15 +108,17 @@ def plan_unit(
     readings: int | None = None,
     noise: float | None = None,
 ) -> UnitPlan:
-    r"""The fewest readings of a further unit of a fleet that reach an uncertainty, and where.
+    """The fewest readings of a further unit of a fleet that reach an uncertainty, and where.
 
-    The coefficients of such a unit are :math:`N(\mu, T)`; after readings X of noise s they scatter
+    The coefficients of such a unit are ``N(μ, T)``; after readings X of noise s they scatter
     by
 
-    .. math:: C = (X^T X / s^2 + T^{-1})^{-1}
+    ::
 
-    and each further reading is taken where the curve is known least, :math:`f(x)^T C f(x)`, which
-    adds most to :math:`\det C^{-1}`. Single readings are then exchanged while that gains.
+        C = (Xᵀ X / s² + T⁻¹)⁻¹
+
+    and each further reading is taken where the curve is known least, ``f(x)ᵀ C f(x)``, which
+    adds most to ``det C⁻¹``. Single readings are then exchanged while that gains.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-r"""The common pattern of units and the variance between them: REML on estimates of known error."""
+"""The common pattern of units and the variance between them: REML on estimates of known error."""
 
 from __future__ import annotations
 
@@ -47,13 +47,14 @@ def robust_variance(values: Array, own: Array, aligned: bool) -> float:
 
 
 def reml(values: Array, own: Array, aligned: bool) -> Between:
-    r"""Mean and variance between units, by restricted maximum likelihood.
+    """Mean and variance between units, by restricted maximum likelihood.
 
-    .. math:: b_u \sim N(\mu, \tau I + S_u), \qquad
-              \ell = -\tfrac12 \sum_u \left[\log|V_u| + r_u' V_u^{-1} r_u\right]
-                     - \tfrac12 \log\left|\sum_u V_u^{-1}\right|
+    ::
 
-    by Fisher's scoring in :math:`\tau \ge 0`; without a mean of its own by maximum likelihood.
+        b_u ~ N(μ, τ I + S_u),
+        l = -1/2 Σ_u [log|V_u| + r_u' V_u⁻¹ r_u] - 1/2 log|Σ_u V_u⁻¹|
+
+    by Fisher's scoring in ``τ ≥ 0``; without a mean of its own by maximum likelihood.
 
     Parameters
     ----------

@@ -14,9 +14,11 @@ _PLACES = np.arange(1, _BLOCK + 1, dtype=np.uint64)
 
 
 class Checksum:
-    r"""Sums of 64-bit words, plain and weighted by place, modulo :math:`2^{64}`.
+    """Sums of 64-bit words, plain and weighted by place, modulo ``2⁶⁴``.
 
-    .. math:: s_0 = \sum_i w_i, \quad s_1 = \sum_i i \, w_i
+    ::
+
+        s₀ = Σ_i w_i,    s₁ = Σ_i i w_i
 
     A changed, lost, doubled or displaced value changes them, while it does not matter how
     the values were cut into batches. Bits are compared, so NaN equals itself. About 1 ns a

@@ -224,7 +224,7 @@ def wanted_columns(signals: Mapping[str, Any] | None) -> dict[str, tuple[str, st
             )
         known = None if unit is None else wanted_unit(unit, role)
         if unit is not None and known is None:
-            raise ArgumentError(f"signals[{role!r}]: {unit!r} is no unit of this role")
+            raise ArgumentError(f"signals[{role!r}]: {unit!r} is not a unit of this role")
         found[role] = (name, known)
     return found
 

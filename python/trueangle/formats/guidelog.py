@@ -1,9 +1,11 @@
-r"""Guide logs of PHD2: the periodic error of a mount's right ascension axis, guiding taken out.
+"""Guide logs of PHD2: the periodic error of a mount's right ascension axis, guiding taken out.
 
 While a mount tracks, its motor turns the axis by the sidereal angle; how far the star lags behind
 it, with all guide pulses so far undone, is the error of the axis:
 
-.. math:: e_n = \frac{s}{\cos\delta} (x_n + \sum_{k < n} r p_k + d_n)
+::
+
+    e_n = (s / cos δ) (x_n + Σ_{k<n} r p_k + d_n)
 
 with the pixel scale s, the declination, the RA distance x in pixels, the guide rate r, the pulses p
 (west positive) and the dithers d. Frames without a star, and those while the guiding settles, are
@@ -125,7 +127,7 @@ def copy(
     topic: str | None = None,
     output_topic: str | None = None,
 ) -> Contents:
-    """Refused: a star's distance is no angle of the axis."""
+    """Refused: a star's distance is not an angle of the axis."""
     raise FileError(
         source,
         "a guide log holds distances of a star, no angles that could be corrected: give the model "

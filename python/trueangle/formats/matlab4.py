@@ -152,7 +152,7 @@ def _matrices(path: Path) -> Iterator[_Matrix]:
             if machine != (order == ">") or zero or kind >= len(_KINDS) or sort > 1:
                 raise FileError(
                     path,
-                    f"a matrix at byte {start} is no full one of numbers or text of MATLAB 4 "
+                    f"a matrix at byte {start} is not a full one of numbers or text of MATLAB 4 "
                     f"(its type is {code}); save the file with -v7",
                 )
             if min(rows, width, length - 1) < 0 or imaginary not in (0, 1):

@@ -191,7 +191,7 @@ def signal_columns(
         signal = find_signal(name)
         if signal.name in reserved:
             raise ArgumentError(
-                f"{name} is an argument of its own: give `{name}=` beside `signals=`"
+                f"{name} is an argument of its own: give `{name}=` as well as `signals=`"
             )
         found[name] = column(f"signals[{name!r}]", values, size)
     return found

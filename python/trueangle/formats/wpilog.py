@@ -141,7 +141,7 @@ def _opened(path: Path) -> _Records:
     check_part(path, path.stat().st_size, "file")
     data = path.read_bytes()
     if len(data) < 12 or not data.startswith(_MAGIC):
-        raise FileError(path, "is no data log of WPILib")
+        raise FileError(path, "is not a data log of WPILib")
     if data[7] != 1:
         raise FileError(path, f"is a data log of version {data[7]}.{data[6]}; version 1 is read")
     place = 12 + int.from_bytes(data[8:12], "little")

@@ -64,11 +64,11 @@ class DeclaredShaft:
 
 @dataclass(frozen=True)
 class Bearing:
-    r"""A rolling bearing, whose lines stand at orders that are not whole.
+    """A rolling bearing, whose lines stand at orders that are not whole.
 
     With n balls and x the ratio of ball to pitch diameter (times the cosine of the contact
-    angle), per turn of the shaft: cage :math:`(1-x)/2`, outer race :math:`n(1-x)/2`, inner
-    race :math:`n(1+x)/2`, ball :math:`(1-x^2)/(2x)`. Slip moves them by a percent or two.
+    angle), per turn of the shaft: cage ``(1-x)/2``, outer race ``n(1-x)/2``, inner
+    race ``n(1+x)/2``, ball ``(1-x²)/(2x)``. Slip moves them by a percent or two.
 
     Parameters
     ----------

@@ -123,13 +123,13 @@ def load_description(path: str | PathLike[str]) -> RobotDescription:
     Raises
     ------
     FileError
-        Names the line where the text is no TOML, or the joint and key at fault.
+        Names the line where the text is not TOML, or the joint and key at fault.
     """
     text = read_text(path, SIMULATION_BYTES, FileError, "a robot file")
     try:
         content = tomllib.loads(text)
     except tomllib.TOMLDecodeError as cause:
-        raise FileError(path, f"is no TOML: {cause}") from None
+        raise FileError(path, f"is not TOML: {cause}") from None
     return _DescriptionReader(Path(path)).robot(content)
 
 

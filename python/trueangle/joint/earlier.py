@@ -15,9 +15,11 @@ Array = NDArray[np.float64]
 
 
 def earlier(signals: Signals, delay_s: float) -> Signals:
-    r"""The signals with angle, direction and speed of a time :math:`\tau` before each reading.
+    """The signals with angle, direction and speed of a time ``τ`` before each reading.
 
-    .. math:: \theta(t - \tau) \approx \theta(t) - v\tau
+    ::
+
+        θ(t - τ) ≈ θ(t) - vτ
 
     Where the readings of a run stand closer than the delay, the angle is read off their own record
     instead, so that the joint may gather speed meanwhile.
@@ -27,7 +29,7 @@ def earlier(signals: Signals, delay_s: float) -> Signals:
     signals : Signals
         With velocity.
     delay_s : float
-        :math:`\tau`, seconds; negative for a time after.
+        ``τ``, seconds; negative for a time after.
 
     Returns
     -------

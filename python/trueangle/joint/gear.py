@@ -173,14 +173,14 @@ def explain_as_harmonic(order: float, amplitudes: Mapping[float, float]) -> tupl
     Examples
     --------
     >>> [str(e) for e in explain_as_harmonic(12, {1: 9.0, 4: 80.0, 12: 2.0})]
-    ['12 (harmonic 3 of order 4, whose waveform is no sine)']
+    ['12 (harmonic 3 of order 4, whose waveform is not a sine)']
     """
     own = amplitudes.get(order, math.inf)
     for base in sorted(amplitudes, key=lambda k: -amplitudes[k]):
         times = order / base
         whole = abs(times - round(times)) < 1e-9 and 2 <= round(times) <= _HIGHEST_MULTIPLE
         if base > 1 and whole and amplitudes[base] >= _LARGER * own:
-            name = f"harmonic {round(times)} of order {base:g}, whose waveform is no sine"
+            name = f"harmonic {round(times)} of order {base:g}, whose waveform is not a sine"
             return (Explanation(order, name),)
     return ()
 

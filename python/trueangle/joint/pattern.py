@@ -33,7 +33,7 @@ ARCSEC_PER_RAD = 1_296_000.0 / (2.0 * math.pi)
 @told_kinds
 @dataclass(frozen=True)
 class Harmonic:
-    r"""One line: :math:`C \sin(k\,f\,\theta + \varphi)` of a shaft that turns f times.
+    """One line: ``C sin(k f θ + φ)`` of a shaft that turns f times.
 
     Parameters
     ----------
@@ -72,9 +72,11 @@ class Harmonic:
 
 @dataclass(frozen=True, eq=False)
 class Pattern:
-    r"""Sum of lines as a function of the output angle in radians, arcsec.
+    """Sum of lines as a function of the output angle in radians, arcsec.
 
-    .. math:: p(\theta) = \sum_m A_m \cos m\theta + B_m \sin m\theta
+    ::
+
+        p(θ) = Σ_m A_m cos mθ + B_m sin mθ
 
     Parameters
     ----------

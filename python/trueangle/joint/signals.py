@@ -162,9 +162,11 @@ class Signals:
         return np.array(covered) / (2.0 * np.pi)
 
     def presliding(self, length_deg: float, start_state: float = 0.0) -> Array:
-        r"""State z of a presliding spring of transition length L, in [-1, 1].
+        """State z of a presliding spring of transition length L, in [-1, 1].
 
-        .. math:: z(s) = d - (d - z_0)\,e^{-s/L}
+        ::
+
+            z(s) = d - (d - z₀) e^(-s/L)
 
         with travel s since the reversal and state z_0 there. A run starts at
         ``start_state * d``: 0 relaxed, 1 after a run-in in the same direction.

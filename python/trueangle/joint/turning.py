@@ -1,9 +1,11 @@
-r"""Direction and speed of readings about a turning point, where the reference alone tells them.
+"""Direction and speed of readings about a turning point, where the reference alone tells them.
 
 The step that leads to the reading farthest out may hold the turning point: the joint then moves
 the other way already. Of the two lines that the readings before and after it make in time,
 
-.. math:: \theta_-(t),\ \theta_+(t),
+::
+
+    θ₋(t), θ₊(t),
 
 it belongs to the one that says its angle. A difference of angles across the turning point is no
 speed either: the last reading before it and the first one after it have the slope of the

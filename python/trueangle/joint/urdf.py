@@ -30,7 +30,7 @@ def robot_of_urdf(path: str | PathLike[str]) -> RobotDescription:
     ------
     FileError
         No XML, an entity or document type of its own, no ``<robot>``, no joint that turns, a
-        reduction that is no number.
+        reduction that is not a number.
     """
     root = _root(path)
     ratios: dict[str, float | None] = {}
@@ -69,9 +69,9 @@ def _root(path: str | PathLike[str]) -> ElementTree.Element:
         root = ElementTree.fromstring(text)
     except (xml.parsers.expat.ExpatError, ElementTree.ParseError) as cause:
         hint = "; expand xacro first" if "xacro" in text else ""
-        raise FileError(path, f"is no XML: {cause}{hint}") from None
+        raise FileError(path, f"is not XML: {cause}{hint}") from None
     if root.tag != "robot":
-        raise FileError(path, f"is no URDF: it begins with <{root.tag}>, not with <robot>")
+        raise FileError(path, f"is not URDF: it begins with <{root.tag}>, not with <robot>")
     return root
 
 

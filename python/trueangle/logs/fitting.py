@@ -61,7 +61,9 @@ def fit_logs(
 ) -> FitResult:
     r"""Fit a model to logs of any size, in memory or in one pass over them.
 
-    .. math:: e_{rj} = z_r + \sum_s \sum_k A_{sk} \cos(k f_s x_{rj}) + B_{sk} \sin(k f_s x_{rj})
+    ::
+
+        e_rj = z_r + Σ_s Σ_k A_sk cos(k f_s x_rj) + B_sk sin(k f_s x_rj)
 
     by least squares with one zero per run: what `fit` gives for the runs of these files. Up to
     2^20 readings are read into runs and fitted so. Of more, all are summed (`Moments`) and some
@@ -77,7 +79,7 @@ def fit_logs(
     orders : iterable of int, mapping of shaft to orders, "auto" or None
     gear_ratio, fixed_member, shafts, argument, covariance
         As in `fit`. ``"hac"`` takes whole runs apart, which sums do not: as if one in so many
-        readings as the noise remembers stood for itself.
+        readings as the noise remembers were independent.
     loss : {"auto", "linear"}
         As in `fit`: ``"auto"`` sets outliers aside, which takes a second pass where there are
         some.

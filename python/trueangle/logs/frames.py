@@ -62,9 +62,11 @@ def correct(
     counts_per_turn: float | None = None,
     threads: int | None = None,
 ) -> Any:
-    r"""Data with the corrected angle of every joint as further columns, of the kind given.
+    """Data with the corrected angle of every joint as further columns, of the kind given.
 
-    .. math:: \theta = \theta_{ind} - \varepsilon(\theta)
+    ::
+
+        θ = θ_ind - ε(θ)
 
     Parameters
     ----------

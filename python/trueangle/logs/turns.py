@@ -36,9 +36,11 @@ class TurnSpan(NamedTuple):
 
 
 class TurnCounter:
-    r"""Turns to add to angles so that no step is longer than half a turn.
+    """Turns to add to angles so that no step is longer than half a turn.
 
-    .. math:: n_i = n_{i-1} - \mathrm{round}((x_i - x_{i-1}) / p)
+    ::
+
+        n_i = n_{i-1} - round((x_i - x_{i-1}) / p)
 
     Only models whose error does not repeat after one turn need it. NaN is stepped over.
 

@@ -42,9 +42,11 @@ Array: TypeAlias = NDArray[np.float64]
 @told_kinds
 @dataclass(frozen=True, eq=False, repr=False)
 class HarmonicModel(Evaluation):
-    r"""Angle error as a constant, harmonics of one or more shafts and terms; immutable.
+    """Angle error as a constant, harmonics of one or more shafts and terms; immutable.
 
-    .. math:: \varepsilon(x) = C_0 + \sum_s \sum_k A_{sk} \cos(k f_s x) + B_{sk} \sin(k f_s x)
+    ::
+
+        ε(x) = C₀ + Σ_s Σ_k A_sk cos(k f_s x) + B_sk sin(k f_s x)
 
     with ``x`` counted in turns of ``2 pi``; error = indicated - reference. ``terms`` add
     what follows travel, velocity, temperature and torque (`trueangle.terms`).
@@ -289,9 +291,11 @@ class HarmonicModel(Evaluation):
         return None if whole else (start, stop)
 
     def band(self, theta: ArrayLike) -> Array:
-        r"""Standard deviation of the fitted error at ``theta``, from the covariance.
+        """Standard deviation of the fitted error at ``theta``, from the covariance.
 
-        .. math:: u(\varepsilon(x))^2 = g(x)^T \,\mathrm{cov}\, g(x)
+        ::
+
+            u(ε(x))² = g(x)ᵀ cov g(x)
 
         with ``g`` the row of regressors at ``x``.
 

@@ -34,9 +34,11 @@ Columns: TypeAlias = Mapping[str, tuple[str, str | None]]
 
 @told_kinds
 class Robot(Shown, Mapping[str, HarmonicModel]):
-    r"""The correction models of a robot's joints, by name, corrected in one call.
+    """The correction models of a robot's joints, by name, corrected in one call.
 
-    .. math:: \theta_j = \theta_{ind,j} - \varepsilon_j(\theta_j), \quad j = 1 \dots J
+    ::
+
+        θ_j = θ_{ind,j} - ε_j(θ_j),    j = 1 ... J
 
     Parameters
     ----------

@@ -180,7 +180,7 @@ def from_arcsec(value: float, period: float) -> float:
 
 
 def line_values(lines: Sequence[Sequence[float]], period: float) -> dict[str, tuple[float, ...]]:
-    r"""``orders, cosine, sine`` of lines :math:`C\sin(m\theta + \varphi)`.
+    """``orders, cosine, sine`` of lines ``C sin(mθ + φ)``.
 
     ``lines`` are ``[output order, C in arcsec, phase in degrees]``.
     """

@@ -33,17 +33,21 @@ HIGHEST: Final = 4096
 
 @told_kinds
 class Monitor(Shown):
-    r"""Watches the error of a running joint in constant memory.
+    """Watches the error of a running joint in constant memory.
 
     Errors are known where a second encoder, an index pulse or a reference switch gives some. Each
     window of travel is fitted by least squares to the orders of the model,
 
-    .. math:: e_j - \varepsilon(x_j) = z_w + \sum_k a_{kw} \cos k x_j + b_{kw} \sin k x_j,
+    ::
+
+        e_j - ε(x_j) = z_w + Σ_k a_kw cos k x_j + b_kw sin k x_j,
 
     each coefficient is standardized by the windows before it (self-starting, Hawkins 1987; the
     correlation of neighbours that is found is taken out), and a two-sided cumulative sum
 
-    .. math:: C^\pm \leftarrow \max(0, C^\pm \pm z - \tfrac12 \delta)
+    ::
+
+        C± <- max(0, C± ± z - δ/2)
 
     alarms above the h that gives the run length to all charts together. The zero, which
     remounting and temperature move, has a chart of its steps. The mean of the first eight windows

@@ -60,7 +60,7 @@ def read_lines(
     Raises
     ------
     FileError
-        There is no line, a column is missing, or a cell is no number.
+        There is no line, a column is missing, or a cell is not a number.
     """
     path = Path("standard input")
     first = lines.readline()

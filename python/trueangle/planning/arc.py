@@ -42,7 +42,7 @@ _GROWS = 0.01
 
 @dataclass(frozen=True)
 class ArcPlan(PlainResult):
-    r"""Places on an arc and readings at each of them.
+    """Places on an arc and readings at each of them.
 
     Attributes
     ----------
@@ -57,7 +57,7 @@ class ArcPlan(PlainResult):
     runs : int
     both_directions : bool
     d_efficiency : float
-        :math:`(\det M / \det M^*)^{1/p}`, M the information of these readings, M* the most that
+        ``(det M / det M^*)^(1/p)``, M the information of these readings, M* the most that
         as many can have.
     efficiency_of_even_spacing : float
         The same for as many places spread evenly, both ends among them.
@@ -138,13 +138,15 @@ def plan_arc(
     standard_error: float | None = None,
     uncertainty: float | None = None,
 ) -> ArcPlan:
-    r"""D-optimal places for readings of a joint that moves over an arc only.
+    """D-optimal places for readings of a joint that moves over an arc only.
 
     The places and shares that make the determinant of the information on the zero and all
     coefficients largest (`trueangle.planning.doptimal`), as whole numbers of readings. By the
     equivalence theorem they also make the largest variance of the curve over the arc smallest:
 
-    .. math:: \max_x \operatorname{var} \hat\varepsilon(x) = p\,\sigma^2 / N
+    ::
+
+        max_x var ε̂(x) = p σ² / N
 
     with p coefficients (the zero is one) and N readings.
 
@@ -267,8 +269,8 @@ def _columns(
         wanted = wanted[:-1]
     if usual and len(wanted) < len(USUAL):
         notes.append(
-            f"orders up to {wanted[-1]:g}: over {stop - start:g} deg higher ones are not told from "
-            "them but by a thousand times the readings"
+            f"orders up to {wanted[-1]:g}: over {stop - start:g} deg higher ones are "
+            "distinguished from them only by a thousand times the readings"
         )
     return columns, wanted
 

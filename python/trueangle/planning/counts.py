@@ -22,7 +22,7 @@ def exchanged(columns: OrthonormalColumns, places: Array) -> Array:
     """Places of single readings, each exchanged for a better one of the grid while one is.
 
     Fedorov's exchange: taking reading i out and x in multiplies the determinant by
-    :math:`(1 + d_{xx})(1 - d_{ii}) + d_{ix}^2`.
+    ``(1 + d_xx)(1 - d_ii) + d_ix²``.
     """
     grid = columns.at(columns.grid)
     places = places.copy()

@@ -40,18 +40,18 @@ _SINGULAR = 1e-7
 
 @dataclass(frozen=True)
 class ArcDesign:
-    r"""Places and weights over an arc, in turns.
+    """Places and weights over an arc, in turns.
 
     Attributes
     ----------
     places, weights : ndarray, shape (s,)
         Increasing places and the shares of the readings that belong there.
     excess : float
-        :math:`\max_x d(x) / p - 1` over the arc, d the variance of the fitted curve times the
+        ``max_x d(x) / p - 1`` over the arc, d the variance of the fitted curve times the
         number of readings and p the number of coefficients: 0 for the optimum (Kiefer and
         Wolfowitz).
     log_det : float
-        :math:`\ln\det M` of the design, with columns as in `Columns.of`.
+        ``ln det M`` of the design, with columns as in `Columns.of`.
     """
 
     places: Array
@@ -116,10 +116,11 @@ class OrthonormalColumns:
 
 
 def d_optimal(columns: OrthonormalColumns) -> ArcDesign:
-    r"""The design whose information has the largest determinant.
+    """The design whose information has the largest determinant.
 
-    .. math:: \max_\xi \det \int f(x) f(x)^T \,\xi(dx), \quad
-              f = (1, \cos k x, \sin k x \ldots)
+    ::
+
+        max_ξ det ∫ f(x) f(x)ᵀ ξ(dx),    f = (1, cos k x, sin k x ...)
 
     by multiplicative steps on a grid (Titterington 1976). Where as many places as coefficients
     are left, each belongs to an equal share, and they are moved off the grid one by one until the
@@ -204,10 +205,10 @@ def _swept(columns: OrthonormalColumns, places: Array) -> Array:
 
 
 def _newton(columns: OrthonormalColumns, places: Array) -> Array:
-    r"""A step of Newton's method on :math:`\ln|\det F|`, F the rows at the places.
+    """A step of Newton's method on ``ln|det F|``, F the rows at the places.
 
-    Its slope is the diagonal of :math:`A = F' F^{-1}`, its curvature
-    :math:`(F'' F^{-1})_{ii} - A_{ii}^2` and :math:`-A_{ij} A_{ji}`. Ends of the arc stay.
+    Its slope is the diagonal of ``A = F' F⁻¹``, its curvature
+    ``(F'' F⁻¹)_ii - A_ii²`` and ``-A_ij A_ji``. Ends of the arc stay.
     """
     start, stop = float(columns.grid[0]), float(columns.grid[-1])
     inverse = np.linalg.inv(columns.at(places))

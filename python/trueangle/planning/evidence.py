@@ -1,12 +1,14 @@
-r"""Expected evidence between rival causes: T-optimality under correlated noise.
+"""Expected evidence between rival causes: T-optimality under correlated noise.
 
 Where A is the cause, with error s at the readings, the best imitation by another cause B leaves
 
-.. math:: T_{A|B} = \min_b \frac{\lVert W(s - X\beta - Z_B b)\rVert^2}{\sigma^2 (1 - \rho^2)}
+::
+
+    T_{A|B} = min_b |W(s - Xβ - Z_B b)|² / (σ² (1 - ρ²))
 
 with the zero and the lines of the simulation in X and W the map that makes noise of correlation rho
 independent. That is the deviance by which A is expected to win, with standard deviation
-:math:`2\sqrt{T}`; less what its parameters cost more, the difference of BIC. Source: Atkinson and
+``2√T``; less what its parameters cost more, the difference of BIC. Source: Atkinson and
 Fedorov (1975).
 """
 

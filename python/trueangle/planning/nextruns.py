@@ -115,7 +115,8 @@ class NextRuns(PlainResult):
     def _brief(self) -> str:
         told = [cause for entry in self.between if entry.told for cause in entry.causes]
         runs = f"{counted(self.runs, 'run')}, {counted(self.readings, 'reading')}"
-        return f"{runs}, {self.seconds:.3g} s: {', '.join(dict.fromkeys(told)) or 'nothing told'}"
+        listed = ", ".join(dict.fromkeys(told))
+        return f"{runs}, {self.seconds:.3g} s: {listed or 'nothing distinguished'}"
 
 
 def plain_run(design: RunDesign) -> dict[str, Any]:

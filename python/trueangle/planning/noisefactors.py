@@ -27,9 +27,11 @@ _SINGULAR: Final = 1e-9
 def noise_factors(
     turns: ArrayLike, orders: Sequence[float], zeros: ArrayLike | None = None
 ) -> Array:
-    r"""Noise factor of each order, all of them and the zeros fitted together.
+    """Noise factor of each order, all of them and the zeros fitted together.
 
-    .. math:: f_k = \sqrt{\tfrac{n}{2}\,\lambda_{\max}\big[(X^T X)^{-1}\big]_k}
+    ::
+
+        f_k = √((n / 2) λ_max[(Xᵀ X)⁻¹]_k)
 
     Parameters
     ----------
@@ -135,10 +137,11 @@ def _half_factors(phase: Array) -> Array:
 
 
 def facet_noise_factor(divisions: int, shifts: ArrayLike, highest: int | None = None) -> Array:
-    r"""Worst factor of the joint's orders when the artefact's own errors are fitted too.
+    """Worst factor of the joint's orders when the artefact's own errors are fitted too.
 
-    .. math:: f_h = \big(J\,(1 - |\overline{w}_h|^2)\big)^{-1/2},\quad
-              w_{hj} = e^{2\pi i\,h s_j/N}
+    ::
+
+        f_h = (J (1 - |w̄_h|²))^(-1/2),    w_hj = e^(2π i h s_j/N)
 
     relative to one mount with a perfect artefact.
 

@@ -101,9 +101,11 @@ class CalibrationPlan(PlainResult):
 
 @told_kinds
 def readings_needed(noise: float, standard_error: float, factor: float = 1.0) -> int:
-    r"""Readings that bring an order's standard error down to ``standard_error``.
+    """Readings that bring an order's standard error down to ``standard_error``.
 
-    .. math:: N = 2\,(f\,\sigma/u)^2
+    ::
+
+        N = 2 (f σ/u)²
 
     Examples
     --------

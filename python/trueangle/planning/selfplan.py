@@ -104,9 +104,11 @@ class SelfPlan(PlainResult):
 
 
 def angle_factors(angles_deg: ArrayLike, orders: Sequence[float]) -> Array:
-    r"""Noise factor of each order for heads or shifts at ``angles_deg``.
+    """Noise factor of each order for heads or shifts at ``angles_deg``.
 
-    .. math:: f_k = (1 - |S_k/n|^2)^{-1/2},\quad S_k = \sum_i e^{ik\alpha_i}
+    ::
+
+        f_k = (1 - |S_k/n|²)^(-1/2),    S_k = Σ_i e^(ikα_i)
 
     Parameters
     ----------
@@ -253,7 +255,7 @@ def plan_self(
         }
     what = "heads" if method == "heads" else "shifts"
     notes = [
-        f"{count} equispaced {what} are blind to multiples of {count}",
+        f"{count} equispaced {what} do not show multiples of {count}",
         "the zero is never seen",
     ]
     if method == "shifts":
@@ -331,7 +333,7 @@ def _dual(
         elif gap > 0.0:
             # Two lines part when they differ by a whole wave over the travel.
             turns = max(turns, math.ceil(1.0 / gap))
-    notes.append("travel both ways: reversal error and delay stand beside the orders")
+    notes.append("travel both ways: reversal error and delay are fitted jointly with the orders")
     return SelfPlan(
         "dual",
         orders,

@@ -81,7 +81,7 @@ def self_plan_summary(plan: SelfPlan) -> str:
         )
         if given["blind_orders"]:
             names = ", ".join(f"{k:g}" for k in given["blind_orders"])
-            lines.append(f"                         blind to {names}")
+            lines.append(f"                         cannot see {names}")
     lines += ["  noise factor per order", *_table(plan.noise_factors)]
     lines += [f"  note: {note}" for note in plan.notes]
     return laid_out(lines)
@@ -89,11 +89,10 @@ def self_plan_summary(plan: SelfPlan) -> str:
 
 def arc_summary(plan: ArcPlan) -> str:
     """A plan of places on an arc."""
-    runs = "" if plan.runs == 1 else f" in each of {plan.runs} runs"
+    each = f": {sum(plan.counts)} in each of {plan.runs} runs" if plan.runs > 1 else ""
     way = ", half from either side" if plan.both_directions else ""
     lines = [
-        f"{plan.readings} readings over {plan.start_deg:g} to {plan.stop_deg:g} deg: "
-        f"{sum(plan.counts)}{runs}{way}",
+        f"{plan.readings} readings over {plan.start_deg:g} to {plan.stop_deg:g} deg{each}{way}",
         *place_table(plan.places_deg, plan.counts),
         f"  D-efficiency           {plan.d_efficiency:.3f} of the best possible",
         f"  of even spacing        {plan.efficiency_of_even_spacing:.3f}",
@@ -101,13 +100,18 @@ def arc_summary(plan: ArcPlan) -> str:
     ]
     for order, factor in plan.noise_factors.items():
         even = plan.even_noise_factors[order]
-        lines.append(f"  {order:5g}  {factor:12.3g}  {even:17.3g}")
+        lines.append(f"  {order:5g}  {_factor(factor):>12}  {_factor(even):>17}")
     if plan.uncertainty_arcsec is not None:
         lines.append(
             f"  uncertainty (k = 2)    {plan.uncertainty_arcsec:.3g} arcsec at the worst place"
         )
     lines += [f"  note: {note}" for note in plan.notes]
     return laid_out(lines)
+
+
+def _factor(factor: float) -> str:
+    """A noise factor, or that the places do not show the order."""
+    return f"{factor:.3g}" if math.isfinite(factor) else "not seen"
 
 
 def place_table(places_deg: Sequence[float], counts: Sequence[int]) -> list[str]:
@@ -133,9 +137,9 @@ def next_summary(plan: NextRuns) -> str:
     for entry in plan.between:
         names = " or ".join(entry.causes)
         if not entry.told:
-            text = f"  not told: {names}"
+            text = f"  not distinguished: {names}"
         elif len(entry.causes) > 1:
-            text = f"  tells {names}"
+            text = f"  distinguishes {names}"
         else:
             text = f"  shows {names}"
         if entry.seen and entry.expected_bic is not None and entry.chance_named is not None:

@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from ..runs.run import CalibrationRun, as_runs
-from ..support.display_units import ErrorsIn, error_unit, significant
+from ..support.display_units import ErrorsIn, error_unit
 from . import palette
-from .canvas import described, legend, new_axes, turn_axis
-from .curves import held_out_points, seen_span, strength, thinned
+from .canvas import new_axes
+from .curves import held_out_points, seen_span, strength
+from .drawnpanel import draw_panel, finish
+from .readingpictures import before_after_picture
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -19,8 +19,6 @@ if TYPE_CHECKING:
     from ..model.model import HarmonicModel
 
 __all__ = ["before_after"]
-
-_MOST = 8000
 
 
 def before_after(
@@ -50,34 +48,9 @@ def before_after(
     """
     pairs = held_out_points(model, as_runs(runs))
     unit = error_unit(errors_in, strength(before for before, _ in pairs), model.period)
+    numbered = [(number, *pair) for number, pair in enumerate(pairs)]
+    picture = before_after_picture(numbered, seen_span(model), unit)
     ax = new_axes(ax)
-    told: list[str] = []
-    for points, colour, name, marker in (
-        ([b.scaled(unit.per_arcsec) for b, _ in pairs], palette.BEFORE, "before", "s"),
-        ([a.scaled(unit.per_arcsec) for _, a in pairs], palette.AFTER, "after", "o"),
-    ):
-        y = np.concatenate([p.y for p in points])
-        rms, ptp = float(np.sqrt(np.mean(y * y))), float(np.ptp(y))
-        for i, part in enumerate(thinned(p, max(1, _MOST // len(points))) for p in points):
-            ax.plot(
-                part.x,
-                part.y,
-                linestyle="none",
-                marker=marker,
-                markersize=3.0 if y.size < 2000 else 1.5,
-                alpha=0.8 if y.size < 2000 else 0.4,
-                markeredgewidth=0.0,
-                color=colour,
-                label=None
-                if i
-                else f"{name}: rms {significant(rms)}, peak-to-peak {significant(ptp)} {unit.name}",
-            )
-        told.append(
-            f"{name} correction rms {significant(rms)}, peak-to-peak {significant(ptp)} {unit.name}"
-        )
+    draw_panel(ax, picture.panels[0])
     ax.axhline(0.0, color=palette.MUTED, linewidth=0.8, zorder=0)
-    turn_axis(ax, *seen_span(model))
-    ax.set_xlabel("reference angle / deg")
-    ax.set_ylabel(f"error of held-out runs / {unit.name}")
-    legend(ax)
-    return described(ax, f"Error of {len(pairs)} held-out runs: {'; '.join(told)}.")
+    return finish(ax, picture)

@@ -23,7 +23,7 @@ def cost_curves(
     *,
     size: str = "readings",
 ) -> Axes:
-    r"""Medians as dots, models :math:`t_0 + n\,t_1` as lines, both axes logarithmic.
+    """Medians as dots, models ``t₀ + n t₁`` as lines, both axes logarithmic.
 
     Parameters
     ----------

@@ -48,7 +48,7 @@ CONFIDENCE: Final = 1.96
 _GOLDEN = 0.5 * (5.0**0.5 - 1.0)
 
 #: Points of a curve for each cycle of its highest order, and the least and most of them.
-_PER_CYCLE, _FEWEST, _MOST_SAMPLES = 12, 721, 12001
+_PER_CYCLE, _FEWEST, _MOST_SAMPLES = 20, 361, 12001
 
 #: Degrees without a reading that make a travel partial, where no model says what was seen.
 _WIDE_GAP: Final = 90.0

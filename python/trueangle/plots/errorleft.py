@@ -8,7 +8,7 @@ from ..errors import ArgumentError
 from ..support.display_units import ErrorsIn, error_unit
 from . import palette
 from .canvas import described, new_axes
-from .simulatedcurves import left_without
+from .simulatedcurves import error_left_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -40,23 +40,24 @@ def error_left(diagnosis: Diagnosis, ax: Axes | None = None, errors_in: ErrorsIn
     ArgumentError
         No finding has a gain that carries over to new runs.
     """
-    steps = left_without(diagnosis)
-    if not steps:
+    left = error_left_of(diagnosis)
+    if left is None:
         raise ArgumentError("no finding of this diagnosis has a gain that carries over to new runs")
-    unit = error_unit(errors_in, max(diagnosis.noise, *(rms for _, rms in steps)))
-    noise = unit.per_arcsec * diagnosis.noise
-    ax = new_axes(ax, height=1.4 + 0.4 * len(steps))
-    place = list(range(len(steps)))
+    names, sizes = zip(*left.rows, strict=True)
+    unit = error_unit(errors_in, max(left.noise, *sizes))
+    noise = unit.per_arcsec * left.noise
+    ax = new_axes(ax, height=1.4 + 0.4 * len(sizes))
+    place = list(range(len(sizes)))
     bars = ax.barh(
         place,
-        [unit.per_arcsec * rms for _, rms in steps],
+        [unit.per_arcsec * rms for rms in sizes],
         height=0.6,
-        color=[palette.AFTER] + [palette.BEFORE] * (len(steps) - 1),
+        color=[palette.AFTER] + [palette.BEFORE] * (len(sizes) - 1),
     )
-    ax.bar_label(bars, [unit.number(rms) for _, rms in steps], padding=3, fontsize="small")
+    ax.bar_label(bars, [unit.number(rms) for rms in sizes], padding=3, fontsize="small")
     ax.axvline(noise, color=palette.ink(ax), linestyle="--", linewidth=1.0)
     ax.annotate(
-        f"noise {unit.number(diagnosis.noise)}",
+        f"noise {unit.number(left.noise)}",
         (noise, 1.0),
         xycoords=("data", "axes fraction"),
         xytext=(0, 3),
@@ -64,10 +65,8 @@ def error_left(diagnosis: Diagnosis, ax: Axes | None = None, errors_in: ErrorsIn
         ha="center",
         fontsize="small",
     )
-    ax.set_yticks(place, [name for name, _ in steps])
+    ax.set_yticks(place, names)
     ax.invert_yaxis()
     ax.margins(x=0.12)
-    ax.set_xlabel(f"rms of what is left of held-out readings / {unit.name}")
-    told = ", ".join(f"{name} {unit.text(rms)}" for name, rms in steps)
-    noise_told = unit.text(diagnosis.noise)
-    return described(ax, f"Rms left of held-out readings: {told}; noise {noise_told}.")
+    ax.set_xlabel(left.axis(unit))
+    return described(ax, left.told(unit))

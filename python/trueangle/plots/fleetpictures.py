@@ -27,7 +27,7 @@ __all__ = ["fleet_history", "fleet_patterns", "fleet_phasors", "fleet_sizes"]
 #: Radius that holds 95 % of a plane normal distribution, in standard deviations of a coordinate.
 _RADIUS: Final = math.sqrt(-2.0 * math.log(0.05))
 
-#: Units whose patterns are drawn at most, those that need something first, and in a row.
+#: Units whose patterns are drawn at most, those that need attention first, and in a row.
 _PATTERNS: Final = 20
 _IN_A_ROW: Final = 5
 
@@ -201,8 +201,8 @@ def fleet_patterns(fleet: Fleet, errors_in: ErrorsIn = "auto", most: int = _PATT
     figure.supylabel(f"error / {shown.name}", fontsize="medium")
     return described(
         axes[0],
-        f"Error over a turn of {len(units)} of {len(fleet.units)} units, those that need something "
-        "first, beside the pattern that all share.",
+        f"Error over a turn of {len(units)} of {len(fleet.units)} units, those that need attention "
+        "first, and the pattern that all share.",
     )
 
 

@@ -8,16 +8,16 @@ import numpy as np
 
 from ..support.display_units import ErrorsIn, error_unit, significant, sine_of_rms
 from ..support.plainresult import counted
-from . import palette
 from .canvas import described, legend, new_axes, turn_axis
-from .curves import CONFIDENCE, Curve, envelope, model_curve, seen_span, strong_gear_order
+from .curves import model_curve, seen_span, strong_gear_order
+from .drawnpanel import draw_curve
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
     from ..model.model import HarmonicModel
 
-__all__ = ["draw_curve", "model_error"]
+__all__ = ["model_error"]
 
 
 def model_error(model: HarmonicModel, ax: Axes | None = None, errors_in: ErrorsIn = "auto") -> Axes:
@@ -56,7 +56,8 @@ def model_error(model: HarmonicModel, ax: Axes | None = None, errors_in: ErrorsI
     unit = error_unit(errors_in, sine_of_rms(float(np.std(curve.error))), model.period)
     curve = curve.scaled(unit.per_arcsec)
     low, high = seen_span(model)
-    draw_curve(ax, curve, pattern, high - low)
+    dense = strong_gear_order(pattern.orders, pattern.amplitudes, high - low) is not None
+    draw_curve(ax, curve, dense)
     turn_axis(ax, low, high)
     ax.set_xlabel(f"{model.argument} angle / deg")
     ax.set_ylabel(f"error / {unit.name}")
@@ -68,32 +69,4 @@ def model_error(model: HarmonicModel, ax: Axes | None = None, errors_in: ErrorsI
         f"{unit.name} peak-to-peak in {counted(len(model.orders), 'order')}"
         + (f"; not drawn: {terms}" if terms else "")
         + ".",
-    )
-
-
-def draw_curve(ax: Axes, curve: Curve, model: HarmonicModel, span: float) -> None:
-    """A model's curve with its band; as an envelope where gear orders fill ``span`` degrees."""
-    if strong_gear_order(model.orders, model.amplitudes, span) is not None:
-        ax.fill_between(
-            *envelope(curve),
-            color=palette.MUTED,
-            alpha=0.35,
-            linewidth=0.0,
-            zorder=0.5,
-            label="envelope of the model",
-        )
-        return
-    ax.plot(curve.angle, curve.error, color=palette.ink(ax), zorder=3.0, label="model")
-    if curve.std is None:
-        return
-    half = CONFIDENCE * curve.std
-    ax.fill_between(
-        curve.angle,
-        curve.error - half,
-        curve.error + half,
-        color=palette.ink(ax),
-        alpha=0.2,
-        linewidth=0.0,
-        zorder=0.5,
-        label="95 % band",
     )

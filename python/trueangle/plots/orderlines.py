@@ -97,9 +97,11 @@ def told_orders(lines: Sequence[OrderLine], unit: ErrorUnit) -> str:
 
 
 def thresholds(selection: OrderSelection) -> Array:
-    r"""Amplitude at which each order of the table would just be significant.
+    """Amplitude at which each order of the table would just be significant.
 
-    .. math:: C = C_k \sqrt{T / T_k}, \qquad (1 + T/v)^{-v/2} = \alpha / K
+    ::
+
+        C = C_k √(T / T_k),    (1 + T/v)^(-v/2) = α / K
 
     with the order's amplitude and statistic, v degrees of freedom of the noise and the chance
     alpha of a false alarm shared by the K orders of the table. Orders found by a wider scan

@@ -10,6 +10,7 @@ import numpy as np
 
 from ..runs.run import CalibrationRun
 from ..support.angles import ARCSEC_PER_TURN, circular_mean, wrap
+from ..support.display_units import ErrorUnit
 from .curves import Points, degrees, label_of
 from .findingnames import finding_names
 
@@ -17,7 +18,7 @@ if TYPE_CHECKING:
     from ..diagnosis import Diagnosis
     from ..simulation import Simulation
 
-__all__ = ["GainBar", "gain_bars", "left_without", "simulated_points"]
+__all__ = ["ErrorLeft", "GainBar", "error_left_of", "gain_bars", "simulated_points"]
 
 
 @dataclass(frozen=True)
@@ -28,6 +29,23 @@ class GainBar:
     share: float
     low: float
     high: float
+
+
+@dataclass(frozen=True)
+class ErrorLeft:
+    """Rms of held-out readings, arcsec: with all causes in place, then without each of them."""
+
+    rows: tuple[tuple[str, float], ...]
+    noise: float
+
+    def axis(self, unit: ErrorUnit) -> str:
+        """Title of the axis of sizes."""
+        return f"rms left of held-out readings / {unit.name}"
+
+    def told(self, unit: ErrorUnit) -> str:
+        """The picture in a sentence."""
+        rows = ", ".join(f"{name} {unit.text(rms)}" for name, rms in self.rows)
+        return f"Rms left of held-out readings: {rows}; noise {unit.text(self.noise)}."
 
 
 def simulated_points(
@@ -50,20 +68,18 @@ def simulated_points(
     return found
 
 
-def left_without(diagnosis: Diagnosis) -> list[tuple[str, float]]:
-    """Rms of held-out readings with all findings in place, and with each of them left out.
-
-    From the gains of the findings that carry over to new runs; empty where none does.
-    """
+def error_left_of(diagnosis: Diagnosis) -> ErrorLeft | None:
+    """From the gains of the findings that carry over to new runs; None where none does."""
     known = [
         (name, finding.gain)
         for name, finding in zip(finding_names(diagnosis), diagnosis.findings, strict=True)
         if finding.gain is not None and finding.gain.reducible_share is not None
     ]
     if not known:
-        return []
+        return None
     together = ("with all causes", known[0][1].after[0])
-    return [together, *((f"without {name}", gain.before[0]) for name, gain in known)]
+    without = (("without " + name, gain.before[0]) for name, gain in known)
+    return ErrorLeft((together, *without), diagnosis.noise)
 
 
 def gain_bars(diagnosis: Diagnosis) -> list[GainBar]:

@@ -54,13 +54,15 @@ def plan_after(
     progress: str = "none",
     **reading: Unpack[Reading],
 ) -> NextRuns:
-    r"""Say which runs to measure next, so that causes are told apart.
+    """Say which runs to measure next, so that causes are told apart.
 
     The runs are diagnosed. Of the further runs that limits allow those are taken whose expected
     evidence between the causes in question is greatest, by what the one leaves that the other
     cannot imitate, under the correlated noise found (`trueangle.planning.evidence`)
 
-    .. math:: T_{A|B} = \min_b \lVert W(s_A - X\beta - Z_B b)\rVert^2 / \sigma^2(1 - \rho^2)
+    ::
+
+        T_{A|B} = min_b |W(s_A - Xβ - Z_B b)|² / (σ² (1 - ρ²))
 
     with as few readings as serve; then every cause in turn is taken to be the true one, all runs
     are simulated and diagnosed, and it is counted how often it is named.

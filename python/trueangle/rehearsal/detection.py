@@ -1,6 +1,8 @@
-r"""From which size on a cause is named: the chance against size, with what is known of it.
+"""From which size on a cause is named: the chance against size, with what is known of it.
 
-.. math:: P(\text{named}) = \frac{1 - \lambda}{1 + \exp(-(x - \mu)/w)}
+::
+
+    P(named) = (1 - λ) / (1 + exp(-(x - μ)/w))
 
 in steps x of the logarithm of size, with the place mu, the width w and the share lambda that is
 never named however large. Every triple of a grid is weighed by the binomial likelihood of all

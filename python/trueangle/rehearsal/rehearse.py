@@ -50,13 +50,15 @@ def rehearse(
     workers: int | None = None,
     progress: str = "none",
 ) -> Rehearsal:
-    r"""Say which causes a diagnosis of these runs would name, and from which size on.
+    """Say which causes a diagnosis of these runs would name, and from which size on.
 
     Every cause in turn is hidden in readings simulated with the joint, the noise and the runs of
     ``sim`` and diagnosed against ``sim``. It counts as named where a confirmed finding (or, where
     the simulation claims it already, a refuted belief) has its name. The chance of that
 
-    .. math:: P = \frac{1 - \lambda}{1 + \exp(-(x - \mu)/w)}
+    ::
+
+        P = (1 - λ) / (1 + exp(-(x - μ)/w))
 
     against the logarithm x of size gives the sizes named in 50 and in 95 % of the trials.
 

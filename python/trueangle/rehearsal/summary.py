@@ -104,9 +104,9 @@ def _never(cause: RehearsedCause) -> str:
         largest = [*cause.tried][-1]
         text += f" (hidden {cause.trials} times, up to {cause.size_name} {largest:.3g}"
         instead = ", ".join([*cause.confused_with][:MOST])
-        text += f"; taken for {instead})" if instead else f"; told: {_else(cause)})"
+        text += f"; taken for {instead})" if instead else f"; reported: {_else(cause)})"
     if cause.measure:
-        text += f". To tell: {cause.measure}"
+        text += f". To find out: {cause.measure}"
     return text + "."
 
 

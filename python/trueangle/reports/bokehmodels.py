@@ -46,13 +46,13 @@ def value(same: Any) -> dict[str, Any]:
 def columns(data: Mapping[str, Iterable[Any]]) -> Model:
     """A source of columns: arrays as bytes, texts as lists."""
     entries = [
-        [name, _packed(some) if isinstance(some, np.ndarray) else list(some)]
+        [name, _written(some) if isinstance(some, np.ndarray) else list(some)]
         for name, some in data.items()
     ]
     return model("ColumnDataSource", data={"type": "map", "entries": entries})
 
 
-def _packed(array: np.ndarray[Any, Any]) -> dict[str, Any]:
+def _written(array: np.ndarray[Any, Any]) -> dict[str, Any]:
     little = array.astype(array.dtype.newbyteorder("<"), copy=False)
     # Level and time as Bokeh's: the same figures are the same bytes.
     packed = gzip.compress(little.tobytes(), 9, mtime=1)

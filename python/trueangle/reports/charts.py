@@ -24,8 +24,8 @@ Array = NDArray[np.float64]
 #: Part of a chart's width at either border from which texts are turned inwards.
 _EDGE: Final = 0.3
 
-#: Bits of a drawn number's mantissa: 1.5e-5 of it.
-_KEPT_BITS: Final = 15
+#: Bits of a drawn number's mantissa: 6e-5 of it.
+_KEPT_BITS: Final = 13
 
 #: Part of the page's width that a chart takes where its neighbours do not decide.
 _SHARES: Final = {"stacked": 1.0, "above": 1.0, "multiples": 1.0 / 3.0}
@@ -202,8 +202,15 @@ class Chart:
         )
         self._legend[label] = ("fore", "╍")
 
-    def labels(self, x: Array, y: Array, texts: Sequence[str], inside: tuple[float, float]) -> None:
-        """Texts above points, turned inwards from the borders ``inside`` of the chart."""
+    def labels(
+        self,
+        x: Array,
+        y: Array,
+        texts: Sequence[str],
+        inside: tuple[float, float],
+        below: Sequence[bool] = (),
+    ) -> None:
+        """Texts above points, or below, turned inwards from the borders ``inside`` of the chart."""
         low, high = inside
         place = (np.asarray(x, dtype=np.float64) - low) / (high - low)
         sides = ["left" if p < _EDGE else "right" if p > 1.0 - _EDGE else "center" for p in place]
@@ -213,11 +220,21 @@ class Chart:
             y=field("y"),
             text=field("text"),
             text_align=field("side"),
-            text_baseline=value("bottom"),
+            text_baseline=field("line"),
             text_font_size=value("11px"),
-            y_offset=value(-7),
+            y_offset=field("off"),
         )
-        source = columns({"x": _short(x), "y": _short(y), "text": texts, "side": sides})
+        under = list(below) or [False] * len(texts)
+        source = columns(
+            {
+                "x": _short(x),
+                "y": _short(y),
+                "text": texts,
+                "side": sides,
+                "line": ["top" if low else "bottom" for low in under],
+                "off": [7 if low else -7 for low in under],
+            }
+        )
         self._add(glyph, source, "fore")
 
     def angle_axis(self, low: float, high: float, most: float = 9.0) -> None:
@@ -334,7 +351,7 @@ def _segment(x0: str, y0: str, x1: str, y1: str, width: float) -> Model:
 def _short(values: Array) -> NDArray[np.float32]:
     """For drawing only, half the bytes: numbers on the page come from the content.
 
-    Rounded to `_KEPT_BITS` of the mantissa, 0.005 of 360 deg: what no screen shows would be
+    Rounded to `_KEPT_BITS` of the mantissa, 0.02 of 360 deg: what no screen shows would be
     a fifth of the figures' bytes, for noise cannot be packed.
     """
     dropped = 23 - _KEPT_BITS

@@ -11,14 +11,12 @@ from typing import TYPE_CHECKING, Any, TypeAlias, Unpack, overload
 from ..errors import ArgumentError
 from ..fitting.heldout import HeldOut
 from ..model.model import HarmonicModel
-from ..plots.curves import Points, degrees, error_points, label_of, travelled
 from ..runs.checks.check import faults_of
 from ..runs.checks.record import records_of
 from ..runs.files import runs_of
 from ..runs.provenance import provenance
 from ..runs.run import CalibrationRun
 from ..runs.source import Reading
-from ..support.angles import ARCSEC_PER_TURN, wrap
 from ..support.blas import one_blas_thread
 from ..support.deadline import pace
 from ..support.display_units import ErrorsIn
@@ -321,8 +319,7 @@ def _figures(
     scale: Scale,
 ) -> dict[str, dict[str, Any]]:
     """Every figure that this report has."""
-    points = error_points(fit) if fit is not None else _plain(runs)
-    made = {"errors": figures.errors_of_runs(fit, runs, points, scale)}
+    made = {"errors": figures.errors_of_runs(fit, runs, scale)}
     if fit is not None or selection is not None:
         made["spectrum"] = spectrum(fit, selection, name, scale)
     if held is not None:
@@ -334,14 +331,3 @@ def _figures(
         for signal in figures.signals_present(fit):
             made[f"residual-{signal}"] = figures.residuals(fit, signal, scale)
     return made
-
-
-def _plain(runs: list[CalibrationRun]) -> list[Points]:
-    """Readings where there is no model, on the turn that begins where the travel does."""
-    low, _ = travelled(runs)
-    found = []
-    for number, run in enumerate(runs):
-        error = wrap(run.indicated - run.reference - run.zero, run.period)
-        error *= ARCSEC_PER_TURN / run.period
-        found.append(Points(label_of(run, number), degrees(run, low), error))
-    return found

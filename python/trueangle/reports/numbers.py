@@ -82,7 +82,7 @@ class Numbers:
         shown = content["errors_in"]
         #: Unit of the errors.
         self.unit = ErrorUnit(shown["unit"], shown["per_arcsec"])
-        self._mark = Markup('<span class="n" data-path="{}"{} data-digits="{}">{}</span>')
+        self._mark = Markup('<span data-path="{}"{}>{}</span>')
 
     def plain(self, path: str, digits: int = 2, unit: str = "") -> Any:
         """A number that is no error."""
@@ -143,5 +143,5 @@ class Numbers:
 
         # Of most pages every number is as the content has it.
         per = "" if of.per_arcsec == 1.0 else Markup(f' data-per="{of.per_arcsec!r}"')
-        span = self._mark.format(path, per, digits, text)
+        span = self._mark.format(path, per, text)
         return span + (f"\u00a0{unit}" if unit and text != NONE else "")

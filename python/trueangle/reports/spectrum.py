@@ -22,6 +22,9 @@ __all__ = ["spectrum"]
 
 #: Half a letter of a name as part of a chart's width, and what parts names above each other.
 _LETTER, _HIGHER = 0.012, 2.0
+#: A dot this much larger than the lowest size shown is whole, and so much above or below another
+#: it is clear of it.
+_WHOLE, _CLEAR = 1.12, 1.1
 #: Orders written at their dots, the largest first.
 _MOST_NAMED: Final = 8
 #: Aliases and explanations that are shown over a dot.
@@ -78,7 +81,7 @@ def _group(
         some = [
             line
             for line in lines
-            if line.kept is kept and scale.factor * line.amplitude >= y_range[0]
+            if line.kept is kept and scale.factor * line.amplitude >= _WHOLE * y_range[0]
         ]
         if some:
             # No stems: on a logarithmic axis their lengths would mean nothing.
@@ -116,14 +119,39 @@ def _group(
             label=_once("95 % interval", joined),
         )
     borders = (low - margin, high + margin)
-    written = _apart(named, *borders, name)
+    sides = _sides(_apart(named, *borders, name), lines, *borders, name)
+    written = list(sides)
     chart.labels(
         _orders(written),
         _sizes(written, "amplitude", scale),
         [_short(line.order, name) for line in written],
         borders,
+        [sides[line] for line in written],
     )
     return chart
+
+
+def _sides(
+    named: Sequence[OrderLine],
+    lines: Sequence[OrderLine],
+    low: float,
+    high: float,
+    name: LineNames,
+) -> dict[OrderLine, bool]:
+    """Names that stand on no dot: above theirs, or below (True); those in the way are left out."""
+    found = {}
+    for line in named:
+        reach = _LETTER * 2.0 * len(_short(line.order, name)) * (high - low)
+        sizes = [
+            other.amplitude / line.amplitude
+            for other in lines
+            if other is not line and abs(other.order - line.order) < reach
+        ]
+        if not any(1.0 / _CLEAR < size < _HIGHER for size in sizes):
+            found[line] = False
+        elif not any(1.0 / _HIGHER < size < _CLEAR for size in sizes):
+            found[line] = True
+    return found
 
 
 def _orders(lines: Sequence[OrderLine]) -> NDArray[np.float64]:

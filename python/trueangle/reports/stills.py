@@ -24,8 +24,8 @@ _REM: Final = 13.0
 _LEFT, _RIGHT, _TOP, _BOTTOM = 64.0, 12.0, 6.0, 34.0
 #: Room for names of categories, a letter.
 _LETTER: Final = 6.2
-#: Dots of one colour at most: more are one blot on paper.
-_MOST: Final = 70
+#: Dots of one colour and size at most: more are one blot on paper.
+_MOST: Final = 120
 #: Ticks of an axis, about.
 _TICKS: Final = 6
 
@@ -48,12 +48,12 @@ def still(
     uprights: Sequence[float] = (),
 ) -> str:
     """A chart as SVG: ``share`` is its part of the page's width, lines stand at ``uprights``."""
-    width, height = max(_WIDTH * share, 150.0), _REM * height_rem
+    width, height = max(_WIDTH * share, 90.0), _REM * height_rem
     names = list(up.categories or ())
     left = max(_LEFT, _LETTER * max(map(len, names), default=0) + 8.0) if up.visible else 8.0
     place = _Placement(marks, across, up, (left, width - _RIGHT), (height - _BOTTOM, _TOP))
     parts = [_axes(place, across, up, width, height)]
-    parts += [_drawn(mark, place) for mark in marks]
+    parts += [_drawn(mark, place) for mark in _together(marks)]
     foot, head = place.ends[1]
     parts += [
         f'<path class="upright" d="M{float(place.of(x, 0)):.0f} {head:.0f}V{foot:.0f}"/>'
@@ -112,6 +112,24 @@ def _covered(parts: list[Any]) -> tuple[float, float]:
     return low - margin, high + margin
 
 
+def _together(marks: Sequence[Mark]) -> list[Mark]:
+    """Dots of one colour and size as one mark, where the first of them stands: runs are many."""
+    found: dict[tuple[str, float], list[Mark]] = {}
+    for mark in marks:
+        if mark.kind == "dots":
+            found.setdefault((mark.colour, mark.size), []).append(mark)
+    joined = []
+    for mark in marks:
+        if mark.kind != "dots":
+            joined.append(mark)
+        elif same := found.pop((mark.colour, mark.size), []):
+            columns = tuple(
+                np.concatenate(part) for part in zip(*(m.arrays for m in same), strict=True)
+            )
+            joined.append(mark._replace(arrays=columns))
+    return joined
+
+
 def _drawn(mark: Mark, place: _Placement) -> str:
     style = f'style="color:var(--{mark.colour})"'
     if mark.kind == "segments":
@@ -121,7 +139,7 @@ def _drawn(mark: Mark, place: _Placement) -> str:
         path = "".join(
             f"M{a:.0f} {b:.1f}L{c:.0f} {d:.1f}" for a, b, c, d in zip(*ends, strict=True)
         )
-        return f'<path {style} d="{path}" stroke="currentColor" stroke-width="{mark.size:g}"/>'
+        return f'<path class="flat" {style} d="{path}" stroke-width="{mark.size:g}"/>'
     x, y = place.of(mark.arrays[0], 0), place.of(mark.arrays[1], 1)
     if mark.kind == "dots":
         keep = place.inside(x, y)
@@ -131,18 +149,14 @@ def _drawn(mark: Mark, place: _Placement) -> str:
         # From each to the next: a third of the letters.
         moves = zip([(0, 0), *spots], spots, strict=False)
         path = "".join(f"m{c - a}{d - b:+d}h0" for (a, b), (c, d) in moves)
-        return (
-            f'<path {style} d="{path}" stroke="currentColor" stroke-linecap="round" '
-            f'stroke-width="{0.7 * mark.size:g}"/>'
-        )
+        return f'<path {style} d="{path}" stroke-width="{0.7 * mark.size:g}"/>'
     step = max(1, x.size // (int(_WIDTH) // 2))
     if mark.kind == "band":
         line = _line(x[::step], y[::step], 0)
         back = _line(x[::-step], place.of(mark.arrays[2], 1)[::-step], 0)
-        return f'<path {style} d="M{line}L{back}Z" fill="currentColor" fill-opacity=".25"/>'
+        return f'<path class="band" {style} d="M{line}L{back}Z"/>'
     line = _line(x[::step], y[::step], 1)
-    stroke = f'stroke="currentColor" stroke-width="{mark.size:g}"'
-    return f'<path {style} d="M{line}" fill="none" {stroke}/>'
+    return f'<path {style} d="M{line}" stroke-width="{mark.size:g}"/>'
 
 
 def _line(x: Array, y: Array, decimals: int) -> str:
@@ -151,31 +165,37 @@ def _line(x: Array, y: Array, decimals: int) -> str:
 
 def _axes(place: _Placement, across: ChartAxis, up: ChartAxis, width: float, height: float) -> str:
     (left, right), (foot, head) = place.ends
-    parts = [f'<path d="M{left:.0f} {head:.0f}H{right:.0f}V{foot:.0f}H{left:.0f}Z" fill="none"/>']
+    # Frame and grid are one path; its style and that of the texts are the page's.
+    lines = [f"M{left:.0f} {head:.0f}H{right:.0f}V{foot:.0f}H{left:.0f}Z"]
+    across_texts, up_texts = [], []
     for tick in _ticks(across, place.limits[0]):
         at = float(place.of(tick, 0))
-        parts.append(f'<path d="M{at:.0f} {head:.0f}V{foot:.0f}"/>')
-        parts.append(_text(at, foot + 13.0, _number(tick), "middle"))
+        lines.append(f"M{at:.0f} {head:.0f}V{foot:.0f}")
+        across_texts.append(_text(at, foot + 13.0, _number(tick)))
+    across_texts.append(_text(0.5 * (left + right), height - 6.0, across.title))
     if place.categories:
-        parts += [
-            _text(left - 6.0, float(place.of([n], 1)[0]) + 3.5, n, "end") for n in place.categories
+        up_texts += [
+            _text(left - 6.0, float(place.of([n], 1)[0]) + 3.5, n) for n in place.categories
         ]
     elif up.visible:
         for tick in _ticks(up, place.limits[1]):
             at = float(place.of(tick, 1))
-            parts.append(f'<path d="M{left:.0f} {at:.0f}H{right:.0f}"/>')
-            parts.append(_text(left - 6.0, at + 3.5, _number(tick), "end"))
+            lines.append(f"M{left:.0f} {at:.0f}H{right:.0f}")
+            up_texts.append(_text(left - 6.0, at + 3.5, _number(tick)))
         middle = 0.5 * (foot + head)
-        turned = f' transform="rotate(-90 11 {middle:.0f})"'
-        parts.append(_text(11.0, middle, up.title, "middle", turned))
-    parts.append(_text(0.5 * (left + right), height - 6.0, across.title, "middle"))
-    return f'<g class="axes">{"".join(parts)}</g>'
+        across_texts.append(
+            _text(11.0, middle, up.title, f' transform="rotate(-90 11 {middle:.0f})"')
+        )
+    return (
+        f'<g class="axes"><path d="{"".join(lines)}"/>{"".join(across_texts)}'
+        f'<g class="up">{"".join(up_texts)}</g></g>'
+    )
 
 
-def _text(x: float, y: float, text: str, anchor: str, more: str = "") -> str:
+def _text(x: float, y: float, text: str, more: str = "") -> str:
     from html import escape
 
-    return f'<text x="{x:.0f}" y="{y:.0f}" text-anchor="{anchor}"{more}>{escape(text)}</text>'
+    return f'<text x="{x:.0f}" y="{y:.0f}"{more}>{escape(text)}</text>'
 
 
 def _ticks(axis: ChartAxis, limits: tuple[float, float]) -> list[float]:

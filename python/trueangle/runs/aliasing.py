@@ -158,7 +158,7 @@ class Positions:
 def distinct_positions(
     runs: CalibrationRun | Iterable[CalibrationRun], tolerance: float | None = None
 ) -> Positions:
-    r"""Distinct reference angles of all runs modulo a turn.
+    """Distinct reference angles of all runs modulo a turn.
 
     0 and 360 degrees are one position, and so are repeats: they add no rank, only
     knowledge of the noise and a check of closure.
@@ -313,9 +313,11 @@ def fold(order: int, divisions: int) -> tuple[int, int]:
 def position_coherence(
     positions: Positions, order: float, others: Sequence[float] | Array
 ) -> Array:
-    r"""How alike ``order`` and each of ``others`` look at these positions, 0 to 1.
+    """How alike ``order`` and each of ``others`` look at these positions, 0 to 1.
 
-    .. math:: \max_\pm \Big|\frac1P \sum_p e^{2\pi i (m \pm k) t_p}\Big|
+    ::
+
+        max_± |Σ_p e^(2π i (m ± k) t_p)| / P
 
     1 means that no reading at these positions tells them apart: they are aliases.
     """

@@ -34,9 +34,11 @@ class _Part(NamedTuple):
 
 
 class Angles(NamedTuple):
-    r"""Columns of the reference with what is added to it, of the indicated angle, or of the error.
+    """Columns of the reference with what is added to it, of the indicated angle, or of the error.
 
-    .. math:: r = r_0 + \delta(r_0 + m) + \sum_i o_i, \qquad y = r + e
+    ::
+
+        r = r₀ + δ(r₀ + m) + Σ_i o_i,    y = r + e
 
     with the offsets o, the deviation of the facet at the nominal angle and the mount m; where
     there is an error e, either r or y is made of the other one.
@@ -126,7 +128,7 @@ def find_angles(
             _refuse_missing(path, header, role)
     if len(found) == 3:
         raise error(
-            "an error stands beside either of the two angles: leave one of the three out",
+            "an error is given with one of the two angles: leave one of the three out",
             found["error"].name,
         )
     first = found.get("reference") or found["indicated"]

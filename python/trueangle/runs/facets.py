@@ -56,7 +56,7 @@ class Facets(NamedTuple):
             facet = self.places[int(nearest[row]) % len(self.places)]
             raise FileError(
                 path,
-                f"reading {row + 1} is at {360.0 * (turns[row] % 1.0):g} deg, which is no facet "
+                f"reading {row + 1} is at {360.0 * (turns[row] % 1.0):g} deg, which is not a facet "
                 f"of {self.file}: the nearest is at {360.0 * facet:g} deg",
                 column=column,
             )

@@ -40,7 +40,7 @@ _TOLD = 1e-4
 
 
 #: A short travel (turns), a single pass over it (travel there over its width), readings of a
-#: log, periods that a line needs to come back, and correlation that is no noise of readings.
+#: log, periods that a line needs to come back, and correlation that is not noise of readings.
 _SHORT = 0.25
 _ONE_PASS = 1.5
 _LONG = 100

@@ -13,7 +13,7 @@ Array = NDArray[np.float64]
 
 
 class BandedFactor:
-    r"""Cholesky factor :math:`L L^T` of a matrix of four diagonals: O(n) work and memory.
+    """Cholesky factor ``L Lᵀ`` of a matrix of four diagonals: O(n) work and memory.
 
     Raises
     ------

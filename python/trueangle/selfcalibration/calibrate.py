@@ -39,10 +39,12 @@ def selfcal(
     period: float | None = None,
     **reading: Unpack[OtherReading],
 ) -> SelfCalibration:
-    r"""Calibrate a joint without a reference: from time stamps, heads, shifts or a motor.
+    """Calibrate a joint without a reference: from time stamps, heads, shifts or a motor.
 
-    .. math:: r_i = S(t_i)\,c + H(\theta_i)\,a + (\omega_m/\omega_i)^2 H(\theta_i)\,b + n_i,
-              \quad \theta_i = r_i - H(\theta_i)\,a
+    ::
+
+        r_i = S(t_i) c + H(θ_i) a + (ω_m/ω_i)² H(θ_i) b + n_i,
+        θ_i = r_i - H(θ_i) a
 
     Parameters
     ----------

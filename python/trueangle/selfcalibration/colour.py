@@ -28,7 +28,7 @@ _CHUNK: Final = 4096
 
 
 def spectrum_at(theta: Array, values: Array, orders: Array) -> Array:
-    r""":math:`2\,|\sum_i e_i \exp(-ik\theta_i)|^2 / \sum e^2`: 2 on average in white noise."""
+    """``2 |Σ_i e_i exp(-ikθ_i)|² / Σ e²``: 2 on average in white noise."""
     total = float(values @ values)
     if total == 0.0:
         return np.zeros(orders.size)

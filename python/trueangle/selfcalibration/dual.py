@@ -243,8 +243,8 @@ def _blind(
         blind.append(
             Blind(
                 tuple(line.order for line in lost),
-                f"{turns:.2g} turns of the output hold too little of them beside the zero and "
-                "the other orders",
+                f"{turns:.2g} turns of the output hold too little of them to separate them from "
+                "the zero and the other orders",
                 "travel over whole turns of the output",
             )
         )

@@ -114,7 +114,7 @@ def heads(
 def _zero() -> Blind:
     return Blind(
         (0.0,),
-        "the zero: no reading without a reference shows it",
+        "no reading without a reference shows it",
         "set the zero at a mark or an index pulse",
     )
 

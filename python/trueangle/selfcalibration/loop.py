@@ -32,10 +32,10 @@ def check_loop(loop: str, bandwidth: float | None) -> None:
 def followed_orders(
     orders: Sequence[float], loop: str, bandwidth: float | None, slowest: float
 ) -> tuple[tuple[float, ...], Blind | None]:
-    r"""Orders that the loop may have followed, and how to say so.
+    """Orders that the loop may have followed, and how to say so.
 
-    With closed-loop transfer T the shaft moves by :math:`-T\varepsilon` and the log shows
-    :math:`(1 - T)\varepsilon`: hidden where T = 1, amplified where T has turned in phase.
+    With closed-loop transfer T the shaft moves by ``-Tε`` and the log shows
+    ``(1 - T)ε``: hidden where T = 1, amplified where T has turned in phase.
 
     Parameters
     ----------

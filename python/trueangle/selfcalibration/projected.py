@@ -58,7 +58,7 @@ def harmonic_rows(
     factor: Array | None = None,
     lead: Array | None = None,
 ) -> Array:
-    r"""``cos k theta, sin k theta`` of each whole order in turn, shape (2 orders, n).
+    """``cos k theta, sin k theta`` of each whole order in turn, shape (2 orders, n).
 
     Neighbouring orders are made by one complex product each: within ``k`` roundings.
     With ``lead`` the phase ``lead / k`` is added, with ``factor`` each reading is scaled.
@@ -86,17 +86,17 @@ def harmonic_sum(
 
 @dataclass(frozen=True)
 class Projected:
-    r"""Least squares for the columns that matter, after the nuisances are eliminated.
+    """Least squares for the columns that matter, after the nuisances are eliminated.
 
     Parameters
     ----------
     columns : sequence of Column
     information : ndarray, shape (m, m)
-        :math:`X^T (I - \Pi) X`, with the nuisances (and their priors) projected out.
+        ``Xᵀ (I - Π) X``, with the nuisances (and their priors) projected out.
     right : ndarray, shape (m,)
-        :math:`X^T (I - \Pi) y`.
+        ``Xᵀ (I - Π) y``.
     alone : ndarray, shape (m,)
-        :math:`x_j^T x_j`: what each column would have with nothing beside it.
+        ``x_jᵀ x_j``: what each column would have with nothing beside it.
     variance : float
         Of one reading, about the fit.
     freedom : float
@@ -144,9 +144,9 @@ class Projected:
         return self.variance * self.inverse
 
     def retained(self, among: Sequence[int] | None = None) -> Array:
-        r"""Share of each column's square that nothing else explains.
+        """Share of each column's square that nothing else explains.
 
-        :math:`1 / (A^{-1}_{jj}\, x_j^T x_j)`: 1 where it stands alone, 0 where it is not seen.
+        ``1 / (A⁻¹_jj x_jᵀ x_j)``: 1 where it stands alone, 0 where it is not seen.
         """
         with np.errstate(divide="ignore", invalid="ignore"):
             share = 1.0 / (np.diagonal(self.inverse) * self.alone)

@@ -1,6 +1,6 @@
-r"""Speed ripple beside the encoder's pattern: both, weighed by what the readings say of it.
+"""Speed ripple beside the encoder's pattern: both, weighed by what the readings say of it.
 
-A torque :math:`T_k \cos k\theta` moves a free shaft by :math:`T_k / (J k^2 \omega^2)`. Where the
+A torque ``T_k cos kθ`` moves a free shaft by ``T_k / (J k² ω²)``. Where the
 speed changes, the ripple is told from the pattern, at the cost of a greater standard error.
 Where it is not there, that cost is not due. So its size is given a distribution: nothing with
 probability one half, else any size, equally probable per octave; the standard error and the
@@ -31,9 +31,11 @@ _NONE: Final = 0.5
 
 
 def cost_of_ripple(ripple: Array) -> float:
-    r"""Factor of the standard error when ripple columns :math:`\rho\,H` stand beside ``H``.
+    """Factor of the standard error when ripple columns ``ρ H`` stand beside ``H``.
 
-    .. math:: (1 - \overline{\rho}^2 / \overline{\rho^2})^{-1/2}
+    ::
+
+        (1 - ρ̄² / mean(ρ²))^(-1/2)
 
     Examples
     --------

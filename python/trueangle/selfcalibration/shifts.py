@@ -76,7 +76,7 @@ def shifts(
         kept = tuple(k for k in kept if k not in lost)
     if not kept:
         raise NoModelError(
-            f"{recordings[0].named}: no order can be told: "
+            f"{recordings[0].named}: no order can be determined: "
             + (f"all shifts are alike at orders {ranges(lost)}" if lost else "none stands out")
         )
     count = sum(a.size for a in design.joint)

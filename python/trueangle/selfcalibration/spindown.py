@@ -200,7 +200,7 @@ def _sorted_out(
     blind = [
         Blind(
             (0.0,),
-            "the zero: no reading without a reference shows it; order k turns by k times the "
+            "no reading without a reference shows it; order k turns by k times the "
             "difference of two zeros",
             "set the zero at a mark or an index pulse",
         )
@@ -219,7 +219,7 @@ def _sorted_out(
             Blind(
                 lost,
                 f"order {ranges(lost)} of {ENCODER} together with {what}: less than "
-                f"{LEAST_RETAINED:.0%} of them is left beside it",
+                f"{LEAST_RETAINED:.0%} of them is left jointly with it",
                 "turn faster or more steadily, with more inertia",
             )
         )
@@ -281,7 +281,7 @@ def _notes(
     if loud:
         k, c = max(loud, key=lambda pair: pair[1])
         notes.append(
-            f"what is left is not white: {c:.1f} times the white noise beside order {k:g}; the "
+            f"what is left is not white: {c:.1f} times the white noise near order {k:g}; the "
             "standard errors allow for it"
         )
     wild = int((~fit.valid).sum())

@@ -94,10 +94,11 @@ def basis(place: Array) -> Array:
 
 
 class Wander:
-    r"""Prior of the motion: the acceleration is noise of one roughness with a memory.
+    """Prior of the motion: the acceleration is noise of one roughness with a memory.
 
-    .. math:: \lambda \sum (\Delta^3 c)^2 + \mu \sum (\Delta^2 c)^2,\quad
-              \mu = \lambda\,(h/\tau)^2
+    ::
+
+        λ Σ (Δ³ c)² + μ Σ (Δ² c)²,    μ = λ (h/τ)²
 
     What is left free is constant speed; ``tau`` is the memory in seconds, ``h`` the spacing.
     """
@@ -122,7 +123,7 @@ class Wander:
         )
 
     def ratio(self, memory: float) -> float:
-        r""":math:`\mu / \lambda`."""
+        """``μ / λ``."""
         return (self.knots.spacing / memory) ** 2
 
     def bands(self, stiffness: float, memory: float) -> Array:

@@ -75,14 +75,14 @@ def fit_steady(
     smooth: bool = False,
     like: MotionFit | None = None,
 ) -> SteadyFit:
-    r"""Gauss-Newton on :math:`r = \theta + \varepsilon(\theta)`, :math:`\theta = S c + \rho H b`.
+    """Gauss-Newton on ``r = θ + ε(θ)``, ``θ = S c + ρ H b``.
 
     Parameters
     ----------
     readings : Readings
     orders, ripple : sequence of int
         Orders of the encoder, and those at which the speed may ripple:
-        :math:`\rho = (\omega_m / \omega)^2`.
+        ``ρ = (ω_m / ω)²``.
     start : SteadyFit, optional
         Where to begin.
     groups : ndarray of int, optional
@@ -177,7 +177,7 @@ def fit_steady(
 
 
 def _settled(fit: MotionFit, orders: Sequence[float]) -> bool:
-    r"""Whether a further step would be small: it is of second order, :math:`k\,\delta^2`."""
+    """Whether a further step would be small: it is of second order, ``k δ²``."""
     step = float(np.linalg.norm(fit.unknowns[: 2 * len(orders)]))
     std = np.sqrt(np.maximum(np.diagonal(fit.projected.covariance), 0.0))
     return bool(

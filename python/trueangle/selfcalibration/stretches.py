@@ -82,11 +82,11 @@ class Segment:
 
 
 def ripple_lead(stretch: Segment, speed: Array) -> Array:
-    r"""Phase by which the ripple of order 1 leads that of a shaft at constant speed.
+    """Phase by which the ripple of order 1 leads that of a shaft at constant speed.
 
-    A rotor of friction :math:`f(\omega)` answers the torque :math:`T e^{ik\theta}` by
-    :math:`-\frac{T}{k^2\omega^2} e^{i(k\theta + \varphi/k)}` with
-    :math:`\varphi = (f'\omega - 3\dot\omega)/\omega^2`, to first order in the deceleration.
+    A rotor of friction ``f(ω)`` answers the torque ``T e^(ikθ)`` by
+    ``-T / (k² ω²) e^(i(kθ + φ/k))`` with
+    ``φ = (f'ω - 3ω̇)/ω²``, to first order in the deceleration.
     """
     if stretch.turns < 6.0:
         return np.zeros(speed.size)
@@ -210,9 +210,9 @@ def _unwrapped(recording: Recording, time: Array, angle: Array) -> Array:
         rate = 1.0 / float(np.median(np.diff(time)[np.diff(time) > 0.0]))
         raise _fault(
             recording,
-            f"steps of {max(usual, 0.4):.2g} turn between readings at {rate:.3g} Hz cannot be told "
-            f"from motion the other way: read at least {4.0 * rate:.3g} times a second or turn "
-            "slower",
+            f"steps of {max(usual, 0.4):.2g} turn between readings at {rate:.3g} Hz cannot be "
+            f"distinguished from motion the other way: read at least {4.0 * rate:.3g} times a "
+            "second or turn slower",
         )
     return np.asarray(np.unwrap(angle, period=turn))
 

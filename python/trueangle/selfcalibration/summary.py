@@ -33,7 +33,7 @@ def summary(result: SelfCalibration, errors_in: ErrorsIn = "auto") -> str:
         lines += ["", *_table(result.orders, unit)]
     if result.sums:
         lines += ["", "not the encoder's alone:", *_table(result.sums, unit)]
-    lines += ["", "blind to"]
+    lines += ["", "cannot be identified"]
     for blind in result.blind:
         lines += wrapped(f"{listed(blind.orders)}: {blind.because}", 4, 2)
         lines += wrapped(f"to see it: {blind.measure}", 6, 4)
@@ -53,7 +53,7 @@ def summary(result: SelfCalibration, errors_in: ErrorsIn = "auto") -> str:
 def _table(orders: tuple[OrderEstimate, ...], unit: ErrorUnit) -> list[str]:
     names = {o.of for o in orders} != {"the encoder"}
     lines = [
-        f"   order  {f'amplitude/{unit.name}':>16}     std  phase/deg  retained  factor"
+        f"   order  {f'amplitude/{unit.name}':>16}      +-  phase/deg  retained  factor"
         + ("  of" if names else "")
     ]
     for o in orders:

@@ -1,16 +1,19 @@
-r"""The shaft as an inertia: what moves it beside the speed that a run asks for.
+"""The shaft as an inertia: what moves it beside the speed that a run asks for.
 
-.. math:: \ddot\theta = -\gamma\dot\theta + c \sin(m\theta + \varphi) + u \sin(\theta + \psi)
-          + f(t) + a
+::
 
-with viscous friction :math:`\gamma` (none at constant speed), cogging, imbalance and a friction
-that wanders, all as accelerations, and :math:`a` what a velocity loop asks of the motor. The
+    θ̈ = -γθ̇ + c sin(mθ + φ) + u sin(θ + ψ) + f(t) + a
+
+with viscous friction ``γ`` (none at constant speed), cogging, imbalance and a friction
+that wanders, all as accelerations, and ``a`` what a velocity loop asks of the motor. The
 loop is closed on the encoder under test: with what the encoder reads, r, and its speed,
 
-.. math:: a = \omega_b (\dot r_0 - \dot r) + \tfrac14 \omega_b^2 (r_0 - r),
-          \quad T(s) = \frac{\omega_b s + \omega_b^2/4}{(s + \omega_b/2)^2},
+::
 
-so that the shaft moves by :math:`-T\varepsilon` and the log shows :math:`(1 - T)\varepsilon`.
+    a = ω_b (ṙ₀ - ṙ) + 1/4 ω_b² (r₀ - r),
+    T(s) = (ω_b s + ω_b²/4) / ((s + ω_b/2)²),
+
+so that the shaft moves by ``-Tε`` and the log shows ``(1 - T)ε``.
 """
 
 from __future__ import annotations

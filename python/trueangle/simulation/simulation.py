@@ -35,9 +35,11 @@ EFFECT = "an effect of a simulation, in arcsec and degrees"
 @told_kinds
 @dataclass(frozen=True)
 class Simulation(Shown):
-    r"""What is believed of a joint, and how it is measured.
+    """What is believed of a joint, and how it is measured.
 
-    .. math:: \varepsilon = p(\theta) + \sum_e \varepsilon_e + n
+    ::
+
+        ε = p(θ) + Σ_e ε_e + n
 
     with the true angle theta as the argument of every line.
 
@@ -228,7 +230,7 @@ def simulate_along(
     seed: int | np.random.Generator = 0,
     correlation: float = 0.0,
 ) -> list[CalibrationRun]:
-    r"""Measure a simulated joint along the motion of runs that there are.
+    """Measure a simulated joint along the motion of runs that there are.
 
     Parameters
     ----------
@@ -237,7 +239,7 @@ def simulate_along(
     runs : iterable of CalibrationRun
     seed : int or numpy.random.Generator
     correlation : float
-        Of the noise, from one reading to the next: :math:`n_t = \rho n_{t-1} + e_t` within a run,
+        Of the noise, from one reading to the next: ``n_t = ρ n_{t-1} + e_t`` within a run,
         of the simulation's standard deviation.
 
     Returns

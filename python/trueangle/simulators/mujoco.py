@@ -28,9 +28,11 @@ _STEPS = 100
 
 
 class SensorLayer:
-    r"""What the encoders of joints would say: true angles of MuJoCo with their errors.
+    """What the encoders of joints would say: true angles of MuJoCo with their errors.
 
-    .. math:: r_j = \theta_j + \varepsilon_j(\theta_j, \dot\theta_j, \tau_j, \ldots)
+    ::
+
+        r_j = θ_j + ε_j(θ_j, θ̇_j, τ_j, ...)
 
     MuJoCo has no harmonic error of a sensor, and no play that leaves the joint alone; models
     of trueangle have both, with the state that play and hysteresis need. A joint's velocity is
@@ -206,7 +208,7 @@ class _Encoder:
         self._field, self.at = "qpos", 0
         if joint < 0 and sensor >= 0:
             if mjmodel.sensor_type[sensor] != mujoco.mjtSensor.mjSENS_JOINTPOS:
-                raise ArgumentError(f"sensor {name!r} is no jointpos: it reads no joint's angle")
+                raise ArgumentError(f"sensor {name!r} is not a jointpos: it reads no joint's angle")
             joint = int(mjmodel.sensor_objid[sensor])
             self._field, self.at = "sensordata", int(mjmodel.sensor_adr[sensor])
         if joint < 0:
@@ -216,7 +218,7 @@ class _Encoder:
                 f"{', '.join(names) or 'none'}"
             )
         if mjmodel.jnt_type[joint] != mujoco.mjtJoint.mjJNT_HINGE:
-            raise ArgumentError(f"joint {name!r} is no hinge: its position is no angle")
+            raise ArgumentError(f"joint {name!r} is not a hinge: its position is not an angle")
         if self._field == "qpos":
             self.at = int(mjmodel.jnt_qposadr[joint])
         self._dof = int(mjmodel.jnt_dofadr[joint])

@@ -20,6 +20,7 @@ __all__ = [
     "circular_mean",
     "unit_name",
     "wrap",
+    "zero_text",
 ]
 
 
@@ -37,6 +38,19 @@ def check_period(period: float) -> float:
     return value
 
 
+def zero_text(value: float, period: float) -> str:
+    """A zero in the unit of ``period``, to a hundredth of an arcsecond at least.
+
+    Examples
+    --------
+    >>> zero_text(3.59802e-05, 360.0)
+    '0.000036 deg'
+    """
+    decimals = max(0, math.ceil(-math.log10(0.01 / arcsec(1.0, period))))
+    # Adding zero takes the sign off what is rounded to nothing.
+    return f"{round(value, decimals) + 0.0:.{decimals}f} {unit_name(period)}"
+
+
 def unit_name(period: float) -> str:
     """Name of the unit in which one turn is ``period``: deg, rad, turn or count."""
     for name, value in UNIT_PERIODS.items():
@@ -52,9 +66,11 @@ def arcsec(angle: float, period: float) -> float:
 
 @told_kinds
 def wrap(angle: ArrayLike, period: float = 2.0 * math.pi) -> NDArray[np.float64]:
-    r"""Angle moved by whole turns into ``(-period/2, period/2]``.
+    """Angle moved by whole turns into ``(-period/2, period/2]``.
 
-    .. math:: \mathrm{wrap}(x) = x - p\,\lceil x/p - 1/2 \rceil
+    ::
+
+        wrap(x) = x - p ceil(x/p - 1/2)
 
     Parameters
     ----------

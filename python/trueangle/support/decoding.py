@@ -41,7 +41,7 @@ def shown(value: Any, most: int = 60) -> str:
 
 
 def finite(value: Any) -> float | None:
-    """``value`` as a float, or None where it is no finite number; true is no number."""
+    """``value`` as a float, or None where it is no finite number; true is not a number."""
     if isinstance(value, bool) or not isinstance(value, (int, float)):
         return None
     try:

@@ -151,7 +151,7 @@ def error_unit(
 
 
 def sine_of_rms(rms: float) -> float:
-    r"""Amplitude of the sine that has this rms, :math:`\sqrt 2\,\mathrm{rms}`; 0 if unknown.
+    """Amplitude of the sine that has this rms, ``√2 rms``; 0 if unknown.
 
     Examples
     --------

@@ -47,7 +47,7 @@ _NORMAL_BEYOND: Final = 1e12
 
 
 def normal_tail(x: float) -> float:
-    r"""Probability :math:`P(Z > x)` of the standard normal distribution.
+    """Probability ``P(Z > x)`` of the standard normal distribution.
 
     Examples
     --------
@@ -58,16 +58,18 @@ def normal_tail(x: float) -> float:
 
 
 def normal_quantile(p: float) -> float:
-    r"""The x with :math:`P(Z \le x) = p`; p inside (0, 1), relative accuracy 1e-15."""
+    """The x with ``P(Z ≤ x) = p``; p inside (0, 1), relative accuracy 1e-15."""
     from statistics import NormalDist  # loads decimal and random: only where it is asked
 
     return NormalDist().inv_cdf(_probability(p))
 
 
 def student_tail(t: float, degrees_of_freedom: float) -> float:
-    r"""Probability :math:`P(T_\nu > t)` of Student's distribution, to about 1e-13 relative.
+    """Probability ``P(T_ν > t)`` of Student's distribution, to about 1e-13 relative.
 
-    .. math:: P(T_\nu > t) = \tfrac12 I_{\nu/(\nu+t^2)}(\nu/2, 1/2),\quad t \ge 0
+    ::
+
+        P(T_ν > t) = 1/2 I_{ν/(ν+t²)}(ν/2, 1/2),    t ≥ 0
 
     Parameters
     ----------
@@ -113,7 +115,7 @@ def student_quantile(p: float, degrees_of_freedom: float) -> float:
 
 
 def chi_squared_tail(x: float, degrees_of_freedom: float) -> float:
-    r"""Probability :math:`P(\chi^2_\nu > x) = Q(\nu/2, x/2)`, to about 1e-13 relative.
+    """Probability ``P(χ²_ν > x) = Q(ν/2, x/2)``, to about 1e-13 relative.
 
     Examples
     --------
@@ -137,9 +139,11 @@ def chi_squared_quantile(p: float, degrees_of_freedom: float) -> float:
 
 
 def f_tail(f: float, numerator: float, denominator: float) -> float:
-    r"""Probability that Fisher's F with (d1, d2) degrees of freedom exceeds ``f``.
+    """Probability that Fisher's F with (d1, d2) degrees of freedom exceeds ``f``.
 
-    .. math:: P(F > f) = I_{d_2/(d_2 + d_1 f)}(d_2/2, d_1/2)
+    ::
+
+        P(F > f) = I_{d₂/(d₂+d₁f)}(d₂/2, d₁/2)
 
     An infinite denominator gives chi-squared over its degrees of freedom.
 
@@ -171,7 +175,7 @@ def f_quantile(p: float, numerator: float, denominator: float) -> float:
 
 
 def incomplete_beta(a: float, b: float, x: float) -> float:
-    r"""Regularised incomplete beta function :math:`I_x(a, b)`, a, b > 0, 0 <= x <= 1.
+    """Regularised incomplete beta function ``I_x(a, b)``, a, b > 0, 0 <= x <= 1.
 
     The continued fraction of DLMF 8.17.22, on the side where it converges fast.
     """
@@ -186,7 +190,7 @@ def incomplete_beta(a: float, b: float, x: float) -> float:
 
 
 def incomplete_gamma_tail(a: float, x: float) -> float:
-    r"""Regularised upper incomplete gamma function :math:`Q(a, x)`, a > 0, x >= 0.
+    """Regularised upper incomplete gamma function ``Q(a, x)``, a > 0, x >= 0.
 
     By its series below a + 1 (DLMF 8.7.1) and its continued fraction above (8.9.2).
     """

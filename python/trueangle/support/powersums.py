@@ -20,9 +20,11 @@ _BLOCK: Final = 512
 def power_sums(
     turns: NDArray[np.float64], columns: NDArray[np.float64], count: int
 ) -> NDArray[np.complex128]:
-    r"""Sums of ``columns`` under the powers of points on the unit circle.
+    """Sums of ``columns`` under the powers of points on the unit circle.
 
-    .. math:: S_{mj} = \sum_i c_{ij} e^{2\pi i m t_i}, \qquad m = 0, \dots, \text{count} - 1
+    ::
+
+        S_mj = Σ_i c_ij e^(2π i m t_i),    m = 0, ..., count - 1
 
     Parameters
     ----------

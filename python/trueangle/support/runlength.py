@@ -1,4 +1,4 @@
-r"""Run lengths of cumulative-sum charts, and the limits that give them."""
+"""Run lengths of cumulative-sum charts, and the limits that give them."""
 
 from __future__ import annotations
 
@@ -20,14 +20,15 @@ _NODES: Final = 64
 
 @told_kinds
 def run_length(allowance: float, limit: float, shift: float = 0.0) -> float:
-    r"""Values until a two-sided cumulative sum alarms, on average.
+    """Values until a two-sided cumulative sum alarms, on average.
 
     A one-sided sum from z has the mean run length (Page's integral equation)
 
-    .. math:: L(z) = 1 + L(0)\,\Phi(k - z - \delta) + \int_0^h L(y)\,
-              \varphi(y + k - z - \delta)\, dy,
+    ::
 
-    and the two sides together :math:`1/L = 1/L^+ + 1/L^-` (Kemp 1961).
+        L(z) = 1 + L(0) Φ(k - z - δ) + ∫_0^h L(y) φ(y + k - z - δ) dy,
+
+    and the two sides together ``1/L = 1/L⁺ + 1/L⁻`` (Kemp 1961).
 
     Parameters
     ----------

@@ -40,7 +40,9 @@ def did_you_mean(got: str, known: Iterable[str]) -> str:
 
     # A wide log has thousands: more are looked through only to be told nothing.
     words = {word.lower(): word for word in reversed(list(islice(known, _LOOKED_AT)))}
-    near = difflib.get_close_matches(got.lower(), words, n=1, cutoff=0.6)
+    near = difflib.get_close_matches(got.lower(), words, n=3, cutoff=0.6)
+    # Words are begun right more often than ended right.
+    near.sort(key=lambda word: word[:2] != got.lower()[:2])
     return f"; did you mean {words[near[0]]}?" if near else ""
 
 

@@ -76,7 +76,7 @@ def test_a_urdf_names_joints_and_ratios(arm):
 @pytest.mark.parametrize(
     ("text", "says"),
     [
-        ("<robot", "is no XML"),
+        ("<robot", "is not XML"),
         ("<a/>", "begins with <a>, not with <robot>"),
         ("<robot/>", "names no joint that turns"),
         ('<!DOCTYPE robot [<!ENTITY a "b">]><robot/>', "declares a document type"),
@@ -203,7 +203,7 @@ def test_wrong_options_beside_a_robot_are_named(options, says, arm, capsys):
         ("gear_ratio = 51.0", "gear_ratio = -1.0", "key 'joint[1].gear_ratio': must be positive"),
         ("reference = ", "refrence = ", "no column has the role 'refrence'"),
         ("fixed_member", "fixed_part", "'joint[0].fixed_part': is unknown"),
-        ('name = "arm"', "name = arm", "is no TOML"),
+        ('name = "arm"', "name = arm", "is not TOML"),
     ],
 )
 def test_a_robot_file_that_is_wrong_says_where(old, new, says, arm, tmp_path, capsys):

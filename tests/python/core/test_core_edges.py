@@ -1,4 +1,4 @@
-"""The core at its edges: last readings, half turns, what is no number, what has not moved."""
+"""The core at its edges: last readings, half turns, what is not a number, what has not moved."""
 
 import numpy as np
 import pytest
@@ -92,7 +92,7 @@ def test_sums_of_another_turn_or_shaft_do_not_merge(other):
     assert made.count == 2
 
 
-# -- what is no number -----------------------------------------------------------------
+# -- what is not a number -----------------------------------------------------------------
 
 
 @pytest.mark.parametrize("wrong", [np.nan, np.inf, -np.inf])

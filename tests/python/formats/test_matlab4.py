@@ -78,7 +78,7 @@ def test_what_is_damaged_or_not_read_is_told(tmp_path):
     with pytest.raises(FileError, match="has no header"):
         ta.read_runs(path)
     io.savemat(path, {"a": TRUE[:, None], "s": sparse.eye_array(3).tocoo()}, format="4")
-    with pytest.raises(FileError, match="no full one of numbers or text of MATLAB 4"):
+    with pytest.raises(FileError, match="not a full one of numbers or text of MATLAB 4"):
         ta.read_runs(path)
     written(path)
     io.savemat(path, {"reference_deg": TRUE, "indicated_deg": READ[:-1]}, format="4")

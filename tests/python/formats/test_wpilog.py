@@ -100,7 +100,7 @@ def test_a_copy_gets_an_entry_and_keeps_its_bytes(tmp_path):
         (EXAMPLE[:-1], "record at byte 58 goes beyond its end"),
         (EXAMPLE[:6] + b"\x00\x02" + EXAMPLE[8:], "version 2.0; version 1 is read"),
         (EXAMPLE[:44] + b"\x20\x02" + EXAMPLE[46:], "byte 44 is of an entry never started"),
-        (EXAMPLE[:10], "is no data log"),
+        (EXAMPLE[:10], "is not a data log"),
         (EXAMPLE.replace(b"\x04\x00\x00\x00test", b"\xff\x00\x00\x00test"), "byte 12 is cut short"),
     ],
 )

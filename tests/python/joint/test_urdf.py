@@ -51,7 +51,7 @@ def test_joints_that_turn_and_their_ratios(tmp_path: Path) -> None:
         ("-50.5", "0", "got '0'"),
         ("-50.5", "inf", "got 'inf'"),
         ("-50.5", "", "got ''"),
-        ("</robot>", "", "is no XML: (?!.*xacro)"),
+        ("</robot>", "", "is not XML: (?!.*xacro)"),
         ("</robot>", "xacro", "expand xacro first"),
         ("<robot", "<!DOCTYPE robot><robot", "declares a document type"),
         ("revolute", "fixed", None),

@@ -205,7 +205,10 @@ def test_the_command(capsys):
     told = capsys.readouterr().out
     assert "place/deg  readings" in told
     assert "arcsec at the worst place" in told
-    for wrong, why in ((["--arc", "90"], "is no arc"), (["--uncertainty", "x"], "is no angle")):
+    for wrong, why in (
+        (["--arc", "90"], "is not an arc"),
+        (["--uncertainty", "x"], "is not an angle"),
+    ):
         with pytest.raises(SystemExit):
             main(["plan", *wrong])
         assert why in capsys.readouterr().err

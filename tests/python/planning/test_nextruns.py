@@ -100,7 +100,7 @@ def test_where_no_run_tells_there_is_none(found):
     )
     assert still.runs == ()
     assert "no run within the limits" in still.notes[0]
-    assert "not told: thermal_drift" in still.summary()
+    assert "not distinguished: thermal_drift" in still.summary()
 
 
 def test_what_was_not_seen_is_opened_a_little_beyond(found):
@@ -125,7 +125,7 @@ def test_the_summary_is_a_table_for_the_rig(plan, found):
     text = plan.summary()
     assert "next-1" in text
     assert "- move " in text
-    assert "tells backlash or latency" in text
+    assert "distinguishes backlash or latency" in text
     assert "Next: 1 run of" in found.summary()
 
 

@@ -119,7 +119,7 @@ def test_a_diagnosis_has_the_same_unit_convention_and_digits(runs, fit) -> None:
 
 
 def test_eight_runs_that_repeat_tell_the_noise() -> None:
-    """A fast line of a new phase in every run moves no low order: its power is no noise of them."""
+    """A fast line of a new phase in every run moves no low order: it is not noise of them."""
     rng = np.random.default_rng(33)
     theta = np.arange(0.0, 360.0, 0.72)
     runs = []

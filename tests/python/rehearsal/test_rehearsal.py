@@ -115,7 +115,7 @@ def test_the_summary_says_it_all(seen):
     text = " ".join(seen.summary().split())
     assert "backlash, half_width_arcsec" in text
     assert "Not named in these runs:" in text
-    assert "- thermal_drift: the temperature varies by less than 2 K. To tell: " in text
+    assert "- thermal_drift: the temperature varies by less than 2 K. To find out: " in text
     assert "Next: " in text
     assert "shows thermal_drift" in text
     assert "real ones are never exact" in text

@@ -14,8 +14,8 @@ from bokeh.document import Document
 
 from trueangle.reports.charts import Chart
 
-#: Numbers drawn keep 15 bits of their mantissa.
-ROUNDED = 2.0**-15
+#: Numbers drawn keep 13 bits of their mantissa.
+ROUNDED = 2.0**-13
 
 #: Patterns of lines as Bokeh reads their names.
 DASHES = {"solid": [], "dashed": [6]}

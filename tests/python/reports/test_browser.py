@@ -229,9 +229,9 @@ def test_tables_equal_the_json(page: Page, made) -> None:
     result = json.loads(page.page.locator("#result").text_content())
     assert result == made.content
     shown = page.page.evaluate(
-        """[...document.querySelectorAll("td .n, .card .n, p .n")]
+        """[...document.querySelectorAll("[data-path]")]
            .map((e) => [e.dataset, e.textContent]).map(([data, text]) =>
-             [data.path, Number(data.per || 1), Number(data.digits), text])"""
+             [data.path, Number(data.per || 1), (text.split(".")[1] || "").length, text])"""
     )
     assert len(shown) > 150
     for path, per, digits, text in shown:

@@ -55,9 +55,9 @@ def test_drawn_numbers_are_near_and_short() -> None:
     rng = np.random.default_rng(20261122)
     values = np.concatenate([rng.normal(0.0, 10.0 ** rng.uniform(-6, 6, 4000)), [0.0, 360.0, -1.0]])
     drawn = _short(values)
-    np.testing.assert_allclose(drawn, values, rtol=2.0**-15)
-    assert np.abs(drawn / np.where(values == 0.0, 1.0, values) - 1.0)[:-3].max() > 2.0**-18
-    assert not np.any(drawn.view(np.uint32) & 0xFF)
+    np.testing.assert_allclose(drawn, values, rtol=2.0**-13)
+    assert np.abs(drawn / np.where(values == 0.0, 1.0, values) - 1.0)[:-3].max() > 2.0**-16
+    assert not np.any(drawn.view(np.uint32) & 0x3FF)
     assert drawn[-3:].tolist() == [0.0, 360.0, -1.0]
     # One bit below a power of two carries into it; what is not finite stays.
     assert _short(np.array([np.nextafter(np.float32(2.0), 0.0)])).tolist() == [2.0]

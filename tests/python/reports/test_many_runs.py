@@ -4,7 +4,7 @@ import numpy as np
 
 import trueangle as ta
 from trueangle.plots.curves import Points, thinned
-from trueangle.reports.figures import dots_of_run
+from trueangle.reports.panelcharts import dots_of_run
 
 #: Bytes of a page at most.
 LARGEST = 1_000_000

@@ -17,7 +17,7 @@ BROWSER = find_browser()
 pytestmark = pytest.mark.skipif(BROWSER is None, reason="no Chromium installed: .ci/browser")
 
 #: Height of the page of a measured joint with a diagnosis, in pixels at this width, and its bytes.
-WIDTH, HIGHEST, LARGEST = 1280, 6000, 800_000
+WIDTH, HIGHEST, LARGEST = 1280, 6000, 760_000
 
 #: Questions on a joint, and what answers each; those of a section after one click on its link.
 QUESTIONS = {
@@ -147,7 +147,7 @@ def test_a_still_sets_numbers_where_its_axes_have_them():
     chart.upright(180.0, label="middle")
     svg = chart.still(1.0)
     (x0, y0), (x1, y1) = (
-        map(float, pair) for pair in re.search(r"M([\d. ]+)L([\d. ]+)\" fill", svg).groups()
+        map(float, pair) for pair in re.search(r"M([\d. ]+)L([\d. ]+)\" stroke", svg).groups()
         for pair in [pair.split()]
     )  # fmt: skip
     frame = re.search(r"M(\d+) (\d+)H(\d+)V(\d+)H", svg).groups()

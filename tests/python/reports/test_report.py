@@ -108,11 +108,12 @@ def drawn_columns(chart: dict) -> list[dict]:
 
 
 def page_numbers(page: str) -> list[tuple[str, float, int, str]]:
-    mark = (
-        r'<span class="n" data-path="([^"]+)"(?: data-per="([^"]+)")? data-digits="(\d+)">([^<]*)<'
-    )
-    found = re.findall(mark, page)
-    return [(path, float(per or 1.0), int(d), html.unescape(text)) for path, per, d, text in found]
+    """Path, factor, decimals and text of every number."""
+    mark = r'<span data-path="([^"]+)"(?: data-per="([^"]+)")?>([^<]*)<'
+    return [
+        (path, float(per or 1.0), len(text.partition(".")[2]), html.unescape(text))
+        for path, per, text in re.findall(mark, page)
+    ]
 
 
 def written(content: dict, path: str, per: float, digits: int) -> str:

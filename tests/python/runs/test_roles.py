@@ -94,7 +94,7 @@ def test_an_error_beside_both_angles(tmp_path):
     (run,) = ta.read_runs(path)  # found by their names, the angles are enough
     np.testing.assert_array_equal(run.indicated, READ)
     np.testing.assert_array_equal(run.columns["error_arcsec"], 0.0)
-    with pytest.raises(FileError, match="an error stands beside either of the two angles"):
+    with pytest.raises(FileError, match="an error is given with one of the two angles"):
         ta.read_runs(path, signals={"error": "error_arcsec"})
     path = saved(tmp_path / "b.csv", reference_deg=NOMINAL, e=ERROR)
     with pytest.raises(FileError, match=r"'e': its unit is not known.*'error': \('e', 'arcsec'\)"):
@@ -152,7 +152,7 @@ def test_facets_that_do_not_fit_are_told(tmp_path, capsys):
     runs, facets = str(tmp_path / "off.csv"), str(tmp_path / "facets.csv")
     saved(tmp_path / "off.csv", reference_deg=FACETS + 5.0, indicated_deg=FACETS + 5.0)
     assert main(["fit", runs, "--facets", facets, "-o", str(tmp_path / "m.json")]) == 1
-    assert "reading 1 is at 5 deg, which is no facet of facets.csv: the nearest is at 0 deg" in (
+    assert "reading 1 is at 5 deg, which is not a facet of facets.csv: the nearest is at 0 deg" in (
         capsys.readouterr().err
     )
     saved(

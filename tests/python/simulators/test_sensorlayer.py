@@ -181,8 +181,8 @@ def test_noise_is_white_and_of_the_stated_size():
     ("models", "message"),
     [
         ({"elbw": PLAIN}, r"no joint 'elbw'; did you mean elbow\?; it has elbow, wrist, rail"),
-        ({"rail": PLAIN}, "is no hinge"),
-        ({"clock": PLAIN}, "is no jointpos"),
+        ({"rail": PLAIN}, "is not a hinge"),
+        ({"clock": PLAIN}, "is not a jointpos"),
         ({"elbow": 1.0}, "must be a HarmonicModel, got float"),
         ({}, "must name a joint at least"),
     ],

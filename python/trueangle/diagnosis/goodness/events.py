@@ -1,10 +1,12 @@
-r"""What follows the time since an event: since the last reversal, or since the start of the run.
+"""What follows the time since an event: since the last reversal, or since the start of the run.
 
-With :math:`s` seconds since the event and :math:`d` the direction, what is left is held against
+With ``s`` seconds since the event and ``d`` the direction, what is left is held against
 
-.. math:: g = e^{-s/\tau} \quad\text{and}\quad g = d\,e^{-s/\tau}
+::
 
-about their means between two events, for a few :math:`\tau`. The sums over runs (or pieces of few
+    g = e^(-s/τ)    and    g = d e^(-s/τ)
+
+about their means between two events, for a few ``τ``. The sums over runs (or pieces of few
 runs) are compared with their own scatter by Student's t, whatever the noise within them is.
 """
 

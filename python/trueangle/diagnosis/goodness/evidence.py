@@ -83,12 +83,14 @@ def drawn_signs(units: int) -> NDArray[np.float64]:
 
 
 def made_even(p: float, drawn: Sequence[float]) -> float:
-    r"""A p value of a search, even under noise, by those of the same search with signs drawn.
+    """A p value of a search, even under noise, by those of the same search with signs drawn.
 
-    Trials depend on each other: the smallest of them has :math:`x = -\ln(1 - p)` exponentially
+    Trials depend on each other: the smallest of them has ``x = - ln(1 - p)`` exponentially
     distributed with a rate that B draws tell, so that the chance of less is
 
-    .. math:: 1 - \Bigl(1 + \frac{x}{\sum_b x_b}\Bigr)^{-B}.
+    ::
+
+        1 - (1 + x / (Σ_b x_b))^(-B).
 
     Examples
     --------

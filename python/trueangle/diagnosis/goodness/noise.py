@@ -1,15 +1,19 @@
-r"""The noise of one reading and its correlation, beside whatever pattern there may be.
+"""The noise of one reading and its correlation, beside whatever pattern there may be.
 
 Residuals of a fitted account tell too little of the correlation: what repeats at a place looks
 like it, and what the fit takes away lowers it. Here the readings of each run are
 
-.. math:: y = X\beta + n, \qquad \mathrm{corr}(n_i, n_j) = \rho^{|i - j|},
+::
+
+    y = Xβ + n,    corr(n_i, n_j) = ρ^(|i - j|),
 
 with X a mean per run and a flexible pattern of the angle, alike and by direction, and rho
 maximises the restricted likelihood (Patterson and Thompson 1971), in which the coefficients
 cost nothing:
 
-.. math:: -2 l = (n - p)\ln \mathrm{RSS}(\rho) - R\ln(1 - \rho^2) + \ln|X^T V^{-1} X|.
+::
+
+    -2 l = (n - p) ln RSS(ρ) - R ln(1 - ρ²) + ln|Xᵀ V⁻¹ X|.
 """
 
 from __future__ import annotations

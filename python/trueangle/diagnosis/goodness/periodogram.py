@@ -1,9 +1,11 @@
-r"""Lines that every run draws anew: of one frequency in time, or of one order in angle.
+"""Lines that every run draws anew: of one frequency in time, or of one order in angle.
 
 The periodograms of the runs, each divided by its own level about every frequency (which takes
 correlation and wander away), add up to
 
-.. math:: P(f) = \sum_j |z_j(f)|^2 / s_j^2(f) \sim \Gamma(R, 1)
+::
+
+    P(f) = Σ_j |z_j(f)|² / s_j²(f) ~ Γ(R, 1)
 
 without asking for phases. Noise that neighbouring readings share comes back at every multiple
 of the rate of readings, whatever the axis: it is taken out reading by reading first, and beyond

@@ -1,16 +1,19 @@
-r"""What comes back at the same place, alike or by direction, speed or load.
+"""What comes back at the same place, alike or by direction, speed or load.
 
 Each unit u (a run, or a piece of one of few runs) gives one complex sum per order m,
 
-.. math:: z_{um} = \sum_{t \in u} g_t e_t \exp(-i m \theta_t), \qquad
-          w_{um} = z_{um} / s_{um},
+::
+
+    z_um = Σ_{t in u} g_t e_t exp(-i m θ_t),    w_um = z_um / s_um,
 
 with a modulator g (1, direction, speed ...) and s the level of the unit's own spectrum about
 m, so that neither correlation nor unequal noise matters. What is bound to place adds up over
 units, noise does not:
 
-.. math:: T_m = \frac{|\sum_u w_{um}|^2}{U} \sim \mathrm{Exp}(1), \qquad
-          \frac{|\sum_u w_{um}|^2}{U \sum_u |w_{um}|^2} \sim \mathrm{Beta}(1, U - 1).
+::
+
+    T_m = |Σ_u w_um|² / U ~ Exp(1),
+    |Σ_u w_um|² / (U Σ_u |w_um|²) ~ Beta(1, U - 1).
 
 The second holds whatever the spectrum's shape, the first where a few units are alike by
 chance; the larger p of the two counts. Orders one by one and the lowest 4, 8, 16 ... together

@@ -1,14 +1,16 @@
-r"""Steps between levels: what changes rarely and by much, not a little all the time.
+"""Steps between levels: what changes rarely and by much, not a little all the time.
 
 Medians of blocks of readings in a row (which single readings and tails hardly move) have
 increments that are normal for any noise and for a random walk. Something that sits at levels and
 changes over between them has few large ones: their kurtosis
 
-.. math:: b_2 = \frac{\overline{d^4}}{\overline{d^2}^{\,2}}
+::
+
+    b₂ = mean(d⁴) / (mean(d²)²)
 
 is above three, which is judged as Anscombe and Glynn (1983) do, with so many increments as are
 independent. Every run is taken in units of its own scatter, which lowers the kurtosis of m
-increments by :math:`m/(m + 2)`.
+increments by ``m/(m + 2)``.
 """
 
 from __future__ import annotations

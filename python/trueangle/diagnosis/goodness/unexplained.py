@@ -36,7 +36,7 @@ class Unexplained(Shown):
     found : bool
         One of the tests of place, direction, run and time fires, at 1 % for all together.
     rms : float
-        Of the structure that the firing tests show, arcsec: at least so much is no noise.
+        Of the structure that the firing tests show, arcsec: at least so much is not noise.
     share : float
         Of the variance that is left, free paths in time among it.
     evidence : list of Evidence
@@ -91,7 +91,7 @@ def goodness_of_fit(
     loose: Leftover | None = None,
     path: Evidence | None = None,
 ) -> Unexplained:
-    """Test a residual for everything that is no noise, without asking for a cause.
+    """Test a residual for everything that is not noise, without asking for a cause.
 
     Parameters
     ----------

@@ -20,9 +20,11 @@ LEAST_RUNS = 3
 
 
 def variance_of_mean(readings: int, noise: Noise) -> float:
-    r"""Variance of the mean of readings in a row.
+    """Variance of the mean of readings in a row.
 
-    .. math:: \frac{\sigma^2}{n^2}\Bigl(n + 2\sum_{k=1}^{n-1}(n - k)\rho^k\Bigr)
+    ::
+
+        (σ² / n²)(n + 2Σ_{k=1..n-1} (n - k) ρ^k)
 
     Examples
     --------

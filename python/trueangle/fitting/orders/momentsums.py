@@ -18,11 +18,11 @@ _WHOLE = 1e-9
 
 
 def sums_of_moments(moments: Moments, orders: Sequence[float]) -> HarmonicSums:
-    r"""Normal equations of output orders, run by run, each run's mean taken out.
+    """Normal equations of output orders, run by run, each run's mean taken out.
 
-    With :math:`W_m = \sum w e^{imx}`, :math:`Y_m = \sum w y e^{imx}` and the mean
-    :math:`\bar y = Y_0 / W_0`, the sums about the mean are :math:`Y_m - \bar y W_m` and
-    :math:`\sum w y^2 - \bar y Y_0`. More than 96 runs are taken together in 32 groups.
+    With ``W_m = Σ w e^(imx)``, ``Y_m = Σ w y e^(imx)`` and the mean
+    ``ȳ = Y₀ / W₀``, the sums about the mean are ``Y_m - ȳ W_m`` and
+    ``Σ w y² - ȳ Y₀``. More than 96 runs are taken together in 32 groups.
 
     Raises
     ------

@@ -45,9 +45,11 @@ class ReadingVariance(NamedTuple):
 
 
 def pure_error(units: Sequence[ZeroGroupReadings], positions: Positions) -> ReadingVariance | None:
-    r"""Scatter of the readings about the means of their positions and units.
+    """Scatter of the readings about the means of their positions and units.
 
-    .. math:: y_{up} = m_p + z_u + e
+    ::
+
+        y_up = m_p + z_u + e
 
     with a mean ``m`` for each position and a zero ``z`` for each unit: no model of the
     error enters. None where no position was read twice.

@@ -22,9 +22,11 @@ NEIGHBOURS: Final = 12
 
 
 def run_scatter(sums: HarmonicSums, chosen: Sequence[int], orders: Sequence[int]) -> Array:
-    r"""Variance of one reading as each order's coefficients vary between the units.
+    """Variance of one reading as each order's coefficients vary between the units.
 
-    .. math:: s_k^2 = \frac{1}{2(R-1)} \sum_r h_{rk}^T H_{rk}^{-1} h_{rk}
+    ::
+
+        s_k² = (1 / (2(R-1))) Σ_r h_rkᵀ H_rk⁻¹ h_rk
 
     with the scores ``h = X' W (y - model)`` of each unit about their common fit: the
     noise at that order, whatever its colour, including what really changes from run to
@@ -54,9 +56,11 @@ def run_scatter(sums: HarmonicSums, chosen: Sequence[int], orders: Sequence[int]
 
 
 def neighbour_scatter(sums: HarmonicSums, chosen: Sequence[int]) -> Array | None:
-    r"""Variance of one reading as the orders next to each say it, for noise that has a colour.
+    """Variance of one reading as the orders next to each say it, for noise that has a colour.
 
-    .. math:: s_k^2 = \mathrm{median}_{j \sim k}\{T_j\} / (2 \ln 2)
+    ::
+
+        s_k² = median_{j~k}{T_j} / (2 ln 2)
 
     with the reduction ``T`` of the sum of squares by each of the `NEIGHBOURS` nearest orders
     that are not chosen: two squares of normal numbers each, the noise at about that order. None

@@ -38,12 +38,14 @@ def select_orders(
     tolerance: float | None = None,
     **reading: Unpack[Reading],
 ) -> OrderSelection:
-    r"""Orders of the angle error that the readings support.
+    """Orders of the angle error that the readings support.
 
     An order is retained when it is significant,
 
-    .. math:: P\{2 F(2, \nu) > T_k\} \le \alpha_k / K_k, \qquad
-              T_k = \frac{\text{reduction of the sum of squares}}{\sigma^2},
+    ::
+
+        P{2 F(2, ν) > T_k} ≤ α_k / K_k,
+        T_k = (reduction of the sum of squares) / σ²,
 
     with a bound for all the orders searched (0.5 % chance of any false order), **and**
     when it lowers the error of readings that took no part in the fit. Held out are whole

@@ -20,7 +20,7 @@ _SAMPLES: Final = 32
 def greatest_slope(
     orders: Sequence[float], cosine: ArrayLike, sine: ArrayLike, period: float
 ) -> float:
-    r"""``max |d error / d angle|`` of a series, by sampling it, not by adding amplitudes.
+    """``max |d error / d angle|`` of a series, by sampling it, not by adding amplitudes.
 
     Whole orders are sampled over a turn and raised by Bernstein's ``1 / cos(pi / 32)``,
     which a trigonometric polynomial cannot exceed between the samples. An order that is not

@@ -172,15 +172,16 @@ def selection_notes(
         )
     if candidates.local:
         notes.append(
-            f"over this travel, passed once, orders below {max(candidates.local) + 1.0:g} are not "
-            "told from drift in time: what is slow is fitted jointly and not kept in the model"
+            f"over this travel, passed once, orders below {max(candidates.local) + 1.0:g} cannot "
+            "be distinguished from drift in time: what is slow is fitted jointly and not kept in "
+            "the model"
         )
     if candidates.unresolved:
         pairs = [f"{m:g} from {k:g}" for m, k in candidates.unresolved.items()]
         needed = 0.5 / min(abs(m - k) for m, k in candidates.unresolved.items())
         notes.append(
-            f"over this travel the gear's orders {', '.join(pairs)} cannot be told: the low "
-            f"order stands for both, within this travel only; {needed:.3g} turns tell them"
+            f"over this travel the gear's orders {', '.join(pairs)} cannot be distinguished: the "
+            f"low order stands for both, within this travel only; {needed:.3g} turns tell them"
         )
     if candidates.gear_ratio is not None and not candidates.whole:
         notes.append(

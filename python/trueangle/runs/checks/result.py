@@ -111,7 +111,7 @@ class Check(PlainResult):
         lines += wrapped(f"Can be known: {'; '.join(self.can)}.", 2)
         for entry in self.cannot:
             lines += wrapped(
-                f"Cannot be known: {entry['what']} ({entry['because']}). To tell: "
+                f"Cannot be known: {entry['what']} ({entry['because']}). To find out: "
                 f"{entry['measure']}.",
                 2,
             )

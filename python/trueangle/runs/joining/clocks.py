@@ -35,11 +35,13 @@ _SIGNIFICANT = 5.0
 
 @dataclass(frozen=True)
 class Clocks:
-    r"""How the clock of one stream runs against that of the other.
+    """How the clock of one stream runs against that of the other.
 
-    .. math:: t_B = t_A + \mathrm{offset} + 10^{-6}\,\mathrm{rate}\,(t_A - t_0)
+    ::
 
-    with :math:`t_0` the first reading of A; standard errors in ``offset_std``, ``rate_std``
+        t_B = t_A + offset + 10⁻⁶ rate · (t_A - t₀)
+
+    with ``t₀`` the first reading of A; standard errors in ``offset_std``, ``rate_std``
     (None where it was declared or the motion does not tell), that of a time on the other
     clock, root mean square over the log, in ``timing_std``.
     """

@@ -44,7 +44,9 @@ def join(
 ) -> Joined:
     r"""Calibration runs from an indicated and a reference log, each with its own time stamps.
 
-    .. math:: \theta(t_i) = \mathrm{ref}(t_i + \mathrm{offset} + \mathrm{rate}\,(t_i - t_0))
+    ::
+
+        θ(t_i) = ref(t_i + offset + rate · (t_i - t₀))
 
     at every indicated reading, by lines or cubics through the readings of the reference,
     whichever foretells left-out ones better. Nothing is made up over gaps. A log that holds

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from os import PathLike
 from typing import Any, NamedTuple
 
-from ...support.display_units import ErrorsIn, error_unit
+from ...support.display_units import ErrorsIn, ErrorUnit, error_unit
 from ...support.layout import laid_out
 from ...support.plainresult import PlainResult, counted
 from ..run import CalibrationRun
@@ -90,7 +90,7 @@ class Joined(PlainResult):
         """
 
         def told(value: float, std: float | None, unit: str) -> str:
-            return f"{value:.9g} {unit}" + ("" if std is None else f" +- {std:.2g}")
+            return ErrorUnit(unit, 1.0).text(value, std)
 
         unit = error_unit(errors_in, self.std_arcsec)
         found = self.to_dict()

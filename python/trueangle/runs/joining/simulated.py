@@ -126,10 +126,11 @@ def minus_simulated(
     by: str | None = None,
     **reading: Any,
 ) -> MeasuredMinusSimulated:
-    r"""Measured runs without what a simulator's log says of the same joint.
+    """Measured runs without what a simulator's log says of the same joint.
 
-    .. math:: r_i' = r_i - \varepsilon_\text{sim}(t_i) \quad\text{or}\quad
-              r_i' = r_i - \varepsilon_\text{sim}(\theta_i, \operatorname{sgn}\dot\theta_i)
+    ::
+
+        r_i' = r_i - ε_sim(t_i)    or    r_i' = r_i - ε_sim(θ_i, sgn θ̇_i)
 
     Parameters
     ----------

@@ -62,7 +62,7 @@ def check_input(path: str | PathLike[str], *, whole: bool = False) -> os.stat_re
                 raise
             found = os.stat(path)
     except ValueError:
-        raise FileError(path, "is no name of a file: it holds a NUL character") from None
+        raise FileError(path, "is not a name of a file: it holds a NUL character") from None
     mode = found.st_mode
     if stat.S_ISREG(mode) or stat.S_ISDIR(mode):
         return found

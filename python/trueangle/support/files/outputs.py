@@ -79,7 +79,7 @@ def check_output(
     if text == "-":
         raise FileError(path, "standard output is not written to; name a file (./- for this name)")
     if not text or "\0" in text:
-        raise FileError(repr(text), "is no name of a file")
+        raise FileError(repr(text), "is not a name of a file")
     if kind is not None:
         kind.check(path)
     try:

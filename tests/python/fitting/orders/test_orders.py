@@ -299,7 +299,7 @@ def test_readings_without_noise_show_their_order_alone():
 
 
 def test_what_an_order_may_be_is_printed():
-    """A sensor whose order 4 is no sine, displaced from its axis: orders 2, 4 and 12."""
+    """A sensor whose order 4 is not a sine, displaced from its axis: orders 2, 4 and 12."""
     theta = np.radians(np.linspace(0.0, 360.0, 721)[:-1])
     error = 0.02 * np.sin(2 * theta) + 0.2 * np.sin(4 * theta) + 0.01 * np.cos(12 * theta)
     rng = np.random.default_rng(12)
