@@ -27,6 +27,10 @@ __all__ = ["Monitor"]
 #: correlation that is found late, take from it.
 _MARGIN: Final = 1.25
 
+#: Share of the model's largest line that the sums of a window may lack of it, at one spacing of the
+#: readings in every window: within a bin the model is told to second order.
+_ROUNDING: Final = 1e-4
+
 #: Highest order that is watched: a window's sums grow with it.
 HIGHEST: Final = 4096
 
@@ -110,6 +114,8 @@ class Monitor(Shown):
         known = [0.0] * (2 * len(orders))
         if model.covariance is not None:
             known = _variances(model, orders)
+        rounding = _ROUNDING * float(np.hypot(cosine, sine).max())
+        known = [variance + rounding**2 for variance in known]
         limits = (allowance, self.limit, step, step)
         self._core = _core.Monitor(model.period, orders, cosine, sine, known, self.every, limits)
         self._step = step

@@ -49,6 +49,7 @@ class WatchReport(Page):
 
     Examples
     --------
+    >>> import numpy as np
     >>> import trueangle as ta
     >>> model = ta.HarmonicModel([ta.Shaft("output", 1, [1], [0.0], [0.05])], period=360.0)
     >>> angle = np.arange(0.0, 20 * 360.0, 3.0)
