@@ -1,7 +1,6 @@
 //! A running joint against its model: windows of readings in constant memory, and charts on them.
 
 pub mod chart;
-mod folded;
 pub mod recent;
 pub mod watch;
 pub mod window;

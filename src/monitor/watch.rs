@@ -59,7 +59,7 @@ pub struct Limits {
 }
 
 /// A joint against its model.
-#[derive(Clone, Debug)]
+#[derive(Clone)]
 pub struct Monitor {
     window: Window,
     period: f64,
@@ -176,7 +176,6 @@ impl Monitor {
             self.travel -= 0.25 * self.every;
             return None;
         };
-        let readings = self.window.readings();
         self.window.clear();
         self.travel = 0.0;
         self.windows += 1;
@@ -220,7 +219,7 @@ impl Monitor {
         Some(Closed {
             reading,
             window: self.windows,
-            readings,
+            readings: solved.readings,
             coefficients: solved.coefficients,
             statistics,
             moved,

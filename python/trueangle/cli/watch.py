@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ..support.files import PICTURE
+from ..support.files import PAGE, PICTURE
 from .error_units import add_errors_in, errors_in
 from .paths import Input, Output
 from .pictures import save_picture
@@ -68,6 +68,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="FILE",
         help="draw the charts of all windows, at the end (needs trueangle[plot])",
     )
+    add(
+        "--report",
+        type=Output.of(PAGE),
+        metavar="FILE",
+        help="write a page with the alarms and charts of all windows, at the end",
+    )
     add("--json", action="store_true", help="print one object per window and line")
 
 
@@ -98,15 +104,19 @@ def run(args: argparse.Namespace) -> int:
     for batch in _batches(args, model):
         for window in watched.windows_of(*batch):
             alarmed |= window.alarm
-            if args.plot is not None:
+            if args.plot is not None or args.report is not None:
                 kept.append(window)
             print(_line(window, model, args), flush=True)
     if not watched.windows:
         print("trueangle: warning: not one window ended", file=sys.stderr)
-    if kept:
+    if kept and args.plot is not None:
         from ..plots.watchedwindows import watched_windows
 
         save_picture(watched_windows(kept, model.period, errors_in(args)), args.plot)
+    if kept and args.report is not None:
+        from ..reports.watched import WatchReport
+
+        WatchReport(kept, model.period, errors_in=errors_in(args)).save(args.report)
     return ALARMED if alarmed else 0
 
 

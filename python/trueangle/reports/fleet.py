@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, Final, NamedTuple
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +17,7 @@ from ..support.angles import arcsec
 from ..support.display_units import ErrorsIn, ErrorUnit, error_unit
 from .chartaxes import ChartAxis
 from .page import Page, filled
-from .stills import Mark, still
+from .stills import Mark, StillPicture, still
 
 __all__ = ["FleetReport"]
 
@@ -33,14 +33,6 @@ _ANGLES: Final = (361, 8)
 _SQUARE: Final = 14.6
 #: Radius that holds 95 % of a plane normal distribution, in standard deviations of a coordinate.
 _RADIUS: Final = math.sqrt(-2.0 * math.log(0.05))
-
-
-class _Picture(NamedTuple):
-    """A still picture with its caption and what it shows, in words."""
-
-    title: str
-    alt: str
-    svg: str
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,7 +115,7 @@ class FleetReport(Page):
     def _dates(self, unit: str) -> int:
         return sum(row.unit == unit for row in self.fleet.history)
 
-    def _chart(self, unit: str) -> _Picture:
+    def _chart(self, unit: str) -> StillPicture:
         """The cumulative sums of a unit's orders over its dates, and their limit."""
         rows = [row for row in self.fleet.history if row.unit == unit]
         date = np.arange(2.0, len(rows) + 2.0)
@@ -139,9 +131,9 @@ class FleetReport(Page):
             marks.append(Mark("line", (date, values), colour))
         title = f"{unit}: cumulative sums of its orders"
         alt = f"{title} on {len(rows)} further dates, limit {limit:.3g}"
-        return _Picture(title, alt, still(marks, across, up, 9.0, 1.0 / 3.0))
+        return StillPicture(title, alt, still(marks, across, up, 9.0, 1.0 / 3.0))
 
-    def _pattern(self, unit: FleetUnit) -> _Picture:
+    def _pattern(self, unit: FleetUnit) -> StillPicture:
         """The error of a unit over a turn; the same axis for all, so that sizes compare."""
         size = self._scale * self.unit.per_arcsec
         highest = max((row.order for row in unit.orders), default=1.0)
@@ -154,11 +146,11 @@ class FleetReport(Page):
         marks = [Mark("line", (angle, size * _curve(unit.orders, angle)), colour)]
         said = f"{unit.unit}: {unit.verdict.replace('_', ' ')}"
         ptp = self.unit.text(self._scale * unit.peak_to_peak)
-        return _Picture(
+        return StillPicture(
             said, f"error of {said}, {ptp} peak-to-peak", still(marks, across, up, 9.0, 1.0 / 3.0)
         )
 
-    def _phasor(self, at: int) -> _Picture:
+    def _phasor(self, at: int) -> StillPicture:
         """Cosine and sine of one order of every unit, and the circle that holds 95 % of them."""
         size = self._scale * self.unit.per_arcsec
         common: CommonOrder = self.fleet.common[at]
@@ -188,7 +180,7 @@ class FleetReport(Page):
         up = ChartAxis(f"sine / {name}", (-reach, reach))
         title = f"order {common.order:g} of the {common.shaft}"
         alt = f"cosine and sine of {title} of every unit, and the circle that holds 95 % of them"
-        return _Picture(title, alt, still(marks, across, up, _SQUARE, 1.0 / 3.0))
+        return StillPicture(title, alt, still(marks, across, up, _SQUARE, 1.0 / 3.0))
 
 
 def _curve(orders: tuple[UnitOrder, ...], angle: Array) -> Array:

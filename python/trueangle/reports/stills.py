@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from .chartaxes import ChartAxis
 
-__all__ = ["Mark", "still"]
+__all__ = ["Mark", "StillPicture", "still"]
 
 Array = NDArray[np.float64]
 
@@ -37,6 +37,14 @@ class Mark(NamedTuple):
     arrays: tuple[Any, ...]
     colour: str
     size: float = 1.5
+
+
+class StillPicture(NamedTuple):
+    """A still picture with its caption and what it shows, in words."""
+
+    title: str
+    alt: str
+    svg: str
 
 
 def still(

@@ -72,6 +72,24 @@ def test_the_charts_are_drawn(desk, capsys):
         ta.plots.watched_windows([], 360.0)
 
 
+def test_the_page_holds_alarms_and_charts(desk, capsys):
+    pytest.importorskip("jinja2")
+    assert main(["watch", "moved.csv", "-m", "m.json", "--json", "--report", "w.html"]) == 3
+    windows = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
+    page = (desk / "w.html").read_text("utf-8")
+    alarms = [window for window in windows if window["alarm"]]
+    rows = re.findall(r'<th scope="row" class="r">(\d+)</th>', page)
+    assert rows == [str(window["window"]) for window in alarms]
+    assert f"{len(windows)} windows of travel, {len(alarms)} alarm" in page
+    assert page.count("order 1 moved by") == len(alarms)
+    # One chart of all, and of each of two orders its sums and its size.
+    assert page.count('<svg class="still"') == 5
+    assert "<script" not in page
+    assert main(["watch", "fine.csv", "-m", "m.json", "--report", "w.html"]) == 0
+    assert "no alarm." in (desk / "w.html").read_text("utf-8")
+    assert main(["watch", "fine.csv", "-m", "m.json", "--report", "w.csv"]) == 1
+
+
 def test_longer_windows(desk, capsys):
     assert main(["watch", "fine.csv", "-m", "m.json", "--every", "5turns"]) == 0
     assert len(capsys.readouterr().out.splitlines()) == 11

@@ -190,3 +190,14 @@ def test_what_cannot_be_watched_is_refused():
         ta.Monitor(high)
     with pytest.raises(ArgumentError, match="error has 2 values"):
         ta.Monitor(model()).update([1.0, 2.0, 3.0], [1.0, 2.0])
+
+
+@pytest.mark.parametrize("step", [3.0, 0.36, 1.234567])
+@pytest.mark.parametrize("count", [1, 8, 32])
+def test_what_windows_lack_of_a_model_is_no_change(count, step):
+    """Without noise nothing but the sums' own rounding is left, and that is the same every turn."""
+    orders = list(range(1, count + 1))
+    shaft = ta.Shaft("output", 1, orders, [0.01] * count, [0.02] * count)
+    exact = ta.HarmonicModel([shaft], period=360.0)
+    angle = np.arange(0.0, 40 * 360.0, step)
+    assert not ta.Monitor(exact).update(angle, exact.error(angle))
