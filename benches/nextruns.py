@@ -1,12 +1,12 @@
 """What a planned run costs: readings until the true one of two rivals is named, and seconds.
 
 Against the plain rule of adding to the last run the change that opens most (another speed, warmer,
-loaded ...), for every pair of causes that confound each other, that three plain runs do not tell and
-that a further one can. Of either run the fewest readings are counted with which a diagnosis of all
-runs names the true one in 95 % of seeds, whichever of the two it is.
+loaded ...), for every pair of causes that confound each other, that three plain runs do not tell
+and that a further one can. Of either run the fewest readings are counted with which a diagnosis of
+all runs names the true one in 95 % of seeds, whichever of the two it is.
 
-Run: python benches/nextruns.py [PAIR ...], a pair as cause,cause; an hour for all. `--times` takes
-the times alone.
+Run: python benches/nextruns.py [PAIR ...], a pair as cause,cause; half an hour for all. `--times`
+takes the times alone.
 """
 
 from __future__ import annotations
@@ -52,8 +52,8 @@ LIMITS = Limits(
 #: count, and how many may fail.
 SIZE, SEEDS, FAILURES = 4.0, 20, 1
 
-#: Readings that are tried: 6 to 1080, by a factor of 1.25.
-LADDER = sorted({round(6.0 * 1.25**k) for k in range(24)})
+#: Readings that are tried: 8 to 720, by a factor of the square root of 2.
+LADDER = [round(8.0 * 2.0 ** (0.5 * k)) for k in range(14)]
 
 Designs = Sequence[RunDesign]
 
@@ -136,21 +136,27 @@ def hidden(cause: str) -> Effect | None:
 
 
 def needed(designs: Designs, truth: Effect, cause: str, alone: bool = False) -> float:
-    """Fewest readings of the ladder with which the cause is named; infinite where none do."""
-    named: dict[int, bool] = {}
+    """Fewest readings of the ladder with which the cause is named; infinite where none do.
+
+    Stepped down from those that are planned, or up.
+    """
+    if not designs:
+        return float("inf")
+    planned = sum(design.samples for design in designs)
+    rung = min(int(np.searchsorted(LADDER, planned)), len(LADDER) - 1)
 
     def is_enough(rung: int) -> bool:
-        if rung not in named:
-            named[rung] = names(shared(designs, LADDER[rung]), truth, cause, alone)
-        return named[rung]
+        return names(shared(designs, LADDER[rung]), truth, cause, alone)
 
-    least, most = -1, len(LADDER) - 1
-    if not designs or not is_enough(most):
-        return float("inf")
-    while most - least > 1:
-        middle = (least + most) // 2
-        least, most = (least, middle) if is_enough(middle) else (middle, most)
-    return float(LADDER[most])
+    if is_enough(rung):
+        while rung and is_enough(rung - 1):
+            rung -= 1
+        return float(LADDER[rung])
+    while rung + 1 < len(LADDER):
+        rung += 1
+        if is_enough(rung):
+            return float(LADDER[rung])
+    return float("inf")
 
 
 def shared(designs: Designs, readings: int) -> Designs:
@@ -221,7 +227,8 @@ def main() -> None:
         if found is None:
             continue
         ratios.append(found[0] / found[1])
-        print(f"{' or '.join(pair)}: {found[0]:g} readings, {found[1]:g} by the plain rule")
+        line = f"{found[0]:g} readings, {found[1]:g} by the plain rule"
+        print(f"{' or '.join(pair)}: {line}", flush=True)
     if ratios:
         median, worst = statistics.median(ratios), max(ratios)
         print(

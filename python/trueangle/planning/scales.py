@@ -171,12 +171,20 @@ class Scales:
         """Whether runs that are held out will confirm every cause: the others tell it as well.
 
         A diagnosis holds a fifth of the runs out at a time. Of a cause that only those show the
-        others say nothing, and what is held out denies it.
+        others say nothing, and what is held out denies it; so of a form that a grid leaves open
+        and a single run off the grid tells.
         """
         regression, _ = self._at(designs, start)
         runs = len(regression.bounds)
         if runs == 1:
             return True  # stretches of it are held out
+        if start is not None and any(
+            spot.factor == "grid" and spot.hides(cause)
+            for spot in self.blind(designs[:-1], start)
+            for question in self.questions
+            for cause in question.causes
+        ):
+            return False
         for question in self.questions:
             for one in question.hypotheses:
                 if not EFFECTS[one.cause].transfers:
