@@ -5,17 +5,18 @@ loaded ...), for every pair of causes that confound each other, that three plain
 and that a further one can. Of either run the fewest readings are counted with which a diagnosis of
 all runs names the true one in 95 % of seeds, whichever of the two it is.
 
-Run: python benches/nextruns.py [PAIR ...], a pair as cause,cause; half an hour for all. `--times`
-takes the times alone.
+Run: python benches/nextruns.py [--times] [--seeds N] [PAIR ...], a pair as cause,cause; all take half
+an hour.
+`--times` takes the times alone.
 """
 
 from __future__ import annotations
 
 import statistics
-import sys
-from collections.abc import Iterator, Sequence
+from argparse import ArgumentParser
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
-from time import perf_counter
+from time import perf_counter, process_time
 from typing import Any
 
 import numpy as np
@@ -48,9 +49,11 @@ LIMITS = Limits(
     runs=6,
 )
 
-#: Error of the true one in a run that shows it, in standard deviations of a reading; seeds of each
-#: count, and how many may fail.
-SIZE, SEEDS, FAILURES = 4.0, 20, 1
+#: Error of the true one in a run that shows it, in standard deviations of a reading.
+SIZE = 4.0
+
+#: Share of the seeds of each count that may fail.
+FAILURES = 0.05
 
 #: Readings that are tried: 8 to 720, by a factor of the square root of 2.
 LADDER = [round(8.0 * 2.0 ** (0.5 * k)) for k in range(14)]
@@ -135,7 +138,7 @@ def hidden(cause: str) -> Effect | None:
     return of_size(cause, SIZE, signals_of(varied), SIM.surroundings)
 
 
-def needed(designs: Designs, truth: Effect, cause: str, alone: bool = False) -> float:
+def needed(designs: Designs, truth: Effect, cause: str, seeds: int, alone: bool = False) -> float:
     """Fewest readings of the ladder with which the cause is named; infinite where none do.
 
     Stepped down from those that are planned, or up.
@@ -146,7 +149,7 @@ def needed(designs: Designs, truth: Effect, cause: str, alone: bool = False) -> 
     rung = min(int(np.searchsorted(LADDER, planned)), len(LADDER) - 1)
 
     def is_enough(rung: int) -> bool:
-        return names(shared(designs, LADDER[rung]), truth, cause, alone)
+        return names(shared(designs, LADDER[rung]), truth, cause, seeds, alone)
 
     if is_enough(rung):
         while rung and is_enough(rung - 1):
@@ -166,18 +169,18 @@ def shared(designs: Designs, readings: int) -> Designs:
     return [replace(d, samples=int(n)) for d, n in zip(designs, counts, strict=True)]
 
 
-def names(designs: Designs, truth: Effect, cause: str, alone: bool) -> bool:
+def names(designs: Designs, truth: Effect, cause: str, seeds: int, alone: bool) -> bool:
     """Whether all but a twentieth of the diagnoses name the cause."""
     true, failed = SIM.with_effects([truth]), 0
-    for seed in range(SEEDS):
+    for seed in range(seeds):
         runs = simulate(true, seed, designs if alone else [*SIM.runs, *designs])
         failed += not judged(ta.diagnose(runs, SIM), cause).is_named
-        if failed > FAILURES:
+        if failed > FAILURES * seeds:
             return False
     return True
 
 
-def compared(pair: tuple[str, str]) -> tuple[float, float] | None:
+def compared(pair: tuple[str, str], seeds: int = 20) -> tuple[float, float] | None:
     """Readings by the plan and by the plain rule; None where no run is needed, or none helps."""
     truths = {cause: hidden(cause) for cause in pair}
     if not blind(SIM.runs) & {*pair} or None in truths.values():
@@ -187,48 +190,58 @@ def compared(pair: tuple[str, str]) -> tuple[float, float] | None:
         assert truth is not None
         found = ta.diagnose(simulate(SIM.with_effects([truth]), 1), SIM)
         plan = found.plan(LIMITS, between=pair)
-        by_plan = max(by_plan, needed(plan.runs, truth, cause, plan.alone))
-        by_rule = max(by_rule, needed(former, truth, cause))
-    return None if min(by_plan, by_rule) == float("inf") else (by_plan, by_rule)
+        by_plan = max(by_plan, needed(plan.runs, truth, cause, seeds, plan.alone))
+        by_rule = max(by_rule, needed(former, truth, cause, seeds))
+        if by_plan == by_rule == float("inf"):
+            return None
+    return by_plan, by_rule
 
 
 def times() -> None:
     """Median seconds of a plan of places and of next runs."""
     arcs = [((1, 2), 180.0), ((1, 2, 3, 4), 270.0), (range(1, 9), 300.0)]
     for orders, stop in arcs:
-        taken = [timed(lambda o=orders, s=stop: ta.plan_arc(0.0, s, o)) for _ in range(5)]
-        print(f"orders 1 to {len(orders)} on {stop:g} deg: {statistics.median(taken):.2f} s")
+        taken = timed(lambda o=orders, s=stop: ta.plan_arc(0.0, s, o), 5)
+        print(f"orders 1 to {len(orders)} on {stop:g} deg: {taken}")
     truth = SIM.with_effects([hidden("latency")])  # type: ignore[list-item]
     runs = simulate(truth, 1)
     for between in (None, ["backlash", "latency"], ["thermal_drift", "torsional_compliance"]):
         for seeds in (0, 10):
-            taken = [
-                timed(lambda b=between, n=seeds: ta.plan_after(runs, SIM, between=b, seeds=n))
-                for _ in range(3)
-            ]
+            taken = timed(
+                lambda b=between, n=seeds: ta.plan_after(runs, SIM, between=b, seeds=n), 3
+            )
             what = "what is open" if between is None else " or ".join(between)
-            print(f"next runs, {what}, {seeds} seeds: {statistics.median(taken):.2f} s")
+            print(f"next runs, {what}, {seeds} seeds: {taken}")
 
 
-def timed(work: Any) -> float:
-    """Seconds of one call."""
-    begun = perf_counter()
-    work()
-    return perf_counter() - begun
+def timed(work: Callable[[], object], rounds: int) -> str:
+    """Median seconds of a call, and of them those of the processor."""
+    taken = []
+    for _ in range(rounds):
+        begun = perf_counter(), process_time()
+        work()
+        taken.append((perf_counter() - begun[0], process_time() - begun[1]))
+    clock, processor = (statistics.median(column) for column in zip(*taken, strict=True))
+    return f"{clock:.2f} s, {processor:.2f} s of a processor"
 
 
 def main() -> None:
     """Print the times, then a line for each pair and the median."""
+    parser = ArgumentParser(description="readings and seconds of planned runs")
+    parser.add_argument("pairs", nargs="*", metavar="PAIR")
+    parser.add_argument("--times", action="store_true")
+    parser.add_argument("--seeds", type=int, default=20)
+    asked = parser.parse_args()
     times()
-    asked = [tuple(name.split(",")) for name in sys.argv[1:] if name != "--times"]
     ratios = []
-    for pair in [] if "--times" in sys.argv else asked or pairs():
-        found = compared(pair)  # type: ignore[arg-type]
+    chosen = [tuple(pair.split(",")) for pair in asked.pairs] or pairs()
+    for one, other in [] if asked.times else chosen:
+        found = compared((one, other), asked.seeds)
         if found is None:
             continue
         ratios.append(found[0] / found[1])
         line = f"{found[0]:g} readings, {found[1]:g} by the plain rule"
-        print(f"{' or '.join(pair)}: {line}", flush=True)
+        print(f"{one} or {other}: {line}", flush=True)
     if ratios:
         median, worst = statistics.median(ratios), max(ratios)
         print(

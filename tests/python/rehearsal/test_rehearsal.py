@@ -49,8 +49,8 @@ ABOUT_PRICE = 2.0, 6.0
 SOON = 20.0
 
 #: Searches with a known chance, and the share of 95 % intervals that must hold it: the prior of a
-#: few trials is no repeated sampling, and 93 to 100 % hold it over many seeds; three standard errors
-#: of so few searches less are rare enough for a seed that is always the same.
+#: few trials is no repeated sampling, and 93 to 100 % hold it over many seeds. The seed is always
+#: the same: of so few searches chance alone takes a tenth.
 SEARCHES, HELD, SEARCH_SEED = 100, 0.86, 27_100
 
 #: Factor of the noise within which the first size must be what theory says.
