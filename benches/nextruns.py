@@ -5,9 +5,8 @@ loaded ...), for every pair of causes that confound each other, that three plain
 and that a further one can. Of either run the fewest readings are counted with which a diagnosis of
 all runs names the true one in 95 % of seeds, whichever of the two it is.
 
-Run: python benches/nextruns.py [--times] [--seeds N] [PAIR ...], a pair as cause,cause; all take half
-an hour.
-`--times` takes the times alone.
+Run: python benches/nextruns.py [--times] [--seeds N] [PAIR ...], a pair as cause,cause; all take
+half an hour. `--times` takes the times alone.
 """
 
 from __future__ import annotations
