@@ -162,8 +162,8 @@ class Search:
     def _shared_out(
         self, designs: Designs, worth: Worth, start: Signals | None
     ) -> tuple[Designs, Worth]:
-        """The same readings in more runs, so many that held-out ones confirm what they tell."""
-        for times in range(2, self.limits.runs // len(designs) + 1):
+        """The same readings in runs so many and unlike that held-out ones confirm what they tell."""
+        for times in range(1, self.limits.runs // len(designs) + 1):
             again = [one for one in _with_readings(designs, 1.0 / times) for _ in range(times)]
             again = [replace(one, label=_label(k)) for k, one in enumerate(again)]
             for tried in (again, _at_more_speeds(again)):

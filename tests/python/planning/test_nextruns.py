@@ -162,6 +162,17 @@ def test_a_form_that_a_grid_leaves_open_is_asked_of_two_runs():
     assert plan.readings < 100
 
 
+def test_runs_by_themselves_tell_a_lag_with_any_speed_left_out():
+    """Of two speeds each alone leaves the lag to the size of the lines."""
+    lines = (*SIM.harmonics, Harmonic("motor", 2, 10.0, 20.0))
+    sim = replace(SIM, joint=Joint(50.0, "circular_spline", "motor"), harmonics=lines)
+    bare = [replace(run, velocity=None, time=None) for run in simulate(sim, 1)]
+    plan = ta.diagnose(bare, sim).plan(Limits(samples=120, reversals=False), between=["filter_lag"])
+    assert plan.alone
+    assert plan.between[0].told
+    assert len({run.speed_deg_s for run in plan.runs}) == 3
+
+
 def test_a_file_of_limits(tmp_path):
     path = tmp_path / "limits.toml"
     path.write_text(
