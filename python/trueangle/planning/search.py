@@ -163,7 +163,7 @@ class Search:
     def _shared_out(
         self, designs: Designs, worth: Worth, start: Signals | None
     ) -> tuple[Designs, Worth]:
-        """The same readings in runs so many and unlike that held-out ones confirm what they tell."""
+        """The same readings in runs so many and unlike that held-out ones confirm them."""
         for times in range(1, self.limits.runs // len(designs) + 1):
             again = [one for one in _with_readings(designs, 1.0 / times) for _ in range(times)]
             again = [replace(one, label=_label(k)) for k, one in enumerate(again)]
