@@ -138,26 +138,10 @@ def hidden(cause: str) -> Effect | None:
 
 
 def needed(designs: Designs, truth: Effect, cause: str, seeds: int, alone: bool = False) -> float:
-    """Fewest readings of the ladder with which the cause is named; infinite where none do.
-
-    Stepped down from those that are planned, or up.
-    """
-    if not designs:
-        return float("inf")
-    planned = sum(design.samples for design in designs)
-    rung = min(int(np.searchsorted(LADDER, planned)), len(LADDER) - 1)
-
-    def is_enough(rung: int) -> bool:
-        return names(shared(designs, LADDER[rung]), truth, cause, seeds, alone)
-
-    if is_enough(rung):
-        while rung and is_enough(rung - 1):
-            rung -= 1
-        return float(LADDER[rung])
-    while rung + 1 < len(LADDER):
-        rung += 1
-        if is_enough(rung):
-            return float(LADDER[rung])
+    """Fewest readings of the ladder with which the cause is named; infinite where none do."""
+    for readings in LADDER if designs else ():
+        if names(shared(designs, readings), truth, cause, seeds, alone):
+            return float(readings)
     return float("inf")
 
 
