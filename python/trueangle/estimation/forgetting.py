@@ -18,10 +18,10 @@ Array = NDArray[np.float64]
 
 
 class Forgetting:
-    r"""By which factor a reading counts less than the one after it in its run.
+    """By which factor a reading counts less than the one after it in its run.
 
     Uncertainties are those of the effective number of readings,
-    :math:`(\sum w)^2 / \sum w^2` less the unknowns.
+    ``(Σ w)² / Σ w²`` less the unknowns.
 
     Parameters
     ----------

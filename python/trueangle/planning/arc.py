@@ -321,8 +321,10 @@ def _places(columns: OrthonormalColumns, best: ArcDesign, readings: int) -> Arra
     return tried
 
 
-#: Efficiency from which on single readings are not exchanged any more.
-_GOOD = 0.99
+#: Efficiency from which on single readings are not exchanged any more: exchanges gain some
+#: thousandths of it, scatter the readings over twice as many places, and leave the worst
+#: coefficient up to 7 % more uncertain.
+_GOOD = 0.985
 
 
 def _spread(turns: Array, apart: float, columns: OrthonormalColumns) -> Array:

@@ -12,7 +12,7 @@ import numpy as np
 from ..simulation.designs import RunDesign
 from .limits import Limits
 
-__all__ = ["base_of", "changes_of", "choices", "levels", "seconds_of", "steps_of"]
+__all__ = ["base_of", "changes_of", "choices", "dialled", "levels", "seconds_of", "steps_of"]
 
 #: Steps in which readings follow a reversal closely, deg.
 CLOSE = 0.25
@@ -26,7 +26,7 @@ def base_of(limits: Limits, label: str) -> RunDesign:
     slow, fast = limits.speed_deg_s
     return RunDesign(
         label=label,
-        speed_deg_s=_plain(np.sqrt(slow * fast)),
+        speed_deg_s=dialled(np.sqrt(slow * fast)),
         samples=limits.samples,
         start_deg=limits.arc_deg[0],
         turns=limits.span_deg / 360.0,
@@ -45,7 +45,7 @@ def choices(
     """
     yield [*_motions(limits, limits.samples if samples is None else samples)]
     slow, fast = limits.speed_deg_s
-    middle = _plain(np.sqrt(slow * fast))
+    middle = dialled(np.sqrt(slow * fast))
     speeds = dict.fromkeys((fast, middle, slow))
     coasting = [{"speed_deg_s": fast, "speed_end_deg_s": max(fast / 4.0, slow)}]
     yield [
@@ -104,11 +104,11 @@ def levels(design: RunDesign, limits: Limits) -> Iterator[tuple[str, Callable[[f
 
 
 def _faster(now: float, least: float, most: float, step: float) -> float:
-    return min(max(_plain(now * (most / least) ** step), least), most)
+    return min(max(dialled(now * (most / least) ** step), least), most)
 
 
 def _higher(now: float, least: float, most: float, step: float) -> float:
-    return min(max(_plain(now + (most - least) * step), least), most)
+    return min(max(dialled(now + (most - least) * step), least), most)
 
 
 def _motions(limits: Limits, samples: int) -> Iterator[dict[str, Any]]:
@@ -170,6 +170,6 @@ def steps_of(design: RunDesign) -> Iterator[str]:
         yield f"the motor's current held at {design.current_A:g} A"
 
 
-def _plain(value: float) -> float:
+def dialled(value: float) -> float:
     """A number that can be dialled in: two digits."""
     return float(f"{value:.2g}")

@@ -25,6 +25,9 @@ DRAWS = 4
 #: Draws of an effect before a cause counts as one that such a joint cannot have.
 TRIES = 4
 
+#: Share of the size asked for below which a cause of bounded size is too small to be what is seen.
+REACHED = 0.5
+
 
 @dataclass(frozen=True)
 class Question:
@@ -34,7 +37,7 @@ class Question:
     ----------
     causes : tuple of str
     hypotheses : tuple of Hypothesis
-        Of those that can be in readings of this joint.
+        Of those that can be in readings of this joint, and so large.
     seen : bool
         Something is seen that one of them explains: the hypotheses are estimates of it.
     draws : tuple of Hypothesis
@@ -75,7 +78,17 @@ def question_of(spot: Blindness, rich: Signals, around: Surroundings, rms: float
             draws += drawn[1:]
         if effects:
             found.append(Hypothesis(cause, effects))
+    large = {
+        one.cause for one in found if one.cause in known or _rms(one, rich, around) > REACHED * rms
+    }
+    if large:  # the others cannot be it, as the argument's error of a joint with small lines
+        found, draws = ([one for one in some if one.cause in large] for some in (found, draws))
     return Question(spot.causes, tuple(found), spot.supported, tuple(draws))
+
+
+def _rms(one: Hypothesis, rich: Signals, around: Surroundings) -> float:
+    """Of its error over these readings, without the mean."""
+    return float(np.std(one.errors(rich, around)[0]))
 
 
 def _alike(

@@ -171,12 +171,21 @@ class Scales:
         """Whether runs that are held out will confirm every cause: the others tell it as well.
 
         A diagnosis holds a fifth of the runs out at a time. Of a cause that only those show the
-        others say nothing, and what is held out denies it.
+        others say nothing, and what is held out denies it; so of a form that a grid leaves open
+        and a single run off the grid tells. Of runs by themselves it leaves out one speed after
+        the other as well.
         """
         regression, _ = self._at(designs, start)
         runs = len(regression.bounds)
         if runs == 1:
             return True  # stretches of it are held out
+        if start is None:
+            speeds = {design.speed_deg_s for design in designs}
+            parts = [[d for d in designs if d.speed_deg_s != speed] for speed in speeds]
+            if any(self._hidden_by("velocity", part, None) for part in parts if part):
+                return False
+        elif self._hidden_by("grid", designs[:-1], start):
+            return False
         for question in self.questions:
             for one in question.hypotheses:
                 if not EFFECTS[one.cause].transfers:
@@ -192,6 +201,12 @@ class Scales:
                 if deviance_left(regression.of_rows(kept), error[kept], self.noise) < SHOWN**2:
                     return False
         return True
+
+    def _hidden_by(self, factor: str, designs: Sequence[RunDesign], start: Signals | None) -> bool:
+        """Whether this factor of the runs hides a cause in question."""
+        causes = {cause for question in self.questions for cause in question.causes}
+        spots = [spot for spot in self.blind(designs, start) if spot.factor == factor]
+        return any(spot.hides(cause) for spot in spots for cause in causes)
 
     def _at(
         self, designs: Sequence[RunDesign], start: Signals | None

@@ -107,11 +107,10 @@ def test_published_efficiencies(orders, arc, dense, even, least, worse):
         assert plan.efficiency_of_even_spacing == pytest.approx(even, abs=PRINTED)
         x = np.linspace(0.0, arc, 200_001)
         assert efficiency(x, np.ones(x.size), orders, optimum) == pytest.approx(dense, abs=PRINTED)
-    # The worst coefficient is hardly worse than with shares that need not be whole readings:
-    # three readings at a place that deserves three and a half cost 6 %.
+    # The worst coefficient is hardly worse than with shares that need not be whole readings.
     shares = np.repeat(found.places, 1000)
     continuous = noise_factors(shares, orders).max()
-    assert plan.worst_noise_factor <= (1.02 if len(orders) < 8 else 1.06) * continuous
+    assert plan.worst_noise_factor <= 1.02 * continuous
     if worse is not None:
         ratio = max(plan.even_noise_factors.values()) / continuous
         assert ratio == pytest.approx(worse[1], rel=0.02)

@@ -12,7 +12,15 @@ from trueangle.errors import ArgumentError, FileError
 from trueangle.joint.signals import join_runs
 from trueangle.planning import Limits, load_limits
 from trueangle.planning.further import base_of, choices, seconds_of, steps_of
-from trueangle.simulation import Backlash, Harmonic, RunDesign, Simulation, simulate
+from trueangle.simulation import (
+    Backlash,
+    Harmonic,
+    Joint,
+    LocalDefect,
+    RunDesign,
+    Simulation,
+    simulate,
+)
 
 #: An arm of 270 degrees, out and back at one speed.
 SIM = Simulation(
@@ -139,6 +147,30 @@ def test_what_one_run_shows_is_shared_out_over_as_many_as_hold_out_each_other():
     assert plan.readings <= 120 + len(plan.runs)
     assert len({replace(run, label="") for run in plan.runs}) == 1
     assert f"next-{len(plan.runs)}, {len(plan.runs)} times the same" in plan.summary()
+
+
+def test_a_form_that_a_grid_leaves_open_is_asked_of_two_runs():
+    """With one of them held out the other still tells it."""
+    grid = RunDesign(samples=36, spacing="uniform")
+    mounts = (0.0, 130.0, 250.0)
+    grids = [replace(grid, label=f"{k}", mount_deg=mounts[k // 2]) for k in range(6)]
+    sim = replace(SIM, joint=Joint(50.0, "circular_spline", "motor"), runs=tuple(grids))
+    runs = simulate(sim.with_effects([LocalDefect(284.7, 4.3, 24.0)]), 1)
+    plan = ta.diagnose(runs, sim).plan(between=["missing_order", "local_defect"])
+    assert plan.between[0].told
+    assert [run.spacing for run in plan.runs] == ["jittered", "jittered"]
+    assert plan.readings < 100
+
+
+def test_runs_by_themselves_tell_a_lag_with_any_speed_left_out():
+    """Of two speeds each alone leaves the lag to the size of the lines."""
+    lines = (*SIM.harmonics, Harmonic("motor", 2, 10.0, 20.0))
+    sim = replace(SIM, joint=Joint(50.0, "circular_spline", "motor"), harmonics=lines)
+    bare = [replace(run, velocity=None, time=None) for run in simulate(sim, 1)]
+    plan = ta.diagnose(bare, sim).plan(Limits(samples=120, reversals=False), between=["filter_lag"])
+    assert plan.alone
+    assert plan.between[0].told
+    assert len({run.speed_deg_s for run in plan.runs}) == 3
 
 
 def test_a_file_of_limits(tmp_path):

@@ -8,7 +8,7 @@ its runs are simulated with the same cause, and all are diagnosed. `make exam` a
 from __future__ import annotations
 
 import os
-import secrets
+import zlib
 from dataclasses import replace
 
 import numpy as np
@@ -147,9 +147,12 @@ ENTRIES = {
     ),
 }
 
-#: Asked of each cause, and the share that must be named: 95 %, less three standard errors.
+#: Diagnoses asked of each cause, shared by several first measurements with a plan each, and the
+#: share that must name it.
 NIGHTLY = bool(os.environ.get("TRUEANGLE_NIGHTLY"))
-SEEDS = int(os.environ.get("TRUEANGLE_EXAM_SEEDS", "20"))
+SEEDS = int(os.environ.get("TRUEANGLE_EXAM_SEEDS", "20")) if NIGHTLY else 3
+FIRSTS = 2 if NIGHTLY else 1
+WANTED = 0.95
 
 
 def blanked(measured, lacking):
@@ -207,10 +210,13 @@ FEW = [
 
 @pytest.mark.parametrize(("entry", "cause"), ASKED if NIGHTLY else FEW)
 def test_a_plan_that_is_followed_names_the_cause(entry, cause):
-    seed, seeds = secrets.randbits(32), SEEDS if NIGHTLY else 3
-    print("seed", seed)
-    named, plan = followed(entry, cause, seeds, seed)
-    print(entry, cause, named, plan)
-    assert plan is None or plan.runs
-    least = 0.95 - 3.0 * (0.95 * 0.05 / seeds) ** 0.5
-    assert named >= least * seeds
+    """The seeds are always the same: a share of 95 % in 20 is missed by chance all too often."""
+    named = 0
+    for first in range(FIRSTS):
+        seed = [zlib.crc32(f"{entry}: {cause}".encode()), first]
+        found, plan = followed(entry, cause, SEEDS // FIRSTS, seed)
+        print(entry, cause, found, plan)
+        assert plan is None or plan.runs
+        assert plan is None or plan.between[0].told
+        named += found
+    assert named >= WANTED * (SEEDS // FIRSTS * FIRSTS)

