@@ -31,7 +31,7 @@ def fit_of(parts, ways, period=360.0, places=None, weights=None):
 
 @pytest.mark.parametrize("period", UNITS)
 def test_half_a_reversal_error_counts_from_three_standard_errors_of_the_runs_on(period):
-    """Halves m - 1, m, m + 1: a standard error of their mean of 1/sqrt 3, two degrees of freedom."""
+    """Halves m - 1, m, m + 1: a standard error of 1/sqrt 3, two degrees of freedom."""
     way = np.tile([1.0, -1.0], 6)
     for mean, seen in ((1.02 * np.sqrt(3.0), True), (0.98 * np.sqrt(3.0), False)):
         parts = [(mean + d) * way for d in (-1.0, 0.0, 1.0)]
@@ -135,7 +135,7 @@ def test_degrees_of_freedom_are_cut_to_whole_ones():
 def test_readings_as_left_are_the_same_in_every_unit(runs_in, model_in):
     """A pattern, a delay and play, corrected in the model's unit and in the readings'."""
     t = np.linspace(0.0, 10.0, 200)
-    turns, speed = 0.4 - 0.4 * np.cos(0.6 * t), 0.24 * np.sin(0.6 * t)
+    turns = 0.4 - 0.4 * np.cos(0.6 * t)
 
     def left(readings, unit):
         shaft = ta.Shaft("output", 1, [1, 3], [2e-4 * unit, 0.0], [0.0, 1e-4 * unit])
