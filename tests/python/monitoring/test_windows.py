@@ -19,7 +19,7 @@ def model(period=360.0, covariance=None):
     """Output orders 1 and 4; order 2 of the output and order 1 of a shaft twice as fast."""
     unit = period / 360.0
     shafts = [
-        ta.Shaft("output", 1, [1, 2, 4], [0.01 * unit, 0.004 * unit, 0.0], [0.0, 0.0, 0.002 * unit]),
+        ta.Shaft("output", 1, [1, 2, 4], [1e-2 * unit, 4e-3 * unit, 0.0], [0.0, 0.0, 2e-3 * unit]),
         ta.Shaft("motor", 2, [1], [-0.001 * unit], [0.003 * unit]),
     ]  # fmt: skip
     return ta.HarmonicModel(shafts, period=period, covariance=covariance)
