@@ -9,6 +9,7 @@ import pytest
 from scipy.stats import t
 
 import trueangle as ta
+from trueangle.fitting.breakdown import _between_neighbours
 from trueangle.fitting.phases import run_phases
 from trueangle.fitting.uncertainty import Uncertainty, _repeated, _thinned, _with_constant
 
@@ -194,17 +195,12 @@ def test_a_reference_that_is_homed_anew_is_told_by_how_much() -> None:
 @pytest.mark.parametrize("kind", ["clusters", "outliers"])
 @pytest.mark.parametrize("level", [0.5, 0.95])
 def test_intervals_are_students_about_the_value(kind: str, level: float) -> None:
-    """Two-sided; of an amplitude with the fewer degrees of freedom of its two coefficients."""
+    """Two-sided, with the degrees of freedom of each."""
     fit = ta.fit(runs_of(kind), **FITS[kind][1])
     low, high = fit.interval(level).T
     times = t.ppf(0.5 + 0.5 * level, fit.freedom)
     np.testing.assert_allclose(high - low, 2.0 * times * np.sqrt(np.diag(fit.covariance)))
     np.testing.assert_allclose(0.5 * (high + low)[0], fit.model.constant)
-    low, high = fit.amplitude_interval(level).T
-    fewest = [min(fit.freedom[1 + 2 * k : 3 + 2 * k]) for k in range(len(fit.orders))]
-    wanted = t.ppf(0.5 + 0.5 * level, fewest) * fit.amplitude_std
-    np.testing.assert_allclose(high, fit.amplitudes + wanted)
-    np.testing.assert_allclose(low, np.maximum(fit.amplitudes - wanted, 0.0))
 
 
 def test_the_constant_is_wider_by_as_much_as_the_coefficients_in_the_middle() -> None:
@@ -227,13 +223,14 @@ def test_thinned_readings_lose_their_unknowns() -> None:
 
 
 @pytest.mark.parametrize("covariance", ["white", "cluster"])
-def test_every_reading_twice_is_no_other_ridge(covariance: str) -> None:
+@pytest.mark.parametrize("ridge", [0.01, 1.0])
+def test_every_reading_twice_is_no_other_ridge(covariance: str, ridge: float) -> None:
     """A penalty is one for each reading: what it takes, and may have taken, stays."""
     runs = runs_of("ridge")
     twice = [
         ta.CalibrationRun(np.repeat(r.reference, 2), np.repeat(r.indicated, 2), 360.0) for r in runs
     ]
-    options = {"orders": [1, 2, 3, 4], "ridge": 0.01, "covariance": covariance}
+    options = {"orders": [1, 2, 3, 4], "ridge": ridge, "covariance": covariance}
     one, other = ta.fit(runs, **options), ta.fit(twice, **options)
     np.testing.assert_allclose(other.amplitudes, one.amplitudes, rtol=1e-6)
     # A ridge so large that its bias is nearly all; which patterns are likely twice as many tell
@@ -244,15 +241,23 @@ def test_every_reading_twice_is_no_other_ridge(covariance: str) -> None:
         np.testing.assert_allclose(by_runs[1].amplitude_std, by_runs[0].amplitude_std, rtol=0.05)
 
 
-def test_a_missing_order_is_told_by_its_size_in_the_noise_of_neighbours() -> None:
-    """An order of 0.5 in noise of 0.01: the median of its sine is that of half of them."""
+def test_neighbours_differ_by_the_noise_whatever_the_model_lacks() -> None:
+    """An order of 0.5 that is not fitted, in noise of 0.01: to 4.5 errors of a median of 4000."""
     theta = np.linspace(0.0, 360.0, 4000, endpoint=False)
     rng = np.random.default_rng(SEED)
     error = 0.1 * np.sin(np.radians(theta)) + 0.5 * np.sin(np.radians(2.0 * theta))
     run = ta.CalibrationRun(theta, theta + error + 0.01 * rng.normal(size=4000), 360.0)
-    found = ta.fit(run, orders=[1], loss="huber")
-    (said,) = re.findall(r"the residuals are (\S+) times what neighbours", " ".join(found.notes))
-    assert float(said) == pytest.approx(1.4826 * 0.5 * np.sqrt(0.5) / 0.01, rel=0.1)
+    found = ta.fit(run, orders=[1])
+    between = _between_neighbours(found.problem, [found.residuals])
+    assert between == pytest.approx(0.01, rel=4.5 * 1.17 / np.sqrt(4000.0))
+
+
+def test_an_amplitude_has_the_fewer_degrees_of_freedom(monkeypatch: pytest.MonkeyPatch) -> None:
+    fit = ta.fit(runs_of("outliers"), orders=[1, 2])
+    freedom = np.array([9.0, 3.0, 8.0, 7.0, 4.0])
+    monkeypatch.setattr(type(fit), "freedom", property(lambda _: freedom))
+    wide = 0.5 * np.diff(fit.amplitude_interval(0.9), axis=1)[:, 0]
+    np.testing.assert_allclose(wide, t.ppf(0.95, [3.0, 4.0]) * fit.amplitude_std)
 
 
 def test_a_known_bias_adds_to_the_variance_and_to_its_freedom() -> None:

@@ -26,7 +26,7 @@ def covariance(x: np.ndarray, orders: list[float], zeros: np.ndarray) -> np.ndar
     """Of cosine and sine of each order beside the zeros, for noise of variance 1."""
     columns = [(zeros == g).astype(float) for g in np.unique(zeros)]
     columns += [f(2.0 * np.pi * k * x) for k in orders for f in (np.cos, np.sin)]
-    u, s, vt = np.linalg.svd(np.column_stack(columns), full_matrices=False)
+    _, s, vt = np.linalg.svd(np.column_stack(columns), full_matrices=False)
     return (vt.T / s**2 @ vt)[-2 * len(orders) :, -2 * len(orders) :]
 
 
