@@ -17,8 +17,9 @@ LINES = {1: (300.0, 0.3), 2: (150.0, 1.0), 4: (50.0, 2.0)}
 OPTIONS = {"orders": [1, 2, 4], "loop": "open", "ripple": "none"}
 
 
-def log_of(seed: int = SEED, *, fast: float = 10.0, slow: float = 3.0, seconds: float = 2.0) -> dict[str, np.ndarray]:  # fmt: skip
-    t, theta = coast(fast, slow, seconds)
+def log_of(seed: int = SEED) -> dict[str, np.ndarray]:
+    """Two seconds from 10 to 3 turns a second, 500 readings."""
+    t, theta = coast(10.0, 3.0, 2.0)
     t, theta = t[::4], theta[::4]
     rng = np.random.default_rng(seed)
     reading = theta + encoder(theta, LINES) + 20.0 * ARCSEC * rng.normal(size=t.size)
