@@ -151,3 +151,29 @@ def test_torque_ripple_falls_with_the_square_of_the_order(order: float) -> None:
         assert _may_be_ripple(one(order, share * 60.0 / order**2, 1.0), faint) is may
     assert _may_be_ripple(first, first)
     assert _may_be_ripple(one(order, 1e6, 1.0), None)
+
+
+@pytest.mark.parametrize("slow", [5.0, 4.75])
+def test_what_one_speed_cannot_tell_is_said_with_its_numbers(slow: float) -> None:
+    """Orders 1 and 2 may be ripple; order 4 is more than order 1 over 16, and the encoder's."""
+    lines = {1: (300.0, 0.3), 2: (60.0, 1.0), 4: (50.0, 2.0)}
+    t, theta = coast(5.0, slow, 3.0)
+    t, theta = t[::6], theta[::6]
+    noise = 20.0 * ARCSEC * np.random.default_rng(SEED + 1).normal(size=t.size)
+    log = {"time_s": t, "indicated_rad": np.mod(theta + encoder(theta, lines) + noise, 2.0 * np.pi)}
+    told = ta.selfcal(log, orders=[1, 2, 4], loop="open")
+    assert [o.order for o in told.sums] == [1.0, 2.0]
+    assert [o.order for o in told.orders] == [4.0]
+    (blind,) = [b for b in told.blind if b.orders == (1.0, 2.0)]
+    ratio = float(blind.because.split("(ratio ")[1].split(")")[0])
+    # Of the speeds from 5 to 95 % of the readings.
+    assert ratio == pytest.approx((5.0 / slow) ** 0.9, abs=0.011)
+    (note,) = [n for n in told.notes if n.startswith("one speed")]
+    size = float(note.split("(")[1].split("/k^2")[0])
+    assert size == pytest.approx(told.sums[0].amplitude, rel=0.005)
+    assert told.model.period == 360.0
+    assert not any("no order can be given" in n for n in told.notes)
+    alone = ta.selfcal(log, orders=[1, 2], loop="open")
+    assert not alone.orders
+    assert any("no order can be given as the encoder's" in n for n in alone.notes)
+    assert not any(n.startswith("one speed") for n in alone.notes)
