@@ -2,15 +2,11 @@
 
 from __future__ import annotations
 
-from types import SimpleNamespace
-
 import numpy as np
 import pytest
 
 from trueangle.selfcalibration.dense import (
-    _BLOCKS,
     DenseRows,
-    _from_blocks,
     _solve,
     _triangle,
     fit_dense,
@@ -211,26 +207,3 @@ def test_orders_stand_out_of_their_errors_as_often_as_chance_says() -> None:
         at[columns.index(Unknown("b", 3.0, "sin"))] = np.sqrt(size)
         assert chosen_orders(nothing, at, np.eye(40), orders, "b") == kept
         assert chosen_orders(nothing, at, np.eye(40), orders, "a") == ()
-
-
-def test_errors_from_blocks_are_those_of_their_scores() -> None:
-    """The sandwich of S sums of scores, S / (S - 1) for the mean that they lack."""
-    patterns, nuisances, y = rows(9)
-    inverse = np.linalg.inv(nuisances.T @ nuisances)
-    beside = nuisances.T @ patterns
-    clear = patterns - nuisances @ inverse @ beside
-    bread = np.linalg.inv(clear.T @ clear)
-    cuts = [50, 51, 200]
-    blocks, at = [], 0
-    size = N // _BLOCKS
-    for n in np.diff([0, *cuts, N]):
-        for start in range(at, at + n, size):
-            stop = min(start + size, at + n)
-            blocks.append(clear[start:stop].T @ y[start:stop])
-        at += n
-    scores = np.array(blocks)
-    wanted = bread @ (scores.T @ scores) @ bread * len(scores) / (len(scores) - 1.0)
-    found = _from_blocks(
-        parts(patterns, nuisances, y, cuts), SimpleNamespace(inverse=bread), inverse, beside, y
-    )
-    np.testing.assert_allclose(found, wanted, rtol=1e-9)
