@@ -22,7 +22,8 @@ def runs_of(period: float = 360.0, sign: float = 1.0) -> list[ta.CalibrationRun]
             error[230:] += 5.0
         found.append(
             ta.CalibrationRun(
-                scale * theta, scale * (theta + error), period, time=time, label=f"r{k}",
+                scale * np.mod(theta, 360.0), scale * np.mod(theta + error, 360.0), period,
+                time=time, label=f"r{k}", velocity=scale * speed * np.sign(500.0 - speed * time),
                 temperature=np.linspace(20.0, 22.0 + k, 400), torque=np.full(400, 3.0 * k),
                 mount=np.full(400, scale * 90.0 * k),
             )
@@ -47,6 +48,15 @@ def test_every_unit_gives_one_check(period: float) -> None:
 def test_what_was_moved_and_measured_is_told() -> None:
     told = ta.check(runs_of()).to_dict()
     assert (told["readings"], told["runs"]) == (800, 2)
+    assert told["turns"] == pytest.approx(500.0 / 360.0, rel=0.01)
+    assert (told["speeds"], told["loads"], told["mounts"]) == (
+        [10.0, 40.0],
+        [0.0, 3.0],
+        [0.0, 90.0],
+    )
+    assert told["temperatures"] == [21.25]
+    # The run without a jump: beyond a turn as well.
+    assert ta.check(runs_of()[:1]).ratio == pytest.approx(1.0, abs=5e-4)
     mirrored = ta.check(runs_of(sign=-1.0)).to_dict()
     assert mirrored["ratio"] == pytest.approx(told["ratio"])
     assert mirrored["usable"] == told["usable"]
