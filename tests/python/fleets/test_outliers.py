@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.stats import f
 
 import trueangle as ta
 from trueangle.fleets.outliers import deviates, weights_of
@@ -97,3 +98,34 @@ def test_a_few_units_tell_no_outlier():
     found = ta.fleet(units(rng, 4), orders=[1, 2])
     assert all(unit.verdict == "fine" for unit in found.units)
     assert any("5 are needed" in note for note in found.notes)
+
+
+@pytest.mark.parametrize("aligned", [True, False])
+def test_a_distance_is_that_from_the_others_in_their_own_scatter(aligned):
+    """Left out and looked at from the others, one by one: known exactly, none outlying."""
+    print("seed", SEED)
+    values = np.random.default_rng(SEED + 70).normal(0.0, 1.0, (11, 2))
+    found = deviates([values], [np.zeros((11, 2, 2))], aligned)
+    assert not found.outlying.any()
+    for u in range(11):
+        others = np.delete(values, u, axis=0)
+        mean = others.mean(axis=0) if aligned else np.zeros(2)
+        freedom = 2.0 * (9.0 if aligned else 10.0)
+        scatter = ((others - mean) ** 2).sum() / freedom
+        square = ((values[u] - mean) ** 2).sum() / scatter / (1.1 if aligned else 1.0)
+        assert found.size[u, 0] == pytest.approx(np.sqrt(square), rel=1e-9)
+        assert found.chance[u, 0] == pytest.approx(f.sf(square / 2.0, 2.0, freedom), rel=1e-9)
+    assert found.limit == pytest.approx(0.8 * 0.01 / 11.0)
+
+
+def test_a_unit_set_aside_is_seen_from_the_others_and_the_limit_is_theirs():
+    print("seed", SEED)
+    values = np.random.default_rng(SEED + 71).normal(0.0, 1.0, (21, 2))
+    values[7] = [30.0, 0.0]
+    found = deviates([values], [np.zeros((21, 2, 2))], True)
+    assert found.outlying.nonzero()[0].tolist() == [7]
+    others = np.delete(values, 7, axis=0)
+    scatter = ((others - others.mean(axis=0)) ** 2).sum() / 38.0
+    square = ((values[7] - others.mean(axis=0)) ** 2).sum() / scatter / 1.05
+    assert found.size[7, 0] == pytest.approx(np.sqrt(square), rel=1e-9)
+    assert found.limit == pytest.approx(0.8 * 0.01 / 20.0)

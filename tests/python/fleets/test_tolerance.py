@@ -48,6 +48,19 @@ def test_ranks_need_as_many_units_as_wilks_says():
     assert tolerance_of(np.arange(1.0, 94.0), np.arange(1.0, 94.0), 0.95, 0.95).peak_to_peak == 92.0
 
 
+def test_few_units_are_bounded_by_the_scatter_of_their_logarithms():
+    """One-sided, with the standard deviation of n - 1."""
+    print("seed", SEED)
+    sizes = np.random.default_rng(SEED + 1).lognormal(2.0, 0.4, 10)
+    found = tolerance_of(sizes, 0.5 * sizes, 0.9, 0.95)
+    assert found.factor == pytest.approx(2.355, abs=6e-4)  # ISO 16269-6, one-sided
+    logs = np.log(sizes)
+    bound = np.exp(logs.mean() + found.factor * np.sqrt(((logs - logs.mean()) ** 2).sum() / 9.0))
+    assert found.peak_to_peak == pytest.approx(bound)
+    assert found.left == pytest.approx(0.5 * bound)
+    assert found.plain(3600.0)["peak_to_peak_arcsec"] == pytest.approx(3600.0 * bound)
+
+
 def test_impossible_limits_are_refused():
     with pytest.raises(ArgumentError, match="n must be 2"):
         tolerance_factor(1, 0.9, 0.9)

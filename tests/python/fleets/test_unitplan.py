@@ -97,6 +97,7 @@ def test_the_unit_s_own_share_is_what_its_readings_take_away():
     variance = np.array([s**2 for s in SPREAD.values()])[:, None]
     expected = (1.0 - left / variance).mean(axis=1)
     assert [*plan.own.values()] == pytest.approx(expected.tolist(), abs=1e-6)
+    assert [*plan.std_arcsec.values()] == pytest.approx(np.sqrt(left.mean(axis=1)).tolist())
     assert plan.readings == 12
 
 

@@ -10,6 +10,8 @@ import scipy.signal
 import trueangle as ta
 from trueangle.cli import main
 from trueangle.errors import ArgumentError, FileError
+from trueangle.runs.joining.clocks import estimated_clocks
+from trueangle.runs.joining.stream import Stream
 
 #: Seeds of noise and jitter; printed by a failing test through its parameters.
 SEEDS = (1, 2)
@@ -66,8 +68,11 @@ def test_offset_and_rate_are_found_within_their_errors(seed, tmp_path):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("memory", [0.0, 0.9])
-def test_pulls_of_offset_and_rate(memory, tmp_path):
-    """White noise and noise that remembers ten readings: errors are what seeds scatter."""
+def test_pulls_of_offset_and_rate(memory):
+    """White noise and noise that remembers ten readings: errors are what seeds scatter.
+
+    Without files: the test above has their way through them.
+    """
     pulls = []
     seeds = range(8_200, 8_230)
     print(f"seeds {seeds}")
@@ -78,15 +83,14 @@ def test_pulls_of_offset_and_rate(memory, tmp_path):
         noise = scipy.signal.lfilter([1.0], [1.0, -memory], drawn)
         s = np.arange(-1.0, 31.0, 0.004)
         true = motion(s) + rng.normal(0.0, 0.001, s.size)
-        found = ta.join(
-            log(tmp_path / "a.csv", "indicated", t, motion(t) + pattern(motion(t)) + noise),
-            log(tmp_path / "b.csv", "reference", s + OFFSET + 1e-6 * RATE * (s - t[0]), true),
+        found = estimated_clocks(
+            Stream.of(t, motion(t) + pattern(motion(t)) + noise),
+            Stream.of(s + OFFSET + 1e-6 * RATE * (s - t[0]), true),
+            None,
+            None,
         )
         pulls.append(
-            (
-                (found.offset_s - OFFSET) / found.offset_std_s,
-                (found.rate_ppm - RATE) / found.rate_std_ppm,
-            )
+            ((found.offset - OFFSET) / found.offset_std, (found.rate - RATE) / found.rate_std)
         )
     spread, mean = np.std(pulls, axis=0), np.mean(pulls, axis=0)
     print(spread, mean)

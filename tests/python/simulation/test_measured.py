@@ -1,5 +1,7 @@
 """Designs of measured runs: what they hold, and that a simulation repeats the measurement."""
 
+from dataclasses import fields, replace
+
 import numpy as np
 import pytest
 
@@ -87,3 +89,48 @@ def test_what_extend_writes_repeats_the_measurement(tmp_path, capsys):
     stated = Simulation(sigma_arcsec=1.5, runs=(RunDesign(),))
     found = ta.diagnose(runs, stated).simulation()
     assert (found.sigma_arcsec, found.runs) == (1.5, stated.runs)
+
+
+@pytest.mark.parametrize("period", [1.0, 2.0 * np.pi, 4096.0])
+def test_a_design_is_the_same_whatever_the_unit_of_the_readings(period):
+    """Travel, speed, mount, shift and the ways of other joints, all angles."""
+    (run,) = ta.simulate(Simulation(runs=(replace(FULL, shift_deg=12.0),)), 3)
+    scale = period / 360.0
+    angles = ("shift", "coupled_wrist")
+    other = ta.CalibrationRun(
+        scale * run.reference, scale * run.indicated, period, time=run.time,
+        temperature=run.temperature, torque=run.torque, mount=scale * run.mount,
+        label=run.label, velocity=scale * run.velocity,
+        signals={n: v * (scale if n in angles else 1.0) for n, v in run.signals.items()},
+    )  # fmt: skip
+    one, found = design_of(run), design_of(other)
+    for field in fields(RunDesign):
+        mine, its = getattr(found, field.name), getattr(one, field.name)
+        if field.name == "coupled":
+            assert [name for name, _ in mine] == [name for name, _ in its]
+            mine, its = (np.concatenate([way for _, way in ways]) for ways in (mine, its))
+            np.testing.assert_allclose(mine, its, atol=1e-6)
+        elif isinstance(its, float | tuple):
+            assert mine == pytest.approx(its, abs=1e-6), field.name
+        else:
+            assert mine == its, field.name
+
+
+@pytest.mark.parametrize("gravity_deg", [-170.0, -25.0, 0.0, 80.0])
+@pytest.mark.parametrize("gravity", [0.5, 4.0])
+def test_a_weight_is_told_from_a_constant_load_by_its_share(gravity_deg, gravity):
+    """Noise of 1 Nm beside it: a weight of 0.5 is a half of less than its variance."""
+    design = replace(FULL, gravity_Nm=gravity, gravity_deg=gravity_deg, turns=2.0)
+    (run,) = ta.simulate(Simulation(runs=(design,)), 5)
+    noise = np.random.default_rng(6).normal(size=500)
+    found = design_of(replace(run, torque=run.torque + noise))
+    if gravity < 1.0:
+        assert (found.gravity_Nm, found.gravity_deg) == (0.0, 0.0)
+        assert found.torque_Nm == pytest.approx(float((run.torque + noise).mean()))
+    else:
+        # Each coefficient to sqrt(2 / 500) of the noise, to 4.5 of them.
+        about = 4.5 * np.sqrt(2.0 / 500.0)
+        assert found.gravity_Nm == pytest.approx(4.0, abs=about)
+        assert found.torque_Nm == pytest.approx(2.0, abs=about)
+        away = (found.gravity_deg - gravity_deg + 180.0) % 360.0 - 180.0
+        assert abs(away) < np.degrees(about / 4.0)

@@ -1,0 +1,150 @@
+"""What a budget takes from the readings, against loops written out; values in every unit."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+import trueangle as ta
+from trueangle.certificate import Budget, Contribution, Specification, conformity
+from trueangle.certificate.asleft import corrected_runs
+from trueangle.certificate.values import left_at_places, reversal
+
+SEED = 61_000
+UNITS = (360.0, 1.0, 2.0 * np.pi)
+ARCSEC = 1_296_000.0
+
+
+def fit_of(parts, ways, period=360.0, places=None, weights=None):
+    """What these functions read of a fit: residuals of runs in arcsec, and how they moved."""
+    runs = []
+    for number, (rest, way) in enumerate(zip(parts, ways, strict=True)):
+        angle = np.linspace(0.0, 0.9, rest.size) if places is None else places[number]
+        x = period * np.asarray(angle)
+        runs.append(ta.CalibrationRun(x, x, period, velocity=np.asarray(way, float)))
+    residuals = np.concatenate(parts) * (period / ARCSEC)
+    model = SimpleNamespace(period=period)
+    return SimpleNamespace(model=model, runs=runs, residuals=residuals, weights=weights)
+
+
+@pytest.mark.parametrize("period", UNITS)
+def test_half_a_reversal_error_counts_from_three_standard_errors_of_the_runs_on(period):
+    """Halves m - 1, m, m + 1: a standard error of 1/sqrt 3, two degrees of freedom."""
+    way = np.tile([1.0, -1.0], 6)
+    for mean, seen in ((1.02 * np.sqrt(3.0), True), (0.98 * np.sqrt(3.0), False)):
+        parts = [(mean + d) * way for d in (-1.0, 0.0, 1.0)]
+        found = reversal(fit_of(parts, 3 * [way], period))
+        assert found.standard == pytest.approx(mean if seen else 0.0, rel=1e-9)
+        assert found.degrees_of_freedom == 2.0
+        assert (found.kind, found.distribution) == ("A", "two-point")
+
+
+@pytest.mark.parametrize("runs", [1, 2])
+def test_of_one_or_two_runs_it_is_the_scatter_of_their_readings(runs):
+    """Twelve readings, two unknowns: a variance of S / 10, and of the half of S / 120."""
+    way = np.tile([1.0, -1.0], 6)
+    rest = np.repeat([1.0, -1.0, 2.0, -2.0, 0.5, -0.5], 2)  # of no mean, either way alike
+    error = np.sqrt(rest @ rest / 10.0 / 12.0)
+    for times, seen in ((3.02, True), (2.98, False)):
+        parts = [times * error * way + rest * (1.0 if k == 0 else 0.5) for k in range(runs)]
+        found = reversal(fit_of(parts, runs * [way]))
+        assert found.standard == pytest.approx(times * error if seen else 0.0, rel=1e-9)
+        assert found.degrees_of_freedom == 1.0
+    assert reversal(fit_of([rest], [np.ones(12)])) is None
+
+
+def by_loops(parts, places, kept):
+    """Mean over the places of the mean product of two runs' means there; places; its error."""
+    means = {}
+    for run, (rest, turn, keep) in enumerate(zip(parts, places, kept, strict=True)):
+        for value, place in zip(rest[keep], np.floor(360.0 * turn[keep]).astype(int), strict=True):
+            means.setdefault(place, {}).setdefault(run, []).append(value)
+    products = []
+    for of_runs in means.values():
+        m = [np.mean(values) for values in of_runs.values()]
+        pairs = [a * b for i, a in enumerate(m) for j, b in enumerate(m) if i != j]
+        if pairs:
+            products.append(np.mean(pairs))
+    return np.mean(products), len(products), np.std(products, ddof=1) / np.sqrt(len(products))
+
+
+@pytest.mark.parametrize("period", UNITS)
+def test_what_places_keep_is_the_mean_product_of_runs_there(period):
+    """Against loops: 200 draws of unlike sizes, some seen and some not."""
+    print("seed", SEED)
+    seen = 0
+    for draw in range(200):
+        rng = np.random.default_rng([SEED, draw])
+        kept_there = rng.normal(0.0, rng.choice([0.2, 0.6, 2.0]), 24)
+        places, parts, kept = [], [], []
+        for _ in range(int(rng.integers(2, 5))):
+            at = rng.integers(0, 24, 40)
+            places.append((15.0 * at + rng.uniform(0.1, 0.9, 40)) / 360.0)
+            parts.append(kept_there[at] + rng.normal(0.0, 1.0, 40))
+            kept.append(rng.random(40) < 0.9)
+        weights = [keep.astype(float) for keep in kept]
+        fit = fit_of(parts, [np.ones(40)] * len(parts), period, places, weights)
+        found = left_at_places(fit)
+        variance, count, error = by_loops(parts, places, kept)
+        is_seen = variance > 3.0 * error
+        seen += is_seen
+        wanted = np.sqrt(variance) if is_seen else 0.0
+        assert found.standard == pytest.approx(wanted, rel=1e-9), draw
+        assert found.degrees_of_freedom == count
+    assert 40 < seen < 160
+
+
+def test_one_run_alone_cannot_show_it():
+    parts = [np.repeat([1.0, -1.0], 10)]
+    assert left_at_places(fit_of(parts, [np.ones(20)])).standard == 0.0
+
+
+def test_the_least_chance_and_the_worst_positions_own_limit_are_told():
+    rows = [
+        {
+            "angle_deg": 10.0 * k, "error_arcsec": e, "standard_arcsec": u,
+            "degrees_of_freedom": free, "expanded_arcsec": 2.0 * u,
+        }
+        for k, (e, u, free) in enumerate([(1.0, 0.5, None), (7.0, 1.0, 3.0), (2.0, 1.5, None)])
+    ]  # fmt: skip
+    found = conformity(Specification(10.0, "guard_band"), rows)
+    assert found["worst"]["angle_deg"] == 10.0
+    assert found["worst"]["acceptance_limit_arcsec"] == 8.0
+    from scipy.stats import t
+
+    # The second: three standard uncertainties from the limit, with three degrees of freedom.
+    assert found["conformance_probability"] == pytest.approx(t.cdf(3.0, 3) - t.cdf(-17.0, 3))
+    assert found["counts"] == {
+        "pass": 3, "conditional_pass": 0, "conditional_fail": 0, "fail": 0,
+    }  # fmt: skip
+
+
+def test_degrees_of_freedom_are_cut_to_whole_ones():
+    from scipy.stats import t
+
+    two = Budget((Contribution("a", 1.0, "A", "t", 5.0), Contribution("b", 0.9, "A", "t", 7.0)))
+    free = 1.81**2 / (1.0 / 5.0 + 0.81**2 / 7.0)
+    assert two.degrees_of_freedom == pytest.approx(free)
+    assert two.expanded == pytest.approx(t.ppf(0.97725, np.floor(free)) * np.sqrt(1.81))
+
+
+@pytest.mark.parametrize("runs_in", UNITS)
+@pytest.mark.parametrize("model_in", UNITS)
+def test_readings_as_left_are_the_same_in_every_unit(runs_in, model_in):
+    """A pattern, a delay and play, corrected in the model's unit and in the readings'."""
+    t = np.linspace(0.0, 10.0, 200)
+    turns = 0.4 - 0.4 * np.cos(0.6 * t)
+
+    def left(readings, unit):
+        shaft = ta.Shaft("output", 1, [1, 3], [2e-4 * unit, 0.0], [0.0, 1e-4 * unit])
+        terms = (ta.terms.Latency(0.01), ta.terms.Backlash(2e-5 * unit))
+        model = ta.HarmonicModel([shaft], period=unit, terms=terms)
+        run = ta.CalibrationRun(readings * turns, readings * (turns + 1e-3), readings, time=t)
+        (corrected,) = corrected_runs(model, [run])
+        return (corrected.indicated - run.indicated) / readings
+
+    same = left(360.0, 360.0)
+    assert np.ptp(same) > 1e-3
+    np.testing.assert_allclose(left(runs_in, model_in), same, rtol=0.0, atol=1e-12)

@@ -1,0 +1,104 @@
+"""Numbers beside the patterns of two scales: facets, coupling, and clampings that are predicted."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+import trueangle as ta
+from selfcalibration.rotor import ARCSEC, encoder
+
+SEED = 67_000
+SHIFTS = (0.0, 84.4, 240.7)
+MINE = {1: (200.0, 0.4), 2: (90.0, 2.0)}
+THEIRS = {1: (120.0, 1.0), 2: (60.0, 0.2)}
+
+
+def clamped(
+    seed: int, coupling: float = 0.0, n: int = 48, shifts: tuple[float, ...] = SHIFTS
+) -> dict[str, np.ndarray]:
+    """Both scales read with 2 arcsec at free places, a run a clamping."""
+    rng = np.random.default_rng(seed)
+    table: dict[str, list[np.ndarray]] = {"run": [], "indicated_rad": [], "reference_rad": []}
+    for j, shift in enumerate(np.radians(shifts)):
+        theta = 2.0 * np.pi * (np.arange(n) + rng.uniform(size=n)) / n
+        waves = (f(k * theta) for k in (1, 2) for f in (np.cos, np.sin))
+        bent = theta + sum(coupling * ARCSEC * rng.normal() * wave for wave in waves)
+        noise = 2.0 * ARCSEC * rng.normal(size=(2, n))
+        a = bent + encoder(bent, MINE) + noise[0]
+        b = theta + shift + encoder(theta + shift, THEIRS) + noise[1]
+        for name, values in (("run", np.full(n, j)), ("indicated_rad", a), ("reference_rad", b)):
+            table[name].append(np.mod(values, 2.0 * np.pi) if name != "run" else values)
+    return {name: np.concatenate(parts) for name, parts in table.items()}
+
+
+def selfcal(log: dict[str, np.ndarray]) -> ta.SelfCalibration:
+    return ta.selfcal(log, method="shifts", orders=[1, 2])
+
+
+def test_a_clamping_left_out_is_predicted_as_the_noise_of_all_says() -> None:
+    """Of 30 logs p is uniform, by Kolmogorov's distance; errors are those of both readings."""
+    print("seeds", SEED, "to", SEED + 29)
+    ps, squares = [], []
+    for seed in range(SEED, SEED + 30):
+        test = selfcal(clamped(seed)).held_out["clampings"]
+        ps.append(test.p)
+        squares.append(test.rms_after**2)
+    away = np.abs(np.sort(ps) - (np.arange(30) + 0.5) / 30).max()
+    assert away < 1.95 / math.sqrt(30.0)
+    # 4.5 errors of the deviation of 30 uniform numbers.
+    assert np.std(ps) == pytest.approx(1.0 / math.sqrt(12.0), abs=0.11)
+    # Twice 4 of the readings, and up to a quarter of it by the patterns of the others.
+    assert 7.5 < np.mean(squares) < 10.5
+
+
+def test_a_coupling_is_told_with_its_size() -> None:
+    """Of 5 arcsec in every coefficient of every clamping, to 4.5 errors of their rms."""
+    print("seeds", SEED + 100, "to", SEED + 109)
+    squares = []
+    for seed in range(SEED + 100, SEED + 110):
+        found = selfcal(clamped(seed, 5.0, shifts=(0.0, 40.0, 95.0, 170.0, 300.0)))
+        squares.append(found.beside["coupling_arcsec"] ** 2)
+        (note,) = [n for n in found.notes if n.startswith("the coupling changes by")]
+        said = float(note.split("changes by ")[1].split()[0])
+        assert said == pytest.approx(found.beside["coupling_arcsec"], rel=0.005)
+    # What clampings have in common passes for the pattern: 16 coefficients of 20 are left.
+    rms = math.sqrt(np.mean(squares))
+    assert rms == pytest.approx(5.0, rel=4.5 / math.sqrt(2.0 * 16.0 * 10.0))
+
+
+def polygon(seed: int, facets: np.ndarray) -> dict[str, np.ndarray]:
+    """A joint read at the facets of a polygon, remounted by some of them, 1 arcsec."""
+    n = facets.size
+    rng = np.random.default_rng(seed)
+    table: dict[str, list[np.ndarray]] = {
+        "run": [], "indicated_rad": [], "reference_rad": [], "shift_deg": [],
+    }  # fmt: skip
+    for j, step in enumerate((0, 2, 5)):
+        place = np.arange(n)
+        theta = 2.0 * np.pi * place / n
+        facet = (place + step) % n
+        error = encoder(theta, MINE) - ARCSEC * facets[facet] + ARCSEC * rng.normal(size=n)
+        table["run"].append(np.full(n, j))
+        table["indicated_rad"].append(np.mod(theta + error, 2.0 * np.pi))
+        table["reference_rad"].append(2.0 * np.pi * facet / n)
+        table["shift_deg"].append(np.full(n, 360.0 * step / n))
+    return {name: np.concatenate(parts) for name, parts in table.items()}
+
+
+def test_errors_of_facets_are_what_seeds_scatter() -> None:
+    """Each facet about the mean of all, over 30 calibrations of one polygon."""
+    print("seeds", SEED + 200, "to", SEED + 229)
+    facets = np.random.default_rng(SEED).normal(0.0, 2.0, 12)
+    found, stated = [], []
+    for seed in range(SEED + 200, SEED + 230):
+        beside = ta.selfcal(polygon(seed, facets), method="shifts", orders=[1, 2, 3]).beside
+        found.append(beside["facets_arcsec"])
+        stated.append(np.square(beside["facets_std_arcsec"]))
+    scatter = np.array(found).std(axis=0, ddof=1)
+    ratio = math.sqrt(np.mean(stated) / np.mean(scatter**2))
+    # 12 facets of 30 draws, their sum fixed.
+    assert ratio == pytest.approx(1.0, abs=4.5 / math.sqrt(2.0 * 11.0 * 29.0) + 0.02)
+    assert np.abs(np.sum(found, axis=1)).max() < 1e-6
