@@ -31,7 +31,7 @@ _MOST_POINTS = 1 << 22
 #: Orders that a summary lists.
 _LISTED = 12
 #: Part of an amplitude below which its standard error is that of rounded numbers.
-_ROUNDING = 1e-4
+_ROUNDING = 1e-6
 
 
 @dataclass(frozen=True)

@@ -104,7 +104,7 @@ class WatchReport(Page):
         )
 
     def to_dict(self) -> dict[str, Any]:
-        """Every number of the page: the windows as ``trueangle watch --json`` prints them."""
+        """Every number of the page: the windows as ``trueangle watch`` prints their objects."""
         return {"windows": [window.plain(self._scale) for window in self.windows]}
 
     def summary(self) -> str:

@@ -411,7 +411,7 @@ def test_nothing_is_lost_when_threads_share_moments():
 @pytest.mark.filterwarnings("ignore:.*fork.*:DeprecationWarning")
 def test_moments_forked_in_the_middle_of_an_update_say_so():
     moments = ta.Moments([1], period=360.0)
-    moments._turn._lock.acquire()  # another thread is at it
+    moments._sums._turn._lock.acquire()  # another thread is at it
     child = os.fork()
     if child == 0:
         signal.alarm(30)
@@ -421,5 +421,5 @@ def test_moments_forked_in_the_middle_of_an_update_say_so():
             os._exit(0 if "forked" in str(refusal) else 2)
         os._exit(1)
     _, status = os.waitpid(child, 0)
-    moments._turn._lock.release()
+    moments._sums._turn._lock.release()
     assert status == 0
