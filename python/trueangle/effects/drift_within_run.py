@@ -49,7 +49,7 @@ SEEN = 0.5
 #: of Kass and Raftery.
 TOLD = 10.0
 
-#: Time constants of settling, in shares of the run.
+#: Time constants of settling, in shares of the mean run.
 SETTLING = {"early settling": 0.12, "settling": 0.4}
 
 #: Half periods over a run of a bend.
@@ -190,19 +190,34 @@ class DriftWithinRun(Effect):
         return regression.propose_run_effect(cls.kind, shape, columns, log_grid)
 
     @staticmethod
-    def _shapes(regression: Regression, form: str, terms: int) -> Array:
-        """Columns of a drift, scaled so that it ends at variance 1 or about that."""
-        u = np.zeros(regression.n)
+    def _mean_span(regression: Regression) -> float:
+        """Of a run's clock."""
+        clock = regression.signals.clock
+        spans = [float(clock[stop - 1] - clock[start]) for start, stop in regression.bounds]
+        return max(float(np.mean(spans)), 1e-300)
+
+    @classmethod
+    def _shapes(cls, regression: Regression, form: str, terms: int) -> Array:
+        """Columns of a drift, scaled so that it ends at variance 1 or about that.
+
+        A ramp and a relaxation have one rate and one time constant in runs of any span, where
+        times tell it; a bend and a free path end where the run does.
+        """
+        timed, mean = regression.signals.time is not None, cls._mean_span(regression)
+        u, passed = np.zeros(regression.n), np.zeros(regression.n)
         for start, stop in regression.bounds:
             clock = regression.signals.clock[start:stop]
-            u[start:stop] = (clock - clock[0]) / max(float(clock[-1] - clock[0]), 1e-300)
+            span = max(float(clock[-1] - clock[0]), 1e-300)
+            u[start:stop] = (clock - clock[0]) / span
+            passed[start:stop] = u[start:stop] * (span / mean if timed else 1.0)
         k = np.arange(1, terms + 1, dtype=np.float64)
         if form == "ramp":
-            return u[:, None]
+            return passed[:, None]
         if form == "centred ramp":
-            return u[:, None] - 0.5
+            middle = [np.full(b - a, 0.5 * passed[b - 1]) for a, b in regression.bounds]
+            return (passed - np.concatenate(middle))[:, None]
         if form in SETTLING:
-            return (1.0 - np.exp(-u / SETTLING[form]))[:, None]
+            return (1.0 - np.exp(-passed / SETTLING[form]))[:, None]
         if form.endswith("bend"):
             waves = _core.line_columns(np.pi * u, k[:BENT])[:, 0::2] / k[:BENT]
             return np.asarray(waves if form.startswith("centred") else waves - 1.0 / k[:BENT])
@@ -223,9 +238,7 @@ class DriftWithinRun(Effect):
         extension = terms[0][0]
         assert extension.run_effect is not None
         size = float(np.sqrt(extension.run_effect.ratio * regression.variance))
-        clock = regression.signals.clock
-        spans = [float(clock[stop - 1] - clock[start]) for start, stop in regression.bounds]
-        rate = size / max(float(np.mean(spans)), 1e-300)
+        rate = size / cls._mean_span(regression)
         share = 1.0 / np.sqrt(2.0 * max(regression.signals.runs, 1))
         parameters = {
             "arcsec_per_s": quantity(rate, rate * share),
