@@ -39,6 +39,10 @@ COVERAGE = 2.0
 #: Share of the readings by which their number grows until the uncertainty wanted is reached.
 _GROWS = 0.01
 
+#: Share of an uncertainty that rounding may miss it by: as many readings as the optimum needs
+#: reach it exactly.
+_ROUNDING = 1e-9
+
 
 @dataclass(frozen=True)
 class ArcPlan(PlainResult):
@@ -215,7 +219,9 @@ def plan_arc(
         turns = _spread(_places(columns, best, steps), apart / 360.0, columns)
         even = np.linspace(start, stop, steps) / 360.0
         reached = _uncertainty(columns, turns, per_step, noise)
-        if uncertainty is None or reached is None or reached <= uncertainty or readings is not None:
+        if uncertainty is None or reached is None or readings is not None:
+            break
+        if reached <= uncertainty * (1.0 + _ROUNDING):
             break
         steps = math.ceil(steps * (1.0 + _GROWS))
     factors = noise_factors(turns, wanted)

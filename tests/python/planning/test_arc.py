@@ -124,6 +124,14 @@ def test_readings_are_shared_out_with_the_least_loss():
     assert rounded(np.array([0.6, 0.3, 0.1]), 10).tolist() == [6, 3, 1]
 
 
+@pytest.mark.parametrize("halves", [1, 2])
+@pytest.mark.parametrize("ratio", [4, 5, 6])
+def test_rounding_asks_for_no_further_readings(ratio, halves):
+    """Nine coefficients at nine places, ``n`` readings each: k s / sqrt(n) is reached exactly."""
+    plan = ta.plan_arc(0.0, 270.0, [1, 2, 3, 4], noise=float(ratio), uncertainty=2.0 / halves)
+    assert plan.readings == 9 * (ratio * halves) ** 2
+
+
 @pytest.mark.parametrize(("runs", "both"), [(1, False), (3, False), (2, True)])
 def test_the_uncertainty_is_the_one_that_fits_get(runs, both):
     """The scatter of fitted curves over the arc, zeros of runs known to none."""
@@ -132,7 +140,7 @@ def test_the_uncertainty_is_the_one_that_fits_get(runs, both):
     sigma, orders = 4.0, [1, 2, 3]
     plan = ta.plan_arc(-100.0, 130.0, orders, noise=sigma, uncertainty=3.0, runs=runs,
                        both_directions=both)  # fmt: skip
-    assert plan.uncertainty_arcsec <= 3.0
+    assert plan.uncertainty_arcsec <= 3.0 * (1.0 + 1e-9)
     x = np.radians(np.repeat(plan.places_deg, plan.counts))
     if both:
         assert all(count % 2 == 0 for count in plan.counts)
