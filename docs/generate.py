@@ -18,6 +18,7 @@ import numpy as np
 mpl.use("Agg")
 
 from causes import causes_page
+from roomfiles import room_files_page
 from simulatorpictures import simulator_pictures
 
 import trueangle as ta
@@ -57,6 +58,7 @@ def everything(folder: Path) -> None:
     (folder / "scaling.md").write_text(scaling(folder / "scaling.svg"), encoding="utf-8")
     (folder / "gallery.md").write_text(gallery(), encoding="utf-8")
     (folder / "causes.md").write_text(causes_page(), encoding="utf-8")
+    (folder / "rooms.md").write_text(room_files_page(), encoding="utf-8")
     (folder / "commands.md").write_text(commands(), encoding="utf-8")
     pages(folder / "pages")
 

@@ -1,11 +1,17 @@
 """The table of rooms and the architecture page say where things are, and they are there."""
 
+import ast
 import re
+import sys
 import tomllib
 
 import pytest
 
 from conftest import ROOT
+
+sys.path.insert(0, str(ROOT / "docs"))
+
+from roomfiles import first_sentence, room_files_page, rooms_of
 
 PACKAGE = ROOT / "python" / "trueangle"
 CONTRIBUTING = (ROOT / "CONTRIBUTING.md").read_text("utf-8")
@@ -13,9 +19,7 @@ PAGE = (ROOT / "docs" / "architecture.md").read_text("utf-8")
 
 
 def rooms_of_the_table():
-    start, end = (CONTRIBUTING.index(f"<!-- {mark} -->") for mark in ("rooms", "end of rooms"))
-    firsts = re.findall(r"^\| (`[^|]+) \|", CONTRIBUTING[start:end], re.MULTILINE)
-    return [name.rstrip("/") for cell in firsts for name in re.findall(r"`([^`]+)`", cell)]
+    return rooms_of(CONTRIBUTING)
 
 
 def test_the_table_has_every_room_in_the_order_of_the_floors():
@@ -45,3 +49,13 @@ def test_what_is_slow_is_there():
     named = [line for line in lines if line and not line.startswith("#")]
     assert [name for name in named if not (here / name).exists()] == []
     assert len(named) == len(set(named))
+
+
+def test_the_page_lists_every_file_by_its_first_sentence():
+    page = room_files_page()
+    files = [file for file in PACKAGE.rglob("*.py") if file.name != "__init__.py"]
+    for file in files:
+        if file.parent != PACKAGE:
+            assert f"| `{file.relative_to(PACKAGE)}` | {first_sentence(file)[:20]}" in page, file
+        assert ast.get_docstring(ast.parse(file.read_text("utf-8"))), file
+    assert page.count("\n| `") == sum(file.parent != PACKAGE for file in files)
