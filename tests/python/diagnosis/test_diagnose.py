@@ -20,6 +20,7 @@ from trueangle.estimation.regression import Regression
 from trueangle.joint.pattern import ARCSEC_PER_RAD
 from trueangle.joint.signals import Signals, join_runs
 from trueangle.simulation import Harmonic, Joint, RunDesign, Simulation, simulate
+from trueangle.support.blas import one_blas_thread
 
 SIM = Simulation(
     Joint(),
@@ -41,15 +42,15 @@ def fitted_to(signals: Signals, y: np.ndarray, rho: float | None = 0.0) -> Regre
 
 
 def test_the_noise_has_the_degrees_of_freedom_of_the_fit(signals: Signals) -> None:
-    """A hundred readings, six coefficients: the mean variance of 400 draws."""
+    """A hundred readings, six coefficients: the mean variance of 200 draws."""
     rest, found = SimpleNamespace(found=False, noise=SimpleNamespace(sigma=77.0)), []
-    for seed in range(400):
+    for seed in range(200):
         noise = np.random.default_rng([88, seed]).uniform(-1.0, 1.0, len(signals)) * np.sqrt(12.0)
         fitted = fitted_to(signals, noise)
         fitted = fitted.with_terms([EFFECTS["backlash"].propose(fitted)])
         found.append(_noise(fitted, rest))
     # Of a uniform number: kurtosis 1.8, so that a variance scatters by sqrt(0.8 / n).
-    assert np.mean(np.square(found)) == pytest.approx(4.0, abs=5.0 * 4.0 * np.sqrt(0.8 / 94 / 400))
+    assert np.mean(np.square(found)) == pytest.approx(4.0, abs=5.0 * 4.0 * np.sqrt(0.8 / 94 / 200))
     assert _noise(fitted, replace_found(rest)) == 77.0
 
 
@@ -86,9 +87,7 @@ def test_likelihoods_of_runs_add_up_to_that_of_all(signals: Signals, rho: float)
     gained = _by_run(with_it) - _by_run(without)
     assert gained.size == 3
     # Each at its own variance, whose n - p stands for n.
-    slow = [
-        -r.n * np.log(r.variance) - float(r.r @ r.r) / r.variance for r in (with_it, without)
-    ]
+    slow = [-r.n * np.log(r.variance) - float(r.r @ r.r) / r.variance for r in (with_it, without)]
     assert gained.sum() == pytest.approx(slow[0] - slow[1], rel=1e-9)
     assert gained.sum() == pytest.approx(without.deviance - with_it.deviance, rel=0.05)
 
@@ -117,19 +116,23 @@ def stale(seed: int, tau: float, sign: float, noise: float = 60.0) -> Signals:
 
 @pytest.mark.parametrize("sign", [-1.0, 1.0])
 def test_delays_scatter_as_they_say_about_the_one_that_is_hidden(sign: float) -> None:
-    """Pulls of 60 seeds, a joint and its mirror image, late and early."""
+    """Pulls of 24 seeds, a joint and its mirror image, late and early.
+
+    One of them (seed 37) has a reading at its turning point that a step puts on the other side.
+    """
     pulls = []
-    for seed in range(60):
+    for seed in range(18, 42):
         tau = 0.02 if seed % 2 else -0.02
         run = stale(seed, tau, sign)
         signals = join_runs([run])
         error = (run.indicated - run.reference) * 3600.0
-        found = find_delay(signals, error, Simulation())
+        with one_blas_thread():
+            found = find_delay(signals, error, Simulation())
         assert found is not None
         pulls.append((found.seconds - tau) / found.std)
     # Five standard errors of the mean and of the deviation.
-    assert abs(np.mean(pulls)) < 5.0 / np.sqrt(60)
-    assert np.std(pulls) == pytest.approx(1.0, abs=5.0 / np.sqrt(120))
+    assert abs(np.mean(pulls)) < 5.0 / np.sqrt(24)
+    assert np.std(pulls) == pytest.approx(1.0, abs=4.0 / np.sqrt(48))
 
 
 def test_an_error_at_the_angle_of_before_says_the_same_indication() -> None:

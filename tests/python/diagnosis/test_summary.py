@@ -102,15 +102,18 @@ def test_the_account_says_each_of_its_numbers_in_one_unit(result, unit, per_arcs
     assert told(rf"rms # {unit}, peak-to-peak #, max abs # \(600 readings\)") == pytest.approx(
         [81.0, 82.0, 83.0], **close
     )
-    assert told(rf"Noise of one reading: # {unit}, correlated by 0.42") == pytest.approx([77.0],
-                                                                                         **close)
+    assert told(rf"Noise of one reading: # {unit}, correlated by 0.42") == pytest.approx(
+        [77.0], **close
+    )
     assert told(
         rf"together: rms # -> # {unit}, peak-to-peak # -> #, max abs # -> #"
     ) == pytest.approx(list(sizes.values()), **close)
     assert told(rf"runs: rms # -> # {unit}, peak-to-peak # -> #, max abs # -> #") == pytest.approx(
         [11.0, 21.0, 12.0, 22.0, 13.0, 23.0], **close
     )
-    assert told(rf"amplitude {unit} # \+- #, believed #") == pytest.approx([9.0, 0.5, 8.0], rel=0.02)
+    assert told(rf"amplitude {unit} # \+- #, believed #") == pytest.approx(
+        [9.0, 0.5, 8.0], rel=0.02
+    )
     assert told(rf"held out, rms # -> # {unit}") == pytest.approx([11.0, 21.0], **close)
     # An angle of phase is in degrees whatever the errors are in.
     assert "phase deg 90.0 +- 1.5, believed 60.00" in text

@@ -34,9 +34,14 @@ def runs_of(period: float, hidden: float) -> list[ta.CalibrationRun]:
         unit = period / (2.0 * np.pi)
         found.append(
             ta.CalibrationRun(
-                theta * unit, theta * unit, period, time=time, velocity=velocity * unit,
-                torque=torque, label=f"{speed:g}",
-            )  # fmt: skip
+                theta * unit,
+                theta * unit,
+                period,
+                time=time,
+                velocity=velocity * unit,
+                torque=torque,
+                label=f"{speed:g}",
+            )
         )
     return found
 
