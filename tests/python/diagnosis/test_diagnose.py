@@ -58,9 +58,10 @@ def replace_found(rest: SimpleNamespace) -> SimpleNamespace:
     return SimpleNamespace(found=True, noise=rest.noise)
 
 
-def test_numbers_before_and_after_are_those_of_what_is_left(signals: Signals) -> None:
+@pytest.mark.parametrize("sign", [-1.0, 1.0])
+def test_numbers_before_and_after_are_those_of_what_is_left(signals: Signals, sign: float) -> None:
     noise = np.random.default_rng(4).normal(size=len(signals)) - 0.2 * signals.direction
-    before = fitted_to(signals, 4.0 * signals.direction + noise)
+    before = fitted_to(signals, sign * (4.0 * signals.direction + noise))
     after = before.with_terms([EFFECTS["backlash"].propose(before)])
     found = _overall(before, after)
     columns = np.hstack([before.base, signals.direction[:, None]])
