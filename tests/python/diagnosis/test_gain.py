@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from trueangle.diagnosis.gain import Gain, _control, _shuffled, _units, measure_delay_gain
+from trueangle.diagnosis.holdout import Law, numbers, residual_at
 from trueangle.diagnosis.levels import LevelGain, _reach, run_levels
 from trueangle.effects import EFFECTS
 from trueangle.estimation.regression import Regression
@@ -224,3 +225,24 @@ def test_a_gain_is_told_with_each_number_at_its_name() -> None:
     assert (of_level["rms_before_arcsec"], of_level["rms_after_arcsec"]) == (21.0, 22.0)
     assert (of_level["levels"], of_level["held_out"]) == ([5.0, 30.0], [5.0])
     assert of_level["reducible_share_interval"] == [0.1, 0.4]
+
+
+def test_zeros_of_their_own_are_the_medians_of_held_out_runs() -> None:
+    """A wild reading and another run's zero move none of the others."""
+    given = signals_of(np.zeros(3), 81)
+    zeros = np.array([5.0, -700.0, 90.0])
+    noise = np.random.default_rng(13).normal(size=len(given))
+    noise[7] += 1e6
+    residual = zeros[given.run] + noise
+    base = np.ones((len(given), 1))
+    law = Law(np.array([2.0]), [], Simulation().surroundings)
+    left = residual_at(law, given, base, residual, False)
+    np.testing.assert_allclose(left, residual - 2.0)
+    own = residual_at(law, given, base, residual, True)
+    for start, stop in given.run_bounds():
+        part = residual[start:stop]
+        np.testing.assert_allclose(own[start:stop], part - np.sort(part)[40], atol=1e-9)
+    # The three numbers of what is left, of either sign.
+    for sign in (-1.0, 1.0):
+        e = sign * np.array([1.0, -2.0, 4.0])
+        assert numbers(e) == pytest.approx((np.sqrt(7.0), 6.0, 4.0))
