@@ -78,6 +78,11 @@ def test_numbers_before_and_after_are_those_of_what_is_left(signals: Signals, si
     assert list(_structure(before).values()) == sorted(_structure(before).values(), reverse=True)
     explained = after.fitted()[0][0].columns @ after.fitted()[0][1]
     assert _size(after, [0]) == pytest.approx(float(np.std(explained)))
+    # Of two terms that undo each other, together.
+    both = after.with_terms([*after.terms, EFFECTS["missing_order"].propose(after)])
+    parts = [term.columns @ c for term, c in both.fitted()]
+    assert _size(both, [0, 1]) == pytest.approx(float(np.std(parts[0] + parts[1])))
+    assert _size(both, [0, 1]) > 1.01 * _size(both, [1])
 
 
 @pytest.mark.parametrize("rho", [0.0, 0.6])
@@ -91,6 +96,24 @@ def test_likelihoods_of_runs_add_up_to_that_of_all(signals: Signals, rho: float)
     slow = [-r.n * np.log(r.variance) - float(r.r @ r.r) / r.variance for r in (with_it, without)]
     assert gained.sum() == pytest.approx(slow[0] - slow[1], rel=1e-9)
     assert gained.sum() == pytest.approx(without.deviance - with_it.deviance, rel=0.05)
+
+
+def test_likelihoods_of_runs_count_how_noise_is_correlated(signals: Signals) -> None:
+    """Of dense covariances of each run, white and correlated: what the one has over the other."""
+    y = 2.0 * signals.direction + np.random.default_rng(5).normal(size=len(signals))
+    fits = [fitted_to(signals, y, rho) for rho in (0.0, 0.6)]
+    found = _by_run(fits[1]) - _by_run(fits[0])
+    slow = []
+    for fitted, rho in zip(fits, (0.0, 0.6), strict=True):
+        left = fitted.residual - fitted.base @ fitted.coefficients
+        told = []
+        for start, stop in signals.run_bounds():
+            lag = np.abs(np.subtract.outer(np.arange(stop - start), np.arange(stop - start)))
+            spread = fitted.variance * rho**lag / (1.0 - rho**2)
+            part = left[start:stop]
+            told.append(-part @ np.linalg.solve(spread, part) - np.linalg.slogdet(spread)[1])
+        slow.append(told)
+    np.testing.assert_allclose(found, np.subtract(slow[1], slow[0]), atol=1e-6)
 
 
 def test_a_ratio_is_told_with_its_distance_in_standard_errors() -> None:
