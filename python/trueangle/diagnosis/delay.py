@@ -46,8 +46,10 @@ ORDERS = 32
 #: Readings used at most, every so many.
 MOST_READINGS = 4_000
 
-#: Steps at most, and the share of a standard error at which a step ends the search.
-STEPS, SETTLED = 20, 0.01
+#: Steps at most, and the share of a standard error at which a step ends the search; the last of
+#: them may be larger: a reading that turned there counts on either side by turns, and steps go to
+#: and fro.
+STEPS, SETTLED, TO_AND_FRO = 20, 0.01, 0.3
 
 #: Standard errors from which on a delay is tried at all.
 TRIED = 6.0
@@ -98,7 +100,8 @@ def find_delay(signals: Signals, error: Array, sim: Simulation) -> Delay | None:
         if step == 0 and abs(change) < TRIED * std:
             return None
         linear = left if step == 0 else linear
-        if step > 0 and abs(change) < SETTLED * std:
+        settled = SETTLED if step < STEPS - 1 else TO_AND_FRO
+        if step > 0 and abs(change) < settled * std:
             told = rows.size * float(np.log(max(linear / max(unmoved, 1e-300), 1e-300)))
             return Delay(delay, std) if abs(delay) > TRIED * std and told > NEW_CAUSE else None
         delay += change

@@ -14,7 +14,7 @@ from ..joint.signals import Signals
 from ..support.deadline import pace
 from ..support.plainresult import Shown
 from .holdout import Law, held_out, numbers, rebuilt, reducible_share, residual_at
-from .levels import LevelGain, gains_by_level
+from .levels import LEAST_SHARE, LevelGain, gains_by_level
 from .unnamed import effect_of
 
 __all__ = ["Gain", "measure_belief_gains", "measure_delay_gain", "measure_gain"]
@@ -275,9 +275,10 @@ def _shuffled(
     if factor == "temperature" and signals.temperature is not None:
         return replace(signals, temperature=_exchanged(signals.temperature, run, other))
     if factor == "torque" and signals.torque is not None:
-        if np.ptp(np.bincount(run, np.abs(signals.torque)) / np.bincount(run)) == 0.0:
-            return replace(signals, torque=signals.torque * sign)
         scale = _level(np.abs(signals.torque), run)
+        # Loads that are alike in all runs are no other labels where they are exchanged.
+        if np.ptp(scale) <= LEAST_SHARE * float(scale.max()):
+            return replace(signals, torque=signals.torque * sign)
         size = np.where(scale > 0.0, scale, 1.0)
         shape = np.where(scale[run] > 0.0, signals.torque / size[run], sign)
         return replace(signals, torque=shape * scale[other][run])

@@ -49,3 +49,24 @@ def test_readings_farther_apart_follow_the_speed():
 def test_no_delay_is_no_change():
     found, _ = signals(0.01)
     assert (earlier(found, 0.0).theta == found.theta).all()
+
+
+@pytest.mark.parametrize("delay", [0.07, 0.1, -0.035])
+def test_every_signal_is_that_of_the_last_reading_before(delay):
+    """Reading by reading, in two runs: nothing comes over the border between them."""
+    one, time = signals(0.01)
+    found = one.followed_by(one)
+    then = earlier(found, delay)
+    n = time.size
+    for k in range(0, 2 * n, 7):
+        start, at = (k // n) * n, time[k % n] - delay
+        before = np.flatnonzero(time <= at)
+        last = start + (int(before[-1]) if before.size else 0)
+        for name in ("direction", "travel", "segment"):
+            assert getattr(then, name)[k] == getattr(found, name)[last], name
+        if time[0] <= at <= time[-1]:
+            own = slice(start, start + n)
+            wanted = np.interp(at, time, found.velocity[own])
+            assert then.velocity[k] == pytest.approx(wanted, abs=1e-9)
+        else:
+            assert then.velocity[k] == found.velocity[k]

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from trueangle import CalibrationRun
-from trueangle.joint.signals import Signals, join_runs
+from trueangle.joint.signals import Signals, _dead_zone_direction, join_runs
 
 UNITS = (360.0, 2.0 * math.pi, 1.0, 4096.0)
 SAMPLED = ("theta", "run", "row", "direction", "travel", "segment", "clock")
@@ -268,3 +268,23 @@ def test_counts_are_told_in_arcsec(period: float) -> None:
         angle = np.arange(60) * move * period
         found = join_runs([CalibrationRun(angle + 1e-3 * period, angle, period)])
         assert (found.count, found.table) == (0.0, table)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_a_dead_zone_turns_at_the_reading_farthest_out_since_it_turned_last(seed: int) -> None:
+    """Slow: the farthest of all readings since, looked for anew at each of them."""
+    rng = np.random.default_rng([77, seed])
+    angle = np.cumsum(rng.choice([-1.0, 1.0, 2.0, -4.0, 3.0], 400))
+    zone = 3.0 * float(np.median(np.abs(np.diff(angle))))
+    first = int(np.flatnonzero(np.abs(angle - angle[0]) > zone)[0])
+    sign, start = float(np.sign(angle[first] - angle[0])), first
+    expected = np.full(angle.size, sign)
+    for k in range(first + 1, angle.size):
+        part = sign * angle[start : k + 1]
+        if part.max() - part[-1] > zone:
+            farthest = start + int(np.flatnonzero(part == part.max())[-1])
+            sign, start = -sign, k
+            expected[farthest + 1 :] = sign
+    assert np.count_nonzero(np.diff(expected)) > 5
+    for way in (1.0, -1.0):
+        np.testing.assert_array_equal(_dead_zone_direction(way * angle), way * expected)

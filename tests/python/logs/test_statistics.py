@@ -54,3 +54,11 @@ def test_the_greatest_correction_is_that_of_either_sign(sign):
     found.update(np.zeros(2), -sign * np.array([0.2, 0.3]), 360.0, None)
     assert found.max_abs_arcsec == pytest.approx(1800.0)
     assert found.rms_arcsec == pytest.approx(3600.0 * np.sqrt((0.26 + 0.13) / 5.0))
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_the_ends_of_the_part_fitted_are_inside(sign):
+    found = CorrectionStatistics()
+    ends = sign * np.array([32.0, 160.0, 31.9, 160.1])
+    found.update(ends, ends, sign * 256.0, (sign * 32.0, sign * 160.0))
+    assert found.outside == 2

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
@@ -53,6 +55,20 @@ def test_noise_that_varies_shows_as_half_the_variance_of_its_logarithm() -> None
     factor = effect.noise_factor(regression.signals, sim.surroundings)
     found = _deviance(effect, regression, np.random.default_rng(1), sim)
     assert found == pytest.approx(0.5 * N * np.var(np.log(factor**2)), rel=1e-9)
+
+
+@pytest.mark.parametrize("sigma", [0.5, 2.0])
+def test_what_the_writing_changes_shows_as_its_energy(sigma: float) -> None:
+    """Every reading written an arcsec off: n / sigma^2, whatever the noise."""
+    sim = believed(sigma)
+    regression = regression_of(sim)
+    made = SimpleNamespace(
+        signal=lambda signals, around, rng: np.zeros(len(signals)),
+        written=lambda degrees: degrees + np.resize([1.0, -1.0], degrees.size) / 3600.0,
+        noise_factor=lambda signals, around: None,
+    )
+    found = _deviance(made, regression, np.random.default_rng(1), sim)
+    assert found == pytest.approx(N / sigma**2, rel=1e-6)
 
 
 @pytest.mark.parametrize(("sigma", "samples"), [(0.5, 720), (2.0, 720), (2.0, 180)])
