@@ -247,3 +247,23 @@ def test_a_run_too_short_for_its_memory_gets_no_small_errors_by_chance(memory):
     assert 0.92 <= np.mean(hit) <= 1.0
     assert np.mean(hit) < 0.9995
     assert min(least) > 0.9
+
+
+@pytest.mark.parametrize("ridge", [0.0, 1e-3])
+def test_readings_written_twice_scatter_no_less_between_runs(ridge, monkeypatch):
+    """Sums, penalty and scores double together: neither coefficients nor their errors move."""
+    from trueangle.fitting import uncertainty
+
+    # What a penalty may take from the coefficients counts readings: that is told apart.
+    monkeypatch.setattr(uncertainty, "_bias", lambda *_: np.zeros((7, 7)))
+    runs = some_runs(11, "arc", 0.9)
+    twice = [
+        ta.CalibrationRun(np.repeat(r.reference, 2), np.repeat(r.indicated, 2), 360.0) for r in runs
+    ]
+    once, again = (
+        ta.fit(r, [1, 2, 5], ridge=ridge, covariance="cluster", loss="linear")
+        for r in (runs, twice)
+    )
+    np.testing.assert_allclose(again.model.amplitudes, once.model.amplitudes, rtol=1e-8)
+    np.testing.assert_allclose(again.covariance[1:, 1:], once.covariance[1:, 1:], rtol=1e-7)
+    np.testing.assert_allclose(again.uncertainty.freedom, once.uncertainty.freedom, rtol=1e-7)

@@ -37,7 +37,9 @@ def there_and_back(seed: int, size: int = 700) -> dict[str, np.ndarray]:
 
 
 def selfcal(log: dict[str, np.ndarray], **more) -> ta.SelfCalibration:
-    return ta.selfcal(log, method="dual", orders=[1, 2], gear_ratio=more.pop("ratio", RATIO), **more)
+    return ta.selfcal(
+        log, method="dual", orders=[1, 2], gear_ratio=more.pop("ratio", RATIO), **more
+    )
 
 
 @pytest.fixture(scope="module")
