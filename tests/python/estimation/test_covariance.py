@@ -267,3 +267,15 @@ def test_readings_written_twice_scatter_no_less_between_runs(ridge, monkeypatch)
     np.testing.assert_allclose(again.model.amplitudes, once.model.amplitudes, rtol=1e-8)
     np.testing.assert_allclose(again.covariance[1:, 1:], once.covariance[1:, 1:], rtol=1e-7)
     np.testing.assert_allclose(again.uncertainty.freedom, once.uncertainty.freedom, rtol=1e-7)
+
+
+def test_readings_thinned_by_their_memory_lose_a_zero_a_run(monkeypatch):
+    """Of 4 runs of 150 readings that remember 5: 120, less 6 coefficients and 4 zeros."""
+    from trueangle.fitting import uncertainty
+
+    runs = some_runs(12, "arc", 0.0, 4)
+    monkeypatch.setattr(uncertainty, "memory_of", lambda *_: (5.0, [1] * 4))
+    found = ta.fit(runs, [1, 2, 5], covariance="hac", loss="linear", ridge=0.0)
+    white = ta.fit(runs, [1, 2, 5], covariance="white", loss="linear", ridge=0.0)
+    np.testing.assert_allclose(found.uncertainty.freedom, 120.0 - 6.0 - 4.0)
+    np.testing.assert_allclose(found.covariance, white.covariance * 5.0 * 120.0 / 110.0)
