@@ -74,7 +74,10 @@ HIDDEN = {
     "scale_error": ({"relative_error": 4e-6}, ("relative_error",)),
     "clock_drift": ({"ppm": 3.0}, ("ppm",)),
     "argument_error": ({"coefficient": -1.0}, ("coefficient",)),
-    "channel_skew": ({"delay_s": 3e-5, "order": 100.0, "phase_deg": 30.0}, ("delay_s",)),
+    "channel_skew": (
+        {"delay_s": 3e-5, "order": 100.0, "phase_deg": 30.0},
+        ("delay_s", "phase_deg"),
+    ),
     "local_defect, output": (
         {"place_deg": 211.0, "width_deg": 2.5, "height_arcsec": 14.0, "shaft": "output"},
         ("place_deg", "width_deg", "height_arcsec"),
