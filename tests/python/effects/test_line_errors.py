@@ -126,6 +126,15 @@ def test_noise_adds_nothing_to_a_faint_line(signals):
 DRAWN = ("time_periodic", "non_integer_order")
 
 
+#: Orders of the lines that are hidden, each with its amplitude.
+LINES = {
+    "direction_dependent_pattern": {2.0: 3.0},
+    "reference_error": {3.0: 3.0},
+    "sidebands": {99.0: 3.0, 101.0: 2.0},
+    "load_dependent_gear_error": {100.0: 0.3},
+}
+
+
 def values_of(effect):
     """Every figure of an effect, whatever it is called there: lines, tuples and numbers."""
     found = []
@@ -158,6 +167,11 @@ def test_what_is_told_is_what_was_fitted(cause, signals):
     away = told - fitted
     away -= zeros @ (zeros.T @ away)
     assert np.std(away) < 1e-6 * np.std(fitted), cause
+    if cause in LINES:
+        (sizes,) = (parameters[n].value for n in parameters if n.startswith("amplitudes"))
+        orders = [float(x) for x in np.ravel(parameters["orders"].value)]
+        found = dict(zip(orders, np.ravel(sizes), strict=True))
+        assert found == pytest.approx(LINES[cause], rel=0.2)
     figures = [x for e in effects for x in values_of(e)]
     # Sidebands are told by their orders, and kept by their distances from the carrier.
     figures += [e.carrier + x for e in effects for x in getattr(e, "offsets", ())]
