@@ -68,6 +68,9 @@ def test_what_a_clamping_left_out_shows_is_counted_reading_by_reading() -> None:
     told = found.held_out["clampings"]
     assert told.rms_before == pytest.approx(math.sqrt(squares / (3.0 * 47.0)), rel=1e-9)
     assert found.readings == 3 * 48
+    limit = found.noise_arcsec * math.sqrt(2.0 / found.readings)
+    for o in found.orders:
+        assert o.std_factor == pytest.approx(o.std / limit, rel=0.1)
     travel = sum(np.ptp(np.unwrap(log["indicated_rad"][log["run"] == run])) for run in range(3))
     assert found.turns == pytest.approx(travel / (2.0 * np.pi), rel=1e-12)
 
