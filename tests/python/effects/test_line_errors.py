@@ -1,6 +1,6 @@
 """Stated errors of causes that are lines, by what seeds scatter."""
 
-from dataclasses import replace
+from dataclasses import fields, replace
 
 import numpy as np
 import pytest
@@ -120,6 +120,68 @@ def test_noise_adds_nothing_to_a_faint_line(signals):
     near = 4.0 * np.std(squares) / np.sqrt(len(squares))
     print(np.mean(squares), near)
     assert abs(np.mean(squares) - size**2) < near < 0.1 * size**2
+
+
+#: Lines whose phase is drawn anew in every run: no column has one coefficient.
+DRAWN = ("time_periodic", "non_integer_order")
+
+
+#: Orders of the lines that are hidden, each with its amplitude.
+LINES = {
+    "direction_dependent_pattern": {2.0: 3.0},
+    "reference_error": {3.0: 3.0},
+    "sidebands": {99.0: 3.0, 101.0: 2.0},
+    "load_dependent_gear_error": {100.0: 0.3},
+}
+
+
+def values_of(effect):
+    """Every figure of an effect, whatever it is called there: lines, tuples and numbers."""
+    found = []
+    for field in fields(effect):
+        value = getattr(effect, field.name)
+        if isinstance(value, int | float | tuple):
+            found += [float(x) for x in np.ravel(np.array(value, dtype=object)) if _number(x)]
+    return found
+
+
+def _number(x):
+    return isinstance(x, int | float) and not isinstance(x, bool)
+
+
+@pytest.mark.parametrize("cause", [c for c in HIDDEN if c not in DRAWN])
+def test_what_is_told_is_what_was_fitted(cause, signals):
+    """The told effect's own signal is that of the columns, and its figures are the told ones."""
+    hidden = EFFECTS[cause](**HIDDEN[cause][0])
+    rng = np.random.default_rng(SEEDS[0])
+    error = hidden.signal(signals, SIM.surroundings, rng) + rng.standard_normal(len(signals))
+    start = Regression.of(signals, error, SIM.surroundings, rho=0.0)
+    full = start.with_terms([EFFECTS[cause].propose(start)])
+    extension, coefficients = full.fitted()[0]
+    parameters, effects = EFFECTS[cause].report(
+        full, [(extension, coefficients, full.covariance(0))]
+    )
+    fitted = extension.columns @ coefficients
+    told = sum(e.signal(signals, SIM.surroundings, rng) for e in effects)
+    zeros = np.linalg.qr(start.base)[0]
+    away = told - fitted
+    away -= zeros @ (zeros.T @ away)
+    assert np.std(away) < 1e-6 * np.std(fitted), cause
+    if cause in LINES:
+        (sizes,) = (parameters[n].value for n in parameters if n.startswith("amplitudes"))
+        orders = [float(x) for x in np.ravel(parameters["orders"].value)]
+        found = dict(zip(orders, np.ravel(sizes), strict=True))
+        assert found == pytest.approx(LINES[cause], rel=0.2)
+    figures = [x for e in effects for x in values_of(e)]
+    # Sidebands are told by their orders, and kept by their distances from the carrier.
+    figures += [e.carrier + x for e in effects for x in getattr(e, "offsets", ())]
+    names = ("orders", "order", "amplitude", "phase", "factor", "arcsec_per_A")
+    for name, one in parameters.items():
+        if name.startswith(names) and not name.startswith("orders_"):
+            for value in np.ravel(np.array(one.value, dtype=object)):
+                if _number(value):
+                    near = [abs(value - x) <= 1e-9 * max(abs(x), 1e-9) for x in figures]
+                    assert any(near), (cause, name, value, figures)
 
 
 #: Causes of which no parameter has a bound or pulls of its own here, and where they are asked.

@@ -247,3 +247,35 @@ def test_a_run_too_short_for_its_memory_gets_no_small_errors_by_chance(memory):
     assert 0.92 <= np.mean(hit) <= 1.0
     assert np.mean(hit) < 0.9995
     assert min(least) > 0.9
+
+
+@pytest.mark.parametrize("ridge", [0.0, 1e-3])
+def test_readings_written_twice_scatter_no_less_between_runs(ridge, monkeypatch):
+    """Sums, penalty and scores double together: neither coefficients nor their errors move."""
+    from trueangle.fitting import uncertainty
+
+    # What a penalty may take from the coefficients counts readings: that is told apart.
+    monkeypatch.setattr(uncertainty, "_bias", lambda *_: np.zeros((7, 7)))
+    runs = some_runs(11, "arc", 0.9)
+    twice = [
+        ta.CalibrationRun(np.repeat(r.reference, 2), np.repeat(r.indicated, 2), 360.0) for r in runs
+    ]
+    once, again = (
+        ta.fit(r, [1, 2, 5], ridge=ridge, covariance="cluster", loss="linear")
+        for r in (runs, twice)
+    )
+    np.testing.assert_allclose(again.model.amplitudes, once.model.amplitudes, rtol=1e-8)
+    np.testing.assert_allclose(again.covariance[1:, 1:], once.covariance[1:, 1:], rtol=1e-7)
+    np.testing.assert_allclose(again.uncertainty.freedom, once.uncertainty.freedom, rtol=1e-7)
+
+
+def test_readings_thinned_by_their_memory_lose_a_zero_a_run(monkeypatch):
+    """Of 4 runs of 150 readings that remember 5: 120, less 6 coefficients and 4 zeros."""
+    from trueangle.fitting import uncertainty
+
+    runs = some_runs(12, "arc", 0.0, 4)
+    monkeypatch.setattr(uncertainty, "memory_of", lambda *_: (5.0, [1] * 4))
+    found = ta.fit(runs, [1, 2, 5], covariance="hac", loss="linear", ridge=0.0)
+    white = ta.fit(runs, [1, 2, 5], covariance="white", loss="linear", ridge=0.0)
+    np.testing.assert_allclose(found.uncertainty.freedom, 120.0 - 6.0 - 4.0)
+    np.testing.assert_allclose(found.covariance, white.covariance * 5.0 * 120.0 / 110.0)

@@ -81,3 +81,22 @@ def test_what_was_passed_once_or_hardly_read_does_not_repeat() -> None:
     assert not repeated_part(10.0 * np.sin(few.theta), few).any()
     still = join_runs([CalibrationRun(np.zeros(40), np.zeros(40), 360.0) for _ in range(2)])
     assert not repeated_part(np.ones(40 * 2), still).any()
+
+
+@pytest.mark.parametrize("by_direction", [False, True])
+@pytest.mark.parametrize("runs", [2, 4])
+def test_it_counts_from_the_ratio_of_the_definition_on(by_direction: bool, runs: int) -> None:
+    """The size of an error from which on it counts, halved up to a thousandth of itself."""
+    rng = np.random.default_rng(17)
+    signals = passes(runs, 24)
+    noise, low, high = rng.normal(size=len(signals)), 0.0, 20.0
+    error = np.sin(2.0 * signals.theta)
+    while high - low > 1e-3 * high:
+        middle = 0.5 * (low + high)
+        if slow(middle * error + noise, signals, by_direction).any():
+            high = middle
+        else:
+            low = middle
+    assert low > 0.1
+    assert not repeated_part(low * error + noise, signals, by_direction).any()
+    assert repeated_part(high * error + noise, signals, by_direction).any()

@@ -87,3 +87,32 @@ def test_errors_of_a_difference_are_those_of_both():
     whole = (np.arange(2.0, 8.0).sum() * 1e-8 + 6 * 4e-8) / 2.0
     assert found.std_arcsec == pytest.approx(np.sqrt(whole) * 3600.0)
     assert ta.compare(base, base).std_arcsec is None
+
+
+@pytest.mark.parametrize(
+    ("zeros", "told"), [((200.0, -170.0), -10.0), ((-170.0, 200.0), 10.0), ((10.0, 190.0), 180.0)]
+)
+@pytest.mark.parametrize("period", [360.0, 1.0])
+def test_zeros_differ_by_the_shorter_way(zeros, told, period):
+    first, second = (
+        model({1: (30.0, 0.0)}, "reference", period, z * period / 360.0) for z in zeros
+    )
+    assert abs(ta.compare(first, second).zero_deg) == pytest.approx(abs(told))
+    if abs(told) < 180.0:
+        assert ta.compare(first, second).zero_deg == pytest.approx(told)
+
+
+@pytest.mark.parametrize("first", ["reference", "indicated"])
+def test_the_zero_between_arguments_is_the_mean_at_true_angles(first):
+    """However steep the line is: over true angles its mean is none."""
+    other = "indicated" if first == "reference" else "reference"
+    lines = {1: (9000.0, 40.0)}
+    a, b = model(lines, first, constant=0.25), model(lines, other, constant=1.0)
+    theta = np.arange(4096.0) * (360.0 / 4096.0)
+    means = []
+    for one in (a, b):
+        found = theta.copy()
+        for _ in range(80):
+            found += theta - np.asarray(one.correct(found))
+        means.append(float(np.mean(found - theta)))
+    assert ta.compare(a, b).zero_deg == pytest.approx(means[1] - means[0], abs=1e-6)

@@ -54,6 +54,27 @@ def test_a_clamping_left_out_is_predicted_as_the_noise_of_all_says() -> None:
     assert 7.5 < np.mean(squares) < 10.5
 
 
+def test_what_a_clamping_left_out_shows_is_counted_reading_by_reading() -> None:
+    """Before: differences of both scales about a zero a clamping, which takes one of them."""
+    print("seed", SEED)
+    log = clamped(SEED)
+    found = selfcal(log)
+    squares = 0.0
+    for run in range(3):
+        at = log["run"] == run
+        turns = np.exp(1j * (log["indicated_rad"] - log["reference_rad"])[at])
+        away = np.angle(turns / turns.mean())
+        squares += float(((away - away.mean()) ** 2).sum()) / ARCSEC**2
+    told = found.held_out["clampings"]
+    assert told.rms_before == pytest.approx(math.sqrt(squares / (3.0 * 47.0)), rel=1e-9)
+    assert found.readings == 3 * 48
+    limit = found.noise_arcsec * math.sqrt(2.0 / found.readings)
+    for o in found.orders:
+        assert o.std_factor == pytest.approx(o.std / limit, rel=0.1)
+    travel = sum(np.ptp(np.unwrap(log["indicated_rad"][log["run"] == run])) for run in range(3))
+    assert found.turns == pytest.approx(travel / (2.0 * np.pi), rel=1e-12)
+
+
 def test_a_coupling_is_told_with_its_size() -> None:
     """Of 5 arcsec in every coefficient of every clamping, to 4.5 errors of their rms."""
     print("seeds", SEED + 100, "to", SEED + 109)

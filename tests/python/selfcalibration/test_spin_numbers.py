@@ -177,3 +177,27 @@ def test_what_one_speed_cannot_tell_is_said_with_its_numbers(slow: float) -> Non
     assert not alone.orders
     assert any("no order can be given as the encoder's" in n for n in alone.notes)
     assert not any(n.startswith("one speed") for n in alone.notes)
+
+
+def test_louder_noise_beside_the_orders_widens_errors_by_its_root(
+    log, found, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from trueangle.selfcalibration import spindown
+
+    monkeypatch.setattr(spindown, "noise_beside", lambda *_: np.array([4.0, 1.0, 9.0]))
+    louder = ta.selfcal(log, **OPTIONS)
+    for o, p, times in zip(found.orders, louder.orders, (2.0, 1.0, 3.0), strict=True):
+        assert p.std == pytest.approx(times * o.std, rel=1e-9)
+        assert p.amplitude == pytest.approx(o.amplitude, rel=1e-12)
+    assert any("9.0 times the white noise near order 4" in note for note in louder.notes)
+
+
+def test_turns_and_readings_of_two_logs_add_up() -> None:
+    print("seeds", SEED, SEED + 1)
+    one, two = log_of(SEED), log_of(SEED + 1)
+    both = {name: np.concatenate([one[name], two[name]]) for name in one}
+    both["run"] = np.repeat([0, 1], one["time_s"].size)
+    parts = [ta.selfcal(log, **OPTIONS) for log in (one, two)]
+    whole = ta.selfcal(both, **OPTIONS)
+    assert whole.turns == pytest.approx(sum(p.turns for p in parts), rel=1e-9)
+    assert whole.readings == sum(p.readings for p in parts)

@@ -134,3 +134,13 @@ def test_a_weight_is_told_from_a_constant_load_by_its_share(gravity_deg, gravity
         assert found.torque_Nm == pytest.approx(2.0, abs=about)
         away = (found.gravity_deg - gravity_deg + 180.0) % 360.0 - 180.0
         assert abs(away) < np.degrees(about / 4.0)
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_the_speed_is_that_of_most_readings(sign):
+    """Two thirds at 4 deg/s, some at 90 and some at rest: neither a mean nor with the rest."""
+    speed = np.repeat([4.0, 90.0, 0.0], [200, 60, 90])
+    time = np.arange(350) * 0.05
+    angle = sign * np.concatenate([[0.0], np.cumsum(speed[1:] * 0.05)])
+    found = design_of(ta.CalibrationRun(angle, angle, 360.0, time=time, velocity=sign * speed))
+    assert (found.speed_deg_s, found.direction) == (pytest.approx(4.0), sign)
