@@ -116,8 +116,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Print the diagnosis."""
     from ..diagnosis import diagnose
-    from ..model.file import load_model
-    from ..runs.joining import minus_simulated
     from .run_lists import read_checked
 
     if args.model is not None and args.corrected_model is None:
@@ -134,12 +132,18 @@ def run(args: argparse.Namespace) -> int:
     if asked is not None:
         return _robot(*asked, args)
     simulation = _believed(args)
-    model = None if args.model is None else load_model(args.model)
+    model = None
+    if args.model is not None:
+        from ..model.file import load_model
+
+        model = load_model(args.model)
     own = [entry for entry in args.signal or () if entry[0] == "simulated"]
     args.signal = [entry for entry in args.signal or () if entry[0] != "simulated"]
     runs = read_checked(args)
     simulated = None
     if args.simulated is not None:
+        from ..runs.joining import minus_simulated
+
         columns = (signals_by_joint(own, single=False) or {}).get("simulated")
         given = {**reading(args), "signals": columns}
         simulated = minus_simulated(runs, args.simulated, by=args.simulated_by, **given)

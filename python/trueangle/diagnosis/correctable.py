@@ -10,7 +10,6 @@ from ..effects import EFFECTS
 from ..effects.blindness import Blindness
 from ..errors import ArgumentError, NoModelError
 from ..model.model import HarmonicModel
-from ..runs.joining import MeasuredMinusSimulated
 from ..simulation.simulation import Simulation
 from ..support.angles import ARCSEC_PER_TURN
 from ..support.oftype import of_type
@@ -20,6 +19,7 @@ from .finding import Finding
 
 if TYPE_CHECKING:
     from ..fitting.argument import AnyArgument
+    from ..runs.joining import MeasuredMinusSimulated
     from ..runs.run import CalibrationRun
 
 __all__ = ["Correctable"]

@@ -10,7 +10,6 @@ import numpy as np
 
 from ..effects import EFFECTS, Effect
 from ..errors import ArgumentError
-from ..fitting.fit import fit
 from ..formats.signals import coupled_with
 from ..joint.signals import join_runs
 from ..model.model import HarmonicModel
@@ -150,6 +149,8 @@ def extend_model(
     NotInvertibleError
         The error is too steep for a model of the true angle.
     """
+    from ..fitting.fit import fit  # a model is asked for after most of a diagnosis, if at all
+
     found = as_runs(runs)
     if argument == "auto":
         argument = _argument(model, simulation)

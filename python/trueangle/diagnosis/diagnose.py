@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any, Unpack
+from typing import TYPE_CHECKING, Any, Unpack
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +17,6 @@ from ..joint.signals import join_runs
 from ..runs.checks.check import faults_of
 from ..runs.checks.record import records_of
 from ..runs.files import runs_of
-from ..runs.joining import MeasuredMinusSimulated, minus_simulated
 from ..runs.run import CalibrationRun
 from ..runs.source import Reading
 from ..simulation.simulation import SIMULATION, Simulation
@@ -40,6 +39,9 @@ from .penalty import cause_terms
 from .remainder import leftover_of, unexplained_after
 from .torque import torque_account
 from .wrongplace import moved
+
+if TYPE_CHECKING:
+    from ..runs.joining import MeasuredMinusSimulated
 
 __all__ = ["diagnose"]
 
@@ -140,6 +142,8 @@ def diagnose(
         of_type("sim", sim, Simulation, SIMULATION)
     log = None
     if simulated is not None:
+        from ..runs.joining import MeasuredMinusSimulated, minus_simulated
+
         is_joined = isinstance(simulated, MeasuredMinusSimulated)
         log = simulated if is_joined else minus_simulated(measured, simulated)
     elif sim is None:

@@ -11,12 +11,7 @@ from typing import TYPE_CHECKING, Any
 from ..effects.blindness import Blindness
 from ..estimation.regression import ROUNDING
 from ..joint.signals import join_runs
-from ..planning.evidence import ReadingNoise
-from ..planning.limits import Limits
-from ..planning.nextruns import NextRuns
-from ..planning.planner import next_runs
 from ..runs.checks import DataFault
-from ..runs.joining import MeasuredMinusSimulated
 from ..simulation.measured import design_of
 from ..simulation.simulation import Simulation
 from ..support.display_units import ErrorsIn
@@ -32,6 +27,9 @@ from .torque import TorqueAccount
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
+    from ..planning.limits import Limits
+    from ..planning.nextruns import NextRuns
+    from ..runs.joining import MeasuredMinusSimulated
     from ..runs.run import CalibrationRun
 
 __all__ = ["Diagnosis"]
@@ -163,6 +161,10 @@ class Diagnosis(Correctable):
         >>> plan.runs[0].speed_deg_s, plan.between[0].causes
         (60.0, ('backlash', 'latency'))
         """
+        # Most accounts leave nothing open, and need no plan.
+        from ..planning.evidence import ReadingNoise
+        from ..planning.planner import next_runs
+
         noise = ReadingNoise(max(self.noise, ROUNDING), self.correlation)
         signals = join_runs(self.runs if self.simulated is None else self.simulated.runs)
         believed, spots = self._without_open(), self.not_identifiable

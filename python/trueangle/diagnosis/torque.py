@@ -24,11 +24,11 @@ from ..effects.latency import Latency
 from ..effects.missing_order import MissingOrder
 from ..effects.presliding_hysteresis import PreslidingHysteresis
 from ..estimation.estimate import Parameters, Quantity, quantity
-from ..runs.joining import MeasuredMinusSimulated, minus_simulated
 from ..runs.run import CalibrationRun
 from ..support.plainresult import Shown
 
 if TYPE_CHECKING:
+    from ..runs.joining import MeasuredMinusSimulated
     from .finding import Finding
     from .findings import Diagnosis
 
@@ -204,6 +204,8 @@ def torque_account(
     diagnosed : callable
         Diagnoses runs whose error is the torque.
     """
+    from ..runs.joining import minus_simulated  # loaded already: it joined the logs
+
     both = [*measured, *joined.logs]
     if not joined.logs or any(run.torque is None for run in both):
         return None

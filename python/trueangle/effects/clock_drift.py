@@ -101,7 +101,4 @@ class ClockDrift(Effect):
     @classmethod
     def told(cls, extension: Extension, regression: Regression) -> bool:
         """Whether the speeds of the runs, unlike for a ramp in angle, stand out."""
-        others = [t for t in regression.terms if t.cause not in (cls.kind, ScaleError.kind)]
-        rest = regression.with_terms(others, regression.whiten.rho)
-        ramp = ScaleError.propose(rest)
-        return ramp is None or rest.bic - ramp.bic_gain - regression.bic > TOLD
+        return cls.beats(ScaleError, regression, TOLD)

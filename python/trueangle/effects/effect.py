@@ -223,6 +223,14 @@ class Effect:
         return False
 
     @classmethod
+    def beats(cls, rival: type[Effect], regression: Regression, by: float) -> bool:
+        """Whether the terms explain more with this effect than with a rival in its place."""
+        others = [t for t in regression.terms if t.cause not in (cls.kind, rival.kind)]
+        rest = regression.with_terms(others, regression.whiten.rho)
+        instead = rival.propose(rest)
+        return instead is None or rest.bic - instead.bic_gain - regression.bic > by
+
+    @classmethod
     def blind(
         cls,
         because: str,

@@ -255,10 +255,7 @@ class PreslidingHysteresis(Effect):
     @classmethod
     def told(cls, extension: Extension, regression: Regression) -> bool:
         """Whether the transition itself stands out, as after a start from a relaxed joint."""
-        others = [t for t in regression.terms if t.cause not in (cls.kind, Backlash.kind)]
-        rest = regression.with_terms(others, regression.whiten.rho)
-        play = Backlash.propose(rest)
-        return play is None or rest.bic - play.bic_gain - regression.bic > TOLD
+        return cls.beats(Backlash, regression, TOLD)
 
     def to_terms(self, period: float, shafts: Mapping[str, float]) -> tuple[Term, ...]:
         amplitude = from_arcsec(self.amplitude_arcsec, period)

@@ -15,7 +15,7 @@ from .oneturn import line_floor
 from .pattern import TurnPattern
 from .proof import enough_bits
 from .reading import failed
-from .setpoint import NOMINAL_DECIMALS, Travel, steepness
+from .setpoint import ENDS, NOMINAL_DECIMALS, POSITIONS, Travel, steepness
 from .setpointreading import travel_model
 from .target import CommentBlock, Made, Option, Target
 
@@ -44,11 +44,8 @@ class LinuxCnc(Target):
     options = {
         "type": Option(("0", "1"), "1", "COMP_FILE_TYPE: 0 positions, 1 trims"),
         "entries": Option(int, 180, "to a turn; 256 in all"),
-        "start": Option(
-            float, None, "of the travel, degrees (default: what the model was fitted on, else 0)"
-        ),
-        "stop": Option(float, None, "of the travel, degrees (default: likewise, else 360)"),
-        "bits": Option(int, 20, "2^bits positions are evaluated, and more where entries are many"),
+        **ENDS,
+        "bits": POSITIONS,
     }
 
     def sizes(self, options: Mapping[str, Any]) -> Sequence[int]:

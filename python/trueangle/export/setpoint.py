@@ -19,12 +19,21 @@ from ..errors import ArgumentError
 from .knots import linear_knots
 from .pattern import TurnPattern
 from .proof import Correction, lost_orders
-from .target import TablePart
+from .target import Option, TablePart
 
-__all__ = ["NOMINAL_DECIMALS", "Travel", "calibrated_travel", "steepness"]
+__all__ = ["ENDS", "NOMINAL_DECIMALS", "POSITIONS", "Travel", "calibrated_travel", "steepness"]
 
 Array = NDArray[np.float64]
 Function = Callable[[Array], Array]
+
+#: Options of such targets: the ends of the travel, and at how many positions a table is checked.
+ENDS = {
+    "start": Option(
+        float, None, "of the travel, degrees (default: what the model was fitted on, else 0)"
+    ),
+    "stop": Option(float, None, "of the travel, degrees (default: likewise, else 360)"),
+}
+POSITIONS = Option(int, 20, "2^bits positions are evaluated, and more where entries are many")
 
 #: Of a degree, as nominal positions are written.
 NOMINAL_DECIMALS = 7

@@ -15,7 +15,7 @@ from .oneturn import line_floor
 from .pattern import TurnPattern
 from .proof import enough_bits
 from .reading import failed
-from .setpoint import Travel
+from .setpoint import ENDS, POSITIONS, Travel
 from .setpointreading import travel_model
 from .target import CommentBlock, Made, Option, Target
 
@@ -43,13 +43,10 @@ class Siemens840d(Target):
     )
     options = {
         "entries": Option(int, 360, "to a turn"),
-        "start": Option(
-            float, None, "of the travel, degrees (default: what the model was fitted on, else 0)"
-        ),
-        "stop": Option(float, None, "of the travel, degrees (default: likewise, else 360)"),
+        **ENDS,
         "axis": Option(str, "AX1", "name of the machine axis"),
         "encoder": Option(("0", "1"), "0", "measuring system of the axis, from 0"),
-        "bits": Option(int, 20, "2^bits positions are evaluated, and more where entries are many"),
+        "bits": POSITIONS,
     }
 
     def sizes(self, options: Mapping[str, Any]) -> Sequence[int]:

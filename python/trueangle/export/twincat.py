@@ -19,7 +19,7 @@ from .oneturn import line_floor
 from .pattern import TurnPattern
 from .proof import enough_bits
 from .reading import failed
-from .setpoint import Travel
+from .setpoint import ENDS, POSITIONS, Travel
 from .setpointreading import travel_model
 from .target import CommentBlock, Made, Option, Target
 
@@ -50,11 +50,8 @@ class TwinCat(Target):
     options = {
         "variant": Option(("cnc", "nc"), "cnc", "cnc: kw.ssfk list; nc: Position,Compensation"),
         "entries": Option(int, 360, "to a turn"),
-        "start": Option(
-            float, None, "of the travel, degrees (default: what the model was fitted on, else 0)"
-        ),
-        "stop": Option(float, None, "of the travel, degrees (default: likewise, else 360)"),
-        "bits": Option(int, 20, "2^bits positions are evaluated, and more where entries are many"),
+        **ENDS,
+        "bits": POSITIONS,
     }
 
     def sizes(self, options: Mapping[str, Any]) -> Sequence[int]:

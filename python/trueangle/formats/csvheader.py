@@ -347,7 +347,7 @@ _BRACKETED = r"[\[(][^\])]*[\])]\s*$"
 def is_comment(text: str) -> bool:
     """True for a note: a line that begins with #, and the mark of an end of file."""
     start = text.lstrip()
-    return start.startswith("#") or start.rstrip() == "EOF"
+    return start.startswith("#") or (start.startswith("EOF") and start.rstrip() == "EOF")
 
 
 def number(cell: str, decimal: str) -> float | None:

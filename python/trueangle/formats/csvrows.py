@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
+import re
 from collections.abc import Iterator, Sequence
 from typing import IO, Any
 
@@ -15,6 +16,9 @@ from .csvheader import LONGEST_LINE, Header, cut_rows, is_comment, number
 from .format import Labels, row_labels
 
 __all__ = ["BLOCK", "QuotedBlock", "quoted_blocks", "too_long"]
+
+#: Numbers in lines, all without an exponent.
+_PLAIN = re.compile(r"-?\d+(?:\.\d+)?(?:\n-?\d+(?:\.\d+)?)*", re.ASCII)
 
 #: Bytes taken together.
 BLOCK = 1 << 21
@@ -64,6 +68,9 @@ class QuotedBlock:
     def _numbers(self, name: str, strict: bool) -> NDArray[np.float64]:
         place = self.header.names.index(name)
         cells = [row[place].strip() for row in self.cells if row]
+        values = _plain_numbers(cells)
+        if values is not None:
+            return values
         values = np.full(len(cells), np.nan)
         for i, cell in enumerate(cells):
             if not cell:
@@ -112,6 +119,14 @@ class QuotedBlock:
         return "".join(lines).encode(errors="surrogateescape")
 
 
+def _plain_numbers(cells: list[str]) -> NDArray[np.float64] | None:
+    """Cells that hold nothing but digits and a point, as most do; None where one does not."""
+    if not _PLAIN.fullmatch("\n".join(cells)):
+        return None
+    values = np.fromiter(map(float, cells), np.float64, len(cells))
+    return values if np.isfinite(values).all() else None
+
+
 def _shown(cell: str) -> str:
     return repr(cell) if len(cell) <= 60 else f"{cell[:50]!r} ... of {len(cell)} characters"
 
@@ -127,7 +142,7 @@ def quoted_blocks(data: bytes, file: IO[bytes], header: Header, line: int) -> It
     """``data`` and the rest of ``file`` in blocks of whole rows; ``line`` is its first."""
     read: list[str] = []
     block = QuotedBlock(header)
-    size = 0
+    size, width = 0, len(header.names)
     reached = line - 1  # the line read last
 
     def lines() -> Iterator[str]:
@@ -146,13 +161,13 @@ def quoted_blocks(data: bytes, file: IO[bytes], header: Header, line: int) -> It
     try:
         for row in reader:
             first = reached + 1 - len(read)
-            blank = not any(cell.strip() for cell in row) and len(row) <= 1
+            blank = len(row) <= 1 and not any(cell.strip() for cell in row)
             cells = [] if blank else row
             text = "".join(read)
             if cells and header.is_message(cells):
                 block.messages.append((first, text.strip()))
                 cells = []
-            if cells and not _fits(cells, header):
+            if cells and len(cells) != width and not _fits(cells, width):
                 raise _wrong_width(header, len(cells), first)
             read.clear()
             block.texts.append(text)
@@ -171,10 +186,9 @@ def quoted_blocks(data: bytes, file: IO[bytes], header: Header, line: int) -> It
         yield block
 
 
-def _fits(row: list[str], header: Header) -> bool:
-    """As many cells as names; one more where the line ends with a delimiter."""
-    width = len(header.names)
-    return len(row) == width or (len(row) == width + 1 and not row[-1].strip())
+def _fits(row: list[str], width: int) -> bool:
+    """One cell more than there are names, where the line ends with a delimiter."""
+    return len(row) == width + 1 and not row[-1].strip()
 
 
 def _lines(data: bytes, file: IO[bytes], header: Header, line: int) -> Iterator[bytes]:

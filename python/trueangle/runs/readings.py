@@ -176,9 +176,14 @@ def readings_of(path: Path, wanted: Mapping[str, Any], topic: str | None) -> Fil
             return FileReadings(path, kind, roles, empty, _source(path))
         others = together(path, needed, others)
     labels = {column.name for column in roles.values() if column.role in LABELS}
-    if "time" in roles and _is_dated(kind, path, roles["time"].name, topic):
+    try:
+        columns = _whole(kind, path, needed, others, labels, topic)
+    except FileError:
+        # A date is no number, and no number a date: only what is not read is looked at for one.
+        if "time" not in roles or not _is_dated(kind, path, roles["time"].name, topic):
+            raise
         labels.add(roles["time"].name)
-    columns = _whole(kind, path, needed, others, labels, topic)
+        columns = _whole(kind, path, needed, others, labels, topic)
     size = next((len(values) for values in columns.values()), 0)
     columns |= {key: _repeated(value, size, key in TEXTS) for key, value in keys.items()}
     return FileReadings(path, kind, roles, columns, _source(path))

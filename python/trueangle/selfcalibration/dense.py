@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from .projected import NOT_SEEN, Projected, Unknown
 
-__all__ = ["DenseFit", "DenseRows", "fit_dense", "low_frequency_inflation"]
+__all__ = ["DenseFit", "DenseRows", "fit_dense", "fixed_point", "low_frequency_inflation"]
 
 Array = NDArray[np.float64]
 
@@ -22,6 +22,11 @@ _VARIANCES: Final = np.concatenate([[-math.inf], np.linspace(-4.0, 10.0, 57)])
 #: Correlation of neighbouring residuals from which standard errors are taken from blocks.
 _CORRELATED: Final = 0.1
 _BLOCKS: Final = 40
+
+#: Fits of which each is made at the places that the one before corrects, at most, and the standard
+#: errors within which coefficients no longer move.
+_ROUNDS: Final = 8
+_STILL: Final = 0.02
 
 
 @dataclass(frozen=True)
@@ -208,6 +213,21 @@ def _best_variance(triangle: Array, p: int, m: int, random: Sequence[int], count
     ]
     best = max(found, key=lambda pair: pair[0].evidence)[1]
     return 10.0**best if math.isfinite(best) else 0.0
+
+
+def fixed_point(fit_at: Callable[[Array], DenseFit], size: int) -> DenseFit:
+    """The fit at the places that its own patterns correct, from no correction on."""
+    coefficients = np.zeros(size)
+    for _ in range(_ROUNDS):
+        fit = fit_at(coefficients)
+        # What is hardly seen is noise of any size: it moves no place.
+        found = np.where(fit.projected.seen, fit.patterns, 0.0)
+        std = np.sqrt(np.maximum(np.diagonal(fit.covariance), 1e-300))
+        still = np.abs((found - coefficients) / std).max(initial=0.0) < _STILL
+        coefficients = found
+        if still:
+            break
+    return fit
 
 
 def low_frequency_inflation(fit: DenseFit) -> float:

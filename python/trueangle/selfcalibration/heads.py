@@ -18,10 +18,10 @@ from numpy.typing import NDArray
 
 from ..errors import ArgumentError, NoModelError
 from ..support.angles import wrap
-from .dense import DenseFit, DenseRows, fit_dense
+from .dense import DenseFit, DenseRows, fit_dense, fixed_point
 from .modelling import made_model
 from .pattern import ENCODER, pattern_model
-from .projected import harmonic_rows, names_in_words, pairs
+from .projected import harmonic_rows, pairs
 from .recording import Recording
 from .result import ARCSEC, Blind, HeldOut, OrderEstimate, SelfCalibration, estimates
 from .significance import chosen_orders
@@ -41,7 +41,6 @@ _LEAST: Final = 1e-3
 #: Heads whose readings differ by less than this share one zero (radians: half a degree).
 _SAME: Final = math.radians(0.5)
 
-_ROUNDS: Final = 8
 _CHUNK: Final = 8192
 
 
@@ -151,22 +150,14 @@ def _places(
 
 def _fit(readings: Sequence[Array], orders: Sequence[float]) -> DenseFit:
     """Fixed point over the places: patterns at corrected readings."""
-    coefficients = np.zeros(2 * len(orders))
     columns = pairs(ENCODER, orders)
-    fit = None
-    for _ in range(_ROUNDS):
+    lost = float(sum(h.shape[1] for h in readings))
+
+    def at(coefficients: Array) -> DenseFit:
         parts = list(_rows(readings, orders, coefficients))
-        lost = float(sum(h.shape[1] for h in readings))
-        fit = fit_dense(parts, columns, freedom_lost=lost, floor=_LEAST)
-        # What is hardly seen is noise of any size: it moves no place.
-        found = np.where(fit.projected.seen, fit.patterns, 0.0)
-        std = np.sqrt(np.maximum(np.diagonal(fit.covariance), 1e-300))
-        still = np.abs((found - coefficients) / std).max(initial=0.0) < 0.02
-        coefficients = found
-        if still:
-            break
-    assert fit is not None
-    return fit
+        return fit_dense(parts, columns, freedom_lost=lost, floor=_LEAST)
+
+    return fixed_point(at, len(columns))
 
 
 def _rows(
@@ -222,12 +213,11 @@ def _blind(
         return []
     angle = np.degrees(_angles(readings)) % 360.0
     where = ", ".join(f"{a:.4g}" for a in angle)
-    names = names_in_words([(f"order {k:g} at head {numbers[0]}", 1.0) for k in lost[:1]])
     return [
         Blind(
             lost,
-            f"with heads at {where} deg all heads see these orders alike ({names} is the same at "
-            "every head): differences hold nothing of them",
+            f"with heads at {where} deg all heads see these orders alike (order {lost[0]:g} at "
+            f"head {numbers[0]} is the same at every head): differences hold nothing of them",
             "move one head, or add one, off the equal spacing "
             '(`trueangle.planning.plan_self("heads")`)',
         )

@@ -18,7 +18,6 @@ __all__ = [
     "Unknown",
     "harmonic_rows",
     "harmonic_sum",
-    "names_in_words",
     "pairs",
 ]
 
@@ -162,45 +161,3 @@ class Projected:
         """Places of the cosine and sine columns."""
         first = self.columns.index(Unknown(source, float(order), "cos"))
         return first, first + 1
-
-    def null_vectors(self) -> list[list[tuple[str, float]]]:
-        """Each combination that is not seen, as names with their shares, largest first.
-
-        Cosine and sine of one harmonic count as one name; combinations of the same names
-        are given once.
-        """
-        _, values, vectors = self._eigen
-        lost = np.flatnonzero(values < self.floor)
-        if lost.size == 0:
-            return []
-        # Rotate within the space to vectors of few columns: reduce by the largest entries.
-        space = vectors[:, lost].T.copy()
-        for row in range(len(space)):
-            pivot = int(np.argmax(np.abs(space[row])))
-            space[row] /= space[row, pivot]
-            for other in range(len(space)):
-                if other != row:
-                    space[other] -= space[other, pivot] * space[row]
-        found: dict[tuple[str, ...], list[tuple[str, float]]] = {}
-        for vector in space:
-            shares: dict[str, float] = {}
-            for column, value in zip(self.columns, vector, strict=True):
-                if abs(value) > 1e-3:
-                    name = str(column)
-                    if abs(value) > abs(shares.get(name, 0.0)):
-                        shares[name] = float(value)
-            ordered = sorted(shares.items(), key=lambda item: -abs(item[1]))
-            found.setdefault(tuple(sorted(shares)), ordered)
-        return list(found.values())
-
-
-def names_in_words(shares: Sequence[tuple[str, float]]) -> str:
-    """A combination that is not seen: ``order 1 of the encoder against order 1 of the ripple``.
-
-    Examples
-    --------
-    >>> names_in_words([("order 2 of a", 1.0), ("order 2 of b", 1.0)])
-    'order 2 of a together with order 2 of b'
-    """
-    names = [name for name, _ in shares[:4]]
-    return " together with ".join(names)

@@ -21,7 +21,7 @@ from ..errors import NoModelError
 from ..support.angles import wrap
 from ..support.distributions import f_tail
 from .clampings import Clampings, clampings_of
-from .dense import DenseFit, DenseRows, fit_dense
+from .dense import DenseFit, DenseRows, fit_dense, fixed_point
 from .modelling import made_model
 from .pattern import ENCODER, pattern_model
 from .projected import Unknown, harmonic_rows, pairs
@@ -38,7 +38,6 @@ OTHER: Final = "the other encoder"
 FACETS: Final = "the polygon's facets"
 
 _HIGHEST: Final = 32
-_ROUNDS: Final = 8
 
 #: Share of an order that is left beside the other pattern, below which it is refused.
 _LEAST: Final = 1e-3
@@ -147,25 +146,17 @@ def _fit(design: Clampings, orders: Sequence[float], runs: Sequence[int] | None 
     """Fixed point over the places on both scales."""
     runs = range(len(design.joint)) if runs is None else runs
     columns = _columns(design, orders)
-    coefficients = np.zeros(len(columns))
     coupling = len(runs) >= 3
-    fit = None
-    for _ in range(_ROUNDS):
+
+    def at(coefficients: Array) -> DenseFit:
         parts = [
             _rows(design, j, i, len(runs), orders, coefficients, coupling)
             for i, j in enumerate(runs)
         ]
         random = list(range(len(runs), parts[0].nuisances.shape[1]))
-        fit = fit_dense(parts, columns, random, floor=_LEAST)
-        # What is hardly seen is noise of any size: it moves no place.
-        found = np.where(fit.projected.seen, fit.patterns, 0.0)
-        std = np.sqrt(np.maximum(np.diagonal(fit.covariance), 1e-300))
-        still = np.abs((found - coefficients) / std).max(initial=0.0) < 0.02
-        coefficients = found
-        if still:
-            break
-    assert fit is not None
-    return fit
+        return fit_dense(parts, columns, random, floor=_LEAST)
+
+    return fixed_point(at, len(columns))
 
 
 def _rows(
