@@ -30,10 +30,10 @@ def model_asked(path: str, joint: str | None = None) -> HarmonicModel:
     if joint is None and len(robot) == 1:
         (model,) = robot.values()
         return model
+    known = ", ".join(robot)
+    if joint is None:
+        raise ArgumentError(f"{path} holds the models of {known}: say which with --joint NAME")
     if joint not in robot:
-        known = ", ".join(robot)
-        if joint is None:
-            raise ArgumentError(f"{path} holds the models of {known}: say which with --joint NAME")
         raise ArgumentError(
             f"--joint {joint}: {path} holds the models of {known}{did_you_mean(joint, list(robot))}"
         )
