@@ -325,3 +325,23 @@ def test_the_file_of_a_robot_is_a_model_of_each_joint(arm, tmp_path, capsys, mon
     assert status == 0
     status, beside = said(*watch, "--joint", "elbow", "--robot", str(arm / "robot.toml"))
     assert beside.out == told.out != ""
+
+
+def test_a_joint_that_rests_does_not_stop_the_others(tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    true = np.arange(120) * 9.0
+    moved = true + 0.02 * np.sin(np.radians(true))
+    rows = np.column_stack([true, moved, 0.0 * true + 12.0, 0.0 * true + 12.001])
+    np.savetxt("arm.csv", rows, "%.9f", ",", header="a_ref,a_enc,b_ref,b_enc", comments="")
+    signals = [f"--signal={j}.{role}={j}_{name}:deg" for j in "ab"
+               for role, name in (("reference", "ref"), ("indicated", "enc"))]  # fmt: skip
+    fitted = ["fit", "arm.csv", *signals, "--orders", "1,2", "-o", "robot.json"]
+    assert main(fitted) == 0
+    told = capsys.readouterr()
+    assert "warning: joint b: rank 1 of 5 unknowns" in told.err
+    assert "b " in told.out.splitlines()[4]  # the worst first
+    assert ta.load_robot("robot.json").joints == ("a",)
+    assert main(["report", "arm.csv", *signals, "-o", "arm.html"]) == 0
+    page = (tmp_path / "arm.html").read_text()
+    assert "There is none, as said above." in page
+    assert "The orders that were looked for" not in page
