@@ -9,6 +9,7 @@ import threading
 import pytest
 
 import trueangle as ta
+import trueangle.formats.formats  # which endings are of logs, as whatever reads one knows
 from trueangle.errors import FileError
 from trueangle.support import files
 from trueangle.support.files import inputs
