@@ -7,6 +7,7 @@ import json
 
 from .error_units import add_errors_in, errors_in
 from .paths import Input
+from .robotmodel import model_asked
 
 HELP = "difference of two models per order and over the turn"
 EXAMPLE = "trueangle compare present.json joint_a.json"
@@ -27,6 +28,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="B",
         help="model file: the new calibration; B less A is printed",
     )
+    add("--joint", metavar="NAME", help="of the file of a robot, this joint")
     add_errors_in(parser)
     add("--json", action="store_true", help="print the result as JSON")
 
@@ -35,7 +37,8 @@ def run(args: argparse.Namespace) -> int:
     """Print the difference."""
     from ..export import compare
 
-    result = compare(args.first, args.second)
+    first, second = (model_asked(path, args.joint) for path in (args.first, args.second))
+    result = compare(first, second)
     if args.json:
         print(json.dumps(result.to_dict(), allow_nan=False))
     else:

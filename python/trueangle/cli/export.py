@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import argparse
 import json
+from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 from .error_units import add_errors_in, errors_in
 from .paths import Input, Output
+from .robotmodel import model_asked
 
 if TYPE_CHECKING:
     from ..export.target import Option
@@ -21,7 +23,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     from ..export.targets import TARGETS
 
     add = parser.add_argument
-    add("model", type=Input, metavar="MODEL", help="model file written by trueangle fit")
+    add(
+        "model",
+        type=Input,
+        metavar="MODEL",
+        help="model file written by trueangle fit, also of a robot (--joint)",
+    )
     add("--to", required=True, choices=tuple(TARGETS), metavar="TARGET", help=_targets())
     add("-o", "--output", required=True, type=Output.of(None), metavar="FILE", help="file to write")
     add(
@@ -30,13 +37,18 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="E",
         help="take the smallest table that differs from the model by at most this",
     )
-    add_target_options(parser)
+    add_target_options(parser, {"joint": "of the file of a robot, the joint to write"})
     add_errors_in(parser)
     add("--json", action="store_true", help="print the result as JSON")
 
 
-def add_target_options(parser: argparse.ArgumentParser) -> None:
-    """Options of the targets, each once; a target refuses those it does not have."""
+def add_target_options(
+    parser: argparse.ArgumentParser, more: Mapping[str, str] | None = None
+) -> None:
+    """Options of the targets, each once; a target refuses those it does not have.
+
+    ``more`` is what some of them mean beside.
+    """
     from ..export.targets import TARGETS
 
     options: dict[str, dict[str, list[str]]] = {}
@@ -50,7 +62,12 @@ def add_target_options(parser: argparse.ArgumentParser) -> None:
             dest=f"option_{name}",
             type=Input if name in read else str,
             metavar="FILE" if name in read else name.upper().replace("_", "-"),
-            help="; ".join(f"{', '.join(names)}: {text}" for text, names in helps.items()),
+            help="; ".join(
+                [
+                    *(f"{', '.join(names)}: {text}" for text, names in helps.items()),
+                    *([more[name]] if more and name in more else []),
+                ]
+            ),
         )
 
 
@@ -81,10 +98,19 @@ def run(args: argparse.Namespace) -> int:
     import sys
 
     from ..export import export_model
+    from ..export.targets import TARGETS
+    from ..model.robotfile import is_robot_file
+    from ..support.files import check_output
 
-    made = export_model(
-        args.model, args.to, args.output, max_arcsec=args.max_arcsec, **target_options(args)
-    )
+    options = target_options(args)
+    model = args.model
+    if is_robot_file(model):
+        target = TARGETS[args.to]
+        check_output(args.output, target.kind, [args.model])
+        model = model_asked(args.model, options.get("joint"))
+        if "joint" not in target.options:
+            options.pop("joint", None)
+    made = export_model(model, args.to, args.output, max_arcsec=args.max_arcsec, **options)
     if args.json:
         print(json.dumps(made.to_dict(), allow_nan=False))
         for note in made.notes:

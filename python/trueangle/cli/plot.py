@@ -14,6 +14,7 @@ from .fit import add_joint
 from .order_lists import declared_shafts, orders_by_shaft
 from .paths import Input, Output
 from .pictures import save_picture
+from .robotmodel import model_asked
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -49,6 +50,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     add("--orders", default="auto", help="auto (default: by evidence), 1-17, output:1-3;motor:1,2")
     add_joint(parser)
+    add("--joint", metavar="NAME", help="of the model file of a robot, this joint")
     add_errors_in(parser)
     add("--json", action="store_true", help="print what was drawn as JSON")
 
@@ -71,14 +73,13 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _of_model(args: argparse.Namespace) -> Axes:
-    from ..model.file import load_model
     from ..plots.modelerror import model_error
 
     if len(args.files) > 1 or args.kind != "errors":
         raise ArgumentError(
             "one model has one picture: give one file and leave --kind out, or give the runs"
         )
-    return model_error(load_model(args.files[0]), errors_in=errors_in(args))
+    return model_error(model_asked(args.files[0], args.joint), errors_in=errors_in(args))
 
 
 def _of_runs(args: argparse.Namespace) -> Axes:

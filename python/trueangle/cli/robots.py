@@ -7,7 +7,7 @@ import sys
 from collections.abc import Callable
 from typing import Any, TypeVar
 
-from ..errors import ArgumentError, NoModelError
+from ..errors import ArgumentError, NoModelError, NotInvertibleError, RankError, TrueAngleError
 from ..support.display_units import ErrorsIn
 from .signal_options import signal_argument, signals_by_joint
 
@@ -142,7 +142,7 @@ def _key(entry: Any) -> str:
 
 def each_joint(
     joints: list[JointAsked], work: Callable[[JointAsked], T]
-) -> tuple[dict[str, T], dict[str, NoModelError]]:
+) -> tuple[dict[str, T], dict[str, TrueAngleError]]:
     """What ``work`` makes of every joint, and of which joints the readings support nothing.
 
     Raises
@@ -153,12 +153,12 @@ def each_joint(
     from ..runs.readings import read_once
 
     found: dict[str, T] = {}
-    failed: dict[str, NoModelError] = {}
+    failed: dict[str, TrueAngleError] = {}
     with read_once():
         for joint in joints:
             try:
                 found[joint.name] = work(joint)
-            except NoModelError as error:
+            except (NoModelError, RankError, NotInvertibleError) as error:
                 print(f"trueangle: warning: joint {joint.name}: {error}", file=sys.stderr)
                 failed[joint.name] = error
             except ArgumentError as error:

@@ -10,10 +10,13 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ..errors import ArgumentError
 from ..support.files import PAGE, PICTURE
 from .error_units import add_errors_in, errors_in
 from .paths import Input, Output
 from .pictures import save_picture
+from .robotmodel import columns_of, model_asked
+from .robots import add_robot, joints_asked
 from .signal_options import add_signals, reading
 
 if TYPE_CHECKING:
@@ -38,7 +41,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="log with a reference and an indicated angle, or with the error; - reads lines of a "
         "table from standard input as they arrive",
     )
-    add("-m", "--model", required=True, type=Input, metavar="MODEL", help="model file")
+    add(
+        "-m",
+        "--model",
+        required=True,
+        type=Input,
+        metavar="MODEL",
+        help="model file, also of a robot (--joint)",
+    )
     add(
         "--every",
         type=_turns,
@@ -61,6 +71,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="windows until a false alarm, on average (default: %(default)g)",
     )
     add_signals(parser)
+    add_robot(parser)
     add_errors_in(parser)
     add(
         "--plot",
@@ -95,13 +106,13 @@ def _turns(text: str) -> float:
 
 def run(args: argparse.Namespace) -> int:
     """Feed the windows, print each."""
-    from ..model.file import load_model
     from ..monitoring.monitor import Monitor
 
-    model = load_model(args.model)
+    joint, args = _of_joint(args)
+    model = model_asked(args.model, joint)
     watched = Monitor(model, every=args.every, shift=args.shift, run_length=args.run_length)
     alarmed, kept = False, []
-    for batch in _batches(args, model):
+    for batch in _batches(args, model, joint):
         for window in watched.windows_of(*batch):
             alarmed |= window.alarm
             if args.plot is not None or args.report is not None:
@@ -120,10 +131,31 @@ def run(args: argparse.Namespace) -> int:
     return ALARMED if alarmed else 0
 
 
-def _batches(args: argparse.Namespace, model: HarmonicModel) -> Iterator[ReadingBatch]:
+def _of_joint(args: argparse.Namespace) -> tuple[str | None, argparse.Namespace]:
+    """The joint of a robot that is watched, if it is one, and the arguments as for it alone."""
+    from ..model.robotfile import is_robot_file
+
+    if args.robot is not None or any(entry[0] is not None for entry in args.signal or ()):
+        asked = joints_asked(args)
+        joints = asked[1] if asked is not None else []
+        if len(joints) != 1:
+            names = ", ".join(joint.name for joint in joints)
+            raise ArgumentError(f"one joint is watched at a time: --joint NAME, one of {names}")
+        return joints[0].name, joints[0].args
+    if args.joint and len(args.joint) > 1:
+        raise ArgumentError(f"one joint is watched at a time, got {', '.join(args.joint)}")
+    if args.joint and not is_robot_file(args.model):
+        raise ArgumentError(f"--joint {args.joint[0]}: {args.model} is the model of one joint")
+    return (args.joint[0] if args.joint else None), args
+
+
+def _batches(
+    args: argparse.Namespace, model: HarmonicModel, joint: str | None
+) -> Iterator[ReadingBatch]:
     from ..monitoring.readings import read_batches, read_lines
 
     options: Any = reading(args)
+    options["signals"] = {**columns_of(args.model, joint), **(options["signals"] or {})} or None
     if args.log == "-":
         return read_lines(sys.stdin, model, options)
     return read_batches(Path(args.log), model, options)

@@ -39,6 +39,9 @@ _OPTIONS: Final = {
     "target": ("to", "source"),
 }
 
+#: Units of columns by the period that they have in Python.
+_UNITS: Final = {"360": "deg", "360.0": "deg", "1": "turn", "1.0": "turn"}
+
 #: Functions of Python that are commands of another name.
 _COMMANDS: Final = {
     "correct_logs": "correct",
@@ -115,6 +118,10 @@ class Wording:
     def _options(self, call: ast.Call) -> Iterator[str]:
         for keyword in call.keywords:
             name = keyword.arg or ""
+            if name == "period" and not self._option(name):  # columns have units, not a period
+                unit = _UNITS.get(_text(keyword.value), "UNIT")
+                yield from (f"--signal {angle}=NAME:{unit}" for angle in ("reference", "indicated"))
+                continue
             # Of another command than that which runs the option is named as a rule is.
             option = self._option(name) or f"--{name.replace('_', '-')}"
             values = _values(keyword.value)

@@ -313,7 +313,8 @@ def _by_name(header: Sequence[str], role: str) -> list[Column]:
     names = dict(_standard(role))
     exact = [Column(role, name, names[name]) for name in header if name in names]
     if exact:
-        return exact
+        # One clock in several units is one clock, and its seconds are taken.
+        return exact if role != "time" else [min(exact, key=lambda c: list(names).index(c.name))]
     found = []
     plain = {_plain(name): unit for name, unit in names.items()}
     for name in header:
@@ -337,6 +338,9 @@ def _standard(role: str) -> Iterator[tuple[str, str | None]]:
     elif kind == "velocity":
         for unit in (*UNIT_PERIODS, "count"):
             yield pattern.format(unit), f"{unit}/s"
+    elif kind == "time":
+        for unit in TIME_UNITS:
+            yield f"{role}_{unit}", unit
     else:
         yield pattern, None
 

@@ -12,7 +12,7 @@ from .format import Format
 __all__ = ["FORMATS", "find_format", "format_of_content", "known_format"]
 
 #: A process variable and a date, as camonitor begins a line.
-_CAMONITOR = rb"\A\S+\s+\d{4}-\d\d-\d\d \d\d:\d\d:\d\d"
+_CAMONITOR = rb"\A\S+[ \t]+\d{4}-\d\d-\d\d \d\d:\d\d:\d\d"
 #: Type, rows, columns, imaginary part, length of the name, of either order of bytes.
 _MATLAB4 = (
     rb"\A(?s:[\x00-\x33]\0\0\0.{8}[\0\1]\0\0\0.\0\0\0"

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias, Unpack, overload
 from ..errors import ArgumentError
 from ..fitting.heldout import HeldOut
 from ..model.model import HarmonicModel
+from ..plots.orderlines import order_lines
 from ..runs.checks.check import faults_of
 from ..runs.checks.record import records_of
 from ..runs.files import runs_of
@@ -320,7 +321,8 @@ def _figures(
 ) -> dict[str, dict[str, Any]]:
     """Every figure that this report has."""
     made = {"errors": figures.errors_of_runs(fit, runs, scale)}
-    if fit is not None or selection is not None:
+    # At one place no order can be looked for.
+    if fit is not None or (selection is not None and order_lines(selection)):
         made["spectrum"] = spectrum(fit, selection, name, scale)
     if held is not None:
         made["before-after"] = figures.before_after(held, runs, scale)

@@ -286,3 +286,62 @@ def test_a_log_is_read_once_for_all_joints(arm, capsys, monkeypatch):
         _, alone, _ = asked(arm, "check", "--joint", name, "--json", capsys=capsys)
         assert json.loads(alone)["joints"][name] == json.loads(together)["joints"][name]
     assert len(calls) == 2 + len(SIZES)
+
+
+def test_the_file_of_a_robot_is_a_model_of_each_joint(arm, tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert asked(arm, "fit", "--orders", "1", "-o", "robot.json", capsys=capsys)[0] == 0
+    robot = ta.load_robot("robot.json")
+    robot["elbow"].save("elbow.json")
+
+    def said(*command):
+        status = main(list(command))
+        return status, capsys.readouterr()
+
+    for command in (["export", "robot.json", "--to", "csv", "-o", "a.csv"],
+                    ["watch", str(arm / "arm.csv"), "-m", "robot.json"],
+                    ["compare", "robot.json", "elbow.json"]):  # fmt: skip
+        status, told = said(*command)
+        assert status == 1
+        assert "shoulder, elbow, wrist: say which with --joint NAME" in told.err
+        status, told = said(*command, "--joint", "elbo")
+        assert status == 1
+        assert "did you mean elbow?" in told.err
+    for path, more in (("robot.json", ["--joint", "elbow"]), ("elbow.json", [])):
+        options = ["--to", "csv", "--bits", "12", "-o", f"{path}.csv", *more]
+        assert said("export", path, *options)[0] == 0
+    read = [[line for line in (tmp_path / f"{path}.csv").read_text().splitlines()
+             if not line.startswith("#")] for path in ("robot.json", "elbow.json")]  # fmt: skip
+    assert len(read[0]) > 100
+    assert read[0] == read[1]
+    # What it is written from is not written over.
+    before = (tmp_path / "robot.json").read_bytes()
+    assert said("export", "robot.json", "--to", "csv", "-o", "robot.json", "--joint", "elbow")[0]
+    assert (tmp_path / "robot.json").read_bytes() == before
+    _, told = said("compare", "robot.json", "elbow.json", "--joint", "elbow", "--json")
+    assert json.loads(told.out)["max_abs_arcsec"] == 0.0
+    watch = ["watch", str(arm / "arm.csv"), "-m", "robot.json", "--json"]
+    status, told = said(*watch, "--joint", "elbow", "--signal", "reference=laser elbow [deg]")
+    assert status == 0
+    status, beside = said(*watch, "--joint", "elbow", "--robot", str(arm / "robot.toml"))
+    assert beside.out == told.out != ""
+
+
+def test_a_joint_that_rests_does_not_stop_the_others(tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    true = np.arange(120) * 9.0
+    moved = true + 0.02 * np.sin(np.radians(true))
+    rows = np.column_stack([true, moved, 0.0 * true + 12.0, 0.0 * true + 12.001])
+    np.savetxt("arm.csv", rows, "%.9f", ",", header="a_ref,a_enc,b_ref,b_enc", comments="")
+    signals = [f"--signal={j}.{role}={j}_{name}:deg" for j in "ab"
+               for role, name in (("reference", "ref"), ("indicated", "enc"))]  # fmt: skip
+    fitted = ["fit", "arm.csv", *signals, "--orders", "1,2", "-o", "robot.json"]
+    assert main(fitted) == 0
+    told = capsys.readouterr()
+    assert "warning: joint b: rank 1 of 5 unknowns" in told.err
+    assert "b " in told.out.splitlines()[4]  # the worst first
+    assert ta.load_robot("robot.json").joints == ("a",)
+    assert main(["report", "arm.csv", *signals, "-o", "arm.html"]) == 0
+    page = (tmp_path / "arm.html").read_text()
+    assert "There is none, as said above." in page
+    assert "The orders that were looked for" not in page

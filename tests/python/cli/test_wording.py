@@ -363,3 +363,13 @@ def test_words_are_suggested_by_one_function():
     with pytest.raises(ArgumentError, match="loop must be one of open, closed, got None"):
         check_choice("loop", None, ("open", "closed"))
     assert inspect.isfunction(check_choice)
+
+
+def test_a_unit_that_is_wrong_is_told_by_an_option_that_there_is(tmp_path, capsys):
+    columns = np.column_stack([THETA, THETA + 0.9 * np.sin(np.radians(THETA))])
+    path = tmp_path / "degrees.csv"
+    np.savetxt(path, columns, "%.6f", ",", header="reference_rad,indicated_rad", comments="")
+    main(["fit", str(path), "-o", str(tmp_path / "m.json"), "--orders", "1"])
+    said = capsys.readouterr().err
+    assert "give --signal reference=NAME:deg --signal indicated=NAME:deg" in said
+    assert "--period" not in said

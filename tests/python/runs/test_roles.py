@@ -293,3 +293,38 @@ def test_a_column_called_when_that_holds_no_dates(tmp_path):
         assert np.allclose(each_door(path, tmp_path), (0.0, 20.0), atol=1e-6)
         with pytest.raises(FileError, match=r"line 2, column 'when': a date and time \(ISO 8601\)"):
             ta.read_runs(path, signals={"when": "when"})
+
+
+@pytest.mark.parametrize("unit", ["s", "ms", "us", "ns"])
+def test_a_time_in_any_unit_is_found_by_its_name(unit, tmp_path):
+    seconds = np.arange(ROWS) * 0.25
+    scaled = seconds / {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}[unit]
+    columns = {f"time_{unit}": scaled, "reference_deg": NOMINAL, "indicated_deg": READ}
+    (run,) = ta.read_runs(saved(tmp_path / "a.csv", **columns))
+    np.testing.assert_allclose(run.time, seconds, atol=1e-9)
+    # One clock written in two units is one: its seconds are taken.
+    both = saved(tmp_path / "b.csv", **{**columns, "time_s": seconds + 1.0})
+    np.testing.assert_allclose(ta.read_runs(both)[0].time, seconds + 1.0, atol=1e-9)
+
+
+def test_a_check_tells_of_a_clock_that_nobody_asked_for(tmp_path, capsys):
+    from datetime import datetime, timedelta
+
+    start = datetime(2026, 3, 1, 23, 59, 58)
+    # A space between date and time, as pandas writes them: no log of camonitor.
+    clock = [str(start + timedelta(milliseconds=250 * i + 1)) for i in range(ROWS)]
+    path = saved(tmp_path / "a.csv", time=clock, reference_deg=NOMINAL, indicated_deg=READ)
+    (entry,) = [e for e in ta.check(path).cannot if "delay" in e["what"]]
+    assert entry["because"] == "column 'time' is not used"
+    (run,) = ta.read_runs(path, signals={"time": "time"})
+    np.testing.assert_allclose(run.time, 0.25 * np.arange(ROWS), atol=1e-9)
+    known = ta.check(path, signals={"time": "time"}).cannot
+    assert not any("not used" in e["because"] for e in known)
+    assert main(["correct", str(path), "-m", "none.json", "-o", str(tmp_path / "b.csv")]) == 1
+    assert "camonitor" not in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(("places", "span"), [([7.0], 0.0), ([7.0, 7.5], 0.5), ([90.0, 90.0], 0.0)])
+def test_readings_at_one_place_span_nothing(places, span):
+    run = ta.CalibrationRun(np.array(places), np.array(places) + 0.1, period=360.0)
+    assert ta.check(run).extent.span_deg == pytest.approx(span, abs=1e-9)

@@ -9,6 +9,7 @@ import threading
 import pytest
 
 import trueangle as ta
+import trueangle.formats.formats  # which endings are of logs, as whatever reads one knows
 from trueangle.errors import FileError
 from trueangle.support import files
 from trueangle.support.files import inputs
@@ -287,3 +288,23 @@ def test_what_is_written_is_small_enough_to_be_read(tmp_path, model, monkeypatch
     with pytest.raises(ta.errors.ArgumentError, match="covariance"):
         model.save(tmp_path / "m.json")
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_folder_that_takes_no_files_ends_the_attempt(model, tmp_path, monkeypatch):
+    """As /proc: a folder, in which nothing can be made."""
+    opened = os.open
+    tried = []
+
+    def refuse(path, flags, *rest, **more):
+        if flags & os.O_CREAT and "partial" in os.fsdecode(path):
+            tried.append(path)
+            if len(tried) > 10_000:
+                pytest.fail("tries without an end")
+            raise FileNotFoundError(errno.ENOENT, os.strerror(errno.ENOENT), os.fsdecode(path))
+        return opened(path, flags, *rest, **more)
+
+    monkeypatch.setattr(os, "open", refuse)
+    with pytest.raises(FileNotFoundError, match="no file can be made in this folder"):
+        model.save(tmp_path / "m.json")
+    assert tried
+    assert not any(tmp_path.iterdir())

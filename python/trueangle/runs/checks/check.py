@@ -86,6 +86,11 @@ def check(data: Any, **reading: Unpack[Reading]) -> Check:
             "measure": "nothing anew: give it the role reference_offset",
         }
         cannot.append(entry)
+    clocks = sorted({name for record in records for name in record.clocks})
+    for entry in cannot if clocks else ():
+        if entry["because"] == "no time stamps":
+            entry["because"] = f"column '{clocks[0]}' is not used"
+            entry["measure"] = "nothing anew: give it the role time, with its unit"
     return Check(
         tuple(faults_of(records)),
         ratio,

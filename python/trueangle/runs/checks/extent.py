@@ -168,5 +168,7 @@ def _span(places: Array) -> float:
     within = gaps < _WITHIN_PLACE * widest
     if gaps[within].sum() < _WITHIN_PLACE * 360.0:
         gaps = gaps[~within]
+    if gaps.size < 2:  # all readings are of one place
+        return 360.0 - widest
     # Evenly spaced places leave no gap but their step.
     return 360.0 if widest < 3.0 * float(median(gaps[gaps > 0.0])) else 360.0 - widest

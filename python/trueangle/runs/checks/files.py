@@ -43,6 +43,7 @@ def read_records(data: Any, reading: Mapping[str, Any]) -> list[Record]:
                     None if mount is None else mount * scale,
                     columns,
                     _deviations(table.table),
+                    _clocks(table.table),
                 )
             )
     return found
@@ -58,6 +59,16 @@ def _deviations(table: FileReadings) -> tuple[str, ...]:
         for name, values in table.columns.items()
         if name not in used and values.dtype != object and _is_deviation(name)
     )
+
+
+def _clocks(table: FileReadings) -> tuple[str, ...]:
+    """Columns that are called like a time, where none is known to be one."""
+    used = {column.name for column in table.roles.values()}
+    unused = () if "time" in table.roles else tuple(n for n in table.columns if n not in used)
+    return tuple(name for name in unused if _CLOCK.match(name.strip()))
+
+
+_CLOCK = re.compile(r"(time|timestamp|stamp|t|date)(_?(s|ms|us|ns|iso|utc))?$", re.IGNORECASE)
 
 
 def _is_deviation(name: str) -> bool:

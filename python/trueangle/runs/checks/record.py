@@ -33,6 +33,8 @@ class Record:
         The columns of the file that were understood.
     deviations : tuple of str
         Columns of no role that look like deviations from a nominal angle.
+    clocks : tuple of str
+        Columns of no role that are called like a time, where none was understood.
     """
 
     label: str
@@ -46,6 +48,7 @@ class Record:
     mount: Array | None = None
     columns: Mapping[str, tuple[str, str | None]] = field(default_factory=dict)
     deviations: tuple[str, ...] = ()
+    clocks: tuple[str, ...] = ()
 
     def __len__(self) -> int:
         return int(self.reference.size)

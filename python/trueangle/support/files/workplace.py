@@ -37,6 +37,8 @@ __all__ = [
 PARTIAL: Final = ".trueangle-partial"
 #: Ending of a folder that is being replaced, in the place where the new one was made.
 _REPLACED: Final = ".replaced"
+#: Times that what others removed at once is made anew; some folders (/proc) take nothing at all.
+_TRIES: Final = 100
 #: Characters of a name that its hidden neighbour repeats: names may have 255 bytes in all.
 _LONGEST: Final = 50
 #: Linux's renameat2: paths are relative to the working folder; both names change places.
@@ -67,7 +69,7 @@ def made_beside(target: Path, make: Callable[[Path], int]) -> Iterator[Path]:
     # Known before it is made: Ctrl-C may come with the call that makes it.
     beside = hidden_beside(target)
     try:
-        while True:
+        for _ in range(_TRIES):
             with contextlib.suppress(FileNotFoundError):
                 handle = make(beside)
                 if handle < 0:  # a system without such locks
@@ -81,6 +83,8 @@ def made_beside(target: Path, make: Callable[[Path], int]) -> Iterator[Path]:
                 os.close(handle)
                 handle = -1
             beside = hidden_beside(target)
+        else:
+            raise FileNotFoundError(2, "no file can be made in this folder", str(target.parent))
         yield beside
     finally:
         try:
