@@ -8,6 +8,10 @@ import signal
 import sys
 from pathlib import Path
 
+# As the command has it, and for what tests start: where the cores are taken by other tests,
+# threads of numpy that wait for each other cost ten times the work. Before numpy is imported.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
 import pytest
 from hypothesis import HealthCheck, settings
 
