@@ -32,11 +32,11 @@ ROOT = Path(__file__).resolve().parents[2]
 
 # Nor does it which causes a diagnosis tried: where no time is given, a test's work ends after so
 # many questions whether its time is up, however busy the machine. The five seconds of the default
-# hold 650 to 1500 of them, and ordinary work asks as many; a test has this many times a thousand.
+# hold 650 (10 000 readings) to 3000 (1600) of them; a test has this many times a thousand.
 # Tests of the default ask for `default_time`, those that need a whole account for `patient`.
 QUESTIONS = 1000.0
 PATIENT = 20.0
-PATIENCE = PATIENT if os.environ.get("TRUEANGLE_NIGHTLY") == "1" else 2.0
+PATIENCE = PATIENT if os.environ.get("TRUEANGLE_NIGHTLY") == "1" else 3.0
 DEFAULT_TIME = deadline.LEAST
 deadline.LEAST = PATIENCE * DEFAULT_TIME
 
