@@ -61,7 +61,8 @@ python:             ## tests of the package
 
 exam:               ## the diagnosis' own exam at full size: an hour or more, figures asserted
 	TRUEANGLE_NIGHTLY=1 TRUEANGLE_EXAM_SEEDS=20 $(PYTHON) -m pytest -s \
-	  tests/python/hidden tests/python/diagnosis/test_diagnosis.py tests/python/rehearsal/test_followed.py
+	  tests/python/hidden tests/python/diagnosis/test_diagnosis.py tests/python/rehearsal/test_followed.py \
+	  tests/python/diagnosis/test_account.py tests/python/effects/test_joint_coupling.py
 
 looks:              ## what a reader sees, as pictures and texts in target/looks; needs Chromium
 	$(PYTHON) tests/looks

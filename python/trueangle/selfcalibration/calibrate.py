@@ -9,6 +9,7 @@ from ..errors import ArgumentError, NoModelError
 from ..joint.shafts import MOST_ORDERS, counted_orders
 from ..runs.source import OtherReading
 from ..support.angles import check_period
+from ..support.blas import one_blas_thread
 from ..support.kinds import told_kinds
 from ..support.suggestions import check_choice
 from .dual import dual
@@ -25,6 +26,7 @@ METHODS: Final = ("auto", "spin-down", "heads", "shifts", "dual")
 
 
 @told_kinds
+@one_blas_thread()
 def selfcal(
     logs: Any,
     *,

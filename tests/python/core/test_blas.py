@@ -73,9 +73,10 @@ def test_products_are_those_of_two_threads(count):
     [
         (ta.select_orders, "trueangle.fitting.orders.choice.choose_argument"),
         (ta.report, "trueangle.reports.composition.check_output"),
+        (ta.selfcal, "trueangle.selfcalibration.calibrate.as_recordings"),
     ],
 )
-def test_selections_and_reports_have_one(what, within, count, monkeypatch, tmp_path):
+def test_what_has_many_small_products_has_one(what, within, count, monkeypatch, tmp_path):
     seen = []
 
     def stop(*_, **__):

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 import pytest
 
@@ -31,15 +33,22 @@ def sweeps(seed: int) -> list[ta.CalibrationRun]:
     return found
 
 
+@cache
+def diagnosed(seed: int) -> ta.Diagnosis:
+    """What is told of the sweeps; both tests look at the same."""
+    print(f"seed {seed}")
+    return ta.diagnose(sweeps(seed), ta.Simulation())
+
+
 #: Of the sweeps below those whose lines, of orders 2 and 5, are not only told as neighbours of
 #: these that make the same curve over so short a travel.
 LINES_TOLD = (6512, 6522)
 
 
+@pytest.mark.usefixtures("patient")
 @pytest.mark.parametrize("seed", [6511, 6512, 6522])
 def test_a_play_by_place_is_told_by_its_direction_and_not_as_bumps(seed: int) -> None:
-    print(f"seed {seed}")
-    result = ta.diagnose(sweeps(seed), ta.Simulation())
+    result = diagnosed(seed)
     found = {finding.cause: finding for finding in result.findings}
     assert found["direction_dependent_pattern"].confirmed
     assert "local_defect" not in found, result.summary()
@@ -57,10 +66,10 @@ def test_a_play_by_place_is_told_by_its_direction_and_not_as_bumps(seed: int) ->
         assert abs(place - PLACE) < 0.2 * PLACE
 
 
+@pytest.mark.usefixtures("patient")
 def test_what_the_others_explain_without_a_doubtful_cause_is_not_unexplained() -> None:
     """Of terms that share what they explain, one that is not confirmed takes nothing with it."""
     for seed in (6511, 6521):
-        print(f"seed {seed}")
-        result = ta.diagnose(sweeps(seed), ta.Simulation())
+        result = diagnosed(seed)
         assert result.unexplained is not None
         assert result.unexplained.rms < SIGMA, result.summary()

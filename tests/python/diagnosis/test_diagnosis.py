@@ -225,7 +225,8 @@ def test_a_line_of_the_reference_or_of_the_joint_is_a_line():
     (spot,) = [spot for spot in result.not_identifiable if "reference_error" in spot.causes]
     assert spot.supported
     assert "turn the reference" in spot.measure
-    assert "Seen, and not distinguished" not in result.summary()
+    # Without readings no further runs are planned, which takes ten times as long as the rest.
+    assert "Seen, and not distinguished" not in replace(result, runs=[]).summary()
 
 
 def test_units_order_of_runs_and_zero_do_not_matter():

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import pickle
 import warnings
 from dataclasses import replace
@@ -13,6 +14,8 @@ import trueangle as ta
 from trueangle import errors
 from trueangle.simulation import Harmonic, Joint, JointCoupling, RunDesign, Simulation, simulate
 from trueangle.terms import JointCoupling as Term
+
+NIGHTLY = os.environ.get("TRUEANGLE_NIGHTLY") == "1"
 
 LINES = (Harmonic("output", 1, 20.0, 30.0), Harmonic("wave_generator", 2, 15.0, 10.0))
 BELIEVED = Simulation(Joint(100.0, "circular_spline", "motor"), LINES)
@@ -57,15 +60,16 @@ def is_named(seed, **noise):
     return parameters["joint"].value == "wrist" and within
 
 
-@pytest.mark.parametrize("noise", [None, 1.0])
-def test_a_hidden_coupling_is_named(noise):
-    seeds = range(9100, 9110)
-    assert all(is_named(seed, noise=noise) for seed in seeds)
+def test_a_hidden_coupling_is_named():
+    """Far beyond the noise; of the size of the noise, see below."""
+    assert all(is_named(seed, noise=1.0) for seed in range(9100, 9110))
 
 
 @pytest.mark.slow
 def test_a_hidden_coupling_is_named_in_95_of_100():
-    assert sum(is_named(seed) for seed in range(9200, 9300)) >= 95
+    """Every tenth seed in the ordinary run, of which none may fail; all in `make exam`."""
+    seeds = range(9200, 9300)[:: 1 if NIGHTLY else 10]
+    assert sum(is_named(seed) for seed in seeds) >= 0.95 * len(seeds)
 
 
 def coupled_runs(*ways, **changes):
