@@ -215,9 +215,9 @@ class DriftWithinRun(Effect):
             return passed[:, None]
         if form == "centred ramp":
             middle = [np.full(b - a, 0.5 * passed[b - 1]) for a, b in regression.bounds]
-            return (passed - np.concatenate(middle))[:, None]
+            return np.asarray(passed - np.concatenate(middle))[:, None]
         if form in SETTLING:
-            return (1.0 - np.exp(-passed / SETTLING[form]))[:, None]
+            return np.asarray(1.0 - np.exp(-passed / SETTLING[form]))[:, None]
         if form.endswith("bend"):
             waves = _core.line_columns(np.pi * u, k[:BENT])[:, 0::2] / k[:BENT]
             return np.asarray(waves if form.startswith("centred") else waves - 1.0 / k[:BENT])
