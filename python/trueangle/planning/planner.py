@@ -10,6 +10,7 @@ from ..joint.signals import Signals
 from ..simulation.designs import RunDesign
 from ..simulation.simulation import Simulation
 from ..support.blas import one_blas_thread
+from ..support.deadline import paced
 from .evidence import ReadingNoise
 from .further import seconds_of
 from .limits import Limits
@@ -18,6 +19,9 @@ from .scales import Scales
 from .search import Search
 
 __all__ = ["next_runs"]
+
+#: Readings whose diagnosis may take as long by default as a plan may: ten seconds.
+WORK = 20_000
 
 
 def next_runs(
@@ -47,9 +51,10 @@ def next_runs(
     One choice after the other is changed to the best there is (speed, motion, load, temperature,
     mount, current, then the levels between), run after run, until all is told or nothing more is.
     Readings are then lowered to the fewest that do, and runs are looked for that need half of
-    those, as long as there are any. Half a second to some seconds.
+    those, as long as there are any. Half a second to some seconds; after ten of the processor
+    where no time is given, the best so far is the answer, and ``notes`` say so.
     """
-    with one_blas_thread():
+    with paced() as at, at.bounded(WORK), one_blas_thread():
         return _next_runs(earlier, believed, spots, noise, limits)
 
 

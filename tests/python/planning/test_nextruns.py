@@ -21,6 +21,7 @@ from trueangle.simulation import (
     Simulation,
     simulate,
 )
+from trueangle.support import deadline
 
 #: An arm of 270 degrees, out and back at one speed.
 SIM = Simulation(
@@ -268,3 +269,10 @@ def test_what_cannot_be_planned_is_refused():
         ta.plan_after(RUNS, SIM, between=[])
     with pytest.raises(ArgumentError, match="seeds must be a whole number from 0"):
         ta.plan_after(RUNS, SIM, seeds=-1)
+
+
+def test_a_plan_comes_to_an_end_by_itself_and_says_so(found, plan, monkeypatch):
+    assert plan.notes == ()
+    monkeypatch.setattr(deadline, "LEAST", 1e-6)
+    monkeypatch.setattr(deadline, "PER_ITEM", 0.0)
+    assert found.plan().notes[-1] == "the search was ended early"
