@@ -276,7 +276,8 @@ def take_out_beside(
 
 _MISSING: Final = {
     "ramp": "nuisance 'ramp' needs travel",
-    "direction": "nuisance 'direction' needs runs with reversals, or in both directions",
+    "direction": "nuisance 'direction' needs runs that reverse: one in a single direction "
+    "has it in its zero",
     "velocity": "nuisance 'velocity' needs time or velocity in every run, and different speeds",
     "drift": "nuisance 'drift' needs time in every run (at most 24 runs)",
 }

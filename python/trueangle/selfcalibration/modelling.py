@@ -8,6 +8,7 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 
 from .._core import __version__
+from ..errors import NotInvertibleError
 from ..joint.shafts import Shaft
 from ..model.model import HarmonicModel
 from ..model.records import FitRecord, Provenance
@@ -33,6 +34,11 @@ def made_model(
     """Whole orders of the output, and of a motor that turns ``motor[0]`` times as fast.
 
     The constant is zero by definition: no reading shows it.
+
+    Raises
+    ------
+    NotInvertibleError
+        The pattern is steeper than that of an encoder that follows its shaft.
     """
     factor = period / (2.0 * math.pi) / ARCSEC
     shafts = []
@@ -55,20 +61,30 @@ def made_model(
         for o in members:
             variances += [(o.std * factor) ** 2] * 2
     sources = dict.fromkeys(r.source for r in recordings if r.source is not None)
-    return HarmonicModel(
-        tuple(shafts),
-        0.0,
-        period,
-        covariance=np.diag(variances),
-        fit=FitRecord(
-            samples=readings,
-            runs=len(recordings),
-            span=(0.0, period) if span is None else span,
-            residual=noise * period / (2.0 * math.pi),
-            method=method,
-            note=" ".join(f"{note[:1].upper()}{note[1:]}." for note in notes),
-            calibrated_without_reference=True,
-            blind=tuple(blind),
-        ),
-        provenance=Provenance(tuple(sources), f"trueangle {__version__}"),
+    fit = FitRecord(
+        samples=readings,
+        runs=len(recordings),
+        span=(0.0, period) if span is None else span,
+        residual=noise * period / (2.0 * math.pi),
+        method=method,
+        note=" ".join(f"{note[:1].upper()}{note[1:]}." for note in notes),
+        calibrated_without_reference=True,
+        blind=tuple(blind),
     )
+    made_by = Provenance(tuple(sources), f"trueangle {__version__}")
+    try:
+        return HarmonicModel(
+            tuple(shafts),
+            0.0,
+            period,
+            covariance=np.diag(variances),
+            fit=fit,
+            provenance=made_by,
+        )
+    except NotInvertibleError as error:
+        raise NotInvertibleError(
+            f"the pattern found is no encoder's: its slope reaches {error.slope:.3g}, and from 1 "
+            "on a reading stands for several angles; does the shaft turn through these readings, "
+            "and are their unit and period right? `check` shows both",
+            error.slope,
+        ) from None

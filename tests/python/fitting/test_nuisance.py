@@ -98,7 +98,7 @@ def test_what_the_design_cannot_tell_is_left_and_told():
     runs = runs_with(lag, there_and_back=False)
     found = ta.fit(runs, nuisance="auto")
     assert "velocity" not in found.nuisance.kinds
-    with pytest.raises(ArgumentError, match=r"different speeds|both directions"):
+    with pytest.raises(ArgumentError, match="needs runs that reverse"):
         ta.fit(runs[:1], nuisance="direction")
 
 

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from trueangle.errors import ArgumentError
+from trueangle.errors import ArgumentError, NotInvertibleError
 from trueangle.model.model import HarmonicModel
 from trueangle.selfcalibration.colour import noise_beside, spectrum_at
 from trueangle.selfcalibration.loop import check_loop, followed_orders, followed_share, widened
@@ -289,6 +289,15 @@ def test_a_model_has_the_orders_of_both_shafts_in_every_unit(period: float) -> N
                        motor=motor, span=(0.0, 0.5 * period))  # fmt: skip
     assert [s.name for s in alone.shafts] == ["motor"]
     assert alone.fit.span == (0.0, 0.5 * period)
+
+
+def test_a_pattern_that_no_encoder_has_is_refused_without_an_advice_for_fits() -> None:
+    """Order 3 of 1/3 rad has the slope 1; the message neither names an argument of a fit."""
+    steep = [order(3.0, 0.5 * ARCSEC, 0.0)]
+    with pytest.raises(NotInvertibleError, match=r"no encoder's: its slope reaches 1\.5") as told:
+        made_model(steep, "heads", [], [], [Recording("a")], readings=9, noise=0.0, period=360.0)
+    assert told.value.slope == pytest.approx(1.5)
+    assert "argument" not in str(told.value)
 
 
 def test_a_summary_tells_every_number() -> None:
