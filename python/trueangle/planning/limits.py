@@ -25,6 +25,10 @@ SPEEDS = (1.0, 60.0)
 #: Readings of one run at most, where not stated and no earlier run had more.
 SAMPLES = 360
 
+#: Readings of one run at most, where not stated, of earlier ones that were logs: what so many do
+#: not tell another motion does, or none; more can be stated.
+MOST_SAMPLES = 2000
+
 #: Degrees of travel from which on a joint is one that turns whole turns.
 WHOLE = 350.0
 
@@ -112,12 +116,12 @@ class Limits:
         """Those that are known of readings, for where none are stated.
 
         One turn or the arc measured so far, 1 to 60 deg/s, the loads, temperatures, mounts and
-        currents seen, and as many readings as an earlier run had.
+        currents seen, and as many readings as an earlier run had (2000 at most).
         """
         bounds = signals.run_bounds()
         limits = cls(
             arc_deg=_arc(signals, bounds),
-            samples=max(SAMPLES, *(stop - start for start, stop in bounds)),
+            samples=min(max(SAMPLES, *(stop - start for start, stop in bounds)), MOST_SAMPLES),
         )
         if signals.temperature is not None:
             limits = replace(limits, temperature_C=_range(signals.temperature))

@@ -55,6 +55,9 @@ def test_limits_without_any_are_the_arc_and_the_levels_that_were_seen():
     assert not limits.turns_freely
     whole = Limits.of_runs(simulate(Simulation(runs=(RunDesign(start_deg=77.0),))))
     assert whole.arc_deg == (0.0, 360.0)
+    logged = Simulation(runs=(RunDesign(samples=5000), RunDesign(samples=700)))
+    assert Limits.of_runs(simulate(logged)).samples == 2000
+    assert Limits.of_runs(simulate(logged)[1:]).samples == 700
     back = replace(RUNS[1], reference=RUNS[1].reference + 720.0)
     assert Limits.of_runs([RUNS[0], back]).arc_deg == limits.arc_deg
 
