@@ -121,7 +121,9 @@ class QuotedBlock:
 
 def _plain_numbers(cells: list[str]) -> NDArray[np.float64] | None:
     """Cells that hold nothing but digits and a point, as most do; None where one does not."""
-    if not _PLAIN.fullmatch("\n".join(cells)):
+    joined = "\n".join(cells)
+    # A quoted cell may hold lines of its own.
+    if joined.count("\n") >= len(cells) or not _PLAIN.fullmatch(joined):
         return None
     values = np.fromiter(map(float, cells), np.float64, len(cells))
     return values if np.isfinite(values).all() else None

@@ -178,6 +178,7 @@ def test_arm_joint_has_a_reversal_error_that_is_not_named_but_estimated(data_dir
     assert 0.0 < half["std"] / 3600.0 < 0.03
 
 
+@pytest.mark.usefixtures("patient")
 def test_arm_joint_has_one_wild_reading(data_dir, tmp_path) -> None:
     runs = [r for r in ta.read_runs(data_dir / "arm_joint_protractor.csv") if "joint2" in r.label]
     (wild,) = [f for f in findings(runs, simulation(tmp_path)) if f["cause"] == "outliers"]

@@ -40,6 +40,7 @@ def with_bursts(length: int, size: float, alike: bool, seed: int) -> tuple[list,
     return runs, rows
 
 
+@pytest.mark.usefixtures("patient")
 @pytest.mark.parametrize("alike", [True, False])
 @pytest.mark.parametrize("size", [10.0, 30.0, 300.0])
 @pytest.mark.parametrize("length", [2, 3, MOST_IN_ROW])

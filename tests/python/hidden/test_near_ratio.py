@@ -12,6 +12,8 @@ from trueangle.diagnosis.gearratio import find_ratio, near_ratio
 from trueangle.joint.signals import join_runs
 from trueangle.simulation import Harmonic, Joint, RunDesign, Simulation
 
+pytestmark = pytest.mark.usefixtures("patient")
+
 #: Simulated joints of the test of standard errors.
 JOINTS = 80
 

@@ -62,6 +62,7 @@ REFUSED = {
     "no reference": ("indicated_deg,x\n1,2\n", "no column reference_deg.*indicated_deg, x"),
     "text": (GOOD.replace("90.5", "abc"), r"line 3, column 'indicated_deg'.*'abc'"),
     "NaN": (GOOD.replace("90.5", "nan"), r"line 3, column 'indicated_deg'.*nan"),
+    "lines in a cell": (GOOD.replace("90.5", '"90\n5"'), r"column 'indicated_deg'.*'90\\n5'"),
     "infinity": (GOOD.replace("90.5", "inf"), r"line 3, column 'indicated_deg'.*inf"),
     "short line": (GOOD.replace(",y", ""), "line 3: 4 values where the header has 5"),
     "time": (GOOD.replace("90.5,1", "90.5,-1"), r"line 3, column 'time_s'.*backwards"),
