@@ -1,7 +1,6 @@
 """A unit from few readings: the prior's estimate, its intervals, and measured motors."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,7 +11,6 @@ from trueangle.errors import ArgumentError, KindError
 from .made import ARCSEC, MEAN, pattern, units
 
 SEED = 52_040
-MEASURED = Path("/work/shared/data/stepper_encoder_units.csv")
 
 
 def few(rng, own, count, noise=3.0):
@@ -120,13 +118,13 @@ def test_what_does_not_go_with_a_prior_is_refused():
 
 
 @pytest.mark.slow
-@pytest.mark.skipif(not MEASURED.exists(), reason="measured data are not here")
-def test_measured_motors_from_ten_readings():
+def test_measured_motors_from_ten_readings(data_dir):
     """Leave one motor out; five of the fifteen units are one motor."""
     print("seed", SEED)
     rng = np.random.default_rng(SEED + 5)
+    measured = data_dir / "stepper_encoder_units.csv"
     one = {"unit_07", "unit_08", "unit_09", "unit_11", "unit_12"}
-    runs = [replace(r, unit="one" if r.label in one else r.label) for r in ta.read_runs(MEASURED)]
+    runs = [replace(r, unit="one" if r.label in one else r.label) for r in ta.read_runs(measured)]
     motors = list(dict.fromkeys(r.unit for r in runs))
     wanted = {10: 0.075, 16: 0.050, 24: 0.039, 40: 0.031}
     left = {count: [] for count in wanted}
