@@ -10,11 +10,16 @@ from ..support.suggestions import did_you_mean
 if TYPE_CHECKING:
     from ..model.model import HarmonicModel
 
-__all__ = ["columns_of", "model_asked"]
+__all__ = ["joint_asked", "model_asked"]
 
 
 def model_asked(path: str, joint: str | None = None) -> HarmonicModel:
-    """The model of a file, or that of one joint of a robot's file.
+    """The model of a file, or that of one joint of a robot's file; errors as `joint_asked`."""
+    return joint_asked(path, joint)[0]
+
+
+def joint_asked(path: str, joint: str | None) -> tuple[HarmonicModel, dict[str, Any]]:
+    """`model_asked`, and the columns by role to which a robot's joint was fitted.
 
     Raises
     ------
@@ -25,11 +30,10 @@ def model_asked(path: str, joint: str | None = None) -> HarmonicModel:
     from ..model.robotfile import is_robot_file, load_robot
 
     if not is_robot_file(path):
-        return load_model(path)
+        return load_model(path), {}
     robot = load_robot(path)
     if joint is None and len(robot) == 1:
-        (model,) = robot.values()
-        return model
+        (joint,) = robot
     known = ", ".join(robot)
     if joint is None:
         raise ArgumentError(f"{path} holds the models of {known}: say which with --joint NAME")
@@ -37,15 +41,4 @@ def model_asked(path: str, joint: str | None = None) -> HarmonicModel:
         raise ArgumentError(
             f"--joint {joint}: {path} holds the models of {known}{did_you_mean(joint, list(robot))}"
         )
-    return robot[joint]
-
-
-def columns_of(path: str, joint: str | None) -> dict[str, Any]:
-    """Columns by role to which the joint of a robot's file was fitted; none of other files."""
-    from ..model.robotfile import is_robot_file, load_robot
-
-    if not is_robot_file(path):
-        return {}
-    robot = load_robot(path)
-    name = next(iter(robot)) if joint is None else joint
-    return dict(robot.signals.get(name, {}))
+    return robot[joint], dict(robot.signals.get(joint, {}))

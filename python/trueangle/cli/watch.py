@@ -6,7 +6,7 @@ import argparse
 import json
 import math
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -15,7 +15,7 @@ from ..support.files import PAGE, PICTURE
 from .error_units import add_errors_in, errors_in
 from .paths import Input, Output
 from .pictures import save_picture
-from .robotmodel import columns_of, model_asked
+from .robotmodel import joint_asked
 from .robots import add_robot, joints_asked
 from .signal_options import add_signals, reading
 
@@ -109,10 +109,10 @@ def run(args: argparse.Namespace) -> int:
     from ..monitoring.monitor import Monitor
 
     joint, args = _of_joint(args)
-    model = model_asked(args.model, joint)
+    model, columns = joint_asked(args.model, joint)
     watched = Monitor(model, every=args.every, shift=args.shift, run_length=args.run_length)
     alarmed, kept = False, []
-    for batch in _batches(args, model, joint):
+    for batch in _batches(args, model, columns):
         for window in watched.windows_of(*batch):
             alarmed |= window.alarm
             if args.plot is not None or args.report is not None:
@@ -150,12 +150,12 @@ def _of_joint(args: argparse.Namespace) -> tuple[str | None, argparse.Namespace]
 
 
 def _batches(
-    args: argparse.Namespace, model: HarmonicModel, joint: str | None
+    args: argparse.Namespace, model: HarmonicModel, columns: Mapping[str, Any]
 ) -> Iterator[ReadingBatch]:
     from ..monitoring.readings import read_batches, read_lines
 
     options: Any = reading(args)
-    options["signals"] = {**columns_of(args.model, joint), **(options["signals"] or {})} or None
+    options["signals"] = {**columns, **(options["signals"] or {})} or None
     if args.log == "-":
         return read_lines(sys.stdin, model, options)
     return read_batches(Path(args.log), model, options)
