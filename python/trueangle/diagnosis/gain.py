@@ -42,8 +42,8 @@ class Gain(Shown):
     interval : (float, float) or None
         95 % of its bootstrap over runs.
     control_share : float or None
-        The same share with the factor's labels shuffled over runs: should be at most 0
-        (given as -1 where it is below).
+        What is gained with the factor's labels shuffled over runs, of what the finding takes
+        off the same readings: should be at most 0 (given as -1 where it is below).
     note : str
     by_level : LevelGain or None
         The same with whole levels of the cause's factor left out (all runs at one speed,
@@ -228,12 +228,15 @@ def _units(regression: Regression) -> tuple[NDArray[np.int64], str]:
 def _control(
     regression: Regression, group: Sequence[int], unit: NDArray[np.int64], rng: np.random.Generator
 ) -> float:
-    """Share that the finding reaches with its factor's labels shuffled over runs."""
+    """Share of what the finding takes off that it gains with its labels shuffled over runs."""
     cause = regression.terms[group[0]].cause
     rest = regression.with_terms(t for k, t in enumerate(regression.terms) if k not in group)
-    y = rest.left - rest.whiten.run_part(rest.left)
-    y = np.where(regression.outlying, 0.0, y)
+    y = _within_runs(rest, regression.outlying)
     test = unit % 2 == 0
+    # What the finding takes off the same readings: against the variance of all readings the
+    # scatter of one half would stand in the denominator of a small finding.
+    reducible = np.mean(y[test] ** 2 - _within_runs(regression, regression.outlying)[test] ** 2)
+    least = 1e-3 * regression.variance
     shares = []
     for _ in range(SHUFFLES):
         signals = _shuffled(regression.signals, effect_of(cause).factor, unit, rng)
@@ -248,10 +251,15 @@ def _control(
         columns = columns[:, seen]
         coefficients = np.linalg.lstsq(columns[~test], y[~test], rcond=None)[0]
         after = y[test] - columns[test] @ coefficients
-        p0, p1 = float(np.mean(y[test] ** 2)), float(np.mean(after**2))
-        share = (p0 - p1) / max(p0 - regression.variance, 1e-3 * regression.variance)
-        shares.append(max(share, -1.0))
+        gained = float(np.mean(y[test] ** 2 - after**2))
+        shares.append(max(gained / max(reducible, least), -1.0))
     return float(np.mean(shares))
+
+
+def _within_runs(regression: Regression, outlying: NDArray[np.bool_]) -> Array:
+    """What is left of the readings beside the zeros of their runs."""
+    left = regression.left - regression.whiten.run_part(regression.left)
+    return np.where(outlying, 0.0, left)
 
 
 def _shuffled(

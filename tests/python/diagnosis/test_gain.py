@@ -106,26 +106,28 @@ def test_loads_alike_in_every_run_are_turned_round() -> None:
     assert [np.ptp(ratio[a:b]) < 1e-9 for a, b in given.run_bounds()] == [True] * RUNS
 
 
-def test_the_share_of_a_control_is_that_of_columns_with_other_labels() -> None:
+@pytest.mark.parametrize("size", [4.0, 0.1])
+def test_the_share_of_a_control_is_that_of_columns_with_other_labels(size: float) -> None:
     """A cause that no label makes gains as much under others; one that a label makes does not."""
     given = signals_of(np.arange(RUNS) * 2.0, 200)
     around = Simulation().surroundings
     effect = EFFECTS["backlash"]
     noise = np.random.default_rng(7).standard_normal(len(given))
-    fitted = Regression.of(given, noise + 4.0 * given.direction, around, rho=0.0)
+    fitted = Regression.of(given, noise + size * given.direction, around, rho=0.0)
     fitted = fitted.with_terms([effect.propose(fitted)])
-    rng = np.random.default_rng(9)
-    found = _control(fitted, [0], given.run, rng)
+    found = _control(fitted, [0], given.run, np.random.default_rng(9))
     # Slow: the size from odd runs under exchanged directions, in the even ones, three times.
-    y = fitted.with_terms([]).left - np.mean(fitted.with_terms([]).left)
     rest = fitted.with_terms([])
-    y = np.where(fitted.outlying, 0.0, rest.left - rest.whiten.run_part(rest.left))
+    y, left = (
+        np.where(fitted.outlying, 0.0, at.left - at.whiten.run_part(at.left))
+        for at in (rest, fitted)
+    )
     test, rng, shares = given.run % 2 == 0, np.random.default_rng(9), []
     for _ in range(3):
         other = _shuffled(given, "direction", given.run, rng).direction
-        size = other[~test] @ y[~test] / (other[~test] @ other[~test])
-        p0, p1 = np.mean(y[test] ** 2), np.mean((y[test] - size * other[test]) ** 2)
-        shares.append(max((p0 - p1) / (p0 - fitted.variance), -1.0))
+        told = other[~test] @ y[~test] / (other[~test] @ other[~test])
+        p0, p1 = np.mean(y[test] ** 2), np.mean((y[test] - told * other[test]) ** 2)
+        shares.append(max((p0 - p1) / (p0 - np.mean(left[test] ** 2)), -1.0))
     assert found == pytest.approx(np.mean(shares), abs=1e-9)
     assert found < 0.5
 
