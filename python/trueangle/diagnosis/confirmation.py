@@ -20,6 +20,7 @@ from .goodness import FREE_PATH, Unexplained
 from .goodness.periodogram import order_test, time_test
 from .penalty import NEW_CAUSE, cause_terms
 from .remainder import free_paths, remainder_of
+from .runzeros import CHANCE, chance_between_runs
 from .selection import is_flexible
 from .unnamed import is_line_in_time, is_line_of, is_named, modulator, modulators
 
@@ -94,6 +95,12 @@ def status_of(
             )
     if effect.transfers and gain is not None and gain.interval is not None:
         if gain.interval[0] > 0.0:
+            chance = chance_between_runs(regression, group, unexplained) if regression else 0.0
+            if chance > CHANCE:
+                return NOT_CONFIRMED, (
+                    "the zeros of the runs scatter beyond the noise, which makes as much of it in "
+                    f"{regression.signals.runs} runs by chance (p {chance:.2g})"
+                )
             return CONFIRMED, ""
         return NOT_CONFIRMED, "its gain on the readings held out does not exclude zero"
     if regression is not None and group and regression.terms[group[0]].run_effect is not None:

@@ -147,10 +147,18 @@ def residual_at(
     return np.asarray(left)
 
 
+#: Standard errors of a unit's power above the noise's from which on there is something in it.
+ABOVE_NOISE = 3.0
+
+
 def reducible_share(
     before: Array, after: Array, unit: NDArray[np.int64], variance: float, rng: np.random.Generator
 ) -> tuple[float, tuple[float, float]]:
-    """Reducible share and its bootstrap interval over the units held out."""
+    """Reducible share and its bootstrap interval over the units held out.
+
+    A draw without any unit that shows more than noise has nothing to take off, and no share: loads
+    in two of four runs are in all but 6 % of the draws.
+    """
     _, unit = np.unique(unit, return_inverse=True)  # a run all of outliers says nothing
     count = np.bincount(unit).astype(np.float64)
     power0 = np.bincount(unit, weights=before**2)
@@ -163,6 +171,9 @@ def reducible_share(
         return np.asarray((p0 - p1) / reducible)
 
     draws = rng.multinomial(count.size, np.full(count.size, 1.0 / count.size), RESAMPLES)
+    acts = power0 - count * variance > ABOVE_NOISE * variance * np.sqrt(2.0 * count)
+    if acts.any():
+        draws = draws[(draws[:, acts] > 0).any(axis=1)]
     low, high = np.quantile(of(draws.astype(np.float64)), [0.025, 0.975])
     return float(of(np.ones((1, count.size)))[0]), (float(low), float(high))
 

@@ -96,6 +96,29 @@ def test_the_share_is_that_of_what_can_be_reduced_and_its_interval_holds_95_perc
     assert (low, high) == pytest.approx(tuple(wanted), abs=0.1 * (wanted[1] - wanted[0]))
 
 
+@pytest.mark.parametrize("gained", [1.0, 0.0])
+def test_runs_at_which_a_cause_does_not_act_say_nothing_of_its_share(gained):
+    """Loads in two of four runs: a draw of the other two has nothing to take off."""
+    rng = np.random.default_rng(16)
+    unit = np.repeat(np.arange(4), 200)
+    noise, load = rng.normal(size=unit.size), np.array([0.0, 5.0, 0.0, -5.0])[unit]
+    share, (low, high) = reducible_share(
+        noise + load, noise + (1.0 - gained) * load, unit, 1.0, rng
+    )
+    assert share == pytest.approx(gained, abs=0.02)
+    assert low == pytest.approx(gained, abs=0.05)
+    assert high == pytest.approx(gained, abs=0.05)
+
+
+def test_a_mean_of_runs_that_all_show_noise_alone_is_drawn_from_all_of_them():
+    rng = np.random.default_rng(17)
+    unit = np.repeat(np.arange(4), 200)
+    before = rng.normal(size=unit.size)
+    _, (low, high) = reducible_share(before, before * 1.01, unit, 1.0, rng)
+    assert low < 0.0
+    assert low <= high
+
+
 @pytest.mark.parametrize(
     ("interval", "status"),
     [

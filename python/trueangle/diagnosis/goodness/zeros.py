@@ -11,9 +11,12 @@ from .evidence import Evidence
 from .leftover import Leftover
 from .noise import Noise
 
-__all__ = ["run_test", "variance_of_mean"]
+__all__ = ["ZEROS", "run_test", "variance_of_mean"]
 
 Array = NDArray[np.float64]
+
+#: The name of the test.
+ZEROS = "zeros of the runs"
 
 #: Runs from which on zeros can differ.
 LEAST_RUNS = 3
@@ -70,7 +73,7 @@ def run_test(left: Leftover, noise: Noise) -> Evidence | None:
         p = max(p, f_tail(statistic / max(within, 1e-300), runs - 1, len(halves)))
     spread = float(np.sqrt(max(float(np.var(m, ddof=1)) - float(np.mean(expected)), 0.0)))
     return Evidence(
-        "zeros of the runs",
+        ZEROS,
         statistic,
         p,
         f"the runs differ in their zeros by {brief(spread)} arcsec beyond what the noise explains",
