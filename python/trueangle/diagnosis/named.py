@@ -7,6 +7,9 @@ from dataclasses import replace
 
 from ..effects import EFFECTS, Effect
 from ..effects.blindness import Blindness
+from ..effects.effect import telling_apart
+from ..effects.missing_order import MissingOrder
+from ..effects.scale_error import ScaleError
 from ..effects.scatter import ScatterFinding
 from ..estimation.estimate import Parameters, Quantity, quantity
 from ..estimation.regression import Regression
@@ -19,7 +22,7 @@ from .gain import Gain, measure_gain
 from .gates import gated
 from .goodness import Unexplained
 from .identifiability import doubts_about, open_origins, with_open_origins
-from .penalty import cause_terms, finding_groups
+from .penalty import NEW_CAUSE, cause_terms, finding_groups
 from .selection import is_flexible
 from .unnamed import is_named
 
@@ -78,6 +81,10 @@ def findings_of(
         if origins[group[0]]:
             parameters["explanations"] = _explanations(parameters, cause, origins[group[0]])
         rivals = _rivals(regression, group) if len(findings) < RIVALLED and not pace().over else []
+        if equal := _equals(cause, rivals):
+            evidence = sum(regression.terms[k].bic_gain for k in group)
+            spots.append(replace(_in_doubt(equal, regression, group), evidence=evidence))
+            continue
         weight = {
             "bic_gain": float(sum(t.bic_gain for t, _, _ in terms)),
             "deviance": float(sum(t.deviance for t, _, _ in terms)),
@@ -180,6 +187,35 @@ def _rivals(regression: Regression, group: Sequence[int]) -> list[tuple[str, flo
 
     gaps = gaps_of(extensions(rest, others, least))
     return [(name, float(gap)) for name, gap in gaps[:RIVALS]]
+
+
+def _equals(cause: str, rivals: Sequence[tuple[str, float]]) -> Blindness | None:
+    """That other causes explain as much as one, where they do; none strongly less.
+
+    What contains it or is contained in it is the same cause in another form, and what takes up
+    anything no cause; a line and a ramp are what is seen, whatever makes them.
+    """
+    effect = EFFECTS[cause]
+    if cause in (MissingOrder.kind, ScaleError.kind) or is_flexible(effect):
+        return None
+    equal = [
+        other
+        for other, gap in rivals
+        if gap < NEW_CAUSE and not _is_another_form(effect, EFFECTS[other])
+    ]
+    if not equal:
+        return None
+    return Blindness(
+        (cause, *equal),
+        "they explain what these readings show alike",
+        telling_apart(effect, EFFECTS[equal[0]]) or effect.measure,
+        supported=True,
+        factor=effect.factor,
+    )
+
+
+def _is_another_form(effect: type[Effect], other: type[Effect]) -> bool:
+    return is_flexible(other) or effect in other.contains or other in effect.contains
 
 
 def scatter_finding(item: ScatterFinding, unexplained: Unexplained) -> Finding:
