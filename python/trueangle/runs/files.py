@@ -209,10 +209,10 @@ class RunColumns(NamedTuple):
     source: Source
 
 
-def read_columns(data: Any, reading: Reading, name: str = "data") -> list[RunColumns]:
+def read_columns(data: Any, reading: Reading) -> list[RunColumns]:
     """The columns of every file or table, grouped by run; time may run backwards."""
     given = Conversion.of(reading)
-    return each_table(data, lambda table: _columns(table, given), reading, name)
+    return each_table(data, lambda table: _columns(table, given), reading, "data")
 
 
 def _columns(table: FileReadings, given: Conversion) -> RunColumns:
