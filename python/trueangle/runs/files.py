@@ -9,11 +9,10 @@ from typing import Any, NamedTuple, TypeAlias, Unpack
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import EmptyCellsWarning, FileError
+from ..errors import EmptyCellsWarning, FileError, level_of_caller
 from ..formats.columns import LABELS, Column, count_turn, signal_code, unit_in_name
 from ..formats.signals import FIELDS
 from ..formats.times import day_of
-from ..support.caller import level_of_caller
 from ..support.kinds import told_kinds
 from .angles import find_angles
 from .facets import Facets, read_facets
