@@ -1,4 +1,4 @@
-"""The correction model as plain values, fitted or given: coefficients, uncertainties, what it leaves."""
+"""The correction model as plain values, fitted or given: its coefficients and what it leaves."""
 
 from __future__ import annotations
 
