@@ -1,11 +1,11 @@
-"""Every file of the package in a line, room by room, from what the files say of themselves."""
+"""Every file of the package in a line with the names it defines, room by room, from the files."""
 
 from __future__ import annotations
 
 import ast
 from pathlib import Path
 
-__all__ = ["first_sentence", "room_files_page", "rooms_of"]
+__all__ = ["defined_names", "first_sentence", "room_files_page", "rooms_of"]
 
 ROOT = Path(__file__).resolve().parents[1]
 PACKAGE = ROOT / "python" / "trueangle"
@@ -24,6 +24,14 @@ def first_sentence(file: Path) -> str:
     return " ".join(told.split("\n\n")[0].split())
 
 
+def defined_names(file: Path) -> list[str]:
+    """Functions and classes of a file that others use: what its page is searched for."""
+    kinds = (ast.FunctionDef, ast.ClassDef)
+    body = ast.parse(file.read_text(encoding="utf-8")).body
+    names = {node.name for node in body if isinstance(node, kinds)}  # an overload once
+    return sorted(name for name in names if not name.startswith("_"))
+
+
 def room_files_page() -> str:
     """A table for each folder, closed until it is opened."""
     parts = []
@@ -31,10 +39,15 @@ def room_files_page() -> str:
         files = sorted((PACKAGE / room).rglob("*.py"))
         rows = [
             f"| `{file.relative_to(PACKAGE)}` | {first_sentence(file)} |"
+            f" {', '.join(f'`{name}`' for name in defined_names(file))} |"
             for file in files
             if file.name != "__init__.py"
         ]
         if rows:
-            table = ["| file | what it holds |", "| --- | --- |", *rows]
+            table = ["| file | what it holds | names |", "| --- | --- | --- |", *rows]
             parts.append("\n".join([f":::{{dropdown}} {room}/", *table, ":::", ""]))
     return "\n".join(parts)
+
+
+if __name__ == "__main__":
+    print(room_files_page())

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from typing import Any
 
 __all__ = [
@@ -22,6 +23,7 @@ __all__ = [
     "TrueAngleError",
     "UnitWarning",
     "UnlikeRunsWarning",
+    "level_of_caller",
 ]
 
 
@@ -172,3 +174,12 @@ class NotCorrectedWarning(UserWarning):
 
 class UnlikeRunsWarning(UserWarning):
     """Runs that do not show one pattern were fitted together; the message names them."""
+
+
+def level_of_caller() -> int:
+    """``stacklevel`` of `warnings.warn` for the first line outside this package."""
+    package = __name__.partition(".")[0]
+    level, frame = 1, sys._getframe(1)
+    while frame.f_back is not None and frame.f_globals["__name__"].partition(".")[0] == package:
+        level, frame = level + 1, frame.f_back
+    return level

@@ -15,12 +15,11 @@ from ..joint.signals import Signals
 from ..simulation.simulation import Simulation
 from ..support.deadline import pace
 from .believed import corrected_effects
-from .commonform import in_common_form
 from .delay import Delay, error_before, find_delay
 from .exchange import exchanged
 from .gearedlines import GearedLines, Ratio
 from .gearratio import aligned, find_ratio, near_ratio
-from .identifiability import blind_spots
+from .identifiability import blind_spots, in_common_form
 from .penalty import NEW_CAUSE, misfit_of_scatter, total_penalty
 from .remainder import unexplained_after
 from .selection import select

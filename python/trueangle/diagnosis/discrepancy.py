@@ -13,15 +13,9 @@ from ..runs.run import CalibrationRun
 from ..support.angles import circular_mean, wrap
 from ..support.plainresult import Shown
 
-__all__ = ["Discrepancy", "compare", "noise_from_repeats", "unfolded_error"]
+__all__ = ["Discrepancy", "compare", "unfolded_error"]
 
 Array = NDArray[np.float64]
-
-#: Degrees within which two readings count as the same position.
-SAME_PLACE = 1e-3
-
-#: Share of the readings that must be repeats before their scatter is called the noise.
-LEAST_REPEATS = 0.25
 
 
 @dataclass(frozen=True)
@@ -69,19 +63,3 @@ def compare(signals: Signals, residual: Array) -> Discrepancy:
         float(np.mean(gaps)) if gaps else None,
         float(np.std(means, ddof=1)) if len(means) > 1 else 0.0,
     )
-
-
-def noise_from_repeats(signals: Signals, left: Array) -> float | None:
-    """Scatter of what is left at positions read several times in one direction, or None.
-
-    The pure error: it needs no model of the pattern.
-    """
-    place = np.round(np.mod(signals.degrees, 360.0) / SAME_PLACE).astype(np.int64)
-    place %= round(360.0 / SAME_PLACE)
-    key = place * 3 + signals.direction.astype(np.int64) + 1
-    _, group, count = np.unique(key, return_inverse=True, return_counts=True)
-    freedom = int((count - 1).sum())
-    if freedom < LEAST_REPEATS * len(signals):
-        return None
-    mean = np.bincount(group, weights=left) / count
-    return float(np.sqrt(np.sum((left - mean[group]) ** 2) / freedom))

@@ -26,6 +26,9 @@ Rows = NDArray[np.bool_]
 FOLDS = 5
 SHUFFLES = 3
 
+#: Parts and shuffles are the same for the same readings.
+_SEED = 0
+
 
 @dataclass(frozen=True)
 class Gain(Shown):
@@ -78,9 +81,7 @@ class Gain(Shown):
         return found
 
 
-def measure_gain(
-    regression: Regression, groups: Sequence[Sequence[int]], seed: int = 0
-) -> list[Gain] | None:
+def measure_gain(regression: Regression, groups: Sequence[Sequence[int]]) -> list[Gain] | None:
     """Gain of every finding (its terms' indices) beside the others, by leaving out runs.
 
     In every fold the model is fitted to the other runs alone, and what was searched for
@@ -89,7 +90,7 @@ def measure_gain(
     are measured on left out levels as well. None where the time is up before
     (`trueangle.support.deadline`).
     """
-    rng = np.random.default_rng(seed)
+    rng = np.random.default_rng(_SEED)
     unit, what = _units(regression)
     count = int(unit.max()) + 1
     folds = rng.permutation(count) % min(FOLDS, count)
@@ -133,13 +134,13 @@ def measure_gain(
     return found
 
 
-def measure_delay_gain(without: Regression, delayed: Regression, seed: int = 0) -> Gain:
+def measure_delay_gain(without: Regression, delayed: Regression) -> Gain:
     """Gain of an account at the angle of a time before, against the same one without that.
 
     Both are fitted to the other runs alone; the last term of ``delayed`` is the change that these
     make of the delay.
     """
-    rng = np.random.default_rng(seed)
+    rng = np.random.default_rng(_SEED)
     unit, what = _units(delayed)
     folds = rng.permutation(int(unit.max()) + 1) % min(FOLDS, int(unit.max()) + 1)
     parts = int(folds.max()) + 1
@@ -160,7 +161,6 @@ def measure_belief_gains(
     regression: Regression,
     columns: Sequence[slice],
     changes: Sequence[tuple[Array, Array]] = (),
-    seed: int = 0,
 ) -> list[Gain]:
     """Gain of measured lines and effects in place of believed ones, by leaving out runs.
 
@@ -168,7 +168,7 @@ def measure_belief_gains(
     ``changes`` are the errors of effects as believed and as measured, at every reading. The
     strength of an effect is measured again in the other runs.
     """
-    rng = np.random.default_rng(seed)
+    rng = np.random.default_rng(_SEED)
     unit, what = _units(regression)
     folds = rng.permutation(int(unit.max()) + 1) % min(FOLDS, int(unit.max()) + 1)
     own_zero = any(effect_of(term.cause).draws_zeros for term in regression.terms)

@@ -9,9 +9,18 @@ from ..effects import EFFECTS
 from ..effects.blindness import Blindness
 from ..effects.blindspots import blind_spots, place_among
 from ..estimation.regression import Extension, Regression
+from .candidates import propose
+from .penalty import cause_terms, finding_groups
 from .unnamed import effect_of
 
-__all__ = ["Blindness", "blind_spots", "doubts_about", "open_origins", "with_open_origins"]
+__all__ = [
+    "Blindness",
+    "blind_spots",
+    "doubts_about",
+    "in_common_form",
+    "open_origins",
+    "with_open_origins",
+]
 
 #: Factors in the order in which they cast doubt on what another cause explains.
 DOUBTS = ("grid", "mount", "torque", "velocity")
@@ -69,3 +78,21 @@ def _doubts(
 ) -> Iterator[Blindness]:
     doubts = (effect.doubt(extension, regression, spots) for effect in EFFECTS.values())
     yield from (doubt for doubt in doubts if doubt is not None)
+
+
+def in_common_form(regression: Regression, spots: Sequence[Blindness]) -> Regression:
+    """The regression with the common form in place of causes that are not told apart.
+
+    A reversal error may be play or a spring, a ramp the ratio's or a clock's: which of them is
+    open, but not that it is there, nor its size for motion like this.
+    """
+    for cause in [regression.terms[g[0]].cause for g in finding_groups(regression.terms)]:
+        group = [k for k, term in enumerate(regression.terms) if term.cause == cause]
+        spot = doubts_about(regression.terms[group[0]], regression, spots) if group else None
+        if spot is None or not spot.common or spot.common == cause:
+            continue
+        rest = cause_terms(regression, group, settled=True)
+        common = propose(EFFECTS[spot.common], rest)
+        if common is not None and common.bic_gain > 0.0:
+            regression = rest.with_terms([*rest.terms, common])
+    return regression

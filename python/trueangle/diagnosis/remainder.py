@@ -116,16 +116,13 @@ def remainder_of(
     return leftover_of(regression.signals, left * regression.root_weights, regression.cache)
 
 
-def unexplained_after(
-    regression: Regression, sigma: float | None = None, rounding: float = 0.0
-) -> Unexplained:
+def unexplained_after(regression: Regression, sigma: float | None = None) -> Unexplained:
     """Goodness of fit of what a regression leaves, up to the orders that it looks for."""
     path = path_evidence(regression)
     return goodness_of_fit(
         remainder_of(regression),
         float(regression.lines.orders.max()),
         sigma,
-        rounding,
         None if path is None else remainder_of(regression, loose=True),
         path,
     )

@@ -8,9 +8,16 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+import trueangle._core as _core
+
 from .whitening import RunEffect, Whitener
 
-__all__ = ["Factor", "in_common", "orthonormal_basis"]
+__all__ = [
+    "BandedFactor",
+    "Factor",
+    "in_common",
+    "orthonormal_basis",
+]
 
 Array = NDArray[np.float64]
 
@@ -171,3 +178,26 @@ def _orthonormal(x: Array) -> tuple[Array, Array, Array] | None:
         again = np.linalg.inv(np.linalg.cholesky(q.T @ q)).T
         q, scaled = q @ again, scaled @ again
     return q, scaled, lengths
+
+
+class BandedFactor:
+    """Cholesky factor ``L Lᵀ`` of a matrix of four diagonals: O(n) work and memory.
+
+    Raises
+    ------
+    numpy.linalg.LinAlgError
+        The matrix is not positive definite to working precision.
+    """
+
+    def __init__(self, bands: Array) -> None:
+        factor = _core.Banded.factor(bands)
+        if factor is None:
+            raise np.linalg.LinAlgError("not positive definite to working precision")
+        self._factor = factor
+        self.log_determinant = factor.log_determinant
+
+    def solve(self, right: Array) -> Array:
+        """``M^-1 right`` for a vector or columns."""
+        solved = np.array(right, dtype=np.float64, order="C")
+        self._factor.solve(solved.reshape(solved.shape[0], -1))
+        return solved

@@ -243,7 +243,7 @@ class FitResult(FittedCoefficients):
 
     def to_dict(self) -> dict[str, Any]:
         """The object that ``trueangle fit`` prints as JSON beside the model."""
-        from .plain import plain_fit
+        from .summary import plain_fit
 
         return plain_fit(self)
 

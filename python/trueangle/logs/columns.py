@@ -24,7 +24,6 @@ __all__ = [
     "AngleColumn",
     "find_angle_column",
     "find_signal",
-    "find_signal_column",
 ]
 
 UNITS = (*UNIT_PERIODS, "count")
@@ -102,14 +101,6 @@ def find_angle_column(
         )
     period = -period if is_reversed else period
     return AngleColumn(column, unit, float(period), corrected, stated is None and not is_reversed)
-
-
-def find_signal_column(
-    path: object, header: Sequence[str], signal: str, joint: str | None, column: str | None
-) -> str | None:
-    """The name of the column of ``signal``; see `find_signal`."""
-    found = find_signal(path, header, signal, joint, None if column is None else (column, None))
-    return None if found is None else found.name
 
 
 def find_signal(

@@ -84,7 +84,7 @@ class CalibrationPlan(PlainResult):
 
     def to_dict(self) -> dict[str, Any]:
         """The object that ``trueangle plan`` prints as JSON."""
-        from .plain import plain_plan
+        from .summary import plain_plan
 
         return plain_plan(self)
 

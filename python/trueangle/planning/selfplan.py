@@ -88,7 +88,7 @@ class SelfPlan(PlainResult):
 
     def to_dict(self) -> dict[str, Any]:
         """The object that ``trueangle plan`` prints as JSON."""
-        from .plain import plain_self_plan
+        from .summary import plain_self_plan
 
         return plain_self_plan(self)
 

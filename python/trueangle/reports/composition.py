@@ -25,15 +25,14 @@ from ..support.files import CERTIFICATE, PDF, REPORT, check_output, written_atom
 from ..support.kinds import told_kinds
 from ..support.oftype import of_type
 from ..support.plainresult import Shown
-from . import diagnosisfigures, figures
+from . import figures
 from .diagnosed import diagnosed
+from .figures import phases
 from .fitted import extended, fitted, gear_of, held_out, joint_of
 from .gained import gained
-from .givenmodel import given_model
 from .linenames import LineNames, line_names
 from .measured import measured
-from .modelled import modelled, selected
-from .phases import phases
+from .modelled import given_model, modelled, selected
 from .scale import Scale, scale_of
 from .spectrum import spectrum
 from .unknowns import unknowns
@@ -298,7 +297,7 @@ def report(
     if simulation is not None and diagnosis is not None:
         content["diagnosis"] = diagnosed(diagnosis)
         content["extended"] = extended(fit, diagnosis, found, simulation)
-        drawn |= diagnosisfigures.figures_of(diagnosis, found, simulation, scale)
+        drawn |= figures.figures_of(diagnosis, found, simulation, scale)
     content["unknowns"] = unknowns(found, selection, content["diagnosis"])
     made = Report(heading, content, drawn)
     if path is not None:

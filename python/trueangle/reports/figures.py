@@ -1,26 +1,45 @@
-"""Figures of readings over the angle: errors, before and after, residuals."""
+"""Figures of a page: errors, before and after, residuals, phases, and those of a diagnosis."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..errors import RankError
+from ..fitting.phases import Phases, run_phases
 from ..plots import curves
 from ..plots.curves import Points
-from ..plots.readingpictures import before_after_picture, errors_picture, residual_picture
-from .charts import Figure
+from ..plots.readingpictures import (
+    before_after_picture,
+    comparison_picture,
+    errors_picture,
+    residual_picture,
+)
+from ..plots.simulatedcurves import ErrorLeft, error_left_of, simulated_points
+from ..support.display_units import significant
+from .charts import Chart, Figure, figure, run_colour, run_marker
+from .linenames import LineNames
 from .panelcharts import figure_of
 from .scale import Scale
 
 if TYPE_CHECKING:
+    from ..diagnosis import Diagnosis
     from ..fitting.heldout import HeldOut
     from ..fitting.result import FitResult
     from ..runs.run import CalibrationRun
+    from ..simulation import Simulation
 
-__all__ = ["before_after", "errors_of_runs", "residuals", "signals_present"]
+__all__ = [
+    "before_after",
+    "errors_of_runs",
+    "figures_of",
+    "phases",
+    "residuals",
+    "signals_present",
+]
 
 Array = NDArray[np.float64]
 
@@ -61,3 +80,113 @@ def signals_present(fit: FitResult) -> list[curves.Signal]:
 def _signal(run: CalibrationRun, name: str) -> Array | None:
     value: Array | None = run.reference if name == "angle" else getattr(run, name)
     return value
+
+
+#: Part of the measured error that a simulation must expect to be drawn beside it.
+_FLAT = 1e-3
+#: Height of one of the charts that stand above each other.
+_HEIGHT_REM = 16.0
+
+
+def figures_of(
+    diagnosis: Diagnosis,
+    runs: Sequence[CalibrationRun],
+    sim: Simulation,
+    scale: Scale,
+) -> dict[str, Figure]:
+    """Measured against simulated; what is left without each of several causes.
+
+    A chart of one dot says less than the sentence beside it: it is left out; so is a simulation
+    that expects no error, beside which the measured one would be drawn once more.
+    """
+    pairs = simulated_points(runs, sim)
+    expected = max(float(np.ptp(simulated.y)) for _, simulated in pairs)
+    found = {}
+    if expected > _FLAT * diagnosis.discrepancy.peak_to_peak:
+        picture = comparison_picture(pairs, scale.unit, diagnosis.extended)
+        arrangement = "stacked" if len(picture.panels) == 2 else "above"
+        found["measured-simulated"] = figure_of(picture, scale, arrangement, height_rem=_HEIGHT_REM)
+    left = error_left_of(diagnosis)
+    if left is not None and len(left.rows) > 2:
+        found["error-left"] = _left(left, scale)
+    return found
+
+
+def _left(left: ErrorLeft, scale: Scale) -> Figure:
+    """On a logarithmic axis: one cause may leave a hundred times what another does."""
+    # The title says "without each cause".
+    names = [name.removeprefix("without ") for name, _ in left.rows]
+    sizes = scale.of(np.array([rms for _, rms in left.rows]))
+    noise = float(scale.of(np.array([left.noise]))[0])
+    low, high = 0.6 * min(float(sizes.min()), noise), 1.5 * max(float(sizes.max()), noise)
+    chart = Chart(
+        left.axis(scale.unit),
+        "",
+        x_range=(low, high),
+        log_x=True,
+        categories=names,
+        height_rem=7.0 + 2.0 * len(names),
+    )
+    hover = f"@y: @x{{{scale.finest}}} {scale.name} rms"
+    chart.level_dots(names[:1], sizes[:1], colour="after", hover=hover)
+    chart.level_dots(names[1:], sizes[1:], colour="before", hover=hover)
+    chart.upright(noise, label=f"noise of one reading, {scale.unit.text(left.noise)}")
+    return figure(left.told(scale.unit), [chart])
+
+
+#: Orders shown, the largest.
+_MOST: Final = 12
+#: Half height of a chart in degrees at least: nothing is made to look like scatter.
+_LEAST: Final = 15.0
+
+
+def phases(fit: FitResult, name: LineNames, scale: Scale) -> Figure | None:
+    """Phase of every order in every run; None where no run holds them, or there is one."""
+    try:
+        found = sorted(run_phases(fit), key=lambda p: -float(p.amplitude.mean()))[:_MOST]
+    except RankError:
+        return None
+    if not found or len(found[0].labels) < 2:
+        return None
+    numbers = {(run.label or str(i + 1)): i for i, run in enumerate(fit.runs)}
+    charts = [
+        _of_order(order, numbers, name(order.order), scale)
+        for order in sorted(found, key=lambda p: p.order)
+    ]
+    alt = (
+        f"Phases of {len(charts)} orders, a chart for each, one dot per run. Dots of one order "
+        "on a level line are a systematic error."
+    )
+    return figure(alt, charts, "multiples")
+
+
+def _of_order(order: Phases, numbers: dict[str, int], name: str, scale: Scale) -> Chart:
+    mean = np.angle(np.mean(order.amplitude * np.exp(1j * order.phase)))
+    around = np.angle(np.exp(1j * (order.phase - mean)))
+    degrees = np.degrees(mean + around)
+    middle = float(np.degrees(mean))
+    if middle < 0.0:
+        degrees, middle = degrees + 360.0, middle + 360.0
+    half = min(max(1.3 * float(np.abs(np.degrees(around)).max()), _LEAST), 190.0)
+    size = significant(scale.factor * float(order.amplitude.mean()), 3)
+    chart = Chart(
+        "run",
+        "phase / deg",
+        x_range=(0.3, len(order.labels) + 0.7),
+        y_range=(middle - half, middle + half),
+        title=f"{name.capitalize()}: {size} {scale.name}",
+        height_rem=11.0,
+    )
+    chart.whole_axis(1.0, float(len(order.labels)), 7)
+    for place, label in enumerate(order.labels):
+        number = numbers[label]
+        chart.dots(
+            np.array([place + 1.0]),
+            degrees[place : place + 1],
+            colour=run_colour(number),
+            marker=run_marker(number),
+            run=number,
+            size=8.0,
+            hover=f"run {label}: {scale.unit.text(float(order.amplitude[place]))} at @y{{0.0}}°",
+        )
+    return chart

@@ -9,11 +9,10 @@ from typing import Any, NamedTuple, TypeAlias, Unpack
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import EmptyCellsWarning, FileError
+from ..errors import EmptyCellsWarning, FileError, level_of_caller
 from ..formats.columns import LABELS, Column, count_turn, signal_code, unit_in_name
 from ..formats.signals import FIELDS
 from ..formats.times import day_of
-from ..support.caller import level_of_caller
 from ..support.kinds import told_kinds
 from .angles import find_angles
 from .facets import Facets, read_facets
@@ -209,10 +208,10 @@ class RunColumns(NamedTuple):
     source: Source
 
 
-def read_columns(data: Any, reading: Reading, name: str = "data") -> list[RunColumns]:
+def read_columns(data: Any, reading: Reading) -> list[RunColumns]:
     """The columns of every file or table, grouped by run; time may run backwards."""
     given = Conversion.of(reading)
-    return each_table(data, lambda table: _columns(table, given), reading, name)
+    return each_table(data, lambda table: _columns(table, given), reading, "data")
 
 
 def _columns(table: FileReadings, given: Conversion) -> RunColumns:

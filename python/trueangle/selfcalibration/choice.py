@@ -37,13 +37,13 @@ def highest_order(readings: SegmentReadings) -> int:
     return max(1, min(HIGHEST, int(0.45 / (usual * max(step, 1e-12)))))
 
 
-def choose_orders(readings: SegmentReadings, highest: int | None = None) -> tuple[float, ...]:
+def choose_orders(readings: SegmentReadings) -> tuple[float, ...]:
     """Orders that stand out of the noise beside them.
 
     The lowest eight are fitted first, then those at which what is left peaks, until none
     does; at last those that are not significant are dropped.
     """
-    most = highest_order(readings) if highest is None else highest
+    most = highest_order(readings)
     orders = tuple(float(k) for k in range(1, min(_FIRST, most) + 1))
     limit = chi_squared_quantile(1.0 - _CHANCE / most, 2.0)
     fit: SteadyFit | None = None
@@ -90,9 +90,8 @@ def _runs(valid: Array) -> Array:
     return np.unique(rows[valid[rows]])
 
 
-def _running_mean(values: Array, width: int = 9) -> Array:
-    width = min(width, values.size)
-    kernel = np.ones(width)
+def _running_mean(values: Array) -> Array:
+    kernel = np.ones(min(9, values.size))
     return np.asarray(
         np.convolve(values, kernel, "same") / np.convolve(np.ones(values.size), kernel, "same")
     )

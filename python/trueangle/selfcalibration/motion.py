@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .banded import BandedFactor
+from ..estimation.factor import BandedFactor
 from .projected import Projected, Unknown
 from .splines import (
     Knots,

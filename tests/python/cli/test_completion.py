@@ -11,8 +11,8 @@ import time
 import pytest
 
 from trueangle.cli import COMMANDS, build_parser, main
+from trueangle.cli.completion import SHELLS, script
 from trueangle.cli.parser import GROUPS
-from trueangle.cli.shells import SHELLS, script
 
 #: Lines typed so far, and words of which each must be offered, and some that must not.
 TYPED = {

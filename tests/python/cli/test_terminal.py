@@ -7,8 +7,7 @@ from pathlib import Path
 import pytest
 
 from trueangle.cli import main
-from trueangle.cli.colours import coloured, has_colours
-from trueangle.cli.terminal import Plain
+from trueangle.cli.terminal import Plain, coloured, has_colours
 from trueangle.support.layout import columns, laid_out, wrapped
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "looks"))

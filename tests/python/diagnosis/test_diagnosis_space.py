@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 import trueangle._core as _core
-from trueangle.diagnosis.discrepancy import noise_from_repeats
 from trueangle.effects.bends import LAG, _late
 from trueangle.estimation.batch import Blocks
 from trueangle.estimation.factor import Factor
@@ -307,15 +306,6 @@ def test_grids_are_seen_and_orders_fold_as_the_paper_counts():
     assert {m: grid.folded(m) for m in folds} == folds
     assert grid.aliases(14, 3) == [22, 50, 58]
     assert uniform_grid(theta + np.radians(np.random.default_rng(0).random(theta.size))) is None
-
-
-def test_repeats_give_the_noise_without_a_model():
-    design = RunDesign(samples=36, spacing="uniform")
-    sim = Simulation(JOINT, LINES, sigma_arcsec=2.0, runs=(design,) * 20)
-    runs = simulate(sim, 3)
-    error = np.concatenate([run.error for run in runs]) * 3600.0
-    # 19 * 36 degrees of freedom: 2.7 % standard error.
-    assert noise_from_repeats(join_runs(runs), error) == pytest.approx(2.0, rel=0.11)
 
 
 def test_what_lags_is_the_recursion_reading_by_reading(space):

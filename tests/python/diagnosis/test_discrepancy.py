@@ -11,7 +11,7 @@ from scipy.stats import norm
 from trueangle import CalibrationRun
 from trueangle.diagnosis import remainder
 from trueangle.diagnosis.correctable import Correctable
-from trueangle.diagnosis.discrepancy import compare, noise_from_repeats, unfolded_error
+from trueangle.diagnosis.discrepancy import compare, unfolded_error
 from trueangle.joint.signals import join_runs
 
 
@@ -37,19 +37,6 @@ def test_numbers_are_those_of_the_residual(sign: float) -> None:
     one = join_runs([CalibrationRun(angle[:90], angle[:90], 360.0)])
     alone = compare(one, residual[:90])
     assert (alone.closure, alone.zero_spread) == (None, 0.0)
-
-
-def test_the_noise_of_repeats_has_their_degrees_of_freedom() -> None:
-    """Each place in each direction has a mean of its own: 300 draws of few repeats."""
-    there = np.concatenate([np.arange(0.0, 350.0, 10.0), np.arange(350.0, -1.0, -10.0)])
-    signals = join_runs([CalibrationRun(there, there, 360.0)] * 2)
-    unlike = 50.0 * signals.direction + 9.0 * np.cos(3.0 * signals.theta)
-    rng = np.random.default_rng(2)
-    found = [
-        noise_from_repeats(signals, unlike + rng.normal(0.0, 2.0, len(signals))) for _ in range(300)
-    ]
-    # 72 degrees of freedom: five standard errors of the mean variance.
-    assert np.mean(np.square(found)) == pytest.approx(4.0, abs=5.0 * 4.0 * np.sqrt(2.0 / 71 / 300))
 
 
 def test_errors_are_unfolded_about_their_mean_in_every_unit() -> None:

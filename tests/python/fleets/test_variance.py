@@ -7,7 +7,7 @@ from scipy.optimize import minimize
 from statsmodels.regression.mixed_linear_model import MixedLM
 
 from trueangle.fleets.calibration import columns_of
-from trueangle.fleets.noise import noise_of
+from trueangle.fleets.units import noise_of
 from trueangle.fleets.variance import held_out_score, reml
 
 SEED = 52_010

@@ -3,7 +3,7 @@
 import pytest
 
 from trueangle.errors import FileError
-from trueangle.logs.columns import find_angle_column, find_signal_column
+from trueangle.logs.columns import find_angle_column, find_signal
 
 FOUND = [
     # joint, columns -> column, unit, corrected
@@ -42,9 +42,13 @@ def test_refused_with_what_to_do(asked, columns, message):
 
 def test_signals_of_the_joint_come_before_common_ones():
     columns = ["temperature_C", "j1_temperature_C", "velocity_rad_s"]
-    assert find_signal_column("log", columns, "temperature", "j1", None) == "j1_temperature_C"
-    assert find_signal_column("log", columns, "temperature", "j2", None) == "temperature_C"
-    assert find_signal_column("log", columns, "velocity", "j2", None) == "velocity_rad_s"
-    assert find_signal_column("log", columns, "torque", None, None) is None
+
+    def found(signal, joint):
+        return find_signal("log", columns, signal, joint, None)
+
+    assert found("temperature", "j1").name == "j1_temperature_C"
+    assert found("temperature", "j2").name == "temperature_C"
+    assert found("velocity", "j2").name == "velocity_rad_s"
+    assert found("torque", None) is None
     with pytest.raises(FileError, match="'T': no such column"):
-        find_signal_column("log", columns, "temperature", None, "T")
+        find_signal("log", columns, "temperature", None, ("T", None))

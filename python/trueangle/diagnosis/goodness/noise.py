@@ -81,15 +81,13 @@ class Noise:
     root: float = 0.0
 
 
-def estimate_noise(left: Leftover, orders: int | None = None) -> Noise:
+def estimate_noise(left: Leftover) -> Noise:
     """Standard deviation and correlation of the noise by restricted likelihood.
 
     Parameters
     ----------
     left : Leftover
         What is left of the readings; a pattern may still be in it.
-    orders : int, optional
-        Orders of the flexible pattern; as many as the readings carry, up to 12.
 
     Returns
     -------
@@ -103,9 +101,9 @@ def estimate_noise(left: Leftover, orders: int | None = None) -> Noise:
     # Wild readings would hide a correlation; what is slow keeps its size.
     e = _without_spikes(e, max(spread, 1e-300))
     columns = left.kept.get("pattern")
-    if columns is None or columns.orders != orders:
-        pattern = _centred(_pattern(left, stop, len(bounds), orders), bounds)
-        columns = left.kept["pattern"] = _PatternProducts(pattern, bounds, orders)
+    if columns is None:
+        pattern = _centred(_pattern(left, stop, len(bounds)), bounds)
+        columns = left.kept["pattern"] = _PatternProducts(pattern, bounds)
     means = len(bounds)
     sums = _Sums(columns, _centred(e[:, None], bounds)[:, 0])
     trials = np.array(TRIALS)
@@ -163,12 +161,12 @@ def _without_spikes(e: Array, spread: float) -> Array:
     return np.where(np.abs(away) > limit, beside + np.clip(away, -limit, limit), e)
 
 
-def _pattern(left: Leftover, n: int, runs: int, orders: int | None) -> Array:
+def _pattern(left: Leftover, n: int, runs: int) -> Array:
     moving = left.direction[:n]
     both = bool(np.ptp(moving[moving != 0.0]) > 0.0) if np.any(moving != 0.0) else False
     width = 4 if both else 2
     most = max((n // READINGS_PER_COLUMN - runs) // width, 0)
-    orders = min(most, MOST_ORDERS) if orders is None else orders
+    orders = min(most, MOST_ORDERS)
     step = 1.0 if left.turns > 0.9 else 1.0 / max(2.0 * left.turns, 1e-3)
     angle = np.outer(left.theta[:n], step * np.arange(1, orders + 1))
     columns = [np.cos(angle), np.sin(angle)]
@@ -188,8 +186,7 @@ def _centred(x: Array, bounds: list[tuple[int, int]]) -> Array:
 class _PatternProducts:
     """The flexible pattern with its products: of readings, of inner ones, of neighbours."""
 
-    def __init__(self, pattern: Array, bounds: list[tuple[int, int]], orders: int | None) -> None:
-        self.orders = orders
+    def __init__(self, pattern: Array, bounds: list[tuple[int, int]]) -> None:
         self.x = x = _independent(pattern)
         self.runs = len(bounds)
         first = np.array([a for a, _ in bounds])

@@ -31,9 +31,7 @@ AT_REST = 1.5
 LAGS, LEAST_READINGS = 5, 50
 
 
-def scatter_tests(
-    left: Leftover, noise: Noise, sigma: float | None = None, rounding: float = 0.0
-) -> list[Evidence]:
+def scatter_tests(left: Leftover, noise: Noise, sigma: float | None = None) -> list[Evidence]:
     """Tests that describe the noise and decide nothing.
 
     Parameters
@@ -42,8 +40,6 @@ def scatter_tests(
     noise : Noise
     sigma : float, optional
         Noise of one reading that the simulation states.
-    rounding : float
-        Step of the readings' lattice.
     """
     found = [_correlation(noise)]
     e = whitened(left, noise)
@@ -65,7 +61,7 @@ def scatter_tests(
             )
         )
     if sigma:
-        found.append(_against_stated(e, noise, float(np.hypot(sigma, rounding / np.sqrt(12.0)))))
+        found.append(_against_stated(e, noise, sigma))
     return found
 
 

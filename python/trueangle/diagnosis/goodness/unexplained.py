@@ -87,7 +87,6 @@ def goodness_of_fit(
     left: Leftover,
     top: float = LEAST_ORDERS,
     sigma: float | None = None,
-    rounding: float = 0.0,
     loose: Leftover | None = None,
     path: Evidence | None = None,
 ) -> Unexplained:
@@ -101,8 +100,6 @@ def goodness_of_fit(
         Highest output order that is looked for.
     sigma : float, optional
         Noise of one reading that the simulation states, arcsec.
-    rounding : float
-        Step of the lattice on which the readings lie, arcsec; 0 for none.
     loose : Leftover, optional
         The same with free paths in time left in, for tests of what is bound to time.
     path : Evidence, optional
@@ -129,7 +126,7 @@ def goodness_of_fit(
     noise = estimate_noise(left)
     deciding = ask(Asked(left, left if loose is None else loose, noise, top))
     deciding += [path] if path is not None else []
-    describing = scatter_tests(left, noise, sigma, rounding)
+    describing = scatter_tests(left, noise, sigma)
     firing = _firing(deciding)
     # Sure is sure: of those far beyond doubt the narrower account comes first, and of a line
     # in angle or in time the one that stands out more.

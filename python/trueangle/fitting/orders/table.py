@@ -223,7 +223,7 @@ class OrderSelection(PlainResult):
 
     def to_dict(self) -> dict[str, Any]:
         """The object that ``trueangle orders`` prints as JSON."""
-        from .plain import plain_selection
+        from .summary import plain_selection
 
         return plain_selection(self)
 

@@ -77,7 +77,7 @@ def check_input(path: str | PathLike[str], *, whole: bool = False) -> os.stat_re
     raise FileError(path, f"is {what_it_is(mode)}, not a file; name a file or a pipe")
 
 
-def read_whole(path: str | PathLike[str], limit: int, what: str, instead: str = "") -> bytes:
+def read_whole(path: str | PathLike[str], limit: int, what: str) -> bytes:
     """All bytes of a file or pipe, at most ``limit``.
 
     Waiting for a pipe ends with Ctrl-C, at most a tenth of a second later.
@@ -89,8 +89,6 @@ def read_whole(path: str | PathLike[str], limit: int, what: str, instead: str = 
         Most bytes that are read, one of the constants of this module.
     what : str
         What the file should hold, as the message names it: ``"a model"``.
-    instead : str, optional
-        What to do with more.
 
     Raises
     ------
@@ -102,11 +100,10 @@ def read_whole(path: str | PathLike[str], limit: int, what: str, instead: str = 
     found = check_input(path)
     if stat.S_ISDIR(found.st_mode):
         raise FileError(path, "is a folder; name a file in it")
-    advice = f"; {instead}" if instead else ""
     if found.st_size > limit:
         raise FileError(
             path,
-            f"has {found.st_size} bytes, but {what} is read up to {_size(limit)} only{advice}",
+            f"has {found.st_size} bytes, but {what} is read up to {_size(limit)} only",
         )
     parts, total = [], 0
     with open(path, "rb", buffering=0) as file:
@@ -120,7 +117,7 @@ def read_whole(path: str | PathLike[str], limit: int, what: str, instead: str = 
             if total > limit:
                 raise FileError(
                     path,
-                    f"goes on after {_size(limit)}, the most that is read of {what}{advice}",
+                    f"goes on after {_size(limit)}, the most that is read of {what}",
                 )
     return parts[0] if len(parts) == 1 else b"".join(parts)
 

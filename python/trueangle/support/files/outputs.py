@@ -122,7 +122,6 @@ def check_output(
 @contextlib.contextmanager
 def written_atomically(
     path: str | PathLike[str],
-    newline: str | None = "\n",
     *,
     kind: Kind | None = None,
     inputs: Iterable[str | PathLike[str]] = (),
@@ -137,13 +136,13 @@ def written_atomically(
     """
     target = check_output(path, kind, inputs, hashes)
     if target.exists() and not target.is_file():  # the null device
-        with open(target, "w", encoding="utf-8", newline=newline) as nowhere:
+        with open(target, "w", encoding="utf-8", newline="\n") as nowhere:
             yield nowhere
         return
     remove_leftovers([target])
     try:
         with _file_beside(target) as beside:
-            with open(beside, "r+", encoding="utf-8", newline=newline) as file:
+            with open(beside, "r+", encoding="utf-8", newline="\n") as file:
                 yield file
             publish(beside, target)
     except OSError as error:

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from trueangle.diagnosis.goodness import estimate_noise, goodness_of_fit
+from trueangle.diagnosis.goodness.leftover import Leftover
 from trueangle.diagnosis.goodness.scatter import repeats
 from trueangle.diagnosis.goodness.zeros import variance_of_mean
 
@@ -43,6 +44,27 @@ def test_variance_of_a_mean_is_that_of_the_full_covariance() -> None:
     lags = np.abs(np.subtract.outer(np.arange(50), np.arange(50)))
     full = noise.sigma**2 * np.mean(noise.correlation**lags)
     assert variance_of_mean(50, noise) == pytest.approx(full, rel=1e-12)
+
+
+def test_repeats_spend_a_mean_of_each_place_and_direction_and_of_each_run() -> None:
+    """Of 142 readings 71 means and one zero between two runs: 300 draws of few repeats."""
+    places = np.radians(
+        np.concatenate([np.arange(0.0, 350.0, 10.0), np.arange(350.0, -1.0, -10.0)])
+    )
+    theta, run = np.tile(places, 2), np.repeat([0, 1], 71)
+    direction = np.tile(np.repeat([1.0, -1.0], [35, 36]), 2)
+    unlike = 50.0 * direction + 9.0 * np.cos(3.0 * theta) + 5.0 * run
+    rng = np.random.default_rng(2)
+    found = [
+        repeats(
+            Leftover(unlike + rng.normal(0.0, 2.0, 142), theta, direction, run, np.arange(142.0))
+        )
+        for _ in range(300)
+    ]
+    assert {freedom for _, freedom in found} == {70.0}
+    # Five standard errors of the mean variance.
+    squares = np.square([scatter for scatter, _ in found])
+    assert squares.mean() == pytest.approx(4.0, abs=5.0 * 4.0 * np.sqrt(2.0 / 70 / 300))
 
 
 def test_rounded_angles_are_no_repeats() -> None:

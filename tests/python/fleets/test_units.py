@@ -5,7 +5,7 @@ import pytest
 from scipy.special import digamma, polygamma
 from scipy.stats import bartlett, chi2, kstest
 
-from trueangle.fleets.noise import _digamma, _trigamma, _trigamma_inverse, noise_of
+from trueangle.fleets.units import _digamma, _trigamma, _trigamma_inverse, noise_of
 
 SEED = 52_300
 
