@@ -103,7 +103,7 @@ def test_what_is_loaded_is_what_was_saved_number_by_number(fleet, tmp_path):
     )
 
 
-@pytest.mark.parametrize("count", [2, 5, 7])
+@pytest.mark.parametrize("count", [2, 5, 6, 7])
 def test_units_that_tell_nothing_are_named_up_to_five_and_counted(count):
     rng = np.random.default_rng(SEED + 1)
     few = [
@@ -111,7 +111,6 @@ def test_units_that_tell_nothing_are_named_up_to_five_and_counted(count):
         for i in range(count)
     ]
     found = ta.fleet([*units(rng, 6, runs=1), *few], orders=[1, 2])
-    listed = ", ".join(f"s{i}" for i in range(min(count, 5))) + (
-        " and 2 more" if count == 7 else ""
-    )
+    more = f" and {count - 5} more" if count > 5 else ""
+    listed = ", ".join(f"s{i}" for i in range(min(count, 5))) + more
     assert f"The readings of {listed} do not tell the orders apart; left out." in found.notes
