@@ -75,9 +75,11 @@ def worth_keeping(
 
     ::
 
-        Σ_u b_u' S_u⁻¹ b_u ~ χ²_2n
+        Σ_u ν_u log(1 + b_u' S_u⁻¹ b_u / ν_u) ~ χ²_2n
 
-    for an order that no unit has; 1 % for all candidates together (Bonferroni), the strongest 24.
+    for an order that no unit has, with the noise in S of each unit's own ν degrees of freedom
+    (Fisher's sum of the logarithms of F's chances); 1 % for all candidates together (Bonferroni),
+    the strongest 24.
 
     Raises
     ------
@@ -99,7 +101,8 @@ def worth_keeping(
         pairs = found.coefficients.reshape(-1, 2)
         inverse = np.linalg.inv(found.blocks())
         noise = max(found.squares / found.freedom, 1e-300)
-        statistic += np.einsum("ki,kij,kj->k", pairs, inverse, pairs) / noise
+        squares = np.einsum("ki,kij,kj->k", pairs, inverse, pairs) / noise
+        statistic += found.freedom * np.log1p(squares / found.freedom)
         freedom += 2.0
     if freedom == 0.0:
         raise NoOrderError("the readings of no unit tell orders 1 and 2 apart: read more places")

@@ -232,15 +232,15 @@ class Robot(Shown, Mapping[str, HarmonicModel]):
         return f"{self.name or 'unnamed'}, {counted(len(self), 'joint')}: {', '.join(self)}"
 
     def summary(self) -> str:
-        """Every joint with its orders and the largest that its correction can be."""
+        """Every joint with its orders and the most that their correction, with its zero, can be."""
         lines = [f"robot {self.name}".rstrip() + f": {counted(len(self), 'joint')}"]
         for joint, model in self.items():
-            most = arcsec(float(model.amplitudes.sum()), model.period)
+            most = arcsec(abs(model.constant) + float(model.amplitudes.sum()), model.period)
             orders = counted(len(model.orders), "order")
             terms = "".join(f", {term.kind}" for term in model.terms)
             lines.append(
-                f"  {joint}: {orders}{terms}, at most {most:.4g} arcsec, "
-                f"angles in {unit_name(model.period)}"
+                f"  {joint}: {orders}{terms}, at most {most:.4g} arcsec"
+                f"{' beside its terms' if model.terms else ''}, angles in {unit_name(model.period)}"
             )
         return laid_out(lines)
 

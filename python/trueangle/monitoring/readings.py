@@ -71,28 +71,31 @@ def read_lines(
     columns = _WatchedColumns.of(
         path, header, reading, Conversion.of(checked_reading(reading)), None
     )
-    waiting: list[list[str]] = []
-    number = 1
-    for line in lines:
-        number += 1
+    waiting: dict[int, list[str]] = {}
+    for number, line in enumerate(lines, 2):
         cells = next(csv.reader([line], delimiter=delimiter), [])
         if len(cells) == len(header):
-            waiting.append(cells)
+            waiting[number] = cells
         if len(waiting) >= most:
-            yield columns.batch(_cells(path, header, waiting, number), model)
-            waiting = []
+            yield columns.batch(_cells(path, header, waiting), model)
+            waiting = {}
     if waiting:
-        yield columns.batch(_cells(path, header, waiting, number), model)
+        yield columns.batch(_cells(path, header, waiting), model)
 
 
-def _cells(path: Path, header: list[str], rows: list[list[str]], last: int) -> Any:
+def _cells(path: Path, header: list[str], rows: dict[int, list[str]]) -> Any:
+    """What gives a column of rows, which stand at the numbers of their lines."""
+
     def get(name: str) -> Array:
         place = header.index(name)
-        try:
-            return np.array([float(row[place] or "nan") for row in rows])
-        except ValueError as cause:
-            line = last - len(rows) + 1
-            raise FileError(path, f"a number is needed: {cause}", line=line, column=name) from None
+        found = []
+        for line, row in rows.items():
+            try:
+                found.append(float(row[place] or "nan"))
+            except ValueError as cause:
+                problem = f"a number is needed: {cause}"
+                raise FileError(path, problem, line=line, column=name) from None
+        return np.array(found)
 
     return get
 

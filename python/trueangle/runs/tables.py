@@ -118,7 +118,8 @@ def _values(column: Any) -> NDArray[Any]:
     """
     values = np.asarray(take_apart(column)[0])
     if values.dtype.kind == "M" and values.ndim == 1:
-        values = values - values[:1]
+        known = values[~np.isnat(values)]
+        values = values - (known[0] if known.size else np.datetime64("NaT"))
     if values.dtype.kind == "m":
         return np.asarray(values / np.timedelta64(1, "s"))
     if values.dtype.kind in "fiub":

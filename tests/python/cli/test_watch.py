@@ -101,7 +101,7 @@ def test_longer_windows(desk, capsys):
 def test_what_cannot_be_read_is_told_with_its_line(desk, capsys, monkeypatch):
     for text, told in (
         ("", "has no lines"),
-        ("reference_deg,indicated_deg\n1,2\nx,3\n", "line 2"),
+        ("reference_deg,indicated_deg\n1,2\n1\nx,3\n", "line 4, column 'reference_deg'"),
         ("a,b\n1,2\n", "reference"),
     ):
         monkeypatch.setattr(sys, "stdin", io.StringIO(text))

@@ -91,7 +91,11 @@ def test_the_common_pattern_and_the_prior_are_those_of_balanced_units(fleet_of):
     prior = fleet.prior
     assert prior.variance == pytest.approx(np.repeat(scatter - noise + scatter / 16.0, 2), rel=1e-6)
     assert (prior.freedom, prior.units) == (30.0, 16)
-    assert fleet.between[0].repeatability is not None
+    # Of single runs about the coefficients of all three: 2 (3 - 1) degrees of freedom a unit.
+    apart = [solved([run])[0][:8] - values[i // 3] for i, run in enumerate(runs)]
+    squares = (np.array(apart) ** 2).reshape(48, 4, 2).sum(axis=(0, 2)) / (4.0 * 16.0)
+    repeats = [between.repeatability for between in fleet.between]
+    assert repeats == pytest.approx(np.sqrt(squares), rel=1e-6)
 
 
 def test_what_does_not_share_a_mean_has_two_degrees_of_freedom_more():
@@ -112,15 +116,21 @@ def test_the_statistic_of_a_date_is_its_distance_in_the_noise_of_both():
         2.0 * f_quantile(1.0 - 0.005 / (4 * n), 2.0, 2.0 * (n - 1.0))
     )
     noise = fleet.prior.noise_variance
-    changes, own = [], []
+    changes, own, lasts = [], [], []
     for u in range(n):
         of_unit = [r for r in runs if r.unit == f"u{u}"]
         first, last = (solved([r for r in of_unit if r.when == w])
                        for w in ("2026-01-10", "2026-07-10"))  # fmt: skip
         changes.append(last[0][:8] - first[0][:8])
+        lasts.append(last[0][:8])
         own.append(noise * (np.diag(last[1])[:8] + np.diag(first[1])[:8]))
     changes, own = np.array(changes).reshape(n, 4, 2), np.array(own).reshape(n, 4, 2)
     rows = {row.unit: row for row in fleet.history}
+    # Units are compared by their last date, three runs of 180 readings.
+    assert all(unit.verdict == "fine" for unit in fleet.units)
+    scatter = np.var(lasts, axis=0, ddof=1).reshape(4, 2).mean(axis=1)
+    between = np.array([row.std for row in fleet.between])
+    assert between**2 == pytest.approx(scatter - 2.0 * noise / 540.0, rel=1e-6)
     for k in range(4):
         # The variance of an ordinary change is the same in all units: two of them tell it.
         squares = (changes[:, k] ** 2).sum(axis=1)
@@ -169,6 +179,19 @@ def test_a_leap_is_farther_than_two_units_are_apart_in_99_percent_of_fleets():
         found = changes_of(dated, np.array([1.0]), 360.0, np.array([25.0]), None)
         assert [one.moved for one in found] == [u == 3 for u in range(8)]
         assert found[3].leaps is leaps
+
+
+@pytest.mark.parametrize(("unsure", "moved"), [(None, True), (0, False), (1, False)])
+def test_a_zero_has_not_moved_by_more_than_either_date_knows_it(unsure, moved):
+    """A zero that is off by 1 degree, on one date known to no better than that."""
+    dated = []
+    for u in range(8):
+        pair = [blank("2026-01-10"), replace(blank("2026-07-10"), zero=1e-3 * u + (u == 3))]
+        if u == 3 and unsure is not None:
+            pair[unsure] = replace(pair[unsure], zero_inverse=1.0)
+        dated.append([(replace(one, unit=f"u{u}"), 1.0) for one in pair])
+    found = changes_of(dated, np.array([1.0]), 360.0, np.array([25.0]), None)
+    assert [one.zero_moved for one in found] == [moved and u == 3 for u in range(8)]
 
 
 @pytest.mark.parametrize("period", [360.0, 1.0, 2.0 * np.pi])

@@ -6,6 +6,7 @@ import pytest
 import trueangle as ta
 from trueangle.cli import main
 from trueangle.errors import FileError, MessageLinesWarning
+from trueangle.formats import guidelog
 from trueangle.formats.guidelog import SIDEREAL
 
 SEED = 44
@@ -115,6 +116,19 @@ def test_guiding_dithers_and_lost_stars_are_taken_out(log):
         off = 3600.0 * run.error - error(run.time)
         # The noise of a frame, its rounding, and nothing that grows with the pulses.
         assert np.std(off) < 1.3 * 0.02 * SCALE / np.cos(np.radians(DECLINATION))
+
+
+@pytest.mark.filterwarnings("ignore::trueangle.errors.MessageLinesWarning")
+def test_what_stands_beside_the_error_is_told_with_its_line(log):
+    """The other axis in seconds of arc, the star's signal to noise, and the frame's own line."""
+    (batch,) = guidelog.read(log, ["time_s", "declination_arcsec", "snr"])
+    np.testing.assert_allclose(batch["declination_arcsec"], 0.010 * SCALE, rtol=1e-12)
+    np.testing.assert_array_equal(batch["snr"], 45.67)
+    lines = log.read_text().splitlines()
+    for row in (0, 1, 350, 700, 1200, batch["snr"].size - 1):
+        cells = lines[guidelog.line_of(log, row) - 1].split(",")
+        begins = 0.0 if row < 681 else 1800.0
+        assert begins + float(cells[1]) == pytest.approx(batch["time_s"][row])
 
 
 @pytest.mark.filterwarnings("ignore::trueangle.errors.MessageLinesWarning")

@@ -5,6 +5,7 @@ import pytest
 
 import trueangle as ta
 from trueangle.errors import FileError, MessageLinesWarning
+from trueangle.formats import seriallog
 from trueangle.formats.formats import find_format
 
 ROWS = 40
@@ -51,7 +52,9 @@ def test_rows_are_read_and_corrected_with_words_among_them(style, ending, tmp_pa
     np.testing.assert_array_equal(found[0].indicated, MODEL.correct(run.indicated))
 
 
-def test_the_clock_of_a_terminal_is_the_time(tmp_path):
+@pytest.mark.parametrize("block", [7, 1 << 14])
+def test_the_clock_of_a_terminal_is_the_time(block, monkeypatch, tmp_path):
+    monkeypatch.setattr(seriallog, "_BLOCK", block)
     seconds = 86390.0 + np.arange(ROWS)  # over midnight
     clocks = [f"{t // 3600 % 24:02.0f}:{t // 60 % 60:02.0f}:{t % 60:06.3f} -> " for t in seconds]
     lines = [a + b for a, b in zip(clocks, rows(STYLES["plotter"]), strict=True)]

@@ -127,6 +127,15 @@ def test_epics_with_other_variables_between(tmp_path):
     assert np.allclose(found, AMPLITUDES, atol=NOISE)
 
 
+def test_epics_times_are_those_of_the_stamps_to_a_microsecond(tmp_path):
+    """Over two days, and since 2000 a double has a tenth of a microsecond."""
+    path = tmp_path / "log.txt"
+    seconds = np.array([0.0, 0.000123, 1.5, 30.000001, 86400.25, 172800.654321])
+    path.write_text("".join(line for _, line in monitored("PV", seconds, np.zeros(6))))
+    (batch,) = camonitor.read(path, ["time_s", "PV"])
+    np.testing.assert_allclose(batch["time_s"] - batch["time_s"][0], seconds, atol=5e-7)
+
+
 def test_epics_that_is_damaged_or_to_be_corrected(tmp_path, capsys):
     path = tmp_path / "log.txt"
     good = next(monitored("PV", np.zeros(1), np.zeros(1)))[1]

@@ -69,6 +69,23 @@ def test_entries_of_one_loop_are_runs(tmp_path):
     np.testing.assert_allclose(run.time, 1.0 + 0.02 * np.arange(ROWS))
 
 
+def test_the_last_record_of_a_time_counts_and_a_signal_holds_from_its_own_time_on(tmp_path):
+    """By a loop over the records: the greatest time at or before, of equal ones the last."""
+    times = [3, 1, 1, 5, 5, 5, 9]
+    parts = [EXAMPLE[:12], record(0, 0, started(1, "x", "double"))]
+    parts += [record(1, t, struct.pack("<d", float(i))) for i, t in enumerate(times)]
+    path = tmp_path / "a.wpilog"
+    path.write_bytes(b"".join(parts))
+    (batch,) = wpilog.read(path, ["time_s", "x"])
+    assert (batch["time_s"] * 1e6).round().tolist() == [1, 3, 5, 9]
+    assert batch["x"].tolist() == [2.0, 0.0, 5.0, 6.0]
+    asked = np.arange(11)
+    wanted = [max(((t, i) for i, t in enumerate(times) if t <= k), default=(0, np.nan))[1]
+              for k in asked.tolist()]  # fmt: skip
+    found = wpilog._at(path, wpilog._opened(path), "x", asked)
+    np.testing.assert_array_equal(found, wanted)
+
+
 def test_entries_with_times_of_their_own_are_joined(tmp_path, capsys):
     path = str(written(tmp_path / "a.wpilog", apart=37))
     command = ["join", path, path, "-o", str(tmp_path / "runs.csv"), "--offset", "0", "--rate", "0"]

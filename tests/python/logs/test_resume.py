@@ -80,8 +80,13 @@ def test_outputs_of_another_request_are_made_anew(change, logs, tmp_path):
     first, second = CHANGES[change]
     first, second = ({"model": made_model()} | request for request in (first, second))
     out, fresh = tmp_path / "out", tmp_path / "fresh"
-    assert statuses(ta.correct_logs(logs, output=out, **first)) == ["done"] * FILES
-    assert statuses(ta.correct_logs(logs, output=out, **first)) == ["done before"] * FILES
+    made, known = (ta.correct_logs(logs, output=out, **first) for _ in range(2))
+    assert statuses(made) == ["done"] * FILES
+    assert statuses(known) == ["done before"] * FILES
+    # Rows are those that were corrected now; each log tells its own.
+    each = [entry["rows"] for entry in made.to_dict()["files"]]
+    assert [entry["rows"] for entry in known.to_dict()["files"]] == each
+    assert (made.to_dict()["rows"], known.to_dict()["rows"]) == (sum(each), 0)
     before = outputs(out)
     assert statuses(ta.correct_logs(logs, output=out, **second)) == ["done"] * FILES
     ta.correct_logs(logs, output=fresh, **second)

@@ -11,6 +11,10 @@ from trueangle.logs.unitevidence import UnitEvidence
 DEG, RAD, TURN = 360.0, 2.0 * np.pi, 1.0
 
 
+#: Ways to cut readings in batches: what is seen does not depend on it.
+BATCHES = (1, 3, 90)
+
+
 def seen(values, period, span=None, batches=3):
     evidence = UnitEvidence(period)
     for batch in np.array_split(np.asarray(values), batches):
@@ -37,7 +41,7 @@ def wrapped(turn, turns=3.0, low=0.0, count=900):
     ],
 )
 def test_another_unit_is_seen(values, period, span, unit):
-    assert seen(values, period, span) == unit
+    assert [seen(values, period, span, batches) for batches in BATCHES] == [unit] * len(BATCHES)
 
 
 @pytest.mark.parametrize(
@@ -59,7 +63,7 @@ def test_another_unit_is_seen(values, period, span, unit):
     ],
 )
 def test_ordinary_readings_are_not_doubted(values, period, span):
-    assert seen(values, period, span) is None
+    assert [seen(values, period, span, batches) for batches in BATCHES] == [None] * len(BATCHES)
 
 
 def model_file(folder, period):
@@ -83,6 +87,8 @@ def written(path, name, values):
 def test_the_command_tells_in_one_line(tmp_path, capsys, period, values, unit):
     model = model_file(tmp_path, period)
     logs = [written(tmp_path / f"{k}.csv", "q", values) for k in range(2)]
+    resting = np.full(200, 0.1 * period)  # tells no unit, and does not count
+    logs.insert(1, written(tmp_path / "rest.csv", "q", resting))
     for folder in ("out", "again"):
         (tmp_path / folder).mkdir()
     out = str(tmp_path / "out")

@@ -148,8 +148,8 @@ def test_correcting_outside_the_fitted_span_warns_once():
     model = ta.HarmonicModel([ta.Shaft("output", 1, [1], [0.0], [0.5])], period=360.0, fit=record)
     inside = np.array([351.0, 0.0, 100.0, 719.0])
     model.correct(inside)  # no warning: pytest turns warnings into errors
-    with pytest.warns(errors.OutsideSpanWarning, match="1 of 2 corrected"):
-        model.correct(np.array([0.0, 200.0]))
+    with pytest.warns(errors.OutsideSpanWarning, match="1 of 3 corrected"):
+        model.correct(np.array([0.0, 200.0, 360.0]))
     model.correct(200.0)  # said once
 
 

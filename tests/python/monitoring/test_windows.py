@@ -8,7 +8,7 @@ from scipy.stats import norm, t
 
 import trueangle as ta
 from trueangle.monitoring.monitor import _lines, _variances
-from trueangle.support.runlength import chart_limit, rare
+from trueangle.support.runlength import chart_limit
 
 SEED = 53_500
 PER = 90
@@ -45,7 +45,7 @@ def test_lines_of_several_shafts_are_added_and_so_are_their_variances():
 def test_the_limit_is_that_of_all_charts_of_both_coefficients_and_the_zero(shift):
     watch = ta.Monitor(model(), shift=shift, run_length=300.0)
     assert watch.limit == pytest.approx(chart_limit(0.5 * shift, 300.0 * 1.25 * 7.0))
-    assert watch._step == pytest.approx(rare(1.0 / (300.0 * 1.25 * 7.0)))
+    assert watch._step == pytest.approx(norm.isf(0.5 / (300.0 * 1.25 * 7.0)))
 
 
 @pytest.mark.parametrize("period", UNITS)

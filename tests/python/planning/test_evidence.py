@@ -75,6 +75,26 @@ def test_evidence_grows_with_the_square_of_the_size_and_falls_with_the_variance(
     assert noisy.deviance == pytest.approx(one[0].deviance / 9.0, rel=1e-9)
 
 
+def test_evidence_is_the_deviance_less_what_parameters_and_searches_cost():
+    """A logarithm of the readings for each parameter, twice that of the places searched."""
+    fitted = regression(0.0)
+    defect = of_size("local_defect", 3.0, fitted.signals, SIM.surroundings)
+    rivals = (RIVALS[1], Hypothesis("local_defect", (defect,)))
+    log_n, prices = np.log(len(fitted.signals)), {}
+    for one in rivals:
+        error = fitted.residual + one.errors(fitted.signals, fitted.belief)[0]
+        alone = Regression.of(fitted.signals, error, fitted.belief, rho=0.0)
+        found = EFFECTS[one.cause].propose(alone)
+        prices[one.cause] = found.parameters * log_n + 2.0 * found.log_grid
+    # One delay; a place, a width and a height among all places of a turn.
+    assert prices["latency"] == pytest.approx(log_n)
+    assert prices["local_defect"] > 3.0 * log_n + 2.0 * np.log(100.0)
+    told = evidence_between(fitted, rivals, ReadingNoise(1.0), searched=True)
+    for cause, price in prices.items():
+        (none,) = [e for e in told if (e.cause, e.rival) == (cause, "")]
+        assert none.deviance - none.bic == pytest.approx(price + 6.0, abs=1e-6)
+
+
 def test_one_speed_leaves_nothing_between_play_and_a_delay():
     # No line, that a delay would move.
     sim = Simulation(runs=(RunDesign(samples=90, reversals=(0.5,)),))

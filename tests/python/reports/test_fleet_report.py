@@ -6,10 +6,14 @@ from html import unescape
 
 import numpy as np
 import pytest
+from scipy.stats import chi2
 
 import trueangle as ta
+from fleets.made import units
+from monitoring.test_windows import PER, model, readings
 from trueangle.cli import main
 from trueangle.reports.fleet import FleetReport
+from trueangle.reports.watched import WatchReport
 
 pytest.importorskip("jinja2")
 
@@ -115,3 +119,130 @@ def test_the_page_says_when_each_unit_is_due(tmp_path, capsys):
     assert "(extrapolated)" in history
     assert main([*command, "--permitted-arcsec", "60"]) == 1
     assert "add --fleet" in capsys.readouterr().err
+
+
+@pytest.fixture(scope="module")
+def dated():
+    """Nine units on three dates, one of which grows."""
+    print(f"seed {SEED}")
+
+    def grows(u, t, b):
+        return b + np.array([[20.0 * t, 0.0]] + 3 * [[0.0, 0.0]]) * (u == 3), 0.0
+
+    rng = np.random.default_rng(SEED + 2)
+    dates = ("2026-01-10", "2026-03-10", "2026-05-10")
+    return ta.fleet(
+        units(rng, 9, dates=dates, change=grows, runs=2, noise=1.0),
+        orders=[1, 2],
+        permitted_arcsec=60.0,
+    )
+
+
+@pytest.fixture
+def drawn(monkeypatch):
+    """Marks and axes of every picture in the order in which they are drawn."""
+    found = []
+
+    def still(marks, across, up, *_rest):
+        found.append((marks, across, up))
+        return "<svg></svg>"
+
+    for module in ("fleet", "watched"):
+        monkeypatch.setattr(f"trueangle.reports.{module}.still", still)
+    return found
+
+
+@pytest.mark.parametrize(("errors_in", "per"), [("arcsec", 3600.0), ("mrad", np.pi / 0.18)])
+def test_pictures_draw_the_units_their_spread_and_their_sums(dated, drawn, errors_in, per):
+    page = FleetReport(dated, "Nine", errors_in)
+    for unit in dated.units:
+        picture = page._pattern(unit)
+        (angle, error), x = drawn[-1][0][0].arrays, np.radians(np.linspace(0.0, 360.0, 361))
+        np.testing.assert_allclose(np.radians(angle), x, atol=1e-12)
+        wave = sum(r.amplitude * np.sin(r.order * x + np.radians(r.phase_deg)) for r in unit.orders)
+        np.testing.assert_allclose(error, per * wave, atol=1e-9)
+        size = float(re.search(r", (\S+) \w+ peak-to-peak", picture.alt)[1])
+        assert size == pytest.approx(per * unit.peak_to_peak, rel=1e-3)
+    page._phasor(1)
+    circle, *dots = (mark.arrays for mark in drawn[-1][0])
+    common, between = dated.common[1], dated.between[1]
+    away = np.hypot(circle[0] - per * common.cosine, circle[1] - per * common.sine)
+    np.testing.assert_allclose(away, per * between.std * np.sqrt(chi2.ppf(0.95, 2)), rtol=1e-9)
+    rows = [
+        u.orders[1] for fine in (True, False) for u in dated.units if (u.verdict == "fine") == fine
+    ]
+    turns = np.array([row.amplitude * np.exp(1j * np.radians(row.phase_deg)) for row in rows])
+    np.testing.assert_allclose(np.concatenate([one[0] for one in dots]), per * turns.imag)
+    np.testing.assert_allclose(np.concatenate([one[1] for one in dots]), per * turns.real)
+    chart = page._chart("u3")
+    limit, *sums = (mark.arrays for mark in drawn[-1][0])
+    rows = [row for row in dated.history if row.unit == "u3"]
+    assert set(limit[1]) == {rows[-1].cusum_limit}
+    for k, (date, values) in enumerate(sums):
+        assert date.tolist() == [2.0, 3.0]
+        assert values.tolist() == [row.orders[k].cusum for row in rows]
+    assert f"on {len(rows)} further dates, limit {limit[1][0]:.3g}" in chart.alt
+
+
+def test_every_table_of_the_page_holds_the_fleets_numbers(dated):
+    """Cell by cell, in seconds of arc."""
+    text, plain = FleetReport(dated, "Nine", "arcsec").html, dated.to_dict()
+    rows = {}
+    for name, cells in re.findall(r'<th scope="row">([^<]+)</th>(.*?)</tr>', text, re.S):
+        rows.setdefault(name, []).append(re.findall(r"<td[^>]*>([^<]*)</td>", cells))
+    last = {row["unit"]: row for row in plain["history"]}
+    for unit in plain["units"]:
+        first, dates = rows[unit["unit"]]
+        wanted = [unit["peak_to_peak_arcsec"], unit["left_arcsec"], unit["p"], unit["limit"]]
+        assert first[0] == unit["verdict"]
+        assert [float(x) for x in first[1:]] == pytest.approx(wanted, rel=0.06)
+        assert [float(x) for x in first[1:3]] == pytest.approx(wanted[:2], rel=6e-4)
+        row = last[unit["unit"]]
+        assert dates[0] == row["when"]
+        sums = max(one["cusum"] for one in row["orders"])
+        wanted = [row["order"], row["statistic"], row["limit"], sums, row["cusum_limit"]]
+        assert [float(x) for x in dates[1:6]] == pytest.approx(wanted, rel=6e-3)
+        assert dates[6] == row["verdict"]
+        assert float(dates[7]) == pytest.approx(row["bound_arcsec"], rel=6e-4)
+        assert dates[8].startswith(row["next_calibration"])
+        assert ("(extrapolated)" in dates[8]) == row["extrapolated"]
+    orders = zip(plain["common"]["orders"], plain["between"]["orders"], strict=True)
+    for common, between in orders:
+        (cells,) = rows[f"{common['order']:g}"]
+        wanted = [
+            common["amplitude_arcsec"],
+            between["std_arcsec"],
+            between["repeatability_arcsec"],
+        ]
+        assert [float(x) for x in cells[1:]] == pytest.approx(wanted, rel=6e-4)
+
+
+def test_the_page_of_a_watched_joint_draws_its_sums_and_sizes(drawn):
+    angle, error = readings(60)
+    error[PER * 50 :] += 0.004 * np.sin(4.0 * np.radians(angle[PER * 50 :]))
+    windows = ta.Monitor(model()).windows_of(angle, error)
+    page = WatchReport(windows, 360.0, errors_in="arcsec")
+    page._chart()
+    limit, largest, alarms = (mark.arrays for mark in drawn[-1][0])
+    assert set(limit[1]) == {windows[0].limit}
+    assert largest[1].tolist() == [one.statistic for one in windows]
+    told = [(one.window, one.statistic) for one in windows if one.alarm]
+    assert [*zip(*alarms, strict=True)] == told
+    for k in range(3):
+        sums, sizes = page._order(k)
+        (_, shown), ((number, size),) = (
+            [mark.arrays for mark in marks] for marks, _, _ in drawn[-2:]
+        )
+        wanted = np.array([one.orders[k].amplitude for one in windows]) * 3600.0
+        assert shown[1].tolist() == [one.orders[k].statistic for one in windows]
+        assert number.tolist() == [one.window for one in windows]
+        np.testing.assert_allclose(size, wanted)
+        assert float(re.search(r", (\S+) arcsec at most", sizes.alt)[1]) == pytest.approx(
+            wanted.max(), rel=6e-4
+        )
+        assert float(re.search(r", (\S+) at most", sums.alt)[1]) == pytest.approx(
+            max(shown[1]), rel=6e-3
+        )
+    first = next(one for one in windows if one.alarm)
+    alarms = f"{len(told)} alarm{'s' * (len(told) > 1)}"
+    assert page.summary() == f"59 windows, {alarms}\nwindow {first.window}: {first.because}"

@@ -99,6 +99,39 @@ def test_pulls_of_offset_and_rate(memory):
     assert (np.abs(mean) < 0.7).all()
 
 
+def test_what_joining_adds_is_what_clocks_not_known_better_make_of_the_motion(tmp_path):
+    """Noise of half a degree, so that the offset alone tells; over seeds the square is one."""
+    seeds = range(8_300, 8_316)
+    print(f"seeds {seeds}")
+    pulls = []
+    for seed in seeds:
+        t, s = np.arange(0.0, 20.0, 0.02), np.arange(-1.0, 21.0, 0.01)
+        said = motion(t) + np.random.default_rng(seed).normal(0.0, 0.5, t.size)
+        joint = log(tmp_path / "a.csv", "indicated", t, said)
+        found = ta.join(joint, log(tmp_path / "b.csv", "reference", s + 5.0, motion(s)))
+        (run,) = found.runs
+        off = 3600.0 * (run.reference - motion(run.time))
+        pulls.append(np.sqrt(np.mean(off**2)) / found.std_arcsec)
+    print(pulls)
+    # The mean of sixteen chi-squared numbers of one degree of freedom is known to 0.35.
+    assert abs(np.mean(np.square(pulls)) - 1.0) < 3.0 * 0.35
+    assert np.mean(np.square(pulls)) > 0.3
+
+
+@pytest.mark.parametrize("side", ["indicated", "reference"])
+def test_a_signal_of_either_log_is_that_of_the_time_of_its_own_clock(side, tmp_path):
+    paths = dict(zip(("indicated", "reference"), logs(tmp_path, 1, gap=False), strict=True))
+    head, *rows = paths[side].read_text().split("\n")
+    lines = [f"{head},temperature_C", *(f"{row},{row.partition(',')[0]}" for row in rows)]
+    paths[side].write_text("\n".join(lines))
+    found = ta.join(*paths.values(), offset_s=OFFSET, rate_ppm=RATE)
+    (run,) = found.runs
+    start = float(paths["indicated"].read_text().split("\n")[1].partition(",")[0])
+    there = run.time + OFFSET + 1e-6 * RATE * (run.time - start)
+    wanted = run.time if side == "indicated" else there
+    np.testing.assert_allclose(run.temperature, wanted, atol=1e-6)
+
+
 def test_nothing_is_made_up_over_a_gap(tmp_path):
     joint, laser = logs(tmp_path, 1)
     found = ta.join(joint, laser)
@@ -147,7 +180,9 @@ def test_a_log_on_change_is_held_in_its_pauses(tmp_path):
     error = found.runs[0].indicated - found.runs[0].reference
     # One step each way and the rounding; a line over a pause would be off by 40 deg.
     assert np.abs(error).max() < 2.5 * step
-    assert 0.3 * found.std_arcsec < 3600.0 * np.std(error) < 1.5 * found.std_arcsec
+    # Uniform over a step, and nothing else: the clocks are declared and nothing is interpolated.
+    assert found.std_arcsec == pytest.approx(3600.0 * step / np.sqrt(12.0), rel=1e-6)
+    assert np.std(error) < step / np.sqrt(12.0)
     estimated = ta.join(joint, epics)
     assert estimated.offset_s == pytest.approx(7.0, abs=0.01)
     assert any("repeats itself" in note for note in estimated.notes)

@@ -146,6 +146,19 @@ def test_deviations_of_facets_are_added_where_they_lie(mounts, tmp_path):
     np.testing.assert_allclose(again, found, atol=1e-9)
 
 
+@pytest.mark.parametrize(("unit", "turn"), [("rad", 2.0 * np.pi), ("turn", 1.0)])
+def test_deviations_of_facets_are_added_in_the_unit_of_the_run(unit, turn, tmp_path):
+    polygon(tmp_path)
+    columns = {
+        f"reference_{unit}": FACETS / 360.0 * turn,
+        f"indicated_{unit}": FACETS / 360.0 * turn,
+    }
+    path = saved(tmp_path / "runs.csv", **columns)
+    (run,) = ta.read_runs(path, facets=tmp_path / "facets.csv")
+    arcsec = (run.reference / run.period - FACETS / 360.0) * 1_296_000.0
+    np.testing.assert_allclose(arcsec, DEVIATIONS, atol=1e-7)
+
+
 def test_facets_that_do_not_fit_are_told(tmp_path, capsys):
     path = saved(tmp_path / "runs.csv", reference_deg=FACETS + 5.0, indicated_deg=FACETS + 5.0)
     polygon(tmp_path)

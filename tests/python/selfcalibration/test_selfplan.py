@@ -49,6 +49,35 @@ def test_the_command_says_how_much_worse_the_present_heads_are(capsys):
     assert told["worst_noise_factor"] < 1.33
 
 
+@pytest.mark.parametrize(("ratio", "standard_error"), [(5.0, 50.0), (5.0, 0.05), (1.5, 0.05)])
+def test_a_coast_has_the_turns_and_readings_of_a_speed_that_falls_exponentially(
+    ratio, standard_error
+):
+    """Ten turns at least, and as many readings as both the turns and the error take."""
+    start, rate = 4.0, 500.0
+    plan = plan_self(
+        "spin-down", [1, 2, 3], speed_ratio=ratio, start_speed=start, rate=rate,
+        noise=10.0, standard_error=standard_error,
+    )  # fmt: skip
+    needed = np.ceil(2.0 * (speed_factor(ratio) * 10.0 / standard_error) ** 2)
+    time = np.linspace(0.0, plan.seconds, 200_001)
+    turns = np.trapezoid(start * ratio ** (-time / plan.seconds), time)
+    assert plan.turns == pytest.approx(turns, rel=1e-6)
+    assert plan.turns >= 10.0 * (1.0 - 1e-9)
+    assert plan.readings == max(needed, np.ceil(plan.seconds * rate))
+    # As short as it may be: either its turns or its readings are what they must.
+    assert min(plan.turns / 10.0, plan.seconds * rate / needed) == pytest.approx(1.0, abs=1e-3)
+
+
+@pytest.mark.parametrize("angles", [[0.0, 40.0, 95.0], [0.0, 10.0, 20.0]])
+def test_given_angles_are_worse_by_the_ratio_of_the_worst_factors(angles):
+    plan = plan_self("heads", range(1, 9), angles=angles)
+    worst = float(angle_factors(angles, range(1, 9)).max())
+    assert plan.given["worst_noise_factor"] == pytest.approx(worst)
+    assert plan.given["worse_by"] == pytest.approx(worst / plan.worst_noise_factor)
+    assert plan.worst_noise_factor > 1.05
+
+
 def test_wrong_wishes_are_refused():
     with pytest.raises(ArgumentError, match="method"):
         plan_self("gyro")

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -55,14 +57,19 @@ def test_what_was_moved_and_measured_is_told() -> None:
         [0.0, 90.0],
     )
     assert told["temperatures"] == [21.25]
+    # Without a velocity the speed is the way gone over the time, there and back.
+    silent = [replace(run, velocity=None) for run in runs_of()]
+    assert ta.check(silent).extent.speeds == pytest.approx((10.0, 40.0), rel=0.01)
     # The run without a jump: beyond a turn as well.
     assert ta.check(runs_of()[:1]).ratio == pytest.approx(1.0, abs=5e-4)
     mirrored = ta.check(runs_of(sign=-1.0)).to_dict()
     assert mirrored["ratio"] == pytest.approx(told["ratio"])
     assert mirrored["usable"] == told["usable"]
-    assert [f["kind"] for f in mirrored["data_faults"]] == [f["kind"] for f in told["data_faults"]]
+    assert [f["fault"] for f in mirrored["data_faults"]] == [
+        f["fault"] for f in told["data_faults"]
+    ]
     backwards = ta.check(runs_of()[::-1]).to_dict()
     assert backwards["ratio"] == pytest.approx(told["ratio"])
-    assert sorted(f["kind"] for f in backwards["data_faults"]) == sorted(
-        f["kind"] for f in told["data_faults"]
+    assert sorted(f["fault"] for f in backwards["data_faults"]) == sorted(
+        f["fault"] for f in told["data_faults"]
     )

@@ -68,6 +68,17 @@ def test_what_interpolation_adds_is_told_in_its_size() -> None:
     assert Stream(np.arange(5.0), np.arange(5.0)).interpolation_std == 0.0
 
 
+@pytest.mark.parametrize("step", [0.1, 0.05])
+def test_what_a_cubic_adds_grows_with_the_fourth_power_of_the_step(step: float) -> None:
+    """Told from readings left out at twice the distance, against the truth in the middle."""
+    time = np.arange(0.0, 60.0, step)
+    found = Stream(time, curve(time))
+    middle = time[8:-8] + 0.5 * step
+    off = np.abs(found.at(middle)[0] - curve(middle))
+    assert found.is_cubic
+    assert found.interpolation_std == pytest.approx(1.4826 * np.median(off), rel=0.03)
+
+
 def test_gaps_from_both_sides() -> None:
     for pause, gap in ((4.9, False), (5.1, True)):
         time = np.concatenate([np.arange(50.0), 49.0 + pause + np.arange(50.0)])

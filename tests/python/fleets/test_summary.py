@@ -1,0 +1,116 @@
+"""What a fleet prints are the numbers of its object, and its file gives them back."""
+
+import re
+
+import numpy as np
+import pytest
+
+import trueangle as ta
+from trueangle.support.angles import arcsec
+
+from .made import units
+
+SEED = 52_600
+DATES = ("2026-01-10", "2026-07-10")
+#: Printed to four digits, and in a sentence to three.
+FOUR, THREE = 6e-4, 6e-3
+
+
+@pytest.fixture(scope="module")
+def fleet():
+    """One unit drifts, one zero moved, and repeats differ by much less than units."""
+    print("seed", SEED)
+
+    def change(u, t, b):
+        b[0] += np.array([24.0, 32.0]) * (t and u == 3)
+        return b, 400.0 * (t and u == 5)
+
+    runs = units(np.random.default_rng(SEED), 14, dates=DATES, change=change, noise=1.0)
+    return ta.fleet(runs, orders=range(1, 5), permitted_arcsec=60.0)
+
+
+@pytest.mark.parametrize(("errors_in", "per"), [("arcsec", 1.0), ("mrad", np.pi / 648.0)])
+def test_the_tables_hold_the_numbers_of_the_object(fleet, errors_in, per):
+    plain, text = fleet.to_dict(), fleet.summary(errors_in)
+    for unit in plain["units"]:
+        row = re.search(rf"^  {unit['unit']} +{unit['verdict']} +([\d.e+-]+ *){{4}}$", text, re.M)
+        if row is None:  # of those that are fine the first are listed
+            assert unit["verdict"] == "fine"
+            continue
+        numbers = [float(x) for x in row[0].split()[2:]]
+        wanted = [per * unit["peak_to_peak_arcsec"], per * unit["left_arcsec"]]
+        assert numbers[:2] == pytest.approx(wanted, rel=FOUR)
+        assert numbers[2:] == pytest.approx([unit["p"], unit["limit"]], rel=0.06)
+    for common, between in zip(plain["common"]["orders"], plain["between"]["orders"], strict=True):
+        row = re.search(rf"^ +{common['order']:g}  ([ \d.]+)$", text, re.M)
+        wanted = [
+            common["amplitude_arcsec"],
+            between["std_arcsec"],
+            between["repeatability_arcsec"],
+        ]
+        assert [float(x) for x in row[1].split()] == pytest.approx(per * np.array(wanted), rel=FOUR)
+    flat, bound = " ".join(text.split()), plain["tolerance"]
+    told = re.search(
+        rf"(\S+) % of units stay below (\S+) {errors_in} peak-to-peak and (\S+) {errors_in} left "
+        r".* with (\S+) % confidence \(.*factor (\S+)\)",
+        flat,
+    )
+    wanted = [100 * bound["share"], per * bound["peak_to_peak_arcsec"], per * bound["left_arcsec"],
+              100 * bound["confidence"], bound["factor"]]  # fmt: skip
+    assert [float(x) for x in told.groups()] == pytest.approx(wanted, rel=FOUR)
+
+
+def test_the_calendar_names_those_that_are_due_by_their_drift(fleet):
+    rows = [row for row in fleet.to_dict()["history"] if row["next_calibration"]]
+    near = [row for row in rows if not row["extrapolated"]]
+    far = sorted(row["next_calibration"] for row in rows if row["extrapolated"])
+    text = fleet.summary("arcsec")
+    told = re.findall(r"(u\d+) +(\d{4}-\d\d-\d\d) +changed by (\S+) arcsec", text)
+    assert [name for name, _, _ in told] == ["u3"] == [row["unit"] for row in near]
+    assert told[0][1] == near[0]["next_calibration"]
+    assert float(told[0][2]) == pytest.approx(near[0]["bound_arcsec"], rel=FOUR)
+    assert f"{len(far)} units from {far[0]}" in " ".join(text.split())
+
+
+def test_a_unit_that_moved_says_by_how_much_its_orders_did(fleet):
+    (moved,) = [unit for unit in fleet.units if unit.verdict == "recalibrate"]
+    told = re.search(r"order 1 by (\S+) arcsec", moved.because)
+    # 24 and 32 arcsec, each of both dates known to 1 sqrt(2 / 540) arcsec.
+    assert float(told[1]) == pytest.approx(40.0, rel=THREE)
+
+
+def numbers(value):
+    """Every entry of nested lists and objects, by its place."""
+    if isinstance(value, dict | list):
+        pairs = value.items() if isinstance(value, dict) else enumerate(value)
+        return {f"{k}.{place}": x for k, one in pairs for place, x in numbers(one).items()}
+    return {"": value}
+
+
+def test_what_is_loaded_is_what_was_saved_number_by_number(fleet, tmp_path):
+    fleet.save(tmp_path / "fleet.json")
+    again = ta.load_fleet(tmp_path / "fleet.json")
+    ours, theirs = numbers(fleet.to_dict()), numbers(again.to_dict())
+    assert ours.keys() == theirs.keys()
+    for place, value in ours.items():
+        same = isinstance(value, float)
+        assert theirs[place] == (pytest.approx(value, rel=1e-9, abs=1e-9) if same else value), place
+    for one, other in zip(fleet.common, again.common, strict=True):
+        assert (other.cosine, other.sine) == pytest.approx((one.cosine, one.sine), abs=1e-12)
+    assert again.summary() == fleet.summary()
+    assert arcsec(again.tolerance.left, again.period) == pytest.approx(
+        ours["tolerance.left_arcsec."]
+    )
+
+
+@pytest.mark.parametrize("count", [2, 5, 6, 7])
+def test_units_that_tell_nothing_are_named_up_to_five_and_counted(count):
+    rng = np.random.default_rng(SEED + 1)
+    few = [
+        ta.CalibrationRun([0.0, 1.0, 2.0], [0.0, 1.0, 2.0], 360.0, unit=f"s{i}")
+        for i in range(count)
+    ]
+    found = ta.fleet([*units(rng, 6, runs=1), *few], orders=[1, 2])
+    more = f" and {count - 5} more" if count > 5 else ""
+    listed = ", ".join(f"s{i}" for i in range(min(count, 5))) + more
+    assert f"The readings of {listed} do not tell the orders apart; left out." in found.notes

@@ -1,0 +1,72 @@
+"""A model and a robot in words: their numbers are the model's, and a bound is one."""
+
+import re
+
+import numpy as np
+import pytest
+
+import trueangle as ta
+from trueangle.terms import ScaleError
+
+PERIODS = (360.0, 2.0 * np.pi, 1.0)
+#: Printed to four digits.
+DIGITS = 6e-4
+
+
+def model(period, seed=0, terms=()):
+    """Orders 1 to 3 of the output and 2 of a motor, with a zero, of a hundred arcsec each."""
+    rng = np.random.default_rng(seed)
+    sizes = rng.normal(0.0, 100.0, (2, 4)) * period / 1_296_000.0
+    shafts = [
+        ta.Shaft("output", 1, [1, 2, 3], sizes[0, :3], sizes[1, :3]),
+        ta.Shaft("motor", 50, [2], sizes[0, 3:], sizes[1, 3:]),
+    ]
+    return ta.HarmonicModel(shafts, -2e-4 * period, period, terms=terms)
+
+
+@pytest.mark.parametrize("period", PERIODS)
+def test_the_table_is_that_of_the_harmonics(period):
+    one = model(period)
+    text = one.summary()
+    constant = re.search(r"constant (\S+) \S+, (\S+) arcsec", text)
+    wanted = [one.constant, one.constant * 1_296_000.0 / period]
+    assert [float(x) for x in constant.groups()] == pytest.approx(wanted, rel=1e-5)
+    rows = re.findall(r"^(output|motor) +(\d+) +(\S+) +(\S+)$", text, re.M)
+    assert [(name, int(k)) for name, k, _, _ in rows] == [
+        (shaft.name, k) for shaft in one.shafts for k in shaft.orders
+    ]
+    arcsec = one.amplitudes * 1_296_000.0 / period
+    assert [float(row[2]) for row in rows] == pytest.approx(arcsec, rel=DIGITS)
+    phases = np.array([float(row[3]) for row in rows])
+    assert ((phases >= 0.0) & (phases < 360.0)).all()
+    np.testing.assert_allclose(phases, np.degrees(one.phases) % 360.0, atol=0.0051)
+    assert (np.degrees(one.phases) < 0.0).any()
+
+
+@pytest.mark.parametrize("period", PERIODS)
+def test_the_most_that_is_told_of_a_joint_bounds_its_correction(period):
+    """And is reached by one line: a bound of orders and zero, not more."""
+    x = np.linspace(0.0, period, 20_000)
+    single = ta.HarmonicModel(
+        [ta.Shaft("output", 1, [1], [0.0], [1e-4 * period])], -2e-4 * period, period
+    )
+    moved = model(period, 3, [ta.Backlash(1e-4 * period)])
+    robot = ta.Robot({"a": model(period, 1), "b": single, "c": moved})
+    told = {}
+    for joint, most, beside in re.findall(
+        r"(\w): .* at most (\S+) arcsec( beside its terms)?,", robot.summary()
+    ):
+        told[joint] = float(most)
+        assert bool(beside) == bool(robot[joint].terms)
+        error = robot[joint].replace(terms=()).error(x)
+        largest = float(np.abs(error).max()) * 1_296_000.0 / period
+        assert largest <= told[joint] * (1.0 + DIGITS)
+    assert told.keys() == {"a", "b", "c"}
+    assert told["b"] == pytest.approx(3e-4 * 1_296_000.0, rel=DIGITS)
+
+
+def test_terms_that_hold_over_their_own_travel_hold_together_where_all_do():
+    """Of two ramps from -100 to 500 and from 20 to 900 deg."""
+    ramps = [ScaleError(1e-5, -100.0, 500.0), ScaleError(2e-5, 20.0, 900.0)]
+    for terms in (ramps, ramps[::-1]):
+        assert model(360.0, terms=terms).partial_span == (20.0, 500.0)

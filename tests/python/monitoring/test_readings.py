@@ -1,0 +1,53 @@
+"""Readings of a log as a watched model takes them: its angle, its unit, seconds."""
+
+import io
+
+import numpy as np
+import pytest
+
+import trueangle as ta
+from trueangle.errors import FileError
+from trueangle.monitoring.readings import read_batches, read_lines
+from trueangle.runs.source import Reading
+
+TURN = np.array([0.05, 0.3, 0.55, 0.8, 1.05])
+ERROR = 1e-3 * np.array([1.0, -2.0, 0.5, 3.0, -1.5])
+PERIODS = {"deg": 360.0, "rad": 2.0 * np.pi, "turn": 1.0}
+
+
+def model(period, argument):
+    shaft = ta.Shaft("output", 1, [1], [1e-4 * period], [0.0])
+    return ta.HarmonicModel([shaft], period=period, argument=argument)
+
+
+def text(unit, clock):
+    turn, seconds = PERIODS[unit], {"s": 1.0, "ms": 1e-3}[clock]
+    lines = [f"time_{clock},reference_{unit},indicated_{unit}"]
+    for i, (x, e) in enumerate(zip(TURN.tolist(), ERROR.tolist(), strict=True)):
+        lines.append(f"{0.5 * i / seconds!r},{x * turn!r},{(x + e) * turn!r}")
+    return "\n".join(lines) + "\n"
+
+
+@pytest.mark.parametrize("argument", ["reference", "indicated"])
+@pytest.mark.parametrize("period", PERIODS.values())
+@pytest.mark.parametrize(("unit", "clock"), [("deg", "s"), ("rad", "ms"), ("turn", "s")])
+def test_angle_and_error_are_in_the_unit_of_the_model(unit, clock, period, argument, tmp_path):
+    (tmp_path / "log.csv").write_text(text(unit, clock))
+    watched, reading = model(period, argument), Reading()
+    (whole,) = read_batches(tmp_path / "log.csv", watched, reading)
+    parts = list(read_lines(io.StringIO(text(unit, clock)), watched, reading, most=2))
+    assert [part.error.size for part in parts] == [2, 2, 1]
+    joined = [np.concatenate(columns) for columns in zip(*parts, strict=True)]
+    angle = TURN if argument == "reference" else TURN + ERROR
+    for found, wanted in zip(
+        (*whole, *joined), 2 * (angle * period, ERROR * period, 0.5 * np.arange(5)), strict=True
+    ):
+        np.testing.assert_allclose(found, wanted, atol=1e-12 * period)
+
+
+def test_a_line_that_holds_no_number_is_named_wherever_it_stands():
+    lines = text("deg", "s").splitlines(keepends=True)
+    lines.insert(2, "Ready.\n")  # a word of a firmware is no reading
+    lines[5] = lines[5].replace(",", ",x", 1)
+    with pytest.raises(FileError, match=r"line 6, column 'reference_deg': a number is needed"):
+        list(read_lines(io.StringIO("".join(lines)), model(360.0, "reference"), Reading(), most=3))

@@ -1,0 +1,52 @@
+"""Limits of a rig as readings show them: loads, currents and where the joint was."""
+
+import numpy as np
+import pytest
+
+import trueangle as ta
+from trueangle.planning.limits import Limits
+
+THETA = np.arange(0.0, 360.0, 2.0)
+
+
+def run(mean=0.0, weight=0.0, start=0.0, span=360.0, **more):
+    """Readings under a constant load and a weight on an arm."""
+    theta = start + THETA * span / 360.0
+    torque = mean + weight * np.sin(np.radians(theta * 360.0 / span))
+    return ta.CalibrationRun(theta, theta, 360.0, torque=torque, **more)
+
+
+@pytest.mark.parametrize("weight", [0.0, 7.5])
+def test_a_load_is_the_mean_of_a_run_and_a_weight_half_its_swing(weight):
+    found = Limits.of_runs([run(2.0, weight), run(9.0, weight)])
+    assert found.gravity_Nm == pytest.approx(weight, abs=5e-3)
+    assert found.torque_Nm == pytest.approx((2.0, 9.0), abs=5e-3)
+    alike = Limits.of_runs([run(2.0, 7.5), run(2.5, 7.5)])  # within a fifth of the swing
+    assert alike.torque_Nm == pytest.approx((2.25, 2.25), abs=5e-3)
+
+
+@pytest.mark.parametrize(
+    ("starts", "span", "arc"),
+    [
+        ((0.0,), 360.0, (0.0, 360.0)),
+        ((-30.0, 10.0), 90.0, (-30.0, 99.5)),
+        ((20.0, 375.0), 60.0, (15.0, 79.7)),
+    ],
+)
+def test_the_arc_is_where_the_runs_went_whole_turns_taken_off(starts, span, arc):
+    found = Limits.of_runs([run(start=start, span=span) for start in starts])
+    assert found.arc_deg == pytest.approx(arc, abs=0.06)
+
+
+@pytest.mark.parametrize("period", [360.0, 2.0 * np.pi])
+def test_temperatures_currents_and_mounts_are_those_seen(period):
+    turn = THETA / 360.0 * period
+    runs = [
+        ta.CalibrationRun(turn, turn, period, temperature=20.0 + 5.0 * k, mount=k * period / 8.0,
+                          signals={"current": -1.0 + 3.0 * k})
+        for k in range(2)
+    ]  # fmt: skip
+    found = Limits.of_runs(runs)
+    assert (found.temperature_C, found.current_A) == ((20.0, 25.0), (-1.0, 2.0))
+    assert found.mount_deg == pytest.approx((0.0, 45.0))
+    assert found.samples == 360

@@ -1,0 +1,94 @@
+"""Plans in words: every number that is printed is the plan's."""
+
+import re
+
+import numpy as np
+import pytest
+
+from trueangle.planning import plan_arc, plan_mounts
+from trueangle.planning.nextruns import NextRuns, RivalEvidence
+from trueangle.planning.selfplan import plan_self
+from trueangle.simulation import RunDesign, Simulation
+
+#: Printed to three digits; factors of mounts and heads to two decimals.
+THREE, CENTS = 6e-3, 0.0051
+
+
+def rows(text, columns):
+    """Lines of nothing but so many numbers."""
+    lines = (line.split() for line in text.splitlines())
+    number = re.compile(r"-?\d+\.?\d*(e[+-]?\d+)?")
+    return [[float(x) for x in line] for line in lines
+            if len(line) == columns and all(map(number.fullmatch, line))]  # fmt: skip
+
+
+def told(text, name):
+    return float(re.search(rf"{re.escape(name)} +(-?[\d.]+)", text)[1])
+
+
+def test_of_an_arc():
+    plan = plan_arc(-135.0, 135.0, [1, 2, 3], readings=60, runs=2, both_directions=True, noise=3.0)
+    text = plan.summary()
+    assert f"{plan.readings} readings over -135 to 135 deg: 30 in each of 2 runs, half" in text
+    assert plan.readings == 60
+    places = np.array(rows(text, 2))
+    np.testing.assert_allclose(places[:, 0], plan.places_deg, atol=5.1e-4)
+    assert places[:, 1].tolist() == list(plan.counts)
+    for order, factor, even in rows(text, 3):
+        assert factor == pytest.approx(plan.noise_factors[order], rel=THREE)
+        assert even == pytest.approx(plan.even_noise_factors[order], rel=THREE)
+        assert even > 1.02 * factor
+    assert told(text, "D-efficiency") == pytest.approx(plan.d_efficiency, abs=5.1e-4)
+    assert told(text, "of even spacing") == pytest.approx(
+        plan.efficiency_of_even_spacing, abs=5.1e-4
+    )
+    assert told(text, "uncertainty (k = 2)") == pytest.approx(plan.uncertainty_arcsec, rel=THREE)
+
+
+def test_of_mounts():
+    plan = plan_mounts(100, 36, 3, noise=5.0, standard_error=0.5)
+    text = plan.summary()
+    offsets = re.search(r"offsets +(.*) deg", text)[1].split(", ")
+    assert [float(x) for x in offsets] == pytest.approx(plan.mount_offsets_deg, rel=THREE)
+    assert told(text, "worst noise factor") == pytest.approx(plan.worst_noise_factor, abs=CENTS)
+    assert told(text, "artefact fitted too    factor") == pytest.approx(
+        plan.facet_noise_factor, abs=CENTS
+    )
+    assert told(text, "readings needed") == plan.readings
+    assert f"{', '.join(map(str, plan.facet_shifts))} facets" in text
+    pairs = dict(re.findall(r"(\d+) +(\d+\.\d\d)\b", text.partition("per order")[2]))
+    for order, factor in plan.noise_factors.items():
+        assert float(pairs[f"{order:g}"]) == pytest.approx(factor, abs=CENTS)
+
+
+def test_of_heads_and_of_a_coast():
+    plan = plan_self("heads", range(1, 9), angles=[0.0, 40.0, 95.0], noise=5.0, standard_error=0.5)
+    text = plan.summary()
+    given = re.search(r"the given angles +factor (\S+), (\S+) times the best", text).groups()
+    wanted = [plan.given["worst_noise_factor"], plan.given["worse_by"]]
+    assert [float(x) for x in given] == pytest.approx(wanted, abs=CENTS)
+    assert told(text, "worst noise factor") == pytest.approx(plan.worst_noise_factor, abs=CENTS)
+    coast = plan_self(
+        "spin-down", [1, 2], start_speed=4.0, rate=500.0, noise=9.0, standard_error=0.3
+    )
+    text = coast.summary()
+    for name, value in (("turns", coast.turns), ("seconds", coast.seconds)):
+        assert told(text, f"  {name}") == pytest.approx(value, rel=THREE)
+    assert told(text, "readings needed") == coast.readings
+    for ratio, factor in coast.speed_ratio_factors.items():
+        assert float(re.search(rf"(?<![\d.]){ratio:g}: ([\d.]+)", text)[1]) == pytest.approx(
+            factor, rel=0.06
+        )
+
+
+@pytest.mark.parametrize(("told_apart", "trials"), [(True, 0), (True, 40), (False, 0)])
+def test_of_the_next_runs(told_apart, trials):
+    entry = RivalEvidence(("backlash", "latency"), True, told_apart, 23.4, 0.87, trials)
+    designs = (RunDesign(label="next-1", samples=120), RunDesign(label="next-2", samples=80))
+    plan = NextRuns(designs, (entry,), False, (), 150.0, Simulation())
+    text = " ".join(plan.summary().split())
+    assert "2 runs of 200 readings in all, 2 min of motion; diagnose with" in text
+    verb = "distinguishes backlash or latency" if told_apart else "not distinguished: backlash or"
+    assert verb in text
+    counted = f" ({trials} simulated)" if trials else ""
+    assert f"BIC better by 23 expected for the true one, named in 87 %{counted}" in text

@@ -1,0 +1,160 @@
+"""Numbers that pictures draw are those of the results, in the unit of the axis."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from scipy.stats import binomtest, norm
+
+import trueangle as ta
+from trueangle import plots
+from trueangle.fitting.phases import run_phases
+from trueangle.plots import curves
+from trueangle.plots.certified import certified_errors
+from trueangle.plots.detection import detection
+from trueangle.plots.gains import gains
+from trueangle.rehearsal.result import RehearsedCause
+
+matplotlib = pytest.importorskip("matplotlib")
+matplotlib.use("Agg")
+
+SEED = 54_100
+PERIODS = (360.0, 2.0 * np.pi, 1.0)
+#: Half width of a 95 % band: 1.96 of scipy's 1.959964.
+NINETY_FIVE = 1e-4
+
+
+def fitted(period=360.0):
+    """Three runs, unlike in every condition: speed, load, temperature and direction."""
+    rng = np.random.default_rng(SEED)
+    runs = []
+    for k, speed in enumerate((10.0, -25.0, 40.0)):
+        time = np.arange(180) * 2.0 / abs(speed)
+        theta = np.mod(speed * time, 360.0)
+        error = 0.01 * np.sin(np.radians(theta) + 0.4) + rng.normal(0.0, 1e-3, theta.size)
+        error += 0.004 * np.cos(np.radians(3.0 * theta))
+        unit = period / 360.0
+        runs.append(
+            ta.CalibrationRun(
+                theta * unit, (theta + error) * unit, period, time=time, label=f"r{k}",
+                torque=np.linspace(k, k + 1.0, 180), temperature=20.0 + 3.0 * k,
+            )
+        )  # fmt: skip
+    return ta.fit(runs, [1, 3], loss="linear")
+
+
+@pytest.fixture(scope="module")
+def fit():
+    print("seed", SEED)
+    return fitted()
+
+
+@pytest.fixture(autouse=True)
+def _closed():
+    yield
+    from matplotlib import pyplot
+
+    pyplot.close("all")
+
+
+@pytest.mark.parametrize("period", PERIODS)
+def test_residuals_stand_at_the_signal_of_their_own_run(period):
+    found = fitted(period)
+    wanted = {
+        "speed": lambda run: run.speed * 360.0 / period,
+        "torque": lambda run: run.torque,
+        "temperature": lambda run: run.temperature,
+        "time": lambda run: run.time,
+        "direction": lambda run: run.direction,
+        "angle": lambda run: run.reference * 360.0 / period,
+    }
+    assert wanted.keys() == curves.SIGNALS.keys()
+    for against, signal in wanted.items():
+        parts = curves.residual_points(found, against)
+        for part, run in zip(parts, found.runs, strict=True):
+            np.testing.assert_allclose(part.x, signal(run), atol=1e-9)
+        left = np.concatenate([part.y for part in parts])
+        np.testing.assert_allclose(left, found.residuals * 1_296_000.0 / period, rtol=1e-9)
+    means = [float(part.x.mean()) for part in curves.residual_points(found, "speed")]
+    assert means == pytest.approx([10.0, -25.0, 40.0], rel=0.02)
+
+
+@pytest.mark.parametrize(("errors_in", "per"), [("arcsec", 1.0), ("mrad", np.pi / 648.0)])
+def test_bands_and_intervals_hold_95_percent(fit, errors_in, per):
+    ax = plots.model_error(fit.model, errors_in=errors_in)
+    angle, error = ax.lines[0].get_data()
+    half = norm.ppf(0.975) * fit.model.band(angle) * 3600.0 * per
+    wanted = (fit.model.error(angle) - fit.model.constant) * 3600.0 * per
+    np.testing.assert_allclose(error, wanted, atol=1e-9)
+    (band,) = ax.collections
+    edges = {}
+    for x, y in band.get_paths()[0].vertices:
+        edges.setdefault(round(float(x), 6), set()).add(float(y))
+    for k in (5, 100, 300):
+        low, high = min(edges[round(angle[k], 6)]), max(edges[round(angle[k], 6)])
+        assert (high - low) / 2.0 == pytest.approx(half[k], rel=NINETY_FIVE)
+    bars = plots.amplitude_spectrum(fit, errors_in=errors_in).containers[0].lines[2][0]
+    ends = np.array([segment[:, 1] for segment in bars.get_segments()])
+    order = np.argsort(fit.orders)
+    half = norm.ppf(0.975) * fit.amplitude_std[order] * 3600.0 * per
+    np.testing.assert_allclose(np.diff(ends)[:, 0] / 2.0, half, rtol=NINETY_FIVE)
+    np.testing.assert_allclose(ends.mean(axis=1), fit.amplitudes[order] * 3600.0 * per)
+
+
+@pytest.mark.parametrize(("errors_in", "per"), [("arcsec", 1.0), ("mrad", np.pi / 648.0)])
+def test_phases_of_runs_and_their_mean(fit, errors_in, per):
+    ax = plots.phases_over_runs(fit, errors_in=errors_in)
+    found = sorted(run_phases(fit), key=lambda p: p.order)
+    for order, dots, mean in zip(found, ax.lines[::2], ax.lines[1::2], strict=True):
+        own = order.amplitude * np.exp(1j * order.phase)
+        drawn = dots.get_ydata() * np.exp(1j * dots.get_xdata())
+        np.testing.assert_allclose(drawn, per * own, atol=1e-9)
+        end = mean.get_ydata()[1] * np.exp(1j * mean.get_xdata()[1])
+        np.testing.assert_allclose(end, per * own.mean(), atol=1e-9)
+
+
+def test_gains_end_at_both_ends_of_their_intervals():
+    def finding(cause, share, low, high):
+        gain = SimpleNamespace(reducible_share=share, interval=(low, high))
+        return SimpleNamespace(cause=cause, gain=gain, parameters={}, confirmed=True)
+
+    rows = [("backlash", 0.6, 0.35, 0.8), ("latency", 0.25, 0.2, 0.45)]
+    diagnosis = SimpleNamespace(findings=[finding(*row) for row in rows])
+    ax = gains(diagnosis)
+    assert [bar.get_width() for bar in ax.patches] == pytest.approx([60.0, 25.0])
+    bars = ax.containers[-1].lines[2][0].get_segments()
+    assert [segment[:, 0].tolist() for segment in bars] == [
+        pytest.approx([100.0 * low, 100.0 * high]) for _, _, low, high in rows
+    ]
+
+
+@pytest.mark.parametrize(("errors_in", "per"), [("arcsec", 1.0), ("mrad", np.pi / 648.0)])
+def test_certified_errors_have_bars_of_their_expanded_uncertainty(errors_in, per):
+    positions = [
+        {"angle_deg": 30.0 * k, "error_arcsec": 4.0 * k - 20.0, "expanded_arcsec": 1.0 + 0.2 * k}
+        for k in range(12)
+    ]
+    ax = certified_errors(positions, errors_in=errors_in)
+    (bars,) = ax.containers[0].lines[2]
+    for segment, row in zip(bars.get_segments(), positions, strict=True):
+        error, expanded = (per * row[f"{name}_arcsec"] for name in ("error", "expanded"))
+        assert segment[:, 0].tolist() == [row["angle_deg"]] * 2
+        assert segment[:, 1].tolist() == pytest.approx([error - expanded, error + expanded])
+
+
+def test_shares_named_have_their_binomial_intervals():
+    tried = {2.0: (3, 20), 4.0: (11, 25), 8.0: (20, 20)}
+    cause = RehearsedCause("backlash", "half width / arcsec", tried, 4.5, None, {}, {}, {}, {})
+    (ax,) = detection(SimpleNamespace(causes=[cause])).axes
+    container = ax.containers[0]
+    size, share = container.lines[0].get_data()
+    assert (size.tolist(), share.tolist()) == ([2.0, 4.0, 8.0], [0.15, 0.44, 1.0])
+    for segment, (named, count) in zip(
+        container.lines[2][0].get_segments(), tried.values(), strict=True
+    ):
+        exact = binomtest(named, count).proportion_ci(method="wilson")
+        assert segment[:, 1].min() == pytest.approx(exact.low, abs=0.05)
+        assert segment[:, 1].max() == pytest.approx(exact.high, abs=0.05)
+    assert [line.get_xdata()[0] for line in ax.lines if line.get_linestyle() == "--"] == [4.5]
