@@ -15,6 +15,7 @@ import pytest
 
 import trueangle as ta
 from trueangle.effects import EFFECTS, Outliers, PreslidingHysteresis, TorqueHysteresis
+from trueangle.effects.drawnline import DrawnLine
 from trueangle.estimation.regression import Regression
 from trueangle.estimation.runcolumns import RunEffectColumns
 from trueangle.joint.signals import join_runs
@@ -370,3 +371,26 @@ def test_a_frequency_that_wanders_is_known_as_a_mean_of_runs(signals):
     assert told.value == pytest.approx(np.median(frequencies))
     assert parameters["frequencies_hz"].value == pytest.approx(frequencies.tolist())
     assert told.std == pytest.approx(frequencies.std() / np.sqrt(signals.runs), rel=1e-9)
+
+
+def test_a_drawn_amplitude_is_without_what_noise_adds_and_as_well_known_as_noise_lets_it(signals):
+    """By lstsq of each run: its square less the variances of cosine and sine."""
+    frequency, rng = 1.7, np.random.default_rng(43)
+    for runs in (8, 1):
+        few = signals.take(signals.run < runs)
+        waves = EFFECTS["time_periodic"].waves(few, [frequency] * runs)
+        error = 2.0 * waves[:, 0] + NOISE * rng.standard_normal(len(few))
+        start = Regression.of(few, error, SIM.surroundings, rho=0.0)
+        shape = {"frequency_hz": [frequency] * runs}
+        full = start.with_terms([start.propose_run_effect("time_periodic", shape, waves)])
+        amplitude, std = DrawnLine(full, "time_periodic", waves).amplitude()
+        squares, spread = [], []
+        for a, b in few.run_bounds():
+            wave = waves[a:b] - waves[a:b].mean(axis=0)
+            squares.append(np.sum(np.linalg.lstsq(wave, full.left[a:b], rcond=None)[0] ** 2))
+            spread.append(full.variance * np.trace(np.linalg.inv(wave.T @ wave)))
+        assert amplitude**2 == pytest.approx(np.mean(squares) - np.mean(spread), rel=2e-3)
+        # Of one run cosine alone tells it, of eight with phases alike the mean of them.
+        assert std >= np.sqrt(np.mean(spread) / 2.0 / runs) * 0.97
+        if runs == 1:
+            assert std == pytest.approx(np.sqrt(spread[0] / 2.0), rel=0.03)
