@@ -207,7 +207,7 @@ def test_a_load_hangs_where_it_is_said_to(gravity):
 ELEMENTS = {
     "presliding_hysteresis": (PreslidingHysteresis, [(4.0, 2.0), (7.0, 30.0)]),
     "presliding_hysteresis, with play": (PreslidingHysteresis, [(3.0, 0.0), (6.0, 9.0)]),
-    "torque_hysteresis": (TorqueHysteresis, [(3.0, 0.6), (5.0, 4.0)]),
+    "torque_hysteresis": (TorqueHysteresis, [(4.0, 1.5), (5.0, 4.0)]),
 }
 
 
