@@ -95,8 +95,12 @@ class CurrentCoupling(FactorEffect):
             parameters["amplitudes_arcsec_per_A"] = quantity(
                 [line[1] for line in lines], [line[3] for line in lines]
             )
-            parameters["phases_deg"] = quantity([line[2] for line in lines])
-        effect = CurrentCoupling(zero[0] if zero else 0.0, tuple((m, c, p) for m, c, p, _ in lines))
+            parameters["phases_deg"] = quantity(
+                [line[2] for line in lines], [line[4] for line in lines]
+            )
+        effect = CurrentCoupling(
+            zero[0] if zero else 0.0, tuple((m, c, p) for m, c, p, *_ in lines)
+        )
         return parameters, [effect]
 
     @classmethod

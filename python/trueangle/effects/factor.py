@@ -62,13 +62,14 @@ class FactorEffect(Effect):
         return scale[:, None] * line_columns(signals.theta, shape["order"])
 
     @classmethod
-    def line_rows(cls, terms: Sequence[Fitted]) -> list[tuple[float, float, float, float]]:
-        """(order, amplitude, phase, std of the amplitude) of the line terms."""
+    def line_rows(cls, terms: Sequence[Fitted]) -> list[tuple[float, float, float, float, float]]:
+        """(order, amplitude, phase, std of the amplitude, of the phase) of the line terms."""
         found = []
         for extension, coefficients, covariance in terms:
             if extension.shape["what"] == "line":
-                amplitude, phase, std, _ = line_parameters(coefficients, covariance)
-                found.append((float(extension.shape["order"]), amplitude, phase, std))
+                found.append(
+                    (float(extension.shape["order"]), *line_parameters(coefficients, covariance))
+                )
         return found
 
     @classmethod

@@ -127,7 +127,7 @@ class LoadDependentGearError(FactorEffect):
             "amplitudes_arcsec_per_Nm": quantity(
                 [line[1] for line in lines], [line[3] for line in lines]
             ),
-            "phases_deg": quantity([line[2] for line in lines]),
+            "phases_deg": quantity([line[2] for line in lines], [line[4] for line in lines]),
         }
         effects: list[Effect] = []
         for kind in ("signed", "absolute"):

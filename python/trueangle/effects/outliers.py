@@ -113,7 +113,7 @@ class Outliers(Effect):
         """Wild readings: a narrow and a wide normal must beat one normal and heavy tails."""
         if regression.is_explained:
             return None
-        e = _beside_neighbours(regression)
+        e, deviation = _beside_neighbours(regression)
         n = regression.n
         normal = _normal(e, max(float(np.sqrt(np.mean(e**2))), NARROWEST))
         tails = max(_student(e, nu, s) for nu in TAILS for s in SCALES)
@@ -143,7 +143,8 @@ class Outliers(Effect):
         bursts = int(np.count_nonzero(_lengths(regression, rows) > 1))
         if _at_reversals(regression, rows):
             return None
-        spread = size * scale * np.sqrt(regression.variance)
+        # Not by the variance of all readings: outliers are in it, clipped.
+        spread = size * scale * deviation
         std = float(np.sqrt(share * (1.0 - share) / n))
         parameters: Parameters = {
             "fraction": quantity(
@@ -181,8 +182,8 @@ def _apart(e: Array) -> NDArray[np.int64]:
     return np.sort(order[: gaps[-1] + 1]) if gaps.size else order[:0]
 
 
-def _beside_neighbours(regression: Regression) -> Array:
-    """Residuals less what both neighbours tell of them, in robust standard deviations.
+def _beside_neighbours(regression: Regression) -> tuple[Array, float]:
+    """Residuals less what both neighbours tell of them, in a robust standard deviation; and that.
 
     ::
 
@@ -204,7 +205,7 @@ def _beside_neighbours(regression: Regression) -> Array:
     ends = np.isin(rows, np.array(regression.bounds) - [0, 1])
     beside = e[rows] + away[rows] / np.where(ends, np.sqrt(1.0 + rho**2), 1.0)
     e[rows] = np.where(np.abs(beside) < np.abs(away[rows]), beside, away[rows])
-    return np.asarray(e / max(spread, 1e-300))
+    return np.asarray(e / max(spread, 1e-300)), spread
 
 
 def _unfiltered(regression: Regression) -> Array:

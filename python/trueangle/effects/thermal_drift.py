@@ -116,11 +116,13 @@ class ThermalDrift(FactorEffect):
             parameters["amplitudes_arcsec_per_K"] = quantity(
                 [line[1] for line in lines], [line[3] for line in lines]
             )
-            parameters["phases_deg"] = quantity([line[2] for line in lines])
+            parameters["phases_deg"] = quantity(
+                [line[2] for line in lines], [line[4] for line in lines]
+            )
         effect = ThermalDrift(
             zero[0] if zero else 0.0,
             pattern[0] if pattern else 0.0,
-            tuple((m, c, p) for m, c, p, _ in lines),
+            tuple((m, c, p) for m, c, p, *_ in lines),
             REFERENCE_C,
         )
         return parameters, [effect]

@@ -86,9 +86,9 @@ class TorsionalCompliance(FactorEffect):
             parameters["arcsec_per_Nm"] = quantity(lines[0][1], lines[0][3])
         if lines:
             parameters["gravity_arcsec_per_Nm"] = quantity(lines[0][1], lines[0][3])
-            parameters["gravity_phase_deg"] = quantity(lines[0][2])
+            parameters["gravity_phase_deg"] = quantity(lines[0][2], lines[0][4])
         effect = TorsionalCompliance(
-            direct[0] if direct else 0.0, tuple((m, c, p) for m, c, p, _ in lines)
+            direct[0] if direct else 0.0, tuple((m, c, p) for m, c, p, *_ in lines)
         )
         return parameters, [effect]
 

@@ -180,22 +180,30 @@ def test_what_beliefs_are_measured_as_scatters_as_they_say():
 
 
 def test_a_corrected_belief_gains_what_was_wrong_with_it():
-    """A line and an effect at once: the energy of each difference, and noise is left."""
+    """A line and an effect at once: the energy of each difference, and noise is left.
+
+    Of the effect as it is, not as an account measured it with an error of its own.
+    """
     line, effect = Harmonic("output", 1, 14.0, 243.0), Backlash(6.0)
     sim = Simulation(JOINT, (line,), (effect,), SIGMA, RUNS)
     truth = replace(sim, harmonics=(replace(line, amplitude_arcsec=9.0),), effects=(Backlash(3.0),))
     signals, around = join_runs(simulate(sim, 1)), sim.surroundings
-    errors = [e.expected(signals, around) for e in (effect, Backlash(3.0))]
+    errors = [e.expected(signals, around) for e in (effect, Backlash(3.0), Backlash(2.2))]
     noise = np.random.default_rng(7101).standard_normal(len(signals))
     y = truth.predict(signals) - sim.predict(signals) + noise
     fitted = Regression.of(signals, y - errors[1] + errors[0], around, rho=0.0)
     of_line, of_effect = measure_belief_gains(fitted, [slice(1, 3)], [(errors[0], errors[1])])
+    nearly = Regression.of(signals, y - errors[2] + errors[0], around, rho=0.0)
+    (of_nearly,) = measure_belief_gains(nearly, [], [(errors[0], errors[2])])
     wrong = Harmonic("output", 1, 5.0, 243.0).coefficients
     wrong = np.cos(signals.theta) * wrong[0] + np.sin(signals.theta) * wrong[1]
-    for gain, difference in ((of_line, wrong), (of_effect, errors[1] - errors[0])):
+    play = errors[1] - errors[0]
+    for gain, difference in ((of_line, wrong), (of_effect, play), (of_nearly, play)):
         wanted = np.hypot(np.std(difference), SIGMA)
         assert gain.before[0] == pytest.approx(wanted, rel=0.03)
         assert gain.after[0] == pytest.approx(SIGMA, rel=0.03)
-        assert gain.reducible_share == pytest.approx(1.0, abs=0.05)
+        # What an account measured wrong is in its noise, which counts as not to be taken off.
+        near = 0.05 if gain is not of_nearly else 0.1
+        assert gain.reducible_share == pytest.approx(1.0, abs=near)
         assert gain.holdout == "whole runs (4 parts)"
         assert gain.note == ""

@@ -108,7 +108,7 @@ def test_correlated_noise_that_runs_off_at_an_end_is_no_outlier():
     runs = [ta.CalibrationRun(part, part, period=360.0) for part in np.split(theta, cuts)]
     found = Regression.of(join_runs(runs), noise, SIM.surroundings, rho=0.95)
     # Against the level alone: 6.8.
-    assert abs(_beside_neighbours(found)[-1]) < 4.0
+    assert abs(_beside_neighbours(found)[0][-1]) < 4.0
 
 
 def test_noise_that_is_narrower_than_normal_has_no_outliers():

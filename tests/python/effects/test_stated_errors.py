@@ -136,3 +136,5 @@ def test_a_stated_error_is_the_bound_of_cramer_and_rao(case, signals):
         told = parameters[name]
         assert NEAR[0] < told.std / bound < NEAR[1], (name, told, bound)
         assert abs(told.value - getattr(hidden, name)) < 4.0 * bound, (name, told, bound)
+        # What extends a simulation is what is told.
+        assert getattr(effects[0], name) == pytest.approx(told.value, rel=1e-12)

@@ -119,6 +119,18 @@ def test_the_determinant_is_that_of_numpy():
     assert sums.log_determinant == pytest.approx(expected, rel=ROUNDING)
 
 
+def test_sums_about_any_coefficients_are_those_of_the_residuals():
+    """Of the best ones and of others, as a prior leaves them."""
+    design, target, _ = drawn(13, 40, 3)
+    sums = NormalEquations.of_rows(design, target[:, 0])
+    for off in (0.0, 0.5):
+        coefficients = sums.solved().coefficients[:, 0] + off
+        about = sums.about(coefficients)
+        wanted = NormalEquations.of_rows(design, target[:, 0] - design @ coefficients)
+        np.testing.assert_allclose(about.moment, wanted.moment, atol=1e-9)
+        assert about.squares == pytest.approx(wanted.squares, rel=1e-9)
+
+
 @pytest.mark.parametrize("ridge", [0.0, 1e-2])
 def test_each_group_is_predicted_by_a_fit_of_the_rows_of_the_others(ridge):
     design, target, _ = drawn(11, 90, 4)

@@ -99,7 +99,7 @@ def estimate_noise(left: Leftover) -> Noise:
     e = left.residual[:stop]
     spread = 1.4826 * float(np.median(np.abs(e - np.median(e))))
     # Wild readings would hide a correlation; what is slow keeps its size.
-    e = _without_spikes(e, max(spread, 1e-300))
+    e = _without_spikes(e, max(spread, 1e-300), bounds)
     columns = left.kept.get("pattern")
     if columns is None:
         pattern = _centred(_pattern(left, stop, len(bounds)), bounds)
@@ -151,11 +151,19 @@ def _some(bounds: list[tuple[int, int]]) -> list[tuple[int, int]]:
     return kept
 
 
-def _without_spikes(e: Array, spread: float) -> Array:
-    """Readings far from the mean of their neighbours put back to it."""
+def _without_spikes(e: Array, spread: float, bounds: list[tuple[int, int]]) -> Array:
+    """Readings far from the mean of their neighbours in the run put back to it."""
     if e.size < 3:
         return e
-    beside = 0.5 * (np.concatenate([e[1:2], e[:-1]]) + np.concatenate([e[1:], e[-2:-1]]))
+    first, last = (
+        np.array(ends) - shift
+        for ends, shift in zip(zip(*bounds, strict=True), (0, 1), strict=True)
+    )
+    before, after = np.roll(e, 1), np.roll(e, -1)
+    # At either end of a run the one neighbour: another run has a zero of its own.
+    before[first] = e[np.minimum(first + 1, last)]
+    after[last] = e[np.maximum(last - 1, first)]
+    beside = 0.5 * (before + after)
     away = e - beside
     limit = CLIP * max(1.4826 * float(np.median(np.abs(away))), 1e-12 * spread)
     return np.where(np.abs(away) > limit, beside + np.clip(away, -limit, limit), e)

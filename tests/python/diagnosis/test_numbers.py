@@ -1,0 +1,297 @@
+"""Figures of an account by what they are said to be, and each under its own name in JSON."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+import trueangle as ta
+from trueangle.diagnosis.beliefs import Belief
+from trueangle.diagnosis.correction import _ranges
+from trueangle.diagnosis.delay import Delay, delay_finding, error_before
+from trueangle.diagnosis.diagnose import _noise, _overall, _structure
+from trueangle.diagnosis.discrepancy import Discrepancy
+from trueangle.diagnosis.finding import Finding
+from trueangle.diagnosis.gain import _exchanged, _level
+from trueangle.diagnosis.holdout import reducible_share
+from trueangle.diagnosis.overlap import overlaps
+from trueangle.diagnosis.remainder import share_of_run
+from trueangle.diagnosis.wrongplace import moved
+from trueangle.effects import EFFECTS, LocalDefect
+from trueangle.effects.blindness import Blindness
+from trueangle.estimation.estimate import quantity
+from trueangle.estimation.regression import Regression
+from trueangle.joint.signals import join_runs
+from trueangle.simulation import Harmonic, RunDesign, Simulation, simulate
+
+SIGMA = 1.3
+RUNS = tuple(
+    RunDesign(samples=n, reversals=(0.4,), speed_deg_s=v, start_deg=30.0 * n)
+    for n, v in ((90, 5.0), (140, 30.0), (200, 5.0), (70, 30.0))
+)
+SIM = Simulation(harmonics=(Harmonic("output", 1, 20.0, 30.0),), sigma_arcsec=SIGMA, runs=RUNS)
+
+
+@pytest.fixture(scope="module")
+def signals():
+    return join_runs(simulate(SIM, 2))
+
+
+def regression(signals, error, seed=5):
+    noise = SIGMA * np.random.default_rng(seed).standard_normal(len(signals))
+    return Regression.of(signals, error + noise, SIM.surroundings, rho=0.0)
+
+
+# -- figures ---------------------------------------------------------------------------
+
+
+def test_the_noise_is_what_is_left_over_its_degrees_of_freedom(signals):
+    """By lstsq, with columns enough to tell a root of n from that of n - p; outliers count not."""
+    wide = np.random.default_rng(6).normal(size=(len(signals), 60))
+    start = regression(signals, 0.0)
+    full = start.with_terms([start.propose("backlash", {}, wide)])
+    design = np.hstack([start.base, wide])
+    rest, rank = np.linalg.lstsq(design, start.residual, rcond=None)[1:3]
+    assert not full.outlying.any()
+    found = SimpleNamespace(found=False, noise=SimpleNamespace(sigma=77.0))
+    assert _noise(full, found) == pytest.approx(np.sqrt(rest[0] / (len(signals) - rank)))
+    found.found = True
+    assert _noise(full, found) == 77.0
+    wild = np.zeros(len(signals))
+    wild[[3, 300]] = 1e4
+    found.found = False
+    assert _noise(regression(signals, wild), found) == pytest.approx(SIGMA, rel=0.1)
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_what_is_left_before_and_after_is_told_by_three_numbers(sign, signals):
+    error = sign * 4.0 * signals.direction
+    error[17] += sign * 3.0
+    start = regression(signals, error)
+    full = start.with_terms([EFFECTS["backlash"].propose(start)])
+    told = _overall(start, full)
+    for name, one in (("before", start), ("after", full)):
+        left = one.residual - one.design @ one.coefficients
+        wanted = np.sqrt(np.mean(left**2)), left.max() - left.min(), max(left.max(), -left.min())
+        keys = (f"rms_{name}_arcsec", f"peak_to_peak_{name}_arcsec", f"max_abs_{name}_arcsec")
+        assert [told[key] for key in keys] == pytest.approx(wanted)
+
+
+def test_shares_of_structure_are_of_the_variance(signals):
+    start = regression(signals, 3.0 * signals.direction)
+    found = _structure(start)
+    about = signals.direction - signals.direction.mean()
+    power = 9.0 * np.mean(about**2)
+    assert found["backlash"] == pytest.approx(power / (power + SIGMA**2), abs=0.03)
+    assert list(found.values()) == sorted(found.values(), reverse=True)
+
+
+def test_time_is_in_shares_of_its_own_run(signals):
+    found = share_of_run(signals)
+    for start, stop in signals.run_bounds():
+        clock = signals.clock[start:stop]
+        wanted = (clock - clock[0]) / (clock[-1] - clock[0])
+        np.testing.assert_allclose(found[start:stop], wanted, atol=1e-12)
+
+
+def test_columns_that_oppose_each_other_overlap_as_much_as_those_that_do_not(signals):
+    rng = np.random.default_rng(9)
+    one = rng.normal(size=len(signals))
+    for sign in (1.0, -1.0):
+        other = sign * one + 0.5 * rng.normal(size=len(signals))
+        start = regression(signals, 3.0 * one + 3.0 * other)
+        terms = [
+            start.propose(c, {}, x[:, None]) for c, x in (("backlash", one), ("latency", other))
+        ]
+        ((i, j, found),) = overlaps(start.with_terms(terms), [[0], [1]])
+        assert (i, j) == (0, 1)
+        assert found == pytest.approx(1.0 / np.sqrt(1.25), abs=0.03)
+
+
+def test_the_interval_of_a_share_is_that_of_95_of_100():
+    """Four standard deviations wide, nearly: by leaving out each of 400 runs in turn."""
+    rng = np.random.default_rng(61)
+    unit = np.repeat(np.arange(400), 20)
+    taken = 3.0 * (1.0 + 0.5 * rng.standard_normal(400))[unit]
+    before = taken + rng.standard_normal(unit.size)
+    after = before - taken * (0.8 + 0.2 * rng.standard_normal(400))[unit]
+    share, (low, high) = reducible_share(before, after, unit, 1.0, rng)
+    p0, p1 = (np.mean(e.reshape(400, 20) ** 2, axis=1) for e in (before, after))
+    rest = [
+        (p0.sum() - a - p1.sum() + b) / (p0.sum() - a - 399.0) for a, b in zip(p0, p1, strict=True)
+    ]
+    std = np.std(rest) * 399.0 / np.sqrt(400.0) * np.sqrt(400.0 / 399.0)
+    # Quantiles of a thousand draws: each known to some 5 % of its distance.
+    assert (high - low) / (2.0 * 1.96 * std) == pytest.approx(1.0, abs=0.1)
+    assert low < share < high
+
+
+def test_the_share_is_of_what_can_be_taken_off():
+    rng = np.random.default_rng(3)
+    before = np.array([3.0, -3.0] * 50)
+    after = np.array([1.0, -1.0] * 50)
+    unit = np.repeat(np.arange(10), 10)
+    found, _ = reducible_share(before, after, unit, 1.0, rng)
+    assert found == pytest.approx((9.0 - 1.0) / (9.0 - 1.0))
+    found, _ = reducible_share(before, after, unit, 5.0, rng)
+    assert found == pytest.approx(8.0 / 4.0)
+
+
+def test_exchanged_levels_are_those_of_other_runs(signals):
+    values = np.random.default_rng(4).normal(20.0, 5.0, len(signals))
+    other = np.array([2, 0, 3, 1])
+    found = _exchanged(values, signals.run, other)
+    levels = _level(values, signals.run)
+    assert _level(found, signals.run) == pytest.approx(levels[other])
+
+
+def test_ranges_of_signals_are_those_of_all_runs():
+    runs = simulate(SIM, 2)
+    runs = [replace(run, torque=run.torque + 4.0 - 3.0 * k) for k, run in enumerate(runs)]
+    found = {name: (low, high) for name, low, high in _ranges(runs)}
+    assert found["torque"] == pytest.approx((-5.0, 4.0))
+    assert found["velocity"] == pytest.approx((-30.0, 30.0))
+    assert found["temperature"] == pytest.approx((20.0, 20.0))
+
+
+# -- a delay that moves the pattern ----------------------------------------------------
+
+TRUE = 0.025
+
+
+def delayed(seed: int) -> tuple:
+    """Sweeps there and back whose pattern is that of an angle 25 ms before; and an offset of it."""
+    rng = np.random.default_rng(seed)
+    time = np.arange(600) / 50.0
+    runs = []
+    for swing in (90.0, 140.0):
+
+        def angle(at, swing=swing):
+            return 200.0 - swing * np.cos(2.0 * np.pi * at / 12.0)  # fmt: skip
+
+        then = angle(time - TRUE)
+        indicated = then + 2.0 * np.sin(np.radians(4.0 * then)) + rng.normal(0.0, 0.02, time.size)
+        runs.append(ta.CalibrationRun(angle(time), indicated, period=360.0, time=time))
+    signals = join_runs(runs)
+    error = np.concatenate([3600.0 * (run.indicated - run.reference) for run in runs])
+    pattern = Harmonic("output", 4, 7200.0, 0.0)
+    sim = Simulation(harmonics=(pattern,))
+    return signals, error, sim
+
+
+def told_delay(seed: int, offset: float) -> Finding:
+    signals, error, sim = delayed(seed)
+    then, moved_error = error_before(signals, error, TRUE + offset)
+    around = sim.surroundings
+    chosen = Regression.of(then, moved_error - sim.predict(then), around, rho=0.0)
+    plain = Regression.of(signals, error - sim.predict(signals), around, rho=0.0)
+    given = Delay(TRUE + offset, 1e-5)
+    rest = SimpleNamespace(found=False, beside_path=0.0)
+    return delay_finding(given, chosen, plain, False, rest), chosen, plain
+
+
+@pytest.mark.parametrize("offset", [-1e-4, 1e-4])
+def test_a_delay_is_told_from_where_the_account_stands(offset):
+    """The rest of it is added with its sign, and its error is by how much seeds scatter."""
+    pulls = []
+    for seed in range(40):
+        found, chosen, plain = told_delay(7_300 + seed, offset)
+        told = found.parameters["delay_s"]
+        pulls.append((told.value - TRUE) / told.std)
+        assert found.effects[0].delay_s == told.value
+    assert abs(np.mean(pulls)) < 5.0 / np.sqrt(40)
+    # A deviation of 40 is known to 11 %.
+    assert 0.6 < np.std(pulls) < 1.5
+    saved = plain.deviance - chosen.deviance
+    assert found.evidence == pytest.approx(
+        {"deviance": saved, "bic_gain": saved - chosen.log_n, "parameters": 1.0, "log_grid": 0.0}
+    )
+
+
+# -- beliefs at another place ----------------------------------------------------------
+
+
+def test_what_is_at_another_place_is_told_with_its_errors():
+    believed = LocalDefect(110.0, 8.0, 4.0)
+    absent = Belief("local_defect", "absent", {"factor": 1.0}, {"factor": 0.0}, {"factor": 0.1})
+    finding = Finding(
+        "local_defect",
+        {"place_deg": quantity(200.0, 0.5), "width_deg": quantity(7.5, 0.25),
+         "height_arcsec": quantity(4.25, 0.125), "shaft": quantity("output")},
+        {"bic_gain": 90.0}, None, [], [LocalDefect(200.0, 7.5, 4.25)],
+    )  # fmt: skip
+    (found,), left = moved([absent], [finding], replace(SIM, effects=(believed,)))
+    assert left == []
+    assert found.verdict == "wrong_place"
+    assert found.believed == {"place_deg": 110.0, "width_deg": 8.0, "height_arcsec": 4.0}
+    assert found.measured == {"place_deg": 200.0, "width_deg": 7.5, "height_arcsec": 4.25}
+    assert found.std == {"place_deg": 0.5, "width_deg": 0.25, "height_arcsec": 0.125}
+
+
+# -- JSON ------------------------------------------------------------------------------
+
+
+def test_every_figure_of_an_account_has_its_own_key():
+    result = ta.diagnose(simulate(SIM, 2), SIM, gain=False)
+    sizes = {f"{n}_{w}_arcsec": float(10 * k + j) for k, n in enumerate(("rms", "max_abs"), 2)
+             for j, w in enumerate(("before", "after"))}  # fmt: skip
+    spot = Blindness(("backlash", "latency"), "why", "what", True, 9.5, common="backlash")
+    made = replace(
+        result,
+        discrepancy=Discrepancy(1.5, 2.5, 3.5, 4.5, 5.5),
+        structure={"backlash": 0.25},
+        noise=6.5,
+        correlation=0.375,
+        readings=701,
+        readings_used=650,
+        gain=sizes,
+        not_identifiable=[spot],
+        notes=["a note"],
+        complete=False,
+        unexplained=replace(result.unexplained, found=True, rms=7.5, share=0.125),
+        unexplained_before=replace(result.unexplained, found=False, rms=8.5, share=0.625),
+    )
+    told = json.loads(made.to_json("joint.toml"))
+    assert told["simulation"] == {
+        "rms_arcsec": 1.5, "peak_to_peak_arcsec": 2.5, "max_abs_arcsec": 3.5,
+        "closure_arcsec": 4.5, "zero_spread_arcsec": 5.5,
+    }  # fmt: skip
+    names = ("structure", "noise_arcsec", "noise_correlation", "readings", "readings_used", "gain")
+    assert [told[name] for name in names] == [{"backlash": 0.25}, 6.5, 0.375, 701, 650, sizes]
+    assert (told["complete"], told["notes"]) == (False, ["a note"])
+    assert told["extended_simulation"] == "joint.toml"
+    rest, before = told["unexplained"], told["unexplained"]["before"]
+    assert (rest["found"], rest["rms_arcsec"], rest["share"]) == (True, 7.5, 0.125)
+    assert (before["found"], before["rms_arcsec"], before["share"]) == (False, 8.5, 0.625)
+    assert told["not_identifiable"] == [
+        {"causes": ["backlash", "latency"], "because": "why", "measure": "what",
+         "supported": True, "bic_gain": 9.5, "estimates": {}}
+    ]  # fmt: skip
+    for item, entry in zip(made.unexplained.evidence, rest["evidence"], strict=True):
+        assert (entry["test"], entry["p"], entry["decides"]) == (item.test, item.p, item.decides)
+        assert entry["statistic"] == item.statistic
+
+
+@pytest.mark.parametrize(("cause", "correctable"), [("backlash", True), ("zero_slip", False)])
+def test_every_figure_of_a_finding_has_its_own_key(cause, correctable):
+    finding = Finding(
+        cause,
+        {"size": quantity(1.5, 0.25)},
+        {"bic_gain": 2.5, "deviance": 3.5},
+        None,
+        [("latency", 4.5), ("sidebands", -5.5)],
+        status="not_confirmed",
+        reason="why",
+    )
+    told = finding.to_dict()
+    assert told["parameters"] == {"size": {"value": 1.5, "std": 0.25}}
+    assert told["evidence"] == {"bic_gain": 2.5, "deviance": 3.5}
+    assert told["rivals"] == [{"cause": "latency", "bic_gap": 4.5},
+                              {"cause": "sidebands", "bic_gap": -5.5}]  # fmt: skip
+    assert (told["status"], told["status_reason"], told["gain"]) == ("not_confirmed", "why", None)
+    assert told["physics"] == EFFECTS[cause].sentence
+    assert told["correctable"] is correctable

@@ -1,0 +1,124 @@
+"""Runs as they are designed: time, place, load and warmth at every reading, by their own laws."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import trueangle as ta
+from trueangle.joint.declared import Head
+from trueangle.simulation import (
+    Harmonic,
+    HeteroscedasticNoise,
+    Joint,
+    ReferenceLines,
+    RunDesign,
+    Simulation,
+    simulate,
+)
+
+N = 4_000
+
+
+def only(design: RunDesign, sim: Simulation = Simulation(), seed: int = 1) -> ta.CalibrationRun:  # noqa: B008
+    (run,) = simulate(replace(sim, runs=(design,)), seed)
+    return run
+
+
+@pytest.mark.parametrize("direction", [1, -1])
+@pytest.mark.parametrize("spacing", ["uniform", "clock", "jittered"])
+def test_a_coasting_shaft_is_where_its_speed_takes_it(spacing, direction):
+    """The angle is the integral of the speed, which falls with the travel and with time."""
+    run = only(RunDesign(direction=direction, speed_deg_s=40.0, speed_end_deg_s=10.0, samples=N,
+                         spacing=spacing, turns=2.0, start_deg=15.0))  # fmt: skip
+    time, speed = run.time, run.velocity
+    way = np.concatenate([[0.0], np.cumsum(0.5 * np.diff(time) * (speed[1:] + speed[:-1]))])
+    # The trapezium is exact to the third power of a step.
+    np.testing.assert_allclose(run.reference - run.reference[0], way, atol=1e-3)
+    travel = np.abs(run.reference - 15.0)
+    np.testing.assert_allclose(np.abs(speed), 40.0 - 30.0 * travel / 720.0, rtol=1e-9)
+    np.testing.assert_allclose(np.abs(speed), 40.0 * np.exp(-30.0 / 720.0 * time), rtol=1e-9)
+    assert np.all(np.sign(speed) == direction)
+    if spacing == "clock":
+        np.testing.assert_allclose(np.diff(time), np.diff(time).mean(), rtol=1e-6)
+    assert travel[-1] == pytest.approx(720.0, rel=2e-3)
+
+
+def test_readings_are_jittered_each_within_its_own_step():
+    share = only(RunDesign(samples=N)).reference / 360.0 * N - np.arange(N)
+    assert share.min() >= 0.0
+    assert share.max() < 1.0
+    # Uniform: a twelfth, known to 1.4 %.
+    assert np.var(share) == pytest.approx(1.0 / 12.0, rel=0.06)
+    assert abs(np.corrcoef(share[1:], share[:-1])[0, 1]) < 5.0 / np.sqrt(N)
+
+
+def test_load_warmth_and_mount_are_those_of_the_place():
+    run = only(RunDesign(samples=500, turns=1.5, reversals=(0.4,), start_deg=70.0, torque_Nm=2.0,
+                         gravity_Nm=5.0, gravity_deg=30.0, temperature_C=20.0,
+                         temperature_end_C=32.0, mount_deg=40.0, shift_deg=25.0))  # fmt: skip
+    moment = 2.0 + 5.0 * np.sin(np.radians(run.reference - 30.0))
+    np.testing.assert_allclose(run.torque, moment, atol=1e-9)
+    way = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(run.reference)))])
+    np.testing.assert_allclose(run.temperature, 20.0 + 12.0 * way / 540.0, atol=0.1)
+    # A reference that is an encoder turned for this run has turned on its mount.
+    np.testing.assert_allclose(run.mount, 65.0)
+    np.testing.assert_allclose(run.signals["shift"], 25.0)
+
+
+def test_an_encoder_that_was_turned_reads_with_its_own_error():
+    """In runs in which it was not, the same error is one of the joint's readings against it."""
+    lines = ReferenceLines((3.0,), (20.0,), (10.0,))
+    sim = Simulation(effects=(lines,))
+    designs = [RunDesign(samples=300, mount_deg=50.0), RunDesign(samples=300, shift_deg=50.0)]
+    for run, turned in zip(simulate(sim, 5, designs), (False, True), strict=True):
+        error = 3600.0 * (run.indicated - run.reference)
+        place = run.indicated if turned else run.reference
+        wanted = 20.0 * np.sin(3.0 * np.radians(place + 50.0) + np.radians(10.0))
+        # To first order in the error itself: 20 arcsec of a radian.
+        np.testing.assert_allclose(error, wanted, atol=0.02)
+
+
+def test_motor_and_heads_read_where_they_are():
+    """A head sees the disc's error at its own place; the motor its own noise, not reduced."""
+    line = Harmonic("output", 2, 50.0, 30.0)
+    joint = Joint(20.0, heads=(Head(0.0), Head(100.0)))
+    sim = Simulation(joint, (line,), sigma_arcsec=0.0)
+    run = only(RunDesign(samples=N, motor_sigma_arcsec=90.0), sim)
+    there = np.radians(run.reference + 100.0)
+    error = 3600.0 * (run.signals["head2"] - 100.0 - run.reference)
+    np.testing.assert_allclose(error, 50.0 * np.sin(2.0 * there + np.radians(30.0)), atol=1e-6)
+    np.testing.assert_allclose(run.signals["head1"], run.indicated, atol=1e-12)
+    noise = 3600.0 * (run.signals["motor"] - 20.0 * run.reference)
+    # A deviation of 4000 is known to 1.1 %.
+    assert np.std(noise) == pytest.approx(90.0, rel=0.05)
+    noisy = only(RunDesign(samples=N), replace(sim, sigma_arcsec=4.0))
+    own, other = (3600.0 * (noisy.signals[f"head{k}"] - at - noisy.reference)
+                  for k, at in ((1, 0.0), (2, 100.0)))  # fmt: skip
+    own -= 50.0 * np.sin(2.0 * np.radians(noisy.reference) + np.radians(30.0))
+    other -= 50.0 * np.sin(2.0 * np.radians(noisy.reference + 100.0) + np.radians(30.0))
+    assert np.std([own, other], axis=1) == pytest.approx([4.0, 4.0], rel=0.05)
+    assert abs(np.corrcoef(own, other)[0, 1]) < 0.08
+
+
+def test_uneven_noise_has_the_deviation_of_its_law():
+    sim = Simulation(sigma_arcsec=3.0, effects=(HeteroscedasticNoise(per_deg_s=0.05),))
+    runs = simulate(sim, 7, [RunDesign(samples=N, speed_deg_s=v) for v in (0.0, 20.0, 60.0)])
+    found = [3600.0 * np.std(run.error) for run in runs]
+    assert found == pytest.approx(3.0 * np.exp(0.025 * np.array([0.0, 20.0, 60.0])), rel=0.06)
+
+
+def test_friction_wanders_by_its_size_and_forgets_in_its_memory():
+    """By the speed's own changes: an acceleration of its deviation and correlation."""
+    run = only(RunDesign(samples=20_000, turns=200.0, speed_deg_s=60.0, spacing="uniform",
+                         friction_deg_s2=4.0, friction_memory_s=2.0), seed=9)  # fmt: skip
+    step = float(np.median(np.diff(run.time)))
+    pushed = np.diff(run.velocity) / np.diff(run.time)
+    pushed = pushed[100:] - pushed[100:].mean()
+    # 1200 s of a memory of 2 s: some 300 pieces, their deviation known to 4 %.
+    assert np.std(pushed) == pytest.approx(4.0, rel=0.2)
+    lag = round(2.0 / step)
+    found = np.corrcoef(pushed[lag:], pushed[:-lag])[0, 1]
+    assert found == pytest.approx(np.exp(-1.0), abs=0.2)
