@@ -166,3 +166,18 @@ def test_errors_hold_where_neighbours_agree() -> None:
     assert abs(np.mean(pulls)) < 4.5 / math.sqrt(64.0)
     # White errors are two and a half times too small; forty blocks tell theirs to a ninth.
     assert 0.7 < np.std(pulls) < 1.5
+
+
+@pytest.mark.parametrize("sense", [1.0, -1.0])
+def test_shifts_that_readings_contradict_are_told_by_how_much(sense: float) -> None:
+    """Of either sense: what a clamping is off by most is said, and its readings are taken."""
+    log = clamped(SEED + 500)
+    log["shift_deg"] = (
+        sense * (np.array(SHIFTS) + np.array([0.0, -2.5, 5.0]))[log["run"].astype(int)]
+    )
+    found = selfcal(log)
+    (note,) = [n for n in found.notes if "are off shift_deg" in n]
+    assert float(note.split("by up to ")[1].split()[0]) == pytest.approx(5.0, abs=0.02)
+    assert found.beside["shifts_deg"] == pytest.approx(SHIFTS, abs=0.1)
+    log["shift_deg"] = sense * np.array(SHIFTS)[log["run"].astype(int)]
+    assert not any("shift_deg" in n for n in selfcal(log).notes)
