@@ -22,7 +22,6 @@ from numpy.typing import NDArray
 
 from ..errors import ArgumentError, NoModelError
 from ..runs.travel import Span, travelled_span
-from ..support.distributions import f_tail
 from .dense import fit_dense
 from .dualfit import (
     BESIDE_RATIO,
@@ -33,6 +32,7 @@ from .dualfit import (
     estimate_ratio,
     fit_lines,
     rows_of,
+    with_slow,
 )
 from .gearlines import Channels, SharedLine, channels_of, lines_of, slope_ratio, varied
 from .modelling import made_model
@@ -40,6 +40,7 @@ from .projected import pairs
 from .recording import Recording
 from .result import ARCSEC, Blind, HeldOut, OrderEstimate, SelfCalibration, estimates
 from .summary import listed
+from .verification import chance_of
 
 __all__ = ["dual"]
 
@@ -65,6 +66,11 @@ _BLOCKS: Final = 20
 
 #: Readings from which parts of them predict each other.
 _READINGS: Final = 200
+
+#: Degrees of freedom of a covariance that 40 blocks of each of two parts tell, and coefficients
+#: up to which they do.
+_FREEDOM: Final = 78.0
+_FEW: Final = 32
 
 
 class _UsedRatio(NamedTuple):
@@ -303,8 +309,10 @@ def _held_out(channels: Channels, ratio: float, fit: DualFit) -> dict[str, HeldO
         list(rows_of(channels, ratio, fit.lines, fit.zeros, Sample(blocks, first)))
         for first in (0, 1)
     )
-    first = fit_dense(trained, columns)
-    own = fit_dense(judged, columns)
+    many = len(columns) > _FEW
+    first, own = (
+        with_slow(fit_dense(rows, columns), fit.lines, motor=many) for rows in (trained, judged)
+    )
     nuisances = np.concatenate([p.nuisances for p in judged])
     plain = np.concatenate([p.target for p in judged])
     predicted = plain - np.concatenate([p.patterns @ first.patterns for p in judged])
@@ -312,15 +320,21 @@ def _held_out(channels: Channels, ratio: float, fit: DualFit) -> dict[str, HeldO
         math.sqrt(float(np.mean((y - nuisances @ np.linalg.lstsq(nuisances, y, 1e-12)[0]) ** 2)))
         for y in (plain, predicted)
     )
-    ratio_f = after**2 / max(own.projected.variance, 1e-300)
-    free = float(own.residuals.size) / (1.0 if not own.correlated else own.residuals.size / 40.0)
+    seen = first.projected.seen & own.projected.seen
+    freedom = first.projected.freedom + own.projected.freedom
+    if first.correlated or own.correlated:
+        freedom = math.inf if many else _FREEDOM
     names = ("the first half", "the second half") if halves else ("odd blocks", "even blocks")
     return {
         "halves" if halves else "blocks": HeldOut(
             *names,
             before * ARCSEC,
             after * ARCSEC,
-            f_tail(ratio_f / (1.0 + 4.0 * len(fit.lines) / free), free, free),
+            chance_of(
+                (own.patterns - first.patterns)[seen],
+                (own.covariance + first.covariance)[np.ix_(seen, seen)],
+                freedom,
+            ),
         )
     }
 

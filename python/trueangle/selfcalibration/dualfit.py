@@ -29,6 +29,7 @@ __all__ = [
     "estimate_ratio",
     "fit_lines",
     "rows_of",
+    "with_slow",
 ]
 
 Array = NDArray[np.float64]
@@ -96,12 +97,18 @@ def fit_lines(
         at = tuple(zeros)
         dense = fit_dense(list(rows_of(channels, ratio, lines, at, slope=slope)), columns)
         zeros = [z + float(dz) for z, dz in zip(at, dense.nuisances[-len(at) :], strict=True)]
-    slow = [2 * i + j for i, line in enumerate(lines) if not line.motor for j in (0, 1)]
-    return DualFit(_with_slow(dense, [*slow, *([len(columns) - 1] * slope)]), tuple(lines), at)
+    return DualFit(with_slow(dense, lines, slope=slope), tuple(lines), at)
 
 
-def _with_slow(fit: DenseFit, slow: Sequence[int]) -> DenseFit:
-    """The fit with the covariance of slow patterns: blocks hold too few of their waves."""
+def with_slow(
+    fit: DenseFit, lines: Sequence[SharedLine], *, slope: bool = False, motor: bool = False
+) -> DenseFit:
+    """The fit with the covariance of slow patterns: blocks hold too few of their waves.
+
+    With ``motor`` those of the motor too: more coefficients than blocks can tell apart.
+    """
+    slow = [2 * i + j for i, line in enumerate(lines) if motor or not line.motor for j in (0, 1)]
+    slow += [2 * len(lines)] * slope
     if not fit.correlated or not slow:
         return fit
     covariance, at = fit.covariance.copy(), np.ix_(slow, slow)

@@ -9,12 +9,12 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from ..support.distributions import chi_squared_tail
+from ..support.distributions import chi_squared_tail, f_tail
 from .readings import SegmentReadings
 from .result import ARCSEC, HeldOut
 from .steady import SteadyFit, fit_steady
 
-__all__ = ["held_out", "judged"]
+__all__ = ["chance_of", "held_out", "judged"]
 
 Array = NDArray[np.float64]
 
@@ -33,15 +33,30 @@ def judged(
     ``covariance`` is that of ``second - first``.
     """
     gap = second - first
-    inverse = np.linalg.pinv(covariance, hermitian=True)
-    size = float(gap @ inverse @ gap)
     return HeldOut(
         fitted_on=names[0],
         judged_on=names[1],
         rms_before=math.hypot(noise, math.sqrt(0.5 * float(second @ second))) * ARCSEC,
         rms_after=math.hypot(noise, math.sqrt(0.5 * float(gap @ gap))) * ARCSEC,
-        p=chi_squared_tail(size, float(max(gap.size, 1))),
+        p=chance_of(gap, covariance),
     )
+
+
+def chance_of(gap: Array, covariance: Array, freedom: float = math.inf) -> float:
+    """Probability that noise makes so great a difference of patterns (Hotelling).
+
+    ::
+
+        T² = g' V⁻¹ g,    T² (ν - d + 1) / (ν d) ~ F(d, ν - d + 1)
+
+    with the degrees of freedom of V; chi-squared where they are infinite.
+    """
+    size = float(gap @ np.linalg.pinv(covariance, hermitian=True) @ gap)
+    count = float(max(gap.size, 1))
+    if math.isinf(freedom):
+        return chi_squared_tail(size, count)
+    left = max(freedom - count + 1.0, 1.0)
+    return f_tail(size * left / (freedom * count), count, left)
 
 
 def held_out(fit: SteadyFit, tested: Sequence[float], colour: float = 1.0) -> dict[str, HeldOut]:

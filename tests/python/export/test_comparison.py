@@ -4,6 +4,8 @@ import numpy as np
 import pytest
 
 import trueangle as ta
+from trueangle.model.records import FitRecord, TableRecord
+from trueangle.terms import Backlash, LocalDefect
 
 SEED = 55_301
 
@@ -116,3 +118,39 @@ def test_the_zero_between_arguments_is_the_mean_at_true_angles(first):
             found += theta - np.asarray(one.correct(found))
         means.append(float(np.mean(found - theta)))
     assert ta.compare(a, b).zero_deg == pytest.approx(means[1] - means[0], abs=1e-6)
+
+
+@pytest.mark.parametrize("argument", ["reference", "indicated"])
+@pytest.mark.parametrize("period", [360.0, 1.0])
+def test_a_bump_moves_the_zero_by_its_mean(argument, period):
+    """Of a turn; what is left about it are its squares and its height."""
+    height, width = 0.03, 4.0
+    plain = model({1: (30.0, 10.0)}, argument, period)
+    unit = period / 360.0
+    bumped = plain.replace(terms=(LocalDefect(70.0 * unit, width * unit, height * unit),))
+    found = ta.compare(plain, bumped)
+    mean = height * width * np.sqrt(2.0 * np.pi) / 360.0
+    # At true angles a bump of readings is wider by the slope of the line there, 1e-4.
+    near = 1e-9 if argument == "reference" else 1e-4
+    assert found.zero_deg == pytest.approx(mean, rel=near)
+    assert ta.compare(bumped, plain).zero_deg == pytest.approx(-mean, rel=near)
+    squares = height**2 * width * np.sqrt(np.pi) / 360.0 - mean**2
+    assert found.rms_arcsec == pytest.approx(3600.0 * np.sqrt(squares), rel=near)
+    assert found.max_abs_arcsec == pytest.approx(3600.0 * (height - mean), rel=1e-4)
+
+
+def test_what_both_tables_do_beside_their_models_adds_up():
+    """At most the sum, in squares; in the unit of each; a play of as many turns is another one."""
+
+    def read(period, rms, largest):
+        table = TableRecord("csv", "reference", rms * period / 1_296_000.0,
+                            largest * period / 1_296_000.0)  # fmt: skip
+        record = FitRecord(36, 1, (0.0, period), 0.0, "table", table=table)
+        one = model({1: (30.0, 10.0)}, "reference", period)
+        return one.replace(fit=record, terms=(Backlash(0.01),))
+
+    found = ta.compare(read(360.0, 0.3, 1.5), read(1.0, 0.4, 2.0))
+    assert found.table_rms_arcsec == pytest.approx(0.5)
+    assert found.table_max_abs_arcsec == pytest.approx(3.5)
+    assert found.differ_in == ["backlash"]
+    assert ta.compare(read(1.0, 0.3, 1.5), read(1.0, 0.4, 2.0)).differ_in == []

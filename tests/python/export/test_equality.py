@@ -4,9 +4,11 @@ import json
 
 import numpy as np
 import pytest
+from scipy import stats
 
 import trueangle as ta
 from trueangle.cli import main
+from trueangle.model.records import FitRecord
 
 SEED = 55_700
 
@@ -83,3 +85,35 @@ def test_the_command_prints_the_verdict(tmp_path, capsys):
     printed = json.loads(capsys.readouterr().out)
     assert printed["verdict"] == "changed"
     assert printed["false_alarms"] == 0.01
+
+
+def recorded(orders, values, variances, readings, period=1.0):
+    """Coefficients with a variance each, of so many readings in 4 runs of which 3 are outliers."""
+    pairs = np.reshape(values, (-1, 2))
+    shaft = ta.Shaft("output", 1, orders, pairs[:, 0] * period, pairs[:, 1] * period)
+    covariance = np.diag([9.0, *np.asarray(variances, float)]) * period**2
+    record = FitRecord(readings, 4, (0.0, period), 0.0, wild=3)
+    return ta.HarmonicModel([shaft], period=period, covariance=covariance, fit=record)
+
+
+def test_p_is_that_of_hotelling_with_the_freedom_of_both():
+    """Two variances of 8 and 18 degrees of freedom, put together by Satterthwaite's formula."""
+    first = recorded([1, 2], [0.01, 0.0, 0.002, 0.0], [1e-8] * 4, 8 + 3 + 4 + 4)
+    second = recorded([1, 2], [0.0103, 0.0, 0.002, 1e-4], [4e-8] * 4, 18 + 3 + 4 + 4, 360.0)
+    squares = (0.0003**2 + 1e-4**2) / 5e-8
+    freedom = 5.0**2 / (1.0 / 8.0 + 16.0 / 18.0)
+    told = stats.f.sf(squares / 4.0, 4, freedom)
+    for pair in ((first, second), (second, first)):
+        assert ta.compare(*pair).p == pytest.approx(told, rel=1e-6)
+
+
+def test_an_order_that_one_model_lacks_is_tested_by_itself():
+    """With twice its covariance, among 220 orders of which one stands out by chance."""
+    first = recorded([1], [0.01, 0.0], [1e-8] * 2, 109)
+    second = recorded([1, 7], [0.01, 0.0, 0.0006, 0.0003], [1e-8] * 4, 111)
+    # 100 degrees of freedom each, in equal parts.
+    told = 220.0 * stats.f.sf((36.0 + 9.0) / 2.0 / 2.0, 2, 200)
+    assert 1e-9 < told < 0.01
+    for pair in ((first, second), (second, first)):
+        assert ta.compare(*pair).p == pytest.approx(told, rel=1e-6)
+        assert ta.compare(*pair).verdict == "changed"

@@ -97,13 +97,17 @@ def test_the_reduction_and_its_interval_are_those_of_the_rms():
     rng = np.random.default_rng(8)
     runs = []
     for i, sigma in enumerate((0.01, 0.02, 0.03, 0.06, 0.08, 0.1)):
-        x = np.sort(rng.uniform(0.0, 360.0, 400))
+        x = np.sort(rng.uniform(0.0, 360.0, 200 + 80 * i))
         error = 0.2 * np.sin(np.radians(x)) + sigma * rng.normal(size=x.size)
         runs.append(ta.CalibrationRun(x, x + error, 360.0, label=f"{i}"))
     held = hold_out(ta.fit(runs, orders=[1], loss="linear"))
     before = np.array([np.sum(run.before**2) for run in held.runs])
     after = np.array([np.sum(run.after**2) for run in held.runs])
     assert held.reduction == pytest.approx(1.0 - np.sqrt(after.sum() / before.sum()), rel=1e-12)
+    # Each reading counts alike, however long its run.
+    readings = sum(map(len, runs))
+    assert held.rms_before == pytest.approx(np.sqrt(before.sum() / readings), rel=1e-12)
+    assert held.rms_after == pytest.approx(np.sqrt(after.sum() / readings), rel=1e-12)
     pick = rng.integers(6, size=(40_000, 6))
     draws = 1.0 - np.sqrt(after[pick].sum(axis=1) / before[pick].sum(axis=1))
     low, high = np.quantile(draws, [0.025, 0.975])

@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 import pytest
+from scipy import signal, stats
 
 import trueangle as ta
 from selfcalibration.rotor import ARCSEC
@@ -120,19 +121,68 @@ def test_lines_come_back_with_their_phase_and_error(found: list[ta.SelfCalibrati
 
 
 def test_one_part_predicts_the_other_as_noise_says(found: list[ta.SelfCalibration]) -> None:
-    """P is uniform by Kolmogorov's distance; what is left is the noise, and the patterns'."""
+    """What is left of one part is its noise, and that of the other's patterns."""
     (name,) = found[0].held_out
     tests = [one.held_out[name] for one in found]
-    ps = np.sort([test.p for test in tests])
-    print(name, ps)
-    away = np.abs(ps - (np.arange(10) + 0.5) / 10).max()
-    assert away < 1.95 / math.sqrt(10.0)
     # Ten lines of each half's 350 readings; 4.5 errors of the square of 10 times 350.
     after, error = NOISE**2 * (1.0 + 20.0 / 350.0), 4.5 * math.sqrt(2.0 / (10.0 * 350.0))
     assert np.mean([t.rms_after**2 for t in tests]) == pytest.approx(after, rel=error)
     lines = 0.5 * (40.0**2 + 15.0**2 + 20.0**2)
     assert np.mean([t.rms_before**2 for t in tests]) == pytest.approx(lines + NOISE**2, rel=0.1)
     assert np.mean([one.noise_arcsec for one in found]) == pytest.approx(NOISE, rel=0.02)
+
+
+def test_p_is_that_of_patterns_fitted_to_each_part(found: list[ta.SelfCalibration]) -> None:
+    """Hotelling's T squared of two fits by themselves, with the freedom that both leave."""
+    log = there_and_back(SEED)
+    theta = log["motor_rad"] / RATIO
+    way, speed = motion(theta, log["time_s"])
+    place = theta + float(np.median(log["indicated_rad"] - theta))
+    columns = [
+        f(o.order * (place if o.order in (1.0, 2.0) else theta))
+        for o in found[0].orders
+        for f in (np.cos, np.sin)
+    ]
+    design = np.column_stack([*columns, way, speed, np.ones(theta.size)])
+    size, fits, spread, freedom = len(columns), [], 0.0, 0
+    for first in (0, 1):  # even and odd ones of 20 blocks of the run
+        part = (np.arange(700) // 35 % 2 == first) & ~turning(way)
+        rows, target = design[part], (log["indicated_rad"] - theta)[part]
+        x, squares, *_ = np.linalg.lstsq(rows, target, rcond=None)
+        left = len(rows) - rows.shape[1]
+        spread = spread + squares[0] / left * np.linalg.inv(rows.T @ rows)[:size, :size]
+        freedom += left
+        fits.append(x[:size])
+    gap = fits[1] - fits[0]
+    rest = freedom - size + 1
+    told = stats.f.sf(gap @ np.linalg.solve(spread, gap) * rest / freedom / size, size, rest)
+    assert found[0].held_out["blocks"].p == pytest.approx(told, rel=2e-3)
+
+
+@pytest.mark.parametrize(("memory", "part"), [(0.0, 1.0), (0.0, 0.5), (0.5, 1.0)])
+def test_halves_differ_by_noise_as_often_as_p_says(memory: float, part: float) -> None:
+    """Uniform by Kolmogorov's distance, by mean and logarithm; a pattern that changed is seen."""
+    size, ps = 1500 if memory else 500, []
+    print("seeds", SEEDS)
+    for seed in range(SEED, SEED + 24):
+        log = there_and_back(seed, size)
+        if memory:
+            shocks = 2.0 * NOISE * ARCSEC * np.random.default_rng(seed + 900).normal(size=size)
+            log["indicated_rad"] += signal.lfilter([1.0], [1.0, -memory], shocks)
+        log = {name: v[: round(part * size)] for name, v in log.items()}
+        (test,) = selfcal(log).held_out.values()
+        ps.append(test.p)
+    print(np.sort(ps))
+    assert np.abs(np.sort(ps) - (np.arange(24) + 0.5) / 24).max() < 1.95 / math.sqrt(24.0)
+    assert np.mean(ps) == pytest.approx(0.5, abs=4.5 * math.sqrt(1.0 / 12.0 / 24.0))
+    assert -np.mean(np.log(ps)) == pytest.approx(1.0, abs=4.5 / math.sqrt(24.0))
+    rows = log["motor_rad"].size
+    blocks = 2 if part < 1.0 else 20  # one sweep there and back, or two over other travels
+    other = np.arange(rows) * blocks // rows % 2
+    moved = 4.0 * NOISE * ARCSEC * np.cos(2.0 * log["indicated_rad"])
+    log["indicated_rad"] = log["indicated_rad"] + other * moved
+    (test,) = selfcal(log).held_out.values()
+    assert test.p < 1e-3
 
 
 def test_the_model_takes_off_the_lines_of_both_shafts(found: list[ta.SelfCalibration]) -> None:
@@ -168,6 +218,18 @@ def test_readings_and_turns_are_counted(found: list[ta.SelfCalibration]) -> None
     one = found[0]
     assert one.readings == 700
     assert one.turns == pytest.approx(6.6 / (2.0 * math.pi), rel=1e-4)
+
+
+def test_part_of_a_turn_holds_for_its_travel_and_the_noise_of_its_ends() -> None:
+    """The model's span: true places of the ends, and four deviations of a reading beyond."""
+    log = {name: v[:175] for name, v in there_and_back(SEED).items()}
+    one = selfcal(log)
+    place = np.degrees(log["motor_rad"] / RATIO + ZERO)
+    room = 4.0 * one.noise_arcsec / 3600.0
+    start, stop = one.model.fit.span  # type: ignore[union-attr]
+    # The zero is told to some arcsec by a fit to half a turn.
+    assert (stop - start) % 360.0 == pytest.approx(np.ptp(place) + 2.0 * room, abs=1e-6)
+    assert (start + room - place.min()) % 360.0 == pytest.approx(0.0, abs=0.05)
 
 
 @pytest.mark.parametrize("unit", ["deg", "turn"])

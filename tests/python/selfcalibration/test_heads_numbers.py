@@ -152,3 +152,17 @@ def test_a_mirrored_disc_has_mirrored_numbers(found: list[ta.SelfCalibration]) -
         found[0].beside["head_angles_deg"], abs=1e-9
     )
     assert two.noise_arcsec == pytest.approx(found[0].noise_arcsec, rel=1e-9)
+
+
+def test_a_log_in_two_runs_is_the_log(found: list[ta.SelfCalibration]) -> None:
+    """Cut in the middle of a turn: readings and travel add up, patterns stay but for a zero."""
+    log, one = log_of(SEED), found[0]
+    two = selfcal({**log, "run": np.repeat([1, 2], [150, SIZE - 150])})
+    step = 6.5 / SIZE
+    assert two.turns == pytest.approx(one.turns - step, abs=1e-3)
+    assert two.readings == one.readings
+    assert two.beside["head_angles_deg"] == pytest.approx(one.beside["head_angles_deg"], abs=0.01)
+    for o, p in zip(one.orders, two.orders, strict=True):
+        assert (p.cosine, p.sine) == pytest.approx((o.cosine, o.sine), abs=0.5 * o.std)
+        assert p.std == pytest.approx(o.std, rel=0.05)
+    assert two.noise_arcsec == pytest.approx(one.noise_arcsec, rel=0.01)

@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy import stats
 
 import trueangle as ta
 from trueangle.errors import ArgumentError, NoModelError
+from trueangle.selfcalibration.projected import Projected, pairs
+from trueangle.selfcalibration.significance import chosen_orders
 
 from .test_other_methods import dual_log, heads_log, shifts_log
 
@@ -164,3 +167,19 @@ def test_shifts_tell_their_numbers() -> None:
         assert o["std_arcsec"] == pytest.approx(found.orders[k - 1].std, rel=0.1)
     assert any("coupling" in key for key in found.beside)
     assert found.beside["coupling_arcsec"] < 1.0
+
+
+def test_an_order_stands_out_where_chance_makes_none_of_thirty_so_large() -> None:
+    """Chi-squared of cosine and sine by their covariance, at a hundredth for all together."""
+    orders = [float(k) for k in range(1, 31)]
+    half = np.array([[2.0, 0.0], [0.7, 0.5]])
+    limit = float(stats.chi2.isf(0.01 / 30.0, 2))
+    size = np.sqrt(limit * np.where(np.arange(30) % 3 == 0, 1.01, 0.99))
+    turned = np.stack([np.cos(np.arange(30.0)), np.sin(np.arange(30.0))], axis=1)
+    values = (size[:, None] * turned) @ half.T
+    columns = tuple(pairs("the encoder", orders))
+    one = np.ones(60)
+    told = Projected(columns, np.eye(60), one, one, 1.0, 900.0)
+    covariance = np.kron(np.eye(30), half @ half.T)
+    kept = chosen_orders(told, values.ravel(), covariance, orders)
+    assert kept == tuple(orders[::3])

@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 import pytest
+from scipy import signal
 
 import trueangle as ta
 from selfcalibration.rotor import ARCSEC, encoder
@@ -34,8 +35,8 @@ def clamped(
     return {name: np.concatenate(parts) for name, parts in table.items()}
 
 
-def selfcal(log: dict[str, np.ndarray]) -> ta.SelfCalibration:
-    return ta.selfcal(log, method="shifts", orders=[1, 2])
+def selfcal(log: dict[str, np.ndarray], orders: tuple[int, ...] = (1, 2)) -> ta.SelfCalibration:
+    return ta.selfcal(log, method="shifts", orders=orders)
 
 
 def test_a_clamping_left_out_is_predicted_as_the_noise_of_all_says() -> None:
@@ -123,3 +124,60 @@ def test_errors_of_facets_are_what_seeds_scatter() -> None:
     # 12 facets of 30 draws, their sum fixed.
     assert ratio == pytest.approx(1.0, abs=4.5 / math.sqrt(2.0 * 11.0 * 29.0) + 0.02)
     assert np.abs(np.sum(found, axis=1)).max() < 1e-6
+
+
+@pytest.mark.parametrize("shifts", [SHIFTS, (0.0, 180.0)])
+def test_exchanged_scales_exchange_their_numbers(shifts: tuple[float, ...]) -> None:
+    """The other scale's pattern with its errors is the first one's of a log turned round."""
+    print("seed", SEED + 300)
+    log = clamped(SEED + 300, shifts=shifts)
+    turned = {**log, "indicated_rad": log["reference_rad"], "reference_rad": log["indicated_rad"]}
+    one, two = (selfcal(given, (1, 2, 3)) for given in (log, turned))
+    # Half a turn is the same place of order 2 on both.
+    assert [o.order for o in one.orders] == ([1.0, 2.0, 3.0] if shifts == SHIFTS else [1.0, 3.0])
+    for mine, its in ((one, two), (two, one)):
+        for o, other in zip(mine.orders, its.beside["other"], strict=True):
+            told = {**o.to_dict(), "of": "the other encoder"}
+            assert other.keys() == told.keys()
+            for name, value in told.items():
+                # The noise is taken at the other's places: 2 % of an error away.
+                if name == "of":
+                    assert other[name] == value
+                elif name != "phase_deg" or o.amplitude > 10.0 * o.std:
+                    assert other[name] == pytest.approx(value, rel=1e-3, abs=0.05 * o.std), name
+    assert two.noise_arcsec == pytest.approx(one.noise_arcsec, rel=1e-4)
+
+
+def test_errors_hold_where_neighbours_agree() -> None:
+    """Pulls of noise that remembers some readings, of both scales, and the note that says so."""
+    print("seeds", SEED + 400, "to", SEED + 415)
+    pulls = []
+    for seed in range(SEED + 400, SEED + 416):
+        log = clamped(seed, n=300, shifts=SHIFTS[:2])  # of three a coupling takes it
+        rng = np.random.default_rng(seed + 1000)
+        slow = signal.lfilter([1.0], [1.0, -0.8], rng.normal(size=log["run"].size))
+        log["indicated_rad"] = np.mod(log["indicated_rad"] + 3.0 * ARCSEC * slow, 2.0 * np.pi)
+        found = selfcal(log)
+        assert "neighbouring residuals agree: standard errors are taken from blocks" in found.notes
+        for o, (size, phase) in zip(found.orders, MINE.values(), strict=True):
+            pulls.append((o.cosine - size * math.sin(phase)) / o.std)
+            pulls.append((o.amplitude - size) / o.std)
+    print(np.mean(pulls), np.std(pulls))
+    assert abs(np.mean(pulls)) < 4.5 / math.sqrt(64.0)
+    # White errors are two and a half times too small; forty blocks tell theirs to a ninth.
+    assert 0.7 < np.std(pulls) < 1.5
+
+
+@pytest.mark.parametrize("sense", [1.0, -1.0])
+def test_shifts_that_readings_contradict_are_told_by_how_much(sense: float) -> None:
+    """Of either sense: what a clamping is off by most is said, and its readings are taken."""
+    log = clamped(SEED + 500)
+    log["shift_deg"] = (
+        sense * (np.array(SHIFTS) + np.array([0.0, -2.5, 5.0]))[log["run"].astype(int)]
+    )
+    found = selfcal(log)
+    (note,) = [n for n in found.notes if "are off shift_deg" in n]
+    assert float(note.split("by up to ")[1].split()[0]) == pytest.approx(5.0, abs=0.02)
+    assert found.beside["shifts_deg"] == pytest.approx(SHIFTS, abs=0.1)
+    log["shift_deg"] = sense * np.array(SHIFTS)[log["run"].astype(int)]
+    assert not any("shift_deg" in n for n in selfcal(log).notes)

@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 import pytest
+from scipy import stats
 
 import trueangle as ta
 from selfcalibration.rotor import ARCSEC, coast, encoder
@@ -201,3 +202,39 @@ def test_turns_and_readings_of_two_logs_add_up() -> None:
     whole = ta.selfcal(both, **OPTIONS)
     assert whole.turns == pytest.approx(sum(p.turns for p in parts), rel=1e-9)
     assert whole.readings == sum(p.readings for p in parts)
+
+
+@pytest.mark.parametrize(("deviations", "outliers"), [(5.8, 0), (8.5, 1)])
+def test_a_reading_is_an_outlier_beyond_seven_deviations(deviations: float, outliers: int) -> None:
+    """The deviation by the median: of the noise, not of what half the readings stay within."""
+    print("seed", SEED + 200)
+    log = log_of(SEED + 200)
+    theta = coast(10.0, 3.0, 2.0)[1][::4]
+    off = deviations * 20.0 * ARCSEC
+    log["indicated_rad"][250] = np.mod((theta + encoder(theta, LINES))[250] + off, 2.0 * np.pi)
+    found = ta.selfcal(log, **OPTIONS)
+    assert found.noise_arcsec == pytest.approx(20.0, rel=0.06)
+    assert sum("outlier" in note for note in found.notes) == outliers
+
+
+def test_an_order_is_kept_where_chance_makes_none_of_all_so_large() -> None:
+    """By its distance in its own errors; none of 20 orders is there in 99 logs of 100."""
+    print("seeds", SEED + 300, "to", SEED + 302)
+    t, theta = coast(10.0, 3.0, 8.0)
+    t, theta = t[::4], theta[::4]
+    told = set()
+    for seed in range(SEED + 300, SEED + 303):
+        weak = 20.0 * math.sqrt(2.0 / t.size) * (4.6 if seed % 2 else 5.2)
+        noise = 20.0 * ARCSEC * np.random.default_rng(seed).normal(size=t.size)
+        reading = theta + encoder(theta, {**LINES, 6: (weak, 1.0)}) + noise
+        log = {"time_s": t, "indicated_rad": np.mod(reading, 2.0 * np.pi)}
+        all_of = ta.selfcal(log, **{**OPTIONS, "orders": range(1, 9)})
+        (o,) = [o for o in all_of.orders if o.order == 6.0]
+        # Read twice a wave at 250 readings a second and 5.5 turns.
+        limit = stats.chi2.isf(0.01 / 20.0, 2)
+        size = (o.amplitude / o.std) ** 2
+        if abs(size / limit - 1.0) > 0.1:
+            kept = {o.order for o in ta.selfcal(log, **{**OPTIONS, "orders": "auto"}).orders}
+            assert (6.0 in kept) == (size > limit), (seed, size, limit)
+            told.add(1.1 * limit < size < 1.9 * limit)
+    assert True in told

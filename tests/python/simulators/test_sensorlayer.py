@@ -167,6 +167,52 @@ def test_a_fragment_is_included(tmp_path):
         ta.import_model(tmp_path / "none.xml", "mujoco")
 
 
+def test_a_joint_of_a_floating_base_is_read_where_it_stands():
+    """A free body has 7 places and 6 velocities, and torques, before those of its joints."""
+    floating = (
+        ROBOT.replace("@include@", "").replace("@class@", "").replace("<body>", "<body><freejoint/>"
+        "<geom size='.1' mass='1'/><body>", 1).replace("</worldbody>", "</body></worldbody>")
+    )  # fmt: skip
+    floating = floating.replace(
+        "</mujoco>", "<actuator><motor joint='wrist' ctrlrange='-9 9'/></actuator></mujoco>"
+    )
+    mj = mujoco.MjModel.from_xml_string(floating)
+    data = mujoco.MjData(mj)
+    rng = np.random.default_rng(5)
+    data.qpos[7:], data.qvel[:] = [0.4, 1.1, 0.0], rng.normal(size=mj.nv)
+    data.ctrl[:] = 3.0
+    mujoco.mj_forward(mj, data)
+    model = ELBOW.replace(terms=(T.Latency(0.002), T.TorsionalCompliance(3 * A)))
+    readings = SensorLayer(mj, {"elbow": model, "wrist": model}).read(data)
+    expected = [
+        angle + float(model.error(angle, velocity=velocity, torque=torque))
+        for angle, velocity, torque in zip((0.4, 1.1), data.qvel[6:8], (0.0, 3.0), strict=True)
+    ]
+    np.testing.assert_allclose(readings, expected, rtol=1e-12)
+
+
+def test_the_noise_of_a_file_is_that_of_its_joint():
+    made = ta.export_model(PLAIN, "mujoco", joint="elbow", noise_std=2e-4)
+    include = made.text.partition("<mujoco>")[2].rpartition("</mujoco>")[0]
+    mj = robot(include)
+    data = mujoco.MjData(mj)
+    noise = SensorLayer(mj, seed=6).read([data] * 2000)
+    assert np.std(noise) == pytest.approx(2e-4, rel=5.0 / np.sqrt(4000.0))
+    assert not SensorLayer(mj, {"elbow": PLAIN}).read(data).any()
+
+
+def test_noise_is_new_in_every_environment_and_joint():
+    """Of their own sizes, and what one reads tells nothing of another."""
+    mj = robot()
+    data = mujoco.MjData(mj)
+    layer = SensorLayer(mj, {"elbow": PLAIN, "wrist": PLAIN}, noise_std=1e-4, seed=4)
+    noise = np.concatenate([layer.read([data] * 500) for _ in range(4)])
+    # Five deviations of 2000 readings each.
+    np.testing.assert_allclose(noise.std(axis=0), 1e-4, rtol=5.0 / np.sqrt(4000.0))
+    assert abs(np.corrcoef(noise.T)[0, 1]) < 5.0 / np.sqrt(2000.0)
+    assert abs(np.corrcoef(noise[:-1, 0], noise[1:, 0])[0, 1]) < 5.0 / np.sqrt(2000.0)
+
+
 def test_noise_is_white_and_of_the_stated_size():
     mj = robot()
     data = mujoco.MjData(mj)
