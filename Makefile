@@ -3,13 +3,14 @@
 PYTHON ?= .venv/bin/python
 
 .PHONY: check quick format lint types stub rust python docs bench develop aarch64 fuzz mutants sample
-.PHONY: looks nightly exam walks asan kills pythons readings chance
+.PHONY: looks nightly exam walks asan kills pythons readings chance chance-core
 
 # Damaged files for each loader, and loaders at a time: `make fuzz CASES=1000000 JOBS=2`.
 CASES ?= 20000
 JOBS ?= 1
-# Faults drawn by chance: hours by the hundred.
+# Faults drawn by chance: hours by the hundred. `SEED=7001` draws the same ones again.
 COUNT ?= 400
+SEED ?=
 # `SAMPLE=--trust` where the tests have just passed.
 SAMPLE ?=
 
@@ -84,7 +85,10 @@ mutants:            ## planted faults: each must be noticed by its tests; an hou
 	$(PYTHON) tests/mutants
 
 chance:             ## faults that nobody chose, in lines that tests reach; needs '.[faults]'
-	$(PYTHON) tests/mutants/chance.py --count $(COUNT)
+	$(PYTHON) tests/mutants/chance.py --count $(COUNT) $(SEED:%=--seed %)
+
+chance-core:        ## the same in the core, all in one build
+	$(PYTHON) tests/mutants/chancecore.py --count $(COUNT) $(SEED:%=--seed %)
 
 pythons:            ## the wheel tried on every Python that is to be had here
 	rm -rf target/tried
@@ -102,7 +106,7 @@ asan:               ## tests of the core under AddressSanitizer, by the compiler
 	RUSTC_BOOTSTRAP=1 RUSTFLAGS="-Zsanitizer=address" CARGO_TARGET_DIR=target/asan \
 	cargo test --locked --tests --target $$(rustc -vV | sed -n 's/^host: //p')
 
-NIGHTLY = aarch64 asan pythons readings kills fuzz mutants chance exam walks
+NIGHTLY = aarch64 asan pythons readings kills fuzz mutants chance chance-core exam walks
 nightly: $(NIGHTLY) ## what takes hours; each has a job of its own in .github/workflows/nightly.yml
 
 bench:              ## benchmarks against a reference, in one run

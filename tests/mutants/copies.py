@@ -35,16 +35,6 @@ BUILD = 3600.0
 
 #: Which fault of the core is switched on, by its number.
 CHOSEN = "TRUEANGLE_PLANTED"
-QUESTION = f"""\
-//! Which of the planted faults is switched on.
-
-/// Whether it is this one.
-#[inline(never)]
-pub fn is(number: usize) -> bool {{
-    static CHOSEN: std::sync::OnceLock<Option<usize>> = std::sync::OnceLock::new();
-    *CHOSEN.get_or_init(|| std::env::var("{CHOSEN}").ok()?.parse().ok()) == Some(number)
-}}
-"""
 
 
 class Verdict(NamedTuple):
@@ -89,9 +79,7 @@ class Copy:
             text = path.read_text(encoding="utf-8")
             either = f"(if crate::planted::is({number}) {{ {fault.new} }} else {{ {fault.old} }})"
             path.write_text(text.replace(fault.old, either), encoding="utf-8")
-        (self.folder / "src" / "planted.rs").write_text(QUESTION, encoding="utf-8")
-        root = self.folder / "src" / "lib.rs"
-        root.write_text(root.read_text(encoding="utf-8") + "pub mod planted;\n", encoding="utf-8")
+        self.switchable()
         command = ["cargo", "build", "--release", "--locked", "-q", "--features", "python", "--lib"]
         status, told = self._done(command, self.environment() | QUICK, BUILD)
         if status != 0:
@@ -102,6 +90,19 @@ class Copy:
         self.core.unlink()
         shutil.copy(built, self.core)
         return ""
+
+    def switchable(self) -> None:
+        """Give the core the question that says which fault is switched on (`planted.rs`)."""
+        source = self.folder / "src"
+        shutil.copy(Path(__file__).with_name("planted.rs"), source / "table")
+        for file, more in (
+            ("table/lib.rs", "pub mod planted;\n"),
+            ("lib.rs", "pub use trueangle_table::planted;\n"),
+        ):
+            text = (source / file).read_text(encoding="utf-8")
+            text = text.replace("#![forbid(unsafe_code)]", "")
+            allowed = "#![allow(unconditional_panic, arithmetic_overflow)]\n"
+            (source / file).write_text(allowed + text + more, encoding="utf-8")
 
     def run(self, tests: tuple[str, ...], more: Mapping[str, str] | None = None) -> Verdict:
         """Run some tests in the copy."""
