@@ -9,11 +9,15 @@ from __future__ import annotations
 
 import contextlib
 import doctest
+import io
 import re
+import shlex
 import subprocess
 import sys
 from pathlib import Path
 from typing import NamedTuple
+
+from trueangle.cli import main
 
 FENCE = re.compile(
     r"(?:^<!-- file: (\S+) -->\n)?^```(\w+)[^\n]*\n(.*?)^```$", re.MULTILINE | re.DOTALL
@@ -79,12 +83,30 @@ def run_console(text: str, folder: Path, where: str) -> None:
         while command.endswith("\\"):
             more, _, expected = expected.partition("\n")
             command = command[:-1] + more.removeprefix("> ").strip()
-        command = re.sub(r"^(\.venv/bin/)?trueangle\b", f"{sys.executable} -m trueangle", command)
-        done = subprocess.run(
-            ["bash", "-c", command], cwd=folder, capture_output=True, text=True, timeout=300
-        )
-        assert done.returncode == 0, f"{where}: $ {command}\n{done.stderr}"
+        status, out, err = _done(command.removeprefix(".venv/bin/"), folder)
+        assert status == 0, f"{where}: $ {command}\n{err}"
         if expected.strip():
-            assert checker.check_output(expected, done.stdout, FLAGS), (
-                f"{where}: $ {command}\nexpected:\n{expected}\ngot:\n{done.stdout}"
+            assert checker.check_output(expected, out, FLAGS), (
+                f"{where}: $ {command}\nexpected:\n{expected}\ngot:\n{out}"
             )
+
+
+def _done(command: str, folder: Path) -> tuple[int | str | None, str, str]:
+    """Exit status, output and errors: of trueangle alone in this process, of a shell otherwise."""
+    if command.startswith("trueangle ") and not re.search(r"[|<>&;*$`]", command):
+        out, err = io.StringIO(), io.StringIO()
+        with (
+            contextlib.chdir(folder),
+            contextlib.redirect_stdout(out),
+            contextlib.redirect_stderr(err),
+        ):
+            try:
+                status: int | str | None = main(shlex.split(command)[1:])
+            except SystemExit as left:
+                status = left.code or 0
+        return status, out.getvalue(), err.getvalue()
+    command = re.sub(r"^trueangle\b", f"{sys.executable} -m trueangle", command)
+    done = subprocess.run(
+        ["bash", "-c", command], cwd=folder, capture_output=True, text=True, timeout=300
+    )
+    return done.returncode, done.stdout, done.stderr
