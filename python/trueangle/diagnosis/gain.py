@@ -136,8 +136,8 @@ def measure_gain(
 def measure_delay_gain(without: Regression, delayed: Regression, seed: int = 0) -> Gain:
     """Gain of an account at the angle of a time before, against the same one without that.
 
-    Both are fitted to the other runs alone; the last term of ``delayed`` is the change that these
-    make of the delay.
+    Both are fitted to the other runs alone; ``delayed`` has the change that these make of the
+    delay among its columns.
     """
     rng = np.random.default_rng(seed)
     unit, what = _units(delayed)
