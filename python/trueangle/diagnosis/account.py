@@ -197,14 +197,20 @@ def _corrections(
 
 
 def _start(seen: Seen, sim: Simulation) -> Regression:
-    """The readings against a simulation, without any cause."""
-    return Regression.of(seen.signals, seen.error - sim.predict(seen.signals), sim.surroundings)
+    """The readings against a simulation, without any cause.
+
+    A delay stays free beside all else: what follows the direction, say, is judged jointly with it.
+    """
+    beside = None if seen.delay is None else seen.delay.columns(seen.signals)
+    error = seen.error - sim.predict(seen.signals)
+    return Regression.of(seen.signals, error, sim.surroundings, beside=beside)
 
 
 def _chosen(seen: Seen, sim: Simulation) -> CauseSelection:
     """Choose the causes by which readings differ from a simulation."""
     start = _start(seen, sim)
-    spots = blind_spots(start)
+    # What is always free is no blind spot.
+    spots = blind_spots(start if seen.delay is None else _start(replace(seen, delay=None), sim))
     chosen = select(start)
     scatter: list[ScatterFinding] = []
     if pace().over:

@@ -66,10 +66,18 @@ class Delay:
     ----------
     seconds, std : float
         Of the joint's reading behind the reference.
+    pattern : Pattern
+        Of the joint, that moves with it.
     """
 
     seconds: float
     std: float
+    pattern: Pattern
+
+    def columns(self, then: Signals) -> Array:
+        """What one second more would add, arcsec, at readings as they were the delay before."""
+        slope = self.pattern.value_and_slope(then.theta)[1]
+        return np.asarray(-(then.turns_per_s * ARCSEC_PER_TURN * (1.0 + slope))[:, None])
 
 
 def error_before(signals: Signals, error: Array, delay_s: float) -> tuple[Signals, Array]:
@@ -94,7 +102,7 @@ def find_delay(signals: Signals, error: Array, sim: Simulation) -> Delay | None:
         then, moved = error_before(signals, error, delay)
         y = (moved - sim.predict(then))[rows]
         then = then.take(rows)
-        change, std, left, unmoved = _newton(then, y, orders, sim)
+        change, std, left, unmoved, pattern = _newton(then, y, orders, sim)
         if not np.isfinite(std):
             return None
         if step == 0 and abs(change) < TRIED * std:
@@ -103,7 +111,8 @@ def find_delay(signals: Signals, error: Array, sim: Simulation) -> Delay | None:
         settled = SETTLED if step < STEPS - 1 else TO_AND_FRO
         if step > 0 and abs(change) < settled * std:
             told = rows.size * float(np.log(max(linear / max(unmoved, 1e-300), 1e-300)))
-            return Delay(delay, std) if abs(delay) > TRIED * std and told > NEW_CAUSE else None
+            is_told = abs(delay) > TRIED * std and told > NEW_CAUSE
+            return Delay(delay, std, pattern) if is_told else None
         delay += change
         if abs(delay) > longest:
             return None
@@ -118,24 +127,29 @@ def _orders(signals: Signals, sim: Simulation) -> Array:
 
 def _newton(
     then: Signals, y: Array, orders: Array, sim: Simulation
-) -> tuple[float, float, float, float]:
-    """Change of the delay with its standard error; sums of squares with it and without."""
+) -> tuple[float, float, float, float, Pattern]:
+    """Change of the delay with its standard error; sums of squares with it and without; pattern."""
     runs = (then.run[:, None] == np.unique(then.run)).astype(np.float64)
     lines = lines_columns(then.theta, orders)
     known = orthonormal_basis(np.hstack([runs, then.direction[:, None], lines]))
     rest = y - known @ (known.T @ y)
     fitted = np.linalg.lstsq(np.hstack([runs, lines]), y, rcond=None)[0][runs.shape[1] :]
-    patterns = (sim.pattern, Pattern(orders, fitted[0::2], fitted[1::2]))
-    slope = sum(pattern.value_and_slope(then.theta)[1] for pattern in patterns)
-    column = -then.turns_per_s * ARCSEC_PER_TURN * (1.0 + slope)
+    known_lines = sim.pattern
+    pattern = Pattern(
+        np.concatenate([known_lines.orders, orders]),
+        np.concatenate([known_lines.cosine, fitted[0::2]]),
+        np.concatenate([known_lines.sine, fitted[1::2]]),
+    )
+    column = Delay(0.0, 0.0, pattern).columns(then)[:, 0]
     column = column - known @ (known.T @ column)
     power, freedom = float(column @ column), y.size - known.shape[1] - 1
     left = float(rest @ rest)
     if power <= 1e-9 * y.size or freedom <= 0:
-        return 0.0, np.inf, left, left
+        return 0.0, np.inf, left, left, pattern
     change = float(column @ rest) / power
     with_it = left - change**2 * power
-    return change, float(np.sqrt(max(with_it, 1e-300) / freedom / power)), with_it, left
+    std = float(np.sqrt(max(with_it, 1e-300) / freedom / power))
+    return change, std, with_it, left, pattern
 
 
 def _at_the_time(regression: Regression, plain: Regression) -> Iterator[Extension]:
@@ -152,14 +166,13 @@ def _at_the_time(regression: Regression, plain: Regression) -> Iterator[Extensio
 def delay_finding(
     delay: Delay, chosen: Regression, plain: Regression, with_gain: bool, unexplained: Unexplained
 ) -> Finding:
-    """The delay as a finding beside the ``chosen`` causes; ``plain`` is without the delay."""
-    column = Latency.columns(chosen.signals, chosen.around, {})
-    extension = chosen.propose(Latency.kind, {}, column)
-    beside = chosen.with_terms([*chosen.terms, extension], chosen.whiten.rho)
-    k = len(beside.terms) - 1
-    change = float(beside.fitted()[k][1][0])
-    std = float(np.sqrt(beside.robust_covariance(k)[0, 0]))
-    seconds = delay.seconds + change
+    """The delay as a finding beside the ``chosen`` causes; ``plain`` is without the delay.
+
+    Its change is the last of the columns that are always free in ``chosen``.
+    """
+    where = np.array([chosen.base.shape[1] - 1])
+    std = float(np.sqrt(chosen.robust(where)[0, 0]))
+    seconds = delay.seconds + float(chosen.coefficients[where[0]])
     without = plain.with_terms(_at_the_time(chosen, plain))
     saved = without.deviance - chosen.deviance
     weight = {
@@ -168,7 +181,7 @@ def delay_finding(
         "parameters": 1.0,
         "log_grid": 0.0,
     }
-    gain = measure_delay_gain(without, beside) if with_gain else None
+    gain = measure_delay_gain(without, chosen) if with_gain else None
     parameters = {"delay_s": quantity(seconds, std)}
     told = status_of(Latency.kind, gain, None, (), unexplained)
     return Finding(Latency.kind, parameters, weight, gain, [], [Latency(seconds)], *told)

@@ -137,8 +137,8 @@ def measure_gain(regression: Regression, groups: Sequence[Sequence[int]]) -> lis
 def measure_delay_gain(without: Regression, delayed: Regression) -> Gain:
     """Gain of an account at the angle of a time before, against the same one without that.
 
-    Both are fitted to the other runs alone; the last term of ``delayed`` is the change that these
-    make of the delay.
+    Both are fitted to the other runs alone; ``delayed`` has the change that these make of the
+    delay among its columns.
     """
     rng = np.random.default_rng(_SEED)
     unit, what = _units(delayed)

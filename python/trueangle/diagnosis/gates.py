@@ -5,6 +5,7 @@ Each gate is a line of `GATES` and gives the reason why a finding is not confirm
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 
@@ -14,11 +15,13 @@ from numpy.typing import NDArray
 from ..effects import EFFECTS
 from ..effects.blindness import Blindness
 from ..effects.presliding_hysteresis import PreslidingHysteresis
+from ..effects.scale_error import ScaleError
 from ..estimation.regression import Regression
 from .confirmation import NOT_CONFIRMED
 from .finding import Finding
 from .levels import UNITS
 from .overlap import overlaps
+from .penalty import cause_terms
 
 __all__ = ["GATES", "MANY", "alike_columns", "gated", "many_causes"]
 
@@ -29,6 +32,10 @@ TOLD = 2.0
 
 #: Share of what can be taken off at a level left out above which more is taken than left.
 MORE_THAN_LEFT = 0.5
+
+#: Parts of the travel, of equally many readings, in each of which a ramp must be found again, and
+#: standard errors beyond which it is not: one ramp in a hundred, of noise alone.
+PARTS, TOLD_OF_PARTS = 4, 3.0
 
 #: Correlation of what two causes add to all others from which on they are one column.
 ALIKE = 0.95
@@ -98,6 +105,39 @@ def against_friction(finding: Finding) -> str:
     return ""
 
 
+def not_in_every_part(regression: Regression, finding: Finding) -> str:
+    """A ramp whose slope over the rest of its travel does not carry over to a part of it.
+
+    A ratio is wrong at every angle alike. What rises for a while and then stays (a wide hysteresis,
+    a creep) is another law, of which the ramp is the mean.
+    """
+    if finding.cause != ScaleError.kind or not finding.group:
+        return ""
+    (k,) = finding.group
+    column = regression.terms[k].columns[:, 0]
+    edges = np.quantile(column, np.linspace(0.0, 1.0, PARTS + 1))
+    parts = np.column_stack([np.clip(column, *pair) for pair in itertools.pairwise(edges)])
+    rest = cause_terms(regression, [k], settled=True)
+    own, excited = rest.projected(parts)
+    if not excited.all():
+        return ""
+    spread = np.linalg.pinv(own.T @ own) * regression.variance
+    slopes = spread @ (own.T @ rest.r) / regression.variance
+    for j in range(PARTS):
+        others = np.arange(PARTS) != j
+        weights = np.linalg.pinv(spread[np.ix_(others, others)]).sum(axis=0)
+        against = np.insert(-weights / weights.sum(), j, 1.0)  # its slope less that of the others
+        change, std = float(against @ slopes), float(np.sqrt(against @ spread @ against))
+        share = 1.0 - (change / slopes[j]) ** 2
+        if abs(change) > TOLD_OF_PARTS * std and share < MORE_THAN_LEFT:
+            found, expected = 1e6 * slopes[j], 1e6 * (slopes[j] - change)
+            return (
+                "its slope does not carry over to every part of the travel "
+                f"({found:.2g} ppm in one, {expected:.2g} in the others)"
+            )
+    return ""
+
+
 #: Every gate, in the order in which reasons are given.
 GATES: tuple[Callable[[Finding], str], ...] = (not_carried, not_told_from_zero, against_friction)
 
@@ -112,9 +152,10 @@ def gated(
     """Findings as the gates leave them, the pairs that are not told apart, and their terms."""
     found = []
     for finding in findings:
-        reason = (
-            next((r for gate in GATES if (r := gate(finding))), "") if finding.confirmed else ""
-        )
+        reason = ""
+        if finding.confirmed:
+            reason = next((r for gate in GATES if (r := gate(finding))), "")
+            reason = reason or not_in_every_part(regression, finding)
         found.append(replace(finding, status=NOT_CONFIRMED, reason=reason) if reason else finding)
     spots: list[Blindness] = []
     shared: set[int] = set()

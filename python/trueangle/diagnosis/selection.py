@@ -179,7 +179,7 @@ def _under_its_noise(regression: Regression) -> Regression:
     tried = [regression]
     if noise.correlation > regression.whiten.rho + SAME_CORRELATION:
         tried.append(_pruned(regression.with_terms(regression.terms, noise.correlation)))
-    plain = [t for t in regression.terms if t.run_effect is None or not is_named(t)]
+    plain = [t for t in regression.terms if not is_named(t) or not _takes_up(t)]
     if len(plain) < len(regression.terms):
         rest = regression.with_terms(plain)
         noise = estimate_noise(remainder_of(rest))
@@ -189,6 +189,11 @@ def _under_its_noise(regression: Regression) -> Regression:
             _pruned(rest.with_terms(plain, rho)) for rho in trials if 0.0 < rho < MOST_CORRELATED
         ]
     return min(tried, key=total_penalty)
+
+
+def _takes_up(term: Extension) -> bool:
+    """It follows what correlated noise does: drawn anew in every run, or flexible."""
+    return term.run_effect is not None or is_flexible(effect_of(term.cause))
 
 
 def _by_other_paths(regression: Regression, direct: Regression) -> Regression:
@@ -203,7 +208,9 @@ def _by_other_paths(regression: Regression, direct: Regression) -> Regression:
     """
     if pace().over:
         return direct
-    found = {term.cause for term in direct.terms}
+    # What a flexible one was dropped from since was chosen beside it, too.
+    grown = _forward(regression, list(EFFECTS))
+    found = {term.cause for term in (*direct.terms, *grown.terms)}
     # Over a part of a turn a bump, too, can stand for several lines at once: lines first.
     travel = regression.signals.run_turns().max()
     if not any(travel < effect_of(cause).flexible_below for cause in found):

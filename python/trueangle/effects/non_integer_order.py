@@ -11,7 +11,7 @@ import numpy as np
 from ..estimation.estimate import Parameters, quantity
 from ..estimation.extension import Extension
 from ..estimation.regression import Regression
-from ..joint.pattern import Surroundings, line_columns
+from ..joint.pattern import Surroundings, line_columns, lines_columns
 from ..joint.signals import Signals
 from ..support.deadline import pace
 from .blindness import (
@@ -43,9 +43,9 @@ MOST_TRIALS = 4096
 #: Orders nearer than this to a known line belong to that line: it changes from run to run.
 OWN_LINE = 0.1
 
-#: Share of a resolution cell (one order over the turns of a run) within which orders are
-#: hardly told apart.
-UNRESOLVED = 0.5
+#: Cycles over the travel within which orders are hardly told apart: a line between two whole ones
+#: is a mixture of both there.
+UNRESOLVED = 1.0
 
 #: Orders per turn of a shaft at which the cage of its bearing goes round: half of 1 less
 #: the ratio of ball to pitch diameter. Expected there, they pay less for the search.
@@ -133,19 +133,20 @@ class NonIntegerOrder(Effect):
 
     @staticmethod
     def _keeps_phase(regression: Regression, found: Extension) -> bool:
-        """A searched order that the travel does not resolve from it explains as much.
+        """The searched orders about it, where the travel does not resolve them, explain as much.
 
-        Phases that are new in each of R runs leave a share of 1/R to one phase for all.
+        Phases that are new in each of R runs leave a share of 1/R to one phase for all; half way
+        between that and all of it is the limit.
         """
-        orders = regression.lines.orders
-        away = np.abs(orders - found.shape["order"])
-        alike = orders[away * regression.signals.run_turns().max() < UNRESOLVED]
-        share = 0.5 + 1.0 / regression.signals.runs
-        return any(
-            regression.gain(line_columns(regression.signals.theta, float(m)))[0]
-            > share * found.deviance
-            for m in alike
-        )
+        away = regression.lines.orders - found.shape["order"]
+        sides = (away[away <= 0.0].max(initial=-np.inf), away[away > 0.0].min(initial=np.inf))
+        turns = regression.signals.run_turns().max()
+        alike = [found.shape["order"] + x for x in sides if abs(x) * turns < UNRESOLVED]
+        if not alike:
+            return False
+        share = 0.5 + 0.5 / regression.signals.runs
+        gain, _ = regression.gain(lines_columns(regression.signals.theta, np.array(alike)))
+        return gain > share * found.deviance
 
     @staticmethod
     def _log_grid(regression: Regression, orders: Array) -> Array:
@@ -175,6 +176,8 @@ class NonIntegerOrder(Effect):
         if sizes.min() < 8 or usual <= 0.0:  # most runs stand still
             return np.zeros(0), np.zeros(0)
         top = float(regression.lines.orders.max()) * 0.75
+        if regression.signals.grid is not None:  # beyond, orders are the same numbers as lower ones
+            top = min(top, 0.5 * regression.signals.grid.positions)
         low = max(LOWEST, LEAST_CYCLES / usual)
         # Half the mean rate of readings is as far as a run can tell.
         step = 1.0 / (OVERSAMPLING * usual)

@@ -36,6 +36,8 @@ class Readings:
     lines : LineBasis
         Shared by readings of the same motion.
     weights : ndarray or None
+    beside : ndarray or None
+        Further columns that are always free, shape (n, k).
     """
 
     signals: Signals
@@ -43,6 +45,7 @@ class Readings:
     belief: Surroundings
     lines: LineBasis
     weights: Array | None = None
+    beside: Array | None = None
 
     def __len__(self) -> int:
         return len(self.signals)
@@ -54,9 +57,10 @@ class Readings:
 
     @cached_property
     def base(self) -> Array:
-        """Columns of the simulation's own: a constant and its pattern's lines."""
-        lines = (line_columns(self.signals.theta, m) for m in self.belief.pattern.orders)
-        return np.column_stack([np.ones(len(self)), *lines])
+        """Columns that are always free: a constant, the lines of the pattern, those `beside`."""
+        lines = [line_columns(self.signals.theta, m) for m in self.belief.pattern.orders]
+        beside = [] if self.beside is None else [self.beside]
+        return np.column_stack([np.ones(len(self)), *lines, *beside])
 
     @cached_property
     def correlation(self) -> LagCorrelation:
@@ -91,4 +95,5 @@ class Readings:
             self.belief,
             self.lines.take(rows),
             None if self.weights is None else self.weights[rows],
+            None if self.beside is None else self.beside[rows],
         )

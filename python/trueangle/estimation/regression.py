@@ -61,10 +61,11 @@ class Regression(Solution):
         weights: Array | None = None,
         lines: LineBasis | None = None,
         rho: float | None = None,
+        beside: Array | None = None,
     ) -> Self:
         """The regression of readings without terms; see `Readings`."""
         lines = LineBasis.of(signals.theta, belief.joint) if lines is None else lines
-        return cls.of_readings(Readings(signals, residual, belief, lines, weights), rho)
+        return cls.of_readings(Readings(signals, residual, belief, lines, weights, beside), rho)
 
     @classmethod
     def of_readings(

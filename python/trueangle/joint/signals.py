@@ -64,7 +64,7 @@ class Signals:
     count : float
         Arcsec of one count, where the indicated angles lie on a lattice of the sensor's; else 0.
     table : int
-        Positions of a turn, where the indicated angles are a table of equal steps; else 0.
+        Positions of a turn, where the readings are a table of equal steps; else 0.
     labels : tuple of str
         Names of the runs.
     """
@@ -111,7 +111,7 @@ class Signals:
     @property
     def grid(self) -> UniformGrid | None:
         """Equal steps of a turn on which the design put the readings, or None."""
-        return UniformGrid(self.table) if self.table else uniform_grid(self.theta)
+        return UniformGrid(self.table) if self.table else None
 
     def take(self, rows: NDArray[np.bool_] | Index) -> Signals:
         """The readings ``rows``; runs keep their index and stretches their history."""
@@ -145,6 +145,7 @@ class Signals:
             **changes,
             run=np.concatenate([self.run, later.run + self.runs]),
             segment=np.concatenate([self.segment, later.segment + self.segment_direction.size]),
+            table=_common_table(self, later),
             labels=(*self.labels, *later.labels),
         )
 
@@ -215,10 +216,11 @@ class Signals:
 def join_runs(runs: Sequence[CalibrationRun]) -> Signals:
     """Signals of ``runs``; a quantity that some run lacks is None for all."""
     parts = [_travel(run) for run in runs]
-    count, table = _lattice(runs)
+    theta = _joined([run.unwrapped_reference * (2.0 * math.pi / run.period) for run in runs])
+    count, table = _lattice(runs, theta)
     offset = np.cumsum([0, *(part[3].size for part in parts[:-1])])
     return Signals(
-        theta=_joined([run.unwrapped_reference * (2.0 * math.pi / run.period) for run in runs]),
+        theta=theta,
         run=np.repeat(np.arange(len(runs)), [len(run) for run in runs]),
         row=np.concatenate([np.arange(len(run)) for run in runs]),
         direction=_joined([part[0] for part in parts]),
@@ -239,15 +241,30 @@ def join_runs(runs: Sequence[CalibrationRun]) -> Signals:
     )
 
 
-def _lattice(runs: Sequence[CalibrationRun]) -> tuple[float, int]:
-    """Count of the sensor in arcsec and positions of a table in a turn; of each 0 where none."""
+def _lattice(runs: Sequence[CalibrationRun], theta: Array) -> tuple[float, int]:
+    """Count of the sensor in arcsec and positions of a table in a turn; of each 0 where none.
+
+    A table shows in the moves of the indicated angles, or in the true ones (radians), in any order.
+    """
     turns = [run.indicated / run.period for run in runs]
     step = lattice_step(np.concatenate(turns))
     move = table_move(turns, step)
-    if not move:
-        return step * ARCSEC_PER_TURN, 0
-    positions = round(1.0 / move)
-    return 0.0, positions if abs(1.0 / move - positions) < CLOSES else 0
+    if move and abs(1.0 / move - round(1.0 / move)) < CLOSES:
+        return 0.0, round(1.0 / move)
+    grid = uniform_grid(theta)
+    table = 0 if grid is None else grid.positions
+    of_design = move or abs(step * table - 1.0) < CLOSES * step
+    return 0.0 if of_design else step * ARCSEC_PER_TURN, table
+
+
+def _common_table(first: Signals, later: Signals) -> int:
+    """Positions of a turn on which all readings stand; 0 where later ones stand beside them."""
+    grid = uniform_grid(np.concatenate([first.theta, later.theta]))
+    if grid is not None or first.table != later.table:
+        return 0 if grid is None else grid.positions
+    one, other = (np.mean(np.exp(1j * first.table * each.theta)) for each in (first, later))
+    beside = float(np.angle(one * np.conj(other))) / (2.0 * np.pi)
+    return first.table if abs(beside) < CLOSES else 0
 
 
 def _joined(parts: list[Array]) -> Array:

@@ -9,6 +9,7 @@ import numpy as np
 from trueangle import CalibrationRun
 
 from ..measurement import ARCSEC
+from .timebound import correlated
 
 #: Readings of a burst and its size in standard deviations of the noise.
 BURSTS = [(length, size) for length in (2, 3, 4) for size in (10.0, 30.0, 300.0)]
@@ -43,19 +44,37 @@ def with_bursts(
     return found, rows
 
 
-def table(positions: int, runs: int, rng: np.random.Generator) -> list[CalibrationRun]:
-    """Tables of the true angle at indicated angles of equal steps."""
+def table(
+    positions: int,
+    runs: int,
+    rng: np.random.Generator,
+    lines: Sequence[tuple[int, float]] = LINES,
+    visited: str = "forward",
+    shared: float = 0.0,
+) -> list[CalibrationRun]:
+    """Tables of the true angle at indicated angles of equal steps.
+
+    Positions are ``visited`` forward, there and "back", or at "random"; neighbours share a part
+    of their noise.
+    """
     grid = np.arange(positions) * 360.0 / positions
-    phases = rng.uniform(0.0, 6.28, len(LINES))
+    phases = rng.uniform(0.0, 6.28, len(lines))
+    if visited == "back":
+        grid = np.concatenate([grid, grid[::-1]])
     found = []
     for j in range(runs):
+        if visited == "random":
+            grid = rng.permutation(grid)
         angle = grid.copy()
         for _ in range(9):
             error = sum(
-                size * np.sin(np.radians(order * angle) + phase)
-                for (order, size), phase in zip(LINES, phases, strict=True)
+                (
+                    size * np.sin(np.radians(order * angle) + phase)
+                    for (order, size), phase in zip(lines, phases, strict=True)
+                ),
+                np.zeros(grid.size),
             )
             angle = grid - error * ARCSEC
-        angle = angle + TABLE_SIGMA * rng.normal(size=positions) * ARCSEC
+        angle = angle + TABLE_SIGMA * correlated(grid.size, shared, rng) * ARCSEC
         found.append(CalibrationRun(angle, grid, period=360.0, label=f"table{j}"))
     return found
