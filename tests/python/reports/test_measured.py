@@ -4,11 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from trueangle.reports.givenmodel import given_model
 
 import trueangle as ta
 from trueangle.fitting.heldout import hold_out
 from trueangle.reports.gained import gained
-from trueangle.reports.givenmodel import given_model
 from trueangle.reports.measured import error_size, measured
 from trueangle.reports.unknowns import unknowns
 
