@@ -4,12 +4,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from trueangle.reports.givenmodel import given_model
 
 import trueangle as ta
 from trueangle.fitting.heldout import hold_out
 from trueangle.reports.gained import gained
 from trueangle.reports.measured import error_size, measured
+from trueangle.reports.modelled import given_model
 from trueangle.reports.unknowns import unknowns
 
 PERIODS = (360.0, 2.0 * np.pi, 1.0)
