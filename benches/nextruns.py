@@ -27,7 +27,7 @@ from trueangle.estimation.regression import Regression
 from trueangle.joint.signals import Signals, join_runs
 from trueangle.planning import Limits
 from trueangle.planning.hypotheses import of_size
-from trueangle.rehearsal.trial import judged
+from trueangle.rehearsal.trial import trial_outcome
 from trueangle.simulation import Harmonic, Joint, RunDesign, Simulation, simulate
 
 SIM = Simulation(
@@ -157,7 +157,7 @@ def names(designs: Designs, truth: Effect, cause: str, seeds: int, alone: bool) 
     true, failed = SIM.with_effects([truth]), 0
     for seed in range(seeds):
         runs = simulate(true, seed, designs if alone else [*SIM.runs, *designs])
-        failed += not judged(ta.diagnose(runs, SIM), cause).is_named
+        failed += not trial_outcome(ta.diagnose(runs, SIM), cause).is_named
         if failed > FAILURES * seeds:
             return False
     return True

@@ -24,7 +24,7 @@ from simulatorpictures import simulator_pictures
 import trueangle as ta
 from trueangle import plots
 from trueangle.certificate import certify
-from trueangle.certificate.typesetting import pictures
+from trueangle.certificate.typesetting import certificate_pictures
 from trueangle.cli import COMMANDS, build_parser
 from trueangle.diagnosis import diagnose
 from trueangle.effects import Backlash, Latency
@@ -187,7 +187,7 @@ def pages(folder: Path) -> None:
         file.write_text(identity[1], encoding="utf-8")
         read = ta.read_runs(Path(made, "joint.csv"))
         content = certify(read, file, gear_ratio=100.0).content
-    for number, page in enumerate(pictures(content), start=1):
+    for number, page in enumerate(certificate_pictures(content), start=1):
         (folder / f"certificate{number}.png").write_bytes(page)
 
 

@@ -3,7 +3,7 @@
 import playwright.sync_api as playwright
 
 import trueangle as ta
-from trueangle.certificate.typesetting import pictures
+from trueangle.certificate.typesetting import certificate_pictures
 from trueangle.reports.pdf import find_browser
 
 __all__ = ["WIDTHS", "pages"]
@@ -61,6 +61,6 @@ def pages(folder, desk, docs):
             runs, gear_ratio=100.0, certificate=identity, model=desk / "joint.json"
         )
         certified.save(folder / f"certificate-{language}.pdf")
-        for number, page in enumerate(pictures(certified.content), 1):
+        for number, page in enumerate(certificate_pictures(certified.content), 1):
             (folder / f"certificate-{language}-{number}.png").write_bytes(page)
     return wide

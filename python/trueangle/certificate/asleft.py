@@ -13,10 +13,10 @@ from ..errors import ArgumentError
 from ..model.model import HarmonicModel
 from ..runs.run import CalibrationRun
 
-__all__ = ["corrected_runs", "is_of_these", "model_of"]
+__all__ = ["corrected_runs", "is_of_these", "model_as_left"]
 
 
-def model_of(model: HarmonicModel | str | PathLike[str]) -> HarmonicModel:
+def model_as_left(model: HarmonicModel | str | PathLike[str]) -> HarmonicModel:
     """The model itself, or that of a file."""
     if isinstance(model, HarmonicModel):
         return model

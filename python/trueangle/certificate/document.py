@@ -13,18 +13,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import ArgumentError
-from ..fitting.summary import unit_of
+from ..fitting.summary import fit_error_unit
 from ..runs.provenance import provenance
 from ..runs.run import CalibrationRun, as_runs
 from ..support.angles import ARCSEC_PER_TURN
 from ..support.display_units import ErrorsIn
 from ..support.kinds import told_kinds
 from ..support.plainresult import finite
-from .asleft import corrected_runs, is_of_these, model_of
+from .asleft import corrected_runs, is_of_these, model_as_left
 from .budget import LEVEL, Budget, Contribution
 from .conformity import conformity
 from .identity import ENTRIES, Identity, load_identity
-from .values import left_at_places, nominal_positions, reversal, values_at
+from .values import left_at_places, nominal_positions, reversal_halfwidth, values_at
 
 if TYPE_CHECKING:
     from ..fitting.result import FitResult
@@ -151,14 +151,14 @@ def certify(
     valued = _valued(fit, angles, who)
     left = None
     if model is not None:
-        by = model_of(model)
+        by = model_as_left(model)
         same = {shaft.name: shaft.orders for shaft in fit.model.shafts}
         left = {
             "model": Path(model).name if isinstance(model, str | PathLike) else repr(by),
             "same_readings": is_of_these(by, found),
             **_valued(_fitted(corrected_runs(by, found), same, gear), angles, who),
         }
-    unit = unit_of(fit, errors_in)
+    unit = fit_error_unit(fit, errors_in)
     source = None if isinstance(identity, Identity) else str(Path(identity))
     content: dict[str, Any] = {
         "format": FORMAT,
@@ -198,7 +198,7 @@ def _valued(fit: FitResult, angles: NDArray[np.float64], who: Identity) -> dict[
             "read more positions, or fit fewer orders"
         )
     values = values_at(fit, angles)
-    shared = [item for item in (left_at_places(fit), reversal(fit)) if item is not None]
+    shared = [item for item in (left_at_places(fit), reversal_halfwidth(fit)) if item is not None]
     shared += list(who.contributions)
     freedom = _degrees_of_freedom(fit)
     budgets = [

@@ -8,7 +8,7 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any, Final
 
-__all__ = ["LANGUAGES", "note_in", "texts"]
+__all__ = ["LANGUAGES", "certificate_texts", "note_in"]
 
 _FOLDER: Final = Path(__file__).parent / "texts"
 
@@ -30,7 +30,7 @@ _PLACE: Final = re.compile(r"#(\w+)")
 _DECIMAL: Final = re.compile(r"(?<![\w.#-])(-?\d+)\.(\d+)(?![\w.])")
 
 
-def texts(language: str) -> dict[str, Any]:
+def certificate_texts(language: str) -> dict[str, Any]:
     """All texts of a language, by the parts of a certificate."""
     return tomllib.loads((_FOLDER / f"{language}.toml").read_text("utf-8"))
 
@@ -62,13 +62,13 @@ def _translated(note: str, language: str) -> str:
             )
     if ", " in note:
         return ", ".join(_translated(part, language) for part in note.split(", "))
-    return _DECIMAL.sub(rf"\1{texts(language)['decimal_mark']}\2", note)
+    return _DECIMAL.sub(rf"\1{certificate_texts(language)['decimal_mark']}\2", note)
 
 
 @lru_cache(maxsize=8)
 def _notes(language: str) -> list[tuple[re.Pattern[str], str]]:
     """Patterns of the notes as they are written, and their texts in a language."""
-    written, told = texts(_WRITTEN)["notes"], texts(language)["notes"]
+    written, told = certificate_texts(_WRITTEN)["notes"], certificate_texts(language)["notes"]
     found = []
     for name, text in written.items():
         parts = _PLACE.split(text)

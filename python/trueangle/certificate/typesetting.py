@@ -12,10 +12,10 @@ from typing import Any, Final
 
 from ..errors import MissingExtraError
 from ..support.angles import ARCSEC_PER_TURN
-from ..support.files import CERTIFICATE, check_output, published, read_whole
-from .language import note_in, texts
+from ..support.files import CERTIFICATE, check_output, external_output, read_whole
+from .language import certificate_texts, note_in
 
-__all__ = ["lay_out", "pictures", "typeset", "write_pdf"]
+__all__ = ["certificate_pictures", "lay_out", "typeset_certificate", "write_pdf"]
 
 #: Part of the span of the errors below which bars of U are not seen beside them.
 _SMALL: Final = 0.04
@@ -30,17 +30,17 @@ def write_pdf(content: dict[str, Any], path: str | PathLike[str], logo: str | No
     """Typeset ``content`` and write it; see `Certificate.save`."""
     hashes = [entry["sha256"] for entry in content["provenance"]["inputs"]]
     target = check_output(path, CERTIFICATE, hashes=hashes)
-    pdf = typeset(content, logo)
-    with published(target) as printed:
+    pdf = typeset_certificate(content, logo)
+    with external_output(target) as printed:
         printed.write_bytes(pdf)
 
 
-def typeset(content: dict[str, Any], logo: str | None = None) -> bytes:
+def typeset_certificate(content: dict[str, Any], logo: str | None = None) -> bytes:
     """The certificate as a PDF/A-2b document."""
     return bytes(_compiled(content, logo, format="pdf", pdf_standards="a-2b"))
 
 
-def pictures(content: dict[str, Any], dots_per_inch: float = 110.0) -> list[bytes]:
+def certificate_pictures(content: dict[str, Any], dots_per_inch: float = 110.0) -> list[bytes]:
     """Its pages as PNG, to be shown where a PDF cannot be."""
     made = _compiled(content, None, format="png", ppi=dots_per_inch)
     return made if isinstance(made, list) else [made]
@@ -48,7 +48,7 @@ def pictures(content: dict[str, Any], dots_per_inch: float = 110.0) -> list[byte
 
 def lay_out(content: dict[str, Any], folder: Path, logo: str | None = None) -> Path:
     """Write what is typeset into ``folder``; the file that the typesetter takes."""
-    said = texts(content["language"])
+    said = certificate_texts(content["language"])
     rows = content["positions"]
     span = max(r["error_arcsec"] for r in rows) - min(r["error_arcsec"] for r in rows)
     small = max(r["expanded_arcsec"] for r in rows) < _SMALL * span

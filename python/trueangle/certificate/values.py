@@ -19,7 +19,14 @@ from .propagation import propagated
 if TYPE_CHECKING:
     from ..fitting.result import FitResult
 
-__all__ = ["POSITIONS", "Values", "left_at_places", "nominal_positions", "reversal", "values_at"]
+__all__ = [
+    "POSITIONS",
+    "Values",
+    "left_at_places",
+    "nominal_positions",
+    "reversal_halfwidth",
+    "values_at",
+]
 
 Array = NDArray[np.float64]
 
@@ -147,7 +154,7 @@ def left_at_places(fit: FitResult) -> Contribution:
     )
 
 
-def reversal(fit: FitResult) -> Contribution | None:
+def reversal_halfwidth(fit: FitResult) -> Contribution | None:
     """Half of the reversal error, where both directions were read and it is seen.
 
     ::

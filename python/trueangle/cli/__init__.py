@@ -19,7 +19,7 @@ from ..support.layout import wrapped
 from .parser import Parser
 from .paths import check_paths
 from .signals import Ending, ending_by_signals
-from .terminal import STANDARD_OUTPUT, plain_streams, silence
+from .terminal import STANDARD_OUTPUT, plain_streams, silence_output
 from .wording import Wording
 
 __all__ = ["COMMANDS", "main", "process"]
@@ -160,7 +160,7 @@ def _failed(
         _say(ending.text + (f": {told}" if told else ""))
         return ending.status
     if isinstance(error, OSError) and error.filename == STANDARD_OUTPUT:
-        silence()
+        silence_output()
         if isinstance(error, BrokenPipeError):
             return 141
     if isinstance(error, TrueAngleError):

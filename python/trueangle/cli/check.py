@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..errors import FileError
 from .paths import Input
-from .robots import add_robot, each_joint, joints_asked, told
+from .robots import add_robot, each_joint, joints_asked, robot_messages
 from .signal_options import add_signals, reading
 
 if TYPE_CHECKING:
@@ -79,5 +79,7 @@ def _robot(name: str, joints: list[JointAsked], args: argparse.Namespace) -> int
         print(json.dumps({"joints": plain, "ranking": plain_ranking(ranking)}, indent=2))
     else:
         texts = {row.joint: checks[row.joint].summary() for row in ranking}
-        print(told(f"Data of {name or 'the robot'}, the worst joint first:", ranking, texts))
+        print(
+            robot_messages(f"Data of {name or 'the robot'}, the worst joint first:", ranking, texts)
+        )
     return 0 if all(result.usable for result in checks.values()) else 1

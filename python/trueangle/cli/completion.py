@@ -23,7 +23,7 @@ def run(args: argparse.Namespace) -> int:
     """Print the script."""
     from . import build_parser
 
-    print(script(build_parser(), args.shell), end="")
+    print(completion_script(build_parser(), args.shell), end="")
     return 0
 
 
@@ -39,7 +39,7 @@ class _Argument(NamedTuple):
     words: tuple[str, ...] = ()
 
 
-def script(parser: Parser, shell: str) -> str:
+def completion_script(parser: Parser, shell: str) -> str:
     """The text of a completion script.
 
     Parameters
@@ -52,7 +52,7 @@ def script(parser: Parser, shell: str) -> str:
     Examples
     --------
     >>> from trueangle.cli import build_parser
-    >>> script(build_parser(), "zsh").splitlines()[0]
+    >>> completion_script(build_parser(), "zsh").splitlines()[0]
     '#compdef trueangle'
     """
     return "\n".join(SHELLS[shell](parser)) + "\n"

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..errors import ArgumentError, TrueAngleError
 from ..support.display_units import ErrorsIn, error_unit
-from ..support.suggestions import did_you_mean, listed
+from ..support.suggestions import did_you_mean, listed_names
 from .error_units import add_errors_in, errors_in
 from .paths import Input, ModelInput
 from .robots import add_robot, joints_asked
@@ -150,7 +150,7 @@ def _columns_of_joints(
         if joint not in known:
             raise ArgumentError(
                 f"--joint {joint}: it has no model{did_you_mean(joint, known)}; the joints are "
-                f"{listed(known)}"
+                f"{listed_names(known)}"
             )
     if args.joint and whole:
         models.update(load_robot(models.pop(None)))
@@ -246,7 +246,7 @@ def _status(result: BatchReport) -> int:
     if failed[_TOLD:]:
         parts.append(f"{len(failed) - _TOLD} more failed")
     if waiting:
-        parts.append(f"not started: {listed(waiting, _TOLD)}")
+        parts.append(f"not started: {listed_names(waiting, _TOLD)}")
     parts.append("run the same command again to go on")
     raise (KeyboardInterrupt if result.interrupted else TrueAngleError)("; ".join(parts))
 

@@ -61,7 +61,7 @@ def _corrected(seed: int) -> str:
             "A joint's encoder is wrong by the same pattern in every turn. Measured once",
             "   against a reference, the pattern can be taken off from then on:",
             "",
-            *chart(place, {"o": read, "*": corrected}, "arcsec"),
+            *letter_chart(place, {"o": read, "*": corrected}, "arcsec"),
             "   o error as read, * error corrected, over one turn of the output in degrees",
             "",
             f"   peak-to-peak  {before:6.2f} -> {after:5.2f} arcsec, "
@@ -108,13 +108,13 @@ _ROWS: Final = 11
 _COLUMNS: Final = 61
 
 
-def chart(place: NDArray[Any], errors: Mapping[str, NDArray[Any]], unit: str) -> list[str]:
+def letter_chart(place: NDArray[Any], errors: Mapping[str, NDArray[Any]], unit: str) -> list[str]:
     """Errors over a turn of 0 to 360 deg, each set by its letter; later ones lie on top.
 
     Examples
     --------
     >>> import numpy as np
-    >>> chart(np.array([0.0, 180.0]), {"o": np.array([9.0, -9.0])}, "arcsec")[1]
+    >>> letter_chart(np.array([0.0, 180.0]), {"o": np.array([9.0, -9.0])}, "arcsec")[1]
     '      +9 |o'
     """
     import numpy as np

@@ -16,7 +16,7 @@ from .error_units import add_errors_in, errors_in
 from .fit import add_argument_choice, add_joint
 from .order_lists import declared_shafts
 from .paths import Input, Output
-from .robots import add_robot, each_joint, joints_asked, told
+from .robots import add_robot, each_joint, joints_asked, robot_messages
 from .signal_options import reading, signals_by_joint
 
 if TYPE_CHECKING:
@@ -187,7 +187,7 @@ def _robot(name: str, joints: list[JointAsked], args: argparse.Namespace) -> int
     else:
         texts = {row.joint: found[row.joint].summary(errors_in(args)) for row in ranking}
         title = f"Diagnosis of {name or 'the robot'}, the worst joint first:"
-        print(told(title, ranking, texts, errors_in(args)), flush=True)
+        print(robot_messages(title, ranking, texts, errors_in(args)), flush=True)
     if args.corrected_model is not None:
         models = {
             joint: result.correction(argument=args.argument)

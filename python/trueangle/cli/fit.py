@@ -12,7 +12,7 @@ from .error_units import add_errors_in, errors_in
 from .onepass import add_one_pass, log_options, wants_one_pass
 from .order_lists import declared_shafts, orders_by_shaft, parse_orders
 from .paths import Input, Output
-from .robots import add_robot, each_joint, joints_asked, told
+from .robots import add_robot, each_joint, joints_asked, robot_messages
 from .signal_options import add_signals
 
 if TYPE_CHECKING:
@@ -185,7 +185,7 @@ def _robot(name: str, joints: list[JointAsked], args: argparse.Namespace) -> int
         told_of = [row.joint for row in ranking if row.joint in fits]
         texts = {joint: fits[joint].summary(errors_in(args)) for joint in told_of}
         title = f"Fit of {name or 'the robot'}, the worst joint first:"
-        print(told(title, ranking, texts, errors_in(args)))
+        print(robot_messages(title, ranking, texts, errors_in(args)))
         print(f"\nsaved {args.output}")
     return 0
 

@@ -67,7 +67,7 @@ def _orders(text: str, shafts: dict[str, float]) -> Any:
     return None if isinstance(orders, str) else orders
 
 
-def judged(args: argparse.Namespace, **limits: Any) -> Fleet:
+def requested_fleet(args: argparse.Namespace, **limits: Any) -> Fleet:
     """The fleet of the runs that are asked for."""
     from ..fleets.fleet import fleet
 
@@ -86,7 +86,7 @@ def judged(args: argparse.Namespace, **limits: Any) -> Fleet:
 
 def run(args: argparse.Namespace) -> int:
     """Judge the units, save, print."""
-    found = judged(
+    found = requested_fleet(
         args,
         share=args.share,
         confidence=args.confidence,

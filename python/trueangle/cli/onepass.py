@@ -61,9 +61,9 @@ def wants_one_pass(args: argparse.Namespace) -> bool:
 
 
 def _is_large(args: argparse.Namespace) -> bool:
-    from ..runs.paths import find_logs, matched
+    from ..runs.paths import find_logs, matched_paths
 
-    paths = matched(args.runs)
+    paths = matched_paths(args.runs)
     if not all(path.is_file() or path.is_dir() for path in paths):
         return False  # a pipe is read once
     from ..logs.sources import hold_at_most

@@ -82,9 +82,9 @@ def _matched(name: str) -> list[str]:
     """The file of this name, or those that a pattern stands for."""
     if not has_magic(name):
         return [name]
-    from ..runs.paths import matched  # takes numpy, which most commands do without here
+    from ..runs.paths import matched_paths  # takes numpy, which most commands do without here
 
-    return [*map(str, matched([name]))]
+    return [*map(str, matched_paths([name]))]
 
 
 def _values(given: dict[str, Any]) -> Iterator[Any]:

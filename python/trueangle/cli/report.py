@@ -7,7 +7,7 @@ import json
 from typing import TYPE_CHECKING, Any
 
 from ..errors import ArgumentError
-from ..support.deadline import STYLES, paced
+from ..support.deadline import STYLES, with_pace
 from ..support.files import PDF, REPORT
 from .error_units import add_errors_in, errors_in
 from .fit import add_joint
@@ -139,7 +139,7 @@ def _robot(name: str, joints: list[JointAsked], args: argparse.Namespace) -> int
 def _fleet(args: argparse.Namespace) -> int:
     """A page of all units: who needs what, patterns, spread, dates."""
     from ..reports.fleet import FleetReport
-    from .fleet import judged
+    from .fleet import requested_fleet
 
     if not {args.certificate, args.pdf, args.model, args.simulation, args.robot} <= {None}:
         raise ArgumentError(
@@ -148,7 +148,7 @@ def _fleet(args: argparse.Namespace) -> int:
         )
     args.orders = None if args.orders == "auto" else args.orders
     title = args.title or "Angle error of a fleet"
-    found = judged(args, permitted_arcsec=args.permitted_arcsec)
+    found = requested_fleet(args, permitted_arcsec=args.permitted_arcsec)
     made = FleetReport(found, title, errors_in(args))
     made.save(args.output)
     print(made.fleet.to_json() if args.json else f"{made.summary()}\n\n{args.output}")
@@ -167,7 +167,7 @@ def _made(args: argparse.Namespace, path: str | None, title: str | None = None) 
 
         simulation = load_simulation(args.simulation)
     known = declared_shafts(args.shaft) if simulation is None else simulation.joint.shafts
-    with paced(style=args.progress):
+    with with_pace(style=args.progress):
         return report(
             runs,
             path,

@@ -11,7 +11,7 @@ from ..errors import ArgumentError, NoModelError, NotInvertibleError, RankError,
 from ..support.display_units import ErrorsIn
 from .signal_options import signal_argument, signals_by_joint
 
-__all__ = ["JointAsked", "add_robot", "each_joint", "joints_asked", "told"]
+__all__ = ["JointAsked", "add_robot", "each_joint", "joints_asked", "robot_messages"]
 
 T = TypeVar("T")
 
@@ -170,7 +170,7 @@ def each_joint(
     return found, failed
 
 
-def told(
+def robot_messages(
     title: str, ranking: list[Any], texts: dict[str, str], errors_in: ErrorsIn = "auto"
 ) -> str:
     """The ranking in front, and what is said of every joint after it."""

@@ -9,10 +9,10 @@ from fnmatch import fnmatchcase
 from ..errors import ArgumentError
 from ..runs.files import read_runs
 from ..runs.run import CalibrationRun
-from ..support.suggestions import did_you_mean, listed
+from ..support.suggestions import did_you_mean, listed_names
 from .signal_options import reading
 
-__all__ = ["listed", "read_selected"]
+__all__ = ["listed_names", "read_selected"]
 
 
 def read_selected(args: argparse.Namespace) -> list[CalibrationRun]:
@@ -38,7 +38,7 @@ def read_selected(args: argparse.Namespace) -> list[CalibrationRun]:
     if missing:
         raise ArgumentError(
             f"--run {missing[0]}: no such run{did_you_mean(missing[0], known)}; "
-            f"the runs are {listed(known)}"
+            f"the runs are {listed_names(known)}"
         )
     chosen = {name for names in found.values() for name in names}
     return [run for run in runs if run.label in chosen]
@@ -51,10 +51,10 @@ def _is_meant(name: str, label: str) -> bool:
 
 def read_checked(args: argparse.Namespace) -> list[CalibrationRun]:
     """Runs of the files; faults of the data are told on stderr, in the words of ``check``."""
-    from ..runs.checks.check import faults_of
+    from ..runs.checks.check import data_faults
     from ..runs.checks.record import records_of
 
     runs = read_runs(args.runs, **reading(args))
-    for fault in faults_of(records_of(runs)):
+    for fault in data_faults(records_of(runs)):
         print(f"trueangle: warning: {fault}", file=sys.stderr)
     return runs

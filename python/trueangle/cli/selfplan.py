@@ -53,10 +53,10 @@ def run_self(args: argparse.Namespace, orders: tuple[float, ...] | None) -> int:
     }
     given = {name: value for name, value in told.items() if value is not None}
     if args.simulation is not None:
-        from ..planning.selfdesigns import designed
+        from ..planning.selfdesigns import designed_selfplan
         from ..simulation import load_simulation
 
-        given = designed(load_simulation(args.simulation), args.self_method) | given
+        given = designed_selfplan(load_simulation(args.simulation), args.self_method) | given
     plan = plan_self(args.self_method, **given)
     print(plan.to_json() if args.json else plan.summary())
     return 0

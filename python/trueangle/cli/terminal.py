@@ -12,12 +12,12 @@ from typing import Any, Final, TextIO
 __all__ = [
     "STANDARD_OUTPUT",
     "Plain",
-    "coloured",
+    "coloured_text",
     "has_colours",
     "own_interrupts",
     "plain_streams",
     "printable",
-    "silence",
+    "silence_output",
 ]
 
 STANDARD_OUTPUT: Final = "standard output"
@@ -84,7 +84,7 @@ class Plain:
         """Write; signs that the stream's encoding lacks become escapes."""
         shown = printable(self._wording(text))
         if self._coloured:
-            shown = coloured(shown)
+            shown = coloured_text(shown)
         with self._named():
             try:
                 self.steering.write(shown)
@@ -139,7 +139,7 @@ def own_interrupts() -> None:
     pyarrow.enable_signal_handlers(False)
 
 
-def silence() -> None:
+def silence_output() -> None:
     """Send what is still to be printed nowhere: Python would complain of it at its end."""
     try:
         handle = sys.stdout.fileno()
@@ -172,14 +172,14 @@ def has_colours(stream: Any) -> bool:
         return False
 
 
-def coloured(text: str) -> str:
+def coloured_text(text: str) -> str:
     r"""``text`` with what stands out in colour; JSON stays as it is.
 
     Examples
     --------
-    >>> coloured("trueangle: error: no such file")
+    >>> coloured_text("trueangle: error: no such file")
     'trueangle: \x1b[1;31merror:\x1b[0m no such file'
-    >>> coloured('{"says": "error:"}')
+    >>> coloured_text('{"says": "error:"}')
     '{"says": "error:"}'
     """
     if text[:1] in ("{", "["):

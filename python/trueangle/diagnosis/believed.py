@@ -23,7 +23,7 @@ from .identifiability import doubts_about, open_origins, with_open_origins
 from .penalty import NEW_CAUSE
 from .unnamed import effect_of
 
-__all__ = ["corrected_effects", "judged_beliefs", "scaled"]
+__all__ = ["corrected_effects", "judged_beliefs", "scaled_effect"]
 
 Array = NDArray[np.float64]
 
@@ -37,7 +37,9 @@ PROPORTIONAL = 1e-3
 NOTHING = 0.05
 
 
-def scaled(effect: Effect, factor: float, signals: Signals, around: Surroundings) -> Effect | None:
+def scaled_effect(
+    effect: Effect, factor: float, signals: Signals, around: Surroundings
+) -> Effect | None:
     """The effect ``factor`` times as strong; None where its signal is not proportional."""
     changes: dict[str, object] = {}
     for entry in fields(effect):  # type: ignore[arg-type]
@@ -82,12 +84,12 @@ def corrected_effects(
         if 2.0 * normal_tail(z) > LEVEL or (worst is not None and z <= worst[0]):
             continue
         total = 1.0 + factor
-        other = scaled(effect, total, signals, around)
+        other = scaled_effect(effect, total, signals, around)
         if other is None:
             continue
         kept = list(believed.effects)
         if abs(total) < max(NOTHING, 3.0 * std):
-            other = scaled(effect, 0.0, signals, around) or other
+            other = scaled_effect(effect, 0.0, signals, around) or other
         kept[k] = other
         worst = (z, replace(believed, effects=tuple(kept)))
     return None if worst is None else worst[1]

@@ -9,7 +9,7 @@ from ..support.display_units import ErrorUnit, significant
 if TYPE_CHECKING:
     from .finding import Finding
 
-__all__ = ["brief_of"]
+__all__ = ["brief_finding"]
 
 #: Parameters that say how large a finding is, the first that it has; by how much it is multiplied,
 #: and its unit where that is not the unit of errors.
@@ -39,7 +39,7 @@ _PLACES = {
 }
 
 
-def brief_of(finding: Finding, unit: ErrorUnit) -> str:
+def brief_finding(finding: Finding, unit: ErrorUnit) -> str:
     """A finding by its cause, of which line it is, and how large."""
     known = {name: quantity.value for name, quantity in finding.parameters.items()}
     name = finding.cause

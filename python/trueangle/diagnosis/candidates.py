@@ -13,7 +13,7 @@ from .forms import told_from_forms
 from .penalty import before_forms, left_by_forms, misfit, penalty_of, total_penalty
 from .unnamed import effect_of
 
-__all__ = ["Candidate", "Scores", "extensions", "propose", "proposed"]
+__all__ = ["Candidate", "Scores", "extensions", "propose", "proposed_above"]
 
 #: An extension, what it extends, and its net BIC gain.
 Candidate: TypeAlias = tuple[Extension, Regression, float]
@@ -60,7 +60,7 @@ def extensions(
             start, penalty = regression, 0.0
         # Alone every cause is searched as far as it can be: that is reported.
         wanted = max(least(found) + penalty, 0.0) if start.terms and least is not None else 0.0
-        extension = proposed(start, cause, wanted)
+        extension = proposed_above(start, cause, wanted)
         if at.over:
             break  # a search that was cut short says nothing of its cause
         if extension is not None:
@@ -70,7 +70,7 @@ def extensions(
     return [found[k] for k in sorted(range(len(found)), key=places.__getitem__)]
 
 
-def proposed(regression: Regression, cause: str, least: float = 0.0) -> Extension | None:
+def proposed_above(regression: Regression, cause: str, least: float = 0.0) -> Extension | None:
     """What a cause proposes, searched only as far as candidates above ``least`` ask for.
 
     None where the time is up and it has not been searched yet.

@@ -14,31 +14,31 @@ from ..errors import ArgumentError
 from ..estimation.estimate import quantity
 from ..estimation.regression import Regression
 from ..joint.signals import join_runs
-from ..runs.checks.check import faults_of
+from ..runs.checks.check import data_faults
 from ..runs.checks.record import records_of
 from ..runs.files import runs_of
 from ..runs.run import CalibrationRun
 from ..runs.source import Reading
 from ..simulation.simulation import SIMULATION, Simulation
 from ..support.blas import one_blas_thread
-from ..support.deadline import Pace, pace, paced
+from ..support.deadline import Pace, pace, with_pace
 from ..support.kinds import told_kinds
 from ..support.oftype import of_type
 from .account import MOST_READINGS, account_of
 from .believed import judged_beliefs
-from .candidates import proposed
+from .candidates import proposed_above
 from .delay import delay_finding
-from .discrepancy import compare, unfolded_error
+from .discrepancy import discrepancy_of, unfolded_error
 from .finding import Finding
 from .findings import Diagnosis
 from .gates import many_causes
 from .gearedlines import Ratio
 from .goodness import Unexplained, goodness_of_fit
-from .named import findings_of, reconsidered, scatter_doubt, scatter_finding
+from .named import findings_of, reconsidered_findings, scatter_doubt, scatter_finding
 from .penalty import cause_terms
 from .remainder import leftover_of, unexplained_after
 from .torque import torque_account
-from .wrongplace import moved
+from .wrongplace import misplaced_beliefs
 
 if TYPE_CHECKING:
     from ..runs.joining import MeasuredMinusSimulated
@@ -148,7 +148,7 @@ def diagnose(
         log = simulated if is_joined else minus_simulated(measured, simulated)
     elif sim is None:
         raise ArgumentError("nothing is believed: give a simulation, or a log as `simulated=`")
-    with paced(within, progress) as at, at.bounded(_used(measured)), one_blas_thread():
+    with with_pace(within, progress) as at, at.bounded(_used(measured)), one_blas_thread():
         stated = Simulation() if sim is None else sim
         found = _diagnosis(measured, log, stated, gain)
         if log is None or not found.complete:
@@ -188,7 +188,7 @@ def _diagnosis(
         others = cause_terms(chosen, doubtful, settled=True)
         rest = unexplained_after(others, sim.sigma_arcsec or None)
         if rest.found:
-            findings = reconsidered(chosen, findings, rest)
+            findings = reconsidered_findings(chosen, findings, rest)
     beliefs, corrected = judged_beliefs(chosen, sim, account.believed, spots, gain)
     in_doubt = any(spot.supported and not spot.common for spot in spots)
     for item in account.choice.scatter:
@@ -204,7 +204,7 @@ def _diagnosis(
     extended = corrected.with_effects(
         effect for finding in findings if finding.confirmed for effect in finding.effects
     )
-    beliefs, findings = moved(beliefs, findings, sim)
+    beliefs, findings = misplaced_beliefs(beliefs, findings, sim)
     notes = [_incomplete(at, gain)] if at.cut else []
     notes += [text] if (text := many_causes(findings)) else []
     residual = error - stated.predict(every)
@@ -214,7 +214,7 @@ def _diagnosis(
         sim.sigma_arcsec or None,
     )
     return Diagnosis(
-        compare(every, residual),
+        discrepancy_of(every, residual),
         _structure(first),
         _noise(chosen, rest),
         findings,
@@ -227,7 +227,7 @@ def _diagnosis(
         rest,
         before,
         beliefs,
-        faults_of(records_of(measured)),
+        data_faults(records_of(measured)),
         notes,
         not at.cut,
         log,
@@ -264,7 +264,7 @@ def _structure(start: Regression) -> dict[str, float]:
     before = _left(start)
     alone = {}
     for cause in EFFECTS:
-        extension = proposed(start, cause)
+        extension = proposed_above(start, cause)
         if extension is not None and extension.bic_gain > 0.0:
             after = _left(start.with_terms([extension], 0.0))
             alone[cause] = 1.0 - float(np.sum(after**2) / max(float(np.sum(before**2)), 1e-300))

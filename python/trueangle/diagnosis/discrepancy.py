@@ -13,7 +13,7 @@ from ..runs.run import CalibrationRun
 from ..support.angles import circular_mean, wrap
 from ..support.plainresult import Shown
 
-__all__ = ["Discrepancy", "compare", "unfolded_error"]
+__all__ = ["Discrepancy", "discrepancy_of", "unfolded_error"]
 
 Array = NDArray[np.float64]
 
@@ -46,7 +46,7 @@ def unfolded_error(runs: Sequence[CalibrationRun]) -> Array:
     return (zero + wrap(difference - zero, period)) * (1_296_000.0 / period)
 
 
-def compare(signals: Signals, residual: Array) -> Discrepancy:
+def discrepancy_of(signals: Signals, residual: Array) -> Discrepancy:
     """Numbers of ``residual`` (measured minus simulated, arcsec)."""
     centred = residual - residual.mean()
     means = [float(residual[a:b].mean()) for a, b in signals.run_bounds()]

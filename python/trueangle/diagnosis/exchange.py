@@ -11,7 +11,7 @@ from ..effects import EFFECTS
 from ..estimation.regression import Regression
 from ..support.deadline import pace
 from .candidates import Scores, extensions
-from .overlap import overlaps
+from .overlap import finding_overlaps
 from .penalty import cause_terms, finding_groups, total_penalty
 from .selection import is_flexible, regrown
 from .unnamed import is_named
@@ -60,7 +60,7 @@ def _better_pair(regression: Regression) -> Regression | None:
     """With others in the place of two causes that overlap, those that do so most first."""
     limit = total_penalty(regression) - BETTER
     groups = [g for g in finding_groups(regression.terms) if is_named(regression.terms[g[0]])]
-    pairs = [pair for pair in overlaps(regression, groups) if pair[2] > OVERLAP]
+    pairs = [pair for pair in finding_overlaps(regression, groups) if pair[2] > OVERLAP]
     specific = [name for name, effect in EFFECTS.items() if not is_flexible(effect)]
     for i, j, _ in sorted(pairs, key=lambda pair: -pair[2]):
         if pace().over:

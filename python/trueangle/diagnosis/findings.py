@@ -15,7 +15,7 @@ from ..runs.checks import DataFault
 from ..simulation.measured import design_of
 from ..simulation.simulation import Simulation
 from ..support.display_units import ErrorsIn
-from ..support.drawn import drawn
+from ..support.drawn import result_picture
 from ..support.plainresult import counted
 from .beliefs import Belief
 from .correctable import Correctable
@@ -264,11 +264,11 @@ class Diagnosis(Correctable):
         `trueangle.plots.measured_and_simulated` and `trueangle.plots.error_left` show the
         readings themselves.
         """
-        axes: Axes = drawn(self, ax)
+        axes: Axes = result_picture(self, ax)
         return axes
 
     def summary(self, errors_in: ErrorsIn = "auto", *, verbose: bool = False) -> str:
-        """A readable account (`trueangle.diagnosis.summary.render`).
+        """A readable account (`trueangle.diagnosis.summary.diagnosis_summary`).
 
         Parameters
         ----------
@@ -278,6 +278,6 @@ class Diagnosis(Correctable):
         verbose : bool
             Tell in full what the readings could not have shown and nobody asked.
         """
-        from .summary import render
+        from .summary import diagnosis_summary
 
-        return render(self, errors_in, verbose)
+        return diagnosis_summary(self, errors_in, verbose)

@@ -30,7 +30,7 @@ DISTINCT = 1e-6
 SLIGHT = 0.01
 
 
-def bends(regression: Regression, exempt: Collection[str] = ()) -> Array:
+def form_error_columns(regression: Regression, exempt: Collection[str] = ()) -> Array:
     """Columns by which the causes found may bend, each with the size that is expected of it.
 
     Of causes ``exempt`` none: a further element of a cause is no companion of it.
@@ -51,10 +51,10 @@ def bends(regression: Regression, exempt: Collection[str] = ()) -> Array:
 
 
 def beside_bends(regression: Regression, exempt: Collection[str] = ()) -> Regression:
-    """The regression beside `bends`, for scores of what else there may be; itself without any."""
+    """The regression beside `form_error_columns`, for scores of others; itself without any."""
 
     def build() -> Regression | None:
-        columns = bends(regression, exempt)
+        columns = form_error_columns(regression, exempt)
         return regression.jointly_with(columns, 1.0) if columns.shape[1] else None
 
     present = {term.cause for term in regression.terms}
@@ -93,7 +93,7 @@ def with_form_errors(regression: Regression) -> Regression:
     where it is hardly better than none), and ``ξ`` has its mean and covariance given
     the residual.
     """
-    columns = regression.whiten(bends(regression))
+    columns = regression.whiten(form_error_columns(regression))
     known = regression.q.T @ columns
     rest = columns - regression.q @ known
     count = columns.shape[1]

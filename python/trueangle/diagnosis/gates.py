@@ -20,10 +20,10 @@ from ..estimation.regression import Regression
 from .confirmation import NOT_CONFIRMED
 from .finding import Finding
 from .levels import UNITS
-from .overlap import overlaps
+from .overlap import finding_overlaps
 from .penalty import cause_terms
 
-__all__ = ["GATES", "MANY", "alike_columns", "gated", "many_causes"]
+__all__ = ["GATES", "MANY", "alike_columns", "gated_findings", "many_causes"]
 
 Array = NDArray[np.float64]
 
@@ -146,7 +146,7 @@ _NOUNS = {"velocity": "speed", "temperature": "temperature", "torque": "load", "
 assert _NOUNS.keys() == UNITS.keys()
 
 
-def gated(
+def gated_findings(
     regression: Regression, findings: Sequence[Finding]
 ) -> tuple[list[Finding], list[Blindness], set[int]]:
     """Findings as the gates leave them, the pairs that are not told apart, and their terms."""
@@ -178,7 +178,7 @@ def alike_columns(
     Of what each explains, beside the terms of neither (`trueangle.diagnosis.overlap`).
     """
     confirmed = [k for k, finding in enumerate(findings) if finding.confirmed]
-    for i, j, found in overlaps(regression, [findings[k].group for k in confirmed]):
+    for i, j, found in finding_overlaps(regression, [findings[k].group for k in confirmed]):
         if found > ALIKE:
             yield confirmed[i], confirmed[j], found
 

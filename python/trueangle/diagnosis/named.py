@@ -19,14 +19,14 @@ from .confirmation import CONFIRMED, NOT_CONFIRMED, status_of
 from .finding import Finding
 from .forms import with_form_errors
 from .gain import Gain, measure_gain
-from .gates import gated
+from .gates import gated_findings
 from .goodness import Unexplained
 from .identifiability import doubts_about, open_origins, with_open_origins
 from .penalty import NEW_CAUSE, cause_terms, finding_groups
 from .selection import is_flexible
 from .unnamed import is_named
 
-__all__ = ["findings_of", "reconsidered", "scatter_doubt", "scatter_finding"]
+__all__ = ["findings_of", "reconsidered_findings", "scatter_doubt", "scatter_finding"]
 
 #: Rivals reported for each finding.
 RIVALS = 3
@@ -107,12 +107,12 @@ def findings_of(
                 tuple(group),
             )
         )
-    findings, alike, shared = gated(regression, findings)
+    findings, alike, shared = gated_findings(regression, findings)
     doubtful = [k for f in findings if not f.confirmed for k in f.group if k not in shared]
     return findings, spots + alike, doubtful
 
 
-def reconsidered(
+def reconsidered_findings(
     regression: Regression, findings: Sequence[Finding], unexplained: Unexplained
 ) -> list[Finding]:
     """Findings once it is known that something is unexplained."""

@@ -11,12 +11,12 @@ from numpy.typing import NDArray
 from ..estimation.projection import EXCITED
 from ..estimation.regression import Regression
 
-__all__ = ["overlaps"]
+__all__ = ["finding_overlaps"]
 
 Array = NDArray[np.float64]
 
 
-def overlaps(
+def finding_overlaps(
     regression: Regression, groups: Sequence[Sequence[int]]
 ) -> Iterator[tuple[int, int, float]]:
     """Correlation of what two findings explain, beside the terms of neither.

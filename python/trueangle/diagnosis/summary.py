@@ -12,17 +12,17 @@ from ..support.display_units import ErrorsIn, ErrorUnit, error_unit, sine_of_rms
 from ..support.layout import laid_out
 from ..support.layout import wrapped as _wrapped
 from .beliefs import Belief
-from .brief import brief_of
+from .brief import brief_finding
 from .goodness.evidence import Evidence
 from .goodness.scatter import AGAINST_STATED
 from .levels import LevelGain
-from .untold import untold
+from .untold import ambiguity_entries
 
 if TYPE_CHECKING:
     from .finding import Finding
     from .findings import Diagnosis
 
-__all__ = ["finding_text", "headline", "render"]
+__all__ = ["diagnosis_headline", "diagnosis_summary", "finding_text"]
 
 #: Share by which the noise must differ from what the simulation states to be told first.
 MATERIAL = 0.1
@@ -44,7 +44,9 @@ _SHUFFLED = {
 _PLAIN = ErrorUnit("", 1.0)
 
 
-def render(diagnosis: Diagnosis, errors_in: ErrorsIn = "auto", verbose: bool = False) -> str:
+def diagnosis_summary(
+    diagnosis: Diagnosis, errors_in: ErrorsIn = "auto", verbose: bool = False
+) -> str:
     """The account of a diagnosis: what is wrong, why, the evidence, the gain, what is open.
 
     ``verbose`` tells in full what the readings could not have shown, and nobody asked.
@@ -53,7 +55,7 @@ def render(diagnosis: Diagnosis, errors_in: ErrorsIn = "auto", verbose: bool = F
     unit = error_unit(errors_in, sine_of_rms(d.rms))
     n = unit.number
     lines = [
-        *headline(diagnosis, unit),
+        *diagnosis_headline(diagnosis, unit),
         *_wrapped(diagnosis.simulated.summary() if diagnosis.simulated else "", 0),
         f"Measured minus simulated: rms {unit.text(d.rms)}, peak-to-peak "
         f"{n(d.peak_to_peak)}, max abs {n(d.max_abs)} ({diagnosis.readings} readings).",
@@ -89,7 +91,7 @@ def render(diagnosis: Diagnosis, errors_in: ErrorsIn = "auto", verbose: bool = F
         lines.append("")
         for text in diagnosis.torque.lines():
             lines += _wrapped(text, 2)
-    open_still = [*untold(diagnosis, verbose, lambda spot: _if_it_is(spot, unit))]
+    open_still = [*ambiguity_entries(diagnosis, verbose, lambda spot: _if_it_is(spot, unit))]
     if diagnosis.next_runs is not None and diagnosis.next_runs.runs:
         lines += ["", *diagnosis.next_runs.summary().splitlines()]
     lines += [""] if open_still else []
@@ -106,7 +108,7 @@ def _if_it_is(spot: Blindness, unit: ErrorUnit) -> Iterator[str]:
         yield f"If {cause}: {shown}."
 
 
-def headline(diagnosis: Diagnosis, unit: ErrorUnit) -> list[str]:
+def diagnosis_headline(diagnosis: Diagnosis, unit: ErrorUnit) -> list[str]:
     """What a reader must know first: faults, what is not understood, what is seen or wrong."""
     lines: list[str] = []
     for note in diagnosis.notes:
@@ -122,8 +124,8 @@ def headline(diagnosis: Diagnosis, unit: ErrorUnit) -> list[str]:
         )
         for item in rest.firing[:3]:
             lines += _wrapped(f"- {unit.spoken(item.says)} (p {_chance(item.p)})", 4, 2)
-    confirmed = [brief_of(f, unit) for f in diagnosis.findings if f.confirmed]
-    doubtful = [brief_of(f, unit) for f in diagnosis.findings if not f.confirmed]
+    confirmed = [brief_finding(f, unit) for f in diagnosis.findings if f.confirmed]
+    doubtful = [brief_finding(f, unit) for f in diagnosis.findings if not f.confirmed]
     wrong = [belief for belief in diagnosis.beliefs if belief.verdict != "confirmed"]
     if confirmed:
         lines += _wrapped(f"Confirmed: {', '.join(confirmed)}.", 2)

@@ -11,13 +11,13 @@ from ..effects.missing_order import MissingOrder
 if TYPE_CHECKING:
     from .findings import Diagnosis
 
-__all__ = ["matters", "untold"]
+__all__ = ["ambiguity_entries", "ambiguity_matters"]
 
 #: What adds an entry to a text: how far its further lines are set in, and the first one.
 Entry = tuple[str, int, int]
 
 
-def matters(spot: Blindness, diagnosis: Diagnosis) -> bool:
+def ambiguity_matters(spot: Blindness, diagnosis: Diagnosis) -> bool:
     """Something is seen, or one of the causes is believed or found beside it."""
     asked = {effect.kind for effect in diagnosis.extended.effects}
     asked |= {belief.what for belief in diagnosis.beliefs}
@@ -26,7 +26,7 @@ def matters(spot: Blindness, diagnosis: Diagnosis) -> bool:
     return spot.supported or bool(set(spot.causes) & (asked - {MissingOrder.kind}))
 
 
-def untold(
+def ambiguity_entries(
     diagnosis: Diagnosis, verbose: bool, sizes: Callable[[Blindness], Iterator[str]]
 ) -> Iterator[Entry]:
     """Entries on what cannot be told, what is seen first.
@@ -37,7 +37,7 @@ def untold(
     plan = diagnosis.next_runs
     planned = {entry.causes for entry in (plan.between if plan and plan.runs else ()) if entry.told}
     spots = sorted(diagnosis.not_identifiable, key=lambda spot: not spot.supported)
-    shown = [spot for spot in spots if verbose or matters(spot, diagnosis)]
+    shown = [spot for spot in spots if verbose or ambiguity_matters(spot, diagnosis)]
     if shown:
         yield "What these readings cannot tell:", 0, 0
     for spot in shown:

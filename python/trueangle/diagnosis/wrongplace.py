@@ -10,13 +10,13 @@ from ..simulation.simulation import Simulation
 from .beliefs import Belief
 from .finding import Finding
 
-__all__ = ["moved"]
+__all__ = ["misplaced_beliefs"]
 
 #: Share of its amplitude by which a line at another order may differ from the believed one.
 AS_LARGE = 0.15
 
 
-def moved(
+def misplaced_beliefs(
     beliefs: Sequence[Belief], findings: Sequence[Finding], sim: Simulation
 ) -> tuple[list[Belief], list[Finding]]:
     """Beliefs with ``wrong_place`` where what is absent was found elsewhere, and other findings.

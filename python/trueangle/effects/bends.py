@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from ..joint.signals import Signals
 
-__all__ = ["bent", "beyond", "transitions"]
+__all__ = ["columns_beyond", "departure_columns", "spring_transitions"]
 
 Array = NDArray[np.float64]
 
@@ -21,7 +21,7 @@ LAG = 0.03
 FORGOTTEN = 1e-18
 
 
-def bent(signals: Signals, factor: str, signal: Array) -> Array:
+def departure_columns(signals: Signals, factor: str, signal: Array) -> Array:
     """Columns by which an error ``signal`` may depart from its law in a factor x.
 
     ::
@@ -42,7 +42,7 @@ def bent(signals: Signals, factor: str, signal: Array) -> Array:
     ndarray, shape (n, k)
     """
     if factor == "direction":
-        soft = (signal * signals.direction)[:, None] * transitions(signals)
+        soft = (signal * signals.direction)[:, None] * spring_transitions(signals)
         return np.asarray(soft - signal[:, None])
     x = getattr(signals, factor) if factor in ("velocity", "temperature", "torque") else None
     if x is None or not np.ptp(x) > 0.0:
@@ -53,15 +53,15 @@ def bent(signals: Signals, factor: str, signal: Array) -> Array:
     loop = np.abs(signal) * np.sign(signal - late)
     curved = signal[:, None] * np.column_stack([x, np.abs(x), x**2, np.abs(x) ** 3])
     # What has a part along the error itself is that much more of it, and no bend.
-    return np.column_stack([beyond(curved, signal[:, None]), late - signal, loop])
+    return np.column_stack([columns_beyond(curved, signal[:, None]), late - signal, loop])
 
 
-def transitions(signals: Signals) -> Array:
+def spring_transitions(signals: Signals) -> Array:
     """States of springs of several lengths, relaxed and run in at the start of a run."""
     return np.column_stack([signals.presliding(x, start) for start in (0.0, 1.0) for x in LENGTHS])
 
 
-def beyond(columns: Array, own: Array) -> Array:
+def columns_beyond(columns: Array, own: Array) -> Array:
     """What ``columns`` have beside the columns ``own``."""
     return np.asarray(columns - own @ np.linalg.lstsq(own, columns, rcond=None)[0])
 

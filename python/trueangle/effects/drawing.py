@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from ..joint.pattern import Surroundings
 from ..joint.signals import Signals
 
-__all__ = ["carrier_order", "free_line", "largest", "phase", "reading_rate", "visited_place"]
+__all__ = ["carrier_order", "free_line", "largest_signal", "phase", "reading_rate", "visited_place"]
 
 #: Low orders of the output that are drawn beside those of its gear.
 LOW_ORDERS = tuple(("output", k) for k in range(1, 9))
@@ -49,6 +49,6 @@ def reading_rate(signals: Signals) -> float:
     return 1.0 / max(max(steps, default=1.0), 1e-12)
 
 
-def largest(values: NDArray[np.float64] | None) -> float:
+def largest_signal(values: NDArray[np.float64] | None) -> float:
     """Largest absolute value of a channel; 0 where it was not recorded."""
     return 0.0 if values is None else float(np.abs(values).max(initial=0.0))

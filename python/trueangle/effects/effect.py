@@ -16,9 +16,9 @@ from ..estimation.regression import Regression
 from ..joint.pattern import Surroundings
 from ..joint.signals import Signals
 from ..model.term import Term
-from .bends import bent
+from .bends import departure_columns
 from .blindness import Blindness
-from .parameters import checked, plain
+from .parameters import checked_parameters, plain_parameters
 from .scatter import ScatterFinding
 from .search import Array, Fitted
 
@@ -182,7 +182,7 @@ class Effect:
         By its factor (`trueangle.effects.bends`); of one that has an exact form none.
         """
         signal = sum((t.columns @ c for t, c in terms if c.size), np.zeros(len(signals)))
-        return bent(signals, cls.factor, np.asarray(signal))
+        return departure_columns(signals, cls.factor, np.asarray(signal))
 
     @classmethod
     def report(
@@ -293,7 +293,7 @@ class Effect:
         ArgumentError
             A parameter that is unknown, missing or of the wrong kind.
         """
-        return cls(**checked(cls, table))
+        return cls(**checked_parameters(cls, table))
 
     def to_table(self) -> dict[str, Any]:
         """The table `from_table` reads, ``kind`` first, defaults left out."""
@@ -301,7 +301,7 @@ class Effect:
         for field in fields(self):  # type: ignore[arg-type]
             value = getattr(self, field.name)
             if field.default is MISSING or value != field.default:
-                table[field.name] = plain(value)
+                table[field.name] = plain_parameters(value)
         return table
 
 

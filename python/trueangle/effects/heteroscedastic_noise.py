@@ -15,7 +15,13 @@ from ..joint.pattern import Surroundings
 from ..joint.signals import Signals
 from .effect import Effect
 from .outliers import Outliers
-from .scatter import CLIPPED_VARIANCE, SQUARE_CLIP, ScatterFinding, clipped, standardised
+from .scatter import (
+    CLIPPED_VARIANCE,
+    SQUARE_CLIP,
+    ScatterFinding,
+    clipped_squares,
+    standardised_residuals,
+)
 from .search import (
     Array,
 )
@@ -94,7 +100,7 @@ class HeteroscedasticNoise(Effect):
         if regression.is_explained:
             return None
         signals, n = regression.signals, regression.n
-        whole = standardised(regression) ** 2
+        whole = standardised_residuals(regression) ** 2
         square = np.minimum(whole, SQUARE_CLIP)
         # A reading tells half as much of the logarithm of a variance as of a mean.
         log_n = regression.log_n - float(np.log(2.0))
@@ -176,7 +182,7 @@ def _log_variance(design: Array, square: Array) -> tuple[Array, Array]:
     gamma[0] = mean = np.log(np.minimum(square, SQUARE_CLIP).mean())
     inverse = np.linalg.inv(design.T @ design)
     for _ in range(30):
-        step = inverse @ (design.T @ (clipped(square, np.exp(design @ gamma)) - 1.0))
+        step = inverse @ (design.T @ (clipped_squares(square, np.exp(design @ gamma)) - 1.0))
         if np.abs(design @ (gamma + step) - mean).max() > WIDEST:
             break  # readings that do not scatter at all have no largest likelihood
         gamma += step

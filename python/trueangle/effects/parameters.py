@@ -14,10 +14,10 @@ from ..support.suggestions import did_you_mean
 if TYPE_CHECKING:
     from .effect import Effect
 
-__all__ = ["checked", "plain"]
+__all__ = ["checked_parameters", "plain_parameters"]
 
 
-def checked(effect: type[Effect], table: Mapping[str, Any]) -> dict[str, Any]:
+def checked_parameters(effect: type[Effect], table: Mapping[str, Any]) -> dict[str, Any]:
     """Values for the fields of ``effect`` from a table without its ``kind``.
 
     Raises
@@ -75,8 +75,8 @@ def _number(where: str, value: Any) -> float:
     return float(value)
 
 
-def plain(value: Any) -> Any:
+def plain_parameters(value: Any) -> Any:
     """Tuples as lists, as files have them."""
     if isinstance(value, tuple):
-        return [plain(item) for item in value]
+        return [plain_parameters(item) for item in value]
     return value

@@ -21,7 +21,7 @@ from .backlash import (
     Backlash,
     goes_both_ways,
 )
-from .bends import transitions
+from .bends import spring_transitions
 from .blindness import (
     Blindness,
     share_left,
@@ -175,7 +175,7 @@ class PreslidingHysteresis(Effect):
         size = sum(float(np.sum(coefficients)) for _, coefficients in terms)
         signal = np.sum([term.columns @ coefficients for term, coefficients in terms], axis=0)
         # Other lengths, and the same amplitude far from the reversal.
-        return np.asarray(size * transitions(signals) - signal[:, None])
+        return np.asarray(size * spring_transitions(signals) - signal[:, None])
 
     @classmethod
     def report(

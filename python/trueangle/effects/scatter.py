@@ -16,7 +16,8 @@ if TYPE_CHECKING:
     from .effect import Effect
 
 __all__ = [
-    "CLIPPED_VARIANCE", "NEW_SCATTER", "SQUARE_CLIP", "ScatterFinding", "clipped", "standardised",
+    "CLIPPED_VARIANCE", "NEW_SCATTER", "SQUARE_CLIP", "ScatterFinding", "clipped_squares",
+    "standardised_residuals",
 ]  # fmt: skip
 
 #: Squared residuals are taken at most this many of their own variances large.
@@ -61,13 +62,13 @@ class ScatterFinding:
     size: float = 1.0
 
 
-def standardised(regression: Regression) -> Array:
+def standardised_residuals(regression: Regression) -> Array:
     """Whitened residuals in robust standard deviations."""
     e = regression.whiten(regression.residual - regression.design @ regression.coefficients)
     spread = 1.4826 * float(np.median(np.abs(e)))
     return np.asarray(e / max(spread, 1e-300))
 
 
-def clipped(square: Array, variance: Array) -> Array:
+def clipped_squares(square: Array, variance: Array) -> Array:
     """Squared residuals in their own variances, clipped, with the mean 1 for normal noise."""
     return np.asarray(np.minimum(square / variance, SQUARE_CLIP) / _CLIPPED_MEAN)

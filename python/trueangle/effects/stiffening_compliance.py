@@ -16,13 +16,13 @@ from ..joint.signals import Signals
 from ..model import forms
 from ..model.forms import Form
 from ..model.term import Term, from_arcsec
-from .bends import beyond
+from .bends import columns_beyond
 from .blindness import (
     OWN_POWER,
     Blindness,
     share_left,
 )
-from .drawing import largest
+from .drawing import largest_signal
 from .effect import Effect
 from .search import (
     Array,
@@ -104,7 +104,7 @@ class StiffeningCompliance(Effect):
         cls, size: float, signals: Signals, around: Surroundings, rng: np.random.Generator
     ) -> Self | None:
         # What is taken off at the largest load is a quarter of the linear part there.
-        return cls(4.0 * size * largest(signals.torque) ** 2, -size)
+        return cls(4.0 * size * largest_signal(signals.torque) ** 2, -size)
 
     @classmethod
     def propose(cls, regression: Regression) -> Extension | None:
@@ -158,7 +158,7 @@ class StiffeningCompliance(Effect):
             moment = cls.moment(signals, term.shape["gravity_deg"])
             top = float(np.abs(moment).max())
             knees = [cls.beyond(moment, share * top) for share in KNEES]
-            columns.append(beyond(np.column_stack([*knees, moment**3]), term.columns))
+            columns.append(columns_beyond(np.column_stack([*knees, moment**3]), term.columns))
         return np.hstack(columns)
 
     @classmethod

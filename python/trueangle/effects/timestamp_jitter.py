@@ -15,7 +15,13 @@ from ..joint.signals import Signals
 from ..support.angles import ARCSEC_PER_DEG
 from .effect import Effect
 from .heteroscedastic_noise import HeteroscedasticNoise
-from .scatter import CLIPPED_VARIANCE, NEW_SCATTER, ScatterFinding, clipped, standardised
+from .scatter import (
+    CLIPPED_VARIANCE,
+    NEW_SCATTER,
+    ScatterFinding,
+    clipped_squares,
+    standardised_residuals,
+)
 from .search import Array
 
 __all__ = ["TimestampJitter"]
@@ -62,7 +68,7 @@ class TimestampJitter(Effect):
         velocity = regression.signals.velocity
         if regression.is_explained or velocity is None or np.ptp(np.abs(velocity)) == 0.0:
             return None
-        e = standardised(regression)
+        e = standardised_residuals(regression)
         plain = _likelihood(e, np.ones((regression.n, 1)), False)[0]
         speed = np.abs(velocity) / np.abs(velocity).max()
         with_speed = np.column_stack([np.ones(regression.n), speed])
@@ -108,7 +114,7 @@ def _likelihood(e: Array, design: Array, logarithm: bool) -> tuple[float, Array]
         linear = design @ g
         variance = np.exp(np.clip(linear, -20.0, 20.0)) if logarithm else np.maximum(linear, FLOOR)
         slope = design if logarithm else design / variance[:, None]
-        g = g + np.linalg.lstsq(slope, clipped(square, variance) - 1.0, rcond=None)[0]
+        g = g + np.linalg.lstsq(slope, clipped_squares(square, variance) - 1.0, rcond=None)[0]
     linear = design @ g
     variance = np.exp(np.clip(linear, -20.0, 20.0)) if logarithm else np.maximum(linear, FLOOR)
-    return -0.5 * float(np.sum(np.log(variance) + clipped(square, variance))), g
+    return -0.5 * float(np.sum(np.log(variance) + clipped_squares(square, variance))), g

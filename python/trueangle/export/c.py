@@ -7,9 +7,9 @@ from typing import ClassVar
 import numpy as np
 
 from ..support.files import Kind
-from .chain import Chain
+from .chain import Chain, source_identifier
 from .cstep import c_step
-from .portable import PortableTarget, identifier, self_test, table_lines
+from .portable import PortableTarget, self_test, table_lines
 from .runtimeterms import RunTimeTerms
 from .table import PER_RADIAN, Table
 from .target import CommentBlock
@@ -49,7 +49,7 @@ class CHeader(PortableTarget):
 
     def write(self, chain: Chain, terms: RunTimeTerms | None, header: CommentBlock) -> str:
         """The header."""
-        name = identifier(header.name)
+        name = source_identifier(header.name)
         guard = f"TRUEANGLE_{name.upper()}_H"
         parts = [
             _comment(name, chain, terms, header),
@@ -75,7 +75,7 @@ class CHeader(PortableTarget):
 
 
 def _table_names(chain: Chain) -> list[str]:
-    return [identifier(table.shaft) for table in chain.tables]
+    return [source_identifier(table.shaft) for table in chain.tables]
 
 
 def _comment(name: str, chain: Chain, terms: RunTimeTerms | None, header: CommentBlock) -> str:

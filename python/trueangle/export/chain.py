@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from .pattern import TurnPattern
 from .table import TURN, Table, make_table
 
-__all__ = ["Chain", "identifier", "make_chain"]
+__all__ = ["Chain", "make_chain", "source_identifier"]
 
 Array = NDArray[np.float64]
 Angles = NDArray[np.uint32]
@@ -109,12 +109,12 @@ def make_chain(
     return Chain(zero, tuple(tables), at_indicated)
 
 
-def identifier(name: str) -> str:
+def source_identifier(name: str) -> str:
     """A name that C and Rust take: lower case, digits and underscores.
 
     Examples
     --------
-    >>> identifier("Joint-A 3"), identifier("3rd")
+    >>> source_identifier("Joint-A 3"), source_identifier("3rd")
     ('joint_a_3', 'angle_3rd')
     """
     found = re.sub(r"[^0-9a-z]+", "_", name.lower()).strip("_")
@@ -123,7 +123,7 @@ def identifier(name: str) -> str:
 
 def _unlike(name: str, others: Sequence[str]) -> str:
     """The name as an identifier, with a number where another shaft has the same."""
-    plain, number = identifier(name), 2
+    plain, number = source_identifier(name), 2
     found = plain
     while found in others:
         found, number = f"{plain}_{number}", number + 1

@@ -18,7 +18,7 @@ from ..support.display_units import ErrorsIn, ErrorUnit, error_unit
 from ..support.kinds import told_kinds
 from ..support.layout import laid_out
 from ..support.plainresult import PlainResult, counted
-from .equality import FALSE_ALARMS, Equality, equality
+from .equality import FALSE_ALARMS, Equality, pattern_equality
 from .pattern import TurnPattern
 
 __all__ = ["Comparison", "compare"]
@@ -231,7 +231,7 @@ def compare(
         for kind in dict.fromkeys(t.kind for t in (*first.terms, *second.terms))
         if _terms(first, kind) != _terms(second, kind)
     ]
-    told: Equality | None = equality(first, second) if same else None
+    told: Equality | None = pattern_equality(first, second) if same else None
     return Comparison(
         orders=rows,
         rms_arcsec=float(np.sqrt(np.mean(difference**2))) * ARCSEC_PER_TURN,

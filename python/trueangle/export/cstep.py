@@ -11,9 +11,9 @@ import re
 from ..model import forms
 from ..model.forms import Form
 from .carithmetic import FIXED, RATIO_WAVES, Arithmetic
-from .ctravel import advance_of, seen_of, springs_of
+from .ctravel import c_advance, c_seen_angle, c_springs
 from .runtimeterms import RunTimeTerms, Waves
-from .table import TURN, ratio_of
+from .table import TURN, ratio_of_cycles
 
 __all__ = ["c_search", "c_state", "c_step", "wave_tables"]
 
@@ -141,7 +141,7 @@ def c_search(
             parts.append(code)
     parts += tables
     if terms.springs:
-        parts.append(springs_of(terms, arithmetic))
+        parts.append(c_springs(terms, arithmetic))
     signals = "const @n@_signals *signals"
     parts.append(_function("@n@_level", (signals,), level))
     stretch = ("const @n@_stretch *along", "@real@ held") if terms.springs else ()
@@ -160,8 +160,8 @@ def c_search(
         .replace("@x@", ", x" if arithmetic.from_near and not at_indicated else "")
     )
     if terms.travels:
-        parts.append(advance_of(terms))
-    parts.append(seen_of(terms, arithmetic, zero))
+        parts.append(c_advance(terms))
+    parts.append(c_seen_angle(terms, arithmetic, zero))
     text = "\n".join(parts)
     for key, value in (("angle", arithmetic.angle), ("real", arithmetic.real)):
         text = text.replace(f"@{key}@", value)
@@ -203,7 +203,7 @@ def wave_tables(name: str, waves: Waves, arithmetic: Arithmetic, rated: bool) ->
     if waves.whole:
         orders = array("uint32_t", "orders", [f"{int(m) % 2**32}u" for m in waves.orders])
     else:
-        parts = [f"UINT64_C({part})" for m in waves.orders for part in ratio_of(m)]
+        parts = [f"UINT64_C({part})" for m in waves.orders for part in ratio_of_cycles(m)]
         orders = array("uint64_t", "orders", parts, "")
         assert len(parts) == 2 * count
     rates = array("@real@", "rates", [number(m) for m in waves.orders]) if rated else ""
@@ -245,7 +245,7 @@ def _form(
             return [], _filter(frequency, damping, waves, name, arithmetic)
         case forms.Bump(place, width, height, cycles):
             if arithmetic is FIXED:
-                turns, fraction = ratio_of(cycles)
+                turns, fraction = ratio_of_cycles(cycles)
                 phase = (
                     f"(uint32_t)(((uint64_t)(x >> 32) * UINT64_C({turns})\n            + "
                     f"(uint64_t)(uint32_t)x * UINT64_C({fraction})) >> 32)"

@@ -5,10 +5,10 @@ from __future__ import annotations
 from .carithmetic import FIXED, Arithmetic
 from .runtimeterms import RunTimeTerms
 
-__all__ = ["advance_of", "seen_of", "springs_of"]
+__all__ = ["c_advance", "c_seen_angle", "c_springs"]
 
 
-def springs_of(terms: RunTimeTerms, arithmetic: Arithmetic) -> str:
+def c_springs(terms: RunTimeTerms, arithmetic: Arithmetic) -> str:
     """Error of the springs on a stretch, and the stretch that begins."""
     number = arithmetic.number
     rows = ["/* Error of the springs at x on a stretch of travel. */",
@@ -42,7 +42,7 @@ def springs_of(terms: RunTimeTerms, arithmetic: Arithmetic) -> str:
     return "\n".join([*rows, "    return next;", "}", ""])
 
 
-def advance_of(terms: RunTimeTerms) -> str:
+def c_advance(terms: RunTimeTerms) -> str:
     """Moving on."""
     held = "state->stretch.direction" if terms.springs else "state->direction"
     begin = (
@@ -71,7 +71,7 @@ static inline void @n@_advance(@n@_state *state, int8_t direction, @angle@ x)
 """
 
 
-def seen_of(terms: RunTimeTerms, arithmetic: Arithmetic, zero: float) -> str:
+def c_seen_angle(terms: RunTimeTerms, arithmetic: Arithmetic, zero: float) -> str:
     """The angle that the encoder saw at a reading, which moves the state on."""
     head = (
         "static inline @angle@ @n@_seen(@n@_state *state, @angle@ reading, @angle@ goal,\n"

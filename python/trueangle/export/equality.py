@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from ..model.model import HarmonicModel
 from ..support.distributions import f_tail
 
-__all__ = ["FALSE_ALARMS", "Equality", "equality"]
+__all__ = ["FALSE_ALARMS", "Equality", "pattern_equality"]
 
 Array = NDArray[np.float64]
 
@@ -34,7 +34,7 @@ class Equality(NamedTuple):
     orders: int
 
 
-def equality(first: HarmonicModel, second: HarmonicModel) -> Equality | None:
+def pattern_equality(first: HarmonicModel, second: HarmonicModel) -> Equality | None:
     """Hotelling's statistic of the orders that both models have.
 
     ::
@@ -57,7 +57,7 @@ def equality(first: HarmonicModel, second: HarmonicModel) -> Equality | None:
     >>> shaft = lambda a: ta.Shaft("output", 1, [1], [a], [0.0])
     >>> known = np.diag([0.0, 1e-4, 1e-4])
     >>> one, other = (ta.HarmonicModel([shaft(a)], covariance=known) for a in (0.5, 0.52))
-    >>> found = equality(one, other)
+    >>> found = pattern_equality(one, other)
     >>> found.verdict, round(found.p, 3)
     ('same', 0.368)
     """

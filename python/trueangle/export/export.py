@@ -21,9 +21,9 @@ from ..support.kinds import told_kinds
 from .exported import HEADER_DIGITS, Exported
 from .leftout import run_time_bound, term_sizes
 from .pattern import TurnPattern
-from .proof import Proof, lost_orders, prove, upward
+from .proof import Proof, lost_orders, prove_export, rounded_up
 from .target import CommentBlock, Made, Target
-from .targets import target_of
+from .targets import export_target
 
 __all__ = ["export_model", "import_model"]
 
@@ -94,7 +94,7 @@ def export_model(
     >>> made.max_difference_arcsec < 1.0
     True
     """
-    found = target_of(target)
+    found = export_target(target)
     given = found.checked(options)
     loaded, sha256, inputs = _model(model)
     inputs += [given[name] for name in found.files if given[name] is not None]
@@ -124,8 +124,8 @@ def export_model(
     else:
         made = _smallest(found, pattern, given, _share(max_arcsec, beside, rows, steep, rounding))
     proof = _proven(made, given.get("bits", 24))
-    largest = upward(proof.max_arcsec)
-    total = upward(steep * largest + rounding + beside) if rows or at_run_time else largest
+    largest = rounded_up(proof.max_arcsec)
+    total = rounded_up(steep * largest + rounding + beside) if rows or at_run_time else largest
     if max_arcsec is not None and total > max_arcsec:
         raise ArgumentError(
             f"{target} differs by up to {total:.4g} arcsec with these options, and at "
@@ -202,7 +202,7 @@ def import_model(
     FileError
         Not a table of this target: file, line and what is wrong.
     """
-    found = target_of(target)
+    found = export_target(target)
     given = found.checked(options)
     raw = read_whole(path, TABLE_BYTES, f"a table of {target}")
     try:
@@ -278,7 +278,9 @@ def _proven(made: Made, bits: int) -> Proof:
     if not 1 <= bits <= 32:
         raise ArgumentError(f"bits must be from 1 to 32, got {bits}")
     part = made.part
-    return prove(part.corrections, part.exact, bits, part.resolution, part.turns, part.continuous)
+    return prove_export(
+        part.corrections, part.exact, bits, part.resolution, part.turns, part.continuous
+    )
 
 
 def _smallest(

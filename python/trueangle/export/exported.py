@@ -8,7 +8,7 @@ from typing import Any
 from ..support.display_units import ErrorsIn, ErrorUnit, error_unit
 from ..support.layout import laid_out
 from ..support.plainresult import PlainResult
-from .proof import upward
+from .proof import rounded_up
 
 __all__ = ["HEADER_DIGITS", "Exported"]
 
@@ -127,7 +127,7 @@ class Exported(PlainResult):
         """One line: how far the corrected angle is from the model's, with all that is left out."""
 
         def shown(arcsec: float) -> str:
-            return f"{upward(arcsec * unit.per_arcsec, digits):.{digits}g}"
+            return f"{rounded_up(arcsec * unit.per_arcsec, digits):.{digits}g}"
 
         table = (
             f"{shown(self.max_difference_arcsec)} {unit.name}, "

@@ -18,7 +18,7 @@ from typing import Any, ClassVar
 
 from .._core import __version__
 from ..errors import ArgumentError
-from ..model.file import model_of
+from ..model.file import embedded_model
 from ..model.model import HarmonicModel
 from ..model.term import Term
 from ..model.text import model_text
@@ -130,7 +130,7 @@ class Fmu(Target):
     def read(self, text: str, path: str, options: Mapping[str, Any]) -> HarmonicModel:
         if not text:
             raise failed(path, f"holds no {_MODEL}: no functional mock-up unit of trueangle")
-        return model_of(text, path)
+        return embedded_model(text, path)
 
 
 def _token(text: str) -> str:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from ..errors import NotInvertibleError
 
-__all__ = ["inverse"]
+__all__ = ["inverse_rising"]
 
 Array = NDArray[np.float64]
 
@@ -18,7 +18,7 @@ Array = NDArray[np.float64]
 _STEPS = 8
 
 
-def inverse(rising: Callable[[Array], Array], wanted: Array, points: int) -> Array:
+def inverse_rising(rising: Callable[[Array], Array], wanted: Array, points: int) -> Array:
     """``x`` with ``rising(x) = wanted``, for a function that gains one turn per turn.
 
     Parameters
@@ -39,7 +39,7 @@ def inverse(rising: Callable[[Array], Array], wanted: Array, points: int) -> Arr
     --------
     >>> def steep(x):
     ...     return x + 0.99 / (2 * np.pi) * np.sin(2 * np.pi * x)
-    >>> x = inverse(steep, np.array([-0.6, 0.0, 2.4]), 64)
+    >>> x = inverse_rising(steep, np.array([-0.6, 0.0, 2.4]), 64)
     >>> bool(np.max(np.abs(steep(x) - [-0.6, 0.0, 2.4])) < 1e-12)
     True
     """

@@ -15,7 +15,7 @@ from .oneturn import line_floor
 from .pattern import TurnPattern
 from .proof import enough_bits
 from .reading import failed
-from .setpoint import ENDS, NOMINAL_DECIMALS, POSITIONS, Travel, steepness
+from .setpoint import ENDS, NOMINAL_DECIMALS, POSITIONS, Travel, axis_steepness
 from .setpointreading import travel_model
 from .target import CommentBlock, Made, Option, Target
 
@@ -68,7 +68,7 @@ class LinuxCnc(Target):
             own = f"{self.what}, COMP_FILE_TYPE = {options['type']}; degrees."
             return "\n".join([*rows, *header.comment("# ", own), ""])
 
-        slope, bend = steepness(travel)
+        slope, bend = axis_steepness(travel)
         step = 10.0**-_DECIMALS / 360.0
         return Made(
             text=text,

@@ -13,7 +13,7 @@ from ..errors import ArgumentError
 from ..model.model import HarmonicModel
 from ..support.angles import ARCSEC_PER_TURN
 from ..support.files import Kind, read_whole
-from .oneturn import array_of, rows
+from .oneturn import longest_array, rows
 from .pattern import TurnPattern
 from .proof import Correction, Places
 from .reading import failed, sampled_model
@@ -107,7 +107,7 @@ def _device(table: Array) -> Correction:
 
 
 def _lookup(text: str, path: str) -> tuple[Array, int]:
-    table, line, decimals = array_of(text, path, Mechaduino.name)
+    table, line, decimals = longest_array(text, path, Mechaduino.name)
     if len(table) != ENTRIES or np.any((table < 0.0) | (table > 360.0)):
         raise failed(
             path, f"lookup must hold {ENTRIES} angles from 0 to 360, got {len(table)} numbers", line

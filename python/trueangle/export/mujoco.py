@@ -10,7 +10,7 @@ from typing import Any, ClassVar
 from xml.sax.saxutils import quoteattr
 
 from ..errors import ArgumentError
-from ..model.file import model_of
+from ..model.file import embedded_model
 from ..model.model import HarmonicModel
 from ..model.term import Term
 from ..model.text import model_text
@@ -143,7 +143,7 @@ class MuJoCo(Target):
             raise failed(
                 path, f"holds no model of joint {joint!r}; it has {', '.join(found) or 'none'}"
             )
-        return model_of(found[joint], path)
+        return embedded_model(found[joint], path)
 
 
 def _ripple(text: str | None) -> list[tuple[int, float, float]]:

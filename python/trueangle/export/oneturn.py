@@ -14,7 +14,7 @@ from .knots import linear_knots
 from .pattern import TurnPattern
 from .reading import failed
 
-__all__ = ["array_of", "line_floor", "one_turn_knots", "rows", "without_mean"]
+__all__ = ["line_floor", "longest_array", "one_turn_knots", "rows", "without_mean"]
 
 Array = NDArray[np.float64]
 
@@ -52,7 +52,7 @@ def rows(values: Sequence[str], width: int = 8, lead: str = "    ") -> str:
     return ",\n".join(lead + ", ".join(values[i : i + width]) for i in range(0, len(values), width))
 
 
-def array_of(text: str, path: str, name: str) -> tuple[Array, int, int]:
+def longest_array(text: str, path: str, name: str) -> tuple[Array, int, int]:
     """Numbers of the longest brace list of a C source, the line it begins in, their decimals.
 
     Raises

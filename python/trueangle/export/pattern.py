@@ -13,7 +13,7 @@ from ..model.model import HarmonicModel
 from ..model.term import Term
 from ..support.angles import ARCSEC_PER_TURN
 from ..terms import LocalDefect
-from .inversion import inverse
+from .inversion import inverse_rising
 
 __all__ = ["TurnPattern", "of_direction"]
 
@@ -70,7 +70,7 @@ class TurnPattern:
         if self.model.argument == "reference":
             return theta + self.error(theta) + self.zero
         points = max(_BRACKETS, math.ceil(_BRACKETS_PER_WAVE * max(self.lines, default=1.0)))
-        return inverse(lambda r: r - self.error(r) - self.zero, theta, points)
+        return inverse_rising(lambda r: r - self.error(r) - self.zero, theta, points)
 
     def directed(self, theta: Array, direction: int) -> Array:
         """The error without its constant far from a reversal, travelling one way.

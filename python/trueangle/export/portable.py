@@ -14,7 +14,7 @@ from ..errors import ArgumentError
 from ..model.model import HarmonicModel
 from ..model.term import Term
 from ..support.angles import ARCSEC_PER_TURN
-from .chain import Chain, identifier, make_chain
+from .chain import Chain, make_chain, source_identifier
 from .pattern import TurnPattern
 from .proof import lost_orders
 from .runtimeterms import DIRECTIONS, RunTimeTerms, is_own
@@ -24,7 +24,7 @@ from .target import CommentBlock, Made, Option, TablePart, Target
 Array = NDArray[np.float64]
 Places = NDArray[np.int64]
 
-__all__ = ["PortableTarget", "identifier", "self_test", "table_lines"]
+__all__ = ["PortableTarget", "self_test", "table_lines"]
 
 #: Sizes that are tried, where none is asked for up to the largest default.
 _SIZES = tuple(1 << bits for bits in range(3, 17))
@@ -131,7 +131,7 @@ class PortableTarget(Target):
 def table_lines(chain: Chain) -> list[str]:
     """What the comment says of each table; `import` reads it back."""
     lines = [
-        f"Table {identifier(table.shaft)}: {table.entries} entries, {table.bytes} bytes, "
+        f"Table {source_identifier(table.shaft)}: {table.entries} entries, {table.bytes} bytes, "
         f"{table.method}, {table.number}, shift {table.shift}, {table.cycles:.17g} cycles per "
         "output turn."
         for table in chain.tables

@@ -21,8 +21,8 @@ __all__ = [
     "Proof",
     "enough_bits",
     "lost_orders",
-    "prove",
-    "upward",
+    "prove_export",
+    "rounded_up",
 ]
 
 #: Readings of so many bits are all evaluated; finer ones on the grid of these, with a bound.
@@ -83,12 +83,12 @@ class Proof:
         )
 
 
-def upward(value: float, digits: int = 6) -> float:
+def rounded_up(value: float, digits: int = 6) -> float:
     """``value`` rounded up to so many digits: a bound that is printed stays one.
 
     Examples
     --------
-    >>> upward(0.123456001), upward(2.5, 2)
+    >>> rounded_up(0.123456001), rounded_up(2.5, 2)
     (0.123457, 2.5)
     """
     shown = float(f"{value:.{digits - 1}e}")
@@ -112,7 +112,7 @@ def enough_bits(asked: int, entries: float) -> int:
 _POINTS_PER_LINE = 16
 
 
-def prove(
+def prove_export(
     corrections: Iterable[Correction],
     exact: Callable[[Array], Array],
     bits: int,

@@ -15,7 +15,7 @@ from ..joint.shafts import Shaft
 from ..model.model import HarmonicModel
 from ..model.records import FitRecord
 from .chain import Chain
-from .inversion import inverse
+from .inversion import inverse_rising
 from .proof import Correction
 from .table import TURN, Table
 
@@ -221,7 +221,7 @@ def _harmonics(table: ReadTable, at_indicated: bool) -> tuple[Array, Array, floa
         # Knots are ends of brackets.
         brackets = table.entries * max(1, _LARGEST_GRID // table.entries // 4)
         brackets = min(brackets, table.entries * _FINE)
-        reading = inverse(lambda r: r - table.cycles * table.function(r), x, brackets)
+        reading = inverse_rising(lambda r: r - table.cycles * table.function(r), x, brackets)
         error = table.function(x) if at_indicated else (reading - x) / table.cycles
     spectrum = np.fft.rfft(error) / points
     top = (table.entries - 1) // 2

@@ -10,8 +10,8 @@ import numpy as np
 import trueangle._core as _core
 
 from ..support.files import Kind
-from .chain import Chain
-from .portable import PortableTarget, identifier, self_test, table_lines
+from .chain import Chain, source_identifier
+from .portable import PortableTarget, self_test, table_lines
 from .runtimeterms import RunTimeTerms
 from .ruststep import rust_step
 from .table import PER_RADIAN, Table
@@ -59,7 +59,7 @@ def _comment(chain: Chain, terms: RunTimeTerms | None, header: CommentBlock) -> 
 
 
 def _table(table: Table) -> str:
-    name = identifier(table.shaft)
+    name = source_identifier(table.shaft)
     # An ending of its own: no shaft has the name of another constant.
     knots = f"{name.upper()}_KNOTS"
     values = np.asarray(table.knots)
@@ -100,7 +100,7 @@ def _steps(chain: Chain) -> list[str]:
     """What each table takes off ``left``, an expression in it and in ``start``."""
     steps = []
     for table in chain.tables:
-        at, name = "start" if chain.at_indicated else "left", identifier(table.shaft)
+        at, name = "start" if chain.at_indicated else "left", source_identifier(table.shaft)
         if table.cycles != int(table.cycles):
             at = f"{name}_place({at})"
         else:
@@ -131,7 +131,7 @@ def _unwrapped(chain: Chain) -> str:
                 f"""\
 /// The angle of a shaft that makes {table.cycles:.17g} turns per output turn.
 #[inline]
-pub fn {identifier(table.shaft)}_place(output: i64) -> u32 {{
+pub fn {source_identifier(table.shaft)}_place(output: i64) -> u32 {{
     let turns = ((output >> 32) as u64).wrapping_mul({turns});
     let angle = u64::from(output as u32).wrapping_mul({fraction});
     (turns.wrapping_add(angle) >> 32) as u32

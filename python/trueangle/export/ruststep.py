@@ -5,8 +5,8 @@ from __future__ import annotations
 from ..model import forms
 from ..model.forms import Form
 from .runtimeterms import RunTimeTerms, Waves
-from .rusttravel import advance_of, rust_number, seen_of, springs_of
-from .table import TURN, ratio_of
+from .rusttravel import rust_advance, rust_number, rust_seen_angle, rust_springs
+from .table import TURN, ratio_of_cycles
 
 __all__ = ["rust_step"]
 
@@ -44,7 +44,7 @@ def rust_step(terms: RunTimeTerms, zero: int, at_indicated: bool, whole: bool) -
             parts.append(code)
     parts += tables
     if terms.springs:
-        parts.append(springs_of(terms))
+        parts.append(rust_springs(terms))
     more = ", along: Option<&Stretch>, held: f32" if terms.springs else ""
     parts.append(_function("level", ("signals: &Signals",), level))
     arguments = ("x: i64", "signals: &Signals", "direction: i8", *more.split(", ")[1:])
@@ -58,8 +58,8 @@ def rust_step(terms: RunTimeTerms, zero: int, at_indicated: bool, whole: bool) -
         .replace("@zero@", str(0 if at_indicated else zero))
     )
     if terms.travels:
-        parts.append(advance_of(bool(terms.springs)))
-    parts.append(seen_of(terms, zero))
+        parts.append(rust_advance(bool(terms.springs)))
+    parts.append(rust_seen_angle(terms, zero))
     start = "pattern(reading)" if at_indicated else "reading"
     bumps = [form for form in terms.smooth if isinstance(form, forms.Bump)]
     if at_indicated and bumps:
@@ -111,7 +111,7 @@ def _struct(name: str, fields: str) -> str:
 def _lines(name: str, waves: Waves) -> str:
     rows = []
     for m, c, phase in zip(waves.orders, waves.amplitudes, waves.phases, strict=True):
-        turns, fraction = ratio_of(m)
+        turns, fraction = ratio_of_cycles(m)
         rows.append(
             f"    ({turns}, {fraction}, {round(phase * TURN) % 2**32}, {rust_number(c)}),\n"
         )
@@ -182,7 +182,7 @@ def _form(form: Form, waves: Waves, name: str) -> tuple[list[str], list[str]]:
                 "}",
             ]
         case forms.Bump(centre, width, height, cycles):
-            turns, fraction = ratio_of(cycles)
+            turns, fraction = ratio_of_cycles(cycles)
             at = f"place(x, {turns}, {fraction}).wrapping_sub({round(centre % 1.0 * TURN) % 2**32})"
             return [], [
                 "{",

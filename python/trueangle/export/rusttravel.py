@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from .runtimeterms import RunTimeTerms
 
-__all__ = ["advance_of", "rust_number", "seen_of", "springs_of"]
+__all__ = ["rust_advance", "rust_number", "rust_seen_angle", "rust_springs"]
 
 
 def rust_number(value: float) -> str:
@@ -14,7 +14,7 @@ def rust_number(value: float) -> str:
     return text if value >= 0.0 else f"({text})"
 
 
-def springs_of(terms: RunTimeTerms) -> str:
+def rust_springs(terms: RunTimeTerms) -> str:
     """Error of the springs on a stretch, and the stretch that begins."""
     wound = [
         f"        sum += {rust_number(s.amplitude)}\n            * (d - (d - self.wound[{i}]) "
@@ -53,7 +53,7 @@ impl Stretch {{
 """
 
 
-def advance_of(spring: bool) -> str:
+def rust_advance(spring: bool) -> str:
     """Moving on."""
     held = "state.stretch.direction" if spring else "state.direction"
     begin = (
@@ -78,7 +78,7 @@ fn advance(state: &mut State, direction: i8, x: i64) {{
 """
 
 
-def seen_of(terms: RunTimeTerms, zero: int) -> str:
+def rust_seen_angle(terms: RunTimeTerms, zero: int) -> str:
     """The angle that the encoder saw at a reading, which moves the state on."""
     if not terms.travels:
         return """\

@@ -21,7 +21,7 @@ from .pattern import TurnPattern
 from .proof import Correction, lost_orders
 from .target import Option, TablePart
 
-__all__ = ["ENDS", "NOMINAL_DECIMALS", "POSITIONS", "Travel", "calibrated_travel", "steepness"]
+__all__ = ["ENDS", "NOMINAL_DECIMALS", "POSITIONS", "Travel", "axis_steepness", "calibrated_travel"]
 
 Array = NDArray[np.float64]
 Function = Callable[[Array], Array]
@@ -214,7 +214,7 @@ def _directed(pattern: TurnPattern, direction: int) -> tuple[Array, Array]:
     return np.append(grid, 1.0), np.append(values, values[0] + 1.0)
 
 
-def steepness(travel: Travel) -> tuple[float, float]:
+def axis_steepness(travel: Travel) -> tuple[float, float]:
     """Largest slope (deg per deg) and its change per degree: what an axis must follow."""
     h = 360.0 / travel.entries
     slopes = [np.diff(values) * 360.0 / h for values in (travel.forward, travel.reverse)]

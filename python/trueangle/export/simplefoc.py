@@ -16,7 +16,7 @@ from ..model.model import HarmonicModel
 from ..support.angles import ARCSEC_PER_TURN
 from ..support.files import Kind
 from .knots import rounded_knots
-from .oneturn import array_of, line_floor, one_turn_knots, rows, without_mean
+from .oneturn import line_floor, longest_array, one_turn_knots, rows, without_mean
 from .pattern import TurnPattern
 from .proof import Correction, Places
 from .reading import failed, sampled_model
@@ -155,7 +155,7 @@ class SimpleFoc(Target):
     def read(self, text: str, path: str, options: Mapping[str, Any]) -> HarmonicModel:
         said = re.search(r"variant (plus-float|minus-float|minus-u16)", text)
         variant = said[1] if said else options["variant"]
-        numbers, line, decimals = array_of(text, path, self.name)
+        numbers, line, decimals = longest_array(text, path, self.name)
         declared = re.search(r"\bn_lut\s*=\s*(\d+)", text)
         entries = int(declared[1]) if declared else len(numbers)
         if len(numbers) not in (entries, entries + 1):

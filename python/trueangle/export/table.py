@@ -17,7 +17,7 @@ from ..errors import ArgumentError
 from ..support.angles import ARCSEC_PER_TURN
 from .knots import cubic_knots, linear_knots, rounded_knots
 
-__all__ = ["METHODS", "NUMBERS", "Table", "make_table", "ratio_of"]
+__all__ = ["METHODS", "NUMBERS", "Table", "make_table", "ratio_of_cycles"]
 
 METHODS = ("linear", "cubic")
 NUMBERS = ("q15", "q31", "f32")
@@ -91,7 +91,7 @@ class Table:
 
         Products of these with an angle in whole numbers of 64 bits are places of the shaft.
         """
-        return ratio_of(self.cycles)
+        return ratio_of_cycles(self.cycles)
 
     def place(self, position: NDArray[np.int64]) -> NDArray[np.uint32]:
         """2^-32 turns of the shaft, at positions of the output with their turns."""
@@ -131,12 +131,12 @@ def _fused(a: NDArray[np.float32], t: Array, b: NDArray[np.float32]) -> NDArray[
     return (a.astype(np.float64) * t + b).astype(np.float32)
 
 
-def ratio_of(cycles: float) -> tuple[int, int]:
+def ratio_of_cycles(cycles: float) -> tuple[int, int]:
     """`Table.ratio` of a number of cycles.
 
     Examples
     --------
-    >>> ratio_of(100.0), ratio_of(0.5)
+    >>> ratio_of_cycles(100.0), ratio_of_cycles(0.5)
     ((0, 429496729600), (9223372036854775808, 2147483648))
     """
     exact = Fraction(cycles)

@@ -22,7 +22,7 @@ from .target import Target
 from .tinymovr import Tinymovr
 from .twincat import TwinCat
 
-__all__ = ["TARGETS", "target_of"]
+__all__ = ["TARGETS", "export_target"]
 
 #: Every target by its name.
 TARGETS: dict[str, Target] = {
@@ -48,7 +48,7 @@ TARGETS: dict[str, Target] = {
 }
 
 
-def target_of(name: str) -> Target:
+def export_target(name: str) -> Target:
     """The target of a name.
 
     Raises

@@ -12,13 +12,13 @@ from ..errors import ArgumentError
 from ..model.model import HarmonicModel
 from ..support.files import Kind
 from .knots import rounded_knots
-from .oneturn import array_of, line_floor, one_turn_knots, rows
+from .oneturn import line_floor, longest_array, one_turn_knots, rows
 from .pattern import TurnPattern
 from .proof import Correction, Places
 from .reading import failed, sampled_model
 from .target import CommentBlock, Made, Option, TablePart, Target
 
-__all__ = ["Tinymovr", "Whole", "rectified"]
+__all__ = ["Tinymovr", "Whole", "tinymovr_rectified"]
 
 Whole = NDArray[np.int64]
 
@@ -53,7 +53,8 @@ class Tinymovr(Target):
         readings = np.arange(ticks)
         exact = pattern.correction(readings / ticks) * ticks
         left = [
-            float(np.sum((readings - rectified(readings, t, bits) - exact) ** 2)) for t in tried
+            float(np.sum((readings - tinymovr_rectified(readings, t, bits) - exact) ** 2))
+            for t in tried
         ]
         table = tried[int(np.argmin(left))]
 
@@ -88,7 +89,7 @@ class Tinymovr(Target):
         )
 
     def read(self, text: str, path: str, options: Mapping[str, Any]) -> HarmonicModel:
-        table, line, _ = array_of(text, path, self.name)
+        table, line, _ = longest_array(text, path, self.name)
         if len(table) & (len(table) - 1) or np.any(table != np.rint(table)):
             raise failed(path, "the table holds whole ticks, a power of two of them", line)
         ticks = 1 << options["bits"]
@@ -99,12 +100,12 @@ class Tinymovr(Target):
 def _device(table: Whole, bits: int) -> Correction:
     def correction(angles: Places) -> NDArray[np.float64]:
         reading = angles % 2**32 >> (32 - bits)
-        return np.asarray((reading - rectified(reading, table, bits)) / (1 << bits))
+        return np.asarray((reading - tinymovr_rectified(reading, table, bits)) / (1 << bits))
 
     return correction
 
 
-def rectified(reading: Whole, table: Whole, bits: int) -> Whole:
+def tinymovr_rectified(reading: Whole, table: Whole, bits: int) -> Whole:
     """``sensor_get_angle_rectified``: the firmware's interpolation, in whole ticks."""
     size = len(table)
     shift = bits - (size.bit_length() - 1)

@@ -20,13 +20,13 @@ __all__ = [
     "FEWEST_RUNS",
     "FEWEST_STRETCHES",
     "SCATTER",
-    "calmer",
     "clusters_of",
     "correlation_found",
-    "memory_of",
+    "residual_memory",
     "runs_together",
     "scatter_between",
-    "weight_of",
+    "weight_sum",
+    "white_variance_share",
 ]
 
 Array = NDArray[np.float64]
@@ -67,7 +67,7 @@ def coefficients_of(fitted: Fitted) -> Array:
     return np.column_stack([a, b]).ravel()
 
 
-def weight_of(weights: Array | None, size: int) -> float:
+def weight_sum(weights: Array | None, size: int) -> float:
     """Sum of the weights of so many readings."""
     return float(size) if weights is None else float(weights.sum())
 
@@ -155,7 +155,7 @@ def scatter_between(
     return scatter_statistic(clusters, solution.residual_variance)
 
 
-def calmer(between: tuple[float, float] | None, runs: int) -> float:
+def white_variance_share(between: tuple[float, float] | None, runs: int) -> float:
     """Part of white noise's variances that many runs show; 1 where they show no less.
 
     The residual holds more than what moves the coefficients where it is no white noise but, say,
@@ -170,7 +170,7 @@ def calmer(between: tuple[float, float] | None, runs: int) -> float:
     return share
 
 
-def memory_of(
+def residual_memory(
     problem: Problem, fitted: Fitted, weights: Sequence[Array | None], used: Sequence[int]
 ) -> tuple[float, list[int]]:
     """Readings that the residuals remember, and stretches to cut each run into."""

@@ -21,7 +21,7 @@ from .argument import ARGUMENTS, AnyArgument, ArgumentChoice, choose_argument
 from .breakdown import breakdown_sentence
 from .problem import Problem
 from .result import FitResult
-from .robust import Loss, unsettled_sentence, weigh, weighed, without_spikes
+from .robust import Loss, fit_robustly, fit_without_outliers, unsettled_sentence, without_spikes
 from .uncertainty import CovarianceKind, check_covariance
 
 if TYPE_CHECKING:
@@ -249,12 +249,12 @@ def fitted_to(
         choice = choose_argument(found, argument, wanted)
     if summed is None:
         problem = Problem(found, wanted, choice.argument, method, threads)
-        weighted = weigh(problem, loss, ROUNDING * problem.period)
+        weighted = fit_robustly(problem, loss, ROUNDING * problem.period)
     else:
         from .summed import SummedProblem
 
         problem = SummedProblem(summed, wanted, threads)
-        weighted = weighed(problem, len(summed.outliers))
+        weighted = fit_without_outliers(problem, len(summed.outliers))
     span = travelled_span(problem.travel, problem.period, problem.is_periodic)
     if ridge is None:
         tame = (span.full and problem.is_periodic) or weighted.fitted.solution.is_conditioned_below(
@@ -279,11 +279,11 @@ def fitted_to(
     if taken is not None:
         remarks += taken.sentences(problem.period)
     if len(found) > 1:
-        from .likeness import names_of, unlike_runs, unlike_sentence
+        from .likeness import run_names, unlike_runs, unlike_sentence
 
         unlike = unlike_runs(problem, fitted)
         if unlike:
-            names = names_of(found)
+            names = run_names(found)
             remarks.append(unlike_sentence([names[i] for i in unlike], len(found)))
             warnings.warn(remarks[-1], UnlikeRunsWarning, stacklevel=4)
     if weighted.unsettled:

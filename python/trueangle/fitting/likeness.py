@@ -17,7 +17,7 @@ from ..support.angles import circular_mean
 from ..support.quantiles import median
 from .problem import Fitted, Problem
 
-__all__ = ["far_runs", "names_of", "unlike_runs", "unlike_sentence"]
+__all__ = ["far_runs", "run_names", "unlike_runs", "unlike_sentence"]
 
 Array = NDArray[np.float64]
 
@@ -98,7 +98,7 @@ def _solved(sums: NormalEquations) -> tuple[Array, int, bool]:
     return found.coefficients[:, 0], found.rank, clear
 
 
-def names_of(runs: Sequence[CalibrationRun]) -> list[str]:
+def run_names(runs: Sequence[CalibrationRun]) -> list[str]:
     """What to call each run: its label, or its file where that tells runs apart, or its number."""
     labels = [run.label or "" for run in runs]
     files = ["" if run.source is None else run.source.file for run in runs]

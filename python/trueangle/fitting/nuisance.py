@@ -23,7 +23,15 @@ from ..errors import ArgumentError
 from ..joint.shafts import ShaftOrders, shaft_cycles
 from ..runs.run import CalibrationRun
 from ..support.suggestions import did_you_mean
-from .nuisancechoice import FOLDS, FoldRows, choose, inflation, solved, stiffest, turns
+from .nuisancechoice import (
+    FOLDS,
+    FoldRows,
+    best_spline,
+    choose_nuisance_groups,
+    error_inflation,
+    reference_lines_help,
+    solve_with_groups,
+)
 
 __all__ = ["KINDS", "Nuisance", "asked_nuisance", "likely_orders", "take_out", "take_out_beside"]
 
@@ -193,7 +201,7 @@ def take_out(
     shares: list[tuple[str, float]] = []
     unseparated: list[str] = []
     if kinds is None:
-        chosen, shares, unseparated = choose(rows, forced)
+        chosen, shares, unseparated = choose_nuisance_groups(rows, forced)
     else:
         missing = [k for k in kinds if not any(name.startswith(k) for name in rows.groups)]
         if missing:
@@ -201,10 +209,10 @@ def take_out(
         named = [name for name in rows.groups if name in kinds]
         chosen = [*forced, *named]
         if "drift" in kinds:
-            chosen.append(stiffest(rows, chosen))
+            chosen.append(best_spline(rows, chosen))
     if not chosen:
         return list(runs), Nuisance(unseparated=tuple(unseparated))
-    found = solved(rows, chosen)
+    found = solve_with_groups(rows, chosen)
     nuisance = Nuisance(
         kinds=tuple(name.rstrip("0123456789") for name in chosen),
         slope=float(found["ramp"][0]) if "ramp" in found else 0.0,
@@ -222,7 +230,7 @@ def take_out(
         else (),
         shares=tuple(shares),
         unseparated=tuple(unseparated),
-        inflation=tuple(inflation(rows, chosen)),
+        inflation=tuple(error_inflation(rows, chosen)),
     )
     drifts = next((found[n] for n in chosen if n.startswith("drift")), None)
     return [_without(run, i, nuisance, drifts) for i, run in enumerate(runs)], nuisance
@@ -233,7 +241,7 @@ def _lines_of_reference(rows: FoldRows) -> str:
 
     The other group leaves the rows.
     """
-    name = "turned" if "turned" in rows.groups and turns(rows) else "reference"
+    name = "turned" if "turned" in rows.groups and reference_lines_help(rows) else "reference"
     rows.groups.pop("reference" if name == "turned" else "turned", None)
     return name
 

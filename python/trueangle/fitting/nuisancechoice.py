@@ -16,7 +16,15 @@ from ..estimation.linear import (
     unexplained,
 )
 
-__all__ = ["FOLDS", "FoldRows", "choose", "inflation", "solved", "stiffest", "turns"]
+__all__ = [
+    "FOLDS",
+    "FoldRows",
+    "best_spline",
+    "choose_nuisance_groups",
+    "error_inflation",
+    "reference_lines_help",
+    "solve_with_groups",
+]
 
 Array = NDArray[np.float64]
 
@@ -60,7 +68,7 @@ def _told(rows: FoldRows, chosen: Sequence[str], name: str) -> float:
     return float((unexplained(_design(rows, chosen), columns) ** 2).sum() / (columns**2).sum())
 
 
-def choose(
+def choose_nuisance_groups(
     rows: FoldRows, forced: list[str]
 ) -> tuple[list[str], list[tuple[str, float]], list[str]]:
     """Groups taken one by one while the best lowers the held-out error."""
@@ -90,7 +98,7 @@ def choose(
         best = min(alike, key=lambda name: rows.groups[name].shape[1])
         kind = best.rstrip("0123456789")
         barred.add(kind)
-        grown = max(inflation(rows, [*chosen, best]), default=1.0)
+        grown = max(error_inflation(rows, [*chosen, best]), default=1.0)
         if _told(rows, chosen, best) < _TOLD or grown > _GROWN:
             unseparated.append(kind)
             continue
@@ -99,20 +107,20 @@ def choose(
         before = good[best]
 
 
-def turns(rows: FoldRows) -> bool:
+def reference_lines_help(rows: FoldRows) -> bool:
     """Whether lines of the reference in every run for itself lower the held-out error."""
     before, after = _held_out(rows, ["reference"]), _held_out(rows, ["turned"])
     lower = np.count_nonzero(after < before) > FOLDS // 2
     return bool(lower and after.sum() < (1.0 - _GAIN) * before.sum())
 
 
-def stiffest(rows: FoldRows, chosen: Sequence[str]) -> str:
+def best_spline(rows: FoldRows, chosen: Sequence[str]) -> str:
     """The spline that lowers the held-out error most."""
     names = [name for name in rows.groups if name.startswith("drift")]
     return min(names, key=lambda name: float(_held_out(rows, [*chosen, name]).sum()))
 
 
-def inflation(rows: FoldRows, chosen: Sequence[str]) -> list[float]:
+def error_inflation(rows: FoldRows, chosen: Sequence[str]) -> list[float]:
     """Standard errors of ``A, B`` of each order beside the chosen groups, over those without."""
     pattern, design = rows.pattern, _design(rows, chosen)
     size = pattern.shape[1]
@@ -123,7 +131,7 @@ def inflation(rows: FoldRows, chosen: Sequence[str]) -> list[float]:
     return [float(v) for v in ratio.reshape(2, -1).T.ravel()]
 
 
-def solved(rows: FoldRows, chosen: Sequence[str]) -> dict[str, Array]:
+def solve_with_groups(rows: FoldRows, chosen: Sequence[str]) -> dict[str, Array]:
     """Coefficients of the chosen groups beside the pattern."""
     design = _design(rows, chosen)
     solution = least_squares(design, rows.error)

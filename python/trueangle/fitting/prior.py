@@ -27,7 +27,7 @@ from ..support.angles import circular_mean, unit_name, wrap
 from .problem import Fitted, PlainSolution, Problem
 from .robust import WILD, Weighted
 
-__all__ = ["Posterior", "Prior", "posterior", "prior_of"]
+__all__ = ["Posterior", "Prior", "fleet_prior", "posterior"]
 
 Array = NDArray[np.float64]
 
@@ -108,7 +108,7 @@ class Posterior(NamedTuple):
         )
 
 
-def prior_of(given: Any, period: float) -> Prior:
+def fleet_prior(given: Any, period: float) -> Prior:
     """A prior, or that of a fleet, for readings of this period.
 
     Raises

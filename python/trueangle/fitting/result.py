@@ -15,12 +15,12 @@ from ..model.model import HarmonicModel
 from ..runs.run import CalibrationRun
 from ..runs.travel import Span
 from ..support.display_units import ErrorsIn
-from ..support.drawn import drawn
+from ..support.drawn import result_picture
 from .coefficients import FittedCoefficients
 from .model import build_model, fit_notes
 from .problem import Fitted, Problem
 from .robust import Weighted
-from .uncertainty import CovarianceKind, Uncertainty, uncertainty
+from .uncertainty import CovarianceKind, Uncertainty, coefficient_uncertainty
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -199,7 +199,9 @@ class FitResult(FittedCoefficients):
                 "white", covariance, np.full(len(covariance), self.posterior.freedom)
             )
         weights = self.weights or self.problem.base
-        found = uncertainty(self.problem, self.fitted, weights, self.ridge, self.covariance_asked)
+        found = coefficient_uncertainty(
+            self.problem, self.fitted, weights, self.ridge, self.covariance_asked
+        )
         if self.nuisance is None or not self.nuisance.inflation:
             return found
         wider = np.array([1.0, *self.nuisance.inflation])
@@ -238,7 +240,7 @@ class FitResult(FittedCoefficients):
         -------
         matplotlib Axes
         """
-        axes: Axes = drawn(self, kind, ax, **options)
+        axes: Axes = result_picture(self, kind, ax, **options)
         return axes
 
     def to_dict(self) -> dict[str, Any]:

@@ -20,7 +20,7 @@ from ..support.quantiles import median, quantile
 from ..support.suggestions import check_choice
 from .problem import Fitted, Problem
 
-__all__ = ["LOSSES", "Loss", "Weighted", "robust_scale", "weigh", "without_spikes"]
+__all__ = ["LOSSES", "Loss", "Weighted", "fit_robustly", "robust_scale", "without_spikes"]
 
 Array = NDArray[np.float64]
 Loss: TypeAlias = Literal["auto", "linear", "huber", "tukey"]
@@ -89,7 +89,7 @@ def robust_scale(residuals: Array) -> float:
     return MAD_TO_SIGMA * _core.median_magnitude(np.ascontiguousarray(residuals), SAMPLE)
 
 
-def weigh(problem: Problem, loss: Loss, floor: float) -> Weighted:
+def fit_robustly(problem: Problem, loss: Loss, floor: float) -> Weighted:
     """Fit under a robust loss.
 
     ``"linear"`` keeps the weights given. ``"huber"`` and ``"tukey"`` re-weight until the
@@ -128,7 +128,7 @@ def weigh(problem: Problem, loss: Loss, floor: float) -> Weighted:
     return Weighted(fitted, weights, wild, far, unsettled)
 
 
-def weighed(problem: Problem, outliers: int) -> Weighted:
+def fit_without_outliers(problem: Problem, outliers: int) -> Weighted:
     """The plain fit of a problem from which so many outliers were set aside before."""
     fitted = problem.solve(problem.base)
     if outliers:
@@ -200,7 +200,7 @@ def without_spikes(run: CalibrationRun) -> CalibrationRun:
 
     A reading is a spike when it lies more than 8 robust standard deviations off the
     median of its neighbours in angle; an error that changes as much from neighbour to
-    neighbour widens the limit itself. For choosing orders; `weigh` looks again with the
+    neighbour widens the limit itself. For choosing orders; `fit_robustly` looks again with the
     model in hand.
     """
     if len(run) < 4 * _NEIGHBOURS:

@@ -17,9 +17,9 @@ if TYPE_CHECKING:
     from .result import FitResult
 
 __all__ = [
+    "fit_error_unit",
     "fit_summary",
     "plain_fit",
-    "unit_of",
 ]
 
 
@@ -27,7 +27,7 @@ def fit_summary(fit: FitResult, errors_in: ErrorsIn = "auto") -> str:
     """See `FitResult.summary`."""
     model = fit.model
     runs = len(fit.problem.runs)
-    shown = unit_of(fit, errors_in)
+    shown = fit_error_unit(fit, errors_in)
     head = [
         ("readings", f"{fit.readings} in {runs} run{'s' if runs > 1 else ''}"),
         ("argument", f"{model.argument} angle"),
@@ -49,7 +49,7 @@ def fit_summary(fit: FitResult, errors_in: ErrorsIn = "auto") -> str:
     return laid_out(lines)
 
 
-def unit_of(fit: FitResult, errors_in: ErrorsIn = "auto") -> ErrorUnit:
+def fit_error_unit(fit: FitResult, errors_in: ErrorsIn = "auto") -> ErrorUnit:
     """One unit for all that is told and drawn of a fit, by the rms of pattern and residual."""
     period = fit.model.period
     pattern = 0.5 * float(fit.model.amplitudes @ fit.model.amplitudes)

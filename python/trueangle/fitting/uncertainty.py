@@ -17,13 +17,13 @@ from .correlation import (
     ENOUGH_RUNS,
     FEWEST_RUNS,
     FEWEST_STRETCHES,
-    calmer,
     clusters_of,
     correlation_found,
-    memory_of,
+    residual_memory,
     runs_together,
     scatter_between,
-    weight_of,
+    weight_sum,
+    white_variance_share,
 )
 from .penalty import bias_covariance, pattern_variances
 from .problem import Fitted, Problem
@@ -33,7 +33,7 @@ __all__ = [
     "CovarianceKind",
     "Uncertainty",
     "check_covariance",
-    "uncertainty",
+    "coefficient_uncertainty",
 ]
 
 Array = NDArray[np.float64]
@@ -89,7 +89,7 @@ def check_covariance(kind: str, runs: int) -> None:
         )
 
 
-def uncertainty(
+def coefficient_uncertainty(
     problem: Problem,
     fitted: Fitted,
     weights: Sequence[Array | None],
@@ -129,7 +129,7 @@ def _noise(
         between = scatter_between(problem, fitted, weights, used)
         found = correlation_found(problem, fitted, weights, used, between)
         if not found:
-            share = calmer(between, len(used))
+            share = white_variance_share(between, len(used))
             if between is None or share == 1.0:
                 return Uncertainty("white", white, freedom, _untold(problem, used))
             told = np.full(len(white) - 1, between[1])
@@ -143,7 +143,7 @@ def _noise(
         clusters = runs_together([clusters_of(problem, fitted, weights, i, 1)[0] for i in used])
         note = said + _between(len(clusters), len(used))
     else:
-        memory, stretches = memory_of(problem, fitted, weights, used)
+        memory, stretches = residual_memory(problem, fitted, weights, used)
         if problem.summed or min(stretches) < FEWEST_STRETCHES:
             why = _SUMMED if problem.summed else _SHORT
             unknowns = problem.unknowns + len(used)
@@ -160,7 +160,9 @@ def _noise(
             f"{ENOUGH_RUNS} runs and more"
         )
     try:
-        weight = sum(weight_of(w, len(problem.runs[i])) for i, w in enumerate(weights) if i in used)
+        weight = sum(
+            weight_sum(w, len(problem.runs[i])) for i, w in enumerate(weights) if i in used
+        )
         robust = cluster_covariance(clusters, penalty * weight)
     except np.linalg.LinAlgError:
         return Uncertainty("white", white, freedom, _CANCEL)

@@ -14,7 +14,7 @@ from ..runs.run import CalibrationRun
 from ..runs.travel import travelled_span
 from ..support.suggestions import check_choice
 from .argument import ARGUMENTS, AnyArgument
-from .prior import posterior, prior_of
+from .prior import fleet_prior, posterior
 from .problem import Problem
 from .result import FitResult
 from .robust import Loss
@@ -47,7 +47,7 @@ def fitted_with_prior(
     check_choice("argument", argument, ARGUMENTS)
     for run in runs:
         check_follows(run)
-    known = prior_of(prior, runs[0].period)
+    known = fleet_prior(prior, runs[0].period)
     angle: Argument = "reference" if argument == "auto" else argument
     problem = Problem(runs, list(known.shafts) if shafts is None else shafts, angle)
     weighted, taken = posterior(problem, known, loss)

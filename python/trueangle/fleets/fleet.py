@@ -13,7 +13,7 @@ from ..runs.files import each_runs
 from ..support.angles import ARCSEC_PER_TURN
 from ..support.kinds import told_kinds
 from ..support.suggestions import check_choice
-from .judgement import judged
+from .judgement import judged_fleet
 from .result import Fleet
 from .sums import FleetSums
 from .units import Units
@@ -127,7 +127,7 @@ def fleet(
     joint = Joint(gear_ratio or 1.0, fixed_member if gear_ratio else "none")
     turn = found.period / ARCSEC_PER_TURN
     permitted = None if permitted_arcsec is None else permitted_arcsec * turn
-    return judged(found, joint, share, confidence, permitted, notes)
+    return judged_fleet(found, joint, share, confidence, permitted, notes)
 
 
 def _listed(names: Sequence[str]) -> str:

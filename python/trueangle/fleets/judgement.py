@@ -20,10 +20,10 @@ from .tolerance import tolerance_of
 from .unit import VERDICTS, FleetUnit, UnitOrder, Verdict
 from .units import FEWEST, SharedPattern, Units, pattern_of
 
-__all__ = ["judged", "unit_row"]
+__all__ = ["judged_fleet", "unit_row"]
 
 
-def judged(
+def judged_fleet(
     units: Units,
     joint: Joint,
     share: float,

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from ..fitting.prior import Prior
 from ..support.angles import arcsec
 from ..support.display_units import ErrorsIn
-from ..support.drawn import drawn
+from ..support.drawn import result_picture
 from ..support.plainresult import PlainResult, counted, finite
 from .history import HistoryRow
 from .tolerance import Tolerance
@@ -186,7 +186,7 @@ class Fleet(PlainResult):
         matplotlib Axes
             The first, where a figure has several.
         """
-        axes: Axes = drawn(self, kind, **options)
+        axes: Axes = result_picture(self, kind, **options)
         return axes
 
     def _brief(self) -> str:

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import ArgumentError
-from ..fitting.prior import Prior, prior_of
+from ..fitting.prior import Prior, fleet_prior
 from ..joint.shafts import counted_orders
 from ..planning.arc import COVERAGE
 from ..support.angles import ARCSEC_PER_TURN
@@ -52,7 +52,7 @@ class Spread:
     ) -> Spread:
         """Of a fleet or its prior, over an arc from turn ``a`` to ``b``."""
         period = getattr(given, "period", 360.0)
-        prior: Prior = prior_of(given, period)
+        prior: Prior = fleet_prior(given, period)
         arcsec = ARCSEC_PER_TURN / prior.period
         scale = math.sqrt(prior.noise_variance) * arcsec if noise is None else noise
         if not (math.isfinite(scale) and scale > 0.0):

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..errors import ArgumentError
-from ..formats.times import day_of
+from ..formats.times import local_day
 from ..joint.shafts import ShaftOrders
 from ..runs.follows import check_follows
 from ..runs.run import CalibrationRun
@@ -99,7 +99,7 @@ class FleetSums:
         }
 
     def _take(self, unit: str | _Unnamed, run: CalibrationRun) -> None:
-        key = (unit, day_of(run.when))
+        key = (unit, local_day(run.when))
         self.sums.setdefault(key, CalibrationSums()).add(run, self.orders, self.periodic)
 
     @property

@@ -6,7 +6,7 @@ import math
 from os import PathLike
 from typing import TYPE_CHECKING, Final
 
-from ..model.text import pretty
+from ..model.text import pretty_json
 from ..support.files import FLEET, written_atomically
 
 if TYPE_CHECKING:
@@ -37,4 +37,4 @@ def save_fleet(fleet: Fleet, path: str | PathLike[str]) -> None:
         **fleet.to_dict(),
     }
     with written_atomically(path, kind=FLEET) as file:
-        file.write(pretty(content) + "\n")
+        file.write(pretty_json(content) + "\n")

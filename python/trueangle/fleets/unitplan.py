@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import ArgumentError
-from ..planning.arc import check_arc, plain_plan, plan_arc
+from ..planning.arc import check_arc, plain_arc_plan, plan_arc
 from ..planning.summary import place_table
 from ..support.kinds import told_kinds
 from ..support.layout import laid_out
@@ -70,7 +70,7 @@ class UnitPlan(PlainResult):
 
     def to_dict(self) -> dict[str, Any]:
         """The object that ``trueangle plan`` prints as JSON for a unit of a fleet."""
-        return plain_plan(self, "unit")
+        return plain_arc_plan(self, "unit")
 
     def summary(self) -> str:
         """The plan as text: a table to follow at the rig."""

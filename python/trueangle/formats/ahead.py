@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
 from typing import Any, TypeVar
 
-__all__ = ["ahead", "side_by_side"]
+__all__ = ["read_ahead", "side_by_side"]
 
 T = TypeVar("T")
 R = TypeVar("R")
@@ -18,7 +18,7 @@ R = TypeVar("R")
 _WAITING = 2
 
 
-def ahead(items: Iterable[T], depth: int = 1) -> Iterator[T]:
+def read_ahead(items: Iterable[T], depth: int = 1) -> Iterator[T]:
     """The same items in the same order, made by another thread up to ``depth`` ahead.
 
     Compiled readers release the interpreter, so making an item and using the one before
@@ -27,7 +27,7 @@ def ahead(items: Iterable[T], depth: int = 1) -> Iterator[T]:
 
     Examples
     --------
-    >>> list(ahead(k * k for k in range(4)))
+    >>> list(read_ahead(k * k for k in range(4)))
     [0, 1, 4, 9]
     """
     made: queue.Queue[Any] = queue.Queue(depth)

@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import pyarrow as pa
 
-from .ahead import ahead
+from .ahead import read_ahead
 from .arrowplaces import PlacedBatch, placed_batch
 from .arrowtables import (
     ArrowDigest,
@@ -99,7 +99,7 @@ def read(
     """Columns ``names`` in batches; see `format.FormatModule`."""
     if stretch is None:
         with _opened(path) as (_schema, batches, _options):
-            yield from ahead(column_batches(path, names, batches, texts))
+            yield from read_ahead(column_batches(path, names, batches, texts))
         return
     with damage_told(path, "Arrow"), path.open("rb", buffering=0) as raw:
         packed = _compression(path, True) is not None
@@ -164,7 +164,7 @@ def copy(
                 yield made
 
         with pa.OSFile(str(target), "wb") as file, new(file, enlarged, options=options) as writer:
-            for batch in ahead(corrected()):
+            for batch in read_ahead(corrected()):
                 writer.write_batch(batch)
                 done += batch.nbytes
                 watch(batch.num_rows, min(1.0, done / size))

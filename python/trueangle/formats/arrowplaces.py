@@ -10,7 +10,7 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
-from .arrowtables import dtype_of
+from .arrowtables import arrow_dtype
 from .stored import ROWS, stored_values
 
 __all__ = ["PlacedBatch", "placed_batch"]
@@ -77,7 +77,7 @@ def placed_batch(
         if batch.schema.get_field_index(name) < 0 or not _is_number(batch[name].type):
             return None
         column = batch[name]
-        dtype, (known, values) = dtype_of(column.type), column.buffers()
+        dtype, (known, values) = arrow_dtype(column.type), column.buffers()
         at = place(values, rows * dtype.itemsize)
         bits = place(known, -(-rows // 8)) if column.null_count else None
         if column.offset or at is None or (column.null_count and bits is None):

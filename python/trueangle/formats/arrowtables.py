@@ -20,15 +20,15 @@ __all__ = [
     "METADATA_KEY",
     "ArrowDigest",
     "add_corrected",
+    "arrow_dtype",
+    "arrow_numbers",
+    "arrow_values",
     "column_batches",
     "corrected_schema",
-    "dtype_of",
     "element_names",
-    "labels",
-    "numbers",
-    "taken",
+    "label_codes",
+    "taken_column",
     "top_names",
-    "values_of",
 ]
 
 #: Key of the schema's metadata under which the provenance is kept.
@@ -40,7 +40,7 @@ _ELEMENT = re.compile(r"(.+)\[(\d+)\]", re.DOTALL)
 _MOST = 256
 
 
-def numbers(path: object, name: str, column: pa.Array | pa.ChunkedArray) -> NDArray[Any]:
+def arrow_numbers(path: object, name: str, column: pa.Array | pa.ChunkedArray) -> NDArray[Any]:
     """A column as an array without a copy where it has no nulls; nulls become NaN.
 
     Raises
@@ -63,10 +63,10 @@ def numbers(path: object, name: str, column: pa.Array | pa.ChunkedArray) -> NDAr
     elif pa.types.is_boolean(kind):
         column = column.cast(pa.uint8())
     elif pa.types.is_timestamp(kind) or pa.types.is_date(kind):
-        return values_of(column.cast(_STAMP).cast(pa.int64())) * 1e-6 - _EPOCH
+        return arrow_values(column.cast(_STAMP).cast(pa.int64())) * 1e-6 - _EPOCH
     elif not (pa.types.is_integer(kind) or pa.types.is_floating(kind)):
         raise FileError(path, f"numbers are needed, the column holds {kind}", column=name)
-    return values_of(column)
+    return arrow_values(column)
 
 
 def element_names(schema: pa.Schema, first: Callable[[str], int]) -> list[str]:
@@ -91,7 +91,7 @@ def top_names(schema: pa.Schema, names: Iterable[str]) -> list[str]:
     return list(dict.fromkeys(_top(schema, name)[0] for name in names))
 
 
-def taken(table: Any, name: str) -> Any:
+def taken_column(table: Any, name: str) -> Any:
     """A column of a table or record batch, or an element of one of lists.
 
     Raises
@@ -108,18 +108,18 @@ def _top(schema: pa.Schema, name: str) -> tuple[str, int | None]:
     return (name, None) if found is None else (found[1], int(found[2]))
 
 
-def dtype_of(kind: pa.DataType) -> np.dtype[Any]:
+def arrow_dtype(kind: pa.DataType) -> np.dtype[Any]:
     """What numpy calls whole numbers or floats of Arrow."""
     letter = "f" if pa.types.is_floating(kind) else "iu"[pa.types.is_unsigned_integer(kind)]
     return np.dtype(f"{letter}{kind.bit_width // 8}")
 
 
-def values_of(column: pa.Array) -> NDArray[Any]:
+def arrow_values(column: pa.Array) -> NDArray[Any]:
     """Whole numbers or floats as `pyarrow.Array.to_numpy` gives them, nulls as NaN.
 
     That method imports pandas where it is installed, which takes longer than a million numbers.
     """
-    data, dtype = column.buffers()[1], dtype_of(column.type)
+    data, dtype = column.buffers()[1], arrow_dtype(column.type)
     if data is None:  # nothing, or nulls alone
         values: NDArray[Any] = np.zeros(len(column), dtype)
     else:
@@ -152,12 +152,12 @@ def add_corrected(path: object, table: Any, channels: Sequence[Addition], schema
     """
     columns = list(table.columns)
     for channel in channels:
-        column = taken(table, channel.column)
+        column = taken_column(table, channel.column)
         signals = {
-            signal: numbers(path, name, taken(table, name))
+            signal: arrow_numbers(path, name, taken_column(table, name))
             for signal, name in channel.signals.items()
         }
-        corrected = channel.correct(numbers(path, channel.column, column), signals)
+        corrected = channel.correct(arrow_numbers(path, channel.column, column), signals)
         missing = None
         if column.null_count:
             missing = np.asarray(column.is_null().to_numpy(zero_copy_only=False))
@@ -268,23 +268,25 @@ def column_batches(
 ) -> Iterator[Batch]:
     """Some columns of record batches: numbers as arrays, texts and times asked for as labels."""
     for batch in batches:
-        yield {name: _values(path, name, taken(batch, name), name in texts) for name in names}
+        yield {
+            name: _values(path, name, taken_column(batch, name), name in texts) for name in names
+        }
 
 
 def _values(path: object, name: str, column: Any, as_text: bool) -> Any:
     if as_text and pa.types.is_timestamp(column.type):
         column = column.cast(pa.string())
-    return labels(column) if _is_label(column.type) else numbers(path, name, column)
+    return label_codes(column) if _is_label(column.type) else arrow_numbers(path, name, column)
 
 
-def labels(column: pa.Array | pa.ChunkedArray) -> Labels:
+def label_codes(column: pa.Array | pa.ChunkedArray) -> Labels:
     """A column of texts by their place among the different ones; nulls are the last."""
     if isinstance(column, pa.ChunkedArray):
         column = column.combine_chunks()
     if not pa.types.is_dictionary(column.type):
         column = column.dictionary_encode()
     names = column.dictionary.to_pylist()
-    codes = values_of(column.indices)
+    codes = arrow_values(column.indices)
     if column.indices.null_count:
         codes = np.where(np.isnan(codes), len(names), codes)
     codes = codes.astype(np.intp)

@@ -17,8 +17,8 @@ __all__ = [
     "FileExtent",
     "check_decoded",
     "check_part",
-    "shown",
-    "stored",
+    "shown_bytes",
+    "stored_size",
     "text_extent",
 ]
 
@@ -59,9 +59,9 @@ def check_decoded(path: Path, size: int, columns: int) -> None:
     if size > DECODED_BYTES:
         raise DecodedSizeError(
             path,
-            f"unpacks to {shown(size)} or more in {columns} columns ({stored(path)} on the "
-            f"disk), but a table of runs is held in memory up to {shown(DECODED_BYTES)} only; "
-            "`ta.fit_logs(...)` reads more, in constant memory",
+            f"unpacks to {shown_bytes(size)} or more in {columns} columns "
+            f"({stored_size(path)} on the disk), but a table of runs is held in memory up to "
+            f"{shown_bytes(DECODED_BYTES)} only; `ta.fit_logs(...)` reads more, in constant memory",
         )
 
 
@@ -75,26 +75,26 @@ def check_part(path: Path, size: int, part: str, column: str | None = None) -> N
     if size > DECODED_BYTES:
         raise DecodedSizeError(
             path,
-            f"one {part} unpacks to {shown(size)} ({stored(path)} on the disk), but at most "
-            f"{shown(DECODED_BYTES)} are unpacked at a time; write it in smaller ones",
+            f"one {part} unpacks to {shown_bytes(size)} ({stored_size(path)} on the disk), but at "
+            f"most {shown_bytes(DECODED_BYTES)} are unpacked at a time; write it in smaller ones",
             column=column,
         )
 
 
-def stored(path: Path) -> str:
+def stored_size(path: Path) -> str:
     """What a file takes on the disk, in the unit that fits."""
     try:
-        return shown(path.stat().st_size)
+        return shown_bytes(path.stat().st_size)
     except OSError:
         return "an unknown size"
 
 
-def shown(size: int) -> str:
+def shown_bytes(size: int) -> str:
     """Bytes in the unit that fits.
 
     Examples
     --------
-    >>> shown(1023), shown(5 << 20), shown(3 << 29)
+    >>> shown_bytes(1023), shown_bytes(5 << 20), shown_bytes(3 << 29)
     ('1023 bytes', '5 MiB', '1.5 GiB')
     """
     for shift, unit in ((30, "GiB"), (20, "MiB"), (10, "KiB")):

@@ -26,8 +26,8 @@ __all__ = [
     "Wanted",
     "count_turn",
     "find_columns",
-    "listed",
-    "matching",
+    "listed_columns",
+    "matching_column",
     "offsets_of",
     "role_kind",
     "signal_code",
@@ -229,7 +229,7 @@ def wanted_columns(signals: Mapping[str, Any] | None) -> dict[str, tuple[str, st
     return found
 
 
-def matching(path: object, header: Sequence[str], name: str) -> str:
+def matching_column(path: object, header: Sequence[str], name: str) -> str:
     """The column called ``name``: exactly, else without case and blanks, else without a unit.
 
     Raises
@@ -252,7 +252,7 @@ def matching(path: object, header: Sequence[str], name: str) -> str:
 
     near = difflib.get_close_matches(_plain(name), by_plain, 1)
     hint = f"did you mean {by_plain[near[0]]!r}? " if near else ""
-    raise FileError(path, f"no such column; {hint}{listed(header)}", line=1, column=name)
+    raise FileError(path, f"no such column; {hint}{listed_columns(header)}", line=1, column=name)
 
 
 def signed_name(path: object, header: Sequence[str], name: str) -> tuple[str, bool]:
@@ -261,10 +261,10 @@ def signed_name(path: object, header: Sequence[str], name: str) -> tuple[str, bo
     Raises
     ------
     FileError
-        As `matching`.
+        As `matching_column`.
     """
     is_reversed = name.startswith("-") and len(name) > 1 and name not in header
-    return matching(path, header, name[1:] if is_reversed else name), is_reversed
+    return matching_column(path, header, name[1:] if is_reversed else name), is_reversed
 
 
 def offsets_of(roles: Mapping[str, Column]) -> list[Column]:
@@ -345,7 +345,7 @@ def _standard(role: str) -> Iterator[tuple[str, str | None]]:
         yield pattern, None
 
 
-def listed(header: Sequence[str]) -> str:
+def listed_columns(header: Sequence[str]) -> str:
     """The columns there are, for a message."""
     shown = ", ".join(header[:20])
     return f"its columns are {shown}" + (f" and {len(header) - 20} more" if header[20:] else "")

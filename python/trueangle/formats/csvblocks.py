@@ -13,7 +13,7 @@ import pyarrow.compute as pc
 import pyarrow.csv
 from numpy.typing import NDArray
 
-from .arrowtables import labels, numbers
+from .arrowtables import arrow_numbers, label_codes
 from .csvheader import Header
 from .csvrows import QuotedBlock
 from .format import Labels
@@ -121,7 +121,7 @@ class PlainBlock:
             # The standard library reads a little more (+1.5) and says what is wrong where.
             self._quoted = QuotedBlock.whole(self.data, self.header, self.line)
             return self._quoted.numbers(names, texts, strict)
-        return {name: numbers(self.header.path, name, self._table[name]) for name in names}
+        return {name: arrow_numbers(self.header.path, name, self._table[name]) for name in names}
 
     @property
     def messages(self) -> list[tuple[int, str]]:
@@ -132,7 +132,7 @@ class PlainBlock:
         """A column of texts after `numbers`; see `QuotedBlock.labels`."""
         if self._quoted is not None:
             return self._quoted.labels(name)
-        codes, names = labels(self._table[name])
+        codes, names = label_codes(self._table[name])
         return Labels(codes, [(text or "").strip() or None for text in names])
 
     def with_columns(self, columns: Sequence[tuple[str, NDArray[Any]]]) -> bytes:

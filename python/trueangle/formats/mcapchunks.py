@@ -22,7 +22,7 @@ from rosbags.rosbag2.reader import DirectoryReader
 from rosbags.rosbag2.storage_mcap import McapReader, McapWriter, PendingChunk, decompress
 
 from .budget import check_part
-from .mcaprows import RecordRows, interleaved
+from .mcaprows import RecordRows, interleaved_rows
 from .packedfolder import unpacked_folder
 from .unpacking import unpacked
 
@@ -196,7 +196,7 @@ class ChunkWriter(McapWriter):  # type: ignore[misc]
 
     def write_rows(self, parts: Sequence[tuple[Any, RecordRows]]) -> None:
         """Write rows of several connections, row by row: as `write` would, one by one."""
-        rows = interleaved([(connection.id, rows) for connection, rows in parts])
+        rows = interleaved_rows([(connection.id, rows) for connection, rows in parts])
         width, size = rows.records.shape[1], rows.messages.shape[1]
         done, turn = 0, len(parts)
         while done < len(rows):

@@ -12,7 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["RecordRows", "interleaved"]
+__all__ = ["RecordRows", "interleaved_rows"]
 
 Bytes = NDArray[np.uint8]
 
@@ -95,7 +95,7 @@ class RecordRows:
         return [cls(part[i : i + _MOST]) for part in parts for i in range(0, len(part), _MOST)]
 
 
-def interleaved(parts: Sequence[tuple[int, RecordRows]]) -> RecordRows:
+def interleaved_rows(parts: Sequence[tuple[int, RecordRows]]) -> RecordRows:
     """Row 0 of every part, row 1 of every part ..., each on the channel that stands before it.
 
     Numbers are 0 and times of publishing those of logging, as for messages written one by one.

@@ -18,7 +18,7 @@ from ruamel.yaml import YAML
 from ruamel.yaml.error import YAMLError
 
 from ..errors import ArgumentError, FileError
-from .budget import shown, stored
+from .budget import shown_bytes, stored_size
 
 if sys.version_info >= (3, 14):
     from compression import zstd
@@ -85,10 +85,10 @@ def _unpack(path: Path, target: Path, room: int) -> int:
             if size > room:
                 raise FileError(
                     path,
-                    f"unpacks to {shown(size)} or more ({stored(path)} on the disk), but the "
-                    f"files of a bag may take {shown(_limit())} together while they are read; "
-                    f"where it is as large as that, set the variable {LIMIT} to the bytes it may "
-                    "take, or unpack the bag by `ros2 bag convert`",
+                    f"unpacks to {shown_bytes(size)} or more ({stored_size(path)} on the disk), "
+                    f"but the files of a bag may take {shown_bytes(_limit())} together while they "
+                    f"are read; where it is as large as that, set the variable {LIMIT} to the "
+                    "bytes it may take, or unpack the bag by `ros2 bag convert`",
                 )
             file.write(part)
     shutil.copystat(path, target)

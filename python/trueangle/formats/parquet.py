@@ -13,7 +13,7 @@ import pyarrow.compute as pc
 import pyarrow.parquet as pq
 
 from ..errors import FileError
-from .ahead import ahead
+from .ahead import read_ahead
 from .arrowtables import (
     ArrowDigest,
     add_corrected,
@@ -91,7 +91,7 @@ def read(
     tops = [name for name in names if "[" not in name]  # elements of lists are no columns
     if stretch is None:
         with _opened(path, read_dictionary=tops) as file:
-            yield from ahead(column_batches(path, names, _batches(file, names), texts))
+            yield from read_ahead(column_batches(path, names, _batches(file, names), texts))
         return
     mapped = {"metadata": stretch.footer, "memory_map": True, "read_dictionary": tops}
     with _opened(path, **mapped) as file:
@@ -138,7 +138,7 @@ def copy(
 
         total = max(file.metadata.num_rows, 1)
         with pq.ParquetWriter(target, schema, **_options(file, channels)) as writer:
-            for table in ahead(corrected()):
+            for table in read_ahead(corrected()):
                 writer.write_table(table, row_group_size=max(table.num_rows, 1))
                 watch(table.num_rows, digest.rows / total)
         if digest.rows != file.metadata.num_rows:

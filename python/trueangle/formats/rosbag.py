@@ -24,7 +24,7 @@ from .format import TEXTS, Addition, Batch, Choose, Contents, Watch
 from .jointstates import Block
 from .mcapchunks import BagReader, ChunkReader
 from .mcaprows import RecordRows
-from .rosbagmarks import corrected_topics, custom_of, made_note, refuse_again
+from .rosbagmarks import bag_custom_data, corrected_topics, made_note, refuse_again
 from .rosbagwriter import opened_writer
 from .unpacking import unpacked
 
@@ -195,7 +195,7 @@ class Bag:
         self.reader = reader
         self.is_ros1 = isinstance(reader, Reader1)
         #: What the writer of a bag of ROS 2 noted beside the messages.
-        self.custom = {} if self.is_ros1 else custom_of(reader)
+        self.custom = {} if self.is_ros1 else bag_custom_data(reader)
         self.types = get_typestore(Stores.ROS1_NOETIC if self.is_ros1 else Stores.LATEST)
         self.chunked = [] if self.is_ros1 else list(_chunked(reader))
         for storage in self.chunked:

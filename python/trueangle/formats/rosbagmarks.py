@@ -22,7 +22,7 @@ from .format import Addition, note
 if TYPE_CHECKING:
     from .rosbag import Bag
 
-__all__ = ["KEY", "caller_note", "corrected_topics", "custom_of", "made_note", "refuse_again"]
+__all__ = ["KEY", "bag_custom_data", "caller_note", "corrected_topics", "made_note", "refuse_again"]
 
 #: Of the custom data.
 KEY = "trueangle"
@@ -106,7 +106,7 @@ def _noted(text: Any) -> Mapping[str, Any]:
     return told if isinstance(told, dict) else {}
 
 
-def custom_of(reader: Any) -> dict[str, str]:
+def bag_custom_data(reader: Any) -> dict[str, str]:
     """The custom data of a bag of ROS 2: of its folder, else of its storage files."""
     storage = reader.storage
     found = dict(storage.metadata.custom or {})

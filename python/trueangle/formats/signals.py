@@ -25,10 +25,10 @@ __all__ = [
     "Signal",
     "Signals",
     "check_names",
-    "column",
     "coupled_with",
     "find_signal",
     "is_at_run_time",
+    "signal_column",
     "signal_columns",
 ]
 
@@ -193,11 +193,11 @@ def signal_columns(
             raise ArgumentError(
                 f"{name} is an argument of its own: give `{name}=` as well as `signals=`"
             )
-        found[name] = column(f"signals[{name!r}]", values, size)
+        found[name] = signal_column(f"signals[{name!r}]", values, size)
     return found
 
 
-def column(name: str, values: ArrayLike, size: int | None) -> NDArray[np.float64]:
+def signal_column(name: str, values: ArrayLike, size: int | None) -> NDArray[np.float64]:
     """``values`` as a read-only one-dimensional float array of ``size`` finite numbers.
 
     One number stands for ``size`` of them; without ``size`` any length but zero will do.

@@ -8,7 +8,7 @@ from datetime import datetime
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["day_of", "parsed_time", "seconds_of"]
+__all__ = ["elapsed_seconds", "local_day", "parsed_time"]
 
 
 def parsed_time(text: str | None) -> datetime | None:
@@ -28,24 +28,24 @@ def parsed_time(text: str | None) -> datetime | None:
         return None
 
 
-def day_of(text: str | None) -> str:
+def local_day(text: str | None) -> str:
     """The day of a date and time, as its own zone counts it; nothing of what is none.
 
     Examples
     --------
-    >>> day_of("2026-11-21 23:30+01:00"), day_of("spring")
+    >>> local_day("2026-11-21 23:30+01:00"), local_day("spring")
     ('2026-11-21', '')
     """
     found = parsed_time(text)
     return "" if found is None else found.date().isoformat()
 
 
-def seconds_of(texts: Sequence[str | None]) -> tuple[NDArray[np.float64], int | None]:
+def elapsed_seconds(texts: Sequence[str | None]) -> tuple[NDArray[np.float64], int | None]:
     """Seconds from the first, NaN for what is empty, and the first place of what is no time.
 
     Examples
     --------
-    >>> seconds_of(["2026-11-21T00:00:00", "2026-11-21T00:00:01.5", None])
+    >>> elapsed_seconds(["2026-11-21T00:00:00", "2026-11-21T00:00:01.5", None])
     (array([0. , 1.5, nan]), None)
     """
     found = np.full(len(texts), np.nan)

@@ -26,7 +26,7 @@ from ..formats.columns import find_columns
 from ..formats.format import Format as LogFormat
 from ..formats.format import Labels, row_labels
 from ..formats.formats import find_format
-from ..formats.times import day_of
+from ..formats.times import local_day
 from ..model.model import Argument, HarmonicModel
 from ..runs.angles import Angles, find_angles
 from ..runs.facets import Facets
@@ -42,9 +42,9 @@ __all__ = [
     "Accumulated",
     "LogFitSettings",
     "OutlierLimits",
-    "accumulate",
     "accumulate_each",
-    "merged",
+    "log_moments",
+    "merged_moments",
 ]
 
 Array: TypeAlias = NDArray[np.float64]
@@ -184,7 +184,7 @@ class _LogPart(NamedTuple):
     unit: str | None
 
 
-def accumulate(path: Path, settings: LogFitSettings) -> Accumulated:
+def log_moments(path: Path, settings: LogFitSettings) -> Accumulated:
     """Moments of one log with the columns ``reference_*``, ``indicated_*`` and maybe ``run``.
 
     Raises
@@ -303,7 +303,7 @@ def _days(column: Any) -> Any:
     """The days of dates and times; nothing of what is none."""
     if not isinstance(column, Labels):
         return Labels(np.zeros(len(column), dtype=np.intp), [""])
-    days = row_labels([day_of(text) for text in column.names])
+    days = row_labels([local_day(text) for text in column.names])
     return Labels(days.codes[column.codes], days.names)
 
 
@@ -351,7 +351,7 @@ def _name(column: NDArray[Any] | Labels, code: Any) -> str | float | None:
     return value if value == value else None  # NaN
 
 
-def merged(parts: Sequence[Accumulated]) -> Accumulated:
+def merged_moments(parts: Sequence[Accumulated]) -> Accumulated:
     """All parts as one, in their order."""
     for part in parts[1:]:
         if part.moments.period != parts[0].moments.period:

@@ -14,12 +14,12 @@ from ..errors import TrueAngleError, UnitWarning
 from ..model.model import HarmonicModel
 from ..support.kinds import told_kinds
 from .correction import Task, correct_log, is_disk_full, states_after
-from .joints import JointState, LogSettings, joints_of
+from .joints import JointState, LogSettings, logged_joints
 from .manifest import Manifest
 from .progress import Progress
 from .report import BatchReport, LogReport, done_before
 from .safety import remove_leftovers, stamp
-from .sources import LogTarget, places
+from .sources import LogTarget, output_places
 
 __all__ = ["BatchReport", "LogReport", "correct_logs"]
 
@@ -98,10 +98,10 @@ def correct_logs(
     """
     start = time.monotonic()
     settings = LogSettings(
-        joints_of(model, column, signals), unit, counts_per_turn, topic, output_topic, threads
+        logged_joints(model, column, signals), unit, counts_per_turn, topic, output_topic, threads
     )
     paths = [logs] if isinstance(logs, (str, PathLike)) else list(logs)
-    found = places(paths, output, in_place, _files_of(model))
+    found = output_places(paths, output, in_place, _files_of(model))
     result = BatchReport(
         [LogReport(place.source, place.target, stamp(place.source)[0]) for place in found]
     )

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 from ..errors import ArgumentError, FileError, MissingExtraError, TrueAngleError
 from ..runs.files import read_runs
 from ..runs.run import CalibrationRun
-from .accumulation import Accumulated, LogFitSettings, accumulate, merged
+from .accumulation import Accumulated, LogFitSettings, log_moments, merged_moments
 from .correction import Task, correct_log, count_turns, is_disk_full, states_after
 from .joints import JointState, LogSettings
 from .manifest import Manifest
@@ -20,14 +20,14 @@ from .report import LogReport, done_before
 from .sources import LogTarget
 from .turns import TurnSpan, TurnState
 
-__all__ = ["accumulated_on_cluster", "connected", "on_cluster", "read_on_cluster"]
+__all__ = ["accumulated_on_cluster", "connected_client", "on_cluster", "read_on_cluster"]
 
 #: Seconds to wait for the scheduler.
 _TIMEOUT = 20
 
 
 @contextmanager
-def connected(scheduler: str) -> Iterator[Any]:
+def connected_client(scheduler: str) -> Iterator[Any]:
     """A client of the Dask scheduler at this address.
 
     Raises
@@ -78,7 +78,7 @@ def on_cluster(
     for place, log in zip(found, logs, strict=True):
         if done_before(place, log, settings, manifests):
             finished(log)
-    with connected(scheduler) as client:
+    with connected_client(scheduler) as client:
         futures = _submitted(client, found, logs, settings)
         try:
             for future in distributed.as_completed(futures, loop=client.loop):
@@ -100,10 +100,12 @@ def accumulated_on_cluster(
 ) -> Accumulated:
     """Moments of all logs: a log on each worker, merged there in a tree."""
     settings = replace(settings, threads=settings.threads or 1)
-    with connected(scheduler) as client:
-        parts = [client.submit(accumulate, path.resolve(), settings) for path in paths]
+    with connected_client(scheduler) as client:
+        parts = [client.submit(log_moments, path.resolve(), settings) for path in paths]
         while len(parts) > 1:
-            parts = [client.submit(merged, parts[i : i + 2]) for i in range(0, len(parts), 2)]
+            parts = [
+                client.submit(merged_moments, parts[i : i + 2]) for i in range(0, len(parts), 2)
+            ]
         found: Accumulated = parts[0].result()
     return found
 
@@ -112,7 +114,7 @@ def read_on_cluster(
     scheduler: str, paths: Sequence[Path], files: Mapping[str, Any]
 ) -> list[CalibrationRun]:
     """The runs of all logs, a log read by each worker."""
-    with connected(scheduler) as client:
+    with connected_client(scheduler) as client:
         parts = [client.submit(read_runs, path.resolve(), **files) for path in paths]
         return [run for part in client.gather(parts) for run in part]
 

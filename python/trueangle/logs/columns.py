@@ -10,7 +10,7 @@ from ..formats.columns import (
     ANGLE_UNITS,
     Column,
     find_columns,
-    listed,
+    listed_columns,
     signed_name,
     unit_in_name,
 )
@@ -23,7 +23,7 @@ __all__ = [
     "UNITS",
     "AngleColumn",
     "find_angle_column",
-    "find_signal",
+    "find_joint_signal",
 ]
 
 UNITS = (*UNIT_PERIODS, "count")
@@ -103,7 +103,7 @@ def find_angle_column(
     return AngleColumn(column, unit, float(period), corrected, stated is None and not is_reversed)
 
 
-def find_signal(
+def find_joint_signal(
     path: object,
     header: Sequence[str],
     signal: str,
@@ -144,7 +144,7 @@ def _search(path: object, header: Sequence[str], joint: str | None) -> str:
         guess = next(filter(None, guesses), "")
         raise FileError(
             path,
-            f"{problem}: name the angle with `column=`{guess}; {listed(header)}",
+            f"{problem}: name the angle with `column=`{guess}; {listed_columns(header)}",
             line=1,
         )
     for candidates in _joint_names(joint):
@@ -161,7 +161,7 @@ def _search(path: object, header: Sequence[str], joint: str | None) -> str:
     raise FileError(
         path,
         f"no column of joint {joint}, such as {joint}_indicated_deg: name it with "
-        f"`column={{{joint!r}: 'NAME'}}`; {listed(header)}",
+        f"`column={{{joint!r}: 'NAME'}}`; {listed_columns(header)}",
         line=1,
     )
 

@@ -14,7 +14,7 @@ from ..errors import ArgumentError, MissingExtraError
 from ..model.model import HarmonicModel
 from ..support.kinds import told_kinds
 from ..support.labelled import take_apart
-from .joints import Channel, JointState, LogSettings, joints_of
+from .joints import Channel, JointState, LogSettings, logged_joints
 
 __all__ = ["correct"]
 
@@ -116,7 +116,7 @@ def correct(
     array([90., nan])
     """
     settings = LogSettings(
-        joints_of(model, column, signals), unit, counts_per_turn, threads=threads
+        logged_joints(model, column, signals), unit, counts_per_turn, threads=threads
     )
     for module, convert in _KINDS:
         # Only a library that is imported can have made the data.

@@ -23,12 +23,12 @@ from ..model.model import HarmonicModel
 from ..model.robot import Robot
 from ..model.robotfile import is_robot_file, load_robot
 from ..support.files import sha256_of
-from .columns import SIGNAL_COLUMNS, AngleColumn, find_angle_column, find_signal
+from .columns import SIGNAL_COLUMNS, AngleColumn, find_angle_column, find_joint_signal
 from .statistics import CorrectionStatistics
 from .turns import TurnCounter, TurnState
 from .unitevidence import UnitEvidence
 
-__all__ = ["Channel", "JointState", "LogJoint", "LogSettings", "joints_of"]
+__all__ = ["Channel", "JointState", "LogJoint", "LogSettings", "logged_joints"]
 
 Array: TypeAlias = NDArray[np.floating[Any]]
 
@@ -132,7 +132,9 @@ class LogSettings:
             )
             taken.append(angle.corrected)
             state = (before or {}).get(joint.name or "", JointState())
-            found.append(Channel(joint, angle, signal_columns(path, header, joint), state, self))
+            found.append(
+                Channel(joint, angle, joint_signal_columns(path, header, joint), state, self)
+            )
         return found
 
     @property
@@ -160,7 +162,7 @@ class LogSettings:
         return self.counts_turns or self.follows_travel
 
 
-def signal_columns(path: object, header: Sequence[str], joint: LogJoint) -> dict[str, Column]:
+def joint_signal_columns(path: object, header: Sequence[str], joint: LogJoint) -> dict[str, Column]:
     """Columns of the signals that the joint's model uses; time stands in for velocity.
 
     Raises
@@ -173,7 +175,7 @@ def signal_columns(path: object, header: Sequence[str], joint: LogJoint) -> dict
     for signal in (*model.uses_signals, *(["time"] if "velocity" in model.uses_signals else [])):
         if signal == "time" and "velocity" in found:
             continue
-        column = find_signal(path, header, signal, joint.name, joint.signals.get(signal))
+        column = find_joint_signal(path, header, signal, joint.name, joint.signals.get(signal))
         if column is not None:
             found[signal] = column
     for term in model.terms:
@@ -333,7 +335,7 @@ def _with_unit(column: Column, angle_unit: str) -> Column:
     return column
 
 
-def joints_of(
+def logged_joints(
     model: HarmonicModel | str | PathLike[str] | Mapping[str, Any],
     column: str | Mapping[str, str] | None = None,
     signals: Mapping[str, Any] | None = None,

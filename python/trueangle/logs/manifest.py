@@ -11,9 +11,9 @@ from typing import Any
 
 from ..errors import ArgumentError
 from ..runs.paths import MANIFEST
-from ..support.decoding import finite
+from ..support.decoding import finite_float
 from ..support.files import check_output
-from .safety import Stamp, locked, stamp
+from .safety import Stamp, lock_path, stamp
 
 __all__ = ["MANIFEST", "Manifest"]
 
@@ -51,7 +51,7 @@ class Manifest:
         check_output(self.path, regular=True)
         with self.path.open("ab"):
             pass
-        with locked(self.path) as free:
+        with lock_path(self.path) as free:
             if not free:
                 raise ArgumentError(
                     f"{self.folder}: another run is correcting logs into this folder; wait for it"
@@ -133,11 +133,11 @@ def _decoded(line: bytes) -> dict[str, Any] | None:
         isinstance(entry, dict)
         and all(isinstance(text, str) for text in texts)
         and all(_is_list_of(stamp, int) and len(stamp) == 2 for stamp in stamps)
-        and all(finite(number) is not None for number in numbers)
+        and all(finite_float(number) is not None for number in numbers)
         and isinstance(result["rows"], int)
         and _is_list_of(joints, dict)
         and all(joint.keys() >= _JOINT_KEYS for joint in joints)
-        and all(finite(joint[key]) is not None for joint in joints for key in _JOINT_NUMBERS)
+        and all(finite_float(joint[key]) is not None for joint in joints for key in _JOINT_NUMBERS)
         and isinstance(after, dict)
         and all(_is_state(state) for state in after.values())
     )
@@ -158,7 +158,7 @@ def _is_state(value: Any) -> bool:
         (last, turns), travel = value
     except (TypeError, ValueError):
         return False
-    known = last is None or finite(last) is not None
+    known = last is None or finite_float(last) is not None
     return (
         known
         and type(turns) is int

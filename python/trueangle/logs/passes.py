@@ -40,7 +40,13 @@ from ..runs.run import CalibrationRun, Source
 from ..runs.source import checked_reading
 from ..support.angles import wrap
 from ..support.files import partition_name
-from .accumulation import Accumulated, LogFitSettings, OutlierLimits, accumulate_each, merged
+from .accumulation import (
+    Accumulated,
+    LogFitSettings,
+    OutlierLimits,
+    accumulate_each,
+    merged_moments,
+)
 from .keeping import SAMPLE
 from .progress import Progress
 
@@ -270,4 +276,4 @@ def _accumulated(
             shown.files += 1
     finally:
         shown.clear()
-    return merged(parts)
+    return merged_moments(parts)

@@ -5,9 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 
 from ..support.files.outputs import publish
-from ..support.files.workplace import locked, remove_leftovers, workplace
+from ..support.files.workplace import lock_path, remove_leftovers, workplace
 
-__all__ = ["Stamp", "locked", "publish", "remove_leftovers", "stamp", "workplace"]
+__all__ = ["Stamp", "lock_path", "publish", "remove_leftovers", "stamp", "workplace"]
 
 Stamp = tuple[int, int]
 

@@ -19,7 +19,7 @@ from ..support.files import (
     same_file,
 )
 
-__all__ = ["LogTarget", "hold_at_most", "places"]
+__all__ = ["LogTarget", "hold_at_most", "output_places"]
 
 #: Rows that a byte of a packed file holds, at most, where nothing else is known.
 _PACKED = 64
@@ -55,7 +55,7 @@ def _rows(path: Path, most: int, topic: str | None) -> int:
         return 0  # who reads it whole says what is wrong
 
 
-def places(
+def output_places(
     paths: Iterable[str | PathLike[str]],
     output: str | PathLike[str] | None,
     in_place: bool,

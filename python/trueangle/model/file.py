@@ -29,7 +29,15 @@ from .term import Term, known_terms
 from .text import FORMAT, ROBOT_FORMAT, VERSION, save_model
 from .validity import MOST_TURNS
 
-__all__ = ["FORMAT", "VERSION", "content_of", "load_model", "model_of", "part_of", "save_model"]
+__all__ = [
+    "FORMAT",
+    "VERSION",
+    "content_of",
+    "embedded_model",
+    "load_model",
+    "part_of",
+    "save_model",
+]
 
 Array: TypeAlias = NDArray[np.float64]
 
@@ -75,7 +83,7 @@ def load_model(path: str | PathLike[str]) -> HarmonicModel:
     return _ModelReader(Path(path), ModelFileError).model()
 
 
-def model_of(text: str, path: str | PathLike[str]) -> HarmonicModel:
+def embedded_model(text: str, path: str | PathLike[str]) -> HarmonicModel:
     """Model of the text of a model file that stands in another file; raises as `load_model`."""
     file = Path(path)
     return part_of(file, json_text(file, text, ModelFileError, "a model file"), "")

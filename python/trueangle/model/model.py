@@ -17,7 +17,7 @@ from ..errors import ArgumentError
 from ..formats.signals import AT_RUN_TIME
 from ..joint.shafts import Shaft
 from ..support.angles import check_period
-from ..support.drawn import drawn
+from ..support.drawn import result_picture
 from ..support.kinds import told_kinds
 from ..support.oftype import all_of_type, of_type
 from . import summary as modelsummary
@@ -210,7 +210,7 @@ class HarmonicModel(Evaluation):
 
     def summary(self) -> str:
         """The harmonics by shaft and order, in arcseconds, and what is known of the fit."""
-        return modelsummary.summary(self)
+        return modelsummary.model_summary(self)
 
     def plot(self, ax: Axes | None = None, **options: Any) -> Axes:
         """The error over the angle with its 95 % band (`trueangle.plots.model_error`).
@@ -225,7 +225,7 @@ class HarmonicModel(Evaluation):
         -------
         matplotlib Axes
         """
-        axes: Axes = drawn(self, ax, **options)
+        axes: Axes = result_picture(self, ax, **options)
         return axes
 
     @property

@@ -12,7 +12,7 @@ from ..support.layout import laid_out, wrapped
 if TYPE_CHECKING:
     from .model import HarmonicModel
 
-__all__ = ["one_line", "summary"]
+__all__ = ["model_summary", "one_line"]
 
 #: Lines that a summary lists before it says how many more there are.
 _LISTED = 40
@@ -35,7 +35,7 @@ def one_line(model: HarmonicModel) -> str:
     return f"<HarmonicModel: {', '.join(parts)}>"
 
 
-def summary(model: HarmonicModel) -> str:
+def model_summary(model: HarmonicModel) -> str:
     """The harmonics by shaft and order, in arcseconds, and what is known of the fit."""
     period, unit = model.period, unit_name(model.period)
     rms = math.sqrt(0.5 * float(model.amplitudes @ model.amplitudes))

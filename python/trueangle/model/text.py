@@ -22,7 +22,7 @@ __all__ = [
     "VERSION",
     "model_content",
     "model_text",
-    "pretty",
+    "pretty_json",
     "save_model",
     "save_robot",
 ]
@@ -34,7 +34,7 @@ VERSION = 1
 
 def model_text(model: HarmonicModel) -> str:
     """What the file of a model holds."""
-    return pretty(model_content(model)) + "\n"
+    return pretty_json(model_content(model)) + "\n"
 
 
 def model_content(model: HarmonicModel) -> dict[str, Any]:
@@ -81,7 +81,7 @@ def save_robot(robot: Robot, path: str | PathLike[str]) -> None:
             for joint, columns in robot.signals.items()
         }
     content["joints"] = {joint: model_content(model) for joint, model in robot.items()}
-    text = pretty(content) + "\n"
+    text = pretty_json(content) + "\n"
     if len(text) > MODEL_BYTES:
         raise ArgumentError(
             f"{path}: the models take {len(text)} bytes, and at most {MODEL_BYTES} are read back; "
@@ -103,14 +103,16 @@ def _record(record: FitRecord) -> dict[str, Any]:
     return table
 
 
-def pretty(value: Any, indent: int = 0) -> str:
+def pretty_json(value: Any, indent: int = 0) -> str:
     """JSON with one line per key and per list of plain numbers."""
     pad = "  " * (indent + 1)
     end = "\n" + "  " * indent
     if isinstance(value, Mapping) and value:
-        items = [f"{pad}{json.dumps(key)}: {pretty(v, indent + 1)}" for key, v in value.items()]
+        items = [
+            f"{pad}{json.dumps(key)}: {pretty_json(v, indent + 1)}" for key, v in value.items()
+        ]
         return "{\n" + ",\n".join(items) + end + "}"
     nested = isinstance(value, (list, tuple)) and any(isinstance(v, (Mapping, list)) for v in value)
     if nested:
-        return "[\n" + ",\n".join(pad + pretty(v, indent + 1) for v in value) + end + "]"
+        return "[\n" + ",\n".join(pad + pretty_json(v, indent + 1) for v in value) + end + "]"
     return json.dumps(value, allow_nan=False)

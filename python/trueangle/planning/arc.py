@@ -19,7 +19,7 @@ from .doptimal import ArcDesign, OrthonormalColumns, d_optimal
 from .noisefactors import noise_factors
 from .plan import readings_needed
 
-__all__ = ["COVERAGE", "ArcPlan", "check_arc", "plain_plan", "plan_arc"]
+__all__ = ["COVERAGE", "ArcPlan", "check_arc", "plain_arc_plan", "plan_arc"]
 
 Array = NDArray[np.float64]
 
@@ -101,7 +101,7 @@ class ArcPlan(PlainResult):
 
     def to_dict(self) -> dict[str, Any]:
         """The object that ``trueangle plan`` prints as JSON for an arc."""
-        return plain_plan(self, "arc")
+        return plain_arc_plan(self, "arc")
 
     def summary(self) -> str:
         """The plan as text: a table to follow at the rig."""
@@ -116,7 +116,7 @@ class ArcPlan(PlainResult):
         )
 
 
-def plain_plan(plan: Any, kind: str) -> dict[str, Any]:
+def plain_arc_plan(plan: Any, kind: str) -> dict[str, Any]:
     """The JSON object of a plan of readings at places: lists, and orders as the keys of objects."""
 
     def plain(value: Any) -> Any:

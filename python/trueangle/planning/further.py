@@ -12,7 +12,15 @@ import numpy as np
 from ..simulation.designs import RunDesign
 from .limits import Limits
 
-__all__ = ["base_of", "changes_of", "choices", "dialled", "levels", "seconds_of", "steps_of"]
+__all__ = [
+    "base_of",
+    "choices",
+    "count_of_changes",
+    "dialled_number",
+    "run_levels",
+    "run_steps",
+    "seconds_of",
+]
 
 #: Steps in which readings follow a reversal closely, deg.
 CLOSE = 0.25
@@ -26,7 +34,7 @@ def base_of(limits: Limits, label: str) -> RunDesign:
     slow, fast = limits.speed_deg_s
     return RunDesign(
         label=label,
-        speed_deg_s=dialled(np.sqrt(slow * fast)),
+        speed_deg_s=dialled_number(np.sqrt(slow * fast)),
         samples=limits.samples,
         start_deg=limits.arc_deg[0],
         turns=limits.span_deg / 360.0,
@@ -45,7 +53,7 @@ def choices(
     """
     yield [*_motions(limits, limits.samples if samples is None else samples)]
     slow, fast = limits.speed_deg_s
-    middle = dialled(np.sqrt(slow * fast))
+    middle = dialled_number(np.sqrt(slow * fast))
     speeds = dict.fromkeys((fast, middle, slow))
     coasting = [{"speed_deg_s": fast, "speed_end_deg_s": max(fast / 4.0, slow)}]
     yield [
@@ -70,7 +78,7 @@ def choices(
         yield [{"current_A": amperes} for amperes in limits.current_A]
 
 
-def changes_of(design: RunDesign, kinds: Sequence[Sequence[dict[str, Any]]]) -> int:
+def count_of_changes(design: RunDesign, kinds: Sequence[Sequence[dict[str, Any]]]) -> int:
     """In how many of these kinds a run is not as plain as it could be."""
     return sum(
         any(getattr(design, name) != value for name, value in options[0].items())
@@ -78,7 +86,7 @@ def changes_of(design: RunDesign, kinds: Sequence[Sequence[dict[str, Any]]]) -> 
     )
 
 
-def levels(design: RunDesign, limits: Limits) -> Iterator[tuple[str, Callable[[float], float]]]:
+def run_levels(design: RunDesign, limits: Limits) -> Iterator[tuple[str, Callable[[float], float]]]:
     """What of a run is a matter of degree: its field, and what a step of it leads to.
 
     A step of 1 leads over the whole range, of speeds in their logarithm, and never beyond limits.
@@ -104,11 +112,11 @@ def levels(design: RunDesign, limits: Limits) -> Iterator[tuple[str, Callable[[f
 
 
 def _faster(now: float, least: float, most: float, step: float) -> float:
-    return min(max(dialled(now * (most / least) ** step), least), most)
+    return min(max(dialled_number(now * (most / least) ** step), least), most)
 
 
 def _higher(now: float, least: float, most: float, step: float) -> float:
-    return min(max(dialled(now + (most - least) * step), least), most)
+    return min(max(dialled_number(now + (most - least) * step), least), most)
 
 
 def _motions(limits: Limits, samples: int) -> Iterator[dict[str, Any]]:
@@ -141,7 +149,7 @@ def seconds_of(design: RunDesign) -> float:
     return float(np.log(design.speed_deg_s / end) / design.decay_per_s)
 
 
-def steps_of(design: RunDesign) -> Iterator[str]:
+def run_steps(design: RunDesign) -> Iterator[str]:
     """A run in the words of who measures it, step by step."""
     span, sign = 360.0 * design.turns, design.direction
     edges = [0.0, *design.reversals, 1.0]
@@ -170,6 +178,6 @@ def steps_of(design: RunDesign) -> Iterator[str]:
         yield f"the motor's current held at {design.current_A:g} A"
 
 
-def dialled(value: float) -> float:
+def dialled_number(value: float) -> float:
     """A number that can be dialled in: two digits."""
     return float(f"{value:.2g}")

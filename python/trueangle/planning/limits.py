@@ -13,7 +13,7 @@ import numpy as np
 from ..errors import ArgumentError, FileError
 from ..joint.signals import Signals, join_runs
 from ..runs.run import CalibrationRun
-from ..support.decoding import finite, read_text, shown
+from ..support.decoding import finite_float, read_text, shown
 from ..support.kinds import told_kinds
 from ..support.suggestions import did_you_mean
 
@@ -85,7 +85,7 @@ class Limits:
     def __post_init__(self) -> None:
         for name in ("arc_deg", "speed_deg_s", "temperature_C", "torque_Nm", "current_A"):
             value = getattr(self, name)
-            if len(value) != 2 or finite(value[0]) is None or finite(value[1]) is None:
+            if len(value) != 2 or finite_float(value[0]) is None or finite_float(value[1]) is None:
                 raise ArgumentError(f"{name} must be two finite numbers, got {value!r}")
             if value[0] > value[1]:
                 raise ArgumentError(f"{name} must be the least before the most, got {value!r}")
@@ -93,9 +93,9 @@ class Limits:
             raise ArgumentError(f"arc_deg must have a length, got {self.arc_deg!r}")
         if self.speed_deg_s[0] <= 0.0:
             raise ArgumentError(f"speed_deg_s must be positive, got {self.speed_deg_s!r}")
-        if finite(self.gravity_Nm) is None or self.gravity_Nm < 0.0:
+        if finite_float(self.gravity_Nm) is None or self.gravity_Nm < 0.0:
             raise ArgumentError(f"gravity_Nm must not be negative, got {self.gravity_Nm!r}")
-        if not self.mount_deg or any(finite(mount) is None for mount in self.mount_deg):
+        if not self.mount_deg or any(finite_float(mount) is None for mount in self.mount_deg):
             raise ArgumentError(f"mount_deg must be finite numbers, got {self.mount_deg!r}")
         for name, least in (("samples", 20), ("runs", 1)):
             if getattr(self, name) < least:
@@ -221,11 +221,11 @@ def _value(path: str | Path, name: str, value: Any, wanted: str) -> Any:
             raise refuse("true or false")
         return value
     if wanted.startswith("tuple"):
-        numbers = tuple(map(finite, value)) if isinstance(value, list) else (None,)
+        numbers = tuple(map(finite_float, value)) if isinstance(value, list) else (None,)
         if None in numbers:
             raise refuse("a list of finite numbers")
         return numbers
-    number = finite(value)
+    number = finite_float(value)
     if number is None or (wanted == "int" and number != int(number)):
         raise refuse("a whole number" if wanted == "int" else "a finite number")
     return int(number) if wanted == "int" else number

@@ -10,7 +10,7 @@ from ..joint.signals import Signals
 from ..simulation.designs import RunDesign
 from ..simulation.simulation import Simulation
 from ..support.blas import one_blas_thread
-from ..support.deadline import paced
+from ..support.deadline import with_pace
 from .evidence import ReadingNoise
 from .further import seconds_of
 from .limits import Limits
@@ -54,7 +54,7 @@ def next_runs(
     those, as long as there are any. Half a second to some seconds; after ten of the processor
     where no time is given, the best so far is the answer, and ``notes`` say so.
     """
-    with paced() as at, at.bounded(WORK), one_blas_thread():
+    with with_pace() as at, at.bounded(WORK), one_blas_thread():
         return _next_runs(earlier, believed, spots, noise, limits)
 
 

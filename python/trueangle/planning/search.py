@@ -9,7 +9,7 @@ from typing import Any, TypeAlias
 
 from ..joint.signals import Signals
 from ..simulation.designs import RunDesign
-from .further import base_of, changes_of, choices, dialled, levels
+from .further import base_of, choices, count_of_changes, dialled_number, run_levels
 from .limits import Limits
 from .scales import Scales
 from .worth import NOTHING, Worth
@@ -98,7 +98,7 @@ class Search:
     def _improved(self, designs: Designs, k: int, start: Signals | None) -> tuple[Designs, Worth]:
         """Run k changed to the best there is: choices, and levels where these do not tell all."""
         kinds = [*choices(self.limits, self.scales.needs_current, designs[k].samples)]
-        best = self.scales.weighed(designs, start, changes_of(designs[k], kinds))
+        best = self.scales.weighed(designs, start, count_of_changes(designs[k], kinds))
         for _ in range(PASSES):
             before = best
             for options in kinds:
@@ -106,7 +106,7 @@ class Search:
             if best == before:
                 break
         for step in () if self._tells_all(best) else STEPS:
-            for name, at in [*levels(designs[k], self.limits)]:
+            for name, at in [*run_levels(designs[k], self.limits)]:
                 options = [{name: at(step)}, {name: at(-step)}]
                 designs, best = self._picked(designs, k, start, best, options, kinds)
         return designs, best
@@ -127,7 +127,7 @@ class Search:
             if design == designs[k] or self.scales.over:
                 continue
             tried = [*designs[:k], design, *designs[k + 1 :]]
-            worth = self.scales.weighed(tried, start, changes_of(design, kinds), best.opened)
+            worth = self.scales.weighed(tried, start, count_of_changes(design, kinds), best.opened)
             if worth > best:
                 best, picked = worth, tried
         return picked, best
@@ -206,7 +206,7 @@ def _with_readings(designs: Designs, share: float) -> Designs:
 def _at_more_speeds(designs: Designs) -> Designs:
     """Every other run between the slowest and the fastest."""
     speeds = [design.speed_deg_s for design in designs]
-    between = dialled(math.sqrt(min(speeds) * max(speeds)))
+    between = dialled_number(math.sqrt(min(speeds) * max(speeds)))
     return [
         replace(design, speed_deg_s=between) if k % 2 and design.speed_end_deg_s is None else design
         for k, design in enumerate(designs)

@@ -9,10 +9,10 @@ from ..errors import ArgumentError
 from ..simulation.designs import RunDesign
 from ..simulation.simulation import Simulation
 
-__all__ = ["designed"]
+__all__ = ["designed_selfplan"]
 
 
-def designed(sim: Simulation, method: str) -> dict[str, Any]:
+def designed_selfplan(sim: Simulation, method: str) -> dict[str, Any]:
     """Arguments of `plan_self` for the heads, shifts or coasts that ``sim`` designs.
 
     Parameters
@@ -34,7 +34,7 @@ def designed(sim: Simulation, method: str) -> dict[str, Any]:
     --------
     >>> from trueangle.simulation import Head, Joint, RunDesign, Simulation
     >>> sim = Simulation(Joint(heads=(Head(0.0), Head(40.0))), sigma_arcsec=5.0)
-    >>> designed(sim, "heads")
+    >>> designed_selfplan(sim, "heads")
     {'noise': 5.0, 'angles': [0.0, 40.0], 'count': 2}
     """
     found: dict[str, Any] = {}

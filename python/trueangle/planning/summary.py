@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..support.layout import laid_out
 from ..support.plainresult import counted, finite
-from .further import steps_of
+from .further import run_steps
 
 if TYPE_CHECKING:
     from .arc import ArcPlan
@@ -137,7 +137,7 @@ def next_summary(plan: NextRuns) -> str:
             f"{spoken_time(plan.seconds)} of motion"
             + ("; diagnose by themselves" if plan.alone else "; diagnose with those there are")
         )
-        for steps, same in groupby(plan.runs, lambda design: [*steps_of(design)]):
+        for steps, same in groupby(plan.runs, lambda design: [*run_steps(design)]):
             labels = [str(design.label) for design in same]
             times = f" to {labels[-1]}, {len(labels)} times the same" if len(labels) > 1 else ""
             lines.append(f"  {labels[0]}{times}")

@@ -15,7 +15,7 @@ from ..support.display_units import ErrorsIn
 from . import palette
 from .canvas import described, grid, legend, new_axes
 from .orderaxis import OrderAxis
-from .orderlines import order_lines, seen_sizes, told_orders
+from .orderlines import largest_orders_text, order_lines, seen_sizes
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -61,9 +61,9 @@ def amplitude_spectrum(
     """
     selection = result if isinstance(result, OrderSelection) else result.selection
     unit = (
-        orders_summary.unit_of(selection, errors_in)
+        orders_summary.selection_error_unit(selection, errors_in)
         if selection is not None
-        else fitting_summary.unit_of(result, errors_in)  # type: ignore[arg-type]
+        else fitting_summary.fit_error_unit(result, errors_in)  # type: ignore[arg-type]
     )
     lines = order_lines(result)
     orders = [line.order for line in lines]
@@ -133,7 +133,7 @@ def amplitude_spectrum(
     ax.set_ylabel(f"amplitude / {unit.name}")
     grid(ax, "y")
     legend(ax)
-    named = told_orders(lines, unit)
+    named = largest_orders_text(lines, unit)
     what = f"{len(lines)} fitted orders: {named}" if fitted else (
         f"{len(lines)} candidate orders. Retained: {named}"
     )  # fmt: skip

@@ -9,7 +9,7 @@ from ..runs.run import CalibrationRun, as_runs
 from ..support.display_units import ErrorsIn, error_unit
 from . import palette
 from .canvas import new_axes
-from .curves import held_out_points, seen_span, strength
+from .curves import held_out_points, rms_amplitude, seen_span
 from .drawnpanel import draw_panel, finish
 from .readingpictures import before_after_picture
 
@@ -47,7 +47,7 @@ def before_after(
     matplotlib Axes
     """
     pairs = held_out_points(model, as_runs(runs))
-    unit = error_unit(errors_in, strength(before for before, _ in pairs), model.period)
+    unit = error_unit(errors_in, rms_amplitude(before for before, _ in pairs), model.period)
     numbered = [(number, *pair) for number, pair in enumerate(pairs)]
     picture = before_after_picture(numbered, seen_span(model), unit)
     ax = new_axes(ax)

@@ -27,16 +27,16 @@ __all__ = [
     "Curve",
     "Points",
     "Signal",
-    "envelope",
+    "curve_envelope",
     "error_points",
     "held_out_points",
     "model_curve",
     "residual_points",
+    "rms_amplitude",
     "seen_span",
-    "strength",
     "strong_gear_order",
-    "thinned",
-    "travelled",
+    "thinned_points",
+    "travelled_span",
 ]
 
 Array = NDArray[np.float64]
@@ -101,13 +101,13 @@ class Curve:
         return Curve(self.angle, factor * self.error, std)
 
 
-def strength(parts: Iterable[Points]) -> float:
+def rms_amplitude(parts: Iterable[Points]) -> float:
     """Amplitude of the sine that has the rms of some readings, arcsec: a unit is chosen by it."""
     errors = np.concatenate([np.zeros(0), *(part.y for part in parts)])
     return sine_of_rms(float(np.sqrt(np.mean(errors * errors)))) if errors.size else 0.0
 
 
-def thinned(points: Points, most: int, number: int = 0) -> Points:
+def thinned_points(points: Points, most: int, number: int = 0) -> Points:
     """At most ``most`` points, evenly taken; each of runs that are alike begins elsewhere."""
     stride = -(-points.x.size // most)
     if stride <= 1:
@@ -116,12 +116,12 @@ def thinned(points: Points, most: int, number: int = 0) -> Points:
     return Points(points.label, points.x[first::stride], points.y[first::stride])
 
 
-def label_of(run: CalibrationRun, number: int) -> str:
+def run_label(run: CalibrationRun, number: int) -> str:
     """The run's label, or its number from 1."""
     return run.label or str(number + 1)
 
 
-def degrees(run: CalibrationRun, low: float = 0.0) -> Array:
+def reference_degrees(run: CalibrationRun, low: float = 0.0) -> Array:
     """Reference angles in degrees, on the turn that begins at ``low``."""
     return low + np.mod(run.reference * (360.0 / run.period) - low, 360.0)
 
@@ -135,7 +135,7 @@ def error_points(fit: FitResult) -> list[Points]:
         zero = fit.offsets[number]
         zero = run.zero if np.isnan(zero) else zero
         error = wrap(run.indicated - run.reference - zero, run.period)
-        found.append(Points(label_of(run, number), degrees(run, low), factor * error))
+        found.append(Points(run_label(run, number), reference_degrees(run, low), factor * error))
     return found
 
 
@@ -162,7 +162,7 @@ def strong_gear_order(
     return float(max(fine)[1]) if part > _NOTABLE else None
 
 
-def envelope(curve: Curve) -> tuple[Array, Array, Array]:
+def curve_envelope(curve: Curve) -> tuple[Array, Array, Array]:
     """Least and greatest value of a curve, at places of which each holds several periods.
 
     Returns
@@ -191,9 +191,9 @@ def seen_span(model: HarmonicModel) -> tuple[float, float]:
     return _about_zero(low, high)
 
 
-def travelled(runs: Sequence[CalibrationRun]) -> tuple[float, float]:
+def travelled_span(runs: Sequence[CalibrationRun]) -> tuple[float, float]:
     """The stretch of the turn that runs hold readings of, in degrees; a turn without a wide gap."""
-    angle = np.sort(np.concatenate([degrees(run) for run in runs]))
+    angle = np.sort(np.concatenate([reference_degrees(run) for run in runs]))
     gaps = np.diff(np.append(angle, angle[0] + 360.0))
     widest = int(np.argmax(gaps))
     if gaps[widest] < _WIDE_GAP:
@@ -218,9 +218,9 @@ def held_out_points(
     low, _ = seen_span(model)
     found = []
     for number, run in enumerate(runs):
-        label = label_of(run, number)
+        label = run_label(run, number)
         held = correct_held_out(model, run, label)
-        x = degrees(run, low)
+        x = reference_degrees(run, low)
         found.append((Points(label, x, held.before), Points(label, x, held.after)))
     return found
 
@@ -239,11 +239,11 @@ def residual_points(fit: FitResult, against: Signal = "angle") -> list[Points]:
     parts = np.split(fit.residuals, np.cumsum([len(run) for run in fit.runs])[:-1])
     found = []
     for number, (run, rest) in enumerate(zip(fit.runs, parts, strict=True)):
-        x = degrees(run, low) if against == "angle" else getattr(run, against)
+        x = reference_degrees(run, low) if against == "angle" else getattr(run, against)
         if x is None:
             continue
         scale = 360.0 / run.period if against == "speed" else 1.0
-        found.append(Points(label_of(run, number), scale * np.asarray(x), factor * rest))
+        found.append(Points(run_label(run, number), scale * np.asarray(x), factor * rest))
     if not found:
         raise ArgumentError(f"no run has {against}: it cannot be drawn against the residual")
     return found

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 from . import palette
 from .canvas import described, grid, legend, turn_axis
-from .curves import CONFIDENCE, Curve, envelope, thinned
+from .curves import CONFIDENCE, Curve, curve_envelope, thinned_points
 from .panel import Cloud, Panel, PanelPicture
 
 if TYPE_CHECKING:
@@ -50,7 +50,7 @@ def draw_clouds(ax: Axes, clouds: Sequence[Cloud]) -> None:
     dense = sum(cloud.points.y.size for cloud in clouds) > _DENSE
     named: set[str] = set()
     for cloud in clouds:
-        part = thinned(cloud.points, max(1, _MOST // len(clouds)), cloud.run)
+        part = thinned_points(cloud.points, max(1, _MOST // len(clouds)), cloud.run)
         ax.plot(
             part.x,
             part.y,
@@ -82,7 +82,7 @@ def draw_curve(ax: Axes, curve: Curve, dense: bool) -> None:
     """A model's curve with its band; its envelope where gear orders fill the picture."""
     if dense:
         ax.fill_between(
-            *envelope(curve),
+            *curve_envelope(curve),
             color=palette.MUTED,
             alpha=0.35,
             linewidth=0.0,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from ..fitting.summary import unit_of
+from ..fitting.summary import fit_error_unit
 from ..support.display_units import ErrorsIn
 from .canvas import new_axes
 from .drawnpanel import draw_panel, finish
@@ -41,7 +41,7 @@ def error_curves(fit: FitResult, ax: Axes | None = None, errors_in: ErrorsIn = "
     MissingExtraError
         matplotlib is not installed.
     """
-    picture = errors_picture(fit.runs, fit, unit_of(fit, errors_in))
+    picture = errors_picture(fit.runs, fit, fit_error_unit(fit, errors_in))
     ax = new_axes(ax)
     draw_panel(ax, picture.panels[0])
     return finish(ax, picture)

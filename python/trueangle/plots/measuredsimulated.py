@@ -12,7 +12,7 @@ from ..runs.run import CalibrationRun, as_runs
 from ..support.display_units import ErrorsIn, error_unit
 from . import palette
 from .canvas import new_axes
-from .curves import Points, strength
+from .curves import Points, rms_amplitude
 from .drawnpanel import draw_clouds, draw_panel, finish
 from .readingpictures import comparison_picture
 from .simulatedcurves import simulated_points
@@ -49,7 +49,7 @@ def measured_and_simulated(
     found = as_runs(runs)
     ax = new_axes(ax)
     expected = simulated_points(found, sim)
-    largest = strength(measured for measured, _ in expected)
+    largest = rms_amplitude(measured for measured, _ in expected)
     unit = error_unit(errors_in, largest, found[0].period)
     picture = comparison_picture(expected, unit)
     both, apart = picture.panels

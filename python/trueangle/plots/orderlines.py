@@ -19,7 +19,14 @@ from .curves import CONFIDENCE
 if TYPE_CHECKING:
     from ..fitting.result import FitResult
 
-__all__ = ["OrderLine", "likely_aliases", "order_lines", "seen_sizes", "thresholds", "told_orders"]
+__all__ = [
+    "OrderLine",
+    "largest_orders_text",
+    "likely_aliases",
+    "order_lines",
+    "seen_sizes",
+    "significance_amplitudes",
+]
 
 Array = NDArray[np.float64]
 
@@ -57,7 +64,7 @@ def order_lines(result: OrderSelection | FitResult) -> list[OrderLine]:
     selection = result if isinstance(result, OrderSelection) else result.selection
     if selection is not None:
         factor = ARCSEC_PER_TURN / selection.period
-        limits = np.nan_to_num(factor * thresholds(selection), posinf=0.0)
+        limits = np.nan_to_num(factor * significance_amplitudes(selection), posinf=0.0)
         return [
             OrderLine(
                 float(row.order), factor * row.amplitude, 0.0, float(limit), row.retained, row
@@ -85,7 +92,7 @@ def seen_sizes(lines: Sequence[OrderLine]) -> tuple[float, float]:
     return low, max([*(line.amplitude + line.half for line in lines), *seen, low])
 
 
-def told_orders(lines: Sequence[OrderLine], unit: ErrorUnit) -> str:
+def largest_orders_text(lines: Sequence[OrderLine], unit: ErrorUnit) -> str:
     """The largest orders kept with their amplitudes, and how many more there are."""
     kept = sorted((line for line in lines if line.kept), key=lambda line: -line.amplitude)
     told = [
@@ -96,7 +103,7 @@ def told_orders(lines: Sequence[OrderLine], unit: ErrorUnit) -> str:
     return (", ".join(told) or "none") + more
 
 
-def thresholds(selection: OrderSelection) -> Array:
+def significance_amplitudes(selection: OrderSelection) -> Array:
     """Amplitude at which each order of the table would just be significant.
 
     ::

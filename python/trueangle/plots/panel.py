@@ -21,8 +21,8 @@ __all__ = [
     "Panel",
     "PanelPicture",
     "Role",
-    "medians",
-    "segment",
+    "binned_medians",
+    "magnified_segment",
     "segment_span",
 ]
 
@@ -106,7 +106,7 @@ class PanelPicture:
     told: str
 
 
-def segment(whole: Panel, order: float, model: Curve | None = None) -> Panel:
+def magnified_segment(whole: Panel, order: float, model: Curve | None = None) -> Panel:
     """A few periods of an order as large as they are, in the middle: both ends may be thin."""
     low, high = segment_span(whole, order)
     clouds = []
@@ -126,14 +126,14 @@ def segment(whole: Panel, order: float, model: Curve | None = None) -> Panel:
 
 
 def segment_span(whole: Panel, order: float) -> tuple[float, float]:
-    """First and last angle of `segment`."""
+    """First and last angle of `magnified_segment`."""
     assert whole.span is not None
     low, high = whole.span
     half = 0.5 * min(_PERIODS * 360.0 / order, high - low)
     return 0.5 * (low + high) - half, 0.5 * (low + high) + half
 
 
-def medians(parts: Sequence[Points]) -> tuple[Array, Array] | None:
+def binned_medians(parts: Sequence[Points]) -> tuple[Array, Array] | None:
     """Medians of readings in bins of x; None of few readings."""
     x = np.concatenate([part.x for part in parts])
     y = np.concatenate([part.y for part in parts])

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..fitting.phases import run_phases
-from ..fitting.summary import unit_of
+from ..fitting.summary import fit_error_unit
 from ..support.display_units import ErrorsIn
 from . import palette
 from .canvas import described, grid, new_axes
@@ -55,7 +55,7 @@ def phases_over_runs(
     """
     found = sorted(run_phases(fit), key=lambda p: -float(p.amplitude.mean()))[:most]
     top = max((float(p.amplitude.max()) for p in found), default=1.0)
-    unit = unit_of(fit, errors_in)
+    unit = fit_error_unit(fit, errors_in)
     polar: Any = new_axes(ax, polar=True)
     for i, order in enumerate(sorted(found, key=lambda p: p.order)):
         colour = palette.run_colour(i)

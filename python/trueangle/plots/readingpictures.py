@@ -13,7 +13,15 @@ from ..support.display_units import ErrorUnit, significant
 from ..support.plainresult import counted
 from . import curves
 from .curves import Points, Signal
-from .panel import ANGLE, Cloud, Panel, PanelPicture, medians, segment, segment_span
+from .panel import (
+    ANGLE,
+    Cloud,
+    Panel,
+    PanelPicture,
+    binned_medians,
+    magnified_segment,
+    segment_span,
+)
 
 if TYPE_CHECKING:
     from ..fitting.result import FitResult
@@ -47,7 +55,7 @@ def errors_picture(
     if fit is None:
         size = significant(max(float(np.ptp(cloud.points.y)) for cloud in clouds), 3)
         told = f"{about}, without a model: up to {size} {unit.name} peak-to-peak."
-        return PanelPicture((Panel(ANGLE, y, clouds, curves.travelled(runs)),), told)
+        return PanelPicture((Panel(ANGLE, y, clouds, curves.travelled_span(runs)),), told)
     low, high = span = curves.seen_span(fit.model)
     strong = curves.strong_gear_order(fit.orders, fit.amplitudes, high - low)
     model = curves.model_curve(fit.model).scaled(unit.per_arcsec)
@@ -59,17 +67,19 @@ def errors_picture(
     if strong is None:
         return PanelPicture((whole,), told)
     near = curves.model_curve(fit.model, segment_span(whole, strong)).scaled(unit.per_arcsec)
-    return PanelPicture((whole, segment(whole, strong, near)), told)
+    return PanelPicture((whole, magnified_segment(whole, strong, near)), told)
 
 
 def _measured(runs: Sequence[CalibrationRun]) -> list[Points]:
     """Readings where there is no model, on the turn that begins where the travel does."""
-    low, _ = curves.travelled(runs)
+    low, _ = curves.travelled_span(runs)
     found = []
     for number, run in enumerate(runs):
         error = wrap(run.indicated - run.reference - run.zero, run.period)
         error *= ARCSEC_PER_TURN / run.period
-        found.append(Points(curves.label_of(run, number), curves.degrees(run, low), error))
+        found.append(
+            Points(curves.run_label(run, number), curves.reference_degrees(run, low), error)
+        )
     return found
 
 
@@ -105,7 +115,7 @@ def residual_picture(fit: FitResult, against: Signal, unit: ErrorUnit) -> PanelP
         An unknown signal, or one that no run has.
     """
     parts = curves.residual_points(fit, against)
-    numbers = {curves.label_of(run, number): number for number, run in enumerate(fit.runs)}
+    numbers = {curves.run_label(run, number): number for number, run in enumerate(fit.runs)}
     if against == "direction":
         # Runs of one direction next to each other instead of on one line.
         shift = _BESIDE * ((np.arange(len(parts)) + 0.5) / len(parts) - 0.5)
@@ -118,7 +128,7 @@ def residual_picture(fit: FitResult, against: Signal, unit: ErrorUnit) -> PanelP
         tuple(Cloud(p, numbers[p.label], name=f"run {p.label}") for p in scaled),
         span,
         angles=against == "angle",
-        medians=medians(scaled),
+        medians=binned_medians(scaled),
     )
     rest = np.concatenate([part.y for part in scaled])
     told = (
@@ -152,7 +162,7 @@ def comparison_picture(
     whole = Panel(ANGLE, f"error / {unit.name}", tuple(both), span)
     panels = [whole]
     if known is not None and (strong := _gear_order(known, span[1] - span[0])) is not None:
-        panels.append(segment(whole, strong))
+        panels.append(magnified_segment(whole, strong))
     panels.append(Panel(ANGLE, f"difference / {unit.name}", tuple(rest), span))
     deviation = float(np.concatenate([cloud.points.y for cloud in rest]).std())
     told = (

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from ..fitting.summary import unit_of
+from ..fitting.summary import fit_error_unit
 from ..support.display_units import ErrorsIn
 from . import palette
 from .canvas import new_axes
@@ -49,7 +49,7 @@ def residuals(
     ArgumentError
         An unknown signal, or one that no run has.
     """
-    picture = residual_picture(fit, against, unit_of(fit, errors_in))
+    picture = residual_picture(fit, against, fit_error_unit(fit, errors_in))
     ax = new_axes(ax, height=3.4)
     draw_panel(ax, picture.panels[0])
     ax.axhline(0.0, color=palette.MUTED, linewidth=0.8, zorder=0)

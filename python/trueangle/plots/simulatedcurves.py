@@ -11,7 +11,7 @@ import numpy as np
 from ..runs.run import CalibrationRun
 from ..support.angles import ARCSEC_PER_TURN, circular_mean, wrap
 from ..support.display_units import ErrorUnit
-from .curves import Points, degrees, label_of
+from .curves import Points, reference_degrees, run_label
 from .findingnames import finding_names
 
 if TYPE_CHECKING:
@@ -63,7 +63,7 @@ def simulated_points(
     found = []
     for number, (run, simulated) in enumerate(zip(runs, expected, strict=True)):
         measured = factor * wrap(run.indicated - run.reference - zero, run.period)
-        x, label = degrees(run), label_of(run, number)
+        x, label = reference_degrees(run), run_label(run, number)
         found.append((Points(label, x, measured), Points(label, x, simulated)))
     return found
 

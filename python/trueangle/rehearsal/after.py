@@ -19,11 +19,11 @@ from ..planning.worth import WANTED
 from ..runs.run import CalibrationRun
 from ..runs.source import Reading
 from ..simulation.simulation import Simulation, simulate, simulate_along
-from ..support.deadline import Pace, entered, pace, paced
+from ..support.deadline import Pace, entered, pace, with_pace
 from ..support.kinds import told_kinds
 from ..support.oftype import of_type
 from ..support.suggestions import check_choice
-from .trial import judged
+from .trial import trial_outcome
 
 __all__ = ["plan_after"]
 
@@ -124,7 +124,7 @@ def plan_after(
     for name, value, least in (("seeds", seeds, 0), ("seed", seed, 0)):
         if not isinstance(value, int) or value < least:
             raise ArgumentError(f"{name} must be a whole number from {least}, got {value!r}")
-    with paced(within, progress) as at:
+    with with_pace(within, progress) as at:
         at.at("diagnosis", 0, 1)
         found = diagnose(runs, sim, **reading)
         plan = found.plan(limits, between=names)
@@ -208,4 +208,4 @@ class _FurtherTrials:
         with entered(Pace(left)) as own:  # its shares of the time are of what is left
             found = diagnose(runs, self.stated)
         at.stopped = at.stopped or own.stopped
-        return judged(found, hypothesis.cause).is_named if found.complete else None
+        return trial_outcome(found, hypothesis.cause).is_named if found.complete else None

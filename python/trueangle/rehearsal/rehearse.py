@@ -14,7 +14,7 @@ from ..planning.evidence import ReadingNoise
 from ..planning.nextruns import NextRuns
 from ..planning.planner import next_runs
 from ..simulation.simulation import SIMULATION, Simulation
-from ..support.deadline import Pace, paced
+from ..support.deadline import Pace, with_pace
 from ..support.kinds import told_kinds
 from ..support.oftype import of_type
 from ..support.suggestions import check_choice
@@ -22,7 +22,7 @@ from .result import Rehearsal, RehearsedCause
 from .search import SizeSearch
 from .trial import FAILED, measured_signals
 from .visibility import blind_causes, size_range
-from .workers import Here, Workers, cores
+from .workers import Here, Workers, usable_cores
 
 __all__ = ["rehearse"]
 
@@ -112,7 +112,7 @@ def rehearse(
     """
     of_type("sim", sim, Simulation, SIMULATION)
     names = _checked(sim, causes, seeds, seed, workers)
-    with paced(within, progress) as at:
+    with with_pace(within, progress) as at:
         signals = measured_signals(sim)
         blind = blind_causes(sim, signals)
         searches = {}
@@ -123,7 +123,7 @@ def rehearse(
         closed = [cause for cause in names if searches[cause].is_blind]
         with at.part(FOR_NEXT_RUNS):
             further = _opening(sim, signals, closed, blind)
-        _ask(sim, signals, list(searches.values()), seed, workers or cores(), at)
+        _ask(sim, signals, list(searches.values()), seed, workers or usable_cores(), at)
         found = [search.result() for search in searches.values()]
         return Rehearsal(
             found,

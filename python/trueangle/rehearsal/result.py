@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from ..planning.nextruns import NextRuns
-from ..support.drawn import drawn
+from ..support.drawn import result_picture
 from ..support.plainresult import PlainResult, Shown, counted
 from .detection import Chance, binomial_interval
 from .visibility import Range
@@ -101,7 +101,7 @@ class RehearsedCause(Shown):
         }
 
 
-def rehearsed(
+def rehearsed_cause(
     cause: str,
     size_name: str,
     sizes: Range | None,
@@ -205,12 +205,12 @@ class Rehearsal(PlainResult):
         return f"{named} of {counted(self.causes, 'cause')} named, {self.trials} trials{ended}"
 
     def summary(self) -> str:
-        """A readable account (`trueangle.rehearsal.summary.render`)."""
-        from .summary import render
+        """A readable account (`trueangle.rehearsal.summary.rehearsal_summary`)."""
+        from .summary import rehearsal_summary
 
-        return render(self)
+        return rehearsal_summary(self)
 
     def plot(self) -> Figure:
         """Detection against size, a small picture for every cause (needs ``trueangle[plot]``)."""
-        figure: Figure = drawn(self)
+        figure: Figure = result_picture(self)
         return figure

@@ -14,7 +14,7 @@ import numpy as np
 from ..effects import EFFECTS
 from ..effects.blindness import Blindness
 from .detection import Chance
-from .result import RehearsedCause, rehearsed
+from .result import RehearsedCause, rehearsed_cause
 from .trial import Trial, TrialOutcome
 from .visibility import Range
 
@@ -128,4 +128,4 @@ class SizeSearch:
             because = "these runs of this joint show nothing of it, however large it is"
             measure = effect.measure or None
         name = effect.size_name or fields(effect)[0].name  # type: ignore[arg-type]
-        return rehearsed(self.cause, name, self.sizes, self.answers, because, measure)
+        return rehearsed_cause(self.cause, name, self.sizes, self.answers, because, measure)

@@ -9,7 +9,7 @@ from ..support.layout import laid_out, wrapped
 if TYPE_CHECKING:
     from .result import Rehearsal, RehearsedCause
 
-__all__ = ["render"]
+__all__ = ["rehearsal_summary"]
 
 #: Names of causes listed of those it is confused with.
 MOST = 3
@@ -19,7 +19,7 @@ MOST = 3
 OPEN = "Sizes with their 95 % intervals; ? where the sizes tried do not bracket them."
 
 
-def render(rehearsal: Rehearsal) -> str:
+def rehearsal_summary(rehearsal: Rehearsal) -> str:
     """The table of sizes, what is not seen and why, and the runs that would help most."""
     lines: list[str] = []
     for note in rehearsal.notes:

@@ -23,7 +23,7 @@ __all__ = [
     "asked",
     "drawn_effect",
     "measured_signals",
-    "rng_of",
+    "trial_rng",
 ]
 
 #: What a diagnosis may say of a hidden cause: it is confirmed; it is listed and not confirmed; it
@@ -86,7 +86,7 @@ class TrialOutcome:
         return self.verdict == NAMED
 
 
-def rng_of(seed: int, cause: str, number: int) -> np.random.Generator:
+def trial_rng(seed: int, cause: str, number: int) -> np.random.Generator:
     """Random numbers of a trial: the same whoever asks for it, and when."""
     return np.random.default_rng([seed, zlib.crc32(cause.encode()), number])
 
@@ -105,7 +105,7 @@ def drawn_effect(
 
 def asked(sim: Simulation, signals: Signals, trial: Trial, seed: int) -> TrialOutcome:
     """Hide the effect of a trial in readings of the simulation, diagnose them, and compare."""
-    rng = rng_of(seed, trial.cause, trial.number)
+    rng = trial_rng(seed, trial.cause, trial.number)
     effect = drawn_effect(trial.cause, trial.size, signals, sim.surroundings, rng)
     if effect is None:
         return TrialOutcome(NOTHING)
@@ -116,10 +116,10 @@ def asked(sim: Simulation, signals: Signals, trial: Trial, seed: int) -> TrialOu
         raise
     except Exception as failure:  # told with the result: hours of other trials are not lost
         return TrialOutcome(FAILED, failure=f"{type(failure).__name__}: {failure}")
-    return judged(result, trial.cause) if result.complete else TrialOutcome(ENDED)
+    return trial_outcome(result, trial.cause) if result.complete else TrialOutcome(ENDED)
 
 
-def judged(result: Diagnosis, cause: str) -> TrialOutcome:
+def trial_outcome(result: Diagnosis, cause: str) -> TrialOutcome:
     """What a diagnosis says where ``cause`` alone is hidden."""
     confirmed = [finding.cause for finding in result.findings if finding.confirmed]
     refuted = [belief.what for belief in result.beliefs if belief.verdict != "confirmed"]

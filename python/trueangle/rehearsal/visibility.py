@@ -14,7 +14,7 @@ from ..estimation.regression import Regression
 from ..joint.signals import Signals
 from ..simulation.simulation import Simulation
 from ..support.angles import ARCSEC_PER_DEG
-from .trial import drawn_effect, rng_of
+from .trial import drawn_effect, trial_rng
 
 __all__ = ["STEPS", "Range", "blind_causes", "size_range"]
 
@@ -82,7 +82,7 @@ def size_range(sim: Simulation, signals: Signals, cause: str, seed: int) -> Rang
         size = 2.0 ** (log_size if effect.size_grows else -log_size)
         found = []
         for number in range(DRAWS):
-            rng = rng_of(seed, cause, number)
+            rng = trial_rng(seed, cause, number)
             drawn = drawn_effect(cause, size, signals, sim.surroundings, rng)
             found.append(0.0 if drawn is None else _deviance(drawn, regression, rng, sim))
         return float(np.mean(found))

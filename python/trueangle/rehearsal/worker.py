@@ -10,10 +10,10 @@ from typing import Any, BinaryIO
 
 from .trial import asked, measured_signals
 
-__all__ = ["serve"]
+__all__ = ["serve_trials"]
 
 
-def serve(source: BinaryIO, target: BinaryIO) -> None:
+def serve_trials(source: BinaryIO, target: BinaryIO) -> None:
     """Answer every trial that comes until there are no more."""
     sim, seed = pickle.load(source)
     signals = measured_signals(sim)
@@ -37,4 +37,4 @@ if __name__ == "__main__":
     with contextlib.suppress(BrokenPipeError, EOFError):
         answers = sys.stdout.buffer
         sys.stdout = sys.stderr
-        serve(sys.stdin.buffer, answers)
+        serve_trials(sys.stdin.buffer, answers)

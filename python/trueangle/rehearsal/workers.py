@@ -19,7 +19,7 @@ from ..simulation.simulation import Simulation
 from ..support.deadline import Pace, entered, pace
 from .trial import ENDED, Trial, TrialOutcome, asked
 
-__all__ = ["Here", "WorkerError", "Workers", "cores"]
+__all__ = ["Here", "WorkerError", "Workers", "usable_cores"]
 
 #: Variables that say how many threads a linear algebra library may use.
 THREADS = (
@@ -38,7 +38,7 @@ class WorkerError(TrueAngleError):
     """A process that asked trials has ended, or could not be given the simulation."""
 
 
-def cores() -> int:
+def usable_cores() -> int:
     """Cores that this process may use."""
     try:
         return len(os.sched_getaffinity(0))

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-__all__ = ["Model", "columns", "field", "model", "reference", "value"]
+__all__ = ["Model", "bokeh_columns", "bokeh_reference", "field", "model", "value"]
 
 #: A model with its kind, identity and attributes.
 Model = dict[str, Any]
@@ -28,7 +28,7 @@ def model(kind: str, **attributes: Any) -> Model:
     return {"type": "object", "name": kind, "id": f"p{next(_identities)}", "attributes": attributes}
 
 
-def reference(made: Model) -> dict[str, str]:
+def bokeh_reference(made: Model) -> dict[str, str]:
     """A model that stands before this place in the document, named again."""
     return {"id": made["id"]}
 
@@ -43,7 +43,7 @@ def value(same: Any) -> dict[str, Any]:
     return {"type": "value", "value": same}
 
 
-def columns(data: Mapping[str, Iterable[Any]]) -> Model:
+def bokeh_columns(data: Mapping[str, Iterable[Any]]) -> Model:
     """A source of columns: arrays as bytes, texts as lists."""
     entries = [
         [name, _written(some) if isinstance(some, np.ndarray) else list(some)]

@@ -8,7 +8,7 @@ from typing import Final
 
 import numpy as np
 
-from .bokehmodels import Model, model, reference
+from .bokehmodels import Model, bokeh_reference, model
 
 __all__ = ["ChartAxis"]
 
@@ -74,7 +74,7 @@ class ChartAxis:
         axis = model(
             f"{self._kind('Linear')}Axis", axis_label=self.title or None, visible=self.visible
         )
-        grid = model("Grid", axis=reference(axis), dimension=dimension)
+        grid = model("Grid", axis=bokeh_reference(axis), dimension=dimension)
         if self.log and self.limits is not None:
             self.ticks = _within_decades(*self.limits)
             axis["attributes"]["formatter"] = model("BasicTickFormatter", use_scientific=False)

@@ -13,11 +13,11 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from .bokehmodels import Model, columns, field, model, reference, value
+from .bokehmodels import Model, bokeh_columns, bokeh_reference, field, model, value
 from .chartaxes import ChartAxis
 from .stills import Mark, still
 
-__all__ = ["Chart", "Figure", "figure", "run_colour", "run_marker", "swatch"]
+__all__ = ["Chart", "Figure", "chart_figure", "chart_run_marker", "css_run_colour", "run_swatch"]
 
 Array = NDArray[np.float64]
 
@@ -39,26 +39,26 @@ _MARKERS: Final = ("circle", "square", "triangle", "diamond", "inverted_triangle
 _GLYPHS: Final = ("●", "■", "▲", "◆", "▼", "✚")
 
 
-def run_colour(number: int) -> str:
+def css_run_colour(number: int) -> str:
     """CSS variable of a run's colour."""
     return f"run-{number % _COLOURS}"
 
 
-def run_marker(number: int) -> str:
+def chart_run_marker(number: int) -> str:
     """Marker of a run; another one with the same colour every six runs."""
     return _MARKERS[_shape(number)]
 
 
-def swatch(number: int) -> tuple[str, str]:
+def run_swatch(number: int) -> tuple[str, str]:
     """Colour and symbol of a run, for the table of runs."""
-    return f"var(--{run_colour(number)})", _GLYPHS[_shape(number)]
+    return f"var(--{css_run_colour(number)})", _GLYPHS[_shape(number)]
 
 
 def _shape(number: int) -> int:
     return (number + number // _COLOURS) % len(_MARKERS)
 
 
-def figure(alt: str, charts: Sequence[Chart], arrangement: str = "row") -> Figure:
+def chart_figure(alt: str, charts: Sequence[Chart], arrangement: str = "row") -> Figure:
     """One figure: alternative text, and its charts in a row, stacked or as small multiples."""
     grown = sum(chart.grow for chart in charts)
     drawn = [
@@ -137,7 +137,9 @@ class Chart:
         self._marks.append(Mark("dots", (x, y), colour, size))
         data = {"x": _short(x), "y": _short(y), **(more or {})}
         sign = "○" if hollow else _GLYPHS[_MARKERS.index(marker)]
-        self._add(_marks(marker, size, hollow), columns(data), colour, label, run, hover, sign)
+        self._add(
+            _marks(marker, size, hollow), bokeh_columns(data), colour, label, run, hover, sign
+        )
 
     def line(
         self, x: Array, y: Array, *, colour: str, label: str = "", width: float = 1.5,
@@ -162,7 +164,7 @@ class Chart:
         """The area between two curves."""
         self._marks.append(Mark("band", (x, low, high), colour))
         glyph = model("VArea", x=field("x"), y1=field("low"), y2=field("y"), fill_alpha=alpha)
-        source = columns({"x": _short(x), "low": _short(low), "y": _short(high)})
+        source = bokeh_columns({"x": _short(x), "low": _short(low), "y": _short(high)})
         self._add(glyph, source, colour, label, sign="▒")
 
     def stems(
@@ -172,19 +174,19 @@ class Chart:
         """Upright lines from ``low`` to ``high``."""
         feet = np.broadcast_to(np.asarray(low, dtype=np.float64), high.shape)
         self._marks.append(Mark("segments", (x, feet, x, high), colour, width))
-        source = columns({"x": _short(x), "y": _short(high), "low": _short(feet)})
+        source = bokeh_columns({"x": _short(x), "y": _short(high), "low": _short(feet)})
         self._add(_segment("x", "low", "x", "y", width), source, colour, label, sign="┃")
 
     def ticks(self, x: Array, y: Array, half: float, *, colour: str, label: str = "") -> None:
         """Short level lines of half width ``half`` at every point."""
         self._marks.append(Mark("segments", (x - half, y, x + half, y), colour, 2.0))
-        source = columns({"x0": _short(x - half), "x1": _short(x + half), "y": _short(y)})
+        source = bokeh_columns({"x0": _short(x - half), "x1": _short(x + half), "y": _short(y)})
         self._add(_segment("x0", "y", "x1", "y", 2.0), source, colour, label, sign="━")
 
     def level_dots(self, names: Sequence[str], values: Array, *, colour: str, hover: str) -> None:
         """A dot of each category at its value."""
         self._marks.append(Mark("dots", (values, list(names)), colour, 11.0))
-        source = columns({"y": names, "x": _short(values)})
+        source = bokeh_columns({"y": names, "x": _short(values)})
         self._add(_marks("circle", 11.0), source, colour, hover=hover)
 
     def upright(self, x: float, *, label: str) -> None:
@@ -225,7 +227,7 @@ class Chart:
             y_offset=field("off"),
         )
         under = list(below) or [False] * len(texts)
-        source = columns(
+        source = bokeh_columns(
             {
                 "x": _short(x),
                 "y": _short(y),
@@ -269,7 +271,12 @@ class Chart:
         left, up = self._up.drawn(1)
         zoom = model("BoxZoomTool")
         hover = [
-            model("HoverTool", renderers=[reference(r) for r in shown], tooltips=text, mode="mouse")
+            model(
+                "HoverTool",
+                renderers=[bokeh_reference(r) for r in shown],
+                tooltips=text,
+                mode="mouse",
+            )
             for text, shown in self._hover.items()
         ]
         tools = [zoom, model("PanTool"), model("ResetTool"), *hover]
@@ -281,7 +288,7 @@ class Chart:
             y_range=self._up.range(),
             x_scale=self._across.scale(),
             y_scale=self._up.scale(),
-            toolbar=model("Toolbar", tools=tools, active_drag=reference(zoom)),
+            toolbar=model("Toolbar", tools=tools, active_drag=bokeh_reference(zoom)),
             toolbar_location=None,
             left=[left],
             below=[below],
@@ -320,7 +327,7 @@ def _tags(colour: str, run: int | None = None) -> list[str]:
 
 
 def _points(x: Array, y: Array) -> Model:
-    return columns({"x": _short(x), "y": _short(y)})
+    return bokeh_columns({"x": _short(x), "y": _short(y)})
 
 
 def _marks(marker: str, size: float, hollow: bool = False) -> Model:

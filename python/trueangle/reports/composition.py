@@ -12,7 +12,7 @@ from ..errors import ArgumentError
 from ..fitting.heldout import HeldOut
 from ..model.model import HarmonicModel
 from ..plots.orderlines import order_lines
-from ..runs.checks.check import faults_of
+from ..runs.checks.check import data_faults
 from ..runs.checks.record import records_of
 from ..runs.files import runs_of
 from ..runs.provenance import provenance
@@ -26,16 +26,16 @@ from ..support.kinds import told_kinds
 from ..support.oftype import of_type
 from ..support.plainresult import Shown
 from . import figures
-from .diagnosed import diagnosed
-from .figures import phases
-from .fitted import extended, fitted, gear_of, held_out, joint_of
-from .gained import gained
+from .diagnosed import diagnosis_content
+from .figures import phase_figure
+from .fitted import extended_correction, fit_or_reason, gain_or_reason, known_gear, known_joint
+from .gained import gain_content
 from .linenames import LineNames, line_names
-from .measured import measured
-from .modelled import given_model, modelled, selected
-from .scale import Scale, scale_of
-from .spectrum import spectrum
-from .unknowns import unknowns
+from .measured import measured_content
+from .modelled import given_model, model_content, order_content
+from .scale import Scale, error_scale
+from .spectrum import spectrum_figure
+from .unknowns import unknown_content
 
 if TYPE_CHECKING:
     from ..certificate import Certificate, Identity
@@ -80,10 +80,10 @@ class Report(Shown):
         MissingExtraError
             jinja2 or bokeh is not installed.
         """
-        from .page import render
+        from .page import rendered_report
 
         # Names of files may hold bytes that are no text.
-        return render(self).encode("utf-8", "replace").decode("utf-8")
+        return rendered_report(self).encode("utf-8", "replace").decode("utf-8")
 
     def save(self, path: str | PathLike[str]) -> None:
         """Write the page, complete or not at all; a name that ends with ``.pdf``, as PDF.
@@ -238,7 +238,7 @@ def report(
     if simulation is not None and (gear_ratio is not None or shafts):
         what = "shafts" if shafts else "gear_ratio"
         raise ArgumentError(f"give {what} or a simulation (which states them), not both")
-    joint = joint_of(simulation, gear_ratio, fixed_member, shafts)
+    joint = known_joint(simulation, gear_ratio, fixed_member, shafts)
     if certificate is not None:
         if title is not None:
             raise ArgumentError("a certificate has no title of its own: its identity names it")
@@ -251,22 +251,22 @@ def report(
             positions=positions,
             model=model,
             errors_in=errors_in,
-            **gear_of(joint),
+            **known_gear(joint),
         )
         if path is not None:
             certified.save(path)
         return certified
     if positions is not None:
         raise ArgumentError("positions are those of a certificate: give certificate too")
-    sizes = measured(found)
-    scale = scale_of(
+    sizes = measured_content(found)
+    scale = error_scale(
         errors_in, sizes["error"]["rms_arcsec"], sizes["error"]["max_abs_arcsec"], found
     )
     at = pace()
     at.at("fitting", 0, _STAGES)
-    fit, selection, why_not = fitted(found, orders, joint)
+    fit, selection, why_not = fit_or_reason(found, orders, joint)
     at.at("holding runs out", 1, _STAGES)
-    held, why_no_gain = held_out(fit)
+    held, why_no_gain = gain_or_reason(fit)
     at.at("diagnosing", 2, _STAGES)
     name = line_names(joint)
     diagnosis = None
@@ -281,12 +281,12 @@ def report(
         "title": heading,
         "errors_in": scale.to_dict(),
         "measured": sizes,
-        "data_faults": [fault.to_dict() for fault in faults_of(records_of(found))],
-        "selection": None if selection is None else selected(selection, name),
-        "model": None if fit is None else modelled(fit, name),
+        "data_faults": [fault.to_dict() for fault in data_faults(records_of(found))],
+        "selection": None if selection is None else order_content(selection, name),
+        "model": None if fit is None else model_content(fit, name),
         "why_no_model": why_not,
         "given_model": None if model is None else given_model(model, found),
-        "gain": None if held is None else gained(held),
+        "gain": None if held is None else gain_content(held),
         "why_no_gain": why_no_gain,
         "diagnosis": None,
         "extended": None,
@@ -295,10 +295,10 @@ def report(
     at.at("drawing", 3, _STAGES)
     drawn = _figures(found, fit, selection, held, name, scale)
     if simulation is not None and diagnosis is not None:
-        content["diagnosis"] = diagnosed(diagnosis)
-        content["extended"] = extended(fit, diagnosis, found, simulation)
+        content["diagnosis"] = diagnosis_content(diagnosis)
+        content["extended"] = extended_correction(fit, diagnosis, found, simulation)
         drawn |= figures.figures_of(diagnosis, found, simulation, scale)
-    content["unknowns"] = unknowns(found, selection, content["diagnosis"])
+    content["unknowns"] = unknown_content(found, selection, content["diagnosis"])
     made = Report(heading, content, drawn)
     if path is not None:
         made.save(path)
@@ -322,13 +322,13 @@ def _figures(
     made = {"errors": figures.errors_of_runs(fit, runs, scale)}
     # At one place no order can be looked for.
     if fit is not None or (selection is not None and order_lines(selection)):
-        made["spectrum"] = spectrum(fit, selection, name, scale)
+        made["spectrum"] = spectrum_figure(fit, selection, name, scale)
     if held is not None:
-        made["before-after"] = figures.before_after(held, runs, scale)
+        made["before-after"] = figures.before_after_figure(held, runs, scale)
     if fit is not None:
-        multiples = phases(fit, name, scale)
+        multiples = phase_figure(fit, name, scale)
         if multiples is not None:
             made["phases"] = multiples
         for signal in figures.signals_present(fit):
-            made[f"residual-{signal}"] = figures.residuals(fit, signal, scale)
+            made[f"residual-{signal}"] = figures.residual_figure(fit, signal, scale)
     return made

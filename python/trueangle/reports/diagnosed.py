@@ -5,12 +5,12 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, Final
 
 from ..plots.findingnames import finding_names
-from .numbers import shortened
+from .numbers import shortened_list
 
 if TYPE_CHECKING:
     from ..diagnosis import Diagnosis
 
-__all__ = ["diagnosed"]
+__all__ = ["diagnosis_content"]
 
 #: Units by the end of a parameter's name, the longer ones first.
 _UNITS: Final = {
@@ -31,7 +31,7 @@ _UNITS: Final = {
 _NAMED: Final = ("shaft", "order", "carrier")
 
 
-def diagnosed(diagnosis: Diagnosis) -> dict[str, Any]:
+def diagnosis_content(diagnosis: Diagnosis) -> dict[str, Any]:
     """`Diagnosis.to_dict` with the sentences of its findings, and the next run.
 
     Parameters are listed; a value that is no single number is given as ``text``.
@@ -109,13 +109,13 @@ def _numbers(value: Any) -> list[float] | None:
 def _text(value: Any) -> str:
     if isinstance(value, list) and any(isinstance(item, list | tuple) for item in value):
         # What belongs together, a run and a row of it, stands on one line.
-        return "\n".join(shortened([" row ".join(map(_text, item)) for item in value]))
+        return "\n".join(shortened_list([" row ".join(map(_text, item)) for item in value]))
     if isinstance(value, list):
         return "; ".join(_text(item) for item in value)
     return f"{value:.4g}" if isinstance(value, float) else str(value)
 
 
 def _toml(diagnosis: Diagnosis) -> str:
-    from ..simulation.simulationfile import dumps
+    from ..simulation.simulationfile import simulation_text
 
-    return dumps(diagnosis.extended)
+    return simulation_text(diagnosis.extended)

@@ -20,9 +20,9 @@ from ..plots.readingpictures import (
 )
 from ..plots.simulatedcurves import ErrorLeft, error_left_of, simulated_points
 from ..support.display_units import significant
-from .charts import Chart, Figure, figure, run_colour, run_marker
+from .charts import Chart, Figure, chart_figure, chart_run_marker, css_run_colour
 from .linenames import LineNames
-from .panelcharts import figure_of
+from .panelcharts import panel_figure
 from .scale import Scale
 
 if TYPE_CHECKING:
@@ -33,11 +33,11 @@ if TYPE_CHECKING:
     from ..simulation import Simulation
 
 __all__ = [
-    "before_after",
+    "before_after_figure",
     "errors_of_runs",
     "figures_of",
-    "phases",
-    "residuals",
+    "phase_figure",
+    "residual_figure",
     "signals_present",
 ]
 
@@ -46,25 +46,25 @@ Array = NDArray[np.float64]
 
 def errors_of_runs(fit: FitResult | None, runs: Sequence[CalibrationRun], scale: Scale) -> Figure:
     """Measured error of every run with the model and its band."""
-    return figure_of(errors_picture(runs, fit, scale.unit), scale)
+    return panel_figure(errors_picture(runs, fit, scale.unit), scale)
 
 
-def before_after(held: HeldOut, runs: Sequence[CalibrationRun], scale: Scale) -> Figure:
+def before_after_figure(held: HeldOut, runs: Sequence[CalibrationRun], scale: Scale) -> Figure:
     """Error of every held-out run before and after correction."""
     pairs = []
     for run in held.runs:
         low = 0.0 if run.model is None else curves.seen_span(run.model)[0]
-        x = curves.degrees(run.run, low)
+        x = curves.reference_degrees(run.run, low)
         number = next(i for i, known in enumerate(runs) if known is run.run)
         pairs.append((number, Points(run.label, x, run.before), Points(run.label, x, run.after)))
     model = next((run.model for run in held.runs if run.model is not None), None)
     span = (0.0, 360.0) if model is None else curves.seen_span(model)
-    return figure_of(before_after_picture(pairs, span, scale.unit), scale)
+    return panel_figure(before_after_picture(pairs, span, scale.unit), scale)
 
 
-def residuals(fit: FitResult, against: curves.Signal, scale: Scale) -> Figure:
+def residual_figure(fit: FitResult, against: curves.Signal, scale: Scale) -> Figure:
     """What the model leaves, against one signal."""
-    return figure_of(residual_picture(fit, against, scale.unit), scale)
+    return panel_figure(residual_picture(fit, against, scale.unit), scale)
 
 
 def signals_present(fit: FitResult) -> list[curves.Signal]:
@@ -105,7 +105,9 @@ def figures_of(
     if expected > _FLAT * diagnosis.discrepancy.peak_to_peak:
         picture = comparison_picture(pairs, scale.unit, diagnosis.extended)
         arrangement = "stacked" if len(picture.panels) == 2 else "above"
-        found["measured-simulated"] = figure_of(picture, scale, arrangement, height_rem=_HEIGHT_REM)
+        found["measured-simulated"] = panel_figure(
+            picture, scale, arrangement, height_rem=_HEIGHT_REM
+        )
     left = error_left_of(diagnosis)
     if left is not None and len(left.rows) > 2:
         found["error-left"] = _left(left, scale)
@@ -131,7 +133,7 @@ def _left(left: ErrorLeft, scale: Scale) -> Figure:
     chart.level_dots(names[:1], sizes[:1], colour="after", hover=hover)
     chart.level_dots(names[1:], sizes[1:], colour="before", hover=hover)
     chart.upright(noise, label=f"noise of one reading, {scale.unit.text(left.noise)}")
-    return figure(left.told(scale.unit), [chart])
+    return chart_figure(left.told(scale.unit), [chart])
 
 
 #: Orders shown, the largest.
@@ -140,7 +142,7 @@ _MOST: Final = 12
 _LEAST: Final = 15.0
 
 
-def phases(fit: FitResult, name: LineNames, scale: Scale) -> Figure | None:
+def phase_figure(fit: FitResult, name: LineNames, scale: Scale) -> Figure | None:
     """Phase of every order in every run; None where no run holds them, or there is one."""
     try:
         found = sorted(run_phases(fit), key=lambda p: -float(p.amplitude.mean()))[:_MOST]
@@ -157,7 +159,7 @@ def phases(fit: FitResult, name: LineNames, scale: Scale) -> Figure | None:
         f"Phases of {len(charts)} orders, a chart for each, one dot per run. Dots of one order "
         "on a level line are a systematic error."
     )
-    return figure(alt, charts, "multiples")
+    return chart_figure(alt, charts, "multiples")
 
 
 def _of_order(order: Phases, numbers: dict[str, int], name: str, scale: Scale) -> Chart:
@@ -183,8 +185,8 @@ def _of_order(order: Phases, numbers: dict[str, int], name: str, scale: Scale) -
         chart.dots(
             np.array([place + 1.0]),
             degrees[place : place + 1],
-            colour=run_colour(number),
-            marker=run_marker(number),
+            colour=css_run_colour(number),
+            marker=chart_run_marker(number),
             run=number,
             size=8.0,
             hover=f"run {label}: {scale.unit.text(float(order.amplitude[place]))} at @y{{0.0}}°",

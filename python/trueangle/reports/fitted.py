@@ -18,10 +18,10 @@ if TYPE_CHECKING:
     from ..fitting.result import FitResult
     from ..simulation import Simulation
 
-__all__ = ["extended", "fitted", "gear_of", "held_out", "joint_of"]
+__all__ = ["extended_correction", "fit_or_reason", "gain_or_reason", "known_gear", "known_joint"]
 
 
-def joint_of(
+def known_joint(
     simulation: Simulation | None,
     gear_ratio: float | None,
     fixed_member: str,
@@ -38,7 +38,7 @@ def joint_of(
     return Joint(gear_ratio, fixed_member, "motor", declared=declared)
 
 
-def gear_of(joint: Joint | None) -> dict[str, Any]:
+def known_gear(joint: Joint | None) -> dict[str, Any]:
     """The joint as `trueangle.fit` takes it."""
     if joint is None:
         return {}
@@ -48,23 +48,23 @@ def gear_of(joint: Joint | None) -> dict[str, Any]:
     return gear
 
 
-def fitted(
+def fit_or_reason(
     runs: list[CalibrationRun], orders: Any, joint: Joint | None
 ) -> tuple[FitResult | None, OrderSelection | None, str]:
     """The fit; or the selection and the reason why there is none."""
     from ..fitting.fit import fit as fit_runs
 
     try:
-        fit = fit_runs(runs, orders, **gear_of(joint))
+        fit = fit_runs(runs, orders, **known_gear(joint))
     except NoModelError as reason:
         from ..fitting.orders.select import select_orders
 
-        selection = select_orders(runs, **gear_of(joint))
+        selection = select_orders(runs, **known_gear(joint))
         return None, selection, str(reason)
     return fit, fit.selection, ""
 
 
-def held_out(fit: FitResult | None) -> tuple[HeldOut | None, str]:
+def gain_or_reason(fit: FitResult | None) -> tuple[HeldOut | None, str]:
     """What the fit gains on runs left out of it; or the reason why that is not known."""
     if fit is None:
         return None, "There is no model to hold against other runs."
@@ -74,7 +74,7 @@ def held_out(fit: FitResult | None) -> tuple[HeldOut | None, str]:
         return None, f"{str(reason)[0].upper()}{str(reason)[1:]}."
 
 
-def extended(
+def extended_correction(
     fit: FitResult | None,
     diagnosis: Diagnosis,
     runs: list[CalibrationRun],

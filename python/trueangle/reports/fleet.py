@@ -16,7 +16,7 @@ from ..fleets.unit import FleetUnit, UnitOrder
 from ..support.angles import arcsec
 from ..support.display_units import ErrorsIn, ErrorUnit, error_unit
 from .chartaxes import ChartAxis
-from .page import Page, filled
+from .page import Page, filled_template
 from .stills import Mark, StillPicture, still
 
 __all__ = ["FleetReport"]
@@ -76,7 +76,7 @@ class FleetReport(Page):
 
         odd = [unit for unit in self.fleet.units if unit.verdict != "fine"]
         drawn = self.fleet.units[:_DRAWN]
-        return filled(
+        return filled_template(
             "fleet.html.j2",
             title=self.title,
             fleet=self.fleet,

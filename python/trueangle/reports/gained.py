@@ -9,10 +9,10 @@ from ..fitting.heldout import HeldOut
 from ..model.model import HarmonicModel
 from .measured import error_size
 
-__all__ = ["extended_model", "gained"]
+__all__ = ["extended_model", "gain_content"]
 
 
-def gained(held: HeldOut) -> dict[str, Any]:
+def gain_content(held: HeldOut) -> dict[str, Any]:
     """Error of held-out runs before and after correction, in all and run by run."""
     interval = held.reduction_interval
     return {
@@ -46,4 +46,4 @@ def extended_model(model: HarmonicModel, held: HeldOut) -> dict[str, Any]:
                 "parameters": [{"name": k, "value": float(v)} for k, v in numbers.items()],
             }
         )
-    return {"terms": terms, "orders": [float(m) for m in model.orders], "gain": gained(held)}
+    return {"terms": terms, "orders": [float(m) for m in model.orders], "gain": gain_content(held)}

@@ -12,14 +12,14 @@ from ..runs.aliasing import distinct_positions
 from ..runs.run import CalibrationRun
 from ..support.angles import ARCSEC_PER_TURN, unit_name, wrap
 
-__all__ = ["error_size", "measured"]
+__all__ = ["error_size", "measured_content"]
 
 Array = NDArray[np.float64]
 
 _WAYS = {(-1, 1): "both", (1,): "forward", (-1,): "backward"}
 
 
-def measured(runs: Sequence[CalibrationRun]) -> dict[str, Any]:
+def measured_content(runs: Sequence[CalibrationRun]) -> dict[str, Any]:
     """Runs, readings and conditions; errors less the zero of each run, in arcsec."""
     errors = [_error(run) for run in runs]
     return {

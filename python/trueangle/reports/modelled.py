@@ -23,8 +23,8 @@ if TYPE_CHECKING:
 
 __all__ = [
     "given_model",
-    "modelled",
-    "selected",
+    "model_content",
+    "order_content",
 ]
 
 #: Correlations of coefficients below this are not worth a note.
@@ -32,7 +32,7 @@ _NOTABLE: Final = 0.3
 _MOST_CORRELATIONS: Final = 5
 
 
-def modelled(fit: FitResult, name: LineNames) -> dict[str, Any]:
+def model_content(fit: FitResult, name: LineNames) -> dict[str, Any]:
     """Coefficients with standard errors, and the quality of the fit, in arcsec and deg."""
     model = fit.model
     factor = ARCSEC_PER_TURN / model.period
@@ -94,7 +94,7 @@ def _correlations(fit: FitResult, name: LineNames) -> list[dict[str, Any]]:
     ]
 
 
-def selected(selection: OrderSelection, name: LineNames) -> dict[str, Any]:
+def order_content(selection: OrderSelection, name: LineNames) -> dict[str, Any]:
     """Every candidate order and the evidence for or against it."""
     factor = ARCSEC_PER_TURN / selection.period
     before, after = selection.holdout_rms

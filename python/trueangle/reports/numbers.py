@@ -8,7 +8,7 @@ from typing import Any, Final
 
 from ..support.display_units import ErrorUnit
 
-__all__ = ["MINUS", "NONE", "Numbers", "formatted", "lookup", "shortened"]
+__all__ = ["MINUS", "NONE", "Numbers", "formatted_number", "lookup", "shortened_list"]
 
 #: Stands where there is no number.
 NONE: Final = "\u2013"
@@ -39,12 +39,12 @@ def lookup(content: Any, path: str) -> Any:
     return content
 
 
-def formatted(value: float | None, digits: int) -> str:
+def formatted_number(value: float | None, digits: int) -> str:
     r"""A number as the page shows it; a dash for none.
 
     Examples
     --------
-    >>> formatted(-0.004, 2), formatted(None, 2)
+    >>> formatted_number(-0.004, 2), formatted_number(None, 2)
     ('0.00', '\u2013')
     """
     if value is None:
@@ -53,12 +53,12 @@ def formatted(value: float | None, digits: int) -> str:
     return text.lstrip("-") if float(text) == 0.0 else text.replace("-", MINUS)
 
 
-def shortened(lines: Sequence[str]) -> list[str]:
+def shortened_list(lines: Sequence[str]) -> list[str]:
     """A list as a cell of a table shows it; a page is no place for hundreds of them.
 
     Examples
     --------
-    >>> shortened([str(n) for n in range(100)])[-2:]
+    >>> shortened_list([str(n) for n in range(100)])[-2:]
     ['5', 'and 94 more']
     """
     if len(lines) <= _MOST_LINES:
@@ -128,7 +128,7 @@ class Numbers:
         shown = [pair[of] for pair in pairs]
         if set(shown) == {"-"}:
             return NONE
-        texts = shortened([text.replace("-", MINUS) for text in shown])
+        texts = shortened_list([text.replace("-", MINUS) for text in shown])
         # A stack is read beside that of the deviations; without them it is a list.
         return ("\n" if stds else ", ").join(texts)
 
@@ -138,7 +138,7 @@ class Numbers:
 
     def _span(self, path: str, of: ErrorUnit, digits: int, unit: str) -> Any:
         value = lookup(self._content, path)
-        text = formatted(None if value is None else value * of.per_arcsec, digits)
+        text = formatted_number(None if value is None else value * of.per_arcsec, digits)
         from markupsafe import Markup
 
         # Of most pages every number is as the content has it.

@@ -22,7 +22,14 @@ if TYPE_CHECKING:
 
     from .composition import Report
 
-__all__ = ["Page", "environment", "filled", "library", "render", "templates"]
+__all__ = [
+    "Page",
+    "bokeh_library",
+    "filled_template",
+    "rendered_report",
+    "report_templates",
+    "template_environment",
+]
 
 _TEMPLATES = Path(__file__).parent / "templates"
 
@@ -31,16 +38,16 @@ _TEMPLATES = Path(__file__).parent / "templates"
 _SIGNS = str.maketrans("<>&", "[]:")
 
 
-def render(report: Report, framed: bool = False) -> str:
+def rendered_report(report: Report, framed: bool = False) -> str:
     """The report as HTML: style, scripts, plotting library, content and figures inside.
 
     ``framed`` in a page that holds the library, it takes that one.
     """
-    made = environment()
+    made = template_environment()
     from markupsafe import Markup
 
     numbers = Numbers(report.content)
-    made.globals |= {"show": numbers, "wording": wording, "swatch": charts.swatch}
+    made.globals |= {"show": numbers, "wording": wording, "swatch": charts.run_swatch}
     content = report.content
     return made.get_template("report.html.j2").render(
         c=content,
@@ -50,7 +57,7 @@ def render(report: Report, framed: bool = False) -> str:
         still=Markup,
         style=Markup((_TEMPLATES / "report.css").read_text("utf-8")),
         script=Markup((_TEMPLATES / "report.js").read_text("utf-8")),
-        library=Markup("" if framed else library()),
+        library=Markup("" if framed else bokeh_library()),
     )
 
 
@@ -63,7 +70,7 @@ def _live(figures: dict[str, Any]) -> dict[str, Any]:
     }
 
 
-def environment() -> Environment:
+def template_environment() -> Environment:
     """What sets contents into the templates.
 
     Raises
@@ -86,10 +93,10 @@ def environment() -> Environment:
     )
 
 
-def filled(template: str, **values: Any) -> str:
+def filled_template(template: str, **values: Any) -> str:
     """A template with its values and the report's style, as text that UTF-8 holds."""
     style = (_TEMPLATES / "report.css").read_text("utf-8")
-    text = environment().get_template(template).render(style=style, **values)
+    text = template_environment().get_template(template).render(style=style, **values)
     return text.encode("utf-8", "replace").decode("utf-8")
 
 
@@ -115,7 +122,7 @@ class Page(Shown):
             file.write(html)
 
 
-def templates() -> Path:
+def report_templates() -> Path:
     """Where the templates lie, and what they include."""
     return _TEMPLATES
 
@@ -127,7 +134,7 @@ def _embedded(value: Any) -> str:
 
 
 @lru_cache(maxsize=1)
-def library() -> str:
+def bokeh_library() -> str:
     """The charting library, compressed; without its widgets, tables and typesetting."""
     found = find_spec("bokeh")  # Its Python takes half a second to import, and is not needed.
     if found is None or found.origin is None:

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from typing import Final
 
-from ..plots.curves import CONFIDENCE, Curve, envelope, thinned
+from ..plots.curves import CONFIDENCE, Curve, curve_envelope, thinned_points
 from ..plots.panel import ANGLE, Cloud, Panel, PanelPicture
-from .charts import Chart, Figure, figure, run_colour, run_marker
+from .charts import Chart, Figure, chart_figure, chart_run_marker, css_run_colour
 from .scale import Scale
 
-__all__ = ["chart_of", "dots_of_run", "figure_of"]
+__all__ = ["dots_of_run", "panel_chart", "panel_figure"]
 
 #: Readings drawn in one chart at most: more do not show, and make the page heavy and slow.
 _MOST_POINTS: Final = 2_000
@@ -27,21 +27,21 @@ _FEW: Final = 600
 _TICKS = {True: 4.0, False: 9.0}
 
 
-def figure_of(
+def panel_figure(
     picture: PanelPicture, scale: Scale, arrangement: str = "row", **given: float
 ) -> Figure:
     """All panels of a picture; the main one is twice as wide as its segment."""
     grows = [2.0 if number == 0 else 1.0 for number in range(len(picture.panels))]
     charts = [
-        chart_of(panel, scale, grow=grow, **given)
+        panel_chart(panel, scale, grow=grow, **given)
         for panel, grow in zip(picture.panels, grows, strict=True)
     ]
     segments = [panel.title for panel in picture.panels if panel.title]
     more = "".join(f" {title} stand beside it." for title in segments)
-    return figure(picture.told + more, charts, arrangement)
+    return chart_figure(picture.told + more, charts, arrangement)
 
 
-def chart_of(panel: Panel, scale: Scale, **given: float) -> Chart:
+def panel_chart(panel: Panel, scale: Scale, **given: float) -> Chart:
     """Readings, model and medians of a panel."""
     segment = bool(panel.title)
     chart = Chart(panel.x, panel.y, x_range=panel.span, title=panel.title, **given)  # type: ignore[arg-type]
@@ -50,7 +50,7 @@ def chart_of(panel: Panel, scale: Scale, **given: float) -> Chart:
     elif panel.span is not None:
         chart.whole_axis(-1.0, 1.0, 3)  # directions
     if panel.model is not None and panel.dense:
-        chart.band(*envelope(panel.model), colour="model", label="envelope of the model")
+        chart.band(*curve_envelope(panel.model), colour="model", label="envelope of the model")
     elif panel.model is not None:
         _draw_model(chart, panel.model, "model there" if segment else "model")
     runs = len({cloud.run for cloud in panel.clouds})
@@ -72,10 +72,10 @@ def dots_of_run(runs: int, most: int = _MOST_POINTS) -> int:
 def _draw_cloud(
     chart: Chart, cloud: Cloud, panel: Panel, scale: Scale, most: int | None, large: bool
 ) -> None:
-    part = cloud.points if most is None else thinned(cloud.points, most, cloud.run)
+    part = cloud.points if most is None else thinned_points(cloud.points, most, cloud.run)
     size = _LARGE_DOT if large else _DOT
     colour, marker, hollow = {
-        "run": (run_colour(cloud.run), run_marker(cloud.run), False),
+        "run": (css_run_colour(cloud.run), chart_run_marker(cloud.run), False),
         "before": ("before", "square", False),
         "after": ("after", "circle", False),
         "measured": ("before", "circle", True),

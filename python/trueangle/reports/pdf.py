@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Final
 
 from ..errors import ArgumentError
-from ..support.files import PDF, check_output, published
+from ..support.files import PDF, check_output, external_output
 
 __all__ = ["find_browser", "print_pdf"]
 
@@ -51,7 +51,7 @@ def print_pdf(html: str, path: str | PathLike[str], browser: str | None = None) 
             "or open the HTML report and print it"
         )
     target = check_output(path, PDF)
-    with published(target) as printed:
+    with external_output(target) as printed:
         folder = printed.parent
         page = folder / "report.html"
         page.write_text(html, encoding="utf-8")

@@ -10,7 +10,7 @@ from ..runs.run import CalibrationRun
 from ..support.angles import arcsec
 from ..support.display_units import ErrorsIn, error_unit
 from ..support.layout import laid_out
-from .measured import measured
+from .measured import measured_content
 
 if TYPE_CHECKING:
     from ..diagnosis import Diagnosis
@@ -129,7 +129,7 @@ def plain_ranking(rows: Sequence[JointRank]) -> list[dict[str, Any]]:
 
 
 def _before(runs: Sequence[CalibrationRun] | None) -> float | None:
-    return None if not runs else float(measured(runs)["error"]["peak_to_peak_arcsec"])
+    return None if not runs else float(measured_content(runs)["error"]["peak_to_peak_arcsec"])
 
 
 def _names(found: FitResult) -> list[str]:

@@ -11,7 +11,7 @@ from ..support.display_units import ErrorsIn, error_unit
 from ..support.plainresult import counted
 from . import wording
 from .composition import Report
-from .page import Page, filled, library, render
+from .page import Page, bokeh_library, filled_template, rendered_report
 from .ranking import JointRank, plain_ranking, ranked, ranking_text
 
 __all__ = ["RobotReport"]
@@ -64,12 +64,14 @@ class RobotReport(Page):
             jinja2 or bokeh is not installed.
         """
         largest = max(0.5 * (row.peak_to_peak_before_arcsec or 0.0) for row in self.ranking)
-        return filled(
+        return filled_template(
             "robot.html.j2",
             title=self.title,
             ranking=self.ranking,
-            pages={row.joint: render(self.reports[row.joint], True) for row in self.ranking},
-            library=library(),
+            pages={
+                row.joint: rendered_report(self.reports[row.joint], True) for row in self.ranking
+            },
+            library=bokeh_library(),
             unit=error_unit(self.errors_in, largest),
         )
 
@@ -88,7 +90,7 @@ def _rank(joint: str, content: dict[str, Any]) -> JointRank:
         left = content["gain"]["after"]["rms_arcsec"]
     elif content["model"] is not None:
         left = content["model"]["residual_std_arcsec"]
-    verdict = wording.verdict(content)
+    verdict = wording.gain_verdict(content)
     findings = (content["diagnosis"] or {}).get("findings") or [{}]
     return JointRank(
         joint,

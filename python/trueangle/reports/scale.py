@@ -13,7 +13,7 @@ from ..plots.curves import Curve, Points
 from ..runs.run import CalibrationRun
 from ..support.display_units import ErrorsIn, ErrorUnit, error_unit, sine_of_rms
 
-__all__ = ["Scale", "scale_of"]
+__all__ = ["Scale", "error_scale"]
 
 #: Part of the largest error that hovering over a point still shows.
 _FINEST: Final = 3e-4
@@ -84,7 +84,9 @@ class Scale:
         return {"unit": self.name, "per_arcsec": self.factor, "defined": self.defined}
 
 
-def scale_of(asked: ErrorsIn, rms: float, largest: float, runs: Sequence[CalibrationRun]) -> Scale:
+def error_scale(
+    asked: ErrorsIn, rms: float, largest: float, runs: Sequence[CalibrationRun]
+) -> Scale:
     """The scale asked for; counts are those of the runs where no number says otherwise.
 
     Raises

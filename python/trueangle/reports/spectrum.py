@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ..plots.orderaxis import order_groups
 from ..plots.orderlines import OrderLine, order_lines, seen_sizes
-from .charts import Chart, Figure, figure
+from .charts import Chart, Figure, chart_figure
 from .linenames import LineNames
 from .scale import Scale
 
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from ..fitting.orders.select import OrderSelection
     from ..fitting.result import FitResult
 
-__all__ = ["spectrum"]
+__all__ = ["spectrum_figure"]
 
 #: Half a letter of a name as part of a chart's width, and what parts names above each other.
 _LETTER, _HIGHER = 0.012, 2.0
@@ -31,7 +31,7 @@ _MOST_NAMED: Final = 8
 _MOST_ALIASES, _MOST_EXPLANATIONS = 4, 3
 
 
-def spectrum(
+def spectrum_figure(
     fit: FitResult | None, selection: OrderSelection | None, name: LineNames, scale: Scale
 ) -> Figure:
     """Amplitude of every order: candidates of a selection, or the orders of a fit."""
@@ -51,7 +51,7 @@ def spectrum(
         "candidate orders with the threshold of significance"
     )  # fmt: skip
     alt = f"Amplitude in {scale.name} of {len(lines)} {what}. Retained: {names}."
-    return figure(alt, charts, "joined")
+    return chart_figure(alt, charts, "joined")
 
 
 def _group(

@@ -15,7 +15,7 @@ from ..support.angles import arcsec
 from ..support.display_units import ErrorsIn, ErrorUnit, error_unit
 from ..support.plainresult import counted
 from .chartaxes import ChartAxis
-from .page import Page, filled
+from .page import Page, filled_template
 from .stills import Mark, StillPicture, still
 
 __all__ = ["WatchReport"]
@@ -90,7 +90,7 @@ class WatchReport(Page):
 
         highest = np.argsort(-self._sums.max(axis=0), kind="stable")
         drawn = np.sort(highest[:_DRAWN]).tolist()
-        return filled(
+        return filled_template(
             "watched.html.j2",
             title=self.title,
             windows=self.windows,

@@ -8,17 +8,17 @@ from ..support.display_units import ErrorUnit
 
 __all__ = [
     "FIGURE_TITLES",
+    "as_sentence",
     "by_kind",
     "cause_name",
     "conditions",
+    "entry_paths",
     "figure_title",
     "gain_paths",
-    "joined",
-    "paths",
+    "gain_verdict",
+    "joined_list",
+    "listed_orders",
     "residual_signals",
-    "sentence",
-    "told_orders",
-    "verdict",
 ]
 
 FIGURE_TITLES: Final = {
@@ -60,7 +60,7 @@ def figure_title(name: str, modelled: bool) -> str:
     return title if modelled else title.removesuffix(", and the model")
 
 
-def verdict(content: dict[str, Any]) -> str:
+def gain_verdict(content: dict[str, Any]) -> str:
     """``"gain"``, ``"no-gain"``, ``"unchecked"`` or ``"no-model"``."""
     if content["model"] is None:
         return "no-model"
@@ -72,12 +72,12 @@ def verdict(content: dict[str, Any]) -> str:
     return "gain" if low >= _WORTH else "no-gain"
 
 
-def sentence(text: str) -> str:
+def as_sentence(text: str) -> str:
     """A remark as a sentence.
 
     Examples
     --------
-    >>> sentence("verified at 36 positions")
+    >>> as_sentence("verified at 36 positions")
     'Verified at 36 positions.'
     """
     text = text.strip()
@@ -95,12 +95,12 @@ def cause_name(cause: str) -> str:
     return cause.replace("_", " ")
 
 
-def joined(items: list[Any]) -> str:
+def joined_list(items: list[Any]) -> str:
     """Items as a list in a sentence.
 
     Examples
     --------
-    >>> joined([1, 2, 3])
+    >>> joined_list([1, 2, 3])
     '1, 2 and 3'
     """
     texts = [f"{item:g}" if isinstance(item, float) else str(item) for item in items]
@@ -139,24 +139,24 @@ def by_kind(faults: list[dict[str, Any]]) -> list[tuple[dict[str, Any], list[str
     return list(found.values())
 
 
-def paths(pattern: str, entries: list[Any]) -> list[str]:
+def entry_paths(pattern: str, entries: list[Any]) -> list[str]:
     """Where the same number of every entry stands in the content.
 
     Examples
     --------
-    >>> paths("runs.{}.rms", ["a", "b"])
+    >>> entry_paths("runs.{}.rms", ["a", "b"])
     ['runs.0.rms', 'runs.1.rms']
     """
     return [pattern.format(i) for i in range(len(entries))]
 
 
-def told_orders(rows: list[dict[str, Any]]) -> list[int]:
+def listed_orders(rows: list[dict[str, Any]]) -> list[int]:
     """Which orders a table lists: those retained, and of the others the largest.
 
     Examples
     --------
     >>> rows = [{"retained": k == 3, "amplitude_arcsec": float(k)} for k in range(100)]
-    >>> told_orders(rows)[:3], len(told_orders(rows))
+    >>> listed_orders(rows)[:3], len(listed_orders(rows))
     ([3, 80, 81], 21)
     """
     others = [i for i, row in enumerate(rows) if not row["retained"]]

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import FileError
-from ..formats.columns import Column, listed, offsets_of, signal_code
+from ..formats.columns import Column, listed_columns, offsets_of, signal_code
 from ..support.angles import UNIT_PERIODS
 from ..support.suggestions import did_you_mean
 from .facets import Facets
@@ -214,6 +214,6 @@ def _refuse_missing(path: object, header: Sequence[str], role: str) -> None:
     raise FileError(
         path,
         f"no column {role}_deg (one of {names} is needed, or another named with "
-        f"{signal_code(role)}){guess}; {listed(header)}",
+        f"{signal_code(role)}){guess}; {listed_columns(header)}",
         line=1,
     )

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ..errors import FileError
 from ..formats.columns import ANGLE_UNITS, find_columns, unit_in_name, wanted_columns
-from .readings import named, readings_of
+from .readings import named_source, readings_of
 
 __all__ = ["Facets", "read_facets"]
 
@@ -75,7 +75,7 @@ def read_facets(path: str | PathLike[str]) -> Facets:
     FileError
         A column is missing, a cell is empty, a facet is listed twice.
     """
-    table = named(Path(path), lambda file: readings_of(file, wanted_columns(None), None))
+    table = named_source(Path(path), lambda file: readings_of(file, wanted_columns(None), None))
     roles = find_columns(path, list(table.columns), {})
     reference = roles.get("reference")
     name = next((n for n in table.columns if n.lower().startswith("deviation")), None)

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ..errors import EmptyCellsWarning, FileError, level_of_caller
 from ..formats.columns import LABELS, Column, count_turn, signal_code, unit_in_name
 from ..formats.signals import FIELDS
-from ..formats.times import day_of
+from ..formats.times import local_day
 from ..support.kinds import told_kinds
 from .angles import find_angles
 from .facets import Facets, read_facets
@@ -343,7 +343,7 @@ def _groups(table: FileReadings, size: int) -> Groups:
     }
     if not columns:
         return [(RunLabels(), np.arange(size))]
-    days = {text: day_of(text) for text in set(columns.get("when", ()))}
+    days = {text: local_day(text) for text in set(columns.get("when", ()))}
     if not all(days.values()):
         row = next(i for i, text in enumerate(columns["when"]) if not days[text])
         if table.roles["when"].is_asked:

@@ -14,7 +14,7 @@ import trueangle._core as _core
 from ..errors import ArgumentError, UnitWarning
 from ..support.angles import wrap
 from ..support.quantiles import quantile
-from .checks.angles import AGREES, ratio_of, suggestion
+from .checks.angles import AGREES, angle_ratio, suggestion
 from .checks.record import records_of
 from .run import CalibrationRun
 
@@ -133,7 +133,7 @@ def _remedies(period: float) -> dict[str, float]:
 def _ratio(run: CalibrationRun) -> float | None:
     """Travel of the indicated angle per travel of the reference, where readings tell it."""
     (record,) = records_of([run])
-    ratio = ratio_of([record])
+    ratio = angle_ratio([record])
     if ratio is None or ratio == 0.0:
         return None
     reference, indicated = record.unwrapped

@@ -15,7 +15,7 @@ from ..errors import ArgumentError
 from ..formats.formats import known_format
 from ..support.files import check_input, restore
 
-__all__ = ["MANIFEST", "find_logs", "matched"]
+__all__ = ["MANIFEST", "find_logs", "matched_paths"]
 
 #: Where `trueangle correct` notes in a folder what it has done there.
 MANIFEST: Final = "trueangle-manifest.jsonl"
@@ -38,7 +38,7 @@ def find_logs(
         file at all.
     """
     found: list[tuple[Path, Path]] = []
-    for path in matched(paths):
+    for path in matched_paths(paths):
         if whole:
             try:
                 check_input(path, whole=True)
@@ -58,7 +58,7 @@ def find_logs(
     return found
 
 
-def matched(paths: Iterable[str | PathLike[str]]) -> list[Path]:
+def matched_paths(paths: Iterable[str | PathLike[str]]) -> list[Path]:
     """The paths, and in place of every pattern what it matches, in natural order.
 
     Raises

@@ -22,7 +22,7 @@ from ..formats.columns import LABELS, Column, find_columns, wanted_columns
 from ..formats.csvheader import number
 from ..formats.format import TEXTS, Batch, Format, Labels
 from ..formats.formats import format_of_content
-from ..formats.times import parsed_time, seconds_of
+from ..formats.times import elapsed_seconds, parsed_time
 from ..support.files import (
     RUNS_BYTES,
     check_input,
@@ -33,7 +33,7 @@ from ..support.files import (
 )
 from .run import Source
 
-__all__ = ["FileReadings", "named", "read_once", "read_readings", "readings_of"]
+__all__ = ["FileReadings", "named_source", "read_once", "read_readings", "readings_of"]
 
 T = TypeVar("T")
 
@@ -88,7 +88,7 @@ class FileReadings(NamedTuple):
         """A column as finite numbers, NaN where a cell is empty."""
         values = self.columns[column.name]
         if values.dtype == object and column.role == "time":
-            seconds, bad = seconds_of(values.tolist())
+            seconds, bad = elapsed_seconds(values.tolist())
             if bad is None:
                 return seconds
             got = repr(values[bad])[:60]
@@ -120,10 +120,10 @@ def read_readings(
         As `read_runs`, but no column is needed.
     """
     wanted = wanted_columns(signals)
-    return named(Path(path), lambda file: readings_of(file, wanted, topic))
+    return named_source(Path(path), lambda file: readings_of(file, wanted, topic))
 
 
-def named(path: Path, read: Callable[[Path], T]) -> T:
+def named_source(path: Path, read: Callable[[Path], T]) -> T:
     """What ``read`` makes of a file; a pipe is written to a file first, and keeps its name."""
     found = check_input(path)
     if stat.S_ISREG(found.st_mode) or (path.is_dir() and (path / "metadata.yaml").is_file()):

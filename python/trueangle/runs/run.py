@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import ArgumentError, KindError
-from ..formats.signals import FIELDS, column, find_signal, signal_columns
+from ..formats.signals import FIELDS, find_signal, signal_column, signal_columns
 from ..support.angles import check_period, circular_mean, wrap
 from ..support.kinds import told_kinds
 
@@ -125,13 +125,13 @@ class CalibrationRun:
     def __post_init__(self) -> None:
         put = object.__setattr__
         put(self, "period", check_period(self.period))
-        reference = column("reference", self.reference, None)
+        reference = signal_column("reference", self.reference, None)
         put(self, "reference", reference)
-        put(self, "indicated", column("indicated", self.indicated, reference.size))
+        put(self, "indicated", signal_column("indicated", self.indicated, reference.size))
         for name in (*FIELDS, "weights"):
             values = getattr(self, name)
             if values is not None:
-                put(self, name, column(name, values, reference.size))
+                put(self, name, signal_column(name, values, reference.size))
         put(self, "signals", MappingProxyType(signal_columns(self.signals, reference.size)))
         if self.time is not None:
             back = np.flatnonzero(np.diff(self.time) < 0.0)

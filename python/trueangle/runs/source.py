@@ -16,7 +16,7 @@ from ..formats.columns import Column, wanted_columns
 from ..support.angles import check_period, unit_name
 from ..support.suggestions import did_you_mean
 from .paths import find_logs
-from .readings import FileReadings, named, readings_of
+from .readings import FileReadings, named_source, readings_of
 from .tables import table_readings
 
 __all__ = ["OtherReading", "Reading", "checked_reading", "each_table", "unit_of_path"]
@@ -152,7 +152,7 @@ def each_table(
     def of_one(entry: Any, called: str) -> list[T] | None:
         if isinstance(entry, str | PathLike):
             return [
-                named(path, of_file(unit_of_path(path, reading["unit_from"])))
+                named_source(path, of_file(unit_of_path(path, reading["unit_from"])))
                 for path, _ in find_logs([entry], whole=False)
             ]
         try:

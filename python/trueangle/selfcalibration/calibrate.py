@@ -13,11 +13,11 @@ from ..support.blas import one_blas_thread
 from ..support.kinds import told_kinds
 from ..support.suggestions import check_choice
 from .dual import dual
-from .heads import heads
+from .heads import head_patterns
 from .loop import check_loop
 from .recording import Recording, as_recordings
 from .result import SelfCalibration
-from .shifts import shifts
+from .shifts import shift_patterns
 from .spindown import spin_down
 
 __all__ = ["METHODS", "selfcal"]
@@ -120,9 +120,9 @@ def selfcal(
     if fit_ratio and chosen != "dual":
         raise ArgumentError(f"fit_ratio needs the motor's angle (method 'dual'), not {chosen!r}")
     if chosen == "heads":
-        return heads(recordings, wanted, angles=head_angles, period=turn)
+        return head_patterns(recordings, wanted, angles=head_angles, period=turn)
     if chosen == "shifts":
-        return shifts(recordings, wanted, period=turn)
+        return shift_patterns(recordings, wanted, period=turn)
     if chosen == "dual":
         return dual(recordings, wanted, gear_ratio=gear_ratio, fit_ratio=fit_ratio, period=turn)
     return spin_down(

@@ -28,7 +28,7 @@ from .significance import chosen_orders
 from .summary import listed
 from .verification import judged
 
-__all__ = ["heads"]
+__all__ = ["head_patterns"]
 
 Array = NDArray[np.float64]
 
@@ -44,7 +44,7 @@ _SAME: Final = math.radians(0.5)
 _CHUNK: Final = 8192
 
 
-def heads(
+def head_patterns(
     recordings: Sequence[Recording],
     orders: str | Sequence[float] = "auto",
     *,

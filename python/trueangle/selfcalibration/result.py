@@ -172,9 +172,9 @@ class SelfCalibration(PlainResult):
             Unit of the errors; by itself arcsec, or degrees where errors are that large. A
             number is the counts of a turn.
         """
-        from .summary import summary
+        from .summary import selfcal_summary
 
-        return summary(self, errors_in)
+        return selfcal_summary(self, errors_in)
 
 
 def estimates(

@@ -30,7 +30,7 @@ from .result import ARCSEC, Blind, HeldOut, SelfCalibration, estimates
 from .significance import chosen_orders
 from .summary import listed, ranges
 
-__all__ = ["shifts"]
+__all__ = ["shift_patterns"]
 
 Array = NDArray[np.float64]
 
@@ -46,7 +46,7 @@ _LEAST: Final = 1e-3
 _COUPLING: Final = (1.0, 2.0)
 
 
-def shifts(
+def shift_patterns(
     recordings: Sequence[Recording],
     orders: str | Sequence[float] = "auto",
     *,

@@ -13,7 +13,15 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["BAND", "Knots", "Wander", "basis", "coarser_bands", "coarser_rows", "smooth_trends"]
+__all__ = [
+    "BAND",
+    "Knots",
+    "Wander",
+    "coarser_bands",
+    "coarser_rows",
+    "smooth_trends",
+    "spline_basis",
+]
 
 Array = NDArray[np.float64]
 
@@ -79,7 +87,7 @@ class Knots:
         )
 
 
-def basis(place: Array) -> Array:
+def spline_basis(place: Array) -> Array:
     """The four cubic B-splines that are not zero at ``place`` in (0, 1), shape (4, n)."""
     u = place
     v = 1.0 - u
@@ -242,7 +250,7 @@ def banded_product(bands: Array, x: Array) -> Array:
     return y
 
 
-def evaluate(
+def spline_values(
     coefficients: Array, index: NDArray[np.int64], weights: Sequence[Array] | Array
 ) -> Array:
     """Spline at the readings whose four coefficients begin at ``index``."""

@@ -12,8 +12,8 @@ from .motion import MotionFit, MotionSearch
 from .pattern import pattern_model, pattern_series, steepness
 from .projected import Unknown, harmonic_rows, harmonic_sum
 from .readings import SegmentReadings
-from .splines import Knots, basis, evaluate
-from .sums import accumulate
+from .splines import Knots, spline_basis, spline_values
+from .sums import ordered_sums
 
 __all__ = ["Steps"]
 
@@ -68,7 +68,7 @@ class Steps:
             part = slice(int(edges[g]), int(edges[g + 1]))
             index[part], place[part] = knots.place(g, time[part])
         theta, slope = self.true_angle(data.angle[rows], unknowns, rows)
-        motion = evaluate(spline, index, basis(place))
+        motion = spline_values(spline, index, spline_basis(place))
         at = self.sets * self.per_set
         if self.ripple:
             b = unknowns[at : at + 2 * len(self.ripple)]
@@ -116,7 +116,7 @@ class Steps:
                 out[at:] = extra[:, part] * weight[part]
 
         good = valid[rows]
-        sums = accumulate(
+        sums = ordered_sums(
             knots,
             index,
             place,

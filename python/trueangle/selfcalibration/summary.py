@@ -12,7 +12,7 @@ from ..support.layout import laid_out, wrapped
 if TYPE_CHECKING:
     from .result import OrderEstimate, SelfCalibration
 
-__all__ = ["listed", "ranges", "summary"]
+__all__ = ["listed", "ranges", "selfcal_summary"]
 
 
 def listed(orders: Sequence[float]) -> str:
@@ -20,7 +20,7 @@ def listed(orders: Sequence[float]) -> str:
     return f"orders {ranges(orders)}" if any(orders) else "zero"
 
 
-def summary(result: SelfCalibration, errors_in: ErrorsIn = "auto") -> str:
+def selfcal_summary(result: SelfCalibration, errors_in: ErrorsIn = "auto") -> str:
     """Numbers, what they are numbers of, what is blind, tests, notes."""
     sizes = [result.noise_arcsec, *(o.amplitude for o in (*result.orders, *result.sums))]
     period = result.model.period

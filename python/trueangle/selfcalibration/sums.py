@@ -9,9 +9,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from .splines import BAND, Knots, basis
+from .splines import BAND, Knots, spline_basis
 
-__all__ = ["MotionSums", "accumulate"]
+__all__ = ["MotionSums", "ordered_sums"]
 
 Array = NDArray[np.float64]
 
@@ -46,7 +46,7 @@ class MotionSums(NamedTuple):
         )
 
 
-def accumulate(
+def ordered_sums(
     knots: Knots,
     index: NDArray[np.int64],
     place: Array,
@@ -86,7 +86,7 @@ def accumulate(
         rows = np.empty((width + 5, b - a))
         columns(slice(a, b), rows[:width])
         rows[width] = target[a:b]
-        rows[width + 1 :] = basis(place[a:b]) * weight[a:b]
+        rows[width + 1 :] = spline_basis(place[a:b]) * weight[a:b]
         if valid is not None:
             rows *= valid[a:b]
         x = rows[: width + 1]

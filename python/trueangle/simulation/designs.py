@@ -15,7 +15,7 @@ from ..formats.signals import COUPLED
 from ..joint.pattern import Pattern
 from ..runs.run import CalibrationRun
 from ..support.kinds import told_kinds
-from .rotor import Motion, turned
+from .rotor import Motion, rotor_angle
 
 __all__ = ["MAX_SAMPLES", "SPACINGS", "RunDesign"]
 
@@ -217,7 +217,7 @@ class RunDesign:
             time = np.log(self.speed_deg_s / speed) / self.decay_per_s
         motion = Motion(angle, np.asarray(signs * speed), np.zeros(n))
         if self.is_moved:
-            motion = turned(self, time, pattern, rng)
+            motion = rotor_angle(self, time, pattern, rng)
         temperature = np.full(n, float(self.temperature_C))
         if self.temperature_end_C is not None:
             share = travel / (360.0 * self.turns)

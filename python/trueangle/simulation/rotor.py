@@ -31,7 +31,7 @@ from ..support.angles import ARCSEC_PER_TURN
 if TYPE_CHECKING:
     from .designs import RunDesign
 
-__all__ = ["Motion", "turned"]
+__all__ = ["Motion", "rotor_angle"]
 
 Array = NDArray[np.float64]
 
@@ -50,7 +50,9 @@ class Motion(NamedTuple):
     driven: Array
 
 
-def turned(design: RunDesign, time: Array, pattern: Pattern, rng: np.random.Generator) -> Motion:
+def rotor_angle(
+    design: RunDesign, time: Array, pattern: Pattern, rng: np.random.Generator
+) -> Motion:
     """Where the shaft is at ``time``, integrated from the start of the run.
 
     Parameters

@@ -113,11 +113,11 @@ class Simulation(Shown):
 
     def summary(self) -> str:
         """What is believed as a simulation file has it, and the names of the runs."""
-        from .simulationtext import dumps
+        from .simulationtext import simulation_text
 
         named = ", ".join(design.label or str(i) for i, design in enumerate(self.runs, 1))
         told = f"\n# {counted(self.runs, 'run')}" + (f": {named}" if named else "")
-        return dumps(replace(self, source=None, runs=())) + told
+        return simulation_text(replace(self, source=None, runs=())) + told
 
     def with_effects(self, effects: Iterable[Effect]) -> Simulation:
         """The simulation with further effects.
@@ -142,10 +142,10 @@ class Simulation(Shown):
         return error
 
     def save(self, path: str | Path) -> None:
-        """Write the simulation as TOML (`trueangle.simulation.simulationtext.write`)."""
-        from .simulationtext import write
+        """Write the simulation as TOML (`trueangle.simulation.simulationtext.write_simulation`)."""
+        from .simulationtext import write_simulation
 
-        write(self, path)
+        write_simulation(self, path)
 
 
 @told_kinds

@@ -6,9 +6,15 @@ from pathlib import Path
 
 from ..support.kinds import told_kinds
 from .simulation import Simulation
-from .simulationtext import decoded, dumps, guarded, to_table, write
+from .simulationtext import (
+    decoded_simulation,
+    guarded_build,
+    simulation_text,
+    to_table,
+    write_simulation,
+)
 
-__all__ = ["dumps", "load_simulation", "to_table", "write"]
+__all__ = ["load_simulation", "simulation_text", "to_table", "write_simulation"]
 
 
 @told_kinds
@@ -41,5 +47,5 @@ def load_simulation(path: str | Path) -> Simulation:
     >>> load_simulation(path).joint.gear_ratio
     50.0
     """
-    found = decoded(path)
-    return guarded(path, "simulation", lambda: Simulation(*found))
+    found = decoded_simulation(path)
+    return guarded_build(path, "simulation", lambda: Simulation(*found))

@@ -13,7 +13,7 @@ from ..errors import ArgumentError, FileError
 from ..joint.declared import Bearing, DeclaredShaft, Head
 from ..joint.joint import Joint
 from ..joint.pattern import Harmonic
-from ..support.decoding import finite, read_text, shown
+from ..support.decoding import finite_float, read_text, shown
 from ..support.files import SIMULATION, SIMULATION_BYTES, written_atomically
 from ..support.suggestions import did_you_mean
 from .designs import MAX_SAMPLES, RunDesign
@@ -21,7 +21,14 @@ from .designs import MAX_SAMPLES, RunDesign
 if TYPE_CHECKING:
     from .simulation import Simulation
 
-__all__ = ["Decoded", "decoded", "dumps", "guarded", "to_table", "write"]
+__all__ = [
+    "Decoded",
+    "decoded_simulation",
+    "guarded_build",
+    "simulation_text",
+    "to_table",
+    "write_simulation",
+]
 
 _TABLES = ("joint", "shaft", "bearing", "head", "harmonic", "effect", "noise", "run")
 _JOINT_KEYS = ("gear_ratio", "fixed_member", "encoder_side", "pole_pairs")
@@ -50,7 +57,7 @@ class Decoded(NamedTuple):
     source: str
 
 
-def decoded(path: str | Path) -> Decoded:
+def decoded_simulation(path: str | Path) -> Decoded:
     """The checked parts of a simulation file; see `load_simulation`."""
     text = read_text(path, SIMULATION_BYTES, FileError, "a simulation")
     return _decoded(path, _document(path, text))
@@ -95,7 +102,7 @@ def _decoded(path: str | Path, document: Mapping[str, Any]) -> Decoded:
     for name in noise:
         if name != "sigma_arcsec":
             raise FileError(path, f"[noise]: unknown key {shown(name)}; it has sigma_arcsec")
-    sigma = finite(noise.get("sigma_arcsec", 0.0))
+    sigma = finite_float(noise.get("sigma_arcsec", 0.0))
     if sigma is None:
         got = shown(noise["sigma_arcsec"])
         raise FileError(path, f"[noise]: sigma_arcsec must be a finite number, got {got}")
@@ -123,7 +130,7 @@ def _joint(path: str | Path, document: Mapping[str, Any]) -> Joint:
     if not any(further.values()):
         return gear
     where = ", ".join(f"[[{name}]]" for field, name, _ in _DECLARED if further[field])
-    return guarded(path, where, lambda: replace(gear, **further))
+    return guarded_build(path, where, lambda: replace(gear, **further))
 
 
 def _geared(joint: Mapping[str, Any]) -> Mapping[str, Any]:
@@ -161,7 +168,7 @@ def _build(path: str | Path, where: str, kind: type[T], table: Mapping[str, Any]
             )
         values[name] = _value(path, where, name, value, known[name])
     try:
-        return guarded(path, where, lambda: kind(**values))
+        return guarded_build(path, where, lambda: kind(**values))
     except TypeError as cause:
         missing = str(cause).rpartition(": ")[2]
         raise FileError(path, f"{where}: missing {missing}") from None
@@ -183,13 +190,13 @@ def _value(path: str | Path, where: str, name: str, value: Any, wanted: str) -> 
             for key, entry in value.items()
         )
     if wanted.startswith("tuple"):
-        numbers = tuple(map(finite, value)) if isinstance(value, list) else (None,)
+        numbers = tuple(map(finite_float, value)) if isinstance(value, list) else (None,)
         if None in numbers:
             raise refuse("a list of finite numbers")
         if len(numbers) > MAX_TABLES:
             raise refuse(f"a list of at most {MAX_TABLES} numbers")
         return numbers
-    number = finite(value)
+    number = finite_float(value)
     if number is None:
         raise refuse("a finite number")
     if wanted.startswith("int"):
@@ -210,7 +217,7 @@ def _effect(path: str | Path, where: str, table: dict[str, Any]) -> Effect:
         )
     for name, value in parameters.items():
         parameters[name] = _checked_numbers(path, f"{where}: {shown(name)}", value)
-    return guarded(path, where, lambda: EFFECTS[kind].from_table(parameters))
+    return guarded_build(path, where, lambda: EFFECTS[kind].from_table(parameters))
 
 
 def _checked_numbers(path: str | Path, where: str, value: Any) -> Any:
@@ -220,13 +227,13 @@ def _checked_numbers(path: str | Path, where: str, value: Any) -> Any:
             raise FileError(path, f"{where} must be a list of at most {MAX_TABLES}")
         return [_checked_numbers(path, where, item) for item in value]
     if isinstance(value, int | float) and not isinstance(value, bool):
-        if finite(value) is None:
+        if finite_float(value) is None:
             raise FileError(path, f"{where} must be a finite number, got {shown(value)}")
         return value if abs(value) < 2**53 else float(value)
     return value
 
 
-def guarded(path: str | Path, where: str, build: Callable[[], T]) -> T:
+def guarded_build(path: str | Path, where: str, build: Callable[[], T]) -> T:
     """What ``build`` makes; its refusals name the file and the place in it."""
     try:
         return build()
@@ -265,23 +272,23 @@ def _given(entry: Any) -> dict[str, Any]:
     return {name: value for name, value in values.items() if value is not None}
 
 
-def write(sim: Simulation, path: str | Path) -> None:
+def write_simulation(sim: Simulation, path: str | Path) -> None:
     """Write a simulation file, beside and then renamed; floats round-trip exactly.
 
     Where the simulation was read from a file, that file's text is kept and only what
     is new is appended, so comments and layout stay. Otherwise the whole is written.
     """
-    text = dumps(sim)
+    text = simulation_text(sim)
     with written_atomically(path, kind=SIMULATION) as file:
         file.write(text)
 
 
-def dumps(sim: Simulation) -> str:
-    """The text of a simulation file, as `write` writes it."""
+def simulation_text(sim: Simulation) -> str:
+    """The text of a simulation file, as `write_simulation` writes it."""
     whole = to_table(sim)
     if sim.source is not None and Path(sim.source).is_file():
         text = Path(sim.source).read_text(encoding="utf-8").rstrip("\n")
-        old = to_table(decoded(sim.source))
+        old = to_table(decoded_simulation(sim.source))
         appended: dict[str, Any] = {
             name: whole[name][len(old[name]) :] for name in ("harmonic", "effect", "run")
         }

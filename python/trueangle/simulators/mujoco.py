@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from ..errors import ArgumentError, MissingSignalError
 from ..export.mujoco import NOISE_NAME, TEXT_NAME
 from ..formats.signals import coupled_with
-from ..model.file import model_of
+from ..model.file import embedded_model
 from ..model.model import HarmonicModel
 from ..support.suggestions import did_you_mean
 
@@ -321,5 +321,5 @@ def _embedded(mjmodel: MjModel) -> dict[str, HarmonicModel]:
         if name.startswith(TEXT_NAME):
             start, size = int(mjmodel.text_adr[i]), int(mjmodel.text_size[i])
             raw = bytes(mjmodel.text_data[start : start + size]).rstrip(b"\0")
-            found[name[len(TEXT_NAME) :]] = model_of(raw.decode("utf-8"), name)
+            found[name[len(TEXT_NAME) :]] = embedded_model(raw.decode("utf-8"), name)
     return found

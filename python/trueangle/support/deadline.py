@@ -1,7 +1,7 @@
 """Time of long work: how far it is, what is left, when it must end.
 
 What works consults the `Pace` that is in force (`pace`) and needs no argument for it; who asked for
-the work enters one with `paced`, and may let Ctrl-C end it early (`ending_early`).
+the work enters one with `with_pace`, and may let Ctrl-C end it early (`ending_early`).
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from typing import Final, TextIO
 from ..errors import ArgumentError
 from .suggestions import check_choice
 
-__all__ = ["STYLES", "Interruption", "Pace", "ending_early", "entered", "pace", "paced"]
+__all__ = ["STYLES", "Interruption", "Pace", "ending_early", "entered", "pace", "with_pace"]
 
 #: What work may take where no time was given, in seconds of its thread's processor: so much, or
 #: so much for each item of many. Work on ordinary readings takes a third of that.
@@ -217,7 +217,7 @@ def entered(own: Pace) -> Iterator[Pace]:
 
 
 @contextlib.contextmanager
-def paced(within: float | None = None, style: str = "none") -> Iterator[Pace]:
+def with_pace(within: float | None = None, style: str = "none") -> Iterator[Pace]:
     """Work at a pace of its own; parameters are those of `Pace`.
 
     Work inside other work that asks for neither has the pace of that.

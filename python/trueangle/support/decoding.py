@@ -17,7 +17,7 @@ __all__ = [
     "MAX_LINE_ORDERS",
     "MAX_ORDER",
     "Decoder",
-    "finite",
+    "finite_float",
     "json_text",
     "read_text",
     "shown",
@@ -40,7 +40,7 @@ def shown(value: Any, most: int = 60) -> str:
     return text if len(text) <= most else f"{text[: most - 4]} ..."
 
 
-def finite(value: Any) -> float | None:
+def finite_float(value: Any) -> float | None:
     """``value`` as a float, or None where it is no finite number; true is not a number."""
     if isinstance(value, bool) or not isinstance(value, (int, float)):
         return None
@@ -152,7 +152,7 @@ class Decoder:
 
     def number(self, value: Any, key: str) -> float:
         """A finite number."""
-        number = finite(value)
+        number = finite_float(value)
         if number is None:
             is_number = isinstance(value, (int, float)) and not isinstance(value, bool)
             wanted = "a finite number within double range" if is_number else "a number"
@@ -166,7 +166,7 @@ class Decoder:
 
     def whole(self, value: Any, key: str, least: int = 0, most: int = 2**53) -> int:
         """A whole number from ``least`` to ``most``."""
-        number = finite(value)
+        number = finite_float(value)
         if number is None or number != math.floor(number) or not least <= number <= most:
             raise self.error(
                 f"a whole number from {least} to {most} is needed, got {shown(value)}", key

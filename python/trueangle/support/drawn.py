@@ -1,14 +1,14 @@
-"""Pictures of results: `drawn` hands a result to the room that draws, which knows its kind."""
+"""Pictures of results: `result_picture` hands a result to the room that draws."""
 
 from __future__ import annotations
 
 import sys
 from typing import Any
 
-__all__ = ["drawn"]
+__all__ = ["result_picture"]
 
 
-def drawn(result: object, *args: Any, **options: Any) -> Any:
+def result_picture(result: object, *args: Any, **options: Any) -> Any:
     """The picture of a result, by `trueangle.plots`; needs ``trueangle[plot]``.
 
     What computes does not import what draws: the package's face finds it when it is called.

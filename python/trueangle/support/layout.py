@@ -10,7 +10,7 @@ from contextlib import contextmanager
 from contextvars import ContextVar
 from typing import Final
 
-__all__ = ["columns", "laid_out", "unfolded", "wrapped"]
+__all__ = ["laid_out", "text_columns", "unfolded_text", "wrapped"]
 
 #: Columns of a line at least and at most; without a terminal it is `_USUAL`.
 _NARROWEST, _WIDEST, _USUAL = 60, 100, 80
@@ -27,12 +27,12 @@ _LEAD: Final = re.compile(r"\s*(?:- |! |\[\d+\] |\d+\. |note: |\S.{0,28}? {2,}(?
 
 
 @contextmanager
-def unfolded() -> Iterator[None]:
+def unfolded_text() -> Iterator[None]:
     """Within it every line of a text is as long as it is: who shows it folds it.
 
     Examples
     --------
-    >>> with unfolded():
+    >>> with unfolded_text():
     ...     len(wrapped("a word and " * 50))
     1
     """
@@ -43,12 +43,12 @@ def unfolded() -> Iterator[None]:
         _UNFOLDED.reset(before)
 
 
-def columns() -> int:
+def text_columns() -> int:
     """Columns that a text may have: the terminal's (``COLUMNS``), within readable bounds.
 
     Examples
     --------
-    >>> 60 <= columns() <= 100
+    >>> 60 <= text_columns() <= 100
     True
     """
     if _UNFOLDED.get():
@@ -69,7 +69,7 @@ def wrapped(text: str, indent: int = 0, first: int = 0) -> list[str]:
     """
     return textwrap.wrap(
         text,
-        columns(),
+        text_columns(),
         initial_indent=" " * first,
         subsequent_indent=" " * indent,
         break_long_words=False,
@@ -86,7 +86,7 @@ def laid_out(lines: Iterable[str]) -> str:
       noise    of one reading, of one reading, of one reading, of one reading, of
                one reading,
     """
-    width = columns()
+    width = text_columns()
     found: list[str] = []
     for line in lines:
         if len(line) <= width or line.lstrip().startswith(_COPIED):

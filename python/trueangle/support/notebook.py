@@ -13,7 +13,7 @@ from html import escape
 from itertools import groupby, pairwise
 from typing import Final
 
-from .layout import unfolded
+from .layout import unfolded_text
 
 __all__ = ["as_html"]
 
@@ -42,7 +42,7 @@ def as_html(result: object) -> str:
     <div class="trueangle"><table><tr><th style="text-align:left">noise</th>\
 <td style="text-align:left">3 arcsec</td></tr></table></div>
     """
-    with unfolded():
+    with unfolded_text():
         lines = str(result).splitlines()
     parts = []
     for cells, group in groupby(zip(_counts(lines), lines, strict=True), key=lambda row: row[0]):

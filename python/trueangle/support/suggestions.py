@@ -7,19 +7,19 @@ from itertools import islice
 
 from ..errors import ArgumentError, KindError
 
-__all__ = ["check_choice", "did_you_mean", "listed"]
+__all__ = ["check_choice", "did_you_mean", "listed_names"]
 
 
 #: Known words that are compared, at most.
 _LOOKED_AT = 2000
 
 
-def listed(names: Sequence[str], most: int = 12) -> str:
+def listed_names(names: Sequence[str], most: int = 12) -> str:
     """The first names, and how many more there are.
 
     Examples
     --------
-    >>> listed(["a", "b", "c"], most=2)
+    >>> listed_names(["a", "b", "c"], most=2)
     'a, b and 1 more'
     """
     more = len(names) - most

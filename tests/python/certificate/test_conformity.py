@@ -368,7 +368,7 @@ def test_notes_are_found_by_words_that_fits_write():
     """Whoever changes a sentence of a fit changes the one that its translation is found by."""
     package = Path(ta.__file__).parent
     written = constants(package / "fitting") + constants(package / "runs")
-    for name, text in language.texts("en")["notes"].items():
+    for name, text in language.certificate_texts("en")["notes"].items():
         # Plurals and numbers are put in where the sentence is made.
         for part in re.split(
             r"#\w+|\b1\b|\b(?:rows?|outliers?|runs?|intervals?|positions?)\b|[.,;:()]", text

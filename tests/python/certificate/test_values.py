@@ -10,7 +10,7 @@ import pytest
 import trueangle as ta
 from trueangle.certificate import Budget, Contribution, Specification, conformity
 from trueangle.certificate.asleft import corrected_runs
-from trueangle.certificate.values import left_at_places, reversal
+from trueangle.certificate.values import left_at_places, reversal_halfwidth
 
 SEED = 61_000
 UNITS = (360.0, 1.0, 2.0 * np.pi)
@@ -35,7 +35,7 @@ def test_half_a_reversal_error_counts_from_three_standard_errors_of_the_runs_on(
     way = np.tile([1.0, -1.0], 6)
     for mean, seen in ((1.02 * np.sqrt(3.0), True), (0.98 * np.sqrt(3.0), False)):
         parts = [(mean + d) * way for d in (-1.0, 0.0, 1.0)]
-        found = reversal(fit_of(parts, 3 * [way], period))
+        found = reversal_halfwidth(fit_of(parts, 3 * [way], period))
         assert found.standard == pytest.approx(mean if seen else 0.0, rel=1e-9)
         assert found.degrees_of_freedom == 2.0
         assert (found.kind, found.distribution) == ("A", "two-point")
@@ -49,10 +49,10 @@ def test_of_one_or_two_runs_it_is_the_scatter_of_their_readings(runs):
     error = np.sqrt(rest @ rest / 10.0 / 12.0)
     for times, seen in ((3.02, True), (2.98, False)):
         parts = [times * error * way + rest * (1.0 if k == 0 else 0.5) for k in range(runs)]
-        found = reversal(fit_of(parts, runs * [way]))
+        found = reversal_halfwidth(fit_of(parts, runs * [way]))
         assert found.standard == pytest.approx(times * error if seen else 0.0, rel=1e-9)
         assert found.degrees_of_freedom == 1.0
-    assert reversal(fit_of([rest], [np.ones(12)])) is None
+    assert reversal_halfwidth(fit_of([rest], [np.ones(12)])) is None
 
 
 def by_loops(parts, places, kept):

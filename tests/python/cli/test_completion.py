@@ -11,7 +11,7 @@ import time
 import pytest
 
 from trueangle.cli import COMMANDS, build_parser, main
-from trueangle.cli.completion import SHELLS, script
+from trueangle.cli.completion import SHELLS, completion_script
 from trueangle.cli.parser import GROUPS
 
 #: Lines typed so far, and words of which each must be offered, and some that must not.
@@ -36,7 +36,7 @@ def shell(name):
 def saved(tmp_path):
     def write(name):
         file = tmp_path / f"completion.{name}"
-        file.write_text(script(build_parser(), name))
+        file.write_text(completion_script(build_parser(), name))
         return file
 
     return write

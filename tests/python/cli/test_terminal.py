@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 from trueangle.cli import main
-from trueangle.cli.terminal import Plain, coloured, has_colours
-from trueangle.support.layout import columns, laid_out, wrapped
+from trueangle.cli.terminal import Plain, coloured_text, has_colours
+from trueangle.support.layout import laid_out, text_columns, wrapped
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "looks"))
 
@@ -38,7 +38,7 @@ def test_no_command_is_wider_than_its_terminal(desk):
 def test_lines_are_as_wide_as_the_terminal_within_bounds(wanted, found, monkeypatch):
     monkeypatch.setenv("COLUMNS", wanted)
     text = "of words " * 60
-    assert columns() == found
+    assert text_columns() == found
     assert found - 9 < max(map(len, wrapped(text))) <= found
     assert max(map(len, laid_out(["  label    " + text]).splitlines())) <= found
 
@@ -75,7 +75,7 @@ def test_a_terminal_has_colours_unless_it_is_told_otherwise(monkeypatch):
             Plain(plain).write("error: x")
             assert plain == ["error: x"]
     assert not has_colours(io.StringIO())
-    assert coloured('[{"says": "warning: x"}]') == '[{"says": "warning: x"}]'
+    assert coloured_text('[{"says": "warning: x"}]') == '[{"says": "warning: x"}]'
 
 
 @pytest.mark.parametrize(

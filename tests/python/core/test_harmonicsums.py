@@ -13,7 +13,7 @@ from trueangle.fitting.orders.evidence import (
     log_tail,
 )
 from trueangle.fitting.orders.harmonicsums import ZeroGroupReadings, harmonic_sums
-from trueangle.fitting.orders.zerogroups import units_of
+from trueangle.fitting.orders.zerogroups import zero_units
 from trueangle.runs.aliasing import distinct_positions
 
 # Normal equations of a few hundred readings, relative to their size.
@@ -153,7 +153,7 @@ def test_units_have_the_errors_of_their_runs(sizes):
         reference = rng.uniform(-720.0, 720.0, n)
         indicated = reference + 178.0 + 3.0 * rng.standard_normal(n) + 360.0 * (k % 2)
         runs.append(ta.CalibrationRun(reference, indicated, period=360.0))
-    units, places = units_of(runs, whole=True)
+    units, places = zero_units(runs, whole=True)
     assert np.array_equal(places, np.arange(sum(sizes)))
     for unit, run in zip(units, runs, strict=True):
         np.testing.assert_allclose(unit.error, run.centred_error, rtol=1e-12, atol=1e-12)

@@ -11,7 +11,7 @@ from scipy.stats import norm
 from trueangle import CalibrationRun
 from trueangle.diagnosis import remainder
 from trueangle.diagnosis.correctable import Correctable
-from trueangle.diagnosis.discrepancy import compare, unfolded_error
+from trueangle.diagnosis.discrepancy import discrepancy_of, unfolded_error
 from trueangle.joint.signals import join_runs
 
 
@@ -25,7 +25,7 @@ def test_numbers_are_those_of_the_residual(sign: float) -> None:
     zero = np.array([10.0, 14.0, -3.0, 40.0])
     drift = 7.0 * np.abs(signals.theta - np.repeat(signals.theta[::200], 200)) / (2.0 * np.pi)
     residual = sign * (zero[signals.run] + drift + rng.normal(0.0, 0.1, signals.theta.size))
-    found = compare(signals, residual)
+    found = discrepancy_of(signals, residual)
     mean = sum(residual) / len(residual)
     assert found.rms == pytest.approx(np.sqrt(sum((residual - mean) ** 2) / len(residual)))
     assert found.peak_to_peak == pytest.approx(max(residual) - min(residual))
@@ -35,7 +35,7 @@ def test_numbers_are_those_of_the_residual(sign: float) -> None:
     spread = np.sqrt(sum((m - np.mean(means)) ** 2 for m in means) / 3.0)
     assert found.zero_spread == pytest.approx(spread)
     one = join_runs([CalibrationRun(angle[:90], angle[:90], 360.0)])
-    alone = compare(one, residual[:90])
+    alone = discrepancy_of(one, residual[:90])
     assert (alone.closure, alone.zero_spread) == (None, 0.0)
 
 

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 import trueangle as ta
-from trueangle.diagnosis.forms import bends, with_form_errors
+from trueangle.diagnosis.forms import form_error_columns, with_form_errors
 from trueangle.effects import EFFECTS
-from trueangle.effects.bends import bent
+from trueangle.effects.bends import departure_columns
 from trueangle.estimation.regression import Regression
 from trueangle.joint.signals import join_runs
 from trueangle.simulation import RunDesign, Simulation, simulate
@@ -78,9 +78,9 @@ def test_a_bend_along_the_error_itself_is_no_bend() -> None:
     rng = np.random.default_rng(42)
     signals = join_runs(loaded_runs(rng))
     signal = -8.0 * signals.torque
-    curved = bent(signals, "torque", signal)[:, :4]
+    curved = departure_columns(signals, "torque", signal)[:, :4]
     assert np.abs(signal @ curved).max() < EXACT * (signal @ signal)
-    assert bent(signals, "angle", signal).shape == (len(signals), 0)
+    assert departure_columns(signals, "angle", signal).shape == (len(signals), 0)
 
 
 @pytest.mark.parametrize("seed", [1, 2])
@@ -115,7 +115,7 @@ def test_errors_are_widened_by_what_a_form_leaves_and_only_then() -> None:
     assert np.abs(wide[:, 1]).max() < 3.0
     assert np.abs(wide[:, 1]).max() > 0.2
     assert np.median(exact[:, 3] / exact[:, 2]) == pytest.approx(1.0, abs=0.05)
-    assert bends(space).shape[1] == 0
+    assert form_error_columns(space).shape[1] == 0
 
 
 def test_a_wander_that_reaches_far_leaves_no_line_where_its_waves_end() -> None:

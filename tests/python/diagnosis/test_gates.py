@@ -11,7 +11,7 @@ import trueangle as ta
 from trueangle.diagnosis.confirmation import CONFIRMED, NOT_CONFIRMED
 from trueangle.diagnosis.finding import Finding
 from trueangle.diagnosis.gain import Gain
-from trueangle.diagnosis.gates import GATES, MANY, alike_columns, gated, many_causes
+from trueangle.diagnosis.gates import GATES, MANY, alike_columns, gated_findings, many_causes
 from trueangle.diagnosis.levels import LevelGain
 from trueangle.estimation.estimate import quantity
 from trueangle.estimation.regression import Regression
@@ -110,7 +110,7 @@ def test_two_causes_that_are_one_column_are_not_told_apart(fitted):
         for x in (fitted.terms[0].columns[:, 0], fitted.terms[1].columns[:, 0])
     ]
     assert pairs[0][2] == pytest.approx(np.corrcoef(own)[0, 1], abs=1e-9)
-    told, spots, shared = gated(fitted, findings)
+    told, spots, shared = gated_findings(fitted, findings)
     assert [f.status for f in told] == [NOT_CONFIRMED, NOT_CONFIRMED, CONFIRMED]
     assert "with latency" in told[0].reason
     assert "with backlash" in told[1].reason

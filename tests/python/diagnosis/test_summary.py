@@ -13,7 +13,7 @@ from trueangle.diagnosis.beliefs import Belief
 from trueangle.diagnosis.finding import Finding
 from trueangle.diagnosis.gain import Gain
 from trueangle.diagnosis.levels import LevelGain
-from trueangle.diagnosis.summary import finding_text, render
+from trueangle.diagnosis.summary import diagnosis_summary, finding_text
 from trueangle.estimation.estimate import quantity
 from trueangle.simulation import Simulation
 
@@ -91,7 +91,7 @@ def test_the_account_says_each_of_its_numbers_in_one_unit(result, unit, per_arcs
         findings=[FOUND],
         beliefs=[belief],
     )
-    text = flat(render(made, unit))
+    text = flat(diagnosis_summary(made, unit))
 
     def told(pattern: str) -> list[float]:
         found = re.search(pattern.replace("#", r"(-?[\d.]+)"), text)
@@ -126,7 +126,7 @@ def test_what_is_not_understood_is_told_by_size_share_and_chance(result) -> None
     sure, rare = (replace(rest.evidence[0], p=p, decides=True, says=says)
                   for p, says in ((1e-20, "first of 12 arcsec"), (0.0023, "second")))  # fmt: skip
     made = replace(rest, found=True, rms=5.5, share=0.375, evidence=[sure, rare])
-    text = flat(render(replace(result, unexplained=made)))
+    text = flat(diagnosis_summary(replace(result, unexplained=made)))
     assert "NOT UNDERSTOOD: at least 5.500 arcsec rms (38 % of the variance that is left)" in text
     assert "- first of 12 arcsec (p below 1e-12)" in text
     assert "- second (p 0.002)" in text

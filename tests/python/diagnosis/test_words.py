@@ -8,7 +8,7 @@ import pytest
 import trueangle as ta
 from trueangle import CalibrationRun
 from trueangle.cli import main
-from trueangle.diagnosis.summary import render
+from trueangle.diagnosis.summary import diagnosis_summary
 from trueangle.simulation import Backlash, Joint, LocalDefect, RunDesign, Simulation, ZeroSlip
 
 SIGMA = 2.0
@@ -82,7 +82,7 @@ def test_every_kind_of_size_has_its_unit():
     assert "no correction can take it off" in " ".join(text.split())
     assert "fits worse by" in text
     assert "would explain" not in text
-    assert render(result) == text
+    assert diagnosis_summary(result) == text
 
 
 def test_the_command_line_tells_in_full_where_asked(tmp_path, capsys):

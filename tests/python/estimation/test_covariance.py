@@ -274,7 +274,7 @@ def test_readings_thinned_by_their_memory_lose_a_zero_a_run(monkeypatch):
     from trueangle.fitting import uncertainty
 
     runs = some_runs(12, "arc", 0.0, 4)
-    monkeypatch.setattr(uncertainty, "memory_of", lambda *_: (5.0, [1] * 4))
+    monkeypatch.setattr(uncertainty, "residual_memory", lambda *_: (5.0, [1] * 4))
     found = ta.fit(runs, [1, 2, 5], covariance="hac", loss="linear", ridge=0.0)
     white = ta.fit(runs, [1, 2, 5], covariance="white", loss="linear", ridge=0.0)
     np.testing.assert_allclose(found.uncertainty.freedom, 120.0 - 6.0 - 4.0)

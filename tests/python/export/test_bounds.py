@@ -10,9 +10,9 @@ import pytest
 import trueangle as ta
 from trueangle.export.klipper import calibrated, solved_knots
 from trueangle.export.moteus import compensated
-from trueangle.export.proof import upward
+from trueangle.export.proof import rounded_up
 from trueangle.export.simplefoc import corrected_float, corrected_short
-from trueangle.export.tinymovr import rectified
+from trueangle.export.tinymovr import tinymovr_rectified
 from trueangle.model.term import TERMS
 
 SEED = 40_771
@@ -74,7 +74,7 @@ def moteus_machine(made, x, rng):
 
 def tinymovr_machine(made, x, rng):
     counts = (x / 360.0 * 8192).astype(int)
-    return rectified(counts, numbers(made).astype(int), 13) / 8192 * 360.0
+    return tinymovr_rectified(counts, numbers(made).astype(int), 13) / 8192 * 360.0
 
 
 def mechaduino_machine(made, x, rng):
@@ -251,7 +251,7 @@ def test_headers_of_200_random_models_never_exceed_what_they_print():
         options = {"method": method, "number": number, "entries": entries}
         made = ta.export_model(model, "c", bits=bits, **options)
         printed = float(re.search(r"at most (\S+) arcsec", made.text)[1])
-        assert printed == made.max_difference_arcsec == upward(printed)
+        assert printed == made.max_difference_arcsec == rounded_up(printed)
         chain = make_chain(TurnPattern(model), method, number, entries)
         device = chain.corrected(places.astype(np.uint32)) / 2.0**32 * 360.0
         off = wrapped(device - np.asarray(model.correct(places / 2.0**32 * 360.0))) * 3600.0

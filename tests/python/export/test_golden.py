@@ -9,7 +9,7 @@ import trueangle as ta
 from trueangle.export.klipper import calibrated, solved_knots
 from trueangle.export.moteus import compensated
 from trueangle.export.simplefoc import corrected_float
-from trueangle.export.tinymovr import rectified
+from trueangle.export.tinymovr import tinymovr_rectified
 
 from .conftest import DATA, columns, golden_model, truth
 
@@ -76,7 +76,11 @@ def test_klipper_count_for_count():
 def test_tinymovr_shifts_down():
     """(7 - 2) * 3 >> 2 is 3, and (2 - 7) * 3 >> 2 is -4: an arithmetic shift, as in C on ARM."""
     table = np.array([2, 7, 2, -3])
-    assert rectified(np.array([3, 7, 15]), table, 4).tolist() == [3 + 2 + 3, 7 + 7 - 4, 15 - 3 + 3]
+    assert tinymovr_rectified(np.array([3, 7, 15]), table, 4).tolist() == [
+        3 + 2 + 3,
+        7 + 7 - 4,
+        15 - 3 + 3,
+    ]
 
 
 @pytest.mark.parametrize("name", ["simplefoc", "moteus", "klipper"])

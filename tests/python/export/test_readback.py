@@ -7,7 +7,7 @@ import pytest
 
 import trueangle as ta
 from trueangle.cli import main
-from trueangle.export.inversion import inverse
+from trueangle.export.inversion import inverse_rising
 
 from .test_bounds import AT_READINGS, existing, random_model, wrapped
 
@@ -105,7 +105,7 @@ def test_brackets_hold_where_newton_would_not():
             return np.floor(x) + np.interp(x % 1.0, np.arange(65) / 64, knots)
 
         x = rng.uniform(-3.0, 3.0, 500)
-        np.testing.assert_allclose(line(inverse(line, line(x), 256)), line(x), atol=1e-13)
+        np.testing.assert_allclose(line(inverse_rising(line, line(x), 256)), line(x), atol=1e-13)
 
 
 @pytest.mark.parametrize("name", [n for n in AT_READINGS if n != "klipper"] + ["admt4000"])

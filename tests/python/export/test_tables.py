@@ -11,7 +11,7 @@ from trueangle import _core
 from trueangle.export.chain import make_chain
 from trueangle.export.knots import cubic_knots, linear_knots, rounded_knots
 from trueangle.export.pattern import TurnPattern
-from trueangle.export.proof import prove
+from trueangle.export.proof import prove_export
 from trueangle.export.table import make_table
 
 from .conftest import ARCSEC, truth
@@ -305,7 +305,7 @@ def test_a_lowered_maximum_is_not_kept(model):
     """The bound is tight: a tenth less is exceeded by the very input that was found worst."""
     pattern = TurnPattern(model)
     chain = make_chain(pattern, "linear", "q15", 128)
-    proof = prove([chain.correction], pattern.correction, 20, 1.0)
+    proof = prove_export([chain.correction], pattern.correction, 20, 1.0)
     at = np.array([proof.worst], dtype=np.uint32)
     left = abs(float((chain.correction(at) - pattern.correction(at / 2.0**32))[0])) * 1_296_000
     assert left == pytest.approx(proof.max_arcsec)

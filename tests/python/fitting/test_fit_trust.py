@@ -223,7 +223,7 @@ def test_many_runs_are_taken_together_with_the_same_sums():
     np.testing.assert_allclose(gram, sum(p.gram(0, every) for p in parts), atol=1e-9)
     np.testing.assert_allclose(rhs, sum(p.rhs(0, every) for p in parts), atol=1e-9)
     assert squares == pytest.approx(sum(p.squares[0] for p in parts))
-    members = unitgroups.dealt(units)[3]
+    members = unitgroups.units_in_groups(units)[3]
     np.testing.assert_allclose(
         sums.gram(3, every), sum(parts[i].gram(0, every) for i in members), atol=1e-9
     )

@@ -13,7 +13,7 @@ import pytest
 pa = pytest.importorskip("pyarrow")
 import pyarrow.parquet as pq  # noqa: E402
 
-from trueangle.formats.arrowtables import labels, numbers, values_of  # noqa: E402
+from trueangle.formats.arrowtables import arrow_numbers, arrow_values, label_codes  # noqa: E402
 
 KINDS = ["int8", "uint8", "int16", "uint16", "int32", "uint32", "int64", "uint64"]
 KINDS += ["float", "double"]
@@ -29,22 +29,22 @@ def test_values_are_those_of_pyarrow(kind: str, nulls: bool, start: int, stop: i
         given[4] = given[7] = None
     column = pa.array(given, pa.type_for_alias(kind)).slice(start, stop - start)
     expected = column.to_numpy(zero_copy_only=False)
-    found = values_of(column)
+    found = arrow_values(column)
     assert found.dtype == expected.dtype
     np.testing.assert_array_equal(found, expected)
 
 
 def test_nothing_but_nulls():
     column = pa.nulls(3, pa.float64())
-    assert np.isnan(values_of(column)).all()
-    assert np.isnan(numbers("f", "a", column)).all()
+    assert np.isnan(arrow_values(column)).all()
+    assert np.isnan(arrow_numbers("f", "a", column)).all()
 
 
 def test_labels_with_and_without_nulls():
-    found = labels(pa.array(["b", None, "a", "b"]))
+    found = label_codes(pa.array(["b", None, "a", "b"]))
     assert [found.names[code] for code in found.codes] == ["b", None, "a", "b"]
     assert found.codes.dtype == np.intp
-    found = labels(pa.array(["b", "a"]))
+    found = label_codes(pa.array(["b", "a"]))
     assert [found.names[code] for code in found.codes] == ["b", "a"]
 
 

@@ -15,7 +15,7 @@ from rosbags.rosbag2 import Writer as PlainWriter
 from rosbags.typesys import Stores, get_typestore
 
 from trueangle.formats import rosbag
-from trueangle.formats.mcaprows import RecordRows, interleaved
+from trueangle.formats.mcaprows import RecordRows, interleaved_rows
 
 SEED = 33
 STORE = get_typestore(Stores.LATEST)
@@ -111,7 +111,7 @@ def test_only_records_that_are_alike_are_rows():
 
 def test_rows_are_written_row_by_row_on_their_channels():
     (rows,) = RecordRows.of_chunk(record(1, 10, b"abc") + record(1, 20, b"xyz"))
-    made = interleaved([(3, rows), (4, rows.with_messages(rows.messages + np.uint8(1)))])
+    made = interleaved_rows([(3, rows), (4, rows.with_messages(rows.messages + np.uint8(1)))])
     heads = [struct.unpack_from("<BQHIQQ", row) for row in made.records]
     assert [head[2:] for head in heads] == [
         (3, 0, 10, 10),

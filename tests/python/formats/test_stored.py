@@ -12,7 +12,7 @@ h5py = pytest.importorskip("h5py")
 pa = pytest.importorskip("pyarrow")
 from trueangle.formats import arrow, hdf5  # noqa: E402
 from trueangle.formats.arrowplaces import placed_batch  # noqa: E402
-from trueangle.formats.arrowtables import numbers  # noqa: E402
+from trueangle.formats.arrowtables import arrow_numbers  # noqa: E402
 from trueangle.formats.hdf5places import Places  # noqa: E402
 
 ROWS = 30_001
@@ -137,7 +137,7 @@ def test_columns_are_those_of_pyarrow(
     assert (placed is None) == (compression is not None)
     found = arrow_read(path, names, parts)
     for name in names:
-        np.testing.assert_array_equal(found[name], numbers(path, name, table[name]))
+        np.testing.assert_array_equal(found[name], arrow_numbers(path, name, table[name]))
 
 
 def test_labels_and_columns_that_lie_elsewhere_are_left_to_pyarrow(tmp_path: Path):
@@ -151,7 +151,7 @@ def test_labels_and_columns_that_lie_elsewhere_are_left_to_pyarrow(tmp_path: Pat
         # What lies elsewhere: in memory, or behind a shifted start.
         assert placed_batch(mapped, table.to_batches()[0], ["a"]) is None
         assert placed_batch(mapped, batch.slice(5), ["a"]) is None
-    wanted = numbers(path, "a", table["a"])
+    wanted = arrow_numbers(path, "a", table["a"])
     batches = list(arrow.read(path, ["a", "label"], None, arrow.BatchRange(range(3))))
     np.testing.assert_array_equal(np.concatenate([batch["a"] for batch in batches]), wanted)
 

@@ -3,7 +3,7 @@
 import pytest
 
 from trueangle.errors import FileError
-from trueangle.logs.columns import find_angle_column, find_signal
+from trueangle.logs.columns import find_angle_column, find_joint_signal
 
 FOUND = [
     # joint, columns -> column, unit, corrected
@@ -44,11 +44,11 @@ def test_signals_of_the_joint_come_before_common_ones():
     columns = ["temperature_C", "j1_temperature_C", "velocity_rad_s"]
 
     def found(signal, joint):
-        return find_signal("log", columns, signal, joint, None)
+        return find_joint_signal("log", columns, signal, joint, None)
 
     assert found("temperature", "j1").name == "j1_temperature_C"
     assert found("temperature", "j2").name == "temperature_C"
     assert found("velocity", "j2").name == "velocity_rad_s"
     assert found("torque", None) is None
     with pytest.raises(FileError, match="'T': no such column"):
-        find_signal("log", columns, "temperature", None, ("T", None))
+        find_joint_signal("log", columns, "temperature", None, ("T", None))

@@ -244,7 +244,10 @@ def test_two_runs_into_one_folder_do_not_mix(logs, model, tmp_path):
     out = tmp_path / "out"
     out.mkdir()
     (out / MANIFEST).touch()
-    with safety.locked(out / MANIFEST), pytest.raises(ta.errors.ArgumentError, match="another run"):
+    with (
+        safety.lock_path(out / MANIFEST),
+        pytest.raises(ta.errors.ArgumentError, match="another run"),
+    ):
         ta.correct_logs(logs, model, out)
 
 
@@ -282,7 +285,7 @@ def test_a_folder_is_replaced_whole_and_put_back_when_killed_between(tmp_path):
 @pytest.mark.parametrize("ends", [KeyboardInterrupt, OSError])
 def test_a_folder_goes_back_when_its_replacement_ends_between(ends, tmp_path, monkeypatch):
     """Ctrl-C or an error after the old folder was moved aside, before the new one has its name."""
-    monkeypatch.setattr(workplace, "exchanged", lambda first, second: False)
+    monkeypatch.setattr(workplace, "exchange_names", lambda first, second: False)
     target = tmp_path / "bag"
     target.mkdir()
     (target / "x").write_text("old")

@@ -11,7 +11,7 @@ from trueangle.cli import main
 from trueangle.errors import ArgumentError, FileError
 from trueangle.joint.signals import join_runs
 from trueangle.planning import Limits, load_limits
-from trueangle.planning.further import base_of, choices, seconds_of, steps_of
+from trueangle.planning.further import base_of, choices, run_steps, seconds_of
 from trueangle.simulation import (
     Backlash,
     Harmonic,
@@ -98,7 +98,7 @@ def test_every_run_stays_within_limits(plan):
         # The time that is told is that of the simulated run, to one reading: of a run that
         # coasts to a quarter of its speed the last takes 2.2 times the mean.
         assert measured.time[-1] == pytest.approx(seconds_of(run), rel=2.2 / run.samples)
-        assert any(f"read {run.samples} times" in step for step in steps_of(run))
+        assert any(f"read {run.samples} times" in step for step in run_steps(run))
 
 
 def test_without_reversals_none_is_planned(found):

@@ -10,7 +10,7 @@ import pytest
 
 from trueangle.planning import plan_arc, plan_encoder, plan_mounts, plan_tilts
 from trueangle.planning.doptimal import OrthonormalColumns
-from trueangle.planning.further import seconds_of, steps_of
+from trueangle.planning.further import run_steps, seconds_of
 from trueangle.planning.mountsearch import TOLERATED_FACTOR
 from trueangle.planning.noisefactors import (
     facet_noise_factor,
@@ -156,6 +156,6 @@ def test_the_steps_of_a_run_lead_where_it_goes() -> None:
         speed_deg_s=20.0, turns=1.5, samples=90, start_deg=30.0, direction=-1,
         reversals=(0.25, 0.75),
     )  # fmt: skip
-    first = next(steps_of(design))
+    first = next(run_steps(design))
     # 540 degrees in all: a quarter down, a half up, a quarter down again.
     assert first.startswith("move 30 to -105 to 165 to 30 deg at 20 deg/s (27 s)")

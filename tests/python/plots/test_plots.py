@@ -89,7 +89,7 @@ def test_gear_orders_are_drawn_as_an_envelope(fit: ta.FitResult) -> None:
     curve = curves.model_curve(fit.model)
     assert drawn.max() == pytest.approx(curve.error.max())
     assert drawn.min() == pytest.approx(curve.error.min())
-    angle, least, most = curves.envelope(curve)
+    angle, least, most = curves.curve_envelope(curve)
     near = np.abs(curve.angle[:, None] - angle).argmin(axis=1)
     # Places that lie between two parts may belong to either.
     inside = (curve.error >= least[near]) & (curve.error <= most[near])
@@ -297,9 +297,9 @@ def selection(runs: list[ta.CalibrationRun]) -> ta.OrderSelection:
 
 def test_threshold_parts_significant_orders_from_the_others(selection) -> None:
     from trueangle.fitting.orders import FALSE_ALARM
-    from trueangle.plots.orderlines import thresholds
+    from trueangle.plots.orderlines import significance_amplitudes
 
-    limit = thresholds(selection)
+    limit = significance_amplitudes(selection)
     assert np.isfinite(limit).all()
     for row, needed in zip(selection.table, limit, strict=True):
         significant = row.log10_false_alarm <= np.log10(FALSE_ALARM)

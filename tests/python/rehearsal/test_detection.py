@@ -9,7 +9,7 @@ import pytest
 from statsmodels.stats.proportion import proportion_confint
 
 from trueangle.rehearsal.detection import HIGH, LAPSES, LOW, WIDTHS, Chance, binomial_interval
-from trueangle.rehearsal.result import SHARES, rehearsed
+from trueangle.rehearsal.result import SHARES, rehearsed_cause
 from trueangle.rehearsal.trial import TrialOutcome
 from trueangle.rehearsal.visibility import STEPS, Range
 
@@ -86,7 +86,7 @@ def test_what_is_told_of_a_cause_is_counted(grows: bool) -> None:
             else:
                 instead = ("thermal_drift", "backlash") if k % 2 else ("backlash",)
                 answers.append((step, TrialOutcome("taken_for_another", instead)))
-    found = rehearsed("x", "size", sizes, answers, "blind", "measure")
+    found = rehearsed_cause("x", "size", sizes, answers, "blind", "measure")
     sign = 1.0 if grows else -1.0
     wanted = {3.0 * 2.0 ** (sign * step / STEPS): tried for step, tried in TRIED.items()}
     assert list(found.tried.values()) == list(wanted.values())
@@ -113,5 +113,5 @@ def test_what_is_told_of_a_cause_is_counted(grows: bool) -> None:
     )
     assert plain["named_50_interval"] == list(found.intervals[0.5])
     assert plain["named_95_interval"] == list(found.intervals[0.95])
-    never = rehearsed("x", "size", sizes, [(0, TrialOutcome("nothing"))], "blind", "measure")
+    never = rehearsed_cause("x", "size", sizes, [(0, TrialOutcome("nothing"))], "blind", "measure")
     assert (never.blind_because, never.measure, never.ever_named) == ("blind", "measure", False)

@@ -19,7 +19,7 @@ from trueangle.effects.argument_error import ArgumentShift
 from trueangle.joint.signals import join_runs
 from trueangle.planning import Limits
 from trueangle.planning.hypotheses import of_size
-from trueangle.rehearsal.trial import judged
+from trueangle.rehearsal.trial import trial_outcome
 from trueangle.simulation import (
     Harmonic,
     Joint,
@@ -182,7 +182,7 @@ def followed(entry, cause, seeds, seed):
     rng = np.random.default_rng(seed)
     first = blanked(simulate(truth, rng, designs), lacking)
     found = ta.diagnose(first, sim)
-    if judged(found, cause).is_named and not any(
+    if trial_outcome(found, cause).is_named and not any(
         cause in spot.causes for spot in found.not_identifiable
     ):
         return seeds, None
@@ -196,7 +196,7 @@ def followed(entry, cause, seeds, seed):
         earlier = [] if plan.alone else simulate(sim, rng, designs)
         measured = simulate_along(truth, [*earlier, *ideal], rng)
         measured = [*blanked(measured[: len(earlier)], lacking), *measured[len(earlier) :]]
-        named += judged(ta.diagnose(measured, sim), cause).is_named
+        named += trial_outcome(ta.diagnose(measured, sim), cause).is_named
     return named, plan
 
 

@@ -196,10 +196,10 @@ def test_the_number_of_workers_changes_nothing():
 
 def test_another_seed_is_another_exam():
     signals = measured_signals(SIM)
-    first, second = (trials.rng_of(seed, "backlash", 0).random() for seed in (0, 1))
+    first, second = (trials.trial_rng(seed, "backlash", 0).random() for seed in (0, 1))
     assert first != second
-    assert trials.rng_of(0, "backlash", 1).random() != first
-    assert trials.rng_of(0, "latency", 0).random() != first
+    assert trials.trial_rng(0, "backlash", 1).random() != first
+    assert trials.trial_rng(0, "latency", 0).random() != first
     one = asked(SIM, signals, Trial("backlash", 0, 5.0, 0), 3)
     assert one == asked(SIM, signals, Trial("backlash", 0, 5.0, 0), 3)
     assert one.is_named
@@ -332,7 +332,7 @@ def test_every_cause_can_be_hidden_or_is_seen_to_be_impossible():
     signals = measured_signals(rich)
     for cause, effect in EFFECTS.items():
         for number in range(3):
-            rng = trials.rng_of(1, cause, number)
+            rng = trials.trial_rng(1, cause, number)
             size = min(1.0, effect.size_most)
             drawn = effect.drawn(size, signals, rich.surroundings, rng)
             assert drawn is not None, cause

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from trueangle.reports.numbers import formatted, lookup
+from trueangle.reports.numbers import formatted_number, lookup
 from trueangle.reports.pdf import find_browser
 
 from .scripts import (
@@ -236,7 +236,7 @@ def test_tables_equal_the_json(page: Page, made) -> None:
     assert len(shown) > 150
     for path, per, digits, text in shown:
         value = lookup(result, path)
-        assert text == formatted(None if value is None else value * per, digits), path
+        assert text == formatted_number(None if value is None else value * per, digits), path
 
 
 def test_box_of_a_run_hides_it_in_every_figure(page: Page) -> None:

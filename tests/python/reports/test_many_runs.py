@@ -3,7 +3,7 @@
 import numpy as np
 
 import trueangle as ta
-from trueangle.plots.curves import Points, thinned
+from trueangle.plots.curves import Points, thinned_points
 from trueangle.reports.panelcharts import dots_of_run
 
 #: Bytes of a page at most.
@@ -20,7 +20,7 @@ def test_few_runs_are_drawn_whole_and_many_in_part():
 
 def test_runs_that_are_alike_are_not_drawn_at_the_same_places():
     angle = np.arange(0.0, 360.0, 0.36)
-    places = [thinned(Points("", angle, angle), 6, number).x for number in range(79)]
+    places = [thinned_points(Points("", angle, angle), 6, number).x for number in range(79)]
     assert all(5 <= x.size <= 6 for x in places)
     drawn = np.sort(np.concatenate(places))
     # Evenly spread: no gap as wide as a hundredth of a turn.

@@ -14,7 +14,7 @@ import trueangle as ta
 from trueangle.cli import main
 from trueangle.errors import ArgumentError, MissingExtraError
 from trueangle.fitting.heldout import hold_out
-from trueangle.reports.numbers import formatted, lookup
+from trueangle.reports.numbers import formatted_number, lookup
 from trueangle.reports.pdf import find_browser, print_pdf
 
 from .conftest import ORDERS
@@ -118,7 +118,7 @@ def page_numbers(page: str) -> list[tuple[str, float, int, str]]:
 
 def written(content: dict, path: str, per: float, digits: int) -> str:
     value = lookup(content, path)
-    return formatted(None if value is None else value * per, digits)
+    return formatted_number(None if value is None else value * per, digits)
 
 
 def test_every_number_of_the_page_is_the_content(made) -> None:
@@ -225,9 +225,9 @@ def test_missing_extras_are_named(made, monkeypatch, missing: str) -> None:
 
     monkeypatch.setattr(page, "find_spec", lambda name: None)
     monkeypatch.setitem(sys.modules, missing, None)
-    page.library.cache_clear()
+    page.bokeh_library.cache_clear()
     with pytest.raises(MissingExtraError, match=r"trueangle\[report\]"):
-        page.render(made)
+        page.rendered_report(made)
 
 
 def test_pdf_without_a_browser_says_what_to_do(made, tmp_path) -> None:

@@ -13,14 +13,14 @@ from trueangle.selfcalibration.splines import (
     Knots,
     Wander,
     banded_product,
-    basis,
     coarser_bands,
     coarser_rows,
-    evaluate,
     finer_coefficients,
     smooth_trends,
+    spline_basis,
+    spline_values,
 )
-from trueangle.selfcalibration.sums import MotionSums, accumulate
+from trueangle.selfcalibration.sums import MotionSums, ordered_sums
 
 KNOTS = Knots((1.0, 30.0), (16, 8), 0.5)
 
@@ -72,10 +72,12 @@ def test_the_basis_is_that_of_cubic_b_splines() -> None:
     stretch, time = some_times()
     index, place = placed(KNOTS, stretch, time)
     expected = design(KNOTS, stretch, time)
-    for row, (i, weights) in enumerate(zip(index, basis(place).T, strict=True)):
+    for row, (i, weights) in enumerate(zip(index, spline_basis(place).T, strict=True)):
         np.testing.assert_allclose(expected[row, i : i + 4], weights, atol=1e-12)
     c = np.random.default_rng(2).normal(size=KNOTS.size)
-    np.testing.assert_allclose(evaluate(c, index, basis(place)), expected @ c, atol=1e-12)
+    np.testing.assert_allclose(
+        spline_values(c, index, spline_basis(place)), expected @ c, atol=1e-12
+    )
     assert (KNOTS.size, KNOTS.first.tolist()) == (30, [0, 19, 30])
     # Straight lines are their own values at the coefficients' times.
     np.testing.assert_allclose(expected @ KNOTS.greville(), time, atol=1e-12)
@@ -148,7 +150,7 @@ def summed(valid: np.ndarray | None = None, repeat: int = 1) -> tuple[MotionSums
     def columns(part: slice, out: np.ndarray) -> None:
         out[:] = common[:, part]
 
-    found = accumulate(KNOTS, index, place, target, weight, columns, 2, valid)
+    found = ordered_sums(KNOTS, index, place, target, weight, columns, 2, valid)
     return found, (design(KNOTS, stretch, time) * weight[:, None], common.T, target)
 
 

@@ -72,7 +72,7 @@ def test_the_machine_is_not_the_file(error, kind, tmp_path):
 def test_a_library_that_cannot_be_loaded_is_not_a_missing_one(monkeypatch):
     import builtins
 
-    from trueangle.certificate.typesetting import typeset
+    from trueangle.certificate.typesetting import typeset_certificate
 
     real = builtins.__import__
 
@@ -84,7 +84,7 @@ def test_a_library_that_cannot_be_loaded_is_not_a_missing_one(monkeypatch):
     pytest.importorskip("matplotlib")
     monkeypatch.setattr(builtins, "__import__", loading)
     with pytest.raises(ImportError, match="failed to map") as told:
-        typeset({})
+        typeset_certificate({})
     assert not isinstance(told.value, ta.errors.MissingExtraError)
 
 

@@ -20,7 +20,7 @@ from trueangle.cli import main
 from trueangle.cli.durations import seconds
 from trueangle.errors import ArgumentError
 from trueangle.simulation import Backlash, Harmonic, Latency, RunDesign, Simulation, simulate
-from trueangle.support.deadline import Pace, ending_early, entered, pace, paced
+from trueangle.support.deadline import Pace, ending_early, entered, pace, with_pace
 
 #: Seconds by which a diagnosis may take longer than it was given: what is in hand is ended (one
 #: search), and what is left is tested. Generous, as the machine that runs this may be busy.
@@ -98,10 +98,10 @@ def test_a_part_ends_before_the_whole():
 
 
 def test_work_inside_other_work_has_its_pace():
-    with paced(5.0) as outer:
-        with paced() as inner:
+    with with_pace(5.0) as outer:
+        with with_pace() as inner:
             assert inner is outer is pace()
-        with paced(1.0) as own:
+        with with_pace(1.0) as own:
             assert own is not outer
     assert pace().within is None
 
@@ -288,7 +288,7 @@ def test_the_same_work_without_a_limit_is_not_changed():
 def test_ctrl_c_asks_first_and_ends_then():
     before = signal.getsignal(signal.SIGINT)
     with ending_early() as interruption:
-        with paced(100.0) as work:
+        with with_pace(100.0) as work:
             os.kill(os.getpid(), signal.SIGINT)
             assert work.over
             assert interruption.happened

@@ -14,7 +14,7 @@ from .place import place_tests
 from .steps import steps_test
 from .zeros import run_test
 
-__all__ = ["DECIDING", "Asked", "ask"]
+__all__ = ["DECIDING", "Asked", "evidence_of_tests"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,6 +50,6 @@ DECIDING: tuple[Callable[[Asked], Iterable[Evidence | None]], ...] = (
 )
 
 
-def ask(asked: Asked) -> list[Evidence]:
+def evidence_of_tests(asked: Asked) -> list[Evidence]:
     """Evidence of every test that can be made of such readings."""
     return [item for test in DECIDING for item in test(asked) if item is not None]

@@ -10,7 +10,13 @@ from .evidence import Evidence
 from .leftover import Leftover
 from .noise import Noise
 
-__all__ = ["AGAINST_STATED", "normal_kurtosis", "repeats", "scatter_tests", "whitened"]
+__all__ = [
+    "AGAINST_STATED",
+    "normal_kurtosis",
+    "scatter_of_repeats",
+    "scatter_tests",
+    "whitened_residual",
+]
 
 Array = NDArray[np.float64]
 
@@ -42,10 +48,10 @@ def scatter_tests(left: Leftover, noise: Noise, sigma: float | None = None) -> l
         Noise of one reading that the simulation states.
     """
     found = [_correlation(noise)]
-    e = whitened(left, noise)
+    e = whitened_residual(left, noise)
     if e.size >= LEAST_READINGS and np.ptp(e) > 0.0:
         found += [_tails(e), _bursts(e)]
-    same = repeats(left)
+    same = scatter_of_repeats(left)
     if same is not None and same[0] > 0.0:
         value, freedom = same
         ratio = noise.sigma / value
@@ -65,7 +71,7 @@ def scatter_tests(left: Leftover, noise: Noise, sigma: float | None = None) -> l
     return found
 
 
-def whitened(left: Leftover, noise: Noise) -> Array:
+def whitened_residual(left: Leftover, noise: Noise) -> Array:
     """Innovations of the residual under the noise's correlation, over their deviation."""
     e = left.centred(left.bounds)
     rho = noise.correlation
@@ -78,7 +84,7 @@ def whitened(left: Leftover, noise: Noise) -> Array:
     return np.asarray(e / max(float(np.sqrt(np.mean(e**2))), 1e-300))
 
 
-def repeats(left: Leftover) -> tuple[float, float] | None:
+def scatter_of_repeats(left: Leftover) -> tuple[float, float] | None:
     """Scatter of readings at places that runs come back to on purpose, and its freedom.
 
     None where no places were repeated, or angles coincide by rounding alone.

@@ -12,7 +12,7 @@ from .evidence import Evidence
 from .leftover import Leftover
 from .noise import Noise, estimate_noise
 from .place import LEAST_ORDERS
-from .registry import Asked, ask
+from .registry import Asked, evidence_of_tests
 from .scatter import scatter_tests
 
 __all__ = ["FREE_PATH", "LEVEL", "Unexplained", "goodness_of_fit"]
@@ -124,7 +124,7 @@ def goodness_of_fit(
     'place'
     """
     noise = estimate_noise(left)
-    deciding = ask(Asked(left, left if loose is None else loose, noise, top))
+    deciding = evidence_of_tests(Asked(left, left if loose is None else loose, noise, top))
     deciding += [path] if path is not None else []
     describing = scatter_tests(left, noise, sigma)
     firing = _firing(deciding)

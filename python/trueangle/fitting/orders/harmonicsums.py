@@ -19,7 +19,7 @@ import trueangle._core as _core
 
 from ...estimation.linear import NormalEquations
 from ...support.powersums import power_sums
-from .unitgroups import GROUPS, MOST_UNITS, columns_summed, dealt
+from .unitgroups import GROUPS, MOST_UNITS, columns_summed, units_in_groups
 
 __all__ = ["HarmonicSums", "ZeroGroupReadings", "harmonic_sums"]
 
@@ -258,7 +258,7 @@ def _in_groups(
     """As `_from_spectra`, many units taken together: one normal matrix a group."""
     index = np.asarray(orders, dtype=np.int64)
     highest, size = int(index.max(initial=0)), index.size
-    grams, moments, groups = [], [], dealt(units)
+    grams, moments, groups = [], [], units_in_groups(units)
     for members in groups:
         group = [units[i] for i in members]
         together = ZeroGroupReadings(

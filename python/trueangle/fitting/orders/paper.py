@@ -25,8 +25,8 @@ from .lookalikes import find_lookalikes
 from .phases import circular_range_deg
 from .repeats import ReadingVariance
 from .table import OrderRow, OrderSelection
-from .verdicts import explained, selection_notes
-from .zerogroups import units_of
+from .verdicts import explained_row, selection_notes
+from .zerogroups import zero_units
 
 __all__ = ["PHASE_RANGE_DEG", "PROMINENCE", "run_coefficients", "select_by_paper"]
 
@@ -104,7 +104,7 @@ def select_by_paper(
     orders = [k for k in candidates.orders if k in candidates.main and k <= candidates.highest]
     if not orders:
         raise ArgumentError("none of the candidates lies below the Nyquist limit of the positions")
-    units, places = units_of(runs, candidates.whole)
+    units, places = zero_units(runs, candidates.whole)
     placed = positions.of_rows(places)
     training, held = units[:-1], units[-1]
     each, left = run_coefficients(training, orders)
@@ -146,7 +146,7 @@ def select_by_paper(
         )
         rows.append(row)
     amplitudes = {row.order: row.amplitude for row in rows if row.retained}
-    rows = [explained(row, candidates, placed, amplitudes) for row in rows]
+    rows = [explained_row(row, candidates, placed, amplitudes) for row in rows]
     before, after = (_residual(held, orders, mean, which) for which in (np.zeros_like(kept), kept))
     selection = OrderSelection(
         orders=tuple(retained),

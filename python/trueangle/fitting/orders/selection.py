@@ -20,8 +20,8 @@ from .phases import circular_range_deg, unit_phases
 from .repeats import pure_error
 from .search import FALSE_ALARM, EvidenceSearch
 from .table import OrderRow, OrderSelection
-from .verdicts import because, explained, selection_notes
-from .zerogroups import angle_blocks, units_of
+from .verdicts import explained_row, selection_notes, verdict_reason
+from .zerogroups import angle_blocks, zero_units
 
 if TYPE_CHECKING:
     from ..summed import Summed
@@ -44,7 +44,7 @@ class EvidenceSelection(EvidenceSearch):
     ) -> None:
         self.runs = runs
         self.candidates = candidates
-        self.units, places = units_of(runs, candidates.whole)
+        self.units, places = zero_units(runs, candidates.whole)
         self.positions = positions.of_rows(places)
         orders = candidates.orders
         sums = harmonic_sums(self.units, orders) if summed is None else summed.sums(orders)
@@ -140,7 +140,7 @@ class EvidenceSelection(EvidenceSearch):
                 )
             )
         retained = {row.order: row.amplitude for row in rows if row.retained}
-        rows = [explained(row, self.candidates, self.positions, retained) for row in rows]
+        rows = [explained_row(row, self.candidates, self.positions, retained) for row in rows]
         orders = tuple(retained)
         without, with_ = self._held_out_rms(model)
         selection = OrderSelection(
@@ -171,7 +171,7 @@ class EvidenceSelection(EvidenceSearch):
         if best.verdict == "reference":
             return "the only orders that stand out are the reference's own"
         if best.verdict != "noise":
-            return f"{beside} {because(best.verdict)}"
+            return f"{beside} {verdict_reason(best.verdict)}"
         chance = 100.0 * 10.0**best.log10_false_alarm
         return (
             f"{beside} does not stand out of the noise "

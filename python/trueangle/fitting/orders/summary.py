@@ -16,20 +16,20 @@ if TYPE_CHECKING:
 
 __all__ = [
     "plain_selection",
-    "summarise",
-    "unit_of",
+    "selection_error_unit",
+    "selection_summary",
 ]
 
 #: Rejected orders listed beside the retained ones, the strongest first.
 _REJECTED = 8
 
 
-def summarise(selection: OrderSelection, errors_in: ErrorsIn = "auto") -> str:
+def selection_summary(selection: OrderSelection, errors_in: ErrorsIn = "auto") -> str:
     """Table of the orders, the reasons and the notes; see `OrderSelection.summary`."""
     period = selection.period
     noise = arcsec(selection.noise.standard_deviation, period)
     before, after = (arcsec(v, period) for v in selection.holdout_rms)
-    unit = unit_of(selection, errors_in)
+    unit = selection_error_unit(selection, errors_in)
     noise_std = noise / math.sqrt(2.0 * max(1.0, selection.noise.degrees_of_freedom))
     runs = f"{selection.runs} run{'s' if selection.runs != 1 else ''}"
     lines = [
@@ -62,7 +62,7 @@ def summarise(selection: OrderSelection, errors_in: ErrorsIn = "auto") -> str:
     return laid_out(lines).rstrip()
 
 
-def unit_of(selection: OrderSelection, errors_in: ErrorsIn = "auto") -> ErrorUnit:
+def selection_error_unit(selection: OrderSelection, errors_in: ErrorsIn = "auto") -> ErrorUnit:
     """One unit for all that is told and drawn of a selection, by the rms before it."""
     before = arcsec(selection.holdout_rms[0], selection.period)
     return error_unit(errors_in, sine_of_rms(before), selection.period)

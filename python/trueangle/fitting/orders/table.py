@@ -11,7 +11,7 @@ from ...joint.gear import Explanation
 from ...model.model import Argument
 from ...runs.aliasing import Positions
 from ...support.display_units import ErrorsIn
-from ...support.drawn import drawn
+from ...support.drawn import result_picture
 from ...support.plainresult import PlainResult
 from .repeats import ReadingVariance
 
@@ -229,7 +229,7 @@ class OrderSelection(PlainResult):
 
     def plot(self, ax: Axes | None = None, errors_in: ErrorsIn = "auto") -> Axes:
         """Amplitude of every candidate with its threshold (needs ``trueangle[plot]``)."""
-        axes: Axes = drawn(self, ax, errors_in)
+        axes: Axes = result_picture(self, ax, errors_in)
         return axes
 
     def summary(self, errors_in: ErrorsIn = "auto") -> str:
@@ -241,9 +241,9 @@ class OrderSelection(PlainResult):
             Unit of the errors; by itself arcsec, or degrees where errors are that large. A
             number is the counts of a turn.
         """
-        from .summary import summarise
+        from .summary import selection_summary
 
-        return summarise(self, errors_in)
+        return selection_summary(self, errors_in)
 
     def __repr__(self) -> str:
         orders = ", ".join(f"{k:g}" for k in self.orders[:_SHOWN])

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 if TYPE_CHECKING:
     from .harmonicsums import ZeroGroupReadings
 
-__all__ = ["GROUPS", "MOST_UNITS", "columns_summed", "dealt", "means_of"]
+__all__ = ["GROUPS", "MOST_UNITS", "columns_summed", "unit_means", "units_in_groups"]
 
 Array = NDArray[np.float64]
 
@@ -32,12 +32,12 @@ _RESEED: Final = 64
 _BLOCK: Final = 1 << 21
 
 
-def dealt(units: Sequence[ZeroGroupReadings]) -> list[list[int]]:
+def units_in_groups(units: Sequence[ZeroGroupReadings]) -> list[list[int]]:
     """Units of each group, dealt in turn, so that a slow change is in all of them."""
     return [list(range(group, len(units), GROUPS)) for group in range(GROUPS)]
 
 
-def means_of(units: Sequence[ZeroGroupReadings], orders: Array) -> Array:
+def unit_means(units: Sequence[ZeroGroupReadings], orders: Array) -> Array:
     """Weighted means of cosines and sines of each order, a row a unit, for short units."""
     found = np.empty((len(units), 2 * orders.size))
     sizes = np.array([unit.turns.size for unit in units])
@@ -68,6 +68,6 @@ def columns_summed(units: Sequence[ZeroGroupReadings], orders: Array) -> Array:
     for begin, end in pairwise([*range(0, len(units), size), len(units)]):
         block = units[begin:end]
         root = np.sqrt([float(unit.weights.sum()) for unit in block])
-        scaled = means_of(block, orders) * root[:, None]
+        scaled = unit_means(block, orders) * root[:, None]
         total += scaled.T @ scaled
     return total

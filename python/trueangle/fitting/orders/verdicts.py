@@ -28,7 +28,13 @@ from ...support.angles import arcsec
 from .candidates import Candidates, choose_candidates
 from .table import OrderRow, OrderSelection
 
-__all__ = ["VerifiedPositions", "because", "explained", "selection_notes", "verified_positions"]
+__all__ = [
+    "VerifiedPositions",
+    "explained_row",
+    "selection_notes",
+    "verdict_reason",
+    "verified_positions",
+]
 
 #: Share of the energy in the upper half of the orders from which under-sampling is said.
 _UNDER_SAMPLED: Final = 0.25
@@ -51,12 +57,12 @@ _VERDICTS: Final = {
 }
 
 
-def because(verdict: str) -> str:
+def verdict_reason(verdict: str) -> str:
     """Why an order of this verdict is not retained, as the rest of a sentence."""
     return _VERDICTS[verdict]
 
 
-def explained(
+def explained_row(
     row: OrderRow, candidates: Candidates, positions: Positions, retained: Mapping[float, float]
 ) -> OrderRow:
     """The row with its explanations and the reason of its verdict.

@@ -15,7 +15,7 @@ from ...runs.travel import over_turns
 from ...support.angles import wrap
 from .harmonicsums import ZeroGroupReadings
 
-__all__ = ["angle_blocks", "units_of"]
+__all__ = ["angle_blocks", "zero_units"]
 
 #: Folds of a single run: whole blocks of neighbouring positions, dealt in turn.
 _FOLDS: Final = 6
@@ -25,7 +25,7 @@ _BLOCKS: Final = 24
 _SHORT: Final = 1000
 
 
-def units_of(
+def zero_units(
     runs: Sequence[CalibrationRun], whole: bool
 ) -> tuple[list[ZeroGroupReadings], NDArray[np.intp]]:
     """Units with a zero of their own: runs, split where the mount changes within one.

@@ -13,7 +13,14 @@ from ...support.quantiles import median, quantile
 from .fault import DataFault
 from .record import Record
 
-__all__ = ["mixed_units", "ratio_of", "suggestion", "swapped", "wrapped", "wrong_ratio"]
+__all__ = [
+    "angle_ratio",
+    "mixed_units",
+    "suggestion",
+    "swapped",
+    "wrapped_reference",
+    "wrong_ratio",
+]
 
 Array = NDArray[np.float64]
 
@@ -51,7 +58,7 @@ STAYS = 0.3
 BLOCKS = 8
 
 
-def ratio_of(records: list[Record]) -> float | None:
+def angle_ratio(records: list[Record]) -> float | None:
     """Indicated per reference travel: the median slope of the runs; None without travel."""
     slopes = [slope for record in records if (slope := _slope(record)) is not None]
     return float(median(slopes)) if slopes else None
@@ -174,7 +181,7 @@ def _parts_in_other_units(record: Record) -> Iterator[DataFault]:
         )
 
 
-def wrapped(records: list[Record]) -> Iterator[DataFault]:
+def wrapped_reference(records: list[Record]) -> Iterator[DataFault]:
     """A reference that wraps at something else than a turn."""
     for record in records:
         if len(record) < BLOCKS:

@@ -9,7 +9,7 @@ from ...errors import ArgumentError
 from ...support.kinds import told_kinds
 from ..run import given_runs
 from ..source import Reading
-from .angles import mixed_units, ratio_of, suggestion, swapped, wrapped, wrong_ratio
+from .angles import angle_ratio, mixed_units, suggestion, swapped, wrapped_reference, wrong_ratio
 from .fault import DataFault
 from .record import Record, records_of
 from .rows import duplicate_rows, duplicate_runs, unsorted_time
@@ -18,13 +18,13 @@ from .still import stuck_readings
 if TYPE_CHECKING:
     from .result import Check
 
-__all__ = ["check", "faults_of"]
+__all__ = ["check", "data_faults"]
 
 #: Every test of the data, in the order in which they are told.
 TESTS = (
     unsorted_time,
     mixed_units,
-    wrapped,
+    wrapped_reference,
     wrong_ratio,
     swapped,
     duplicate_runs,
@@ -69,15 +69,15 @@ def check(data: Any, **reading: Unpack[Reading]) -> Check:
     >>> [fault.fault for fault in check(run).data_faults]
     ['wrong_sign']
     """
-    from .extent import extent_of, verdicts
+    from .extent import extent_of, extent_verdicts
     from .result import Check
 
     records = _records(data, reading)
     if not records:
         raise ArgumentError("no data: give at least one file or run")
     extent = extent_of(records)
-    ratio = ratio_of(records)
-    can, cannot = verdicts(extent)
+    ratio = angle_ratio(records)
+    can, cannot = extent_verdicts(extent)
     unused = sorted({name for record in records for name in record.deviations})
     if unused:
         entry = {
@@ -92,7 +92,7 @@ def check(data: Any, **reading: Unpack[Reading]) -> Check:
             entry["because"] = f"column '{clocks[0]}' is not used"
             entry["measure"] = "nothing anew: give it the role time, with its unit"
     return Check(
-        tuple(faults_of(records)),
+        tuple(data_faults(records)),
         ratio,
         suggestion(ratio),
         extent,
@@ -102,12 +102,12 @@ def check(data: Any, **reading: Unpack[Reading]) -> Check:
     )
 
 
-def faults_of(records: list[Record]) -> list[DataFault]:
+def data_faults(records: list[Record]) -> list[DataFault]:
     """Faults of the data; where units are mixed, what follows from that is not told twice."""
     found: list[DataFault] = []
     for test in TESTS:
         mixed = {label for fault in found if fault.fault in UNSURE for label in fault.runs}
-        angles = test in (wrapped, wrong_ratio, swapped, stuck_readings)
+        angles = test in (wrapped_reference, wrong_ratio, swapped, stuck_readings)
         found += test([r for r in records if not (angles and r.label in mixed)])
     return found
 

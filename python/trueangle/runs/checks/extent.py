@@ -11,7 +11,7 @@ from ...support.plainresult import counted
 from ...support.quantiles import median, quantile
 from .record import Record
 
-__all__ = ["Extent", "extent_of", "verdicts"]
+__all__ = ["Extent", "extent_of", "extent_verdicts"]
 
 Array = NDArray[np.float64]
 
@@ -90,7 +90,7 @@ def extent_of(records: list[Record]) -> Extent:
     )
 
 
-def verdicts(extent: Extent) -> tuple[list[str], list[dict[str, str]]]:
+def extent_verdicts(extent: Extent) -> tuple[list[str], list[dict[str, str]]]:
     """What can be known from such data; what cannot, why, and which measurement tells it."""
     can = ["the periodic error at the places visited"]
     cannot: list[dict[str, str]] = []

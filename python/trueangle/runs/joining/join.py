@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import ArgumentError, FileError
-from ...formats.columns import count_turn, matching, signal_code, wanted_columns
+from ...formats.columns import count_turn, matching_column, signal_code, wanted_columns
 from ...formats.signals import FIELDS
 from ...support.angles import ARCSEC_PER_TURN
 from ...support.kinds import told_kinds
@@ -179,7 +179,7 @@ def _assigned(
         if fitting:
             tables[i] = read_readings(paths[i], {**fitting, **own[i]}, topics[i])
     for role in shared.keys() - used:  # says what was meant
-        matching(tables[0].path, list(tables[0].columns), _name(shared[role]))
+        matching_column(tables[0].path, list(tables[0].columns), _name(shared[role]))
     for one, other in (tables, tables[::-1]):
         if "indicated" in one.roles and "reference" in other.roles:
             return one, other
@@ -198,7 +198,7 @@ def _name(wanted: Any) -> str:
 
 def _has(table: FileReadings, wanted: Any) -> bool:
     try:
-        matching(table.path, list(table.columns), _name(wanted))
+        matching_column(table.path, list(table.columns), _name(wanted))
     except FileError:
         return False
     return True

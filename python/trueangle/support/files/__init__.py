@@ -24,7 +24,7 @@ from .kinds import (
     kind_of_log,
     promised_format,
 )
-from .outputs import check_output, publish, published, written_atomically
+from .outputs import check_output, external_output, publish, written_atomically
 from .partition import partition_keys, partition_name
 from .samefile import same_file
 from .workplace import remove_leftovers, restore
@@ -47,12 +47,12 @@ __all__ = [
     "check_input",
     "check_output",
     "declare_endings",
+    "external_output",
     "kind_of_log",
     "partition_keys",
     "partition_name",
     "promised_format",
     "publish",
-    "published",
     "read_whole",
     "remove_leftovers",
     "restore",

@@ -27,10 +27,10 @@ from .workplace import (
 __all__ = [
     "PARTIAL",
     "check_output",
+    "external_output",
     "hidden_name",
     "publish",
-    "published",
-    "sync",
+    "sync_to_disk",
     "written_atomically",
 ]
 
@@ -153,7 +153,7 @@ def written_atomically(
 
 
 @contextlib.contextmanager
-def published(target: Path) -> Iterator[Path]:
+def external_output(target: Path) -> Iterator[Path]:
     """Path of a file to be made by another program, which has the name ``target`` at the end.
 
     It is alone in a folder of its own beside it. Of the null device that is elsewhere.
@@ -201,16 +201,16 @@ def publish(aside: str | PathLike[str], target: str | PathLike[str]) -> None:
         if stat.S_ISREG(found.st_mode):
             os.chmod(aside, stat.S_IMODE(found.st_mode) & 0o777)
     for inside in Path(aside).rglob("*"):
-        sync(inside)
-    sync(aside)
+        sync_to_disk(inside)
+    sync_to_disk(aside)
     if found is not None and stat.S_ISDIR(found.st_mode):
         replace_folder(Path(aside), Path(target))
     else:
         os.replace(aside, target)
-    sync(Path(target).parent)
+    sync_to_disk(Path(target).parent)
 
 
-def sync(path: str | PathLike[str]) -> None:
+def sync_to_disk(path: str | PathLike[str]) -> None:
     """Wait until a file, or the names in a folder, are on the disk."""
     if os.name == "nt" and os.path.isdir(path):  # pragma: no cover - folders have no handle there
         return

@@ -22,10 +22,10 @@ except ImportError:  # pragma: no cover - Windows has no flock
 
 __all__ = [
     "PARTIAL",
-    "exchanged",
+    "exchange_names",
     "hidden_beside",
     "hidden_name",
-    "locked",
+    "lock_path",
     "made_beside",
     "remove_leftovers",
     "replace_folder",
@@ -118,7 +118,7 @@ def workplace(target: Path) -> Iterator[Path]:
 
 
 @contextmanager
-def locked(path: Path) -> Iterator[bool]:
+def lock_path(path: Path) -> Iterator[bool]:
     """Hold a lock on a file or folder until the end; False when another process has it.
 
     False as well where it has lost its name meanwhile.
@@ -148,12 +148,12 @@ def replace_folder(aside: Path, target: Path) -> None:
     In one step where the system can let both change names. Else there is a moment in which
     ``target`` is not there: `restore` and `remove_leftovers` undo it.
     """
-    if not exchanged(aside, target):
+    if not exchange_names(aside, target):
         os.replace(target, aside.with_name(aside.name + _REPLACED))
         os.replace(aside, target)
 
 
-def exchanged(first: Path, second: Path) -> bool:
+def exchange_names(first: Path, second: Path) -> bool:
     """Let two files or folders change names in one step; False where that cannot be done."""
     import ctypes  # where a folder is replaced only
 
@@ -178,7 +178,7 @@ def restore(folder: Path) -> bool:
     for name in names:
         # Looked for before it is locked: most are of files, or of work that goes on.
         if any(_moved(folder / name)):
-            with contextlib.suppress(OSError), locked(folder / name) as free:
+            with contextlib.suppress(OSError), lock_path(folder / name) as free:
                 found |= free and _put_back(folder / name)
     return found
 
@@ -203,7 +203,7 @@ def remove_leftovers(targets: Iterable[Path]) -> None:
             if not of:
                 continue
             # What cannot be locked may be alive.
-            with contextlib.suppress(OSError), locked(parent / name) as free:
+            with contextlib.suppress(OSError), lock_path(parent / name) as free:
                 if free:
                     _remove(parent / name, of)
 

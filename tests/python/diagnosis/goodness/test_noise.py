@@ -7,7 +7,7 @@ import pytest
 
 from trueangle.diagnosis.goodness import estimate_noise, goodness_of_fit
 from trueangle.diagnosis.goodness.leftover import Leftover
-from trueangle.diagnosis.goodness.scatter import repeats
+from trueangle.diagnosis.goodness.scatter import scatter_of_repeats
 from trueangle.diagnosis.goodness.zeros import variance_of_mean
 
 from .readings import Motion, leftover
@@ -56,7 +56,7 @@ def test_repeats_spend_a_mean_of_each_place_and_direction_and_of_each_run() -> N
     unlike = 50.0 * direction + 9.0 * np.cos(3.0 * theta) + 5.0 * run
     rng = np.random.default_rng(2)
     found = [
-        repeats(
+        scatter_of_repeats(
             Leftover(unlike + rng.normal(0.0, 2.0, 142), theta, direction, run, np.arange(142.0))
         )
         for _ in range(300)
@@ -69,13 +69,13 @@ def test_repeats_spend_a_mean_of_each_place_and_direction_and_of_each_run() -> N
 
 def test_rounded_angles_are_no_repeats() -> None:
     left = leftover("grid", "gauss", 5)
-    again = repeats(left)
+    again = scatter_of_repeats(left)
     assert again is not None
     assert again[0] == pytest.approx(1.0, abs=0.1)
     rounded = leftover("rich", "gauss", 5)
     step = np.radians(0.5)
     object.__setattr__(rounded, "theta", np.round(rounded.theta / step) * step)
-    assert repeats(rounded) is None
+    assert scatter_of_repeats(rounded) is None
 
 
 @pytest.mark.parametrize(("kind", "test"), [("t5", "tails"), ("ar 0.5", "correlation")])

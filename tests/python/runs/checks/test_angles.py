@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 
 from trueangle.runs.checks.angles import (
+    angle_ratio,
     mixed_units,
-    ratio_of,
     suggestion,
     swapped,
-    wrapped,
+    wrapped_reference,
     wrong_ratio,
 )
-from trueangle.runs.checks.extent import Extent, extent_of, verdicts
+from trueangle.runs.checks.extent import Extent, extent_of, extent_verdicts
 from trueangle.runs.checks.fault import DataFault
 from trueangle.runs.checks.record import Record
 from trueangle.runs.checks.rows import duplicate_rows, duplicate_runs, unsorted_time
@@ -57,13 +57,13 @@ def test_what_a_ratio_suggests(size: float, says: str, sign: float) -> None:
 
 def test_the_ratio_is_the_median_of_the_runs() -> None:
     runs = [record(SWEEP, k * SWEEP) for k in (1.0, 3.0, 2.0)]
-    assert ratio_of(runs) == pytest.approx(2.0)
+    assert angle_ratio(runs) == pytest.approx(2.0)
     for travel, told in ((5.01, True), (4.99, False)):
-        assert (ratio_of([record(np.linspace(0.0, travel, 20))]) is not None) == told
+        assert (angle_ratio([record(np.linspace(0.0, travel, 20))]) is not None) == told
     for step, told in ((89.0, True), (91.0, False)):
-        assert (ratio_of([record(np.arange(12) * step)]) is not None) == told
-    assert ratio_of([record(np.array([0.0, 5.0, 10.0]))]) is None
-    assert ratio_of([record(np.array([0.0, 5.0, 10.0, 15.0]))]) == pytest.approx(1.0)
+        assert (angle_ratio([record(np.arange(12) * step)]) is not None) == told
+    assert angle_ratio([record(np.array([0.0, 5.0, 10.0]))]) is None
+    assert angle_ratio([record(np.array([0.0, 5.0, 10.0, 15.0]))]) == pytest.approx(1.0)
 
 
 @pytest.mark.parametrize(
@@ -104,18 +104,18 @@ def test_radians_among_degrees() -> None:
 def test_a_reference_that_wraps_at_no_turn() -> None:
     angle = np.linspace(0.0, 700.0, 400)
     for period, told in ((180.0, True), (300.0, True), (360.0, False)):
-        (found,) = list(wrapped([record(np.mod(angle, period), angle)])) or (None,)
+        (found,) = list(wrapped_reference([record(np.mod(angle, period), angle)])) or (None,)
         assert (found is not None) == told
         if found:
             jumps = np.flatnonzero(np.diff(np.floor(angle / period))) + 1
             assert found.rows == tuple(11 + jumps)
             assert f"wraps after {period:.4g} deg" in found.says or "wraps after" in found.says
     wraps = np.mod(angle, 180.0)
-    assert not list(wrapped([record(wraps[:7], angle[:7])]))
+    assert not list(wrapped_reference([record(wraps[:7], angle[:7])]))
     # A slip in the middle of the range, and one that closes up again, are no wraps.
     slip = angle + np.where(angle > 200.0, -90.0, 0.0)
-    assert not list(wrapped([record(slip, angle)]))
-    assert not list(wrapped([record(np.mod(angle, 180.0), np.mod(angle, 180.0))]))
+    assert not list(wrapped_reference([record(slip, angle)]))
+    assert not list(wrapped_reference([record(np.mod(angle, 180.0), np.mod(angle, 180.0))]))
 
 
 def test_a_reference_much_noisier_than_the_joint() -> None:
@@ -217,7 +217,7 @@ def test_what_can_and_cannot_be_known() -> None:
         whole = {"readings": 900, "runs": 3, "span_deg": 350.0, "turns": 2.0,
                  "directions": (-1, 1), "speeds": (1.0, 2.0), "loads": (1.0, 2.0),
                  "temperatures": (1.0, 2.0), "mounts": (1.0, 2.0), "timed": True}  # fmt: skip
-        can, cannot = verdicts(Extent(**(whole | changes)))
+        can, cannot = extent_verdicts(Extent(**(whole | changes)))
         return can, [f"{c['what']}: {c['because']}" for c in cannot]
 
     can, cannot = told()
