@@ -35,10 +35,11 @@ from faults import Fault
 ROOT = Path(__file__).resolve().parents[2]
 PACKAGE = ROOT / "python" / "trueangle"
 
-#: Rooms that compute; what is printed, drawn and parsed has tests of another kind.
+#: Rooms that compute or that read, print and draw numbers.
 ROOMS = (
-    "certificate", "diagnosis", "effects", "estimation", "export", "fitting", "joint", "logs",
-    "model", "planning", "rehearsal", "runs", "selfcalibration", "simulation", "support",
+    "certificate", "cli", "diagnosis", "effects", "estimation", "export", "fitting", "fleets",
+    "formats", "joint", "logs", "model", "monitoring", "planning", "plots", "rehearsal", "reports",
+    "runs", "selfcalibration", "simulation", "simulators", "support",
 )  # fmt: skip
 
 OPERATORS = (

@@ -158,3 +158,22 @@ def test_a_long_cell_takes_its_own_room_only(tmp_path):
     path = written(tmp_path, "reference_deg,indicated_deg,note\n" + rows + f"1,1,{'y' * 90_000}\n")
     (run,) = ta.read_runs(path)  # as an array of texts: 7 GB
     assert len(run.columns["note"][-1]) == 90_000
+
+
+@pytest.mark.parametrize("period", [360.0, 2.0 * math.pi, 1.0])
+def test_runs_are_written_in_degrees_whatever_their_unit(period, tmp_path):
+    """Angles and speeds; loads, temperatures and times are what they are."""
+    turn = np.linspace(0.1, 0.9, 9)
+    run = ta.CalibrationRun(
+        turn * period, (turn + 1e-3) * period, period, time=np.arange(9.0), torque=2.0 * turn,
+        temperature=20.0, mount=0.25 * period, velocity=0.1 * period, label="a",
+        signals={"current": 0.5, "head1": 0.5 * period},
+    )  # fmt: skip
+    assert ta.write_runs([run], tmp_path / "a.csv") == 9
+    (back,) = ta.read_runs(tmp_path / "a.csv")
+    assert (back.period, back.label) == (360.0, "a")
+    for name in ("reference", "indicated", "mount", "velocity"):
+        np.testing.assert_allclose(getattr(back, name), getattr(run, name) * 360.0 / period)
+    np.testing.assert_allclose(back.signal("head1"), 180.0)
+    for name in ("time", "torque", "temperature", "current"):
+        np.testing.assert_array_equal(back.signal(name), run.signal(name))

@@ -1,0 +1,134 @@
+"""Coefficients, correlations, phases and axes of a page against the fit they come from."""
+
+import math
+
+import numpy as np
+import pytest
+
+import trueangle as ta
+from trueangle.fitting.orders.select import select_orders
+from trueangle.fitting.phases import run_phases
+from trueangle.reports import phases as phase_charts
+from trueangle.reports.chartaxes import ChartAxis
+from trueangle.reports.linenames import line_names
+from trueangle.reports.modelled import modelled, selected
+from trueangle.reports.numbers import shortened
+from trueangle.reports.scale import scale_of
+from trueangle.reports.stills import Mark, _Placement
+
+SEED = 56_100
+NAMES = line_names(None)
+PERIODS = (360.0, 2.0 * np.pi, 1.0)
+
+
+def fitted(period=360.0, arc=200.0, seed=SEED):
+    """Three runs over an arc, where the coefficients hang together; a phase below zero."""
+    rng, unit = np.random.default_rng(seed), period / 360.0
+    theta, runs = np.arange(0.0, arc, 1.0), []
+    for k in range(3):
+        error = 0.02 * np.sin(np.radians(theta) - 0.7) + 0.01 * np.sin(np.radians(2 * theta) + 2.0)
+        error += rng.normal(0.0, 1e-3, theta.size)
+        runs.append(ta.CalibrationRun(theta * unit, (theta + error) * unit, period, label=f"r{k}"))
+    return ta.fit(runs, [1, 2], loss="linear", covariance="white")
+
+
+@pytest.fixture(scope="module")
+def fit():
+    print("seed", SEED)
+    return fitted()
+
+
+@pytest.mark.parametrize("period", PERIODS)
+def test_coefficients_have_each_their_own_error_in_seconds_of_arc(period):
+    found = fitted(period)
+    content, unit = modelled(found, NAMES), 1_296_000.0 / period
+    std = np.sqrt(np.diag(found.covariance)) * unit
+    (shaft,) = found.model.shafts
+    for n, row in enumerate(content["coefficients"]):
+        wanted = {
+            "cosine_arcsec": unit * shaft.cosine[n], "cosine_std_arcsec": std[1 + 2 * n],
+            "sine_arcsec": unit * shaft.sine[n], "sine_std_arcsec": std[2 + 2 * n],
+            "amplitude_arcsec": unit * found.amplitudes[n],
+            "amplitude_std_arcsec": unit * found.amplitude_std[n],
+            "phase_deg": math.degrees(found.phases[n]) % 360.0,
+            "phase_std_deg": math.degrees(found.phase_std[n]),
+        }  # fmt: skip
+        assert {key: row[key] for key in wanted} == pytest.approx(wanted)
+        assert row["cosine_std_arcsec"] != pytest.approx(row["sine_std_arcsec"], rel=1e-3)
+    assert found.phases.min() < 0.0
+    assert content["residual_std_arcsec"] == pytest.approx(3.6, rel=0.1)
+    assert content["constant_deg"] == pytest.approx(360.0 * found.model.constant / period)
+
+
+def test_the_strongest_correlations_are_told_with_their_sign(fit):
+    covariance = fit.covariance[1:, 1:]
+    std = np.sqrt(np.diag(covariance))
+    matrix = covariance / np.outer(std, std)
+    names = ["A of output 1", "B of output 1", "A of output 2", "B of output 2"]
+    told = modelled(fit, NAMES)["correlations"]
+    pairs = {(row["first"], row["second"]): row["correlation"] for row in told}
+    wanted = {(names[i], names[j]): matrix[i, j] for i in range(4) for j in range(i + 1, 4)}
+    strongest = dict(sorted(wanted.items(), key=lambda pair: -abs(pair[1]))[:5])
+    assert pairs == pytest.approx({k: v for k, v in strongest.items() if abs(v) >= 0.3})
+    assert min(pairs.values()) < 0.0 < max(pairs.values())
+
+
+@pytest.mark.parametrize("period", PERIODS)
+def test_the_evidence_of_orders_is_that_of_the_selection(period):
+    found = select_orders(fitted(period, arc=360.0).runs)
+    content, unit = selected(found, NAMES), 1_296_000.0 / period
+    assert content["noise_arcsec"] == pytest.approx(unit * found.noise.standard_deviation)
+    before, after = (unit * x for x in found.holdout_rms)
+    assert content["holdout_rms_before_arcsec"] == pytest.approx(before)
+    assert content["holdout_rms_after_arcsec"] == pytest.approx(after)
+    assert before > 2.0 * after
+    for told, row in zip(content["table"], found.table, strict=True):
+        wanted = [unit * row.amplitude, unit * row.standard_error, row.phase_deg % 360.0,
+                  row.phase_error_deg, 100.0 * row.holdout_gain]  # fmt: skip
+        keys = ("amplitude_arcsec", "std_arcsec", "phase_deg", "phase_std_deg",
+                "holdout_gain_percent")  # fmt: skip
+        for key, value in zip(keys, wanted, strict=True):
+            assert told[key] == (pytest.approx(value) if math.isfinite(value) else None), key
+
+
+def test_phases_of_runs_stand_where_the_runs_have_them(fit, monkeypatch):
+    """Each within half a turn of the mean, which lies in a turn from zero."""
+    drawn = []
+
+    class Chart(phase_charts.Chart):
+        def dots(self, x, y, **more):
+            drawn.append((float(x[0]), float(y[0]), more["run"]))
+
+    monkeypatch.setattr(phase_charts, "Chart", Chart)
+    scale = scale_of("arcsec", 50.0, 100.0, fit.runs)
+    for order in run_phases(fit):
+        drawn.clear()
+        phase_charts._of_order(order, {"r0": 0, "r1": 1, "r2": 2}, "output 1", scale)
+        assert [(x, run) for x, _, run in drawn] == [(1.0, 0), (2.0, 1), (3.0, 2)]
+        shown = np.array([y for _, y, _ in drawn])
+        apart = np.exp(1j * np.radians(shown)) - np.exp(1j * order.phase)
+        np.testing.assert_allclose(apart, 0.0, atol=1e-12)
+        assert 0.0 <= shown.mean() < 360.0
+        assert np.ptp(shown) > 1e-3
+
+
+@pytest.mark.parametrize("log", [False, True])
+def test_a_still_picture_places_numbers_along_its_axes(log):
+    """Equal steps, or equal factors, are equally far apart, and the ends are the axis's."""
+    limits = (1.0, 1000.0) if log else (-3.0, 12.0)
+    across, up = ChartAxis("x", limits, log), ChartAxis("y", limits, log)
+    place = _Placement(
+        [Mark("dots", ([1.0], [1.0]), "fore")], across, up, (60.0, 660.0), (300.0, 0.0)
+    )
+    values = [1.0, 10.0, 100.0, 1000.0] if log else [-3.0, 2.0, 7.0, 12.0]
+    np.testing.assert_allclose(place.of(values, 0), [60.0, 260.0, 460.0, 660.0])
+    np.testing.assert_allclose(place.of(values, 1), [300.0, 200.0, 100.0, 0.0])
+
+
+@pytest.mark.parametrize("count", [12, 13, 40])
+def test_a_list_is_shortened_without_losing_count(count):
+    lines = shortened([str(k) for k in range(count)])
+    if count <= 12:
+        assert lines == [str(k) for k in range(count)]
+    else:
+        assert int(lines[-1].split()[1]) + len(lines) - 1 == count
