@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 import trueangle as ta
+from trueangle.diagnosis import believed
 from trueangle.diagnosis.beliefs import Belief
 from trueangle.diagnosis.correction import _ranges
 from trueangle.diagnosis.delay import Delay, delay_finding, error_before
@@ -216,7 +217,7 @@ def test_a_delay_is_told_from_where_the_account_stands(offset):
 
 
 def test_what_is_at_another_place_is_told_with_its_errors():
-    believed = LocalDefect(110.0, 8.0, 4.0)
+    claimed = LocalDefect(110.0, 8.0, 4.0)
     absent = Belief("local_defect", "absent", {"factor": 1.0}, {"factor": 0.0}, {"factor": 0.1})
     finding = Finding(
         "local_defect",
@@ -224,12 +225,27 @@ def test_what_is_at_another_place_is_told_with_its_errors():
          "height_arcsec": quantity(4.25, 0.125), "shaft": quantity("output")},
         {"bic_gain": 90.0}, None, [], [LocalDefect(200.0, 7.5, 4.25)],
     )  # fmt: skip
-    (found,), left = moved([absent], [finding], replace(SIM, effects=(believed,)))
+    (found,), left = moved([absent], [finding], replace(SIM, effects=(claimed,)))
     assert left == []
     assert found.verdict == "wrong_place"
     assert found.believed == {"place_deg": 110.0, "width_deg": 8.0, "height_arcsec": 4.0}
     assert found.measured == {"place_deg": 200.0, "width_deg": 7.5, "height_arcsec": 4.25}
     assert found.std == {"place_deg": 0.5, "width_deg": 0.25, "height_arcsec": 0.125}
+
+
+def test_a_line_in_doubt_has_the_evidence_that_is_left_of_its_search(monkeypatch, signals):
+    """Deviance less two coefficients and the choice among the believed lines."""
+    spot = Blindness(("missing_order", "reference_error"), "why", "what")
+    monkeypatch.setattr(believed, "doubts_about", lambda *_: spot)
+    lines = (*SIM.harmonics, Harmonic("output", 2, 5.0, 0.0), Harmonic("output", 3, 5.0, 0.0))
+    around = replace(SIM, harmonics=lines).surroundings
+    found = Regression.of(signals, np.zeros(len(signals)), around, rho=0.0)
+    change, spread, spots = np.array([3.0, -2.0]), np.array([[0.2, 0.1], [0.1, 0.4]]), []
+    assert believed._doubt(found, 2.0, change, spread, spots)
+    deviance = change @ np.linalg.inv(spread) @ change
+    (told,) = spots
+    assert told.evidence == pytest.approx(deviance - 2.0 * found.log_n - 2.0 * np.log(3.0))
+    assert told.supported
 
 
 # -- JSON ------------------------------------------------------------------------------
