@@ -17,9 +17,9 @@ from trueangle.diagnosis.goodness.periodogram import order_test, time_test
 from trueangle.diagnosis.goodness.place import ModulatedSums, place_tests
 from trueangle.diagnosis.goodness.scatter import scatter_tests
 from trueangle.diagnosis.goodness.steps import steps_test
-from trueangle.diagnosis.goodness.zeros import run_test
+from trueangle.diagnosis.goodness.zeros import run_test, variance_of_mean
 
-from .readings import leftover, motion
+from .readings import leftover
 from .test_events import readings
 
 #: Of a structure twice the noise in thousands of readings, its rms is told to a few percent; what
@@ -87,6 +87,17 @@ def test_a_structure_is_told_with_its_size_and_place(test: str) -> None:
     if len(told) == 2 and "place x" not in test and test != "place":
         assert found.at == pytest.approx(told[0], rel=0.01)
     assert str(told[0]) == "2.3" or "Hz" not in found.says
+
+
+def test_what_follows_the_direction_has_the_rms_of_the_readings_that_move() -> None:
+    """A joint that rests in three readings of four; its play of 2 is told as that."""
+    left = leftover("rich", "gauss", 78)
+    direction = np.where(np.arange(len(left)) % 4, 0.0, left.direction)
+    left = replace(left, residual=left.residual + 2.0 * direction, direction=direction)
+    found = next(e for e in place_tests(left) if e.test == "place x direction")
+    assert "at every place" in found.says
+    assert numbers(found.says) == pytest.approx([2.0], rel=NEAR)
+    assert found.rms == pytest.approx(1.0, rel=NEAR)
 
 
 @pytest.mark.parametrize("way", [1.0, -1.0])
@@ -287,7 +298,12 @@ def test_tails_are_called_what_they_are(kind: str, word: str) -> None:
     )
 
 
-def test_motions_of_the_designs_are_as_said() -> None:
-    """What the sizes above stand on: 24 runs, whose zeros take one degree of freedom."""
-    m = motion("rich", np.random.default_rng(1))
-    assert np.unique(m.run).size == 24
+def test_zeros_of_few_runs_differ_by_more_than_their_means_scatter() -> None:
+    """Of three: their variance has two degrees of freedom, and noise has a part in it."""
+    left = leftover("few", "gauss", 77, lambda m, rng: own(m, np.array([1.0, -1.0, 3.0])), 0.2)
+    noise = estimate_noise(left)
+    means = [float(left.residual[a:b].mean()) for a, b in left.bounds]
+    scatter = np.mean([variance_of_mean(b - a, noise) for a, b in left.bounds])
+    found = run_test(left, noise)
+    assert found.rms == pytest.approx(np.sqrt(np.var(means, ddof=1) - scatter))
+    assert found.statistic == pytest.approx(np.var(means, ddof=1) / scatter)
