@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.stats import ttest_1samp
+from scipy.stats import f, ttest_1samp
 
 from trueangle.diagnosis.goodness import FREE_PATH, LEVEL, Unexplained, goodness_of_fit
 from trueangle.diagnosis.goodness.events import CONSTANTS, reversal_test, start_test
@@ -15,7 +15,7 @@ from trueangle.diagnosis.goodness.evidence import Evidence
 from trueangle.diagnosis.goodness.noise import Noise, estimate_noise
 from trueangle.diagnosis.goodness.periodogram import order_test, time_test
 from trueangle.diagnosis.goodness.place import ModulatedSums, place_tests
-from trueangle.diagnosis.goodness.scatter import scatter_tests
+from trueangle.diagnosis.goodness.scatter import repeats, scatter_tests
 from trueangle.diagnosis.goodness.steps import steps_test
 from trueangle.diagnosis.goodness.zeros import run_test, variance_of_mean
 
@@ -201,9 +201,9 @@ def made(*evidence: Evidence) -> Unexplained:
 
 
 def test_tests_fire_at_one_percent_for_all_of_their_kind_together() -> None:
-    deciding = [item(f * LEVEL / 4.0) for f in (0.9, 1.1, 3.9)]
+    deciding = [item(part * LEVEL / 4.0) for part in (0.9, 1.1, 3.9)]
     path = item(0.7, 9.0, looks_like=FREE_PATH)
-    noise = [item(f * LEVEL / 3.0, decides=False) for f in (0.95, 1.05, 2.9)]
+    noise = [item(part * LEVEL / 3.0, decides=False) for part in (0.95, 1.05, 2.9)]
     fit = made(*deciding, path, *noise)
     assert fit.firing == [deciding[0], path]
     assert fit.noise_firing == [noise[0]]
@@ -274,6 +274,20 @@ def test_repeats_tell_the_noise_as_a_pattern_does(kind: str) -> None:
     assert np.mean(ratios) == pytest.approx(1.0, abs=0.01)
     # Of sixty at 5 % nine or more have a chance of 0.3 %.
     assert np.count_nonzero(np.array(p) < 0.05) < 9
+
+
+def test_repeats_count_as_many_independent_squares_as_there_are() -> None:
+    """Less a mean of each place and way, and of each run; squares are correlated by the square."""
+    left = repeated("ar 0.5", 7_900)
+    noise = estimate_noise(left)
+    value, freedom = repeats(left)
+    assert freedom == 1800 - 2 * 180 - 9
+    lags = np.arange(-60, 61)
+    worth = 1.0 / np.sum(noise.correlation ** (2.0 * np.abs(lags)))
+    found = {e.test: e for e in scatter_tests(left, noise)}["noise against repeats"]
+    assert found.statistic == pytest.approx(noise.sigma / value)
+    wanted = f.sf(found.statistic**2, worth * noise.freedom, worth * freedom)
+    assert found.p == pytest.approx(wanted, rel=1e-6)
 
 
 def test_the_zeros_of_runs_are_no_scatter_of_repeats() -> None:
