@@ -12,6 +12,7 @@ import trueangle as ta
 from trueangle.diagnosis import delay
 from trueangle.diagnosis.delay import Delay, delay_finding, error_before
 from trueangle.diagnosis.finding import Finding
+from trueangle.effects import EFFECTS
 from trueangle.estimation.regression import Regression
 from trueangle.joint.signals import join_runs
 from trueangle.simulation import Harmonic, Simulation
@@ -76,6 +77,9 @@ def told_delay(seed: int, offset: float) -> Finding:
     then, moved_error = error_before(signals, error, TRUE + offset)
     around = sim.surroundings
     chosen = Regression.of(then, moved_error - sim.predict(then), around, rho=0.0)
+    # Beside another cause, whose error is its own.
+    play = chosen.propose("backlash", {}, EFFECTS["backlash"].columns(then, around, {}))
+    chosen = chosen.with_terms([play])
     plain = Regression.of(signals, error - sim.predict(signals), around, rho=0.0)
     given = Delay(TRUE + offset, 1e-5)
     rest = SimpleNamespace(found=False, beside_path=0.0)
@@ -94,6 +98,9 @@ def test_a_delay_is_told_from_where_the_account_stands(offset):
     assert abs(np.mean(pulls)) < 5.0 / np.sqrt(40)
     # A deviation of 40 is known to 11 %.
     assert 0.6 < np.std(pulls) < 1.5
+    plain = plain.with_terms(
+        [replace(term, columns=plain.signals.direction[:, None]) for term in chosen.terms]
+    )
     saved = plain.deviance - chosen.deviance
     assert found.evidence == pytest.approx(
         {"deviance": saved, "bic_gain": saved - chosen.log_n, "parameters": 1.0, "log_grid": 0.0}

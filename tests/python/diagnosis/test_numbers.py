@@ -13,10 +13,13 @@ from trueangle.diagnosis.beliefs import Belief
 from trueangle.diagnosis.candidates import proposed
 from trueangle.diagnosis.correction import _ranges
 from trueangle.diagnosis.diagnose import _noise, _overall, _structure
+from trueangle.diagnosis.discrepancy import unfolded_error
 from trueangle.diagnosis.finding import Finding
 from trueangle.diagnosis.gain import _exchanged, _level
+from trueangle.diagnosis.gearedlines import GearedLines
+from trueangle.diagnosis.gearratio import find_ratio
 from trueangle.diagnosis.holdout import reducible_share
-from trueangle.diagnosis.named import findings_of
+from trueangle.diagnosis.named import _rivals, findings_of
 from trueangle.diagnosis.overlap import overlaps
 from trueangle.diagnosis.remainder import share_of_run
 from trueangle.diagnosis.wrongplace import moved
@@ -25,7 +28,7 @@ from trueangle.effects.blindness import Blindness
 from trueangle.estimation.estimate import quantity
 from trueangle.estimation.regression import Regression
 from trueangle.joint.signals import join_runs
-from trueangle.simulation import Harmonic, RunDesign, Simulation, simulate
+from trueangle.simulation import Harmonic, Joint, RunDesign, Simulation, simulate
 
 SIGMA = 1.3
 RUNS = tuple(
@@ -189,6 +192,26 @@ def test_a_finding_of_several_terms_has_the_evidence_of_all():
     for cause, gap in found.rivals:
         instead = proposed(start, cause)
         assert gap == pytest.approx(start.bic - instead.bic_gain - full.bic, abs=1e-6)
+
+
+def test_a_rival_that_explains_more_has_a_gap_below_zero(signals):
+    start = regression(signals, 3.0 * signals.direction)
+    full = start.with_terms([proposed(start, "latency")])
+    found = dict(_rivals(full, [0]))
+    assert found["backlash"] < -6.0
+    instead = proposed(start, "backlash")
+    assert found["backlash"] == pytest.approx(start.bic - instead.bic_gain - full.bic, abs=1e-6)
+
+
+def test_a_ratio_is_told_with_what_is_found_there_and_left_at_the_believed_one():
+    lines = (Harmonic("motor", 1, 12.0, 10.0), Harmonic("motor", 2, 8.0, 100.0))
+    believed = Simulation(Joint(50.0), lines, (), 1.0, RUNS)
+    runs = simulate(replace(believed, joint=Joint(53.0)), 7)
+    found = find_ratio(GearedLines.of(believed, join_runs(runs), unfolded_error(runs)))
+    assert (found.gear_ratio, found.believed) == (53.0, 50.0)
+    assert found.found > 0.95
+    assert found.left < 0.2
+    assert found.simulation.joint.gear_ratio == 53.0
 
 
 # -- beliefs at another place ----------------------------------------------------------
