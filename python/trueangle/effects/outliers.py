@@ -150,7 +150,8 @@ class Outliers(Effect):
             "fraction": quantity(
                 float(share), max(std, float(share) * float(np.clip(HIDDEN / size, 0.2, 1.0)))
             ),
-            "size_arcsec": quantity(float(spread), None),
+            # A deviation of so many readings.
+            "size_arcsec": quantity(float(spread), float(spread / np.sqrt(2.0 * rows.size))),
             **({"bursts": quantity(bursts)} if bursts else {}),
             "rows": quantity(
                 [

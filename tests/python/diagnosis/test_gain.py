@@ -9,7 +9,7 @@ import pytest
 
 from trueangle.diagnosis.gain import Gain, _control, _shuffled, _units, measure_delay_gain
 from trueangle.diagnosis.holdout import Law, numbers, residual_at
-from trueangle.diagnosis.levels import LevelGain, _reach, run_levels
+from trueangle.diagnosis.levels import LevelGain, _reach, gains_by_level, run_levels
 from trueangle.effects import EFFECTS
 from trueangle.estimation.regression import Regression
 from trueangle.joint.signals import Signals, join_runs
@@ -180,6 +180,31 @@ def test_levels_are_of_what_each_run_is_at(sign: float) -> None:
     assert len(found) == 5
     assert level[::80].tolist() == [0, 0, 1, 2, 2, 3, 4]
     assert found == pytest.approx([22.5, 30.0, 37.5, 45.0, 50.0], abs=0.02)
+
+
+def test_a_law_is_held_against_each_level_that_was_left_out() -> None:
+    """A delay at three speeds: before, its error and the noise; after, the noise alone."""
+    given = signals_of(np.array([0.0, 8.0, 20.0] * 2), 200)
+    effect, around = EFFECTS["latency"], Simulation().surroundings
+    column = effect.columns(given, around, {})[:, 0]
+    error = column * (6.0 / np.std(column))
+    noise = np.random.default_rng(15).standard_normal(len(given))
+    fitted = Regression.of(given, error + noise, around, rho=0.0)
+    fitted = fitted.with_terms([effect.propose(fitted)])
+    rng = np.random.default_rng(16)
+    found = gains_by_level(fitted, [[0]], False, given.run, rng)[0]
+    assert (found.factor, found.unit) == ("velocity", "deg/s")
+    assert found.levels == found.held_out == pytest.approx([10.0, 18.0, 30.0])
+    assert found.rms_before == pytest.approx(np.hypot(6.0, 1.0), rel=0.03)
+    assert found.rms_after == pytest.approx(1.0, rel=0.05)
+    assert found.reducible_share == pytest.approx(1.0, abs=0.01)
+    # One that shows at the fastest speed alone is not asked where it does not show.
+    weak = Regression.of(given, 0.012 * error + noise, around, rho=0.0)
+    weak = weak.with_terms([effect.propose(weak)])
+    found = gains_by_level(weak, [[0]], False, given.run, rng)[0]
+    assert found.levels == pytest.approx([10.0, 18.0, 30.0])
+    assert found.held_out == []
+    assert (found.rms_before, found.rms_after, found.reducible_share) == (None, None, None)
 
 
 @pytest.mark.parametrize(

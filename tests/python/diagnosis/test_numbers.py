@@ -1,23 +1,25 @@
-"""Figures of an account by what they are said to be, and each under its own name in JSON."""
+"""Figures of an account by what they are said to be."""
 
 from __future__ import annotations
 
-import json
 from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-import trueangle as ta
+from trueangle.diagnosis import believed
 from trueangle.diagnosis.beliefs import Belief
+from trueangle.diagnosis.candidates import proposed
 from trueangle.diagnosis.correction import _ranges
-from trueangle.diagnosis.delay import Delay, delay_finding, error_before
 from trueangle.diagnosis.diagnose import _noise, _overall, _structure
-from trueangle.diagnosis.discrepancy import Discrepancy
+from trueangle.diagnosis.discrepancy import unfolded_error
 from trueangle.diagnosis.finding import Finding
 from trueangle.diagnosis.gain import _exchanged, _level
+from trueangle.diagnosis.gearedlines import GearedLines
+from trueangle.diagnosis.gearratio import find_ratio
 from trueangle.diagnosis.holdout import reducible_share
+from trueangle.diagnosis.named import _rivals, findings_of
 from trueangle.diagnosis.overlap import overlaps
 from trueangle.diagnosis.remainder import share_of_run
 from trueangle.diagnosis.wrongplace import moved
@@ -26,7 +28,7 @@ from trueangle.effects.blindness import Blindness
 from trueangle.estimation.estimate import quantity
 from trueangle.estimation.regression import Regression
 from trueangle.joint.signals import join_runs
-from trueangle.simulation import Harmonic, RunDesign, Simulation, simulate
+from trueangle.simulation import Harmonic, Joint, RunDesign, Simulation, simulate
 
 SIGMA = 1.3
 RUNS = tuple(
@@ -158,65 +160,65 @@ def test_ranges_of_signals_are_those_of_all_runs():
     assert found["temperature"] == pytest.approx((20.0, 20.0))
 
 
-# -- a delay that moves the pattern ----------------------------------------------------
-
-TRUE = 0.025
-
-
-def delayed(seed: int) -> tuple:
-    """Sweeps there and back whose pattern is that of an angle 25 ms before; and an offset of it."""
-    rng = np.random.default_rng(seed)
-    time = np.arange(600) / 50.0
-    runs = []
-    for swing in (90.0, 140.0):
-
-        def angle(at, swing=swing):
-            return 200.0 - swing * np.cos(2.0 * np.pi * at / 12.0)  # fmt: skip
-
-        then = angle(time - TRUE)
-        indicated = then + 2.0 * np.sin(np.radians(4.0 * then)) + rng.normal(0.0, 0.02, time.size)
-        runs.append(ta.CalibrationRun(angle(time), indicated, period=360.0, time=time))
-    signals = join_runs(runs)
-    error = np.concatenate([3600.0 * (run.indicated - run.reference) for run in runs])
-    pattern = Harmonic("output", 4, 7200.0, 0.0)
-    sim = Simulation(harmonics=(pattern,))
-    return signals, error, sim
-
-
-def told_delay(seed: int, offset: float) -> Finding:
-    signals, error, sim = delayed(seed)
-    then, moved_error = error_before(signals, error, TRUE + offset)
-    around = sim.surroundings
-    chosen = Regression.of(then, moved_error - sim.predict(then), around, rho=0.0)
-    plain = Regression.of(signals, error - sim.predict(signals), around, rho=0.0)
-    given = Delay(TRUE + offset, 1e-5)
-    rest = SimpleNamespace(found=False, beside_path=0.0)
-    return delay_finding(given, chosen, plain, False, rest), chosen, plain
-
-
-@pytest.mark.parametrize("offset", [-1e-4, 1e-4])
-def test_a_delay_is_told_from_where_the_account_stands(offset):
-    """The rest of it is added with its sign, and its error is by how much seeds scatter."""
-    pulls = []
-    for seed in range(40):
-        found, chosen, plain = told_delay(7_300 + seed, offset)
-        told = found.parameters["delay_s"]
-        pulls.append((told.value - TRUE) / told.std)
-        assert found.effects[0].delay_s == told.value
-    assert abs(np.mean(pulls)) < 5.0 / np.sqrt(40)
-    # A deviation of 40 is known to 11 %.
-    assert 0.6 < np.std(pulls) < 1.5
-    saved = plain.deviance - chosen.deviance
-    assert found.evidence == pytest.approx(
-        {"deviance": saved, "bic_gain": saved - chosen.log_n, "parameters": 1.0, "log_grid": 0.0}
+def test_a_finding_of_several_terms_has_the_evidence_of_all():
+    """And what stands in its place explains so much less: by the BIC of either account."""
+    runs = tuple(
+        replace(run, temperature_C=t) for run, t in zip(RUNS, (20, 35, 28, 42), strict=True)
     )
+    signals = join_runs(simulate(replace(SIM, runs=runs), 2))
+    effect, around = EFFECTS["thermal_drift"], SIM.surroundings
+    shapes = [{"what": "zero"}, {"what": "line", "order": 3.0}]
+    columns = [effect.columns(signals, around, shape) for shape in shapes]
+    start = regression(signals, columns[0][:, 0] * 0.6 + columns[1][:, 0] * 0.4)
+    terms = [
+        start.propose(effect.kind, shape, x, 3 + k, 0.5 + k)
+        for k, (shape, x) in enumerate(zip(shapes, columns, strict=True))
+    ]
+    full = start.with_terms(terms)
+    rest = SimpleNamespace(found=False, beside_path=0.0)
+    (found,), spots, doubtful = findings_of(full, [], False, rest)
+    assert (found.cause, spots, doubtful) == ("thermal_drift", [], [])
+    assert found.evidence == pytest.approx(
+        {
+            "bic_gain": sum(t.bic_gain for t in full.terms),
+            "deviance": sum(t.deviance for t in full.terms),
+            "parameters": 7.0,
+            "log_grid": 2.0,
+        }
+    )
+    assert len(found.rivals) == 3
+    gaps = [gap for _, gap in found.rivals]
+    assert gaps == sorted(gaps)
+    for cause, gap in found.rivals:
+        instead = proposed(start, cause)
+        assert gap == pytest.approx(start.bic - instead.bic_gain - full.bic, abs=1e-6)
+
+
+def test_a_rival_that_explains_more_has_a_gap_below_zero(signals):
+    start = regression(signals, 3.0 * signals.direction)
+    full = start.with_terms([proposed(start, "latency")])
+    found = dict(_rivals(full, [0]))
+    assert found["backlash"] < -6.0
+    instead = proposed(start, "backlash")
+    assert found["backlash"] == pytest.approx(start.bic - instead.bic_gain - full.bic, abs=1e-6)
+
+
+def test_a_ratio_is_told_with_what_is_found_there_and_left_at_the_believed_one():
+    lines = (Harmonic("motor", 1, 12.0, 10.0), Harmonic("motor", 2, 8.0, 100.0))
+    believed = Simulation(Joint(50.0), lines, (), 1.0, RUNS)
+    runs = simulate(replace(believed, joint=Joint(53.0)), 7)
+    found = find_ratio(GearedLines.of(believed, join_runs(runs), unfolded_error(runs)))
+    assert (found.gear_ratio, found.believed) == (53.0, 50.0)
+    assert found.found > 0.95
+    assert found.left < 0.2
+    assert found.simulation.joint.gear_ratio == 53.0
 
 
 # -- beliefs at another place ----------------------------------------------------------
 
 
 def test_what_is_at_another_place_is_told_with_its_errors():
-    believed = LocalDefect(110.0, 8.0, 4.0)
+    claimed = LocalDefect(110.0, 8.0, 4.0)
     absent = Belief("local_defect", "absent", {"factor": 1.0}, {"factor": 0.0}, {"factor": 0.1})
     finding = Finding(
         "local_defect",
@@ -224,7 +226,7 @@ def test_what_is_at_another_place_is_told_with_its_errors():
          "height_arcsec": quantity(4.25, 0.125), "shaft": quantity("output")},
         {"bic_gain": 90.0}, None, [], [LocalDefect(200.0, 7.5, 4.25)],
     )  # fmt: skip
-    (found,), left = moved([absent], [finding], replace(SIM, effects=(believed,)))
+    (found,), left = moved([absent], [finding], replace(SIM, effects=(claimed,)))
     assert left == []
     assert found.verdict == "wrong_place"
     assert found.believed == {"place_deg": 110.0, "width_deg": 8.0, "height_arcsec": 4.0}
@@ -232,66 +234,16 @@ def test_what_is_at_another_place_is_told_with_its_errors():
     assert found.std == {"place_deg": 0.5, "width_deg": 0.25, "height_arcsec": 0.125}
 
 
-# -- JSON ------------------------------------------------------------------------------
-
-
-def test_every_figure_of_an_account_has_its_own_key():
-    result = ta.diagnose(simulate(SIM, 2), SIM, gain=False)
-    sizes = {f"{n}_{w}_arcsec": float(10 * k + j) for k, n in enumerate(("rms", "max_abs"), 2)
-             for j, w in enumerate(("before", "after"))}  # fmt: skip
-    spot = Blindness(("backlash", "latency"), "why", "what", True, 9.5, common="backlash")
-    made = replace(
-        result,
-        discrepancy=Discrepancy(1.5, 2.5, 3.5, 4.5, 5.5),
-        structure={"backlash": 0.25},
-        noise=6.5,
-        correlation=0.375,
-        readings=701,
-        readings_used=650,
-        gain=sizes,
-        not_identifiable=[spot],
-        notes=["a note"],
-        complete=False,
-        unexplained=replace(result.unexplained, found=True, rms=7.5, share=0.125),
-        unexplained_before=replace(result.unexplained, found=False, rms=8.5, share=0.625),
-    )
-    told = json.loads(made.to_json("joint.toml"))
-    assert told["simulation"] == {
-        "rms_arcsec": 1.5, "peak_to_peak_arcsec": 2.5, "max_abs_arcsec": 3.5,
-        "closure_arcsec": 4.5, "zero_spread_arcsec": 5.5,
-    }  # fmt: skip
-    names = ("structure", "noise_arcsec", "noise_correlation", "readings", "readings_used", "gain")
-    assert [told[name] for name in names] == [{"backlash": 0.25}, 6.5, 0.375, 701, 650, sizes]
-    assert (told["complete"], told["notes"]) == (False, ["a note"])
-    assert told["extended_simulation"] == "joint.toml"
-    rest, before = told["unexplained"], told["unexplained"]["before"]
-    assert (rest["found"], rest["rms_arcsec"], rest["share"]) == (True, 7.5, 0.125)
-    assert (before["found"], before["rms_arcsec"], before["share"]) == (False, 8.5, 0.625)
-    assert told["not_identifiable"] == [
-        {"causes": ["backlash", "latency"], "because": "why", "measure": "what",
-         "supported": True, "bic_gain": 9.5, "estimates": {}}
-    ]  # fmt: skip
-    for item, entry in zip(made.unexplained.evidence, rest["evidence"], strict=True):
-        assert (entry["test"], entry["p"], entry["decides"]) == (item.test, item.p, item.decides)
-        assert entry["statistic"] == item.statistic
-
-
-@pytest.mark.parametrize(("cause", "correctable"), [("backlash", True), ("zero_slip", False)])
-def test_every_figure_of_a_finding_has_its_own_key(cause, correctable):
-    finding = Finding(
-        cause,
-        {"size": quantity(1.5, 0.25)},
-        {"bic_gain": 2.5, "deviance": 3.5},
-        None,
-        [("latency", 4.5), ("sidebands", -5.5)],
-        status="not_confirmed",
-        reason="why",
-    )
-    told = finding.to_dict()
-    assert told["parameters"] == {"size": {"value": 1.5, "std": 0.25}}
-    assert told["evidence"] == {"bic_gain": 2.5, "deviance": 3.5}
-    assert told["rivals"] == [{"cause": "latency", "bic_gap": 4.5},
-                              {"cause": "sidebands", "bic_gap": -5.5}]  # fmt: skip
-    assert (told["status"], told["status_reason"], told["gain"]) == ("not_confirmed", "why", None)
-    assert told["physics"] == EFFECTS[cause].sentence
-    assert told["correctable"] is correctable
+def test_a_line_in_doubt_has_the_evidence_that_is_left_of_its_search(monkeypatch, signals):
+    """Deviance less two coefficients and the choice among the believed lines."""
+    spot = Blindness(("missing_order", "reference_error"), "why", "what")
+    monkeypatch.setattr(believed, "doubts_about", lambda *_: spot)
+    lines = (*SIM.harmonics, Harmonic("output", 2, 5.0, 0.0), Harmonic("output", 3, 5.0, 0.0))
+    around = replace(SIM, harmonics=lines).surroundings
+    found = Regression.of(signals, np.zeros(len(signals)), around, rho=0.0)
+    change, spread, spots = np.array([3.0, -2.0]), np.array([[0.2, 0.1], [0.1, 0.4]]), []
+    assert believed._doubt(found, 2.0, change, spread, spots)
+    deviance = change @ np.linalg.inv(spread) @ change
+    (told,) = spots
+    assert told.evidence == pytest.approx(deviance - 2.0 * found.log_n - 2.0 * np.log(3.0))
+    assert told.supported

@@ -10,12 +10,14 @@ import pytest
 
 import trueangle as ta
 from trueangle.diagnosis.beliefs import Belief
+from trueangle.diagnosis.brief import brief_of
 from trueangle.diagnosis.finding import Finding
 from trueangle.diagnosis.gain import Gain
 from trueangle.diagnosis.levels import LevelGain
 from trueangle.diagnosis.summary import diagnosis_summary, finding_text
 from trueangle.estimation.estimate import quantity
 from trueangle.simulation import Simulation
+from trueangle.support.display_units import error_unit
 
 LEVEL = LevelGain(
     "velocity", "deg/s", [5.0, 30.0], [30.0], 61.0, 62.0, 0.63, (0.64, 0.65), "far enough"
@@ -130,3 +132,41 @@ def test_what_is_not_understood_is_told_by_size_share_and_chance(result) -> None
     assert "NOT UNDERSTOOD: at least 5.500 arcsec rms (38 % of the variance that is left)" in text
     assert "- first of 12 arcsec (p below 1e-12)" in text
     assert "- second (p 0.002)" in text
+
+
+#: A finding by its parameters, and what is said of it in a few words.
+BRIEFLY = {
+    "latency": ({"delay_s": 0.00125}, "latency (1.25 ms)"),
+    "timestamp_jitter": ({"sigma_s": 2.5e-4}, "timestamp_jitter (0.25 ms)"),
+    "scale_error": ({"relative_error": -4.5e-6}, "scale_error (-4.5 ppm)"),
+    "clock_drift": ({"ppm": 3.5}, "clock_drift (3.5 ppm)"),
+    "filter_lag": ({"cutoff_hz": 22.5}, "filter_lag (22.5 Hz)"),
+    "outliers": ({"fraction": 0.025}, "outliers (2.5 % of the readings)"),
+    "torsional_compliance": ({"arcsec_per_Nm": 1.5}, "torsional_compliance (1.5 arcsec per Nm)"),
+    "backlash": ({"half_width_arcsec": 7.2}, "backlash (0.002000 deg)"),
+    "sidebands": (
+        {"carrier": 102.0, "amplitudes": [3.6, 7.2]},
+        "sidebands of order 102 (0.001000, 0.002000 deg)",
+    ),
+    "missing_order": (
+        {"shaft": "wave_generator", "order": 2, "amplitude_arcsec": 36.0},
+        "missing_order wave generator order 2 (0.01000 deg)",
+    ),
+    "time_periodic": (
+        {"frequency_hz": 49.96, "amplitude_arcsec": 3.6},
+        "time_periodic 49.96 Hz (0.001000 deg)",
+    ),
+    "local_defect": (
+        {"place_deg": 211.5, "height_arcsec": 3.6},
+        "local_defect at 211.5 deg (0.001000 deg)",
+    ),
+    "drift_within_run": ({"arcsec_per_run": 3.6}, "drift_within_run (0.001000 deg)"),
+}
+
+
+@pytest.mark.parametrize("cause", BRIEFLY)
+def test_a_finding_is_told_in_brief_with_its_size_in_its_unit(cause) -> None:
+    given, said = BRIEFLY[cause]
+    parameters = {name: quantity(value) for name, value in given.items()}
+    found = brief_of(Finding(cause, parameters, {}, None, []), error_unit("deg", 1.0))
+    assert re.sub(r"(\.\d*?[1-9])0+(?= (ms|ppm|Hz|%|arcsec))", r"\1", found) == said

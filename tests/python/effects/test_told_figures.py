@@ -40,7 +40,7 @@ def test_outliers_are_told_by_share_size_and_row():
         for k, part in enumerate(np.split(angle, cuts))
     ]
     signals = join_runs(runs)
-    pulls, told, bursts, missed, wrong = [], [], [], 0, 0
+    pulls, pulls_of_size, told, bursts, missed, wrong = [], [], [], [], 0, 0
     print(f"seeds {PULLS}")
     for seed in PULLS:
         rng = np.random.default_rng(seed)
@@ -65,9 +65,15 @@ def test_outliers_are_told_by_share_size_and_row():
         fraction = parameters["fraction"]
         pulls.append((fraction.value - share) / fraction.std)
         told.append(parameters["size_arcsec"].value)
+        # A deviation of a few numbers is skewed, and its logarithm is not.
+        relative = parameters["size_arcsec"].std / told[-1]
+        pulls_of_size.append(np.log(told[-1] / size) / relative)
     print(np.mean(pulls), np.std(pulls), np.sqrt(np.mean(np.square(told))), missed, wrong)
     assert WIDE[0] < np.std(pulls) < WIDE[1]
     assert abs(np.mean(pulls)) < 0.4
+    print(np.mean(pulls_of_size), np.std(pulls_of_size))
+    assert WIDE[0] < np.std(pulls_of_size) < WIDE[1]
+    assert abs(np.mean(pulls_of_size)) < 0.4
     # Two next to each other, of unlike size, may pass for a transition.
     assert missed + wrong < 0.02 * len(PULLS) * share * angle.size
     # Some 960 of them: their deviation is known to 2.3 %.

@@ -9,17 +9,15 @@ import numpy as np
 import pytest
 from scipy.stats import ttest_1samp
 
-from trueangle.diagnosis.goodness import FREE_PATH, LEVEL, Unexplained, goodness_of_fit
+from trueangle.diagnosis.goodness import goodness_of_fit
 from trueangle.diagnosis.goodness.events import CONSTANTS, reversal_test, start_test
-from trueangle.diagnosis.goodness.evidence import Evidence
-from trueangle.diagnosis.goodness.noise import Noise, estimate_noise
+from trueangle.diagnosis.goodness.noise import estimate_noise
 from trueangle.diagnosis.goodness.periodogram import order_test, time_test
 from trueangle.diagnosis.goodness.place import ModulatedSums, place_tests
-from trueangle.diagnosis.goodness.scatter import scatter_tests
 from trueangle.diagnosis.goodness.steps import steps_test
 from trueangle.diagnosis.goodness.zeros import run_test
 
-from .readings import leftover, motion
+from .readings import leftover
 from .test_events import readings
 
 #: Of a structure twice the noise in thousands of readings, its rms is told to a few percent; what
@@ -87,6 +85,17 @@ def test_a_structure_is_told_with_its_size_and_place(test: str) -> None:
     if len(told) == 2 and "place x" not in test and test != "place":
         assert found.at == pytest.approx(told[0], rel=0.01)
     assert str(told[0]) == "2.3" or "Hz" not in found.says
+
+
+def test_what_follows_the_direction_has_the_rms_of_the_readings_that_move() -> None:
+    """A joint that rests in three readings of four; its play of 2 is told as that."""
+    left = leftover("rich", "gauss", 78)
+    direction = np.where(np.arange(len(left)) % 4, 0.0, left.direction)
+    left = replace(left, residual=left.residual + 2.0 * direction, direction=direction)
+    found = next(e for e in place_tests(left) if e.test == "place x direction")
+    assert "at every place" in found.says
+    assert numbers(found.says) == pytest.approx([2.0], rel=NEAR)
+    assert found.rms == pytest.approx(1.0, rel=NEAR)
 
 
 @pytest.mark.parametrize("way", [1.0, -1.0])
@@ -176,118 +185,3 @@ def test_the_chance_of_modulated_sums_is_that_of_student() -> None:
         wanted = ttest_1samp(signs * sums, 0.0).pvalue
         assert ModulatedSums(sums, -1.0).chance(signs) == pytest.approx(wanted, rel=1e-9)
     assert ModulatedSums(sums, 0.0).chance() == 1.0
-
-
-# -- the decision ----------------------------------------------------------------------
-
-
-def item(p: float, rms: float = 1.0, decides: bool = True, looks_like: str = "") -> Evidence:
-    return Evidence(f"{p:g}", 1.0, p, "", decides, rms, None, looks_like)
-
-
-def made(*evidence: Evidence) -> Unexplained:
-    return Unexplained(True, 1.0, 1.0, list(evidence), Noise(1.0, 0.0, 0.1, 0.0, 10.0))
-
-
-def test_tests_fire_at_one_percent_for_all_of_their_kind_together() -> None:
-    deciding = [item(f * LEVEL / 4.0) for f in (0.9, 1.1, 3.9)]
-    path = item(0.7, 9.0, looks_like=FREE_PATH)
-    noise = [item(f * LEVEL / 3.0, decides=False) for f in (0.95, 1.05, 2.9)]
-    fit = made(*deciding, path, *noise)
-    assert fit.firing == [deciding[0], path]
-    assert fit.noise_firing == [noise[0]]
-
-
-def test_what_is_beside_a_path_is_the_largest_that_fires() -> None:
-    fit = made(item(0.0, 2.0), item(0.0, 5.0), item(0.0, 9.0, looks_like=FREE_PATH), item(0.9, 7.0))
-    assert fit.beside_path == 5.0
-    assert made(item(0.0, 9.0, looks_like=FREE_PATH)).beside_path == 0.0
-    assert made(item(0.0, 0.0)).beside_path > 0.0
-
-
-def test_the_share_is_of_the_variance_with_paths_in_time() -> None:
-    left = leftover("rich", "gauss", 71, HIDDEN["place"][0], 2.0)
-    slow = replace(left, residual=left.residual + 3.0 * np.sin(left.clock / 40.0))
-    path = item(0.3, 2.5, looks_like=FREE_PATH)
-    for loose, beside in ((None, None), (slow, path)):
-        fit = goodness_of_fit(left, 40.0, loose=loose, path=beside)
-        assert fit.found
-        assert fit.rms == pytest.approx(max(e.rms for e in fit.firing))
-        assert fit.share == pytest.approx(fit.rms**2 / np.var((loose or left).residual))
-    assert fit.rms == pytest.approx(2.5)
-
-
-# -- the noise -------------------------------------------------------------------------
-
-
-def test_white_noise_is_that_of_least_squares_beside_the_pattern() -> None:
-    """By lstsq: a mean of each run and lines, alike and by direction; their degrees of freedom."""
-    left = leftover("few", "uniform", 74)
-    found = estimate_noise(left, orders=2)
-    d, x = left.direction[:, None], np.outer(left.theta, [1.0, 2.0])
-    waves = np.hstack([np.cos(x), np.sin(x)])
-    runs = (left.run[:, None] == np.unique(left.run)).astype(float)
-    design = np.hstack([runs, waves, d, d * waves])
-    rest, rank = np.linalg.lstsq(design, left.residual, rcond=None)[1:3]
-    assert found.correlation == 0.0
-    assert found.freedom == len(left) - rank == 900 - 3 - 9
-    assert found.sigma == pytest.approx(np.sqrt(rest[0] / found.freedom), rel=1e-9)
-
-
-def test_the_error_of_a_correlation_is_by_how_much_seeds_scatter() -> None:
-    """Of 150 pulls the deviation is known to 6 %."""
-    found = [estimate_noise(leftover("few", "ar 0.5", 7_500 + s)) for s in range(150)]
-    pulls = [(noise.correlation - 0.5) / noise.std for noise in found]
-    print(np.mean(pulls), np.std(pulls))
-    assert 0.8 < np.std(pulls) < 1.2
-    assert abs(np.mean(pulls)) < 0.4
-
-
-def repeated(kind: str, seed: int):
-    """Ten runs at the same places, of a pattern that each run shares."""
-    left = leftover("grid", kind, seed)
-    return replace(left, residual=left.residual + 3.0 * np.sin(11.0 * left.theta))
-
-
-@pytest.mark.parametrize("kind", ["gauss", "ar 0.5"])
-def test_repeats_tell_the_noise_as_a_pattern_does(kind: str) -> None:
-    """Both are of the same readings: the p value may be careful, never hasty."""
-    p, ratios = [], []
-    for seed in range(60):
-        left = repeated(kind, 7_700 + seed)
-        found = {e.test: e for e in scatter_tests(left, estimate_noise(left))}
-        p.append(found["noise against repeats"].p)
-        ratios.append(found["noise against repeats"].statistic)
-    print(np.mean(ratios), np.std(ratios), sorted(p)[:4])
-    # Noise of all readings over that of what repeats, each known to 2 %, the same readings.
-    assert np.mean(ratios) == pytest.approx(1.0, abs=0.01)
-    # Of sixty at 5 % nine or more have a chance of 0.3 %.
-    assert np.count_nonzero(np.array(p) < 0.05) < 9
-
-
-def test_the_zeros_of_runs_are_no_scatter_of_repeats() -> None:
-    left = repeated("gauss", 7_800)
-    plain = {e.test: e.statistic for e in scatter_tests(left, estimate_noise(left))}
-    moved = replace(left, residual=left.residual + 50.0 * np.cos(9.0 * left.run), kept={})
-    other = {e.test: e.statistic for e in scatter_tests(moved, estimate_noise(moved))}
-    assert other["noise against repeats"] == pytest.approx(plain["noise against repeats"])
-
-
-@pytest.mark.parametrize(("kind", "word"), [("t5", "heavier"), ("uniform", "lighter")])
-def test_tails_are_called_what_they_are(kind: str, word: str) -> None:
-    left = leftover("rich", kind, 76)
-    found = {e.test: e for e in scatter_tests(left, estimate_noise(left), 2.0, 6.0)}
-    assert word in found["tails"].says
-    # Rounding adds a twelfth of the square of its step to what is stated.
-    assert numbers(found["noise against the simulation's"].says)[-1] == pytest.approx(
-        2.65, abs=0.01
-    )
-    assert found["noise against the simulation's"].statistic == pytest.approx(
-        1.0 / np.sqrt(7.0), rel=0.03
-    )
-
-
-def test_motions_of_the_designs_are_as_said() -> None:
-    """What the sizes above stand on: 24 runs, whose zeros take one degree of freedom."""
-    m = motion("rich", np.random.default_rng(1))
-    assert np.unique(m.run).size == 24
