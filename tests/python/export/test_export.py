@@ -78,3 +78,17 @@ def test_the_order_that_loses_most_is_the_one_that_the_summary_names() -> None:
     assert said is not None
     assert float(said[1]) == worst["order"]
     assert float(said[2]) == pytest.approx(worst["arcsec"], rel=0.01)
+
+
+@pytest.mark.parametrize("target", ["csv", "c"])
+def test_the_smallest_table_leaves_room_for_what_is_beside_it(target: str) -> None:
+    """A bound that the smallest table keeps without the terms, and not with them."""
+    model = described()
+    options = {"bits": 12}
+    size = {"csv": 36, "c": 8}[target]
+    small = ta.export_model(model, target, entries=size, **options)
+    beside = small.max_difference_total_arcsec - small.max_difference_arcsec
+    asked = beside + 0.9 * small.max_difference_arcsec
+    made = ta.export_model(model, target, max_arcsec=asked, **options)
+    assert made.max_difference_total_arcsec <= asked
+    assert made.entries > small.entries
