@@ -182,8 +182,9 @@ def test_a_certificate_counts_readings_and_zeros(period):
     for number in range(3):
         error = 40.0 * np.sin(2.0 * np.pi * turn) + rng.normal(size=72) + 36.0 * (number - 1)
         error[20] += 300.0 * (number > 0)
-        runs.append(ta.CalibrationRun(period * turn, period * (turn + error / ARCSEC), period,
-                                      temperature=np.full(72, 19.0 + number)))  # fmt: skip
+        heat = np.full(72, (20.0, 19.0, 21.0)[number])
+        read = period * (turn + error / ARCSEC)
+        runs.append(ta.CalibrationRun(period * turn, read, period, temperature=heat))
     made = certify(runs, Identity("1", "joint"), orders=[1]).content
     read = made["readings"]
     assert (read["readings"], read["runs"], read["mounts"], read["outliers"]) == (216, 3, 1, 2)
