@@ -102,10 +102,12 @@ class TurnPattern:
     @property
     def lines(self) -> dict[float, float]:
         """Amplitude in turns of every output order."""
-        found: dict[float, float] = {}
-        for order, amplitude in zip(self.model.orders, self.model.amplitudes, strict=True):
-            found[order] = math.hypot(found.get(order, 0.0), amplitude / self.period)
-        return dict(sorted(found.items()))
+        model = self.model
+        found: dict[float, complex] = {}
+        for order, size, phase in zip(model.orders, model.amplitudes, model.phases, strict=True):
+            wave = complex(size / self.period * np.exp(1j * phase))
+            found[order] = found.get(order, 0j) + wave
+        return {order: abs(wave) for order, wave in sorted(found.items())}
 
     @property
     def uncertainty_arcsec(self) -> float | None:

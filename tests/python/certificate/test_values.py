@@ -8,7 +8,14 @@ import numpy as np
 import pytest
 
 import trueangle as ta
-from trueangle.certificate import Budget, Contribution, Specification, conformity
+from trueangle.certificate import (
+    Budget,
+    Contribution,
+    Identity,
+    Specification,
+    certify,
+    conformity,
+)
 from trueangle.certificate.asleft import corrected_runs
 from trueangle.certificate.values import left_at_places, reversal_halfwidth
 
@@ -148,3 +155,63 @@ def test_readings_as_left_are_the_same_in_every_unit(runs_in, model_in):
     same = left(360.0, 360.0)
     assert np.ptp(same) > 1e-3
     np.testing.assert_allclose(left(runs_in, model_in), same, rtol=0.0, atol=1e-12)
+
+
+def test_the_least_chance_need_not_be_the_worst_positions():
+    """Of two that pass by simple acceptance the nearer to the limit is known better."""
+    rows = [
+        {
+            "angle_deg": 0.0, "error_arcsec": e, "standard_arcsec": u,
+            "degrees_of_freedom": None, "expanded_arcsec": 2.0 * u,
+        }
+        for e, u in [(8.0, 0.5), (7.0, 3.0)]
+    ]  # fmt: skip
+    from scipy.stats import norm
+
+    found = conformity(Specification(10.0, "simple"), rows)
+    assert found["worst"]["error_arcsec"] == 8.0
+    assert found["conformance_probability"] == pytest.approx(norm.cdf(1.0) - norm.cdf(-17.0 / 3.0))
+
+
+@pytest.mark.parametrize("period", UNITS)
+def test_a_certificate_counts_readings_and_zeros(period):
+    """Zeros of three runs scatter by 36 arcsec; one reading of two runs is off, in one row."""
+    rng = np.random.default_rng(SEED + 5)
+    turn = np.arange(72) / 72.0
+    runs = []
+    for number in range(3):
+        error = 40.0 * np.sin(2.0 * np.pi * turn) + rng.normal(size=72) + 36.0 * (number - 1)
+        error[20] += 300.0 * (number > 0)
+        heat = np.full(72, (20.0, 19.0, 21.0)[number])
+        read = period * (turn + error / ARCSEC)
+        runs.append(ta.CalibrationRun(period * turn, read, period, temperature=heat))
+    made = certify(runs, Identity("1", "joint"), orders=[1]).content
+    read = made["readings"]
+    assert (read["readings"], read["runs"], read["mounts"], read["outliers"]) == (216, 3, 1, 2)
+    assert read["zero_spread_arcsec"] == pytest.approx(36.0, abs=0.5)
+    assert read["standard_deviation_arcsec"] == pytest.approx(1.0, abs=4.5 / np.sqrt(2.0 * 211.0))
+    assert read["zero_deg"] == pytest.approx(0.0, abs=0.5 / 3600.0)
+    assert made["temperature_recorded_C"] == {"mean": 20.0, "low": 19.0, "high": 21.0}
+    (line,) = made["harmonics"]
+    assert line["amplitude_arcsec"] == pytest.approx(40.0, abs=0.5)
+    # Two of nearly 200 degrees of freedom.
+    expected = 2.0 * read["standard_deviation_arcsec"] * np.sqrt(2.0 / 214.0)
+    assert line["amplitude_expanded_arcsec"] == pytest.approx(expected, rel=0.05)
+
+
+@pytest.mark.parametrize("period", UNITS)
+def test_an_order_of_few_readings_has_their_factor(period):
+    """Of 8 readings 5 degrees of freedom are left: 2.65 standard errors, of its phase too."""
+    from scipy.stats import t
+
+    turn = np.arange(8) / 8.0
+    error = 40.0 * np.sin(2.0 * np.pi * turn + 0.5)
+    error += np.random.default_rng(SEED + 6).normal(size=8)
+    run = ta.CalibrationRun(period * turn, period * (turn + error / ARCSEC), period)
+    fit = ta.fit(run, orders=[1])
+    (line,) = certify(run, Identity("1", "joint"), fit=fit).content["harmonics"]
+    factor = t.ppf(0.97725, 5)
+    std = float(fit.amplitude_std[0]) * ARCSEC / period
+    assert line["amplitude_expanded_arcsec"] == pytest.approx(factor * std)
+    assert line["phase_expanded_deg"] == pytest.approx(factor * np.degrees(fit.phase_std[0]))
+    assert line["phase_deg"] == pytest.approx(np.degrees(0.5), abs=5.0)

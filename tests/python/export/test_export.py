@@ -30,8 +30,10 @@ def described(period: float = 360.0, std: float = 1e-4, **more) -> ta.HarmonicMo
     return ta.HarmonicModel(shafts, period=period, **{**given, **more})
 
 
-@pytest.mark.parametrize("unit", PERIODS)
-@pytest.mark.parametrize("target", ["csv", "c", "simplefoc", "twincat"])
+@pytest.mark.parametrize(
+    ("target", "unit"),
+    [("csv", "rad"), ("csv", "count"), ("c", "turn"), ("simplefoc", "rad"), ("twincat", "turn")],
+)
 def test_a_model_in_another_unit_makes_the_same_table(target: str, unit: str) -> None:
     options = {"entries": 64} if target != "twincat" else {"entries": 72}
     made, other = (
@@ -78,3 +80,26 @@ def test_the_order_that_loses_most_is_the_one_that_the_summary_names() -> None:
     assert said is not None
     assert float(said[1]) == worst["order"]
     assert float(said[2]) == pytest.approx(worst["arcsec"], rel=0.01)
+
+
+@pytest.mark.parametrize("target", ["csv", "c"])
+def test_the_smallest_table_leaves_room_for_what_is_beside_it(target: str) -> None:
+    """A bound that the smallest table keeps without the terms, and not with them."""
+    model = described()
+    options = {"bits": 12}
+    size = {"csv": 36, "c": 8}[target]
+    small = ta.export_model(model, target, entries=size, **options)
+    beside = small.max_difference_total_arcsec - small.max_difference_arcsec
+    asked = beside + 0.9 * small.max_difference_arcsec
+    made = ta.export_model(model, target, max_arcsec=asked, **options)
+    assert made.max_difference_total_arcsec <= asked
+    assert made.entries > small.entries
+
+
+def test_tables_of_several_shafts_add_up_and_name_the_outputs_orders() -> None:
+    """The motor's first order is the third of the output; two tables of 17 knots of 4 bytes."""
+    made = ta.export_model(described(terms=()), "c", entries=16, number="q31", bits=12)
+    assert [row["order"] for row in made.lost] == [1.0, 2.0, 3.0]
+    assert made.entries == sum(row["entries"] for row in made.tables) == 32
+    assert made.bytes == sum(row["bytes"] for row in made.tables) == 2 * 17 * 4
+    assert [row["cycles_per_turn"] for row in made.tables] == [1.0, 3.0]

@@ -95,3 +95,20 @@ def test_a_table_holds_orders_below_half_its_entries(entries, holds):
     else:
         with pytest.raises(ta.TrueAngleError, match=r"28 entries hold orders up to 13.* order 14"):
             pattern.check_orders(entries, "table", "take more")
+
+
+@pytest.mark.parametrize("period", UNITS)
+@pytest.mark.parametrize("turned", [0.0, 70.0, 180.0])
+def test_one_order_of_two_shafts_has_the_amplitude_of_their_sum(period, turned):
+    """By the spectrum of the error: in phase they add up, against each other they do not."""
+    size, angle = 0.01 * period / 360.0, np.radians(turned)
+    shafts = [
+        ta.Shaft("output", 1, [2, 7], [0.0, size], [2.0 * size, 0.0]),
+        ta.Shaft("motor", 7, [1], [1.5 * size * np.cos(angle)], [1.5 * size * np.sin(angle)]),
+    ]
+    pattern = TurnPattern(ta.HarmonicModel(shafts, period=period))
+    grid = np.arange(64) / 64.0
+    spectrum = np.abs(np.fft.rfft(pattern.error(grid))) / 32.0
+    assert list(pattern.lines) == [2.0, 7.0]
+    for order, amplitude in pattern.lines.items():
+        assert amplitude == pytest.approx(spectrum[int(order)], rel=1e-9, abs=1e-15)

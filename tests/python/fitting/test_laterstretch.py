@@ -5,8 +5,8 @@ import pytest
 
 import trueangle as ta
 from trueangle.errors import NoModelError
-from trueangle.fitting.laterstretch import gains_of_stretches
-from trueangle.fitting.newrun import gains_of_runs
+from trueangle.fitting.laterstretch import check_later_stretch, gains_of_stretches
+from trueangle.fitting.newrun import check_new_run, gains_of_runs
 from trueangle.fitting.problem import Problem
 from trueangle.joint.shafts import resolve_orders
 
@@ -133,3 +133,24 @@ def test_a_drift_that_would_stand_for_the_pattern_is_left():
     assert "drift" not in found.nuisance.kinds
     assert "drift" in found.nuisance.unseparated
     assert found.model.amplitudes.max() < 0.9  # the greatest of a run
+
+
+def test_a_refusal_counts_those_that_would_be_made_worse():
+    """One run of four is turned over, and one quarter of a run: by the gains of each."""
+    x = np.linspace(0.0, 360.0, 400, endpoint=False)
+    signs = (1.0, 1.0, 1.0, -1.0)
+    errors = [0.1 * sign * np.sin(np.radians(2.0 * x)) for sign in signs]
+    runs = [run_of(x, error, seed=seed) for seed, error in enumerate(errors)]
+    wanted = resolve_orders([2])
+    told = gains_of_runs(runs, [2.0], "reference").gains
+    assert (told < 0.0).tolist() == [False, False, False, True]
+    with pytest.raises(NoModelError, match=r"order 2 would make the error of 1 of 4 runs larger"):
+        check_new_run(runs, wanted, "reference")
+    passes = np.concatenate([x, x[::-1], x, x[::-1]])
+    whole = run_of(
+        passes, np.concatenate([errors[0], errors[0][::-1], errors[0], -errors[0][::-1]])
+    )
+    assert (gains(whole, [2]) < 0.0).tolist() == [False, False, False, True]
+    problem = Problem([whole], wanted, "reference")
+    with pytest.raises(NoModelError, match=r"order 2 would make the error of 1 of 4 segments of"):
+        check_later_stretch(problem, problem.base)

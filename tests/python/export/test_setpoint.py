@@ -1,0 +1,95 @@
+"""Tables over a travel: how steep they are, and what forward and reverse say when read back."""
+
+from __future__ import annotations
+
+import re
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+import trueangle as ta
+from trueangle.export import TARGETS
+from trueangle.export.setpoint import steepness
+from trueangle.export.setpointreading import travel_model
+
+DIGIT = 1e-4
+
+
+@pytest.mark.parametrize("steeper", ["forward", "reverse"])
+def test_slope_and_bend_are_those_of_a_parabola(steeper: str) -> None:
+    """Of ``c x²`` in degrees over 36 steps of 10 deg: between its last two points, and 2 c."""
+    c, x = 2e-6, np.arange(37) * 10.0
+    flat = SimpleNamespace(entries=36, forward=c * x / 360.0, reverse=c * x / 360.0)
+    setattr(flat, steeper, -c * x**2 / 360.0)
+    slope, bend = steepness(flat)
+    assert slope == pytest.approx(c * (360.0**2 - 350.0**2) / 10.0)
+    assert bend == pytest.approx(2.0 * c)
+
+
+def read(tmp_path, half: np.ndarray):
+    """A turn of 120 entries whose columns differ by twice ``half``, degrees."""
+    nominal = np.arange(121) * 3.0
+    pattern = 0.05 * np.sin(np.radians(nominal))
+    path = tmp_path / "a.comp"
+    path.write_text("table")
+    table = np.column_stack([nominal, pattern + half, pattern - half])
+    return travel_model(table, str(path), TARGETS["linuxcnc"], DIGIT)
+
+
+@pytest.mark.parametrize(("play", "seen"), [(0.05, True), (0.02, False), (-300.0, True)])
+def test_play_counts_beyond_the_rounding_of_its_mean(tmp_path, play: float, seen: bool) -> None:
+    """A digit rounds to 0.29 of it, the mean of 121 to 0.026."""
+    model = read(tmp_path, np.full(121, play * DIGIT))
+    assert [term.kind for term in model.terms] == ["backlash"] * seen
+    for term in model.terms:
+        assert term.half_width == pytest.approx(play * DIGIT)
+    assert "differ by a pattern" not in model.fit.note
+
+
+@pytest.mark.parametrize("size", [0.5, 20.0])
+def test_what_differs_between_the_ways_beside_its_mean_is_told(tmp_path, size: float) -> None:
+    wave = np.sin(np.radians(np.arange(121) * 6.0))
+    model = read(tmp_path, 0.01 + size * DIGIT * wave)
+    (term,) = model.terms
+    assert term.half_width == pytest.approx(0.01, rel=1e-4)
+    assert ("differ by a pattern" in model.fit.note) == (size > 2.0)
+    if size > 2.0:
+        told = float(model.fit.note.split("differ by a pattern of ")[1].split()[0])
+        # A sine over both ends of the turn: 120 of 121 squares.
+        assert told == pytest.approx(size * DIGIT * 3600.0 * np.sqrt(60.0 / 121.0), rel=1e-3)
+
+
+def shown(target: str, **options):
+    shaft = ta.Shaft("output", 1, [1, 2], [0.03, 0.0], [0.0, -0.02])
+    return ta.export_model(ta.HarmonicModel([shaft], period=360.0), target, bits=12, **options)
+
+
+def test_a_check_on_the_machine_is_made_where_its_table_has_the_value() -> None:
+    """At the largest entry: the position in counts, and what the encoder goes on by."""
+    made = shown("pmac", counts_per_turn=36_000, entries=90)
+    table = [int(n) for n in made.text.partition("DEFINE COMP 90,36000")[2].split()[:90]]
+    place, moved = re.search(r"to (\d+) counts[^.]*\..*?must go on by (\S+) counts",
+                             re.sub(r"\n; *", " ", made.text)).groups()  # fmt: skip
+    assert float(moved) == pytest.approx(table[int(place) // 400 - 1] / 16.0, rel=1e-5)
+    assert abs(float(moved)) == max(map(abs, table)) / 16.0
+
+
+def test_a_control_is_told_to_hold_every_point() -> None:
+    made = shown("siemens840d", entries=72)
+    points = {int(n) for n in re.findall(r"^\$AA_ENC_COMP\[0,(\d+),", made.text, re.M)}
+    assert points == set(range(73))
+    (note,) = [n for n in made.notes if "MAX_POINTS" in n]
+    assert int(re.findall(r"MAX_POINTS to (\d+)", note)[0]) == made.entries == 73
+
+
+def test_errors_of_a_table_that_is_read_are_those_of_its_rounding(tmp_path) -> None:
+    """Ticks of 2^13 a turn in 64 entries: uniform, and spread over the coefficients."""
+    path = tmp_path / "a.h"
+    path.write_text(shown("tinymovr", entries=64).text)
+    model = ta.import_model(path, "tinymovr", bits=12)
+    tick = (360.0 / 4096.0) ** 2 / 12.0
+    expected = [tick / 64.0, *[2.0 * tick / 64.0] * (2 * len(model.orders))]
+    np.testing.assert_allclose(np.diag(model.covariance), expected)
+    assert model.fit.samples == 64
+    assert model.fit.residual == pytest.approx(np.sqrt(tick))
