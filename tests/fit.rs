@@ -1,5 +1,6 @@
 //! The fit as a whole: what must not change it, and the paths against each other.
 
+use nalgebra::{DMatrix, DVector};
 use proptest::prelude::*;
 use trueangle::Error;
 use trueangle::design::{Design, Frequencies};
@@ -102,6 +103,86 @@ fn residuals_are_orthogonal_to_every_harmonic() {
             }
         );
     }
+}
+
+/// Of `[constant, A, B, ...]` and of every zero, by the inverse of all columns together: runs of
+/// unlike zeros and lengths over parts of the turn, weighted.
+#[test]
+fn errors_are_those_of_the_dense_inverse() {
+    const ROUNDING: f64 = 1e-9;
+    let design = design(360.0, &[1, 3]);
+    let (reference, indicated) = readings(5, 300);
+    let reference: Vec<f64> = reference.iter().map(|x| x * x / 500.0).collect();
+    let weights: Vec<f64> = (0..300).map(|i| f64::from(i % 4)).collect();
+    let ends = [0, 60, 140, 300];
+    let zeros = [0.0, 1.5, -40.0];
+    let run = |i: usize| (0..3).find(|&r| i < ends[r + 1]).unwrap();
+    let (noise, _) = readings(6, 300);
+    let indicated: Vec<f64> = (0..300)
+        .map(|i| reference[i] + zeros[run(i)] + 0.01 * noise[i] + 0.001 * indicated[i])
+        .collect();
+    let runs: Vec<Run> = (0..3)
+        .map(|r| Run {
+            reference: &reference[ends[r]..ends[r + 1]],
+            indicated: &indicated[ends[r]..ends[r + 1]],
+            weights: Some(&weights[ends[r]..ends[r + 1]]),
+        })
+        .collect();
+    let found = fit(&design, &runs, Options::default()).unwrap();
+    let rows: Vec<f64> = (0..300)
+        .flat_map(|i| {
+            let mut row = vec![0.0; 3];
+            row[run(i)] = 1.0;
+            design.extend_row(&mut row, reference[i], 1.0);
+            row
+        })
+        .collect();
+    let x = DMatrix::from_row_slice(300, 7, &rows);
+    let y = DVector::from_fn(300, |i, _| indicated[i] - reference[i]);
+    let weighted = DMatrix::from_fn(300, 7, |i, j| weights[i] * x[(i, j)]);
+    let inverse = x.tr_mul(&weighted).try_inverse().unwrap();
+    let solution = &inverse * weighted.tr_mul(&y);
+    let left = y - &x * &solution;
+    let squares: f64 = left.iter().zip(&weights).map(|(e, w)| w * e * e).sum();
+    // Every fourth reading has no weight.
+    let variance = squares / (225.0 - 7.0);
+    assert!((found.residual_variance / variance - 1.0).abs() < ROUNDING);
+    assert!(close(&found.offsets, &solution.as_slice()[..3], ROUNDING));
+    assert!(close(
+        found.coefficients(),
+        &solution.as_slice()[3..],
+        ROUNDING
+    ));
+    let std: Vec<f64> = (0..3)
+        .map(|r| (variance * inverse[(r, r)]).sqrt())
+        .collect();
+    assert!(close(&found.offset_std, &std, ROUNDING * std[0]));
+    // The constant is the circular mean of the zeros.
+    let turns: Vec<f64> = found.offsets.iter().map(|o| o.to_radians()).collect();
+    let (sine, cosine) = turns
+        .iter()
+        .fold((0.0, 0.0), |(s, c), o| (s + o.sin(), c + o.cos()));
+    assert!((found.constant - sine.atan2(cosine).to_degrees()).abs() < ROUNDING);
+    let mut map = DMatrix::zeros(5, 7);
+    for (r, zero) in turns.iter().enumerate() {
+        map[(0, r)] = (zero - sine.atan2(cosine)).cos() / sine.hypot(cosine);
+    }
+    (0..4).for_each(|j| map[(1 + j, 3 + j)] = 1.0);
+    let covariance = &map * inverse * map.transpose() * variance;
+    let size = covariance.amax();
+    assert!(close(
+        &found.covariance(),
+        covariance.as_slice(),
+        ROUNDING * size
+    ));
+    let scaled = DMatrix::from_fn(300, 7, |i, j| weights[i].sqrt() * x[(i, j)]);
+    let values = scaled.singular_values();
+    let condition = values.max() / values.min();
+    assert!((found.condition_number() / condition - 1.0).abs() < 1e-3);
+    assert!(
+        found.is_conditioned_below(1.01 * condition)
+            && !found.is_conditioned_below(0.9 * condition)
+    );
 }
 
 #[test]

@@ -103,24 +103,26 @@ fn many_coefficients_have_one_factor_for_all_clusters() {
     }
 }
 
+/// Of an element of a triangle or of sums: a determinant takes it relative to its least pivot.
+const ROUNDING: f64 = 1e-13;
+
 /// Columns `Q R` have the determinant of `R' R`, however near to each other they are.
 #[test]
 fn determinants_are_those_of_the_triangle() {
     let q = DMatrix::from_fn(40, 4, wave).qr().q();
-    for (least, of_sums) in [(0.5, true), (1e-5, true), (1e-8, false)] {
+    for (least, of_sums) in [(0.5, true), (1e-4, true), (1e-8, false)] {
         let mut r = DMatrix::from_fn(4, 4, |i, j| if i <= j { 2.0 + wave(i, j) } else { 0.0 });
         r[(2, 2)] = -least;
         let design = &q * &r;
         let expected: f64 = r.diagonal().iter().map(|d| 2.0 * d.abs().ln()).sum();
         let rows = design.clone().insert_column(4, 1.0).transpose();
         let model = LinearModel::of_rows(&Triangle::of_rows(5, rows.as_slice()), 1).unwrap();
-        // A determinant takes the rounding of its least pivot, relative to that.
-        assert!((model.log_determinant - expected).abs() < 1e-14 / least + SAME);
+        assert!((model.log_determinant - expected).abs() < ROUNDING / least + SAME);
         if of_sums {
             let gram = design.tr_mul(&design);
             let none = DMatrix::zeros(4, 0);
             let model = LinearModel::of_sums(&gram, &none, &[], None, None).unwrap();
-            assert!((model.log_determinant - expected).abs() < 1e-14 / (least * least) + SAME);
+            assert!((model.log_determinant - expected).abs() < ROUNDING / (least * least) + SAME);
         }
     }
 }

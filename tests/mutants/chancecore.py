@@ -21,7 +21,7 @@ import tempfile
 import time
 import tomllib
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -44,6 +44,8 @@ LEAST_SECONDS = 30.0
 
 #: File told of what is reached, see `planted.rs`.
 REACHED = "TRUEANGLE_REACHED"
+
+LIBRARIES = ("libtrueangle.so", "libtrueangle.dylib", "trueangle.dll")
 
 #: As tests are built (Cargo.toml), without what only a debugger reads.
 PROFILE = {f"CARGO_PROFILE_{name}_DEBUG": "0" for name in ("DEV", "TEST")}
@@ -186,13 +188,14 @@ def of_rust(copy: Copy, executables: Sequence[str]) -> dict[int, list[Test]]:
 
 def of_python(copy: Copy, folders: Sequence[str]) -> dict[int, list[Test]]:
     """Tests in Python that reach each fault, the quickest first."""
-    pytest = (sys.executable, "-m", "pytest", "-x", "-q", "-p", "no:cacheprovider")
     record = copy.folder / "reached"
     record.write_text("")
     environment = copy.environment() | {REACHED: str(record)}
     environment["PYTHONPATH"] += os.pathsep + str(Path(__file__).parent)
-    command = [*pytest[:3], "-q", "-p", "no:cacheprovider", "-p", "reached", *folders]
-    subprocess.run(command, cwd=copy.folder, env=environment, check=False)
+    command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "-p", "reached"]
+    subprocess.run(
+        [*command, "-m", "not slow", *folders], cwd=copy.folder, env=environment, check=False
+    )
     reached: dict[int, list[Test]] = {}
     numbers: list[int] = []
     for line in record.read_text("utf-8").splitlines():
@@ -201,24 +204,35 @@ def of_python(copy: Copy, folders: Sequence[str]) -> dict[int, list[Test]]:
             continue
         seconds, name = line[2:].split(" ", 1)
         for number in numbers:
-            reached.setdefault(number, []).append(Test((*pytest, name), float(seconds)))
+            reached.setdefault(number, []).append(Test((name,), float(seconds)))
         numbers = []
     return {number: sorted(tests, key=lambda t: t.seconds) for number, tests in reached.items()}
 
 
+def noticed_in_rust(copy: Copy, number: int, tests: Sequence[Test]) -> str:
+    """The first test that fails with the fault."""
+    more = {CHOSEN: str(number)}
+    return next((test.command[-1] for test in tests if not ran(copy, test, more)), "")
+
+
+def noticed_in_python(copy: Copy, number: int, tests: Sequence[Test]) -> str:
+    """The same of tests in Python, all in one process."""
+    verdict = copy.run(tuple(test.command[-1] for test in tests), {CHOSEN: str(number)})
+    return "" if verdict.outcome == "survived" else verdict.by or verdict.outcome
+
+
 def judge(
-    copy: Copy, faults: dict[int, Drawn], tests: dict[int, list[Test]], tell: str
+    faults: dict[int, Drawn], tests: dict[int, list[Test]], notice: Callable[..., str], copy: Copy
 ) -> dict[int, str]:
     """``killed``, ``survived`` or ``unreached``: what becomes of each."""
     found: dict[int, str] = {}
     for number, fault in faults.items():
         start, mine = time.monotonic(), tests.get(number, [])[:MOST_TESTS]
-        more = {CHOSEN: str(number)}
-        by = next((test.command[-1] for test in mine if not ran(copy, test, more)), "")
+        by = notice(copy, number, mine) if mine else ""
         found[number] = "killed" if by else "survived" if mine else "unreached"
         print(
             f"{found[number]:9} {fault.file}:{fault.change.line} {fault.change.operator}"
-            f" {fault.before!r} -> {fault.after!r} ({len(mine)} tests {tell},"
+            f" {fault.before!r} -> {fault.after!r} ({len(mine)} tests,"
             f" {time.monotonic() - start:.0f} s) {by}",
             flush=True,
         )
@@ -233,6 +247,7 @@ def main() -> int:
     parser.add_argument("--file", action="append", type=Path, help="of these files alone")
     parser.add_argument("--tests", action="append", help="in Python, in place of the usual ones")
     parser.add_argument("--least", type=float, default=0.0, help="share noticed, else status 1")
+    parser.add_argument("--seconds", type=float, default=300.0, help="in Python, for a fault")
     parser.add_argument("--copy", type=Path, help="where the copy is kept for another time")
     args = parser.parse_args()
     seed = int(time.time()) // 86400 if args.seed is None else args.seed
@@ -241,19 +256,20 @@ def main() -> int:
     faults = drawn(args.count, seed, [path for path in files if path.name != FOREIGN])
     left = dict(enumerate(faults))
     with tempfile.TemporaryDirectory(prefix="mutants-") as folder:
-        copy = Copy(ROOT, args.copy or Path(folder), 0.0)
+        copy = Copy(ROOT, args.copy or Path(folder), args.seconds)
         copy.switchable()
         made = built(copy, left, ["test", "--no-run", "--lib", "--tests"])
         executables = [path for path in made if os.access(path, os.X_OK) and "/deps/" in path]
         tests = of_rust(copy, [path for path in executables if not Path(path).suffix])
         asked = {k: f for k, f in left.items() if not excused(f)}
-        outcomes = dict.fromkeys(left, "excused") | judge(copy, asked, tests, "in Rust")
+        outcomes = dict.fromkeys(left, "excused") | judge(asked, tests, noticed_in_rust, copy)
         asked = {k: f for k, f in asked.items() if outcomes[k] != "killed"}
         made = built(copy, left, ["build", "--lib", "--features", "python"])
         copy.core.unlink()
-        library = next(p for p in made if Path(p).suffix in (".so", ".dylib", ".dll"))
+        library = next(p for p in made if p.endswith(LIBRARIES))
         shutil.copy(library, copy.core)
-        again = judge(copy, asked, of_python(copy, args.tests or ASKED), "in Python")
+        tests = of_python(copy, args.tests or ASKED)
+        again = judge(asked, tests, noticed_in_python, copy)
         for number, outcome in again.items():
             if outcome != "unreached":
                 outcomes[number] = "by Python" if outcome == "killed" else outcome
