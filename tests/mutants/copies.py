@@ -7,7 +7,9 @@ for each would take a day.
 
 from __future__ import annotations
 
+import compileall
 import os
+import py_compile
 import shutil
 import signal
 import subprocess
@@ -61,6 +63,10 @@ class Copy:
         assert core.origin is not None
         self.core = folder / "python" / "trueangle" / Path(core.origin).name
         shutil.copy(core.origin, self.core)
+        # A fault's modules are compiled by its tests; the others once. By what they hold, for
+        # faults come and go within the second that times of files tell.
+        by_content = py_compile.PycInvalidationMode.CHECKED_HASH
+        compileall.compile_dir(folder / "python", quiet=2, invalidation_mode=by_content)
 
     def tried(self, fault: Fault, number: int) -> Verdict:
         """What the tests of a fault say with it planted."""

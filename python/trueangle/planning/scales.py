@@ -79,6 +79,7 @@ class Scales:
             self._possible(question, spot.hypotheses)
             for question, spot in zip(questions, asked, strict=True)
         ]
+        self._known: dict[tuple[tuple[RunDesign, ...], bool], Worth] = {}
         self.afresh()
 
     def afresh(self) -> None:
@@ -132,8 +133,13 @@ class Scales:
         """What designs tell beside earlier runs.
 
         ``changes`` are those from the plainest run. The evidence of designs that open fewer than
-        ``least`` of the questions is not worked out: they are worth less whatever it is.
+        ``least`` of the questions is not worked out: they are worth less whatever it is. A search
+        comes back to designs that it has weighed: one in six.
         """
+        key = (*designs,), start is None
+        if key in self._known:
+            self._left -= 1
+            return replace(self._known[key], plain=-changes)
         regression = self._readings(self._signals(designs, start))
         spots = blind_spots(regression)
         are_open = [self._open(question, regression, spots) for question in self.questions]
@@ -149,7 +155,9 @@ class Scales:
             told += is_open and is_strong(evidence)
         halves = round(total / (np.log(ALIKE) * len(self.questions)))
         clear = -sum(len(self._unclear(question, spots)) for question in self.questions)
-        return Worth(opened, told, foretold(regression), clear, halves, -changes, seconds)
+        worth = Worth(opened, told, foretold(regression), clear, halves, -changes, seconds)
+        self._known[key] = worth
+        return worth
 
     def answers(self, designs: Sequence[RunDesign], start: Signals | None) -> Iterator[Answer]:
         """What designs say of each question."""

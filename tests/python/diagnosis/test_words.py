@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -23,7 +25,9 @@ def geared():
         theta = np.sort(rng.uniform(0.0, 2.0 * np.pi, 300))
         error = 60.0 * np.sin(theta) + 5.0 * np.sin(2.0 * theta) + rng.normal(0.0, SIGMA, 300)
         runs.append(CalibrationRun(theta, theta + np.radians(error / 3600.0), time=theta))
-    return ta.diagnose(runs, Simulation(joint=Joint(gear_ratio=100.0)))
+    found = ta.diagnose(runs, Simulation(joint=Joint(gear_ratio=100.0)))
+    # Without readings no further runs are planned, which takes ten times as long as the rest.
+    return replace(found, runs=[])
 
 
 def test_a_headline_says_which_line_and_how_large(geared):

@@ -87,6 +87,7 @@ def _compiler():
 @pytest.mark.parametrize("name", list(TERMS))
 def test_a_correction_is_that_of_the_model(name, fmi, argument, tmp_path):
     seed = int(np.random.SeedSequence().generate_state(1)[0])
+    print(f"seed {seed}")
     model = ta.HarmonicModel((OUTPUT, MOTOR), 0.01, argument=argument, terms=TERMS[name])
     path = tmp_path / "joint.fmu"
     made = ta.export_model(model, "fmu", path, fmi=fmi)
@@ -97,7 +98,7 @@ def test_a_correction_is_that_of_the_model(name, fmi, argument, tmp_path):
     for kind in ("CoSimulation", "ModelExchange"):
         found = simulated(path, "indicated", "true_angle", moved, kind)
         worst = np.max(np.abs(found - want[: len(found)]))
-        print(f"seed {seed}, {kind}: {worst}")
+        print(f"{kind}: {worst}")
         assert worst <= WITHIN
     assert np.max(np.abs(want - moved["angle"])) > 1e-3
     assert ta.import_model(path, "fmu") == model
@@ -107,6 +108,7 @@ def test_a_correction_is_that_of_the_model(name, fmi, argument, tmp_path):
 @pytest.mark.parametrize("name", list(TERMS))
 def test_a_sensor_says_what_the_model_does(name, fmi, tmp_path):
     seed = int(np.random.SeedSequence().generate_state(1)[0])
+    print(f"seed {seed}")
     model = ta.HarmonicModel((OUTPUT, MOTOR), 0.01, terms=TERMS[name])
     path = tmp_path / "joint.fmu"
     ta.export_model(model, "fmu", path, fmi=fmi, variant="sensor")
@@ -115,7 +117,7 @@ def test_a_sensor_says_what_the_model_does(name, fmi, tmp_path):
     want = moved["angle"] + model.error(moved["angle"], **signals_of(model, moved))
     found = simulated(path, "true_angle", "indicated", moved, "CoSimulation")
     worst = np.max(np.abs(found - want[: len(found)]))
-    print(f"seed {seed}: {worst}")
+    print(worst)
     assert worst <= WITHIN
 
 
@@ -123,6 +125,7 @@ def test_a_sensor_says_what_the_model_does(name, fmi, tmp_path):
 @pytest.mark.parametrize("name", list(TERMS))
 def test_random_inputs(name, variant, tmp_path):
     seed = int(np.random.SeedSequence().generate_state(1)[0])
+    print(f"seed {seed}")
     model = ta.HarmonicModel((OUTPUT, MOTOR), 0.01, terms=TERMS[name])
     path = tmp_path / "joint.fmu"
     ta.export_model(model, "fmu", path, variant=variant)
@@ -148,7 +151,7 @@ def test_random_inputs(name, variant, tmp_path):
     else:
         want = angle + model.error(angle, **signals)
     worst = np.max(np.abs(found - want))
-    print(f"seed {seed}: {worst} of {INPUTS} inputs")
+    print(f"{worst} of {INPUTS} inputs")
     assert worst <= WITHIN
 
 

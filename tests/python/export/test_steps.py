@@ -124,6 +124,7 @@ def walked_in_rust(model, rows, folder):
 @pytest.mark.parametrize("case", list(CASES))
 def test_c_against_the_corrector(case, tmp_path):
     seed = int(np.random.SeedSequence().generate_state(1)[0])
+    print(f"seed {seed}")
     model = model_of(case)
     made, program = walk_in_c(model, tmp_path)
     readings, angles = tmp_path / "readings", tmp_path / "angles"
@@ -141,7 +142,7 @@ def test_c_against_the_corrector(case, tmp_path):
             away = found - wanted(corrector, rows, fields_of(model))
             off = max(off, np.max(np.abs(away)) * 3600.0)
             without = max(without, np.max(np.abs(plain.correct(rows["place"] * UNIT) - found)))
-    print(f"{case}, seed {seed}: {off:.6f} of {made.max_difference_total_arcsec} arcsec")
+    print(f"{case}: {off:.6f} of {made.max_difference_total_arcsec} arcsec")
     assert off <= made.max_difference_total_arcsec
     assert made.left_out == []
     if made.max_difference_arcsec < 1e-3:

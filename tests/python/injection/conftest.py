@@ -2,11 +2,13 @@
 
 import shutil
 import sys
+from functools import cache
 
 import numpy as np
 import pytest
 
 import trueangle as ta
+from trueangle.model.text import model_text
 
 from .shim import Driver, compiled
 
@@ -42,18 +44,25 @@ def commands():
 def furnish(folder):
     """Put the inputs of all commands into an empty folder."""
     (folder / "logs").mkdir(parents=True)
+    for name, content in inputs().items():
+        (folder / name).write_bytes(content)
+
+
+@cache
+def inputs():
+    """The inputs of all commands: a thousand desks hold the same."""
     rng = np.random.default_rng(5)
     theta = np.arange(0.0, 360.0, 4.0)
     error = 0.1 * np.sin(np.radians(theta)) + 1e-3 * rng.normal(size=theta.size)
     rows = [f"{t!r},{t + e!r}" for t, e in zip(theta.tolist(), error.tolist(), strict=True)]
-    (folder / "r.csv").write_text("\n".join(["reference_deg,indicated_deg", *rows]) + "\n")
-    (folder / "b.toml").write_text(SIMULATION)
+    table = "\n".join(["reference_deg,indicated_deg", *rows]) + "\n"
+    found = {"r.csv": table, "b.toml": SIMULATION}
     for name in ("a.csv", "b.csv"):
-        angles = rng.uniform(0.0, 360.0, 50)
-        lines = [f"{x:.9f}" for x in angles]
-        (folder / "logs" / name).write_text("\n".join(["indicated_deg", *lines]) + "\n")
+        lines = [f"{x:.9f}" for x in rng.uniform(0.0, 360.0, 50)]
+        found[f"logs/{name}"] = "\n".join(["indicated_deg", *lines]) + "\n"
     shaft = ta.Shaft("output", 1, [1, 2], [0.1, 0.0], [0.4, -0.05])
-    ta.HarmonicModel([shaft], constant=0.2, period=360.0).save(folder / "m.json")
+    found["m.json"] = model_text(ta.HarmonicModel([shaft], constant=0.2, period=360.0))
+    return {name: text.encode() for name, text in found.items()}
 
 
 def tree(folder):

@@ -12,6 +12,7 @@ from trueangle.errors import ArgumentError, FileError
 from trueangle.joint.signals import join_runs
 from trueangle.planning import Limits, load_limits
 from trueangle.planning.further import base_of, choices, run_steps, seconds_of
+from trueangle.planning.scales import Scales
 from trueangle.simulation import (
     Backlash,
     Harmonic,
@@ -99,6 +100,19 @@ def test_every_run_stays_within_limits(plan):
         # coasts to a quarter of its speed the last takes 2.2 times the mean.
         assert measured.time[-1] == pytest.approx(seconds_of(run), rel=2.2 / run.samples)
         assert any(f"read {run.samples} times" in step for step in run_steps(run))
+
+
+def test_designs_that_were_weighed_are_worth_what_they_were(found, plan, monkeypatch):
+    weighed, known = Scales.weighed, []
+
+    def anew(self, *given):
+        known.append(len(self._known))
+        self._known.clear()
+        return weighed(self, *given)
+
+    monkeypatch.setattr(Scales, "weighed", anew)
+    assert found.plan().to_dict() == plan.to_dict()
+    assert max(known) == 1
 
 
 def test_without_reversals_none_is_planned(found):

@@ -189,7 +189,8 @@ def bursts(case: Case) -> Posed:
     question = _question(case, joint, habit, (), rng)
     length, size = case.kind.split(" of ")
     runs, rows = with_bursts(question.runs, int(length), float(size) * habit.sigma, rng)
-    return replace(question, runs=runs), rows, None
+    # What is right are rows, by their numbers.
+    return replace(question, runs=runs, whole=True), rows, None
 
 
 def tables(case: Case) -> Posed:
