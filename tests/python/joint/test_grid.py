@@ -136,3 +136,19 @@ def test_how_many_readings_of_a_table_may_linger():
     # The step over the seam is as long as the others.
     assert table_move([np.array([0.7, 0.8, 0.9, 0.0, 0.1])], 0.1) == pytest.approx(0.1)
     assert table_move([np.arange(9) / 10.0], -0.1) == 0.0
+
+
+@pytest.mark.parametrize(("steps", "positions"), [(0.0, 20), (0.5, 40), (0.3, None)])
+def test_a_table_in_any_order_keeps_its_positions(steps, positions):
+    rng = np.random.default_rng(20)
+
+    def visited(start: float):
+        grid = (rng.permutation(20) + start) * 18.0
+        return join_runs([ta.CalibrationRun(grid + rng.normal(0.0, 0.01, 20), grid, period=360.0)])
+
+    signals = visited(0.0)
+    assert signals.count == 0.0
+    # Of some positions alone no one could tell.
+    assert signals.take(np.arange(17)).grid == UniformGrid(20)
+    both = signals.followed_by(visited(steps))
+    assert both.grid == (None if positions is None else UniformGrid(positions))
