@@ -12,6 +12,7 @@ mod exact;
 mod expansion;
 mod inverse;
 pub mod ladder;
+pub mod lag;
 pub mod lines;
 mod pass;
 mod route;

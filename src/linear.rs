@@ -4,16 +4,22 @@
 //! have made: [`rank_limit`] is the one limit. What is left out gets nothing, so that solution and
 //! covariance are those of the pseudo-inverse in scaled columns.
 
+mod beside;
+mod clipped;
 mod clusters;
 mod groups;
 mod model;
+mod products;
 mod ratio;
 mod ridge;
 mod whitening;
 
+pub use beside::{Beside, Powers};
+pub use clipped::{Clipped, clipped};
 pub use clusters::{Robust, cluster_covariance};
 pub use groups::{Sums, left_out, others};
 pub use model::LinearModel;
+pub use products::Table;
 pub use ratio::{Left, RunProducts, best_ratio};
 pub use ridge::{Fold, RidgePath, ridge_path};
 pub use whitening::Correlated;

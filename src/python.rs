@@ -6,6 +6,7 @@
 mod alike;
 mod angles;
 mod array;
+mod beside;
 mod circle;
 mod corrector;
 mod door;
@@ -47,6 +48,9 @@ mod _core {
     use super::step::PyCompensator;
 
     #[pymodule_export]
+    use super::beside::PyBeside;
+
+    #[pymodule_export]
     use super::circle::{covered_span, residuals, resultant};
 
     #[pymodule_export]
@@ -64,7 +68,7 @@ mod _core {
     use super::linear::{PyLinearModel, cluster_covariance, left_out, ridge_path};
 
     #[pymodule_export]
-    use super::lines::{line_columns, line_sum, line_sum_and_slope, unit_sums};
+    use super::lines::{lagged, line_columns, line_sum, line_sum_and_slope, unit_sums};
 
     #[pymodule_export]
     use super::moments::{PyMoments, fit_moments};
@@ -76,7 +80,7 @@ mod _core {
     use super::motion::{PyBanded, harmonic_rows, harmonic_sum};
 
     #[pymodule_export]
-    use super::noise::{best_ratio, whitened};
+    use super::noise::{clipped, median, whitened};
 
     #[pymodule_export]
     use super::robot::PyRobotStep;

@@ -102,9 +102,13 @@ pub fn add_running_means(values: &[f64], boxes: &[(usize, f64)], totals: &mut [f
     }
 }
 
-/// The mean of the two middle values; NaN stands last.
-fn median(values: &mut [f64]) -> f64 {
+/// The mean of the two middle values, or the one there is; NaN stands last, and there is one
+/// without any.
+pub fn median(values: &mut [f64]) -> f64 {
     let n = values.len();
+    if n == 0 {
+        return f64::NAN;
+    }
     let (below, upper, _) = values.select_nth_unstable_by(n / 2, f64::total_cmp);
     if n % 2 == 1 {
         return *upper;

@@ -230,9 +230,35 @@ def whitened(
     roots: NDArray[np.float64] | None = None,
     transposed: bool = False,
 ) -> NDArray[Any]: ...
-def best_ratio(
-    grams: NDArray[np.float64], moments: NDArray[np.float64], readings: float, squares: float
-) -> tuple[float, float]: ...
+
+@final
+class Beside:
+    """A fit as columns see it that are not whitened."""
+
+    def __new__(
+        cls,
+        fitted: NDArray[np.float64],
+        residual: NDArray[np.float64],
+        squares: float,
+        excited: float,
+        bounds: Sequence[tuple[int, int]],
+        rho: float,
+        roots: NDArray[np.float64] | None = None,
+        taken: tuple[NDArray[np.float64], NDArray[np.float64]] | None = None,
+    ) -> Beside: ...
+    @property
+    def seen(self) -> _Array: ...
+    def gain(self, columns: NDArray[np.float64]) -> tuple[float, _Array]: ...
+    def powers(self, columns: NDArray[np.float64]) -> tuple[_Array, _Array, _Array]: ...
+    def ratio(self, columns: NDArray[np.float64]) -> tuple[float, float]: ...
+
+def clipped(
+    readings: NDArray[np.float64],
+    left: NDArray[np.float64],
+    roots: NDArray[np.float64],
+    most: float,
+) -> tuple[_Array, _Array, NDArray[np.bool_]]: ...
+def median(values: NDArray[np.float64]) -> float: ...
 def left_out(
     grams: NDArray[np.float64],
     moments: NDArray[np.float64],
@@ -365,6 +391,12 @@ def line_columns(
 def line_columns(
     theta: NDArray[np.float64], orders: NDArray[np.float64], single: Literal[True]
 ) -> NDArray[np.float32]: ...
+def lagged(
+    waves: NDArray[np.float64],
+    frequency: NDArray[np.float64],
+    cutoff: float,
+    damping: float | None = None,
+) -> _Array: ...
 def line_sum(
     theta: NDArray[np.float64],
     orders: NDArray[np.float64],

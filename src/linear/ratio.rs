@@ -50,7 +50,7 @@ pub struct Left {
 
 impl Left {
     /// Twice the logarithm of the likelihood ratio that squares saved are worth.
-    fn deviance(self, saved: f64) -> f64 {
+    pub(super) fn deviance(self, saved: f64) -> f64 {
         -self.readings * (-(saved / self.squares).min(ALL)).ln_1p()
     }
 }
@@ -201,7 +201,7 @@ impl Turned {
 }
 
 /// Values and vectors of a symmetric matrix; None where a number is not finite.
-fn eigensystem(matrix: DMatrix<f64>) -> Option<SymmetricEigen<f64, Dyn>> {
+pub(super) fn eigensystem(matrix: DMatrix<f64>) -> Option<SymmetricEigen<f64, Dyn>> {
     let steps = STEPS * (matrix.nrows() + 1);
     let finite = matrix.iter().all(|value| value.is_finite());
     finite.then(|| SymmetricEigen::try_new(matrix, f64::EPSILON, steps))?

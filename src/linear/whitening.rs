@@ -16,6 +16,11 @@ pub struct Correlated<'a> {
 }
 
 impl Correlated<'_> {
+    /// Nothing to filter.
+    pub fn is_white(&self) -> bool {
+        self.rho == 0.0 && self.roots.is_none()
+    }
+
     /// Rows `x_t - rho x_(t - 1)` within runs, the first of each times `sqrt(1 - rho^2)`.
     pub fn filtered<T: RealField + Copy>(&self, x: &[T], columns: usize, out: &mut [T]) {
         let mut weighted = Vec::new();

@@ -1,12 +1,14 @@
 //! Lines of any order: columns, sums, sums over units of readings.
 
-use numpy::{PyArray1, PyReadonlyArray1, PyReadonlyArray2, PyUntypedArray};
+use numpy::{PyArray1, PyReadonlyArray1, PyReadonlyArray2, PyUntypedArray, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 
 use super::array::{data, empty};
 use super::failure::argument_error;
 use super::release::detached;
+use crate::check::same_length;
 use crate::kernel::ladder::{self, Ladder};
+use crate::kernel::lag;
 use crate::kernel::lines::{self, Lines};
 
 /// Cosines and sines of orders times angles, shape (n, 2 orders); in single precision where
@@ -114,4 +116,25 @@ pub fn unit_sums<'py>(
         ladder::unit_sums(theta, values, &starts, orders, out)
     })??;
     Ok(array)
+}
+
+/// Change of lines by a low-pass of a cutoff and, of second order, a damping: of every reading.
+/// `waves` are real and imaginary parts side by side, shape (n, 2 lines).
+#[pyfunction]
+#[pyo3(signature = (waves, frequency, cutoff, damping=None))]
+pub fn lagged<'py>(
+    py: Python<'py>,
+    waves: PyReadonlyArray2<'py, f64>,
+    frequency: PyReadonlyArray2<'py, f64>,
+    cutoff: f64,
+    damping: Option<f64>,
+) -> PyResult<Bound<'py, PyArray1<f64>>> {
+    let n = frequency.shape()[0];
+    let (waves, frequency) = (waves.as_slice()?, frequency.as_slice()?);
+    same_length("waves", waves.len(), "2 * frequency", 2 * frequency.len())?;
+    let array = empty::<f64>(py, &[n], false)?;
+    // SAFETY: a fresh contiguous array of this type and size.
+    let out = unsafe { std::slice::from_raw_parts_mut(data::<f64>(&array), n) };
+    detached(py, || lag::lagged(waves, frequency, cutoff, damping, out))?;
+    Ok(array.into_any().cast_into()?)
 }

@@ -1,18 +1,17 @@
-//! Noise that is not white: its filter, and errors that are drawn by the run.
+//! Noise that is not white, and readings that are wild: filter, medians, outliers clipped.
 
-use nalgebra::{DMatrix, RealField};
+use nalgebra::RealField;
 use numpy::{
-    Element, PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3, PyUntypedArray,
-    PyUntypedArrayMethods,
+    Element, PyArray1, PyReadonlyArray1, PyReadonlyArray2, PyUntypedArray, PyUntypedArrayMethods,
 };
 use pyo3::prelude::*;
 
-use super::array::{data, empty};
+use super::array::{data, empty, vector};
 use super::failure::argument_error;
-use super::linear::{NOT_FINITE, told};
 use super::release::detached;
 use crate::check::same_length;
-use crate::linear::{self, Correlated, Left, RunProducts};
+use crate::linear::{self, Correlated};
+use crate::spectrum;
 
 /// Rows of either precision.
 #[derive(FromPyObject)]
@@ -21,7 +20,8 @@ pub enum Rows<'py> {
     Single(PyReadonlyArray2<'py, f32>),
 }
 
-type Bounds = Vec<(usize, usize)>;
+type Values<'py, T> = Bound<'py, PyArray1<T>>;
+pub(super) type Bounds = Vec<(usize, usize)>;
 
 /// Rows under the filter that makes noise of first-order correlation white, or its transpose.
 #[pyfunction]
@@ -70,7 +70,7 @@ fn filtered<'py, T: Element + RealField + Copy>(
 }
 
 /// Runs follow each other from the first reading to the last.
-fn consecutive(py: Python<'_>, n: usize, noise: &Correlated<'_>) -> PyResult<()> {
+pub(super) fn consecutive(py: Python<'_>, n: usize, noise: &Correlated<'_>) -> PyResult<()> {
     if let Some(roots) = noise.roots {
         same_length("roots", roots.len(), "rows", n)?;
     }
@@ -88,31 +88,30 @@ fn consecutive(py: Python<'_>, n: usize, noise: &Correlated<'_>) -> PyResult<()>
     Err(argument_error(py, problem))
 }
 
-/// Best ratio of variances of a run effect and the deviance that it saves; see
-/// `linear::best_ratio`.
+/// What a fit leaves, outliers clipped at `most` standard deviations; readings to match; which
+/// are outlying.
 #[pyfunction]
-pub fn best_ratio<'py>(
+pub fn clipped<'py>(
     py: Python<'py>,
-    grams: PyReadonlyArray3<'py, f64>,
-    moments: PyReadonlyArray3<'py, f64>,
-    readings: f64,
-    squares: f64,
-) -> PyResult<(f64, f64)> {
-    let (grams, moments) = (grams.as_array(), moments.as_array());
-    let (runs, k, columns) = grams.dim();
-    same_length("columns", columns, "rows", k)?;
-    let (count, rows, fitted) = moments.dim();
-    if (count, rows) != (runs, k) || fitted == 0 {
-        let problem = format!("moments must have the shape ({runs}, {k}, fitted + 1)");
-        return Err(argument_error(py, problem));
+    readings: PyReadonlyArray1<'py, f64>,
+    left: PyReadonlyArray1<'py, f64>,
+    roots: PyReadonlyArray1<'py, f64>,
+    most: f64,
+) -> PyResult<(Values<'py, f64>, Values<'py, f64>, Values<'py, bool>)> {
+    same_length("left", left.len(), "readings", readings.len())?;
+    same_length("roots", roots.len(), "readings", readings.len())?;
+    let (readings, left, roots) = (readings.as_slice()?, left.as_slice()?, roots.as_slice()?);
+    let found = detached(py, || linear::clipped(readings, left, roots, most))?;
+    let (kept, target) = (vector(py, &found.kept)?, vector(py, &found.target)?);
+    Ok((kept, target, vector(py, &found.outlying)?))
+}
+
+/// The mean of the two middle values, or the middle one; NaN where a value is.
+#[pyfunction]
+pub fn median(py: Python<'_>, values: PyReadonlyArray1<'_, f64>) -> PyResult<f64> {
+    let mut values: Vec<f64> = values.as_array().iter().copied().collect();
+    if values.iter().any(|value| value.is_nan()) {
+        return Ok(f64::NAN);
     }
-    let parts: Vec<_> = (0..runs)
-        .map(|r| RunProducts {
-            gram: DMatrix::from_fn(k, k, |i, j| grams[(r, i, j)]),
-            moments: DMatrix::from_fn(k, fitted, |i, j| moments[(r, i, j)]),
-        })
-        .collect();
-    let left = Left { readings, squares };
-    let found = detached(py, || linear::best_ratio(&parts, left))?;
-    told(py, found, NOT_FINITE)
+    detached(py, || spectrum::median(&mut values))
 }

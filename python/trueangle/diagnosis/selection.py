@@ -370,7 +370,7 @@ def _is_beyond_shown(regression: Regression, k: int) -> bool:
     else:
         power = float(np.mean(np.sum(term.run_effect.columns**2, axis=1)))
         size = float(np.sqrt(max(term.run_effect.ratio, 0.0) * power * regression.variance))
-    return size > BEYOND_SHOWN * float(np.std(regression.residual))
+    return size > BEYOND_SHOWN * regression.readings.scatter
 
 
 def _plainest(regression: Regression) -> Regression:

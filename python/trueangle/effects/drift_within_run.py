@@ -13,7 +13,6 @@ import trueangle._core as _core
 from ..estimation.estimate import Parameters, quantity
 from ..estimation.extension import Extension
 from ..estimation.regression import Regression
-from ..estimation.runcolumns import RunEffectColumns
 from ..estimation.whitening import wander_basis
 from ..joint.pattern import Surroundings
 from ..joint.signals import Signals
@@ -183,7 +182,7 @@ class DriftWithinRun(Effect):
         columns = regression.cache.of_motion(
             f"{form} {terms}",
             None,
-            lambda: RunEffectColumns(cls._shapes(regression, form, terms), regression.bounds),
+            lambda: np.ascontiguousarray(cls._shapes(regression, form, terms)),
         )
         log_grid = float(np.log(UNLIKE_FORMS))
         shape = {"form": form, "terms": terms}

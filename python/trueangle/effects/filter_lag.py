@@ -360,13 +360,4 @@ def _lagged(
     waves: NDArray[np.complex128], frequency: Array, cutoff_hz: float, damping: float | None
 ) -> Array:
     """Change of the pattern by a low-pass of first or second order."""
-    w = frequency / cutoff_hz
-    square = w * w
-    # Real parts alone: of -jw/(1 + jw), and of (w^2 - 2j zeta w)/(1 - w^2 + 2j zeta w).
-    if damping is None:
-        change = (waves.imag * w - waves.real * square) / (1.0 + square)
-    else:
-        w *= 2.0 * damping
-        lead = waves.real * square * (1.0 - square - 4.0 * damping**2) + waves.imag * w
-        change = lead / ((1.0 - square) ** 2 + w * w)
-    return np.asarray(change.sum(axis=1))
+    return _core.lagged(waves.view(np.float64), frequency, cutoff_hz, damping)

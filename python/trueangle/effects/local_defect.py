@@ -45,6 +45,9 @@ WIDTHS = (0.35, 0.7, 1.4, 2.8, 5.6, 11.0)
 #: low orders, which have causes of their own (order 7 falls to 1/e^2 at 16 deg).
 WIDEST = 16.0
 
+#: Widths from the place beyond which a bump is below the rounding of its height.
+VANISHES = 9.0
+
 #: Peaks of the quick search that are scored exactly.
 PEAKS = 2
 
@@ -109,7 +112,11 @@ class LocalDefect(Effect):
         """The bump of height 1 at shaft angles ``phase`` (radians)."""
         away = np.degrees(phase) - place_deg
         away -= 360.0 * np.round(away / 360.0)
-        return np.asarray(np.exp(-0.5 * (away / width_deg) ** 2))
+        away /= width_deg
+        bump = np.zeros_like(away)
+        near = np.flatnonzero(np.abs(away) < VANISHES)
+        bump[near] = np.exp(-0.5 * away[near] ** 2)
+        return bump
 
     @classmethod
     def drawn(

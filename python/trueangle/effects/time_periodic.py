@@ -15,7 +15,6 @@ import trueangle._core as _core
 from ..estimation.estimate import Parameters, quantity
 from ..estimation.extension import Extension
 from ..estimation.regression import Regression
-from ..estimation.runcolumns import RunEffectColumns
 from ..joint.pattern import Surroundings, line_columns
 from ..joint.signals import Signals
 from .blindness import Blindness
@@ -284,8 +283,7 @@ def _refined(regression: Regression, frequencies: list[float], step: float) -> l
         f, runs = frequencies[0], len(frequencies)
 
         def saved(f: float) -> float:
-            waves = TimePeriodic.waves(regression.signals, [f] * runs)
-            return regression.ratio_of(RunEffectColumns(waves, regression.bounds))[1]
+            return regression.ratio_of(TimePeriodic.waves(regression.signals, [f] * runs))[1]
 
         return [float(golden_maximum(saved, f - step, f + step)[0])] * runs
     e = regression.left - regression.whiten.run_part(regression.left)

@@ -11,6 +11,9 @@ __all__ = ["Cache", "Proposal", "ProposalKey"]
 
 T = TypeVar("T")
 
+#: Numbers of the fits that are kept: 32 MiB, some twenty fits of 5000 readings, one of many.
+MOST_KEPT = 2**22
+
 #: A cause, and the terms that it was asked beside.
 ProposalKey: TypeAlias = "tuple[str, tuple[tuple[str, str], ...]]"
 
@@ -25,17 +28,19 @@ class Proposal(NamedTuple):
 class Cache:
     """Results by what they depend on: the motion, the readings, or one fit of them.
 
-    Regressions of the same readings share one for the motion and the proposals; each has answers
-    of its own.
+    Regressions of the same readings share one for the motion, the proposals and the fits asked for
+    last; each has answers of its own.
     """
 
     def __init__(
         self,
         motion: dict[str, tuple[object, Any]] | None = None,
         proposals: dict[ProposalKey, Proposal] | None = None,
+        fits: dict[object, tuple[Any, int]] | None = None,
     ) -> None:
         self._motion = {} if motion is None else motion
         self._proposals = {} if proposals is None else proposals
+        self._fits = {} if fits is None else fits
         self._answers: dict[object, Any] = {}
 
     def of_motion(self, name: str, key: object, build: Callable[[], T]) -> T:
@@ -53,6 +58,20 @@ class Cache:
         answer: T = self._answers[key]
         return answer
 
+    def fit(self, key: object, build: Callable[[], tuple[T, int]]) -> T:
+        """A fit of the same readings and its size; of those asked for last some are kept.
+
+        It must not hold this cache: what holds itself is not let go of.
+        """
+        kept = self._fits[key] = self._fits.pop(key, None) or build()  # the last one now
+        excess = sum(size for _, size in self._fits.values()) - MOST_KEPT
+        for old in list(self._fits):
+            if excess <= 0:
+                break
+            excess -= self._fits.pop(old)[1]
+        found: T = kept[0]
+        return found
+
     def proposed(self, key: ProposalKey, least: float) -> Proposal | None:
         """A proposal that was searched at least as far as ``least`` asks for."""
         kept = self._proposals.get(key)
@@ -65,7 +84,7 @@ class Cache:
 
     def for_other_terms(self) -> Cache:
         """That of the same readings with other terms."""
-        return Cache(self._motion, self._proposals)
+        return Cache(self._motion, self._proposals, self._fits)
 
     def for_other_errors(self) -> Cache:
         """That of other errors along the same motion."""

@@ -173,11 +173,12 @@ def _orthonormal(x: Array) -> tuple[Array, Array, Array] | None:
     condition = float(np.linalg.norm(scaled))
     if not condition < WELL:
         return None
-    q = x @ (scaled / lengths[:, None])
+    # Rows of the transpose, so that columns stand one after the other.
+    rows = (scaled / lengths[:, None]).T @ x.T
     if condition > VERY_WELL:
-        again = np.linalg.inv(np.linalg.cholesky(q.T @ q)).T
-        q, scaled = q @ again, scaled @ again
-    return q, scaled, lengths
+        again = np.linalg.inv(np.linalg.cholesky(rows @ rows.T))
+        rows, scaled = again @ rows, scaled @ again.T
+    return rows.T, scaled, lengths
 
 
 class BandedFactor:

@@ -13,7 +13,6 @@ import trueangle._core as _core
 
 from .batch import Blocks, Products
 from .factor import Factor
-from .runcolumns import RunEffectColumns
 from .whitening import Whitener
 
 __all__ = ["EXCITED", "ROUNDING", "Projection", "project"]
@@ -95,14 +94,15 @@ class Projection:
     # -- what others would save --------------------------------------------------
 
     @cached_property
-    def _all_seen(self) -> Array:
-        """`seen`, the residual as the last column."""
-        return self.whiten.transposed(np.column_stack([self.q, self.r]))
+    def beside(self) -> _core.Beside:
+        """What columns that are not whitened see of the fit."""
+        return self.whiten.beside(self.q, self.r, self.rss, EXCITED)
 
     @property
     def seen(self) -> tuple[Array, Array]:
-        """The fitted columns and the residual as columns that are not whitened see them."""
-        return self._all_seen[:, :-1], self._all_seen[:, -1]
+        """The fitted columns, as rows, and the residual as columns not whitened see them."""
+        rows = self.beside.seen
+        return rows[:-1], rows[-1]
 
     def projected(self, columns: Array) -> tuple[Array, NDArray[np.bool_]]:
         """Whitened columns with what is fitted taken out, and which are excited."""
@@ -141,33 +141,20 @@ class Projection:
 
     def gain(self, columns: Array) -> tuple[float, Array]:
         """Deviance that ``columns`` save together, and their coefficients."""
-        x, before, after, known = self._powers(columns)
-        coefficients = np.zeros(columns.shape[1])
-        if not (after > EXCITED * np.maximum(before, 1e-300)).all():
-            return 0.0, coefficients
-        gram = x.T @ x - known.T @ known
-        scale = np.sqrt(np.diag(gram))
-        values, vectors = np.linalg.eigh(gram / np.outer(scale, scale))
-        if values[0] < EXCITED * values[-1]:
-            return 0.0, coefficients
-        moment = vectors.T @ (x.T @ self.r / scale)
-        saved = float(np.sum(moment**2 / values))
-        coefficients = (vectors @ (moment / values)) / scale
-        return self.as_deviance(saved), coefficients
+        return self.beside.gain(columns)
 
     def gains(self, columns: Array) -> Array:
         """Deviance that each column saves alone."""
-        x, before, after, _ = self._powers(columns)
+        before, after, moment = self.beside.powers(columns)
         excited = after > EXCITED * np.maximum(before, 1e-300)
-        saved = (x.T @ self.r) ** 2 / np.where(excited, after, 1.0)
+        saved = moment**2 / np.where(excited, after, 1.0)
         return np.where(excited, self.as_deviances(np.where(excited, saved, 0.0)), 0.0)
 
     def fixed_gains(self, columns: Array) -> Array:
         """Deviance that each column saves with the coefficient 1."""
-        x, before, after, _ = self._powers(columns)
+        before, after, moment = self.beside.powers(columns)
         excited = after > EXCITED * np.maximum(before, 1e-300)
-        saved = 2.0 * (x.T @ self.r) - after
-        return np.where(excited, self.as_deviances(saved), 0.0)
+        return np.where(excited, self.as_deviances(2.0 * moment - after), 0.0)
 
     def block_gains(self, blocks: Blocks) -> Array:
         """Deviance that each block of columns saves alone, as `gain` of each."""
@@ -176,7 +163,7 @@ class Projection:
         for where, products in blocks.groups:
             columns, width = products.columns, products.width
             before = products.under(self.whiten)
-            known = (q.T @ columns).reshape(q.shape[1], -1, width)
+            known = (q @ columns).reshape(len(q), -1, width)
             moment = (r @ columns).reshape(-1, width)
             after = before - np.einsum("kbi,kbj->bij", known, known)
             power = np.einsum("bii->bi", after)
@@ -195,7 +182,7 @@ class Projection:
         before = pairs.under(self.whiten)
         cosines, sines, mixed = before[:, 0, 0], before[:, 1, 1], before[:, 0, 1]
         q, r = (columns.astype(np.float32) for columns in self.seen)
-        known = (q.T @ pairs.columns).astype(np.float64)
+        known = (q @ pairs.columns).astype(np.float64)
         moment = (r @ pairs.columns).astype(np.float64)
         aa = cosines - (known[:, 0::2] ** 2).sum(axis=0)
         bb = sines - (known[:, 1::2] ** 2).sum(axis=0)
@@ -206,17 +193,9 @@ class Projection:
         saved = (bb * c * c - 2.0 * ab * c * s + aa * s * s) / np.where(excited, determinant, 1.0)
         return np.where(excited, self.as_deviances(np.maximum(saved, 0.0)), 0.0)
 
-    def ratio_of(self, columns: RunEffectColumns) -> tuple[float, float]:
+    def ratio_of(self, columns: Array) -> tuple[float, float]:
         """Best ratio of variances of a run effect beside what is fitted, and what it saves."""
-        moments = columns.moments(self._all_seen)
-        return _core.best_ratio(columns.grams(self.whiten), moments, self.n, self.rss)
-
-    def _powers(self, columns: Array) -> tuple[Array, Array, Array, Array]:
-        """Whitened columns, their powers before and after projection, their fitted shares."""
-        x = self.whiten(columns)
-        before = np.einsum("ij,ij->j", x, x)
-        known = self.q.T @ x
-        return x, before, before - np.einsum("ij,ij->j", known, known), known
+        return self.beside.ratio(columns)
 
 
 def project(factor: Factor, target: Array) -> Projection:

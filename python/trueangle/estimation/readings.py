@@ -68,6 +68,11 @@ class Readings:
         return LagCorrelation(self.signals.clock, self.bounds)
 
     @cached_property
+    def scatter(self) -> float:
+        """Standard deviation of the residuals."""
+        return float(np.std(self.residual))
+
+    @cached_property
     def root_weights(self) -> Array:
         """Square roots of the weights."""
         return np.ones(len(self)) if self.weights is None else np.sqrt(self.weights)

@@ -17,7 +17,6 @@ from .lines import LineBasis
 from .projection import ROUNDING
 from .readings import Readings
 from .repeats import repeated_part
-from .runcolumns import RunEffectColumns
 from .solution import Solution, values_of
 from .whitening import RunEffect
 
@@ -80,8 +79,14 @@ class Regression(Solution):
 
     def with_terms(self, terms: Iterable[Extension], rho: float | None = None) -> Self:
         """The same readings with other terms (and this correlation of the noise)."""
-        fixed = self.fixed_rho if rho is None else rho
-        solution = Solution.solve(self.readings, terms, fixed, self)
+        fixed, terms = self.fixed_rho if rho is None else rho, tuple(terms)
+
+        def build() -> tuple[Solution, int]:
+            found = Solution.solve(self.readings, terms, fixed, self)
+            return found, found.size + self.size
+
+        # Another fit before it leaves other roundings.
+        solution = self.cache.fit((fixed, self.factors, terms), build)
         return self.with_solution(solution, least=0.0, cache=self.cache.for_other_terms())
 
     def with_evidence(self, terms: Iterable[Extension]) -> Self:
@@ -155,7 +160,7 @@ class Regression(Solution):
         be taken off again by another one.
         """
         saved, coefficients = self.gain(columns)
-        if float(np.std(columns @ coefficients)) > BEYOND_SHOWN * float(np.std(self.residual)):
+        if float(np.std(columns @ coefficients)) > BEYOND_SHOWN * self.readings.scatter:
             saved = 0.0
             deviance = None if deviance is None else 0.0
         return Extension(
@@ -174,12 +179,10 @@ class Regression(Solution):
         self,
         cause: str,
         shape: dict[str, Any],
-        columns: Array | RunEffectColumns,
+        columns: Array,
         log_grid: float = 0.0,
     ) -> Extension:
         """Extension of a run effect with its evidence in this regression."""
-        if not isinstance(columns, RunEffectColumns):
-            columns = RunEffectColumns(columns, self.bounds)
         ratio, deviance = self.ratio_of(columns)
         return Extension(
             cause,
@@ -189,7 +192,7 @@ class Regression(Solution):
             log_grid,
             deviance,
             self.readings.log_runs,
-            RunEffect(columns.columns, ratio),
+            RunEffect(columns, ratio),
         )
 
     def is_pruned(self, deviance: float, parameters: int, log_grid: float = 0.0) -> bool:

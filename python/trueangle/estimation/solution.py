@@ -10,15 +10,15 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
+import trueangle._core as _core
+
 from ..joint.pattern import Pattern, Surroundings
 from ..joint.signals import Signals
-from ..support.quantiles import median
 from .extension import Extension
 from .factor import Factor, in_common
 from .lines import LineBasis
 from .projection import Projection, project
 from .readings import ENOUGH_RUNS, Readings
-from .runcolumns import RunEffectColumns
 from .stretches import short_stretches
 from .whitening import RunEffect
 
@@ -94,7 +94,9 @@ class Solution(Projection):
         for _ in range(2):
             found = projected(target, correlation, effects)
             left = _left(readings, design, found)
-            kept, target, outlying = _clipped(readings, left)
+            kept, target, outlying = _core.clipped(
+                readings.residual, left, readings.root_weights, CLIP
+            )
             if rho is None:
                 # What lasts over two readings or three is not noise that neighbours share.
                 if outlying.any():
@@ -106,8 +108,7 @@ class Solution(Projection):
         if len(effects) > 1:
             for k, effect in enumerate(effects):
                 others = [other for j, other in enumerate(effects) if j != k]
-                columns = RunEffectColumns(effect.columns, readings.bounds)
-                ratio, _ = projected(target, correlation, others).ratio_of(columns)
+                ratio, _ = projected(target, correlation, others).ratio_of(effect.columns)
                 effects[k] = RunEffect(effect.columns, max(ratio, 1e-9))
         if len(effects) > 1 or not settled:
             found = projected(target, correlation, effects)
@@ -192,6 +193,11 @@ class Solution(Projection):
         penalty = sum(t.parameters * t.log_n + 2.0 * t.log_grid for t in self.terms)
         return self.deviance + penalty
 
+    @property
+    def size(self) -> int:
+        """Numbers that it holds beside the readings, about."""
+        return self.design.size + sum(factor.q.size for factor in self.factors)
+
     def has(self, cause: str) -> bool:
         """A term of this cause is among the terms."""
         return any(term.cause == cause for term in self.terms)
@@ -264,7 +270,8 @@ class Solution(Projection):
         coefficients = solved(self.residual)
         for _ in range(2):
             left = self.residual - self.design @ coefficients
-            _, target, outlying = _clipped(self.readings, left - self.whiten.run_part(left))
+            left = left - self.whiten.run_part(left)
+            _, target, outlying = _core.clipped(self.residual, left, self.root_weights, CLIP)
             if not outlying.any():
                 break
             coefficients = solved(target)
@@ -308,17 +315,3 @@ def _left(readings: Readings, design: Array, fit: Projection) -> Array:
     left = readings.residual - design @ fit.coefficients
     left -= fit.whiten.run_part(left)
     return np.asarray(left)
-
-
-def _clipped(readings: Readings, left: Array) -> tuple[Array, Array, NDArray[np.bool_]]:
-    """What is left, outliers clipped; readings to match; which are outlying."""
-    scale = readings.root_weights * left
-    spread = 1.4826 * float(median(np.abs(scale - median(scale))))
-    limit = CLIP * max(spread, 1e-12) / readings.root_weights
-    outlying = np.abs(left) > limit
-    if 2 * np.count_nonzero(outlying) > outlying.size:
-        # More than half read alike, and away from the mean: no outlier is in the majority.
-        limit = CLIP * 1.4826 * float(median(np.abs(scale))) / readings.root_weights
-        outlying = np.abs(left) > limit
-    kept = np.clip(left, -limit, limit)
-    return kept, np.where(outlying, readings.residual - left + kept, readings.residual), outlying

@@ -175,17 +175,6 @@ class Whitener:
         found = _core.whitened(rows, self.bounds, self.rho, self.root_weights, transposed)
         return found.reshape(x.shape)
 
-    def transposed(self, y: Array) -> Array:
-        """The transpose of the map applied to a column or to columns.
-
-        Products ``map(X).T @ y`` of many columns X are ``X.T @ transposed(y)``: the many
-        need not be mapped.
-        """
-        if self.effects:
-            y = y.copy()
-            self._shrink(y)
-        return self._filtered(y, transposed=True)
-
     def taken(self) -> tuple[Array, Array]:
         """What run effects take from products of columns, as columns w and shares c.
 
@@ -201,6 +190,15 @@ class Whitener:
             w[start:stop, : u.shape[1]] = u
             c[j, : u.shape[1]] = shrink * (2.0 - shrink)
         return self._filtered(w, transposed=True), c
+
+    def beside(self, q: Array, r: Array, squares: float, excited: float) -> _core.Beside:
+        """A fit's orthonormal columns and residual, as columns that are not mapped see them."""
+        taken = None
+        if self.effects:
+            both, taken = np.column_stack([q, r]), self.taken()
+            self._shrink(both)
+            q, r = both[:, :-1], np.ascontiguousarray(both[:, -1])
+        return _core.Beside(q, r, squares, excited, self.bounds, self.rho, self.root_weights, taken)
 
     def _shrink(self, out: NDArray[Any]) -> None:
         for (start, stop), (u, shrink) in zip(self.bounds, self._rotations, strict=True):

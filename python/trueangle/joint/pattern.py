@@ -144,8 +144,8 @@ class Pattern:
     def indicated_value(self, theta: Array, steps: int = 30) -> Array:
         """Solution e of ``e = p(theta + e)``: the pattern evaluated at the indicated angle.
 
-        By Newton's steps; where the pattern may be about as steep as the angle, which that of
-        no joint is, by putting e in.
+        By Newton's steps; where the pattern is about as steep as the angle at a reading, which
+        that of no joint is, by putting e in.
         """
         sizes = np.hypot(self.cosine, self.sine)
         steepest = float(self.orders @ sizes) / ARCSEC_PER_RAD
@@ -155,11 +155,12 @@ class Pattern:
         for _ in range(steps):
             value, slope = self.value_and_slope(theta + error / ARCSEC_PER_RAD)
             change = value - error
-            if steepest < STEEP:
+            is_gentle = steepest < STEEP or float(np.max(np.abs(slope), initial=0.0)) < STEEP
+            if is_gentle:
                 change = change / (1.0 - slope)
             error = error + change
             largest = float(np.max(np.abs(change), initial=0.0))
-            if min(largest, bend * largest**2 if steepest < STEEP else np.inf) < SOLVED:
+            if min(largest, bend * largest**2 if is_gentle else np.inf) < SOLVED:
                 break
         return error
 

@@ -6,6 +6,7 @@ import itertools
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -108,7 +109,7 @@ class Signals:
         """Signed output speed in turns per second (zeros where unknown)."""
         return np.zeros_like(self.theta) if self.velocity is None else self.velocity / 360.0
 
-    @property
+    @cached_property
     def grid(self) -> UniformGrid | None:
         """Equal steps of a turn on which the design put the readings, or None."""
         return UniformGrid(self.table) if self.table else None

@@ -7,6 +7,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+import trueangle._core as _core
+
 __all__ = ["median", "quantile"]
 
 
@@ -18,7 +20,10 @@ def median(values: ArrayLike, axis: int = -1) -> Any:
     >>> float(median([3.0, 1.0, 2.0])), median([[1.0, 4.0], [3.0, 8.0]], axis=0).tolist()
     (2.0, [2.0, 6.0])
     """
-    below, above, part, top = _beside(values, 0.5, axis)
+    given = np.asarray(values, dtype=np.float64)
+    if given.ndim == 1:
+        return np.float64(_core.median(given))
+    below, above, part, top = _beside(given, 0.5, axis)
     return np.where(np.isnan(top), np.nan, 0.5 * (below + above) if part else below)[()]
 
 

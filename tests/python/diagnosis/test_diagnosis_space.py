@@ -11,7 +11,6 @@ from trueangle.estimation.batch import Blocks
 from trueangle.estimation.factor import Factor
 from trueangle.estimation.projection import project
 from trueangle.estimation.regression import Regression
-from trueangle.estimation.runcolumns import RunEffectColumns
 from trueangle.estimation.whitening import LagCorrelation, RunEffect, Whitener
 from trueangle.joint.grid import UniformGrid, uniform_grid
 from trueangle.simulation import Harmonic, Joint, RunDesign, Simulation, join_runs, simulate
@@ -96,21 +95,15 @@ def test_products_under_a_noise_need_no_mapped_columns(space, noise):
     rng = np.random.default_rng(3)
     whiten = Whitener(space.bounds, noise["rho"], noise["effects"], noise["weights"])
     x, y = rng.standard_normal((space.n, 6)), rng.standard_normal((space.n, 2))
-    assert x.T @ whiten.transposed(y) == pytest.approx(whiten(x).T @ y, rel=ROUNDING, abs=ROUNDING)
+    seen = whiten.beside(y, y[:, 1].copy(), 1.0, 0.0).seen
+    slow = y[:, [0, 1, 1]].T @ whiten(x)
+    assert seen @ x == pytest.approx(slow, rel=ROUNDING, abs=ROUNDING)
     blocks = Blocks([x[:, :2], x[:, 2:3], x[:, 3:5], x[:, 5:]])
     for where, products in blocks.groups:
         for k, gram in zip(where, products.under(whiten), strict=True):
             start = (0, 2, 3, 5)[k]
             mapped = whiten(x[:, start : start + products.width])
             assert gram == pytest.approx(mapped.T @ mapped, rel=ROUNDING, abs=ROUNDING)
-    drawn = RunEffectColumns(x, space.bounds)
-    grams, moments = drawn.grams(whiten), drawn.moments(whiten.transposed(whiten(y)))
-    mapped, seen = whiten(x), whiten(y)
-    for k, (a, b) in enumerate(space.bounds):
-        slow = mapped[a:b].T @ mapped[a:b]
-        assert grams[k] == pytest.approx(slow, rel=ROUNDING, abs=ROUNDING)
-        slow = mapped[a:b].T @ seen[a:b]
-        assert moments[k] == pytest.approx(slow, rel=ROUNDING, abs=ROUNDING)
 
 
 def test_gains_of_blocks_are_those_of_each(space, noise):
@@ -195,7 +188,7 @@ def test_gains_are_those_of_least_squares(space):
 @pytest.mark.parametrize("seconds", [5.0, 10.0, 14.0, 20.0])
 def test_run_effects_have_the_likelihood_of_the_dense_covariance(space, seconds):
     z = np.column_stack([np.ones(space.n), space.signals.clock / seconds])
-    ratio, deviance = space.ratio_of(RunEffectColumns(z, space.bounds))
+    ratio, deviance = space.ratio_of(z)
 
     def minus_two_log_likelihood(ratio):
         v = dense_covariance(space, 0.0, [RunEffect(z, ratio)], np.ones(space.n))
@@ -270,16 +263,13 @@ def test_squares_saved_at_every_ratio_are_those_of_a_ridge(space, width):
         own[start:stop, k * width : (k + 1) * width] = z[start:stop]
     left = own @ rng.standard_normal(own.shape[1])
     beside, left = (x - space.q @ (space.q.T @ x) for x in (own, left))
-    columns = RunEffectColumns(z, space.bounds)
-    moments = columns.moments(np.column_stack([space.q, left]))
     squares = 2.0 * float(left @ left)
-    readings = 2.0 * squares
-    ratio, deviance = _core.best_ratio(columns.grams(space.whiten), moments, readings, squares)
+    ratio, deviance = _core.Beside(space.q, left, squares, 0.0, space.bounds, 0.0).ratio(z)
     assert ratio > 0.0
     moment = own.T @ left
     saved = moment @ np.linalg.solve(np.eye(own.shape[1]) / ratio + beside.T @ own, moment)
     paid = np.linalg.slogdet(np.eye(own.shape[1]) + ratio * own.T @ own)[1]
-    expected = -readings * np.log1p(-saved / squares) - paid
+    expected = -space.n * np.log1p(-saved / squares) - paid
     assert deviance == pytest.approx(expected, rel=1e-7)
 
 

@@ -9,7 +9,6 @@ import trueangle as ta
 from trueangle.effects import EFFECTS, Outliers
 from trueangle.effects.drawnline import DrawnLine
 from trueangle.estimation.regression import Regression
-from trueangle.estimation.runcolumns import RunEffectColumns
 from trueangle.joint.declared import Bearing
 from trueangle.joint.pattern import line_columns
 from trueangle.joint.signals import join_runs
@@ -131,8 +130,7 @@ def test_a_frequency_that_wanders_is_known_as_a_mean_of_runs(signals):
     error = np.sum(waves * drawn, axis=1) + rng.standard_normal(len(signals))
     start = Regression.of(signals, error, SIM.surroundings, rho=0.0)
     shape = {"frequency_hz": frequencies.tolist()}
-    columns = RunEffectColumns(waves, start.bounds)
-    full = start.with_terms([start.propose_run_effect("time_periodic", shape, columns)])
+    full = start.with_terms([start.propose_run_effect("time_periodic", shape, waves)])
     parameters, _ = effect.report(full, [(*full.fitted()[0], np.zeros((0, 0)))])
     told = parameters["frequency_hz"]
     assert told.value == pytest.approx(np.median(frequencies))

@@ -43,6 +43,9 @@ class NothingKept(Cache):
     def of_fit(self, key, build):
         return build()
 
+    def fit(self, key, build):
+        return build()[0]
+
     def proposed(self, key, least):
         return None
 
@@ -101,6 +104,24 @@ def test_what_is_kept_is_that_of_the_readings(start):
         assert other is kept or other.of_fit("f", lambda: "new") == "new"
     assert kept.of_motion("m", 2, lambda: "other key") == "other key"
     assert kept.of_fit("f", lambda: "new") == "fit"
+
+
+def test_fits_asked_for_last_are_kept_and_large_ones_are_not(start, monkeypatch):
+    made = []
+
+    def ask(key, size):
+        return start.cache.fit(key, lambda: (made.append(key) or key, size))
+
+    monkeypatch.setattr("trueangle.estimation.cache.MOST_KEPT", 10)
+    assert [ask(key, 4) for key in "abaca"] == [*"abaca"]
+    assert made == [*"abc"]  # room is made by what was asked for longest ago
+    assert [ask(key, 4) for key in "cb"] == [*"cb"] and made == [*"abcb"]
+    assert ask("d", 11) == ask("d", 11) == "d" and made == [*"abcbdd"]
+    # Terms fitted to the same readings again, after the same fit, are the fit that is there.
+    line = start.propose("missing_order", {"order": 3.0}, start.base[:, :1] * 1.0)
+    monkeypatch.undo()
+    assert start.with_terms([line]).q is start.with_terms([line]).q
+    assert start.with_terms([line], 0.5).q is not start.with_terms([line]).q
 
 
 def test_a_proposal_that_was_searched_less_far_is_not_taken(start):

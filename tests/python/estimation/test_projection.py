@@ -8,7 +8,6 @@ import pytest
 from trueangle.estimation.batch import Blocks, Products
 from trueangle.estimation.factor import Factor, in_common, orthonormal_basis
 from trueangle.estimation.projection import Projection, project
-from trueangle.estimation.runcolumns import RunEffectColumns
 from trueangle.estimation.whitening import RunEffect, Whitener
 
 from .dense import BOUNDS, CASES, N, case, covariance
@@ -83,10 +82,9 @@ def test_what_candidates_save_is_what_a_fit_with_them_saves(kind: tuple) -> None
     np.testing.assert_allclose(found.pair_gains(Products(pairs, 2)), gains[1:3], rtol=2e-3,
                                atol=2e-3)  # fmt: skip
     seen, residual = found.seen
-    np.testing.assert_allclose(
-        blocks[3].T @ residual, blocks[3].T @ found.whiten.transposed(found.r)
-    )
-    np.testing.assert_allclose(blocks[3].T @ seen, found.whiten(blocks[3]).T @ found.q, atol=1e-10)
+    mapped = found.whiten(blocks[3])
+    np.testing.assert_allclose(residual @ blocks[3], found.r @ mapped, atol=1e-10)
+    np.testing.assert_allclose(seen @ blocks[3], found.q.T @ mapped, atol=1e-10)
 
 
 @pytest.mark.parametrize("kind", CASES)
@@ -122,7 +120,6 @@ def test_the_best_ratio_of_a_run_effect_is_that_of_the_likelihood(kind: tuple, s
     for a, b in BOUNDS:
         shift[a:b] = size * z[a:b] @ rng.normal(size=2)
     found = found.of_target(y + shift)
-    effect = RunEffectColumns(z, BOUNDS)
 
     def saved(ratio: float) -> float:
         wide = v.copy()
@@ -131,7 +128,7 @@ def test_the_best_ratio_of_a_run_effect_is_that_of_the_likelihood(kind: tuple, s
         likelihood = N * np.log(gls(x, y + shift, wide)[1] / found.rss)
         return -likelihood - np.linalg.slogdet(wide)[1] + np.linalg.slogdet(v)[1]
 
-    ratio, deviance = found.ratio_of(effect)
+    ratio, deviance = found.ratio_of(z)
     scan = max((saved(t), t) for t in np.geomspace(1e-4, 1e4, 400))
     assert deviance == pytest.approx(max(scan[0], 0.0), abs=0.02)
     if ratio > 0.0:
@@ -147,12 +144,22 @@ def test_many_columns_have_their_ratio_as_few_have() -> None:
     bounds = [(8 * k, 8 * k + 8) for k in range(50)]
     y = rng.normal(size=400) + np.repeat(rng.normal(size=50), 8) * 0.7
     factor = Factor.of([np.ones((400, 1))], bounds, 0.0, [], None)
-    ratio, _ = project(factor, y).ratio_of(RunEffectColumns(np.ones((400, 1)), bounds))
+    ratio, _ = project(factor, y).ratio_of(np.ones((400, 1)))
     # Of equal runs the likelihood has a closed form: variance between over that within.
     means = y.reshape(50, 8).mean(axis=1)
     within = ((y - np.repeat(means, 8)) ** 2).sum() / 350.0
     between = ((means - y.mean()) ** 2).sum() / 50.0
     assert ratio == pytest.approx((between - within / 8.0) / within, rel=0.02)
+
+
+def test_a_long_run_is_one_however_many_of_its_readings_are_held_at_once() -> None:
+    rng = np.random.default_rng(26)
+    factor = Factor.of([np.ones((900, 1))], [(0, 900)], 0.9, [], None)
+    found = project(factor, rng.normal(size=900))
+    columns = np.cumsum(rng.normal(size=(900, 3)), axis=0)
+    x, _ = found.projected(columns)
+    expected = np.linalg.lstsq(x, found.r, rcond=None)[0]
+    np.testing.assert_allclose(found.gain(columns)[1], expected, rtol=1e-9)
 
 
 def test_a_factor_grown_is_one_made_anew() -> None:

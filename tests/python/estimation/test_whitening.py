@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from trueangle.estimation.batch import Blocks, Products
-from trueangle.estimation.runcolumns import RunEffectColumns
 from trueangle.estimation.whitening import (
     LagCorrelation,
     RunEffect,
@@ -27,18 +26,19 @@ def test_the_map_makes_the_covariance_the_unit_matrix(kind: tuple) -> None:
     v = covariance(whiten)
     m = whiten(np.eye(N))
     np.testing.assert_allclose(m @ v @ m.T, np.eye(N), atol=1e-10)
-    np.testing.assert_allclose(whiten.transposed(np.eye(N)), m.T, atol=1e-12)
     assert whiten.log_determinant == pytest.approx(np.linalg.slogdet(v)[1], abs=1e-9)
     x = np.random.default_rng(3).normal(size=(N, 3))
     column, keep = np.ascontiguousarray(x[:, 1]), x.copy()
     np.testing.assert_allclose(whiten(column), m @ column, atol=1e-12)
-    np.testing.assert_allclose(whiten.transposed(column), m.T @ column, atol=1e-12)
+    # As columns see it that are not mapped: the transpose of the map, applied.
+    seen = whiten.beside(np.eye(N), column, 1.0, 0.0).seen
+    np.testing.assert_allclose(seen, np.vstack([m, m.T @ column]), atol=1e-12)
     z = x[:, :1] + 1j * x[:, 1:2]
     np.testing.assert_allclose(whiten(z), m @ z, atol=1e-12)
     np.testing.assert_allclose(whiten(x.astype(np.float32)), m @ x, atol=1e-5)
     assert whiten(x.astype(np.float32)).dtype == np.float32
-    whiten.transposed(x)
-    np.testing.assert_array_equal(x, keep)
+    whiten.beside(x, column, 1.0, 0.0)
+    np.testing.assert_array_equal(np.column_stack([x, column]), keep[:, [0, 1, 2, 1]])
     assert whiten.is_identity == (kind == (0.0, (), False))
 
 
@@ -75,20 +75,6 @@ def test_products_within_blocks_are_those_of_the_inverse_covariance(kind: tuple)
     assert seen == 5
     single = Products(np.hstack(blocks[:1]).astype(np.float32), 2).under(whiten)
     np.testing.assert_allclose(single[0], blocks[0].T @ inverse @ blocks[0], rtol=1e-4, atol=1e-3)
-
-
-@pytest.mark.parametrize("kind", CASES)
-def test_products_of_a_run_effect_run_by_run(kind: tuple) -> None:
-    whiten = case(*kind)
-    x = np.random.default_rng(6).normal(size=(N, 2))
-    columns = RunEffectColumns(x, BOUNDS)
-    for noise in (whiten, case(0.3, (), True, 9), whiten):
-        inverse = np.linalg.inv(covariance(noise))
-        expected = [x[a:b].T @ inverse[a:b, a:b] @ x[a:b] for a, b in BOUNDS]
-        np.testing.assert_allclose(columns.grams(noise), expected, rtol=1e-9, atol=1e-9)
-    y = np.random.default_rng(7).normal(size=(N, 3))
-    expected = [x[a:b].T @ y[a:b] for a, b in BOUNDS]
-    np.testing.assert_allclose(columns.moments(y), expected, rtol=1e-12, atol=1e-12)
 
 
 @pytest.mark.parametrize("chosen", [None, (True, False), (False, True), (True, True)])

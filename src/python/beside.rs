@@ -1,0 +1,165 @@
+//! `_core.Beside`: what columns would save beside a fit.
+
+use std::borrow::Cow;
+
+use numpy::{PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods};
+use pyo3::prelude::*;
+
+use super::array::vector;
+use super::linear::{NOT_FINITE, told};
+use super::noise::{Bounds, consecutive};
+use super::release::detached;
+use crate::check::same_length;
+use crate::linear::{Beside, Correlated};
+
+type Vector<'py> = Bound<'py, numpy::PyArray1<f64>>;
+
+/// Rows that are turned into columns at a time: they stay in the first cache.
+const TURNED: usize = 64;
+
+/// A fit as columns see it that are not whitened.
+#[pyclass(name = "Beside", module = "trueangle._core", frozen)]
+pub struct PyBeside(Beside);
+
+#[pymethods]
+impl PyBeside {
+    /// Of the orthonormal columns and the residual of a fit, both whitened, and its sum of squares;
+    /// `taken` are the shapes of run effects and what every run takes off products with them.
+    #[new]
+    #[pyo3(signature = (fitted, residual, squares, excited, bounds, rho, roots=None, taken=None))]
+    #[allow(clippy::too_many_arguments)]
+    fn new(
+        py: Python<'_>,
+        fitted: PyReadonlyArray2<'_, f64>,
+        residual: PyReadonlyArray1<'_, f64>,
+        squares: f64,
+        excited: f64,
+        bounds: Bounds,
+        rho: f64,
+        roots: Option<PyReadonlyArray1<'_, f64>>,
+        taken: Option<(PyReadonlyArray2<'_, f64>, PyReadonlyArray2<'_, f64>)>,
+    ) -> PyResult<Self> {
+        let noise = Correlated {
+            bounds: &bounds,
+            rho,
+            roots: roots.as_ref().map(PyReadonlyArray1::as_slice).transpose()?,
+        };
+        let n = residual.len();
+        consecutive(py, n, &noise)?;
+        same_length("fitted", fitted.shape()[0], "residual", n)?;
+        let (mut shapes, mut shares) = (Cow::Borrowed(&[][..]), Vec::new());
+        if let Some((columns, runs)) = &taken {
+            same_length("shapes", columns.shape()[0], "residual", n)?;
+            same_length("shares", runs.shape()[0], "bounds", noise.bounds.len())?;
+            same_length("shares", runs.shape()[1], "shapes", columns.shape()[1])?;
+            shapes = by_columns(columns)?;
+            shares = by_rows(runs);
+        }
+        let fitted = by_columns(&fitted)?;
+        let residual = residual.as_slice()?;
+        let made = detached(py, || {
+            Beside::new(
+                noise,
+                &fitted,
+                residual,
+                (&shapes, &shares),
+                squares,
+                excited,
+            )
+        })?;
+        Ok(Self(made))
+    }
+
+    /// The fitted columns and what they leave, as rows.
+    #[getter]
+    fn seen<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let n = self.0.readings();
+        let rows = self.0.seen();
+        vector(py, rows)?.reshape([rows.len() / n.max(1), n])
+    }
+
+    /// Deviance that columns save together, and their coefficients.
+    fn gain<'py>(
+        &self,
+        py: Python<'py>,
+        columns: PyReadonlyArray2<'py, f64>,
+    ) -> PyResult<(f64, Vector<'py>)> {
+        let rows = self.rows(&columns)?;
+        let table = (rows.slice()?, columns.shape()[1]);
+        let (deviance, coefficients) = detached(py, || self.0.gain(table))?;
+        Ok((deviance, vector(py, &coefficients)?))
+    }
+
+    /// Powers of columns, what of them is not fitted, and products with what is left.
+    fn powers<'py>(
+        &self,
+        py: Python<'py>,
+        columns: PyReadonlyArray2<'py, f64>,
+    ) -> PyResult<(Vector<'py>, Vector<'py>, Vector<'py>)> {
+        let rows = self.rows(&columns)?;
+        let table = (rows.slice()?, columns.shape()[1]);
+        let found = detached(py, || self.0.powers(table))?;
+        Ok((
+            vector(py, &found.before)?,
+            vector(py, &found.after)?,
+            vector(py, &found.moment)?,
+        ))
+    }
+
+    /// Best ratio of variances of a run effect and the deviance that it saves.
+    fn ratio(&self, py: Python<'_>, columns: PyReadonlyArray2<'_, f64>) -> PyResult<(f64, f64)> {
+        let rows = self.rows(&columns)?;
+        let table = (rows.slice()?, columns.shape()[1]);
+        let found = detached(py, || self.0.ratio(table))?;
+        told(py, found, NOT_FINITE)
+    }
+}
+
+impl PyBeside {
+    fn rows<'a, 'py>(&self, columns: &'a PyReadonlyArray2<'py, f64>) -> PyResult<Rows<'a, 'py>> {
+        same_length("columns", columns.shape()[0], "readings", self.0.readings())?;
+        Ok(if columns.is_c_contiguous() {
+            Rows::There(columns)
+        } else {
+            Rows::Made(by_rows(columns))
+        })
+    }
+}
+
+/// Rows one after the other.
+enum Rows<'a, 'py> {
+    There(&'a PyReadonlyArray2<'py, f64>),
+    Made(Vec<f64>),
+}
+
+impl Rows<'_, '_> {
+    fn slice(&self) -> PyResult<&[f64]> {
+        Ok(match self {
+            Self::There(array) => array.as_slice()?,
+            Self::Made(rows) => rows,
+        })
+    }
+}
+
+fn by_rows(table: &PyReadonlyArray2<'_, f64>) -> Vec<f64> {
+    table.as_array().iter().copied().collect()
+}
+
+/// Columns one after the other: as they stand, or of so many rows at a time.
+fn by_columns<'a>(table: &'a PyReadonlyArray2<'_, f64>) -> PyResult<Cow<'a, [f64]>> {
+    if table.is_fortran_contiguous() {
+        return Ok(Cow::Borrowed(table.as_slice()?));
+    }
+    let table = table.as_array();
+    let (n, columns) = table.dim();
+    let mut turned = vec![0.0; n * columns];
+    for start in (0..n).step_by(TURNED) {
+        for (j, column) in table.columns().into_iter().enumerate() {
+            let stop = n.min(start + TURNED);
+            for i in start..stop {
+                turned[j * n + i] = column[i];
+            }
+        }
+    }
+    Ok(Cow::Owned(turned))
+}
