@@ -10,7 +10,7 @@ import pytest
 
 from trueangle.diagnosis import believed
 from trueangle.diagnosis.beliefs import Belief
-from trueangle.diagnosis.candidates import proposed
+from trueangle.diagnosis.candidates import proposed_above
 from trueangle.diagnosis.correction import _ranges
 from trueangle.diagnosis.diagnose import _noise, _overall, _structure
 from trueangle.diagnosis.discrepancy import unfolded_error
@@ -20,9 +20,9 @@ from trueangle.diagnosis.gearedlines import GearedLines
 from trueangle.diagnosis.gearratio import find_ratio
 from trueangle.diagnosis.holdout import reducible_share
 from trueangle.diagnosis.named import _rivals, findings_of
-from trueangle.diagnosis.overlap import overlaps
+from trueangle.diagnosis.overlap import finding_overlaps
 from trueangle.diagnosis.remainder import share_of_run
-from trueangle.diagnosis.wrongplace import moved
+from trueangle.diagnosis.wrongplace import misplaced_beliefs
 from trueangle.effects import EFFECTS, LocalDefect
 from trueangle.effects.blindness import Blindness
 from trueangle.estimation.estimate import quantity
@@ -109,7 +109,7 @@ def test_columns_that_oppose_each_other_overlap_as_much_as_those_that_do_not(sig
         terms = [
             start.propose(c, {}, x[:, None]) for c, x in (("backlash", one), ("latency", other))
         ]
-        ((i, j, found),) = overlaps(start.with_terms(terms), [[0], [1]])
+        ((i, j, found),) = finding_overlaps(start.with_terms(terms), [[0], [1]])
         assert (i, j) == (0, 1)
         assert found == pytest.approx(1.0 / np.sqrt(1.25), abs=0.03)
 
@@ -190,16 +190,16 @@ def test_a_finding_of_several_terms_has_the_evidence_of_all():
     gaps = [gap for _, gap in found.rivals]
     assert gaps == sorted(gaps)
     for cause, gap in found.rivals:
-        instead = proposed(start, cause)
+        instead = proposed_above(start, cause)
         assert gap == pytest.approx(start.bic - instead.bic_gain - full.bic, abs=1e-6)
 
 
 def test_a_rival_that_explains_more_has_a_gap_below_zero(signals):
     start = regression(signals, 3.0 * signals.direction)
-    full = start.with_terms([proposed(start, "latency")])
+    full = start.with_terms([proposed_above(start, "latency")])
     found = dict(_rivals(full, [0]))
     assert found["backlash"] < -6.0
-    instead = proposed(start, "backlash")
+    instead = proposed_above(start, "backlash")
     assert found["backlash"] == pytest.approx(start.bic - instead.bic_gain - full.bic, abs=1e-6)
 
 
@@ -226,7 +226,7 @@ def test_what_is_at_another_place_is_told_with_its_errors():
          "height_arcsec": quantity(4.25, 0.125), "shaft": quantity("output")},
         {"bic_gain": 90.0}, None, [], [LocalDefect(200.0, 7.5, 4.25)],
     )  # fmt: skip
-    (found,), left = moved([absent], [finding], replace(SIM, effects=(claimed,)))
+    (found,), left = misplaced_beliefs([absent], [finding], replace(SIM, effects=(claimed,)))
     assert left == []
     assert found.verdict == "wrong_place"
     assert found.believed == {"place_deg": 110.0, "width_deg": 8.0, "height_arcsec": 4.0}

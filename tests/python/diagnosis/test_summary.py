@@ -10,7 +10,7 @@ import pytest
 
 import trueangle as ta
 from trueangle.diagnosis.beliefs import Belief
-from trueangle.diagnosis.brief import brief_of
+from trueangle.diagnosis.brief import brief_finding
 from trueangle.diagnosis.finding import Finding
 from trueangle.diagnosis.gain import Gain
 from trueangle.diagnosis.levels import LevelGain
@@ -168,5 +168,5 @@ BRIEFLY = {
 def test_a_finding_is_told_in_brief_with_its_size_in_its_unit(cause) -> None:
     given, said = BRIEFLY[cause]
     parameters = {name: quantity(value) for name, value in given.items()}
-    found = brief_of(Finding(cause, parameters, {}, None, []), error_unit("deg", 1.0))
+    found = brief_finding(Finding(cause, parameters, {}, None, []), error_unit("deg", 1.0))
     assert re.sub(r"(\.\d*?[1-9])0+(?= (ms|ppm|Hz|%|arcsec))", r"\1", found) == said

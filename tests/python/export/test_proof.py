@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from trueangle.export.oneturn import line_floor
-from trueangle.export.proof import lost_orders, prove, upward
+from trueangle.export.proof import lost_orders, prove_export, rounded_up
 from trueangle.export.table import make_table
 
 ARCSEC = 1_296_000.0
@@ -30,7 +30,7 @@ def test_an_order_is_lost_by_the_amplitude_that_differs() -> None:
 def test_a_proof_has_the_largest_and_the_mean_of_squares(continuous: bool) -> None:
     """Of a sine of 5 arcsec; between inputs half of a step more, and the target's rounding."""
     size, resolution = 5.0, 0.01 / ARCSEC
-    found = prove(
+    found = prove_export(
         [lambda places: wave(3, size, 0.1)(places / TURN)], np.zeros_like, 12,
         resolution, continuous=continuous,
     )  # fmt: skip
@@ -57,6 +57,6 @@ def test_what_rounded_numbers_leave_is_that_of_lines_between_them() -> None:
 @pytest.mark.parametrize("digits", [2, 4, 6])
 def test_a_bound_that_is_printed_stays_one(digits: int) -> None:
     for value in 10.0 ** np.random.default_rng(digits).uniform(-6.0, 4.0, 200):
-        shown = upward(float(value), digits)
+        shown = rounded_up(float(value), digits)
         assert value <= shown <= value * (1.0 + 1.001 * 10.0 ** (1 - digits))
         assert float(f"{shown:.{digits}g}") == shown

@@ -10,7 +10,7 @@ import pytest
 
 import trueangle as ta
 from trueangle.export import TARGETS
-from trueangle.export.setpoint import steepness
+from trueangle.export.setpoint import axis_steepness
 from trueangle.export.setpointreading import travel_model
 
 DIGIT = 1e-4
@@ -22,7 +22,7 @@ def test_slope_and_bend_are_those_of_a_parabola(steeper: str) -> None:
     c, x = 2e-6, np.arange(37) * 10.0
     flat = SimpleNamespace(entries=36, forward=c * x / 360.0, reverse=c * x / 360.0)
     setattr(flat, steeper, -c * x**2 / 360.0)
-    slope, bend = steepness(flat)
+    slope, bend = axis_steepness(flat)
     assert slope == pytest.approx(c * (360.0**2 - 350.0**2) / 10.0)
     assert bend == pytest.approx(2.0 * c)
 

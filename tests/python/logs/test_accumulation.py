@@ -10,7 +10,7 @@ import pytest
 import trueangle as ta
 from trueangle.errors import EmptyCellsWarning
 from trueangle.logs import accumulation
-from trueangle.logs.accumulation import LogFitSettings, OutlierLimits, Tally, accumulate
+from trueangle.logs.accumulation import LogFitSettings, OutlierLimits, Tally, log_moments
 
 SEED = 72_000
 PERIOD = 360.0
@@ -49,7 +49,7 @@ def test_outliers_have_their_row_among_the_known_ones_of_their_run(log) -> None:
     path, expected, known = log
     zeros = {(str(path), None, name): zero for name, zero in ZEROS.items()}
     limits = OutlierLimits(MODEL, zeros, 0.5)
-    found = accumulate(path, replace(SETTINGS, outliers=limits))
+    found = log_moments(path, replace(SETTINGS, outliers=limits))
     told = {run[2]: tally.outliers for run, tally in found.tallies.items()}
     assert told == expected
     assert (found.rows, found.missing) == (900, 30)
@@ -70,7 +70,7 @@ def test_ends_are_those_of_all_blocks_where_a_turn_is_not_all(tmp_path, monkeypa
     theta = 100.0 + 500.0 * np.sin(np.linspace(0.0, 2.0 * np.pi, 1001))
     path = tmp_path / "log.csv"
     path.write_text("\n".join(["reference_deg,indicated_deg", *(f"{x},{x}" for x in theta)]))
-    (tally,) = accumulate(
+    (tally,) = log_moments(
         path, LogFitSettings({"output": (1,), "motor": (1,)}, {"output": 1.0, "motor": 7.3})
     ).tallies.values()
     assert (tally.rows, tally.low, tally.high) == (1001, theta.min(), theta.max())

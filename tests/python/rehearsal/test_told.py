@@ -12,8 +12,8 @@ from trueangle.planning.evidence import ReadingNoise
 from trueangle.planning.nextruns import RivalEvidence
 from trueangle.rehearsal.after import _FurtherTrials
 from trueangle.rehearsal.result import Rehearsal, RehearsedCause
-from trueangle.rehearsal.summary import _never, _size, render
-from trueangle.rehearsal.trial import judged
+from trueangle.rehearsal.summary import _never, _size, rehearsal_summary
+from trueangle.rehearsal.trial import trial_outcome
 
 
 def cause(**changes) -> RehearsedCause:
@@ -75,7 +75,7 @@ def test_every_figure_of_a_rehearsal_has_its_own_place() -> None:
     assert [(t["size"], t["named"], t["trials"]) for t in of["tried"]] == [
         (1.0, 0, 4), (2.0, 3, 4), (4.0, 2, 2),
     ]  # fmt: skip
-    text = " ".join(render(found).split())
+    text = " ".join(rehearsal_summary(found).split())
     assert "8 runs, 701 readings, noise 1.25 arcsec; 10 diagnoses, at most 20 of a cause" in text
     assert "seed 41" in text
 
@@ -148,6 +148,6 @@ def told(findings=(), beliefs=(), spots=(), unexplained=False):
     ],
 )
 def test_a_verdict_is_of_what_is_confirmed_and_hidden(said, verdict, instead, beside) -> None:
-    found = judged(told(**said), "backlash")
+    found = trial_outcome(told(**said), "backlash")
     assert (found.verdict, found.instead, found.beside) == (verdict, instead, beside)
     assert found.is_named == (verdict == "named")

@@ -7,10 +7,10 @@ import pytest
 
 import trueangle as ta
 from trueangle.fitting.heldout import hold_out
-from trueangle.reports.gained import gained
-from trueangle.reports.measured import error_size, measured
+from trueangle.reports.gained import gain_content
+from trueangle.reports.measured import error_size, measured_content
 from trueangle.reports.modelled import given_model
-from trueangle.reports.unknowns import unknowns
+from trueangle.reports.unknowns import unknown_content
 
 PERIODS = (360.0, 2.0 * np.pi, 1.0)
 
@@ -28,7 +28,7 @@ def run(period=360.0, zero=0.0, there_and_back=True, **more):
 def test_a_run_is_told_with_its_conditions_and_its_error_about_its_own_zero(period):
     there = run(period, 0.25, label="there", torque=np.linspace(1.0, 3.0, 720), temperature=21.0,
                 mount=period / 8.0)  # fmt: skip
-    content = measured([there, run(period, -0.1, there_and_back=False)])
+    content = measured_content([there, run(period, -0.1, there_and_back=False)])
     first, second = content["runs"]
     assert (first["label"], second["label"]) == ("there", "2")
     assert (first["readings"], second["readings"], content["readings"]) == (720, 360, 1080)
@@ -78,7 +78,7 @@ def test_what_is_gained_is_that_of_each_run_and_of_all():
         error = 0.01 * np.sin(np.radians(theta)) + rng.normal(0.0, 0.001 * (k + 1), theta.size)
         runs.append(ta.CalibrationRun(theta, theta + error, 360.0, label=f"r{k}"))
     held = hold_out(ta.fit(runs, [1]))
-    told = gained(held)
+    told = gain_content(held)
     before, after = (
         np.array([[entry[name]["rms_arcsec"] for entry in told["runs"]]]).ravel()
         for name in ("before", "after")
@@ -95,7 +95,9 @@ def test_what_is_gained_is_that_of_each_run_and_of_all():
 
 
 def told(*runs):
-    return " ".join(f"{entry['what']}: {entry['because']}" for entry in unknowns(runs, None, None))
+    return " ".join(
+        f"{entry['what']}: {entry['because']}" for entry in unknown_content(runs, None, None)
+    )
 
 
 def test_what_is_unknown_follows_from_what_was_not_done():

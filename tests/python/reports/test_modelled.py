@@ -11,9 +11,9 @@ from trueangle.fitting.phases import run_phases
 from trueangle.reports import phases as phase_charts
 from trueangle.reports.chartaxes import ChartAxis
 from trueangle.reports.linenames import line_names
-from trueangle.reports.modelled import modelled, selected
-from trueangle.reports.numbers import shortened
-from trueangle.reports.scale import scale_of
+from trueangle.reports.modelled import model_content, order_content
+from trueangle.reports.numbers import shortened_list
+from trueangle.reports.scale import error_scale
 from trueangle.reports.stills import Mark, _Placement
 
 SEED = 56_100
@@ -41,7 +41,7 @@ def fit():
 @pytest.mark.parametrize("period", PERIODS)
 def test_coefficients_have_each_their_own_error_in_seconds_of_arc(period):
     found = fitted(period)
-    content, unit = modelled(found, NAMES), 1_296_000.0 / period
+    content, unit = model_content(found, NAMES), 1_296_000.0 / period
     std = np.sqrt(np.diag(found.covariance)) * unit
     (shaft,) = found.model.shafts
     for n, row in enumerate(content["coefficients"]):
@@ -65,7 +65,7 @@ def test_the_strongest_correlations_are_told_with_their_sign(fit):
     std = np.sqrt(np.diag(covariance))
     matrix = covariance / np.outer(std, std)
     names = ["A of output 1", "B of output 1", "A of output 2", "B of output 2"]
-    told = modelled(fit, NAMES)["correlations"]
+    told = model_content(fit, NAMES)["correlations"]
     pairs = {(row["first"], row["second"]): row["correlation"] for row in told}
     wanted = {(names[i], names[j]): matrix[i, j] for i in range(4) for j in range(i + 1, 4)}
     strongest = dict(sorted(wanted.items(), key=lambda pair: -abs(pair[1]))[:5])
@@ -76,7 +76,7 @@ def test_the_strongest_correlations_are_told_with_their_sign(fit):
 @pytest.mark.parametrize("period", PERIODS)
 def test_the_evidence_of_orders_is_that_of_the_selection(period):
     found = select_orders(fitted(period, arc=360.0).runs)
-    content, unit = selected(found, NAMES), 1_296_000.0 / period
+    content, unit = order_content(found, NAMES), 1_296_000.0 / period
     assert content["noise_arcsec"] == pytest.approx(unit * found.noise.standard_deviation)
     before, after = (unit * x for x in found.holdout_rms)
     assert content["holdout_rms_before_arcsec"] == pytest.approx(before)
@@ -100,7 +100,7 @@ def test_phases_of_runs_stand_where_the_runs_have_them(fit, monkeypatch):
             drawn.append((float(x[0]), float(y[0]), more["run"]))
 
     monkeypatch.setattr(phase_charts, "Chart", Chart)
-    scale = scale_of("arcsec", 50.0, 100.0, fit.runs)
+    scale = error_scale("arcsec", 50.0, 100.0, fit.runs)
     for order in run_phases(fit):
         drawn.clear()
         phase_charts._of_order(order, {"r0": 0, "r1": 1, "r2": 2}, "output 1", scale)
@@ -127,7 +127,7 @@ def test_a_still_picture_places_numbers_along_its_axes(log):
 
 @pytest.mark.parametrize("count", [12, 13, 40])
 def test_a_list_is_shortened_without_losing_count(count):
-    lines = shortened([str(k) for k in range(count)])
+    lines = shortened_list([str(k) for k in range(count)])
     if count <= 12:
         assert lines == [str(k) for k in range(count)]
     else:

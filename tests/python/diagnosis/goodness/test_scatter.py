@@ -10,7 +10,7 @@ import pytest
 from scipy.stats import f
 
 from trueangle.diagnosis.goodness.noise import estimate_noise
-from trueangle.diagnosis.goodness.scatter import repeats, scatter_tests
+from trueangle.diagnosis.goodness.scatter import scatter_of_repeats, scatter_tests
 from trueangle.diagnosis.goodness.zeros import run_test, variance_of_mean
 
 from .readings import leftover
@@ -65,7 +65,7 @@ def test_repeats_count_as_many_independent_squares_as_there_are() -> None:
     """Less a mean of each place and way, and of each run; squares are correlated by the square."""
     left = repeated("ar 0.5", 7_900)
     noise = estimate_noise(left)
-    value, freedom = repeats(left)
+    value, freedom = scatter_of_repeats(left)
     assert freedom == 1800 - 2 * 180 - 9
     lags = np.arange(-60, 61)
     worth = 1.0 / np.sum(noise.correlation ** (2.0 * np.abs(lags)))
