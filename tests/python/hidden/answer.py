@@ -7,14 +7,11 @@ import math
 import tempfile
 import time
 from collections.abc import Iterable
-from dataclasses import asdict, dataclass, fields, replace
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 import trueangle as ta
-from trueangle import CalibrationRun
 
 from .case import Case, Question, pose
 from .source import Source
@@ -88,24 +85,6 @@ def ask(case: Case) -> Answer:
     return judge(pose(case))
 
 
-#: One of so many readings is diagnosed of questions with more readings than `PLENTY`: all, but
-#: every second one in the ordinary run of the tests (`conftest`).
-EVERY, PLENTY = 1, 4_000
-
-
-def read(question: Question) -> list[CalibrationRun]:
-    """The runs as they are diagnosed."""
-    whole = question.whole or sum(map(len, question.runs)) < PLENTY
-    return [_every(1 if whole else EVERY, run) for run in question.runs]
-
-
-def _every(step: int, run: CalibrationRun) -> CalibrationRun:
-    """One of so many readings of a run."""
-    columns = {one.name: getattr(run, one.name) for one in fields(run)}
-    fewer = {n: column[::step] for n, column in columns.items() if isinstance(column, np.ndarray)}
-    return replace(run, **fewer, signals={n: column[::step] for n, column in run.signals.items()})
-
-
 def diagnose(question: Question, simulation: str | None = None) -> tuple[dict[str, Any], float]:
     """The diagnosis as the contract's JSON object, and the seconds it took."""
     with tempfile.TemporaryDirectory() as folder:
@@ -113,7 +92,7 @@ def diagnose(question: Question, simulation: str | None = None) -> tuple[dict[st
         path.write_text(simulation or question.simulation, encoding="utf-8")
         loaded = ta.load_simulation(path)
     start = time.perf_counter()
-    result = ta.diagnose(read(question), loaded)
+    result = ta.diagnose(question.runs, loaded)
     seconds = time.perf_counter() - start
     return as_json(result), seconds
 

@@ -50,7 +50,6 @@ class Question:
     sources: tuple[Source, ...]
     habit: Habit
     runs: list[CalibrationRun]
-    whole: bool = False  # no reading may be left out (`answer.read`)
 
     @property
     def simulation(self) -> str:
@@ -94,10 +93,7 @@ def pose(case: Case) -> Question:
         habit = Habit(sigma=habit.sigma, resolution=habit.resolution)
     habit = Habit(**{**vars(habit), "noise": case.noise})
     runs = measure(joint, design, scenes, sources, habit, rng)
-    # No chi-square says how many readings it needs; of every second one of seed 0 a line in time
-    # is confirmed that is not there.
-    whole = "heteroscedastic_noise" in case.causes
-    return Question(case, joint, scenes, sources, habit, runs, whole)
+    return Question(case, joint, scenes, sources, habit, runs)
 
 
 def hide(

@@ -11,7 +11,6 @@ import pytest
 import trueangle as ta
 from trueangle.simulation import Backlash, Harmonic, Joint, Simulation
 
-from .answer import read
 from .case import Case, pose
 from .causes import CAUSES
 from .sweeps import measured, route
@@ -96,7 +95,6 @@ def test_an_extended_simulation_leaves_nothing(cause, seed, tmp_path):
     question = pose(Case((cause,), 1.0, seed))
     path = tmp_path / "joint.toml"
     path.write_text(question.simulation, encoding="utf-8")
-    runs = read(question)
-    result = ta.diagnose(runs, ta.load_simulation(path))
+    result = ta.diagnose(question.runs, ta.load_simulation(path))
     assert cause in [finding.cause for finding in result.findings if finding.confirmed]
-    again(result, runs)
+    again(result, question.runs)

@@ -189,8 +189,7 @@ def bursts(case: Case) -> Posed:
     question = _question(case, joint, habit, (), rng)
     length, size = case.kind.split(" of ")
     runs, rows = with_bursts(question.runs, int(length), float(size) * habit.sigma, rng)
-    # What is right are rows, by their numbers.
-    return replace(question, runs=runs, whole=True), rows, None
+    return replace(question, runs=runs), rows, None
 
 
 def tables(case: Case) -> Posed:

@@ -11,7 +11,6 @@ import os
 
 import pytest
 
-from ..answer import read
 from .exam import attempt, table
 from .questions import Case, Verdict, cases
 
@@ -84,7 +83,7 @@ def test_an_unnamed_effect_is_what_a_reader_learns_first() -> None:
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "joint.toml"
         path.write_text(question.simulation, encoding="utf-8")
-        result = ta.diagnose(read(question), ta.load_simulation(path))
+        result = ta.diagnose(question.runs, ta.load_simulation(path))
     assert result.unexplained.found
     assert result.summary().startswith("NOT UNDERSTOOD")
     assert "Nothing beyond the simulation" not in result.summary()
