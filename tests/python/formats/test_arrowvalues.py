@@ -13,6 +13,7 @@ import pytest
 pa = pytest.importorskip("pyarrow")
 import pyarrow.parquet as pq  # noqa: E402
 
+from trueangle.formats.arrow import BatchRange  # noqa: E402
 from trueangle.formats.arrowtables import arrow_numbers, arrow_values, label_codes  # noqa: E402
 
 KINDS = ["int8", "uint8", "int16", "uint16", "int32", "uint32", "int64", "uint64"]
@@ -32,6 +33,14 @@ def test_values_are_those_of_pyarrow(kind: str, nulls: bool, start: int, stop: i
     found = arrow_values(column)
     assert found.dtype == expected.dtype
     np.testing.assert_array_equal(found, expected)
+
+
+@pytest.mark.parametrize("rows", [0, 2, 7, 10])
+@pytest.mark.parametrize("parts", [1, 3, 4])
+def test_parts_of_a_batch_hold_each_row_once(rows: int, parts: int):
+    batch = pa.record_batch({"x": np.arange(rows)})
+    found = [BatchRange(range(1), part, parts).of(batch)["x"].to_numpy() for part in range(parts)]
+    np.testing.assert_array_equal(np.concatenate(found), np.arange(rows))
 
 
 def test_nothing_but_nulls():

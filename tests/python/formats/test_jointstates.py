@@ -124,3 +124,19 @@ def test_chunks_of_damaged_records_are_refused():
     for bad in (record[:-1], other[:-1], longer, shorter, record + b"\5", record + b"\4" * 9):
         with pytest.raises(ValueError, match="beyond its chunk"):
             list(_messages(bad, {1: "c"}))
+
+
+def test_a_bags_columns_are_the_fields_of_the_message():
+    """Velocity in rad/s and effort in Nm, as sensor_msgs/JointState has them."""
+    rosbag = pytest.importorskip("trueangle.formats.rosbag")
+
+    class States:
+        def values(self, joint, field):
+            return joint, field
+
+    for name, wanted in (
+        ("elbow", ("elbow", "position")),
+        ("elbow/velocity_rad_s", ("elbow", "velocity")),
+        ("elbow/torque_Nm", ("elbow", "effort")),
+    ):
+        assert rosbag._values(States(), name, ["elbow"]) == wanted

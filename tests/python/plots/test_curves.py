@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from types import SimpleNamespace
 
 import numpy as np
@@ -13,9 +14,12 @@ from trueangle import plots
 from trueangle.fitting.phases import run_phases
 from trueangle.plots import curves
 from trueangle.plots.certified import certified_errors
+from trueangle.plots.curves import Points
 from trueangle.plots.detection import detection
 from trueangle.plots.gains import gains
+from trueangle.plots.readingpictures import before_after_picture, residual_picture
 from trueangle.rehearsal.result import RehearsedCause
+from trueangle.support.display_units import error_unit
 
 matplotlib = pytest.importorskip("matplotlib")
 matplotlib.use("Agg")
@@ -158,3 +162,19 @@ def test_shares_named_have_their_binomial_intervals():
         assert segment[:, 1].min() == pytest.approx(exact.low, abs=0.05)
         assert segment[:, 1].max() == pytest.approx(exact.high, abs=0.05)
     assert [line.get_xdata()[0] for line in ax.lines if line.get_linestyle() == "--"] == [4.5]
+
+
+@pytest.mark.parametrize(("unit", "per"), [("arcsec", 1.0), ("mrad", np.pi / 648.0)])
+def test_sizes_are_told_about_nought_and_what_is_left_by_its_deviation(fit, unit, per):
+    """A zero that is left counts in the rms of held-out runs."""
+    before = Points("a", np.arange(4.0), np.array([300.0, 500.0, 300.0, 500.0]))
+    after = Points("a", np.arange(4.0), np.array([1.0, -1.0, 3.0, 1.0]))
+    picture = before_after_picture([(0, before, after)], (0.0, 360.0), error_unit(unit))
+    told = re.findall(r"rms (\S+), peak-to-peak (\S+) ", picture.told)
+    wanted = [(np.sqrt(170_000.0), 200.0), (np.sqrt(3.0), 4.0)]
+    for numbers, sizes in zip(told, wanted, strict=True):
+        assert [float(x) for x in numbers] == pytest.approx(per * np.array(sizes), rel=6e-4)
+    picture = residual_picture(fit, "torque", error_unit(unit))
+    found = re.search(r"leaves of (\d+) readings against torque: (\S+) \S+ standard", picture.told)
+    assert int(found[1]) == fit.residuals.size
+    assert float(found[2]) == pytest.approx(per * 3600.0 * fit.residuals.std(), rel=6e-3)

@@ -8,6 +8,7 @@ import pytest
 import trueangle as ta
 from trueangle.fitting.orders.select import select_orders
 from trueangle.fitting.phases import run_phases
+from trueangle.plots.curves import Curve, Points
 from trueangle.reports import phases as phase_charts
 from trueangle.reports.chartaxes import ChartAxis
 from trueangle.reports.linenames import line_names
@@ -123,6 +124,25 @@ def test_a_still_picture_places_numbers_along_its_axes(log):
     values = [1.0, 10.0, 100.0, 1000.0] if log else [-3.0, 2.0, 7.0, 12.0]
     np.testing.assert_allclose(place.of(values, 0), [60.0, 260.0, 460.0, 660.0])
     np.testing.assert_allclose(place.of(values, 1), [300.0, 200.0, 100.0, 0.0])
+
+
+@pytest.mark.parametrize(
+    ("asked", "turn"),
+    [("arcsec", 1_296_000.0), ("deg", 360.0), ("mrad", 2000.0 * np.pi), (4096.0, 4096.0)],
+)
+def test_every_error_of_a_page_is_in_its_unit(asked, turn, fit):
+    """A whole turn is what a turn has, in arrays, readings and curves alike."""
+    scale = scale_of(asked, 50.0, 100.0, fit.runs)
+    whole = np.array([1_296_000.0, -648_000.0])
+    parts = (
+        scale.of(whole),
+        scale.points(Points("a", np.zeros(2), whole)).y,
+        scale.curve(Curve(np.zeros(2), whole, np.abs(whole))).error,
+    )
+    for values in parts:
+        np.testing.assert_allclose(values, [turn, -turn / 2.0])
+    std = scale.curve(Curve(np.zeros(2), whole, np.abs(whole))).std
+    np.testing.assert_allclose(std, [turn, turn / 2.0])
 
 
 @pytest.mark.parametrize("count", [12, 13, 40])
