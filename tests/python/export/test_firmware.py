@@ -1,0 +1,58 @@
+"""What tables of firmware leave, and what is told of a list that is there, by closed forms."""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+import pytest
+
+import trueangle as ta
+
+from .test_bounds import existing
+
+
+def model(**orders: float) -> ta.HarmonicModel:
+    """Sines of some arcsec by order: ``o1=300.0``."""
+    sizes = [size / 3600.0 for size in orders.values()]
+    shaft = ta.Shaft("output", 1, [int(o[1:]) for o in orders], [0.0] * len(sizes), sizes)
+    return ta.HarmonicModel([shaft], period=360.0)
+
+
+def test_orders_without_a_register_are_told_with_what_they_leave() -> None:
+    """Order 4 of 200 arcsec, and the rounding of four magnitudes and phases beside it."""
+    made = ta.export_model(model(o1=600.0, o4=200.0), "admt4000", bits=12)
+    (note,) = [n for n in made.notes if "no register" in n]
+    assert note.startswith("order 4 has no register")
+    left = float(re.findall(r"register: (\S+) arcsec rms", note)[0])
+    assert left == pytest.approx(200.0 / np.sqrt(2.0), rel=0.02)
+    assert made.rms_difference_arcsec == pytest.approx(left, rel=1e-3)
+    # A sine whose amplitude is rounded leaves a root of 1/24 of its step; there are four.
+    step = 360.0 / 65536.0 / 0.6072 * 3600.0
+    assert made.floor_arcsec == pytest.approx(np.sqrt(4.0 / 24.0) * step)
+    assert not any(
+        "no register" in n for n in ta.export_model(model(o8=90.0), "admt4000", bits=12).notes
+    )
+
+
+def test_a_scaled_table_is_read_with_the_error_of_its_step(tmp_path) -> None:
+    """Moteus: 127 steps of int8 to the largest knot, of 256 entries."""
+    path = tmp_path / "a.cfg"
+    made = ta.export_model(model(o1=900.0), "moteus", path, bits=14)
+    scale = float(re.search(r"compensation_scale (\S+)", made.text)[1])
+    step = scale / 127.0 * 360.0
+    read = ta.import_model(path, "moteus", bits=14)
+    assert read.fit.residual == pytest.approx(step / np.sqrt(12.0))
+    variance = step**2 / 12.0
+    np.testing.assert_allclose(np.diag(read.covariance)[1:], 2.0 * variance / 256.0, rtol=1e-6)
+    assert made.floor_arcsec == pytest.approx(step * 3600.0 / np.sqrt(18.0))
+
+
+def test_a_list_that_is_there_is_told_by_its_distance(tmp_path) -> None:
+    """Klipper's of 500 arcsec of order 2, and a model of 800: 300 of a sine, rms."""
+    path = existing(tmp_path, model(o2=500.0))
+    made = ta.export_model(model(o2=800.0), "klipper", existing=path)
+    (note,) = [n for n in made.notes if n.startswith("the present list is")]
+    said = float(re.findall(r"is (\S+) arcsec", note)[0])
+    # Whole tenths of a count are 2 arcsec.
+    assert said == pytest.approx(300.0 / np.sqrt(2.0), rel=0.02)
