@@ -156,6 +156,120 @@ proptest! {
     }
 }
 
+/// Longer than a part, and no multiple of one: nothing is lost or done twice where parts meet.
+#[test]
+fn a_long_batch_is_its_steps() {
+    let angles: Vec<f64> = (0..9001)
+        .map(|i| 300.0 * (0.01 * f64::from(i)).sin())
+        .collect();
+    let torque: Vec<f64> = angles.iter().map(|x| 0.02 * x).collect();
+    let columns = Columns::default()
+        .with(Signal::Velocity, &[20.0][..])
+        .with(Signal::Temperature, &[35.0][..])
+        .with(Signal::Torque, &torque[..])
+        .with(Signal::Current, &[0.7][..]);
+    for some in [0..4, 3..11] {
+        let terms = &every_term()[some];
+        let mut batch = angles.clone();
+        let pairs = Batch::in_place(&mut batch);
+        let mut whole = corrector(terms);
+        whole
+            .run(Quantity::Correction, pairs, &columns, None, None)
+            .unwrap();
+        let mut steps = corrector(terms);
+        for (i, &x) in angles.iter().enumerate() {
+            assert_eq!(steps.correct(x, &columns.at(i)).unwrap(), batch[i], "{i}");
+        }
+    }
+}
+
+/// The formula of each form, written out beside the series: the error with it less that without.
+#[test]
+fn every_form_adds_its_formula() {
+    const ROUNDING: f64 = 1e-13;
+    let series = |x: f64| {
+        let (one, fifty) = (x.to_radians(), (50.0 * x).to_radians());
+        let low = 0.3 * one.cos() + 0.1 * one.sin() + 0.05 * (3.0 * one).sin();
+        low + 0.003 * (2.0 * fifty).cos() + 0.002 * (2.0 * fifty).sin()
+    };
+    let scaled = |absolute| Form::Scaled {
+        signal: Signal::Temperature,
+        origin: 20.0,
+        absolute,
+        level: 1e-3,
+        relative: 2e-3,
+        lines: vec![Line {
+            order: 1.5,
+            cosine: 1e-3,
+            sine: 2e-3,
+        }],
+    };
+    let spring = |gravity| Form::Spring {
+        signal: Signal::Torque,
+        linear: 1e-3,
+        cubic: 2e-6,
+        beyond: -2e-4,
+        knee: 3.0,
+        gravity,
+    };
+    let bump = Form::Bump {
+        place: 100.0,
+        width: 5.0,
+        height: 0.01,
+        cycles: 2.0,
+    };
+    let ramp = Form::Ramp {
+        slope: 1e-4,
+        start: -20.0,
+        stop: 80.0,
+    };
+    let factor = |x: f64| {
+        let turn = 1.5 * x.to_radians();
+        1e-3 + 2e-3 * series(x) + 1e-3 * turn.cos() + 2e-3 * turn.sin()
+    };
+    let wound = |m: f64| {
+        let past = (m.abs() - 3.0).max(0.0) * m.signum();
+        1e-3 * m + 2e-6 * m.powi(3) - 2e-4 * past
+    };
+    let gauss = |x: f64| {
+        let apart = (2.0 * x - 100.0 + 180.0).rem_euclid(PERIOD) - 180.0;
+        0.01 * (-0.5 * (apart / 5.0).powi(2)).exp()
+    };
+    type Formula<'a> = Box<dyn Fn(f64, f64, f64) -> f64 + 'a>;
+    let all: Vec<(Form, Formula)> = vec![
+        (scaled(false), Box::new(|x, t, _| (t - 20.0) * factor(x))),
+        (
+            scaled(true),
+            Box::new(|x, t, _| (t - 20.0).abs() * factor(x)),
+        ),
+        (spring(None), Box::new(|_, _, m| wound(m))),
+        (
+            spring(Some(30.0)),
+            Box::new(|x, _, m| wound(m * (x - 30.0).to_radians().sin())),
+        ),
+        (bump, Box::new(|x, _, _| gauss(x))),
+        (
+            ramp,
+            Box::new(|x, _, _| 1e-4 * (x.clamp(-20.0, 80.0) - 30.0)),
+        ),
+    ];
+    let mut bare = corrector(&[]);
+    for (form, formula) in all {
+        let mut with_form = corrector(&[term(form.clone())]);
+        for k in 0..200 {
+            let x = 3.7 * f64::from(k) - 300.0;
+            let (t, m) = (20.0 + 15.0 * (0.3 * x).sin(), 9.0 * (0.7 * x).cos());
+            let signals = Signals::default()
+                .with(Signal::Temperature, t)
+                .with(Signal::Torque, m);
+            let with = with_form.error(x, &signals).unwrap();
+            let without = bare.error(x, &signals).unwrap();
+            let off = (with - without - formula(x, t, m)).abs();
+            assert!(off < ROUNDING, "{form:?} at {x}: {off}");
+        }
+    }
+}
+
 #[test]
 fn a_missing_signal_is_named() {
     let mut corrector = corrector(&every_term());

@@ -135,7 +135,8 @@ def built(copy: Copy, faults: dict[int, Drawn], cargo: Sequence[str]) -> list[st
         said = [json.loads(line) for line in done.stdout.splitlines() if line.startswith("{")]
         if done.returncode == 0:
             made = [m for m in said if m["reason"] == "compiler-artifact"]
-            return [path for m in made for path in [m["executable"], *m["filenames"]] if path]
+            tests = [m["executable"] for m in made if m["profile"]["test"] and m["executable"]]
+            return tests or [path for m in made for path in m["filenames"]]
         refused: set[int] = set()
         told = [m["message"] for m in said if m["reason"] == "compiler-message"]
         errors = [e for e in told if e["level"] == "error"]
@@ -259,8 +260,7 @@ def main() -> int:
         copy = Copy(ROOT, args.copy or Path(folder), args.seconds)
         copy.switchable()
         made = built(copy, left, ["test", "--no-run", "--lib", "--tests"])
-        executables = [path for path in made if os.access(path, os.X_OK) and "/deps/" in path]
-        tests = of_rust(copy, [path for path in executables if not Path(path).suffix])
+        tests = of_rust(copy, made)
         asked = {k: f for k, f in left.items() if not excused(f)}
         outcomes = dict.fromkeys(left, "excused") | judge(asked, tests, noticed_in_rust, copy)
         asked = {k: f for k, f in asked.items() if outcomes[k] != "killed"}
