@@ -115,8 +115,10 @@ def test_fits_asked_for_last_are_kept_and_large_ones_are_not(start, monkeypatch)
     monkeypatch.setattr("trueangle.estimation.cache.MOST_KEPT", 10)
     assert [ask(key, 4) for key in "abaca"] == [*"abaca"]
     assert made == [*"abc"]  # room is made by what was asked for longest ago
-    assert [ask(key, 4) for key in "cb"] == [*"cb"] and made == [*"abcb"]
-    assert ask("d", 11) == ask("d", 11) == "d" and made == [*"abcbdd"]
+    assert [ask(key, 4) for key in "cb"] == [*"cb"]
+    assert made == [*"abcb"]
+    assert ask("d", 11) == ask("d", 11) == "d"
+    assert made == [*"abcbdd"]
     # Terms fitted to the same readings again, after the same fit, are the fit that is there.
     line = start.propose("missing_order", {"order": 3.0}, start.base[:, :1] * 1.0)
     monkeypatch.undo()
