@@ -132,7 +132,7 @@ def test_a_still_picture_places_numbers_along_its_axes(log):
 )
 def test_every_error_of_a_page_is_in_its_unit(asked, turn, fit):
     """A whole turn is what a turn has, in arrays, readings and curves alike."""
-    scale = scale_of(asked, 50.0, 100.0, fit.runs)
+    scale = error_scale(asked, 50.0, 100.0, fit.runs)
     whole = np.array([1_296_000.0, -648_000.0])
     parts = (
         scale.of(whole),
