@@ -136,6 +136,9 @@ def test_watch(period, desk, capsys):
         assert bool(alarm) == one["alarm"]
         apart += largest is not max(one["orders"], key=lambda row: row["statistic"])
     assert apart > 5
+    # 0.01 deg, known to 0.002 sqrt(2 / 90) in a window.
+    off = [row["amplitude_arcsec"] for one in told[32:] for row in one["orders"][:1]]
+    assert np.mean(off) == pytest.approx(36.0, rel=0.05)
     moved = re.search(r"order 1 moved by (\S+) mrad", "".join(lines))
     assert float(moved[1]) == pytest.approx(0.01 * 3600.0 * MRAD, rel=0.1)
 

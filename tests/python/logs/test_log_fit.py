@@ -383,3 +383,17 @@ def test_a_gear_of_a_fraction_is_fitted_over_its_turns(tmp_path):
         pq.write_table(within, tmp_path / f"{i}.parquet")
     with pytest.raises(ta.errors.ArgumentError, match="turns would have to be counted"):
         ta.fit_logs(tmp_path, ORDERS, gear_ratio=ratio)
+
+
+def test_outliers_of_logs_without_labels_are_named_as_in_memory(tmp_path):
+    for i in range(2):
+        reference, indicated = readings(6000, 40 + i, 10.0 * i)
+        indicated[[700 * (i + 1), 4000]] += 20.0
+        table = pa.table({"reference_deg": reference, "indicated_deg": indicated})
+        pq.write_table(table, tmp_path / f"{i}.parquet")
+    found = ta.fit_logs(tmp_path, {"output": [1, 2], "motor": [2]}, gear_ratio=50)
+    runs = ta.read_runs([tmp_path / f"{i}.parquet" for i in range(2)])
+    fitted = ta.fit(runs, {"output": [1, 2], "motor": [2]}, gear_ratio=50)
+    assert {row for _, row in found.wild} >= {700, 1400, 4000}
+    assert found.moments is not None
+    assert found.wild == fitted.wild
