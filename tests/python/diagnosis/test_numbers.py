@@ -15,6 +15,7 @@ from trueangle.diagnosis.correction import _ranges
 from trueangle.diagnosis.diagnose import _noise, _overall, _structure
 from trueangle.diagnosis.discrepancy import unfolded_error
 from trueangle.diagnosis.finding import Finding
+from trueangle.diagnosis.forms import SIZES, bends, with_form_errors
 from trueangle.diagnosis.gain import _exchanged, _level
 from trueangle.diagnosis.gearedlines import GearedLines
 from trueangle.diagnosis.gearratio import find_ratio
@@ -192,6 +193,27 @@ def test_a_finding_of_several_terms_has_the_evidence_of_all():
     for cause, gap in found.rivals:
         instead = proposed_above(start, cause)
         assert gap == pytest.approx(start.bic - instead.bic_gain - full.bic, abs=1e-6)
+
+
+def test_form_errors_are_the_mean_square_of_bends_given_what_is_left(signals):
+    """By the normal equations of bends with a prior of one of the sizes that are tried."""
+    soft = 60.0 * signals.presliding(4.0, 1.0)
+    start = regression(signals, soft)
+    full = start.with_terms([start.propose("backlash", {}, signals.direction[:, None])])
+    found = with_form_errors(full).form_errors
+    assert found is not None
+    columns = full.whiten(bends(full))
+    known = full.q.T @ columns
+    rest, moved_by = columns - full.q @ known, full.back @ known
+    away = []
+    for size in SIZES:
+        spread = np.linalg.inv(rest.T @ rest / full.variance + np.eye(rest.shape[1]) / size**2)
+        mean = spread @ rest.T @ full.r / full.variance
+        wanted = moved_by @ (np.outer(mean, mean) + spread) @ moved_by.T
+        away.append(np.abs(found - wanted).max() / np.abs(wanted).max())
+    assert min(away) < 1e-5
+    # What bends shift is more than noise leaves.
+    assert found[-1, -1] > full.covariance(0)[0, 0]
 
 
 def test_a_rival_that_explains_more_has_a_gap_below_zero(signals):
