@@ -15,7 +15,7 @@ from trueangle.diagnosis.correction import _ranges
 from trueangle.diagnosis.diagnose import _noise, _overall, _structure
 from trueangle.diagnosis.discrepancy import unfolded_error
 from trueangle.diagnosis.finding import Finding
-from trueangle.diagnosis.forms import SIZES, bends, with_form_errors
+from trueangle.diagnosis.forms import SIZES, form_error_columns, with_form_errors
 from trueangle.diagnosis.gain import _exchanged, _level
 from trueangle.diagnosis.gearedlines import GearedLines
 from trueangle.diagnosis.gearratio import find_ratio
@@ -202,7 +202,7 @@ def test_form_errors_are_the_mean_square_of_bends_given_what_is_left(signals):
     full = start.with_terms([start.propose("backlash", {}, signals.direction[:, None])])
     found = with_form_errors(full).form_errors
     assert found is not None
-    columns = full.whiten(bends(full))
+    columns = full.whiten(form_error_columns(full))
     known = full.q.T @ columns
     rest, moved_by = columns - full.q @ known, full.back @ known
     away = []
