@@ -9,7 +9,7 @@ import trueangle as ta
 from trueangle.fitting.orders.select import select_orders
 from trueangle.fitting.phases import run_phases
 from trueangle.plots.curves import Curve, Points
-from trueangle.reports import phases as phase_charts
+from trueangle.reports import figures as page_figures
 from trueangle.reports.chartaxes import ChartAxis
 from trueangle.reports.linenames import line_names
 from trueangle.reports.modelled import model_content, order_content
@@ -96,15 +96,15 @@ def test_phases_of_runs_stand_where_the_runs_have_them(fit, monkeypatch):
     """Each within half a turn of the mean, which lies in a turn from zero."""
     drawn = []
 
-    class Chart(phase_charts.Chart):
+    class Chart(page_figures.Chart):
         def dots(self, x, y, **more):
             drawn.append((float(x[0]), float(y[0]), more["run"]))
 
-    monkeypatch.setattr(phase_charts, "Chart", Chart)
+    monkeypatch.setattr(page_figures, "Chart", Chart)
     scale = error_scale("arcsec", 50.0, 100.0, fit.runs)
     for order in run_phases(fit):
         drawn.clear()
-        phase_charts._of_order(order, {"r0": 0, "r1": 1, "r2": 2}, "output 1", scale)
+        page_figures._of_order(order, {"r0": 0, "r1": 1, "r2": 2}, "output 1", scale)
         assert [(x, run) for x, _, run in drawn] == [(1.0, 0), (2.0, 1), (3.0, 2)]
         shown = np.array([y for _, y, _ in drawn])
         apart = np.exp(1j * np.radians(shown)) - np.exp(1j * order.phase)
