@@ -176,8 +176,6 @@ class NonIntegerOrder(Effect):
         if sizes.min() < 8 or usual <= 0.0:  # most runs stand still
             return np.zeros(0), np.zeros(0)
         top = float(regression.lines.orders.max()) * 0.75
-        if regression.signals.grid is not None:  # beyond, orders are the same numbers as lower ones
-            top = min(top, 0.5 * regression.signals.grid.positions)
         low = max(LOWEST, LEAST_CYCLES / usual)
         # Half the mean rate of readings is as far as a run can tell.
         step = 1.0 / (OVERSAMPLING * usual)

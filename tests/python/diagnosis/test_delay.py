@@ -81,7 +81,7 @@ def told_delay(seed: int, offset: float) -> Finding:
     play = chosen.propose("backlash", {}, EFFECTS["backlash"].columns(then, around, {}))
     chosen = chosen.with_terms([play])
     plain = Regression.of(signals, error - sim.predict(signals), around, rho=0.0)
-    given = Delay(TRUE + offset, 1e-5)
+    given = Delay(TRUE + offset, 1e-5, sim.pattern)
     rest = SimpleNamespace(found=False, beside_path=0.0)
     return delay_finding(given, chosen, plain, False, rest), chosen, plain
 
