@@ -41,7 +41,7 @@ if TYPE_CHECKING:
     from .rehearsal.after import plan_after as plan_after
     from .rehearsal.rehearse import rehearse as rehearse
     from .reports import report as report
-    from .runs.checks import check as check
+    from .runs.checks.check import check as check
     from .runs.files import read_runs as read_runs
     from .runs.joining import join as join
     from .runs.run import CalibrationRun as CalibrationRun
@@ -77,7 +77,7 @@ _PUBLIC = {
     "HarmonicModel": "model.model",
     "SelfCalibration": "selfcalibration",
     "Shaft": "joint.shafts",
-    "check": "runs.checks",
+    "check": "runs.checks.check",
     "correct": "logs.frames",
     "correct_logs": "logs.batch",
     "compare": "export",

@@ -95,19 +95,27 @@ def status_of(
             )
     if effect.transfers and gain is not None and gain.interval is not None:
         if gain.interval[0] > 0.0:
-            chance = chance_between_runs(regression, group, unexplained) if regression else 0.0
-            if chance > CHANCE:
-                return NOT_CONFIRMED, (
-                    "the zeros of the runs scatter beyond the noise, which makes as much of it in "
-                    f"{regression.signals.runs} runs by chance (p {chance:.2g})"
-                )
-            return CONFIRMED, ""
+            scattered = _of_scattered_zeros(regression, group, unexplained) if regression else ""
+            return (NOT_CONFIRMED, scattered) if scattered else (CONFIRMED, "")
         return NOT_CONFIRMED, "its gain on the readings held out does not exclude zero"
     if regression is not None and group and regression.terms[group[0]].run_effect is not None:
         if _explains_runs(regression, group):
             return CONFIRMED, ""
         return NOT_CONFIRMED, "it explains the noise of some runs only"
     return CONFIRMED, ""
+
+
+def _of_scattered_zeros(
+    regression: Regression, group: Sequence[int], unexplained: Unexplained
+) -> str:
+    """That unexplained zeros of the runs may as well have made a finding, where they may."""
+    chance = chance_between_runs(regression, group, unexplained)
+    if chance <= CHANCE:
+        return ""
+    return (
+        "the zeros of the runs scatter beyond the noise, which makes as much of it in "
+        f"{regression.signals.runs} runs by chance (p {chance:.2g})"
+    )
 
 
 def _size(regression: Regression, group: Sequence[int]) -> float:

@@ -63,7 +63,8 @@ class Cache:
 
         It must not hold this cache: what holds itself is not let go of.
         """
-        kept = self._fits[key] = self._fits.pop(key, None) or build()  # the last one now
+        kept = self._fits.pop(key) if key in self._fits else build()
+        self._fits[key] = kept  # the last one now
         excess = sum(size for _, size in self._fits.values()) - MOST_KEPT
         for old in list(self._fits):
             if excess <= 0:
