@@ -19,14 +19,14 @@ from .readings import leftover
 def test_white_noise_is_that_of_least_squares_beside_the_pattern() -> None:
     """By lstsq: a mean of each run and lines, alike and by direction; their degrees of freedom."""
     left = leftover("few", "uniform", 74)
-    found = estimate_noise(left, orders=2)
-    d, x = left.direction[:, None], np.outer(left.theta, [1.0, 2.0])
+    found = estimate_noise(left)
+    d, x = left.direction[:, None], np.outer(left.theta, np.arange(1.0, 13.0))
     waves = np.hstack([np.cos(x), np.sin(x)])
     runs = (left.run[:, None] == np.unique(left.run)).astype(float)
     design = np.hstack([runs, waves, d, d * waves])
     rest, rank = np.linalg.lstsq(design, left.residual, rcond=None)[1:3]
     assert found.correlation == 0.0
-    assert found.freedom == len(left) - rank == 900 - 3 - 9
+    assert found.freedom == len(left) - rank == 900 - 3 - (1 + 4 * 12)
     assert found.sigma == pytest.approx(np.sqrt(rest[0] / found.freedom), rel=1e-9)
 
 
@@ -86,9 +86,8 @@ def test_the_zeros_of_runs_are_no_scatter_of_repeats() -> None:
 @pytest.mark.parametrize(("kind", "word"), [("t5", "heavier"), ("uniform", "lighter")])
 def test_tails_are_called_what_they_are(kind: str, word: str) -> None:
     left = leftover("rich", kind, 76)
-    found = {e.test: e for e in scatter_tests(left, estimate_noise(left), 2.0, 6.0)}
+    found = {e.test: e for e in scatter_tests(left, estimate_noise(left), np.sqrt(7.0))}
     assert word in found["tails"].says
-    # Rounding adds a twelfth of the square of its step to what is stated.
     said = found["noise against the simulation's"].says
     assert re.search(r"states 2\.65$", said), said
     assert found["noise against the simulation's"].statistic == pytest.approx(
