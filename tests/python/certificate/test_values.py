@@ -215,3 +215,23 @@ def test_an_order_of_few_readings_has_their_factor(period):
     assert line["amplitude_expanded_arcsec"] == pytest.approx(factor * std)
     assert line["phase_expanded_deg"] == pytest.approx(factor * np.degrees(fit.phase_std[0]))
     assert line["phase_deg"] == pytest.approx(np.degrees(0.5), abs=5.0)
+
+
+@pytest.mark.parametrize("beyond", [20.0, 250.0])
+def test_the_budget_is_of_the_position_with_the_greatest_uncertainty(beyond):
+    """Readings are few on one side of the turn: its row, and its lines make up what is there."""
+    rng = np.random.default_rng([SEED, 5])
+    runs = []
+    for _ in range(3):
+        dense = rng.uniform(0.0, 360.0, 200)
+        x = np.sort(dense[(np.abs(dense - beyond) > 60.0) | (rng.uniform(size=200) < 0.1)])
+        error = 0.02 * np.sin(np.radians(x - 100.0)) + 0.001 * rng.normal(size=x.size)
+        runs.append(ta.CalibrationRun(x, x + error, 360.0))
+    content = certify(runs, Identity("1", "joint"), orders=[1, 2, 3, 4]).content
+    rows, budget = content["positions"], content["budget"]
+    widest = max(rows, key=lambda row: row["expanded_arcsec"])
+    assert min(abs(widest["angle_deg"] - beyond), 360.0 - abs(widest["angle_deg"] - beyond)) < 60.0
+    for name in ("angle_deg", "standard_arcsec", "coverage_factor", "expanded_arcsec"):
+        assert budget[name] == widest[name], name
+    lines = np.array([line["standard_arcsec"] * line["sensitivity"] for line in budget["lines"]])
+    assert np.sqrt(np.sum(lines**2)) == pytest.approx(widest["standard_arcsec"])

@@ -170,6 +170,9 @@ def test_levels_are_of_what_each_run_is_at(sign: float) -> None:
     hanging = replace(given, torque=sign * (given.torque * 0.0 + 2.0 + levels[given.run]))
     assert run_levels(hanging, "torque")[1] == pytest.approx(sorted([sign * 2.0, sign * 6.0,
                                                                       sign * 10.0]))  # fmt: skip
+    # Loads within a tenth of each other are one, to whichever side they pull.
+    alike = replace(given, torque=sign * (20.0 + 0.3 * levels[given.run]))
+    assert run_levels(alike, "torque") is None
     assert run_levels(given, "time") is None
     assert run_levels(
         replace(given, temperature=20.0 + 0.2 * levels[given.run]), "temperature"

@@ -158,6 +158,20 @@ RULES = {
         ("thermal_drift", "torsional_compliance", "load_dependent_gear_error"),
         "change together",
     ),
+    "load of either sign and temperature together": (
+        [
+            replace(
+                run,
+                gravity_Nm=0.0,
+                torque_Nm=5.0 * (k % 2) * (1 if k % 4 > 1 else -1),
+                temperature_C=20.0 + 15 * (k % 2),
+            )
+            for k, run in enumerate(RICH)
+        ],
+        {},
+        ("thermal_drift", "torsional_compliance", "load_dependent_gear_error"),
+        "change together",
+    ),
     "no mount": (RICH, {"mount": None}, ("reference_error",), "mount of the reference was not"),
     "one mount": (
         runs(mount_deg=0.0),

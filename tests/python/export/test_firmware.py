@@ -48,6 +48,23 @@ def test_a_scaled_table_is_read_with_the_error_of_its_step(tmp_path) -> None:
     assert made.floor_arcsec == pytest.approx(step * 3600.0 / np.sqrt(18.0))
 
 
+@pytest.mark.parametrize(("bits", "entries"), [(13, 128), (13, 256), (14, 256)])
+def test_whole_ticks_leave_what_their_rounding_and_their_shift_do(bits: int, entries: int) -> None:
+    """Tinymovr: of entries rounded, and of what is between them cut down, in the device's own way.
+
+    The error is steep, so that entries differ by ticks; what their
+    curve between entries adds is small. Cutting goes in few steps where entries differ by few.
+    """
+    ratios = []
+    for k in range(12):
+        made = ta.export_model(
+            model(o1=20_000.0 + 370.0 * k), "tinymovr", bits=bits, entries=entries
+        )
+        ratios.append(made.rms_difference_arcsec / made.floor_arcsec)
+    print(np.mean(ratios), np.std(ratios))
+    assert np.sqrt(np.mean(np.square(ratios))) == pytest.approx(1.0, rel=0.08)
+
+
 def test_a_list_that_is_there_is_told_by_its_distance(tmp_path) -> None:
     """Klipper's of 500 arcsec of order 2, and a model of 800: 300 of a sine, rms."""
     path = existing(tmp_path, model(o2=500.0))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -183,6 +184,9 @@ def test_phases_of_runs_are_those_of_each_alone(argument: str, period: float) ->
             assert one.phase[number] == pytest.approx(alone.phases[k], abs=1e-9)
             # To 0.1 and 0.03 degrees of 200 readings of 0.01.
             assert one.amplitude[number] == pytest.approx((360.0, 108.0)[k], abs=4.5 * 3.6)
+    # One without a name has its number, from 1.
+    unnamed = ta.fit([replace(run, label="") for run in runs], orders=[1])
+    assert run_phases(unnamed)[0].labels == ("1", "2")
 
 
 def test_a_reference_that_is_homed_anew_is_told_by_how_much() -> None:

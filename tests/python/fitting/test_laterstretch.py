@@ -1,5 +1,7 @@
 """Orders of one run hold for its later stretches, or no correction is given."""
 
+import re
+
 import numpy as np
 import pytest
 
@@ -100,6 +102,15 @@ def test_orders_on_which_unlike_joints_agree_by_chance_are_refused(count):
     why = r"share nothing may by chance|different joints|no order"
     with pytest.raises(NoModelError, match=why):
         ta.fit(runs, argument="reference")
+    # Told: by how much the mean of the others' order 4 lessens each, of all that each shows.
+    sizes = 0.05 * (1.0 + 0.3 * np.arange(count))
+    others = (sizes.sum() - sizes) / (count - 1)
+    gain = np.mean(sizes**2 - (sizes - others) ** 2)
+    every = sum((0.3 / k) ** 2 for k in range(1, 11) if k != 4) + np.mean(sizes**2)
+    with pytest.raises(NoModelError) as told:
+        check_new_run(runs, resolve_orders([4]), "reference")
+    (percent,) = re.findall(r"they share (\S+) % \(order 4\), no more than", str(told.value))
+    assert float(percent) == pytest.approx(100.0 * gain / every, rel=0.1)
 
 
 @pytest.mark.parametrize("seed", range(4))

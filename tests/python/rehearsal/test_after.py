@@ -1,5 +1,8 @@
 """A plan of next runs is rehearsed: as many readings as name the true cause."""
 
+from types import SimpleNamespace
+
+import numpy as np
 import pytest
 
 import trueangle as ta
@@ -7,6 +10,7 @@ from trueangle.joint.signals import join_runs
 from trueangle.planning import Limits
 from trueangle.planning.evidence import ReadingNoise
 from trueangle.planning.scales import Scales
+from trueangle.rehearsal import after
 from trueangle.simulation import Harmonic, Latency, RunDesign, Simulation, simulate
 
 SIM = Simulation(
@@ -59,3 +63,30 @@ def test_correlated_noise_leaves_less_evidence():
     )
     (more,), (less,) = (one.answers([out_and_back], signals) for one in (white, red))
     assert less.bic < more.bic
+
+
+@pytest.mark.parametrize("rho", [0.0, 0.8])
+def test_simulated_readings_have_the_noise_that_was_found(plan, monkeypatch, rho):
+    """Deviation and correlation from one to the next, in runs made again and in planned ones."""
+    seen = []
+
+    def caught(runs, sim):
+        seen.append(list(runs))
+        return SimpleNamespace(complete=False)
+
+    monkeypatch.setattr(after, "diagnose", caught)
+    trials = after._FurtherTrials(RUNS, SIM, ReadingNoise(3.0, rho), 20, 0)
+    for seed in range(20):
+        trials.names(plan, plan.hypotheses[0][0], np.random.default_rng([16, seed]))
+    assert [len(runs) for runs in seen] == 20 * [len(RUNS) + len(plan.runs)]
+    left = []
+    for run in (run for runs in seen for run in runs):
+        x = 2.0 * np.pi * run.reference / run.period
+        known = np.column_stack([np.ones(x.size), np.cos(x), np.sin(x), run.direction])
+        error = run.error * (1_296_000.0 / run.period)
+        left.append(error - known @ np.linalg.lstsq(known, error, rcond=None)[0])
+    power = sum(float(e @ e) for e in left)
+    count = sum(e.size for e in left)
+    # Of 10 000 readings; four columns a run take a part of them.
+    assert np.sqrt(power / count) == pytest.approx(3.0, rel=0.1)
+    assert sum(float(e[1:] @ e[:-1]) for e in left) / power == pytest.approx(rho, abs=0.05)

@@ -73,11 +73,12 @@ def test_p_values_of_noise_are_even_in_every_test() -> None:
     assert not wrong, wrong
 
 
-def test_the_number_of_trials_is_told_by_signs_drawn() -> None:
-    """The smallest of m independent p values: even, whatever m is."""
+@pytest.mark.parametrize("draws", [1, 4, 32])
+def test_the_number_of_trials_is_told_by_signs_drawn(draws: int) -> None:
+    """The smallest of m independent p values: even, whatever m is, however few the draws."""
     rng = np.random.default_rng(41)
     for m in (1, 7, 60):
-        smallest = rng.uniform(size=(400, 33, m)).min(axis=2)
+        smallest = rng.uniform(size=(400, 1 + draws, m)).min(axis=2)
         p = np.sort([made_even(row[0], row[1:]) for row in smallest])
         away = float(np.max(np.abs(p - (np.arange(400) + 0.5) / 400)))
         assert away < BOTH / 20.0, (m, away)

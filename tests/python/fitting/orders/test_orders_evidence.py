@@ -4,9 +4,11 @@ import math
 
 import numpy as np
 import pytest
+from scipy.stats import chi2
 
 import trueangle as ta
 from trueangle.fitting.orders.evidence import (
+    OVERDISPERSED,
     choose_forward,
     examine_orders,
     fit_subset,
@@ -60,6 +62,17 @@ def test_pooled_noise_leaves_out_what_disagrees_and_counts_the_rest():
     assert variance == pytest.approx(scatter.mean(), rel=1e-12)
     assert freedom == 40 * 4
     assert pooled_scatter(scatter[:4], 3) is None
+
+
+@pytest.mark.parametrize("units", [2, 3, 4, 8])
+def test_of_noise_one_order_in_a_thousand_is_left_out_of_the_pool(units):
+    """Quantiles of chi-square themselves; its median is known to 1.3 % (2 degrees of freedom)."""
+    each, count = 2 * (units - 1), 20_000
+    scatter = SIGMA**2 * chi2.ppf((np.arange(count) + 0.5) / count, each) / each
+    variance, freedom = pooled_scatter(scatter, units)
+    left_out = count - round(freedom / each)
+    assert left_out == pytest.approx(OVERDISPERSED * count, rel=0.12)
+    assert variance == pytest.approx(scatter[: count - left_out].mean(), rel=1e-12)
 
 
 def test_an_order_that_differs_between_units_has_its_own_noise_and_freedom():
