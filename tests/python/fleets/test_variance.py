@@ -138,7 +138,7 @@ def test_held_out_units_tell_whether_there_is_a_mean():
 
 @pytest.mark.parametrize("aligned", [False, True])
 def test_the_score_of_a_held_out_unit_is_its_density_by_the_others(aligned):
-    """By scipy, one unit after another: its own error, that between units, the mean's of the rest."""
+    """By scipy, one after another: its own error, that between units, that of the others' mean."""
     print("seed", SEED)
     rng = np.random.default_rng(SEED + 5)
     roots = rng.normal(size=(7, 2, 2))

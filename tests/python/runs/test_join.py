@@ -131,7 +131,9 @@ def test_a_time_on_the_other_clock_is_known_by_offset_and_rate_together():
     found = estimated_clocks(Stream.of(t, said), true, None, None)
     # The speed is even to a period in twenty-nine.
     assert found.timing_std == pytest.approx(found.offset_std / math.sqrt(2.0), rel=0.02)
-    assert 1e-6 * 60.0 * found.rate_std == pytest.approx(found.offset_std * math.sqrt(3.0), rel=0.02)
+    assert 1e-6 * 60.0 * found.rate_std == pytest.approx(
+        found.offset_std * math.sqrt(3.0), rel=0.02
+    )
 
 
 @pytest.mark.parametrize("side", ["indicated", "reference"])
