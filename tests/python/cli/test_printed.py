@@ -70,6 +70,16 @@ def test_correct(desk, capsys):
     assert "1 of 3 logs corrected, 2 already: 101 readings in" in text
 
 
+def test_correct_tells_readings_outside_the_span_beside_those_missing(desk, capsys):
+    arc = np.linspace(30.0, 200.0, 300)
+    run = ta.CalibrationRun(arc, arc + 0.3 * np.sin(np.radians(arc)), period=360.0)
+    ta.fit(run, orders=[1]).model.save("arc.json")
+    (desk / "d.csv").write_text("indicated_deg,x\n0,1\n29,2\n,3\n100,4\n210,5\n")
+    text = printed(capsys, "correct", "d.csv", "-m", "arc.json", "-o", "d_out.csv")
+    assert "d.csv: 5 readings corrected" in text
+    assert ", 1 missing kept, 3 outside the calibrated span\n" in text
+
+
 def test_correct_that_fails_for_many(desk, capsys):
     for k in range(7):
         (desk / f"bad{k}.csv").write_text("indicated_deg\nopen\n")

@@ -4,6 +4,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from scipy.optimize import minimize
+from scipy.stats import multivariate_normal
 from statsmodels.regression.mixed_linear_model import MixedLM
 
 from trueangle.fleets.calibration import columns_of
@@ -133,6 +134,29 @@ def test_held_out_units_tell_whether_there_is_a_mean():
             for aligned in (False, True)
         ]
         assert (scores[1] > scores[0]) == better
+
+
+@pytest.mark.parametrize("aligned", [False, True])
+def test_the_score_of_a_held_out_unit_is_its_density_by_the_others(aligned):
+    """By scipy, one after another: its own error, that between units, that of the others' mean."""
+    print("seed", SEED)
+    rng = np.random.default_rng(SEED + 5)
+    roots = rng.normal(size=(7, 2, 2))
+    own = roots @ roots.transpose(0, 2, 1) + 0.1 * np.eye(2)
+    values, variance = rng.normal(1.0, 2.0, (7, 2)), 0.6
+    wanted = []
+    for u in range(7):
+        mean, unsure = np.zeros(2), np.zeros((2, 2))
+        if aligned:
+            rest = [np.linalg.inv(own[v] + variance * np.eye(2)) for v in range(7) if v != u]
+            unsure = np.linalg.inv(sum(rest))
+            mean = unsure @ sum(
+                w @ x for w, x in zip(rest, np.delete(values, u, axis=0), strict=True)
+            )
+        spread = own[u] + variance * np.eye(2) + unsure
+        wanted.append(multivariate_normal(mean, spread).logpdf(values[u]) + np.log(2.0 * np.pi))
+    found = held_out_score(values, own, variance, aligned)
+    np.testing.assert_allclose(found, wanted, rtol=1e-9)
 
 
 def test_noise_that_differs_is_each_units_own_but_held_to_the_common():

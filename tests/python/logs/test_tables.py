@@ -111,14 +111,22 @@ def test_the_summary_counts_and_measures(tmp_path, model):
     assert joint["outside_span"] is None  # fitted on the whole turn, or not known
 
 
-def test_rows_outside_the_calibrated_span_are_counted(tmp_path):
+@pytest.mark.parametrize("unit", ["deg", "rad", "turn", "count"])
+def test_rows_outside_the_calibrated_span_are_counted_whatever_the_columns_unit(unit, tmp_path):
     theta = np.linspace(30.0, 200.0, 300)
     run = ta.CalibrationRun(theta, theta + 0.3 * np.sin(np.radians(theta)), period=360.0)
     model = ta.fit(run, orders=[1]).model
     angles = np.array([0.0, 29.0, 31.0, 100.0, 199.0, 210.0, 391.0, np.nan])
-    source = write(pa.table({"indicated_deg": angles}), tmp_path / "a.parquet")
-    report = ta.correct_logs(source, model, tmp_path / "b.parquet")
-    assert report.logs[0].result["joints"][0]["outside_span"] == 3
+    turn = {"deg": 360.0, "rad": 2.0 * np.pi, "turn": 1.0, "count": 4096.0}[unit]
+    table = pa.table({f"indicated_{unit}": angles * (turn / 360.0)})
+    counts = {"counts_per_turn": turn} if unit == "count" else {}
+    source = write(table, tmp_path / "a.parquet")
+    report = ta.correct_logs(source, model, tmp_path / "b.parquet", **counts)
+    (joint,) = report.logs[0].result["joints"]
+    assert joint["outside_span"] == 3
+    change = (model.correct(angles) - angles)[:-1]
+    assert joint["rms_correction_arcsec"] == pytest.approx(3600.0 * np.sqrt(np.mean(change**2)))
+    assert joint["max_abs_correction_arcsec"] == pytest.approx(3600.0 * np.abs(change).max())
 
 
 @pytest.mark.parametrize("codec", ["snappy", "zstd", "gzip", "lz4", "brotli", "none"])

@@ -11,8 +11,8 @@ from trueangle.logs.unitevidence import UnitEvidence
 DEG, RAD, TURN = 360.0, 2.0 * np.pi, 1.0
 
 
-#: Ways to cut readings in batches: what is seen does not depend on it.
-BATCHES = (1, 3, 90)
+#: Ways to cut readings in batches, at last one by one: what is seen does not depend on it.
+BATCHES = (1, 3, 90, 900)
 
 
 def seen(values, period, span=None, batches=3):

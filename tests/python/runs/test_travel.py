@@ -101,6 +101,7 @@ def test_spans_in_words_and_over_the_turns() -> None:
     assert Span(20.0, 300.0, False).describe(360.0) == "20 to 300 deg"
     assert Span(0.0, 420.0, False).describe(360.0) == "0 to 420 deg"
     assert Span(0.0, 360.0, True).describe(360.0) == "0 to 360 deg"
+    assert Span(180.0, 360.0, False).describe(360.0) == "180 to 360 deg"
     assert Span(0.02, 280.0, False).describe(360.0) == "0 to 280 deg"
     assert Span(0.03, 280.0, False).describe(360.0) == "0.03 to 280 deg"
     two = [np.linspace(30.0, 90.0, 40), np.linspace(-400.0, -300.0, 40)]
