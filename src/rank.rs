@@ -237,3 +237,118 @@ fn name(design: &Design, orders: &[(usize, u32)]) -> String {
     }
     parts.join(" and ")
 }
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::{DMatrix, DVector};
+
+    use super::*;
+    use crate::design::Frequencies;
+    use crate::lstsq::Triangle;
+
+    fn design(orders: Vec<u32>) -> Design {
+        let cycles = 1.0;
+        Design::new(360.0, vec![Frequencies { cycles, orders }]).unwrap()
+    }
+
+    /// What is left is as many unknowns as the singular values of the rows say.
+    #[test]
+    fn the_rank_is_that_of_the_rows() {
+        /// Of rows of numbers up to 1: dependent columns leave rounding.
+        const ROUNDING: f64 = 1e-9;
+        let cases: [(usize, Vec<u32>, &[u32]); 5] = [
+            (36, vec![1, 18], &[18]),
+            (36, vec![16, 20], &[16, 20]),
+            (36, vec![1, 36], &[36]),
+            (10, (1..8).collect(), &[5, 6, 7]),
+            (36, vec![1, 2, 5], &[]),
+        ];
+        for (positions, orders, fault) in cases {
+            let design = design(orders.clone());
+            let angles: Vec<f64> = (0..3 * positions)
+                .map(|i| 360.0 / positions as f64 * i as f64)
+                .collect();
+            let (mut rows, mut plain) = (Vec::new(), Vec::<f64>::new());
+            for &x in &angles {
+                let mut row = vec![1.0];
+                design.extend_row(&mut row, x, 1.0);
+                plain.extend(&row);
+                rows.extend(row.iter().chain(&[0.0]));
+            }
+            let columns = 1 + design.columns();
+            let (pivot, shared) = Triangle::of_rows(columns + 1, &rows).eliminate();
+            let runs = vec![pivot];
+            let system = System { runs, shared };
+            let wanted = DMatrix::from_row_slice(angles.len(), columns, &plain).rank(ROUNDING);
+            let found = check(
+                &design,
+                &system,
+                f64::INFINITY,
+                || 1e-14,
+                || angles.iter().copied(),
+            );
+            match found {
+                Ok(()) => assert_eq!((wanted, fault.len()), (columns, 0), "{orders:?}"),
+                Err(Error::Rank {
+                    rank,
+                    unknowns,
+                    orders,
+                    ..
+                }) => {
+                    assert_eq!((rank, unknowns), (wanted, columns), "{orders:?}");
+                    let named: Vec<_> = fault.iter().map(|&order| (0, order)).collect();
+                    assert_eq!(orders, named);
+                }
+                Err(other) => panic!("{other}"),
+            }
+        }
+    }
+
+    /// Ones with minus ones above them: no column is near the others, all together are by
+    /// `2^(1 - n)`. Refused is what leaves no digit, and named are all.
+    #[test]
+    fn a_hopeless_system_is_refused_without_a_column_at_fault() {
+        for (orders, is_refused) in [(12, false), (15, false), (30, true)] {
+            let n = 2 * orders as usize;
+            let row = |i: usize, j: usize| match i.cmp(&j) {
+                std::cmp::Ordering::Less if j < n => -1.0,
+                std::cmp::Ordering::Equal => 1.0,
+                _ => 0.0,
+            };
+            let rows: Vec<f64> = (0..n * (n + 1))
+                .map(|k| row(k / (n + 1), k % (n + 1)))
+                .collect();
+            let shared = Triangle::of_rows(n + 1, &rows);
+            let runs = Vec::new();
+            let system = System { runs, shared };
+            let design = design((1..=orders).collect());
+            let look = |bound| check(&design, &system, bound, || 0.0, || [].into_iter());
+            assert_eq!(look(1e8), Ok(()));
+            match look(f64::INFINITY) {
+                Ok(()) => assert!(!is_refused, "{orders}"),
+                Err(Error::Rank {
+                    rank,
+                    unknowns,
+                    orders: named,
+                    reason,
+                }) => {
+                    assert!(is_refused, "{reason}");
+                    assert_eq!((rank, unknowns, named.len()), (n - 1, n, orders as usize));
+                    assert!(reason.contains("too little of a turn"));
+                }
+                Err(other) => panic!("{other}"),
+            }
+        }
+    }
+
+    #[test]
+    fn back_substitution_solves_the_triangle() {
+        let made = [vec![2.0], vec![-1.0, 4.0], vec![3.0, 0.5, -0.25]];
+        let wanted = DVector::from_vec(vec![1.5, -2.0, 7.0]);
+        let triangle = DMatrix::from_fn(3, 3, |i, j| made[j].get(i).copied().unwrap_or(0.0));
+        let mut shares = (&triangle * &wanted).as_slice().to_vec();
+        back_substitute(&made, &mut shares);
+        // Every number is exact.
+        assert_eq!(shares, wanted.as_slice());
+    }
+}

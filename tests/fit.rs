@@ -4,7 +4,7 @@ use nalgebra::{DMatrix, DVector};
 use proptest::prelude::*;
 use trueangle::Error;
 use trueangle::design::{Design, Frequencies};
-use trueangle::fit::{Argument, Method, Options, Run, Solution, fit, scan};
+use trueangle::fit::{Argument, Method, Options, Run, Solution, fit, sample, scan};
 use trueangle::kernel;
 use trueangle::series::{HarmonicSeries, Shaft};
 
@@ -185,6 +185,40 @@ fn errors_are_those_of_the_dense_inverse() {
     );
 }
 
+/// Zeros that lie around the whole turn have no mean: the first stands for it, and its error for
+/// the error. So does a zero alone.
+#[test]
+fn zeros_without_a_mean_have_the_first_for_it() {
+    /// Of zeros half a turn less 0.1 apart: the mean is as sharp as they are.
+    const ROUNDING: f64 = 1e-9;
+    let design = design(360.0, &[1]);
+    let (reference, noisy) = readings(7, 200);
+    let of = |zeros: &[f64]| {
+        let shift = |zero: &f64| noisy.iter().map(|y| y + zero).collect::<Vec<_>>();
+        let shifted: Vec<_> = zeros.iter().map(shift).collect();
+        let run = |indicated| Run {
+            reference: &reference,
+            indicated,
+            weights: None,
+        };
+        let runs: Vec<_> = shifted.iter().map(|indicated| run(indicated)).collect();
+        fit(&design, &runs, Options::default()).unwrap()
+    };
+    for zeros in [&[31.0][..], &[31.0, -149.0], &[10.0, 130.0, -110.0]] {
+        let found = of(zeros);
+        assert_eq!(found.constant, found.offsets[0]);
+        let share = found.covariance()[0] / found.offset_std[0].powi(2);
+        assert!((share - 1.0).abs() < ROUNDING, "{zeros:?}: {share}");
+    }
+    let near = of(&[31.0, -149.1]);
+    let middle = near.offsets[0] + 0.5 * (near.offsets[1] - near.offsets[0] + 360.0);
+    assert!(
+        (near.constant - middle).abs() < ROUNDING,
+        "{}",
+        near.constant
+    );
+}
+
 #[test]
 fn ridge_that_leaves_an_order_undetermined_is_refused() {
     let reference: Vec<f64> = (0..72).map(|i| 10.0 * f64::from(i)).collect();
@@ -302,6 +336,22 @@ fn a_scan_sees_the_residuals_that_count() {
         assert_eq!(few, look(37, 2));
         assert_eq!(few.largest, all.largest);
         assert!((few.sample.len() as f64 / (slow.len() as f64 / 37.0) - 1.0).abs() < 0.01);
+        // Within a part it is every so many, also without a look at the others.
+        let short = Run {
+            reference: &reference[..60_000],
+            indicated: &indicated[..60_000],
+            weights: weights.map(|w| &w[..60_000]),
+        };
+        let slow: Vec<f64> = (0..60_000)
+            .filter(counts)
+            .map(residual)
+            .step_by(37)
+            .collect();
+        let kept = scan(&fitted, &short, Argument::Reference, 0.25, 37, 1).unwrap();
+        let alone = sample(&fitted, &short, Argument::Reference, 0.25, 37, 1).unwrap();
+        for found in [&kept.sample, &alone] {
+            assert!(found.len() == slow.len() && close(found, &slow, SAME));
+        }
     }
 }
 

@@ -1,5 +1,6 @@
 //! Least squares against its defining identity and certified outside numbers.
 
+use nalgebra::DMatrix;
 use proptest::prelude::*;
 use trueangle::lstsq::{Reduction, System, Triangle};
 
@@ -82,6 +83,57 @@ fn longley_has_its_certified_coefficients() {
     }
     let found = (variance * covariance[0]).sqrt();
     assert!((found / 890420.383607373 - 1.0).abs() < KEPT);
+}
+
+/// Beyond the size of singular values, the condition number comes from a power iteration: never
+/// greater than theirs, some per cent low at most. With a column of zeros it is infinite.
+#[test]
+fn a_large_system_has_the_condition_of_its_singular_values() {
+    const COLUMNS: usize = 140;
+    const READINGS: usize = 200;
+    const LOW: f64 = 0.97;
+    let mut state = 1u64;
+    let mut uniform = || {
+        state = state
+            .wrapping_mul(6364136223846793005)
+            .wrapping_add(1442695040888963407);
+        (state >> 11) as f64 / (1u64 << 53) as f64
+    };
+    for (runs, least) in [(1, 0.1), (3, 0.1), (1, 0.0)] {
+        let mut dense = DMatrix::zeros(runs * READINGS, runs + COLUMNS);
+        let (mut pivots, mut reduction) = (Vec::new(), Reduction::default());
+        for run in 0..runs {
+            let mut rows = Vec::new();
+            for i in run * READINGS..(run + 1) * READINGS {
+                dense[(i, run)] = 1.0;
+                rows.push(1.0);
+                for j in 0..COLUMNS {
+                    let scale = [10.0, least, 1.0][j.min(2)];
+                    let value = scale * (uniform() - 0.3);
+                    dense[(i, runs + j)] = value;
+                    rows.push(value);
+                }
+                rows.push(0.0);
+            }
+            let (pivot, shared) = Triangle::of_rows(COLUMNS + 2, &rows).eliminate();
+            pivots.push(pivot);
+            reduction.push(shared);
+        }
+        let system = System {
+            runs: pivots,
+            shared: reduction.finish().unwrap(),
+        };
+        let found = system.condition_number();
+        if least == 0.0 {
+            assert_eq!(found, f64::INFINITY);
+            continue;
+        }
+        let values = dense.singular_values();
+        let share = found * values.min() / values.max();
+        assert!(share > LOW && share < 1.0 + ORTHOGONAL, "{runs}: {share}");
+        assert_eq!(system.condition_bound(), f64::INFINITY);
+        assert_eq!(system.near_condition_bound(), f64::INFINITY);
+    }
 }
 
 proptest! {

@@ -5,6 +5,7 @@ use std::f64::consts::TAU;
 use proptest::prelude::*;
 use trueangle::angle::Period;
 use trueangle::moments::accumulator::Accumulator;
+use trueangle::moments::expected::Expected;
 use trueangle::moments::spectrum::Spectrum;
 use trueangle::readings::Readings;
 
@@ -201,6 +202,86 @@ fn stretches_have_the_sums_of_their_own_readings() {
             for (a, b) in pairs[0].error.iter().zip(&pairs[1].error) {
                 assert!((a - b).norm() <= EXACT * scale * period, "{i}: {a} {b}");
             }
+        }
+    }
+}
+
+/// Of every segment the greatest and least angle and error, whether its readings wait for each
+/// other or not, and wherever parts count errors from.
+#[test]
+fn extremes_are_those_of_a_loop() {
+    /// Of angles of half a turn that come and go as places in a segment.
+    const ROUNDING: f64 = 1e-12;
+    let noted = |data: &[Vec<f64>; 3], some: std::ops::Range<usize>, centre| {
+        let mut sums = Accumulator::new(Period::new(360.0).unwrap(), 1.0, 3, centre);
+        let mut waiting = sums.waiting(some.len(), false).noting();
+        let readings = Readings {
+            angle: &data[0][some.clone()],
+            error: &data[1][some],
+            reference: None,
+            weights: None,
+        };
+        sums.update_piece(readings, &mut waiting);
+        sums.settle(&mut waiting);
+        sums
+    };
+    for len in [40, 20_000] {
+        let data = readings(11, len, 360.0);
+        let mut sums = noted(&data, 0..len / 3, 0.5);
+        sums.merge(&noted(&data, len / 3..len, 2.5));
+        let count = sums.moments().len();
+        let mut slow = vec![None; count];
+        for (x, &y) in data[0].iter().zip(&data[1]) {
+            let x = x - 360.0 * (x / 360.0).round();
+            let segment = ((x / 360.0 + 0.5) * count as f64) as usize;
+            let [high, low, most, least] = slow[segment].get_or_insert([x, x, y, y]);
+            (*high, *low) = (high.max(x), low.min(x));
+            (*most, *least) = (most.max(y), least.min(y));
+        }
+        let slow: Vec<[f64; 4]> = slow.into_iter().flatten().collect();
+        let found = sums.extremes();
+        assert_eq!(found.len(), slow.len());
+        for (found, slow) in found.as_flattened().iter().zip(slow.as_flattened()) {
+            assert!((found - slow).abs() < 360.0 * ROUNDING, "{found} {slow}");
+        }
+    }
+}
+
+/// How far the farthest reading that counts is off what is expected: by a loop, where readings
+/// are many enough to wait for each other.
+#[test]
+fn the_farthest_reading_is_that_of_a_loop() {
+    const ROUNDING: f64 = 1e-12;
+    let data = readings(12, 40_000, 360.0);
+    let (constant, orders, coefficients) = (0.2, [1, 5], [1.0, 0.5, 0.0, -0.3]);
+    for (len, waits) in [(100, false), (40_000, true)] {
+        let mut errors = data[1][..len].to_vec();
+        let mut weights = data[2][..len].to_vec();
+        (errors[70], weights[70]) = (50.0, 0.0);
+        errors[31] = -20.0;
+        let mut sums = Accumulator::new(Period::new(360.0).unwrap(), 1.0, 5, 0.0);
+        let segments = sums.moments().len();
+        let expected = Expected::new(segments, constant, &orders, &coefficients);
+        let readings = Readings {
+            angle: &data[0][..len],
+            error: &errors,
+            reference: None,
+            weights: Some(&weights),
+        };
+        let found = sums.update_watched(readings, 2, &expected);
+        let off = |i: usize| {
+            let x = data[0][i].to_radians();
+            let one = coefficients[0] * x.cos() + coefficients[1] * x.sin();
+            let five = coefficients[3] * (5.0 * x).sin();
+            (errors[i] - constant - one - five).abs()
+        };
+        let counting = (0..len).filter(|&i| weights[i] > 0.0);
+        let slow = counting.map(off).fold(0.0, f64::max);
+        if waits {
+            let missed = expected.missed() + ROUNDING;
+            assert!((found - slow).abs() < missed, "{found} {slow}");
+        } else {
+            assert_eq!(found, f64::INFINITY);
         }
     }
 }

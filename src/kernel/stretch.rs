@@ -109,4 +109,15 @@ mod tests {
         assert_eq!(outside(stretch, &[-10.0, 0.0, 500.0, 800.0]), 0);
         assert_eq!(outside(stretch, &[-11.0, 801.0, 5000.0, -4000.0]), 4);
     }
+
+    #[test]
+    fn rounding_is_no_excursion() {
+        for period in [1.0, 360.0, 65536.0] {
+            let stretch = Stretch::new(0.1 * period, 0.4 * period, period, true);
+            for (away, count) in [(0.5e-9, 0), (1.5e-9, 2)] {
+                let ends = [(0.1 - away) * period, (0.4 + away) * period];
+                assert_eq!(outside(stretch, &ends), count, "{period}");
+            }
+        }
+    }
 }

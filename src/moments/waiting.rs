@@ -183,3 +183,27 @@ impl Rows<'_, '_> {
         self.lens[segment] = len - TOGETHER;
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// There is room from some readings a segment on, and for so many segments; only readings that
+    /// wait, and of which something is expected, are looked at.
+    #[test]
+    fn room_is_where_it_pays() {
+        let expected = Expected::new(7, 0.0, &[], &[]);
+        for (readings, segments, room) in [
+            (READINGS * 7, 7, true),
+            (READINGS * 7 - 1, 7, false),
+            (READINGS * MOST_SEGMENTS, MOST_SEGMENTS, true),
+            (READINGS * (MOST_SEGMENTS + 1), MOST_SEGMENTS + 1, false),
+        ] {
+            let waiting = Waiting::new(readings, segments, false);
+            assert_eq!(waiting.has_room(), room, "{readings} {segments}");
+            assert_eq!(waiting.farthest(), f64::INFINITY);
+            let watched = waiting.watching(Some(&expected)).farthest();
+            assert_eq!(watched, if room { 0.0 } else { f64::INFINITY });
+        }
+    }
+}

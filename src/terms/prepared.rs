@@ -163,3 +163,28 @@ impl Terms {
         self.evaluator.series().period().value()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::series::{HarmonicSeries, Shaft};
+
+    /// Where a line is steepest, its inverse is as steep as the bound says.
+    #[test]
+    fn the_steepness_is_that_of_the_inverse() {
+        for slope in [0.05, 0.4f64] {
+            let shaft = Shaft {
+                cycles: 1.0,
+                orders: vec![1],
+                cosine: vec![0.0],
+                sine: vec![-slope.to_degrees()],
+            };
+            let series = HarmonicSeries::new(360.0, 0.0, vec![shaft]).unwrap();
+            let evaluator = Arc::new(Evaluator::new(series, Argument::Reference));
+            let terms = Terms::new(Arc::clone(&evaluator), &[]).unwrap();
+            // x - slope x around 0: its inverse rises by 1 / (1 - slope).
+            let rise = evaluator.correct_one(1e-3) / 1e-3;
+            assert!((terms.steepness / (rise - 1.0) - 1.0).abs() < 1e-6);
+        }
+    }
+}

@@ -1,0 +1,193 @@
+"""Functions of the core by themselves, against numpy: layouts, defaults, what is refused.
+
+The package calls each in one way, with the right arguments.
+"""
+
+import numpy as np
+import pytest
+
+from trueangle import _core
+from trueangle.errors import ArgumentError
+
+N = 40
+RNG = np.random.default_rng(11)
+THETA = RNG.uniform(-6.0, 6.0, N)
+ORDERS = np.array([1.0, 2.5, 7.0])
+COSINE, SINE = RNG.normal(size=(2, ORDERS.size))
+PHASES = np.outer(THETA, ORDERS)
+BOUNDS = [(0, 15), (15, 16), (16, N)]
+ROWS = RNG.normal(size=(N, 3))
+ROOTS = RNG.uniform(0.5, 2.0, N)
+BANDS = np.column_stack([np.full(N, 5.0), *RNG.uniform(-1.0, 1.0, (3, N))])
+SHORT = np.ones(N - 1)
+
+#: Of sums of some dozen numbers around 1; of numbers that single precision keeps.
+ROUNDING = 1e-12
+SINGLE = 1e-6
+
+
+def filtering():
+    """Matrix of the filter over `BOUNDS`: the defining equation, row by row."""
+    matrix = np.diag(np.ones(N)) - 0.6 * np.diag(np.ones(N - 1), -1)
+    for start, _ in BOUNDS:
+        matrix[start] = 0.0
+        matrix[start, start] = 0.8
+    return matrix
+
+
+def zeros(*shape):
+    return np.zeros(shape)
+
+
+def test_lines_are_those_of_numpy():
+    columns = np.empty((N, 2 * ORDERS.size))
+    columns[:, 0::2], columns[:, 1::2] = np.cos(PHASES), np.sin(PHASES)
+    plain, single = (
+        _core.line_columns(THETA, ORDERS),
+        _core.line_columns(THETA, ORDERS, single=True),
+    )
+    assert (plain.dtype, single.dtype) == (np.float64, np.float32)
+    np.testing.assert_allclose(plain, columns, rtol=0, atol=ROUNDING)
+    np.testing.assert_allclose(single, columns, rtol=0, atol=SINGLE)
+    value = np.cos(PHASES) @ COSINE + np.sin(PHASES) @ SINE
+    slope = np.cos(PHASES) @ (ORDERS * SINE) - np.sin(PHASES) @ (ORDERS * COSINE)
+    found = _core.line_sum(THETA, ORDERS, COSINE, SINE)
+    np.testing.assert_allclose(found, value, rtol=0, atol=ROUNDING)
+    both = _core.line_sum_and_slope(THETA, ORDERS, COSINE, SINE)
+    np.testing.assert_allclose(both, [value, slope], rtol=0, atol=10 * ROUNDING)
+
+
+def test_sums_over_units_are_those_of_numpy():
+    values, starts = RNG.normal(size=(2, N)), [0, 3, 20]
+    found = _core.unit_sums(THETA, values, starts, 0.5, 0.25, 6)
+    assert found.shape == (6, 3, 4)
+    for k, own in enumerate(found):
+        waves = values * np.exp(-1j * (0.5 + 0.25 * k) * THETA)
+        sums = np.add.reduceat(waves, starts, axis=1).T
+        found_sums = own[:, 0::2] + 1j * own[:, 1::2]
+        np.testing.assert_allclose(found_sums, sums, rtol=0, atol=100 * ROUNDING)
+
+
+@pytest.mark.parametrize("damping", [None, 0.4])
+def test_a_lag_is_the_gain_of_its_equation(damping):
+    waves = RNG.normal(size=(N, 3)) + 1j * RNG.normal(size=(N, 3))
+    frequency = RNG.uniform(-3.0, 3.0, (N, 3))
+    jw = 1j * frequency / 2.0
+    options = {} if damping is None else {"damping": damping}
+    gain = 1.0 / (1.0 + jw) if damping is None else 1.0 / (1.0 + 2.0 * damping * jw + jw**2)
+    parts = np.stack([waves.real, waves.imag], axis=2).reshape(N, 6)
+    found = _core.lagged(parts, frequency, 2.0, **options)
+    expected = (waves * (gain - 1.0)).real.sum(axis=1)
+    np.testing.assert_allclose(found, expected, rtol=0, atol=10 * ROUNDING)
+
+
+@pytest.mark.parametrize("dtype", [np.float64, np.float32])
+@pytest.mark.parametrize("roots", [None, ROOTS])
+@pytest.mark.parametrize("transposed", [False, True])
+def test_whitening_is_its_matrix(dtype, roots, transposed):
+    matrix = filtering() * (1.0 if roots is None else roots)
+    rows = ROWS.astype(dtype)
+    found = _core.whitened(rows, BOUNDS, 0.6, roots, transposed)
+    assert found.dtype == dtype
+    expected = (matrix.T if transposed else matrix) @ rows
+    np.testing.assert_allclose(found, expected, rtol=0, atol=10 * SINGLE)
+    if not transposed:
+        np.testing.assert_array_equal(found, _core.whitened(rows, BOUNDS, 0.6, roots))
+
+
+def test_medians_and_what_is_clipped():
+    assert _core.median(np.array([3.0, -1.0, 9.0, 4.0])) == 3.5
+    assert _core.median(np.arange(12.0)[::3]) == 4.5
+    assert np.isnan(_core.median(np.array([1.0, np.nan, 2.0])))
+    left = 0.1 * RNG.normal(size=N)
+    left[[3, 30]] = 5.0, -7.0
+    readings = 100.0 + left
+    away = left * ROOTS
+    limit = 4.0 * 1.4826 * np.median(np.abs(away - np.median(away))) / ROOTS
+    kept, target, outlying = _core.clipped(readings, left, ROOTS, 4.0)
+    assert outlying.dtype == np.bool_
+    np.testing.assert_array_equal(outlying, np.abs(left) > limit)
+    np.testing.assert_allclose(kept, np.clip(left, -limit, limit), rtol=ROUNDING)
+    np.testing.assert_allclose(target, 100.0 + kept, rtol=ROUNDING)
+
+
+def test_a_banded_system_is_that_of_numpy():
+    dense = np.diag(BANDS[:, 0])
+    for lag in (1, 2, 3):
+        dense += np.diag(BANDS[: N - lag, lag], lag) + np.diag(BANDS[: N - lag, lag], -lag)
+    factor = _core.Banded.factor(BANDS)
+    assert factor.log_determinant == pytest.approx(np.linalg.slogdet(dense)[1], rel=ROUNDING)
+    right = ROWS.copy()
+    factor.solve(right)
+    np.testing.assert_allclose(dense @ right, ROWS, rtol=0, atol=ROUNDING)
+    assert _core.Banded.factor(-BANDS) is None
+
+
+def test_rows_of_harmonics_are_those_of_numpy():
+    factor, lead = RNG.uniform(0.5, 2.0, N), RNG.uniform(-1.0, 1.0, N)
+    orders = np.array([1, 2, 9])
+    for scale, turn, options in (
+        (np.ones(N), np.zeros(N), {}),
+        (factor, lead, {"factor": factor, "lead": lead}),
+    ):
+        phases = orders[:, None] * THETA + turn / orders[:, None]
+        expected = np.empty((6, N))
+        expected[0::2], expected[1::2] = scale * np.cos(phases), scale * np.sin(phases)
+        rows = zeros(6, N)
+        _core.harmonic_rows(THETA, orders, rows, **options)
+        np.testing.assert_allclose(rows, expected, rtol=0, atol=ROUNDING)
+        total = zeros(N)
+        coefficients = np.arange(1.0, 7.0)
+        _core.harmonic_sum(THETA, orders, coefficients, total, **options)
+        np.testing.assert_allclose(total, coefficients @ expected, rtol=0, atol=100 * ROUNDING)
+
+
+def power(cuts, boxes, columns):
+    _core.add_relative_power(zeros(9), np.array(cuts), boxes, zeros(1, columns))
+
+
+LINES = (THETA, ORDERS, COSINE, SINE)
+MOMENTS = _core.Moments(360.0, [1.0], [[1]])
+ALIKE = _core.Corrector(_core.Series(360.0, 0.0, [1.0], [[1]], [[0.1]], [[0.0]]), []).alike(2)
+
+
+@pytest.mark.parametrize(
+    ("call", "arguments", "word"),
+    [
+        (_core.line_sum, (*LINES[:2], COSINE[:2], SINE), "cosine"),
+        (_core.line_sum, (*LINES[:3], SINE[:2]), "sine"),
+        (_core.line_sum_and_slope, (*LINES[:2], COSINE[:2], SINE), "cosine"),
+        (_core.unit_sums, (THETA, np.ones((2, N - 1)), [0], 1.0, 1.0, 2), "row, got 39"),
+        (_core.lagged, (np.ones((N, 5)), np.ones((N, 3)), 1.0), "waves"),
+        (_core.whitened, (ROWS, BOUNDS[:2], 0.5), "of 40 readings in all"),
+        (_core.whitened, (ROWS, [(0, 10), (11, N)], 0.5), "one after the other"),
+        (_core.whitened, (ROWS, [(0, 30), (30, 20), (20, N)], 0.5), "one after the other"),
+        (_core.whitened, (ROWS, BOUNDS, 0.5, SHORT), "roots"),
+        (_core.clipped, (THETA, SHORT, ROOTS, 3.0), "left"),
+        (_core.clipped, (THETA, THETA, SHORT, 3.0), "roots"),
+        (_core.Banded.factor, (np.ones((N, 3)),), "bands"),
+        (_core.Banded.factor(BANDS).solve, (zeros(N - 1, 2),), "right"),
+        (_core.harmonic_rows, (THETA, [1, 2], zeros(4, N), SHORT), "factor"),
+        (_core.harmonic_rows, (THETA, [1, 2], zeros(4, N), None, SHORT), "lead"),
+        (power, ([0, 9], [], 9), "totals"),
+        (power, ([0, 10], [(1, 1.0)], 9), "0 to 9"),
+        (power, ([0, 5, 5], [(1, 1.0)], 9), "grow"),
+        (power, ([-1, 9], [(1, 1.0)], 9), "grow"),
+        (power, ([4], [(1, 1.0)], 9), "two edges"),
+        (power, ([0, 9], [(1, 1.0)], 10), "9 columns"),
+        (_core.Beside, (ROWS, THETA[1:], 1.0, 0.0, BOUNDS, 0.5), "39 readings in all"),
+        (_core.Beside, (ROWS[1:], THETA, 1.0, 0.0, BOUNDS, 0.5), "fitted"),
+        (_core.Beside(ROWS, THETA, 1.0, 0.0, BOUNDS, 0.5).gain, (ROWS[1:],), "columns"),
+        (MOMENTS.update, (THETA, SHORT), "error"),
+        (MOMENTS.update, (THETA, THETA, SHORT), "weights"),
+        (MOMENTS.update_known, (THETA, SHORT, False), "indicated"),
+        (MOMENTS.restore, (np.ones(3),), "sums of such moments"),
+        (MOMENTS.merge, (_core.Moments(360.0, [1.0], [[2]]),), "merge"),
+        (MOMENTS.subtract, (_core.Moments(1.0, [1.0], [[1]]),), "merge"),
+        (ALIKE.reset, ([0, 2],), "no joint 2 among 2"),
+        (ALIKE.error, (np.ones(3),), "angles has 3 elements, joint has 2"),
+    ],
+)  # fmt: skip
+def test_a_wrong_argument_is_named(call, arguments, word):
+    with pytest.raises(ArgumentError, match=word):
+        call(*arguments)
