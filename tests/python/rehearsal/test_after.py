@@ -10,6 +10,7 @@ from trueangle.joint.signals import join_runs
 from trueangle.planning import Limits
 from trueangle.planning.evidence import ReadingNoise
 from trueangle.planning.scales import Scales
+from trueangle.planning.worth import WANTED
 from trueangle.rehearsal import after
 from trueangle.simulation import Harmonic, Latency, RunDesign, Simulation, simulate
 
@@ -90,3 +91,18 @@ def test_simulated_readings_have_the_noise_that_was_found(plan, monkeypatch, rho
     # Of 10 000 readings; four columns a run take a part of them.
     assert np.sqrt(power / count) == pytest.approx(3.0, rel=0.1)
     assert sum(float(e[1:] @ e[:-1]) for e in left) / power == pytest.approx(rho, abs=0.05)
+
+
+@pytest.mark.parametrize("missed", [0, 1])
+@pytest.mark.parametrize("to_the_end", [False, True])
+def test_trials_of_every_cause_are_counted(plan, monkeypatch, missed, to_the_end):
+    """The cause named least often is told; a failure ends them before all are made."""
+    wrong = plan.hypotheses[0][missed].cause
+    monkeypatch.setattr(
+        after._FurtherTrials, "names", lambda self, plan, one, rng: one.cause != wrong
+    )
+    trials = after._FurtherTrials(RUNS, SIM, ReadingNoise(1.0), 20, 0)
+    found = trials.counted(plan, 0, plan.between[0], to_the_end)
+    enough = int((1.0 - WANTED) * 20 + 1e-9) + 1
+    assert found.trials == (40 if to_the_end else 20 * missed + enough)
+    assert found.chance_named == 0.0
