@@ -99,7 +99,8 @@ fn a_large_system_has_the_condition_of_its_singular_values() {
             .wrapping_add(1442695040888963407);
         (state >> 11) as f64 / (1u64 << 53) as f64
     };
-    for (runs, least) in [(1, 0.1), (3, 0.1), (1, 0.0)] {
+    // The greatest singular value is that of a column, then of the zeros.
+    for (runs, size, least) in [(1, 1.0, 0.1), (3, 1.0, 0.1), (3, 0.01, 0.1), (1, 1.0, 0.0)] {
         let mut dense = DMatrix::zeros(runs * READINGS, runs + COLUMNS);
         let (mut pivots, mut reduction) = (Vec::new(), Reduction::default());
         for run in 0..runs {
@@ -108,7 +109,7 @@ fn a_large_system_has_the_condition_of_its_singular_values() {
                 dense[(i, run)] = 1.0;
                 rows.push(1.0);
                 for j in 0..COLUMNS {
-                    let scale = [10.0, least, 1.0][j.min(2)];
+                    let scale = size * [10.0, least, 1.0][j.min(2)];
                     let value = scale * (uniform() - 0.3);
                     dense[(i, runs + j)] = value;
                     rows.push(value);

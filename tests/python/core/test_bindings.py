@@ -142,6 +142,29 @@ def test_rows_of_harmonics_are_those_of_numpy():
         np.testing.assert_allclose(total, coefficients @ expected, rtol=0, atol=100 * ROUNDING)
 
 
+@pytest.mark.parametrize("order", ["C", "F"])
+def test_a_fit_is_seen_however_its_columns_lie(order):
+    found = _core.Beside(np.array(ROWS, order=order), THETA, 1.0, 0.0, BOUNDS, 0.6).seen
+    expected = filtering().T @ np.column_stack([ROWS, THETA])
+    np.testing.assert_allclose(found, expected.T, rtol=0, atol=10 * ROUNDING)
+
+
+def test_sums_count_what_has_a_weight():
+    sums = _core.Moments(360.0, [0.5], [[1]])
+    assert (sums.count, sums.cycles) == (0, 0.5)
+    sums.update(THETA, THETA, zeros(N))
+    assert sums.count == 0
+    sums.update(THETA, THETA, ROOTS)
+    assert sums.update_known(THETA, np.append(np.nan, THETA[1:]), False) == N - 1
+    assert (sums.count, sums.copy().count) == (2 * N - 1, 2 * N - 1)
+
+
+def test_joints_alike_are_copied_whole():
+    copied = ALIKE.copy()
+    assert (len(ALIKE), len(copied)) == (2, 2)
+    np.testing.assert_array_equal(copied.error(THETA[:2]), ALIKE.error(THETA[:2]))
+
+
 def power(cuts, boxes, columns):
     _core.add_relative_power(zeros(9), np.array(cuts), boxes, zeros(1, columns))
 
