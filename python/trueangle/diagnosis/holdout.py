@@ -23,6 +23,9 @@ Rows = NDArray[np.bool_]
 #: Resamples of runs for the interval.
 RESAMPLES = 1000
 
+#: Standard errors of a unit's power above the noise's from which on there is something in it.
+ABOVE_NOISE = 3.0
+
 #: Findings, in the order found, for which every fold searches again.
 SEARCHED = 4
 
@@ -145,10 +148,6 @@ def residual_at(
         for start, stop in signals.run_bounds():
             left[start:stop] -= np.median(left[start:stop])
     return np.asarray(left)
-
-
-#: Standard errors of a unit's power above the noise's from which on there is something in it.
-ABOVE_NOISE = 3.0
 
 
 def reducible_share(

@@ -18,6 +18,8 @@ from .momentsfit import Spectrum
 
 __all__ = ["Exclusive", "RunSums"]
 
+Array = NDArray[np.float64]
+
 #: Seconds between two looks at whose turn it is.
 _PATIENCE = 0.05
 
@@ -44,9 +46,6 @@ class Exclusive:
 
     def __exit__(self, *_: object) -> None:
         self._lock.release()
-
-
-Array = NDArray[np.float64]
 
 
 class RunSums:
