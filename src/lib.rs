@@ -34,6 +34,7 @@ pub mod lstsq;
 pub mod moments;
 pub mod monitor;
 pub mod rank;
+pub mod rounded;
 pub mod spectrum;
 pub mod waves;
 

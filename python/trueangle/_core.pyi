@@ -257,7 +257,14 @@ def clipped(
     left: NDArray[np.float64],
     roots: NDArray[np.float64],
     most: float,
+    least: float = 0.0,
 ) -> tuple[_Array, _Array, NDArray[np.bool_]]: ...
+def rounded(
+    left: NDArray[np.float64], step: float, sigma: float
+) -> tuple[_Array, float, float]: ...
+def rounded_drawn(
+    left: NDArray[np.float64], step: float, sigma: float, shares: NDArray[np.float64]
+) -> _Array: ...
 def median(values: NDArray[np.float64]) -> float: ...
 def left_out(
     grams: NDArray[np.float64],

@@ -20,14 +20,14 @@ pub struct Clipped {
 }
 
 /// Readings `y` that a fit leaves `left` of, of these roots of their weights, clipped at `most`
-/// standard deviations. Where more than half would be beyond, these are counted from zero: no
+/// standard deviations, that of a reading being `least` at least. Where more than half would be beyond, these are counted from zero: no
 /// outlier is in the majority.
-pub fn clipped(y: &[f64], left: &[f64], roots: &[f64], most: f64) -> Clipped {
+pub fn clipped(y: &[f64], left: &[f64], roots: &[f64], most: f64, least: f64) -> Clipped {
     let scaled: Vec<f64> = left.iter().zip(roots).map(|(e, root)| e * root).collect();
     let middle = median(&mut scaled.clone());
     let about = |centre: f64| {
         let mut away: Vec<f64> = scaled.iter().map(|e| (e - centre).abs()).collect();
-        NORMAL * median(&mut away)
+        (NORMAL * median(&mut away)).max(least)
     };
     let mut limit = most * about(middle).max(LEAST);
     let beyond = |limit: f64| move |(e, root): (&f64, &f64)| e.abs() > limit / root;
@@ -76,7 +76,7 @@ mod tests {
     fn what_lies_beyond_is_put_at_the_limit_and_the_readings_follow() {
         let left = [0.1, -0.1, 0.3, -0.2, 0.0, 9.0, -8.0];
         let y: Vec<f64> = left.iter().map(|e| 100.0 + e).collect();
-        let found = clipped(&y, &left, &[1.0; 7], 4.0);
+        let found = clipped(&y, &left, &[1.0; 7], 4.0, 0.0);
         // Deviations from the median 0: 0, 0.1, 0.1, 0.2, 0.3, 8, 9.
         let limit = 4.0 * NORMAL * 0.2;
         assert_eq!(
@@ -89,9 +89,18 @@ mod tests {
     }
 
     #[test]
+    fn readings_of_few_levels_are_no_outliers_one_level_apart() {
+        let left = [0.0, 0.0, 0.0, 0.0, 0.0, 1.0, -9.0];
+        let found = clipped(&left, &left, &[1.0; 7], 4.0, 0.3);
+        assert_eq!(found.outlying.iter().filter(|&&beyond| beyond).count(), 1);
+        assert!((found.kept[6] + 1.2).abs() < 1e-12);
+        assert!(clipped(&left, &left, &[1.0; 7], 4.0, 0.0).outlying[5]);
+    }
+
+    #[test]
     fn a_majority_away_from_zero_is_no_outlier() {
         let left = [5.0, 5.0, 5.0, 5.0, 0.0, 0.1, -0.1];
-        let found = clipped(&left, &left, &[1.0; 7], 4.0);
+        let found = clipped(&left, &left, &[1.0; 7], 4.0, 0.0);
         assert!(found.outlying.iter().all(|&beyond| !beyond));
     }
 
@@ -100,7 +109,7 @@ mod tests {
         let left = [0.1, -0.1, 0.2, -0.2, 0.0, 2.0, 2.0];
         let mut roots = [1.0; 7];
         roots[6] = 0.1;
-        let found = clipped(&left, &left, &roots, 4.0);
+        let found = clipped(&left, &left, &roots, 4.0, 0.0);
         assert!(found.outlying[5] && !found.outlying[6]);
     }
 }

@@ -88,22 +88,64 @@ pub(super) fn consecutive(py: Python<'_>, n: usize, noise: &Correlated<'_>) -> P
     Err(argument_error(py, problem))
 }
 
-/// What a fit leaves, outliers clipped at `most` standard deviations; readings to match; which
-/// are outlying.
+/// What a fit leaves, outliers clipped at `most` standard deviations, that of a reading being
+/// `least` at least; readings to match; which are outlying.
 #[pyfunction]
+#[pyo3(signature = (readings, left, roots, most, least = 0.0))]
 pub fn clipped<'py>(
     py: Python<'py>,
     readings: PyReadonlyArray1<'py, f64>,
     left: PyReadonlyArray1<'py, f64>,
     roots: PyReadonlyArray1<'py, f64>,
     most: f64,
+    least: f64,
 ) -> PyResult<(Values<'py, f64>, Values<'py, f64>, Values<'py, bool>)> {
     same_length("left", left.len(), "readings", readings.len())?;
     same_length("roots", roots.len(), "readings", readings.len())?;
     let (readings, left, roots) = (readings.as_slice()?, left.as_slice()?, roots.as_slice()?);
-    let found = detached(py, || linear::clipped(readings, left, roots, most))?;
+    let found = detached(py, || linear::clipped(readings, left, roots, most, least))?;
     let (kept, target) = (vector(py, &found.kept)?, vector(py, &found.target)?);
     Ok((kept, target, vector(py, &found.outlying)?))
+}
+
+/// Expected errors of readings rounded to whole steps, of which a fit leaves `left`: each, the sum
+/// of their squares, and the logarithm of the likelihood.
+#[pyfunction]
+pub fn rounded<'py>(
+    py: Python<'py>,
+    left: PyReadonlyArray1<'py, f64>,
+    step: f64,
+    sigma: f64,
+) -> PyResult<(Values<'py, f64>, f64, f64)> {
+    positive(py, step, sigma)?;
+    let left = left.as_slice()?;
+    let found = detached(py, || crate::rounded::rounded(left, step, sigma))?;
+    let error = vector(py, &found.error)?;
+    Ok((error, found.squares, found.log_likelihood))
+}
+
+/// Errors drawn among those that the steps of rounded readings allow, at these shares of the chance.
+#[pyfunction]
+pub fn rounded_drawn<'py>(
+    py: Python<'py>,
+    left: PyReadonlyArray1<'py, f64>,
+    step: f64,
+    sigma: f64,
+    shares: PyReadonlyArray1<'py, f64>,
+) -> PyResult<Values<'py, f64>> {
+    positive(py, step, sigma)?;
+    same_length("shares", shares.len(), "left", left.len())?;
+    let (left, shares) = (left.as_slice()?, shares.as_slice()?);
+    let found = detached(py, || crate::rounded::drawn(left, step, sigma, shares))?;
+    vector(py, &found)
+}
+
+fn positive(py: Python<'_>, step: f64, sigma: f64) -> PyResult<()> {
+    if step > 0.0 && sigma > 0.0 {
+        return Ok(());
+    }
+    let problem = format!("step and sigma must be above zero, not {step} and {sigma}");
+    Err(argument_error(py, problem))
 }
 
 /// The mean of the two middle values, or the middle one; NaN where a value is.

@@ -22,6 +22,7 @@ from .gearratio import aligned, find_ratio, near_ratio
 from .identifiability import blind_spots, in_common_form
 from .penalty import NEW_CAUSE, misfit_of_scatter, total_penalty
 from .remainder import unexplained_after
+from .rounding import beyond_rounding, tells_no_more, unrounded
 from .selection import select
 from .unnamed import is_named
 
@@ -211,7 +212,7 @@ def _chosen(seen: Seen, sim: Simulation) -> CauseSelection:
     start = _start(seen, sim)
     # What is always free is no blind spot.
     spots = blind_spots(start if seen.delay is None else _start(replace(seen, delay=None), sim))
-    chosen = select(start)
+    chosen = start if tells_no_more(start) else beyond_rounding(start, select(start))
     scatter: list[ScatterFinding] = []
     if pace().over:
         return CauseSelection(start, chosen, scatter, spots)  # what is left is no scatter yet
@@ -222,7 +223,7 @@ def _chosen(seen: Seen, sim: Simulation) -> CauseSelection:
         chosen = select(start, chosen.terms)
     if not all(map(is_named, chosen.terms)) and not unexplained_after(chosen).found:
         chosen = select(start, unnamed=False)
-    chosen = in_common_form(exchanged(chosen), spots)
+    chosen = beyond_rounding(start, in_common_form(exchanged(chosen), spots))
     scatter += [i for i in _scatter(chosen, weighs=False) if i.bic_gain > NEW_CAUSE]
     return CauseSelection(start, chosen, scatter, spots)
 
@@ -243,10 +244,12 @@ def _uneven(start: Regression, chosen: Regression) -> ScatterFinding | None:
 
 def _scatter(regression: Regression, weighs: bool) -> list[ScatterFinding]:
     """Causes of the scatter, of those that weigh readings or not, strongest first."""
+    asked = [effect for effect in EFFECTS.values() if effect.weighs == weighs]
+    before = unrounded(regression)
     found = [
         item
-        for effect in EFFECTS.values()
-        if effect.weighs == weighs and (item := effect.find_scatter(regression)) is not None
+        for effect in asked
+        if (item := effect.find_scatter(regression if effect.rounds else before)) is not None
     ]
     return sorted(found, key=lambda item: -item.bic_gain)
 

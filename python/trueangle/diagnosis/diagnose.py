@@ -37,6 +37,7 @@ from .goodness import Unexplained, goodness_of_fit
 from .named import findings_of, reconsidered_findings, scatter_doubt, scatter_finding
 from .penalty import cause_terms
 from .remainder import leftover_of, unexplained_after
+from .rounding import rounding_of
 from .torque import torque_account
 from .wrongplace import misplaced_beliefs
 
@@ -281,7 +282,7 @@ def _noise(chosen: Regression, rest: Unexplained) -> float:
     clean = ~chosen.outlying
     freedom = int(np.count_nonzero(clean)) - chosen.q.shape[1]
     if rest.found or freedom <= 0:
-        return rest.noise.sigma
+        return float(np.hypot(rest.noise.sigma, rounding_of(chosen)))
     return float(np.sqrt(np.sum(_left(chosen)[clean] ** 2) / freedom))
 
 

@@ -15,6 +15,7 @@ from ..joint.signals import Signals
 from ..support.display_units import brief
 from ..support.distributions import chi_squared_tail
 from .goodness import FREE_PATH, Evidence, Leftover, Unexplained, goodness_of_fit
+from .rounding import unrounded
 from .unnamed import effect_of, is_named
 
 __all__ = ["free_paths", "leftover_of", "remainder_of", "unexplained_after"]
@@ -118,6 +119,7 @@ def remainder_of(
 
 def unexplained_after(regression: Regression, sigma: float | None = None) -> Unexplained:
     """Goodness of fit of what a regression leaves, up to the orders that it looks for."""
+    regression = unrounded(regression)
     path = path_evidence(regression)
     return goodness_of_fit(
         remainder_of(regression),

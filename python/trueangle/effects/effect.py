@@ -79,6 +79,8 @@ class Effect:
         A blind spot that names it is reason enough not to name it.
     weighs : bool
         A cause of the scatter that gives the readings weights.
+    rounds : bool
+        It is the rounding of readings; other causes of the scatter act before it.
     of_motion : bool
         Its columns follow from the shape and the motion alone, whatever the pattern.
     not_at_run_time : str
@@ -109,6 +111,7 @@ class Effect:
     changes_lines: ClassVar[bool] = False
     is_doubted: ClassVar[bool] = True
     weighs: ClassVar[bool] = False
+    rounds: ClassVar[bool] = False
     of_motion: ClassVar[bool] = False
     not_at_run_time: ClassVar[str] = ""
     size_name: ClassVar[str] = ""

@@ -9,6 +9,7 @@ from typing import ClassVar
 import numpy as np
 
 from ..estimation.estimate import quantity
+from ..estimation.readings import MOST_SHARE
 from ..estimation.regression import Regression
 from ..joint.pattern import Surroundings
 from ..joint.signals import Signals
@@ -22,9 +23,6 @@ __all__ = ["Quantisation"]
 
 #: Share of the noise's variance from which on the rounding of the readings is its cause.
 LEAST_SHARE = 0.2
-
-#: Beyond it the lattice is no rounding of the sensor's: a rounding leaves its own variance.
-MOST_SHARE = 2.0
 
 
 @dataclass(frozen=True)
@@ -50,6 +48,7 @@ class Quantisation(Effect):
     }
     measure: ClassVar[str] = "readings with the full resolution of the sensor"
     transfers: ClassVar[bool] = False
+    rounds: ClassVar[bool] = True
     not_at_run_time: ClassVar[str] = "what was rounded away is not in the reading"
 
     def signal(self, signals: Signals, around: Surroundings, rng: np.random.Generator) -> Array:

@@ -21,6 +21,10 @@ Array = NDArray[np.float64]
 #: Runs from which they, and not the readings, are what informs on a variance between runs.
 ENOUGH_RUNS = 8
 
+#: Times the variance that is there which the rounding of a sensor may have: on few positions it
+#: errs by other numbers than on all, but on none that does not scatter.
+MOST_SHARE = 2.0
+
 
 @dataclass(frozen=True, eq=False)
 class Readings:
@@ -71,6 +75,15 @@ class Readings:
     def scatter(self) -> float:
         """Standard deviation of the residuals."""
         return float(np.std(self.residual))
+
+    @cached_property
+    def rounding(self) -> float:
+        """Standard deviation of the rounding to the sensor's counts, arcsec.
+
+        0 where it is more than all residuals are: such steps are none of the sensor's.
+        """
+        rounding = self.signals.count / float(np.sqrt(12.0))
+        return rounding if rounding**2 < MOST_SHARE * self.scatter**2 else 0.0
 
     @cached_property
     def root_weights(self) -> Array:

@@ -95,7 +95,7 @@ class Solution(Projection):
             found = projected(target, correlation, effects)
             left = _left(readings, design, found)
             kept, target, outlying = _core.clipped(
-                readings.residual, left, readings.root_weights, CLIP
+                readings.residual, left, readings.root_weights, CLIP, readings.rounding
             )
             if rho is None:
                 # What lasts over two readings or three is not noise that neighbours share.
@@ -271,7 +271,9 @@ class Solution(Projection):
         for _ in range(2):
             left = self.residual - self.design @ coefficients
             left = left - self.whiten.run_part(left)
-            _, target, outlying = _core.clipped(self.residual, left, self.root_weights, CLIP)
+            _, target, outlying = _core.clipped(
+                self.residual, left, self.root_weights, CLIP, self.readings.rounding
+            )
             if not outlying.any():
                 break
             coefficients = solved(target)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["UniformGrid", "lattice_step", "table_move", "uniform_grid"]
+__all__ = ["UniformGrid", "finer_step", "lattice_step", "table_move", "uniform_grid"]
 
 #: Departure from the grid, in shares of its step, up to which readings lie on it.
 ON_GRID = 0.02
@@ -17,6 +17,9 @@ ON_GRID = 0.02
 #: share of the largest value are the rounding of sums.
 ON_LATTICE = 0.05
 LEAST_STEP = 1e-9
+
+#: Chance below which moves on a finer lattice are on it for a reason, and steps of it looked for.
+BY_CHANCE, STEPS_TRIED = 1e-3, 200
 
 #: Positions beyond which a grid is not looked for.
 MOST_POSITIONS = 10_000
@@ -93,6 +96,45 @@ def lattice_step(values: NDArray[np.float64]) -> float:
         away = steps * (parts / step)
         if np.abs(away - np.round(away)).max() < ON_LATTICE:
             return step / parts
+    return 0.0
+
+
+def finer_step(values: NDArray[np.float64], below: float = np.inf) -> float:
+    """Step of the lattice that all values lie on to their last digit; 0 where there is none.
+
+    At places of equal steps all counts of a sensor lie near a lattice of those steps, and the
+    moves from count to count tell the step by how they differ: 113 and 114 are no multiples
+    of 113.
+
+    Parameters
+    ----------
+    values : ndarray
+    below : float
+        Step of a design, which is none of the sensor's.
+
+    Examples
+    --------
+    >>> places = np.arange(36) / 36.0
+    >>> counts = np.round(4096 * places) / 4096
+    >>> 1.0 / finer_step(counts, 1.0 / 36.0)
+    4096.0
+    >>> finer_step(places, 1.0 / 36.0)
+    0.0
+    """
+    moves = np.diff(np.unique(values))
+    rounding = LEAST_STEP * float(np.abs(values).max(initial=1.0))
+    moves = moves[moves > rounding]
+    some = np.unique(moves[:: max(1, moves.size // STEPS_TRIED)])
+    tried = np.unique(np.concatenate([some, np.diff(some)]))
+    tried = tried[(tried > rounding) & (tried < 0.5 * below)][::-1]
+    for step in tried.tolist():
+        counts = np.round(some / step)
+        away = float(np.abs(some / step - counts).max())
+        told = np.unique(counts).size - 1
+        # That each further move is a whole number of counts, as near as they all are.
+        if away < ON_LATTICE and tried.size * (2.0 * away) ** told < BY_CHANCE:
+            off = np.abs(moves / step - np.round(moves / step)).max()
+            return step if off < ON_LATTICE else 0.0
     return 0.0
 
 

@@ -16,7 +16,7 @@ from ..formats.signals import coupled_with
 from ..runs.run import CalibrationRun
 from ..support.angles import ARCSEC_PER_TURN
 from ..support.quantiles import median
-from .grid import UniformGrid, lattice_step, table_move, uniform_grid
+from .grid import UniformGrid, finer_step, lattice_step, table_move, uniform_grid
 from .turning import direction_at_turns, velocity_at_turns
 
 __all__ = ["Signals", "join_runs"]
@@ -248,14 +248,18 @@ def _lattice(runs: Sequence[CalibrationRun], theta: Array) -> tuple[float, int]:
     A table shows in the moves of the indicated angles, or in the true ones (radians), in any order.
     """
     turns = [run.indicated / run.period for run in runs]
-    step = lattice_step(np.concatenate(turns))
+    values = np.concatenate(turns)
+    step = lattice_step(values)
     move = table_move(turns, step)
     if move and abs(1.0 / move - round(1.0 / move)) < CLOSES:
-        return 0.0, round(1.0 / move)
+        return finer_step(values, step) * ARCSEC_PER_TURN, round(1.0 / move)
     grid = uniform_grid(theta)
     table = 0 if grid is None else grid.positions
-    of_design = move or abs(step * table - 1.0) < CLOSES * step
-    return 0.0 if of_design else step * ARCSEC_PER_TURN, table
+    # Values that all lie one step apart lie on any lattice of that step.
+    moves = np.diff(np.unique(values))
+    if move or abs(step * table - 1.0) < CLOSES * step or moves.max(initial=0.0) < 1.5 * step:
+        step = finer_step(values, step)
+    return (step or finer_step(values)) * ARCSEC_PER_TURN, table
 
 
 def _common_table(first: Signals, later: Signals) -> int:

@@ -109,6 +109,10 @@ def test_medians_and_what_is_clipped():
     np.testing.assert_array_equal(outlying, np.abs(left) > limit)
     np.testing.assert_allclose(kept, np.clip(left, -limit, limit), rtol=ROUNDING)
     np.testing.assert_allclose(target, 100.0 + kept, rtol=ROUNDING)
+    # No reading is known better than the least.
+    kept, _, outlying = _core.clipped(readings, left, ROOTS, 4.0, 1.5)
+    np.testing.assert_array_equal(outlying, np.abs(left) > 6.0 / ROOTS)
+    np.testing.assert_allclose(kept, np.clip(left, -6.0 / ROOTS, 6.0 / ROOTS), rtol=ROUNDING)
 
 
 def test_a_banded_system_is_that_of_numpy():

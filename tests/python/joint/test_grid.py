@@ -6,7 +6,13 @@ import numpy as np
 import pytest
 
 import trueangle as ta
-from trueangle.joint.grid import UniformGrid, lattice_step, table_move, uniform_grid
+from trueangle.joint.grid import (
+    UniformGrid,
+    finer_step,
+    lattice_step,
+    table_move,
+    uniform_grid,
+)
 from trueangle.joint.signals import join_runs
 from trueangle.simulation import Simulation
 
@@ -152,3 +158,29 @@ def test_a_table_in_any_order_keeps_its_positions(steps, positions):
     assert signals.take(np.arange(17)).grid == UniformGrid(20)
     both = signals.followed_by(visited(steps))
     assert both.grid == (None if positions is None else UniformGrid(positions))
+
+
+@pytest.mark.parametrize("counts", [1024, 4096, 65536])
+@pytest.mark.parametrize("n", [24, 36, 72, 100])
+@pytest.mark.parametrize("back", [False, True])
+def test_counts_of_a_sensor_show_at_places_of_equal_steps(counts, n, back):
+    """The step is read off the moves, and where these leave it open none is told."""
+    places = np.arange(n) * 360.0 / n
+    places = np.concatenate([places, places[::-1]]) if back else places
+    error = 0.13 * np.sin(np.radians(2.0 * places + 7.0))
+    indicated = np.round((places + error) * counts / 360.0) * 360.0 / counts
+    told = join_runs([ta.CalibrationRun(places, indicated, period=360.0)]).count
+    moves = np.unique(np.abs(np.diff(np.round(indicated * counts / 360.0))))
+    if np.gcd.reduce(np.diff(moves).astype(int)) == 1:
+        assert told == pytest.approx(1296000.0 / counts, rel=1e-6)
+    else:
+        assert told == 0.0 or told == pytest.approx(1296000.0 / counts, rel=1e-6)
+
+
+def test_no_finer_step_is_told_of_what_has_none():
+    rng = np.random.default_rng(11)
+    for _ in range(200):
+        n = int(rng.integers(8, 100))
+        for spread in (1e-3, 1e-6):
+            assert finer_step(np.arange(n) / n + rng.normal(0.0, spread / n, n), 1.0 / n) == 0.0
+    assert finer_step(np.array([0.25])) == finer_step(np.zeros(0)) == 0.0

@@ -1,0 +1,103 @@
+"""What readings tell that were rounded: causes that the rounding itself would show are none.
+
+On the same positions a sensor that rounds errs alike in every run, by up to half a step, and that
+has orders, follows the direction, and has a period in time. So the causes that were chosen are
+asked again of the steps in which the readings are (`trueangle.estimation.rounded`), the strongest
+first; and what is left is held against noise as it was before it was rounded.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..effects.quantisation import LEAST_SHARE
+from ..estimation.factor import orthonormal_basis
+from ..estimation.regression import Extension, Regression
+from ..estimation.rounded import Rounded, fit_rounded
+from .penalty import NEW_CAUSE, finding_groups
+
+__all__ = ["beyond_rounding", "rounding_of", "tells_no_more", "unrounded"]
+
+Array = NDArray[np.float64]
+
+
+def rounding_of(regression: Regression) -> float:
+    """Standard deviation of the rounding where it is a good part of what is left, else 0."""
+    rounding = regression.readings.rounding
+    is_part = rounding**2 > LEAST_SHARE * regression.variance and not regression.is_explained
+    return rounding if is_part else 0.0
+
+
+def beyond_rounding(start: Regression, chosen: Regression) -> Regression:
+    """The account with those of its causes that the rounding of the readings does not make.
+
+    Parameters
+    ----------
+    start : Regression
+        The readings without any cause.
+    chosen : Regression
+        The causes chosen as if no reading had been rounded.
+    """
+    if not chosen.terms or not rounding_of(chosen):
+        return chosen
+    groups = [[chosen.terms[k] for k in group] for group in finding_groups(chosen.terms)]
+    told: list[Extension] = []
+    fit = _fit(start, told, chosen.outlying)
+    while groups and not fit.within:
+        tried = [_fit(start, [*told, *group], chosen.outlying) for group in groups]
+        gains = [
+            2.0 * (other.log_likelihood - fit.log_likelihood) - _penalty(group, start)
+            for other, group in zip(tried, groups, strict=True)
+        ]
+        best = int(np.argmax(gains))
+        if gains[best] < NEW_CAUSE:
+            break
+        told += groups.pop(best)
+        fit = tried[best]
+    return start.with_terms(told) if groups else chosen
+
+
+def tells_no_more(regression: Regression) -> bool:
+    """Every reading is what was fitted, rounded."""
+    if not rounding_of(regression):
+        return False
+    return _fit(regression, regression.terms, regression.outlying).within
+
+
+def unrounded(regression: Regression) -> Regression:
+    """The same account of errors as they may have been before they were rounded (seed 0)."""
+    if not rounding_of(regression):
+        return regression
+    fit = _fit(regression, regression.terms, regression.outlying)
+    error = np.where(regression.outlying, fit.left, fit.drawn(np.random.default_rng(0)))
+    readings = regression.readings.less(fit.left - error)
+    found = regression.of_readings(readings, cache=regression.cache.for_other_errors())
+    return found.with_terms(regression.terms)
+
+
+def _fit(start: Regression, terms: Sequence[Extension], outlying: NDArray[np.bool_]) -> Rounded:
+    """Terms fitted to the steps of the readings; what runs draw anew has a size in each."""
+    drawn = [term.run_effect.columns for term in terms if term.run_effect is not None]
+    own = [_of_each_run(columns, start.bounds) for columns in drawn]
+    columns = np.hstack([start.base, *(term.columns for term in terms), *own])
+    basis = orthonormal_basis(columns)
+    return fit_rounded(basis, start.residual, start.signals.count, outlying)
+
+
+def _of_each_run(columns: Array, bounds: Sequence[tuple[int, int]]) -> Array:
+    found = np.zeros((len(columns), len(bounds), columns.shape[1]))
+    for k, (start, stop) in enumerate(bounds):
+        found[start:stop, k] = columns[start:stop]
+    return found.reshape(len(columns), -1)
+
+
+def _penalty(group: Sequence[Extension], start: Regression) -> float:
+    """What the terms of one finding must bring: with a size in each run of what these draw."""
+    penalty = 0.0
+    for term in group:
+        own = 0 if term.run_effect is None else term.run_effect.columns.shape[1] * len(start.bounds)
+        penalty += max(term.parameters, own) * term.log_n + 2.0 * term.log_grid
+    return penalty
