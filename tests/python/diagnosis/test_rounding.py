@@ -106,3 +106,17 @@ def test_outliers_of_a_sensor_that_rounds_are_still_outliers():
     assert set(found) == {"missing_order", "outliers", "quantisation"}
     assert found["missing_order"].parameters["order"].value == 2
     assert found["outliers"].parameters["fraction"].value == pytest.approx(3 / 1200, rel=0.02)
+
+
+def test_one_reading_is_as_uncertain_as_its_step_beside_what_is_unexplained():
+    """A zero that jumps to and fro by a count, in time: noise before the rounding is not all."""
+    sensor = Sensor(12, 400, 4, True, 0.1, 0.0, 1, 8)
+    rng, runs = np.random.default_rng(8), []
+    for run in sensor.read():
+        jumps = (np.cumsum(rng.random(400) < 0.02) % 2) * sensor.count
+        runs.append(
+            ta.CalibrationRun(run.reference, run.indicated + jumps, period=360.0, time=run.time)
+        )
+    result = ta.diagnose(runs, DIRECT, gain=False)
+    assert result.unexplained.found
+    assert result.noise > 3600.0 * sensor.count / np.sqrt(12.0)

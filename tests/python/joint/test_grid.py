@@ -183,4 +183,6 @@ def test_no_finer_step_is_told_of_what_has_none():
         n = int(rng.integers(8, 100))
         for spread in (1e-3, 1e-6):
             assert finer_step(np.arange(n) / n + rng.normal(0.0, spread / n, n), 1.0 / n) == 0.0
+    # Some places of a table in any order are no counts, however far apart.
+    assert finer_step(np.array([3, 9, 4, 20, 1, 0, 27]) / 36.0, 1.0 / 36.0) == 0.0
     assert finer_step(np.array([0.25])) == finer_step(np.zeros(0)) == 0.0
