@@ -23,8 +23,7 @@ from rosbags.rosbag2.storage_mcap import McapReader, McapWriter, PendingChunk, d
 
 from .budget import check_part
 from .mcaprows import RecordRows, interleaved_rows
-from .packedfolder import unpacked_folder
-from .unpacking import unpacked
+from .unpacking import unpacked, unpacked_folder
 
 __all__ = ["BagReader", "ChunkReader", "ChunkWriter", "ChunkedBagWriter"]
 

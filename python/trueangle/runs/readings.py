@@ -20,7 +20,7 @@ from ..errors import FileError
 from ..formats.budget import DecodedSizeError, check_decoded
 from ..formats.columns import LABELS, Column, find_columns, wanted_columns
 from ..formats.csvheader import number
-from ..formats.format import TEXTS, Batch, Format, Labels
+from ..formats.format import TEXTS, Batch, Format, Labels, Selection
 from ..formats.formats import format_of_content
 from ..formats.times import elapsed_seconds, parsed_time
 from ..support.files import (
@@ -237,7 +237,7 @@ def _columns(
     """Whole columns; ``others`` are texts where they are not all numbers."""
     names = [*needed, *others]
     if names:
-        check_decoded(path, kind.module.extent(path, names, topic).size, len(names))
+        check_decoded(path, kind.extent(path, names, topic).size, len(names))
     numeric = _numeric(kind, path, others, topic)
     try:
         return _joined(kind, path, names, labels | set(others) - numeric, topic)
@@ -251,7 +251,7 @@ def _numeric(kind: Format, path: Path, names: list[str], topic: str | None) -> s
     """Columns of a text file that look like numbers in its first rows."""
     if not names or not hasattr(kind.module, "line_of"):
         return set()
-    first = next(iter(kind.module.read(path, names, topic, texts=names)), {})
+    first = next(iter(kind.module.read(path, Selection(names, topic, texts=names))), {})
     return {
         name
         for name, found in first.items()
@@ -263,7 +263,7 @@ def _is_dated(kind: Format, path: Path, name: str, topic: str | None) -> bool:
     """Whether a column of a text file begins with a date and time."""
     if not hasattr(kind.module, "line_of"):
         return False
-    found = next(iter(kind.module.read(path, [name], topic, texts=[name])), {}).get(name)
+    found = next(iter(kind.module.read(path, Selection([name], topic, texts=[name]))), {}).get(name)
     names = found.names if isinstance(found, Labels) else ()
     return any(parsed_time(text) is not None for text in [t for t in names if t][:1])
 
@@ -284,7 +284,7 @@ def _joined(
     """Whole columns."""
     parts: dict[str, list[Any]] = {name: [] for name in names}
     rows = size = 0
-    for batch in kind.module.read(path, names, topic, texts=texts, strict=True):
+    for batch in kind.module.read(path, Selection(names, topic, texts=texts, strict=True)):
         for name in names:
             bad = _undecoded(batch[name])
             if bad is not None:
