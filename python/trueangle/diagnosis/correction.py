@@ -16,7 +16,7 @@ from ..model.model import HarmonicModel
 from ..model.term import Term
 from ..runs.run import CalibrationRun, as_runs
 from ..simulation.simulation import EFFECT
-from ..support.oftype import of_type
+from ..support.kinds import of_type
 
 if TYPE_CHECKING:
     from ..fitting.argument import AnyArgument

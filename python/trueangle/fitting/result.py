@@ -15,7 +15,7 @@ from ..model.model import HarmonicModel
 from ..runs.run import CalibrationRun
 from ..runs.travel import Span
 from ..support.display_units import ErrorsIn
-from ..support.drawn import result_picture
+from ..support.plainresult import result_picture
 from .coefficients import FittedCoefficients
 from .model import build_model, fit_notes
 from .problem import Fitted, Problem

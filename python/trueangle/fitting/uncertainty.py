@@ -25,8 +25,8 @@ from .correlation import (
     weight_sum,
     white_variance_share,
 )
-from .penalty import bias_covariance, pattern_variances
 from .problem import Fitted, Problem
+from .ridge import bias_covariance, pattern_variances
 
 __all__ = [
     "COVARIANCES",
@@ -103,7 +103,7 @@ def coefficient_uncertainty(
     three or more. With fewer, stretches are, eight times as long as the memory of the residuals:
     right where the correlation dies out within a run, which one run cannot prove, so that a note
     says it. What a penalty takes from the coefficients is added to either
-    (`trueangle.fitting.penalty`).
+    (`trueangle.fitting.ridge`).
     """
     noise = _noise(problem, fitted, weights, penalty, kind)
     if not penalty > 0.0 or not np.isfinite(noise.covariance).all():

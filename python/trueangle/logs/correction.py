@@ -15,10 +15,10 @@ import numpy as np
 from ..errors import FileError
 from ..formats.format import CopyTask, Selection, Watch
 from ..formats.formats import find_format
-from ..support.files.workplace import PARTIAL
+from ..support.files import publish
+from ..support.files.workplace import PARTIAL, workplace
 from .joints import Channel, JointState, LogSettings
-from .manifest import Manifest
-from .safety import publish, stamp, workplace
+from .manifest import Manifest, stamp
 from .turns import TurnCounter, TurnSpan
 
 #: What the system says of writing only.

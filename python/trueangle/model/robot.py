@@ -16,9 +16,8 @@ from ..errors import ArgumentError, KindError, MissingSignalError
 from ..formats.columns import wanted_columns
 from ..formats.signals import GivenSignals, check_names, coupled_with
 from ..support.angles import arcsec, unit_name
-from ..support.kinds import told_kinds
+from ..support.kinds import of_type, told_kinds
 from ..support.layout import laid_out
-from ..support.oftype import of_type
 from ..support.plainresult import Shown, counted
 from .model import HarmonicModel
 from .step import exchangeable

@@ -38,8 +38,7 @@ from .gearlines import Channels, SharedLine, channels_of, lines_of, slope_ratio,
 from .modelling import made_model
 from .projected import pairs
 from .recording import Recording
-from .result import ARCSEC, Blind, HeldOut, OrderEstimate, SelfCalibration, estimates
-from .summary import listed
+from .result import ARCSEC, Blind, HeldOut, OrderEstimate, SelfCalibration, estimates, listed
 from .verification import chance_of
 
 __all__ = ["dual"]

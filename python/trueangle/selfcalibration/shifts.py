@@ -20,15 +20,14 @@ from numpy.typing import NDArray
 from ..errors import NoModelError
 from ..support.angles import wrap
 from ..support.distributions import f_tail
+from .choice import chosen_orders
 from .clampings import Clampings, clampings_of
 from .dense import DenseFit, DenseRows, fit_dense, fixed_point
 from .modelling import made_model
 from .pattern import ENCODER, pattern_model
 from .projected import Unknown, harmonic_rows, pairs
 from .recording import Recording
-from .result import ARCSEC, Blind, HeldOut, SelfCalibration, estimates
-from .significance import chosen_orders
-from .summary import listed, ranges
+from .result import ARCSEC, Blind, HeldOut, SelfCalibration, estimates, listed, ranges
 
 __all__ = ["shift_patterns"]
 

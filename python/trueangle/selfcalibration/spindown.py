@@ -23,11 +23,10 @@ from .modelling import made_model
 from .pattern import ENCODER, pattern_series
 from .readings import SegmentReadings
 from .recording import Recording
-from .result import ARCSEC, Blind, OrderEstimate, SelfCalibration, estimates
+from .result import ARCSEC, Blind, OrderEstimate, SelfCalibration, estimates, listed, ranges
 from .ripple import LARGEST_COST, averaged_over_ripple, cost_of_ripple
 from .steady import SteadyFit, fit_steady
 from .stretches import cut_stretches
-from .summary import listed, ranges
 from .verification import held_out
 
 __all__ = ["spin_down"]

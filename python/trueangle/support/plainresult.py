@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import json
 import math
+import sys
 from collections.abc import Iterator, Sized
 from typing import Any
 
-__all__ = ["PlainResult", "Shown", "counted", "finite"]
+__all__ = ["PlainResult", "Shown", "counted", "finite", "result_picture"]
 
 #: Characters of a result's ``repr`` at most: one line of a screen.
 WIDTH = 100
@@ -90,3 +91,12 @@ def counted(things: Sized | int, one: str, several: str = "") -> str:
 def finite(value: float) -> float | None:
     """A number that JSON can hold, else None."""
     return float(value) if math.isfinite(value) else None
+
+
+def result_picture(result: object, *args: Any, **options: Any) -> Any:
+    """The picture of a result, by `trueangle.plots`; needs ``trueangle[plot]``.
+
+    What computes does not import what draws: the package's face finds it when it is called.
+    """
+    face = sys.modules[__name__.partition(".")[0]]
+    return face.plots.drawn(result, *args, **options)

@@ -22,8 +22,8 @@ from .candidates import Candidates
 from .evidence import log_tail
 from .harmonicsums import ZeroGroupReadings
 from .lookalikes import find_lookalikes
+from .noise import ReadingVariance
 from .phases import circular_range_deg
-from .repeats import ReadingVariance
 from .table import OrderRow, OrderSelection
 from .verdicts import explained_row, selection_notes
 from .zerogroups import zero_units

@@ -13,12 +13,11 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ...model.validity import greatest_slope
 from ..uncertainty import CovarianceKind
 from .evidence import OrderTest, choose_forward, examine_orders, fit_subset, held_out_gains
 from .harmonicsums import HarmonicSums
-from .repeats import ReadingVariance
-from .scatter import NEIGHBOURS, neighbour_scatter, pooled_scatter, run_scatter
-from .steepness import greatest_slope
+from .noise import NEIGHBOURS, ReadingVariance, neighbour_scatter, pooled_scatter, run_scatter
 
 __all__ = ["FALSE_ALARM", "NEGLIGIBLE_NOISE", "NEGLIGIBLE_SHARE", "STEEPEST", "EvidenceSearch"]
 

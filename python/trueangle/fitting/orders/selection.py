@@ -16,8 +16,8 @@ from ..uncertainty import CovarianceKind
 from .candidates import Candidates
 from .harmonicsums import HarmonicSums, harmonic_sums
 from .lookalikes import find_lookalikes
+from .noise import pure_error
 from .phases import circular_range_deg, unit_phases
-from .repeats import pure_error
 from .search import FALSE_ALARM, EvidenceSearch
 from .table import OrderRow, OrderSelection
 from .verdicts import explained_row, selection_notes, verdict_reason

@@ -116,6 +116,6 @@ def _records(data: Any, reading: Mapping[str, Any]) -> list[Record]:
     runs, data = given_runs(data)
     if runs is not None:
         return records_of(runs)
-    from .files import read_records
+    from .record import read_records
 
     return read_records(data, reading)

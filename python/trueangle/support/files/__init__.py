@@ -5,6 +5,8 @@ from .inputs import (
     RUNS_BYTES,
     SIMULATION_BYTES,
     check_input,
+    partition_keys,
+    partition_name,
     read_whole,
     sha256_of,
 )
@@ -25,7 +27,6 @@ from .kinds import (
     promised_format,
 )
 from .outputs import check_output, external_output, publish, written_atomically
-from .partition import partition_keys, partition_name
 from .samefile import same_file
 from .workplace import remove_leftovers, restore
 
