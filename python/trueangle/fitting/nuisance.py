@@ -189,10 +189,7 @@ def take_out(
 ) -> tuple[list[CalibrationRun], Nuisance]:
     """The runs without their nuisances, which are fitted beside these orders.
 
-    Parameters
-    ----------
-    kinds : tuple of str or None
-        None chooses by the error of stretches held out.
+    ``kinds`` of None are chosen by the error of stretches held out.
     """
     stride = max(1, sum(map(len, runs)) // _LOOKED_AT)
     orders = [k * s.cycles_per_turn for s in shafts for k in s.orders]

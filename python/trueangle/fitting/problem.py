@@ -118,14 +118,7 @@ def _series(solution: PlainSolution, shafts: Sequence[ShaftOrders], period: floa
 class Problem:
     """The readings of several runs and the regressors asked for.
 
-    Parameters
-    ----------
-    runs : sequence of CalibrationRun
-        Of one period.
-    shafts : sequence of ShaftOrders
-    argument : {"reference", "indicated"}
-    method, threads
-        Passed to the core's least squares.
+    The runs are of one period; ``method`` and ``threads`` are the core's.
     """
 
     def __init__(

@@ -75,16 +75,8 @@ def choose_ridge(problem: Problem, weights: Sequence[Array | None]) -> float:
     after a turn. The best is taken, and raised until the amplitudes add
     up to no more than three times the range of the measured error.
 
-    Parameters
-    ----------
-    problem : Problem
-    weights : sequence of (ndarray or None)
-        Of every run; readings of weight 0 take no part.
-
-    Returns
-    -------
-    float
-        The penalty relative to the sum of weights; 0 for plain least squares.
+    Readings of weight 0 take no part. The penalty is relative to the sum of weights; 0 is plain
+    least squares.
 
     Notes
     -----
@@ -155,20 +147,9 @@ def pattern_variances(
 
     with every slope, and every decade of sizes below the greatest, equally probable beforehand.
 
-    Parameters
-    ----------
-    gram, moment : ndarray, shape (n, n) and (n,)
-        ``X'WX`` and ``X'Wy`` about the zeros of the runs.
-    variance : float
-        Of a reading of weight 1.
-    steps : ndarray, shape (n,)
-        Order of every coefficient relative to the lowest of its shaft.
-    greatest : float
-        Size that no pattern exceeds.
-
-    Returns
-    -------
-    ndarray, shape (n,)
+    ``gram`` and ``moment`` are ``X'WX`` and ``X'Wy`` about the zeros of the runs, ``variance`` is
+    that of a reading of weight 1, ``steps`` the order of every coefficient relative to the lowest
+    of its shaft, and no pattern exceeds the size ``greatest``.
 
     Examples
     --------
@@ -209,19 +190,8 @@ def bias_covariance(gram: Array, means: Array, penalty: float, variances: Array)
 
     for the constant makes good on the readings what the coefficients are off by there.
 
-    Parameters
-    ----------
-    gram : ndarray, shape (n, n)
-    means : ndarray, shape (n,)
-        Of every regressor over the readings: the mean of the runs.
-    penalty : float
-        As added to the diagonal of ``gram``.
-    variances : ndarray, shape (n,)
-        See `pattern_variances`.
-
-    Returns
-    -------
-    ndarray, shape (n + 1, n + 1)
+    ``means`` are those of every regressor over the readings (of the runs), ``penalty`` is what the
+    diagonal of ``gram`` gets, ``variances`` are those of `pattern_variances`.
     """
     taken = penalty * np.linalg.inv(gram + penalty * np.eye(len(gram)))
     taken = np.vstack([-means @ taken, taken])

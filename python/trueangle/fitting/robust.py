@@ -114,17 +114,8 @@ def fit_robustly(problem: Problem, loss: Loss, floor: float) -> Weighted:
     from the Huber fit so that they cannot hide each other; the rest is plain least
     squares, so clean data give the least-squares coefficients exactly.
 
-    Parameters
-    ----------
-    problem : Problem
-    loss : {"auto", "linear", "huber", "tukey"}
-    floor : float
-        Deviations below this are rounding, never wild.
-
-    Returns
-    -------
-    Weighted
-        ``wild`` counts readings of weight 0 that were given more.
+    Deviations below ``floor`` are rounding, never wild; ``wild`` of the result counts readings of
+    weight 0 that were given more.
     """
     check_choice("loss", loss, LOSSES)
     if loss == "linear":

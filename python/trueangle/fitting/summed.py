@@ -80,11 +80,6 @@ class Summed:
 class SummedProblem(Problem):
     """The problem of readings that are known by their sums, and by some of them.
 
-    Parameters
-    ----------
-    summed : Summed
-    shafts : sequence of ShaftOrders
-
     Raises
     ------
     ArgumentError

@@ -10,10 +10,10 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..formats.times import parsed_time
 from ..support.angles import wrap
 from ..support.distributions import f_quantile
 from ..support.runlength import chart_limit
+from ..support.times import parsed_time
 from .calibration import Calibration, columns_of
 from .charts import ALLOWANCE, LENGTH, charted
 from .outliers import LEVEL, Deviates, deviates, weights_of

@@ -6,8 +6,8 @@ import math
 from os import PathLike
 from typing import TYPE_CHECKING, Final
 
-from ..model.text import pretty_json
 from ..support.files import FLEET, written_atomically
+from ..support.plainresult import pretty_json
 
 if TYPE_CHECKING:
     from .result import Fleet

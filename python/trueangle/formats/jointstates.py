@@ -122,11 +122,7 @@ class _LayoutGroup(NamedTuple):
 class Block:
     """Some messages one after the other.
 
-    Parameters
-    ----------
-    messages : sequence of bytes, or array of them, one a row
-    is_ros1 : bool
-        Of ROS 1; else CDR of ROS 2.
+    Messages are bytes each, or an array of one a row; of ROS 1, else CDR of ROS 2.
 
     Raises
     ------

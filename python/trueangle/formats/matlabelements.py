@@ -42,11 +42,6 @@ def check_elements(data: bytes) -> None:
 
     Files without the header of level 5 pass: they are read by other means.
 
-    Parameters
-    ----------
-    data : bytes
-        The whole file.
-
     Raises
     ------
     ValueError

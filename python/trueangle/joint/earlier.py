@@ -24,16 +24,7 @@ def earlier(signals: Signals, delay_s: float) -> Signals:
     Where the readings of a run stand closer than the delay, the angle is read off their own record
     instead, so that the joint may gather speed meanwhile.
 
-    Parameters
-    ----------
-    signals : Signals
-        With velocity.
-    delay_s : float
-        ``τ``, seconds; negative for a time after.
-
-    Returns
-    -------
-    Signals
+    The signals need a velocity; ``delay_s`` is τ, negative for a time after.
 
     Examples
     --------

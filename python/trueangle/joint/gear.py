@@ -164,11 +164,8 @@ def explain_order(
 def explain_as_harmonic(order: float, amplitudes: Mapping[float, float]) -> tuple[Explanation, ...]:
     """The larger line that ``order`` is a multiple of: what is not sinusoidal has harmonics.
 
-    Parameters
-    ----------
-    order : float
-    amplitudes : mapping of float to float
-        Of every retained order, in any unit. Order 1 is left out: all are multiples of it.
+    ``amplitudes`` are those of every retained order, in any unit. Order 1 is left out: all are
+    multiples of it.
 
     Examples
     --------

@@ -12,10 +12,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..formats.signals import coupled_with
 from ..runs.run import CalibrationRun
 from ..support.angles import ARCSEC_PER_TURN
 from ..support.quantiles import median
+from ..support.signals import coupled_with
 from .grid import UniformGrid, lattice_step, table_move, uniform_grid
 from .turning import direction_at_turns, velocity_at_turns
 

@@ -34,18 +34,8 @@ LINE, PARABOLA = 2, 3
 def direction_at_turns(angle: Array, clock: Array, direction: Array) -> Array:
     """Directions of the steps, put right for readings that had turned back already.
 
-    Parameters
-    ----------
-    angle : ndarray, shape (n,)
-        Unwrapped.
-    clock : ndarray, shape (n,)
-        Times, or the places in the record where none were recorded.
-    direction : ndarray, shape (n,)
-        Of the step that led to each reading.
-
-    Returns
-    -------
-    ndarray, shape (n,)
+    ``angle`` is unwrapped, ``clock`` holds times, or places in the record where none were recorded,
+    and ``direction`` is that of the step that led to each reading.
 
     Examples
     --------
@@ -72,14 +62,6 @@ def direction_at_turns(angle: Array, clock: Array, direction: Array) -> Array:
 
 def velocity_at_turns(angle: Array, time: Array, direction: Array, velocity: Array) -> Array:
     """Velocities by central differences, put right beside turning points.
-
-    Parameters
-    ----------
-    angle, time, direction, velocity : ndarray, shape (n,)
-
-    Returns
-    -------
-    ndarray, shape (n,)
 
     Examples
     --------

@@ -26,7 +26,6 @@ from ..formats.columns import find_columns
 from ..formats.format import Format as LogFormat
 from ..formats.format import Labels, Selection, row_labels
 from ..formats.formats import find_format
-from ..formats.times import local_day
 from ..model.model import Argument, HarmonicModel
 from ..runs.angles import Angles, find_angles
 from ..runs.facets import Facets
@@ -35,6 +34,7 @@ from ..runs.run import CalibrationRun
 from ..runs.source import unit_of_path
 from ..support.angles import wrap
 from ..support.files import partition_keys
+from ..support.times import local_day
 from .keeping import SAMPLE, Kept
 
 __all__ = [

@@ -27,11 +27,6 @@ class Manifest:
     the recorded size and time has that name: a process killed between the two leaves a line
     that does not count, one killed while writing a line leaves half a line, which is
     skipped.
-
-    Parameters
-    ----------
-    folder : Path
-        Must exist.
     """
 
     def __init__(self, folder: Path) -> None:

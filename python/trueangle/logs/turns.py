@@ -44,11 +44,7 @@ class TurnCounter:
 
     Only models whose error does not repeat after one turn need it. NaN is stepped over.
 
-    Parameters
-    ----------
-    period : float
-    state : TurnState
-        Where the batch or file before stopped; the first reading ever is in turn 0.
+    ``state`` is where the batch or file before stopped; the first reading ever is in turn 0.
 
     Examples
     --------

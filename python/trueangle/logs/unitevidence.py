@@ -30,10 +30,7 @@ class UnitEvidence:
 
     A joint that moves little near zero is no evidence, nor is one that makes many turns.
 
-    Parameters
-    ----------
-    period : float
-        One turn in the unit that the readings are taken for.
+    ``period`` is one turn in the unit that the readings are taken for.
 
     Examples
     --------

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import ArgumentError
-from ..formats.signals import GivenSignals, check_names
 from ..support.angles import wrap
+from ..support.signals import GivenSignals, check_names
 
 if TYPE_CHECKING:
     from .model import HarmonicModel, Step

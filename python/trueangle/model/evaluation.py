@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import OutsideSpanWarning
-from ..formats.signals import GivenSignals, check_names
 from ..support.plainresult import Shown
+from ..support.signals import GivenSignals, check_names
 
 if TYPE_CHECKING:
     import trueangle._core as _core

@@ -14,11 +14,11 @@ from numpy.typing import ArrayLike, NDArray
 import trueangle._core as _core
 
 from ..errors import ArgumentError
-from ..formats.signals import AT_RUN_TIME
 from ..joint.shafts import Shaft
 from ..support.angles import check_period
 from ..support.kinds import all_of_type, of_type, told_kinds
 from ..support.plainresult import result_picture
+from ..support.signals import AT_RUN_TIME
 from .evaluation import Evaluation, SpanGuard
 from .records import FitRecord, Provenance
 from .step import ExchangeableStep, Step, exchangeable

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import fields
 from typing import Any
 
-from ..runs.run import Source
 from ..support.decoding import Decoder, shown
+from ..support.files import Source
 from .records import FitRecord, Provenance, TableRecord
 from .validity import MOST_TURNS
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ..runs.run import Source
+from ..support.files import Source
 
 __all__ = ["FitRecord", "Provenance", "TableRecord"]
 

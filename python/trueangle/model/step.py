@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Protocol, Unpack
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..formats.signals import GivenSignals
+from ..support.signals import GivenSignals
 
 if TYPE_CHECKING:
     from .model import HarmonicModel

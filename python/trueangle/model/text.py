@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import json
 import math
-from collections.abc import Mapping
 from dataclasses import asdict
 from os import PathLike
 from typing import TYPE_CHECKING, Any
@@ -14,6 +12,7 @@ from ..support.angles import arcsec, unit_name
 from ..support.display_units import error_unit, sine_of_rms
 from ..support.files import MODEL, MODEL_BYTES, written_atomically
 from ..support.layout import laid_out, wrapped
+from ..support.plainresult import pretty_json
 
 if TYPE_CHECKING:
     from .model import HarmonicModel
@@ -28,7 +27,6 @@ __all__ = [
     "model_summary",
     "model_text",
     "one_line",
-    "pretty_json",
     "save_model",
     "save_robot",
 ]
@@ -113,21 +111,6 @@ def _record(record: FitRecord) -> dict[str, Any]:
         if not table[name]:
             del table[name]
     return table
-
-
-def pretty_json(value: Any, indent: int = 0) -> str:
-    """JSON with one line per key and per list of plain numbers."""
-    pad = "  " * (indent + 1)
-    end = "\n" + "  " * indent
-    if isinstance(value, Mapping) and value:
-        items = [
-            f"{pad}{json.dumps(key)}: {pretty_json(v, indent + 1)}" for key, v in value.items()
-        ]
-        return "{\n" + ",\n".join(items) + end + "}"
-    nested = isinstance(value, (list, tuple)) and any(isinstance(v, (Mapping, list)) for v in value)
-    if nested:
-        return "[\n" + ",\n".join(pad + pretty_json(v, indent + 1) for v in value) + end + "]"
-    return json.dumps(value, allow_nan=False)
 
 
 def one_line(model: HarmonicModel) -> str:

@@ -11,13 +11,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import FileError
-from ..formats.columns import Column, find_columns, wanted_columns
+from ..formats.columns import find_columns
 from ..formats.format import Selection
 from ..formats.formats import find_format
 from ..model.model import HarmonicModel
 from ..runs.angles import Angles, find_angles
 from ..runs.files import Conversion
 from ..runs.source import Reading, checked_reading
+from ..support.roles import Column, wanted_columns
 
 __all__ = ["ReadingBatch", "read_batches", "read_lines"]
 

@@ -9,8 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import FileError
-from ..formats.columns import Column, listed_columns, offsets_of, signal_code
+from ..formats.columns import listed_columns
 from ..support.angles import UNIT_PERIODS
+from ..support.roles import Column, offsets_of, signal_code
 from ..support.suggestions import did_you_mean
 from .facets import Facets
 
@@ -98,16 +99,7 @@ def find_angles(
 ) -> Angles:
     """What the angles of a table are made of, and their period.
 
-    Parameters
-    ----------
-    path : object
-        For messages.
-    header : sequence of str
-    roles : mapping of role to Column
-    unit : str, optional
-        Of angles whose columns state none.
-    counts_per_turn, counts_per_turn_reference : float, optional
-    facets : Facets, optional
+    ``unit`` is that of angles whose columns state none, ``path`` stands in messages.
 
     Raises
     ------

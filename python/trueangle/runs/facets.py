@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import FileError
-from ..formats.columns import ANGLE_UNITS, find_columns, unit_in_name, wanted_columns
+from ..formats.columns import find_columns
+from ..support.roles import ANGLE_UNITS, unit_in_name, wanted_columns
 from .readings import named_source, readings_of
 
 __all__ = ["Facets", "read_facets"]

@@ -18,20 +18,21 @@ from numpy.typing import NDArray
 
 from ..errors import FileError
 from ..formats.budget import DecodedSizeError, check_decoded
-from ..formats.columns import LABELS, Column, find_columns, wanted_columns
+from ..formats.columns import find_columns
 from ..formats.csvheader import number
 from ..formats.format import TEXTS, Batch, Format, Labels, Selection
 from ..formats.formats import format_of_content
-from ..formats.times import elapsed_seconds, parsed_time
 from ..support.files import (
     RUNS_BYTES,
+    Source,
     check_input,
     partition_keys,
     partition_name,
     read_whole,
     sha256_of,
 )
-from .run import Source
+from ..support.roles import LABELS, Column, wanted_columns
+from ..support.times import elapsed_seconds, parsed_time
 
 __all__ = ["FileReadings", "named_source", "read_once", "read_readings", "readings_of"]
 

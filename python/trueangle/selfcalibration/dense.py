@@ -74,18 +74,9 @@ def fit_dense(
 ) -> DenseFit:
     """Least squares by orthogonal triangles, the nuisances eliminated first.
 
-    Parameters
-    ----------
-    parts : sequence of Rows
-        In the order they were read.
-    columns : sequence of Column
-        Names of the patterns.
-    random : sequence of int
-        Nuisances that are drawn anew in every run, with one variance, found by evidence.
-    freedom_lost : float
-        Rows that say nothing of their own (differences to a mean).
-    floor : float
-        Combinations of patterns of which less is left count as not seen.
+    ``random`` nuisances are drawn anew in every run, with one variance, found by evidence;
+    ``freedom_lost`` counts rows that say nothing of their own (differences to a mean); combinations
+    of patterns of which less than ``floor`` is left count as not seen.
     """
     p, m = parts[0].nuisances.shape[1], len(columns)
     triangle = _triangle(parts)

@@ -37,14 +37,8 @@ def followed_orders(
     With closed-loop transfer T the shaft moves by ``-Tε`` and the log shows
     ``(1 - T)ε``: hidden where T = 1, amplified where T has turned in phase.
 
-    Parameters
-    ----------
-    orders : sequence of float
-    loop : {"open", "closed", "unknown"}
-    bandwidth : float, optional
-        Hertz; with ``"unknown"`` it is taken for what it would be if the loop was closed.
-    slowest : float
-        Slowest speed in the readings, turns per second.
+    The ``bandwidth`` is in hertz, with ``"unknown"`` what it would be if the loop was closed;
+    ``slowest`` is the slowest speed in the readings, turns per second.
     """
     if loop == "open":
         return (), None

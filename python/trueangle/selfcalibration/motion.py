@@ -119,16 +119,9 @@ class _Grid:
 class MotionSearch:
     """Fits of motion and common columns to the sums over readings, on any coarser grid.
 
-    Parameters
-    ----------
-    sums : MotionSums
-        On the finest grid, with ``e = reading - motion``.
-    motion : ndarray
-        Coefficients of the motion so far, on the finest grid.
-    columns : sequence of Column
-        Names of the common columns.
-    trends : sequence of int
-        Smooth trends that each stretch is free to follow.
+    The ``sums`` (with ``e = reading - motion``) and the coefficients of the ``motion`` so far are
+    on the finest grid, ``columns`` names the common columns, and ``trends`` are smooth trends that
+    each stretch is free to follow.
 
     Notes
     -----

@@ -11,10 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import ArgumentError, FileError
-from ..formats.columns import LABELS, Column, role_kind, signal_code
 from ..runs.readings import FileReadings
-from ..runs.run import CalibrationRun, Source, given_runs
+from ..runs.run import CalibrationRun, given_runs
 from ..runs.source import Reading, checked_reading, each_table
+from ..support.files import Source
+from ..support.roles import LABELS, Column, role_kind, signal_code
 
 __all__ = ["Recording", "as_recordings"]
 

@@ -51,21 +51,8 @@ def averaged_over_ripple(
 ) -> tuple[Array, Array, Array]:
     """Pattern and covariance averaged over the size of the ripple at each order.
 
-    Parameters
-    ----------
-    unknowns, covariance : ndarray
-        Pattern, then ripple; both as if nothing were known of the ripple's size.
-    orders, ripple : sequence of int
-        Orders of the pattern and of the ripple.
-
-    Returns
-    -------
-    unknowns : ndarray
-        Pattern and ripple.
-    covariance : ndarray
-        Of both.
-    probable : ndarray, shape (len(ripple),)
-        Probability that the order ripples.
+    ``unknowns`` and ``covariance`` hold pattern, then ripple, as if nothing were known of the
+    ripple's size, and so does what comes back, with the probability that each order ripples.
     """
     m = 2 * len(orders)
     precision = np.zeros(2 * len(ripple))

@@ -58,21 +58,10 @@ def ordered_sums(
 ) -> MotionSums:
     """Sums over readings in order of time.
 
-    Parameters
-    ----------
-    knots : Knots
-    index, place : ndarray
-        Of `Knots.place`; ``index`` must not decrease.
-    target : ndarray
-        ``e``, what is left of each reading.
-    weight : ndarray
-        Factor of the splines in each row: ``1 + error'``.
-    columns : callable
-        Writes the common columns of a slice of readings into an array (m, n).
-    width : int
-        ``m``.
-    valid : ndarray of bool, optional
-        Readings that count.
+    ``index`` and ``place`` are those of `Knots.place`, the index not decreasing; ``target`` is what
+    is left of each reading, ``weight`` the factor of the splines in its row, ``1 + error'``.
+    ``columns`` writes the ``width`` common columns of a slice of readings into an array; only
+    ``valid`` readings count.
     """
     size, n = knots.size, target.size
     bands, cross = np.zeros((size, BAND)), np.zeros((size, width + 1))

@@ -71,11 +71,7 @@ def student_tail(t: float, degrees_of_freedom: float) -> float:
 
         P(T_ν > t) = 1/2 I_{ν/(ν+t²)}(ν/2, 1/2),    t ≥ 0
 
-    Parameters
-    ----------
-    t : float
-    degrees_of_freedom : float
-        nu > 0, need not be whole; infinity gives the normal distribution.
+    ν > 0 need not be whole; infinity gives the normal distribution.
 
     Examples
     --------

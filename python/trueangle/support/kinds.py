@@ -180,16 +180,8 @@ def of_type(
 ) -> T:
     """``value``, which must be a ``kind``.
 
-    Parameters
-    ----------
-    what : str
-        The argument, for the message.
-    value : object
-    kind : type
-    wanted : str
-        What must be given, in words.
-    instead : callable, optional
-        What is meant where such a value is given, or nothing.
+    Messages call the argument ``what``, and say in words what is ``wanted`` and what is meant where
+    such a value is given (``instead``).
 
     Raises
     ------

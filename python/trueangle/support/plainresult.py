@@ -5,10 +5,10 @@ from __future__ import annotations
 import json
 import math
 import sys
-from collections.abc import Iterator, Sized
+from collections.abc import Iterator, Mapping, Sized
 from typing import Any
 
-__all__ = ["PlainResult", "Shown", "counted", "finite", "result_picture"]
+__all__ = ["PlainResult", "Shown", "counted", "finite", "pretty_json", "result_picture"]
 
 #: Characters of a result's ``repr`` at most: one line of a screen.
 WIDTH = 100
@@ -100,3 +100,18 @@ def result_picture(result: object, *args: Any, **options: Any) -> Any:
     """
     face = sys.modules[__name__.partition(".")[0]]
     return face.plots.drawn(result, *args, **options)
+
+
+def pretty_json(value: Any, indent: int = 0) -> str:
+    """JSON with one line per key and per list of plain numbers."""
+    pad = "  " * (indent + 1)
+    end = "\n" + "  " * indent
+    if isinstance(value, Mapping) and value:
+        items = [
+            f"{pad}{json.dumps(key)}: {pretty_json(v, indent + 1)}" for key, v in value.items()
+        ]
+        return "{\n" + ",\n".join(items) + end + "}"
+    nested = isinstance(value, (list, tuple)) and any(isinstance(v, (Mapping, list)) for v in value)
+    if nested:
+        return "[\n" + ",\n".join(pad + pretty_json(v, indent + 1) for v in value) + end + "]"
+    return json.dumps(value, allow_nan=False)

@@ -51,7 +51,7 @@ RENAMED: Final = {
     "runfiles": "runs.files",
     "runtables": "runs.tables",
     "shafts": "joint.shafts",
-    "signals": "formats.signals",
+    "signals": "support.signals",
     "spanguard": "model.evaluation",
     "step": "model.step",
     "suggestions": "support.suggestions",

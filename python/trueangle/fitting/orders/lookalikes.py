@@ -39,11 +39,8 @@ def find_lookalikes(
 ) -> list[dict[int, float]]:
     """For each of ``orders``, those up to ``highest`` that could take its place.
 
-    Returns
-    -------
-    list of dict of int to float
-        Ascending, with the increase of the sum of squares that each would cost; empty
-        where the readings decide.
+    Ascending, with the increase of the sum of squares that each would cost; none where the readings
+    decide.
     """
     every = np.arange(1, highest + 1)
     found: list[dict[int, float]] = []

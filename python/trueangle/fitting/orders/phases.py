@@ -37,10 +37,7 @@ def unit_coefficients(
 ) -> tuple[Array, Array]:
     """A and B of each order in each unit, the other chosen orders held at the common fit.
 
-    Returns
-    -------
-    cosine, sine : ndarray, shape (units, len(orders))
-        NaN where the unit does not see the order.
+    Both of shape (units, orders), NaN where the unit does not see the order.
     """
     index = np.asarray(orders, dtype=np.intp)
     size, n = len(chosen), index.size

@@ -9,10 +9,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
-from ...formats.columns import unit_in_name
 from ...formats.formats import format_of_content
 from ...support.layout import laid_out
 from ...support.plainresult import PlainResult, counted
+from ...support.roles import unit_in_name
 
 __all__ = ["LikelyColumn", "LogColumns", "columns_of_log"]
 

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...formats.columns import offsets_of, unit_in_name
+from ...support.roles import offsets_of, unit_in_name
 from ..files import read_columns
 from ..readings import FileReadings
 from ..run import CalibrationRun

@@ -11,10 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import ArgumentError, FileError
-from ...formats.columns import count_turn, matching_column, signal_code, wanted_columns
-from ...formats.signals import FIELDS
+from ...formats.columns import matching_column
 from ...support.angles import ARCSEC_PER_TURN
 from ...support.kinds import told_kinds
+from ...support.roles import count_turn, signal_code, wanted_columns
+from ...support.signals import FIELDS
 from ..readings import FileReadings, read_readings
 from ..run import CalibrationRun
 from .clocks import Clocks, estimated_clocks

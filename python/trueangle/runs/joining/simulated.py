@@ -11,10 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import ArgumentError
-from ...formats.signals import FIELDS
 from ...support.angles import ARCSEC_PER_TURN
 from ...support.layout import wrapped
 from ...support.plainresult import Shown
+from ...support.signals import FIELDS
 from ..files import runs_of
 from ..run import CalibrationRun
 from .clocks import estimated_clocks

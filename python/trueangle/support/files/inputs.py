@@ -7,7 +7,7 @@ import os
 import stat
 from os import PathLike
 from pathlib import Path
-from typing import Final
+from typing import Final, NamedTuple
 from urllib.parse import unquote
 
 from ...errors import FileError, KindError
@@ -18,6 +18,7 @@ __all__ = [
     "MODEL_BYTES",
     "RUNS_BYTES",
     "SIMULATION_BYTES",
+    "Source",
     "check_input",
     "is_null_device",
     "partition_keys",
@@ -41,6 +42,13 @@ _LOOK_MS: Final = 100
 
 #: What stands for no value.
 _NOTHING: Final = "__HIVE_DEFAULT_PARTITION__"
+
+
+class Source(NamedTuple):
+    """A file that readings came from: its name and the sha256 of its bytes."""
+
+    file: str
+    sha256: str
 
 
 def check_input(path: str | PathLike[str], *, whole: bool = False) -> os.stat_result:
@@ -88,13 +96,8 @@ def read_whole(path: str | PathLike[str], limit: int, what: str) -> bytes:
 
     Waiting for a pipe ends with Ctrl-C, at most a tenth of a second later.
 
-    Parameters
-    ----------
-    path : path
-    limit : int
-        Most bytes that are read, one of the constants of this module.
-    what : str
-        What the file should hold, as the message names it: ``"a model"``.
+    ``limit`` is one of the constants of this module, ``what`` names what the file should hold: ``"a
+    model"``.
 
     Raises
     ------

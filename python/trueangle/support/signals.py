@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import ArgumentError
-from ..support.suggestions import did_you_mean
+from .suggestions import did_you_mean
 
 __all__ = [
     "AT_RUN_TIME",
