@@ -17,11 +17,11 @@ from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..errors import ArgumentError
 from ..joint.shafts import ShaftOrders, shaft_cycles
 from ..runs.run import CalibrationRun
+from ..support.arrays import Array
 from ..support.suggestions import did_you_mean
 from .nuisancechoice import (
     FOLDS,
@@ -34,8 +34,6 @@ from .nuisancechoice import (
 )
 
 __all__ = ["KINDS", "Nuisance", "asked_nuisance", "likely_orders", "take_out", "take_out_beside"]
-
-Array = NDArray[np.float64]
 
 #: What may be asked for, in the order in which it is told.
 KINDS: Final = ("ramp", "direction", "velocity", "drift")

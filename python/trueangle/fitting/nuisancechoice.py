@@ -15,6 +15,7 @@ from ..estimation.linear import (
     pseudo_inverse,
     unexplained,
 )
+from ..support.arrays import Array
 
 __all__ = [
     "FOLDS",
@@ -25,8 +26,6 @@ __all__ = [
     "reference_lines_help",
     "solve_with_groups",
 ]
-
-Array = NDArray[np.float64]
 
 #: Parts that are held out one by one.
 FOLDS: Final = 3

@@ -18,7 +18,6 @@ from dataclasses import dataclass
 from typing import Any, Final, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..errors import ArgumentError, KindError
 from ..estimation.linear import NormalEquations, total
@@ -29,6 +28,7 @@ from ..runs.follows import check_follows
 from ..runs.run import CalibrationRun
 from ..runs.travel import travelled_span
 from ..support.angles import circular_mean, unit_name, wrap
+from ..support.arrays import Array
 from ..support.suggestions import check_choice
 from .argument import ARGUMENTS, AnyArgument
 from .problem import Fitted, PlainSolution, Problem
@@ -36,8 +36,6 @@ from .result import FitResult
 from .robust import WILD, Loss, Weighted
 
 __all__ = ["Posterior", "Prior", "fitted_with_prior", "fleet_prior", "posterior"]
-
-Array = NDArray[np.float64]
 
 #: Rounds in which the noise and what is set aside settle.
 _ROUNDS: Final = 20

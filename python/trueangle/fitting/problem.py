@@ -7,7 +7,6 @@ from collections.abc import Callable, Iterator, Sequence
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple, TypeVar, cast
 
 import numpy as np
-from numpy.typing import NDArray
 
 import trueangle._core as _core
 
@@ -17,6 +16,7 @@ from ..model.model import Argument
 from ..runs.run import CalibrationRun
 from ..runs.travel import over_turns
 from ..support.angles import circular_mean
+from ..support.arrays import Array
 from ..support.suggestions import check_choice
 
 if TYPE_CHECKING:
@@ -24,7 +24,6 @@ if TYPE_CHECKING:
 
 __all__ = ["METHODS", "Fitted", "Problem"]
 
-Array = NDArray[np.float64]
 _Look = TypeVar("_Look")
 
 #: Ways of solving; None takes the fastest that keeps QR's accuracy.

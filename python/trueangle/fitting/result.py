@@ -8,12 +8,12 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..errors import ArgumentError
 from ..model.model import HarmonicModel
 from ..runs.run import CalibrationRun
 from ..runs.travel import Span
+from ..support.arrays import Array
 from ..support.display_units import ErrorsIn
 from ..support.plainresult import result_picture
 from .coefficients import FittedCoefficients
@@ -33,7 +33,6 @@ if TYPE_CHECKING:
 
 __all__ = ["FitResult"]
 
-Array = NDArray[np.float64]
 Picture: TypeAlias = Literal["errors", "spectrum", "phases", "residuals"]
 
 

@@ -27,17 +27,15 @@ from collections.abc import Sequence
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 import trueangle._core as _core
 
 from ..runs.run import CalibrationRun
 from ..support.angles import circular_mean, wrap
+from ..support.arrays import Array
 from .problem import Problem
 
 __all__ = ["REACH", "bias_covariance", "choose_ridge", "error_range", "pattern_variances"]
-
-Array = NDArray[np.float64]
 
 #: Penalties tried, relative to the sum of weights: from "none" to "hardly any harmonics".
 _PENALTIES = [0.0, *np.logspace(-9.0, 0.0, 19).tolist()]

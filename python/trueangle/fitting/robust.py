@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 import trueangle._core as _core
 
 from ..runs.run import CalibrationRun
+from ..support.arrays import Array
 from ..support.display_units import brief
 from ..support.quantiles import median, quantile
 from ..support.suggestions import check_choice
@@ -32,7 +33,6 @@ __all__ = [
     "without_spikes",
 ]
 
-Array = NDArray[np.float64]
 Loss: TypeAlias = Literal["auto", "linear", "huber", "tukey"]
 LOSSES: tuple[Loss, ...] = ("auto", "linear", "huber", "tukey")
 

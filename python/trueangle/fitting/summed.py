@@ -6,7 +6,6 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..errors import ArgumentError
 from ..estimation.linear import NormalEquations
@@ -14,13 +13,12 @@ from ..estimation.moments import Moments
 from ..joint.shafts import ShaftOrders
 from ..model.model import Argument
 from ..runs.run import CalibrationRun
+from ..support.arrays import Array
 from .orders.harmonicsums import HarmonicSums
 from .orders.unitgroups import MOST_UNITS
 from .problem import Fitted, Problem
 
 __all__ = ["Summed", "SummedProblem", "sums_of_moments"]
-
-Array = NDArray[np.float64]
 
 #: Orders this close to a whole multiple of the base shaft are one.
 _WHOLE = 1e-9

@@ -13,6 +13,7 @@ from ..estimation.linear import NormalEquations, left_out
 from ..joint.shafts import ShaftOrders
 from ..runs.run import CalibrationRun
 from ..runs.travel import CONDITION, travelled_span
+from ..support.arrays import Array
 from ..support.display_units import brief
 from ..support.distributions import student_quantile
 from .problem import Problem
@@ -27,8 +28,6 @@ __all__ = [
     "gains_of_runs",
     "gains_of_stretches",
 ]
-
-Array = NDArray[np.float64]
 
 #: Readings looked at, and columns times readings: drawn at random, so that no grid is met.
 _LOOKED_AT: Final = 24_000

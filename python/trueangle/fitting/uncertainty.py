@@ -7,10 +7,10 @@ from collections.abc import Sequence
 from typing import Final, Literal, NamedTuple, TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..errors import ArgumentError
 from ..estimation.linear import NormalEquations, cluster_covariance, total
+from ..support.arrays import Array
 from ..support.quantiles import median
 from ..support.suggestions import check_choice
 from .correlation import (
@@ -36,7 +36,6 @@ __all__ = [
     "coefficient_uncertainty",
 ]
 
-Array = NDArray[np.float64]
 CovarianceKind: TypeAlias = Literal["auto", "white", "cluster", "hac"]
 COVARIANCES: tuple[CovarianceKind, ...] = ("auto", "white", "cluster", "hac")
 

@@ -5,13 +5,11 @@ from __future__ import annotations
 from typing import Final, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..support.arrays import Array
 from ..support.quantiles import median
 
 __all__ = ["Between", "held_out_score", "reml", "robust_variance"]
-
-Array = NDArray[np.float64]
 
 #: Relative change at which the iteration ends, and steps at most.
 _SETTLED: Final = 1e-12

@@ -5,13 +5,10 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from .signals import Signals
 
 __all__ = ["earlier"]
-
-Array = NDArray[np.float64]
 
 
 def earlier(signals: Signals, delay_s: float) -> Signals:

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 import trueangle._core as _core
 
 from ..errors import ArgumentError
+from ..support.arrays import Array
 from ..support.kinds import told_kinds
 from .joint import Joint
 
@@ -24,8 +25,6 @@ __all__ = [
     "line_sum",
     "lines_columns",
 ]
-
-Array = NDArray[np.float64]
 
 ARCSEC_PER_RAD = 1_296_000.0 / (2.0 * math.pi)
 

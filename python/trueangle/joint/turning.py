@@ -17,11 +17,10 @@ from __future__ import annotations
 import itertools
 
 import numpy as np
-from numpy.typing import NDArray
+
+from ..support.arrays import Array
 
 __all__ = ["direction_at_turns", "velocity_at_turns"]
-
-Array = NDArray[np.float64]
 
 #: Share of the one line's error below which the other one's must be to have the reading: where
 #: both are alike the joint may have stopped there, and came the way it came.

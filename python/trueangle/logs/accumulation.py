@@ -33,6 +33,7 @@ from ..runs.follows import check_follows
 from ..runs.run import CalibrationRun
 from ..runs.source import unit_of_path
 from ..support.angles import wrap
+from ..support.arrays import Array
 from ..support.files import partition_keys
 from ..support.times import local_day
 from .keeping import SAMPLE, Kept
@@ -46,8 +47,6 @@ __all__ = [
     "log_moments",
     "merged_moments",
 ]
-
-Array: TypeAlias = NDArray[np.float64]
 
 #: Roles whose columns tell runs apart.
 LABELS = ("unit", "run")

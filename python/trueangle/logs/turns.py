@@ -7,9 +7,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["TurnCounter", "TurnSpan", "TurnState"]
+from ..support.arrays import Array
 
-Array = NDArray[np.float64]
+__all__ = ["TurnCounter", "TurnSpan", "TurnState"]
 
 
 class TurnState(NamedTuple):

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..errors import ArgumentError
 from ..support.angles import wrap
+from ..support.arrays import Array
 from ..support.signals import GivenSignals, check_names
 
 if TYPE_CHECKING:
@@ -19,8 +20,6 @@ __all__ = [
     "Corrector",
     "Velocity",
 ]
-
-Array = NDArray[np.float64]
 
 
 class Velocity:

@@ -6,21 +6,14 @@ import warnings
 from collections.abc import Mapping
 from os import PathLike
 from pathlib import Path
-from typing import Any, TypeAlias
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..errors import ArgumentError, FileError, ModelFileError, OutsideSpanWarning
 from ..joint.shafts import Shaft
-from ..support.decoding import (
-    MAX_LINE_ORDERS,
-    MAX_LINES,
-    MAX_ORDER,
-    json_text,
-    read_text,
-    shown,
-)
+from ..support.arrays import Array
+from ..support.decoding import MAX_LINE_ORDERS, MAX_LINES, MAX_ORDER, json_text, read_text, shown
 from ..support.files import MODEL_BYTES
 from ..support.kinds import told_kinds
 from .model import HarmonicModel
@@ -38,8 +31,6 @@ __all__ = [
     "part_of",
     "save_model",
 ]
-
-Array: TypeAlias = NDArray[np.float64]
 
 #: Key of the file -> whether it must be there.
 _KEYS = {

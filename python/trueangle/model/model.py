@@ -9,13 +9,14 @@ from os import PathLike
 from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 import trueangle._core as _core
 
 from ..errors import ArgumentError
 from ..joint.shafts import Shaft
 from ..support.angles import check_period
+from ..support.arrays import Array
 from ..support.kinds import all_of_type, of_type, told_kinds
 from ..support.plainresult import result_picture
 from ..support.signals import AT_RUN_TIME
@@ -34,7 +35,6 @@ if TYPE_CHECKING:
 __all__ = ["Argument", "HarmonicModel", "Step", "check_invertible"]
 
 Argument: TypeAlias = Literal["reference", "indicated"]
-Array: TypeAlias = NDArray[np.float64]
 
 
 @told_kinds

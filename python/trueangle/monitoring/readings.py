@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import IO, Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..errors import FileError
 from ..formats.columns import find_columns
@@ -18,11 +17,10 @@ from ..model.model import HarmonicModel
 from ..runs.angles import Angles, find_angles
 from ..runs.files import Conversion
 from ..runs.source import Reading, checked_reading
+from ..support.arrays import Array
 from ..support.roles import Column, wanted_columns
 
 __all__ = ["ReadingBatch", "read_batches", "read_lines"]
-
-Array = NDArray[np.float64]
 
 
 class ReadingBatch(NamedTuple):

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import ArgumentError
+from ..support.arrays import Array
 from ..support.powersums import power_sums
 from ..support.quantiles import median
 from .run import CalibrationRun, as_runs
@@ -30,8 +31,6 @@ __all__ = [
     "fold",
     "position_coherence",
 ]
-
-Array = NDArray[np.float64]
 
 #: Positions closer than this (turns) count as one: 0.01 degree, which turns the phase
 #: of order 202 by 2 degrees, so that no order of interest is told by the difference.

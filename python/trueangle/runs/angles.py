@@ -3,21 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import NamedTuple, TypeAlias
-
-import numpy as np
-from numpy.typing import NDArray
+from typing import NamedTuple
 
 from ..errors import FileError
 from ..formats.columns import listed_columns
 from ..support.angles import UNIT_PERIODS
+from ..support.arrays import Array
 from ..support.roles import Column, offsets_of, signal_code
 from ..support.suggestions import did_you_mean
 from .facets import Facets
 
 __all__ = ["Angles", "find_angles"]
-
-Array: TypeAlias = NDArray[np.float64]
 
 #: Unit of the run's angles where the reference has none that a run may be in.
 _PERIOD = 360.0

@@ -9,17 +9,16 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from ..errors import ArgumentError, KindError
 from ..support.angles import check_period, circular_mean, wrap
+from ..support.arrays import Array
 from ..support.files import Source
 from ..support.kinds import told_kinds
 from ..support.signals import FIELDS, find_signal, signal_column, signal_columns
 
 __all__ = ["CalibrationRun", "as_runs", "given_runs"]
-
-Array = NDArray[np.float64]
 
 
 @told_kinds

@@ -12,16 +12,14 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 import trueangle._core as _core
 
 from ..support.angles import unit_name
+from ..support.arrays import Array
 from .run import CalibrationRun
 
 __all__ = ["Span", "covered_span", "held_orders", "over_turns", "travelled_span", "without_drift"]
-
-Array = NDArray[np.float64]
 
 #: Readings whose positions are looked at: one lies in every degree of the travel.
 _LOOKED_AT = 65_536

@@ -18,10 +18,10 @@ from dataclasses import replace
 from typing import Any, Final, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..errors import ArgumentError, NoModelError
 from ..runs.travel import Span, travelled_span
+from ..support.arrays import Array
 from .dense import fit_dense
 from .dualfit import (
     BESIDE_RATIO,
@@ -42,8 +42,6 @@ from .result import ARCSEC, Blind, HeldOut, OrderEstimate, SelfCalibration, esti
 from .verification import chance_of
 
 __all__ = ["dual"]
-
-Array = NDArray[np.float64]
 
 #: A ratio is taken for another than the given or a whole one beyond so many standard errors:
 #: a chance of 6e-5.

@@ -32,8 +32,6 @@ __all__ = [
     "with_slow",
 ]
 
-Array = NDArray[np.float64]
-
 #: Probability of taking up any line that is not there.
 _CHANCE: Final = 0.01
 

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import NoModelError
+from ..support.arrays import Array
 from .recording import Recording
 
 __all__ = [
@@ -23,8 +24,6 @@ __all__ = [
     "turning",
     "varied",
 ]
-
-Array = NDArray[np.float64]
 
 #: Orders of each shaft that are tried by default.
 _HIGHEST: Final = 8

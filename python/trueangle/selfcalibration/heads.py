@@ -14,10 +14,10 @@ from collections.abc import Sequence
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..errors import ArgumentError, NoModelError
 from ..support.angles import wrap
+from ..support.arrays import Array
 from .choice import chosen_orders
 from .dense import DenseFit, DenseRows, fit_dense, fixed_point
 from .modelling import made_model
@@ -28,8 +28,6 @@ from .result import ARCSEC, Blind, HeldOut, OrderEstimate, SelfCalibration, esti
 from .verification import judged
 
 __all__ = ["head_patterns"]
-
-Array = NDArray[np.float64]
 
 #: Orders tried by default.
 _HIGHEST: Final = 32

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..estimation.factor import BandedFactor
+from ..support.arrays import Array
 from .projected import Projected, Unknown
 from .splines import (
     Knots,
@@ -29,8 +30,6 @@ from .splines import (
 from .sums import MotionSums
 
 __all__ = ["MotionFit", "MotionSearch"]
-
-Array = NDArray[np.float64]
 
 #: Stiffness looked at, as a power of ten relative to the readings per knot.
 _STIFFEST, _SOFTEST = 7.0, -5.0

@@ -12,6 +12,8 @@ from numpy.typing import NDArray
 
 import trueangle._core as _core
 
+from ..support.arrays import Array
+
 __all__ = [
     "NOT_SEEN",
     "Projected",
@@ -20,8 +22,6 @@ __all__ = [
     "harmonic_sum",
     "pairs",
 ]
-
-Array = NDArray[np.float64]
 
 #: A column is not seen where nuisances and other columns leave less of its square.
 #: Below this share rounding in the sums (1e-16 of a column, times its condition) decides.

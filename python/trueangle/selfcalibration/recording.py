@@ -14,12 +14,11 @@ from ..errors import ArgumentError, FileError
 from ..runs.readings import FileReadings
 from ..runs.run import CalibrationRun, given_runs
 from ..runs.source import Reading, checked_reading, each_table
+from ..support.arrays import Array
 from ..support.files import Source
 from ..support.roles import LABELS, Column, role_kind, signal_code
 
 __all__ = ["Recording", "as_recordings"]
-
-Array = NDArray[np.float64]
 
 _LABELS = ("unit", "run")
 

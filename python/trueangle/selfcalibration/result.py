@@ -8,10 +8,10 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..model.model import HarmonicModel
 from ..support.angles import ARCSEC_PER_TURN
+from ..support.arrays import Array
 from ..support.display_units import ErrorsIn, ErrorUnit, error_unit
 from ..support.layout import laid_out, wrapped
 from ..support.plainresult import PlainResult, counted
@@ -25,8 +25,6 @@ __all__ = [
     "ranges",
     "selfcal_summary",
 ]
-
-Array = NDArray[np.float64]
 
 #: Seconds of arc in a radian.
 ARCSEC = ARCSEC_PER_TURN / (2.0 * math.pi)

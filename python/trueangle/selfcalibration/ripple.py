@@ -13,11 +13,10 @@ from collections.abc import Sequence
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
+
+from ..support.arrays import Array
 
 __all__ = ["LARGEST_COST", "averaged_over_ripple", "cost_of_ripple"]
-
-Array = NDArray[np.float64]
 
 #: Where separating the ripple multiplies the standard error by more, speeds are too much
 #: alike: the sum is given under both names instead. A ratio of speeds of about 1.2.

@@ -15,10 +15,10 @@ from collections.abc import Sequence
 from typing import Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..errors import NoModelError
 from ..support.angles import wrap
+from ..support.arrays import Array
 from ..support.distributions import f_tail
 from .choice import chosen_orders
 from .clampings import Clampings, clampings_of
@@ -30,8 +30,6 @@ from .recording import Recording
 from .result import ARCSEC, Blind, HeldOut, SelfCalibration, estimates, listed, ranges
 
 __all__ = ["shift_patterns"]
-
-Array = NDArray[np.float64]
 
 OTHER: Final = "the other encoder"
 FACETS: Final = "the polygon's facets"

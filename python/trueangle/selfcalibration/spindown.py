@@ -12,9 +12,9 @@ from collections.abc import Sequence
 from typing import Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..errors import NoModelError
+from ..support.arrays import Array
 from ..support.plainresult import counted
 from .choice import choose_orders, highest_order
 from .colour import noise_beside
@@ -30,8 +30,6 @@ from .stretches import cut_stretches
 from .verification import held_out
 
 __all__ = ["spin_down"]
-
-Array = NDArray[np.float64]
 
 #: An order of which motion leaves less is not the encoder's to say.
 LEAST_RETAINED: Final = 0.02

@@ -13,6 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ..support.arrays import Array
+
 __all__ = [
     "BAND",
     "Knots",
@@ -22,8 +24,6 @@ __all__ = [
     "smooth_trends",
     "spline_basis",
 ]
-
-Array = NDArray[np.float64]
 
 #: Diagonals of a banded matrix that are kept: the main one and three above it.
 BAND = 4

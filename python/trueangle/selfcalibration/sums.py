@@ -9,11 +9,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ..support.arrays import Array
 from .splines import BAND, Knots, spline_basis
 
 __all__ = ["MotionSums", "ordered_sums"]
-
-Array = NDArray[np.float64]
 
 #: Readings whose columns are made at once: some MB, so that they stay in cache.
 _CHUNK = 4096

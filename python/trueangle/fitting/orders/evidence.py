@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...estimation.linear import pseudo_inverse
+from ...support.arrays import Array
 from .harmonicsums import HarmonicSums
 
 __all__ = [
@@ -30,7 +31,6 @@ __all__ = [
     "log_tail",
 ]
 
-Array = NDArray[np.float64]
 Index = NDArray[np.intp]
 
 #: A candidate whose columns keep less than this of their energy beside those already

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...runs.aliasing import Positions
+from ...support.arrays import Array
 from ...support.quantiles import median
 from .evidence import COLLINEAR, OVERDISPERSED, fit_subset, log_chi2_tail
 from .harmonicsums import HarmonicSums, ZeroGroupReadings
@@ -22,8 +23,6 @@ __all__ = [
     "pure_error",
     "run_scatter",
 ]
-
-Array = NDArray[np.float64]
 
 #: Sweeps of alternating means (positions, zeros); whole grids need one.
 _SWEEPS: Final = 20

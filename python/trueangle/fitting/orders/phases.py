@@ -6,14 +6,13 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from ...support.arrays import Array
 from .evidence import fit_subset
 from .harmonicsums import HarmonicSums
 
 __all__ = ["circular_range_deg", "unit_coefficients", "unit_phases"]
-
-Array = NDArray[np.float64]
 
 
 def circular_range_deg(phases: ArrayLike) -> float:

@@ -6,9 +6,6 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
-import numpy as np
-from numpy.typing import NDArray
-
 from ...runs.aliasing import Positions
 from ...runs.run import CalibrationRun
 from ...support.display_units import brief
@@ -27,8 +24,6 @@ if TYPE_CHECKING:
     from ..summed import Summed
 
 __all__ = ["FALSE_ALARM", "EvidenceSelection"]
-
-Array = NDArray[np.float64]
 
 
 class EvidenceSelection(EvidenceSearch):

@@ -9,6 +9,7 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
+from ...support.arrays import Array
 from ...support.quantiles import median, quantile
 from .fault import DataFault
 from .record import Record
@@ -21,8 +22,6 @@ __all__ = [
     "wrapped_reference",
     "wrong_ratio",
 ]
-
-Array = NDArray[np.float64]
 
 #: Travel (degrees) from which on a ratio of the channels means anything, and how far from 1
 #: it may be: errors of several degrees over a short travel are still errors.

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ...support.arrays import Array
 from ...support.roles import offsets_of, unit_in_name
 from ..files import read_columns
 from ..readings import FileReadings
@@ -18,8 +19,6 @@ from ..run import CalibrationRun
 from ..source import checked_reading
 
 __all__ = ["Record", "read_records", "records_of"]
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

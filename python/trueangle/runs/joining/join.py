@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from ...errors import ArgumentError, FileError
 from ...formats.columns import matching_column
 from ...support.angles import ARCSEC_PER_TURN
+from ...support.arrays import Array
 from ...support.kinds import told_kinds
 from ...support.roles import count_turn, signal_code, wanted_columns
 from ...support.signals import FIELDS
@@ -23,8 +24,6 @@ from .result import Gap, Joined
 from .stream import Stream
 
 __all__ = ["join"]
-
-Array = NDArray[np.float64]
 
 #: FileReadings that a run is made of, at least.
 _LEAST = 4

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from ...errors import ArgumentError
 from ...support.angles import ARCSEC_PER_TURN
+from ...support.arrays import Array
 from ...support.layout import wrapped
 from ...support.plainresult import Shown
 from ...support.signals import FIELDS
@@ -22,8 +23,6 @@ from .stream import Stream
 from .travel import Travelled
 
 __all__ = ["BY", "MeasuredMinusSimulated", "minus_simulated"]
-
-Array = NDArray[np.float64]
 
 #: How a log may be brought to the readings.
 BY = ("time", "angle")

@@ -8,9 +8,9 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Stream"]
+from ...support.arrays import Array
 
-Array = NDArray[np.float64]
+__all__ = ["Stream"]
 
 #: Times the typical step in time from which on a pause is a gap.
 GAP = 5.0

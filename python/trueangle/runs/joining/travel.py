@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Travelled"]
+from ...support.arrays import Array
 
-Array = NDArray[np.float64]
+__all__ = ["Travelled"]
 
 #: Times the typical step in angle from which on a stretch is a gap.
 GAP = 5.0
