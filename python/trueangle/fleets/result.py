@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from ..fitting.prior import Prior
 from ..support.angles import arcsec
 from ..support.display_units import ErrorsIn
-from ..support.drawn import result_picture
-from ..support.plainresult import PlainResult, counted, finite
+from ..support.plainresult import PlainResult, counted, finite, result_picture
 from .history import HistoryRow
 from .tolerance import Tolerance
 from .unit import FleetUnit
