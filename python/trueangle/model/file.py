@@ -17,10 +17,9 @@ from ..support.decoding import MAX_LINE_ORDERS, MAX_LINES, MAX_ORDER, json_text,
 from ..support.files import MODEL_BYTES
 from ..support.kinds import told_kinds
 from .model import HarmonicModel
-from .recordfile import MAX_TERMS, RecordReader
+from .records import MAX_TERMS, MOST_TURNS, RecordReader
 from .term import Term, known_terms
 from .text import FORMAT, ROBOT_FORMAT, VERSION, save_model
-from .validity import MOST_TURNS
 
 __all__ = [
     "FORMAT",

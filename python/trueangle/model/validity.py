@@ -12,12 +12,9 @@ from numpy.typing import ArrayLike, NDArray
 import trueangle._core as _core
 
 from ..errors import ArgumentError, NotInvertibleError
-from .records import FitRecord
+from .records import MOST_TURNS, FitRecord
 
 __all__ = ["check_fit", "check_invertible", "check_number", "checked_covariance", "greatest_slope"]
-
-#: Ends of a span are within so many turns.
-MOST_TURNS = 1e9
 
 #: What a condition number may be below 1 by rounding.
 ROUNDING = 1e-6
