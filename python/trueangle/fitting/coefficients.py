@@ -16,8 +16,6 @@ from ..support.plainresult import PlainResult
 if TYPE_CHECKING:
     from .uncertainty import Uncertainty
 
-__all__ = ["FittedCoefficients"]
-
 
 class FittedCoefficients(PlainResult):
     """Coefficients with their uncertainty: what fits of runs and of logs have in common."""

@@ -15,20 +15,6 @@ from ..support.arrays import Array
 from ..support.distributions import chi_squared_tail
 from .problem import Fitted, Problem
 
-__all__ = [
-    "ENOUGH_RUNS",
-    "FEWEST_RUNS",
-    "FEWEST_STRETCHES",
-    "SCATTER",
-    "clusters_of",
-    "correlation_found",
-    "residual_memory",
-    "runs_together",
-    "scatter_between",
-    "weight_sum",
-    "white_variance_share",
-]
-
 #: Most clusters: of more runs several are taken together.
 _MOST_CLUSTERS: Final = 128
 

@@ -34,8 +34,6 @@ if TYPE_CHECKING:
     from .orders.table import OrderSelection
     from .summed import Summed
 
-__all__ = ["ROUNDING", "fit", "fitted_to"]
-
 #: Rounding of angles around a whole turn, in parts of a turn: smaller deviations are
 #: never taken for outliers.
 ROUNDING = 1e-12

@@ -17,8 +17,6 @@ from ..support.arrays import Array
 from ..support.quantiles import median
 from .problem import Fitted, Problem
 
-__all__ = ["far_runs", "run_names", "unlike_runs", "unlike_sentence"]
-
 #: Readings of a run that are looked at, and runs.
 _READINGS: Final = 512
 _RUNS: Final = 512

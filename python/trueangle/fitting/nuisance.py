@@ -33,8 +33,6 @@ from .nuisancechoice import (
     solve_with_groups,
 )
 
-__all__ = ["KINDS", "Nuisance", "asked_nuisance", "likely_orders", "take_out", "take_out_beside"]
-
 #: What may be asked for, in the order in which it is told.
 KINDS: Final = ("ramp", "direction", "velocity", "drift")
 

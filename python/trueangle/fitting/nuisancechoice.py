@@ -17,16 +17,6 @@ from ..estimation.linear import (
 )
 from ..support.arrays import Array
 
-__all__ = [
-    "FOLDS",
-    "FoldRows",
-    "best_spline",
-    "choose_nuisance_groups",
-    "error_inflation",
-    "reference_lines_help",
-    "solve_with_groups",
-]
-
 #: Parts that are held out one by one.
 FOLDS: Final = 3
 

@@ -14,8 +14,6 @@ from .fit import fit as fit_runs
 from .result import FitResult
 from .robust import Loss
 
-__all__ = ["Phases", "run_phases"]
-
 
 @dataclass(frozen=True)
 class Phases:

@@ -35,8 +35,6 @@ from .problem import Fitted, PlainSolution, Problem
 from .result import FitResult
 from .robust import WILD, Loss, Weighted
 
-__all__ = ["Posterior", "Prior", "fitted_with_prior", "fleet_prior", "posterior"]
-
 #: Rounds in which the noise and what is set aside settle.
 _ROUNDS: Final = 20
 

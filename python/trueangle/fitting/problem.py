@@ -22,8 +22,6 @@ from ..support.suggestions import check_choice
 if TYPE_CHECKING:
     from .summed import Summed
 
-__all__ = ["METHODS", "Fitted", "Problem"]
-
 _Look = TypeVar("_Look")
 
 #: Ways of solving; None takes the fastest that keeps QR's accuracy.

@@ -31,8 +31,6 @@ if TYPE_CHECKING:
     from .prior import Posterior
     from .summed import Summed
 
-__all__ = ["FitResult"]
-
 Picture: TypeAlias = Literal["errors", "spectrum", "phases", "residuals"]
 
 

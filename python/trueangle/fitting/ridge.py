@@ -35,8 +35,6 @@ from ..support.angles import circular_mean, wrap
 from ..support.arrays import Array
 from .problem import Problem
 
-__all__ = ["REACH", "bias_covariance", "choose_ridge", "error_range", "pattern_variances"]
-
 #: Penalties tried, relative to the sum of weights: from "none" to "hardly any harmonics".
 _PENALTIES = [0.0, *np.logspace(-9.0, 0.0, 19).tolist()]
 

@@ -23,16 +23,6 @@ from ..support.quantiles import median, quantile
 from ..support.suggestions import check_choice
 from .problem import Fitted, Problem
 
-__all__ = [
-    "LOSSES",
-    "Loss",
-    "Weighted",
-    "breakdown_sentence",
-    "fit_robustly",
-    "robust_scale",
-    "without_spikes",
-]
-
 Loss: TypeAlias = Literal["auto", "linear", "huber", "tukey"]
 LOSSES: tuple[Loss, ...] = ("auto", "linear", "huber", "tukey")
 

@@ -18,8 +18,6 @@ from .orders.harmonicsums import HarmonicSums
 from .orders.unitgroups import MOST_UNITS
 from .problem import Fitted, Problem
 
-__all__ = ["Summed", "SummedProblem", "sums_of_moments"]
-
 #: Orders this close to a whole multiple of the base shaft are one.
 _WHOLE = 1e-9
 

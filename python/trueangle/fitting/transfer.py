@@ -21,14 +21,6 @@ from .problem import Problem
 if TYPE_CHECKING:
     from .summed import Summed
 
-__all__ = [
-    "RunGains",
-    "check_later_stretch",
-    "check_new_run",
-    "gains_of_runs",
-    "gains_of_stretches",
-]
-
 #: Readings looked at, and columns times readings: drawn at random, so that no grid is met.
 _LOOKED_AT: Final = 24_000
 _CELLS: Final = 8_000_000

@@ -28,14 +28,6 @@ from .correlation import (
 from .problem import Fitted, Problem
 from .ridge import bias_covariance, pattern_variances
 
-__all__ = [
-    "COVARIANCES",
-    "CovarianceKind",
-    "Uncertainty",
-    "check_covariance",
-    "coefficient_uncertainty",
-]
-
 CovarianceKind: TypeAlias = Literal["auto", "white", "cluster", "hac"]
 COVARIANCES: tuple[CovarianceKind, ...] = ("auto", "white", "cluster", "hac")
 

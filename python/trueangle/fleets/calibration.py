@@ -16,8 +16,6 @@ from ..runs.travel import over_turns
 from ..support.angles import circular_mean
 from ..support.arrays import Array
 
-__all__ = ["Calibration", "CalibrationSums", "columns_of", "output_orders"]
-
 
 def output_orders(shafts: Sequence[ShaftOrders]) -> Array:
     """Output orders of all harmonics, shaft by shaft."""

@@ -10,8 +10,6 @@ import numpy as np
 from ..support.arrays import Array
 from .calibration import Calibration
 
-__all__ = ["ALLOWANCE", "LENGTH", "charted"]
-
 #: Half of the shift that is looked for, in standard deviations of a calibration.
 ALLOWANCE: Final = 0.5
 

@@ -18,8 +18,6 @@ from .calibration import Calibration, columns_of
 from .charts import ALLOWANCE, LENGTH, charted
 from .outliers import LEVEL, Deviates, deviates, weights_of
 
-__all__ = ["Change", "HistoryOrder", "HistoryRow", "changes_of"]
-
 #: Units with a second date from which their changes tell what an ordinary change is.
 _FEWEST: Final = 4
 

@@ -15,8 +15,6 @@ from ..runs.run import CalibrationRun
 from ..support.distributions import chi_squared_tail
 from .calibration import Calibration, CalibrationSums, columns_of, output_orders
 
-__all__ = ["MOST_KEPT", "SAMPLE", "candidates", "worth_keeping"]
-
 #: Units by which orders are chosen: of the first so many.
 SAMPLE: Final = 32
 

@@ -12,8 +12,6 @@ from numpy.typing import NDArray
 from ..support.arrays import Array
 from .variance import robust_variance
 
-__all__ = ["LEVEL", "Deviates", "deviates", "weights_of"]
-
 #: Chance that a fleet without an outlier is told of one.
 LEVEL: Final = 0.01
 

@@ -19,8 +19,6 @@ from .unit import FleetUnit
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = ["BetweenOrder", "CommonOrder", "Fleet", "fleet_summary"]
-
 _TESTED = (
     "  p: chance that a sound unit is as far from the other units or, where it moved, has changed "
     "as much; reported below the limit, which one fleet of sound units in a hundred passes"

@@ -16,8 +16,6 @@ from ..support.times import local_day
 from .calibration import Calibration, CalibrationSums, output_orders
 from .orders import SAMPLE, candidates, worth_keeping
 
-__all__ = ["FleetSums"]
-
 
 class _Unnamed(NamedTuple):
     """A run whose unit no column names: its label and its file."""

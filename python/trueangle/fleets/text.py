@@ -12,8 +12,6 @@ from ..support.plainresult import pretty_json
 if TYPE_CHECKING:
     from .result import Fleet
 
-__all__ = ["FORMAT", "VERSION", "save_fleet"]
-
 FORMAT: Final = "trueangle-fleet"
 VERSION: Final = 1
 

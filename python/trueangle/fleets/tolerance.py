@@ -12,8 +12,6 @@ from ..support.arrays import Array
 from ..support.distributions import chi_squared_tail, normal_quantile, normal_tail
 from ..support.kinds import told_kinds
 
-__all__ = ["Tolerance", "tolerance_factor", "tolerance_of", "wilks_units"]
-
 #: Nodes of Gauss and Legendre's rule on each of the pieces of an integral.
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(24)
 _PIECES: Final = 24

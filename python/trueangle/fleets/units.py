@@ -16,8 +16,6 @@ from .calibration import Calibration, columns_of, output_orders
 from .outliers import Deviates, deviates, weights_of
 from .variance import Between, held_out_score, reml
 
-__all__ = ["FEWEST", "SharedPattern", "UnitNoise", "Units", "noise_of", "pattern_of"]
-
 #: Units below which none is told to be an outlier: the others are what it is told by.
 FEWEST: Final = 5
 

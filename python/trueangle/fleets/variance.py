@@ -9,8 +9,6 @@ import numpy as np
 from ..support.arrays import Array
 from ..support.quantiles import median
 
-__all__ = ["Between", "held_out_score", "reml", "robust_variance"]
-
 #: Relative change at which the iteration ends, and steps at most.
 _SETTLED: Final = 1e-12
 _STEPS: Final = 200

@@ -27,8 +27,6 @@ from .budget import FileExtent, check_part
 from .damage import damage_told
 from .format import Batch, Contents, CopyTask, Selection
 
-__all__ = ["columns", "contents", "copy", "extent", "read", "stretches"]
-
 _FILE_MAGIC = b"ARROW1"
 #: Codecs by their number in the format's BodyCompression.
 _CODECS = {0: "lz4", 1: "zstd"}

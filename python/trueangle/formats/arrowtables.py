@@ -16,21 +16,6 @@ from ..errors import FileError
 from .checksum import Checksum
 from .format import Addition, Batch, Contents, Labels, Selection, note
 
-__all__ = [
-    "METADATA_KEY",
-    "ArrowDigest",
-    "add_corrected",
-    "arrow_dtype",
-    "arrow_numbers",
-    "arrow_values",
-    "column_batches",
-    "corrected_schema",
-    "element_names",
-    "label_codes",
-    "taken_column",
-    "top_names",
-]
-
 #: Key of the schema's metadata under which the provenance is kept.
 METADATA_KEY = b"trueangle"
 #: Times count from 2000: a later start keeps more digits of a second.

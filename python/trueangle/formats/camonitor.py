@@ -17,8 +17,6 @@ from ..errors import FileError
 from .csvheader import number as read_number
 from .format import Batch, Contents, CopyTask, Selection
 
-__all__ = ["LINE", "columns", "contents", "copy", "read"]
-
 #: Name, date, time, value; what follows (alarms) is of no concern.
 LINE = re.compile(rb"(\S+)\s+(\d{4}-\d\d-\d\d)\s(\d\d:\d\d:\d\d(?:\.\d{1,9})?)\s+(\S+)")
 _TIME = "time_s"

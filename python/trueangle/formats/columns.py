@@ -22,8 +22,6 @@ from ..support.roles import (
 )
 from ..support.signals import SIGNALS, find_signal
 
-__all__ = ["find_columns", "listed_columns", "matching_column", "signed_name"]
-
 
 def matching_column(path: object, header: Sequence[str], name: str) -> str:
     """The column called ``name``: exactly, else without case and blanks, else without a unit.

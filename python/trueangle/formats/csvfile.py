@@ -27,8 +27,6 @@ from .messages import warn_of_messages
 if TYPE_CHECKING:
     from .csvblocks import PlainBlock
 
-__all__ = ["columns", "contents", "copy", "header_line", "line_of", "read"]
-
 _Block: TypeAlias = "QuotedBlock | PlainBlock"
 
 #: Bytes of a file that the standard library reads in less time than pyarrow takes to start.

@@ -18,20 +18,6 @@ from .._core import __version__
 from ..errors import FileError, MissingExtraError
 from .budget import FileExtent, text_extent
 
-__all__ = [
-    "TEXTS",
-    "Addition",
-    "Batch",
-    "Choose",
-    "Contents",
-    "Format",
-    "Labels",
-    "Watch",
-    "note",
-    "refuse_corrected",
-    "row_labels",
-]
-
 #: Columns that are texts whatever they look like, in formats that do not say.
 TEXTS = ("run", "unit")
 

@@ -29,8 +29,6 @@ from ..errors import FileError, MessageLinesWarning
 from .csvheader import number
 from .format import Batch, Contents, CopyTask, Selection, row_labels
 
-__all__ = ["columns", "contents", "copy", "line_of", "read"]
-
 #: Degrees a second by which the sky turns.
 SIDEREAL: Final = 360.0 / 86164.0905
 _COLUMNS = ("run", "when", "time_s", "indicated_deg", "error_arcsec", "declination_arcsec", "snr")

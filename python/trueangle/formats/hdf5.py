@@ -25,8 +25,6 @@ from .format import Addition, Batch, Contents, CopyTask, Selection, check_length
 from .hdf5places import Places
 from .stored import ROWS
 
-__all__ = ["columns", "contents", "copy", "extent", "read", "stretches"]
-
 #: Readings taken together: what is read of them stays in the cache of the processor.
 _BLOCK = 1 << 17
 #: Rows of a part that is read on its own, and parts at most: each opens the file.

@@ -13,8 +13,6 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["FIELDS", "Block"]
-
 #: Numbers of a joint, in the order in which the message holds them.
 FIELDS = ("position", "velocity", "effort")
 #: Longest string or list that a message may state.

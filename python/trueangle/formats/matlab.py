@@ -18,8 +18,6 @@ from .damage import damage_told
 from .format import Batch, Contents, CopyTask, Selection, check_lengths, note, row_labels
 from .matlabelements import check_elements
 
-__all__ = ["columns", "contents", "copy", "extent", "read", "together"]
-
 #: Bytes of the header of a file, whose last two tell the order of bytes.
 _HEADER = 128
 #: Variable of a copy that tells how its corrected ones were made.

@@ -18,8 +18,6 @@ from ..errors import FileError
 from .budget import FileExtent, check_part
 from .format import Batch, Contents, CopyTask, Selection, check_lengths, note
 
-__all__ = ["columns", "contents", "copy", "extent", "read", "together"]
-
 #: Kinds of numbers by the tens of the type.
 _KINDS = ("f8", "f4", "i4", "i2", "u2", "u1")
 _HEAD = struct.Struct("<5i")

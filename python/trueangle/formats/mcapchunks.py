@@ -25,8 +25,6 @@ from .budget import check_part
 from .mcaprows import RecordRows, interleaved_rows
 from .unpacking import unpacked, unpacked_folder
 
-__all__ = ["BagReader", "ChunkReader", "ChunkWriter", "ChunkedBagWriter"]
-
 _MESSAGE, _CHUNK, _MESSAGE_INDEX = 0x05, 0x06, 0x07
 #: Start of a chunk without messages.
 _NEVER = (1 << 63) - 1

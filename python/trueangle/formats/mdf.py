@@ -23,8 +23,6 @@ from .damage import damage_told
 from .format import Addition, Batch, Contents, CopyTask, Selection, note
 from .mdfblocks import check_chains
 
-__all__ = ["columns", "contents", "copy", "extent", "read"]
-
 #: Bytes that one byte of a file can stand for: deflate reaches 1032.
 _MOST_COMPRESSED = 2000
 #: Readings taken together.

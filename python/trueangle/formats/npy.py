@@ -17,8 +17,6 @@ from .budget import FileExtent
 from .damage import damage_told
 from .format import Addition, Batch, Contents, CopyTask, Selection, refuse_corrected, row_labels
 
-__all__ = ["columns", "contents", "copy", "extent", "read", "read_header", "write_header"]
-
 #: Readings taken together.
 _BLOCK = 1 << 18
 

@@ -21,8 +21,6 @@ from .damage import damage_told
 from .format import Addition, Batch, Contents, CopyTask, Selection, check_lengths, note, row_labels
 from .npy import read_header, write_header
 
-__all__ = ["columns", "contents", "copy", "extent", "read", "together"]
-
 #: Readings taken together.
 _BLOCK = 1 << 18
 #: Member of a copy that tells how its arrays were made.

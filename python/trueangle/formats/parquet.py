@@ -26,8 +26,6 @@ from .budget import FileExtent
 from .damage import damage_told
 from .format import Addition, Batch, Contents, CopyTask, Selection
 
-__all__ = ["columns", "contents", "copy", "extent", "read", "stretches"]
-
 #: Bytes of decoded columns in hand at once; larger row groups are cut.
 _BYTES = 1 << 25
 #: Bytes of a column of the file that are in hand while it is read.

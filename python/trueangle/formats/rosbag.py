@@ -28,8 +28,6 @@ from .rosbagmarks import bag_custom_data, corrected_topics, made_note, refuse_ag
 from .rosbagwriter import opened_writer
 from .unpacking import unpacked
 
-__all__ = ["columns", "contents", "copy", "extent", "read"]
-
 _JOINT_STATE = "sensor_msgs/msg/JointState"
 #: Signals of a joint in the message, under the names of columns.
 _FIELDS = {"velocity_rad_s": "velocity", "torque_Nm": "effort"}

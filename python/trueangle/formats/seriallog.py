@@ -18,8 +18,6 @@ from ..errors import FileError
 from .format import Batch, Contents, CopyTask, Selection
 from .messages import warn_of_messages
 
-__all__ = ["columns", "contents", "copy", "line_of", "read"]
-
 _NUMBER = rb"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?|[+-]?(?:nan|inf)"
 _NAME = rb"[A-Za-z_][\w.\[\]/-]*(?: [\w.\[\]/-]+){0,4}"
 _PAIR = re.compile(rb"(%s)[ \t]*[:=][ \t]*(%s)(?![\w.])" % (_NAME, _NUMBER), re.IGNORECASE)

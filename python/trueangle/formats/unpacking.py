@@ -28,8 +28,6 @@ if sys.version_info >= (3, 14):
 else:
     from backports import zstd
 
-__all__ = ["LIMIT", "UNPACKED_BYTES", "unpacked", "unpacked_folder"]
-
 #: Bytes on the disk that the files of a bag may unpack to: hours of a robot's sensors with images.
 UNPACKED_BYTES: Final = 1 << 36
 #: The variable of the environment that says another limit.

@@ -22,8 +22,6 @@ from ..errors import FileError
 from .budget import FileExtent, check_part
 from .format import Batch, Contents, CopyTask, Selection, note
 
-__all__ = ["columns", "contents", "copy", "extent", "read"]
-
 _TIME = "time_s"
 _MAGIC = b"WPILOG"
 #: Types of entries that are numbers.

@@ -18,8 +18,6 @@ from ..support.roles import role_kind
 from ..support.suggestions import did_you_mean
 from .members import FIXED_MEMBERS
 
-__all__ = ["JointDescription", "RobotDescription", "load_description"]
-
 #: Joints of one robot, at most.
 MAX_JOINTS: Final = 256
 

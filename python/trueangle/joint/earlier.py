@@ -8,8 +8,6 @@ import numpy as np
 
 from .signals import Signals
 
-__all__ = ["earlier"]
-
 
 def earlier(signals: Signals, delay_s: float) -> Signals:
     """The signals with angle, direction and speed of a time ``τ`` before each reading.

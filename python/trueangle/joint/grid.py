@@ -8,8 +8,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["UniformGrid", "lattice_step", "table_move", "uniform_grid"]
-
 #: Departure from the grid, in shares of its step, up to which readings lie on it.
 ON_GRID = 0.02
 

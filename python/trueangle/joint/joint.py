@@ -11,8 +11,6 @@ from .declared import Bearing, DeclaredShaft, Head
 from .members import FIXED_MEMBERS
 from .shafts import shaft_cycles
 
-__all__ = ["Joint"]
-
 ENCODER_SIDES = ("motor", "output")
 
 #: Multiples of a declared shaft that are expected of it.

@@ -16,16 +16,6 @@ from ..support.arrays import Array
 from ..support.kinds import told_kinds
 from .joint import Joint
 
-__all__ = [
-    "ARCSEC_PER_RAD",
-    "Harmonic",
-    "Pattern",
-    "Surroundings",
-    "line_columns",
-    "line_sum",
-    "lines_columns",
-]
-
 ARCSEC_PER_RAD = 1_296_000.0 / (2.0 * math.pi)
 
 

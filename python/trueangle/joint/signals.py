@@ -20,8 +20,6 @@ from ..support.signals import coupled_with
 from .grid import UniformGrid, lattice_step, table_move, uniform_grid
 from .turning import direction_at_turns, velocity_at_turns
 
-__all__ = ["Signals", "join_runs"]
-
 Index = NDArray[np.int64]
 
 #: Share of sign changes between neighbouring steps above which the direction is read

@@ -20,8 +20,6 @@ import numpy as np
 
 from ..support.arrays import Array
 
-__all__ = ["direction_at_turns", "velocity_at_turns"]
-
 #: Share of the one line's error below which the other one's must be to have the reading: where
 #: both are alike the joint may have stopped there, and came the way it came.
 CLEARLY = 0.5

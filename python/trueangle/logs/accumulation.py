@@ -38,16 +38,6 @@ from ..support.files import partition_keys
 from ..support.times import local_day
 from .keeping import SAMPLE, Kept
 
-__all__ = [
-    "LABELS",
-    "Accumulated",
-    "LogFitSettings",
-    "OutlierLimits",
-    "accumulate_each",
-    "log_moments",
-    "merged_moments",
-]
-
 #: Roles whose columns tell runs apart.
 LABELS = ("unit", "run")
 

@@ -12,14 +12,6 @@ from ..support.roles import ANGLE_UNITS, Column, unit_in_name
 from ..support.signals import SIGNALS
 from ..support.suggestions import check_choice, did_you_mean
 
-__all__ = [
-    "SIGNAL_COLUMNS",
-    "UNITS",
-    "AngleColumn",
-    "find_angle_column",
-    "find_joint_signal",
-]
-
 UNITS = (*UNIT_PERIODS, "count")
 
 #: Column endings of the signals that terms of a model may need.

@@ -24,8 +24,6 @@ from .turns import TurnCounter, TurnSpan
 #: What the system says of writing only.
 _OF_WRITING = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 
-__all__ = ["Task", "correct_log", "count_turns", "is_disk_full", "states_after"]
-
 
 @dataclass(frozen=True)
 class Task:

@@ -28,8 +28,6 @@ from .statistics import CorrectionStatistics
 from .turns import TurnCounter, TurnState
 from .unitevidence import UnitEvidence
 
-__all__ = ["Channel", "JointState", "LogJoint", "LogSettings", "logged_joints"]
-
 Array: TypeAlias = NDArray[np.floating[Any]]
 
 

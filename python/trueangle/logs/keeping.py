@@ -11,8 +11,6 @@ from numpy.typing import NDArray
 
 from ..support.arrays import Array
 
-__all__ = ["KEPT", "SAMPLE", "Kept"]
-
 #: Up to so many readings, 16 bytes each, are all read into runs ...
 KEPT: Final = 1 << 20
 #: ... and of more so many are kept: what is decided by them costs a part of a second.

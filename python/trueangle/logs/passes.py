@@ -39,8 +39,6 @@ from .accumulation import (
 from .keeping import SAMPLE
 from .progress import Progress
 
-__all__ = ["Passes"]
-
 #: Orders per order of the table that sums of segments hold to a part in 1e10.
 _REACH = 2.89
 #: With more logs, each with its sums, the scan beyond the low orders is left out.

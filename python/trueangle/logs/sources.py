@@ -13,8 +13,6 @@ from ..formats.formats import find_format, known_format
 from ..runs.paths import find_logs
 from ..support.files import RUNS_BYTES, check_output, kind_of_log, promised_format, same_file
 
-__all__ = ["LogTarget", "hold_at_most", "output_places"]
-
 #: Rows that a byte of a packed file holds, at most, where nothing else is known.
 _PACKED = 64
 

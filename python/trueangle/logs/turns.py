@@ -9,8 +9,6 @@ from numpy.typing import NDArray
 
 from ..support.arrays import Array
 
-__all__ = ["TurnCounter", "TurnSpan", "TurnState"]
-
 
 class TurnState(NamedTuple):
     """Where a reading stopped: the last angle seen and the turns counted up to it."""

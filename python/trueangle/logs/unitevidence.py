@@ -10,8 +10,6 @@ from numpy.typing import NDArray
 
 from ..support.angles import UNIT_PERIODS, unit_name
 
-__all__ = ["UnitEvidence"]
-
 #: Readings that fill a turn of another unit, and no more, to this share ...
 _FILLED: Final = 0.9
 #: ... and jump over its border by as much, while a usual step is below a tenth.

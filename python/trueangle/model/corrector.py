@@ -16,11 +16,6 @@ from ..support.signals import GivenSignals, check_names
 if TYPE_CHECKING:
     from .model import HarmonicModel, Step
 
-__all__ = [
-    "Corrector",
-    "Velocity",
-]
-
 
 class Velocity:
     """Backward differences of angle over time, carried over batches.

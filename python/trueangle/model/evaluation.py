@@ -17,8 +17,6 @@ if TYPE_CHECKING:
 
     from .term import Term
 
-__all__ = ["Evaluation", "Path", "SpanGuard", "Stretch"]
-
 Path: TypeAlias = Literal["table", "cubics", "exact", "direct", "counts"]
 
 #: Start, stop, and whether every turn looks the same.

@@ -8,8 +8,6 @@ from typing import Any
 from ..support.decoding import Decoder, shown
 from ..support.files import Source
 
-__all__ = ["MAX_TERMS", "FitRecord", "Provenance", "RecordReader", "TableRecord"]
-
 #: Ends of a span are within so many turns.
 MOST_TURNS = 1e9
 

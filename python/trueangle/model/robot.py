@@ -25,8 +25,6 @@ from .step import exchangeable
 if TYPE_CHECKING:
     from .step import AllJoints
 
-__all__ = ["Robot"]
-
 #: Columns of a log by role, each with its unit where its name does not tell it.
 Columns: TypeAlias = Mapping[str, tuple[str, str | None]]
 

@@ -15,8 +15,6 @@ if TYPE_CHECKING:
     from .model import HarmonicModel
     from .robot import Robot
 
-__all__ = ["AllJoints", "ExchangeableStep", "Step", "exchangeable"]
-
 
 class Step(Protocol):
     """One corrected angle for one indicated one; signals that are not needed are ignored."""

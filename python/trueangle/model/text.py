@@ -19,18 +19,6 @@ if TYPE_CHECKING:
     from .records import FitRecord
     from .robot import Robot
 
-__all__ = [
-    "FORMAT",
-    "ROBOT_FORMAT",
-    "VERSION",
-    "model_content",
-    "model_summary",
-    "model_text",
-    "one_line",
-    "save_model",
-    "save_robot",
-]
-
 FORMAT = "trueangle-model"
 ROBOT_FORMAT = "trueangle-robot"
 VERSION = 1

@@ -14,8 +14,6 @@ import trueangle._core as _core
 from ..errors import ArgumentError, NotInvertibleError
 from .records import MOST_TURNS, FitRecord
 
-__all__ = ["check_fit", "check_invertible", "check_number", "checked_covariance", "greatest_slope"]
-
 #: What a condition number may be below 1 by rounding.
 ROUNDING = 1e-6
 

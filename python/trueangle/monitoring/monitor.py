@@ -20,8 +20,6 @@ from ..support.plainresult import Shown, counted
 from ..support.runlength import chart_limit, rare
 from .alarm import WatchedOrder, WatchedWindow
 
-__all__ = ["Monitor"]
-
 #: By which the run length of all charts is raised: what standardizing by a few windows, and
 #: correlation that is found late, take from it.
 _MARGIN: Final = 1.25

@@ -20,8 +20,6 @@ from ..runs.source import Reading, checked_reading
 from ..support.arrays import Array
 from ..support.roles import Column, wanted_columns
 
-__all__ = ["ReadingBatch", "read_batches", "read_lines"]
-
 
 class ReadingBatch(NamedTuple):
     """Angle that the model's error is a function of, error in the model's unit, and seconds."""

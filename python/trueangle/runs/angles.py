@@ -13,8 +13,6 @@ from ..support.roles import Column, offsets_of, signal_code
 from ..support.suggestions import did_you_mean
 from .facets import Facets
 
-__all__ = ["Angles", "find_angles"]
-
 #: Unit of the run's angles where the reference has none that a run may be in.
 _PERIOD = 360.0
 

@@ -14,8 +14,6 @@ from ..support.arrays import Array
 from ..support.roles import ANGLE_UNITS, unit_in_name, wanted_columns
 from .readings import named_source, readings_of
 
-__all__ = ["Facets", "read_facets"]
-
 #: How far a nominal angle may be off its facet, as a share of the closest two facets' distance.
 _OFF = 0.01
 

@@ -21,15 +21,6 @@ from .readings import FileReadings
 from .run import CalibrationRun, as_runs, given_runs
 from .source import Reading, checked_reading, each_table
 
-__all__ = [
-    "RunColumns",
-    "each_runs",
-    "read_columns",
-    "read_runs",
-    "runs_of",
-    "runs_of_readings",
-]
-
 
 class RunLabels(NamedTuple):
     """What tells a run from the others: its joint, when it was calibrated, and its label."""

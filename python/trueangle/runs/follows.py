@@ -17,8 +17,6 @@ from .checks.angles import AGREES, angle_ratio, suggestion
 from .checks.record import records_of
 from .run import CalibrationRun
 
-__all__ = ["check_follows"]
-
 #: Readings looked at; a mistake of unit shows in any few.
 _SAMPLE = 1000
 

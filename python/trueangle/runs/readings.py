@@ -34,8 +34,6 @@ from ..support.files import (
 from ..support.roles import LABELS, Column, wanted_columns
 from ..support.times import elapsed_seconds, parsed_time
 
-__all__ = ["FileReadings", "named_source", "read_once", "read_readings", "readings_of"]
-
 T = TypeVar("T")
 
 #: Columns that are kept although nothing is known of them, at most: a wide log has thousands.

@@ -18,8 +18,6 @@ from ..support.files import Source
 from ..support.kinds import told_kinds
 from ..support.signals import FIELDS, find_signal, signal_column, signal_columns
 
-__all__ = ["CalibrationRun", "as_runs", "given_runs"]
-
 
 @told_kinds
 @dataclass(frozen=True, eq=False)

@@ -19,8 +19,6 @@ from .paths import find_logs
 from .readings import FileReadings, named_source, readings_of
 from .tables import table_readings
 
-__all__ = ["OtherReading", "Reading", "checked_reading", "each_table", "unit_of_path"]
-
 T = TypeVar("T")
 
 

@@ -18,8 +18,6 @@ from ..support.labelled import take_apart
 from ..support.roles import Wanted
 from .readings import FileReadings
 
-__all__ = ["table_readings"]
-
 
 class _Memory(Format):
     """A table that was never in a file: its rows are counted from 1."""

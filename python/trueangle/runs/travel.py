@@ -19,8 +19,6 @@ from ..support.angles import unit_name
 from ..support.arrays import Array
 from .run import CalibrationRun
 
-__all__ = ["Span", "covered_span", "held_orders", "over_turns", "travelled_span", "without_drift"]
-
 #: Readings whose positions are looked at: one lies in every degree of the travel.
 _LOOKED_AT = 65_536
 

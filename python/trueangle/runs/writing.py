@@ -14,8 +14,6 @@ from ..support.kinds import told_kinds
 from ..support.signals import find_signal
 from .run import CalibrationRun, as_runs
 
-__all__ = ["write_runs"]
-
 #: Signals that stand first, in the order that these files have always had.
 _ORDER = ("time", "velocity", "torque", "temperature", "mount")
 

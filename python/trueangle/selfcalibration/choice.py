@@ -15,8 +15,6 @@ from .projected import Projected
 from .readings import SegmentReadings
 from .steady import SteadyFit, fit_steady
 
-__all__ = ["HIGHEST", "choose_orders", "chosen_orders", "highest_order"]
-
 Array = NDArray[Any]
 
 #: Highest order looked for.

@@ -14,8 +14,6 @@ from ..support.angles import wrap
 from ..support.arrays import Array
 from .recording import Recording
 
-__all__ = ["Clampings", "clampings_of"]
-
 #: Shifts that differ by less (radians) are one shift.
 _APART: Final = math.radians(0.5)
 

@@ -11,8 +11,6 @@ from ..support.arrays import Array
 from ..support.distributions import chi_squared_tail
 from .projected import harmonic_rows
 
-__all__ = ["noise_beside", "spectrum_at"]
-
 #: Distances from an order at which its neighbourhood is looked at.
 _BESIDE: Final = (-0.5, -0.41, -0.32, -0.23, 0.23, 0.32, 0.41, 0.5)
 

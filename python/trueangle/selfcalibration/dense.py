@@ -12,8 +12,6 @@ import numpy as np
 from ..support.arrays import Array
 from .projected import NOT_SEEN, Projected, Unknown
 
-__all__ = ["DenseFit", "DenseRows", "fit_dense", "fixed_point", "low_frequency_inflation"]
-
 #: Variances of random terms that are tried, relative to the noise (powers of ten).
 _VARIANCES: Final = np.concatenate([[-math.inf], np.linspace(-4.0, 10.0, 57)])
 

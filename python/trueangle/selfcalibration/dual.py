@@ -41,8 +41,6 @@ from .recording import Recording
 from .result import ARCSEC, Blind, HeldOut, OrderEstimate, SelfCalibration, estimates, listed
 from .verification import chance_of
 
-__all__ = ["dual"]
-
 #: A ratio is taken for another than the given or a whole one beyond so many standard errors:
 #: a chance of 6e-5.
 _FAR: Final = 4.0

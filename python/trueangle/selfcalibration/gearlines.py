@@ -13,18 +13,6 @@ from ..errors import NoModelError
 from ..support.arrays import Array
 from .recording import Recording
 
-__all__ = [
-    "SLIP",
-    "Channels",
-    "SharedLine",
-    "channels_of",
-    "lines_of",
-    "motion",
-    "slope_ratio",
-    "turning",
-    "varied",
-]
-
 #: Orders of each shaft that are tried by default.
 _HIGHEST: Final = 8
 

@@ -27,8 +27,6 @@ from .recording import Recording
 from .result import ARCSEC, Blind, HeldOut, OrderEstimate, SelfCalibration, estimates, listed
 from .verification import judged
 
-__all__ = ["head_patterns"]
-
 #: Orders tried by default.
 _HIGHEST: Final = 32
 

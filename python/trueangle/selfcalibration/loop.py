@@ -11,8 +11,6 @@ from ..errors import ArgumentError
 from ..support.suggestions import check_choice
 from .result import Blind, OrderEstimate
 
-__all__ = ["LOOPS", "check_loop", "followed_orders", "followed_share", "widened"]
-
 LOOPS: Final = ("open", "closed", "unknown")
 
 #: Below so many bandwidths a velocity loop follows more than a tenth of what it sees.

@@ -29,8 +29,6 @@ from .splines import (
 )
 from .sums import MotionSums
 
-__all__ = ["MotionFit", "MotionSearch"]
-
 #: Stiffness looked at, as a power of ten relative to the readings per knot.
 _STIFFEST, _SOFTEST = 7.0, -5.0
 

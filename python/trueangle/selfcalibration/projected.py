@@ -14,15 +14,6 @@ import trueangle._core as _core
 
 from ..support.arrays import Array
 
-__all__ = [
-    "NOT_SEEN",
-    "Projected",
-    "Unknown",
-    "harmonic_rows",
-    "harmonic_sum",
-    "pairs",
-]
-
 #: A column is not seen where nuisances and other columns leave less of its square.
 #: Below this share rounding in the sums (1e-16 of a column, times its condition) decides.
 NOT_SEEN = 1e-9

@@ -12,8 +12,6 @@ from ..support.arrays import Array
 from .splines import Knots
 from .stretches import Segment, ripple_lead
 
-__all__ = ["PER_KNOT", "SegmentReadings"]
-
 #: Readings per knot of the finest grid, at least.
 PER_KNOT: Final = 6
 

@@ -18,8 +18,6 @@ from ..support.arrays import Array
 from ..support.files import Source
 from ..support.roles import LABELS, Column, role_kind, signal_code
 
-__all__ = ["Recording", "as_recordings"]
-
 _LABELS = ("unit", "run")
 
 #: Roles of columns that a recording keeps, besides the heads.

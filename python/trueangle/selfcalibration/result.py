@@ -16,16 +16,6 @@ from ..support.display_units import ErrorsIn, ErrorUnit, error_unit
 from ..support.layout import laid_out, wrapped
 from ..support.plainresult import PlainResult, counted
 
-__all__ = [
-    "Blind",
-    "HeldOut",
-    "OrderEstimate",
-    "SelfCalibration",
-    "listed",
-    "ranges",
-    "selfcal_summary",
-]
-
 #: Seconds of arc in a radian.
 ARCSEC = ARCSEC_PER_TURN / (2.0 * math.pi)
 

@@ -16,8 +16,6 @@ import numpy as np
 
 from ..support.arrays import Array
 
-__all__ = ["LARGEST_COST", "averaged_over_ripple", "cost_of_ripple"]
-
 #: Where separating the ripple multiplies the standard error by more, speeds are too much
 #: alike: the sum is given under both names instead. A ratio of speeds of about 1.2.
 LARGEST_COST: Final = 10.0

@@ -29,8 +29,6 @@ from .projected import Unknown, harmonic_rows, pairs
 from .recording import Recording
 from .result import ARCSEC, Blind, HeldOut, SelfCalibration, estimates, listed, ranges
 
-__all__ = ["shift_patterns"]
-
 OTHER: Final = "the other encoder"
 FACETS: Final = "the polygon's facets"
 

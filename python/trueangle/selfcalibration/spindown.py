@@ -29,8 +29,6 @@ from .steady import SteadyFit, fit_steady
 from .stretches import cut_stretches
 from .verification import held_out
 
-__all__ = ["spin_down"]
-
 #: An order of which motion leaves less is not the encoder's to say.
 LEAST_RETAINED: Final = 0.02
 

@@ -15,16 +15,6 @@ from numpy.typing import NDArray
 
 from ..support.arrays import Array
 
-__all__ = [
-    "BAND",
-    "Knots",
-    "Wander",
-    "coarser_bands",
-    "coarser_rows",
-    "smooth_trends",
-    "spline_basis",
-]
-
 #: Diagonals of a banded matrix that are kept: the main one and three above it.
 BAND = 4
 

@@ -17,8 +17,6 @@ from .projected import Projected, Unknown, pairs
 from .readings import PER_KNOT, SegmentReadings
 from .steps import Steps
 
-__all__ = ["SteadyFit", "fit_steady"]
-
 #: Readings that the first iterations look at: enough to come close.
 _FIRST_LOOK: Final = 40_000
 

@@ -16,8 +16,6 @@ from .readings import SegmentReadings
 from .splines import Knots, spline_basis, spline_values
 from .sums import ordered_sums
 
-__all__ = ["Steps"]
-
 #: Slope of the error that no step goes beyond: at 1 an angle would be read twice.
 _STEEPEST: Final = 0.97
 

@@ -15,8 +15,6 @@ from ..errors import FileError, NoModelError
 from ..support.arrays import Array
 from .recording import Recording
 
-__all__ = ["Segment", "cut_stretches", "ripple_lead"]
-
 #: Motion slower than this share of the median speed is left out, as are reversals.
 SLOWEST: Final = 0.2
 

@@ -12,8 +12,6 @@ from numpy.typing import NDArray
 from ..support.arrays import Array
 from .splines import BAND, Knots, spline_basis
 
-__all__ = ["MotionSums", "ordered_sums"]
-
 #: Readings whose columns are made at once: some MB, so that they stay in cache.
 _CHUNK = 4096
 

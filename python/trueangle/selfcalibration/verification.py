@@ -15,8 +15,6 @@ from .readings import SegmentReadings
 from .result import ARCSEC, HeldOut
 from .steady import SteadyFit, fit_steady
 
-__all__ = ["chance_of", "held_out", "judged"]
-
 #: Speeds that differ by less than this ratio test nothing.
 _SPEEDS: Final = 1.3
 

@@ -7,7 +7,5 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Array"]
-
 #: Numbers of double precision, of any shape.
 Array: TypeAlias = NDArray[np.float64]

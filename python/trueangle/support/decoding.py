@@ -12,18 +12,6 @@ from typing import Any, TypeVar
 from ..errors import FileError
 from .files import read_whole
 
-__all__ = [
-    "MAX_LINES",
-    "MAX_LINE_ORDERS",
-    "MAX_ORDER",
-    "Decoder",
-    "Entries",
-    "finite_float",
-    "json_text",
-    "read_text",
-    "shown",
-]
-
 T = TypeVar("T")
 
 #: Highest order of the output, in cycles per output turn: the lines of a disc of a million.

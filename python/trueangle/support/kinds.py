@@ -9,8 +9,6 @@ from typing import Any, TypeVar
 
 from ..errors import KindError, TrueAngleError
 
-__all__ = ["all_of_type", "of_type", "told_kinds"]
-
 F = TypeVar("F", bound=Callable[..., Any])
 
 #: How many items of a collection are looked at: one may be longer than there is time for.

@@ -13,8 +13,6 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["take_apart"]
-
 #: Puts the labels of the data taken apart on results of their shape.
 PutBack: TypeAlias = Callable[[NDArray[Any]], Any]
 

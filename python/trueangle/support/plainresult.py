@@ -8,8 +8,6 @@ import sys
 from collections.abc import Iterator, Mapping, Sized
 from typing import Any
 
-__all__ = ["PlainResult", "Shown", "counted", "finite", "pretty_json", "result_picture"]
-
 #: Characters of a result's ``repr`` at most: one line of a screen.
 WIDTH = 100
 

@@ -8,8 +8,6 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["power_sums"]
-
 #: Powers between two fresh evaluations: keeps rounding near 1e-15 * 64.
 _RESEED: Final = 64
 

@@ -11,8 +11,6 @@ import warnings
 from types import ModuleType
 from typing import Any, Final
 
-__all__ = ["RENAMED", "install", "moved_name"]
-
 #: Former module or room, and where it is now; the longest that fits counts.
 RENAMED: Final = {
     "aliasing": "runs.aliasing",

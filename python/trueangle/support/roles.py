@@ -19,23 +19,6 @@ from .angles import UNIT_PERIODS
 from .signals import SIGNALS, find_signal
 from .suggestions import did_you_mean
 
-__all__ = [
-    "ANGLES",
-    "ANGLE_UNITS",
-    "BRACKET",
-    "LABELS",
-    "TIME_UNITS",
-    "Column",
-    "Wanted",
-    "count_turn",
-    "offsets_of",
-    "role_kind",
-    "signal_code",
-    "unit_in_name",
-    "wanted_columns",
-    "wanted_unit",
-]
-
 #: Turns in the units of angles; counts have no turn of their own.
 ANGLE_UNITS: Final[Mapping[str, float]] = {**UNIT_PERIODS, "arcsec": 1_296_000.0, "arcmin": 21600.0}
 #: Seconds in the units of time.

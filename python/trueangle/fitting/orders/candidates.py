@@ -17,8 +17,6 @@ from ...runs.aliasing import POSITION_TOLERANCE, Positions, distinct_positions, 
 from ...runs.run import CalibrationRun
 from ...support.arrays import Array
 
-__all__ = ["Candidates", "choose_candidates", "effective_positions"]
-
 #: Low orders looked at when no gear is declared and the angles are free.
 HIGHEST_FREE_ORDER: Final = 100
 

@@ -25,8 +25,6 @@ from .table import OrderSelection
 if TYPE_CHECKING:
     from ..summed import Summed
 
-__all__ = ["Method", "declared_cycles", "selected_of"]
-
 Method: TypeAlias = Literal["evidence", "paper"]
 
 #: Angles looked at to tell whether a gear's orders are resolved over the travel.

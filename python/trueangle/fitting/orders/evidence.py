@@ -19,18 +19,6 @@ from ...estimation.linear import pseudo_inverse
 from ...support.arrays import Array
 from .harmonicsums import HarmonicSums
 
-__all__ = [
-    "COLLINEAR",
-    "OVERDISPERSED",
-    "OrderTest",
-    "choose_forward",
-    "examine_orders",
-    "fit_subset",
-    "held_out_gains",
-    "log_chi2_tail",
-    "log_tail",
-]
-
 Index = NDArray[np.intp]
 
 #: A candidate whose columns keep less than this of their energy beside those already

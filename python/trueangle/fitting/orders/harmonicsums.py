@@ -22,8 +22,6 @@ from ...support.arrays import Array
 from ...support.powersums import power_sums
 from .unitgroups import GROUPS, MOST_UNITS, columns_summed, units_in_groups
 
-__all__ = ["HarmonicSums", "ZeroGroupReadings", "harmonic_sums"]
-
 #: From so many readings on the core's piecewise moments are faster than this file's powers.
 _LARGE: Final = 1024
 

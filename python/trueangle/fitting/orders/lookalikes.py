@@ -16,8 +16,6 @@ from ...runs.aliasing import Positions, position_coherence
 from .evidence import fit_subset
 from .harmonicsums import ZeroGroupReadings, harmonic_sums
 
-__all__ = ["DECISIVE", "find_lookalikes", "substitution_losses"]
-
 #: Two orders are told apart when one explains better by this many noise variances: a
 #: likelihood ratio of e^5, about 150 to 1.
 DECISIVE: Final = 10.0

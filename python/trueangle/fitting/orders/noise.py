@@ -15,15 +15,6 @@ from ...support.quantiles import median
 from .evidence import COLLINEAR, OVERDISPERSED, fit_subset, log_chi2_tail
 from .harmonicsums import HarmonicSums, ZeroGroupReadings
 
-__all__ = [
-    "NEIGHBOURS",
-    "ReadingVariance",
-    "neighbour_scatter",
-    "pooled_scatter",
-    "pure_error",
-    "run_scatter",
-]
-
 #: Sweeps of alternating means (positions, zeros); whole grids need one.
 _SWEEPS: Final = 20
 

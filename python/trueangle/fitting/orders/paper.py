@@ -29,8 +29,6 @@ from .table import OrderRow, OrderSelection
 from .verdicts import explained_row, selection_notes
 from .zerogroups import zero_units
 
-__all__ = ["PHASE_RANGE_DEG", "PROMINENCE", "run_coefficients", "select_by_paper"]
-
 #: Phases of a retained order lie within this arc over the runs. Noise alone stays within
 #: 60 degrees over five runs in 0.4 % of cases, within the paper's "about 10" in 3e-6,
 #: which in turn loses an order of 10 standard errors every other time.

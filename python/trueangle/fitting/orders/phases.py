@@ -12,8 +12,6 @@ from ...support.arrays import Array
 from .evidence import fit_subset
 from .harmonicsums import HarmonicSums
 
-__all__ = ["circular_range_deg", "unit_coefficients", "unit_phases"]
-
 
 def circular_range_deg(phases: ArrayLike) -> float:
     """Smallest arc in degrees that holds all phases (radians); NaN for fewer than two.

@@ -19,8 +19,6 @@ from .evidence import OrderTest, choose_forward, examine_orders, fit_subset, hel
 from .harmonicsums import HarmonicSums
 from .noise import NEIGHBOURS, ReadingVariance, neighbour_scatter, pooled_scatter, run_scatter
 
-__all__ = ["FALSE_ALARM", "NEGLIGIBLE_NOISE", "NEGLIGIBLE_SHARE", "STEEPEST", "EvidenceSearch"]
-
 #: Chance, over the whole search, that noise alone makes any order significant. Half of
 #: the 1 % promised: the rest covers what the noise estimate itself does not know.
 FALSE_ALARM: Final = 0.005

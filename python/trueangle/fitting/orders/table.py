@@ -19,8 +19,6 @@ if TYPE_CHECKING:
 
     from ..result import FitResult
 
-__all__ = ["OrderRow", "OrderSelection"]
-
 #: Orders that the one line of a selection lists.
 _SHOWN = 6
 

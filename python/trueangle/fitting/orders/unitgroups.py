@@ -18,8 +18,6 @@ from ...support.arrays import Array
 if TYPE_CHECKING:
     from .harmonicsums import ZeroGroupReadings
 
-__all__ = ["GROUPS", "MOST_UNITS", "columns_summed", "unit_means", "units_in_groups"]
-
 #: With more units than this they are taken together, in so many groups.
 MOST_UNITS: Final = 96
 GROUPS: Final = 32

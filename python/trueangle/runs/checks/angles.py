@@ -14,15 +14,6 @@ from ...support.quantiles import median, quantile
 from .fault import DataFault
 from .record import Record
 
-__all__ = [
-    "angle_ratio",
-    "mixed_units",
-    "suggestion",
-    "swapped",
-    "wrapped_reference",
-    "wrong_ratio",
-]
-
 #: Travel (degrees) from which on a ratio of the channels means anything, and how far from 1
 #: it may be: errors of several degrees over a short travel are still errors.
 LEAST_TRAVEL, AGREES = 5.0, 0.15

@@ -18,8 +18,6 @@ from .still import stuck_readings
 if TYPE_CHECKING:
     from .result import Check
 
-__all__ = ["check", "data_faults"]
-
 #: Every test of the data, in the order in which they are told.
 TESTS = (
     unsorted_time,

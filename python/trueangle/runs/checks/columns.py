@@ -14,8 +14,6 @@ from ...support.layout import laid_out
 from ...support.plainresult import PlainResult, counted
 from ...support.roles import unit_in_name
 
-__all__ = ["LikelyColumn", "LogColumns", "columns_of_log"]
-
 #: Words of a name that tell its role.
 _WORDS: Final = {
     "reference": "reference ref laser tracker true truth polygon interferometer external",

@@ -11,8 +11,6 @@ from ...support.plainresult import counted
 from ...support.quantiles import median, quantile
 from .record import Record
 
-__all__ = ["Extent", "extent_of", "extent_verdicts"]
-
 #: Levels are apart by this share of their range, and by so much at least.
 GAP = 0.1
 LEAST_GAP = {"speed": 0.5, "load": 0.05, "temperature": 1.0, "mount": 0.5}

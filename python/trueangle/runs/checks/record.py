@@ -18,8 +18,6 @@ from ..readings import FileReadings
 from ..run import CalibrationRun
 from ..source import checked_reading
 
-__all__ = ["Record", "read_records", "records_of"]
-
 
 @dataclass(frozen=True, eq=False)
 class Record:

@@ -22,8 +22,6 @@ from ...support.quantiles import median, quantile
 from .fault import DataFault
 from .record import Record
 
-__all__ = ["stuck_readings"]
-
 #: What the other channel must have passed by: in noise (a chance of 1e-9), in counts of a
 #: column that has a lattice, and of one whose steps only look like it (no count is so long).
 _FAR: Final = 6.0

@@ -12,8 +12,6 @@ from ...errors import ArgumentError
 from ...support.arrays import Array
 from .stream import Stream
 
-__all__ = ["Clocks", "estimated_clocks"]
-
 #: Points of the grid on which the coarse offset is searched, at most.
 _GRID = 1 << 20
 #: Share of the shorter stream that must overlap.

@@ -23,8 +23,6 @@ from .clocks import Clocks, estimated_clocks
 from .result import Gap, Joined
 from .stream import Stream
 
-__all__ = ["join"]
-
 #: FileReadings that a run is made of, at least.
 _LEAST = 4
 

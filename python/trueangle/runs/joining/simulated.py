@@ -22,8 +22,6 @@ from .clocks import estimated_clocks
 from .stream import Stream
 from .travel import Travelled
 
-__all__ = ["BY", "MeasuredMinusSimulated", "minus_simulated"]
-
 #: How a log may be brought to the readings.
 BY = ("time", "angle")
 #: rms by which two motions differ, as a share of their own, from which on they are not the same.

@@ -10,8 +10,6 @@ from numpy.typing import NDArray
 
 from ...support.arrays import Array
 
-__all__ = ["Stream"]
-
 #: Times the typical step in time from which on a pause is a gap.
 GAP = 5.0
 #: Part of a step by which a time may lie outside.

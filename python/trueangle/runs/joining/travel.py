@@ -10,8 +10,6 @@ from numpy.typing import NDArray
 
 from ...support.arrays import Array
 
-__all__ = ["Travelled"]
-
 #: Times the typical step in angle from which on a stretch is a gap.
 GAP = 5.0
 #: Part of a turn that may be missing in a log of a whole turn.

@@ -14,19 +14,6 @@ from ...errors import FileError, KindError
 from .samefile import what_it_is
 from .workplace import restore
 
-__all__ = [
-    "MODEL_BYTES",
-    "RUNS_BYTES",
-    "SIMULATION_BYTES",
-    "Source",
-    "check_input",
-    "is_null_device",
-    "partition_keys",
-    "partition_name",
-    "read_whole",
-    "sha256_of",
-]
-
 #: Most bytes of files that are read whole. The covariance of a model of 1800 orders, the
 #: largest part of any model, takes 256 MiB as text; a simulation is written by hand; larger
 #: tables of readings go through the readers of logs, in constant memory.
