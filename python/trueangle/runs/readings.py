@@ -31,7 +31,7 @@ from ..support.files import (
     read_whole,
     sha256_of,
 )
-from ..support.roles import LABELS, Column, wanted_columns
+from ..support.roles import LABELS, Column, role_kind, signal_code, wanted_columns
 from ..support.times import elapsed_seconds, parsed_time
 
 T = TypeVar("T")
@@ -104,6 +104,19 @@ class FileReadings(NamedTuple):
             problem = f"readings must be finite, got {numbers[row]}; drop the row"
             raise self.error(problem, column.name, row)
         return numbers
+
+    def values(
+        self, column: Column, period: float, counts_per_turn: float | None
+    ) -> NDArray[np.float64]:
+        """A column in the unit of a run of ``period``, refused where its own is not known."""
+        if role_kind(column.role) == "angle" and column.unit is None:
+            code = signal_code(column.role, column.name, "deg")
+            raise self.error(f"its unit is not known; give it: {code}", column.name)
+        if column.unit == "count" and counts_per_turn is None:
+            beside = "_reference" if column.role == "reference" else ""
+            problem = f"counts need their number per turn: give `counts_per_turn{beside}=`"
+            raise self.error(problem, column.name)
+        return column.values(self.raw(column), period, counts_per_turn)
 
 
 def read_readings(

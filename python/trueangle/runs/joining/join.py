@@ -131,16 +131,8 @@ class _Log(NamedTuple):
                 + signal_code("time")
             )
         column = roles[role]._replace(unit=roles[role].unit or table.format.unit)
-        if column.unit is None:
-            problem = f"its unit is not known; give it: {signal_code(role, column.name, 'deg')}"
-            raise table.error(problem, column.name)
-        if column.unit == "count" and counts is None:
-            beside = "" if role == "indicated" else "_reference"
-            raise table.error(
-                f"counts need their number per turn: give `counts_per_turn{beside}=`", column.name
-            )
+        angle = table.values(column, 360.0, counts)
         time = roles["time"].values(table.raw(roles["time"]), 360.0)
-        angle = column.values(table.raw(column), 360.0, counts)
         known = np.isfinite(time) & np.isfinite(angle)
         if np.count_nonzero(known) < _LEAST:
             raise table.error(f"fewer than {_LEAST} readings", column.name)
