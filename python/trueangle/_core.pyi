@@ -4,7 +4,7 @@ from typing import Any, Literal, Unpack, final, overload
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .formats.signals import GivenSignals
+from .support.signals import GivenSignals
 
 __version__: str
 

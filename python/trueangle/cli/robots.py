@@ -32,7 +32,7 @@ class JointAsked:
     @property
     def signals(self) -> dict[str, Any]:
         """Columns by role that a correction reads, as a robot's file keeps them."""
-        from ..formats.signals import is_at_run_time
+        from ..support.signals import is_at_run_time
 
         read = ("indicated", "time")
         entries = [e for e in self.args.signal or () if e[0] is None]
@@ -110,7 +110,7 @@ def _asked(
 
     The angles of the others are signals that it may be coupled to.
     """
-    from ..formats.signals import COUPLED
+    from ..support.signals import COUPLED
 
     own = {_key(e): e for e in entries if e[0] == joint.name}
     for role, column in joint.signals.items():

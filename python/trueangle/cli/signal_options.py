@@ -77,7 +77,7 @@ def signal_argument(text: str) -> _Entry:
     >>> signal_argument("arm.torque=tau"), signal_argument("reference=IOC:m1.RBV")
     (('arm', 'torque', 'tau', None), (None, 'reference', 'IOC:m1.RBV', None))
     """
-    from ..formats.columns import role_kind, wanted_unit  # takes numpy, which a help does without
+    from ..support.roles import role_kind, wanted_unit  # takes numpy, which a help does without
 
     left, equals, name = text.partition("=")
     joint, _, role = left.rpartition(".")

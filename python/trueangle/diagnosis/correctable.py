@@ -12,7 +12,7 @@ from ..errors import ArgumentError, NoModelError
 from ..model.model import HarmonicModel
 from ..simulation.simulation import Simulation
 from ..support.angles import ARCSEC_PER_TURN
-from ..support.oftype import of_type
+from ..support.kinds import of_type
 from ..support.plainresult import PlainResult
 from .correction import extend_model
 from .finding import Finding

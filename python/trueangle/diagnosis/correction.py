@@ -10,13 +10,13 @@ import numpy as np
 
 from ..effects import EFFECTS, Effect
 from ..errors import ArgumentError
-from ..formats.signals import coupled_with
 from ..joint.signals import join_runs
 from ..model.model import HarmonicModel
 from ..model.term import Term
 from ..runs.run import CalibrationRun, as_runs
 from ..simulation.simulation import EFFECT
-from ..support.oftype import of_type
+from ..support.kinds import of_type
+from ..support.signals import coupled_with
 
 if TYPE_CHECKING:
     from ..fitting.argument import AnyArgument

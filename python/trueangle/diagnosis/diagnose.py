@@ -22,8 +22,7 @@ from ..runs.source import Reading
 from ..simulation.simulation import SIMULATION, Simulation
 from ..support.blas import one_blas_thread
 from ..support.deadline import Pace, pace, with_pace
-from ..support.kinds import told_kinds
-from ..support.oftype import of_type
+from ..support.kinds import of_type, told_kinds
 from .account import MOST_READINGS, account_of
 from .believed import judged_beliefs
 from .candidates import proposed_above

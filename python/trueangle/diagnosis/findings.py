@@ -15,8 +15,7 @@ from ..runs.checks import DataFault
 from ..simulation.measured import design_of
 from ..simulation.simulation import Simulation
 from ..support.display_units import ErrorsIn
-from ..support.drawn import result_picture
-from ..support.plainresult import counted
+from ..support.plainresult import counted, result_picture
 from .beliefs import Belief
 from .correctable import Correctable
 from .discrepancy import Discrepancy

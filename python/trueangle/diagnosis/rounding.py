@@ -17,11 +17,8 @@ from ..effects.quantisation import LEAST_SHARE
 from ..estimation.factor import orthonormal_basis
 from ..estimation.regression import Extension, Regression
 from ..estimation.rounded import Rounded, fit_rounded
+from ..support.arrays import Array
 from .penalty import NEW_CAUSE, finding_groups
-
-__all__ = ["beyond_rounding", "rounding_of", "tells_no_more", "unrounded"]
-
-Array = NDArray[np.float64]
 
 
 def rounding_of(regression: Regression) -> float:

@@ -12,13 +12,13 @@ from ..errors import ArgumentError
 from ..estimation.estimate import Parameters, quantity
 from ..estimation.extension import Extension
 from ..estimation.regression import Regression
-from ..formats.signals import COUPLED
 from ..joint.pattern import Surroundings
 from ..joint.signals import Signals
 from ..model import forms
 from ..model.forms import Form
 from ..model.term import Term
 from ..support.angles import ARCSEC_PER_DEG
+from ..support.signals import COUPLED
 from .blindness import OWN_POWER, Blindness, share_left
 from .effect import Effect
 from .scale_error import ScaleError

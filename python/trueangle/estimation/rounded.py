@@ -23,9 +23,7 @@ from numpy.typing import NDArray
 
 import trueangle._core as _core
 
-__all__ = ["Rounded", "fit_rounded"]
-
-Array = NDArray[np.float64]
+from ..support.arrays import Array
 
 #: Standard deviation of the noise, in steps, below which readings tell of none: only one in a
 #: dozen is then within two of them of the border of its step.

@@ -131,8 +131,7 @@ class Admt4000(Target):
             sizes.append((codes[order]["MAG"] & ((1 << bits) - 1)) * _MAGNITUDE / _CORDIC)
             phases.append(math.radians((codes[order]["PH"] & 0xFFF) * _PHASE))
         from ..model.records import Provenance, TableRecord
-        from ..runs.run import Source
-        from ..support.files import sha256_of
+        from ..support.files import Source, sha256_of
 
         step = _MAGNITUDE / _CORDIC
         std = step / math.sqrt(12.0)

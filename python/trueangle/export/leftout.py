@@ -12,10 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import ArgumentError, OutsideSpanWarning
-from ..formats.signals import coupled_with
 from ..model.model import HarmonicModel
 from ..model.term import Term
 from ..support.angles import ARCSEC_PER_TURN
+from ..support.signals import coupled_with
 from ..terms import LocalDefect
 from .pattern import TurnPattern
 from .runtimeterms import RunTimeTerms

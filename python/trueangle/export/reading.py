@@ -164,8 +164,7 @@ def _model(
         residual = math.hypot(residual, sigma)
         samples += table.entries
     from ..model.records import Provenance, TableRecord
-    from ..runs.run import Source
-    from ..support.files import sha256_of
+    from ..support.files import Source, sha256_of
 
     model = HarmonicModel(
         tuple(shafts),

@@ -18,11 +18,11 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from ..errors import ArgumentError
-from ..formats.signals import coupled_with
 from ..model import forms
 from ..model.forms import Form
 from ..model.model import HarmonicModel
 from ..model.term import Term
+from ..support.signals import coupled_with
 from ..terms import LocalDefect
 
 __all__ = ["DIRECTIONS", "RunTimeTerms", "Waves", "is_own"]

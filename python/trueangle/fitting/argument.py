@@ -16,8 +16,6 @@ from ..support.angles import circular_mean, wrap
 from ..support.suggestions import check_choice
 from .problem import Problem
 
-__all__ = ["ARGUMENTS", "AnyArgument", "ArgumentChoice", "at_indicated", "choose_argument"]
-
 AnyArgument: TypeAlias = Literal["auto", "reference", "indicated"]
 ARGUMENTS: tuple[AnyArgument, ...] = ("auto", "reference", "indicated")
 

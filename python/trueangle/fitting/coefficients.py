@@ -6,19 +6,15 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..errors import ArgumentError
 from ..model.model import HarmonicModel
+from ..support.arrays import Array
 from ..support.distributions import student_quantile
 from ..support.plainresult import PlainResult
 
 if TYPE_CHECKING:
     from .uncertainty import Uncertainty
-
-__all__ = ["FittedCoefficients"]
-
-Array = NDArray[np.float64]
 
 
 class FittedCoefficients(PlainResult):

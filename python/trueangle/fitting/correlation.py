@@ -7,29 +7,13 @@ from collections.abc import Sequence
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 import trueangle._core as _core
 
 from ..estimation.linear import NormalEquations, scatter_statistic, total
+from ..support.arrays import Array
 from ..support.distributions import chi_squared_tail
 from .problem import Fitted, Problem
-
-__all__ = [
-    "ENOUGH_RUNS",
-    "FEWEST_RUNS",
-    "FEWEST_STRETCHES",
-    "SCATTER",
-    "clusters_of",
-    "correlation_found",
-    "residual_memory",
-    "runs_together",
-    "scatter_between",
-    "weight_sum",
-    "white_variance_share",
-]
-
-Array = NDArray[np.float64]
 
 #: Most clusters: of more runs several are taken together.
 _MOST_CLUSTERS: Final = 128

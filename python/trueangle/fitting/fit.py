@@ -18,17 +18,21 @@ from ..runs.travel import CONDITION, travelled_span, without_drift
 from ..support.kinds import told_kinds
 from ..support.suggestions import check_choice
 from .argument import ARGUMENTS, AnyArgument, ArgumentChoice, choose_argument
-from .breakdown import breakdown_sentence
 from .problem import Problem
 from .result import FitResult
-from .robust import Loss, fit_robustly, fit_without_outliers, unsettled_sentence, without_spikes
+from .robust import (
+    Loss,
+    breakdown_sentence,
+    fit_robustly,
+    fit_without_outliers,
+    unsettled_sentence,
+    without_spikes,
+)
 from .uncertainty import CovarianceKind, check_covariance
 
 if TYPE_CHECKING:
     from .orders.table import OrderSelection
     from .summed import Summed
-
-__all__ = ["ROUNDING", "fit", "fitted_to"]
 
 #: Rounding of angles around a whole turn, in parts of a turn: smaller deviations are
 #: never taken for outliers.
@@ -150,7 +154,7 @@ def fit(
     0.5
     """
     if prior is not None:
-        from .unit import fitted_with_prior
+        from .prior import fitted_with_prior
 
         asked = {"nuisance": nuisance, "covariance": covariance, "ridge": ridge, "method": method}
         return fitted_with_prior(
@@ -242,7 +246,7 @@ def fitted_to(
             cycles = [k * shaft.cycles_per_turn for shaft in wanted for k in shaft.orders]
             found = [without_drift(run, cycles) for run in found]
         if len(found) > 1:
-            from .newrun import check_new_run
+            from .transfer import check_new_run
 
             check_new_run(found, wanted, choice.argument, summed)
     else:
@@ -267,7 +271,7 @@ def fitted_to(
             ridge = choose_ridge(problem, weighted.weights or problem.base)
     fitted = weighted.fitted
     if selection is not None:
-        from .laterstretch import check_later_stretch
+        from .transfer import check_later_stretch
 
         check_later_stretch(problem, weighted.weights or problem.base)
     if ridge > 0.0:

@@ -9,7 +9,6 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..errors import (
     ArgumentError,
@@ -21,6 +20,7 @@ from ..errors import (
 from ..model.model import HarmonicModel
 from ..runs.run import CalibrationRun
 from ..support.angles import ARCSEC_PER_TURN, circular_mean, wrap
+from ..support.arrays import Array
 from ..support.plainresult import Shown
 from ..support.renamed import attribute
 from .robust import Loss
@@ -29,8 +29,6 @@ if TYPE_CHECKING:
     from .result import FitResult
 
 __all__ = ["HeldOut", "HeldOutRun", "correct_held_out", "folds", "hold_out", "in_order"]
-
-Array = NDArray[np.float64]
 
 #: Most refits, and most of them with a selection of orders, which costs more: with more
 #: runs several are left out together.

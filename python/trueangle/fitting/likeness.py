@@ -7,19 +7,15 @@ from dataclasses import replace
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 import trueangle._core as _core
 
 from ..estimation.linear import NormalEquations, least_squares, total
 from ..runs.run import CalibrationRun
 from ..support.angles import circular_mean
+from ..support.arrays import Array
 from ..support.quantiles import median
 from .problem import Fitted, Problem
-
-__all__ = ["far_runs", "run_names", "unlike_runs", "unlike_sentence"]
-
-Array = NDArray[np.float64]
 
 #: Readings of a run that are looked at, and runs.
 _READINGS: Final = 512

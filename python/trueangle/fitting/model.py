@@ -17,8 +17,6 @@ from ..support.angles import wrap
 if TYPE_CHECKING:
     from .result import FitResult
 
-__all__ = ["build_model", "fit_notes"]
-
 #: Positions are told apart by sorting: of more readings than this they are not counted.
 _COUNTED = 20_000
 

@@ -17,11 +17,11 @@ from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..errors import ArgumentError
 from ..joint.shafts import ShaftOrders, shaft_cycles
 from ..runs.run import CalibrationRun
+from ..support.arrays import Array
 from ..support.suggestions import did_you_mean
 from .nuisancechoice import (
     FOLDS,
@@ -32,10 +32,6 @@ from .nuisancechoice import (
     reference_lines_help,
     solve_with_groups,
 )
-
-__all__ = ["KINDS", "Nuisance", "asked_nuisance", "likely_orders", "take_out", "take_out_beside"]
-
-Array = NDArray[np.float64]
 
 #: What may be asked for, in the order in which it is told.
 KINDS: Final = ("ramp", "direction", "velocity", "drift")
@@ -189,10 +185,7 @@ def take_out(
 ) -> tuple[list[CalibrationRun], Nuisance]:
     """The runs without their nuisances, which are fitted beside these orders.
 
-    Parameters
-    ----------
-    kinds : tuple of str or None
-        None chooses by the error of stretches held out.
+    ``kinds`` of None are chosen by the error of stretches held out.
     """
     stride = max(1, sum(map(len, runs)) // _LOOKED_AT)
     orders = [k * s.cycles_per_turn for s in shafts for k in s.orders]

@@ -15,18 +15,7 @@ from ..estimation.linear import (
     pseudo_inverse,
     unexplained,
 )
-
-__all__ = [
-    "FOLDS",
-    "FoldRows",
-    "best_spline",
-    "choose_nuisance_groups",
-    "error_inflation",
-    "reference_lines_help",
-    "solve_with_groups",
-]
-
-Array = NDArray[np.float64]
+from ..support.arrays import Array
 
 #: Parts that are held out one by one.
 FOLDS: Final = 3

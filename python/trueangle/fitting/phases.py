@@ -6,17 +6,13 @@ from dataclasses import dataclass
 from typing import cast
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..errors import RankError, TrueAngleError
 from ..support.angles import ARCSEC_PER_TURN
+from ..support.arrays import Array
 from .fit import fit as fit_runs
 from .result import FitResult
 from .robust import Loss
-
-__all__ = ["Phases", "run_phases"]
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

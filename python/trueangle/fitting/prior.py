@@ -1,4 +1,4 @@
-"""A prior for the coefficients of a unit: what others of its design are like.
+"""A prior for the coefficients of a unit, and the fit with it: what others of its design are like.
 
 With ``b ~ N(μ, T)`` and readings of noise s the coefficients are normal about
 
@@ -13,26 +13,39 @@ differ in little.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..errors import ArgumentError, KindError
 from ..estimation.linear import NormalEquations, total
 from ..joint.shafts import ShaftOrders
+from ..model.model import Argument
+from ..model.validity import check_invertible
+from ..runs.follows import check_follows
+from ..runs.run import CalibrationRun
+from ..runs.travel import travelled_span
 from ..support.angles import circular_mean, unit_name, wrap
+from ..support.arrays import Array
+from ..support.suggestions import check_choice
+from .argument import ARGUMENTS, AnyArgument
 from .problem import Fitted, PlainSolution, Problem
-from .robust import WILD, Weighted
-
-__all__ = ["Posterior", "Prior", "fleet_prior", "posterior"]
-
-Array = NDArray[np.float64]
+from .result import FitResult
+from .robust import WILD, Loss, Weighted
 
 #: Rounds in which the noise and what is set aside settle.
 _ROUNDS: Final = 20
+
+#: What does not go with a prior, and what each is where nothing was asked.
+_USUAL: dict[str, Any] = {
+    "nuisance": "none",
+    "covariance": "auto",
+    "ridge": None,
+    "method": None,
+    "reference_orders": (),
+}
 
 
 @dataclass(frozen=True, eq=False)
@@ -236,3 +249,39 @@ def _solved(
     worth = min(prior.freedom, prior.noise_freedom + freedom)
     known = Posterior(tuple(shares.tolist()), max(worth, 1.0), prior.units, math.sqrt(noise))
     return Fitted(solution, offsets, problem.shafts, problem.period), known
+
+
+def fitted_with_prior(
+    runs: Sequence[CalibrationRun],
+    prior: Any,
+    shafts: list[ShaftOrders] | None,
+    argument: AnyArgument,
+    loss: Loss,
+    joint: tuple[float | None, str],
+    asked: Mapping[str, Any],
+) -> FitResult:
+    """See `trueangle.fit` with ``prior``."""
+    for name, value in asked.items():
+        if not (value is None or value == _USUAL[name]):
+            raise ArgumentError(f"{name} does not go with prior=; leave one of them out")
+    check_choice("argument", argument, ARGUMENTS)
+    for run in runs:
+        check_follows(run)
+    known = fleet_prior(prior, runs[0].period)
+    angle: Argument = "reference" if argument == "auto" else argument
+    problem = Problem(runs, list(known.shafts) if shafts is None else shafts, angle)
+    weighted, taken = posterior(problem, known, loss)
+    check_invertible(weighted.fitted.series.slope_bound)
+    return FitResult(
+        problem,
+        weighted.fitted,
+        weighted,
+        loss,
+        0.0,
+        travelled_span(problem.travel, problem.period, problem.is_periodic),
+        None,
+        joint,
+        (taken.note(),),
+        "auto",
+        posterior=taken,
+    )

@@ -7,7 +7,6 @@ from collections.abc import Callable, Iterator, Sequence
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple, TypeVar, cast
 
 import numpy as np
-from numpy.typing import NDArray
 
 import trueangle._core as _core
 
@@ -17,14 +16,12 @@ from ..model.model import Argument
 from ..runs.run import CalibrationRun
 from ..runs.travel import over_turns
 from ..support.angles import circular_mean
+from ..support.arrays import Array
 from ..support.suggestions import check_choice
 
 if TYPE_CHECKING:
     from .summed import Summed
 
-__all__ = ["METHODS", "Fitted", "Problem"]
-
-Array = NDArray[np.float64]
 _Look = TypeVar("_Look")
 
 #: Ways of solving; None takes the fastest that keeps QR's accuracy.
@@ -118,14 +115,7 @@ def _series(solution: PlainSolution, shafts: Sequence[ShaftOrders], period: floa
 class Problem:
     """The readings of several runs and the regressors asked for.
 
-    Parameters
-    ----------
-    runs : sequence of CalibrationRun
-        Of one period.
-    shafts : sequence of ShaftOrders
-    argument : {"reference", "indicated"}
-    method, threads
-        Passed to the core's least squares.
+    The runs are of one period; ``method`` and ``threads`` are the core's.
     """
 
     def __init__(

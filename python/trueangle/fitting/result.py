@@ -8,14 +8,14 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..errors import ArgumentError
 from ..model.model import HarmonicModel
 from ..runs.run import CalibrationRun
 from ..runs.travel import Span
+from ..support.arrays import Array
 from ..support.display_units import ErrorsIn
-from ..support.drawn import result_picture
+from ..support.plainresult import result_picture
 from .coefficients import FittedCoefficients
 from .model import build_model, fit_notes
 from .problem import Fitted, Problem
@@ -31,9 +31,6 @@ if TYPE_CHECKING:
     from .prior import Posterior
     from .summed import Summed
 
-__all__ = ["FitResult"]
-
-Array = NDArray[np.float64]
 Picture: TypeAlias = Literal["errors", "spectrum", "phases", "residuals"]
 
 

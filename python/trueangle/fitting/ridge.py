@@ -1,21 +1,39 @@
-"""The Tikhonov penalty for partial travel, chosen by held-out error."""
+"""The Tikhonov penalty for partial travel, chosen by held-out error, and what it takes.
+
+A ridge answers ``b̂ = (G + λ)⁻¹ X'Wy`` and is off by
+
+::
+
+    b̂ - b = (G + λ)⁻¹ X'W e - λ (G + λ)⁻¹ b
+
+The first part is noise. The second depends on the pattern itself, and just where readings say
+little of it. Patterns are taken as drawn with variances ``τ² (k / k₀)^(-2q)`` of both
+coefficients of order k, ``k₀`` the lowest of its shaft; how probable each size
+``τ`` and steepness q is, the readings tell by their marginal likelihood. With
+``D`` the mean of these variances the covariance of the second part is
+
+::
+
+    λ² (G + λ)⁻¹ D (G + λ)⁻¹
+
+Intervals from the sum of both hold the truth as often as they say on average over the travel,
+and over patterns (Wahba 1983, Nychka 1988): not for each angle by itself, and not for a
+pattern whose sizes nothing in the travel shows.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 import trueangle._core as _core
 
 from ..runs.run import CalibrationRun
 from ..support.angles import circular_mean, wrap
+from ..support.arrays import Array
 from .problem import Problem
-
-__all__ = ["REACH", "choose_ridge", "error_range"]
-
-Array = NDArray[np.float64]
 
 #: Penalties tried, relative to the sum of weights: from "none" to "hardly any harmonics".
 _PENALTIES = [0.0, *np.logspace(-9.0, 0.0, 19).tolist()]
@@ -34,6 +52,15 @@ REACH = 3.0
 #: Readings whose angles and errors are looked at for the ends of blocks and the range.
 _LOOKED_AT = 65_536
 
+#: How fast sizes fall with the order: not at all, up to twice as fast as those of a kink.
+_STEEPNESS: Final = (0.0, 0.5, 1.0, 1.5, 2.0, 3.0)
+
+#: Sizes looked at, relative to the greatest: four decades, 20 to each.
+_SIZES: Final = np.logspace(-4.0, 0.0, 81)
+
+#: Noise counts as at least this part of the greatest size: rounding, where there is no noise.
+_LEAST_NOISE: Final = 1e-9
+
 
 def choose_ridge(problem: Problem, weights: Sequence[Array | None]) -> float:
     """Tikhonov penalty for partial travel, chosen by held-out error.
@@ -44,16 +71,8 @@ def choose_ridge(problem: Problem, weights: Sequence[Array | None]) -> float:
     after a turn. The best is taken, and raised until the amplitudes add
     up to no more than three times the range of the measured error.
 
-    Parameters
-    ----------
-    problem : Problem
-    weights : sequence of (ndarray or None)
-        Of every run; readings of weight 0 take no part.
-
-    Returns
-    -------
-    float
-        The penalty relative to the sum of weights; 0 for plain least squares.
+    Readings of weight 0 take no part. The penalty is relative to the sum of weights; 0 is plain
+    least squares.
 
     Notes
     -----
@@ -110,3 +129,66 @@ def error_range(problem: Problem, weights: Sequence[Array | None]) -> float:
         error = wrap(error, problem.period)
         parts.append(error if weight is None else error[weight[::stride] > 0.0])
     return float(np.ptp(np.concatenate(parts)))
+
+
+def pattern_variances(
+    gram: Array, moment: Array, variance: float, steps: Array, greatest: float
+) -> Array:
+    """Mean variance of every coefficient, over the sizes and slopes that the readings allow.
+
+    ::
+
+        D_i = Σ_{q,τ} p(q, τ | y) τ² s_i^(-2q),
+        y ~ N(0, σ² + τ² X S^(-2q) X')
+
+    with every slope, and every decade of sizes below the greatest, equally probable beforehand.
+
+    ``gram`` and ``moment`` are ``X'WX`` and ``X'Wy`` about the zeros of the runs, ``variance`` is
+    that of a reading of weight 1, ``steps`` the order of every coefficient relative to the lowest
+    of its shaft, and no pattern exceeds the size ``greatest``.
+
+    Examples
+    --------
+    Where readings say all, it is the mean square of the coefficients:
+
+    >>> b = np.tile([3.0, -4.0], 50)
+    >>> found = pattern_variances(1e6 * np.eye(100), 1e6 * b, 1.0, np.ones(100), 100.0)
+    >>> round(float(found[0]), 1)
+    12.8
+    """
+    if not greatest > 0.0:
+        return np.zeros(moment.size)
+    noise = max(variance, (_LEAST_NOISE * greatest) ** 2)
+    squares = (greatest * _SIZES) ** 2
+    values, vectors = np.linalg.eigh(gram)
+    seen = values > 1e-14 * values[-1]
+    root = vectors[:, seen] * np.sqrt(values[seen])
+    whitened = vectors[:, seen].T @ moment / np.sqrt(values[seen])
+    evidence, shapes = [], []
+    for steepness in _STEEPNESS:
+        shape = steps**-steepness
+        rows = root * shape[:, None]
+        spread, turn = np.linalg.eigh(rows.T @ rows)
+        expected = noise + np.outer(squares, np.maximum(spread, 0.0))
+        misfit = (turn.T @ whitened) ** 2 / expected
+        evidence.append(-0.5 * np.sum(np.log(expected) + misfit, axis=1))
+        shapes.append(shape**2)
+    chance = np.exp(np.array(evidence) - np.max(evidence))
+    return np.asarray((chance @ squares) @ np.array(shapes) / chance.sum())
+
+
+def bias_covariance(gram: Array, means: Array, penalty: float, variances: Array) -> Array:
+    """Covariance of what a penalty takes from ``[constant, A, B, ...]``.
+
+    ::
+
+        M λ² (G + λ)⁻¹ D (G + λ)⁻¹ M',    M = [-x̄'; I]
+
+    for the constant makes good on the readings what the coefficients are off by there.
+
+    ``means`` are those of every regressor over the readings (of the runs), ``penalty`` is what the
+    diagonal of ``gram`` gets, ``variances`` are those of `pattern_variances`.
+    """
+    taken = penalty * np.linalg.inv(gram + penalty * np.eye(len(gram)))
+    taken = np.vstack([-means @ taken, taken])
+    return np.asarray((taken * variances) @ taken.T)

@@ -1,4 +1,4 @@
-"""Wild readings: losses of robust fitting, and setting readings aside.
+"""Wild readings: losses of robust fitting, setting readings aside, and where both break down.
 
 A bit flip or a slipped tooth leaves one reading degrees off, and least squares spreads
 it over every coefficient.
@@ -6,9 +6,10 @@ it over every coefficient.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import Literal, NamedTuple, TypeAlias
+from typing import Final, Literal, NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,13 +17,12 @@ from numpy.typing import NDArray
 import trueangle._core as _core
 
 from ..runs.run import CalibrationRun
+from ..support.arrays import Array
+from ..support.display_units import brief
 from ..support.quantiles import median, quantile
 from ..support.suggestions import check_choice
 from .problem import Fitted, Problem
 
-__all__ = ["LOSSES", "Loss", "Weighted", "fit_robustly", "robust_scale", "without_spikes"]
-
-Array = NDArray[np.float64]
 Loss: TypeAlias = Literal["auto", "linear", "huber", "tukey"]
 LOSSES: tuple[Loss, ...] = ("auto", "linear", "huber", "tukey")
 
@@ -69,6 +69,12 @@ _NEIGHBOURS = 7
 #: The scale is taken from at most about so many readings.
 SAMPLE = 4096
 
+#: With this share of them a robust fit of several orders is at its end wherever they are ...
+_MOST: Final = 0.15
+#: ... and with `MANY` where neighbours in angle agree so many times better than the fit:
+#: the readings that stand apart stand together, and the model has bent towards them.
+_BENT: Final = 3.0
+
 
 class Weighted(NamedTuple):
     """A robust fit: its weights (None where all are as given) and what it ended with.
@@ -98,17 +104,8 @@ def fit_robustly(problem: Problem, loss: Loss, floor: float) -> Weighted:
     from the Huber fit so that they cannot hide each other; the rest is plain least
     squares, so clean data give the least-squares coefficients exactly.
 
-    Parameters
-    ----------
-    problem : Problem
-    loss : {"auto", "linear", "huber", "tukey"}
-    floor : float
-        Deviations below this are rounding, never wild.
-
-    Returns
-    -------
-    Weighted
-        ``wild`` counts readings of weight 0 that were given more.
+    Deviations below ``floor`` are rounding, never wild; ``wild`` of the result counts readings of
+    weight 0 that were given more.
     """
     check_choice("loss", loss, LOSSES)
     if loss == "linear":
@@ -267,3 +264,38 @@ def _huber(distance: Array) -> Array:
 
 def _tukey(distance: Array) -> Array:
     return np.square(np.maximum(0.0, 1.0 - np.square(distance / TUKEY)))
+
+
+def breakdown_sentence(problem: Problem, weighted: Weighted) -> str:
+    """What to tell of a robust fit at the end of its powers; empty where it is not."""
+    share, robust = weighted.far, weighted.weights is not None or weighted.wild > 0
+    if share <= MANY and not robust:
+        return ""
+    rest = problem.residuals(weighted.fitted)
+    scale, near = robust_scale(np.concatenate(rest)), _between_neighbours(problem, rest)
+    bent = scale > _BENT * near
+    if robust and share > (MANY if bent else _MOST):
+        return (
+            f"{100.0 * share:.0f} % of the readings lie beyond {FAR:g} robust standard deviations "
+            "(0.7 % of normal ones do): more than a robust fit holds out against, where they stand "
+            "together; the coefficients may be off by far more than their errors. Look at the "
+            "residuals, and give the readings that are wrong weight 0"
+        )
+    # Most neighbours are equal where a joint rests or a grid is coarse: they tell nothing.
+    if not bent or near == 0.0:
+        return ""
+    # A block of readings that the few orders cannot follow widens the scale it is judged by.
+    many = ", more than a robust fit holds out against" if robust else ""
+    return (
+        f"the residuals are {brief(scale / near)} times what neighbours in angle differ by: the "
+        f"model lacks an effect, or wrong readings stand together{many}; look at the residuals"
+    )
+
+
+def _between_neighbours(problem: Problem, residuals: list[Array]) -> float:
+    """Standard deviation of a reading by how neighbours in angle differ, run by run."""
+    steps = [
+        np.diff(rest[np.argsort(np.mod(x, problem.period), kind="stable")])
+        for rest, x in zip(residuals, problem.angles, strict=True)
+    ]
+    return robust_scale(np.concatenate(steps)) / math.sqrt(2.0)

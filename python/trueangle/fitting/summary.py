@@ -16,12 +16,6 @@ from ..support.plainresult import finite
 if TYPE_CHECKING:
     from .result import FitResult
 
-__all__ = [
-    "fit_error_unit",
-    "fit_summary",
-    "plain_fit",
-]
-
 
 def fit_summary(fit: FitResult, errors_in: ErrorsIn = "auto") -> str:
     """See `FitResult.summary`."""

@@ -7,10 +7,10 @@ from collections.abc import Sequence
 from typing import Final, Literal, NamedTuple, TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..errors import ArgumentError
 from ..estimation.linear import NormalEquations, cluster_covariance, total
+from ..support.arrays import Array
 from ..support.quantiles import median
 from ..support.suggestions import check_choice
 from .correlation import (
@@ -25,18 +25,9 @@ from .correlation import (
     weight_sum,
     white_variance_share,
 )
-from .penalty import bias_covariance, pattern_variances
 from .problem import Fitted, Problem
+from .ridge import bias_covariance, pattern_variances
 
-__all__ = [
-    "COVARIANCES",
-    "CovarianceKind",
-    "Uncertainty",
-    "check_covariance",
-    "coefficient_uncertainty",
-]
-
-Array = NDArray[np.float64]
 CovarianceKind: TypeAlias = Literal["auto", "white", "cluster", "hac"]
 COVARIANCES: tuple[CovarianceKind, ...] = ("auto", "white", "cluster", "hac")
 
@@ -103,7 +94,7 @@ def coefficient_uncertainty(
     three or more. With fewer, stretches are, eight times as long as the memory of the residuals:
     right where the correlation dies out within a run, which one run cannot prove, so that a note
     says it. What a penalty takes from the coefficients is added to either
-    (`trueangle.fitting.penalty`).
+    (`trueangle.fitting.ridge`).
     """
     noise = _noise(problem, fitted, weights, penalty, kind)
     if not penalty > 0.0 or not np.isfinite(noise.covariance).all():

@@ -7,7 +7,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..estimation.linear import NormalEquations, total
 from ..fitting.robust import without_spikes
@@ -15,10 +14,7 @@ from ..joint.shafts import ShaftOrders
 from ..runs.run import CalibrationRun
 from ..runs.travel import over_turns
 from ..support.angles import circular_mean
-
-__all__ = ["Calibration", "CalibrationSums", "columns_of", "output_orders"]
-
-Array = NDArray[np.float64]
+from ..support.arrays import Array
 
 
 def output_orders(shafts: Sequence[ShaftOrders]) -> Array:

@@ -6,13 +6,9 @@ from collections.abc import Sequence
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..support.arrays import Array
 from .calibration import Calibration
-
-__all__ = ["ALLOWANCE", "LENGTH", "charted"]
-
-Array = NDArray[np.float64]
 
 #: Half of the shift that is looked for, in standard deviations of a calibration.
 ALLOWANCE: Final = 0.5

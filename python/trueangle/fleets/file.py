@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
+from dataclasses import fields
 from os import PathLike
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -24,38 +26,17 @@ from .unit import VERDICTS, FleetUnit, UnitOrder
 
 __all__ = ["FORMAT", "load_fleet"]
 
-_KEYS = dict.fromkeys(
-    ("format", "version", "prior", "units", "common", "between", "tolerance", "history", "notes"),
-    True,
-)
-_PRIOR = dict.fromkeys(
-    ("period", "shafts", "mean", "variance", "freedom", "noise_variance", "noise_freedom", "units"),
-    True,
-)
-_UNIT = dict.fromkeys(
-    (
-        "unit",
-        "verdict",
-        "because",
-        "orders",
-        "peak_to_peak_arcsec",
-        "left_arcsec",
-        "p",
-        "limit",
-    ),
-    True,
-)
-_ROW = dict.fromkeys(("order", "amplitude_arcsec", "phase_deg", "std_arcsec", "z"), True)
-_COMMON = dict.fromkeys(("order", "shaft", "amplitude_arcsec", "phase_deg", "std_arcsec"), True)
-_BETWEEN = dict.fromkeys(("order", "std_arcsec", "repeatability_arcsec"), True)
-_SHAFT = dict.fromkeys(("name", "cycles_per_turn", "orders"), True)
-_TOLERANCE = dict.fromkeys(
-    ("share", "confidence", "factor", "method", "peak_to_peak_arcsec", "left_arcsec"), True
-)
-_HISTORY = dict.fromkeys(
-    (*(name for name in HistoryRow._fields if name != "bound"), "bound_arcsec"), True
-)
-_MOVED = dict.fromkeys(HistoryOrder._fields, True)
+T = TypeVar("T")
+
+_KEYS = ("prior", "units", "common", "between", "tolerance", "history", "notes")
+_PRIOR = tuple(field.name for field in fields(Prior))
+_UNIT = ("unit", "verdict", "because", "orders", "peak_to_peak_arcsec", "left_arcsec", "p", "limit")
+_ROW = ("order", "amplitude_arcsec", "phase_deg", "std_arcsec", "z")
+_COMMON = ("order", "shaft", "amplitude_arcsec", "phase_deg", "std_arcsec")
+_BETWEEN = ("order", "std_arcsec", "repeatability_arcsec")
+_SHAFT = ("name", "cycles_per_turn", "orders")
+_TOLERANCE = ("share", "confidence", "factor", "method", "peak_to_peak_arcsec", "left_arcsec")
+_HISTORY = (*(name for name in HistoryRow._fields if name != "bound"), "bound_arcsec")
 
 #: Units, and orders of each, at most.
 _MOST_UNITS = 2_000_000
@@ -85,7 +66,7 @@ class _FleetReader(Decoder):
             raise self.error(f"'format' must be {FORMAT!r}: this is not a fleet file")
         if content.get("version") != VERSION:
             raise self.error(f"version {VERSION} is known; install a later trueangle", "version")
-        self.table(content, _KEYS)
+        self.table(content, dict.fromkeys(("format", "version", *_KEYS), True))
         prior = self.prior(content["prior"])
         self.turn = prior.period / ARCSEC_PER_TURN
         common = self.table(content["common"], {"aligned": True, "orders": True}, "common")
@@ -114,129 +95,132 @@ class _FleetReader(Decoder):
             raise self.error("must not be negative", key)
         return number
 
+    def above_zero(self, value: Any, key: str) -> float:
+        number = self.number(value, key)
+        if number <= 0.0:
+            raise self.error("must be positive", key)
+        return number
+
     def angle(self, value: Any, key: str) -> float:
         return self.positive(value, key) * self.turn
 
     def maybe(self, value: Any, key: str) -> float | None:
         return None if value is None else self.number(value, key)
 
+    def maybe_angle(self, value: Any, key: str) -> float | None:
+        number = self.maybe(value, key)
+        return None if number is None else number * self.turn
+
+    def maybe_text(self, value: Any, key: str) -> str | None:
+        return None if value is None else self.text(value, key)
+
+    def listed(self, read: Callable[[Any, str], T]) -> Callable[[Any, str], tuple[T, ...]]:
+        return lambda value, key: tuple(self.each(value, key, read))
+
     def prior(self, value: Any) -> Prior:
-        given = self.table(value, _PRIOR, "prior")
-        period = self.number(given["period"], "prior.period")
-        if period <= 0.0:
-            raise self.error("must be positive", "prior.period")
-        shafts = tuple(self.each(given["shafts"], "prior.shafts", self.shaft))
+        of = self.entries(value, _PRIOR, "prior")
+        period = of(self.above_zero, "period")
+        shafts = of(self.listed(self.shaft), "shafts")
         size = 2 * sum(len(shaft.orders) for shaft in shafts)
-        mean, variance = (
-            np.array(self.numbers(given[name], f"prior.{name}", 2 * _MOST_ORDERS))
-            for name in ("mean", "variance")
-        )
+        mean, variance = (np.array(of(self.coefficients, name)) for name in ("mean", "variance"))
         if mean.size != size or variance.size != size or (variance < 0.0).any():
             raise self.error(f"{size} numbers, none negative, are needed", "prior.variance")
-        worth = self.maybe(given["noise_freedom"], "prior.noise_freedom")
-        noise = self.number(given["noise_variance"], "prior.noise_variance")
-        if noise <= 0.0:
-            raise self.error("must be positive", "prior.noise_variance")
+        worth = of(self.maybe, "noise_freedom")
+        noise = of(self.above_zero, "noise_variance")
         return Prior(
             period,
             shafts,
             mean,
             variance,
-            max(self.positive(given["freedom"], "prior.freedom"), 1.0),
+            max(of(self.positive, "freedom"), 1.0),
             noise,
             math.inf if worth is None else worth,
-            self.whole(given["units"], "prior.units", 1),
+            of(lambda v, k: self.whole(v, k, 1), "units"),
         )
+
+    def coefficients(self, value: Any, key: str) -> tuple[float, ...]:
+        return self.numbers(value, key, 2 * _MOST_ORDERS)
 
     def shaft(self, value: Any, key: str) -> ShaftOrders:
-        given = self.table(value, _SHAFT, key)
-        orders = self.each(
-            given["orders"], f"{key}.orders", lambda v, k: self.whole(v, k, 1, 2**31)
-        )
-        cycles = self.number(given["cycles_per_turn"], f"{key}.cycles_per_turn")
-        if cycles <= 0.0:
-            raise self.error("must be positive", f"{key}.cycles_per_turn")
-        return ShaftOrders(self.text(given["name"], f"{key}.name"), cycles, tuple(orders))
+        of = self.entries(value, _SHAFT, key)
+        orders = of(self.listed(lambda v, k: self.whole(v, k, 1, 2**31)), "orders")
+        cycles = of(self.above_zero, "cycles_per_turn")
+        return ShaftOrders(of(self.text, "name"), cycles, orders)
+
+    def verdict(self, value: Any, key: str) -> Any:
+        if value not in VERDICTS:
+            raise self.error(f"one of {', '.join(VERDICTS)} is needed", key)
+        return value
 
     def unit(self, value: Any, key: str) -> FleetUnit:
-        given = self.table(value, _UNIT, key)
-        verdict = given["verdict"]
-        if verdict not in VERDICTS:
-            raise self.error(f"one of {', '.join(VERDICTS)} is needed", f"{key}.verdict")
+        of = self.entries(value, _UNIT, key)
+        verdict = of(self.verdict, "verdict")
         return FleetUnit(
-            self.text(given["unit"], f"{key}.unit"),
+            of(self.text, "unit"),
             verdict,
-            self.text(given["because"], f"{key}.because"),
-            tuple(self.each(given["orders"], f"{key}.orders", self.row)),
-            self.angle(given["peak_to_peak_arcsec"], f"{key}.peak_to_peak_arcsec"),
-            self.angle(given["left_arcsec"], f"{key}.left_arcsec"),
-            self.number(given["p"], f"{key}.p"),
-            self.number(given["limit"], f"{key}.limit"),
+            of(self.text, "because"),
+            of(self.listed(self.row), "orders"),
+            of(self.angle, "peak_to_peak_arcsec"),
+            of(self.angle, "left_arcsec"),
+            of(self.number, "p"),
+            of(self.number, "limit"),
         )
 
     def row(self, value: Any, key: str) -> UnitOrder:
-        given = self.table(value, _ROW, key)
+        of = self.entries(value, _ROW, key)
         return UnitOrder(
-            self.number(given["order"], f"{key}.order"),
-            self.angle(given["amplitude_arcsec"], f"{key}.amplitude_arcsec"),
-            self.number(given["phase_deg"], f"{key}.phase_deg"),
-            self.angle(given["std_arcsec"], f"{key}.std_arcsec"),
-            self.number(given["z"], f"{key}.z"),
+            of(self.number, "order"),
+            of(self.angle, "amplitude_arcsec"),
+            of(self.number, "phase_deg"),
+            of(self.angle, "std_arcsec"),
+            of(self.number, "z"),
         )
 
     def common(self, value: Any, key: str) -> CommonOrder:
-        given = self.table(value, _COMMON, key)
-        amplitude = self.angle(given["amplitude_arcsec"], f"{key}.amplitude_arcsec")
-        phase = math.radians(self.number(given["phase_deg"], f"{key}.phase_deg"))
+        of = self.entries(value, _COMMON, key)
+        size = of(self.angle, "amplitude_arcsec")
+        phase = math.radians(of(self.number, "phase_deg"))
         return CommonOrder(
-            self.number(given["order"], f"{key}.order"),
-            self.text(given["shaft"], f"{key}.shaft"),
-            amplitude * math.sin(phase),
-            amplitude * math.cos(phase),
-            self.angle(given["std_arcsec"], f"{key}.std_arcsec"),
+            of(self.number, "order"),
+            of(self.text, "shaft"),
+            size * math.sin(phase),
+            size * math.cos(phase),
+            of(self.angle, "std_arcsec"),
         )
 
     def between(self, value: Any, key: str) -> BetweenOrder:
-        given = self.table(value, _BETWEEN, key)
-        again = self.maybe(given["repeatability_arcsec"], f"{key}.repeatability_arcsec")
-        return BetweenOrder(
-            self.number(given["order"], f"{key}.order"),
-            self.angle(given["std_arcsec"], f"{key}.std_arcsec"),
-            None if again is None else again * self.turn,
-        )
+        of = self.entries(value, _BETWEEN, key)
+        again = of(self.maybe_angle, "repeatability_arcsec")
+        return BetweenOrder(of(self.number, "order"), of(self.angle, "std_arcsec"), again)
 
     def tolerance(self, value: Any) -> Tolerance:
-        given = self.table(value, _TOLERANCE, "tolerance")
-        sizes = [
-            self.maybe(given[name], f"tolerance.{name}")
-            for name in ("peak_to_peak_arcsec", "left_arcsec")
-        ]
+        of = self.entries(value, _TOLERANCE, "tolerance")
+        sizes = [of(self.maybe_angle, name) for name in ("peak_to_peak_arcsec", "left_arcsec")]
         return Tolerance(
-            self.number(given["share"], "tolerance.share"),
-            self.number(given["confidence"], "tolerance.confidence"),
-            self.maybe(given["factor"], "tolerance.factor"),
-            self.text(given["method"], "tolerance.method"),
-            *(math.nan if size is None else size * self.turn for size in sizes),
+            of(self.number, "share"),
+            of(self.number, "confidence"),
+            of(self.maybe, "factor"),
+            of(self.text, "method"),
+            *(math.nan if size is None else size for size in sizes),
         )
 
     def history(self, value: Any, key: str) -> HistoryRow:
-        given = self.table(value, _HISTORY, key)
-        due = given["next_calibration"]
-        bound = self.maybe(given["bound_arcsec"], f"{key}.bound_arcsec")
+        of = self.entries(value, _HISTORY, key)
+        bound = of(self.maybe_angle, "bound_arcsec")
         return HistoryRow(
-            self.text(given["unit"], f"{key}.unit"),
-            self.text(given["when"], f"{key}.when"),
-            self.maybe(given["order"], f"{key}.order"),
-            self.number(given["statistic"], f"{key}.statistic"),
-            self.number(given["limit"], f"{key}.limit"),
-            self.text(given["verdict"], f"{key}.verdict"),
-            None if due is None else self.text(due, f"{key}.next_calibration"),
-            given["extrapolated"] is True,
-            None if bound is None else bound * self.turn,
-            self.number(given["cusum_limit"], f"{key}.cusum_limit"),
-            tuple(self.each(given["orders"], f"{key}.orders", self.moved)),
+            of(self.text, "unit"),
+            of(self.text, "when"),
+            of(self.maybe, "order"),
+            of(self.number, "statistic"),
+            of(self.number, "limit"),
+            of(self.text, "verdict"),
+            of(self.maybe_text, "next_calibration"),
+            of(lambda v, _: v is True, "extrapolated"),
+            bound,
+            of(self.number, "cusum_limit"),
+            of(self.listed(self.moved), "orders"),
         )
 
     def moved(self, value: Any, key: str) -> HistoryOrder:
-        given = self.table(value, _MOVED, key)
-        return HistoryOrder(*(self.positive(given[name], f"{key}.{name}") for name in _MOVED))
+        of = self.entries(value, HistoryOrder._fields, key)
+        return HistoryOrder(*(of(self.positive, name) for name in HistoryOrder._fields))

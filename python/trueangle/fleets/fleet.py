@@ -18,8 +18,6 @@ from .result import Fleet
 from .sums import FleetSums
 from .units import Units
 
-__all__ = ["fleet"]
-
 
 @told_kinds
 def fleet(

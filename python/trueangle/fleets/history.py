@@ -8,19 +8,15 @@ from datetime import datetime, timedelta
 from typing import Any, Final, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..formats.times import parsed_time
 from ..support.angles import wrap
+from ..support.arrays import Array
 from ..support.distributions import f_quantile
 from ..support.runlength import chart_limit
+from ..support.times import parsed_time
 from .calibration import Calibration, columns_of
 from .charts import ALLOWANCE, LENGTH, charted
 from .outliers import LEVEL, Deviates, deviates, weights_of
-
-__all__ = ["Change", "HistoryOrder", "HistoryRow", "changes_of"]
-
-Array = NDArray[np.float64]
 
 #: Units with a second date from which their changes tell what an ordinary change is.
 _FEWEST: Final = 4

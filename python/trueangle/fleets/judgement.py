@@ -20,8 +20,6 @@ from .tolerance import tolerance_of
 from .unit import VERDICTS, FleetUnit, UnitOrder, Verdict
 from .units import FEWEST, SharedPattern, Units, pattern_of
 
-__all__ = ["judged_fleet", "unit_row"]
-
 
 def judged_fleet(
     units: Units,

@@ -7,7 +7,6 @@ from collections.abc import Sequence
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..errors import NoOrderError
 from ..joint.joint import Joint
@@ -15,10 +14,6 @@ from ..joint.shafts import ShaftOrders, resolve_orders
 from ..runs.run import CalibrationRun
 from ..support.distributions import chi_squared_tail
 from .calibration import Calibration, CalibrationSums, columns_of, output_orders
-
-__all__ = ["MOST_KEPT", "SAMPLE", "candidates", "worth_keeping"]
-
-Array = NDArray[np.float64]
 
 #: Units by which orders are chosen: of the first so many.
 SAMPLE: Final = 32

@@ -9,11 +9,8 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ..support.arrays import Array
 from .variance import robust_variance
-
-__all__ = ["LEVEL", "Deviates", "deviates", "weights_of"]
-
-Array = NDArray[np.float64]
 
 #: Chance that a fleet without an outlier is told of one.
 LEVEL: Final = 0.01

@@ -15,10 +15,10 @@ from ..fitting.prior import Prior, fleet_prior
 from ..joint.shafts import counted_orders
 from ..planning.arc import COVERAGE
 from ..support.angles import ARCSEC_PER_TURN
+from ..support.arrays import Array
 
 __all__ = ["MOST", "Spread"]
 
-Array = NDArray[np.float64]
 Places = NDArray[np.int64]
 
 #: Places of the grid to a cycle of the highest order, and at least.

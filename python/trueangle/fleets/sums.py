@@ -9,14 +9,12 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..errors import ArgumentError
-from ..formats.times import local_day
 from ..joint.shafts import ShaftOrders
 from ..runs.follows import check_follows
 from ..runs.run import CalibrationRun
+from ..support.times import local_day
 from .calibration import Calibration, CalibrationSums, output_orders
 from .orders import SAMPLE, candidates, worth_keeping
-
-__all__ = ["FleetSums"]
 
 
 class _Unnamed(NamedTuple):

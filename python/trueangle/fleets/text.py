@@ -6,13 +6,11 @@ import math
 from os import PathLike
 from typing import TYPE_CHECKING, Final
 
-from ..model.text import pretty_json
 from ..support.files import FLEET, written_atomically
+from ..support.plainresult import pretty_json
 
 if TYPE_CHECKING:
     from .result import Fleet
-
-__all__ = ["FORMAT", "VERSION", "save_fleet"]
 
 FORMAT: Final = "trueangle-fleet"
 VERSION: Final = 1

@@ -6,15 +6,11 @@ import math
 from typing import Any, Final, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..errors import ArgumentError
+from ..support.arrays import Array
 from ..support.distributions import chi_squared_tail, normal_quantile, normal_tail
 from ..support.kinds import told_kinds
-
-__all__ = ["Tolerance", "tolerance_factor", "tolerance_of", "wilks_units"]
-
-Array = NDArray[np.float64]
 
 #: Nodes of Gauss and Legendre's rule on each of the pieces of an integral.
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(24)

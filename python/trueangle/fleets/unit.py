@@ -5,8 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any, Final, Literal, NamedTuple, TypeAlias
 
-__all__ = ["VERDICTS", "FleetUnit", "UnitOrder", "Verdict"]
-
 Verdict: TypeAlias = Literal["fine", "outlier", "recalibrate", "changed", "zero_moved"]
 
 #: The most urgent first.

@@ -17,8 +17,6 @@ from ..support.layout import laid_out
 from ..support.plainresult import PlainResult, counted
 from .spread import MOST, Spread
 
-__all__ = ["UnitPlan", "plan_unit"]
-
 
 @dataclass(frozen=True)
 class UnitPlan(PlainResult):

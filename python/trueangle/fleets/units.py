@@ -10,14 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..joint.shafts import ShaftOrders
+from ..support.arrays import Array
 from ..support.distributions import chi_squared_tail
 from .calibration import Calibration, columns_of, output_orders
 from .outliers import Deviates, deviates, weights_of
 from .variance import Between, held_out_score, reml
-
-__all__ = ["FEWEST", "SharedPattern", "UnitNoise", "Units", "noise_of", "pattern_of"]
-
-Array = NDArray[np.float64]
 
 #: Units below which none is told to be an outlier: the others are what it is told by.
 FEWEST: Final = 5

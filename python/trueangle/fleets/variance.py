@@ -5,13 +5,9 @@ from __future__ import annotations
 from typing import Final, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..support.arrays import Array
 from ..support.quantiles import median
-
-__all__ = ["Between", "held_out_score", "reml", "robust_variance"]
-
-Array = NDArray[np.float64]
 
 #: Relative change at which the iteration ends, and steps at most.
 _SETTLED: Final = 1e-12
@@ -32,13 +28,8 @@ class Between(NamedTuple):
 def robust_variance(values: Array, own: Array, aligned: bool) -> float:
     """Variance between units by the median square, which a half of outliers does not move.
 
-    Parameters
-    ----------
-    values : ndarray, shape (n, 2)
-    own : ndarray, shape (n, 2, 2)
-        Covariance of each estimate.
-    aligned : bool
-        Whether the units share a mean; else it is 0.
+    ``values`` (n, 2) have the covariances ``own``; units that are ``aligned`` share a mean, else it
+    is 0.
     """
     centre = np.median(values, axis=0) if aligned else np.zeros(2)
     squares = ((values - centre) ** 2).sum(axis=1)
@@ -125,14 +116,8 @@ def _score(values: Array, own: Array, aligned: bool, tau: float) -> _Likelihood:
 def held_out_score(values: Array, own: Array, variance: float, aligned: bool) -> Array:
     """Logarithm of the density of every unit by the others', the variance taken from all.
 
-    Parameters
-    ----------
-    values, own
-        As `reml`.
-    variance : float
-        Between units.
-    aligned : bool
-        Whether the others' mean predicts a unit; else 0 does.
+    ``values`` and ``own`` are those of `reml`; where the units are ``aligned`` the others' mean
+    predicts one, else 0 does.
     """
     spread = own + variance * np.eye(2)
     mean = np.zeros_like(values)

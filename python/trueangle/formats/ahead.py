@@ -9,8 +9,6 @@ from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
 from typing import Any, TypeVar
 
-__all__ = ["read_ahead", "side_by_side"]
-
 T = TypeVar("T")
 R = TypeVar("R")
 

@@ -6,7 +6,7 @@ Batches that pyarrow has to look at, and are not packed, come from mapped memory
 from __future__ import annotations
 
 import struct
-from collections.abc import Collection, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import NamedTuple
@@ -25,9 +25,7 @@ from .arrowtables import (
 )
 from .budget import FileExtent, check_part
 from .damage import damage_told
-from .format import TEXTS, Batch, Choose, Contents, Watch
-
-__all__ = ["columns", "contents", "copy", "extent", "read", "stretches"]
+from .format import Batch, Contents, CopyTask, Selection
 
 _FILE_MAGIC = b"ARROW1"
 #: Codecs by their number in the format's BodyCompression.
@@ -87,32 +85,25 @@ def stretches(path: Path) -> list[BatchRange | None]:
     ] or [None]
 
 
-def read(
-    path: Path,
-    names: Sequence[str],
-    topic: str | None = None,
-    stretch: BatchRange | None = None,
-    *,
-    texts: Collection[str] = TEXTS,
-    strict: bool = False,
-) -> Iterator[Batch]:
+def read(path: Path, wanted: Selection) -> Iterator[Batch]:
     """Columns ``names`` in batches; see `format.FormatModule`."""
+    stretch: BatchRange | None = wanted.stretch
     if stretch is None:
         with _opened(path) as (_schema, batches, _options):
-            yield from read_ahead(column_batches(path, names, batches, texts))
+            yield from read_ahead(column_batches(path, batches, wanted))
         return
     with damage_told(path, "Arrow"), path.open("rb", buffering=0) as raw:
         packed = _compression(path, True) is not None
-        if not packed and not set(names) & set(texts):
-            placed = _placed(path, names, stretch)
+        if not packed and not set(wanted.names) & set(wanted.texts):
+            placed = _placed(path, wanted.names, stretch)
             if placed:
                 for found in placed:
                     yield from found.read(raw, stretch.part, stretch.parts)
                 return
-        with _library(path, names, packed) as file:
-            tops = top_names(file.schema, names)
+        with _library(path, wanted.names, packed) as file:
+            tops = top_names(file.schema, wanted.names)
             batches = (stretch.of(file.get_batch(i).select(tops)) for i in stretch.batches)
-            yield from column_batches(path, names, _cut(map(_valid, batches)), texts)
+            yield from column_batches(path, _cut(map(_valid, batches)), wanted)
 
 
 def _placed(path: Path, names: Sequence[str], stretch: BatchRange) -> list[PlacedBatch]:
@@ -139,35 +130,25 @@ def _library(path: Path, names: Sequence[str], packed: bool) -> Iterator[pa.Reco
         yield pa.ipc.open_file(source, options=only)
 
 
-def copy(
-    source: Path,
-    target: Path,
-    choose: Choose,
-    watch: Watch,
-    topic: str | None = None,
-    output_topic: str | None = None,
-) -> Contents:
+def copy(task: CopyTask) -> Contents:
     """Write ``target`` with the corrected columns; see `format.FormatModule`."""
     digest = ArrowDigest()
-    with _opened(source) as (schema, batches, options):
+    with _opened(task.source) as (schema, batches, options):
         elements = element_names(schema, lambda name: 0)
-        channels = choose(list(dict.fromkeys([*schema.names, *elements])))
-        enlarged = corrected_schema(schema, channels, source)
-        new = pa.ipc.new_file if _is_file(source) else pa.ipc.new_stream
-        size = max(source.stat().st_size, 1)
+        channels = task.choose(list(dict.fromkeys([*schema.names, *elements])))
+        enlarged = corrected_schema(schema, channels, task.source)
+        new = pa.ipc.new_file if _is_file(task.source) else pa.ipc.new_stream
+        size = max(task.source.stat().st_size, 1)
         done = 0
-
-        def corrected() -> Iterator[pa.RecordBatch]:
-            for batch in batches:
-                made = add_corrected(source, batch, channels, enlarged)
-                digest.update(made)
-                yield made
-
-        with pa.OSFile(str(target), "wb") as file, new(file, enlarged, options=options) as writer:
-            for batch in read_ahead(corrected()):
+        made = (add_corrected(task.source, batch, channels, enlarged) for batch in batches)
+        with (
+            pa.OSFile(str(task.target), "wb") as file,
+            new(file, enlarged, options=options) as writer,
+        ):
+            for batch in read_ahead(digest.passed(made)):
                 writer.write_batch(batch)
                 done += batch.nbytes
-                watch(batch.num_rows, min(1.0, done / size))
+                task.watch(batch.num_rows, min(1.0, done / size))
     return digest.contents()
 
 

@@ -13,8 +13,6 @@ from numpy.typing import NDArray
 from .arrowtables import arrow_dtype
 from .stored import ROWS, stored_values
 
-__all__ = ["PlacedBatch", "placed_batch"]
-
 
 class ColumnBuffers(NamedTuple):
     """Where the values of a column lie, and the bits that are 0 where one is null."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import zlib
-from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -14,22 +14,7 @@ from numpy.typing import NDArray
 
 from ..errors import FileError
 from .checksum import Checksum
-from .format import Addition, Batch, Contents, Labels, note
-
-__all__ = [
-    "METADATA_KEY",
-    "ArrowDigest",
-    "add_corrected",
-    "arrow_dtype",
-    "arrow_numbers",
-    "arrow_values",
-    "column_batches",
-    "corrected_schema",
-    "element_names",
-    "label_codes",
-    "taken_column",
-    "top_names",
-]
+from .format import Addition, Batch, Contents, Labels, Selection, note
 
 #: Key of the schema's metadata under which the provenance is kept.
 METADATA_KEY = b"trueangle"
@@ -180,6 +165,12 @@ class ArrowDigest:
             for chunk in chunks:
                 self._column(name, chunk)
 
+    def passed(self, tables: Iterable[Any]) -> Iterator[Any]:
+        """The same tables, taken in on their way."""
+        for table in tables:
+            self.update(table)
+            yield table
+
     def contents(self) -> Contents:
         """Rows and checksums so far."""
         return Contents(
@@ -263,13 +254,12 @@ def _is_list(kind: pa.DataType) -> bool:
     )
 
 
-def column_batches(
-    path: object, names: Sequence[str], batches: Iterable[Any], texts: Collection[str] = ()
-) -> Iterator[Batch]:
-    """Some columns of record batches: numbers as arrays, texts and times asked for as labels."""
+def column_batches(path: object, batches: Iterable[Any], wanted: Selection) -> Iterator[Batch]:
+    """What is wanted of record batches: numbers as arrays, texts and times asked for as labels."""
     for batch in batches:
         yield {
-            name: _values(path, name, taken_column(batch, name), name in texts) for name in names
+            name: _values(path, name, taken_column(batch, name), name in wanted.texts)
+            for name in wanted.names
         }
 
 

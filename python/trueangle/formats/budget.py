@@ -11,17 +11,6 @@ from typing import Final, NamedTuple
 
 from ..errors import FileError
 
-__all__ = [
-    "DECODED_BYTES",
-    "DecodedSizeError",
-    "FileExtent",
-    "check_decoded",
-    "check_part",
-    "shown_bytes",
-    "stored_size",
-    "text_extent",
-]
-
 #: Bytes of unpacked columns, at most: as much as a table of runs may have as a file.
 DECODED_BYTES: Final = 1 << 30
 

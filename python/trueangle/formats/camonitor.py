@@ -8,17 +8,14 @@ number.
 from __future__ import annotations
 
 import re
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 
 from ..errors import FileError
-from .budget import FileExtent, text_extent
 from .csvheader import number as read_number
-from .format import TEXTS, Batch, Choose, Contents, Watch
-
-__all__ = ["LINE", "columns", "contents", "copy", "extent", "read"]
+from .format import Batch, Contents, CopyTask, Selection
 
 #: Name, date, time, value; what follows (alarms) is of no concern.
 LINE = re.compile(rb"(\S+)\s+(\d{4}-\d\d-\d\d)\s(\d\d:\d\d:\d\d(?:\.\d{1,9})?)\s+(\S+)")
@@ -39,21 +36,13 @@ def columns(path: Path, topic: str | None = None) -> list[str]:
     return [_TIME, *(name for name, is_number in names.items() if is_number)]
 
 
-def read(
-    path: Path,
-    names: Sequence[str],
-    topic: str | None = None,
-    stretch: None = None,
-    *,
-    texts: Collection[str] = TEXTS,
-    strict: bool = False,
-) -> Iterator[Batch]:
+def read(path: Path, wanted: Selection) -> Iterator[Batch]:
     """Columns in batches, NaN where another variable changed; see `format.FormatModule`."""
-    lines = (line for line in _lines(path) if line[0] in names or names == [_TIME])
+    lines = (line for line in _lines(path) if line[0] in wanted.names or wanted.names == [_TIME])
     while block := [line for _, line in zip(range(_BLOCK), lines, strict=False)]:
         found, stamps, values, places = zip(*block, strict=True)
         bad = next((i for i, value in enumerate(values) if isinstance(value, str)), None)
-        if bad is not None and found[bad] in names:
+        if bad is not None and found[bad] in wanted.names:
             problem = f"a number is needed, got {values[bad][:60]!r}"
             raise FileError(path, problem, line=places[bad], column=found[bad])
         number = np.array([np.nan if isinstance(value, str) else value for value in values])
@@ -61,26 +50,14 @@ def read(
         times = (np.array(stamps, dtype="datetime64[ns]") - _EPOCH) / np.timedelta64(1, "s")
         yield {
             name: times if name == _TIME else np.where(name_of == name, number, np.nan)
-            for name in names
+            for name in wanted.names
         }
 
 
-def extent(path: Path, names: Sequence[str] = (), topic: str | None = None) -> FileExtent:
-    """Lines as the first ones tell; see `format.FormatModule`."""
-    return text_extent(path)
-
-
-def copy(
-    source: Path,
-    target: Path,
-    choose: Choose,
-    watch: Watch,
-    topic: str | None = None,
-    output_topic: str | None = None,
-) -> Contents:
+def copy(task: CopyTask) -> Contents:
     """Refused: a line has no room for another column."""
     raise FileError(
-        source,
+        task.source,
         "a log of camonitor has no room for corrected angles; make a table of it first "
         "(`ta.join(...)`), or correct the runs that it was joined to",
     )

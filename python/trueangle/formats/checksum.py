@@ -5,8 +5,6 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Checksum"]
-
 _MODULUS = 1 << 64
 #: Words taken together: their places stay in cache.
 _BLOCK = 1 << 16

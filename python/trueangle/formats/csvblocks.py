@@ -18,8 +18,6 @@ from .csvheader import Header
 from .csvrows import QuotedBlock
 from .format import Labels
 
-__all__ = ["PlainBlock", "plain_block"]
-
 _NEWLINE, _NOTE, _END = b"\n#E"
 
 

@@ -10,7 +10,7 @@ import contextlib
 import functools
 import importlib.util
 import zlib
-from collections.abc import Callable, Collection, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import IO, TYPE_CHECKING, TypeAlias
 
@@ -19,16 +19,13 @@ from numpy.typing import NDArray
 
 from .._core import thread_count
 from ..errors import FileError
-from .budget import FileExtent, text_extent
 from .csvheader import LONGEST_LINE, Header
 from .csvrows import BLOCK, QuotedBlock, quoted_blocks, too_long
-from .format import TEXTS, Addition, Batch, Choose, Contents, Watch, refuse_corrected
+from .format import Addition, Batch, Contents, CopyTask, Selection, refuse_corrected
 from .messages import warn_of_messages
 
 if TYPE_CHECKING:
     from .csvblocks import PlainBlock
-
-__all__ = ["columns", "contents", "copy", "extent", "header_line", "line_of", "read"]
 
 _Block: TypeAlias = "QuotedBlock | PlainBlock"
 
@@ -42,21 +39,13 @@ def columns(path: Path, topic: str | None = None) -> list[str]:
         return Header(path, file).names
 
 
-def read(
-    path: Path,
-    names: Sequence[str],
-    topic: str | None = None,
-    stretch: None = None,
-    *,
-    texts: Collection[str] = TEXTS,
-    strict: bool = False,
-) -> Iterator[Batch]:
+def read(path: Path, wanted: Selection) -> Iterator[Batch]:
     """Columns ``names`` in batches, empty cells as NaN; see `format.FormatModule`.
 
     Those of ``texts`` are labels, whatever they look like.
     """
-    labels = [name for name in names if name in texts]
-    numbers = [name for name in names if name not in texts]
+    labels = [name for name in wanted.names if name in wanted.texts]
+    numbers = [name for name in wanted.names if name not in wanted.texts]
     with path.open("rb") as file:
         header = Header(path, file)
         # The length of a pipe is told as 0.
@@ -64,7 +53,7 @@ def read(
         messages: list[tuple[int, str]] = []
 
         def values(block: _Block) -> Batch:
-            found: Batch = dict(block.numbers(numbers, labels, strict))
+            found: Batch = dict(block.numbers(numbers, labels, wanted.strict))
             found |= {name: block.labels(name) for name in labels}
             messages.extend(block.messages)
             return found
@@ -77,11 +66,6 @@ def read(
 
             yield from side_by_side(values, blocks, thread_count())
     warn_of_messages(path, messages)
-
-
-def extent(path: Path, names: Sequence[str] = (), topic: str | None = None) -> FileExtent:
-    """Rows as the first lines tell, bytes once it is read; see `format.FormatModule`."""
-    return text_extent(path)
 
 
 def header_line(path: Path) -> int:
@@ -101,20 +85,13 @@ def line_of(path: Path, row: int) -> int:
     return row
 
 
-def copy(
-    source: Path,
-    target: Path,
-    choose: Choose,
-    watch: Watch,
-    topic: str | None = None,
-    output_topic: str | None = None,
-) -> Contents:
+def copy(task: CopyTask) -> Contents:
     """Write ``target`` with the corrected columns last; see `format.FormatModule`."""
-    size = max(source.stat().st_size, 1)
+    size = max(task.source.stat().st_size, 1)
     rows, check = 0, 0
-    with source.open("rb") as file, target.open("wb") as output:
-        header = Header(source, file)
-        channels = choose(header.names)
+    with task.source.open("rb") as file, task.target.open("wb") as output:
+        header = Header(task.source, file)
+        channels = task.choose(header.names)
         used = _used(channels)
         head = header.with_names([channel.added for channel in channels])
         output.write(head)
@@ -128,13 +105,13 @@ def copy(
                 signals = {name: values[column] for name, column in channel.signals.items()}
                 indicated = values[channel.column]
                 after = channel.correct(indicated, signals)
-                refuse_corrected(source, others, channel, after)
+                refuse_corrected(task.source, others, channel, after)
                 corrected.append((channel.column, after))
             data = block.with_columns(corrected)
             output.write(data)
             check = zlib.crc32(data, check)
             rows += block.rows
-            watch(block.rows, file.tell() / size)
+            task.watch(block.rows, file.tell() / size)
     return Contents(rows, {"bytes": f"{check:08x}"})
 
 

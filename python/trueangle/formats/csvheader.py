@@ -12,8 +12,6 @@ from typing import IO, NamedTuple
 
 from ..errors import FileError
 
-__all__ = ["LONGEST_LINE", "Header", "cut_rows", "is_comment", "number"]
-
 #: Bytes and lines within which the readings must begin.
 _HEAD = 1 << 18
 _LINES = 1000

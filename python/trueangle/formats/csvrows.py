@@ -15,8 +15,6 @@ from ..errors import FileError
 from .csvheader import LONGEST_LINE, Header, cut_rows, is_comment, number
 from .format import Labels, row_labels
 
-__all__ = ["BLOCK", "QuotedBlock", "quoted_blocks", "too_long"]
-
 #: Numbers in lines, all without an exponent.
 _PLAIN = re.compile(r"-?\d+(?:\.\d+)?(?:\n-?\d+(?:\.\d+)?)*", re.ASCII)
 

@@ -9,8 +9,6 @@ from contextlib import contextmanager
 
 from ..errors import FileError, TrueAngleError
 
-__all__ = ["damage_told"]
-
 
 @contextmanager
 def damage_told(path: object, name: str, hint: str = "") -> Iterator[None]:

@@ -16,21 +16,7 @@ from numpy.typing import NDArray
 
 from .._core import __version__
 from ..errors import FileError, MissingExtraError
-from .budget import FileExtent
-
-__all__ = [
-    "TEXTS",
-    "Addition",
-    "Batch",
-    "Choose",
-    "Contents",
-    "Format",
-    "Labels",
-    "Watch",
-    "note",
-    "refuse_corrected",
-    "row_labels",
-]
+from .budget import FileExtent, text_extent
 
 #: Columns that are texts whatever they look like, in formats that do not say.
 TEXTS = ("run", "unit")
@@ -111,6 +97,43 @@ def refuse_corrected(
             raise FileError(path, problem, column=name)
 
 
+def check_lengths(path: Path, kind: str, sizes: Mapping[str, int]) -> None:
+    """Refuse columns of several lengths, in formats that call a column a ``kind``.
+
+    Raises
+    ------
+    FileError
+    """
+    if len(set(sizes.values())) > 1:
+        listed = ", ".join(f"{name} {size}" for name, size in sizes.items())
+        raise FileError(path, f"{kind} that belong together differ in length: {listed}")
+
+
+class Selection(NamedTuple):
+    """What is read of a file: columns, of a topic and of one of its stretches, if it has them.
+
+    Formats of text take ``texts`` for labels and refuse, where ``strict``, numbers that are not
+    finite.
+    """
+
+    names: Sequence[str]
+    topic: str | None = None
+    stretch: Any = None
+    texts: Collection[str] = TEXTS
+    strict: bool = False
+
+
+class CopyTask(NamedTuple):
+    """A copy to be written, with the chosen columns added."""
+
+    source: Path
+    target: Path
+    choose: Choose
+    watch: Watch
+    topic: str | None = None
+    output_topic: str | None = None
+
+
 class FormatModule(Protocol):
     """What the module of a format defines.
 
@@ -118,41 +141,21 @@ class FormatModule(Protocol):
     of: then the batches of that part only, and parts may be read side by side; ``line_of(path,
     row)`` and ``header_line(path)``, formats of text, the line that a row or the names come
     from; and ``together(path, needed, others)``, formats whose columns need not be equally
-    long, those of ``others`` that are.
+    long, those of ``others`` that are. Formats of text that know no more of their length than
+    their first lines tell need no ``extent``.
     """
 
     def columns(self, path: Path, topic: str | None) -> list[str]:
         """Names of the columns that hold numbers or labels."""
 
-    def read(
-        self,
-        path: Path,
-        names: Sequence[str],
-        topic: str | None = None,
-        stretch: Any = None,
-        *,
-        texts: Collection[str] = TEXTS,
-        strict: bool = False,
-    ) -> Iterator[Batch]:
-        """Some columns in batches of bounded size, NaN where a value is missing.
-
-        Formats of text take ``texts`` for labels and refuse, where ``strict``, numbers that
-        are not finite.
-        """
+    def read(self, path: Path, wanted: Selection) -> Iterator[Batch]:
+        """Some columns in batches of bounded size, NaN where a value is missing."""
 
     def extent(self, path: Path, names: Sequence[str] = (), topic: str | None = None) -> FileExtent:
         """Rows of a file and bytes of columns in memory, by what the file says of itself."""
 
-    def copy(
-        self,
-        source: Path,
-        target: Path,
-        choose: Choose,
-        watch: Watch,
-        topic: str | None,
-        output_topic: str | None,
-    ) -> Contents:
-        """Write ``target`` as ``source`` with the chosen columns added.
+    def copy(self, task: CopyTask) -> Contents:
+        """Write the target as the source with the chosen columns added.
 
         Returns what was handed to the writer, to be compared with `contents` of the file.
         """
@@ -212,16 +215,10 @@ class Format:
         cut = getattr(self.module, "stretches", None)
         return [None] if cut is None else list(cut(path))
 
-    def read(
-        self,
-        path: Path,
-        names: Sequence[str],
-        topic: str | None,
-        stretch: Any,
-        texts: Collection[str] = TEXTS,
-    ) -> Iterator[Batch]:
-        """Batches of one of the `stretches`."""
-        return self.module.read(path, names, topic, stretch, texts=texts)
+    def extent(self, path: Path, names: Sequence[str], topic: str | None) -> FileExtent:
+        """Rows of a file and bytes of columns in memory, as far as that is known before."""
+        find = getattr(self.module, "extent", None)
+        return text_extent(path) if find is None else find(path, names, topic)
 
     @contextmanager
     def at_header(self, path: Path) -> Iterator[None]:

@@ -9,8 +9,6 @@ from ..errors import FileError
 from ..support.files import declare_endings, promised_format
 from .format import Format
 
-__all__ = ["FORMATS", "find_format", "format_of_content", "known_format"]
-
 #: A process variable and a date, as camonitor begins a line.
 _CAMONITOR = rb"\A\S+[ \t]+\d{4}-\d\d-\d\d \d\d:\d\d:\d\d"
 #: Type, rows, columns, imaginary part, length of the name, of either order of bytes.

@@ -17,7 +17,7 @@ from __future__ import annotations
 import math
 import re
 import warnings
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from datetime import datetime
 from pathlib import Path
@@ -26,11 +26,8 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from ..errors import FileError, MessageLinesWarning
-from .budget import FileExtent, text_extent
 from .csvheader import number
-from .format import TEXTS, Batch, Choose, Contents, Watch, row_labels
-
-__all__ = ["columns", "contents", "copy", "extent", "line_of", "read"]
+from .format import Batch, Contents, CopyTask, Selection, row_labels
 
 #: Degrees a second by which the sky turns.
 SIDEREAL: Final = 360.0 / 86164.0905
@@ -83,22 +80,14 @@ def columns(path: Path, topic: str | None = None) -> list[str]:
     return list(_COLUMNS)
 
 
-def read(
-    path: Path,
-    names: Sequence[str],
-    topic: str | None = None,
-    stretch: None = None,
-    *,
-    texts: Collection[str] = TEXTS,
-    strict: bool = False,
-) -> Iterator[Batch]:
+def read(path: Path, wanted: Selection) -> Iterator[Batch]:
     """All frames as one batch; see `format.FormatModule`."""
     frames, lost, settling = _frames(path)
     yield {
         name: row_labels([getattr(frame, name) for frame in frames])
         if name in _LABELS
         else np.array([getattr(frame, name) for frame in frames])
-        for name in names
+        for name in wanted.names
     }
     if lost or settling:
         warnings.warn(
@@ -114,22 +103,10 @@ def line_of(path: Path, row: int) -> int:
     return _frames(path)[0][row].line
 
 
-def extent(path: Path, names: Sequence[str] = (), topic: str | None = None) -> FileExtent:
-    """Rows as the first lines tell; see `format.FormatModule`."""
-    return text_extent(path)
-
-
-def copy(
-    source: Path,
-    target: Path,
-    choose: Choose,
-    watch: Watch,
-    topic: str | None = None,
-    output_topic: str | None = None,
-) -> Contents:
+def copy(task: CopyTask) -> Contents:
     """Refused: a star's distance is not an angle of the axis."""
     raise FileError(
-        source,
+        task.source,
         "a guide log holds distances of a star, no angles that could be corrected: give the model "
         "to the mount's controller (`ta.export_model(...)`)",
     )

@@ -7,7 +7,7 @@ import json
 import math
 import os
 import shutil
-from collections.abc import Collection, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -21,11 +21,9 @@ from . import budget
 from .budget import FileExtent
 from .checksum import Checksum
 from .damage import damage_told
-from .format import TEXTS, Addition, Batch, Choose, Contents, Watch, note
+from .format import Addition, Batch, Contents, CopyTask, Selection, check_lengths, note
 from .hdf5places import Places
 from .stored import ROWS
-
-__all__ = ["columns", "contents", "copy", "extent", "read", "stretches"]
 
 #: Readings taken together: what is read of them stays in the cache of the processor.
 _BLOCK = 1 << 17
@@ -79,20 +77,12 @@ def stretches(path: Path) -> list[RowRange | None]:
     return [RowRange(i, parts) for i in range(parts)] or [None]
 
 
-def read(
-    path: Path,
-    names: Sequence[str],
-    topic: str | None = None,
-    stretch: RowRange | None = None,
-    *,
-    texts: Collection[str] = TEXTS,
-    strict: bool = False,
-) -> Iterator[Batch]:
+def read(path: Path, wanted: Selection) -> Iterator[Batch]:
     """Data sets ``names`` in batches; see `format.FormatModule`."""
     with _opened(path) as file:
-        sets = {name: _data_set(path, file, name) for name in names}
-        _check_lengths(path, sets)
+        sets = _data_sets(path, file, wanted.names)
         size = next(iter(sets.values())).size if sets else 0
+        stretch: RowRange | None = wanted.stretch
         rows = range(size) if stretch is None else stretch.rows(size, sets.values())
         found = {name: Places.of(data, rows) for name, data in sets.items()}
         places = {name: data for name, data in found.items() if data is not None}
@@ -103,32 +93,24 @@ def read(
                     yield {name: data.read(raw, start, stop) for name, data in places.items()}
             return
         sets.clear()  # a data set that is open keeps the cache that it has
-        packed = {name: _cached(file, name) for name in names}
+        packed = {name: _cached(file, name) for name in wanted.names}
         for start in rows[::_BLOCK]:
             stop = min(start + _BLOCK, rows.stop)
             yield {name: _part(data, start, stop) for name, data in packed.items()}
 
 
-def copy(
-    source: Path,
-    target: Path,
-    choose: Choose,
-    watch: Watch,
-    topic: str | None = None,
-    output_topic: str | None = None,
-) -> Contents:
+def copy(task: CopyTask) -> Contents:
     """Write ``target`` with the corrected data sets; see `format.FormatModule`."""
-    with _opened(source) as file:  # refuse what cannot be corrected before it is copied
-        channels = choose(_names(file))
+    with _opened(task.source) as file:  # refuse what cannot be corrected before it is copied
+        channels = task.choose(_names(file))
         for channel in channels:
-            names = [channel.column, *channel.signals.values()]
-            _check_lengths(source, {name: _data_set(source, file, name) for name in names})
+            _data_sets(task.source, file, [channel.column, *channel.signals.values()])
         total = max(sum(file[channel.column].size for channel in channels), 1)
-    shutil.copyfile(source, target)
-    before = contents(source)  # an earlier correction, of another joint
+    shutil.copyfile(task.source, task.target)
+    before = contents(task.source)  # an earlier correction, of another joint
     rows, done = before.rows, 0
     sums: dict[str, Checksum] = {}
-    with _opened(target, "r+") as file:
+    with _opened(task.target, "r+") as file:
         for channel in channels:
             indicated = _cached(file, channel.column)
             used = {signal: _cached(file, name) for signal, name in channel.signals.items()}
@@ -144,7 +126,7 @@ def copy(
                 for check, values in zip(checks, (given, after), strict=True):
                     check.update(values)
                 done += stop - start
-                watch(stop - start, done / total)
+                task.watch(stop - start, done / total)
             rows = max(rows, indicated.size)
     texts = {name: found.text() for name, found in sums.items()}
     return Contents(rows, {**before.checksums, **texts})
@@ -212,6 +194,13 @@ def _names(file: h5py.File) -> list[str]:
 
     file.visititems(visit)
     return found
+
+
+def _data_sets(path: Path, file: h5py.File, names: Sequence[str]) -> dict[str, h5py.Dataset]:
+    """Data sets that belong together."""
+    sets = {name: _data_set(path, file, name) for name in names}
+    check_lengths(path, "data sets", {name: data.size for name, data in sets.items()})
+    return sets
 
 
 def _data_set(path: Path, file: h5py.File, name: str) -> h5py.Dataset:
@@ -282,13 +271,6 @@ def _cached(file: h5py.File, name: str) -> h5py.Dataset:
     access.set_chunk_cache(_SLOTS, chunk if packed else 0, 1.0)
     del data  # one that is open keeps the cache that it has
     return h5py.Dataset(h5py.h5d.open(file.id, name.encode(), access))
-
-
-def _check_lengths(path: Path, sets: dict[str, h5py.Dataset]) -> None:
-    sizes = {name: data.size for name, data in sets.items()}
-    if len(set(sizes.values())) > 1:
-        listed = ", ".join(f"{name} {size}" for name, size in sizes.items())
-        raise FileError(path, f"data sets that belong together differ in length: {listed}")
 
 
 def _place(data: h5py.Dataset, start: int, stop: int) -> tuple[slice, ...]:

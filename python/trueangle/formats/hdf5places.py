@@ -15,8 +15,6 @@ from numpy.typing import NDArray
 
 from .stored import stored_values
 
-__all__ = ["Places"]
-
 #: Rows of a chunk from which it is worth while to ask where it lies.
 _LEAST_CHUNK = 1 << 13
 

@@ -13,8 +13,6 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["FIELDS", "Block"]
-
 #: Numbers of a joint, in the order in which the message holds them.
 FIELDS = ("position", "velocity", "effort")
 #: Longest string or list that a message may state.
@@ -122,11 +120,7 @@ class _LayoutGroup(NamedTuple):
 class Block:
     """Some messages one after the other.
 
-    Parameters
-    ----------
-    messages : sequence of bytes, or array of them, one a row
-    is_ros1 : bool
-        Of ROS 1; else CDR of ROS 2.
+    Messages are bytes each, or an array of one a row; of ROS 1, else CDR of ROS 2.
 
     Raises
     ------

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import io
 import zlib
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -15,10 +15,8 @@ from scipy.io import loadmat, savemat
 from ..errors import FileError
 from .budget import FileExtent
 from .damage import damage_told
-from .format import TEXTS, Batch, Choose, Contents, Watch, note, row_labels
+from .format import Batch, Contents, CopyTask, Selection, check_lengths, note, row_labels
 from .matlabelements import check_elements
-
-__all__ = ["columns", "contents", "copy", "extent", "read", "together"]
 
 #: Bytes of the header of a file, whose last two tell the order of bytes.
 _HEADER = 128
@@ -45,44 +43,26 @@ def together(path: Path, needed: Sequence[str], others: Sequence[str]) -> list[s
     return [name for name in others if len(found[name]) in sizes]
 
 
-def read(
-    path: Path,
-    names: Sequence[str],
-    topic: str | None = None,
-    stretch: None = None,
-    *,
-    texts: Collection[str] = TEXTS,
-    strict: bool = False,
-) -> Iterator[Batch]:
+def read(path: Path, wanted: Selection) -> Iterator[Batch]:
     """Variables ``names`` as one batch: this format has no parts; see `format.FormatModule`."""
     found = _vectors(path)
-    sizes = {name: len(found[name]) for name in names}
-    if len(set(sizes.values())) > 1:
-        listed = ", ".join(f"{name} {size}" for name, size in sizes.items())
-        raise FileError(path, f"variables that belong together differ in length: {listed}")
-    yield {name: _values(found[name]) for name in names}
+    check_lengths(path, "variables", {name: len(found[name]) for name in wanted.names})
+    yield {name: _values(found[name]) for name in wanted.names}
 
 
-def copy(
-    source: Path,
-    target: Path,
-    choose: Choose,
-    watch: Watch,
-    topic: str | None = None,
-    output_topic: str | None = None,
-) -> Contents:
+def copy(task: CopyTask) -> Contents:
     """Write ``target`` with the corrected variables; see `format.FormatModule`.
 
     The bytes of the source stay as they are.
     """
-    data = source.read_bytes()
+    data = task.source.read_bytes()
     if data[_HEADER - 2 : _HEADER] != b"IM":
         raise FileError(
-            source,
+            task.source,
             "has a damaged header or its bytes the other way round; save it with -v7 or -v7.3",
         )
-    found = _vectors(source)
-    additions = choose(list(found))
+    found = _vectors(task.source)
+    additions = task.choose(list(found))
     made: dict[str, Any] = {}
     rows = 0
     for addition in additions:
@@ -91,13 +71,13 @@ def copy(
         after = addition.correct(_values(column), signals)
         name = addition.added.replace("/", "_")
         if name in found:
-            raise FileError(source, "is there already: corrected before", column=name)
+            raise FileError(task.source, "is there already: corrected before", column=name)
         made[name] = after[:, None]
         rows = max(rows, len(column))
-        watch(len(column), 1.0)
+        task.watch(len(column), 1.0)
     extra = io.BytesIO()
     savemat(extra, {**made, _NOTE: note(additions)}, do_compression=False, long_field_names=True)
-    with target.open("wb") as file:
+    with task.target.open("wb") as file:
         file.write(data)
         file.write(extra.getvalue()[_HEADER:])
     sums = {"source": f"{zlib.crc32(data):08x}:{len(data)}"}

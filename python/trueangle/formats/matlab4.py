@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import struct
 import zlib
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -16,9 +16,7 @@ from numpy.typing import NDArray
 
 from ..errors import FileError
 from .budget import FileExtent, check_part
-from .format import TEXTS, Batch, Choose, Contents, Watch, note
-
-__all__ = ["columns", "contents", "copy", "extent", "read", "together"]
+from .format import Batch, Contents, CopyTask, Selection, check_lengths, note
 
 #: Kinds of numbers by the tens of the type.
 _KINDS = ("f8", "f4", "i4", "i2", "u2", "u1")
@@ -59,48 +57,30 @@ def extent(path: Path, names: Sequence[str] = (), topic: str | None = None) -> F
     return FileExtent(max(rows, default=0), 8 * sum(rows) if names else 0)
 
 
-def read(
-    path: Path,
-    names: Sequence[str],
-    topic: str | None = None,
-    stretch: None = None,
-    *,
-    texts: Collection[str] = TEXTS,
-    strict: bool = False,
-) -> Iterator[Batch]:
+def read(path: Path, wanted: Selection) -> Iterator[Batch]:
     """Vectors ``names`` as one batch; see `format.FormatModule`."""
     found = _vectors(path)
-    sizes = {name: found[name].size for name in names}
-    if len(set(sizes.values())) > 1:
-        listed = ", ".join(f"{name} {size}" for name, size in sizes.items())
-        raise FileError(path, f"vectors that belong together differ in length: {listed}")
-    yield {name: _values(path, found[name]) for name in names}
+    check_lengths(path, "vectors", {name: found[name].size for name in wanted.names})
+    yield {name: _values(path, found[name]) for name in wanted.names}
 
 
-def copy(
-    source: Path,
-    target: Path,
-    choose: Choose,
-    watch: Watch,
-    topic: str | None = None,
-    output_topic: str | None = None,
-) -> Contents:
+def copy(task: CopyTask) -> Contents:
     """Write ``target`` with the corrected vectors; the bytes of the source stay as they are."""
-    check_part(source, source.stat().st_size, "file")
-    found = _vectors(source)
-    additions = choose(list(found))
-    data = source.read_bytes()
-    with target.open("wb") as file:
+    check_part(task.source, task.source.stat().st_size, "file")
+    found = _vectors(task.source)
+    additions = task.choose(list(found))
+    data = task.source.read_bytes()
+    with task.target.open("wb") as file:
         file.write(data)
         rows, sums = 0, {"source": f"{zlib.crc32(data):08x}:{len(data)}"}
         for addition in additions:
-            signals = {s: _values(source, found[name]) for s, name in addition.signals.items()}
+            signals = {s: _values(task.source, found[name]) for s, name in addition.signals.items()}
             column = found[addition.column]
-            after = addition.correct(_values(source, column), signals).astype("<f8")
+            after = addition.correct(_values(task.source, column), signals).astype("<f8")
             file.write(_head(0, len(after), addition.added) + after.tobytes())
             sums[addition.added] = f"{zlib.crc32(after.tobytes()):08x}"
             rows = max(rows, column.size)
-            watch(column.size, 1.0)
+            task.watch(column.size, 1.0)
         text = np.frombuffer(note(additions).encode(), np.uint8)
         file.write(_head(51, 1, _NOTE, text.size) + text.tobytes())
     return Contents(rows, sums)

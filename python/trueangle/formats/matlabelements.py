@@ -15,8 +15,6 @@ from typing import Final, NamedTuple
 
 from . import budget
 
-__all__ = ["check_elements"]
-
 _HEADER: Final = 128
 #: Bytes of a value by the type of an element.
 _SIZES: Final = {1: 1, 2: 1, 3: 2, 4: 2, 5: 4, 6: 4, 7: 4, 9: 8, 12: 8, 13: 8, 16: 1, 17: 2, 18: 4}
@@ -41,11 +39,6 @@ def check_elements(data: bytes) -> None:
     """Hold every element to the bytes that are there.
 
     Files without the header of level 5 pass: they are read by other means.
-
-    Parameters
-    ----------
-    data : bytes
-        The whole file.
 
     Raises
     ------

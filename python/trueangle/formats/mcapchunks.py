@@ -23,10 +23,7 @@ from rosbags.rosbag2.storage_mcap import McapReader, McapWriter, PendingChunk, d
 
 from .budget import check_part
 from .mcaprows import RecordRows, interleaved_rows
-from .packedfolder import unpacked_folder
-from .unpacking import unpacked
-
-__all__ = ["BagReader", "ChunkReader", "ChunkWriter", "ChunkedBagWriter"]
+from .unpacking import unpacked, unpacked_folder
 
 _MESSAGE, _CHUNK, _MESSAGE_INDEX = 0x05, 0x06, 0x07
 #: Start of a chunk without messages.

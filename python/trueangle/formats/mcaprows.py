@@ -12,8 +12,6 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["RecordRows", "interleaved_rows"]
-
 Bytes = NDArray[np.uint8]
 
 #: Of a message record: its kind; places of length, channel, number, times of logging and

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -20,10 +20,8 @@ from ..errors import FileError
 from .budget import FileExtent
 from .checksum import Checksum
 from .damage import damage_told
-from .format import TEXTS, Addition, Batch, Choose, Contents, Watch, note
+from .format import Addition, Batch, Contents, CopyTask, Selection, note
 from .mdfblocks import check_chains
-
-__all__ = ["columns", "contents", "copy", "extent", "read"]
 
 #: Bytes that one byte of a file can stand for: deflate reaches 1032.
 _MOST_COMPRESSED = 2000
@@ -51,62 +49,47 @@ def columns(path: Path, topic: str | None = None) -> list[str]:
         return _names(mdf)
 
 
-def read(
-    path: Path,
-    names: Sequence[str],
-    topic: str | None = None,
-    stretch: None = None,
-    *,
-    texts: Collection[str] = TEXTS,
-    strict: bool = False,
-) -> Iterator[Batch]:
+def read(path: Path, wanted: Selection) -> Iterator[Batch]:
     """Channels ``names`` in batches; see `format.FormatModule`."""
     with _opened(path) as mdf:
-        _common_group(path, mdf, names)
-        for parts in _parts(path, mdf, [_place(mdf, name) for name in names]):
-            yield {name: part.samples for name, part in zip(names, parts, strict=True)}
+        _common_group(path, mdf, wanted.names)
+        for parts in _parts(path, mdf, [_place(mdf, name) for name in wanted.names]):
+            yield {name: part.samples for name, part in zip(wanted.names, parts, strict=True)}
 
 
-def copy(
-    source: Path,
-    target: Path,
-    choose: Choose,
-    watch: Watch,
-    topic: str | None = None,
-    output_topic: str | None = None,
-) -> Contents:
+def copy(task: CopyTask) -> Contents:
     """Write ``target`` with the corrected channels; see `format.FormatModule`.
 
     Each goes into a new channel group with the times of its source; a reading marked
     invalid stays marked.
     """
-    with _opened(source) as mdf:
-        channels = choose(_names(mdf))
+    with _opened(task.source) as mdf:
+        channels = task.choose(_names(mdf))
         groups = [
-            _common_group(source, mdf, [channel.column, *channel.signals.values()])
+            _common_group(task.source, mdf, [channel.column, *channel.signals.values()])
             for channel in channels
         ]
         rows = [_cycles(mdf, group) for group in groups]
     # What is added is kept beside the output until it is saved.
-    with _opened(source, temporary_folder=str(target.parent)) as mdf:
-        sums = _kept(source, mdf)
+    with _opened(task.source, temporary_folder=str(task.target.parent)) as mdf:
+        sums = _kept(task.source, mdf)
         compression = _compression(mdf)
         done, total = 0, max(sum(rows), 1)
         for channel in channels:
             check = Checksum()
             made: int | None = None
             names = [channel.column, *channel.signals.values()]
-            for part, *beside in _parts(source, mdf, [_place(mdf, name) for name in names]):
+            for part, *beside in _parts(task.source, mdf, [_place(mdf, name) for name in names]):
                 values = (other.samples for other in beside)
                 signals = dict(zip(channel.signals, values, strict=True))
                 corrected = channel.correct(part.samples, signals)
                 check.update(corrected)
                 made = _put(mdf, made, part, corrected, channel)
                 done += corrected.size
-                watch(corrected.size, done / total)
+                task.watch(corrected.size, done / total)
             sums[channel.added] = check.text()
         mdf.file_history.append(_history(mdf, note(channels)))
-        mdf.save(target, overwrite=True, compression=compression, add_history_block=False)
+        mdf.save(task.target, overwrite=True, compression=compression, add_history_block=False)
     return Contents(max(rows), sums)
 
 

@@ -9,8 +9,6 @@ from typing import BinaryIO, Final
 
 from ..errors import FileError
 
-__all__ = ["check_chains"]
-
 #: Where the header block stands.
 _HEADER: Final = 0x40
 #: Bytes before the links of a block: kind, length, number of links.

@@ -8,8 +8,6 @@ from pathlib import Path
 
 from ..errors import MessageLinesWarning
 
-__all__ = ["warn_of_messages"]
-
 #: Characters of a message that are shown.
 _SHOWN = 60
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import zlib
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import IO, Any
@@ -15,9 +15,7 @@ from numpy.typing import NDArray
 from ..errors import FileError
 from .budget import FileExtent
 from .damage import damage_told
-from .format import TEXTS, Addition, Batch, Choose, Contents, Watch, refuse_corrected, row_labels
-
-__all__ = ["columns", "contents", "copy", "extent", "read", "read_header", "write_header"]
+from .format import Addition, Batch, Contents, CopyTask, Selection, refuse_corrected, row_labels
 
 #: Readings taken together.
 _BLOCK = 1 << 18
@@ -35,37 +33,22 @@ def extent(path: Path, names: Sequence[str] = (), topic: str | None = None) -> F
         return FileExtent(len(array), 8 * len(array) * len(names))
 
 
-def read(
-    path: Path,
-    names: Sequence[str],
-    topic: str | None = None,
-    stretch: None = None,
-    *,
-    texts: Collection[str] = TEXTS,
-    strict: bool = False,
-) -> Iterator[Batch]:
+def read(path: Path, wanted: Selection) -> Iterator[Batch]:
     """Columns ``names`` in batches; see `format.FormatModule`."""
     with _opened(path) as array:
         for start in range(0, len(array), _BLOCK):
             part = array[start : start + _BLOCK]
-            yield {name: _values(part, array, name) for name in names}
+            yield {name: _values(part, array, name) for name in wanted.names}
 
 
-def copy(
-    source: Path,
-    target: Path,
-    choose: Choose,
-    watch: Watch,
-    topic: str | None = None,
-    output_topic: str | None = None,
-) -> Contents:
+def copy(task: CopyTask) -> Contents:
     """Write ``target`` with the corrected columns last; see `format.FormatModule`.
 
     Records get further fields; plain columns become those of one table, whose order is kept.
     """
-    with _opened(source) as array, target.open("wb") as output:
+    with _opened(task.source) as array, task.target.open("wb") as output:
         names = _names(array)
-        additions = choose(names)
+        additions = task.choose(names)
         kind, width = _enlarged(array, additions)
         shape = (len(array),) if kind.names else (len(array), width + len(additions))
         write_header(output, kind, shape)
@@ -83,11 +66,11 @@ def copy(
                 after = addition.correct(_values(part, array, addition.column), signals)
                 if not kind.names and start == 0:
                     columns = {name: _values(part, array, name) for name in names}
-                    refuse_corrected(source, columns, addition, after)
+                    refuse_corrected(task.source, columns, addition, after)
                 put[addition.added if kind.names else (slice(None), width + i)] = after
             check = zlib.crc32(put.data.cast("B"), check)
             output.write(put.data)
-            watch(len(part), (start + len(part)) / len(array))
+            task.watch(len(part), (start + len(part)) / len(array))
         return Contents(len(array), {"bytes": f"{check:08x}"})
 
 

@@ -7,7 +7,7 @@ import math
 import shutil
 import zipfile
 import zlib
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import IO, Any, NamedTuple
@@ -18,10 +18,8 @@ from numpy.typing import NDArray
 from ..errors import FileError
 from .budget import FileExtent, check_part
 from .damage import damage_told
-from .format import TEXTS, Addition, Batch, Choose, Contents, Watch, note, row_labels
+from .format import Addition, Batch, Contents, CopyTask, Selection, check_lengths, note, row_labels
 from .npy import read_header, write_header
-
-__all__ = ["columns", "contents", "copy", "extent", "read", "together"]
 
 #: Readings taken together.
 _BLOCK = 1 << 18
@@ -60,33 +58,21 @@ def together(path: Path, needed: Sequence[str], others: Sequence[str]) -> list[s
     return [name for name in others if found[name].size in sizes]
 
 
-def read(
-    path: Path,
-    names: Sequence[str],
-    topic: str | None = None,
-    stretch: None = None,
-    *,
-    texts: Collection[str] = TEXTS,
-    strict: bool = False,
-) -> Iterator[Batch]:
+def read(path: Path, wanted: Selection) -> Iterator[Batch]:
     """Arrays ``names`` in batches; see `format.FormatModule`."""
     with _opened(path) as archive:
-        yield from _batches(path, archive, names)
+        yield from _batches(path, archive, wanted.names)
 
 
-def copy(
-    source: Path,
-    target: Path,
-    choose: Choose,
-    watch: Watch,
-    topic: str | None = None,
-    output_topic: str | None = None,
-) -> Contents:
+def copy(task: CopyTask) -> Contents:
     """Write ``target`` with the corrected arrays; see `format.FormatModule`."""
     sums: dict[str, str] = {}
-    with _opened(source) as archive, zipfile.ZipFile(target, "w", allowZip64=True) as output:
+    with (
+        _opened(task.source) as archive,
+        zipfile.ZipFile(task.target, "w", allowZip64=True) as output,
+    ):
         found = _columns(archive)
-        additions = choose(list(found))
+        additions = task.choose(list(found))
         for member in archive.infolist():
             if member.filename == _NOTE:
                 continue
@@ -104,11 +90,11 @@ def copy(
             kept.compress_type = archive.getinfo(f"{addition.column}.npy").compress_type
             with output.open(kept, "w", force_zip64=True) as put:
                 check = 0
-                for part in _corrected(source, archive, addition, found[addition.column]):
+                for part in _corrected(task.source, archive, addition, found[addition.column]):
                     put.write(part)
                     check = zlib.crc32(part, check)
                     done += len(part) // 8
-                    watch(len(part) // 8, min(done / total, 1.0))
+                    task.watch(len(part) // 8, min(done / total, 1.0))
             sums[name] = f"{check:08x}"
             rows = max(rows, size)
         told = note(additions).encode()
@@ -172,9 +158,7 @@ def _batches(path: Path, archive: zipfile.ZipFile, names: Sequence[str]) -> Iter
             check_part(path, column.kind.itemsize * min(column.size, _BLOCK), "array", name)
             streams[name] = (given, column)
         sizes = {name: column.size for name, (_given, column) in streams.items()}
-        if len(set(sizes.values())) > 1:
-            listed = ", ".join(f"{name} {size}" for name, size in sizes.items())
-            raise FileError(path, f"arrays that belong together differ in length: {listed}")
+        check_lengths(path, "arrays", sizes)
         size = next(iter(sizes.values()), 0)
         for start in range(0, size, _BLOCK):
             count = min(_BLOCK, size - start)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -24,9 +24,7 @@ from .arrowtables import (
 )
 from .budget import FileExtent
 from .damage import damage_told
-from .format import TEXTS, Addition, Batch, Choose, Contents, Watch
-
-__all__ = ["columns", "contents", "copy", "extent", "read", "stretches"]
+from .format import Addition, Batch, Contents, CopyTask, Selection
 
 #: Bytes of decoded columns in hand at once; larger row groups are cut.
 _BYTES = 1 << 25
@@ -75,27 +73,20 @@ def stretches(path: Path) -> list[RowGroupRange | None]:
     return [RowGroupRange(groups, footer) for groups in found] if len(found) > 1 else [None]
 
 
-def read(
-    path: Path,
-    names: Sequence[str],
-    topic: str | None = None,
-    stretch: RowGroupRange | None = None,
-    *,
-    texts: Collection[str] = TEXTS,
-    strict: bool = False,
-) -> Iterator[Batch]:
+def read(path: Path, wanted: Selection) -> Iterator[Batch]:
     """Columns ``names`` in batches; see `format.FormatModule`.
 
     A stretch is read from mapped memory, by the calling thread alone.
     """
-    tops = [name for name in names if "[" not in name]  # elements of lists are no columns
+    tops = [name for name in wanted.names if "[" not in name]  # elements of lists are no columns
+    stretch: RowGroupRange | None = wanted.stretch
     if stretch is None:
         with _opened(path, read_dictionary=tops) as file:
-            yield from read_ahead(column_batches(path, names, _batches(file, names), texts))
+            yield from read_ahead(column_batches(path, _batches(file, wanted.names), wanted))
         return
     mapped = {"metadata": stretch.footer, "memory_map": True, "read_dictionary": tops}
     with _opened(path, **mapped) as file:
-        yield from column_batches(path, names, _batches(file, names, stretch.groups), texts)
+        yield from column_batches(path, _batches(file, wanted.names, stretch.groups), wanted)
 
 
 def _batches(
@@ -115,35 +106,22 @@ def _first_length(file: pq.ParquetFile, name: str) -> int:
     return int(length or 0)
 
 
-def copy(
-    source: Path,
-    target: Path,
-    choose: Choose,
-    watch: Watch,
-    topic: str | None = None,
-    output_topic: str | None = None,
-) -> Contents:
+def copy(task: CopyTask) -> Contents:
     """Write ``target`` with the corrected columns; see `format.FormatModule`."""
     digest = ArrowDigest()
-    with _whole(source) as (file, tables):
+    with _whole(task.source) as (file, tables):
         elements = element_names(file.schema_arrow, lambda name: _first_length(file, name))
-        channels = choose(list(dict.fromkeys([*file.schema_arrow.names, *elements])))
-        schema = corrected_schema(file.schema_arrow, channels, source)
-
-        def corrected() -> Iterator[pa.Table]:
-            for table in tables:
-                made = add_corrected(source, table, channels, schema)
-                digest.update(made)
-                yield made
-
+        channels = task.choose(list(dict.fromkeys([*file.schema_arrow.names, *elements])))
+        schema = corrected_schema(file.schema_arrow, channels, task.source)
+        made = (add_corrected(task.source, table, channels, schema) for table in tables)
         total = max(file.metadata.num_rows, 1)
-        with pq.ParquetWriter(target, schema, **_options(file, channels)) as writer:
-            for table in read_ahead(corrected()):
+        with pq.ParquetWriter(task.target, schema, **_options(file, channels)) as writer:
+            for table in read_ahead(digest.passed(made)):
                 writer.write_table(table, row_group_size=max(table.num_rows, 1))
-                watch(table.num_rows, digest.rows / total)
+                task.watch(table.num_rows, digest.rows / total)
         if digest.rows != file.metadata.num_rows:
             raise FileError(
-                source, f"{digest.rows} rows read, its footer says {file.metadata.num_rows}"
+                task.source, f"{digest.rows} rows read, its footer says {file.metadata.num_rows}"
             )
     return digest.contents()
 

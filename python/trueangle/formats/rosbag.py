@@ -20,15 +20,13 @@ from rosbags.typesys import Stores, get_typestore
 from ..errors import FileError
 from .budget import FileExtent
 from .damage import damage_told
-from .format import TEXTS, Addition, Batch, Choose, Contents, Watch
+from .format import Addition, Batch, Contents, CopyTask, Selection
 from .jointstates import Block
 from .mcapchunks import BagReader, ChunkReader
 from .mcaprows import RecordRows
 from .rosbagmarks import bag_custom_data, corrected_topics, made_note, refuse_again
 from .rosbagwriter import opened_writer
 from .unpacking import unpacked
-
-__all__ = ["columns", "contents", "copy", "extent", "read"]
 
 _JOINT_STATE = "sensor_msgs/msg/JointState"
 #: Signals of a joint in the message, under the names of columns.
@@ -53,54 +51,40 @@ def extent(path: Path, names: Sequence[str] = (), topic: str | None = None) -> F
     return FileExtent(rows, 8 * rows * len(names))
 
 
-def read(
-    path: Path,
-    names: Sequence[str],
-    topic: str | None = None,
-    stretch: None = None,
-    *,
-    texts: Collection[str] = TEXTS,
-    strict: bool = False,
-) -> Iterator[Batch]:
+def read(path: Path, wanted: Selection) -> Iterator[Batch]:
     """Positions and signals in batches; see `format.FormatModule`."""
     with _opened(path) as bag:
-        connections = bag.topic(topic)
+        connections = bag.topic(wanted.topic)
         joints = bag.joints(connections)
         for block in bag.blocks(connections):
             states = bag.states(block)
-            yield {name: _values(states, name, joints) for name in names}
+            yield {name: _values(states, name, joints) for name in wanted.names}
 
 
-def copy(
-    source: Path,
-    target: Path,
-    choose: Choose,
-    watch: Watch,
-    topic: str | None = None,
-    output_topic: str | None = None,
-) -> Contents:
+def copy(task: CopyTask) -> Contents:
     """Write ``target`` with the corrected positions; see `format.FormatModule`.
 
     They go to the topic ``output_topic`` (default: that of the joint states with
     ``_corrected`` added) in messages that are otherwise the same, at the same times; an
     output topic that is the input topic replaces its positions.
     """
-    with _opened(source) as bag:
-        connections = bag.topic(topic)
-        channels = choose(bag.columns(connections))
+    with _opened(task.source) as bag:
+        connections = bag.topic(task.topic)
+        channels = task.choose(bag.columns(connections))
         name = connections[0].topic
-        output = output_topic or f"{name}_corrected"
-        refuse_again(source, bag, name, channels)
+        output = task.output_topic or f"{name}_corrected"
+        refuse_again(task.source, bag, name, channels)
         if output != name and any(c.topic == output for c in bag.reader.connections):
             raise FileError(
-                source, f"topic {output} is there already: corrected before, or `output_topic=`"
+                task.source,
+                f"topic {output} is there already: corrected before, or `output_topic=`",
             )
         total = max(bag.reader.message_count, 1)
         joints = bag.joints(connections)
         digest = _Digest()
         done = 0
         ours = {c.id for c in connections}
-        with opened_writer(bag, target, made_note(bag, channels, output)) as writer:
+        with opened_writer(bag, task.target, made_note(bag, channels, output)) as writer:
             copies = {
                 c.id: writer.add(c, c.topic, output == name and c.id in ours)
                 for c in bag.reader.connections
@@ -119,11 +103,11 @@ def copy(
                         made = rows.with_messages(states.rows_with_positions(positions))
                         parts = parts[: 1 if output != name else 0]
                         parts.append((outputs[connection.id], output, made))
-                    writer.write_rows([(target, some) for target, _topic, some in parts])
-                    for _target, topic, some in parts:
+                    writer.write_rows([(place, some) for place, _topic, some in parts])
+                    for _place, topic, some in parts:
                         digest.update_rows(topic, some)
                     done += len(rows)
-                    watch(len(rows) if connection.id in outputs else 0, done / total)
+                    task.watch(len(rows) if connection.id in outputs else 0, done / total)
                     continue
                 places = [i for i, message in enumerate(block) if message[0].id in outputs]
                 states = Block([block[i][2] for i in places], bag.is_ros1)
@@ -139,7 +123,7 @@ def copy(
                         writer.write(outputs[connection.id], time, data)
                         digest.update(output, time, data)
                 done += len(block)
-                watch(len(states), done / total)
+                task.watch(len(states), done / total)
     return digest.contents()
 
 

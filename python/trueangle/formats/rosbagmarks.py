@@ -22,8 +22,6 @@ from .format import Addition, note
 if TYPE_CHECKING:
     from .rosbag import Bag
 
-__all__ = ["KEY", "bag_custom_data", "caller_note", "corrected_topics", "made_note", "refuse_again"]
-
 #: Of the custom data.
 KEY = "trueangle"
 _JOINT_STATE = "sensor_msgs/msg/JointState"

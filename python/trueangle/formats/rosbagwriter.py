@@ -21,8 +21,6 @@ from .rosbagmarks import KEY, caller_note
 if TYPE_CHECKING:
     from .rosbag import Bag
 
-__all__ = ["BagWriter", "opened_writer"]
-
 
 class BagWriter:
     """A bag being written beside the one read."""

@@ -8,18 +8,15 @@ from __future__ import annotations
 
 import re
 import zlib
-from collections.abc import Callable, Collection, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
 from ..errors import FileError
-from .budget import FileExtent, text_extent
-from .format import TEXTS, Batch, Choose, Contents, Watch
+from .format import Batch, Contents, CopyTask, Selection
 from .messages import warn_of_messages
-
-__all__ = ["columns", "contents", "copy", "extent", "line_of", "read"]
 
 _NUMBER = rb"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?|[+-]?(?:nan|inf)"
 _NAME = rb"[A-Za-z_][\w.\[\]/-]*(?: [\w.\[\]/-]+){0,4}"
@@ -54,19 +51,11 @@ def columns(path: Path, topic: str | None = None) -> list[str]:
     return list(names)
 
 
-def read(
-    path: Path,
-    names: Sequence[str],
-    topic: str | None = None,
-    stretch: None = None,
-    *,
-    texts: Collection[str] = TEXTS,
-    strict: bool = False,
-) -> Iterator[Batch]:
+def read(path: Path, wanted: Selection) -> Iterator[Batch]:
     """Columns in batches, NaN where a row lacks a name; see `format.FormatModule`."""
     words: list[tuple[int, str]] = []
     block: list[_Row] = []
-    values = _clocked(names)
+    values = _clocked(wanted.names)
     for number, (raw, row) in enumerate(_lines(path), 1):
         if row is not None:
             block.append(row)
@@ -86,26 +75,14 @@ def line_of(path: Path, row: int) -> int:
     return next((line for i, line in enumerate(rows) if i == row), row)
 
 
-def extent(path: Path, names: Sequence[str] = (), topic: str | None = None) -> FileExtent:
-    """Rows as the first lines tell; see `format.FormatModule`."""
-    return text_extent(path)
-
-
-def copy(
-    source: Path,
-    target: Path,
-    choose: Choose,
-    watch: Watch,
-    topic: str | None = None,
-    output_topic: str | None = None,
-) -> Contents:
+def copy(task: CopyTask) -> Contents:
     """Write ``target`` with a pair more at the end of every row; see `format.FormatModule`."""
-    additions = choose(columns(source))
+    additions = task.choose(columns(task.source))
     used = [name for a in additions for name in (a.column, *a.signals.values())]
     values = _clocked(used)
-    size, done, rows, check = max(source.stat().st_size, 1), 0, 0, 0
-    with target.open("wb") as output:
-        for lines in _blocks(source):
+    size, done, rows, check = max(task.source.stat().st_size, 1), 0, 0, 0
+    with task.target.open("wb") as output:
+        for lines in _blocks(task.source):
             found = [row for _raw, row in lines if row is not None]
             styles = [_style(raw) for raw, row in lines if row is not None]
             batch = values(found)
@@ -128,7 +105,7 @@ def copy(
             check = zlib.crc32(data, check)
             done += sum(len(raw) for raw, _row in lines)
             rows += len(found)
-            watch(len(found), done / size)
+            task.watch(len(found), done / size)
     return Contents(rows, {"bytes": f"{check:08x}"})
 
 

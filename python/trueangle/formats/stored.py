@@ -13,8 +13,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
-__all__ = ["ROWS", "stored_values"]
-
 #: Values at once: two columns of them stay in the second cache until they are used.
 ROWS = 1 << 16
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 import re
 import struct
 import zlib
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import NamedTuple
@@ -20,9 +20,7 @@ from numpy.typing import NDArray
 
 from ..errors import FileError
 from .budget import FileExtent, check_part
-from .format import TEXTS, Batch, Choose, Contents, Watch, note
-
-__all__ = ["columns", "contents", "copy", "extent", "read"]
+from .format import Batch, Contents, CopyTask, Selection, note
 
 _TIME = "time_s"
 _MAGIC = b"WPILOG"
@@ -67,23 +65,15 @@ def extent(path: Path, names: Sequence[str] = (), topic: str | None = None) -> F
     return FileExtent(rows, 8 * rows * len(names))
 
 
-def read(
-    path: Path,
-    names: Sequence[str],
-    topic: str | None = None,
-    stretch: None = None,
-    *,
-    texts: Collection[str] = TEXTS,
-    strict: bool = False,
-) -> Iterator[Batch]:
+def read(path: Path, wanted: Selection) -> Iterator[Batch]:
     """Columns as one batch, NaN where an entry has no record; see `format.FormatModule`."""
     log = _opened(path)
-    series = {name: _series(path, log, name) for name in names if name != _TIME}
+    series = {name: _series(path, log, name) for name in wanted.names if name != _TIME}
     if not series:
         series = {name: _series(path, log, name) for name in _names(log)}
     times = np.unique(np.concatenate([np.empty(0, _STAMP), *(own for own, _ in series.values())]))
     found: Batch = {}
-    for name in names:
+    for name in wanted.names:
         if name == _TIME:
             found[name] = times * 1e-6
             continue
@@ -94,32 +84,25 @@ def read(
     yield found
 
 
-def copy(
-    source: Path,
-    target: Path,
-    choose: Choose,
-    watch: Watch,
-    topic: str | None = None,
-    output_topic: str | None = None,
-) -> Contents:
+def copy(task: CopyTask) -> Contents:
     """Write ``target`` with an entry of corrected angles at the end; see `format.FormatModule`."""
-    log = _opened(source)
-    additions = choose([_TIME, *_names(log)])
+    log = _opened(task.source)
+    additions = task.choose([_TIME, *_names(log)])
     parts, rows = [log.data], sum(len(entry.times) for entry in log.entries.values())
     number = max(log.numbers, default=0)
     for addition in additions:
         number += 1
-        times, values = _series(source, log, addition.column)
-        signals = {s: _at(source, log, name, times) for s, name in addition.signals.items()}
+        times, values = _series(task.source, log, addition.column)
+        signals = {s: _at(task.source, log, name, times) for s, name in addition.signals.items()}
         after = addition.correct(values, signals).astype("<f8")
         first = int(times[0]) if times.size else 0
         parts.append(_started(number, addition.added, note([addition]), first))
         for time, value in zip(times.tolist(), after.tolist(), strict=True):
             parts.append(_record(number, time, struct.pack("<d", value)))
         rows += times.size
-        watch(times.size, 1.0)
+        task.watch(times.size, 1.0)
     data = b"".join(parts)
-    target.write_bytes(data)
+    task.target.write_bytes(data)
     return Contents(rows, {"bytes": f"{zlib.crc32(data):08x}"})
 
 

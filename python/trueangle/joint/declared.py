@@ -8,8 +8,6 @@ from dataclasses import dataclass
 
 from ..errors import ArgumentError
 
-__all__ = ["Bearing", "DeclaredShaft", "Head"]
-
 #: Names that belong to the output and its gear.
 _TAKEN = ("output", "motor", "wave_generator")
 

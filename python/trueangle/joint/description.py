@@ -12,13 +12,11 @@ from types import MappingProxyType
 from typing import Any, Final
 
 from ..errors import ArgumentError, FileError
-from ..formats.columns import role_kind
 from ..support.decoding import Decoder, read_text, shown
 from ..support.files import SIMULATION, SIMULATION_BYTES, written_atomically
+from ..support.roles import role_kind
 from ..support.suggestions import did_you_mean
 from .members import FIXED_MEMBERS
-
-__all__ = ["JointDescription", "RobotDescription", "load_description"]
 
 #: Joints of one robot, at most.
 MAX_JOINTS: Final = 256

@@ -5,13 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from .signals import Signals
-
-__all__ = ["earlier"]
-
-Array = NDArray[np.float64]
 
 
 def earlier(signals: Signals, delay_s: float) -> Signals:
@@ -24,16 +19,7 @@ def earlier(signals: Signals, delay_s: float) -> Signals:
     Where the readings of a run stand closer than the delay, the angle is read off their own record
     instead, so that the joint may gather speed meanwhile.
 
-    Parameters
-    ----------
-    signals : Signals
-        With velocity.
-    delay_s : float
-        ``τ``, seconds; negative for a time after.
-
-    Returns
-    -------
-    Signals
+    The signals need a velocity; ``delay_s`` is τ, negative for a time after.
 
     Examples
     --------

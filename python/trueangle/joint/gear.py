@@ -11,17 +11,6 @@ from ..support.kinds import told_kinds
 from ..support.suggestions import check_choice
 from .members import FIXED_MEMBERS
 
-__all__ = [
-    "COMMON_RATIOS",
-    "HIGHEST_LOW_ORDER",
-    "Explanation",
-    "explain_as_harmonic",
-    "explain_by_shafts",
-    "explain_order",
-    "gear_orders",
-    "wanted_orders",
-]
-
 #: Gear ratios of common strain wave gears, tried where none is declared.
 COMMON_RATIOS: Final = (30, 50, 80, 100, 120, 160)
 
@@ -164,11 +153,8 @@ def explain_order(
 def explain_as_harmonic(order: float, amplitudes: Mapping[float, float]) -> tuple[Explanation, ...]:
     """The larger line that ``order`` is a multiple of: what is not sinusoidal has harmonics.
 
-    Parameters
-    ----------
-    order : float
-    amplitudes : mapping of float to float
-        Of every retained order, in any unit. Order 1 is left out: all are multiples of it.
+    ``amplitudes`` are those of every retained order, in any unit. Order 1 is left out: all are
+    multiples of it.
 
     Examples
     --------

@@ -8,8 +8,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["UniformGrid", "finer_step", "lattice_step", "table_move", "uniform_grid"]
-
 #: Departure from the grid, in shares of its step, up to which readings lie on it.
 ON_GRID = 0.02
 
@@ -31,12 +29,7 @@ LINGERS = 0.05
 
 @dataclass(frozen=True)
 class UniformGrid:
-    """Equal steps of one turn.
-
-    Attributes
-    ----------
-    positions : int
-    """
+    """Equal steps of one turn."""
 
     positions: int
 
@@ -144,12 +137,8 @@ def table_move(runs: Sequence[NDArray[np.float64]], step: float) -> float:
     Where each reading stands one and the same number of steps from the one before, the design put
     it there: such a lattice is no property of the sensor.
 
-    Parameters
-    ----------
-    runs : sequence of ndarray
-        Angles of each run, turns.
-    step : float
-        Of the lattice that they lie on (`lattice_step`), turns.
+    ``runs`` are the angles of each run and ``step`` that of their lattice (`lattice_step`), in
+    turns.
 
     Examples
     --------

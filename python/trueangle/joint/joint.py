@@ -5,14 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from ..errors import ArgumentError
-from ..support.kinds import told_kinds
-from ..support.oftype import all_of_type
+from ..support.kinds import all_of_type, told_kinds
 from ..support.suggestions import check_choice
 from .declared import Bearing, DeclaredShaft, Head
 from .members import FIXED_MEMBERS
 from .shafts import shaft_cycles
-
-__all__ = ["Joint"]
 
 ENCODER_SIDES = ("motor", "output")
 

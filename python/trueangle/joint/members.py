@@ -4,6 +4,4 @@ from __future__ import annotations
 
 from typing import Final
 
-__all__ = ["FIXED_MEMBERS"]
-
 FIXED_MEMBERS: Final = ("circular_spline", "flexspline", "none")

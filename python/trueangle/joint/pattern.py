@@ -12,20 +12,9 @@ from numpy.typing import NDArray
 import trueangle._core as _core
 
 from ..errors import ArgumentError
+from ..support.arrays import Array
 from ..support.kinds import told_kinds
 from .joint import Joint
-
-__all__ = [
-    "ARCSEC_PER_RAD",
-    "Harmonic",
-    "Pattern",
-    "Surroundings",
-    "line_columns",
-    "line_sum",
-    "lines_columns",
-]
-
-Array = NDArray[np.float64]
 
 ARCSEC_PER_RAD = 1_296_000.0 / (2.0 * math.pi)
 

@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from itertools import islice
-from typing import Final, NamedTuple, TypeAlias, TypeVar
+from typing import Final, NamedTuple, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..errors import ArgumentError
+from ..support.arrays import Array
 from ..support.kinds import told_kinds
 from ..support.suggestions import check_choice
 from .members import FIXED_MEMBERS
@@ -25,7 +25,6 @@ __all__ = [
     "shaft_cycles",
 ]
 
-Array: TypeAlias = NDArray[np.float64]
 T = TypeVar("T")
 
 #: Orders that are looked at together, at most: the core's limit of one fit.

@@ -12,16 +12,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..formats.signals import coupled_with
 from ..runs.run import CalibrationRun
 from ..support.angles import ARCSEC_PER_TURN
+from ..support.arrays import Array
 from ..support.quantiles import median
+from ..support.signals import coupled_with
 from .grid import UniformGrid, finer_step, lattice_step, table_move, uniform_grid
 from .turning import direction_at_turns, velocity_at_turns
 
-__all__ = ["Signals", "join_runs"]
-
-Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 
 #: Share of sign changes between neighbouring steps above which the direction is read

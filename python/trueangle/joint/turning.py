@@ -17,11 +17,8 @@ from __future__ import annotations
 import itertools
 
 import numpy as np
-from numpy.typing import NDArray
 
-__all__ = ["direction_at_turns", "velocity_at_turns"]
-
-Array = NDArray[np.float64]
+from ..support.arrays import Array
 
 #: Share of the one line's error below which the other one's must be to have the reading: where
 #: both are alike the joint may have stopped there, and came the way it came.
@@ -34,18 +31,8 @@ LINE, PARABOLA = 2, 3
 def direction_at_turns(angle: Array, clock: Array, direction: Array) -> Array:
     """Directions of the steps, put right for readings that had turned back already.
 
-    Parameters
-    ----------
-    angle : ndarray, shape (n,)
-        Unwrapped.
-    clock : ndarray, shape (n,)
-        Times, or the places in the record where none were recorded.
-    direction : ndarray, shape (n,)
-        Of the step that led to each reading.
-
-    Returns
-    -------
-    ndarray, shape (n,)
+    ``angle`` is unwrapped, ``clock`` holds times, or places in the record where none were recorded,
+    and ``direction`` is that of the step that led to each reading.
 
     Examples
     --------
@@ -72,14 +59,6 @@ def direction_at_turns(angle: Array, clock: Array, direction: Array) -> Array:
 
 def velocity_at_turns(angle: Array, time: Array, direction: Array, velocity: Array) -> Array:
     """Velocities by central differences, put right beside turning points.
-
-    Parameters
-    ----------
-    angle, time, direction, velocity : ndarray, shape (n,)
-
-    Returns
-    -------
-    ndarray, shape (n,)
 
     Examples
     --------

@@ -13,8 +13,6 @@ from ..support.decoding import read_text
 from ..support.files import SIMULATION_BYTES
 from .description import JointDescription, RobotDescription
 
-__all__ = ["robot_of_urdf"]
-
 #: Joints that turn; others have no angle.
 _TURNING = ("revolute", "continuous")
 

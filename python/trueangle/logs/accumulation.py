@@ -24,9 +24,8 @@ from ..estimation.moments import Moments
 from ..formats.ahead import side_by_side
 from ..formats.columns import find_columns
 from ..formats.format import Format as LogFormat
-from ..formats.format import Labels, row_labels
+from ..formats.format import Labels, Selection, row_labels
 from ..formats.formats import find_format
-from ..formats.times import local_day
 from ..model.model import Argument, HarmonicModel
 from ..runs.angles import Angles, find_angles
 from ..runs.facets import Facets
@@ -34,20 +33,10 @@ from ..runs.follows import check_follows
 from ..runs.run import CalibrationRun
 from ..runs.source import unit_of_path
 from ..support.angles import wrap
+from ..support.arrays import Array
 from ..support.files import partition_keys
+from ..support.times import local_day
 from .keeping import SAMPLE, Kept
-
-__all__ = [
-    "LABELS",
-    "Accumulated",
-    "LogFitSettings",
-    "OutlierLimits",
-    "accumulate_each",
-    "log_moments",
-    "merged_moments",
-]
-
-Array: TypeAlias = NDArray[np.float64]
 
 #: Roles whose columns tell runs apart.
 LABELS = ("unit", "run")
@@ -258,10 +247,11 @@ def _accumulate(stretch: _LogPart, settings: LogFitSettings, advance: Advance) -
     )
     labels = [*stretch.labels.values()]
     names = [*dict.fromkeys([*stretch.angles.names, *labels])]
+    wanted = Selection(names, settings.topic, stretch.part, texts=labels)
     left = stretch.size
     folders = partition_keys(path) | ({} if stretch.unit is None else {"unit": stretch.unit})
     taken_of: Counter[Hashable] = Counter()
-    for batch in stretch.kind.read(path, names, settings.topic, stretch.part, texts=labels):
+    for batch in stretch.kind.module.read(path, wanted):
         true, said = stretch.angles.values(batch.__getitem__)
         if is_first and found.rows == 0:
             _check_follows(path, true, said, period)

@@ -12,13 +12,13 @@ from typing import Any
 
 from ..errors import TrueAngleError, UnitWarning
 from ..model.model import HarmonicModel
+from ..support.files import remove_leftovers
 from ..support.kinds import told_kinds
 from .correction import Task, correct_log, is_disk_full, states_after
 from .joints import JointState, LogSettings, logged_joints
-from .manifest import Manifest
+from .manifest import Manifest, stamp
 from .progress import Progress
 from .report import BatchReport, LogReport, done_before
-from .safety import remove_leftovers, stamp
 from .sources import LogTarget, output_places
 
 __all__ = ["BatchReport", "LogReport", "correct_logs"]

@@ -20,8 +20,6 @@ from .report import LogReport, done_before
 from .sources import LogTarget
 from .turns import TurnSpan, TurnState
 
-__all__ = ["accumulated_on_cluster", "connected_client", "on_cluster", "read_on_cluster"]
-
 #: Seconds to wait for the scheduler.
 _TIMEOUT = 20
 

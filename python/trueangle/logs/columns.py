@@ -6,25 +6,11 @@ from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 from ..errors import FileError
-from ..formats.columns import (
-    ANGLE_UNITS,
-    Column,
-    find_columns,
-    listed_columns,
-    signed_name,
-    unit_in_name,
-)
-from ..formats.signals import SIGNALS
+from ..formats.columns import find_columns, listed_columns, signed_name
 from ..support.angles import UNIT_PERIODS, unit_name
+from ..support.roles import ANGLE_UNITS, Column, unit_in_name
+from ..support.signals import SIGNALS
 from ..support.suggestions import check_choice, did_you_mean
-
-__all__ = [
-    "SIGNAL_COLUMNS",
-    "UNITS",
-    "AngleColumn",
-    "find_angle_column",
-    "find_joint_signal",
-]
 
 UNITS = (*UNIT_PERIODS, "count")
 

@@ -13,18 +13,16 @@ from typing import Any
 import numpy as np
 
 from ..errors import FileError
-from ..formats.format import Watch
+from ..formats.format import CopyTask, Selection, Watch
 from ..formats.formats import find_format
-from ..support.files.workplace import PARTIAL
+from ..support.files import publish
+from ..support.files.workplace import PARTIAL, workplace
 from .joints import Channel, JointState, LogSettings
-from .manifest import Manifest
-from .safety import publish, stamp, workplace
+from .manifest import Manifest, stamp
 from .turns import TurnCounter, TurnSpan
 
 #: What the system says of writing only.
 _OF_WRITING = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
-
-__all__ = ["Task", "correct_log", "count_turns", "is_disk_full", "states_after"]
 
 
 @dataclass(frozen=True)
@@ -71,7 +69,9 @@ def correct_log(task: Task, watch: Watch = lambda rows, part: None) -> dict[str,
         return channels
 
     with kind.at_header(source), _named(target), workplace(target) as aside:
-        written = module.copy(source, aside, choose, watch, settings.topic, settings.output_topic)
+        written = module.copy(
+            CopyTask(source, aside, choose, watch, settings.topic, settings.output_topic)
+        )
         read_back = module.contents(aside, settings.topic)
         if written != read_back:
             changed = [
@@ -132,7 +132,7 @@ def count_turns(source: Path, settings: LogSettings) -> dict[str, TurnSpan]:
     channels = [c for c in settings.channels(source, header, unit=kind.unit) if c.counts_turns]
     counters = {c.name: TurnCounter(c.angle.period) for c in channels}
     first: dict[str, float | None] = {c.name: None for c in channels}
-    for batch in module.read(source, [c.angle.name for c in channels], settings.topic):
+    for batch in module.read(source, Selection([c.angle.name for c in channels], settings.topic)):
         for channel in channels:
             angle = batch[channel.angle.name]
             known = angle[np.isfinite(angle)]

@@ -7,19 +7,13 @@ from os import PathLike
 from pathlib import Path
 from typing import Any, TypeAlias
 
-from ..errors import (
-    ArgumentError,
-    FileError,
-    NoModelError,
-)
+from ..errors import ArgumentError, FileError, NoModelError
 from ..fitting.argument import AnyArgument
 from ..fitting.fit import fit, fitted_to
 from ..fitting.orders.choice import selected_of
 from ..fitting.orders.select import OrderSelection, select_orders
 from ..fitting.result import FitResult
-from ..fitting.robust import (
-    without_spikes,
-)
+from ..fitting.robust import without_spikes
 from ..fitting.summed import Summed
 from ..fitting.uncertainty import CovarianceKind, check_covariance
 from ..joint.shafts import resolve_orders
@@ -31,8 +25,6 @@ from ..support.kinds import told_kinds
 from .keeping import KEPT
 from .passes import Passes
 from .sources import hold_at_most
-
-__all__ = ["fit_logs", "select_log_orders"]
 
 _Logs: TypeAlias = str | PathLike[str] | Iterable[str | PathLike[str]]
 

@@ -16,8 +16,6 @@ from ..support.kinds import told_kinds
 from ..support.labelled import take_apart
 from .joints import Channel, JointState, LogSettings, logged_joints
 
-__all__ = ["correct"]
-
 _DATA = "data"
 
 

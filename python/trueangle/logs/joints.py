@@ -17,18 +17,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import ArgumentError, FileError, OutsideSpanWarning
-from ..formats.columns import Column, signal_code, wanted_columns
 from ..model.file import load_model
 from ..model.model import HarmonicModel
 from ..model.robot import Robot
 from ..model.robotfile import is_robot_file, load_robot
 from ..support.files import sha256_of
+from ..support.roles import Column, signal_code, wanted_columns
 from .columns import SIGNAL_COLUMNS, AngleColumn, find_angle_column, find_joint_signal
 from .statistics import CorrectionStatistics
 from .turns import TurnCounter, TurnState
 from .unitevidence import UnitEvidence
-
-__all__ = ["Channel", "JointState", "LogJoint", "LogSettings", "logged_joints"]
 
 Array: TypeAlias = NDArray[np.floating[Any]]
 

@@ -9,9 +9,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["KEPT", "SAMPLE", "Kept"]
-
-Array = NDArray[np.float64]
+from ..support.arrays import Array
 
 #: Up to so many readings, 16 bytes each, are all read into runs ...
 KEPT: Final = 1 << 20

@@ -13,9 +13,11 @@ from ..errors import ArgumentError
 from ..runs.paths import MANIFEST
 from ..support.decoding import finite_float
 from ..support.files import check_output
-from .safety import Stamp, lock_path, stamp
+from ..support.files.workplace import lock_path
 
-__all__ = ["MANIFEST", "Manifest"]
+__all__ = ["MANIFEST", "Manifest", "Stamp", "stamp"]
+
+Stamp = tuple[int, int]
 
 
 class Manifest:
@@ -25,11 +27,6 @@ class Manifest:
     the recorded size and time has that name: a process killed between the two leaves a line
     that does not count, one killed while writing a line leaves half a line, which is
     skipped.
-
-    Parameters
-    ----------
-    folder : Path
-        Must exist.
     """
 
     def __init__(self, folder: Path) -> None:
@@ -165,3 +162,10 @@ def _is_state(value: Any) -> bool:
         and isinstance(travel, list)
         and all(type(number) in (int, float) for number in travel)  # NaN: no motion yet
     )
+
+
+def stamp(path: Path) -> Stamp:
+    """Size in bytes and time of the last change (ns) of a file, or of all in a folder."""
+    files = [path] if path.is_file() else [p for p in path.rglob("*") if p.is_file()]
+    stats = [file.stat() for file in files]
+    return sum(s.st_size for s in stats), max((s.st_mtime_ns for s in stats), default=0)

@@ -11,35 +11,24 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import (
-    NoModelError,
-    TrueAngleError,
-    UnlikeRunsWarning,
-)
+from ..errors import NoModelError, TrueAngleError, UnlikeRunsWarning
 from ..estimation.moments import Moments
 from ..fitting.argument import AnyArgument, choose_argument
 from ..fitting.fit import ROUNDING, fit
 from ..fitting.orders.candidates import HIGHEST_FREE_ORDER, HIGHEST_SCANNED, SHAFT_HARMONICS
 from ..fitting.problem import Fitted
 from ..fitting.result import FitResult
-from ..fitting.robust import (
-    FAR,
-    HIDDEN,
-    MANY,
-    WILD,
-    WILD_SHARE,
-    robust_scale,
-)
+from ..fitting.robust import FAR, HIDDEN, MANY, WILD, WILD_SHARE, robust_scale
 from ..fitting.summed import Summed
-from ..formats.columns import wanted_columns
 from ..joint.gear import gear_orders
 from ..joint.shafts import Shaft, ShaftOrders, shaft_cycles
 from ..model.model import Argument, HarmonicModel
 from ..runs.files import Conversion
-from ..runs.run import CalibrationRun, Source
+from ..runs.run import CalibrationRun
 from ..runs.source import checked_reading
 from ..support.angles import wrap
-from ..support.files import partition_name
+from ..support.files import Source, partition_name
+from ..support.roles import wanted_columns
 from .accumulation import (
     Accumulated,
     LogFitSettings,
@@ -49,8 +38,6 @@ from .accumulation import (
 )
 from .keeping import SAMPLE
 from .progress import Progress
-
-__all__ = ["Passes"]
 
 #: Orders per order of the table that sums of segments hold to a part in 1e10.
 _REACH = 2.89

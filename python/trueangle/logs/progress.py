@@ -9,8 +9,6 @@ import time
 from collections.abc import Callable
 from typing import TextIO
 
-__all__ = ["Progress"]
-
 #: Seconds between two lines.
 _INTERVAL = 0.5
 

@@ -12,8 +12,6 @@ from .joints import LogSettings
 from .manifest import Manifest
 from .sources import LogTarget
 
-__all__ = ["BatchReport", "LogReport", "done_before"]
-
 
 @dataclass
 class LogReport:

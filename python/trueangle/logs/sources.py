@@ -11,15 +11,7 @@ from typing import NamedTuple
 from ..errors import ArgumentError, FileError, TrueAngleError
 from ..formats.formats import find_format, known_format
 from ..runs.paths import find_logs
-from ..support.files import (
-    RUNS_BYTES,
-    check_output,
-    kind_of_log,
-    promised_format,
-    same_file,
-)
-
-__all__ = ["LogTarget", "hold_at_most", "output_places"]
+from ..support.files import RUNS_BYTES, check_output, kind_of_log, promised_format, same_file
 
 #: Rows that a byte of a packed file holds, at most, where nothing else is known.
 _PACKED = 64
@@ -50,7 +42,7 @@ def _rows(path: Path, most: int, topic: str | None) -> int:
     if path.is_file() and size <= most // _PACKED:
         return size
     try:
-        return find_format(path).module.extent(path, (), topic).rows
+        return find_format(path).extent(path, (), topic).rows
     except TrueAngleError:
         return 0  # who reads it whole says what is wrong
 

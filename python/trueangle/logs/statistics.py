@@ -10,8 +10,6 @@ from numpy.typing import NDArray
 
 from ..support.angles import arcsec
 
-__all__ = ["CorrectionStatistics"]
-
 
 @dataclass
 class CorrectionStatistics:

@@ -7,9 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["TurnCounter", "TurnSpan", "TurnState"]
-
-Array = NDArray[np.float64]
+from ..support.arrays import Array
 
 
 class TurnState(NamedTuple):
@@ -44,11 +42,7 @@ class TurnCounter:
 
     Only models whose error does not repeat after one turn need it. NaN is stepped over.
 
-    Parameters
-    ----------
-    period : float
-    state : TurnState
-        Where the batch or file before stopped; the first reading ever is in turn 0.
+    ``state`` is where the batch or file before stopped; the first reading ever is in turn 0.
 
     Examples
     --------

@@ -10,8 +10,6 @@ from numpy.typing import NDArray
 
 from ..support.angles import UNIT_PERIODS, unit_name
 
-__all__ = ["UnitEvidence"]
-
 #: Readings that fill a turn of another unit, and no more, to this share ...
 _FILLED: Final = 0.9
 #: ... and jump over its border by as much, while a usual step is below a tenth.
@@ -30,10 +28,7 @@ class UnitEvidence:
 
     A joint that moves little near zero is no evidence, nor is one that makes many turns.
 
-    Parameters
-    ----------
-    period : float
-        One turn in the unit that the readings are taken for.
+    ``period`` is one turn in the unit that the readings are taken for.
 
     Examples
     --------

@@ -9,18 +9,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import ArgumentError
-from ..formats.signals import GivenSignals, check_names
 from ..support.angles import wrap
+from ..support.arrays import Array
+from ..support.signals import GivenSignals, check_names
 
 if TYPE_CHECKING:
     from .model import HarmonicModel, Step
-
-__all__ = [
-    "Corrector",
-    "Velocity",
-]
-
-Array = NDArray[np.float64]
 
 
 class Velocity:

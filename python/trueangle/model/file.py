@@ -6,28 +6,20 @@ import warnings
 from collections.abc import Mapping
 from os import PathLike
 from pathlib import Path
-from typing import Any, TypeAlias
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..errors import ArgumentError, FileError, ModelFileError, OutsideSpanWarning
 from ..joint.shafts import Shaft
-from ..support.decoding import (
-    MAX_LINE_ORDERS,
-    MAX_LINES,
-    MAX_ORDER,
-    json_text,
-    read_text,
-    shown,
-)
+from ..support.arrays import Array
+from ..support.decoding import MAX_LINE_ORDERS, MAX_LINES, MAX_ORDER, json_text, read_text, shown
 from ..support.files import MODEL_BYTES
 from ..support.kinds import told_kinds
 from .model import HarmonicModel
-from .recordfile import MAX_TERMS, RecordReader
+from .records import MAX_TERMS, MOST_TURNS, RecordReader
 from .term import Term, known_terms
 from .text import FORMAT, ROBOT_FORMAT, VERSION, save_model
-from .validity import MOST_TURNS
 
 __all__ = [
     "FORMAT",
@@ -38,8 +30,6 @@ __all__ = [
     "part_of",
     "save_model",
 ]
-
-Array: TypeAlias = NDArray[np.float64]
 
 #: Key of the file -> whether it must be there.
 _KEYS = {

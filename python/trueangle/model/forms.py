@@ -9,19 +9,6 @@ from __future__ import annotations
 
 from typing import NamedTuple, TypeAlias
 
-__all__ = [
-    "Bump",
-    "Filter",
-    "Form",
-    "Friction",
-    "Lag",
-    "Lines",
-    "Play",
-    "Ramp",
-    "Scaled",
-    "Spring",
-]
-
 Lines: TypeAlias = tuple[tuple[float, float, float], ...]
 
 

@@ -9,22 +9,21 @@ from os import PathLike
 from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 import trueangle._core as _core
 
 from ..errors import ArgumentError
-from ..formats.signals import AT_RUN_TIME
 from ..joint.shafts import Shaft
 from ..support.angles import check_period
-from ..support.drawn import result_picture
-from ..support.kinds import told_kinds
-from ..support.oftype import all_of_type, of_type
-from . import summary as modelsummary
-from .evaluation import Evaluation
+from ..support.arrays import Array
+from ..support.kinds import all_of_type, of_type, told_kinds
+from ..support.plainresult import result_picture
+from ..support.signals import AT_RUN_TIME
+from .evaluation import Evaluation, SpanGuard
 from .records import FitRecord, Provenance
-from .spanguard import SpanGuard
 from .step import ExchangeableStep, Step, exchangeable
+from .text import model_summary, one_line, save_model
 from .validity import ROUNDING, check_fit, check_invertible, check_number, checked_covariance
 
 if TYPE_CHECKING:
@@ -36,7 +35,6 @@ if TYPE_CHECKING:
 __all__ = ["Argument", "HarmonicModel", "Step", "check_invertible"]
 
 Argument: TypeAlias = Literal["reference", "indicated"]
-Array: TypeAlias = NDArray[np.float64]
 
 
 @told_kinds
@@ -206,11 +204,11 @@ class HarmonicModel(Evaluation):
     # -- description --------------------------------------------------------------
 
     def __repr__(self) -> str:
-        return modelsummary.one_line(self)
+        return one_line(self)
 
     def summary(self) -> str:
         """The harmonics by shaft and order, in arcseconds, and what is known of the fit."""
-        return modelsummary.model_summary(self)
+        return model_summary(self)
 
     def plot(self, ax: Axes | None = None, **options: Any) -> Axes:
         """The error over the angle with its 95 % band (`trueangle.plots.model_error`).
@@ -325,8 +323,6 @@ class HarmonicModel(Evaluation):
 
         Floats are written so that they read back bit for bit.
         """
-        from .text import save_model
-
         save_model(self, path)
 
     # -- identity -----------------------------------------------------------------

@@ -13,20 +13,17 @@ from numpy.typing import ArrayLike, NDArray
 
 from .. import _core
 from ..errors import ArgumentError, KindError, MissingSignalError
-from ..formats.columns import wanted_columns
-from ..formats.signals import GivenSignals, check_names, coupled_with
 from ..support.angles import arcsec, unit_name
-from ..support.kinds import told_kinds
+from ..support.kinds import of_type, told_kinds
 from ..support.layout import laid_out
-from ..support.oftype import of_type
 from ..support.plainresult import Shown, counted
+from ..support.roles import wanted_columns
+from ..support.signals import GivenSignals, check_names, coupled_with
 from .model import HarmonicModel
 from .step import exchangeable
 
 if TYPE_CHECKING:
     from .step import AllJoints
-
-__all__ = ["Robot"]
 
 #: Columns of a log by role, each with its unit where its name does not tell it.
 Columns: TypeAlias = Mapping[str, tuple[str, str | None]]

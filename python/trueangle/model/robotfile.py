@@ -13,8 +13,6 @@ from .file import content_of, part_of
 from .robot import Robot
 from .text import ROBOT_FORMAT
 
-__all__ = ["is_robot_file", "load_robot"]
-
 #: Joints of one robot, at most.
 MAX_JOINTS: Final = 256
 

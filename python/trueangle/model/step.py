@@ -9,13 +9,11 @@ from typing import TYPE_CHECKING, Any, Protocol, Unpack
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..formats.signals import GivenSignals
+from ..support.signals import GivenSignals
 
 if TYPE_CHECKING:
     from .model import HarmonicModel
     from .robot import Robot
-
-__all__ = ["AllJoints", "ExchangeableStep", "Step", "exchangeable"]
 
 
 class Step(Protocol):

@@ -13,8 +13,6 @@ from ..support.angles import ARCSEC_PER_TURN
 from ..support.suggestions import did_you_mean
 from .forms import Form, Lines
 
-__all__ = ["TERMS", "Term", "from_arcsec", "known_terms", "line_values"]
-
 #: Every term by its kind: a class joins by being defined.
 TERMS: dict[str, type[Term]] = {}
 

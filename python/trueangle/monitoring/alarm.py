@@ -7,8 +7,6 @@ from typing import Any
 
 from ..support.plainresult import Shown, finite
 
-__all__ = ["WatchedOrder", "WatchedWindow"]
-
 
 @dataclass(frozen=True)
 class WatchedOrder:

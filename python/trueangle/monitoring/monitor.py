@@ -15,13 +15,10 @@ from ..errors import ArgumentError
 from ..joint.joint import Joint
 from ..model.model import HarmonicModel
 from ..support.angles import arcsec
-from ..support.kinds import told_kinds
-from ..support.oftype import of_type
+from ..support.kinds import of_type, told_kinds
 from ..support.plainresult import Shown, counted
 from ..support.runlength import chart_limit, rare
 from .alarm import WatchedOrder, WatchedWindow
-
-__all__ = ["Monitor"]
 
 #: By which the run length of all charts is raised: what standardizing by a few windows, and
 #: correlation that is found late, take from it.

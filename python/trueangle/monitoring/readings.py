@@ -8,19 +8,17 @@ from pathlib import Path
 from typing import IO, Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..errors import FileError
-from ..formats.columns import Column, find_columns, wanted_columns
+from ..formats.columns import find_columns
+from ..formats.format import Selection
 from ..formats.formats import find_format
 from ..model.model import HarmonicModel
 from ..runs.angles import Angles, find_angles
 from ..runs.files import Conversion
 from ..runs.source import Reading, checked_reading
-
-__all__ = ["ReadingBatch", "read_batches", "read_lines"]
-
-Array = NDArray[np.float64]
+from ..support.arrays import Array
+from ..support.roles import Column, wanted_columns
 
 
 class ReadingBatch(NamedTuple):
@@ -46,7 +44,7 @@ def read_batches(path: Path, model: HarmonicModel, reading: Reading) -> Iterator
         header = kind.module.columns(path, topic)
         columns = _WatchedColumns.of(path, header, reading, given, kind.unit)
     for stretch in kind.stretches(path):
-        for batch in kind.read(path, columns.names, topic, stretch):
+        for batch in kind.module.read(path, Selection(columns.names, topic, stretch)):
             yield columns.batch(lambda name, b=batch: np.asarray(b[name], dtype=float), model)
 
 

@@ -62,5 +62,5 @@ def thumbnail(result: object) -> str:
 
 
 def drawn(result: object, *args: Any, **options: Any) -> Any:
-    """The picture of a result (`trueangle.support.drawn.result_picture`)."""
+    """The picture of a result (`trueangle.support.plainresult.result_picture`)."""
     return _RESULTS[type(result).__name__](result, *args, **options)

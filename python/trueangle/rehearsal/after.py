@@ -20,8 +20,7 @@ from ..runs.run import CalibrationRun
 from ..runs.source import Reading
 from ..simulation.simulation import Simulation, simulate, simulate_along
 from ..support.deadline import Pace, entered, pace, with_pace
-from ..support.kinds import told_kinds
-from ..support.oftype import of_type
+from ..support.kinds import of_type, told_kinds
 from ..support.suggestions import check_choice
 from .trial import trial_outcome
 

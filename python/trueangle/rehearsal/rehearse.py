@@ -15,8 +15,7 @@ from ..planning.nextruns import NextRuns
 from ..planning.planner import next_runs
 from ..simulation.simulation import SIMULATION, Simulation
 from ..support.deadline import Pace, with_pace
-from ..support.kinds import told_kinds
-from ..support.oftype import of_type
+from ..support.kinds import of_type, told_kinds
 from ..support.suggestions import check_choice
 from .result import Rehearsal, RehearsedCause
 from .search import SizeSearch

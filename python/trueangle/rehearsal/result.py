@@ -7,8 +7,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from ..planning.nextruns import NextRuns
-from ..support.drawn import result_picture
-from ..support.plainresult import PlainResult, Shown, counted
+from ..support.plainresult import PlainResult, Shown, counted, result_picture
 from .detection import Chance, binomial_interval
 from .visibility import Range
 

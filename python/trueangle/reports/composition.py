@@ -22,8 +22,7 @@ from ..support.blas import one_blas_thread
 from ..support.deadline import pace
 from ..support.display_units import ErrorsIn
 from ..support.files import CERTIFICATE, PDF, REPORT, check_output, written_atomically
-from ..support.kinds import told_kinds
-from ..support.oftype import of_type
+from ..support.kinds import of_type, told_kinds
 from ..support.plainresult import Shown
 from . import figures
 from .diagnosed import diagnosis_content

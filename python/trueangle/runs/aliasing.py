@@ -17,21 +17,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import ArgumentError
+from ..support.arrays import Array
 from ..support.powersums import power_sums
 from ..support.quantiles import median
 from .run import CalibrationRun, as_runs
-
-__all__ = [
-    "POSITION_TOLERANCE",
-    "Positions",
-    "closure_errors",
-    "distinct_positions",
-    "energy_near_nyquist",
-    "fold",
-    "position_coherence",
-]
-
-Array = NDArray[np.float64]
 
 #: Positions closer than this (turns) count as one: 0.01 degree, which turns the phase
 #: of order 202 by 2 degrees, so that no order of interest is told by the difference.

@@ -3,20 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import NamedTuple, TypeAlias
-
-import numpy as np
-from numpy.typing import NDArray
+from typing import NamedTuple
 
 from ..errors import FileError
-from ..formats.columns import Column, listed_columns, offsets_of, signal_code
+from ..formats.columns import listed_columns
 from ..support.angles import UNIT_PERIODS
+from ..support.arrays import Array
+from ..support.roles import Column, offsets_of, signal_code
 from ..support.suggestions import did_you_mean
 from .facets import Facets
-
-__all__ = ["Angles", "find_angles"]
-
-Array: TypeAlias = NDArray[np.float64]
 
 #: Unit of the run's angles where the reference has none that a run may be in.
 _PERIOD = 360.0
@@ -98,16 +93,7 @@ def find_angles(
 ) -> Angles:
     """What the angles of a table are made of, and their period.
 
-    Parameters
-    ----------
-    path : object
-        For messages.
-    header : sequence of str
-    roles : mapping of role to Column
-    unit : str, optional
-        Of angles whose columns state none.
-    counts_per_turn, counts_per_turn_reference : float, optional
-    facets : Facets, optional
+    ``unit`` is that of angles whose columns state none, ``path`` stands in messages.
 
     Raises
     ------

@@ -7,15 +7,12 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..errors import FileError
-from ..formats.columns import ANGLE_UNITS, find_columns, unit_in_name, wanted_columns
+from ..formats.columns import find_columns
+from ..support.arrays import Array
+from ..support.roles import ANGLE_UNITS, unit_in_name, wanted_columns
 from .readings import named_source, readings_of
-
-__all__ = ["Facets", "read_facets"]
-
-Array = NDArray[np.float64]
 
 #: How far a nominal angle may be off its facet, as a share of the closest two facets' distance.
 _OFF = 0.01

@@ -10,24 +10,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import EmptyCellsWarning, FileError, level_of_caller
-from ..formats.columns import LABELS, Column, count_turn, signal_code, unit_in_name
-from ..formats.signals import FIELDS
-from ..formats.times import local_day
+from ..support.files import Source
 from ..support.kinds import told_kinds
+from ..support.roles import LABELS, Column, count_turn, signal_code, unit_in_name
+from ..support.signals import FIELDS
+from ..support.times import local_day
 from .angles import find_angles
 from .facets import Facets, read_facets
 from .readings import FileReadings
-from .run import CalibrationRun, Source, as_runs, given_runs
+from .run import CalibrationRun, as_runs, given_runs
 from .source import Reading, checked_reading, each_table
-
-__all__ = [
-    "RunColumns",
-    "each_runs",
-    "read_columns",
-    "read_runs",
-    "runs_of",
-    "runs_of_readings",
-]
 
 
 class RunLabels(NamedTuple):
@@ -58,7 +50,7 @@ def read_runs(path: Any, **reading: Unpack[Reading]) -> list[CalibrationRun]:
         a mapping of names to arrays, a structured array, or one of pandas, polars (also lazy),
         pyarrow, DuckDB, xarray, Dask. Columns: ``reference_deg`` and ``indicated_deg`` (or
         ``_rad``, ``_turn``, ``_count``, or a unit in brackets), and optionally ``run``,
-        ``unit``, ``when`` (ISO 8601) and those of `trueangle.formats.signals.SIGNALS`; an
+        ``unit``, ``when`` (ISO 8601) and those of `trueangle.support.signals.SIGNALS`; an
         ``error_arcsec`` (or another unit) may stand beside one of the two angles. Others are
         kept in `CalibrationRun.columns`.
     **reading
@@ -109,13 +101,8 @@ def runs_of(
 ) -> list[CalibrationRun]:
     """Runs as they are, those of what `read_runs` reads, or of a list of both.
 
-    Parameters
-    ----------
-    data : CalibrationRun, path, table, or iterable of them
-    reading : mapping
-        Keywords of `read_runs`; runs do not need them.
-    name, table : str
-        What messages call the data, and a table in memory in place of a file.
+    ``reading`` holds keywords of `read_runs`, which runs do not need; ``name`` and ``table`` are
+    what messages call the data, and a table in memory in place of a file.
 
     Raises
     ------
@@ -136,12 +123,7 @@ def each_runs(
 ) -> None:
     """Hand over the runs of one file or table after the other, so that none need be kept.
 
-    Parameters
-    ----------
-    data, reading
-        As `runs_of`.
-    take : callable
-        Is called with the runs of each.
+    ``take`` is called with the runs of each; ``data`` and ``reading`` are those of `runs_of`.
 
     Raises
     ------

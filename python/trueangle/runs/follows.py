@@ -4,23 +4,18 @@ from __future__ import annotations
 
 import math
 import warnings
-from typing import TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
 import trueangle._core as _core
 
 from ..errors import ArgumentError, UnitWarning
 from ..support.angles import wrap
+from ..support.arrays import Array
 from ..support.quantiles import quantile
 from .checks.angles import AGREES, angle_ratio, suggestion
 from .checks.record import records_of
 from .run import CalibrationRun
-
-__all__ = ["check_follows"]
-
-Array: TypeAlias = NDArray[np.float64]
 
 #: Readings looked at; a mistake of unit shows in any few.
 _SAMPLE = 1000

@@ -15,8 +15,6 @@ from ..errors import ArgumentError
 from ..formats.formats import known_format
 from ..support.files import check_input, restore
 
-__all__ = ["MANIFEST", "find_logs", "matched_paths"]
-
 #: Where `trueangle correct` notes in a folder what it has done there.
 MANIFEST: Final = "trueangle-manifest.jsonl"
 

@@ -14,8 +14,6 @@ import numpy as np
 from .._core import __version__
 from .run import CalibrationRun
 
-__all__ = ["provenance"]
-
 
 def provenance(runs: Sequence[CalibrationRun], simulation: str | None) -> dict[str, Any]:
     """Inputs (name, sha256), versions and the time of writing in UTC."""

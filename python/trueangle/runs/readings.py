@@ -18,22 +18,21 @@ from numpy.typing import NDArray
 
 from ..errors import FileError
 from ..formats.budget import DecodedSizeError, check_decoded
-from ..formats.columns import LABELS, Column, find_columns, wanted_columns
+from ..formats.columns import find_columns
 from ..formats.csvheader import number
-from ..formats.format import TEXTS, Batch, Format, Labels
+from ..formats.format import TEXTS, Batch, Format, Labels, Selection
 from ..formats.formats import format_of_content
-from ..formats.times import elapsed_seconds, parsed_time
 from ..support.files import (
     RUNS_BYTES,
+    Source,
     check_input,
     partition_keys,
     partition_name,
     read_whole,
     sha256_of,
 )
-from .run import Source
-
-__all__ = ["FileReadings", "named_source", "read_once", "read_readings", "readings_of"]
+from ..support.roles import LABELS, Column, role_kind, signal_code, wanted_columns
+from ..support.times import elapsed_seconds, parsed_time
 
 T = TypeVar("T")
 
@@ -105,6 +104,19 @@ class FileReadings(NamedTuple):
             problem = f"readings must be finite, got {numbers[row]}; drop the row"
             raise self.error(problem, column.name, row)
         return numbers
+
+    def values(
+        self, column: Column, period: float, counts_per_turn: float | None
+    ) -> NDArray[np.float64]:
+        """A column in the unit of a run of ``period``, refused where its own is not known."""
+        if role_kind(column.role) == "angle" and column.unit is None:
+            code = signal_code(column.role, column.name, "deg")
+            raise self.error(f"its unit is not known; give it: {code}", column.name)
+        if column.unit == "count" and counts_per_turn is None:
+            beside = "_reference" if column.role == "reference" else ""
+            problem = f"counts need their number per turn: give `counts_per_turn{beside}=`"
+            raise self.error(problem, column.name)
+        return column.values(self.raw(column), period, counts_per_turn)
 
 
 def read_readings(
@@ -237,7 +249,7 @@ def _columns(
     """Whole columns; ``others`` are texts where they are not all numbers."""
     names = [*needed, *others]
     if names:
-        check_decoded(path, kind.module.extent(path, names, topic).size, len(names))
+        check_decoded(path, kind.extent(path, names, topic).size, len(names))
     numeric = _numeric(kind, path, others, topic)
     try:
         return _joined(kind, path, names, labels | set(others) - numeric, topic)
@@ -251,7 +263,7 @@ def _numeric(kind: Format, path: Path, names: list[str], topic: str | None) -> s
     """Columns of a text file that look like numbers in its first rows."""
     if not names or not hasattr(kind.module, "line_of"):
         return set()
-    first = next(iter(kind.module.read(path, names, topic, texts=names)), {})
+    first = next(iter(kind.module.read(path, Selection(names, topic, texts=names))), {})
     return {
         name
         for name, found in first.items()
@@ -263,7 +275,7 @@ def _is_dated(kind: Format, path: Path, name: str, topic: str | None) -> bool:
     """Whether a column of a text file begins with a date and time."""
     if not hasattr(kind.module, "line_of"):
         return False
-    found = next(iter(kind.module.read(path, [name], topic, texts=[name])), {}).get(name)
+    found = next(iter(kind.module.read(path, Selection([name], topic, texts=[name]))), {}).get(name)
     names = found.names if isinstance(found, Labels) else ()
     return any(parsed_time(text) is not None for text in [t for t in names if t][:1])
 
@@ -284,7 +296,7 @@ def _joined(
     """Whole columns."""
     parts: dict[str, list[Any]] = {name: [] for name in names}
     rows = size = 0
-    for batch in kind.module.read(path, names, topic, texts=texts, strict=True):
+    for batch in kind.module.read(path, Selection(names, topic, texts=texts, strict=True)):
         for name in names:
             bad = _undecoded(batch[name])
             if bad is not None:

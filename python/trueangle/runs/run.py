@@ -6,26 +6,17 @@ import math
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, fields
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from ..errors import ArgumentError, KindError
-from ..formats.signals import FIELDS, find_signal, signal_column, signal_columns
 from ..support.angles import check_period, circular_mean, wrap
+from ..support.arrays import Array
+from ..support.files import Source
 from ..support.kinds import told_kinds
-
-__all__ = ["CalibrationRun", "Source", "as_runs", "given_runs"]
-
-Array = NDArray[np.float64]
-
-
-class Source(NamedTuple):
-    """A file that readings came from: its name and the sha256 of its bytes."""
-
-    file: str
-    sha256: str
+from ..support.signals import FIELDS, find_signal, signal_column, signal_columns
 
 
 @told_kinds
@@ -56,7 +47,7 @@ class CalibrationRun:
     weights : array_like, shape (n,), optional
         Relative weights of the readings (inverse variances), not negative.
     signals : mapping of str to array_like or float, optional
-        Further signals of `trueangle.formats.signals.SIGNALS` by name: ``current`` (A), ``shift``
+        Further signals of `trueangle.support.signals.SIGNALS` by name: ``current`` (A), ``shift``
         and the angles ``motor``, ``head1``, ``head2`` ... in the unit of ``reference``.
     unit : str, optional
         Label of the joint that the run is of, where runs of several are read together.

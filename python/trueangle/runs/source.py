@@ -12,14 +12,12 @@ from typing import Any, TypedDict, TypeVar
 import numpy as np
 
 from ..errors import ArgumentError, FileError, KindError
-from ..formats.columns import Column, wanted_columns
 from ..support.angles import check_period, unit_name
+from ..support.roles import Column, wanted_columns
 from ..support.suggestions import did_you_mean
 from .paths import find_logs
 from .readings import FileReadings, named_source, readings_of
 from .tables import table_readings
-
-__all__ = ["OtherReading", "Reading", "checked_reading", "each_table", "unit_of_path"]
 
 T = TypeVar("T")
 
@@ -123,16 +121,9 @@ def each_table(
 ) -> list[T]:
     """What ``read`` makes of every table: one of each file, one of each table in memory.
 
-    Parameters
-    ----------
-    data : path, table, or iterable of them
-        Paths of files, folders and patterns (``"log*.csv"``); tables as
-        `tables.table_readings` takes them.
-    read : callable
-    reading : Reading
-        As `checked_reading` gives it.
-    name, table : str
-        What messages call the data, and a table in memory in place of a file.
+    ``data`` are paths of files, folders and patterns (``"log*.csv"``), tables as
+    `tables.table_readings` takes them, or lists of both; ``reading`` is as `checked_reading` gives
+    it, ``name`` and ``table`` as in `files.runs_of`.
 
     Raises
     ------

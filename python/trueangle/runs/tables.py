@@ -11,13 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import ArgumentError, KindError, MissingExtraError
-from ..formats.columns import Wanted, find_columns
+from ..formats.columns import find_columns
 from ..formats.format import Format
+from ..support.files import Source
 from ..support.labelled import take_apart
+from ..support.roles import Wanted
 from .readings import FileReadings
-from .run import Source
-
-__all__ = ["table_readings"]
 
 
 class _Memory(Format):
@@ -33,16 +32,9 @@ _MEMORY = _Memory("", {"a table in memory": ()})
 def table_readings(data: Any, name: str, wanted: Wanted) -> FileReadings | None:
     """The readings of a table; None of what is none.
 
-    Parameters
-    ----------
-    data : table
-        A mapping of names to arrays, a structured array, or a table of pandas, polars (a lazy
-        one is collected), pyarrow, xarray, Dask (computed), or any other with the Arrow stream
-        ``__arrow_c_stream__`` (a relation of DuckDB).
-    name : str
-        What messages call it.
-    wanted : mapping
-        Columns asked for, as `columns.wanted_columns` makes it.
+    A table is a mapping of names to arrays, a structured array, or a table of pandas, polars (a
+    lazy one is collected), pyarrow, xarray, Dask (computed), or any other with the Arrow stream
+    ``__arrow_c_stream__`` (a relation of DuckDB). ``name`` is what messages call it.
 
     Raises
     ------

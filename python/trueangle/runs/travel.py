@@ -12,16 +12,12 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 import trueangle._core as _core
 
 from ..support.angles import unit_name
+from ..support.arrays import Array
 from .run import CalibrationRun
-
-__all__ = ["Span", "covered_span", "held_orders", "over_turns", "travelled_span", "without_drift"]
-
-Array = NDArray[np.float64]
 
 #: Readings whose positions are looked at: one lies in every degree of the travel.
 _LOOKED_AT = 65_536
@@ -82,17 +78,8 @@ def covered_span(angles: Sequence[Array], period: float) -> Span:
     A gap is missing travel when it is wider than 20 deg and than chance leaves between as
     many random positions (2 %). Of more than 65 536 readings every n-th is looked at.
 
-    Parameters
-    ----------
-    angles : sequence of ndarray
-        Positions of every run, any number of turns.
-    period : float
-
-    Returns
-    -------
-    Span
-        ``start`` in ``[0, period)``; ``stop - start`` is below ``period`` for partial
-        travel; ``(0, period, True)`` for a full turn.
+    ``start`` lies in ``[0, period)``; partial travel is narrower than ``period``, a full turn ``(0,
+    period, True)``.
 
     Examples
     --------

@@ -9,12 +9,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ..formats.signals import find_signal
 from ..support.files import RUNS, written_atomically
 from ..support.kinds import told_kinds
+from ..support.signals import find_signal
 from .run import CalibrationRun, as_runs
-
-__all__ = ["write_runs"]
 
 #: Signals that stand first, in the order that these files have always had.
 _ORDER = ("time", "velocity", "torque", "temperature", "mount")
@@ -25,7 +23,7 @@ def write_runs(runs: CalibrationRun | Iterable[CalibrationRun], path: str | Path
     """Write ``runs`` in degrees, beside and then renamed; floats round-trip exactly.
 
     Columns: run, reference_deg, indicated_deg and those of the signals of
-    `trueangle.formats.signals.SIGNALS` that every run has, such as time_s and current_A; ``unit``
+    `trueangle.support.signals.SIGNALS` that every run has, such as time_s and current_A; ``unit``
     and ``when`` where a run has one.
 
     Parameters

@@ -20,8 +20,6 @@ from .result import SelfCalibration
 from .shifts import shift_patterns
 from .spindown import spin_down
 
-__all__ = ["METHODS", "selfcal"]
-
 METHODS: Final = ("auto", "spin-down", "heads", "shifts", "dual")
 
 

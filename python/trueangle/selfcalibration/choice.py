@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any, Final
 
 import numpy as np
@@ -10,11 +11,9 @@ from numpy.typing import NDArray
 from ..support.distributions import chi_squared_quantile
 from .colour import spectrum_at
 from .pattern import ENCODER, pattern_series
-from .projected import pairs
+from .projected import Projected
 from .readings import SegmentReadings
 from .steady import SteadyFit, fit_steady
-
-__all__ = ["HIGHEST", "choose_orders", "highest_order"]
 
 Array = NDArray[Any]
 
@@ -45,7 +44,7 @@ def choose_orders(readings: SegmentReadings) -> tuple[float, ...]:
     """
     most = highest_order(readings)
     orders = tuple(float(k) for k in range(1, min(_FIRST, most) + 1))
-    limit = chi_squared_quantile(1.0 - _CHANCE / most, 2.0)
+    limit = _limit(most)
     fit: SteadyFit | None = None
     stride = max(1, readings.size // 100_000)
     for _ in range(_ROUNDS):
@@ -65,17 +64,13 @@ def choose_orders(readings: SegmentReadings) -> tuple[float, ...]:
     assert fit is not None
     if fit.orders != orders:
         fit = fit_steady(readings, orders, start=fit, thorough=False, smooth=True)
-    projected = fit.projected
-    covariance = projected.covariance
-    kept = []
-    for order in orders:
-        i = projected.columns.index(pairs(ENCODER, [order])[0])
-        block = covariance[i : i + 2, i : i + 2]
-        value = fit.unknowns[i : i + 2]
-        size = float(value @ np.linalg.solve(block, value)) if np.linalg.det(block) > 0.0 else 0.0
-        if size > limit:
-            kept.append(order)
-    return tuple(kept)
+    return chosen_orders(
+        fit.projected, fit.unknowns, fit.projected.covariance, orders, ENCODER, most
+    )
+
+
+def _limit(tried: int) -> float:
+    return chi_squared_quantile(1.0 - _CHANCE / max(tried, 1), 2.0)
 
 
 def _series(fit: SteadyFit, rows: Array) -> Array:
@@ -95,3 +90,27 @@ def _running_mean(values: Array) -> Array:
     return np.asarray(
         np.convolve(values, kernel, "same") / np.convolve(np.ones(values.size), kernel, "same")
     )
+
+
+def chosen_orders(
+    projected: Projected,
+    coefficients: NDArray[np.float64],
+    covariance: NDArray[np.float64],
+    among: Sequence[float],
+    source: str | None = None,
+    tried: int | None = None,
+) -> tuple[float, ...]:
+    """Orders of ``among`` whose cosine and sine together are significant, of so many tried."""
+    limit = _limit(len(among) if tried is None else tried)
+    kept = []
+    for order in among:
+        at = [
+            i
+            for i, column in enumerate(projected.columns)
+            if column.order == order and column.part and source in (None, column.source)
+        ]
+        block, value = covariance[np.ix_(at, at)], coefficients[at]
+        size = float(value @ np.linalg.pinv(block, hermitian=True) @ value)
+        if size > limit:
+            kept.append(order)
+    return tuple(kept)

@@ -8,15 +8,11 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..errors import NoModelError
 from ..support.angles import wrap
+from ..support.arrays import Array
 from .recording import Recording
-
-__all__ = ["Clampings", "clampings_of"]
-
-Array = NDArray[np.float64]
 
 #: Shifts that differ by less (radians) are one shift.
 _APART: Final = math.radians(0.5)

@@ -6,14 +6,10 @@ from collections.abc import Sequence
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..support.arrays import Array
 from ..support.distributions import chi_squared_tail
 from .projected import harmonic_rows
-
-__all__ = ["noise_beside", "spectrum_at"]
-
-Array = NDArray[np.float64]
 
 #: Distances from an order at which its neighbourhood is looked at.
 _BESIDE: Final = (-0.5, -0.41, -0.32, -0.23, 0.23, 0.32, 0.41, 0.5)

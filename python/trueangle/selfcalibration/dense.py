@@ -8,13 +8,9 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..support.arrays import Array
 from .projected import NOT_SEEN, Projected, Unknown
-
-__all__ = ["DenseFit", "DenseRows", "fit_dense", "fixed_point", "low_frequency_inflation"]
-
-Array = NDArray[np.float64]
 
 #: Variances of random terms that are tried, relative to the noise (powers of ten).
 _VARIANCES: Final = np.concatenate([[-math.inf], np.linspace(-4.0, 10.0, 57)])
@@ -74,18 +70,9 @@ def fit_dense(
 ) -> DenseFit:
     """Least squares by orthogonal triangles, the nuisances eliminated first.
 
-    Parameters
-    ----------
-    parts : sequence of Rows
-        In the order they were read.
-    columns : sequence of Column
-        Names of the patterns.
-    random : sequence of int
-        Nuisances that are drawn anew in every run, with one variance, found by evidence.
-    freedom_lost : float
-        Rows that say nothing of their own (differences to a mean).
-    floor : float
-        Combinations of patterns of which less is left count as not seen.
+    ``random`` nuisances are drawn anew in every run, with one variance, found by evidence;
+    ``freedom_lost`` counts rows that say nothing of their own (differences to a mean); combinations
+    of patterns of which less than ``floor`` is left count as not seen.
     """
     p, m = parts[0].nuisances.shape[1], len(columns)
     triangle = _triangle(parts)

@@ -18,10 +18,10 @@ from dataclasses import replace
 from typing import Any, Final, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..errors import ArgumentError, NoModelError
 from ..runs.travel import Span, travelled_span
+from ..support.arrays import Array
 from .dense import fit_dense
 from .dualfit import (
     BESIDE_RATIO,
@@ -38,13 +38,8 @@ from .gearlines import Channels, SharedLine, channels_of, lines_of, slope_ratio,
 from .modelling import made_model
 from .projected import pairs
 from .recording import Recording
-from .result import ARCSEC, Blind, HeldOut, OrderEstimate, SelfCalibration, estimates
-from .summary import listed
+from .result import ARCSEC, Blind, HeldOut, OrderEstimate, SelfCalibration, estimates, listed
 from .verification import chance_of
-
-__all__ = ["dual"]
-
-Array = NDArray[np.float64]
 
 #: A ratio is taken for another than the given or a whole one beyond so many standard errors:
 #: a chance of 6e-5.

@@ -20,20 +20,6 @@ from .dense import DenseFit, DenseRows, fit_dense, low_frequency_inflation
 from .gearlines import Channels, SharedLine, lines_of, motion, turning, varied
 from .projected import Unknown, pairs
 
-__all__ = [
-    "BESIDE_RATIO",
-    "DualFit",
-    "RatioEstimate",
-    "Sample",
-    "chosen_lines",
-    "estimate_ratio",
-    "fit_lines",
-    "rows_of",
-    "with_slow",
-]
-
-Array = NDArray[np.float64]
-
 #: Probability of taking up any line that is not there.
 _CHANCE: Final = 0.01
 

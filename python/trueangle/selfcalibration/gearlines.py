@@ -10,21 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import NoModelError
+from ..support.arrays import Array
 from .recording import Recording
-
-__all__ = [
-    "SLIP",
-    "Channels",
-    "SharedLine",
-    "channels_of",
-    "lines_of",
-    "motion",
-    "slope_ratio",
-    "turning",
-    "varied",
-]
-
-Array = NDArray[np.float64]
 
 #: Orders of each shaft that are tried by default.
 _HIGHEST: Final = 8

@@ -14,23 +14,18 @@ from collections.abc import Sequence
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..errors import ArgumentError, NoModelError
 from ..support.angles import wrap
+from ..support.arrays import Array
+from .choice import chosen_orders
 from .dense import DenseFit, DenseRows, fit_dense, fixed_point
 from .modelling import made_model
 from .pattern import ENCODER, pattern_model
 from .projected import harmonic_rows, pairs
 from .recording import Recording
-from .result import ARCSEC, Blind, HeldOut, OrderEstimate, SelfCalibration, estimates
-from .significance import chosen_orders
-from .summary import listed
+from .result import ARCSEC, Blind, HeldOut, OrderEstimate, SelfCalibration, estimates, listed
 from .verification import judged
-
-__all__ = ["head_patterns"]
-
-Array = NDArray[np.float64]
 
 #: Orders tried by default.
 _HIGHEST: Final = 32

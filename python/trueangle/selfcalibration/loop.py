@@ -11,8 +11,6 @@ from ..errors import ArgumentError
 from ..support.suggestions import check_choice
 from .result import Blind, OrderEstimate
 
-__all__ = ["LOOPS", "check_loop", "followed_orders", "followed_share", "widened"]
-
 LOOPS: Final = ("open", "closed", "unknown")
 
 #: Below so many bandwidths a velocity loop follows more than a tenth of what it sees.
@@ -37,14 +35,8 @@ def followed_orders(
     With closed-loop transfer T the shaft moves by ``-Tε`` and the log shows
     ``(1 - T)ε``: hidden where T = 1, amplified where T has turned in phase.
 
-    Parameters
-    ----------
-    orders : sequence of float
-    loop : {"open", "closed", "unknown"}
-    bandwidth : float, optional
-        Hertz; with ``"unknown"`` it is taken for what it would be if the loop was closed.
-    slowest : float
-        Slowest speed in the readings, turns per second.
+    The ``bandwidth`` is in hertz, with ``"unknown"`` what it would be if the loop was closed;
+    ``slowest`` is the slowest speed in the readings, turns per second.
     """
     if loop == "open":
         return (), None

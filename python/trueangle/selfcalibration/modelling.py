@@ -15,8 +15,6 @@ from ..model.records import FitRecord, Provenance
 from .recording import Recording
 from .result import ARCSEC, OrderEstimate
 
-__all__ = ["made_model"]
-
 
 def made_model(
     orders: Iterable[OrderEstimate],

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..estimation.factor import BandedFactor
+from ..support.arrays import Array
 from .projected import Projected, Unknown
 from .splines import (
     Knots,
@@ -27,10 +28,6 @@ from .splines import (
     smooth_trends,
 )
 from .sums import MotionSums
-
-__all__ = ["MotionFit", "MotionSearch"]
-
-Array = NDArray[np.float64]
 
 #: Stiffness looked at, as a power of ten relative to the readings per knot.
 _STIFFEST, _SOFTEST = 7.0, -5.0
@@ -119,16 +116,9 @@ class _Grid:
 class MotionSearch:
     """Fits of motion and common columns to the sums over readings, on any coarser grid.
 
-    Parameters
-    ----------
-    sums : MotionSums
-        On the finest grid, with ``e = reading - motion``.
-    motion : ndarray
-        Coefficients of the motion so far, on the finest grid.
-    columns : sequence of Column
-        Names of the common columns.
-    trends : sequence of int
-        Smooth trends that each stretch is free to follow.
+    The ``sums`` (with ``e = reading - motion``) and the coefficients of the ``motion`` so far are
+    on the finest grid, ``columns`` names the common columns, and ``trends`` are smooth trends that
+    each stretch is free to follow.
 
     Notes
     -----

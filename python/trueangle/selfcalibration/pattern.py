@@ -14,8 +14,6 @@ import trueangle._core as _core
 from ..joint.shafts import Shaft
 from ..model.model import HarmonicModel
 
-__all__ = ["ENCODER", "RIPPLE", "pattern_model", "pattern_series", "steepness"]
-
 Array = NDArray[Any]
 
 ENCODER: Final = "the encoder"

@@ -12,16 +12,7 @@ from numpy.typing import NDArray
 
 import trueangle._core as _core
 
-__all__ = [
-    "NOT_SEEN",
-    "Projected",
-    "Unknown",
-    "harmonic_rows",
-    "harmonic_sum",
-    "pairs",
-]
-
-Array = NDArray[np.float64]
+from ..support.arrays import Array
 
 #: A column is not seen where nuisances and other columns leave less of its square.
 #: Below this share rounding in the sums (1e-16 of a column, times its condition) decides.

@@ -7,14 +7,10 @@ from collections.abc import Sequence
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..support.arrays import Array
 from .splines import Knots
 from .stretches import Segment, ripple_lead
-
-__all__ = ["PER_KNOT", "SegmentReadings"]
-
-Array = NDArray[np.float64]
 
 #: Readings per knot of the finest grid, at least.
 PER_KNOT: Final = 6

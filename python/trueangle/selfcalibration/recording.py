@@ -11,14 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import ArgumentError, FileError
-from ..formats.columns import LABELS, Column, role_kind, signal_code
 from ..runs.readings import FileReadings
-from ..runs.run import CalibrationRun, Source, given_runs
+from ..runs.run import CalibrationRun, given_runs
 from ..runs.source import Reading, checked_reading, each_table
-
-__all__ = ["Recording", "as_recordings"]
-
-Array = NDArray[np.float64]
+from ..support.arrays import Array
+from ..support.files import Source
+from ..support.roles import LABELS, Column, role_kind
 
 _LABELS = ("unit", "run")
 
@@ -121,15 +119,9 @@ def _of_table(table: FileReadings, reading: Reading) -> list[Recording]:
 
 def _in_radians(column: Column, table: FileReadings, reading: Reading) -> Array:
     """A channel in radians, seconds or the unit of its only column."""
-    beside = "_reference" if column.role == "reference" else ""
-    turn = reading["counts_per_turn_reference" if beside else "counts_per_turn"]
-    if role_kind(column.role) == "angle" and column.unit is None:
-        code = signal_code(column.role, column.name, "deg")
-        raise table.error(f"its unit is not known; give it: {code}", column.name)
-    if column.unit == "count" and turn is None:
-        message = f"counts need their number per turn: give `counts_per_turn{beside}=`"
-        raise table.error(message, column.name)
-    return column.values(table.raw(column), 2.0 * np.pi, turn)
+    is_reference = column.role == "reference"
+    turn = reading["counts_per_turn_reference" if is_reference else "counts_per_turn"]
+    return table.values(column, 2.0 * np.pi, turn)
 
 
 def _split(

@@ -13,11 +13,8 @@ from collections.abc import Sequence
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
-__all__ = ["LARGEST_COST", "averaged_over_ripple", "cost_of_ripple"]
-
-Array = NDArray[np.float64]
+from ..support.arrays import Array
 
 #: Where separating the ripple multiplies the standard error by more, speeds are too much
 #: alike: the sum is given under both names instead. A ratio of speeds of about 1.2.
@@ -51,21 +48,8 @@ def averaged_over_ripple(
 ) -> tuple[Array, Array, Array]:
     """Pattern and covariance averaged over the size of the ripple at each order.
 
-    Parameters
-    ----------
-    unknowns, covariance : ndarray
-        Pattern, then ripple; both as if nothing were known of the ripple's size.
-    orders, ripple : sequence of int
-        Orders of the pattern and of the ripple.
-
-    Returns
-    -------
-    unknowns : ndarray
-        Pattern and ripple.
-    covariance : ndarray
-        Of both.
-    probable : ndarray, shape (len(ripple),)
-        Probability that the order ripples.
+    ``unknowns`` and ``covariance`` hold pattern, then ripple, as if nothing were known of the
+    ripple's size, and so does what comes back, with the probability that each order ripples.
     """
     m = 2 * len(orders)
     precision = np.zeros(2 * len(ripple))

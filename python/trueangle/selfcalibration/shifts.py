@@ -15,24 +15,19 @@ from collections.abc import Sequence
 from typing import Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..errors import NoModelError
 from ..support.angles import wrap
+from ..support.arrays import Array
 from ..support.distributions import f_tail
+from .choice import chosen_orders
 from .clampings import Clampings, clampings_of
 from .dense import DenseFit, DenseRows, fit_dense, fixed_point
 from .modelling import made_model
 from .pattern import ENCODER, pattern_model
 from .projected import Unknown, harmonic_rows, pairs
 from .recording import Recording
-from .result import ARCSEC, Blind, HeldOut, SelfCalibration, estimates
-from .significance import chosen_orders
-from .summary import listed, ranges
-
-__all__ = ["shift_patterns"]
-
-Array = NDArray[np.float64]
+from .result import ARCSEC, Blind, HeldOut, SelfCalibration, estimates, listed, ranges
 
 OTHER: Final = "the other encoder"
 FACETS: Final = "the polygon's facets"

@@ -12,9 +12,9 @@ from collections.abc import Sequence
 from typing import Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..errors import NoModelError
+from ..support.arrays import Array
 from ..support.plainresult import counted
 from .choice import choose_orders, highest_order
 from .colour import noise_beside
@@ -23,16 +23,11 @@ from .modelling import made_model
 from .pattern import ENCODER, pattern_series
 from .readings import SegmentReadings
 from .recording import Recording
-from .result import ARCSEC, Blind, OrderEstimate, SelfCalibration, estimates
+from .result import ARCSEC, Blind, OrderEstimate, SelfCalibration, estimates, listed, ranges
 from .ripple import LARGEST_COST, averaged_over_ripple, cost_of_ripple
 from .steady import SteadyFit, fit_steady
 from .stretches import cut_stretches
-from .summary import listed, ranges
 from .verification import held_out
-
-__all__ = ["spin_down"]
-
-Array = NDArray[np.float64]
 
 #: An order of which motion leaves less is not the encoder's to say.
 LEAST_RETAINED: Final = 0.02

@@ -13,17 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = [
-    "BAND",
-    "Knots",
-    "Wander",
-    "coarser_bands",
-    "coarser_rows",
-    "smooth_trends",
-    "spline_basis",
-]
-
-Array = NDArray[np.float64]
+from ..support.arrays import Array
 
 #: Diagonals of a banded matrix that are kept: the main one and three above it.
 BAND = 4

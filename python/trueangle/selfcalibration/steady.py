@@ -10,15 +10,12 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from ..support.arrays import Array
 from .motion import MotionFit
 from .pattern import ENCODER, RIPPLE
 from .projected import Projected, Unknown, pairs
 from .readings import PER_KNOT, SegmentReadings
 from .steps import Steps
-
-__all__ = ["SteadyFit", "fit_steady"]
-
-Array = NDArray[np.float64]
 
 #: Readings that the first iterations look at: enough to come close.
 _FIRST_LOOK: Final = 40_000

@@ -8,16 +8,13 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from ..support.arrays import Array
 from .motion import MotionFit, MotionSearch
 from .pattern import pattern_model, pattern_series, steepness
 from .projected import Unknown, harmonic_rows, harmonic_sum
 from .readings import SegmentReadings
 from .splines import Knots, spline_basis, spline_values
 from .sums import ordered_sums
-
-__all__ = ["Steps"]
-
-Array = NDArray[np.float64]
 
 #: Slope of the error that no step goes beyond: at 1 an angle would be read twice.
 _STEEPEST: Final = 0.97

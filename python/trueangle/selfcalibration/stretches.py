@@ -12,11 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import FileError, NoModelError
+from ..support.arrays import Array
 from .recording import Recording
-
-__all__ = ["Segment", "cut_stretches", "ripple_lead"]
-
-Array = NDArray[np.float64]
 
 #: Motion slower than this share of the median speed is left out, as are reversals.
 SLOWEST: Final = 0.2

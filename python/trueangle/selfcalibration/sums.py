@@ -9,11 +9,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ..support.arrays import Array
 from .splines import BAND, Knots, spline_basis
-
-__all__ = ["MotionSums", "ordered_sums"]
-
-Array = NDArray[np.float64]
 
 #: Readings whose columns are made at once: some MB, so that they stay in cache.
 _CHUNK = 4096
@@ -58,21 +55,10 @@ def ordered_sums(
 ) -> MotionSums:
     """Sums over readings in order of time.
 
-    Parameters
-    ----------
-    knots : Knots
-    index, place : ndarray
-        Of `Knots.place`; ``index`` must not decrease.
-    target : ndarray
-        ``e``, what is left of each reading.
-    weight : ndarray
-        Factor of the splines in each row: ``1 + error'``.
-    columns : callable
-        Writes the common columns of a slice of readings into an array (m, n).
-    width : int
-        ``m``.
-    valid : ndarray of bool, optional
-        Readings that count.
+    ``index`` and ``place`` are those of `Knots.place`, the index not decreasing; ``target`` is what
+    is left of each reading, ``weight`` the factor of the splines in its row, ``1 + error'``.
+    ``columns`` writes the ``width`` common columns of a slice of readings into an array; only
+    ``valid`` readings count.
     """
     size, n = knots.size, target.size
     bands, cross = np.zeros((size, BAND)), np.zeros((size, width + 1))

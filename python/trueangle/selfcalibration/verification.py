@@ -9,14 +9,11 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from ..support.arrays import Array
 from ..support.distributions import chi_squared_tail, f_tail
 from .readings import SegmentReadings
 from .result import ARCSEC, HeldOut
 from .steady import SteadyFit, fit_steady
-
-__all__ = ["chance_of", "held_out", "judged"]
-
-Array = NDArray[np.float64]
 
 #: Speeds that differ by less than this ratio test nothing.
 _SPEEDS: Final = 1.3

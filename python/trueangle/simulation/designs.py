@@ -11,10 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import ArgumentError
-from ..formats.signals import COUPLED
 from ..joint.pattern import Pattern
 from ..runs.run import CalibrationRun
 from ..support.kinds import told_kinds
+from ..support.signals import COUPLED
 from .rotor import Motion, rotor_angle
 
 __all__ = ["MAX_SAMPLES", "SPACINGS", "RunDesign"]

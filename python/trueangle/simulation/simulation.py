@@ -17,8 +17,7 @@ from ..joint.signals import Signals, join_runs
 from ..runs.run import CalibrationRun, as_runs
 from ..support.angles import ARCSEC_PER_DEG
 from ..support.distributions import random_numbers
-from ..support.kinds import told_kinds
-from ..support.oftype import all_of_type, of_type
+from ..support.kinds import all_of_type, of_type, told_kinds
 from ..support.plainresult import Shown, counted
 from .designs import RunDesign
 

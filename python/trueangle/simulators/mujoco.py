@@ -10,9 +10,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..errors import ArgumentError, MissingSignalError
 from ..export.mujoco import NOISE_NAME, TEXT_NAME
-from ..formats.signals import coupled_with
 from ..model.file import embedded_model
 from ..model.model import HarmonicModel
+from ..support.signals import coupled_with
 from ..support.suggestions import did_you_mean
 
 if TYPE_CHECKING:

@@ -1,1 +1,1 @@
-"""What every room uses: angles and units, files, distributions, deadlines, suggestions."""
+"""What every room uses: angles and units, signals and roles, files, distributions, deadlines."""

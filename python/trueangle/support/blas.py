@@ -11,8 +11,6 @@ from pathlib import Path
 
 import numpy as np
 
-__all__ = ["one_blas_thread"]
-
 #: Names by which builds of OpenBLAS ask for and set their threads.
 NAMES = tuple(
     (f"{before}openblas_get_num_threads{after}", f"{before}openblas_set_num_threads{after}")

@@ -21,8 +21,6 @@ from typing import Final, TextIO
 from ..errors import ArgumentError
 from .suggestions import check_choice
 
-__all__ = ["STYLES", "Interruption", "Pace", "ending_early", "entered", "pace", "with_pace"]
-
 #: What work may take where no time was given, in seconds of its thread's processor: so much, or
 #: so much for each item of many. Work on ordinary readings takes a third of that.
 LEAST, PER_ITEM = 5.0, 5e-4

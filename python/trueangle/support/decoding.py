@@ -4,24 +4,15 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Iterable, Mapping
 from os import PathLike
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from ..errors import FileError
 from .files import read_whole
 
-__all__ = [
-    "MAX_LINES",
-    "MAX_LINE_ORDERS",
-    "MAX_ORDER",
-    "Decoder",
-    "finite_float",
-    "json_text",
-    "read_text",
-    "shown",
-]
+T = TypeVar("T")
 
 #: Highest order of the output, in cycles per output turn: the lines of a disc of a million.
 MAX_ORDER = 1_000_000.0
@@ -107,6 +98,17 @@ def json_text(path: Path, text: str, kind: type[FileError], what: str) -> Any:
         ) from None
 
 
+class Entries:
+    """Entries of one object, read one by one: a refusal names the object and the key."""
+
+    def __init__(self, table: Mapping[str, Any], key: str) -> None:
+        self._table, self._key = table, key
+
+    def __call__(self, read: Callable[[Any, str], T], name: str) -> T:
+        """The entry called ``name``, as ``read`` checks it."""
+        return read(self._table[name], f"{self._key}.{name}")
+
+
 class Decoder:
     """Checks plain values of one file; every refusal names the file and the key.
 
@@ -141,6 +143,10 @@ class Decoder:
             if needed and name not in value:
                 raise self.error("is missing", f"{where}{name}")
         return value
+
+    def entries(self, value: Any, names: Iterable[str], key: str) -> Entries:
+        """The entries of an object that has all of these keys and no others."""
+        return Entries(self.table(value, dict.fromkeys(names, True), key), key)
 
     def items(self, value: Any, key: str, what: str, most: int = MAX_LINES) -> list[Any]:
         """A list of at most ``most``."""

@@ -14,17 +14,6 @@ from ..errors import ArgumentError
 from .suggestions import check_choice
 from .unit_periods import ARCSEC_PER_TURN, UNIT_PERIODS
 
-__all__ = [
-    "ERROR_UNITS",
-    "ErrorUnit",
-    "ErrorsIn",
-    "brief",
-    "error_unit",
-    "phase_pair",
-    "significant",
-    "sine_of_rms",
-]
-
 #: What may be asked for by name; a number is the counts of a turn.
 ERROR_UNITS: Final = ("auto", "arcsec", "deg", "mrad", "count")
 

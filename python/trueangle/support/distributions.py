@@ -16,20 +16,6 @@ from ..errors import ArgumentError, KindError
 if TYPE_CHECKING:
     import numpy as np
 
-__all__ = [
-    "chi_squared_quantile",
-    "chi_squared_tail",
-    "f_quantile",
-    "f_tail",
-    "incomplete_beta",
-    "incomplete_gamma_tail",
-    "normal_quantile",
-    "normal_tail",
-    "random_numbers",
-    "student_quantile",
-    "student_tail",
-]
-
 #: Relative size of a step of a fraction or series that no longer counts: two roundings.
 _NEGLIGIBLE: Final = 4e-16
 
@@ -71,11 +57,7 @@ def student_tail(t: float, degrees_of_freedom: float) -> float:
 
         P(T_ν > t) = 1/2 I_{ν/(ν+t²)}(ν/2, 1/2),    t ≥ 0
 
-    Parameters
-    ----------
-    t : float
-    degrees_of_freedom : float
-        nu > 0, need not be whole; infinity gives the normal distribution.
+    ν > 0 need not be whole; infinity gives the normal distribution.
 
     Examples
     --------

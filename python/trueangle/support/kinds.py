@@ -9,8 +9,6 @@ from typing import Any, TypeVar
 
 from ..errors import KindError, TrueAngleError
 
-__all__ = ["told_kinds"]
-
 F = TypeVar("F", bound=Callable[..., Any])
 
 #: How many items of a collection are looked at: one may be longer than there is time for.
@@ -18,6 +16,11 @@ MOST_ITEMS = 1000
 
 #: What code raises that meets an object it cannot use.
 _FAILURES = (TypeError, AttributeError, ValueError, LookupError, ArithmeticError)
+
+T = TypeVar("T")
+
+#: Characters of a value that a message repeats.
+_SHOWN = 60
 
 
 def told_kinds(function: F) -> F:
@@ -168,3 +171,57 @@ def _is_numbers(value: Any, kinds: str = "iuf") -> bool:
         return np.asarray(value).dtype.kind in kinds
     except (TypeError, ValueError):
         return False
+
+
+def of_type(
+    what: str, value: object, kind: type[T], wanted: str, instead: Callable[[Any], str] = str
+) -> T:
+    """``value``, which must be a ``kind``.
+
+    Messages call the argument ``what``, and say in words what is ``wanted`` and what is meant where
+    such a value is given (``instead``).
+
+    Raises
+    ------
+    KindError
+        It is something else: names what was got and what is wanted.
+    """
+    if isinstance(value, kind):
+        return value
+    meant = "" if instead is str else instead(value)
+    told = f"{what} must be {wanted}, got {_told(value)}"
+    raise KindError(f"{told}; {meant}" if meant else told)
+
+
+def all_of_type(
+    what: str,
+    values: Iterable[Any],
+    kind: type[T],
+    wanted: str,
+    instead: Callable[[Any], str] = str,
+) -> tuple[T, ...]:
+    """``values`` as a tuple, each of which must be a ``kind``; see `of_type`.
+
+    Examples
+    --------
+    >>> all_of_type("sizes", [1, 2], int, "a whole number")
+    (1, 2)
+    """
+    if not isinstance(values, Iterable) or isinstance(values, str | kind):
+        raise KindError(f"{what} must be a list, each {wanted}, got {_told(values)}")
+    found = tuple(values)
+    for i, value in enumerate(found):
+        of_type(f"{what}[{i}]", value, kind, wanted, instead)
+    return found
+
+
+def _told(value: object) -> str:
+    """What a value is, in few words."""
+    shown = " ".join(repr(value).split())
+    if len(shown) > _SHOWN:
+        shown = shown[: _SHOWN - 3] + "..."
+    noun = getattr(type(value), "noun", "")
+    if noun:
+        return f"{noun}, {shown}"
+    name = type(value).__name__
+    return shown if shown.startswith(name) else f"{name} {shown}"

@@ -13,8 +13,6 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["take_apart"]
-
 #: Puts the labels of the data taken apart on results of their shape.
 PutBack: TypeAlias = Callable[[NDArray[Any]], Any]
 
@@ -22,16 +20,8 @@ PutBack: TypeAlias = Callable[[NDArray[Any]], Any]
 def take_apart(data: Any) -> tuple[Any, PutBack | None]:
     """The numbers of labelled data, and what makes such data of other numbers.
 
-    Parameters
-    ----------
-    data : pandas.Series, pandas.DataFrame, polars.Series, xarray.DataArray or anything else
-        Missing values are NaN. Anything else is returned as it is.
-
-    Returns
-    -------
-    values : array_like
-    put_back : callable or None
-        ``put_back(results)`` has the name, index, coordinates and attributes of ``data``.
+    Missing values are NaN, and anything else than such data is returned as it is.
+    ``put_back(results)`` has the name, index, coordinates and attributes of ``data``.
 
     Examples
     --------

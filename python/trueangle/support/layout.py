@@ -10,8 +10,6 @@ from contextlib import contextmanager
 from contextvars import ContextVar
 from typing import Final
 
-__all__ = ["laid_out", "text_columns", "unfolded_text", "wrapped"]
-
 #: Columns of a line at least and at most; without a terminal it is `_USUAL`.
 _NARROWEST, _WIDEST, _USUAL = 60, 100, 80
 

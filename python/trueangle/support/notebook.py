@@ -15,8 +15,6 @@ from typing import Final
 
 from .layout import unfolded_text
 
-__all__ = ["as_html"]
-
 #: Blanks that part the cells of a line.
 _APART: Final = re.compile(r" {2,}")
 _WORD: Final = re.compile(r"\S+")

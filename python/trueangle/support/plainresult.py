@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Iterator, Sized
+import sys
+from collections.abc import Iterator, Mapping, Sized
 from typing import Any
-
-__all__ = ["PlainResult", "Shown", "counted", "finite"]
 
 #: Characters of a result's ``repr`` at most: one line of a screen.
 WIDTH = 100
@@ -90,3 +89,27 @@ def counted(things: Sized | int, one: str, several: str = "") -> str:
 def finite(value: float) -> float | None:
     """A number that JSON can hold, else None."""
     return float(value) if math.isfinite(value) else None
+
+
+def result_picture(result: object, *args: Any, **options: Any) -> Any:
+    """The picture of a result, by `trueangle.plots`; needs ``trueangle[plot]``.
+
+    What computes does not import what draws: the package's face finds it when it is called.
+    """
+    face = sys.modules[__name__.partition(".")[0]]
+    return face.plots.drawn(result, *args, **options)
+
+
+def pretty_json(value: Any, indent: int = 0) -> str:
+    """JSON with one line per key and per list of plain numbers."""
+    pad = "  " * (indent + 1)
+    end = "\n" + "  " * indent
+    if isinstance(value, Mapping) and value:
+        items = [
+            f"{pad}{json.dumps(key)}: {pretty_json(v, indent + 1)}" for key, v in value.items()
+        ]
+        return "{\n" + ",\n".join(items) + end + "}"
+    nested = isinstance(value, (list, tuple)) and any(isinstance(v, (Mapping, list)) for v in value)
+    if nested:
+        return "[\n" + ",\n".join(pad + pretty_json(v, indent + 1) for v in value) + end + "]"
+    return json.dumps(value, allow_nan=False)

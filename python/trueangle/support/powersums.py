@@ -8,8 +8,6 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["power_sums"]
-
 #: Powers between two fresh evaluations: keeps rounding near 1e-15 * 64.
 _RESEED: Final = 64
 
@@ -26,17 +24,9 @@ def power_sums(
 
         S_mj = Σ_i c_ij e^(2π i m t_i),    m = 0, ..., count - 1
 
-    Parameters
-    ----------
-    turns : ndarray, shape (n,)
-        Angles of the points in turns, any number of them.
-    columns : ndarray, shape (n, k)
-    count : int
-
-    Returns
-    -------
-    ndarray of complex, shape (count, k)
-        To 1e-14 of the sums of ``abs(columns)``; O(n count k), by products of matrices.
+    ``turns`` (n,) are the angles of the points in turns, any number of them, ``columns`` is (n, k)
+    and the result (count, k): to 1e-14 of the sums of ``abs(columns)``; O(n count k), by products
+    of matrices.
 
     Examples
     --------

@@ -9,8 +9,6 @@ from numpy.typing import ArrayLike
 
 import trueangle._core as _core
 
-__all__ = ["median", "quantile"]
-
 
 def median(values: ArrayLike, axis: int = -1) -> Any:
     """What `numpy.median` gives along one axis: NaN where a value is, or where there is none.

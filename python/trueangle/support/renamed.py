@@ -11,8 +11,6 @@ import warnings
 from types import ModuleType
 from typing import Any, Final
 
-__all__ = ["RENAMED", "install", "moved_name"]
-
 #: Former module or room, and where it is now; the longest that fits counts.
 RENAMED: Final = {
     "aliasing": "runs.aliasing",
@@ -32,7 +30,7 @@ RENAMED: Final = {
     "logs.ahead": "formats.ahead",
     "logs.checksum": "formats.checksum",
     "modelfile": "model.file",
-    "modelsummary": "model.summary",
+    "modelsummary": "model.text",
     "modeltext": "model.text",
     "moments": "estimation.moments",
     "momentsfit": "estimation.momentsfit",
@@ -51,8 +49,8 @@ RENAMED: Final = {
     "runfiles": "runs.files",
     "runtables": "runs.tables",
     "shafts": "joint.shafts",
-    "signals": "formats.signals",
-    "spanguard": "model.spanguard",
+    "signals": "support.signals",
+    "spanguard": "model.evaluation",
     "step": "model.step",
     "suggestions": "support.suggestions",
     "turns": "support.unit_periods",

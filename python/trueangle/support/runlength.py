@@ -12,8 +12,6 @@ from ..errors import ArgumentError
 from .distributions import normal_quantile, normal_tail
 from .kinds import told_kinds
 
-__all__ = ["chart_limit", "run_length"]
-
 #: Nodes of Gauss and Legendre's rule in the integral equation.
 _NODES: Final = 64
 

@@ -7,9 +7,6 @@ from itertools import islice
 
 from ..errors import ArgumentError, KindError
 
-__all__ = ["check_choice", "did_you_mean", "listed_names"]
-
-
 #: Known words that are compared, at most.
 _LOOKED_AT = 2000
 

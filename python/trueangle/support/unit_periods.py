@@ -5,8 +5,6 @@ from __future__ import annotations
 import math
 from typing import Final
 
-__all__ = ["ARCSEC_PER_DEG", "ARCSEC_PER_TURN", "UNIT_PERIODS"]
-
 ARCSEC_PER_DEG: Final = 3600.0
 ARCSEC_PER_TURN: Final = 360.0 * ARCSEC_PER_DEG
 

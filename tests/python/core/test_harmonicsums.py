@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import trueangle as ta
-from trueangle.fitting.orders import harmonicsums, repeats
+from trueangle.fitting.orders import harmonicsums, noise
 from trueangle.fitting.orders.evidence import (
     choose_forward,
     examine_orders,
@@ -173,11 +173,11 @@ def test_noise_of_repeats_is_that_of_least_squares(monkeypatch):
     design[np.arange(y.size), len(positions) + unit] = 1.0
     left = y - design @ np.linalg.lstsq(design, y)[0]
     freedom = y.size - np.linalg.matrix_rank(design)
-    for room in (repeats._ROOM, 0):
-        monkeypatch.setattr(repeats, "_ROOM", room)
-        noise = repeats.pure_error(units, positions)
-        assert noise.degrees_of_freedom == freedom
-        assert noise.variance == pytest.approx(left @ left / freedom, rel=1e-6)
+    for room in (noise._ROOM, 0):
+        monkeypatch.setattr(noise, "_ROOM", room)
+        found = noise.pure_error(units, positions)
+        assert found.degrees_of_freedom == freedom
+        assert found.variance == pytest.approx(left @ left / freedom, rel=1e-6)
 
 
 @pytest.mark.parametrize("orders", [[1, 2, 5, 9], [1.0, 2.5, 7.3]])

@@ -7,7 +7,7 @@ import pytest
 
 import trueangle as ta
 from trueangle.errors import NoModelError
-from trueangle.fitting.newrun import gains_of_runs
+from trueangle.fitting.transfer import gains_of_runs
 from trueangle.support.angles import circular_mean
 
 SEED = 41

@@ -12,7 +12,7 @@ import trueangle as ta
 from trueangle.cli import main
 from trueangle.export import TARGETS
 from trueangle.model.records import FitRecord, Provenance
-from trueangle.runs.run import Source
+from trueangle.support.files import Source
 
 from .test_bounds import existing
 

@@ -10,8 +10,8 @@ import pytest
 from scipy.stats import t
 
 import trueangle as ta
-from trueangle.fitting.breakdown import _between_neighbours
 from trueangle.fitting.phases import run_phases
+from trueangle.fitting.robust import _between_neighbours
 from trueangle.fitting.uncertainty import Uncertainty, _repeated, _thinned, _with_constant
 
 SEED = 64_000

@@ -7,9 +7,13 @@ import pytest
 
 import trueangle as ta
 from trueangle.errors import NoModelError
-from trueangle.fitting.laterstretch import check_later_stretch, gains_of_stretches
-from trueangle.fitting.newrun import check_new_run, gains_of_runs
 from trueangle.fitting.problem import Problem
+from trueangle.fitting.transfer import (
+    check_later_stretch,
+    check_new_run,
+    gains_of_runs,
+    gains_of_stretches,
+)
 from trueangle.joint.shafts import resolve_orders
 
 SEED = 20261

@@ -9,7 +9,7 @@ import trueangle as ta
 from trueangle.cli import main
 from trueangle.errors import NotInvertibleError, RankError
 from trueangle.estimation.reference import design_matrix
-from trueangle.fitting.penalty import bias_covariance, pattern_variances
+from trueangle.fitting.ridge import bias_covariance, pattern_variances
 from trueangle.support.distributions import student_quantile
 
 SEED = 20261122

@@ -7,6 +7,7 @@ import trueangle as ta
 from trueangle.cli import main
 from trueangle.errors import FileError, MessageLinesWarning
 from trueangle.formats import guidelog
+from trueangle.formats.format import Selection
 from trueangle.formats.guidelog import SIDEREAL
 
 SEED = 44
@@ -121,7 +122,7 @@ def test_guiding_dithers_and_lost_stars_are_taken_out(log):
 @pytest.mark.filterwarnings("ignore::trueangle.errors.MessageLinesWarning")
 def test_what_stands_beside_the_error_is_told_with_its_line(log):
     """The other axis in seconds of arc, the star's signal to noise, and the frame's own line."""
-    (batch,) = guidelog.read(log, ["time_s", "declination_arcsec", "snr"])
+    (batch,) = guidelog.read(log, Selection(["time_s", "declination_arcsec", "snr"]))
     np.testing.assert_allclose(batch["declination_arcsec"], 0.010 * SCALE, rtol=1e-12)
     np.testing.assert_array_equal(batch["snr"], 45.67)
     lines = log.read_text().splitlines()

@@ -9,6 +9,7 @@ import trueangle as ta
 from trueangle.cli import main
 from trueangle.errors import FileError
 from trueangle.formats import camonitor
+from trueangle.formats.format import Selection
 
 SEED = 21
 #: Half a degree once, a fifth twice a turn; known to a hundredth of the noise of a reading.
@@ -132,7 +133,7 @@ def test_epics_times_are_those_of_the_stamps_to_a_microsecond(tmp_path):
     path = tmp_path / "log.txt"
     seconds = np.array([0.0, 0.000123, 1.5, 30.000001, 86400.25, 172800.654321])
     path.write_text("".join(line for _, line in monitored("PV", seconds, np.zeros(6))))
-    (batch,) = camonitor.read(path, ["time_s", "PV"])
+    (batch,) = camonitor.read(path, Selection(["time_s", "PV"]))
     np.testing.assert_allclose(batch["time_s"] - batch["time_s"][0], seconds, atol=5e-7)
 
 
@@ -142,10 +143,10 @@ def test_epics_that_is_damaged_or_to_be_corrected(tmp_path, capsys):
     for bad, told in (("23:59:30", "25:61:30"), (" 2024-", " 2024")):
         path.write_text(good + good.replace(bad, told))
         with pytest.raises(FileError, match=r"log.txt, line 2: a variable, date, time and value"):
-            list(camonitor.read(path, ["PV"]))
+            list(camonitor.read(path, Selection(["PV"])))
     path.write_text(good + good.replace(" 0.00000", " open"))
     with pytest.raises(FileError, match=r"line 2, column 'PV': a number is needed, got 'open'"):
-        list(camonitor.read(path, ["PV"]))
+        list(camonitor.read(path, Selection(["PV"])))
     path = tmp_path / "log.camonitor"
     path.write_text(good * 3)
     model = ta.HarmonicModel([ta.Shaft("output", 1, [1], [0.1], [0.0])], period=360.0)

@@ -7,6 +7,7 @@ import pytest
 
 from trueangle.errors import FileError
 from trueangle.formats import stored
+from trueangle.formats.format import Selection
 
 h5py = pytest.importorskip("h5py")
 pa = pytest.importorskip("pyarrow")
@@ -60,7 +61,11 @@ def test_values_are_those_of_the_library(layout: str, tmp_path: Path):
     with h5py.File(path) as file:
         assert (Places.of(file["a"], range(ROWS)) is not None) == LAYOUTS[layout][2]
     for parts in ([None], [hdf5.RowRange(i, PARTS) for i in range(PARTS)]):
-        batches = [batch for part in parts for batch in hdf5.read(path, ["a", "b"], None, part)]
+        batches = [
+            batch
+            for part in parts
+            for batch in hdf5.read(path, Selection(["a", "b"], stretch=part))
+        ]
         found = np.concatenate([batch["a"] for batch in batches])
         np.testing.assert_array_equal(found, wanted)
         assert found.dtype.isnative
@@ -71,7 +76,7 @@ def test_values_are_those_of_the_library(layout: str, tmp_path: Path):
 def test_a_file_that_is_cut_short_while_it_is_read_is_told(tmp_path: Path):
     path = tmp_path / "log.h5"
     made(path, "in one piece")
-    batches = hdf5.read(path, ["a", "b"])
+    batches = hdf5.read(path, Selection(["a", "b"]))
     next(batches)
     with path.open("r+b") as file:
         file.truncate(20_000)
@@ -116,7 +121,8 @@ def arrow_read(path: Path, names: list[str], parts: int) -> dict[str, np.ndarray
         for number in range(3)
         for part in range(parts)
         for batch in arrow.read(
-            path, names, None, arrow.BatchRange(range(number, number + 1), part, parts)
+            path,
+            Selection(names, stretch=arrow.BatchRange(range(number, number + 1), part, parts)),
         )
     ]
     return {name: np.concatenate([batch[name] for batch in batches]) for name in names}
@@ -152,7 +158,7 @@ def test_labels_and_columns_that_lie_elsewhere_are_left_to_pyarrow(tmp_path: Pat
         assert placed_batch(mapped, table.to_batches()[0], ["a"]) is None
         assert placed_batch(mapped, batch.slice(5), ["a"]) is None
     wanted = arrow_numbers(path, "a", table["a"])
-    batches = list(arrow.read(path, ["a", "label"], None, arrow.BatchRange(range(3))))
+    batches = list(arrow.read(path, Selection(["a", "label"], stretch=arrow.BatchRange(range(3)))))
     np.testing.assert_array_equal(np.concatenate([batch["a"] for batch in batches]), wanted)
 
 
@@ -170,7 +176,7 @@ def test_an_arrow_file_that_is_cut_short_while_it_is_read_is_told(tmp_path: Path
     monkeypatch.setattr("trueangle.formats.arrowplaces.ROWS", 997)
     path = tmp_path / "log.arrow"
     made_arrow(path)
-    batches = arrow.read(path, ["a"], None, arrow.BatchRange(range(3)))
+    batches = arrow.read(path, Selection(["a"], stretch=arrow.BatchRange(range(3))))
     next(batches)
     with path.open("r+b") as file:
         file.truncate(9000)

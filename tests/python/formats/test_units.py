@@ -5,7 +5,7 @@ import pytest
 from scipy import constants
 
 import trueangle as ta
-from trueangle.formats.columns import ANGLE_UNITS, PLAIN_UNITS, TIME_UNITS
+from trueangle.support.roles import ANGLE_UNITS, PLAIN_UNITS, TIME_UNITS
 
 PLACES = np.arange(12) * 30.0
 RAW = np.linspace(-40.0, 90.0, 12)

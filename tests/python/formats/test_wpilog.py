@@ -9,6 +9,7 @@ import trueangle as ta
 from trueangle.cli import main
 from trueangle.errors import FileError
 from trueangle.formats import wpilog
+from trueangle.formats.format import Selection
 
 ROWS = 200
 TRUE = np.linspace(0.0, 2.0 * np.pi, ROWS)
@@ -55,7 +56,7 @@ def test_the_example_of_the_specification(tmp_path):
     path = tmp_path / "a.wpilog"
     path.write_bytes(EXAMPLE)
     assert wpilog.columns(path) == ["time_s", "test"]
-    (batch,) = wpilog.read(path, ["time_s", "test"])
+    (batch,) = wpilog.read(path, Selection(["time_s", "test"]))
     assert (batch["time_s"].tolist(), batch["test"].tolist()) == ([1.0], [3.0])
     assert wpilog._record(1, 1_000_000, struct.pack("<q", 3)) == EXAMPLE[44:58]
 
@@ -76,7 +77,7 @@ def test_the_last_record_of_a_time_counts_and_a_signal_holds_from_its_own_time_o
     parts += [record(1, t, struct.pack("<d", float(i))) for i, t in enumerate(times)]
     path = tmp_path / "a.wpilog"
     path.write_bytes(b"".join(parts))
-    (batch,) = wpilog.read(path, ["time_s", "x"])
+    (batch,) = wpilog.read(path, Selection(["time_s", "x"]))
     assert (batch["time_s"] * 1e6).round().tolist() == [1, 3, 5, 9]
     assert batch["x"].tolist() == [2.0, 0.0, 5.0, 6.0]
     asked = np.arange(11)

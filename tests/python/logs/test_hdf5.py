@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import trueangle as ta
+from trueangle.formats.format import Selection
 
 from .conftest import made_angles, made_model, unwrapped_truth
 
@@ -151,7 +152,7 @@ def test_parts_hold_every_row_once_and_whole_chunks(tmp_path, monkeypatch, chunk
     assert len(stretches) == parts
     read = [
         np.concatenate(
-            [batch[name] for batch in hdf5.read(source, [name], stretch=stretch)] or [[]]
+            [batch[name] for batch in hdf5.read(source, Selection([name], stretch=stretch))] or [[]]
         )
         for stretch in stretches
     ]

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import trueangle as ta
+from trueangle.formats.format import Selection
 
 from .conftest import made_angles, made_model, unwrapped_truth
 
@@ -153,7 +154,7 @@ def test_records_are_gone_through_once(compression, tmp_path, monkeypatch):
         "asammdf.blocks.mdf_v4.get_channel_raw_bytes_complete",
         lambda *args: pytest.fail("all records are read for a part of them"),
     )
-    parts = list(mdf.read(path, ["indicated_deg", "counter"]))
+    parts = list(mdf.read(path, Selection(["indicated_deg", "counter"])))
     assert len(seen) == 1
     assert len(parts) == -(-ROWS // 777)
     assert np.array_equal(np.concatenate([part["indicated_deg"] for part in parts]), angles)
@@ -171,5 +172,5 @@ def test_a_large_block_is_taken_in_pieces(monkeypatch, tmp_path):
         sizes = [block.original_size for block in blocks]
     assert max(sizes) == 1000
     assert np.array_equal(np.diff(at), sizes[:-1])
-    parts = list(mdf.read(path, ["indicated_deg"]))
+    parts = list(mdf.read(path, Selection(["indicated_deg"])))
     assert np.array_equal(np.concatenate([part["indicated_deg"] for part in parts]), angles)

@@ -15,9 +15,8 @@ import pytest
 
 import trueangle as ta
 from trueangle.cli import main
-from trueangle.logs import safety
 from trueangle.logs.manifest import MANIFEST
-from trueangle.support.files import workplace
+from trueangle.support.files import publish, workplace
 from trueangle.support.files.workplace import PARTIAL, hidden_name
 
 from .conftest import made_angles
@@ -245,7 +244,7 @@ def test_two_runs_into_one_folder_do_not_mix(logs, model, tmp_path):
     out.mkdir()
     (out / MANIFEST).touch()
     with (
-        safety.lock_path(out / MANIFEST),
+        workplace.lock_path(out / MANIFEST),
         pytest.raises(ta.errors.ArgumentError, match="another run"),
     ):
         ta.correct_logs(logs, model, out)
@@ -253,13 +252,13 @@ def test_two_runs_into_one_folder_do_not_mix(logs, model, tmp_path):
 
 def test_leftovers_of_the_living_are_spared(tmp_path):
     target = tmp_path / "a.csv"
-    with safety.workplace(target) as aside:
+    with workplace.workplace(target) as aside:
         aside.write_text("x")
-        safety.remove_leftovers([target])
+        workplace.remove_leftovers([target])
         assert aside.exists()
         dead = tmp_path / (aside.parent.name.replace(".a.csv.", ".a.csv.dead"))
         dead.mkdir()
-        safety.remove_leftovers([target])
+        workplace.remove_leftovers([target])
         assert not dead.exists()
     assert list(tmp_path.iterdir()) == []
 
@@ -268,16 +267,16 @@ def test_a_folder_is_replaced_whole_and_put_back_when_killed_between(tmp_path):
     target = tmp_path / "bag"
     target.mkdir()
     (target / "x").write_text("old")
-    with safety.workplace(target) as aside:
+    with workplace.workplace(target) as aside:
         aside.mkdir()
         (aside / "x").write_text("new")
-        safety.publish(aside, target)
+        publish(aside, target)
     assert (target / "x").read_text() == "new"
     # Killed after the old folder was moved aside, before the new one had its name.
     dead = tmp_path / f".bag.dead{PARTIAL}"
     dead.mkdir()
     os.replace(target, dead / "bag.replaced")
-    safety.remove_leftovers([target])
+    workplace.remove_leftovers([target])
     assert (target / "x").read_text() == "new"
     assert not dead.exists()
 
@@ -298,11 +297,11 @@ def test_a_folder_goes_back_when_its_replacement_ends_between(ends, tmp_path, mo
         replace(old, new)
 
     def corrected():
-        with safety.workplace(target) as aside:
+        with workplace.workplace(target) as aside:
             aside.mkdir()
             (aside / "x").write_text("new")
             monkeypatch.setattr(os, "replace", moved)
-            safety.publish(aside, target)
+            publish(aside, target)
 
     with pytest.raises(ends):
         corrected()
@@ -324,7 +323,7 @@ def test_leftovers_of_many_outputs_are_found_in_one_listing(tmp_path, monkeypatc
     listed = []
     listdir = os.listdir
     monkeypatch.setattr(os, "listdir", lambda path: listed.append(path) or listdir(path))
-    safety.remove_leftovers(targets)
+    workplace.remove_leftovers(targets)
     assert listed.count(tmp_path) == 1
     assert sorted(p.name for p in tmp_path.iterdir()) == sorted([spared.name, f"{long}2.csv"])
 

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 import trueangle as ta
 from trueangle.errors import ModelFileError
 from trueangle.model.records import FitRecord, Provenance
-from trueangle.runs.run import Source
+from trueangle.support.files import Source
 
 numbers = st.floats(-1e-3, 1e-3, allow_nan=False).map(lambda x: x + 0.0)
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import trueangle as ta
-from trueangle.fitting.orders.steepness import greatest_slope
+from trueangle.model.validity import greatest_slope
 
 
 @pytest.mark.parametrize("seed", range(5))

@@ -175,8 +175,8 @@ def test_travel_crosses_files_on_a_cluster(recording, tmp_path):
 
 def test_a_velocity_without_a_unit_has_that_of_the_angle():
     """A log in radians whose speeds are named without a unit: radians per second."""
-    from trueangle.formats.columns import Column
     from trueangle.logs.joints import _with_unit
+    from trueangle.support.roles import Column
 
     speed = Column("velocity", "v", None)
     for unit in ("deg", "rad", "turn"):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from trueangle.selfcalibration.choice import chosen_orders
 from trueangle.selfcalibration.dense import (
     DenseRows,
     _solve,
@@ -13,7 +14,6 @@ from trueangle.selfcalibration.dense import (
     low_frequency_inflation,
 )
 from trueangle.selfcalibration.projected import Projected, Unknown, pairs
-from trueangle.selfcalibration.significance import chosen_orders
 
 N = 300
 COLUMNS = pairs("the encoder", [1, 2])

@@ -8,8 +8,8 @@ from scipy import stats
 
 import trueangle as ta
 from trueangle.errors import ArgumentError, NoModelError
+from trueangle.selfcalibration.choice import chosen_orders
 from trueangle.selfcalibration.projected import Projected, pairs
-from trueangle.selfcalibration.significance import chosen_orders
 
 from .test_other_methods import dual_log, heads_log, shifts_log
 

@@ -21,9 +21,10 @@ from trueangle.selfcalibration.result import (
     OrderEstimate,
     SelfCalibration,
     estimates,
+    listed,
+    ranges,
 )
 from trueangle.selfcalibration.ripple import averaged_over_ripple, cost_of_ripple
-from trueangle.selfcalibration.summary import listed, ranges
 from trueangle.selfcalibration.verification import chance_of, judged
 
 ARCSEC = 1_296_000.0 / (2.0 * math.pi)

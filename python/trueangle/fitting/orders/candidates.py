@@ -15,10 +15,7 @@ from ...joint.gear import COMMON_RATIOS, HIGHEST_LOW_ORDER, gear_orders
 from ...joint.shafts import counted_orders
 from ...runs.aliasing import POSITION_TOLERANCE, Positions, distinct_positions, position_coherence
 from ...runs.run import CalibrationRun
-
-__all__ = ["Candidates", "choose_candidates", "effective_positions"]
-
-Array = NDArray[np.float64]
+from ...support.arrays import Array
 
 #: Low orders looked at when no gear is declared and the angles are free.
 HIGHEST_FREE_ORDER: Final = 100

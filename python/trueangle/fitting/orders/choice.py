@@ -7,13 +7,13 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Final, Literal, TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...errors import ArgumentError
 from ...joint.shafts import counted_orders
 from ...runs.aliasing import distinct_positions
 from ...runs.run import CalibrationRun
 from ...runs.travel import held_orders, over_turns
+from ...support.arrays import Array
 from ...support.blas import one_blas_thread
 from ...support.suggestions import check_choice
 from ..argument import AnyArgument, at_indicated, choose_argument
@@ -25,9 +25,6 @@ from .table import OrderSelection
 if TYPE_CHECKING:
     from ..summed import Summed
 
-__all__ = ["Method", "declared_cycles", "selected_of"]
-
-Array = NDArray[np.float64]
 Method: TypeAlias = Literal["evidence", "paper"]
 
 #: Angles looked at to tell whether a gear's orders are resolved over the travel.

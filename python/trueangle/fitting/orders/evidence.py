@@ -16,21 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...estimation.linear import pseudo_inverse
+from ...support.arrays import Array
 from .harmonicsums import HarmonicSums
 
-__all__ = [
-    "COLLINEAR",
-    "OVERDISPERSED",
-    "OrderTest",
-    "choose_forward",
-    "examine_orders",
-    "fit_subset",
-    "held_out_gains",
-    "log_chi2_tail",
-    "log_tail",
-]
-
-Array = NDArray[np.float64]
 Index = NDArray[np.intp]
 
 #: A candidate whose columns keep less than this of their energy beside those already
@@ -76,24 +64,11 @@ def choose_forward(
 ) -> list[int]:
     """Indices of orders, taken one by one while the best of the rest is significant.
 
-    Parameters
-    ----------
-    sums : HarmonicSums
-    log_limits : ndarray, shape (orders,)
-        Log of the false-alarm probability that each order may use up.
-    readings : int
-        Degrees of freedom before any order: readings less zeros.
-    noise : (variance, degrees of freedom) or None
-        None takes the residual of the orders chosen so far, the one on trial included.
-    forced : sequence of int
-        Taken first, whatever they bring.
-    barred : sequence of int
-        Never taken.
-
-    Returns
-    -------
-    list of int
-        In the order of their choice; among aliases the lowest of the likeliest.
+    ``log_limits`` is the log of the false-alarm probability that each order may use up,
+    ``readings`` their number less that of the zeros, ``noise`` a variance and its degrees of
+    freedom (None: the residual of the orders chosen so far, the one on trial included). ``forced``
+    orders are taken first, whatever they bring, ``barred`` ones never; among aliases the lowest of
+    the likeliest is taken.
     """
     gram, rhs, rest = sums.total()
     gram, rhs = gram.copy(), rhs.copy()

@@ -18,12 +18,9 @@ from numpy.typing import NDArray
 import trueangle._core as _core
 
 from ...estimation.linear import NormalEquations
+from ...support.arrays import Array
 from ...support.powersums import power_sums
 from .unitgroups import GROUPS, MOST_UNITS, columns_summed, units_in_groups
-
-__all__ = ["HarmonicSums", "ZeroGroupReadings", "harmonic_sums"]
-
-Array = NDArray[np.float64]
 
 #: From so many readings on the core's piecewise moments are faster than this file's powers.
 _LARGE: Final = 1024

@@ -16,8 +16,6 @@ from ...runs.aliasing import Positions, position_coherence
 from .evidence import fit_subset
 from .harmonicsums import ZeroGroupReadings, harmonic_sums
 
-__all__ = ["DECISIVE", "find_lookalikes", "substitution_losses"]
-
 #: Two orders are told apart when one explains better by this many noise variances: a
 #: likelihood ratio of e^5, about 150 to 1.
 DECISIVE: Final = 10.0
@@ -39,11 +37,8 @@ def find_lookalikes(
 ) -> list[dict[int, float]]:
     """For each of ``orders``, those up to ``highest`` that could take its place.
 
-    Returns
-    -------
-    list of dict of int to float
-        Ascending, with the increase of the sum of squares that each would cost; empty
-        where the readings decide.
+    Ascending, with the increase of the sum of squares that each would cost; none where the readings
+    decide.
     """
     every = np.arange(1, highest + 1)
     found: list[dict[int, float]] = []

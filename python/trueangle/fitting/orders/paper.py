@@ -17,20 +17,17 @@ from numpy.typing import NDArray
 from ...errors import ArgumentError
 from ...runs.aliasing import Positions
 from ...runs.run import CalibrationRun
+from ...support.arrays import Array
 from ...support.quantiles import median
 from .candidates import Candidates
 from .evidence import log_tail
 from .harmonicsums import ZeroGroupReadings
 from .lookalikes import find_lookalikes
+from .noise import ReadingVariance
 from .phases import circular_range_deg
-from .repeats import ReadingVariance
 from .table import OrderRow, OrderSelection
 from .verdicts import explained_row, selection_notes
 from .zerogroups import zero_units
-
-__all__ = ["PHASE_RANGE_DEG", "PROMINENCE", "run_coefficients", "select_by_paper"]
-
-Array = NDArray[np.float64]
 
 #: Phases of a retained order lie within this arc over the runs. Noise alone stays within
 #: 60 degrees over five runs in 0.4 % of cases, within the paper's "about 10" in 3e-6,

@@ -6,14 +6,11 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from ...support.arrays import Array
 from .evidence import fit_subset
 from .harmonicsums import HarmonicSums
-
-__all__ = ["circular_range_deg", "unit_coefficients", "unit_phases"]
-
-Array = NDArray[np.float64]
 
 
 def circular_range_deg(phases: ArrayLike) -> float:
@@ -37,10 +34,7 @@ def unit_coefficients(
 ) -> tuple[Array, Array]:
     """A and B of each order in each unit, the other chosen orders held at the common fit.
 
-    Returns
-    -------
-    cosine, sine : ndarray, shape (units, len(orders))
-        NaN where the unit does not see the order.
+    Both of shape (units, orders), NaN where the unit does not see the order.
     """
     index = np.asarray(orders, dtype=np.intp)
     size, n = len(chosen), index.size

@@ -11,18 +11,13 @@ from collections.abc import Sequence
 from typing import Final, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...model.validity import greatest_slope
+from ...support.arrays import Array
 from ..uncertainty import CovarianceKind
 from .evidence import OrderTest, choose_forward, examine_orders, fit_subset, held_out_gains
 from .harmonicsums import HarmonicSums
-from .repeats import ReadingVariance
-from .scatter import NEIGHBOURS, neighbour_scatter, pooled_scatter, run_scatter
-from .steepness import greatest_slope
-
-__all__ = ["FALSE_ALARM", "NEGLIGIBLE_NOISE", "NEGLIGIBLE_SHARE", "STEEPEST", "EvidenceSearch"]
-
-Array = NDArray[np.float64]
+from .noise import NEIGHBOURS, ReadingVariance, neighbour_scatter, pooled_scatter, run_scatter
 
 #: Chance, over the whole search, that noise alone makes any order significant. Half of
 #: the 1 % promised: the rest covers what the noise estimate itself does not know.

@@ -6,9 +6,6 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
-import numpy as np
-from numpy.typing import NDArray
-
 from ...runs.aliasing import Positions
 from ...runs.run import CalibrationRun
 from ...support.display_units import brief
@@ -16,8 +13,8 @@ from ..uncertainty import CovarianceKind
 from .candidates import Candidates
 from .harmonicsums import HarmonicSums, harmonic_sums
 from .lookalikes import find_lookalikes
+from .noise import pure_error
 from .phases import circular_range_deg, unit_phases
-from .repeats import pure_error
 from .search import FALSE_ALARM, EvidenceSearch
 from .table import OrderRow, OrderSelection
 from .verdicts import explained_row, selection_notes, verdict_reason
@@ -27,8 +24,6 @@ if TYPE_CHECKING:
     from ..summed import Summed
 
 __all__ = ["FALSE_ALARM", "EvidenceSelection"]
-
-Array = NDArray[np.float64]
 
 
 class EvidenceSelection(EvidenceSearch):

@@ -14,12 +14,6 @@ from ...support.plainresult import finite
 if TYPE_CHECKING:
     from .table import OrderRow, OrderSelection
 
-__all__ = [
-    "plain_selection",
-    "selection_error_unit",
-    "selection_summary",
-]
-
 #: Rejected orders listed beside the retained ones, the strongest first.
 _REJECTED = 8
 

@@ -11,16 +11,13 @@ from ...joint.gear import Explanation
 from ...model.model import Argument
 from ...runs.aliasing import Positions
 from ...support.display_units import ErrorsIn
-from ...support.drawn import result_picture
-from ...support.plainresult import PlainResult
-from .repeats import ReadingVariance
+from ...support.plainresult import PlainResult, result_picture
+from .noise import ReadingVariance
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
     from ..result import FitResult
-
-__all__ = ["OrderRow", "OrderSelection"]
 
 #: Orders that the one line of a selection lists.
 _SHOWN = 6

@@ -12,14 +12,11 @@ from itertools import pairwise
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
-from numpy.typing import NDArray
+
+from ...support.arrays import Array
 
 if TYPE_CHECKING:
     from .harmonicsums import ZeroGroupReadings
-
-__all__ = ["GROUPS", "MOST_UNITS", "columns_summed", "unit_means", "units_in_groups"]
-
-Array = NDArray[np.float64]
 
 #: With more units than this they are taken together, in so many groups.
 MOST_UNITS: Final = 96

@@ -28,14 +28,6 @@ from ...support.angles import arcsec
 from .candidates import Candidates, choose_candidates
 from .table import OrderRow, OrderSelection
 
-__all__ = [
-    "VerifiedPositions",
-    "explained_row",
-    "selection_notes",
-    "verdict_reason",
-    "verified_positions",
-]
-
 #: Share of the energy in the upper half of the orders from which under-sampling is said.
 _UNDER_SAMPLED: Final = 0.25
 

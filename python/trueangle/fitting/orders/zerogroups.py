@@ -15,8 +15,6 @@ from ...runs.travel import over_turns
 from ...support.angles import wrap
 from .harmonicsums import ZeroGroupReadings
 
-__all__ = ["angle_blocks", "zero_units"]
-
 #: Folds of a single run: whole blocks of neighbouring positions, dealt in turn.
 _FOLDS: Final = 6
 _BLOCKS: Final = 24

@@ -9,20 +9,10 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
+from ...support.arrays import Array
 from ...support.quantiles import median, quantile
 from .fault import DataFault
 from .record import Record
-
-__all__ = [
-    "angle_ratio",
-    "mixed_units",
-    "suggestion",
-    "swapped",
-    "wrapped_reference",
-    "wrong_ratio",
-]
-
-Array = NDArray[np.float64]
 
 #: Travel (degrees) from which on a ratio of the channels means anything, and how far from 1
 #: it may be: errors of several degrees over a short travel are still errors.

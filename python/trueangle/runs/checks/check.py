@@ -18,8 +18,6 @@ from .still import stuck_readings
 if TYPE_CHECKING:
     from .result import Check
 
-__all__ = ["check", "data_faults"]
-
 #: Every test of the data, in the order in which they are told.
 TESTS = (
     unsorted_time,
@@ -116,6 +114,6 @@ def _records(data: Any, reading: Mapping[str, Any]) -> list[Record]:
     runs, data = given_runs(data)
     if runs is not None:
         return records_of(runs)
-    from .files import read_records
+    from .record import read_records
 
     return read_records(data, reading)

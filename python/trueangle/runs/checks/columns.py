@@ -9,12 +9,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
-from ...formats.columns import unit_in_name
 from ...formats.formats import format_of_content
 from ...support.layout import laid_out
 from ...support.plainresult import PlainResult, counted
-
-__all__ = ["LikelyColumn", "LogColumns", "columns_of_log"]
+from ...support.roles import unit_in_name
 
 #: Words of a name that tell its role.
 _WORDS: Final = {

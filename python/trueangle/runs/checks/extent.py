@@ -5,15 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...support.arrays import Array
 from ...support.plainresult import counted
 from ...support.quantiles import median, quantile
 from .record import Record
-
-__all__ = ["Extent", "extent_of", "extent_verdicts"]
-
-Array = NDArray[np.float64]
 
 #: Levels are apart by this share of their range, and by so much at least.
 GAP = 0.1

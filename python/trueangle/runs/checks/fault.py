@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from typing import Any, NamedTuple
 
-__all__ = ["UNUSABLE", "DataFault"]
-
 #: Faults with which nothing may be fitted: the angles are not what they seem.
 UNUSABLE = (
     "unsorted_time",

@@ -11,8 +11,6 @@ from ...support.plainresult import PlainResult, counted
 from .extent import Extent
 from .fault import DataFault
 
-__all__ = ["Check"]
-
 
 @dataclass(frozen=True)
 class Check(PlainResult):

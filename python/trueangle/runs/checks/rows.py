@@ -9,8 +9,6 @@ import numpy as np
 from .fault import DataFault
 from .record import Record
 
-__all__ = ["duplicate_rows", "duplicate_runs", "unsorted_time"]
-
 #: Readings that a run must have to be compared as a whole.
 LEAST_READINGS = 3
 

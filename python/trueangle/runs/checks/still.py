@@ -17,13 +17,10 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ...support.arrays import Array
 from ...support.quantiles import median, quantile
 from .fault import DataFault
 from .record import Record
-
-__all__ = ["stuck_readings"]
-
-Array = NDArray[np.float64]
 
 #: What the other channel must have passed by: in noise (a chance of 1e-9), in counts of a
 #: column that has a lattice, and of one whose steps only look like it (no count is so long).

@@ -9,11 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import ArgumentError
+from ...support.arrays import Array
 from .stream import Stream
-
-__all__ = ["Clocks", "estimated_clocks"]
-
-Array = NDArray[np.float64]
 
 #: Points of the grid on which the coarse offset is searched, at most.
 _GRID = 1 << 20

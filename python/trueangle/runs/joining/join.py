@@ -11,19 +11,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import ArgumentError, FileError
-from ...formats.columns import count_turn, matching_column, signal_code, wanted_columns
-from ...formats.signals import FIELDS
+from ...formats.columns import matching_column
 from ...support.angles import ARCSEC_PER_TURN
+from ...support.arrays import Array
 from ...support.kinds import told_kinds
+from ...support.roles import count_turn, signal_code, wanted_columns
+from ...support.signals import FIELDS
 from ..readings import FileReadings, read_readings
 from ..run import CalibrationRun
 from .clocks import Clocks, estimated_clocks
 from .result import Gap, Joined
 from .stream import Stream
-
-__all__ = ["join"]
-
-Array = NDArray[np.float64]
 
 #: FileReadings that a run is made of, at least.
 _LEAST = 4
@@ -133,16 +131,8 @@ class _Log(NamedTuple):
                 + signal_code("time")
             )
         column = roles[role]._replace(unit=roles[role].unit or table.format.unit)
-        if column.unit is None:
-            problem = f"its unit is not known; give it: {signal_code(role, column.name, 'deg')}"
-            raise table.error(problem, column.name)
-        if column.unit == "count" and counts is None:
-            beside = "" if role == "indicated" else "_reference"
-            raise table.error(
-                f"counts need their number per turn: give `counts_per_turn{beside}=`", column.name
-            )
+        angle = table.values(column, 360.0, counts)
         time = roles["time"].values(table.raw(roles["time"]), 360.0)
-        angle = column.values(table.raw(column), 360.0, counts)
         known = np.isfinite(time) & np.isfinite(angle)
         if np.count_nonzero(known) < _LEAST:
             raise table.error(f"fewer than {_LEAST} readings", column.name)

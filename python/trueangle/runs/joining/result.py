@@ -11,8 +11,6 @@ from ...support.layout import laid_out
 from ...support.plainresult import PlainResult, counted
 from ..run import CalibrationRun
 
-__all__ = ["Gap", "Joined"]
-
 
 class Gap(NamedTuple):
     """A pause of the reference, on its own clock, and the readings left out over it."""

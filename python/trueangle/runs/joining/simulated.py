@@ -11,19 +11,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import ArgumentError
-from ...formats.signals import FIELDS
 from ...support.angles import ARCSEC_PER_TURN
+from ...support.arrays import Array
 from ...support.layout import wrapped
 from ...support.plainresult import Shown
+from ...support.signals import FIELDS
 from ..files import runs_of
 from ..run import CalibrationRun
 from .clocks import estimated_clocks
 from .stream import Stream
 from .travel import Travelled
-
-__all__ = ["BY", "MeasuredMinusSimulated", "minus_simulated"]
-
-Array = NDArray[np.float64]
 
 #: How a log may be brought to the readings.
 BY = ("time", "angle")

@@ -8,9 +8,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Stream"]
-
-Array = NDArray[np.float64]
+from ...support.arrays import Array
 
 #: Times the typical step in time from which on a pause is a gap.
 GAP = 5.0

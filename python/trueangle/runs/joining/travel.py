@@ -8,9 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Travelled"]
-
-Array = NDArray[np.float64]
+from ...support.arrays import Array
 
 #: Times the typical step in angle from which on a stretch is a gap.
 GAP = 5.0

@@ -4,7 +4,10 @@ from .inputs import (
     MODEL_BYTES,
     RUNS_BYTES,
     SIMULATION_BYTES,
+    Source,
     check_input,
+    partition_keys,
+    partition_name,
     read_whole,
     sha256_of,
 )
@@ -25,7 +28,6 @@ from .kinds import (
     promised_format,
 )
 from .outputs import check_output, external_output, publish, written_atomically
-from .partition import partition_keys, partition_name
 from .samefile import same_file
 from .workplace import remove_leftovers, restore
 
@@ -44,6 +46,7 @@ __all__ = [
     "SIMULATION",
     "SIMULATION_BYTES",
     "Kind",
+    "Source",
     "check_input",
     "check_output",
     "declare_endings",

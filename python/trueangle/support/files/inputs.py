@@ -7,21 +7,12 @@ import os
 import stat
 from os import PathLike
 from pathlib import Path
-from typing import Final
+from typing import Final, NamedTuple
+from urllib.parse import unquote
 
 from ...errors import FileError, KindError
 from .samefile import what_it_is
 from .workplace import restore
-
-__all__ = [
-    "MODEL_BYTES",
-    "RUNS_BYTES",
-    "SIMULATION_BYTES",
-    "check_input",
-    "is_null_device",
-    "read_whole",
-    "sha256_of",
-]
 
 #: Most bytes of files that are read whole. The covariance of a model of 1800 orders, the
 #: largest part of any model, takes 256 MiB as text; a simulation is written by hand; larger
@@ -35,6 +26,16 @@ _CHUNK: Final = 1 << 20
 
 #: Milliseconds between two looks for Ctrl-C while a pipe is waited for.
 _LOOK_MS: Final = 100
+
+#: What stands for no value.
+_NOTHING: Final = "__HIVE_DEFAULT_PARTITION__"
+
+
+class Source(NamedTuple):
+    """A file that readings came from: its name and the sha256 of its bytes."""
+
+    file: str
+    sha256: str
 
 
 def check_input(path: str | PathLike[str], *, whole: bool = False) -> os.stat_result:
@@ -82,13 +83,8 @@ def read_whole(path: str | PathLike[str], limit: int, what: str) -> bytes:
 
     Waiting for a pipe ends with Ctrl-C, at most a tenth of a second later.
 
-    Parameters
-    ----------
-    path : path
-    limit : int
-        Most bytes that are read, one of the constants of this module.
-    what : str
-        What the file should hold, as the message names it: ``"a model"``.
+    ``limit`` is one of the constants of this module, ``what`` names what the file should hold: ``"a
+    model"``.
 
     Raises
     ------
@@ -169,3 +165,38 @@ def _is_terminal(path: str | PathLike[str]) -> bool:
 
 def _size(count: int) -> str:
     return f"{count >> 20} MiB" if count < 1 << 30 else f"{count >> 30} GiB"
+
+
+def partition_keys(path: str | PathLike[str]) -> dict[str, str]:
+    """Keys and values of the folders right above a file, the outermost first.
+
+    Examples
+    --------
+    >>> partition_keys("cells/unit=a%201/run=3/data.parquet")
+    {'unit': 'a 1', 'run': '3'}
+    >>> partition_keys("cells/data.parquet")
+    {}
+    """
+    pairs = (folder.partition("=") for folder in _folders(path))
+    return {unquote(key): unquote(value) for key, _, value in pairs if value != _NOTHING}
+
+
+def partition_name(path: str | PathLike[str]) -> str:
+    """The name of a file, with the folders that tell it from others of this name.
+
+    Examples
+    --------
+    >>> partition_name("cells/unit=a/run=3/data.parquet"), partition_name("cells/a.csv")
+    ('unit=a/run=3/data.parquet', 'a.csv')
+    """
+    return "/".join([*_folders(path), Path(path).name])
+
+
+def _folders(path: str | PathLike[str]) -> list[str]:
+    found: list[str] = []
+    for folder in reversed(Path(path).parts[:-1]):
+        key, equals, _ = folder.partition("=")
+        if not key or not equals:
+            break
+        found.insert(0, folder)
+    return found

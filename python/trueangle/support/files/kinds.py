@@ -9,23 +9,6 @@ from typing import Final, NamedTuple
 
 from ...errors import FileError
 
-__all__ = [
-    "FLEET",
-    "MODEL",
-    "PAGE",
-    "PDF",
-    "PICTURE",
-    "REPORT",
-    "RUNS",
-    "SENSOR",
-    "SIMULATION",
-    "Kind",
-    "declare_endings",
-    "kind_of_log",
-    "log_endings",
-    "promised_format",
-]
-
 #: Endings that promise a format, by its name: a file of another must not bear them. Those of
 #: logs are declared by their formats.
 _FORMATS: Final[dict[str, tuple[str, ...]]] = {

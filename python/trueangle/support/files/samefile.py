@@ -7,8 +7,6 @@ import stat
 from collections.abc import Iterable, Iterator
 from os import PathLike
 
-__all__ = ["named_again", "same_file"]
-
 
 def same_file(first: str | PathLike[str], second: str | PathLike[str]) -> bool:
     """Whether both names lead to one file: by spelling, symbolic link or hard link.

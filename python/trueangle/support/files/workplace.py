@@ -20,19 +20,6 @@ try:
 except ImportError:  # pragma: no cover - Windows has no flock
     fcntl = None  # type: ignore[assignment]
 
-__all__ = [
-    "PARTIAL",
-    "exchange_names",
-    "hidden_beside",
-    "hidden_name",
-    "lock_path",
-    "made_beside",
-    "remove_leftovers",
-    "replace_folder",
-    "restore",
-    "workplace",
-]
-
 #: Ending of what is being written beside its name.
 PARTIAL: Final = ".trueangle-partial"
 #: Ending of a folder that is being replaced, in the place where the new one was made.

@@ -15,7 +15,7 @@ from trueangle.fitting.orders.evidence import (
     log_tail,
 )
 from trueangle.fitting.orders.harmonicsums import ZeroGroupReadings, harmonic_sums
-from trueangle.fitting.orders.scatter import neighbour_scatter, pooled_scatter, run_scatter
+from trueangle.fitting.orders.noise import neighbour_scatter, pooled_scatter, run_scatter
 
 SIGMA = 0.3
 

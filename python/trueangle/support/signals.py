@@ -14,23 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import ArgumentError
-from ..support.suggestions import did_you_mean
-
-__all__ = [
-    "AT_RUN_TIME",
-    "COUPLED",
-    "FIELDS",
-    "SIGNALS",
-    "GivenSignals",
-    "Signal",
-    "Signals",
-    "check_names",
-    "coupled_with",
-    "find_signal",
-    "is_at_run_time",
-    "signal_column",
-    "signal_columns",
-]
+from .suggestions import did_you_mean
 
 #: Values by the name of the signal; one per reading, or one for all.
 Signals: TypeAlias = Mapping[str, ArrayLike]

@@ -8,8 +8,6 @@ from datetime import datetime
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["elapsed_seconds", "local_day", "parsed_time"]
-
 
 def parsed_time(text: str | None) -> datetime | None:
     """The date and time that a text holds; None where it is none.
