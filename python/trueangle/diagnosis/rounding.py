@@ -13,12 +13,14 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from ..effects.quantisation import LEAST_SHARE
 from ..estimation.factor import orthonormal_basis
+from ..estimation.readings import LEAST_SHARE
 from ..estimation.regression import Extension, Regression
 from ..estimation.rounded import Rounded, fit_rounded
+from ..estimation.whitening import RunEffect
 from ..support.arrays import Array
 from .penalty import NEW_CAUSE, finding_groups
+from .unnamed import effect_of, is_named
 
 
 def rounding_of(regression: Regression) -> float:
@@ -40,7 +42,9 @@ def beyond_rounding(start: Regression, chosen: Regression) -> Regression:
     """
     if not chosen.terms or not rounding_of(chosen):
         return chosen
+    paths = [term for term in chosen.terms if _is_path(term)]
     groups = [[chosen.terms[k] for k in group] for group in finding_groups(chosen.terms)]
+    groups = [group for group in groups if not _is_path(group[0])]
     told: list[Extension] = []
     fit = _fit(start, told, chosen.outlying)
     while groups and not fit.within:
@@ -54,7 +58,24 @@ def beyond_rounding(start: Regression, chosen: Regression) -> Regression:
             break
         told += groups.pop(best)
         fit = tried[best]
-    return start.with_terms(told) if groups else chosen
+    if not (groups or paths):
+        return chosen
+    account = start.with_terms(told)
+    for path in paths:
+        # One that follows anything has no size in each run that could be fitted to steps.
+        drawn = path.run_effect
+        if drawn is None or _gain_of_path(unrounded(account), path, drawn) > NEW_CAUSE:
+            account = start.with_terms([*account.terms, path])
+    return account
+
+
+def _is_path(term: Extension) -> bool:
+    return is_named(term) and effect_of(term.cause).describes_noise(term)
+
+
+def _gain_of_path(regression: Regression, path: Extension, drawn: RunEffect) -> float:
+    asked = (path.cause, path.shape, drawn.columns, path.log_grid)
+    return regression.propose_run_effect(*asked).bic_gain
 
 
 def tells_no_more(regression: Regression) -> bool:

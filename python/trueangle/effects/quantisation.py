@@ -9,7 +9,7 @@ from typing import ClassVar
 import numpy as np
 
 from ..estimation.estimate import quantity
-from ..estimation.readings import MOST_SHARE
+from ..estimation.readings import LEAST_SHARE, MOST_SHARE
 from ..estimation.regression import Regression
 from ..joint.pattern import Surroundings
 from ..joint.signals import Signals
@@ -20,9 +20,6 @@ from .scatter import ScatterFinding
 from .search import Array
 
 __all__ = ["Quantisation"]
-
-#: Share of the noise's variance from which on the rounding of the readings is its cause.
-LEAST_SHARE = 0.2
 
 
 @dataclass(frozen=True)

@@ -21,6 +21,9 @@ Array = NDArray[np.float64]
 #: Runs from which they, and not the readings, are what informs on a variance between runs.
 ENOUGH_RUNS = 8
 
+#: Share of what is left from which on the rounding of the readings is a part that matters.
+LEAST_SHARE = 0.2
+
 #: Times the variance that is there which the rounding of a sensor may have: on few positions it
 #: errs by other numbers than on all, but on none that does not scatter.
 MOST_SHARE = 2.0

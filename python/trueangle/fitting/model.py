@@ -13,12 +13,10 @@ from ..joint.shafts import Shaft
 from ..model.model import HarmonicModel
 from ..model.records import FitRecord, Provenance
 from ..support.angles import wrap
+from .rounding import COUNTED
 
 if TYPE_CHECKING:
     from .result import FitResult
-
-#: Positions are told apart by sorting: of more readings than this they are not counted.
-_COUNTED = 20_000
 
 
 def build_model(fit: FitResult) -> HarmonicModel:
@@ -105,7 +103,7 @@ def _verified(fit: FitResult) -> tuple[int, str] | None:
     from .orders.verdicts import verified_positions
 
     runs = fit.problem.runs
-    if fit.problem.readings > _COUNTED:
+    if fit.problem.readings > COUNTED:
         return None
     verified = verified_positions(runs, *fit.joint)
     return None if verified.between else (verified.count, verified.sentence)

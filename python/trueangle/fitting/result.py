@@ -20,6 +20,7 @@ from .coefficients import FittedCoefficients
 from .model import build_model, fit_notes
 from .problem import Fitted, Problem
 from .robust import Weighted
+from .rounding import beside_rounding
 from .uncertainty import CovarianceKind, Uncertainty, coefficient_uncertainty
 
 if TYPE_CHECKING:
@@ -199,6 +200,7 @@ class FitResult(FittedCoefficients):
         found = coefficient_uncertainty(
             self.problem, self.fitted, weights, self.ridge, self.covariance_asked
         )
+        found = beside_rounding(found, self.problem, self.fitted)
         if self.nuisance is None or not self.nuisance.inflation:
             return found
         wider = np.array([1.0, *self.nuisance.inflation])

@@ -16,7 +16,9 @@ from numpy.typing import NDArray
 
 import trueangle._core as _core
 
+from ..joint.signals import sensor_lattice
 from ..runs.run import CalibrationRun
+from ..support.angles import ARCSEC_PER_TURN
 from ..support.arrays import Array
 from ..support.display_units import brief
 from ..support.quantiles import median, quantile
@@ -36,6 +38,9 @@ MAD_TO_SIGMA = 1.4826
 
 #: Readings further off than this are wild. Of 1e12 normal readings not one is.
 WILD = 8.0
+
+#: Counts of a sensor up to which a reading differs from its neighbours by being rounded.
+WILD_COUNTS = 2.0
 
 #: With more than this share beyond `WILD` the readings are not wild: the model lacks an
 #: effect, and least squares on all of them is the honest answer.
@@ -212,6 +217,10 @@ def without_spikes(run: CalibrationRun) -> CalibrationRun:
     distance = np.abs(deviation)
     # Readings in counts: most deviations may be exactly 0, the rest one count.
     wild = distance > WILD * max(robust_scale(deviation), float(quantile(distance, 0.8)))
+    if wild.any():
+        turns = run.unwrapped_reference * (2.0 * math.pi / run.period)
+        count = sensor_lattice([run], turns)[0] * run.period / ARCSEC_PER_TURN
+        wild &= distance > WILD_COUNTS * count
     if not wild.any() or wild.mean() > WILD_SHARE:
         return run
     return replace(run, weights=np.where(wild, 0.0, _given(run.weights, wild.size)))

@@ -216,7 +216,7 @@ def join_runs(runs: Sequence[CalibrationRun]) -> Signals:
     """Signals of ``runs``; a quantity that some run lacks is None for all."""
     parts = [_travel(run) for run in runs]
     theta = _joined([run.unwrapped_reference * (2.0 * math.pi / run.period) for run in runs])
-    count, table = _lattice(runs, theta)
+    count, table = sensor_lattice(runs, theta)
     offset = np.cumsum([0, *(part[3].size for part in parts[:-1])])
     return Signals(
         theta=theta,
@@ -240,7 +240,7 @@ def join_runs(runs: Sequence[CalibrationRun]) -> Signals:
     )
 
 
-def _lattice(runs: Sequence[CalibrationRun], theta: Array) -> tuple[float, int]:
+def sensor_lattice(runs: Sequence[CalibrationRun], theta: Array) -> tuple[float, int]:
     """Count of the sensor in arcsec and positions of a table in a turn; of each 0 where none.
 
     A table shows in the moves of the indicated angles, or in the true ones (radians), in any order.

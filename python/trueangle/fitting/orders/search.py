@@ -73,6 +73,9 @@ class EvidenceSearch:
     forced : sequence of int
         Orders that are in every model and never retained.
     covariance : {"auto", "white", "cluster", "hac"}
+    rounding : float
+        Variance of one reading by what a coarse sensor repeats at each position, of which no
+        scatter tells.
     """
 
     def __init__(
@@ -85,7 +88,9 @@ class EvidenceSearch:
         repeats: ReadingVariance | None = None,
         forced: Sequence[int] = (),
         covariance: CovarianceKind = "auto",
+        rounding: float = 0.0,
     ) -> None:
+        self.rounding = rounding
         self.sums, self.folds, self.repeats = sums, folds, repeats
         # Whole orders as whole numbers: results show and compare them.
         self.orders: list[float] = [int(m) if m == int(m) else m for m in sums.orders.tolist()]
@@ -138,12 +143,13 @@ class EvidenceSearch:
     def _level(self, chosen: Sequence[int]) -> _Level:
         """Noise of the coefficients: common to all orders, and each order's own."""
         noise = self.noise(chosen)
-        level = (noise.variance, float(noise.degrees_of_freedom))
+        level = (noise.variance + self.rounding, float(noise.degrees_of_freedom))
         if self.covariance == "hac":
-            return _Level(level, neighbour_scatter(self.sums, chosen), NEIGHBOURS)
+            near = neighbour_scatter(self.sums, chosen)
+            return _Level(level, None if near is None else near + self.rounding, NEIGHBOURS)
         if self.sums.units < 2 or self.covariance == "white":
             return _Level(level, None, None)
-        scatter = run_scatter(self.sums, chosen, range(len(self.orders)))
+        scatter = run_scatter(self.sums, chosen, range(len(self.orders))) + self.rounding
         return _Level(pooled_scatter(scatter, self.sums.units) or level, scatter, None)
 
     def examined(self, chosen: Sequence[int], orders: Sequence[int]) -> OrderTest:
@@ -156,7 +162,7 @@ class EvidenceSearch:
         noise = self.noise(())
         known = None
         if noise.source != "model":
-            known = (noise.variance, float(noise.degrees_of_freedom))
+            known = (noise.variance + self.rounding, float(noise.degrees_of_freedom))
         return choose_forward(self.sums, self.limits, self.free, known, self.forced, self.barred)
 
     def _backward(self, chosen: list[int]) -> tuple[list[int], dict[int, str]]:

@@ -6,15 +6,19 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from ...runs.aliasing import Positions
 from ...runs.run import CalibrationRun
 from ...support.display_units import brief
+from ..rounding import repeated_variance, rounding_step
 from ..uncertainty import CovarianceKind
 from .candidates import Candidates
 from .harmonicsums import HarmonicSums, harmonic_sums
 from .lookalikes import find_lookalikes
 from .noise import pure_error
 from .phases import circular_range_deg, unit_phases
+from .rounding import beyond_rounding
 from .search import FALSE_ALARM, EvidenceSearch
 from .table import OrderRow, OrderSelection
 from .verdicts import explained_row, selection_notes, verdict_reason
@@ -56,26 +60,54 @@ class EvidenceSelection(EvidenceSearch):
             parts = angle_blocks(self.units[0], self.positions)
             self.holdout = "whole blocks of neighbouring positions (single run)"
             folds = harmonic_sums(parts, candidates.orders) if parts else None
+        repeats = pure_error(self.units, self.positions)
+        self.samples = int(sums.count.sum())
+        self.step = rounding_step(runs, self.positions)
+        rounding = 0.0
+        if self.step and repeats is not None:
+            rounding = repeated_variance(self.step, repeats.variance)
+            rounding *= self.samples / len(self.positions)
         super().__init__(
             sums,
             candidates.log_limits(FALSE_ALARM),
             runs[0].period,
-            int(sums.count.sum()) - units,
+            self.samples - units,
             folds,
-            pure_error(self.units, self.positions),
+            repeats,
             [i for i, k in enumerate(candidates.orders) if k in reference],
             covariance,
+            rounding,
         )
-        self.samples = int(sums.count.sum())
 
     def result(self) -> OrderSelection:
         """The selection with its table."""
-        chosen, dropped = self.search()
+        chosen, dropped = self._beyond_rounding(*self.search())
         lookalikes = self._lookalikes(chosen)
         lowest = self._lowest(chosen, lookalikes)
         if lowest != chosen:
             lookalikes = self._lookalikes(lowest)
         return self._report(lowest, dropped, lookalikes)
+
+    def _beyond_rounding(
+        self, chosen: list[int], dropped: dict[int, str]
+    ) -> tuple[list[int], dict[int, str]]:
+        """Without the orders that the rounding of a coarse sensor may have made."""
+        mine = [i for i in chosen if i not in self.forced]
+        if not (self.step and mine):
+            return chosen, dropped
+        test = self.examined(chosen, mine)
+        strongest = np.argsort(-np.hypot(test.cosine, test.sine), kind="stable")
+        places = [*self.forced, *(mine[k] for k in strongest)]
+        told = beyond_rounding(
+            self.units,
+            self.step,
+            self.orders_of(places),
+            self.limits[places].tolist(),
+            len(self.forced),
+        )
+        kept = {*self.forced, *(places[k] for k in told)}
+        dropped |= {i: "rounding" for i in chosen if i not in kept}
+        return [i for i in chosen if i in kept], dropped
 
     def _lookalikes(self, chosen: Sequence[int]) -> dict[int, dict[int, float]]:
         """Aliases of every chosen order that these readings cannot exclude."""

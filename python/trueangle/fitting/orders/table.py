@@ -36,8 +36,8 @@ class OrderRow:
     retained : bool
     verdict : str
         ``"retained"``, ``"noise"``, ``"no held-out gain"``, ``"negligible"``,
-        ``"too steep"``, ``"alias"``, ``"reference"``, ``"weak"``; with method ``"paper"``
-        also ``"small"`` and ``"phase varies"``.
+        ``"too steep"``, ``"alias"``, ``"reference"``, ``"weak"``, ``"rounding"``,
+        ``"too long"``; with method ``"paper"`` also ``"small"`` and ``"phase varies"``.
     cosine, sine : float
         Coefficients A and B beside all retained orders.
     standard_error : float

@@ -41,6 +41,8 @@ _VERDICTS: Final = {
     "negligible": "significant, but too small to change any reading",
     "too steep": "with it an indicated angle would stand for several true ones: "
     "it can be corrected with argument='indicated' only",
+    "rounding": "may be made by the sensor's rounding to whole steps, which at evenly spaced "
+    "positions is the same each time: read at other positions, too",
     "small": "has no prominent amplitude",
     "phase varies": "its phase varies from run to run",
     "too long": "over so short a travel, passed once, it cannot be distinguished from drift in "

@@ -1,0 +1,64 @@
+"""Orders that the rounding of a coarse sensor makes at positions that are evenly spaced."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ...estimation.factor import orthonormal_basis
+from ...estimation.readings import LEAST_SHARE, MOST_SHARE
+from ...estimation.rounded import fit_rounded
+from ...joint.pattern import lines_columns
+from ...support.arrays import Array
+from .harmonicsums import ZeroGroupReadings
+
+
+def beyond_rounding(
+    units: Sequence[ZeroGroupReadings],
+    step: float,
+    orders: Sequence[float],
+    limits: Sequence[float],
+    forced: int = 0,
+) -> list[int]:
+    """Places of those orders, the strongest first, that the steps of the readings tell of.
+
+    Parameters
+    ----------
+    units : sequence of ZeroGroupReadings
+    step : float
+        Of the sensor, in the unit of the errors.
+    orders : sequence of float
+        Strongest first; the first ``forced`` of them are always in the model and not told of.
+    limits : sequence of float
+        Log of the chance below which an order is one: of the likelihood ratio with both of its
+        coefficients, which is of χ² with two degrees of freedom without it.
+    """
+    error = np.concatenate([unit.error for unit in units])
+    theta = 2.0 * np.pi * np.concatenate([unit.turns for unit in units])
+    zeros = np.repeat(np.eye(len(units)), [unit.turns.size for unit in units], axis=0)
+    lines = lines_columns(theta, np.asarray(orders, dtype=np.float64))
+
+    def columns(places: Sequence[int]) -> Array:
+        return np.hstack([zeros, *(lines[:, 2 * k : 2 * k + 2] for k in places)])
+
+    left = error - _fitted(columns(range(len(orders))), error)
+    about = error - _fitted(zeros, error)
+    rounding = step**2 / 12.0
+    if rounding < LEAST_SHARE * np.var(left) or rounding > MOST_SHARE * np.var(about):
+        return list(range(forced, len(orders)))
+    told = list(range(forced))
+    fit = fit_rounded(orthonormal_basis(columns(told)), error, step)
+    for k in range(forced, len(orders)):
+        if fit.within:
+            break
+        other = fit_rounded(orthonormal_basis(columns([*told, k])), error, step)
+        if fit.log_likelihood - other.log_likelihood < limits[k]:
+            told.append(k)
+            fit = other
+    return told[forced:]
+
+
+def _fitted(columns: Array, error: Array) -> Array:
+    basis = orthonormal_basis(columns)
+    return np.asarray(basis @ (basis.T @ error))

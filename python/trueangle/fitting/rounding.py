@@ -1,0 +1,94 @@
+"""What the rounding of a coarse sensor adds to errors where positions are read again.
+
+At one position a sensor that rounds to steps q errs alike each time, as far as its noise σ does not
+carry it to another step. Over the positions that part has the variance
+
+::
+
+    v(σ) = Σ_k q²/(2π²k²) exp(-(2πkσ/q)²),    v(0) = q²/12,
+
+which further readings at the same positions do not make smaller. Their scatter about the mean of
+their position, ``s² = σ² + q²/12 - v(σ)``, tells σ. Source: Widrow and Kollar, Quantization Noise
+(2008), for the moments of a rounded normal number.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Final
+
+import numpy as np
+
+from ..joint.signals import sensor_lattice
+from ..runs.aliasing import Positions, distinct_positions
+from ..runs.run import CalibrationRun
+from ..support.angles import ARCSEC_PER_TURN
+from .problem import Fitted, Problem
+from .uncertainty import Uncertainty
+
+#: Terms of the sum, and passes of the search for the noise.
+_TERMS: Final = 200
+_PASSES: Final = 60
+
+#: Readings up to which positions are told apart, by sorting.
+COUNTED: Final = 20_000
+
+
+def rounding_step(runs: Sequence[CalibrationRun], positions: Positions) -> float:
+    """Step of the sensor, in the unit of the runs, at positions that are evenly spaced; else 0."""
+    if positions.divisions is None or sum(map(len, runs)) > COUNTED:
+        return 0.0
+    theta = np.concatenate([run.unwrapped_reference * (2.0 * math.pi / run.period) for run in runs])
+    return sensor_lattice(runs, theta)[0] * runs[0].period / ARCSEC_PER_TURN
+
+
+def repeated_variance(step: float, scatter: float) -> float:
+    """Variance of the rounding that repeats at each position, by that of the readings there.
+
+    Examples
+    --------
+    >>> round(repeated_variance(1.0, 0.0), 4), round(repeated_variance(1.0, 1.0 / 12.0 + 0.25), 4)
+    (0.0831, 0.0004)
+    """
+    k = np.arange(1, _TERMS + 1)
+
+    def repeated(sigma: float) -> float:
+        damped = np.exp(-((2.0 * math.pi * k * sigma / step) ** 2)) / (2.0 * (math.pi * k) ** 2)
+        return step**2 * float(damped.sum())
+
+    low, high = 0.0, math.sqrt(scatter) + step
+    for _ in range(_PASSES):
+        sigma = 0.5 * (low + high)
+        if sigma**2 + step**2 / 12.0 - repeated(sigma) < scatter:
+            low = sigma
+        else:
+            high = sigma
+    return repeated(low)
+
+
+def beside_rounding(found: Uncertainty, problem: Problem, fitted: Fitted) -> Uncertainty:
+    """The covariance with that of the rounding that repeats at each position.
+
+    ::
+
+        C + (R - 1) v (Xᵀ X)⁻¹,    R readings at each position
+
+    One share of v is among the residuals; where runs are clusters none is, for it is the same in
+    all of them. Of more than `COUNTED` readings positions are not counted.
+    """
+    from .orders.noise import pure_error
+    from .orders.zerogroups import zero_units
+
+    variance = fitted.solution.residual_variance
+    if problem.readings > COUNTED or not 0.0 < variance < math.inf:  # of summed runs these are few
+        return found
+    positions = distinct_positions(problem.runs)
+    step = rounding_step(problem.runs, positions)
+    units, places = zero_units(problem.runs, True)
+    scatter = pure_error(units, positions.of_rows(places)) if step else None
+    if scatter is None:
+        return found
+    missing = problem.readings / len(positions) - (1.0 if found.kind == "white" else 0.0)
+    share = missing * repeated_variance(step, scatter.variance) / variance
+    return found.beside(share * np.asarray(fitted.solution.covariance))
