@@ -76,19 +76,26 @@ def test_ends_are_those_of_all_blocks_where_a_turn_is_not_all(tmp_path, monkeypa
     assert (tally.rows, tally.low, tally.high) == (1001, theta.min(), theta.max())
 
 
-def test_outliers_of_one_pass_are_named_as_in_memory(tmp_path, monkeypatch) -> None:
-    """Of two files without a column of runs: number of the run and row among those known."""
+@pytest.mark.parametrize(
+    ("signs", "unit"), [([1.0], "deg"), ([-1.0], "deg"), ([-1.0, 1.0], "rad"), ([-1.0], "turn")]
+)
+def test_outliers_of_one_pass_are_named_as_in_memory(signs, unit, tmp_path, monkeypatch) -> None:
+    """Of two files without a column of runs: number of the run and row among those known.
+
+    Above the pattern, below it and on both sides, in every unit.
+    """
     print("seed", SEED + 1)
     rng = np.random.default_rng(SEED + 1)
+    turn = {"deg": 360.0, "rad": 2.0 * np.pi, "turn": 1.0}[unit]
     for name in ("a", "b"):
         theta = np.sort(rng.uniform(0.0, PERIOD, 3000))
         error = np.asarray(MODEL.error(theta)) + 0.01 * rng.normal(size=3000)
-        error[rng.choice(3000, 5, replace=False)] += 0.7
-        rows = [
-            f"{x!r},{y!r}" for x, y in zip(theta.tolist(), (theta + error).tolist(), strict=True)
-        ]
+        error[rng.choice(3000, 5, replace=False)] += 0.7 * rng.choice(signs, 5)
+        both = np.column_stack([theta, theta + error]) * (turn / PERIOD)
+        rows = [f"{x!r},{y!r}" for x, y in both.tolist()]
         rows[40] = rows[40].partition(",")[0] + ","
-        (tmp_path / f"{name}.csv").write_text("\n".join(["reference_deg,indicated_deg", *rows]))
+        head = f"reference_{unit},indicated_{unit}"
+        (tmp_path / f"{name}.csv").write_text("\n".join([head, *rows]))
     with pytest.warns(EmptyCellsWarning, match="1 of 3000 rows"):
         expected = ta.fit(ta.read_runs(tmp_path), [1])
     assert len(expected.wild) == 10
