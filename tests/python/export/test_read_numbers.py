@@ -29,13 +29,17 @@ def registers(rng, constant, argument):
 
 @pytest.mark.parametrize("argument", ["indicated", "reference"])
 @pytest.mark.parametrize("constant", [0.0, -30.0])
-def test_registers_take_off_the_correction_and_the_zero_that_is_told(constant, argument):
-    """A correction that is a function of the reading has a mean: it is in the zero."""
+@pytest.mark.parametrize("bump", [0.0, 0.3])
+def test_registers_take_off_the_correction_and_the_zero_that_is_told(bump, constant, argument):
+    """A bump on one side has a mean, which no register holds: it is in the zero."""
     print("seed", SEED)
     rng = np.random.default_rng(SEED)
     x = np.arange(0.0, 360.0, 0.25)
     for _ in range(10):
         model = registers(rng, constant, argument)
+        if bump:
+            terms = (ta.terms.LocalDefect(rng.uniform(0.0, 360.0), 20.0, bump),)
+            model = model.replace(terms=terms)
         made = ta.export_model(model, "admt4000", bits=12)
         left = x - series(made.text, x) - np.asarray(model.correct(x)) - made.zero_deg
         left -= 360.0 * np.rint(left / 360.0)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+import itertools
 import json
 from types import SimpleNamespace
 
@@ -9,8 +11,9 @@ import pytest
 
 import trueangle as ta
 from trueangle.planning.evidence import ReadingNoise
-from trueangle.planning.nextruns import RivalEvidence
+from trueangle.planning.nextruns import NextRuns, RivalEvidence
 from trueangle.rehearsal.after import _FurtherTrials
+from trueangle.rehearsal.rehearse import _still
 from trueangle.rehearsal.result import Rehearsal, RehearsedCause
 from trueangle.rehearsal.summary import _never, _size, rehearsal_summary
 from trueangle.rehearsal.trial import trial_outcome
@@ -151,3 +154,25 @@ def test_a_verdict_is_of_what_is_confirmed_and_hidden(said, verdict, instead, be
     found = trial_outcome(told(**said), "backlash")
     assert (found.verdict, found.instead, found.beside) == (verdict, instead, beside)
     assert found.is_named == (verdict == "named")
+
+
+def test_further_runs_are_for_causes_of_which_one_was_not_named() -> None:
+    """Against sets written out: what is told by them has to be among what is left."""
+    names = ("backlash", "latency", "zero_slip", "thermal_drift")
+    pairs = [(names[:2], True), (names[1:3], False), (names[3:], True), (names[:3], True)]
+    entries = tuple(RivalEvidence(causes, True, told, 8.0, 0.9) for causes, told in pairs)
+    given = {"runs": (), "hypotheses": (), "simulation": None, "notes": (), "between": entries}
+    fields = {field.name for field in dataclasses.fields(NextRuns)}
+    plan = NextRuns(**{name: given.get(name) for name in fields})
+    for named in itertools.chain.from_iterable(
+        itertools.combinations(names, count) for count in range(5)
+    ):
+        found = [cause(cause=name, tried={1.0: (int(name in named), 2)}) for name in names]
+        left = [entry for entry in entries if set(entry.causes) - set(named)]
+        further = _still(plan, found)
+        if any(entry.told for entry in left):
+            assert further is not None
+            assert list(further.between) == left, named
+        else:
+            assert further is None, named
+    assert _still(None, found) is None
