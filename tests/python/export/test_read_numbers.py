@@ -99,3 +99,27 @@ def test_numbers_are_known_to_the_last_digit_of_any_column(finest, decimals, tmp
     step = 10.0**-decimals
     assert model.fit.residual == pytest.approx(step / np.sqrt(12.0))
     np.testing.assert_allclose(np.diag(model.covariance)[1:], step**2 / 12.0 * 2.0 / 36.0)
+
+
+@pytest.mark.parametrize("decimals", [2, 4])
+def test_a_lookup_of_a_mechaduino_is_known_to_its_last_digit_of_a_degree(decimals, tmp_path):
+    """Sixteen thousand angles; orders below three deviations of their rounding are left out."""
+    count = 16384
+    read = np.arange(count) * (360.0 / count)
+    pattern = 0.4 * np.sin(np.radians(read)) + 0.1 * np.cos(np.radians(3.0 * read))
+    table = np.mod(read - pattern + 123.0, 360.0)
+    path = tmp_path / "lookup.cpp"
+    body = ", ".join(f"{value:.{decimals}f}" for value in table)
+    path.write_text(f"const PROGMEM float lookup[{count}] = {{\n{body}\n}};\n")
+    model = ta.import_model(path, "mechaduino")
+    step = 10.0**-decimals
+    assert model.fit.residual == pytest.approx(step / np.sqrt(12.0))
+    std = step / np.sqrt(6.0 * count)
+    np.testing.assert_allclose(np.sqrt(np.diag(model.covariance)[1:]), std)
+    assert {1, 3} <= set(model.orders)
+    assert min(model.amplitudes) > 3.0 * std
+    np.testing.assert_allclose(
+        np.asarray(model.correct(read)) - table + 123.0
+        - 360.0 * np.rint((np.asarray(model.correct(read)) - table + 123.0) / 360.0),
+        0.0, atol=0.51 * step + 1e-3 * step * 16.0,
+    )  # fmt: skip

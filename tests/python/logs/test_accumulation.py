@@ -8,9 +8,15 @@ import numpy as np
 import pytest
 
 import trueangle as ta
-from trueangle.errors import EmptyCellsWarning
+from trueangle.errors import EmptyCellsWarning, FileError
 from trueangle.logs import accumulation
-from trueangle.logs.accumulation import LogFitSettings, OutlierLimits, Tally, log_moments
+from trueangle.logs.accumulation import (
+    LogFitSettings,
+    OutlierLimits,
+    Tally,
+    log_moments,
+    merged_moments,
+)
 
 SEED = 72_000
 PERIOD = 360.0
@@ -104,3 +110,22 @@ def test_outliers_of_one_pass_are_named_as_in_memory(signs, unit, tmp_path, monk
     assert found.moments is not None
     assert found.wild == expected.wild
     assert found.readings == expected.readings
+
+
+@pytest.mark.parametrize("odd", [1, 2])
+def test_a_log_in_another_unit_is_named_beside_the_first(odd, tmp_path) -> None:
+    """The one that differs, wherever it stands; the first is what it differs from."""
+    parts = []
+    for number in range(3):
+        unit, turn = ("rad", 2.0 * np.pi) if number == odd else ("deg", 360.0)
+        rows = [f"{x!r},{x!r}" for x in np.linspace(0.0, 0.9 * turn, 50).tolist()]
+        path = tmp_path / f"log{number}.csv"
+        path.write_text("\n".join([f"reference_{unit},indicated_{unit}", *rows]))
+        parts.append(log_moments(path, SETTINGS))
+    with pytest.raises(FileError, match=rf"log{odd}\.csv: .*than that of \S*log0\.csv"):
+        merged_moments(parts)
+    merged = merged_moments([part for k, part in enumerate(parts) if k != odd])
+    assert merged.rows == 100
+    # Parts may be merged again: none is changed.
+    assert [part.rows for part in parts] == [50] * 3
+    assert [part.moments.count for part in parts] == [50] * 3

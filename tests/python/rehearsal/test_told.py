@@ -13,10 +13,11 @@ import trueangle as ta
 from trueangle.planning.evidence import ReadingNoise
 from trueangle.planning.nextruns import NextRuns, RivalEvidence
 from trueangle.rehearsal.after import _FurtherTrials
-from trueangle.rehearsal.rehearse import _still
+from trueangle.rehearsal.rehearse import _notes, _still
 from trueangle.rehearsal.result import Rehearsal, RehearsedCause
+from trueangle.rehearsal.search import SizeSearch
 from trueangle.rehearsal.summary import _never, _size, rehearsal_summary
-from trueangle.rehearsal.trial import trial_outcome
+from trueangle.rehearsal.trial import FAILED, NAMED, TrialOutcome, trial_outcome
 
 
 def cause(**changes) -> RehearsedCause:
@@ -176,3 +177,29 @@ def test_further_runs_are_for_causes_of_which_one_was_not_named() -> None:
         else:
             assert further is None, named
     assert _still(None, found) is None
+
+
+@pytest.mark.parametrize("stopped", [False, True])
+def test_what_is_incomplete_is_what_has_trials_left(stopped) -> None:
+    """Of causes that are done, of some trials, of none, and of none to make; and of failures."""
+    at = SimpleNamespace(stopped=stopped, within=7.5)
+    kinds = {"done": (True, 3), "some": (False, 2), "none": (False, 0), "blind": (True, 0)}
+    for count in range(5):
+        for chosen in itertools.combinations(kinds, count):
+            searches = []
+            for name in chosen:
+                done, trials = kinds[name]
+                answers = [(0, TrialOutcome(NAMED))] * trials
+                searches.append(SizeSearch(name, None, None, 3, answers=answers, done=done))
+            notes = _notes(searches, at)
+            left = [name for name in chosen if name in ("some", "none")]
+            assert len(notes) == bool(left)
+            if left:
+                why = "it was interrupted" if stopped else "the 7.5 s given were up"
+                wanted = f"INCOMPLETE: {why} before all trials of {len(left)} causes were made"
+                more = "; not tried at all: none" if "none" in chosen else ""
+                assert notes == [wanted + more]
+    failed = [(0, TrialOutcome(FAILED, failure="KeyError: x")), (0, TrialOutcome(NAMED))]
+    searches = [SizeSearch("a", None, None, 2, answers=failed, done=True)] * 2
+    (note,) = _notes(searches, at)
+    assert note.startswith("2 diagnoses failed (KeyError: x) and count as not named")

@@ -1,4 +1,4 @@
-"""Words that numbers decide: verdicts at their borders, digits of columns, lists without repeats."""
+"""Words that numbers decide: verdicts at their borders, digits of columns, lists of each once."""
 
 import itertools
 
