@@ -92,6 +92,11 @@ def refuse_without_after(args: argparse.Namespace) -> None:
         "--within": args.within,
         "--output": args.output,
         "--signal": args.signal,
+        "--counts-per-turn": args.counts_per_turn,
+        "--counts-per-turn-reference": args.counts_per_turn_reference,
+        "--topic": args.topic,
+        "--facets": args.facets,
+        "--unit-from": args.unit_from,
     }
     for option, value in given.items():
         if value is not None:

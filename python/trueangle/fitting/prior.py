@@ -35,8 +35,9 @@ from .problem import Fitted, PlainSolution, Problem
 from .result import FitResult
 from .robust import WILD, Loss, Weighted
 
-#: Rounds in which the noise and what is set aside settle.
+#: Rounds in which what is set aside settles, and the noise: each takes off a part of what is left.
 _ROUNDS: Final = 20
+_STEPS: Final = 200
 
 #: What does not go with a prior, and what each is where nothing was asked.
 _USUAL: dict[str, Any] = {
@@ -188,13 +189,12 @@ def _solved(
     means = np.array([part[0] / part[0, 0] for part in products])
     sums = total([NormalEquations.of_products(part) for part in products])
     size, runs = sums.moment.size, len(problem.runs)
-    precision = 1.0 / prior.variance  # of an order that no unit has: its mean, exactly
-    fixed = ~(prior.variance > 0.0)
-    precision[fixed] = 0.0
+    fixed = ~(prior.variance > 0.0)  # an order that no unit has of its own: its mean, exactly
+    precision = np.divide(1.0, prior.variance, out=np.zeros(size), where=~fixed)
     apart = sums.moment - sums.gram @ np.where(fixed, prior.mean, 0.0)
     noise, freedom = prior.noise_variance, 1.0
     free = ~fixed
-    for _ in range(_ROUNDS):
+    for _ in range(_STEPS):
         hessian = (sums.gram / noise + np.diag(precision))[np.ix_(free, free)]
         target = (apart / noise + precision * prior.mean)[free]
         model = NormalEquations(hessian, target).solved()
@@ -244,7 +244,7 @@ def _solved(
         math.sqrt(float(np.linalg.cond(hessian))) if free.any() else 1.0,
         "plain",
     )
-    taken = np.where(np.isfinite(prior.variance) & free, np.diag(inverse) / prior.variance, fixed)
+    taken = np.divide(np.diag(inverse), prior.variance, out=np.ones(size), where=free)
     shares = 1.0 - np.clip(taken, 0.0, 1.0).reshape(-1, 2).mean(axis=1)
     worth = min(prior.freedom, prior.noise_freedom + freedom)
     known = Posterior(tuple(shares.tolist()), max(worth, 1.0), prior.units, math.sqrt(noise))

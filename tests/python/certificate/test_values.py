@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -16,8 +17,10 @@ from trueangle.certificate import (
     certify,
     conformity,
 )
-from trueangle.certificate.asleft import corrected_runs
+from trueangle.certificate.asleft import corrected_runs, is_of_these
 from trueangle.certificate.values import left_at_places, reversal_halfwidth
+from trueangle.model.records import Provenance
+from trueangle.runs.run import Source
 
 SEED = 61_000
 UNITS = (360.0, 1.0, 2.0 * np.pi)
@@ -235,3 +238,19 @@ def test_the_budget_is_of_the_position_with_the_greatest_uncertainty(beyond):
         assert budget[name] == widest[name], name
     lines = np.array([line["standard_arcsec"] * line["sensitivity"] for line in budget["lines"]])
     assert np.sqrt(np.sum(lines**2)) == pytest.approx(widest["standard_arcsec"])
+
+
+@pytest.mark.parametrize("places", [(), (0,), (1,), (2,), (0, 2), (0, 1, 2)])
+def test_readings_are_a_models_own_where_any_file_of_them_is(places):
+    runs = [
+        ta.CalibrationRun([0.0, 1.0], [0.0, 1.0], 360.0, source=Source(f"{k}.csv", str(k) * 64))
+        for k in range(3)
+    ]
+    inputs = (Source("elsewhere.csv", "9" * 64), *(Source("x", str(k) * 64) for k in places))
+    plain = ta.HarmonicModel([ta.Shaft("output", 1, [1], [0.1], [0.0])], period=360.0)
+    model = plain.replace(provenance=Provenance(inputs))
+    for order in (runs, runs[::-1]):
+        assert is_of_these(model, order) == bool(places)
+        assert not is_of_these(plain, order)
+    without = [replace(run, source=None) for run in runs]
+    assert not is_of_these(model, without)

@@ -1,6 +1,7 @@
 """What a terminal shows: no wider than it is, in colour where it has colours."""
 
 import io
+import re
 import sys
 from pathlib import Path
 
@@ -119,3 +120,25 @@ def test_a_picture_is_of_the_format_that_its_ending_says(ending, desk):
     assert status == 0
     assert '"shows": "Error of the model' in told
     assert (desk / f"drawn.{ending}").read_bytes().startswith(begins[ending])
+
+
+@pytest.mark.parametrize("encoding", ["utf-8", "ascii", "latin-1"])
+@pytest.mark.parametrize("colours", [False, True])
+def test_what_is_written_is_as_long_as_what_was_given(colours, encoding, monkeypatch):
+    """Whatever words, colours and escapes make of it: who writes counts letters of his own."""
+
+    class Terminal(io.TextIOWrapper):
+        def isatty(self):
+            return colours
+
+    for name in ("NO_COLOR", "TERM"):
+        monkeypatch.delenv(name, raising=False)
+    held = io.BytesIO()
+    stream = Plain(Terminal(held, encoding, newline=""), wording=lambda text: f"<{text}>")
+    for text in ("error: none", "a\x1b[31m", "\u2212 3 \u2192 4\n", "", "Confirmed:\nretained\n"):
+        before = len(held.getvalue())
+        assert stream.write(text) == len(text)
+        stream.flush()
+        shown = re.sub(r"\x1b\[[\d;]*m", "", held.getvalue()[before:].decode(encoding))
+        plain = f"<{text}>".replace("\x1b", "\\x1b")
+        assert shown == plain.encode(encoding, "backslashreplace").decode(encoding)

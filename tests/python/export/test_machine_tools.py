@@ -161,3 +161,28 @@ def test_every_text_may_end_in_txt(target, tmp_path):
     path = tmp_path / "table.txt"
     made = export(degrees(), target, tmp_path, path=path)
     assert path.read_text() == made.text
+
+
+@pytest.mark.parametrize("bilateral", ["0", "1", None])
+def test_a_list_for_one_direction_is_that_of_both(bilateral, tmp_path):
+    """What stands under ``neg`` counts only where the list is bilateral."""
+    pos = np.rint(900.0 * np.sin(2.0 * np.pi * np.arange(36) / 36.0)).astype(int)
+    models = []
+    for number, neg in enumerate((pos, pos + 400, None)):
+        lines = ["kw.ssfk.interval 100000", "kw.ssfk.kw_startpos 0", "kw.ssfk.kw_nr_max 36"]
+        lines += [] if bilateral is None else [f"kw.ssfk.bilateral {bilateral}"]
+        for column, values in (("pos", pos), ("neg", neg)):
+            if values is not None:
+                lines += [f"kw.ssfk.table[{i}].{column} {v}" for i, v in enumerate(values)]
+        path = tmp_path / f"{number}.lis"
+        path.write_text("\n".join(lines) + "\n")
+        models.append(ta.import_model(path, "twincat"))
+    same, other, alone = models
+    assert (same.terms, alone.terms) == ((), ())
+    np.testing.assert_array_equal(alone.amplitudes, same.amplitudes)
+    # Actual less programmed, 0.0001 deg: half of the difference either way.
+    widths = [term.half_width for term in other.terms]
+    assert widths == ([pytest.approx(0.02)] if bilateral == "1" else [])
+    if bilateral != "1":
+        np.testing.assert_array_equal(other.amplitudes, same.amplitudes)
+        assert other.constant == same.constant

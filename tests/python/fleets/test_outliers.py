@@ -5,7 +5,7 @@ import pytest
 from scipy.stats import f
 
 import trueangle as ta
-from trueangle.fleets.outliers import deviates, weights_of
+from trueangle.fleets.outliers import _variance, deviates, weights_of
 
 from .made import units
 
@@ -129,3 +129,44 @@ def test_a_unit_set_aside_is_seen_from_the_others_and_the_limit_is_theirs():
     square = ((values[7] - others.mean(axis=0)) ** 2).sum() / scatter / 1.05
     assert found.size[7, 0] == pytest.approx(np.sqrt(square), rel=1e-9)
     assert found.limit == pytest.approx(0.8 * 0.01 / 20.0)
+
+
+@pytest.mark.parametrize("aligned", [True, False])
+@pytest.mark.parametrize("size", [1, 2])
+@pytest.mark.parametrize("between", [0.0, 0.5, 20.0])
+def test_the_variance_between_units_is_without_that_of_their_noise(between, size, aligned):
+    """Of zeros as of orders, by draws: noise alone leaves what a median scatters by, half the time.
+
+    In units of the mean noise, which is unlike from unit to unit by half of it.
+    """
+    print("seed", SEED)
+    rng = np.random.default_rng([SEED, size, int(2 * between)])
+    found = []
+    for _ in range(60):
+        noise = rng.uniform(0.5, 1.5, 300)
+        values = rng.normal(size=(300, size)) * np.sqrt(between + noise)[:, None]
+        values += 7.0 * aligned
+        own = noise[:, None, None] * np.eye(size)
+        found.append(_variance(values, own, aligned))
+    # A variance by its median scatters by 2.33 / sqrt n in one dimension, 1.44 / sqrt n in two.
+    spread = (2.33 if size == 1 else 1.45) / np.sqrt(300.0) * (between + 1.0)
+    # Of a normal number cut off at nought the mean is 0.4 of its deviation.
+    wanted = between or 0.4 * spread
+    # Unlike noise has a lower median than the normal of its mean: by 4 % of it at most here.
+    low = 0.04 * (between == 0.5) + 0.015 * (between == 0.0)
+    margin = 4.5 * spread / np.sqrt(60.0)
+    assert wanted - margin - low <= np.mean(found) <= wanted + margin
+
+
+@pytest.mark.parametrize("size", [1, 2])
+def test_units_that_are_known_worse_are_not_named_for_it(size):
+    """A tenth of the units with twenty times the variance of the others, and nothing between."""
+    print("seed", SEED + 9)
+    rng = np.random.default_rng([SEED + 9, size])
+    noise = np.where(np.arange(40) < 4, 20.0, 1.0)
+    own, told = [noise[:, None, None] * np.eye(size)], 0
+    for _ in range(400):
+        values = [rng.normal(size=(40, size)) * np.sqrt(noise)[:, None]]
+        told += bool(deviates(values, own, True).outlying.any())
+    # Weights by a variance that is not there are as of its error: some more than 1 %.
+    assert told <= 12

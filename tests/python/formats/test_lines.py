@@ -6,7 +6,7 @@ import pytest
 
 import trueangle as ta
 from trueangle.errors import EmptyCellsWarning, FileError
-from trueangle.formats import csvfile, csvheader, csvrows, seriallog
+from trueangle.formats import camonitor, csvfile, csvheader, csvrows, seriallog
 
 ROWS = 60
 HEAD = "run,reference_deg,indicated_deg"
@@ -82,3 +82,24 @@ def test_of_a_serial_log(which, monkeypatch, tmp_path):
     ):
         (run,) = ta.read_runs(path, signals=signals)
     assert (len(run), run.left_out) == (ROWS - 1, 1)
+
+
+@pytest.mark.parametrize("which", [0, 7, 8, 33, ROWS - 1])
+def test_of_a_monitor(which, monkeypatch, tmp_path):
+    """Of blocks of eight lines; another variable, comments and lost lines stand among them."""
+    monkeypatch.setattr(camonitor, "_BLOCK", 8)
+    lines = []
+    for i in range(ROWS):
+        value = "open" if i == which else f"{6.0 * i:g}"
+        if i % 5 == 2:
+            lines += ["# paused", f"PV 2026-11-21 12:00:{i:02d} *** Disconnected", ""]
+        lines.append(f"PV 2026-11-21 12:00:{i:02d}.5 {value} ")
+        if i % 3 == 0:
+            lines.append(f"STATE 2026-11-21 12:00:{i:02d}.7 {i} ")
+        if i == which:
+            line = next(k for k, text in enumerate(lines, 1) if " open " in text)
+    path = tmp_path / "log.txt"
+    path.write_text("\n".join(lines) + "\n")
+    with pytest.raises(FileError, match=rf"line {line}, column 'PV': a number is needed"):
+        list(camonitor.read(path, ["PV"]))
+    assert [batch["STATE"].size for batch in camonitor.read(path, ["STATE"])] == [8, 8, 4]

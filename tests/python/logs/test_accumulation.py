@@ -8,9 +8,15 @@ import numpy as np
 import pytest
 
 import trueangle as ta
-from trueangle.errors import EmptyCellsWarning
+from trueangle.errors import EmptyCellsWarning, FileError
 from trueangle.logs import accumulation
-from trueangle.logs.accumulation import LogFitSettings, OutlierLimits, Tally, log_moments
+from trueangle.logs.accumulation import (
+    LogFitSettings,
+    OutlierLimits,
+    Tally,
+    log_moments,
+    merged_moments,
+)
 
 SEED = 72_000
 PERIOD = 360.0
@@ -76,19 +82,26 @@ def test_ends_are_those_of_all_blocks_where_a_turn_is_not_all(tmp_path, monkeypa
     assert (tally.rows, tally.low, tally.high) == (1001, theta.min(), theta.max())
 
 
-def test_outliers_of_one_pass_are_named_as_in_memory(tmp_path, monkeypatch) -> None:
-    """Of two files without a column of runs: number of the run and row among those known."""
+@pytest.mark.parametrize(
+    ("signs", "unit"), [([1.0], "deg"), ([-1.0], "deg"), ([-1.0, 1.0], "rad"), ([-1.0], "turn")]
+)
+def test_outliers_of_one_pass_are_named_as_in_memory(signs, unit, tmp_path, monkeypatch) -> None:
+    """Of two files without a column of runs: number of the run and row among those known.
+
+    Above the pattern, below it and on both sides, in every unit.
+    """
     print("seed", SEED + 1)
     rng = np.random.default_rng(SEED + 1)
+    turn = {"deg": 360.0, "rad": 2.0 * np.pi, "turn": 1.0}[unit]
     for name in ("a", "b"):
         theta = np.sort(rng.uniform(0.0, PERIOD, 3000))
         error = np.asarray(MODEL.error(theta)) + 0.01 * rng.normal(size=3000)
-        error[rng.choice(3000, 5, replace=False)] += 0.7
-        rows = [
-            f"{x!r},{y!r}" for x, y in zip(theta.tolist(), (theta + error).tolist(), strict=True)
-        ]
+        error[rng.choice(3000, 5, replace=False)] += 0.7 * rng.choice(signs, 5)
+        both = np.column_stack([theta, theta + error]) * (turn / PERIOD)
+        rows = [f"{x!r},{y!r}" for x, y in both.tolist()]
         rows[40] = rows[40].partition(",")[0] + ","
-        (tmp_path / f"{name}.csv").write_text("\n".join(["reference_deg,indicated_deg", *rows]))
+        head = f"reference_{unit},indicated_{unit}"
+        (tmp_path / f"{name}.csv").write_text("\n".join([head, *rows]))
     with pytest.warns(EmptyCellsWarning, match="1 of 3000 rows"):
         expected = ta.fit(ta.read_runs(tmp_path), [1])
     assert len(expected.wild) == 10
@@ -97,3 +110,22 @@ def test_outliers_of_one_pass_are_named_as_in_memory(tmp_path, monkeypatch) -> N
     assert found.moments is not None
     assert found.wild == expected.wild
     assert found.readings == expected.readings
+
+
+@pytest.mark.parametrize("odd", [1, 2])
+def test_a_log_in_another_unit_is_named_beside_the_first(odd, tmp_path) -> None:
+    """The one that differs, wherever it stands; the first is what it differs from."""
+    parts = []
+    for number in range(3):
+        unit, turn = ("rad", 2.0 * np.pi) if number == odd else ("deg", 360.0)
+        rows = [f"{x!r},{x!r}" for x in np.linspace(0.0, 0.9 * turn, 50).tolist()]
+        path = tmp_path / f"log{number}.csv"
+        path.write_text("\n".join([f"reference_{unit},indicated_{unit}", *rows]))
+        parts.append(log_moments(path, SETTINGS))
+    with pytest.raises(FileError, match=rf"log{odd}\.csv: .*than that of \S*log0\.csv"):
+        merged_moments(parts)
+    merged = merged_moments([part for k, part in enumerate(parts) if k != odd])
+    assert merged.rows == 100
+    # Parts may be merged again: none is changed.
+    assert [part.rows for part in parts] == [50] * 3
+    assert [part.moments.count for part in parts] == [50] * 3

@@ -141,6 +141,33 @@ def test_dask_frames_stay_lazy_and_give_the_same_numbers(model):
         ta.correct(frame, made_model(ratio=50.5))
 
 
+@pytest.mark.parametrize("kind", ["float64", "float32", "int64"])
+@pytest.mark.parametrize("ratio", [50.0, 50.5])
+def test_what_is_lazy_tells_the_type_that_it_gives(ratio, kind):
+    """As numpy's: also over blocks that begin, end or consist of missing readings."""
+    model = made_model(ratio=ratio)
+    angles = np.round(ANGLES).astype(kind)
+    if kind != "int64":
+        angles[[0, 129, 130, 131, 999]] = np.nan
+        angles[390:520] = np.nan
+    wanted = ta.correct(angles, model)
+    assert wanted.dtype == (np.float32 if kind == "float32" else np.float64)
+    da = pytest.importorskip("dask.array")
+    lazy = ta.correct(da.from_array(angles, chunks=130), model)
+    found = lazy.compute(scheduler="threads")
+    assert lazy.dtype == found.dtype == wanted.dtype
+    np.testing.assert_array_equal(found, wanted)
+    if ratio == 50.0:
+        pd, dd = pytest.importorskip("pandas"), pytest.importorskip("dask.dataframe")
+        frame = dd.from_pandas(pd.DataFrame({"indicated_deg": angles}), npartitions=4)
+        column = ta.correct(frame, model)["corrected_deg"]
+        assert column.dtype == column.compute(scheduler="threads").dtype == wanted.dtype
+        pl = pytest.importorskip("polars")
+        table = ta.correct(pl.LazyFrame({"indicated_deg": angles}), model)
+        assert table.collect_schema()["corrected_deg"] == table.collect()["corrected_deg"].dtype
+        np.testing.assert_array_equal(table.collect()["corrected_deg"].to_numpy(), wanted)
+
+
 def test_what_cannot_be_corrected_is_refused(model):
     with pytest.raises(ArgumentError, match="got list"):
         ta.correct([1.0], model)

@@ -66,6 +66,44 @@ def test_ordinary_readings_are_not_doubted(values, period, span):
     assert [seen(values, period, span, batches) for batches in BATCHES] == [None] * len(BATCHES)
 
 
+def beside_and_inside(low, high, span, period, factor):
+    """Readings that no turn more or less brings to a span, and all of whose multiples lie in it."""
+    turns = [(low + k * period, high + k * period) for k in (-1, 0, 1)]
+    beside = all(b < span[0] or a > span[1] for a, b in turns)
+    a, b = low * factor, high * factor
+    whole = range(int(-3.0 - abs(a) / period), int(4.0 + abs(a) / period))
+    return beside and any(span[0] <= a + k * period and b + k * period <= span[1] for k in whole)
+
+
+@pytest.mark.parametrize("period", [DEG, RAD, TURN])
+def test_a_calibrated_part_of_the_turn_tells_the_unit_as_written_out(period):
+    """Any readings, spans also beyond a turn; and the same of all that is seen in a mirror."""
+    print("seed 8123")
+    rng = np.random.default_rng(8123)
+    counts = {True: 0, False: 0}
+    for _ in range(1500):
+        start = rng.uniform(-0.6, 1.0)
+        span = (start * period, (start + rng.uniform(0.05, 0.9)) * period)
+        if rng.random() < 0.5:  # of another unit
+            turn = float(rng.choice([t for t in (DEG, RAD) if t != period]))
+            low, high = np.sort(rng.uniform(*span, 2)) * turn / period
+            at = rng.integers(-1, 2) * turn
+        else:
+            low, high = np.sort(rng.uniform(-1.6, 1.6, 2)) * period
+            at = 0.0
+        evidence, mirrored = UnitEvidence(period), UnitEvidence(period)
+        evidence.update(np.array([low, high]) + at)
+        mirrored.update(-np.array([low, high]) - at)
+        for turn in (DEG, RAD):
+            if turn == period:
+                continue
+            wanted = beside_and_inside(low + at, high + at, span, period, period / turn)
+            counts[wanted] += 1
+            assert evidence._fits(span, period / turn) == wanted
+            assert mirrored._fits((-span[1], -span[0]), period / turn) == wanted
+    assert min(counts.values()) > 80
+
+
 def model_file(folder, period):
     theta = np.arange(0.0, 1.0, 1.0 / 36.0) * period
     error = 1e-3 * period * np.sin(theta * 2.0 * np.pi / period)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+import itertools
 import json
 from types import SimpleNamespace
 
@@ -9,11 +11,13 @@ import pytest
 
 import trueangle as ta
 from trueangle.planning.evidence import ReadingNoise
-from trueangle.planning.nextruns import RivalEvidence
+from trueangle.planning.nextruns import NextRuns, RivalEvidence
 from trueangle.rehearsal.after import _FurtherTrials
+from trueangle.rehearsal.rehearse import _notes, _still
 from trueangle.rehearsal.result import Rehearsal, RehearsedCause
+from trueangle.rehearsal.search import SizeSearch
 from trueangle.rehearsal.summary import _never, _size, rehearsal_summary
-from trueangle.rehearsal.trial import trial_outcome
+from trueangle.rehearsal.trial import FAILED, NAMED, TrialOutcome, trial_outcome
 
 
 def cause(**changes) -> RehearsedCause:
@@ -151,3 +155,51 @@ def test_a_verdict_is_of_what_is_confirmed_and_hidden(said, verdict, instead, be
     found = trial_outcome(told(**said), "backlash")
     assert (found.verdict, found.instead, found.beside) == (verdict, instead, beside)
     assert found.is_named == (verdict == "named")
+
+
+def test_further_runs_are_for_causes_of_which_one_was_not_named() -> None:
+    """Against sets written out: what is told by them has to be among what is left."""
+    names = ("backlash", "latency", "zero_slip", "thermal_drift")
+    pairs = [(names[:2], True), (names[1:3], False), (names[3:], True), (names[:3], True)]
+    entries = tuple(RivalEvidence(causes, True, told, 8.0, 0.9) for causes, told in pairs)
+    given = {"runs": (), "hypotheses": (), "simulation": None, "notes": (), "between": entries}
+    fields = {field.name for field in dataclasses.fields(NextRuns)}
+    plan = NextRuns(**{name: given.get(name) for name in fields})
+    for named in itertools.chain.from_iterable(
+        itertools.combinations(names, count) for count in range(5)
+    ):
+        found = [cause(cause=name, tried={1.0: (int(name in named), 2)}) for name in names]
+        left = [entry for entry in entries if set(entry.causes) - set(named)]
+        further = _still(plan, found)
+        if any(entry.told for entry in left):
+            assert further is not None
+            assert list(further.between) == left, named
+        else:
+            assert further is None, named
+    assert _still(None, found) is None
+
+
+@pytest.mark.parametrize("stopped", [False, True])
+def test_what_is_incomplete_is_what_has_trials_left(stopped) -> None:
+    """Of causes that are done, of some trials, of none, and of none to make; and of failures."""
+    at = SimpleNamespace(stopped=stopped, within=7.5)
+    kinds = {"done": (True, 3), "some": (False, 2), "none": (False, 0), "blind": (True, 0)}
+    for count in range(5):
+        for chosen in itertools.combinations(kinds, count):
+            searches = []
+            for name in chosen:
+                done, trials = kinds[name]
+                answers = [(0, TrialOutcome(NAMED))] * trials
+                searches.append(SizeSearch(name, None, None, 3, answers=answers, done=done))
+            notes = _notes(searches, at)
+            left = [name for name in chosen if name in ("some", "none")]
+            assert len(notes) == bool(left)
+            if left:
+                why = "it was interrupted" if stopped else "the 7.5 s given were up"
+                wanted = f"INCOMPLETE: {why} before all trials of {len(left)} causes were made"
+                more = "; not tried at all: none" if "none" in chosen else ""
+                assert notes == [wanted + more]
+    failed = [(0, TrialOutcome(FAILED, failure="KeyError: x")), (0, TrialOutcome(NAMED))]
+    searches = [SizeSearch("a", None, None, 2, answers=failed, done=True)] * 2
+    (note,) = _notes(searches, at)
+    assert note.startswith("2 diagnoses failed (KeyError: x) and count as not named")

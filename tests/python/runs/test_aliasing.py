@@ -289,16 +289,17 @@ def test_the_share_of_energy_near_the_end():
     assert energy_near_nyquist([1], [0.0], 3) == 0.0
 
 
-def test_a_turn_that_closes_from_both_sides_of_its_tolerance():
-    slip = np.array([0.0, 0.0, 0.0, 0.25])
+@pytest.mark.parametrize("turn", [360.0, 2.0 * np.pi, 1.0, 8192.0])
+def test_a_turn_that_closes_from_both_sides_of_its_tolerance(turn):
+    slip, unit = np.array([0.0, 0.0, 0.0, 0.25 * turn / 360.0]), turn / 360.0
     for off, closes in ((0.009, True), (0.011, False)):
-        reference = np.array([0.0, 120.0, 240.0, 360.0 + off])
-        run = ta.CalibrationRun(reference, reference + slip, 360.0)
-        assert closure_errors(run).tolist() == (pytest.approx([0.25]) if closes else [])
-        back = ta.CalibrationRun(-reference, -reference + slip, 360.0)
-        assert closure_errors(back).tolist() == (pytest.approx([0.25]) if closes else [])
-    wide = closure_errors(run, tolerance=0.02)
-    assert wide == pytest.approx([0.25])
-    assert closure_errors(ta.CalibrationRun([0.0, 360.0], [0.0, 360.0], 360.0)).size == 0
-    half = np.array([0.0, 90.0, 180.0])
-    assert closure_errors(ta.CalibrationRun(half, half, 360.0)).size == 0
+        reference = np.array([0.0, 120.0, 240.0, 360.0 + off]) * unit
+        run = ta.CalibrationRun(reference, reference + slip, turn)
+        assert closure_errors(run).tolist() == (pytest.approx([slip[-1]]) if closes else [])
+        back = ta.CalibrationRun(-reference, -reference + slip, turn)
+        assert closure_errors(back).tolist() == (pytest.approx([slip[-1]]) if closes else [])
+    wide = closure_errors(run, tolerance=0.02 * unit)
+    assert wide == pytest.approx([slip[-1]])
+    assert closure_errors(ta.CalibrationRun([0.0, turn], [0.0, turn], turn)).size == 0
+    half = np.array([0.0, 90.0, 180.0]) * unit
+    assert closure_errors(ta.CalibrationRun(half, half, turn)).size == 0

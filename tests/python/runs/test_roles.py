@@ -341,3 +341,30 @@ def test_a_check_tells_of_a_clock_that_nobody_asked_for(tmp_path, capsys):
 def test_readings_at_one_place_span_nothing(places, span):
     run = ta.CalibrationRun(np.array(places), np.array(places) + 0.1, period=360.0)
     assert ta.check(run).extent.span_deg == pytest.approx(span, abs=1e-9)
+
+
+@pytest.mark.parametrize("offset", ["deg", "rad", "turn", "count", "arcsec"])
+@pytest.mark.parametrize("indicated", ["deg", "rad", "turn", "count"])
+@pytest.mark.parametrize("reference", ["deg", "rad", "turn", "count"])
+def test_every_column_has_its_own_unit_and_counts(reference, indicated, offset):
+    """In counts the reference and what is added to it are of the reference's turn."""
+    turn = {"deg": 360.0, "rad": 2.0 * np.pi, "turn": 1.0, "arcsec": 1_296_000.0}
+    own = {"reference": 4096.0, "indicated": 8192.0, "reference_offset": 4096.0}
+    true = np.arange(0.0, 2.0, 0.05)
+    added = 0.002 * np.cos(5.0 * true)
+    said = true + 0.001 * np.sin(2.0 * np.pi * true)
+    table, signals = {}, {}
+    columns = (
+        ("reference", reference, true - added),
+        ("indicated", indicated, said),
+        ("reference_offset", offset, added),
+    )
+    for number, (role, unit, values) in enumerate(columns):
+        name = f"q{number}"
+        table[name] = values * (own[role] if unit == "count" else turn[unit])
+        signals[role] = [(name, unit)] if role == "reference_offset" else (name, unit)
+    (run,) = ta.read_runs(
+        table, signals=signals, counts_per_turn=8192, counts_per_turn_reference=4096
+    )
+    np.testing.assert_allclose(run.reference / run.period, true, atol=1e-12)
+    np.testing.assert_allclose(run.indicated / run.period, said, atol=1e-12)

@@ -225,3 +225,28 @@ def test_a_rate_is_taken_from_five_standard_errors_on(monkeypatch: pytest.Monkey
         monkeypatch.setattr("trueangle.runs.joining.clocks._solved", solved)
         found = estimated_clocks(sampled(), sampled(), 0.0, None)
         assert found.rate == (-2.0 * share if taken else 0.0)
+
+
+@pytest.mark.parametrize("apart", [0.0, 3001.3, -252.1])
+@pytest.mark.parametrize("behind", [0.0, 1.7])
+def test_offsets_that_fit_as_well_are_those_of_the_motions_period(apart, behind) -> None:
+    """A motion of 5 s, clocks that begin far apart: every one told is a whole period from it."""
+    period = 5.0
+    time = np.arange(0.0, 60.0, 0.02)
+
+    def motion(t: np.ndarray) -> np.ndarray:
+        turn = 2.0 * np.pi * t / period
+        return 30.0 * np.sin(turn) + 8.0 * np.cos(2.0 * turn)
+
+    said = Stream(time, motion(time))
+    true = Stream(time + apart, motion(time - behind))
+    found = estimated_clocks(said, true, None, 0.0)
+    (note,) = [text for text in found.notes if "repeats itself" in text]
+    told = [float(word) for word in note.split("offsets of ")[1].split(" s fit")[0].split(", ")]
+    assert len(told) == 4
+    for other in (*told, found.offset):
+        periods = (other - apart - behind) / period
+        assert abs(periods - round(periods)) < 0.01, other
+    assert len({round((other - found.offset) / period) for other in (*told, found.offset)}) == 5
+    # The one taken has most readings in common.
+    assert abs(found.offset - apart) <= min(abs(other - apart) for other in told) + 1e-6

@@ -1,0 +1,61 @@
+"""What a help tells of limits is what the command goes by; options of one use only are refused."""
+
+import argparse
+import re
+from types import SimpleNamespace
+
+import pytest
+
+import trueangle as ta
+from trueangle.cli import main, onepass
+from trueangle.cli.nextplan import add_after_arguments, refuse_without_after
+from trueangle.logs.keeping import KEPT, SAMPLE
+
+
+def after_options():
+    parser = argparse.ArgumentParser(add_help=False)
+    add_after_arguments(parser)
+    return [action for action in parser._actions if action.dest != "after"]
+
+
+@pytest.mark.parametrize("given", after_options(), ids=lambda action: action.dest)
+def test_an_option_of_a_plan_after_a_diagnosis_is_refused_without_one(given):
+    """Whichever it is, and by its long name, also where what is given counts as nothing."""
+    args = argparse.Namespace(**{action.dest: None for action in after_options()})
+    refuse_without_after(args)
+    for value in ("x", 0):
+        setattr(args, given.dest, value)
+        with pytest.raises(ta.errors.ArgumentError, match=rf"^{given.option_strings[-1]} is of "):
+            refuse_without_after(args)
+
+
+def test_a_command_refuses_it(capsys):
+    for words in (["--seeds", "0"], ["--counts-per-turn", "4096"], ["--topic", "/joints"]):
+        assert main(["plan", "--gear-ratio", "100", *words]) == 1
+        assert f"{words[0]} is of plans after a diagnosis" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("command", ["fit", "orders"])
+def test_readings_from_which_on_one_pass_is_made_are_those_that_the_help_tells(
+    command, monkeypatch, capsys
+):
+    with pytest.raises(SystemExit):
+        main([command, "--help"])
+    text = " ".join(capsys.readouterr().out.split())
+    asked, by_itself = (int(n) for n in re.findall(r"more than 2\^(\d+)", text))
+    kept = int(re.search(r"some (\d+) 000 of them", text)[1])
+    assert asked == KEPT.bit_length() - 1
+    assert kept * 1000 == pytest.approx(SAMPLE, rel=0.01)
+    limits = []
+
+    def hold_at_most(paths, most, topic):
+        limits.append(most)
+        return True
+
+    monkeypatch.setattr("trueangle.logs.sources.hold_at_most", hold_at_most)
+    args = SimpleNamespace(
+        one_pass=False, scheduler=None, runs=["."], topic=None, nuisance="none",
+        reference_orders=None, run=None,
+    )  # fmt: skip
+    assert not onepass.wants_one_pass(args)
+    assert limits == [1 << by_itself]
