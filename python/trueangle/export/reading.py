@@ -13,7 +13,9 @@ from numpy.typing import NDArray
 from ..errors import FileError, NotInvertibleError
 from ..joint.shafts import Shaft
 from ..model.model import HarmonicModel
-from ..model.records import FitRecord
+from ..model.records import FitRecord, Provenance, TableRecord
+from ..runs.run import Source
+from ..support.files import sha256_of
 from .chain import Chain
 from .inversion import inverse_rising
 from .proof import Correction
@@ -163,9 +165,6 @@ def _model(
         variances[0] += sigma**2 / table.entries
         residual = math.hypot(residual, sigma)
         samples += table.entries
-    from ..model.records import Provenance, TableRecord
-    from ..runs.run import Source
-    from ..support.files import sha256_of
 
     model = HarmonicModel(
         tuple(shafts),
