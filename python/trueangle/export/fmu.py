@@ -23,14 +23,15 @@ from ..model.model import HarmonicModel
 from ..model.term import Term
 from ..model.text import model_text
 from ..support.files import Kind
-from .fmudescription import (
+from .fmufiles import (
     IDENTIFIER,
     Variable,
     build_description,
+    fmi_functions,
+    fmu_source,
     model_description,
     variables_of,
 )
-from .fmusource import fmi_functions, fmu_source
 from .pattern import TurnPattern
 from .proof import Proof
 from .reading import failed

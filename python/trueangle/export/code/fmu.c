@@ -1,4 +1,4 @@
-// Parts of the source of a functional mock-up unit (fmusource.py), each behind the line with its name.
+// Parts of the source of a functional mock-up unit (fmufiles.py), each behind the line with its name.
 
 //@ includes
 #include <math.h>

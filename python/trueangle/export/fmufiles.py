@@ -1,21 +1,75 @@
-"""The C source of a functional mock-up unit: the model in doubles, and FMI around it."""
+"""Files of a functional mock-up unit: the model in C with FMI around it, and its descriptions."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import NamedTuple
+from xml.sax.saxutils import quoteattr
 
 from ..model.model import HarmonicModel
 from .carithmetic import DOUBLE
 from .codetext import code_file, code_parts, filled
 from .cstep import c_search, c_state, wave_tables
-from .fmudescription import Variable
 from .runtimeterms import RunTimeTerms
 
-__all__ = ["fmi_functions", "fmu_source"]
+__all__ = [
+    "IDENTIFIER",
+    "Variable",
+    "build_description",
+    "fmi_functions",
+    "fmu_source",
+    "model_description",
+    "variables_of",
+]
+
+#: Of the library and of its functions.
+IDENTIFIER = "trueangle_model"
 
 #: Turns that the last step of a search may leave.
 _LEFT = 1e-17
+
+
+class Variable(NamedTuple):
+    """One variable; its place in the list is its value reference."""
+
+    name: str
+    reference: int
+    causality: str
+    variability: str
+    unit: str
+    start: float
+    description: str
+
+
+def variables_of(model: HarmonicModel, sensor: bool, noise_std: float = 0.0) -> list[Variable]:
+    """The time, inputs, parameters and the output last."""
+    true = "true angle of the joint"
+    said = "angle that its encoder indicates"
+    first, last = (("true_angle", true), ("indicated", said))[:: 1 if sensor else -1]
+    rows = [
+        ("time", "independent", "continuous", "s", 0.0, "time"),
+        (first[0], "input", "continuous", "rad", 0.0, first[1]),
+        ("velocity", "input", "continuous", "rad/s", 0.0, "velocity of the joint"),
+        ("torque", "input", "continuous", "N.m", 0.0, "torque at the output"),
+        ("temperature", "input", "continuous", "K", 293.15, "temperature of the joint"),
+    ]
+    if "current" in model.signals:
+        rows.append(("current", "input", "continuous", "A", 0.0, "current of the motor"))
+    if sensor:
+        rows += [
+            (
+                "noise_std",
+                "parameter",
+                "tunable",
+                "rad",
+                noise_std,
+                "standard deviation of white noise",
+            ),
+            ("seed", "parameter", "fixed", "", 1.0, "of the noise"),
+        ]
+    rows.append((last[0], "output", "continuous", "rad", 0.0, last[1]))
+    return [Variable(name, i, *rest) for i, (name, *rest) in enumerate(rows)]  # type: ignore[arg-type]
 
 
 def fmu_source(model: HarmonicModel, variables: Sequence[Variable], sensor: bool, head: str) -> str:
@@ -97,3 +151,39 @@ def _sense(terms: RunTimeTerms, zero: str, at_indicated: bool) -> str:
     if at_indicated:
         reading = f"m_solved(y, -1.0, y + {zero})"
     return _part("sense", early=early, travel=travel, direction=direction, reading=reading)
+
+
+def model_description(
+    variables: Sequence[Variable], fmi: str, sensor: bool, token: str, about: str, tool: str
+) -> str:
+    """modelDescription.xml of FMI 3.0 or 2.0."""
+    # Of version 2 the time is no variable, and unknowns are counted from 1.
+    listed = variables if fmi == "3" else variables[1:]
+    return filled(
+        code_file(f"fmi{fmi}.xml"),
+        identifier=IDENTIFIER,
+        name=quoteattr(f"trueangle {'sensor' if sensor else 'correction'}"),
+        token=token,
+        variables="\n".join(_element(v, fmi) for v in listed),
+        output=variables[-1].reference,
+        tool=quoteattr(tool),
+        about=quoteattr(about),
+    )
+
+
+def build_description() -> str:
+    """sources/buildDescription.xml of FMI 3.0."""
+    return filled(code_file("fmibuild.xml"), identifier=IDENTIFIER)
+
+
+def _element(v: Variable, fmi: str) -> str:
+    """One variable of modelDescription.xml."""
+    start = "" if v.causality in ("independent", "output") else f' start="{v.start!r}"'
+    unit = f' unit="{v.unit}"' if v.unit else ""
+    told = (
+        f'name="{v.name}" valueReference="{v.reference}" causality="{v.causality}" '
+        f'variability="{v.variability}" description="{v.description}"'
+    )
+    if fmi == "3":
+        return f"<Float64 {told}{unit}{start}/>"
+    return f"<ScalarVariable {told}><Real{unit}{start}/></ScalarVariable>"
